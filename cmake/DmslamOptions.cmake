@@ -1,0 +1,32 @@
+# Language level, warnings and numerics shared by every target of ours.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+set(DMSLAM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
+
+# The promise of identical bytes needs products and sums to be rounded one by one.
+add_library(dmslam_options INTERFACE)
+target_compile_options(dmslam_options INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -Werror -ffp-contract=off)
+if(DMSLAM_SANITIZE)
+  target_compile_options(dmslam_options INTERFACE
+    -fsanitize=${DMSLAM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(dmslam_options INTERFACE -fsanitize=${DMSLAM_SANITIZE})
+endif()
+target_include_directories(dmslam_options INTERFACE ${PROJECT_SOURCE_DIR}/src)
+# Third-party headers are not held to our warnings.
+find_package(Eigen3 REQUIRED NO_MODULE)
+get_target_property(_eigen_include Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+target_include_directories(dmslam_options SYSTEM INTERFACE ${_eigen_include})

@@ -1,0 +1,38 @@
+# dmslam_room(NAME <room> [SRCS ...] [DEPS ...] [TESTS ...] [TEST_DEPS ...] [BENCHES ...])
+#
+# One library per room: target dmslam_<room>, alias dmslam::<room>. Every file in TESTS becomes its own test
+# program, every file in BENCHES its own benchmark program.
+function(dmslam_room)
+  cmake_parse_arguments(ROOM "" "NAME" "SRCS;DEPS;TESTS;TEST_DEPS;BENCHES" ${ARGN})
+  set(target dmslam_${ROOM_NAME})
+  if(ROOM_SRCS)
+    add_library(${target} STATIC ${ROOM_SRCS})
+    target_link_libraries(${target} PUBLIC dmslam_options ${ROOM_DEPS})
+  else()
+    add_library(${target} INTERFACE)
+    target_link_libraries(${target} INTERFACE dmslam_options ${ROOM_DEPS})
+  endif()
+  add_library(dmslam::${ROOM_NAME} ALIAS ${target})
+  if(DMSLAM_BUILD_TESTS)
+    foreach(test_source ${ROOM_TESTS})
+      dmslam_test(${test_source} ${target} ${ROOM_TEST_DEPS})
+    endforeach()
+  endif()
+  if(DMSLAM_BUILD_BENCH)
+    foreach(bench_source ${ROOM_BENCHES})
+      get_filename_component(bench_name ${bench_source} NAME_WE)
+      add_executable(${bench_name} ${bench_source})
+      target_link_libraries(${bench_name} PRIVATE ${target} ${ROOM_TEST_DEPS} benchmark::benchmark)
+    endforeach()
+  endif()
+endfunction()
+
+# dmslam_test(<source> <libraries...>): one GoogleTest program, registered with ctest under its file name.
+function(dmslam_test test_source)
+  get_filename_component(test_name ${test_source} NAME_WE)
+  add_executable(${test_name} ${test_source})
+  target_link_libraries(${test_name} PRIVATE ${ARGN} GTest::gtest_main)
+  add_test(NAME ${test_name} COMMAND ${test_name})
+  set_tests_properties(${test_name} PROPERTIES TIMEOUT 600 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [1-9]"
+    ENVIRONMENT "DMSLAM_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
+endfunction()

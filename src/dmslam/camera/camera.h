@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+namespace dmslam {
+
+/// Pinhole camera with Brown distortion (k1, k2, k3 radial; p1, p2 tangential; OpenCV's order and meaning). Pixels are
+/// in the coordinate frame whose origin is the centre of the top left pixel, x right, y down; the camera frame has x
+/// right, y down, z forward.
+struct Camera {
+  int width_px = 0;
+  int height_px = 0;
+  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  double fps = 30.0;  ///< Nominal rate; only for rules that speak of frames per second.
+
+  bool HasDistortion() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+  Eigen::Matrix3d K() const;
+
+  /// The ideal (undistorted) pixel of a point in the camera frame; none for points at or behind the camera.
+  std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_cam) const {
+    if (!(p_cam.z() > 1e-9)) return std::nullopt;
+    return Eigen::Vector2d(fx_px * p_cam.x() / p_cam.z() + cx_px, fy_px * p_cam.y() / p_cam.z() + cy_px);
+  }
+  /// Undistorted pixel to the ray through it, with z = 1.
+  Eigen::Vector3d Ray(const Eigen::Vector2d& uv_px) const {
+    return {(uv_px.x() - cx_px) / fx_px, (uv_px.y() - cy_px) / fy_px, 1.0};
+  }
+  /// Ideal pixel to the pixel that the lens makes of it, and back (fixed point, to 1e-9 in normalised coordinates; none
+  /// where the distortion cannot be inverted).
+  Eigen::Vector2d Distort(const Eigen::Vector2d& ideal_px) const;
+  std::optional<Eigen::Vector2d> Undistort(const Eigen::Vector2d& raw_px) const;
+
+  /// What is wrong with the values, or nothing.
+  std::optional<std::string> Problem() const;
+};
+
+/// Reads a camera file (YAML: width, height, fx, fy, cx, cy, optional distortion [k1, k2, p1, p2, k3], fps and model).
+/// Throws InputError that names file, field and cure; a model other than "pinhole" is refused by name.
+Camera LoadCamera(const std::string& path);
+
+}  // namespace dmslam

@@ -1,0 +1,71 @@
+#include "dmslam/camera/camera.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+
+#include "dmslam/util/check.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+Camera Freiburg1() {
+  return Camera{640,      480,       517.306408, 516.469215, 318.643040, 255.313989,
+                0.262383, -0.953104, -0.005358,  0.002628,   1.163314,   30.0};
+}
+
+TEST(Camera, UndistortIsInverseOfDistort) {
+  const Camera camera = Freiburg1();
+  Random random(1);
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector2d raw(random.Uniform(0, 639), random.Uniform(0, 479));
+    const auto ideal = camera.Undistort(raw);
+    ASSERT_TRUE(ideal.has_value()) << raw.transpose();
+    EXPECT_NEAR((camera.Distort(*ideal) - raw).norm(), 0.0, 1e-5);
+  }
+}
+
+TEST(Camera, DistortionMovesCornersByPixels) {
+  const auto ideal = Freiburg1().Undistort({10, 10});
+  ASSERT_TRUE(ideal.has_value());
+  EXPECT_GT((*ideal - Eigen::Vector2d(10, 10)).norm(), 2.0);
+}
+
+TEST(Camera, ProjectRefusesPointsBehind) {
+  EXPECT_FALSE(Freiburg1().Project({0, 0, -1}).has_value());
+  EXPECT_FALSE(Freiburg1().Project({0, 0, 0}).has_value());
+}
+
+std::string WriteTemporary(const std::string& text) {
+  const std::string path = testing::TempDir() + "/camera_test_" +
+                           testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml";
+  std::ofstream(path) << text;
+  return path;
+}
+
+std::string ErrorOf(const std::string& text) {
+  try {
+    LoadCamera(WriteTemporary(text));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CameraFile, NamesTheFieldThatIsWrong) {
+  const std::string good = "width: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n";
+  EXPECT_EQ(ErrorOf(good), "");
+  EXPECT_NE(ErrorOf("width: 640\n").find("'height'"), std::string::npos);
+  EXPECT_NE(ErrorOf(good + "model: fisheye\n").find("fisheye"), std::string::npos);
+  EXPECT_NE(ErrorOf(good + "distortion: [1, 2]\n").find("'distortion'"), std::string::npos);
+  EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: abc\nfy: 500\ncx: 320\ncy: 240\n").find("'fx'"), std::string::npos);
+  EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 3200\ncy: 240\n").find("'cx'"), std::string::npos);
+  EXPECT_NE(ErrorOf("][").find("YAML"), std::string::npos);
+  EXPECT_THROW(LoadCamera("/nonexistent.yaml"), InputError);
+}
+
+}  // namespace
+}  // namespace dmslam

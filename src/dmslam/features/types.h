@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace dmslam {
+
+/// An 8-bit grey image that somebody else owns. Row-major, `stride` bytes from row to row.
+struct GrayView {
+  const uint8_t* data = nullptr;
+  int width = 0;
+  int height = 0;
+  ptrdiff_t stride = 0;
+
+  const uint8_t* row(int y) const { return data + y * stride; }
+};
+
+/// A keypoint as it travels: position in the raw (distorted) image at full resolution, in sixteenths of a pixel, so that
+/// every process computes with the same numbers.
+struct Keypoint {
+  uint16_t x_q4 = 0;  ///< x [px] * 16
+  uint16_t y_q4 = 0;  ///< y [px] * 16
+  uint8_t octave = 0; ///< pyramid level, 0 = full resolution
+  uint8_t angle = 0;  ///< orientation, 256 steps per turn
+
+  double x_px() const { return x_q4 / 16.0; }
+  double y_px() const { return y_q4 / 16.0; }
+  auto operator<=>(const Keypoint&) const = default;
+};
+
+/// 256-bit ORB descriptor (Rublee et al., ORB, ICCV 2011).
+struct alignas(32) Descriptor {
+  std::array<uint64_t, 4> words{};
+  auto operator<=>(const Descriptor&) const = default;
+};
+
+/// Number of bits in which two descriptors differ, 0..256.
+inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
+  return std::popcount(a.words[0] ^ b.words[0]) + std::popcount(a.words[1] ^ b.words[1]) +
+         std::popcount(a.words[2] ^ b.words[2]) + std::popcount(a.words[3] ^ b.words[3]);
+}
+
+/// Keypoints of one image and their descriptors, same order and length.
+struct FeatureSet {
+  std::vector<Keypoint> keypoints;
+  std::vector<Descriptor> descriptors;
+
+  size_t size() const { return keypoints.size(); }
+};
+
+/// The image pyramid that keypoints' octaves refer to.
+struct Pyramid {
+  int levels = 8;
+  double scale_factor = 1.2;
+
+  /// Size of one pixel of a level in pixels of level 0; also the standard deviation of a keypoint's position [px].
+  double Scale(int octave) const { return std::pow(scale_factor, octave); }
+  double SigmaSquared(int octave) const { return std::pow(scale_factor, 2 * octave); }
+};
+
+}  // namespace dmslam

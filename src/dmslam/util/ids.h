@@ -1,0 +1,49 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <functional>
+
+namespace dmslam {
+
+/// Which keyframe, for ever: the session in the high 32 bits, the index of its frame in the low ones. A keyframe that
+/// is proposed twice therefore carries the same id twice. Zero is no keyframe (sessions start at 1).
+struct KeyframeId {
+  uint64_t value = 0;
+
+  static constexpr KeyframeId Make(uint32_t session, uint32_t frame_index) {
+    return KeyframeId{(static_cast<uint64_t>(session) << 32) | frame_index};
+  }
+  constexpr uint32_t session() const { return static_cast<uint32_t>(value >> 32); }
+  constexpr uint32_t frame_index() const { return static_cast<uint32_t>(value); }
+  constexpr bool valid() const { return value != 0; }
+  auto operator<=>(const KeyframeId&) const = default;
+};
+
+/// Which landmark, for ever: the ordinal of the mapper's epoch in the high 16 bits (1 for a first mapper, 2 for the one
+/// that took over from it), a running number in the low 48. Zero is no landmark.
+struct LandmarkId {
+  uint64_t value = 0;
+
+  static constexpr LandmarkId Make(uint16_t epoch_ordinal, uint64_t number) {
+    return LandmarkId{(static_cast<uint64_t>(epoch_ordinal) << 48) | number};
+  }
+  constexpr uint16_t epoch_ordinal() const { return static_cast<uint16_t>(value >> 48); }
+  constexpr uint64_t number() const { return value & 0xffffffffffffULL; }
+  constexpr bool valid() const { return value != 0; }
+  auto operator<=>(const LandmarkId&) const = default;
+};
+
+/// Which map: after a reset there may be several. Zero is no map.
+using MapId = uint32_t;
+
+}  // namespace dmslam
+
+template <>
+struct std::hash<dmslam::KeyframeId> {
+  size_t operator()(dmslam::KeyframeId id) const noexcept { return id.value * 0x9e3779b97f4a7c15ULL >> 7; }
+};
+template <>
+struct std::hash<dmslam::LandmarkId> {
+  size_t operator()(dmslam::LandmarkId id) const noexcept { return id.value * 0x9e3779b97f4a7c15ULL >> 7; }
+};
