@@ -1,0 +1,28 @@
+#include "dmslam/map/keyframe.h"
+
+#include <optional>
+#include <utility>
+
+namespace dmslam {
+
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera, const Pyramid& pyramid) {
+  auto features = std::make_shared<FrameFeatures>();
+  FeatureSet kept;
+  kept.keypoints.reserve(set.size());
+  kept.descriptors.reserve(set.size());
+  features->uv_px.reserve(set.size());
+  for (size_t i = 0; i < set.size(); ++i) {
+    const Keypoint& keypoint = set.keypoints[i];
+    if (keypoint.octave >= pyramid.levels) continue;
+    const std::optional<Eigen::Vector2d> uv = camera.Undistort({keypoint.x_px(), keypoint.y_px()});
+    if (!uv) continue;
+    kept.keypoints.push_back(keypoint);
+    kept.descriptors.push_back(set.descriptors[i]);
+    features->uv_px.push_back(*uv);
+  }
+  features->set = std::move(kept);
+  features->grid.Build(features->uv_px, features->set.keypoints, camera.width_px, camera.height_px);
+  return features;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "dmslam/camera/camera.h"
+#include "dmslam/features/feature_grid.h"
+#include "dmslam/features/types.h"
+#include "dmslam/geometry/rigid3.h"
+#include "dmslam/util/ids.h"
+
+namespace dmslam {
+
+/// What a camera saw in one frame, and where on the ideal image plane. Made once, never changed, shared by all who hold
+/// the frame or the keyframe made of it.
+struct FrameFeatures {
+  FeatureSet set;
+  std::vector<Eigen::Vector2d> uv_px;  ///< undistorted pixel of each keypoint
+  FeatureGrid grid;                    ///< finds features near an undistorted pixel
+
+  size_t size() const { return set.size(); }
+};
+
+/// Undistorts the keypoints of `set` and indexes them. Keypoints whose distortion cannot be inverted are dropped.
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera, const Pyramid& pyramid);
+
+/// A keyframe of the map. `landmarks[i]` is the landmark that feature i observes (invalid: none).
+struct Keyframe {
+  KeyframeId id;
+  MapId map_id = 0;
+  int64_t stamp_ns = 0;
+  Rigid3d T_cam_world;
+  double scale = 1.0;                  ///< product of the scales of all corrections since it was made
+  KeyframeId parent;                   ///< spanning tree; invalid for a map's first keyframe
+  std::vector<KeyframeId> loop_edges;  ///< sorted
+  std::shared_ptr<const FrameFeatures> features;
+  std::vector<LandmarkId> landmarks;
+
+  // Derived from the above, the same in every replica.
+  std::map<KeyframeId, int> covisible;  ///< landmarks seen in common (at least one)
+};
+
+}  // namespace dmslam

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "dmslam/features/types.h"
+#include "dmslam/util/ids.h"
+
+namespace dmslam {
+
+/// Who sees a landmark, and with which of its features.
+struct Observation {
+  KeyframeId keyframe;
+  uint16_t feature = 0;
+  auto operator<=>(const Observation&) const = default;
+};
+
+/// What frames said of a landmark since it was made. All of it is the mapper's state and travels with the map.
+struct LandmarkEvidence {
+  uint32_t visible = 0;  ///< frames in which it should have been seen
+  uint32_t found = 0;    ///< frames in which it was seen where the map says
+  uint32_t moved = 0;    ///< frames in which something like it was seen elsewhere
+  float motion_belief = 0.0F;  ///< log odds that it moves; above zero it has no vote (see docs/motion_belief.md)
+  int64_t last_moved_ns = 0;   ///< stamp of the newest frame that saw it elsewhere; 0 = never
+  auto operator<=>(const LandmarkEvidence&) const = default;
+};
+
+/// A point of the map.
+struct Landmark {
+  LandmarkId id;
+  MapId map_id = 0;
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+  Descriptor descriptor;          ///< the observation nearest to all others
+  KeyframeId reference;           ///< the keyframe whose corrections it follows
+  KeyframeId first_keyframe;      ///< the newest keyframe when it was made: its age is counted from here
+  int64_t first_ns = 0;           ///< stamp of the oldest frame that sees it
+  int64_t last_ns = 0;            ///< stamp of the newest keyframe that sees it
+  LandmarkEvidence evidence;
+  std::vector<Observation> observations;  ///< sorted by keyframe
+
+  /// Seen from where, and from how far; derived from position and observations.
+  struct ViewingRange {
+    Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();  ///< unit, from the cameras to the point
+    double min_distance = 0;  ///< nearer, it would be coarser than the pyramid's coarsest level
+    double max_distance = 0;  ///< at this distance it is seen at octave 0
+  };
+  ViewingRange viewing;
+  bool viewing_stale = true;
+};
+
+}  // namespace dmslam

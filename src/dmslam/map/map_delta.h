@@ -1,0 +1,121 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dmslam/features/types.h"
+#include "dmslam/geometry/rigid3.h"
+#include "dmslam/map/landmark.h"
+#include "dmslam/util/ids.h"
+
+namespace dmslam {
+
+/// Why a map record was written.
+enum class MapEvent : uint8_t {
+  kKeyframeInserted = 1,
+  kLandmarksCreated = 2,
+  kFused = 3,
+  kAdjusted = 4,       ///< local bundle adjustment
+  kCulled = 5,
+  kEvidence = 6,
+  kCorrected = 7,      ///< a loop correction was applied
+  kGloballyAdjusted = 8,
+  kMapStarted = 9,
+  kMapDropped = 10,
+  kSettled = 11,       ///< all work that keyframe `about` caused is done
+  kSnapshot = 12,      ///< part of a snapshot
+  kRefused = 13,       ///< a correction that was not applied; `note` says why
+};
+
+/// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.
+struct KeyframeState {
+  KeyframeId id;
+  MapId map_id = 0;
+  int64_t stamp_ns = 0;
+  Rigid3d T_cam_world;
+  double scale = 1.0;
+  KeyframeId parent;
+  std::vector<KeyframeId> loop_edges;
+  bool has_features = false;
+  FeatureSet features;
+};
+
+/// A keyframe's pose alone.
+struct KeyframePose {
+  KeyframeId id;
+  Rigid3d T_cam_world;
+  double scale = 1.0;
+};
+
+/// A landmark's own state, without its observations.
+struct LandmarkState {
+  LandmarkId id;
+  MapId map_id = 0;
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+  Descriptor descriptor;
+  KeyframeId reference;
+  KeyframeId first_keyframe;
+  int64_t first_ns = 0;
+  LandmarkEvidence evidence;
+};
+
+struct LandmarkPosition {
+  LandmarkId id;
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+};
+
+struct LandmarkEvidenceState {
+  LandmarkId id;
+  LandmarkEvidence evidence;
+};
+
+/// What feature `feature` of `keyframe` observes now (invalid: nothing).
+struct ObservationState {
+  KeyframeId keyframe;
+  uint16_t feature = 0;
+  LandmarkId landmark;
+  auto operator<=>(const ObservationState&) const = default;
+};
+
+/// A keyframe that is no more: where it stood, relative to the parent that takes its place.
+struct KeyframeTombstone {
+  KeyframeId id;
+  KeyframeId parent;
+  int64_t stamp_ns = 0;
+  Rigid3d T_kf_parent;
+  double parent_scale = 1.0;  ///< the parent's scale when T_kf_parent was taken
+};
+
+struct LandmarkTombstone {
+  LandmarkId id;
+  LandmarkId replaced_by;  ///< invalid: culled
+};
+
+/// A change of the map as absolute values: applying it twice is applying it once. One delta becomes one map record.
+struct MapDelta {
+  MapEvent event = MapEvent::kSettled;
+  KeyframeId about;        ///< the keyframe whose arrival caused it
+  MapId map_id = 0;
+  uint64_t version = 0;    ///< the map's version after it; counts deltas
+  uint64_t correction_id = 0;
+  std::string note;
+  std::vector<KeyframeState> keyframes;
+  std::vector<KeyframePose> keyframe_poses;
+  std::vector<LandmarkState> landmarks;
+  std::vector<LandmarkPosition> landmark_positions;
+  std::vector<LandmarkEvidenceState> landmark_evidence;
+  std::vector<ObservationState> observations;
+  std::vector<KeyframeTombstone> keyframe_tombstones;
+  std::vector<LandmarkTombstone> landmark_tombstones;
+  std::vector<MapId> dropped_maps;
+
+  bool Empty() const {
+    return keyframes.empty() && keyframe_poses.empty() && landmarks.empty() && landmark_positions.empty() &&
+           landmark_evidence.empty() && observations.empty() && keyframe_tombstones.empty() &&
+           landmark_tombstones.empty() && dropped_maps.empty();
+  }
+};
+
+}  // namespace dmslam
