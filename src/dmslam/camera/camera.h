@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "dmslam/geometry/pinhole.h"
+
 namespace dmslam {
 
 /// Pinhole camera with Brown distortion (k1, k2, k3 radial; p1, p2 tangential; OpenCV's order and meaning). Pixels are
@@ -18,6 +20,8 @@ struct Camera {
 
   bool HasDistortion() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
   Eigen::Matrix3d K() const;
+  /// The camera without its lens, for undistorted pixels.
+  Pinhole Ideal() const { return {fx_px, fy_px, cx_px, cy_px}; }
 
   /// The ideal (undistorted) pixel of a point in the camera frame; none for points at or behind the camera.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_cam) const {
