@@ -1,0 +1,13 @@
+# Imported targets opencv_<module> (core, imgproc, imgcodecs, ...) for the modules whose development packages are there.
+# Debian ships OpenCV's CMake configuration with the metapackage libopencv-dev only, which brings every module; the
+# single packages (libopencv-core-dev, ...) are all that is needed here.
+find_path(DMSLAM_OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
+foreach(module core imgproc imgcodecs features2d calib3d flann videoio highgui)
+  find_library(DMSLAM_OPENCV_${module}_LIBRARY opencv_${module})
+  mark_as_advanced(DMSLAM_OPENCV_${module}_LIBRARY)
+  if(DMSLAM_OPENCV_${module}_LIBRARY AND NOT TARGET opencv_${module})
+    add_library(opencv_${module} INTERFACE IMPORTED GLOBAL)
+    target_include_directories(opencv_${module} SYSTEM INTERFACE ${DMSLAM_OPENCV_INCLUDE_DIR})
+    target_link_libraries(opencv_${module} INTERFACE ${DMSLAM_OPENCV_${module}_LIBRARY})
+  endif()
+endforeach()
