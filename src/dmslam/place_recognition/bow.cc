@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <tuple>
 
 #include "dmslam/util/check.h"
 
@@ -37,7 +38,8 @@ struct Nearest {
   int second = 257;
 };
 
-Nearest FindNearest(const Descriptor& wanted, const BowMatchSide& side, std::span<const NodeFeature> candidates) {
+Nearest FindNearest(const Descriptor& wanted, const BowMatchSide& side,
+                    std::span<const NodeFeature> candidates) {
   Nearest nearest;
   for (const NodeFeature& candidate : candidates) {
     if (!Usable(side, candidate.feature)) continue;
@@ -71,7 +73,8 @@ void MatchUnderNode(const BowMatchSide& a, std::span<const NodeFeature> run_a, c
   }
 }
 
-/// Of several matches to the same feature of the second image, the nearest stays (ties: the lower first feature).
+/// Of several matches to the same feature of the second image, the nearest stays (ties: the lower first
+/// feature).
 void KeepOnePerFeature(std::vector<BowMatch>& matches) {
   std::sort(matches.begin(), matches.end(), [](const BowMatch& x, const BowMatch& y) {
     return std::tie(x.b, x.distance, x.a) < std::tie(y.b, y.distance, y.a);
@@ -95,7 +98,9 @@ void KeepCommonTurn(const BowMatchSide& a, const BowMatchSide& b, std::vector<Bo
   int best_bin = 0;
   int best_count = -1;
   for (int bin = 0; bin < kTurnBins; ++bin) {
-    const auto at = [&](int offset) { return counts[static_cast<size_t>((bin + offset + kTurnBins) % kTurnBins)]; };
+    const auto at = [&](int offset) {
+      return counts[static_cast<size_t>((bin + offset + kTurnBins) % kTurnBins)];
+    };
     const int count = at(-1) + at(0) + at(1);
     if (count > best_count) {
       best_count = count;
@@ -109,7 +114,8 @@ void KeepCommonTurn(const BowMatchSide& a, const BowMatchSide& b, std::vector<Bo
 }
 
 void CheckSide(const BowMatchSide& side) {
-  DMSLAM_CHECK(side.features != nullptr && side.nodes != nullptr, "both features and direct index are needed");
+  DMSLAM_CHECK(side.features != nullptr && side.nodes != nullptr,
+               "both features and direct index are needed");
   DMSLAM_CHECK(side.usable.empty() || side.usable.size() == side.features->size(), "one flag per feature");
   for (const NodeFeature& item : *side.nodes) {
     DMSLAM_CHECK(item.feature < side.features->size(), "direct index of another image");
@@ -130,8 +136,9 @@ size_t CountCommonWords(const BowVector& a, const BowVector& b) {
   return count;
 }
 
-void ForEachCommonNode(const FeatureVector& a, const FeatureVector& b,
-                       const std::function<void(std::span<const NodeFeature>, std::span<const NodeFeature>)>& visit) {
+void ForEachCommonNode(
+    const FeatureVector& a, const FeatureVector& b,
+    const std::function<void(std::span<const NodeFeature>, std::span<const NodeFeature>)>& visit) {
   size_t i = 0;
   size_t j = 0;
   while (i < a.size() && j < b.size()) {
@@ -154,14 +161,14 @@ void BowMatchOptions::Check() const {
   if (!(max_ratio > 0.0 && max_ratio <= 1.0)) throw InputError("match: max_ratio must lie in (0, 1]");
 }
 
-std::vector<BowMatch> MatchByNodes(const BowMatchSide& a, const BowMatchSide& b, const BowMatchOptions& options) {
+std::vector<BowMatch> MatchByNodes(const BowMatchSide& a, const BowMatchSide& b,
+                                   const BowMatchOptions& options) {
   options.Check();
   CheckSide(a);
   CheckSide(b);
   std::vector<BowMatch> matches;
-  ForEachCommonNode(*a.nodes, *b.nodes, [&](auto run_a, auto run_b) {
-    MatchUnderNode(a, run_a, b, run_b, options, matches);
-  });
+  ForEachCommonNode(*a.nodes, *b.nodes,
+                    [&](auto run_a, auto run_b) { MatchUnderNode(a, run_a, b, run_b, options, matches); });
   KeepOnePerFeature(matches);
   if (options.check_orientation) KeepCommonTurn(a, b, matches);
   std::sort(matches.begin(), matches.end());

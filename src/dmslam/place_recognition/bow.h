@@ -22,7 +22,8 @@ struct WordWeight {
   auto operator<=>(const WordWeight&) const = default;
 };
 
-/// The words of an image: sorted by word, each once, weights positive with sum one. Empty for an image without features.
+/// The words of an image: sorted by word, each once, weights positive with sum one. Empty for an image
+/// without features.
 using BowVector = std::vector<WordWeight>;
 
 /// A feature and the inner node of the vocabulary that it falls under.
@@ -32,8 +33,9 @@ struct NodeFeature {
   auto operator<=>(const NodeFeature&) const = default;
 };
 
-/// The direct index of an image: every feature once, sorted by node, then by feature. Features under the same node are
-/// alike, so that only these need be compared when two images are matched (Galvez-Lopez, Tardos, section IV-D).
+/// The direct index of an image: every feature once, sorted by node, then by feature. Features under the same
+/// node are alike, so that only these need be compared when two images are matched (Galvez-Lopez, Tardos,
+/// section IV-D).
 using FeatureVector = std::vector<NodeFeature>;
 
 /// Both sides of an image in terms of a vocabulary.
@@ -42,24 +44,27 @@ struct BowImage {
   FeatureVector nodes;
 };
 
-/// Likeness of two images, 0 (no word in common) to 1 (equal vectors): 1 - |a - b|_1 / 2, which for vectors of sum one is
-/// the sum of min(a_i, b_i) over common words (Galvez-Lopez, Tardos, "Bags of binary words for fast place recognition in
-/// image sequences", T-RO 2012, eq. 2). Symmetric to the bit.
+/// Likeness of two images, 0 (no word in common) to 1 (equal vectors): 1 - |a - b|_1 / 2, which for vectors
+/// of sum one is the sum of min(a_i, b_i) over common words (Galvez-Lopez, Tardos, "Bags of binary words for
+/// fast place recognition in image sequences", T-RO 2012, eq. 2). Symmetric to the bit.
 double L1Score(const BowVector& a, const BowVector& b);
 
 /// Number of words in common.
 size_t CountCommonWords(const BowVector& a, const BowVector& b);
 
-/// Calls `visit` for every node that both images have, in order of nodes, with each image's features under it.
-void ForEachCommonNode(const FeatureVector& a, const FeatureVector& b,
-                       const std::function<void(std::span<const NodeFeature>, std::span<const NodeFeature>)>& visit);
+/// Calls `visit` for every node that both images have, in order of nodes, with each image's features under
+/// it.
+void ForEachCommonNode(
+    const FeatureVector& a, const FeatureVector& b,
+    const std::function<void(std::span<const NodeFeature>, std::span<const NodeFeature>)>& visit);
 
 /// How two images are matched through a vocabulary.
 struct BowMatchOptions {
-  int max_distance = 50;          ///< largest Hamming distance of a match [bits]
-  double max_ratio = 0.75;        ///< best distance must be below this share of the second best; 1 turns it off
-  bool check_orientation = true;  ///< keep only matches whose turn of the keypoint's angle agrees with most others
-  bool mutual = true;             ///< each feature must be the best of its match
+  int max_distance = 50;    ///< largest Hamming distance of a match [bits]
+  double max_ratio = 0.75;  ///< best distance must be below this share of the second best; 1 turns it off
+  bool check_orientation =
+      true;            ///< keep only matches whose turn of the keypoint's angle agrees with most others
+  bool mutual = true;  ///< each feature must be the best of its match
 
   /// Throws InputError naming the field.
   void Check() const;
@@ -73,14 +78,17 @@ struct BowMatch {
   auto operator<=>(const BowMatch&) const = default;
 };
 
-/// One image of a pair to match. `usable`, when not empty, has one entry per feature; features with 0 are left out.
+/// One image of a pair to match. `usable`, when not empty, has one entry per feature; features with 0 are
+/// left out.
 struct BowMatchSide {
   const FeatureSet* features = nullptr;
   const FeatureVector* nodes = nullptr;
   std::span<const uint8_t> usable{};
 };
 
-/// Matches features that fall under the same node. Every feature takes part in at most one match. Sorted by `a`.
-std::vector<BowMatch> MatchByNodes(const BowMatchSide& a, const BowMatchSide& b, const BowMatchOptions& options = {});
+/// Matches features that fall under the same node. Every feature takes part in at most one match. Sorted by
+/// `a`.
+std::vector<BowMatch> MatchByNodes(const BowMatchSide& a, const BowMatchSide& b,
+                                   const BowMatchOptions& options = {});
 
 }  // namespace dmslam

@@ -94,8 +94,8 @@ std::vector<uint16_t> KeyframeDatabase::CountCommon(const BowVector& words) cons
 
 std::vector<PlaceCandidate> KeyframeDatabase::Score(const BowVector& words, const PlaceQuery& query) const {
   const std::vector<uint16_t> common = CountCommon(words);
-  // Keyframes with most words in common first (ties: the newer one, whatever its slot). Exclusion is asked only of those
-  // that could matter.
+  // Keyframes with most words in common first (ties: the newer one, whatever its slot). Exclusion is asked
+  // only of those that could matter.
   std::vector<std::tuple<int, KeyframeId, Slot>> sharing;
   for (Slot slot = 0; slot < common.size(); ++slot) {
     if (common[slot] > 0) sharing.emplace_back(common[slot], entries_[slot].id, slot);

@@ -16,10 +16,11 @@ struct KeyframeDatabaseOptions {
   double min_common_share = 0.8;  ///< a candidate shares at least this part of the most words that any shares
   double min_group_share = 0.75;  ///< and its group scores at least this part of the best group
   size_t group_size = 10;         ///< most neighbours whose scores join a candidate's
-  size_t max_scored = 100;        ///< most keyframes that are scored exactly per query (those with most common words)
-  /// Most entries of the inverted index that a query reads. It reads the words that fewest keyframes have first, and
-  /// stops before the word that would exceed it: the common words, which say little, are what a large database leaves
-  /// out, and a query stays bounded. 0: no bound.
+  size_t max_scored =
+      100;  ///< most keyframes that are scored exactly per query (those with most common words)
+  /// Most entries of the inverted index that a query reads. It reads the words that fewest keyframes have
+  /// first, and stops before the word that would exceed it: the common words, which say little, are what a
+  /// large database leaves out, and a query stays bounded. 0: no bound.
   size_t max_postings = 150000;
 
   /// Throws InputError naming the field.
@@ -39,14 +40,15 @@ struct PlaceCandidate {
 struct PlaceQuery {
   /// Keyframes that may not be found (neighbours of the query, other maps); empty: all may.
   std::function<bool(KeyframeId)> excluded;
-  /// The neighbours of a keyframe in the covisibility graph, best first; empty: every keyframe is its own group.
+  /// The neighbours of a keyframe in the covisibility graph, best first; empty: every keyframe is its own
+  /// group.
   std::function<std::vector<KeyframeId>(KeyframeId)> neighbours;
   double min_score = 0;  ///< keyframes that score less are not candidates
 };
 
-/// Which keyframes have which words: finds those that look like an image. The candidates of Mur-Artal, Tardos, "Fast
-/// relocalisation and loop closing in keyframe-based SLAM", ICRA 2014, section III. Results depend on the contents alone,
-/// not on the order in which keyframes came.
+/// Which keyframes have which words: finds those that look like an image. The candidates of Mur-Artal,
+/// Tardos, "Fast relocalisation and loop closing in keyframe-based SLAM", ICRA 2014, section III. Results
+/// depend on the contents alone, not on the order in which keyframes came.
 class KeyframeDatabase {
  public:
   explicit KeyframeDatabase(KeyframeDatabaseOptions options = {});
@@ -62,8 +64,8 @@ class KeyframeDatabase {
   /// Words of a keyframe, or null when it is not there.
   const BowVector* Find(KeyframeId id) const;
 
-  /// Candidates, best group first (ties: older keyframe first): of each group the keyframe that scores best, once. Safe to
-  /// call from several threads while nobody edits.
+  /// Candidates, best group first (ties: older keyframe first): of each group the keyframe that scores best,
+  /// once. Safe to call from several threads while nobody edits.
   std::vector<PlaceCandidate> Query(const BowVector& words, const PlaceQuery& query = {}) const;
 
  private:
@@ -78,7 +80,7 @@ class KeyframeDatabase {
   std::vector<PlaceCandidate> Group(const std::vector<PlaceCandidate>& scored, const PlaceQuery& query) const;
 
   KeyframeDatabaseOptions options_;
-  std::vector<Entry> entries_;               ///< by slot; free ones have an invalid id
+  std::vector<Entry> entries_;  ///< by slot; free ones have an invalid id
   std::vector<Slot> free_slots_;
   std::map<KeyframeId, Slot> slot_of_;
   std::vector<std::vector<Slot>> postings_;  ///< by word: slots of the keyframes that have it, any order

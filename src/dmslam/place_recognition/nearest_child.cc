@@ -37,9 +37,10 @@ __attribute__((target("popcnt"))) int NearestPopcnt(const Descriptor& query, con
   return static_cast<int>(best_key & 0xffffffff);
 }
 
-/// Bits are counted by nibble through a table in a register (Mula, Kurz, Lemire, "Faster population counts using AVX2
-/// instructions", 2018).
-__attribute__((target("avx2"))) int NearestAvx2(const Descriptor& query, const Descriptor* candidates, int count) {
+/// Bits are counted by nibble through a table in a register (Mula, Kurz, Lemire, "Faster population counts
+/// using AVX2 instructions", 2018).
+__attribute__((target("avx2"))) int NearestAvx2(const Descriptor& query, const Descriptor* candidates,
+                                                int count) {
   const __m256i table = _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4,  //
                                          0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
   const __m256i low_nibble = _mm256_set1_epi8(15);

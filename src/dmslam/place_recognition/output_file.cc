@@ -34,7 +34,8 @@ void OutputFile::Commit() {
 }
 
 void OutputFile::Fail() const {
-  throw InputError(path_.string() + ": cannot be written; check that the folder exists, may be written and has room");
+  throw InputError(path_.string() +
+                   ": cannot be written; check that the folder exists, may be written and has room");
 }
 
 }  // namespace dmslam

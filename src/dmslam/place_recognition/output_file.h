@@ -7,8 +7,8 @@
 
 namespace dmslam {
 
-/// A file that appears under its name only when it is complete: written beside it and renamed by Commit. Dropped without
-/// Commit it leaves nothing. Throws InputError naming the file when it cannot be written.
+/// A file that appears under its name only when it is complete: written beside it and renamed by Commit.
+/// Dropped without Commit it leaves nothing. Throws InputError naming the file when it cannot be written.
 class OutputFile {
  public:
   explicit OutputFile(std::filesystem::path path);

@@ -148,7 +148,8 @@ Vocabulary Vocabulary::Load(const std::filesystem::path& path) {
   return Vocabulary(format::ParseText(text, path.string()), path.string());
 }
 
-Vocabulary Vocabulary::FromMapping(const std::filesystem::path& path, std::shared_ptr<const Mapping> mapping) {
+Vocabulary Vocabulary::FromMapping(const std::filesystem::path& path,
+                                   std::shared_ptr<const Mapping> mapping) {
   const std::string name = path.string();
   const auto bytes = mapping->bytes();
   format::Header header;
@@ -162,12 +163,13 @@ Vocabulary Vocabulary::FromMapping(const std::filesystem::path& path, std::share
   shared->child_counts = mapping->Array<uint8_t>(layout.child_counts, header.num_nodes);
   shared->descriptors = mapping->Array<Descriptor>(layout.descriptors, header.num_nodes);
   shared->weights = mapping->Array<float>(layout.weights, header.num_words);
-  shared->checksum = ChecksumOf(header.branching, header.levels, shared->child_counts, shared->descriptors,
-                                shared->weights);
+  shared->checksum =
+      ChecksumOf(header.branching, header.levels, shared->child_counts, shared->descriptors, shared->weights);
   const size_t counts_end = layout.child_counts + header.num_nodes;
   const bool padding_zero =
       AllZero(bytes.subspan(counts_end, layout.descriptors - counts_end)) && AllZero(header.reserved);
-  if (shared->checksum != header.checksum || !padding_zero) Fail(name, "checksum does not match, file is damaged");
+  if (shared->checksum != header.checksum || !padding_zero)
+    Fail(name, "checksum does not match, file is damaged");
   CheckValues(*shared, name);
   Link(*shared, name);
   shared->mapping = std::move(mapping);
@@ -229,9 +231,18 @@ void Vocabulary::SaveBinary(const std::filesystem::path& path) const {
 
 void Vocabulary::SaveText(const std::filesystem::path& path) const { format::WriteText(*this, path); }
 
+void Vocabulary::Save(const std::filesystem::path& path) const {
+  if (path.extension() == ".txt") {
+    SaveText(path);
+  } else {
+    SaveBinary(path);
+  }
+}
+
 void Vocabulary::Descend(std::span<const Descriptor> features, std::vector<NodeIndex>& leaves, int level,
                          std::vector<NodeIndex>* at_level) const {
-  // Level by level over all features, so that the children of the next ones are on their way while one is compared.
+  // Level by level over all features, so that the children of the next ones are on their way while one is
+  // compared.
   constexpr size_t kAhead = 6;
   const Shared& tree = *shared_;
   leaves.assign(features.size(), 0);
@@ -250,7 +261,8 @@ void Vocabulary::Descend(std::span<const Descriptor> features, std::vector<NodeI
       const int count = tree.child_counts[node];
       if (count == 0) continue;
       const NodeIndex child = tree.links[node];
-      leaves[i] = child + static_cast<NodeIndex>(nearest_child_(features[i], &tree.descriptors[child], count));
+      leaves[i] =
+          child + static_cast<NodeIndex>(nearest_child_(features[i], &tree.descriptors[child], count));
       moved = true;
     }
     if (!moved) break;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "dmslam/features/types.h"
@@ -13,37 +14,43 @@
 
 namespace dmslam {
 
-/// What a vocabulary is made of, breadth first: root, its children, their children. The children of a node are
-/// consecutive, and nodes of one level stand in the order of their parents, so `child_counts` alone gives the tree.
+/// What a vocabulary is made of, breadth first: root, its children, their children. The children of a node
+/// are consecutive, and nodes of one level stand in the order of their parents, so `child_counts` alone gives
+/// the tree.
 struct VocabularyTree {
-  uint32_t branching = 0;             ///< most children of a node, 2..64
-  uint32_t levels = 0;                ///< most steps from the root to a leaf, 1..10
-  std::vector<uint8_t> child_counts;  ///< per node; 0 = leaf, which is a word
+  uint32_t branching = 0;               ///< most children of a node, 2..64
+  uint32_t levels = 0;                  ///< most steps from the root to a leaf, 1..10
+  std::vector<uint8_t> child_counts;    ///< per node; 0 = leaf, which is a word
   std::vector<Descriptor> descriptors;  ///< per node; the root's is unused (zero)
-  std::vector<float> weights;           ///< per word, breadth first: inverse document frequency, >= 0; 0 = ignored
+  std::vector<float> weights;  ///< per word, breadth first: inverse document frequency, >= 0; 0 = ignored
 };
 
-/// A tree of visual words over 256-bit descriptors (Nister, Stewenius, "Scalable recognition with a vocabulary tree",
-/// CVPR 2006; for binary descriptors: Galvez-Lopez, Tardos, T-RO 2012). Immutable and cheap to copy (copies share it).
+/// A tree of visual words over 256-bit descriptors (Nister, Stewenius, "Scalable recognition with a
+/// vocabulary tree", CVPR 2006; for binary descriptors: Galvez-Lopez, Tardos, T-RO 2012). Immutable and cheap
+/// to copy (copies share it).
 class Vocabulary {
  public:
   /// From a tree in memory. Throws InputError, beginning with `name`, when it is not a tree.
   explicit Vocabulary(VocabularyTree tree, const std::string& name = "vocabulary");
 
-  /// Reads a vocabulary in either format, told by its first bytes. The binary one is mapped, not copied. Throws InputError
-  /// (file, field, cure) when the file is absent, truncated, damaged or of another kind; nothing is ever half-loaded.
+  /// Reads a vocabulary in either format, told by its first bytes. The binary one is mapped, not copied.
+  /// Throws InputError (file, field, cure) when the file is absent, truncated, damaged or of another kind;
+  /// nothing is ever half-loaded.
   static Vocabulary Load(const std::filesystem::path& path);
 
   /// Writes our binary format: see vocabulary_format.h. Throws InputError when the file cannot be written.
   void SaveBinary(const std::filesystem::path& path) const;
 
-  /// Writes DBoW2's text format: "k L scoring weighting", then per node but the root "parent is_leaf 32-bytes weight".
-  /// The format has no checksum and no count.
+  /// Writes DBoW2's text format: "k L scoring weighting", then per node but the root "parent is_leaf 32-bytes
+  /// weight". The format has no checksum and no count.
   void SaveText(const std::filesystem::path& path) const;
 
-  /// Words (tf-idf, L1-normalised) and direct index of an image. `node_level`: the level, counted from the root, whose
-  /// nodes the direct index names; leaves above that level stand for themselves. Words of weight zero are left out of the
-  /// words, never of the direct index.
+  /// Text for a path that ends in ".txt", binary for any other.
+  void Save(const std::filesystem::path& path) const;
+
+  /// Words (tf-idf, L1-normalised) and direct index of an image. `node_level`: the level, counted from the
+  /// root, whose nodes the direct index names; leaves above that level stand for themselves. Words of weight
+  /// zero are left out of the words, never of the direct index.
   BowImage Transform(std::span<const Descriptor> descriptors, int node_level = kDirectIndexLevel) const;
 
   /// The word of each descriptor.
@@ -66,7 +73,8 @@ class Vocabulary {
   /// Word of a leaf.
   WordIndex word_of_leaf(NodeIndex node) const { return shared_->links[node]; }
 
-  /// CRC-32C over shape, descriptors and weights: the same for the same vocabulary, whichever format it came from.
+  /// CRC-32C over shape, descriptors and weights: the same for the same vocabulary, whichever format it came
+  /// from.
   uint32_t checksum() const { return shared_->checksum; }
 
   /// The same vocabulary, descending with other instructions (for tests and measurements).
@@ -81,7 +89,7 @@ class Vocabulary {
     std::span<const uint8_t> child_counts;
     std::span<const Descriptor> descriptors;
     std::span<const float> weights;
-    std::vector<uint32_t> links;  ///< inner node: its first child; leaf: its word
+    std::vector<uint32_t> links;             ///< inner node: its first child; leaf: its word
     VocabularyTree owned;                    ///< backs the spans, or
     std::shared_ptr<const Mapping> mapping;  ///< this does
   };

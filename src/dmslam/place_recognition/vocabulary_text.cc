@@ -45,8 +45,9 @@ class LineReader {
   }
 
   [[noreturn]] void Fail(const std::string& problem) const {
-    throw InputError(name_ + ": line " + std::to_string(number_) + " " + problem +
-                     "; give a vocabulary made by dmslam-vocab or in DBoW2's text format (scoring 0, weighting 0)");
+    throw InputError(
+        name_ + ": line " + std::to_string(number_) + " " + problem +
+        "; give a vocabulary made by dmslam-vocab or in DBoW2's text format (scoring 0, weighting 0)");
   }
 
  private:
@@ -141,7 +142,8 @@ VocabularyTree ParseText(std::string_view text, const std::string& name) {
       continue;
     }
     const TextNode& node = source.nodes[number - 1];
-    if (!node.leaf && count == 0) reader.Fail("ends a file in which an inner node has no children: it is truncated");
+    if (!node.leaf && count == 0)
+      reader.Fail("ends a file in which an inner node has no children: it is truncated");
     tree.descriptors.push_back(node.descriptor);
     if (node.leaf) tree.weights.push_back(node.weight);
   }

@@ -68,8 +68,8 @@ class BitCounter {
   int unflushed_ = 0;
 };
 
-/// Seeds of k-medians: the first at random, each further one with probability by the squared distance to the nearest of
-/// those before. Fewer than `most` when there are not that many different descriptors.
+/// Seeds of k-medians: the first at random, each further one with probability by the squared distance to the
+/// nearest of those before. Fewer than `most` when there are not that many different descriptors.
 std::vector<Descriptor> ChooseSeeds(std::span<const Descriptor> points, size_t most, Random& random) {
   std::vector<Descriptor> seeds = {points[random.Below(static_cast<uint32_t>(points.size()))]};
   std::vector<uint32_t> squared(points.size(), UINT32_MAX);
@@ -130,7 +130,8 @@ void DropEmpty(Clusters& clusters) {
   clusters.medians = std::move(kept);
 }
 
-Clusters KMedians(std::span<const Descriptor> points, const VocabularyTrainingOptions& options, Random random) {
+Clusters KMedians(std::span<const Descriptor> points, const VocabularyTrainingOptions& options,
+                  Random random) {
   const NearestChildFunction nearest = NearestChildOn(HammingPath::kBest);
   Clusters clusters;
   clusters.of_point.assign(points.size(), 0xff);
@@ -249,7 +250,8 @@ void TrainingSet::AddImage(std::span<const Descriptor> image) {
 
 Vocabulary TrainVocabulary(const TrainingSet& training, const VocabularyTrainingOptions& options) {
   options.Check();
-  if (training.descriptors.empty()) throw InputError("vocabulary training: no descriptors; give images with texture");
+  if (training.descriptors.empty())
+    throw InputError("vocabulary training: no descriptors; give images with texture");
   VocabularyTree tree = TreeBuilder(training, options).Build();
   if (tree.descriptors.size() < 3) {
     throw InputError("vocabulary training: fewer than two different descriptors; give more images");

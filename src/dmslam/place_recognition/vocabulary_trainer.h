@@ -33,9 +33,9 @@ struct TrainingSet {
   size_t num_images() const { return image_ends.size(); }
 };
 
-/// Clusters the descriptors hierarchically by k-medians: seeds as in k-means++ (Arthur, Vassilvitskii, SODA 2007) on
-/// Hamming distances, the median of a cluster by majority of each bit. Words are weighed by log(images / images with the
-/// word). Throws InputError when there are fewer than two different descriptors.
+/// Clusters the descriptors hierarchically by k-medians: seeds as in k-means++ (Arthur, Vassilvitskii, SODA
+/// 2007) on Hamming distances, the median of a cluster by majority of each bit. Words are weighed by
+/// log(images / images with the word). Throws InputError when there are fewer than two different descriptors.
 Vocabulary TrainVocabulary(const TrainingSet& training, const VocabularyTrainingOptions& options);
 
 }  // namespace dmslam
