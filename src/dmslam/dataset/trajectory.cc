@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
@@ -43,22 +44,39 @@ StampedPose ParsePose(std::span<const std::string_view> fields, const std::strin
   return {*stamp_ns, Rigid3d(rotation.normalized(), Eigen::Vector3d(v[0], v[1], v[2]))};
 }
 
-}  // namespace
-
-std::vector<StampedPose> ReadTrajectory(const std::string& path) {
+// Poses with strictly rising stamps; one whose stamp repeats the one before goes to `repeated` as an error
+// and is left out where that returns.
+std::vector<StampedPose> ReadPoses(const std::string& path,
+                                   const std::function<void(const std::string& error)>& repeated) {
   std::vector<StampedPose> poses;
   ForEachRow(ReadTextFile(path), " \t,", [&](size_t line, std::span<const std::string_view> fields) {
     const StampedPose pose = ParsePose(fields, FileLine(path, line));
     if (!poses.empty() && pose.stamp_ns <= poses.back().stamp_ns) {
-      const bool same = pose.stamp_ns == poses.back().stamp_ns;
-      throw InputError(FileLine(path, line) + ": stamp " + FormatStampNs(pose.stamp_ns) +
-                       (same ? " repeats the one before; remove one of them"
-                             : " is earlier than the one before; sort the file by stamp"));
+      const std::string error = FileLine(path, line) + ": stamp " + FormatStampNs(pose.stamp_ns);
+      if (pose.stamp_ns < poses.back().stamp_ns) {
+        throw InputError(error + " is earlier than the one before; sort the file by stamp");
+      }
+      return repeated(error + " repeats the one before; remove one of them");
     }
     poses.push_back(pose);
   });
   if (poses.empty()) throw InputError(path + ": holds no pose; is it a trajectory in TUM format?");
   return poses;
+}
+
+}  // namespace
+
+std::vector<StampedPose> ReadTrajectory(const std::string& path) {
+  return ReadPoses(path, [](const std::string& error) { throw InputError(error); });
+}
+
+GroundTruth ReadGroundTruth(const std::string& path) {
+  std::vector<std::string> errors;
+  GroundTruth truth;
+  truth.poses = ReadPoses(path, [&](const std::string& error) { errors.push_back(error); });
+  if (errors.size() * 1000 > truth.poses.size()) throw InputError(errors.front());
+  for (const std::string& error : errors) truth.repeated.push_back(error.substr(0, error.find(": stamp ")));
+  return truth;
 }
 
 std::string FormatPose(const StampedPose& pose) {

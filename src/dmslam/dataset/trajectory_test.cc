@@ -32,7 +32,8 @@ class TrajectoryTest : public testing::Test {
 };
 
 TEST_F(TrajectoryTest, ReadsStampsExactlyAndNormalisesQuaternions) {
-  const auto poses = ReadTrajectory(Write("# c\n\n1305031102.175304 1 2 3 0 0 0 2\r\n1305031102.2,4,5,6,0,0,1,0\n"));
+  const auto poses =
+      ReadTrajectory(Write("# c\n\n1305031102.175304 1 2 3 0 0 0 2\r\n1305031102.2,4,5,6,0,0,1,0\n"));
   ASSERT_EQ(poses.size(), 2u);
   EXPECT_EQ(poses[0].stamp_ns, 1305031102175304000);
   EXPECT_EQ(poses[1].stamp_ns, 1305031102200000000);
@@ -77,6 +78,21 @@ TEST_F(TrajectoryTest, BadInputNamesFileLineAndReason) {
   EXPECT_THROW(ReadTrajectory("/nonexistent/trajectory.txt"), InputError);
   EXPECT_THROW(ReadTrajectory(testing::TempDir()), InputError);
   EXPECT_THROW(WriteTrajectory("/nonexistent/trajectory.txt", {}), InputError);
+}
+
+TEST_F(TrajectoryTest, AGroundTruthMayRepeatOneStampInAThousand) {
+  const auto text = [](int poses) {
+    std::string lines = "1.0 1 0 0 0 0 0 1\n1.0 9 9 9 0 0 0 1\n";
+    for (int i = 1; i < poses; ++i) lines += std::to_string(1 + i) + ".0 1 0 0 0 0 0 1\n";
+    return lines;
+  };
+  const GroundTruth truth = ReadGroundTruth(Write(text(1000)));
+  ASSERT_EQ(truth.poses.size(), 1000u);
+  EXPECT_EQ(truth.poses[0].T_world_cam.translation.x(), 1);
+  ASSERT_EQ(truth.repeated.size(), 1u);
+  EXPECT_TRUE(truth.repeated[0].ends_with(":2"));
+  EXPECT_THROW(ReadGroundTruth(Write(text(999))), InputError);
+  EXPECT_THROW(ReadTrajectory(Write(text(1000))), InputError);
 }
 
 }  // namespace
