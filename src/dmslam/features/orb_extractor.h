@@ -1,0 +1,70 @@
+#pragma once
+
+#include <vector>
+
+#include "dmslam/features/brief_pattern.h"
+#include "dmslam/features/corner_detector.h"
+#include "dmslam/features/image_kernels.h"
+#include "dmslam/features/image_pyramid.h"
+#include "dmslam/features/types.h"
+
+namespace dmslam {
+
+struct OrbExtractorOptions {
+  int num_features = 1000;     ///< most keypoints of an image; fewer where there are too few corners
+  Pyramid pyramid;             ///< levels 1..16, scale factor in [1.05, 2]
+  int fast_threshold = 20;     ///< a corner's least difference to its circle [grey values], 1..254
+  int min_fast_threshold = 7;  ///< the same for cells without any corner above `fast_threshold`, 1..fast_threshold
+  int cell_size_px = 32;       ///< side of the cells over which keypoints are spread [px of the level], >= 8
+  double rank_decay = 0.8;     ///< worth of a cell's next corner relative to the one before, 0..1; see CornerSelector
+  int border_px = 16;          ///< keypoints keep this far from the edges of their level [px of the level], >= 16
+  SimdPath simd_path = SimdPath::kBest;
+
+  /// Throws InputError that names the field and its range.
+  void Check() const;
+};
+
+/// Extracts ORB features: FAST corners of an image pyramid, spread over the image, oriented by the intensity centroid and
+/// described by 256 comparisons turned along (Rublee, Rabaud, Konolige, Bradski: ORB: an efficient alternative to SIFT or
+/// SURF, ICCV 2011).
+///
+/// The same image and options give the same features on every machine and SIMD path. Keeps its buffers: once it has seen
+/// an image of a size, further ones of this size allocate nothing (given that `features` keeps its memory too). One
+/// extractor serves one thread.
+class OrbExtractor {
+ public:
+  explicit OrbExtractor(const OrbExtractorOptions& options = {});
+
+  /// Features of `image`, by level from the finest, within a level in reading order. Empty for images too small to have
+  /// any. Throws InvariantError for images wider or higher than 4095 px, which keypoints cannot name.
+  void Extract(const GrayView& image, FeatureSet* features);
+
+  const OrbExtractorOptions& options() const { return options_; }
+
+ private:
+  struct Level {
+    PaddedImage image;
+    std::vector<ImageShrinker> shrinker;  ///< from the level before; empty for the first
+    double scale_x = 1.0, scale_y = 1.0;  ///< size of a pixel in pixels of level 0
+    int quota = 0;                        ///< keypoints asked of this level
+  };
+
+  void SetUpLevels(int width, int height);
+  void ReserveFor(int width, int height);
+  void FillLevel(size_t index, const GrayView& image);
+  void Blur(const PaddedImage& image);
+  void Describe(int octave, const Level& level, FeatureSet* features);
+
+  OrbExtractorOptions options_;
+  const ImageKernels& kernels_;
+  SteeredPattern pattern_;
+  std::vector<Level> levels_;
+  CornerDetector detector_;
+  CornerSelector selector_;
+  std::vector<Corner> corners_;
+  std::vector<Corner> chosen_;
+  PaddedImage blurred_;
+  std::vector<uint8_t> blur_row_;
+};
+
+}  // namespace dmslam
