@@ -76,8 +76,9 @@ struct PlaneMotion {
   Rigid3d T_cam2_cam1;
   Eigen::Vector3d normal_cam1 = Eigen::Vector3d::UnitZ();
 };
-/// The interpretations of H (pixels): up to four, and each with the normal and the translation reversed, at most eight
-/// (Faugeras and Lustman 1988; closed form over the SVD). A pure rotation gives one, with zero translation.
+/// The interpretations of H (pixels) with both cameras on the same side of the plane: at most four, two and each with
+/// normal and translation reversed (Ma, Soatto, Kosecka, Sastry, "An Invitation to 3-D Vision", Theorem 5.19; the other
+/// four of Faugeras and Lustman have the plane between the cameras). A pure rotation gives one, with zero translation.
 std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& H, const Pinhole& camera1, const Pinhole& camera2);
 
 // ---- Which pose ---------------------------------------------------------------------------------------------------
