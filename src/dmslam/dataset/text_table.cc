@@ -36,8 +36,9 @@ std::string ReadTextFile(const std::string& path) {
   return std::move(text).str();
 }
 
-void ForEachRow(std::string_view text, std::string_view separators,
-                const std::function<void(size_t line_number, std::span<const std::string_view> fields)>& row) {
+void ForEachRow(
+    std::string_view text, std::string_view separators,
+    const std::function<void(size_t line_number, std::span<const std::string_view> fields)>& row) {
   std::vector<std::string_view> fields;
   size_t line_number = 0;
   while (!text.empty()) {
