@@ -100,6 +100,7 @@ struct MapDelta {
   MapId map_id = 0;
   uint64_t version = 0;    ///< the map's version after it; counts deltas
   uint64_t correction_id = 0;
+  int64_t stamp_ns = 0;    ///< capture time of `about`; 0: not known
   std::string note;
   std::vector<KeyframeState> keyframes;
   std::vector<KeyframePose> keyframe_poses;

@@ -91,6 +91,7 @@ struct MapReset {
   MapId map_id = 0;
   bool drop = false;  ///< true: it was wrong from the beginning; false: keep it, a new one follows
   std::string reason;
+  int64_t stamp_ns = 0;  ///< capture time of the frame at which it did so; 0: not known
 };
 
 /// The loop closer's answer to keyframe `keyframe`.
@@ -116,6 +117,7 @@ struct LoopAnswer {
   };
   std::vector<LandmarkCorrection> landmark_positions;  ///< of a global adjustment
   std::string note;
+  int64_t stamp_ns = 0;  ///< capture time of `keyframe`; 0: not known
 };
 
 }  // namespace dmslam

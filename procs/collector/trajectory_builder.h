@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "dmslam/dataset/trajectory.h"
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+
+namespace dmslam {
+
+/// Collects a run's trajectory from the frontend's and the mapper's streams: a reader like any other.
+class TrajectoryBuilder {
+ public:
+  TrajectoryBuilder(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
+
+  void OnFramePose(const FramePose& pose);
+  void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
+
+  struct Trajectories {
+    MapId map_id = 0;                     ///< the map that holds most frames
+    std::vector<StampedPose> final;       ///< every placed frame, by its reference keyframe's final pose
+    std::vector<StampedPose> online;      ///< as tracked, frames of a map that survived
+    std::vector<StampedPose> keyframes;
+    std::vector<std::pair<MapId, size_t>> other_maps;  ///< and how many frames they hold
+  };
+  /// World-from-camera, in map units, of the map that holds most frames.
+  Trajectories Build() const;
+
+  const Map& map() const { return map_; }
+  const std::map<uint32_t, FramePose>& frame_poses() const { return poses_; }
+
+ private:
+  MapId MapOfFrame(const FramePose& pose) const;
+
+  Map map_;
+  std::map<uint32_t, FramePose> poses_;  ///< by frame index; a later placement does not replace an online one
+};
+
+}  // namespace dmslam

@@ -1,0 +1,340 @@
+#include "frontend/frontend_core.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kNsPerSecond = 1'000'000'000;
+constexpr double kPredictionValid_s = 0.5;  // how long after the last pose the motion model is still tried
+constexpr int kLostAfterFrames = 10;
+
+int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * static_cast<double>(kNsPerSecond)); }
+
+double MillisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+FrontendCore::FrontendCore(Setup setup)
+    : options_(setup.options),
+      camera_(setup.camera),
+      pyramid_(setup.pyramid),
+      session_(setup.session),
+      seed_(setup.seed),
+      map_(setup.camera, setup.pyramid),
+      extractor_(setup.extractor),
+      initializer_options_(setup.initializer),
+      initializer_(std::make_unique<Initializer>(setup.initializer, setup.camera, setup.seed)),
+      tracker_(setup.options.tracking, setup.camera, setup.pyramid),
+      relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {}
+
+void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
+  map_.Apply(delta);
+  relocalizer_.Update(map_);
+  if (delta.event == MapEvent::kSettled && delta.about == awaited_) awaited_ = {};
+}
+
+void FrontendCore::ProcessImage(uint32_t frame_index, int64_t stamp_ns, const GrayView& image,
+                                std::vector<FrontendEvent>* events) {
+  const auto start = std::chrono::steady_clock::now();
+  FeatureSet features;
+  extractor_.Extract(image, &features);
+  extract_ms_ = MillisecondsSince(start);
+  ProcessFeatures(frame_index, stamp_ns, std::move(features), events);
+}
+
+void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features,
+                                   std::vector<FrontendEvent>* events) {
+  ++counters_.frames;
+  frame_ = Frame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
+  switch (state_) {
+    case TrackingState::kNotInitialized:
+      Initialize(events);
+      break;
+    case TrackingState::kWaitingForMap:
+      AwaitMap(events);
+      break;
+    default:
+      Track(events);
+  }
+}
+
+// ---- Initialisation ------------------------------------------------------------------------------------------------
+
+void FrontendCore::KeepUnplaced() {
+  unplaced_.push_back(frame_);
+  if (static_cast<int>(unplaced_.size()) > options_.max_kept_frames) unplaced_.pop_front();
+}
+
+void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
+  KeepUnplaced();
+  const InitializerReport report = initializer_->AddFrame({frame_.index, frame_.stamp_ns, frame_.features});
+  TrackingReport status;
+  status.reason = report.reason.c_str();
+  if (report.result) {
+    InitialMap proposal = MakeInitialMap(*report.result, session_, map_id_);
+    initial_first_ = proposal.first.id;
+    initial_second_ = proposal.second.id;
+    last_keyframe_ = awaited_ = initial_second_;
+    last_keyframe_ns_ = proposal.second.stamp_ns;
+    events->push_back(std::move(proposal));
+    ++counters_.keyframes_proposed;
+    state_ = TrackingState::kWaitingForMap;
+    status.reason = "a first map was proposed";
+  }
+  events->push_back(MakePose(state_, status));
+}
+
+void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
+  const Keyframe* second = map_.FindKeyframe(initial_second_);
+  if (second == nullptr) {
+    KeepUnplaced();
+    if (!awaited_.valid()) {  // settled without it: the mapper refused the proposal
+      GiveUpMap(true, "the mapper refused the first map", events);
+    }
+    TrackingReport status;
+    status.reason = "waiting for the mapper to answer the first map";
+    events->push_back(MakePose(state_, status));
+    return;
+  }
+  last_ = FrameOfKeyframe(*second);
+  last_placed_ = {second->id, Rigid3d(), second->scale};
+  velocity_.reset();
+  last_tracked_ns_ = second->stamp_ns;
+  trial_until_ns_ = second->stamp_ns + ToNs(options_.trial_s);
+  state_ = TrackingState::kTrial;
+  Track(events);
+}
+
+Frame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {
+  Frame frame(keyframe.id.frame_index(), keyframe.stamp_ns, keyframe.features);
+  frame.landmarks = keyframe.landmarks;
+  frame.T_cam_world = keyframe.T_cam_world;
+  return frame;
+}
+
+// ---- Tracking ------------------------------------------------------------------------------------------------------
+
+std::optional<Rigid3d> FrontendCore::PredictPose() const {
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(last_placed_.reference);
+  if (!reference) return std::nullopt;
+  const Rigid3d T_last_world = reference->Compose(last_placed_.T_cam_reference, last_placed_.scale);
+  return velocity_ ? *velocity_ * T_last_world : T_last_world;
+}
+
+bool FrontendCore::FindPose() {
+  const std::optional<Rigid3d> predicted = PredictPose();
+  const bool recent = frame_.stamp_ns - last_tracked_ns_ < ToNs(kPredictionValid_s);
+  relocalized_ = false;
+  if (predicted && recent) {
+    if (tracker_.TrackFromFrame(map_, last_, *predicted, &frame_)) return true;
+    const uint64_t seed = DeriveSeed(seed_, frame_.index, "track_keyframe");
+    if (tracker_.TrackFromKeyframe(map_, last_placed_.reference, seed, &frame_)) return true;
+  }
+  return false;
+}
+
+void FrontendCore::Track(std::vector<FrontendEvent>* events) {
+  TrackingReport report;
+  report.reason = "too few features match the last frame";
+  if (FindPose()) {
+    const bool careful = frame_.stamp_ns - relocalized_ns_ < kNsPerSecond && relocalized_ns_ != 0;
+    report = tracker_.TrackLocalMap(map_, careful, &frame_);
+  }
+  if (!report.ok && state_ != TrackingState::kTrial) {
+    Frame attempt(frame_.index, frame_.stamp_ns, frame_.features);
+    if (relocalizer_.Relocalize(map_, map_id_, DeriveSeed(seed_, frame_.index, "relocalize"), &tracker_, &attempt)) {
+      frame_ = std::move(attempt);
+      report = tracker_.TrackLocalMap(map_, true, &frame_);
+      if (report.ok) {
+        ++counters_.relocalizations;
+        relocalized_ = true;
+        relocalized_ns_ = frame_.stamp_ns;
+      }
+    }
+  }
+  if (report.ok) {
+    OnTracked(report, events);
+  } else {
+    OnNotTracked(report, events);
+  }
+}
+
+std::optional<FrontendCore::Placed> FrontendCore::Place(const Rigid3d& T_cam_world, KeyframeId reference) const {
+  const Keyframe* keyframe = map_.FindKeyframe(reference);
+  if (keyframe == nullptr) return std::nullopt;
+  return Placed{reference, T_cam_world * keyframe->T_cam_world.Inverse(), keyframe->scale};
+}
+
+void FrontendCore::OnTracked(const TrackingReport& report, std::vector<FrontendEvent>* events) {
+  const std::optional<Rigid3d> last_pose = [&]() -> std::optional<Rigid3d> {
+    const auto reference = map_.ResolvePose(last_placed_.reference);
+    if (!reference) return std::nullopt;
+    return reference->Compose(last_placed_.T_cam_reference, last_placed_.scale);
+  }();
+  const std::optional<Placed> placed = Place(frame_.T_cam_world, tracker_.reference());
+  if (!placed) {
+    OnNotTracked(report, events);
+    return;
+  }
+  ++counters_.tracked;
+  const bool successive = frame_.index - last_.index <= 2 && !relocalized_;
+  velocity_.reset();
+  if (successive && last_pose) velocity_ = frame_.T_cam_world * last_pose->Inverse();
+  last_placed_ = *placed;
+  last_tracked_ns_ = frame_.stamp_ns;
+  if (state_ != TrackingState::kTrial || frame_.stamp_ns >= trial_until_ns_) state_ = TrackingState::kTracking;
+  const bool keyframe = WantsKeyframe(report);
+  if (++frames_since_evidence_ >= options_.evidence_every_frames || keyframe) FlushEvidence(events);
+  if (keyframe) ProposeKeyframe(events);
+  events->push_back(MakePose(state_, report));
+  last_ = frame_;
+}
+
+void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<FrontendEvent>* events) {
+  KeepUnplaced();
+  if (state_ == TrackingState::kTrial) {
+    GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason, events);
+    events->push_back(MakePose(state_, report));
+    return;
+  }
+  const int64_t missing_ns = frame_.stamp_ns - last_tracked_ns_;
+  const bool lost = missing_ns > ToNs(kLostAfterFrames / camera_.fps);
+  state_ = lost ? TrackingState::kLost : TrackingState::kUncertain;
+  ++(lost ? counters_.lost : counters_.uncertain);
+  if (missing_ns > ToNs(options_.new_map_after_s)) {
+    GiveUpMap(false, "lost for too long", events);
+  }
+  events->push_back(MakePose(state_, report));
+}
+
+void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<FrontendEvent>* events) {
+  ++counters_.resets;
+  events->push_back(MapReset{map_id_, drop, reason});
+  ++map_id_;
+  tracker_.Reset();
+  velocity_.reset();
+  initializer_ = std::make_unique<Initializer>(initializer_options_, camera_, seed_);
+  state_ = TrackingState::kNotInitialized;
+  awaited_ = {};
+}
+
+FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& report) const {
+  FramePose pose;
+  pose.frame_index = frame_.index;
+  pose.stamp_ns = frame_.stamp_ns;
+  pose.state = state;
+  pose.map_id = map_id_;
+  pose.num_features = static_cast<uint16_t>(frame_.features->size());
+  pose.num_static = static_cast<uint16_t>(report.num_static);
+  pose.num_moving = static_cast<uint16_t>(report.num_moving);
+  pose.num_unknown = static_cast<uint16_t>(report.num_unknown);
+  pose.moving_image_share = static_cast<float>(report.moving_share);
+  pose.reason = report.reason;
+  if (!report.ok) return pose;
+  pose.reference = last_placed_.reference;
+  pose.T_cam_reference = last_placed_.T_cam_reference;
+  pose.reference_scale = last_placed_.scale;
+  pose.T_cam_world = frame_.T_cam_world;
+  return pose;
+}
+
+// ---- Keyframes -----------------------------------------------------------------------------------------------------
+
+bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
+  const KeyframeOptions& o = options_.keyframe;
+  const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
+  if (reference == nullptr || report.num_static <= o.min_inliers) return false;
+  const int min_observations = map_.keyframes().size() <= 2 ? 2 : 3;
+  const int expected = map_.CountTracked(*reference, min_observations);
+  const int64_t since_ns = frame_.stamp_ns - last_keyframe_ns_;
+  const bool weak = report.num_static < 0.5 * expected || report.num_static < 60;
+  const bool behind = report.num_static < o.tracked_ratio * expected;
+  const bool due = since_ns >= ToNs(o.max_interval_s) || since_ns >= ToNs(o.min_interval_s) || weak;
+  if (!behind || !due) return false;
+  if (withheld_ || (awaited_.valid() && !weak)) {
+    ++counters_.keyframes_withheld;
+    return false;
+  }
+  return true;
+}
+
+void FrontendCore::ProposeKeyframe(std::vector<FrontendEvent>* events) {
+  KeyframeProposal proposal;
+  proposal.id = KeyframeId::Make(session_, frame_.index);
+  proposal.map_id = map_id_;
+  proposal.stamp_ns = frame_.stamp_ns;
+  proposal.reference = last_placed_.reference;
+  proposal.T_cam_reference = last_placed_.T_cam_reference;
+  proposal.reference_scale = last_placed_.scale;
+  proposal.features = frame_.features->set;
+  for (size_t i = 0; i < frame_.classes.size(); ++i) {
+    const uint16_t feature = static_cast<uint16_t>(i);
+    if (frame_.classes[i] == FeatureClass::kUsed && frame_.landmarks[i].valid()) {
+      proposal.matches.push_back({feature, frame_.landmarks[i]});
+    } else if (frame_.classes[i] == FeatureClass::kMoving) {
+      proposal.moving.push_back(feature);
+    }
+  }
+  last_keyframe_ = awaited_ = proposal.id;
+  last_keyframe_ns_ = proposal.stamp_ns;
+  ++counters_.keyframes_proposed;
+  events->push_back(std::move(proposal));
+}
+
+void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
+  frames_since_evidence_ = 0;
+  FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
+  if (!evidence.items.empty()) events->push_back(std::move(evidence));
+}
+
+// ---- After the end -------------------------------------------------------------------------------------------------
+
+bool FrontendCore::LocalizeLater(Frame* frame, const Frame* neighbour) {
+  if (neighbour != nullptr) {
+    const Rigid3d predicted = neighbour->T_cam_world;
+    if (tracker_.TrackFromFrame(map_, *neighbour, predicted, frame) && tracker_.TrackLocalMap(map_, false, frame).ok) {
+      return true;
+    }
+  }
+  frame->ClearMatches();
+  return relocalizer_.Relocalize(map_, 0, DeriveSeed(seed_, frame->index, "later"), &tracker_, frame) &&
+         tracker_.TrackLocalMap(map_, true, frame).ok;
+}
+
+void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
+  std::optional<Frame> neighbour;
+  for (auto it = unplaced_.rbegin(); it != unplaced_.rend(); ++it) {  // from the newest back: the map lies after them
+    Frame& frame = *it;
+    const bool adjacent = neighbour && neighbour->index - frame.index <= 3;
+    if (!adjacent) {
+      neighbour.reset();
+      const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, frame.index));
+      if (next != map_.keyframes().end()) neighbour = FrameOfKeyframe(next->second);
+    }
+    if (!LocalizeLater(&frame, neighbour ? &*neighbour : nullptr)) continue;
+    const std::optional<Placed> placed = Place(frame.T_cam_world, tracker_.reference());
+    if (!placed) continue;
+    neighbour = frame;
+    ++counters_.localized_later;
+    FramePose pose;
+    pose.frame_index = frame.index;
+    pose.stamp_ns = frame.stamp_ns;
+    pose.state = TrackingState::kLocalizedLater;
+    pose.map_id = map_.FindKeyframe(placed->reference)->map_id;
+    pose.reference = placed->reference;
+    pose.T_cam_reference = placed->T_cam_reference;
+    pose.reference_scale = placed->scale;
+    pose.T_cam_world = frame.T_cam_world;
+    events->push_back(pose);
+  }
+  unplaced_.clear();
+}
+
+}  // namespace dmslam

@@ -1,0 +1,130 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "dmslam/features/orb_extractor.h"
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+#include "dmslam/motion_segmentation/initializer.h"
+#include "frontend/frame.h"
+#include "frontend/frontend_options.h"
+#include "frontend/pose_tracker.h"
+#include "frontend/relocalizer.h"
+
+namespace dmslam {
+
+/// A record of the frontend's stream.
+using FrontendEvent = std::variant<FramePose, InitialMap, KeyframeProposal, FrameEvidence, MapReset>;
+
+struct FrontendCounters {
+  uint64_t frames = 0;
+  uint64_t tracked = 0;
+  uint64_t uncertain = 0;
+  uint64_t lost = 0;
+  uint64_t relocalizations = 0;
+  uint64_t resets = 0;
+  uint64_t keyframes_proposed = 0;
+  uint64_t keyframes_withheld = 0;  ///< wanted, but the mapper is behind
+  uint64_t localized_later = 0;
+};
+
+/// Tracks the camera in a replica of the map and proposes keyframes. Knows no bus, no clock and no thread: images and
+/// map records in, records out. The same inputs give the same outputs.
+class FrontendCore {
+ public:
+  struct Setup {
+    FrontendOptions options;
+    OrbExtractorOptions extractor;
+    InitializerOptions initializer;
+    Camera camera;
+    Pyramid pyramid;
+    uint32_t session = 1;
+    uint64_t seed = 0;
+    std::shared_ptr<const Vocabulary> vocabulary;  ///< for relocalisation; without one only the newest places are tried
+  };
+  explicit FrontendCore(Setup setup);
+
+  /// A record of the map stream; call between frames.
+  void ApplyMapDelta(const MapDelta& delta);
+  /// Whether a keyframe was proposed whose settled record has not come: lock-step waits for it.
+  KeyframeId awaited() const { return awaited_; }
+  /// Told by the node: no more keyframes now (too many are not acknowledged).
+  void SetWithheld(bool withheld) { withheld_ = withheld; }
+
+  /// Tracks one frame; appends what there is to say, in order. The last FramePose in `events` is this frame's.
+  void ProcessImage(uint32_t frame_index, int64_t stamp_ns, const GrayView& image, std::vector<FrontendEvent>* events);
+  void ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features, std::vector<FrontendEvent>* events);
+  /// At the end of the sequence: places frames that had no pose when they came.
+  void Finish(std::vector<FrontendEvent>* events);
+
+  TrackingState state() const { return state_; }
+  const Frame& frame() const { return frame_; }
+  const Map& map() const { return map_; }
+  const FrontendCounters& counters() const { return counters_; }
+  double extract_ms() const { return extract_ms_; }
+
+ private:
+  struct Placed {
+    KeyframeId reference;
+    Rigid3d T_cam_reference;
+    double scale = 1.0;
+  };
+
+  void Initialize(std::vector<FrontendEvent>* events);
+  void AwaitMap(std::vector<FrontendEvent>* events);
+  void Track(std::vector<FrontendEvent>* events);
+  bool FindPose();
+  std::optional<Rigid3d> PredictPose() const;
+  void OnTracked(const TrackingReport& report, std::vector<FrontendEvent>* events);
+  void OnNotTracked(const TrackingReport& report, std::vector<FrontendEvent>* events);
+  void GiveUpMap(bool drop, const std::string& reason, std::vector<FrontendEvent>* events);
+  bool WantsKeyframe(const TrackingReport& report);
+  void ProposeKeyframe(std::vector<FrontendEvent>* events);
+  void FlushEvidence(std::vector<FrontendEvent>* events);
+  std::optional<Placed> Place(const Rigid3d& T_cam_world, KeyframeId reference) const;
+  FramePose MakePose(TrackingState state, const TrackingReport& report) const;
+  Frame FrameOfKeyframe(const Keyframe& keyframe) const;
+  bool LocalizeLater(Frame* frame, const Frame* neighbour);
+  void KeepUnplaced();
+
+  FrontendOptions options_;
+  Camera camera_;
+  Pyramid pyramid_;
+  uint32_t session_;
+  uint64_t seed_;
+  Map map_;
+  OrbExtractor extractor_;
+  InitializerOptions initializer_options_;
+  std::unique_ptr<Initializer> initializer_;
+  PoseTracker tracker_;
+  Relocalizer relocalizer_;
+
+  TrackingState state_ = TrackingState::kNotInitialized;
+  MapId map_id_ = 1;
+  Frame frame_;
+  Frame last_;                 ///< the frame tracked last
+  Placed last_placed_;
+  std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the frame tracked last
+  int64_t last_tracked_ns_ = 0;
+  int64_t trial_until_ns_ = 0;
+  int frames_since_evidence_ = 0;
+  bool relocalized_ = false;
+  int64_t relocalized_ns_ = 0;
+  bool withheld_ = false;
+
+  KeyframeId initial_first_, initial_second_;
+  KeyframeId last_keyframe_;
+  int64_t last_keyframe_ns_ = 0;
+  KeyframeId awaited_;
+  std::deque<Frame> unplaced_;
+  double extract_ms_ = 0;
+  FrontendCounters counters_;
+};
+
+}  // namespace dmslam

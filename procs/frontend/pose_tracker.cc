@@ -1,0 +1,342 @@
+#include "frontend/pose_tracker.h"
+
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <cmath>
+#include <map>
+
+#include "dmslam/robust/pose_from_matches.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kCellColumns = 8, kCellRows = 6;
+constexpr int kTurnBins = 30;
+constexpr float kStrongBelief = 0.0F;  // log odds above which a landmark has no vote
+constexpr int kStreakWithoutVote = 3;  // frames in a row seen elsewhere: no vote, before the mapper says so
+constexpr int kMaxKeyframeDistance = 50;
+constexpr double kFrontalCos = 0.998;
+constexpr int kNeighboursOfLocal = 10;
+
+size_t CellOf(const Eigen::Vector2d& uv_px, const Camera& camera) {
+  const int column = std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
+  const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
+  return static_cast<size_t>(row * kCellColumns + column);
+}
+
+}  // namespace
+
+PoseTracker::PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid)
+    : options_(options), camera_(camera), pyramid_(pyramid) {}
+
+void PoseTracker::Reset() {
+  reference_ = {};
+  local_keyframes_.clear();
+  local_landmarks_.clear();
+  recent_motion_.clear();
+  evidence_.clear();
+}
+
+bool PoseTracker::HasVote(const Landmark& landmark) const {
+  if (!options_.motion_belief) return true;
+  if (landmark.evidence.motion_belief > kStrongBelief) return false;
+  const auto recent = recent_motion_.find(landmark.id);
+  return recent == recent_motion_.end() || recent->second.streak < kStreakWithoutVote;
+}
+
+double PoseTracker::Trust(const Landmark& landmark, int64_t stamp_ns) const {
+  if (!options_.motion_belief) return 1.0;
+  const double age_s = static_cast<double>(stamp_ns - landmark.first_ns) * 1e-9;
+  const double grown = std::clamp(age_s / options_.trusted_age_s, 0.0, 1.0);
+  return options_.young_trust + (1.0 - options_.young_trust) * grown;
+}
+
+// ---- First guess ---------------------------------------------------------------------------------------------------
+
+void PoseTracker::MatchByProjection(const Map& map, const Frame& last, const Rigid3d& T_cam_world, double radius_px,
+                                    const Frame& frame) {
+  matches_.clear();
+  match_turns_.clear();
+  taken_.assign(frame.features->size(), 0);
+  for (size_t i = 0; i < last.landmarks.size(); ++i) {
+    if (!last.landmarks[i].valid()) continue;
+    const std::optional<LandmarkId> id = map.Resolve(last.landmarks[i]);
+    if (!id) continue;
+    const Landmark& landmark = *map.FindLandmark(*id);
+    if (!HasVote(landmark)) continue;
+    const std::optional<Eigen::Vector2d> uv = camera_.Project(T_cam_world * landmark.p_world);
+    if (!uv) continue;
+    const Keypoint& seen = last.features->set.keypoints[i];
+    const FeatureHit hit = FindFeature(*frame.features, *uv, radius_px * pyramid_.Scale(seen.octave), seen.octave - 1,
+                                       seen.octave + 1, last.features->set.descriptors[i], taken_);
+    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
+    const size_t feature = static_cast<size_t>(hit.feature);
+    taken_[feature] = 1;
+    matches_.push_back({*id, static_cast<uint16_t>(feature)});
+    match_turns_.push_back(static_cast<float>(
+        static_cast<uint8_t>(frame.features->set.keypoints[feature].angle - seen.angle)));
+  }
+}
+
+/// Keeps the matches whose keypoints turned as most others did (three best of thirty bins, as in ORB-SLAM2).
+void PoseTracker::KeepConsistentTurns(const Frame&, const Frame&) {
+  std::array<int, kTurnBins> counts{};
+  const auto bin_of = [](float turn) { return static_cast<size_t>(turn * kTurnBins / 256.0F) % kTurnBins; };
+  for (const float turn : match_turns_) ++counts[bin_of(turn)];
+  std::array<int, kTurnBins> sorted = counts;
+  std::sort(sorted.begin(), sorted.end(), std::greater<>());
+  const int least = std::max(sorted[2], sorted[0] / 10);
+  size_t kept = 0;
+  for (size_t i = 0; i < matches_.size(); ++i) {
+    if (counts[bin_of(match_turns_[i])] >= std::max(1, least)) matches_[kept++] = matches_[i];
+  }
+  matches_.resize(kept);
+}
+
+bool PoseTracker::TrackFromFrame(const Map& map, const Frame& last, const Rigid3d& T_predicted, Frame* frame) {
+  double radius_px = options_.motion_radius_px;
+  for (int attempt = 0; attempt < 2; ++attempt, radius_px *= 2) {
+    MatchByProjection(map, last, T_predicted, radius_px, *frame);
+    KeepConsistentTurns(last, *frame);
+    if (static_cast<int>(matches_.size()) >= options_.min_motion_matches) break;
+  }
+  if (static_cast<int>(matches_.size()) < options_.min_motion_matches) return false;
+  frame->ClearMatches();
+  for (const Match& match : matches_) frame->landmarks[match.feature] = match.landmark;
+  frame->T_cam_world = T_predicted;
+  return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
+}
+
+bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed, Frame* frame) {
+  const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
+  if (keyframe == nullptr) return false;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<double> inv_sigma_squared;
+  matches_.clear();
+  taken_.assign(frame->features->size(), 0);
+  for (size_t i = 0; i < keyframe->landmarks.size(); ++i) {
+    const Landmark* landmark = keyframe->landmarks[i].valid() ? map.FindLandmark(keyframe->landmarks[i]) : nullptr;
+    if (landmark == nullptr || !HasVote(*landmark)) continue;
+    const FeatureHit hit =
+        FindFeature(*frame->features, {camera_.width_px / 2.0, camera_.height_px / 2.0}, 2.0 * camera_.width_px, 0,
+                    pyramid_.levels, keyframe->features->set.descriptors[i], taken_);
+    if (hit.feature < 0 || hit.distance > kMaxKeyframeDistance || hit.distance > 0.75 * hit.second_distance) continue;
+    const size_t feature = static_cast<size_t>(hit.feature);
+    taken_[feature] = 1;
+    matches_.push_back({landmark->id, static_cast<uint16_t>(feature)});
+    points.push_back(landmark->p_world);
+    pixels.push_back(frame->features->uv_px[feature]);
+    inv_sigma_squared.push_back(1.0 / pyramid_.SigmaSquared(frame->features->set.keypoints[feature].octave));
+  }
+  if (matches_.size() < 15) return false;
+  PoseRansacOptions ransac;
+  ransac.seed = seed;
+  const auto report = PoseFromMatches(camera_.Ideal(), points, pixels, inv_sigma_squared, ransac);
+  if (!report.success) return false;
+  frame->ClearMatches();
+  for (const Match& match : matches_) frame->landmarks[match.feature] = match.landmark;
+  frame->T_cam_world = report.model;
+  return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
+}
+
+int PoseTracker::OptimizeMatches(const Map& map, Frame* frame) {
+  observations_.clear();
+  matches_.clear();
+  for (size_t i = 0; i < frame->landmarks.size(); ++i) {
+    if (!frame->landmarks[i].valid()) continue;
+    const Landmark* landmark = map.FindLandmark(frame->landmarks[i]);
+    if (landmark == nullptr) continue;
+    matches_.push_back({landmark->id, static_cast<uint16_t>(i)});
+    observations_.push_back({landmark->p_world, frame->features->uv_px[i],
+                             1.0 / pyramid_.SigmaSquared(frame->features->set.keypoints[i].octave),
+                             Trust(*landmark, frame->stamp_ns)});
+  }
+  PoseOptimizationOptions options;
+  options.max_chi2 = options_.chi2;
+  OptimizePose(camera_.Ideal(), frame->T_cam_world, observations_, options, optimized_);
+  if (!optimized_.usable) return 0;
+  frame->T_cam_world = optimized_.T_cam_world;
+  for (size_t i = 0; i < matches_.size(); ++i) {
+    const size_t feature = matches_[i].feature;
+    const bool inlier = optimized_.inliers[i] != 0;
+    frame->classes[feature] = inlier ? FeatureClass::kUsed : FeatureClass::kRejected;
+    if (!inlier) frame->landmarks[feature] = LandmarkId{};
+  }
+  return optimized_.num_inliers;
+}
+
+// ---- Local map -----------------------------------------------------------------------------------------------------
+
+void PoseTracker::CollectLocalMap(const Map& map, const Frame& frame) {
+  std::map<KeyframeId, int> votes;
+  for (const LandmarkId id : frame.landmarks) {
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    if (landmark == nullptr) continue;
+    for (const Observation& o : landmark->observations) ++votes[o.keyframe];
+  }
+  std::vector<std::pair<int, KeyframeId>> ranked;
+  for (const auto& [id, count] : votes) ranked.emplace_back(-count, id);
+  std::sort(ranked.begin(), ranked.end());
+  std::vector<KeyframeId> keyframes;
+  const size_t most = static_cast<size_t>(options_.max_local_keyframes);
+  for (const auto& [count, id] : ranked) {
+    if (keyframes.size() < most) keyframes.push_back(id);
+  }
+  if (!keyframes.empty()) reference_ = keyframes.front();
+  std::vector<KeyframeId> listed = keyframes;
+  std::sort(listed.begin(), listed.end());
+  const size_t direct = keyframes.size();
+  for (size_t i = 0; i < direct && keyframes.size() < most; ++i) {
+    for (const KeyframeId neighbour : map.BestCovisible(keyframes[i], kNeighboursOfLocal, 1)) {
+      const auto at = std::lower_bound(listed.begin(), listed.end(), neighbour);
+      if (at != listed.end() && *at == neighbour) continue;
+      listed.insert(at, neighbour);
+      keyframes.push_back(neighbour);
+      break;
+    }
+  }
+  local_keyframes_ = std::move(keyframes);
+  local_landmarks_.clear();
+  for (const KeyframeId id : local_keyframes_) {
+    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+      if (landmark.valid()) local_landmarks_.push_back(landmark);
+    }
+  }
+  std::sort(local_landmarks_.begin(), local_landmarks_.end());
+  local_landmarks_.erase(std::unique(local_landmarks_.begin(), local_landmarks_.end()), local_landmarks_.end());
+}
+
+void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, Frame* frame) {
+  std::vector<LandmarkId> matched;
+  taken_.assign(frame->features->size(), 0);
+  for (size_t i = 0; i < frame->landmarks.size(); ++i) {
+    if (!frame->landmarks[i].valid()) continue;
+    matched.push_back(frame->landmarks[i]);
+    taken_[i] = 1;
+  }
+  std::sort(matched.begin(), matched.end());
+  visible_.clear();
+  for (const LandmarkId id : local_landmarks_) {
+    const Landmark& landmark = *map.FindLandmark(id);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, frame->T_cam_world);
+    if (!view) continue;
+    visible_.emplace_back(id, *view);
+    if (!HasVote(landmark) || std::binary_search(matched.begin(), matched.end(), id)) continue;
+    double radius = view->view_cos > kFrontalCos ? options_.local_radius_frontal : options_.local_radius;
+    if (relocalized) radius *= 2;
+    const FeatureHit hit = FindFeature(*frame->features, view->uv_px, radius * pyramid_.Scale(view->octave),
+                                       view->octave - 1, view->octave, landmark.descriptor, taken_);
+    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
+    if (hit.octave == hit.second_octave && hit.distance > options_.local_ratio * hit.second_distance) continue;
+    frame->landmarks[static_cast<size_t>(hit.feature)] = id;
+    taken_[static_cast<size_t>(hit.feature)] = 1;
+  }
+}
+
+void PoseTracker::FindMoved(const Map& map, Frame* frame) {
+  std::vector<LandmarkId> used;
+  taken_.assign(frame->features->size(), 0);
+  for (size_t i = 0; i < frame->landmarks.size(); ++i) {
+    if (!frame->landmarks[i].valid()) continue;
+    used.push_back(frame->landmarks[i]);
+    taken_[i] = 1;
+  }
+  std::sort(used.begin(), used.end());
+  moved_.clear();
+  for (const auto& [id, guess] : visible_) {
+    if (std::binary_search(used.begin(), used.end(), id)) continue;
+    const Landmark& landmark = *map.FindLandmark(id);
+    const std::optional<Eigen::Vector2d> uv = camera_.Project(frame->T_cam_world * landmark.p_world);
+    if (!uv) continue;
+    const FeatureHit hit = FindFeature(*frame->features, *uv, options_.moved_radius_px, guess.octave - 1,
+                                       guess.octave + 1, landmark.descriptor, taken_);
+    if (hit.feature < 0 || hit.distance > options_.moved_max_distance ||
+        hit.distance > options_.moved_ratio * hit.second_distance) {
+      continue;
+    }
+    if (NormalizedErrorSquared(*frame->features, hit.feature, *uv, pyramid_) < options_.moved_chi2) continue;
+    moved_.push_back(id);
+    frame->classes[static_cast<size_t>(hit.feature)] = FeatureClass::kMoving;
+  }
+}
+
+void PoseTracker::CountEvidence(const Map& map, const Frame& frame) {
+  for (const auto& [id, view] : visible_) {
+    FrameEvidence::Item& item = evidence_[id];
+    item.landmark = id;
+    ++item.visible;
+  }
+  for (const LandmarkId id : moved_) {
+    ++evidence_[id].moved;
+    ++recent_motion_[id].streak;
+  }
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    const LandmarkId id = frame.landmarks[i];
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    if (landmark == nullptr) continue;
+    FrameEvidence::Item& item = evidence_[id];
+    if (item.visible == 0) item.visible = 1;
+    item.landmark = id;
+    ++item.found;
+    recent_motion_.erase(id);
+  }
+}
+
+TrackingReport PoseTracker::Summarize(const Frame& frame, int inliers, bool relocalized) const {
+  TrackingReport report;
+  std::array<int, kCellColumns * kCellRows> fixed{}, moving{};
+  for (size_t i = 0; i < frame.classes.size(); ++i) {
+    const size_t cell = CellOf(frame.features->uv_px[i], camera_);
+    if (frame.classes[i] == FeatureClass::kUsed) {
+      ++fixed[cell];
+    } else if (frame.classes[i] == FeatureClass::kMoving) {
+      ++moving[cell];
+      ++report.num_moving;
+    } else if (frame.classes[i] == FeatureClass::kRejected) {
+      ++report.num_unknown;
+    }
+  }
+  int occupied = 0, mostly_moving = 0;
+  for (size_t cell = 0; cell < fixed.size(); ++cell) {
+    if (fixed[cell] > 0) ++report.cells;
+    if (fixed[cell] + moving[cell] > 0) ++occupied;
+    if (moving[cell] > fixed[cell]) ++mostly_moving;
+  }
+  report.moving_share = occupied == 0 ? 0.0 : static_cast<double>(mostly_moving) / occupied;
+  report.num_static = inliers;
+  report.mean_chi2 = optimized_.mean_chi2;
+  const int needed = relocalized ? options_.min_inliers_after_relocalization : options_.min_local_inliers;
+  if (inliers < needed) {
+    report.reason = "too few static features match the map";
+  } else if (report.cells < options_.min_cells) {
+    report.reason = "the static features lie in too small a part of the image";
+  } else {
+    report.ok = true;
+  }
+  return report;
+}
+
+TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, Frame* frame) {
+  CollectLocalMap(map, *frame);
+  SearchLocalLandmarks(map, relocalized, frame);
+  const int inliers = OptimizeMatches(map, frame);
+  FindMoved(map, frame);
+  TrackingReport report = Summarize(*frame, inliers, relocalized);
+  if (report.ok) CountEvidence(map, *frame);
+  return report;
+}
+
+FrameEvidence PoseTracker::TakeEvidence(int64_t stamp_ns, MapId map_id) {
+  FrameEvidence evidence;
+  evidence.stamp_ns = stamp_ns;
+  evidence.map_id = map_id;
+  for (const auto& [id, item] : evidence_) evidence.items.push_back(item);
+  std::sort(evidence.items.begin(), evidence.items.end(),
+            [](const auto& a, const auto& b) { return a.landmark < b.landmark; });
+  evidence_.clear();
+  return evidence;
+}
+
+}  // namespace dmslam

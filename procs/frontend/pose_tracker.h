@@ -1,0 +1,88 @@
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "dmslam/map/map.h"
+#include "dmslam/map/projection.h"
+#include "dmslam/map/proposals.h"
+#include "dmslam/optimization/pose_optimization.h"
+#include "frontend/frame.h"
+#include "frontend/frontend_options.h"
+
+namespace dmslam {
+
+/// What tracking one frame against the map came to.
+struct TrackingReport {
+  bool ok = false;
+  const char* reason = "";   ///< why not
+  int num_static = 0;        ///< inliers
+  int num_moving = 0;
+  int num_unknown = 0;       ///< matched, neither inlier nor moving
+  int cells = 0;             ///< of an 8 x 6 grid that hold inliers
+  double moving_share = 0;   ///< of the cells that hold matches, those with more moving than static ones
+  double mean_chi2 = 0;
+};
+
+/// Finds a frame's pose in a map: by the motion model, by likeness to a keyframe, and then against the local map. Owns
+/// the buffers that this needs, the cached local map, and the frontend's own short memory of what moves. The map is
+/// given with each call and only read.
+class PoseTracker {
+ public:
+  PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid);
+
+  /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
+  bool TrackFromFrame(const Map& map, const Frame& last, const Rigid3d& T_predicted, Frame* frame);
+  /// Matches a keyframe's landmarks by descriptor alone, and finds the pose from nothing.
+  bool TrackFromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, Frame* frame);
+  /// Refines the pose against the landmarks around: what its matches' keyframes and their neighbours see.
+  TrackingReport TrackLocalMap(const Map& map, bool relocalized, Frame* frame);
+
+  /// The keyframe that shares most landmarks with the frame tracked last.
+  KeyframeId reference() const { return reference_; }
+  /// What frames said since the last call, and forgets it.
+  FrameEvidence TakeEvidence(int64_t stamp_ns, MapId map_id);
+  /// Forgets what belongs to a map that is gone.
+  void Reset();
+
+ private:
+  struct Match {
+    LandmarkId landmark;
+    uint16_t feature = 0;
+  };
+  struct RecentMotion {
+    int streak = 0;  ///< frames in a row that saw it elsewhere
+  };
+
+  bool HasVote(const Landmark& landmark) const;
+  double Trust(const Landmark& landmark, int64_t stamp_ns) const;
+  void MatchByProjection(const Map& map, const Frame& last, const Rigid3d& T_cam_world, double radius_px,
+                         const Frame& frame);
+  void KeepConsistentTurns(const Frame& last, const Frame& frame);
+  int OptimizeMatches(const Map& map, Frame* frame);
+  void CollectLocalMap(const Map& map, const Frame& frame);
+  void SearchLocalLandmarks(const Map& map, bool relocalized, Frame* frame);
+  void FindMoved(const Map& map, Frame* frame);
+  void SpreadMotion(Frame* frame);
+  void CountEvidence(const Map& map, const Frame& frame);
+  TrackingReport Summarize(const Frame& frame, int inliers, bool relocalized) const;
+
+  TrackingOptions options_;
+  Camera camera_;
+  Pyramid pyramid_;
+  KeyframeId reference_;
+
+  std::vector<Match> matches_;
+  std::vector<float> match_turns_;
+  std::vector<PoseObservation> observations_;
+  PoseOptimizationReport optimized_;
+  std::vector<uint8_t> taken_;
+  std::vector<KeyframeId> local_keyframes_;
+  std::vector<LandmarkId> local_landmarks_;
+  std::vector<std::pair<LandmarkId, LandmarkView>> visible_;  ///< local landmarks that this frame should see
+  std::vector<LandmarkId> moved_;
+  std::unordered_map<LandmarkId, RecentMotion> recent_motion_;
+  std::unordered_map<LandmarkId, FrameEvidence::Item> evidence_;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "dmslam/map/map.h"
+#include "dmslam/place_recognition/keyframe_database.h"
+#include "dmslam/place_recognition/vocabulary.h"
+#include "frontend/frame.h"
+#include "frontend/pose_tracker.h"
+
+namespace dmslam {
+
+/// Finds a lost camera in the replica of the map: keyframes that look alike, matches by words, pose by RANSAC, guided
+/// search and refinement. Needs nothing but the replica, so it works when the loop closer is down.
+class Relocalizer {
+ public:
+  Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera, const Pyramid& pyramid);
+
+  /// Keeps the index in step with the replica: call after each applied delta.
+  void Update(const Map& map);
+  /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
+  bool Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, Frame* frame) const;
+
+ private:
+  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, const BowImage& image) const;
+  bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed, Frame* frame) const;
+
+  std::shared_ptr<const Vocabulary> vocabulary_;
+  Camera camera_;
+  Pyramid pyramid_;
+  KeyframeDatabase database_;
+  std::map<KeyframeId, FeatureVector> nodes_;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,131 @@
+#include "mapper/map_maintenance.h"
+
+#include <algorithm>
+
+namespace dmslam {
+namespace {
+
+/// How many keyframes were inserted after `id`, up to `most`; culled ones count.
+int KeyframesSince(const Map& map, KeyframeId id, int most) {
+  int count = 0;
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && it->first > id && count < most; ++it) ++count;
+  const auto& tombstones = map.keyframe_tombstones();
+  for (auto it = tombstones.rbegin(); it != tombstones.rend() && it->first > id && count < most; ++it) ++count;
+  return count;
+}
+
+/// The keyframes inserted last, as far back as probation reaches.
+std::vector<KeyframeId> YoungestKeyframes(const Map& map, MapId map_id, int most) {
+  std::vector<KeyframeId> ids;
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && static_cast<int>(ids.size()) < most; ++it) {
+    if (it->second.map_id == map_id) ids.push_back(it->first);
+  }
+  return ids;
+}
+
+bool FailsProbation(const Map& map, const Landmark& landmark, const MapperOptions& options) {
+  const int age = KeyframesSince(map, landmark.first_keyframe, options.probation_keyframes);
+  if (age >= options.probation_keyframes) return false;
+  const LandmarkEvidence& evidence = landmark.evidence;
+  if (evidence.visible > 0 && evidence.found < options.min_found_ratio * evidence.visible) return true;
+  return age >= options.probation_keyframes - 1 &&
+         static_cast<int>(landmark.observations.size()) < options.probation_min_observations;
+}
+
+/// Whether at least three other keyframes see the landmark at the same or a finer scale.
+bool SeenByThreeOthers(const Map& map, const Landmark& landmark, KeyframeId self, int octave) {
+  int others = 0;
+  for (const Observation& o : landmark.observations) {
+    if (o.keyframe == self) continue;
+    if (map.FindKeyframe(o.keyframe)->features->set.keypoints[o.feature].octave <= octave + 1 && ++others >= 3) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool IsRedundant(const Map& map, const Keyframe& keyframe, double share) {
+  int total = 0, redundant = 0;
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    const LandmarkId id = keyframe.landmarks[i];
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    if (landmark == nullptr) continue;
+    ++total;
+    if (SeenByThreeOthers(map, *landmark, keyframe.id, keyframe.features->set.keypoints[i].octave)) ++redundant;
+  }
+  return redundant > share * total;
+}
+
+LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item, int64_t stamp_ns,
+                         const MotionBeliefOptions& options) {
+  state.visible += item.visible;
+  state.found += item.found;
+  state.moved += item.moved;
+  if (item.moved > 0) state.last_moved_ns = stamp_ns;
+  if (options.enabled) {
+    const float change = options.moved_step * static_cast<float>(item.moved) -
+                         options.found_step * static_cast<float>(item.found);
+    state.motion_belief = std::clamp(state.motion_belief + change, options.floor, options.ceiling);
+  }
+  return state;
+}
+
+}  // namespace
+
+int CullYoungLandmarks(Map& map, MapId map_id, const MapperOptions& options) {
+  // A landmark on probation is seen by one of the keyframes around its making.
+  std::vector<LandmarkId> candidates;
+  for (const KeyframeId id : YoungestKeyframes(map, map_id, 2 * options.probation_keyframes + 2)) {
+    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+      if (landmark.valid()) candidates.push_back(landmark);
+    }
+  }
+  std::sort(candidates.begin(), candidates.end());
+  candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+  int culled = 0;
+  for (const LandmarkId id : candidates) {
+    if (!FailsProbation(map, *map.FindLandmark(id), options)) continue;
+    map.RemoveLandmark(id);
+    ++culled;
+  }
+  return culled;
+}
+
+int CullRedundantKeyframes(Map& map, KeyframeId id, KeyframeId keep, const MapperOptions& options) {
+  int culled = 0;
+  for (const KeyframeId neighbour : map.BestCovisible(id, 1000, options.min_covisibility)) {
+    const Keyframe& keyframe = *map.FindKeyframe(neighbour);
+    if (!keyframe.parent.valid() || neighbour == keep) continue;
+    if (!keyframe.loop_edges.empty() || !IsRedundant(map, keyframe, options.redundant_share)) continue;
+    const std::vector<LandmarkId> seen = keyframe.landmarks;
+    map.RemoveKeyframe(neighbour);
+    ++culled;
+    for (const LandmarkId landmark : seen) {
+      const Landmark* left = landmark.valid() ? map.FindLandmark(landmark) : nullptr;
+      if (left != nullptr && left->observations.size() < 2) map.RemoveLandmark(landmark);
+    }
+  }
+  return culled;
+}
+
+EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const MotionBeliefOptions& options) {
+  EvidenceReport report;
+  for (const FrameEvidence::Item& item : evidence.items) {
+    const std::optional<LandmarkId> id = map.Resolve(item.landmark);
+    if (!id) {
+      ++report.unknown;
+      continue;
+    }
+    const LandmarkEvidence updated = Updated(map.FindLandmark(*id)->evidence, item, evidence.stamp_ns, options);
+    ++report.applied;
+    if (options.enabled && updated.motion_belief > options.remove_above) {
+      map.RemoveLandmark(*id);
+      ++report.removed;
+    } else {
+      map.SetEvidence(*id, updated);
+    }
+  }
+  return report;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,282 @@
+#include "mapper/mapper_core.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "mapper/landmark_fusion.h"
+#include "mapper/map_maintenance.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kInitialAdjustmentIterations = 20;
+constexpr int kMinInitialLandmarks = 40;
+
+/// The correction of a keyframe: its own, or that of its nearest ancestor that has one.
+const Sim3d* CorrectionOf(const Map& map, KeyframeId id, const std::map<KeyframeId, Sim3d>& corrections) {
+  while (id.valid()) {
+    const auto it = corrections.find(id);
+    if (it != corrections.end()) return &it->second;
+    const Keyframe* keyframe = map.FindKeyframe(id);
+    if (keyframe != nullptr) {
+      id = keyframe->parent;
+    } else {
+      const auto tombstone = map.keyframe_tombstones().find(id);
+      id = tombstone == map.keyframe_tombstones().end() ? KeyframeId{} : tombstone->second.parent;
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+MapperCore::MapperCore(const MapperOptions& options, const Camera& camera, const Pyramid& pyramid,
+                       uint16_t epoch_ordinal, Sink sink)
+    : options_(options), map_(camera, pyramid), epoch_ordinal_(epoch_ordinal), sink_(std::move(sink)) {}
+
+void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id, std::string note) {
+  MapDelta delta = map_.TakeDelta(event, about, map_id);
+  delta.correction_id = correction_id;
+  delta.note = std::move(note);
+  if (!delta.Empty() || event == MapEvent::kSettled || event == MapEvent::kRefused) sink_(delta);
+}
+
+LandmarkId MapperCore::AddLandmark(MapId map_id, KeyframeId reference, KeyframeId newest,
+                                   const Eigen::Vector3d& p_world) {
+  Landmark landmark;
+  landmark.id = LandmarkId::Make(epoch_ordinal_, next_landmark_++);
+  landmark.map_id = map_id;
+  landmark.p_world = p_world;
+  landmark.reference = reference;
+  landmark.first_keyframe = newest;
+  landmark.evidence.visible = 1;
+  landmark.evidence.found = 1;
+  const LandmarkId id = landmark.id;
+  map_.AddLandmark(std::move(landmark));
+  return id;
+}
+
+// ---- A first map ---------------------------------------------------------------------------------------------------
+
+void MapperCore::OnInitialMap(const InitialMap& proposal) {
+  if (map_.FindKeyframe(proposal.second.id) != nullptr) {
+    ++counters_.keyframes_repeated;
+    return;
+  }
+  if (BuildInitialMap(proposal)) {
+    ++counters_.maps_started;
+    Publish(MapEvent::kMapStarted, proposal.second.id, proposal.map_id);
+  } else {
+    ++counters_.maps_refused;
+    map_.DropMap(proposal.map_id);
+    Publish(MapEvent::kMapDropped, proposal.second.id, proposal.map_id, 0, "too few landmarks after bundle adjustment");
+  }
+}
+
+bool MapperCore::BuildInitialMap(const InitialMap& proposal) {
+  const KeyframeId first = proposal.first.id, second = proposal.second.id;
+  if (map_.FindKeyframe(first) != nullptr || map_.keyframe_tombstones().contains(first)) return false;
+  map_.AddKeyframe(MakeKeyframe(proposal.first, Rigid3d()));
+  Keyframe other = MakeKeyframe(proposal.second, proposal.second.T_cam_reference);
+  other.parent = first;
+  map_.AddKeyframe(std::move(other));
+  for (const InitialMap::Point& point : proposal.points) {
+    const bool known = point.feature_first < map_.FindKeyframe(first)->landmarks.size() &&
+                       point.feature_second < map_.FindKeyframe(second)->landmarks.size();
+    if (!known) continue;
+    const LandmarkId id = AddLandmark(proposal.map_id, first, second, point.p_world);
+    map_.SetObservation(first, point.feature_first, id);
+    map_.SetObservation(second, point.feature_second, id);
+    map_.UpdateDescriptor(id);
+  }
+  AdjustWholeMap(map_, proposal.map_id, kInitialAdjustmentIterations, nullptr);
+  if (map_.CountTracked(*map_.FindKeyframe(second), 2) < kMinInitialLandmarks) return false;
+  ScaleToUnitDepth(proposal.map_id, first);
+  return true;
+}
+
+void MapperCore::ScaleToUnitDepth(MapId map_id, KeyframeId first) {
+  const std::optional<double> depth = map_.MedianDepth(*map_.FindKeyframe(first));
+  if (!depth || !(*depth > 0)) return;
+  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    if (keyframe.map_id != map_id) continue;
+    poses.emplace_back(id, Rigid3d(keyframe.T_cam_world.rotation, keyframe.T_cam_world.translation / *depth));
+  }
+  for (const auto& [id, pose] : poses) map_.SetPose(id, pose);
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) {
+    const Landmark& landmark = *map_.FindLandmark(id);
+    if (landmark.map_id == map_id) map_.SetPosition(id, landmark.p_world / *depth);
+  }
+}
+
+// ---- A keyframe ----------------------------------------------------------------------------------------------------
+
+void MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
+  if (!Insert(proposal)) return;
+  const KeyframeId id = proposal.id;
+  const MapId map_id = proposal.map_id;
+  Publish(MapEvent::kKeyframeInserted, id, map_id);
+  counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, options_));
+  CreateLandmarks(id, proposal.moving);
+  Publish(MapEvent::kLandmarksCreated, id, map_id);
+  if (Interrupted()) {
+    ++counters_.adjustments_interrupted;
+    return;
+  }
+  counters_.fusions += static_cast<uint64_t>(FuseWithNeighbours(map_, id, options_));
+  Publish(MapEvent::kFused, id, map_id);
+  const LocalAdjustmentReport report = AdjustLocally(map_, id, options_, interrupt_);
+  if (report.bundle.interrupted) ++counters_.adjustments_interrupted;
+  Publish(MapEvent::kAdjusted, id, map_id);
+  counters_.keyframes_culled += static_cast<uint64_t>(CullRedundantKeyframes(map_, id, proposal.reference, options_));
+  Publish(MapEvent::kCulled, id, map_id);
+}
+
+Keyframe MapperCore::MakeKeyframe(const KeyframeProposal& proposal, const Rigid3d& T_cam_world) const {
+  Keyframe keyframe;
+  keyframe.id = proposal.id;
+  keyframe.map_id = proposal.map_id;
+  keyframe.stamp_ns = proposal.stamp_ns;
+  keyframe.T_cam_world = T_cam_world;
+  keyframe.features = MakeFrameFeatures(proposal.features, map_.camera(), map_.pyramid());
+  return keyframe;
+}
+
+bool MapperCore::Insert(const KeyframeProposal& proposal) {
+  if (map_.FindKeyframe(proposal.id) != nullptr || map_.keyframe_tombstones().contains(proposal.id)) {
+    ++counters_.keyframes_repeated;
+    return false;
+  }
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(proposal.reference);
+  const std::optional<KeyframeId> parent = map_.ResolveKeyframe(proposal.reference);
+  if (!reference || !parent || reference->map_id != proposal.map_id) {
+    ++counters_.keyframes_refused;
+    return false;
+  }
+  Keyframe keyframe = MakeKeyframe(proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
+  keyframe.scale = reference->scale;
+  keyframe.parent = *parent;
+  map_.AddKeyframe(std::move(keyframe));
+  ++counters_.keyframes_inserted;
+  AddMatches(proposal);
+  ChooseParent(proposal.id, *parent);
+  return true;
+}
+
+void MapperCore::AddMatches(const KeyframeProposal& proposal) {
+  for (const KeyframeProposal::Match& match : proposal.matches) {
+    const std::optional<LandmarkId> landmark = map_.Resolve(match.landmark);
+    const bool usable = landmark && match.feature < map_.FindKeyframe(proposal.id)->landmarks.size() &&
+                        map_.FindLandmark(*landmark)->map_id == proposal.map_id;
+    if (!usable) {
+      ++counters_.observations_dropped;
+      continue;
+    }
+    map_.SetObservation(proposal.id, match.feature, *landmark);
+    map_.UpdateDescriptor(*landmark);
+  }
+}
+
+void MapperCore::ChooseParent(KeyframeId id, KeyframeId fallback) {
+  const std::vector<KeyframeId> best = map_.BestCovisible(id, 1, 1);
+  map_.SetParent(id, best.empty() ? fallback : best.front());
+}
+
+void MapperCore::CreateLandmarks(KeyframeId id, const std::vector<uint16_t>& moving) {
+  const MapId map_id = map_.FindKeyframe(id)->map_id;
+  for (const NewLandmark& made : ProposeLandmarks(map_, id, moving, options_.creation, &counters_.creation)) {
+    // An earlier one of the list may have taken the neighbour's feature.
+    if (map_.FindKeyframe(made.neighbour)->landmarks[made.neighbour_feature].valid()) continue;
+    const LandmarkId landmark = AddLandmark(map_id, id, id, made.p_world);
+    map_.SetObservation(id, made.feature, landmark);
+    map_.SetObservation(made.neighbour, made.neighbour_feature, landmark);
+    map_.UpdateDescriptor(landmark);
+  }
+}
+
+void MapperCore::OnEvidence(const FrameEvidence& evidence) {
+  const EvidenceReport report = ApplyEvidence(map_, evidence, options_.belief);
+  counters_.evidence_dropped += static_cast<uint64_t>(report.unknown);
+  counters_.landmarks_moving_removed += static_cast<uint64_t>(report.removed);
+  Publish(MapEvent::kEvidence, {}, evidence.map_id);
+}
+
+void MapperCore::OnReset(const MapReset& reset) {
+  if (!reset.drop) return;
+  ++counters_.maps_dropped;
+  map_.DropMap(reset.map_id);
+  Publish(MapEvent::kMapDropped, {}, reset.map_id, 0, reset.reason);
+}
+
+void MapperCore::Settle(KeyframeId id, MapId map_id) { Publish(MapEvent::kSettled, id, map_id); }
+
+// ---- Corrections ---------------------------------------------------------------------------------------------------
+
+void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
+  if (answer.kind == LoopAnswer::Kind::kNone) return;
+  const bool known = std::any_of(answer.corrections.begin(), answer.corrections.end(),
+                                 [&](const auto& c) { return map_.FindKeyframe(c.keyframe) != nullptr; });
+  if (!known) {
+    ++counters_.corrections_refused;
+    Publish(MapEvent::kRefused, answer.keyframe, 0, answer.correction_id, "its keyframes are gone");
+    return;
+  }
+  Correct(answer);
+  ++counters_.corrections_applied;
+  const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(answer.keyframe);
+  const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
+  Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe, anchor ? anchor->map_id : 0,
+          answer.correction_id, answer.note);
+}
+
+void MapperCore::Correct(const LoopAnswer& answer) {
+  std::map<KeyframeId, Sim3d> corrections;
+  for (const auto& c : answer.corrections) corrections[c.keyframe] = c.corrected_from_base;
+  std::map<LandmarkId, Eigen::Vector3d> positions;
+  for (const auto& c : answer.landmark_positions) positions[c.landmark] = c.p_world;
+
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) {
+    const auto given = positions.find(id);
+    if (given != positions.end()) {
+      map_.SetPosition(id, given->second);
+      continue;
+    }
+    const Landmark& landmark = *map_.FindLandmark(id);
+    const Sim3d* correction = CorrectionOf(map_, landmark.reference, corrections);
+    if (correction != nullptr) map_.SetPosition(id, *correction * landmark.p_world);
+  }
+  std::vector<std::pair<KeyframeId, Sim3d>> moved;
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    const Sim3d* correction = CorrectionOf(map_, id, corrections);
+    if (correction != nullptr) moved.emplace_back(id, *correction);
+  }
+  for (const auto& [id, correction] : moved) {
+    const Sim3d corrected = Sim3d(map_.FindKeyframe(id)->T_cam_world) * correction.Inverse();
+    map_.SetPoseAndScale(id, corrected.ToRigid(), correction.scale);
+  }
+  const Keyframe* here = map_.FindKeyframe(answer.keyframe);
+  const Keyframe* there = map_.FindKeyframe(answer.matched);
+  if (here != nullptr && there != nullptr && answer.kind == LoopAnswer::Kind::kLoop) {
+    if (here->map_id != there->map_id) JoinMaps(here->map_id, there->map_id);
+    map_.AddLoopEdge(answer.keyframe, answer.matched);
+  }
+  for (const auto& fusion : answer.fusions) {
+    const auto from = map_.Resolve(fusion.from), into = map_.Resolve(fusion.into);
+    if (from && into) map_.Fuse(*from, *into);
+  }
+}
+
+void MapperCore::JoinMaps(MapId from, MapId into) {
+  std::vector<KeyframeId> keyframes;
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    if (keyframe.map_id == from) keyframes.push_back(id);
+  }
+  for (const KeyframeId id : keyframes) map_.SetMapId(id, into);
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) {
+    if (map_.FindLandmark(id)->map_id == from) map_.SetMapId(id, into);
+  }
+}
+
+}  // namespace dmslam

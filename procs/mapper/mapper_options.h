@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace dmslam {
+
+/// Creation of landmarks: DM-SLAM's Algorithm 1 (paper 2.2) and the checks around it.
+struct LandmarkCreationOptions {
+  bool mutual_exclusion = true;   ///< Algorithm 1; off: every match that passes the checks becomes a landmark
+  double neighbourhood_px = 25;   ///< half the side of the neighbourhood in which one candidate excludes others
+  double alpha = 0.3;             ///< candidates of a keyframe are at most alpha * Ln...
+  int min_candidates = 60;        ///< ...but never fewer than this
+  int neighbours = 20;            ///< covisible keyframes that are matched with the new one
+  double min_baseline_over_depth = 0.01;
+  int max_descriptor_distance = 50;   ///< bits
+  double descriptor_ratio = 0.85;     ///< best over second best along the epipolar line; 1 = not asked
+  double epipolar_sigmas_squared = 3.84;
+  double max_parallax_cos = 0.9998;
+  double reprojection_sigmas_squared = 5.991;
+  double scale_ratio_slack = 1.5;     ///< times the pyramid's factor
+
+  std::optional<std::string> Problem() const;
+};
+
+/// What each landmark's evidence does to the belief that it moves.
+struct MotionBeliefOptions {
+  bool enabled = true;
+  float found_step = 0.5F;      ///< taken from the log odds for each frame that found it in its place
+  float moved_step = 1.0F;      ///< added for each frame that found it elsewhere
+  float floor = -4.0F;          ///< however long it stood still, it may start to move
+  float ceiling = 4.0F;
+  float remove_above = 2.5F;    ///< beyond this it leaves the map
+
+  std::optional<std::string> Problem() const;
+};
+
+struct MapperOptions {
+  LandmarkCreationOptions creation;
+  MotionBeliefOptions belief;
+  double min_found_ratio = 0.25;         ///< landmarks found less often than this, of the frames that should see them, go
+  int probation_keyframes = 3;           ///< a landmark is on probation until this many keyframes followed
+  int probation_min_observations = 3;    ///< from the second keyframe on, a landmark on probation needs as many observers
+  double redundant_share = 0.9;          ///< a keyframe goes when this share of its landmarks is seen by three others
+  int local_keyframes = 25;              ///< at most this many keyframes are adjusted at a time (most covisible first)
+  int local_fixed_keyframes = 40;        ///< at most this many hold the window in place
+  int min_covisibility = 15;             ///< landmarks in common that make two keyframes neighbours
+  double fuse_radius_px = 3.0;           ///< times the scale of the predicted octave
+
+  std::optional<std::string> Problem() const;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "dmslam/map/map.h"
+
+namespace dmslam {
+
+/// Where and how a camera at some pose should see a landmark.
+struct LandmarkView {
+  Eigen::Vector2d uv_px;  ///< undistorted
+  double depth = 0;       ///< along the optical axis [map units]
+  double view_cos = 1;    ///< cosine between this view and the mean of those that saw it
+  int octave = 0;         ///< the pyramid level at which it should appear
+};
+
+struct ViewLimits {
+  double min_view_cos = 0.5;      ///< views from the side are refused (ORB-SLAM2: 60 degrees)
+  double distance_slack = 1.2;    ///< how far outside its range of distances a landmark may be
+  double border_px = 0;           ///< how far outside the image a projection may lie
+};
+
+/// Predicts the view of a landmark; none when it is behind, outside the image, or seen from too different a place.
+std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark, const Rigid3d& T_cam_world,
+                                        const ViewLimits& limits = {});
+
+/// The feature near a pixel whose descriptor is nearest.
+struct FeatureHit {
+  int feature = -1;           ///< -1: none
+  int distance = 257;         ///< bits
+  int second_distance = 257;  ///< of the next best feature
+  int octave = -1;
+  int second_octave = -1;
+};
+
+/// Looks within `radius_px` of `uv_px`, at octaves min..max, for the feature nearest to `descriptor`. Features whose
+/// entry in `taken` is non-zero are passed over (`taken` may be empty). Ties go to the lower index.
+FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px, int min_octave,
+                       int max_octave, const Descriptor& descriptor, const std::vector<uint8_t>& taken);
+
+/// Squared reprojection error over the feature's variance (sigma of a pixel at its octave).
+inline double NormalizedErrorSquared(const FrameFeatures& features, int feature, const Eigen::Vector2d& uv_px,
+                                     const Pyramid& pyramid) {
+  const size_t i = static_cast<size_t>(feature);
+  return (features.uv_px[i] - uv_px).squaredNorm() / pyramid.SigmaSquared(features.set.keypoints[i].octave);
+}
+
+}  // namespace dmslam
