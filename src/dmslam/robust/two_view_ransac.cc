@@ -1,0 +1,146 @@
+#include "dmslam/robust/two_view_ransac.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <vector>
+
+#include "dmslam/geometry/two_view.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+struct Matches {
+  std::span<const Eigen::Vector2d> x1_px, x2_px;
+  std::vector<double> inverse_threshold;  ///< 1 / (bound * sigma^2)
+
+  Matches(std::span<const Eigen::Vector2d> x1, std::span<const Eigen::Vector2d> x2,
+          std::span<const double> sigma_squared, double max_error_squared_px)
+      : x1_px(x1), x2_px(x2), inverse_threshold(x1.size(), 1.0 / max_error_squared_px) {
+    DMSLAM_CHECK(x1.size() == x2.size(), "matches come in pairs");
+    DMSLAM_CHECK(sigma_squared.empty() || sigma_squared.size() == x1.size(), "one sigma per match");
+    for (size_t i = 0; i < sigma_squared.size(); ++i) inverse_threshold[i] /= sigma_squared[i];
+  }
+  int size() const { return static_cast<int>(x1_px.size()); }
+  double Sampson(const Eigen::Matrix3d& F, int index) const {
+    const auto i = static_cast<size_t>(index);
+    return SampsonErrorSquared(F, x1_px[i], x2_px[i]) * inverse_threshold[i];
+  }
+};
+
+struct FundamentalProblem {
+  using Model = Eigen::Matrix3d;
+  static constexpr int kSampleSize = 8;
+  static constexpr int kMaxModels = 1;
+  const Matches& matches;
+
+  int size() const { return matches.size(); }
+  int Fit(std::span<const int, 8> sample, std::array<Eigen::Matrix3d, 1>& models) const {
+    const auto F = FundamentalEightPointMinimal(matches.x1_px, matches.x2_px, sample);
+    if (F) models[0] = *F;
+    return F ? 1 : 0;
+  }
+  double NormalizedErrorSquared(const Eigen::Matrix3d& F, int i) const { return matches.Sampson(F, i); }
+  bool Refit(std::span<const int> indices, Eigen::Matrix3d& F) const {
+    const auto refitted = FundamentalEightPoint(matches.x1_px, matches.x2_px, indices, matches.inverse_threshold);
+    if (refitted) F = *refitted;
+    return refitted.has_value();
+  }
+};
+
+/// The model is F = K^-T E K^-1, so that errors are in pixels.
+struct EssentialProblem {
+  using Model = Eigen::Matrix3d;
+  static constexpr int kSampleSize = 5;
+  static constexpr int kMaxModels = 10;
+  const Matches& matches;
+  const Pinhole& camera;
+  const std::vector<Eigen::Vector3d>& rays1;
+  const std::vector<Eigen::Vector3d>& rays2;
+
+  int size() const { return matches.size(); }
+  int Fit(std::span<const int, 5> sample, std::array<Eigen::Matrix3d, 10>& models) const {
+    const int count = EssentialFivePoint(rays1, rays2, sample, models);
+    for (int k = 0; k < count; ++k) {
+      Eigen::Matrix3d& model = models[static_cast<size_t>(k)];
+      model = FundamentalFromEssential(model, camera, camera);
+    }
+    return count;
+  }
+  double NormalizedErrorSquared(const Eigen::Matrix3d& F, int i) const { return matches.Sampson(F, i); }
+  bool Refit(std::span<const int> indices, Eigen::Matrix3d& F) const {
+    const auto E = indices.size() < 16 ? std::nullopt : EssentialEightPoint(rays1, rays2, indices);
+    if (E) F = FundamentalFromEssential(*E, camera, camera);
+    return E.has_value();
+  }
+};
+
+struct Transfer {
+  Eigen::Matrix3d forward = Eigen::Matrix3d::Identity(), backward = Eigen::Matrix3d::Identity();
+};
+
+struct HomographyProblem {
+  using Model = Transfer;
+  static constexpr int kSampleSize = 4;
+  static constexpr int kMaxModels = 1;
+  const Matches& matches;
+
+  int size() const { return matches.size(); }
+  int Fit(std::span<const int, 4> sample, std::array<Transfer, 1>& models) const {
+    const auto H = HomographyFourPoint(matches.x1_px, matches.x2_px, sample);
+    if (H) models[0] = {*H, H->inverse()};
+    return H ? 1 : 0;
+  }
+  double NormalizedErrorSquared(const Transfer& H, int index) const {
+    const auto i = static_cast<size_t>(index);
+    const double there = TransferErrorSquared(H.forward, matches.x1_px[i], matches.x2_px[i]);
+    const double back = TransferErrorSquared(H.backward, matches.x2_px[i], matches.x1_px[i]);
+    return std::max(there, back) * matches.inverse_threshold[i];
+  }
+  bool Refit(std::span<const int> indices, Transfer& model) const {
+    const auto H = HomographyLinear(matches.x1_px, matches.x2_px, indices);
+    if (H) model = {*H, H->inverse()};
+    return H.has_value();
+  }
+};
+
+}  // namespace
+
+RansacReport<Eigen::Matrix3d> FundamentalFromMatches(std::span<const Eigen::Vector2d> x1_px,
+                                                     std::span<const Eigen::Vector2d> x2_px,
+                                                     std::span<const double> sigma_squared,
+                                                     const TwoViewRansacOptions& options) {
+  const Matches matches(x1_px, x2_px, sigma_squared, options.max_error_squared_px);
+  return Ransac(FundamentalProblem{matches}, options.ransac);
+}
+
+RansacReport<Eigen::Matrix3d> EssentialFromMatches(const Pinhole& camera, std::span<const Eigen::Vector2d> x1_px,
+                                                   std::span<const Eigen::Vector2d> x2_px,
+                                                   std::span<const double> sigma_squared,
+                                                   const TwoViewRansacOptions& options) {
+  const Matches matches(x1_px, x2_px, sigma_squared, options.max_error_squared_px);
+  std::vector<Eigen::Vector3d> rays1, rays2;
+  for (const auto& x : x1_px) rays1.push_back(camera.Ray(x));
+  for (const auto& x : x2_px) rays2.push_back(camera.Ray(x));
+  auto report = Ransac(EssentialProblem{matches, camera, rays1, rays2}, options.ransac);
+  report.model = EssentialFromFundamental(report.model, camera, camera);
+  return report;
+}
+
+RansacReport<Eigen::Matrix3d> HomographyFromMatches(std::span<const Eigen::Vector2d> x1_px,
+                                                    std::span<const Eigen::Vector2d> x2_px,
+                                                    std::span<const double> sigma_squared,
+                                                    const TwoViewRansacOptions& options) {
+  const Matches matches(x1_px, x2_px, sigma_squared, options.max_error_squared_px);
+  auto found = Ransac(HomographyProblem{matches}, options.ransac);
+  RansacReport<Eigen::Matrix3d> report;
+  report.success = found.success;
+  report.model = found.model.forward;
+  report.iterations = found.iterations;
+  report.num_inliers = found.num_inliers;
+  report.cost = found.cost;
+  report.inliers = std::move(found.inliers);
+  return report;
+}
+
+}  // namespace dmslam
