@@ -17,7 +17,7 @@ function(lcm_generate target)
     set(header ${out}/dmslam/${type}.hpp)
     add_custom_command(
       OUTPUT ${header}
-      COMMAND ${LCM_GEN} --cpp --cpp-hpath=${out} --cpp-include=dmslam ${lcm_file}
+      COMMAND ${LCM_GEN} --cpp --cpp-hpath=${out} ${lcm_file}
       DEPENDS ${lcm_file}
       COMMENT "lcm-gen ${base}" VERBATIM)
     list(APPEND headers ${header})
