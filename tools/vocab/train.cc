@@ -55,7 +55,8 @@ bool IsImage(const fs::path& path) {
 std::vector<std::string> ImagesIn(const std::string& folder) {
   std::vector<std::string> images;
   if (fs::exists(fs::path(folder) / "rgb.txt")) {
-    for (const StampedFile& frame : TumSequence(folder).frames()) images.push_back(frame.path);
+    const TumSequence sequence(folder);
+    for (const StampedFile& frame : sequence.frames()) images.push_back(frame.path);
     return images;
   }
   std::error_code error;
@@ -70,16 +71,16 @@ std::vector<std::string> ImagesIn(const std::string& folder) {
 }
 
 TrainingSet ExtractAll(const std::vector<std::string>& images, const TrainCommand& command) {
-  OrbOptions options;
+  OrbExtractorOptions options;
   options.num_features = command.features;
   OrbExtractor extractor(options);
   ProgressLine progress("features");
   TrainingSet training;
+  FeatureSet features;
   const auto step = static_cast<size_t>(command.every);
   for (size_t i = 0; i < images.size(); i += step) {
-    const auto image = LoadGray(images[i]);
-    FeatureSet features;
-    extractor.Extract(image.View(), &features);
+    const GrayImage image = LoadGray(images[i]);
+    extractor.Extract({image.data.data(), image.width, image.height, image.width}, &features);
     training.AddImage(features.descriptors);
     progress.Show(static_cast<double>(i + 1) / static_cast<double>(images.size()));
   }

@@ -2,10 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
+#include "dmslam/features/matcher.h"
 #include "dmslam/features/types.h"
 
 namespace dmslam {
@@ -26,17 +26,10 @@ struct WordWeight {
 /// without features.
 using BowVector = std::vector<WordWeight>;
 
-/// A feature and the inner node of the vocabulary that it falls under.
-struct NodeFeature {
-  NodeIndex node = 0;
-  uint32_t feature = 0;
-  auto operator<=>(const NodeFeature&) const = default;
-};
-
-/// The direct index of an image: every feature once, sorted by node, then by feature. Features under the same
-/// node are alike, so that only these need be compared when two images are matched (Galvez-Lopez, Tardos,
-/// section IV-D).
-using FeatureVector = std::vector<NodeFeature>;
+/// The direct index of an image: every feature once with the inner node of the vocabulary that it falls
+/// under, sorted by node (`group`), then by feature. Features under the same node are alike, so that only
+/// these need be compared when two images are matched (Galvez-Lopez, Tardos, section IV-D).
+using FeatureVector = std::vector<GroupedFeature>;
 
 /// Both sides of an image in terms of a vocabulary.
 struct BowImage {
@@ -51,24 +44,6 @@ double L1Score(const BowVector& a, const BowVector& b);
 
 /// Number of words in common.
 size_t CountCommonWords(const BowVector& a, const BowVector& b);
-
-/// Calls `visit` for every node that both images have, in order of nodes, with each image's features under
-/// it.
-void ForEachCommonNode(
-    const FeatureVector& a, const FeatureVector& b,
-    const std::function<void(std::span<const NodeFeature>, std::span<const NodeFeature>)>& visit);
-
-/// How two images are matched through a vocabulary.
-struct BowMatchOptions {
-  int max_distance = 50;    ///< largest Hamming distance of a match [bits]
-  double max_ratio = 0.75;  ///< best distance must be below this share of the second best; 1 turns it off
-  bool check_orientation =
-      true;            ///< keep only matches whose turn of the keypoint's angle agrees with most others
-  bool mutual = true;  ///< each feature must be the best of its match
-
-  /// Throws InputError naming the field.
-  void Check() const;
-};
 
 /// Feature `a` of the first image looks like feature `b` of the second.
 struct BowMatch {
@@ -86,9 +61,12 @@ struct BowMatchSide {
   std::span<const uint8_t> usable{};
 };
 
-/// Matches features that fall under the same node. Every feature takes part in at most one match. Sorted by
-/// `a`.
+/// How MatchByNodes decides unless told otherwise.
+inline constexpr MatchOptions kBowMatchOptions = {.max_ratio = 0.75};
+
+/// Matches features that fall under the same node, as FeatureMatcher::MatchGroups does. Every feature takes
+/// part in at most one match. Sorted by `a`.
 std::vector<BowMatch> MatchByNodes(const BowMatchSide& a, const BowMatchSide& b,
-                                   const BowMatchOptions& options = {});
+                                   const MatchOptions& options = kBowMatchOptions);
 
 }  // namespace dmslam

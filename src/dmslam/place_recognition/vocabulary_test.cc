@@ -108,9 +108,9 @@ TEST_F(VocabularyTest, TransformEqualsDescentByDefinitionOnEveryPath) {
     const auto words = on_path.Quantize(image);
     const BowImage bow = on_path.Transform(image, 2);
     ASSERT_EQ(bow.nodes.size(), image.size());
-    for (const NodeFeature& item : bow.nodes) {
+    for (const GroupedFeature& item : bow.nodes) {
       const auto expected = DescendByDefinition(vocabulary, image[item.feature]);
-      EXPECT_EQ(item.node, expected[std::min<size_t>(2, expected.size() - 1)]);
+      EXPECT_EQ(item.group, expected[std::min<size_t>(2, expected.size() - 1)]);
       EXPECT_EQ(words[item.feature], vocabulary.word_of_leaf(expected.back()));
     }
     EXPECT_TRUE(std::ranges::is_sorted(bow.nodes));
@@ -144,9 +144,9 @@ TEST_F(VocabularyTest, DirectIndexLevelsRunFromRootToLeaf) {
   const Vocabulary vocabulary = SmallVocabulary();
   SyntheticWorld world(400, 7);
   const auto image = world.Image(0, 50, 10);
-  for (const NodeFeature& item : vocabulary.Transform(image, 0).nodes) EXPECT_EQ(item.node, 0U);
-  for (const NodeFeature& item : vocabulary.Transform(image, 99).nodes)
-    EXPECT_TRUE(vocabulary.is_leaf(item.node));
+  for (const GroupedFeature& item : vocabulary.Transform(image, 0).nodes) EXPECT_EQ(item.group, 0U);
+  for (const GroupedFeature& item : vocabulary.Transform(image, 99).nodes)
+    EXPECT_TRUE(vocabulary.is_leaf(item.group));
 }
 
 TEST_F(VocabularyTest, TrainingIsDeterministicUnderItsSeed) {
