@@ -7,22 +7,12 @@
 #include <vector>
 
 #include "dmslam/camera/camera.h"
-#include "dmslam/features/feature_grid.h"
+#include "dmslam/features/frame_features.h"
 #include "dmslam/features/types.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/util/ids.h"
 
 namespace dmslam {
-
-/// What a camera saw in one frame, and where on the ideal image plane. Made once, never changed, shared by all who hold
-/// the frame or the keyframe made of it.
-struct FrameFeatures {
-  FeatureSet set;
-  std::vector<Eigen::Vector2d> uv_px;  ///< undistorted pixel of each keypoint
-  FeatureGrid grid;                    ///< finds features near an undistorted pixel
-
-  size_t size() const { return set.size(); }
-};
 
 /// Undistorts the keypoints of `set` and indexes them. Keypoints whose distortion cannot be inverted are dropped.
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera, const Pyramid& pyramid);

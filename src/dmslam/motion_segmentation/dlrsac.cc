@@ -1,0 +1,348 @@
+#include "dmslam/motion_segmentation/dlrsac.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "dmslam/geometry/two_view.h"
+#include "dmslam/motion_segmentation/neighbor_vote.h"
+#include "dmslam/motion_segmentation/sampling.h"
+
+namespace dmslam {
+namespace {
+
+/// A kept cell: its matches are `range` of the sorted arrays.
+struct Cell {
+  int index = 0;  ///< into StaticSelection::cells
+  Range range;
+  TwoViewModel model;
+  std::vector<uint8_t> own;  ///< inliers of its own model, parallel to range
+  int num_own = 0;
+  CellState state = CellState::kNoModel;
+  Eigen::Vector2d centroid_px = Eigen::Vector2d::Zero();
+};
+
+/// A cell with all that couple with it, and the motion of the whole set.
+struct CoupledSet {
+  std::vector<size_t> members;  ///< into the kept cells
+  TwoViewModel model;
+  double distribution_px = 0;
+  int support = 0;  ///< inliers of the model in the member cells
+};
+
+/// One call's work.
+class Segmentation {
+ public:
+  Segmentation(const DlrsacOptions& options, std::span<const Match> matches, const Camera& camera)
+      : options_(options), matches_(matches), camera_(camera) {}
+
+  StaticSelection Run(uint64_t seed) {
+    SortIntoCells();
+    if (Refused(static_cast<int>(kept_.size()), "enough matches")) return std::move(out_);
+    FitCells(seed);
+    if (Refused(NumModels(), "a model")) return std::move(out_);
+    FillCoupleMatrix();
+    const std::optional<CoupledSet> set = ChooseSet();
+    if (!set) return Refuse(Refusal::kNoModel, "no cell may lead a coupled set", matches_.size());
+    Select(*set);
+    return std::move(out_);
+  }
+
+ private:
+  ModelKind kind() const { return options_.sampling.kind; }
+
+  void SortIntoCells();
+  void FitCells(uint64_t seed);
+  void FitCell(int iterations, Random& random, Cell* cell);
+  CellState Classify(const Cell& cell) const;
+  bool ExplainedByPlane(std::span<const int> own) const;
+  bool ExplainedByRotation(const Cell& cell) const;
+  void FillCoupleMatrix();
+  double Couple(const Eigen::Matrix3d& M, const Cell& cell) const;
+  CoupledSet MakeSet(size_t leader);
+  void Measure(CoupledSet* set) const;
+  std::optional<CoupledSet> ChooseSet();
+  void Select(const CoupledSet& set);
+  void VoteWithNeighbors(std::vector<uint8_t>* flags) const;
+
+  int NumModels() const {
+    return static_cast<int>(std::count_if(kept_.begin(), kept_.end(), [](const Cell& c) { return c.num_own > 0; }));
+  }
+  bool Refused(int cells, const char* what) {
+    if (cells >= options_.min_cells) return false;
+    out_.refusal = Refusal::kTooFewCells;
+    out_.explanation = std::to_string(cells) + " cells with " + what + ", " +
+                       std::to_string(options_.min_cells) + " needed";
+    out_.is_static.assign(matches_.size(), 0);
+    return true;
+  }
+
+  const DlrsacOptions& options_;
+  std::span<const Match> matches_;
+  const Camera& camera_;
+  std::vector<uint32_t> order_;
+  MatchArrays arrays_;
+  std::vector<Cell> kept_;
+  StaticSelection out_;
+};
+
+/// Steps 2: cells, kept ones and their centroids.
+void Segmentation::SortIntoCells() {
+  out_.columns = std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.width_px) / options_.cell_px)));
+  out_.rows = std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.height_px) / options_.cell_px)));
+  out_.cells.resize(static_cast<size_t>(out_.columns) * static_cast<size_t>(out_.rows));
+  const auto cell_of = [&](const Match& match) {
+    const int c = static_cast<int>(match.uv0_px.x() * out_.columns / camera_.width_px);
+    const int r = static_cast<int>(match.uv0_px.y() * out_.rows / camera_.height_px);
+    return std::clamp(r, 0, out_.rows - 1) * out_.columns + std::clamp(c, 0, out_.columns - 1);
+  };
+  order_.resize(matches_.size());
+  std::iota(order_.begin(), order_.end(), 0U);
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](uint32_t a, uint32_t b) { return cell_of(matches_[a]) < cell_of(matches_[b]); });
+  arrays_ = MakeArrays(matches_, order_, camera_, options_.inlier);
+  const int needed = std::max(options_.min_cell_matches, SampleSize(kind()));
+  size_t next = 0;
+  for (int index = 0; index < out_.columns * out_.rows; ++index) {
+    CellReport& report = out_.cells[static_cast<size_t>(index)];
+    report.column = index % out_.columns;
+    report.row = index / out_.columns;
+    Range range{next, next};
+    while (range.end < order_.size() && cell_of(matches_[order_[range.end]]) == index) {
+      report.centroid_px += matches_[order_[range.end++]].uv0_px;
+    }
+    next = range.end;
+    report.num_matches = static_cast<int>(range.size());
+    if (range.size() > 0) report.centroid_px /= static_cast<double>(range.size());
+    if (report.num_matches < needed) continue;
+    Cell cell;
+    cell.index = index;
+    cell.range = range;
+    cell.centroid_px = report.centroid_px;
+    kept_.push_back(std::move(cell));
+  }
+}
+
+/// Step 3: every kept cell gets its share of the iterations.
+void Segmentation::FitCells(uint64_t seed) {
+  const int share = std::max(1, options_.sampling.max_iterations / static_cast<int>(kept_.size()));
+  for (Cell& cell : kept_) {
+    Random random(DeriveSeed(seed, static_cast<uint64_t>(cell.index), "dlrsac-cell"));
+    FitCell(share, random, &cell);
+    CellReport& report = out_.cells[static_cast<size_t>(cell.index)];
+    report.state = cell.state;
+    report.num_inliers = cell.num_own;
+  }
+}
+
+void Segmentation::FitCell(int iterations, Random& random, Cell* cell) {
+  const auto count = [&](const Eigen::Matrix3d& M) {
+    return static_cast<double>(CountInliers(M, arrays_, cell->range));
+  };
+  const BestSample best =
+      DrawModels(options_.sampling, arrays_, cell->range, iterations, random, count,
+                 [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(cell->range.size()); });
+  out_.iterations += best.iterations;
+  if (!best.found()) return;
+  std::vector<uint8_t> flags(arrays_.size(), 0);
+  const int inliers = FlagInliers(best.model.M, arrays_, cell->range, flags);
+  // A sample agrees with itself; a model needs more than that.
+  if (inliers <= SampleSize(kind())) return;
+  cell->model = best.model;
+  cell->num_own = inliers;
+  cell->own.assign(flags.begin() + static_cast<ptrdiff_t>(cell->range.begin),
+                   flags.begin() + static_cast<ptrdiff_t>(cell->range.end));
+  if (kind() == ModelKind::kEssential) ChooseEssentialPose(arrays_, flags, &cell->model);
+  cell->state = Classify(*cell);
+}
+
+CellState Segmentation::Classify(const Cell& cell) const {
+  if (options_.degenerate_vote == DegenerateVote::kAlways) return CellState::kGeneral;
+  std::vector<int> own;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (size_t k = 0; k < cell.own.size(); ++k) {
+    if (!cell.own[k]) continue;
+    own.push_back(static_cast<int>(cell.range.begin + k));
+    mean += matches_[order_[cell.range.begin + k]].uv0_px;
+  }
+  const double n = static_cast<double>(own.size());
+  mean /= n;
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const int i : own) {
+    const Eigen::Vector2d offset = matches_[order_[static_cast<size_t>(i)]].uv0_px - mean;
+    scatter += offset * offset.transpose() / n;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(scatter);
+  if (eigen.eigenvalues()[0] < options_.collinear_px * options_.collinear_px) return CellState::kCollinear;
+  if (ExplainedByRotation(cell)) return CellState::kPureRotation;
+  if (ExplainedByPlane(own)) return CellState::kPlane;
+  return CellState::kGeneral;
+}
+
+bool Segmentation::ExplainedByRotation(const Cell& cell) const {
+  std::vector<uint8_t> use(arrays_.size(), 0);
+  std::copy(cell.own.begin(), cell.own.end(), use.begin() + static_cast<ptrdiff_t>(cell.range.begin));
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  if (!RefineRotation(arrays_, use, 5, &R)) return false;
+  return CountRotationInliers(R, arrays_, cell.range) >= options_.degenerate_share * cell.num_own;
+}
+
+bool Segmentation::ExplainedByPlane(std::span<const int> own) const {
+  const auto H = HomographyLinear(arrays_.p0, arrays_.p1, own);
+  if (!H) return false;
+  int explained = 0;
+  for (const int index : own) {
+    const auto i = static_cast<size_t>(index);
+    const double bound = (5.99 / 3.84) * (arrays_.bound0[i] + arrays_.bound1[i]);
+    if (TransferErrorSquared(*H, arrays_.p0[i], arrays_.p1[i]) <= bound) ++explained;
+  }
+  return explained >= options_.degenerate_share * static_cast<double>(own.size());
+}
+
+/// Step 4. Cells without a model couple with nothing and are coupled with nothing.
+double Segmentation::Couple(const Eigen::Matrix3d& M, const Cell& cell) const {
+  if (cell.num_own == 0) return 0;
+  if (!options_.couple_over_own_inliers) {
+    return CountInliers(M, arrays_, cell.range) / static_cast<double>(cell.range.size());
+  }
+  std::vector<uint8_t> flags(arrays_.size());
+  FlagInliers(M, arrays_, cell.range, flags);
+  int shared = 0;
+  for (size_t k = 0; k < cell.own.size(); ++k) shared += cell.own[k] & flags[cell.range.begin + k];
+  return shared / static_cast<double>(cell.num_own);
+}
+
+void Segmentation::FillCoupleMatrix() {
+  const auto n = static_cast<Eigen::Index>(out_.cells.size());
+  out_.couple = Eigen::MatrixXd::Zero(n, n);
+  for (const Cell& leader : kept_) {
+    if (leader.num_own == 0) continue;
+    for (const Cell& other : kept_) out_.couple(leader.index, other.index) = Couple(leader.model.M, other);
+  }
+}
+
+/// Step 5: the set that `leader` couples with, refined as the options say.
+CoupledSet Segmentation::MakeSet(size_t leader) {
+  CoupledSet set;
+  set.model = kept_[leader].model;
+  for (int round = 0;; ++round) {
+    std::vector<size_t> members;
+    for (size_t j = 0; j < kept_.size(); ++j) {
+      const double degree = round == 0 ? out_.couple(kept_[leader].index, kept_[j].index)
+                                       : Couple(set.model.M, kept_[j]);
+      if (j == leader || degree > options_.couple_threshold) members.push_back(j);
+    }
+    const bool settled = round > 0 && members == set.members;
+    set.members = std::move(members);
+    if (settled || round >= options_.set_refit_rounds) break;
+    std::vector<uint8_t> use(arrays_.size(), 0);
+    for (const size_t j : set.members) FlagInliers(set.model.M, arrays_, kept_[j].range, use);
+    if (!Refine(kind(), arrays_, use, 5, &set.model)) break;
+  }
+  Measure(&set);
+  return set;
+}
+
+/// D over the members' centroids (paper Eq. 3).
+void Segmentation::Measure(CoupledSet* set) const {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  double total = 0, sum = 0;
+  set->support = 0;
+  const auto weight = [&](const Cell& cell) {
+    return options_.distribution_weight == DistributionWeight::kCells ? 1.0 : static_cast<double>(cell.range.size());
+  };
+  for (const size_t j : set->members) {
+    mean += weight(kept_[j]) * kept_[j].centroid_px;
+    total += weight(kept_[j]);
+    set->support += CountInliers(set->model.M, arrays_, kept_[j].range);
+  }
+  mean /= total;
+  for (const size_t j : set->members) sum += weight(kept_[j]) * (kept_[j].centroid_px - mean).squaredNorm();
+  set->distribution_px = std::sqrt(sum / total);
+}
+
+/// Step 6: the widest set; of equally wide ones that with more support.
+std::optional<CoupledSet> Segmentation::ChooseSet() {
+  const bool general = std::any_of(kept_.begin(), kept_.end(),
+                                   [](const Cell& cell) { return cell.state == CellState::kGeneral; });
+  std::optional<CoupledSet> best;
+  for (size_t i = 0; i < kept_.size(); ++i) {
+    if (kept_[i].num_own == 0) continue;
+    const bool may_lead = kept_[i].state == CellState::kGeneral ||
+                          (options_.degenerate_vote == DegenerateVote::kWhenNoneIsGeneral && !general);
+    if (!may_lead) continue;
+    CoupledSet set = MakeSet(i);
+    out_.cells[static_cast<size_t>(kept_[i].index)].coupled_distribution_px = set.distribution_px;
+    const bool better = !best || set.distribution_px > best->distribution_px ||
+                        (set.distribution_px == best->distribution_px && set.support > best->support);
+    if (!better) continue;
+    best = std::move(set);
+    out_.leading_cell = kept_[i].index;
+  }
+  return best;
+}
+
+/// The answer: model and flags of the chosen set.
+void Segmentation::Select(const CoupledSet& set) {
+  for (const size_t j : set.members) out_.cells[static_cast<size_t>(kept_[j].index)].chosen = true;
+  const double set_distribution_px = set.distribution_px;
+  if (set_distribution_px < options_.min_distribution_px) {
+    out_.refusal = Refusal::kDistributionTooSmall;
+    out_.explanation = "the widest coupled set spreads over " + std::to_string(set_distribution_px) + " px, " +
+                       std::to_string(options_.min_distribution_px) + " asked for";
+    out_.is_static.assign(matches_.size(), 0);
+    return;
+  }
+  TwoViewModel model = set.model;
+  std::vector<uint8_t> flags(arrays_.size(), 0);
+  if (options_.scope == StaticScope::kImage) {
+    RefitOnAll(kind(), arrays_, options_.sampling.refit_rounds, &model, &flags);
+    if (options_.neighbor_share > 0) VoteWithNeighbors(&flags);
+  } else {
+    for (const size_t j : set.members) FlagInliers(model.M, arrays_, kept_[j].range, flags);
+    if (options_.scope == StaticScope::kCoupledCells) {
+      for (const size_t j : set.members) {
+        for (size_t k = kept_[j].range.begin; k < kept_[j].range.end; ++k) flags[k] = 1;
+      }
+    }
+  }
+  Finish(matches_, order_, flags, model, kind(), camera_, options_.min_static, &out_);
+  for (const Cell& cell : kept_) {
+    CellReport& report = out_.cells[static_cast<size_t>(cell.index)];
+    for (size_t k = cell.range.begin; k < cell.range.end; ++k) report.num_static += out_.is_static[order_[k]];
+  }
+}
+
+void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
+  std::vector<Match> sorted(matches_.size());
+  for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
+  const std::vector<float> shares = NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_px);
+  for (size_t k = 0; k < flags->size(); ++k) {
+    if (shares[k] < options_.neighbor_share) (*flags)[k] = 0;
+  }
+}
+
+}  // namespace
+
+DlrsacOptions DlrsacOptions::Paper() {
+  DlrsacOptions options;
+  options.sampling.kind = ModelKind::kFundamental;
+  options.sampling.refit_rounds = 0;
+  options.inlier.scale_by_octave = false;
+  options.set_refit_rounds = 0;
+  options.scope = StaticScope::kCoupledCells;
+  options.degenerate_vote = DegenerateVote::kAlways;
+  options.neighbor_share = 0.0;
+  return options;
+}
+
+StaticSelection Dlrsac::Select(std::span<const Match> matches, const Camera& camera, uint64_t seed) const {
+  if (const auto problem = CheckMatches(matches, camera, options_.input)) {
+    return Refuse(problem->refusal, problem->explanation, matches.size());
+  }
+  return Segmentation(options_, matches, camera).Run(seed);
+}
+
+}  // namespace dmslam

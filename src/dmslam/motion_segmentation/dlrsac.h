@@ -1,0 +1,76 @@
+#pragma once
+
+#include "dmslam/motion_segmentation/ransac.h"
+#include "dmslam/motion_segmentation/static_selector.h"
+
+namespace dmslam {
+
+/// How D over a coupled set is taken.
+enum class DistributionWeight : uint8_t {
+  kCells,    ///< mean over the member cells' centroids (the paper)
+  kMatches,  ///< each centroid weighs as much as its cell has matches
+};
+
+/// Which matches may be called static once the motion is chosen.
+enum class StaticScope : uint8_t {
+  kCoupledCells,  ///< all features in the cells of the chosen set (the paper)
+  kCoupledInliers,  ///< those of them that agree with the model
+  kImage,         ///< every match of the image that agrees with the model
+};
+
+/// When degenerate cells (plane, pure rotation, collinear) lead a coupled set.
+enum class DegenerateVote : uint8_t {
+  kAlways,            ///< they are not told apart (the paper)
+  kWhenNoneIsGeneral,  ///< only in pictures in which no cell is general
+  kNever,
+};
+
+/// DLRSAC (Lu et al., Appl. Sci. 2020, 10(12), 4252, Sec. 2.1): the static world is the motion whose support is spread
+/// widest over the image. What the paper leaves open is a field here; `Paper()` is the paper as written, the defaults
+/// are what selects better (docs/dlrsac.md has the numbers).
+struct DlrsacOptions {
+  SamplingOptions sampling;  ///< max_iterations is shared by the cells kept; stop_confidence works per cell
+  InputOptions input;
+  InlierOptions inlier;
+
+  int cell_px = 160;          ///< side of a cell; the paper shows 180 and 240
+  int min_cell_matches = 15;  ///< a cell with fewer is dropped; never below the solver's sample
+  int min_cells = 3;          ///< fewer cells with a model: refused
+  /// Cell i couples with cell j when at least this share of j's own inliers satisfies i's model.
+  double couple_threshold = 0.7;
+  /// The tested share is of the cell's own inliers (the paper); off: of all its matches.
+  bool couple_over_own_inliers = true;
+  DistributionWeight distribution_weight = DistributionWeight::kCells;
+  /// Each coupled set's model is refitted to the set's matches that it explains, and its row of C taken anew, so often.
+  int set_refit_rounds = 2;
+  StaticScope scope = StaticScope::kImage;
+
+  DegenerateVote degenerate_vote = DegenerateVote::kWhenNoneIsGeneral;
+  double degenerate_share = 0.95;  ///< share of a cell's inliers that a plane or a rotation must explain
+  double collinear_px = 4.0;       ///< spread across the main direction below this: collinear
+
+  /// A match is called static only if this share of its neighbours in the image agrees with the model too. What moves
+  /// agrees by accident, and not all of it together. 0: not asked.
+  double neighbor_share = 0.0;
+  int neighbors = 10;              ///< how many nearest matches are asked at most
+  double neighbor_reach_px = 40;   ///< and how far they may be, about
+
+  double min_distribution_px = 0.0;  ///< root of D of the chosen set below this: refused, motion too complex
+  int min_static = 12;               ///< fewer static matches: refused
+
+  /// The paper as written: fundamental matrices, no octaves, no degeneracy, all features of the chosen cells.
+  static DlrsacOptions Paper();
+};
+
+class Dlrsac : public StaticSelector {
+ public:
+  explicit Dlrsac(const DlrsacOptions& options) : options_(options) {}
+  std::string_view name() const override { return "dlrsac"; }
+  StaticSelection Select(std::span<const Match> matches, const Camera& camera, uint64_t seed) const override;
+  const DlrsacOptions& options() const { return options_; }
+
+ private:
+  DlrsacOptions options_;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,38 @@
+#include "dmslam/motion_segmentation/match_frames.h"
+
+namespace dmslam {
+
+std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1,
+                               const MatchingOptions& options, FeatureMatcher* matcher) {
+  const MatchSide side0{frame0.set.keypoints, frame0.set.descriptors, frame0.uv_px, {}};
+  const MatchSide side1{frame1.set.keypoints, frame1.set.descriptors, frame1.uv_px, {}};
+  MatchOptions match;
+  match.max_distance = options.max_distance;
+  match.max_ratio = options.max_ratio;
+  match.check_orientation = options.check_orientation;
+  std::vector<FeatureMatch> found;
+  if (options.use_window) {
+    WindowMatchOptions window;
+    window.match = match;
+    window.window_px = options.window_px;
+    window.octave_slack = options.octave_slack;
+    matcher->MatchWindow(side0, side1, frame1.grid, window, &found);
+  } else {
+    matcher->MatchAll(side0, side1, match, &found);
+  }
+  std::vector<Match> matches;
+  matches.reserve(found.size());
+  for (const FeatureMatch& pair : found) {
+    Match match_px;
+    match_px.index0 = pair.index0;
+    match_px.index1 = pair.index1;
+    match_px.uv0_px = frame0.uv_px[pair.index0];
+    match_px.uv1_px = frame1.uv_px[pair.index1];
+    match_px.octave0 = frame0.set.keypoints[pair.index0].octave;
+    match_px.octave1 = frame1.set.keypoints[pair.index1].octave;
+    matches.push_back(match_px);
+  }
+  return matches;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,87 @@
+#include "dmslam/motion_segmentation/static_selector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dmslam/motion_segmentation/dlrsac.h"
+#include "dmslam/motion_segmentation/ransac.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+
+std::string_view ToString(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::kNone: return "none";
+    case Refusal::kTooFewMatches: return "too few matches";
+    case Refusal::kBadInput: return "bad input";
+    case Refusal::kNoMotion: return "no motion";
+    case Refusal::kTooFewCells: return "too few cells";
+    case Refusal::kNoModel: return "no model";
+    case Refusal::kTooFewStatic: return "too few static matches";
+    case Refusal::kDistributionTooSmall: return "distribution too small";
+  }
+  return "unknown";
+}
+
+std::string_view ToString(CellState state) {
+  switch (state) {
+    case CellState::kTooFew: return "too few";
+    case CellState::kNoModel: return "no model";
+    case CellState::kCollinear: return "collinear";
+    case CellState::kPlane: return "plane";
+    case CellState::kPureRotation: return "pure rotation";
+    case CellState::kGeneral: return "general";
+  }
+  return "unknown";
+}
+
+std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const Camera& camera,
+                                         const InputOptions& options) {
+  const auto needed = static_cast<size_t>(std::max(8, options.min_matches));
+  if (matches.size() < needed) {
+    return InputProblem{Refusal::kTooFewMatches,
+                        std::to_string(matches.size()) + " matches, " + std::to_string(needed) + " needed"};
+  }
+  const double outside = 0.5 + (camera.HasDistortion() ? options.outside_share * camera.width_px : 0.0);
+  const auto inside = [&](const Eigen::Vector2d& uv) {
+    return uv.x() >= -outside && uv.y() >= -outside && uv.x() <= camera.width_px - 1 + outside &&
+           uv.y() <= camera.height_px - 1 + outside;  // False for NaN.
+  };
+  std::vector<double> displacement;
+  displacement.reserve(matches.size());
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (!inside(matches[i].uv0_px) || !inside(matches[i].uv1_px)) {
+      return InputProblem{Refusal::kBadInput,
+                          "match " + std::to_string(i) + " is not finite or lies outside the image"};
+    }
+    displacement.push_back((matches[i].uv1_px - matches[i].uv0_px).squaredNorm());
+  }
+  const auto middle = displacement.begin() + static_cast<ptrdiff_t>(displacement.size() / 2);
+  std::nth_element(displacement.begin(), middle, displacement.end());
+  if (std::sqrt(*middle) < options.min_displacement_px) {
+    return InputProblem{Refusal::kNoMotion, "the median displacement is " + std::to_string(std::sqrt(*middle)) +
+                                                " px: the frames show the same picture"};
+  }
+  return std::nullopt;
+}
+
+std::unique_ptr<StaticSelector> MakeSelector(const std::string& name, ModelKind kind) {
+  if (name == "ransac") {
+    RansacSelectorOptions options;
+    options.sampling.kind = kind;
+    return std::make_unique<RansacSelector>(options);
+  }
+  if (name == "arsac") {
+    ArsacOptions options;
+    options.sampling.kind = kind;
+    return std::make_unique<Arsac>(options);
+  }
+  if (name == "dlrsac" || name == "dlrsac-paper") {
+    DlrsacOptions options = name == "dlrsac" ? DlrsacOptions() : DlrsacOptions::Paper();
+    if (name == "dlrsac") options.sampling.kind = kind;
+    return std::make_unique<Dlrsac>(options);
+  }
+  throw InputError("unknown method '" + name + "': use dlrsac, dlrsac-paper, arsac or ransac");
+}
+
+}  // namespace dmslam

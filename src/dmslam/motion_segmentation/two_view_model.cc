@@ -1,0 +1,285 @@
+#include "dmslam/motion_segmentation/two_view_model.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "dmslam/geometry/rigid3.h"
+#include "dmslam/geometry/two_view.h"
+#include "dmslam/robust/ransac.h"
+
+namespace dmslam {
+namespace {
+
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
+using Vector5d = Eigen::Matrix<double, 5, 1>;
+
+/// Two directions that span the plane across `t`.
+Eigen::Matrix<double, 3, 2> Tangent(const Eigen::Vector3d& t) {
+  const Eigen::Vector3d helper =
+      std::abs(t.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Matrix<double, 3, 2> B;
+  B.col(0) = t.cross(helper).normalized();
+  B.col(1) = t.cross(B.col(0));
+  return B;
+}
+
+/// Algebraic epipolar residual t . (R ray0 x ray1) and its derivative with respect to a left rotation and to t in its
+/// tangent plane.
+struct EssentialRow {
+  double residual = 0;
+  Vector5d jacobian;
+};
+
+EssentialRow MakeEssentialRow(const Eigen::Vector3d& y, const Eigen::Vector3d& ray1, const Eigen::Vector3d& t,
+                              const Eigen::Matrix<double, 3, 2>& B) {
+  EssentialRow row;
+  const Eigen::Vector3d normal = y.cross(ray1);
+  row.residual = t.dot(normal);
+  row.jacobian.head<3>() = y.cross(ray1.cross(t));
+  row.jacobian.tail<2>() = B.transpose() * normal;
+  return row;
+}
+
+Eigen::Matrix3d SmallRotation(const Eigen::Vector3d& w) { return ExpSo3(w).toRotationMatrix(); }
+
+void UpdateEssential(const Vector5d& step, const Eigen::Matrix<double, 3, 2>& B, TwoViewModel* model) {
+  model->R = SmallRotation(step.head<3>()) * model->R;
+  model->t = (model->t + B * step.tail<2>()).normalized();
+}
+
+/// Sampson's denominator with both points' bounds, for row vectors of M.
+double SampsonBound(const Eigen::Matrix3d& M, const MatchArrays& a, size_t i) {
+  const Eigen::Vector3d l1 = M * a.ray0[i];
+  const Eigen::Vector3d l0 = M.transpose() * a.ray1[i];
+  return a.bound1[i] * l1.head<2>().squaredNorm() + a.bound0[i] * l0.head<2>().squaredNorm();
+}
+
+}  // namespace
+
+MatchArrays MakeArrays(std::span<const Match> matches, std::span<const uint32_t> order, const Camera& camera,
+                       const InlierOptions& options) {
+  MatchArrays arrays;
+  const size_t n = order.size();
+  for (auto* array : {&arrays.x0, &arrays.y0, &arrays.x1, &arrays.y1, &arrays.bound0, &arrays.bound1}) {
+    array->resize(n);
+  }
+  for (auto* array : {&arrays.p0, &arrays.p1}) array->resize(n);
+  for (auto* array : {&arrays.ray0, &arrays.ray1}) array->resize(n);
+  const double focal = 0.5 * (camera.fx_px + camera.fy_px);
+  const double unit = options.chi2 * options.sigma_px * options.sigma_px / (focal * focal);
+  std::array<double, 256> variance{};
+  for (int octave = 0; octave < 256; ++octave) {
+    const bool known = options.scale_by_octave && octave < options.pyramid.levels;
+    variance[static_cast<size_t>(octave)] = known ? options.pyramid.SigmaSquared(octave) : 1.0;
+  }
+  for (size_t k = 0; k < n; ++k) {
+    const Match& match = matches[order[k]];
+    const Eigen::Vector3d ray0 = camera.Ray(match.uv0_px), ray1 = camera.Ray(match.uv1_px);
+    arrays.x0[k] = static_cast<float>(ray0.x());
+    arrays.y0[k] = static_cast<float>(ray0.y());
+    arrays.x1[k] = static_cast<float>(ray1.x());
+    arrays.y1[k] = static_cast<float>(ray1.y());
+    arrays.bound0[k] = static_cast<float>(unit * variance[match.octave0]);
+    arrays.bound1[k] = static_cast<float>(unit * variance[match.octave1]);
+    arrays.ray0[k] = ray0;
+    arrays.ray1[k] = ray1;
+    arrays.p0[k] = ray0.head<2>();
+    arrays.p1[k] = ray1.head<2>();
+  }
+  return arrays;
+}
+
+double NormalizedSampson(const Eigen::Matrix3d& M, const MatchArrays& arrays, size_t i) {
+  const double e = arrays.ray1[i].dot(M * arrays.ray0[i]);
+  const double bound = SampsonBound(M, arrays, i);
+  return bound > 0 ? e * e / bound : 1e30;
+}
+
+namespace {
+
+/// Calls `sink(i, inlier)` for all of range. Written so that the compiler makes vector code of it.
+template <typename Sink>
+inline void ForEachSampson(const Eigen::Matrix3d& Md, const MatchArrays& a, Range range, Sink sink) {
+  const Eigen::Matrix3f M = Md.cast<float>();
+  const float m00 = M(0, 0), m01 = M(0, 1), m02 = M(0, 2), m10 = M(1, 0), m11 = M(1, 1), m12 = M(1, 2),
+              m20 = M(2, 0), m21 = M(2, 1), m22 = M(2, 2);
+  const float* const x0 = a.x0.data();
+  const float* const y0 = a.y0.data();
+  const float* const x1 = a.x1.data();
+  const float* const y1 = a.y1.data();
+  const float* const b0 = a.bound0.data();
+  const float* const b1 = a.bound1.data();
+  for (size_t i = range.begin; i < range.end; ++i) {
+    const float lx = m00 * x0[i] + m01 * y0[i] + m02;
+    const float ly = m10 * x0[i] + m11 * y0[i] + m12;
+    const float lz = m20 * x0[i] + m21 * y0[i] + m22;
+    const float kx = m00 * x1[i] + m10 * y1[i] + m20;
+    const float ky = m01 * x1[i] + m11 * y1[i] + m21;
+    const float e = x1[i] * lx + y1[i] * ly + lz;
+    const float bound = b1[i] * (lx * lx + ly * ly) + b0[i] * (kx * kx + ky * ky);
+    sink(i, e * e <= bound ? 1 : 0);
+  }
+}
+
+}  // namespace
+
+int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range) {
+  int count = 0;
+  ForEachSampson(M, arrays, range, [&count](size_t, int inlier) { count += inlier; });
+  return count;
+}
+
+int FlagInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, std::span<uint8_t> flags) {
+  int count = 0;
+  uint8_t* const out = flags.data();
+  ForEachSampson(M, arrays, range, [&count, out](size_t i, int inlier) {
+    out[i] = static_cast<uint8_t>(inlier);
+    count += inlier;
+  });
+  return count;
+}
+
+int CountRotationInliers(const Eigen::Matrix3d& R, const MatchArrays& arrays, Range range) {
+  int count = 0;
+  for (size_t i = range.begin; i < range.end; ++i) {
+    const Eigen::Vector3d moved = R * arrays.ray0[i];
+    if (moved.z() <= 0) continue;
+    const double dx = moved.x() / moved.z() - arrays.x1[i], dy = moved.y() / moved.z() - arrays.y1[i];
+    // Two residuals instead of one: 5.99 takes the place of 3.84.
+    if (dx * dx + dy * dy <= (5.99 / 3.84) * (arrays.bound0[i] + arrays.bound1[i])) ++count;
+  }
+  return count;
+}
+
+namespace {
+
+template <int kSize>
+std::array<int, kSize> DrawFrom(Range range, Random& random) {
+  std::array<int, kSize> sample;
+  DrawSample<kSize>(random, static_cast<int>(range.size()), sample);
+  for (int& index : sample) index += static_cast<int>(range.begin);
+  return sample;
+}
+
+}  // namespace
+
+int SolveSample(ModelKind kind, const MatchArrays& arrays, Range range, Random& random,
+                std::array<Eigen::Matrix3d, kMaxModels>& models) {
+  if (kind == ModelKind::kEssential) {
+    return EssentialFivePoint(arrays.ray0, arrays.ray1, DrawFrom<5>(range, random), models);
+  }
+  const auto F = FundamentalEightPointMinimal(arrays.p0, arrays.p1, DrawFrom<8>(range, random));
+  if (!F) return 0;
+  models[0] = *F;
+  return 1;
+}
+
+void ChooseEssentialPose(const MatchArrays& arrays, std::span<const uint8_t> use, TwoViewModel* model) {
+  std::vector<int> indices;
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (use[i]) indices.push_back(static_cast<int>(i));
+  }
+  Rigid3d pose;
+  PoseFromEssential(model->M, arrays.ray0, arrays.ray1, indices, pose);
+  model->R = pose.rotation.toRotationMatrix();
+  model->t = pose.translation.normalized();
+}
+
+bool Refine(ModelKind kind, const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
+            TwoViewModel* model) {
+  return kind == ModelKind::kFundamental ? RefineFundamental(arrays, use, model)
+                                         : RefineEssential(arrays, use, iterations, model);
+}
+
+bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, TwoViewModel* model) {
+  std::vector<int> indices;
+  std::vector<double> weights(use.size(), 0.0);
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (!use[i]) continue;
+    indices.push_back(static_cast<int>(i));
+    weights[i] = arrays.bound0[0] / (static_cast<double>(arrays.bound0[i]) + static_cast<double>(arrays.bound1[i]));
+  }
+  const auto F = FundamentalEightPoint(arrays.p0, arrays.p1, indices, weights);
+  if (!F) return false;
+  model->M = *F / F->norm();
+  return model->M.allFinite();
+}
+
+bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
+                     TwoViewModel* model) {
+  double damping = 1e-6;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
+    const Eigen::Matrix3d M = Hat(model->t) * model->R;
+    Matrix5d normal = Matrix5d::Zero();
+    Vector5d gradient = Vector5d::Zero();
+    int used = 0;
+    for (size_t i = 0; i < use.size(); ++i) {
+      if (!use[i]) continue;
+      const double bound = SampsonBound(M, arrays, i);
+      if (!(bound > 0)) continue;
+      const EssentialRow row =
+          MakeEssentialRow(model->R * arrays.ray0[i], arrays.ray1[i], model->t, B);
+      const double squared = row.residual * row.residual / bound;
+      const double weight = 1.0 / (bound * (1.0 + squared) * (1.0 + squared));  // Geman-McClure
+      normal.noalias() += row.jacobian * (weight * row.jacobian.transpose());
+      gradient += weight * row.residual * row.jacobian;
+      ++used;
+    }
+    if (used < 5) return false;
+    normal.diagonal() *= 1.0 + damping;
+    normal.diagonal().array() += 1e-12;
+    const Vector5d step = -normal.ldlt().solve(gradient);
+    if (!step.allFinite() || step.head<3>().norm() > 1.0) return false;
+    UpdateEssential(step, B, model);
+    if (step.squaredNorm() < 1e-14) break;
+  }
+  model->M = Hat(model->t) * model->R;
+  model->M /= model->M.norm();
+  return model->M.allFinite();
+}
+
+bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, Eigen::Matrix3d* R) {
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < use.size(); ++i) {
+      if (!use[i]) continue;
+      const Eigen::Vector3d y = (*R * arrays.ray0[i]).normalized();
+      const Eigen::Vector3d x = arrays.ray1[i].normalized();
+      const double variance = static_cast<double>(arrays.bound0[i]) + static_cast<double>(arrays.bound1[i]);
+      const double squared = (x - y).squaredNorm() / variance;
+      const double weight = 1.0 / (variance * (1.0 + squared) * (1.0 + squared));
+      normal += weight * (Eigen::Matrix3d::Identity() - y * y.transpose());
+      rhs += weight * y.cross(x);
+    }
+    const Eigen::Vector3d step = normal.ldlt().solve(rhs);
+    if (!step.allFinite()) return false;
+    *R = SmallRotation(step) * *R;
+    if (step.squaredNorm() < 1e-14) break;
+  }
+  return R->allFinite();
+}
+
+void StoreModel(const TwoViewModel& model, ModelKind kind, const Camera& camera, StaticSelection* selection) {
+  const Eigen::Matrix3d K_inverse = camera.K().inverse();
+  selection->kind = kind;
+  selection->F = K_inverse.transpose() * model.M * K_inverse;
+  selection->F /= selection->F.norm();
+  if (kind == ModelKind::kEssential) selection->E = model.M;
+}
+
+double Spread(std::span<const Eigen::Vector2d> points_px) {
+  if (points_px.empty()) return 0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& point : points_px) mean += point;
+  mean /= static_cast<double>(points_px.size());
+  double sum = 0;
+  for (const Eigen::Vector2d& point : points_px) sum += (point - mean).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(points_px.size()));
+}
+
+}  // namespace dmslam
