@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "dmslam/camera/camera.h"
+#include "dmslam/features/types.h"
+#include "dmslam/geometry/rigid3.h"
+#include "dmslam/util/ids.h"
+
+namespace dmslam::wire {
+
+/// Collects what is wrong with a message; the first complaint stays.
+class Checker {
+ public:
+  bool ok() const { return what_ == nullptr; }
+  const char* what() const { return what_; }
+
+  void Require(bool condition, const char* what) {
+    if (!condition && what_ == nullptr) what_ = what;
+  }
+  void Finite(double value, const char* what) { Require(std::isfinite(value), what); }
+  /// Finite and not beyond any map's size.
+  void Position(const Eigen::Vector3d& p, const char* what);
+  void UnitQuaternion(const Eigen::Quaterniond& q, const char* what);
+  void Pose(const Rigid3d& T, const char* what);
+  void Scale(double scale, const char* what);
+  void Stamp(int64_t stamp_ns) { Require(stamp_ns >= 0, "negative stamp"); }
+  void Session(uint32_t session) { Require(session >= 1, "no session"); }
+  void Share(double share) { Require(share >= 0 && share <= 1, "a share outside 0..1"); }
+  /// An id that some session, or some mapper, can have made; `Optional`: or none.
+  void Id(KeyframeId id, const char* what) { Require(id.session() >= 1, what); }
+  void Id(LandmarkId id, const char* what) { Require(id.epoch_ordinal() >= 1, what); }
+  template <typename AnyId>
+  void OptionalId(AnyId id, const char* what) {
+    if (id.valid()) Id(id, what);
+  }
+  void CameraModel(const Camera& camera);
+  void Features(const FeatureSet& features);
+
+ private:
+  const char* what_ = nullptr;
+};
+
+/// Whether a text may travel: valid UTF-8 without control characters but line feeds, at most kMaxTextBytes.
+bool IsCleanText(std::string_view text);
+/// The text with a question mark for each byte that may not, cut to the longest that may travel.
+std::string CleanText(std::string_view text);
+
+/// Largest coordinate of a pose or a point [map units].
+inline constexpr double kMaxCoordinate = 1e12;
+inline constexpr int kMaxImageSide = 4096;
+inline constexpr int kMaxPyramidLevels = 32;
+inline constexpr size_t kMaxFeatures = 65535;
+
+}  // namespace dmslam::wire

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "dmslam/wire/codec_impl.h"
+
+namespace dmslam::wire {
+
+template <>
+struct EnumRange<PlaybackMode> {
+  static constexpr auto kFirst = PlaybackMode::kRealtime, kLast = PlaybackMode::kLockstep;
+  static constexpr const char* kName = "unknown mode";
+};
+template <>
+struct EnumRange<TrackingState> {
+  static constexpr auto kFirst = TrackingState::kNotInitialized, kLast = TrackingState::kLocalizedLater;
+  static constexpr const char* kName = "unknown tracking state";
+};
+
+}  // namespace dmslam::wire

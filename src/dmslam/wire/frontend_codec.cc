@@ -1,0 +1,332 @@
+#include <algorithm>
+
+#include "dmslam/features_t.hpp"
+#include "dmslam/frame_done_t.hpp"
+#include "dmslam/frame_evidence_t.hpp"
+#include "dmslam/frame_pose_t.hpp"
+#include "dmslam/frame_trace_t.hpp"
+#include "dmslam/initial_map_t.hpp"
+#include "dmslam/keyframe_t.hpp"
+#include "dmslam/map_reset_t.hpp"
+#include "dmslam/pose_t.hpp"
+#include "dmslam/session_t.hpp"
+#include "dmslam/wire/camera_fields.h"
+#include "dmslam/wire/enum_ranges.h"
+
+namespace dmslam::wire {
+
+template <>
+struct Codec<SessionStart> {
+  using Wire = session_t;
+  static constexpr const char* kChannel = channels::kSession;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.first_stamp_ns, w.utime);
+    s(m.session, w.session);
+    s(m.seed, w.seed);
+    s(m.configuration_hash, w.configuration_hash);
+    s(m.vocabulary_checksum, w.vocabulary_checksum);
+    s(m.first_stamp_ns, w.first_stamp_ns);
+    s(m.mode, w.mode);
+    s(m.pyramid.levels, w.pyramid_levels);
+    s(m.pyramid.scale_factor, w.pyramid_scale_factor);
+    CameraFields(s, m.camera, w);
+    s(m.sequence, w.sequence);
+    s(m.profile, w.profile);
+  }
+  static void Validate(const SessionStart& m, Checker& check) {
+    check.Session(m.session);
+    check.Stamp(m.first_stamp_ns);
+    check.CameraModel(m.camera);
+    check.Require(m.pyramid.levels >= 1 && m.pyramid.levels <= kMaxPyramidLevels,
+                  "number of pyramid levels out of range");
+    check.Require(m.pyramid.scale_factor > 1 && m.pyramid.scale_factor <= 4,
+                  "pyramid's scale factor out of range");
+  }
+};
+
+namespace {
+
+void KeyframeFields(auto& s, auto& m, auto& w) {
+  s(m.id, w.id);
+  s(m.reference, w.reference_id);
+  s(m.stamp_ns, w.stamp_ns);
+  s(m.map_id, w.map_id);
+  s(m.T_cam_reference, w.rotation_cam_reference, w.translation_cam_reference);
+  s(m.reference_scale, w.reference_scale);
+  auto& keypoints = m.features.keypoints;
+  s.Count(keypoints, w.num_features, kMaxFeatures);
+  s.Count(m.features.descriptors, w.num_features, kMaxFeatures);
+  s.Column(keypoints, w.x_q4, &Keypoint::x_q4);
+  s.Column(keypoints, w.y_q4, &Keypoint::y_q4);
+  s.Column(keypoints, w.octave, &Keypoint::octave);
+  s.Column(keypoints, w.angle, &Keypoint::angle);
+  s.Descriptors(m.features.descriptors, w.num_descriptor_bytes, w.descriptors, std::identity());
+  s.Count(m.matches, w.num_matches, kMaxFeatures);
+  s.Column(m.matches, w.match_feature, &KeyframeProposal::Match::feature);
+  s.Column(m.matches, w.match_landmark, &KeyframeProposal::Match::landmark);
+  s.Count(m.moving, w.num_moving, kMaxFeatures);
+  s.Column(m.moving, w.moving, std::identity());
+}
+
+void ValidateKeyframe(const KeyframeProposal& m, Checker& check) {
+  check.Id(m.id, "no keyframe id");
+  check.OptionalId(m.reference, "impossible id of the reference keyframe");
+  check.Require(m.map_id >= 1, "no map id");
+  check.Stamp(m.stamp_ns);
+  check.Pose(m.T_cam_reference, "no pose");
+  check.Scale(m.reference_scale, "scale of the reference out of range");
+  check.Features(m.features);
+  for (const KeyframeProposal::Match& match : m.matches) {
+    check.Require(match.feature < m.features.size(), "a match names a feature that is not there");
+    check.Id(match.landmark, "a match names an impossible landmark");
+  }
+  for (size_t i = 0; i < m.moving.size(); ++i) {
+    check.Require(m.moving[i] < m.features.size(), "a moving feature is not there");
+    check.Require(i == 0 || m.moving[i - 1] < m.moving[i], "moving features are not ascending");
+  }
+}
+
+}  // namespace
+
+template <>
+struct Codec<KeyframeProposal> {
+  using Wire = keyframe_t;
+  static constexpr const char* kChannel = channels::kKeyframe;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    KeyframeFields(s, m, w.keyframe);
+  }
+  static void Validate(const KeyframeProposal& m, Checker& check) { ValidateKeyframe(m, check); }
+};
+
+template <>
+struct Codec<InitialMap> {
+  using Wire = initial_map_t;
+  static constexpr const char* kChannel = channels::kInitialMap;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    using Point = InitialMap::Point;
+    s.Utime(m.second.stamp_ns, w.utime);
+    s(m.map_id, w.map_id);
+    KeyframeFields(s, m.first, w.first);
+    KeyframeFields(s, m.second, w.second);
+    s.Count(m.points, w.num_points, kMaxFeatures);
+    s.Column(m.points, w.feature_first, &Point::feature_first);
+    s.Column(m.points, w.feature_second, &Point::feature_second);
+    s.Column(m.points, w.x_world, Coordinate<0, &Point::p_world>());
+    s.Column(m.points, w.y_world, Coordinate<1, &Point::p_world>());
+    s.Column(m.points, w.z_world, Coordinate<2, &Point::p_world>());
+  }
+  static void Validate(const InitialMap& m, Checker& check) {
+    check.Require(m.map_id >= 1, "no map id");
+    ValidateKeyframe(m.first, check);
+    ValidateKeyframe(m.second, check);
+    for (const InitialMap::Point& point : m.points) {
+      check.Require(
+          point.feature_first < m.first.features.size() && point.feature_second < m.second.features.size(),
+          "a point names a feature that is not there");
+      check.Position(point.p_world, "position of a point is not finite");
+    }
+  }
+};
+
+template <>
+struct Codec<FramePose> {
+  using Wire = frame_pose_t;
+  static constexpr const char* kChannel = channels::kFramePose;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.frame_index, w.frame_index);
+    s(m.state, w.state);
+    s(m.stamp_ns, w.stamp_ns);
+    s(m.map_id, w.map_id);
+    s(m.reference, w.reference_id);
+    s(m.T_cam_reference, w.rotation_cam_reference, w.translation_cam_reference);
+    s(m.reference_scale, w.reference_scale);
+    s(m.T_cam_world, w.rotation_cam_world, w.translation_cam_world);
+    s(m.num_features, w.num_features);
+    s(m.num_static, w.num_static);
+    s(m.num_moving, w.num_moving);
+    s(m.num_unknown, w.num_unknown);
+    s(m.moving_image_share, w.moving_image_share);
+    s(m.reason, w.reason);
+  }
+  static void Validate(const FramePose& m, Checker& check) {
+    check.Stamp(m.stamp_ns);
+    check.OptionalId(m.reference, "impossible id of the reference keyframe");
+    check.Pose(m.T_cam_reference, "no pose relative to the reference keyframe");
+    check.Pose(m.T_cam_world, "no pose in the map");
+    check.Scale(m.reference_scale, "scale of the reference out of range");
+    check.Share(static_cast<double>(m.moving_image_share));
+  }
+};
+
+template <>
+struct Codec<FrameEvidence> {
+  using Wire = frame_evidence_t;
+  static constexpr const char* kChannel = channels::kFrameEvidence;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    using Item = FrameEvidence::Item;
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.map_id, w.map_id);
+    s(m.stamp_ns, w.stamp_ns);
+    s.Count(m.items, w.num_landmarks);
+    s.Column(m.items, w.landmark, &Item::landmark);
+    s.Column(m.items, w.visible, &Item::visible);
+    s.Column(m.items, w.found, &Item::found);
+    s.Column(m.items, w.moved, &Item::moved);
+    s.Column(m.items, w.chi2_sum, &Item::chi2_sum);
+  }
+  static void Validate(const FrameEvidence& m, Checker& check) {
+    check.Stamp(m.stamp_ns);
+    for (size_t i = 0; i < m.items.size(); ++i) {
+      check.Id(m.items[i].landmark, "impossible landmark");
+      check.Require(i == 0 || m.items[i - 1].landmark < m.items[i].landmark, "landmarks are not ascending");
+      check.Require(std::isfinite(m.items[i].chi2_sum) && m.items[i].chi2_sum >= 0,
+                    "sum of squares below zero");
+    }
+  }
+};
+
+template <>
+struct Codec<MapReset> {
+  using Wire = map_reset_t;
+  static constexpr const char* kChannel = channels::kMapReset;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.stamp_ns, w.stamp_ns);
+    s(m.map_id, w.map_id);
+    s(m.drop, w.drop);
+    s(m.reason, w.reason);
+  }
+  static void Validate(const MapReset& m, Checker& check) {
+    check.Stamp(m.stamp_ns);
+    check.Require(m.map_id >= 1, "no map id");
+  }
+};
+
+template <>
+struct Codec<FrameDone> {
+  using Wire = frame_done_t;
+  static constexpr const char* kChannel = channels::kFrameDone;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.session, w.session);
+    s(m.frame_index, w.frame_index);
+    s(m.stamp_ns, w.done_stamp_ns);
+  }
+  static void Validate(const FrameDone& m, Checker& check) {
+    check.Session(m.session);
+    check.Stamp(m.stamp_ns);
+  }
+};
+
+template <>
+struct Codec<PoseView> {
+  using Wire = pose_t;
+  static constexpr const char* kChannel = channels::kPoseView;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.session, w.session);
+    s(m.stamp_ns, w.stamp_ns);
+    s(m.frame_index, w.frame_index);
+    s(m.state, w.state);
+    s(m.map_id, w.map_id);
+    s(m.has_pose, w.has_pose);
+    s(m.T_world_cam.translation.x(), w.x);
+    s(m.T_world_cam.translation.y(), w.y);
+    s(m.T_world_cam.translation.z(), w.z);
+    s(m.T_world_cam.rotation.x(), w.qx);
+    s(m.T_world_cam.rotation.y(), w.qy);
+    s(m.T_world_cam.rotation.z(), w.qz);
+    s(m.T_world_cam.rotation.w(), w.qw);
+    s(m.inliers, w.inliers);
+    s(m.moving, w.moving);
+    s(m.unknown, w.unknown);
+    s(m.moving_share, w.moving_share);
+    s(m.latency_ms, w.latency_ms);
+    s(m.error_m, w.error_m);
+  }
+  static void Validate(const PoseView& m, Checker& check) {
+    check.Session(m.session);
+    check.Stamp(m.stamp_ns);
+    check.Pose(m.T_world_cam, "no pose");
+    check.Require(m.inliers >= 0 && m.moving >= 0 && m.unknown >= 0, "negative number of features");
+    check.Share(m.moving_share);
+    check.Finite(m.latency_ms, "latency is not finite");
+    check.Finite(m.error_m, "error is not finite");
+  }
+};
+
+template <>
+struct EnumRange<FeatureView::Kind> {
+  static constexpr auto kFirst = FeatureView::Kind::kUnmatched, kLast = FeatureView::Kind::kMoving;
+  static constexpr const char* kName = "unknown kind of a feature";
+};
+
+template <>
+struct Codec<FeatureView> {
+  using Wire = features_t;
+  static constexpr const char* kChannel = channels::kFeatureView;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    using Item = FeatureView::Item;
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.session, w.session);
+    s(m.frame_index, w.frame_index);
+    s(m.stamp_ns, w.stamp_ns);
+    s.Count(m.items, w.num_features, kMaxFeatures);
+    s.Column(m.items, w.u_q4, &Item::u_q4);
+    s.Column(m.items, w.v_q4, &Item::v_q4);
+    s.Column(m.items, w.kind, &Item::kind);
+  }
+  static void Validate(const FeatureView& m, Checker& check) {
+    check.Session(m.session);
+    check.Stamp(m.stamp_ns);
+  }
+};
+
+template <>
+struct Codec<FrameTrace> {
+  using Wire = frame_trace_t;
+  static constexpr const char* kChannel = channels::kFrameTrace;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.session, w.session);
+    s(m.frame_index, w.frame_index);
+    s(m.stamp_ns, w.stamp_ns);
+    s(m.capture_us, w.capture_us);
+    s(m.publish_us, w.publish_us);
+    s(m.receive_us, w.receive_us);
+    s(m.begin_us, w.begin_us);
+    s(m.decoded_us, w.decoded_us);
+    s(m.extracted_us, w.extracted_us);
+    s(m.tracked_us, w.tracked_us);
+    s(m.published_us, w.published_us);
+  }
+  static void Validate(const FrameTrace& m, Checker& check) {
+    check.Session(m.session);
+    check.Stamp(m.stamp_ns);
+  }
+};
+
+DMSLAM_WIRE_MESSAGE(SessionStart);
+DMSLAM_WIRE_MESSAGE(KeyframeProposal);
+DMSLAM_WIRE_MESSAGE(InitialMap);
+DMSLAM_WIRE_MESSAGE(FramePose);
+DMSLAM_WIRE_MESSAGE(FrameEvidence);
+DMSLAM_WIRE_MESSAGE(MapReset);
+DMSLAM_WIRE_MESSAGE(FrameDone);
+DMSLAM_WIRE_MESSAGE(PoseView);
+DMSLAM_WIRE_MESSAGE(FeatureView);
+DMSLAM_WIRE_MESSAGE(FrameTrace);
+
+}  // namespace dmslam::wire
