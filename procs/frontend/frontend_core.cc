@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dmslam/util/random.h"
+#include "frontend/initial_map.h"
 
 namespace dmslam {
 namespace {
@@ -30,9 +31,13 @@ FrontendCore::FrontendCore(Setup setup)
       map_(setup.camera, setup.pyramid),
       extractor_(setup.extractor),
       initializer_options_(setup.initializer),
-      initializer_(std::make_unique<Initializer>(setup.initializer, setup.camera, setup.seed)),
+      initializer_(MakeInitializer()),
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
       relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {}
+
+std::unique_ptr<Initializer> FrontendCore::MakeInitializer() const {
+  return std::make_unique<Initializer>(initializer_options_, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
+}
 
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
@@ -52,7 +57,7 @@ void FrontendCore::ProcessImage(uint32_t frame_index, int64_t stamp_ns, const Gr
 void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features,
                                    std::vector<FrontendEvent>* events) {
   ++counters_.frames;
-  frame_ = Frame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
+  frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
   switch (state_) {
     case TrackingState::kNotInitialized:
       Initialize(events);
@@ -112,8 +117,8 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   Track(events);
 }
 
-Frame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {
-  Frame frame(keyframe.id.frame_index(), keyframe.stamp_ns, keyframe.features);
+TrackedFrame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {
+  TrackedFrame frame(keyframe.id.frame_index(), keyframe.stamp_ns, keyframe.features);
   frame.landmarks = keyframe.landmarks;
   frame.T_cam_world = keyframe.T_cam_world;
   return frame;
@@ -148,7 +153,7 @@ void FrontendCore::Track(std::vector<FrontendEvent>* events) {
     report = tracker_.TrackLocalMap(map_, careful, &frame_);
   }
   if (!report.ok && state_ != TrackingState::kTrial) {
-    Frame attempt(frame_.index, frame_.stamp_ns, frame_.features);
+    TrackedFrame attempt(frame_.index, frame_.stamp_ns, frame_.features);
     if (relocalizer_.Relocalize(map_, map_id_, DeriveSeed(seed_, frame_.index, "relocalize"), &tracker_, &attempt)) {
       frame_ = std::move(attempt);
       report = tracker_.TrackLocalMap(map_, true, &frame_);
@@ -220,7 +225,7 @@ void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<F
   ++map_id_;
   tracker_.Reset();
   velocity_.reset();
-  initializer_ = std::make_unique<Initializer>(initializer_options_, camera_, seed_);
+  initializer_ = MakeInitializer();
   state_ = TrackingState::kNotInitialized;
   awaited_ = {};
 }
@@ -296,7 +301,7 @@ void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
 
 // ---- After the end -------------------------------------------------------------------------------------------------
 
-bool FrontendCore::LocalizeLater(Frame* frame, const Frame* neighbour) {
+bool FrontendCore::LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighbour) {
   if (neighbour != nullptr) {
     const Rigid3d predicted = neighbour->T_cam_world;
     if (tracker_.TrackFromFrame(map_, *neighbour, predicted, frame) && tracker_.TrackLocalMap(map_, false, frame).ok) {
@@ -309,9 +314,9 @@ bool FrontendCore::LocalizeLater(Frame* frame, const Frame* neighbour) {
 }
 
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
-  std::optional<Frame> neighbour;
+  std::optional<TrackedFrame> neighbour;
   for (auto it = unplaced_.rbegin(); it != unplaced_.rend(); ++it) {  // from the newest back: the map lies after them
-    Frame& frame = *it;
+    TrackedFrame& frame = *it;
     const bool adjacent = neighbour && neighbour->index - frame.index <= 3;
     if (!adjacent) {
       neighbour.reset();

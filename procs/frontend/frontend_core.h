@@ -12,7 +12,7 @@
 #include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/motion_segmentation/initializer.h"
-#include "frontend/frame.h"
+#include "frontend/tracked_frame.h"
 #include "frontend/frontend_options.h"
 #include "frontend/pose_tracker.h"
 #include "frontend/relocalizer.h"
@@ -64,7 +64,7 @@ class FrontendCore {
   void Finish(std::vector<FrontendEvent>* events);
 
   TrackingState state() const { return state_; }
-  const Frame& frame() const { return frame_; }
+  const TrackedFrame& frame() const { return frame_; }
   const Map& map() const { return map_; }
   const FrontendCounters& counters() const { return counters_; }
   double extract_ms() const { return extract_ms_; }
@@ -76,6 +76,7 @@ class FrontendCore {
     double scale = 1.0;
   };
 
+  std::unique_ptr<Initializer> MakeInitializer() const;
   void Initialize(std::vector<FrontendEvent>* events);
   void AwaitMap(std::vector<FrontendEvent>* events);
   void Track(std::vector<FrontendEvent>* events);
@@ -89,8 +90,8 @@ class FrontendCore {
   void FlushEvidence(std::vector<FrontendEvent>* events);
   std::optional<Placed> Place(const Rigid3d& T_cam_world, KeyframeId reference) const;
   FramePose MakePose(TrackingState state, const TrackingReport& report) const;
-  Frame FrameOfKeyframe(const Keyframe& keyframe) const;
-  bool LocalizeLater(Frame* frame, const Frame* neighbour);
+  TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
+  bool LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighbour);
   void KeepUnplaced();
 
   FrontendOptions options_;
@@ -107,8 +108,8 @@ class FrontendCore {
 
   TrackingState state_ = TrackingState::kNotInitialized;
   MapId map_id_ = 1;
-  Frame frame_;
-  Frame last_;                 ///< the frame tracked last
+  TrackedFrame frame_;
+  TrackedFrame last_;                 ///< the frame tracked last
   Placed last_placed_;
   std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the frame tracked last
   int64_t last_tracked_ns_ = 0;
@@ -122,7 +123,7 @@ class FrontendCore {
   KeyframeId last_keyframe_;
   int64_t last_keyframe_ns_ = 0;
   KeyframeId awaited_;
-  std::deque<Frame> unplaced_;
+  std::deque<TrackedFrame> unplaced_;
   double extract_ms_ = 0;
   FrontendCounters counters_;
 };

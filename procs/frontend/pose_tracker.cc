@@ -54,8 +54,8 @@ double PoseTracker::Trust(const Landmark& landmark, int64_t stamp_ns) const {
 
 // ---- First guess ---------------------------------------------------------------------------------------------------
 
-void PoseTracker::MatchByProjection(const Map& map, const Frame& last, const Rigid3d& T_cam_world, double radius_px,
-                                    const Frame& frame) {
+void PoseTracker::MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double radius_px,
+                                    const TrackedFrame& frame) {
   matches_.clear();
   match_turns_.clear();
   taken_.assign(frame.features->size(), 0);
@@ -80,7 +80,7 @@ void PoseTracker::MatchByProjection(const Map& map, const Frame& last, const Rig
 }
 
 /// Keeps the matches whose keypoints turned as most others did (three best of thirty bins, as in ORB-SLAM2).
-void PoseTracker::KeepConsistentTurns(const Frame&, const Frame&) {
+void PoseTracker::KeepConsistentTurns(const TrackedFrame&, const TrackedFrame&) {
   std::array<int, kTurnBins> counts{};
   const auto bin_of = [](float turn) { return static_cast<size_t>(turn * kTurnBins / 256.0F) % kTurnBins; };
   for (const float turn : match_turns_) ++counts[bin_of(turn)];
@@ -94,7 +94,7 @@ void PoseTracker::KeepConsistentTurns(const Frame&, const Frame&) {
   matches_.resize(kept);
 }
 
-bool PoseTracker::TrackFromFrame(const Map& map, const Frame& last, const Rigid3d& T_predicted, Frame* frame) {
+bool PoseTracker::TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, TrackedFrame* frame) {
   double radius_px = options_.motion_radius_px;
   for (int attempt = 0; attempt < 2; ++attempt, radius_px *= 2) {
     MatchByProjection(map, last, T_predicted, radius_px, *frame);
@@ -108,7 +108,7 @@ bool PoseTracker::TrackFromFrame(const Map& map, const Frame& last, const Rigid3
   return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
 }
 
-bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed, Frame* frame) {
+bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed, TrackedFrame* frame) {
   const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
   if (keyframe == nullptr) return false;
   std::vector<Eigen::Vector3d> points;
@@ -141,7 +141,7 @@ bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint
   return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
 }
 
-int PoseTracker::OptimizeMatches(const Map& map, Frame* frame) {
+int PoseTracker::OptimizeMatches(const Map& map, TrackedFrame* frame) {
   observations_.clear();
   matches_.clear();
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
@@ -169,7 +169,7 @@ int PoseTracker::OptimizeMatches(const Map& map, Frame* frame) {
 
 // ---- Local map -----------------------------------------------------------------------------------------------------
 
-void PoseTracker::CollectLocalMap(const Map& map, const Frame& frame) {
+void PoseTracker::CollectLocalMap(const Map& map, const TrackedFrame& frame) {
   std::map<KeyframeId, int> votes;
   for (const LandmarkId id : frame.landmarks) {
     const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
@@ -208,7 +208,7 @@ void PoseTracker::CollectLocalMap(const Map& map, const Frame& frame) {
   local_landmarks_.erase(std::unique(local_landmarks_.begin(), local_landmarks_.end()), local_landmarks_.end());
 }
 
-void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, Frame* frame) {
+void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame) {
   std::vector<LandmarkId> matched;
   taken_.assign(frame->features->size(), 0);
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
@@ -235,7 +235,7 @@ void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, Frame* 
   }
 }
 
-void PoseTracker::FindMoved(const Map& map, Frame* frame) {
+void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
   std::vector<LandmarkId> used;
   taken_.assign(frame->features->size(), 0);
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
@@ -262,7 +262,7 @@ void PoseTracker::FindMoved(const Map& map, Frame* frame) {
   }
 }
 
-void PoseTracker::CountEvidence(const Map& map, const Frame& frame) {
+void PoseTracker::CountEvidence(const Map& map, const TrackedFrame& frame) {
   for (const auto& [id, view] : visible_) {
     FrameEvidence::Item& item = evidence_[id];
     item.landmark = id;
@@ -284,7 +284,7 @@ void PoseTracker::CountEvidence(const Map& map, const Frame& frame) {
   }
 }
 
-TrackingReport PoseTracker::Summarize(const Frame& frame, int inliers, bool relocalized) const {
+TrackingReport PoseTracker::Summarize(const TrackedFrame& frame, int inliers, bool relocalized) const {
   TrackingReport report;
   std::array<int, kCellColumns * kCellRows> fixed{}, moving{};
   for (size_t i = 0; i < frame.classes.size(); ++i) {
@@ -318,7 +318,7 @@ TrackingReport PoseTracker::Summarize(const Frame& frame, int inliers, bool relo
   return report;
 }
 
-TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, Frame* frame) {
+TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, TrackedFrame* frame) {
   CollectLocalMap(map, *frame);
   SearchLocalLandmarks(map, relocalized, frame);
   const int inliers = OptimizeMatches(map, frame);

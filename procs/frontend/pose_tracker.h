@@ -7,7 +7,7 @@
 #include "dmslam/map/projection.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/optimization/pose_optimization.h"
-#include "frontend/frame.h"
+#include "frontend/tracked_frame.h"
 #include "frontend/frontend_options.h"
 
 namespace dmslam {
@@ -32,11 +32,11 @@ class PoseTracker {
   PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid);
 
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
-  bool TrackFromFrame(const Map& map, const Frame& last, const Rigid3d& T_predicted, Frame* frame);
+  bool TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, TrackedFrame* frame);
   /// Matches a keyframe's landmarks by descriptor alone, and finds the pose from nothing.
-  bool TrackFromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, Frame* frame);
+  bool TrackFromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, TrackedFrame* frame);
   /// Refines the pose against the landmarks around: what its matches' keyframes and their neighbours see.
-  TrackingReport TrackLocalMap(const Map& map, bool relocalized, Frame* frame);
+  TrackingReport TrackLocalMap(const Map& map, bool relocalized, TrackedFrame* frame);
 
   /// The keyframe that shares most landmarks with the frame tracked last.
   KeyframeId reference() const { return reference_; }
@@ -56,16 +56,16 @@ class PoseTracker {
 
   bool HasVote(const Landmark& landmark) const;
   double Trust(const Landmark& landmark, int64_t stamp_ns) const;
-  void MatchByProjection(const Map& map, const Frame& last, const Rigid3d& T_cam_world, double radius_px,
-                         const Frame& frame);
-  void KeepConsistentTurns(const Frame& last, const Frame& frame);
-  int OptimizeMatches(const Map& map, Frame* frame);
-  void CollectLocalMap(const Map& map, const Frame& frame);
-  void SearchLocalLandmarks(const Map& map, bool relocalized, Frame* frame);
-  void FindMoved(const Map& map, Frame* frame);
-  void SpreadMotion(Frame* frame);
-  void CountEvidence(const Map& map, const Frame& frame);
-  TrackingReport Summarize(const Frame& frame, int inliers, bool relocalized) const;
+  void MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double radius_px,
+                         const TrackedFrame& frame);
+  void KeepConsistentTurns(const TrackedFrame& last, const TrackedFrame& frame);
+  int OptimizeMatches(const Map& map, TrackedFrame* frame);
+  void CollectLocalMap(const Map& map, const TrackedFrame& frame);
+  void SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame);
+  void FindMoved(const Map& map, TrackedFrame* frame);
+  void SpreadMotion(TrackedFrame* frame);
+  void CountEvidence(const Map& map, const TrackedFrame& frame);
+  TrackingReport Summarize(const TrackedFrame& frame, int inliers, bool relocalized) const;
 
   TrackingOptions options_;
   Camera camera_;

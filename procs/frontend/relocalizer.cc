@@ -46,7 +46,7 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, co
 }
 
 bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
-                              Frame* frame) const {
+                              TrackedFrame* frame) const {
   std::vector<uint8_t> usable(keyframe.landmarks.size(), 0);
   for (size_t i = 0; i < usable.size(); ++i) {
     const Landmark* landmark = keyframe.landmarks[i].valid() ? map.FindLandmark(keyframe.landmarks[i]) : nullptr;
@@ -76,7 +76,7 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
   return true;
 }
 
-bool Relocalizer::Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, Frame* frame) const {
+bool Relocalizer::Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, TrackedFrame* frame) const {
   if (!vocabulary_) return false;
   const BowImage image = vocabulary_->Transform(frame->features->set.descriptors);
   for (const KeyframeId id : Candidates(map, map_id, image)) {

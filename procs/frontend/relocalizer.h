@@ -7,7 +7,7 @@
 #include "dmslam/map/map.h"
 #include "dmslam/place_recognition/keyframe_database.h"
 #include "dmslam/place_recognition/vocabulary.h"
-#include "frontend/frame.h"
+#include "frontend/tracked_frame.h"
 #include "frontend/pose_tracker.h"
 
 namespace dmslam {
@@ -21,11 +21,11 @@ class Relocalizer {
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Map& map);
   /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
-  bool Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, Frame* frame) const;
+  bool Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, TrackedFrame* frame) const;
 
  private:
   std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, const BowImage& image) const;
-  bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed, Frame* frame) const;
+  bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed, TrackedFrame* frame) const;
 
   std::shared_ptr<const Vocabulary> vocabulary_;
   Camera camera_;

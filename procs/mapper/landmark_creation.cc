@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "dmslam/geometry/triangulation.h"
+#include "dmslam/map/projection.h"
 
 namespace dmslam {
 namespace {

@@ -17,7 +17,7 @@ enum class FeatureClass : uint8_t {
 };
 
 /// A frame in tracking.
-struct Frame {
+struct TrackedFrame {
   uint32_t index = 0;
   int64_t stamp_ns = 0;
   std::shared_ptr<const FrameFeatures> features;
@@ -25,8 +25,8 @@ struct Frame {
   std::vector<LandmarkId> landmarks;   ///< parallel to the features
   std::vector<FeatureClass> classes;   ///< parallel to the features
 
-  Frame() = default;
-  Frame(uint32_t frame_index, int64_t stamp, std::shared_ptr<const FrameFeatures> seen)
+  TrackedFrame() = default;
+  TrackedFrame(uint32_t frame_index, int64_t stamp, std::shared_ptr<const FrameFeatures> seen)
       : index(frame_index),
         stamp_ns(stamp),
         features(std::move(seen)),
