@@ -1,0 +1,367 @@
+#include "dmslam/messaging/stream_reader.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "dmslam/ack_t.hpp"
+#include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/part_t.hpp"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+constexpr size_t kMaxMissing = 32;  // ranges named in one acknowledgement: it must fit one datagram
+
+Version ParentOf(const head_t& head) { return {head.header.parent_epoch, head.header.parent_seq}; }
+
+std::string ToText(const Version& version) {
+  return std::to_string(version.epoch) + ":" + std::to_string(version.seq);
+}
+
+}  // namespace
+
+StreamReader::StreamReader(Options options)
+    : options_(std::move(options)), held_(options_.start), accepted_(options_.start), window_(options_.limits) {
+  DMSLAM_CHECK(options_.id != 0, "a reader needs an id");
+}
+
+// ---- what comes in
+
+void StreamReader::Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
+  const std::optional<int64_t> type = FingerprintOf(bytes);
+  if (type == head_t::getHash()) {
+    if (channel == HeadChannel(options_.owner)) ReceiveHead(channel, bytes, now_ns);
+  } else if (type == part_t::getHash()) {
+    if (channel == PartChannel(options_.owner)) ReceivePart(bytes);
+  } else if (type != ack_t::getHash()) {
+    ReceiveRecord(channel, bytes);
+  }
+}
+
+void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
+  const std::optional<head_t> head = DecodeHead(channel, bytes);
+  if (!head) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  if (head->header.stream != static_cast<int32_t>(options_.stream)) return;
+  if (head->header.session != options_.session) {
+    ++statistics_.dropped_foreign;
+    return;
+  }
+  const Term term{head->header.epoch, head->header.writer};
+  if (term < term_ || term.epoch < held_.epoch || !term.valid()) {
+    ++statistics_.dropped_stale;
+    return;
+  }
+  last_head_ns_ = now_ns;
+  if (!SpeaksOurLanguage(*head)) return;
+  if (term > term_ || state_ == State::kRefusedVersion) BeginTerm(*head);
+  writer_closed_ = head->state == head_t::STATE_CLOSED;
+  Follow(*head);
+}
+
+bool StreamReader::SpeaksOurLanguage(const head_t& head) {
+  if (head.protocol_version == kProtocolVersion && head.schema_hash == options_.schema_hash) return true;
+  if (state_ != State::kRefusedVersion) ack_due_ = true;
+  state_ = State::kRefusedVersion;
+  term_ = {head.header.epoch, head.header.writer};
+  problem_ = "writer " + head.name + " speaks protocol " + std::to_string(head.protocol_version) +
+             (head.protocol_version == kProtocolVersion ? " with other message types" : "") +
+             ", this reader protocol " + std::to_string(kProtocolVersion) + ": run the same build everywhere";
+  return false;
+}
+
+// ---- terms
+
+void StreamReader::BeginTerm(const head_t& head) {
+  const bool fresh = (head.header.flags & RecordHeader::FLAG_FRESH) != 0;
+  const bool same_epoch = held_.epoch == head.header.epoch && term_.epoch < head.header.epoch;  // as we start
+  const Version parent = ParentOf(head);
+  const Version end = same_epoch ? held_ : DrainFormerTerm(parent, fresh);
+  term_ = {head.header.epoch, head.header.writer};
+  window_.Reset(same_epoch ? held_.seq + 1 : 1);
+  snapshot_.reset();
+  named_missing_.clear();
+  problem_.clear();
+  ack_due_ = true;
+  state_ = State::kFollowing;
+  if (same_epoch || fresh || parent == end) return;
+  if (end > parent) {
+    state_ = State::kRefusedBehind;
+    problem_ = "writer " + head.name + " continues version " + ToText(parent) + ", but this reader holds " +
+               ToText(end) + " already: let it take over the newest replica, or restart this process";
+  } else if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
+    NeedSnapshot();
+  }
+}
+
+// What arrived of the former term in order and is part of what the new one continues is still handed out.
+Version StreamReader::DrainFormerTerm(const Version& parent, bool fresh) {
+  if (state_ == State::kFollowing) {
+    while (window_.CanTake()) former_.push_back(*window_.Take());
+  }
+  if (!fresh) {
+    while (!former_.empty() && former_.back().version() > parent) former_.pop_back();
+  }
+  return former_.empty() ? held_ : former_.back().version();
+}
+
+void StreamReader::NeedSnapshot() {
+  state_ = State::kSnapshot;
+  snapshot_.emplace(Snapshot{0, 0, 0, ReceiveWindow(options_.limits)});
+  ack_due_ = true;
+}
+
+void StreamReader::Forget() {
+  held_ = accepted_ = {};
+  former_.clear();
+  if (!term_.valid() || state_ == State::kRefusedVersion) return;
+  problem_.clear();
+  NeedSnapshot();
+}
+
+void StreamReader::Follow(const head_t& head) {
+  if (state_ == State::kSnapshot) {
+    FollowSnapshot(head);
+    if (snapshot_->number == 0) return;
+  } else if (state_ != State::kFollowing) {
+    return;
+  }
+  window_.Expose(head.header.seq);
+  if (head.first_seq <= window_.received() + 1) return;
+  if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
+    NeedSnapshot();
+    FollowSnapshot(head);
+  } else {
+    statistics_.lost += window_.GiveUpBefore(head.first_seq);
+  }
+}
+
+void StreamReader::FollowSnapshot(const head_t& head) {
+  if (snapshot_->complete()) return;
+  const bool joined = snapshot_->number != 0 && snapshot_->number == head.snapshots;
+  if (joined && head.snapshot_first > 0 && head.snapshot_first <= snapshot_->window.received() + 1) {
+    snapshot_->window.Expose(head.snapshot_last);
+    return;
+  }
+  snapshot_->number = 0;
+  if (joined || head.snapshot_first != 1) return;
+  snapshot_->number = head.snapshots;
+  snapshot_->cut = head.snapshot_cut;
+  snapshot_->last = 0;
+  snapshot_->window.Reset(1);
+  snapshot_->window.Expose(head.snapshot_last);
+  window_.Reset(snapshot_->cut + 1);
+  ack_due_ = true;
+}
+
+// ---- records
+
+int32_t StreamReader::KeyOf(int64_t snapshot) const {
+  return StreamKey(options_.session, options_.stream, term_, snapshot);
+}
+
+void StreamReader::ReceivePart(std::span<const uint8_t> bytes) {
+  const std::optional<part_t> part = DecodePart(bytes);
+  if (!part) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  ++statistics_.parts;
+  ReceiveWindow* window = nullptr;
+  const bool in_snapshot = snapshot_ && snapshot_->number != 0;
+  if (in_snapshot && part->stream_key == KeyOf(snapshot_->number)) window = &snapshot_->window;
+  if ((state_ == State::kFollowing || in_snapshot) && part->stream_key == KeyOf(0)) window = &window_;
+  if (window == nullptr || part->seq < 1) {
+    ++statistics_.dropped_stale;
+    return;
+  }
+  ReceiveWindow::PartResult result = window->AddPart(*part);
+  if (result.result == ReceiveWindow::Result::kDuplicate) ++statistics_.duplicates;
+  if (result.result == ReceiveWindow::Result::kNoRoom) ++statistics_.dropped_no_room;
+  if (!result.whole) return;
+  auto& [channel, message] = *result.whole;
+  const std::optional<RecordHeader> header = ParseHeader(message);
+  if (!header || header->seq != part->seq || WindowOf(*header) != window || !IsIntact(channel, message)) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  Add(window, channel, std::move(message), *header);
+}
+
+void StreamReader::ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes) {
+  const std::optional<RecordHeader> header = ParseHeader(bytes);
+  if (!header || header->stream != static_cast<int32_t>(options_.stream)) return;
+  if (!IsIntact(channel, bytes)) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  if (header->session != options_.session) {
+    ++statistics_.dropped_foreign;
+    return;
+  }
+  ReceiveWindow* window = WindowOf(*header);
+  if (window == nullptr) {
+    ++statistics_.dropped_stale;
+    return;
+  }
+  Add(window, channel, Bytes(bytes.begin(), bytes.end()), *header);
+}
+
+// Where a record belongs: the stream's window or the snapshot's, if it is of the term that is followed.
+ReceiveWindow* StreamReader::WindowOf(const RecordHeader& header) {
+  if (Term{header.epoch, header.writer} != term_ || header.seq < 1 || header.session != options_.session) {
+    return nullptr;
+  }
+  const bool in_snapshot = snapshot_ && snapshot_->number != 0;
+  if ((header.flags & RecordHeader::FLAG_SNAPSHOT) != 0) {
+    return in_snapshot && header.parent_epoch == snapshot_->number ? &snapshot_->window : nullptr;
+  }
+  return state_ == State::kFollowing || in_snapshot ? &window_ : nullptr;
+}
+
+void StreamReader::Add(ReceiveWindow* window, const std::string& channel, Bytes bytes,
+                       const RecordHeader& header) {
+  Record record{channel, std::make_shared<const Bytes>(std::move(bytes)), header};
+  const ReceiveWindow::Result result = window->Add(record);
+  if (result == ReceiveWindow::Result::kDuplicate) ++statistics_.duplicates;
+  if (result == ReceiveWindow::Result::kNoRoom) ++statistics_.dropped_no_room;
+  if (result != ReceiveWindow::Result::kNew) return;
+  if (record.in_snapshot()) {
+    ack_due_ = true;
+    if (record.ends_snapshot()) snapshot_->last = header.seq;
+    return;
+  }
+  for (const MissingRange& range : named_missing_) {
+    if (range.first_seq <= header.seq && header.seq <= range.last_seq) {
+      ++statistics_.repaired;
+      break;
+    }
+  }
+}
+
+// ---- what the owner does
+
+std::optional<Record> StreamReader::Take() {
+  std::optional<Record> record;
+  if (!former_.empty()) {
+    record = std::move(former_.front());
+    former_.pop_front();
+    held_ = record->version();
+  } else if (state_ == State::kSnapshot) {
+    record = TakeFromSnapshot();
+  } else if (state_ == State::kFollowing) {
+    record = window_.Take();
+    if (record) held_ = record->version();
+  }
+  if (!record) return std::nullopt;
+  ++statistics_.records;
+  statistics_.payload_bytes += static_cast<int64_t>(record->bytes->size());
+  return record;
+}
+
+std::optional<Record> StreamReader::TakeFromSnapshot() {
+  std::optional<Record> record = snapshot_->window.Take();
+  if (!record) return std::nullopt;
+  held_ = record->version();
+  accepted_ = {};
+  if (record->ends_snapshot()) {
+    ++statistics_.snapshots;
+    snapshot_.reset();
+    state_ = State::kFollowing;
+    ack_due_ = true;
+  }
+  return record;
+}
+
+void StreamReader::Accept(const Version& version) {
+  if (version.epoch != term_.epoch || version > held_) return;
+  accepted_ = std::max(accepted_, version);
+}
+
+bool StreamReader::AtEnd() const {
+  return writer_closed_ && state_ == State::kFollowing && former_.empty() && window_.next() > window_.newest();
+}
+
+// ---- acknowledgements
+
+bool StreamReader::AckIsUrgent() const {
+  if (!term_.valid()) return false;
+  const int64_t accepted = accepted_.epoch == term_.epoch ? accepted_.seq : 0;
+  if (ack_due_ || accepted != acked_ || window_.received() != acked_received_) return true;
+  const bool writer_silent = last_ack_ns_ - last_head_ns_ > options_.writer_timeout_ns;
+  if (writer_silent) return false;
+  return (state_ == State::kFollowing && window_.AnyMissing()) ||
+         (snapshot_ && (snapshot_->number == 0 || snapshot_->window.AnyMissing()));
+}
+
+int64_t StreamReader::deadline_ns() const {
+  if (!term_.valid()) return INT64_MAX;
+  return last_ack_ns_ + (AckIsUrgent() ? options_.ack_ns : options_.idle_ack_ns);
+}
+
+void StreamReader::Advance(int64_t now_ns) {
+  if (now_ns < deadline_ns()) return;
+  if (snapshot_ && snapshot_->number != 0) SendAck(true, now_ns);
+  SendAck(false, now_ns);
+  last_ack_ns_ = now_ns;
+  ack_due_ = false;
+}
+
+void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
+  const ReceiveWindow& window = of_snapshot ? snapshot_->window : window_;
+  ack_t ack{};
+  ack.utime = now_ns / 1000;
+  ack.header.session = options_.session;
+  ack.header.stream = static_cast<int32_t>(options_.stream);
+  if (state_ != State::kRefusedVersion && state_ != State::kRefusedBehind) {  // who refuses follows nobody
+    ack.header.epoch = term_.epoch;
+    ack.header.writer = term_.writer;
+  }
+  ack.received = window.received();
+  if (of_snapshot) {
+    ack.header.flags = RecordHeader::FLAG_SNAPSHOT;
+    ack.header.seq = window.received();
+    ack.header.parent_epoch = snapshot_->number;
+    ack.header.parent_seq = snapshot_->cut;
+  } else {
+    ack.header.seq = accepted_.epoch == term_.epoch ? accepted_.seq : 0;
+    ack.header.parent_epoch = held_.epoch;
+    ack.header.parent_seq = held_.seq;
+    acked_ = ack.header.seq;
+    acked_received_ = ack.received;
+  }
+  ack.protocol_version = kProtocolVersion;
+  ack.schema_hash = options_.schema_hash;
+  ack.reader = options_.id;
+  ack.wants = snapshot_ && !snapshot_->complete() ? ack_t::WANTS_SNAPSHOT : 0;
+  std::vector<MissingRange> missing;
+  if (of_snapshot || state_ == State::kFollowing || (snapshot_ && snapshot_->number != 0)) {
+    missing = window.Missing(kMaxMissing);
+  }
+  ack.num_missing = static_cast<int32_t>(missing.size());
+  for (const MissingRange& range : missing) {
+    ack.missing_first_seq.push_back(range.first_seq);
+    ack.missing_last_seq.push_back(range.last_seq);
+    ack.missing_first_byte.push_back(range.first_byte);
+    ack.missing_end_byte.push_back(range.end_byte);
+  }
+  if (!of_snapshot) named_missing_ = std::move(missing);
+  ack.role = options_.role;
+  ack.name = options_.name;
+  outgoing_.push_back(SealedMessage(AckChannel(options_.reader), ack));
+  ++statistics_.acks;
+}
+
+std::vector<Outgoing> StreamReader::TakeOutgoing() { return std::exchange(outgoing_, {}); }
+
+ReaderStatistics StreamReader::statistics() const {
+  ReaderStatistics result = statistics_;
+  result.backlog = window_.newest() - window_.next() + 1 + static_cast<int64_t>(former_.size());
+  return result;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dmslam/head_t.hpp"
+#include "dmslam/messaging/receive_window.h"
+#include "dmslam/messaging/types.h"
+
+namespace dmslam {
+
+struct ReaderStatistics {
+  int64_t records = 0;           ///< handed out
+  int64_t payload_bytes = 0;     ///< of them
+  int64_t parts = 0;             ///< that arrived
+  int64_t duplicates = 0;        ///< records and parts that were here already
+  int64_t repaired = 0;          ///< records that came late or in pieces, after they had been named as missing
+  int64_t lost = 0;              ///< records given up: no longer kept, and the writer offers no snapshot
+  int64_t snapshots = 0;         ///< received whole
+  int64_t dropped_bad = 0;       ///< messages with wrong bytes
+  int64_t dropped_foreign = 0;   ///< of other sessions
+  int64_t dropped_stale = 0;     ///< of other terms, or before any beacon was heard
+  int64_t dropped_no_room = 0;   ///< beyond what is kept ahead; they come again
+  int64_t acks = 0;              ///< sent
+  int64_t backlog = 0;           ///< records known to exist and not yet taken
+};
+
+/// The receiving end of a stream: hands out its records once each, strictly in order, whatever is lost, doubled or late
+/// on the way; follows the writer with the highest term; takes a snapshot when it lacks more than the writer keeps. A
+/// pure state machine: no clock, no I/O, no threads.
+class StreamReader {
+ public:
+  struct Options {
+    int64_t session = 1;
+    StreamId stream = StreamId::kTest;
+    std::string owner;                 ///< of the stream: names its channels, "MAPPER"
+    std::string reader;                ///< this process: names the channel of its acknowledgements, "FRONTEND"
+    std::string role;                  ///< as the writer's configuration names it
+    std::string name;                  ///< for messages to people: process, host and process id
+    int64_t id = 0;                    ///< random, not zero
+    int64_t schema_hash = 0;           ///< over all message types; writers with another one are refused
+    Version start;                     ///< what the owner holds already
+    ReceiveWindow::Limits limits;
+    int64_t ack_ns = 30'000'000;       ///< between acknowledgements while something is new or missing
+    int64_t idle_ack_ns = 1'000'000'000;     ///< ... and otherwise
+    int64_t writer_timeout_ns = 1'000'000'000;  ///< a writer is there so long after its last word
+  };
+  enum class State {
+    kNoWriter,        ///< none heard yet
+    kFollowing,       ///< records come in order
+    kSnapshot,        ///< lacks more than is kept: asks for a snapshot, or receives it
+    kRefusedVersion,  ///< the writer speaks another protocol or other types: see problem()
+    kRefusedBehind,   ///< the writer knows less than is held here: see problem(); Forget() gives in
+  };
+
+  explicit StreamReader(Options options);
+
+  /// Takes in any message of the bus; those of other streams are ignored.
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
+
+  /// The next record in order. The owner applies it now. When `begins_anew()` it forgets what it held before.
+  std::optional<Record> Take();
+
+  /// The owner has all records up to this version safe: this is what the writer hears. Versions of earlier terms and
+  /// those that were not yet taken are ignored.
+  void Accept(const Version& version);
+  /// Accepts all that was taken.
+  void AcceptTaken() { Accept(held_); }
+
+  /// Gives up what is held, so that a snapshot of the present writer is taken.
+  void Forget();
+
+  void Advance(int64_t now_ns);
+  std::vector<Outgoing> TakeOutgoing();
+  int64_t deadline_ns() const;
+
+  State state() const { return state_; }
+  /// The writer's beacon was heard lately.
+  bool writer_present(int64_t now_ns) const { return now_ns - last_head_ns_ <= options_.writer_timeout_ns; }
+  /// The writer said that its stream is complete, and all of it was taken.
+  bool AtEnd() const;
+  /// What keeps this reader from following; empty when nothing does. Names the writer and the cure.
+  const std::string& problem() const { return problem_; }
+  /// All records up to here were taken; empty inside a snapshot.
+  const Version& held() const { return held_; }
+  const Version& accepted() const { return accepted_; }
+  const Term& term() const { return term_; }
+
+  ReaderStatistics statistics() const;
+
+ private:
+  struct Snapshot {
+    int64_t number = 0;  // 0: asked for, not yet begun
+    int64_t cut = 0;
+    int64_t last = 0;  // its last piece, once known
+    ReceiveWindow window;
+    bool complete() const { return last > 0 && window.received() >= last; }
+  };
+
+  void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
+  void ReceivePart(std::span<const uint8_t> bytes);
+  void ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes);
+  void Add(ReceiveWindow* window, const std::string& channel, Bytes bytes, const RecordHeader& header);
+  ReceiveWindow* WindowOf(const RecordHeader& header);
+  bool SpeaksOurLanguage(const head_t& head);
+  void BeginTerm(const head_t& head);
+  Version DrainFormerTerm(const Version& parent, bool fresh);
+  void Follow(const head_t& head);
+  void FollowSnapshot(const head_t& head);
+  void NeedSnapshot();
+  std::optional<Record> TakeFromSnapshot();
+  void SendAck(bool of_snapshot, int64_t now_ns);
+  bool AckIsUrgent() const;
+  int32_t KeyOf(int64_t snapshot) const;
+
+  Options options_;
+  State state_ = State::kNoWriter;
+  Term term_;
+  Version held_, accepted_;
+  ReceiveWindow window_;
+  std::deque<Record> former_;  // of the former term: complete, in order, not yet taken
+  std::optional<Snapshot> snapshot_;
+  std::vector<MissingRange> named_missing_;  // in the last acknowledgement
+  bool writer_closed_ = false;
+  int64_t last_head_ns_ = INT64_MIN / 2;
+  int64_t last_ack_ns_ = INT64_MIN / 2;
+  int64_t acked_ = -1, acked_received_ = -1;
+  bool ack_due_ = false;
+  std::string problem_;
+  std::vector<Outgoing> outgoing_;
+  ReaderStatistics statistics_;
+};
+
+}  // namespace dmslam

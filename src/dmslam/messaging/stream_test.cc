@@ -1,0 +1,401 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/messaging/stream_reader.h"
+#include "dmslam/messaging/stream_writer.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kSession = 7;
+
+// A record of about `size` bytes: replica_t serves as a message with a header; its role holds the payload.
+Bytes MakeRecord(int64_t value, size_t size = 100) {
+  replica_t message{};
+  message.holder = value;
+  message.role.assign(size, 'x');
+  return Encode(message);
+}
+int64_t ValueOf(const Record& record) {
+  return DecodeReplica(record.channel, *record.bytes).value().holder;
+}
+
+StreamWriter::Options WriterOptions(Link link = Link::kHost) {
+  StreamWriter::Options options;
+  options.session = kSession;
+  options.owner = "TEST";
+  options.name = "writer";
+  options.link = link;
+  options.roles = {{"reader", false}};
+  return options;
+}
+
+StreamReader::Options ReaderOptions(int64_t id = 1) {
+  StreamReader::Options options;
+  options.session = kSession;
+  options.owner = "TEST";
+  options.reader = "READER";
+  options.role = "reader";
+  options.name = "reader " + std::to_string(id);
+  options.id = id;
+  return options;
+}
+
+// One writer and one reader in step; `drop` decides what the wire swallows.
+struct Pair {
+  StreamWriter writer;
+  StreamReader reader;
+  int64_t now_ns = 0;
+  std::function<bool(const Outgoing&)> drop = [](const Outgoing&) { return false; };
+
+  explicit Pair(StreamWriter::Options options = WriterOptions(), SnapshotSource* snapshots = nullptr)
+      : writer(std::move(options), Term{1000, 5}, Version{}, snapshots), reader(ReaderOptions()) {}
+
+  void Run(int64_t duration_ns) {
+    for (const int64_t end = now_ns + duration_ns; now_ns < end; now_ns += kMs) Step();
+  }
+  void Step() {
+    writer.Advance(now_ns);
+    for (const Outgoing& out : writer.TakeOutgoing()) {
+      if (!out.local && !drop(out)) reader.Receive(out.channel, *out.bytes, now_ns);
+    }
+    reader.Advance(now_ns);
+    for (const Outgoing& out : reader.TakeOutgoing()) {
+      if (!drop(out)) writer.Receive(out.channel, *out.bytes, now_ns);
+    }
+  }
+  std::vector<int64_t> TakeAll() {
+    std::vector<int64_t> values;
+    while (std::optional<Record> record = reader.Take()) values.push_back(ValueOf(*record));
+    return values;
+  }
+};
+
+TEST(Stream, DeliversInOrderAndHearsTheAcceptance) {
+  Pair pair;
+  pair.Step();
+  for (int64_t value : {11, 12, 13}) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(value), pair.now_ns);
+  pair.Run(50 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{11, 12, 13}));
+  EXPECT_FALSE(pair.writer.AcknowledgedByAny(1));
+  pair.reader.Accept({1000, 2});
+  pair.Run(50 * kMs);
+  EXPECT_TRUE(pair.writer.AcknowledgedByAny(2));
+  EXPECT_FALSE(pair.writer.AcknowledgedByAny(3));
+  EXPECT_EQ(pair.writer.Backlog("reader"), 1);
+  pair.reader.AcceptTaken();
+  pair.Run(50 * kMs);
+  EXPECT_EQ(pair.writer.AcknowledgedBy("reader"), 3);
+  EXPECT_EQ(pair.writer.AcknowledgedBy("nobody"), std::nullopt);
+}
+
+TEST(Stream, TheFirstRecordOfAFreshTermBeginsAnew) {
+  Pair pair;
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(2), 0);
+  pair.Run(200 * kMs);
+  EXPECT_TRUE(pair.reader.Take()->begins_anew());
+  EXPECT_FALSE(pair.reader.Take()->begins_anew());
+}
+
+TEST(Stream, RepairsTheTailThatOnlyTheBeaconExposes) {
+  Pair pair;
+  pair.Step();
+  pair.drop = [](const Outgoing& out) { return out.channel == "DMSLAM_TEST_X"; };
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1, 5000), pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), std::vector<int64_t>{1});
+  EXPECT_EQ(pair.reader.statistics().repaired, 1);
+  EXPECT_EQ(pair.writer.statistics().parts_repaired, 5);
+}
+
+TEST(Stream, OnALanOnlyTheLostPartsAreSentAgain) {
+  Pair pair(WriterOptions(Link::kLan));
+  pair.Step();
+  int parts = 0;
+  pair.drop = [&](const Outgoing& out) { return out.channel == "DMSLAM_TEST_PART" && ++parts % 10 == 0; };
+  for (int i = 0; i < 10; ++i) {
+    pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i, 30000), pair.now_ns);
+    pair.Run(33 * kMs);
+  }
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll().size(), 10u);
+  const WriterStatistics statistics = pair.writer.statistics();
+  EXPECT_EQ(statistics.parts, 260);
+  EXPECT_EQ(statistics.parts_repaired, parts / 10);
+}
+
+TEST(Stream, OnALanNothingIsSentAgainWhenNothingIsLost) {
+  Pair pair(WriterOptions(Link::kLan));
+  pair.Step();
+  for (int i = 0; i < 30; ++i) {
+    pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i, 60000), pair.now_ns);
+    pair.Run(33 * kMs);
+  }
+  pair.Run(100 * kMs);
+  EXPECT_EQ(pair.TakeAll().size(), 30u);
+  const WriterStatistics statistics = pair.writer.statistics();
+  EXPECT_EQ(statistics.parts_repaired, 0);
+  EXPECT_LT(static_cast<double>(statistics.sent_bytes), 1.05 * static_cast<double>(statistics.payload_bytes));
+}
+
+TEST(Stream, ALocalTapCarriesTheWholeMessageOfALan) {
+  StreamWriter writer(WriterOptions(Link::kLan), Term{1000, 5}, Version{});
+  writer.Publish("DMSLAM_TEST_X", MakeRecord(1, 5000), 0);
+  int taps = 0;
+  for (const Outgoing& out : writer.TakeOutgoing()) {
+    taps += out.local;
+    EXPECT_EQ(out.local, out.channel == "DMSLAM_TEST_X");
+    EXPECT_TRUE(out.local || out.bytes->size() <= 1300u);
+  }
+  EXPECT_EQ(taps, 1);
+}
+
+TEST(Stream, CorruptMessagesAreCountedAndRepaired) {
+  Pair pair;
+  pair.Step();
+  StreamWriter& writer = pair.writer;
+  writer.Publish("DMSLAM_TEST_X", MakeRecord(1), pair.now_ns);
+  Bytes changed = *writer.TakeOutgoing().at(0).bytes;
+  changed[changed.size() - 3] ^= 1;
+  pair.reader.Receive("DMSLAM_TEST_X", changed, pair.now_ns);
+  EXPECT_EQ(pair.reader.statistics().dropped_bad, 1);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), std::vector<int64_t>{1});
+}
+
+TEST(Stream, ForeignSessionsAreDroppedAndCounted) {
+  Pair pair;
+  StreamWriter::Options options = WriterOptions();
+  options.session = 8;
+  StreamWriter ghost(options, Term{2000, 6}, Version{});
+  ghost.Advance(0);
+  ghost.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+  for (const Outgoing& out : ghost.TakeOutgoing()) {
+    pair.reader.Receive(out.channel, *out.bytes, 0);
+    pair.writer.Receive(out.channel, *out.bytes, 0);
+  }
+  EXPECT_EQ(pair.reader.statistics().dropped_foreign, 2);
+  EXPECT_EQ(pair.writer.statistics().dropped_foreign, 1);
+  EXPECT_FALSE(pair.reader.Take().has_value());
+  EXPECT_FALSE(pair.writer.superseded_by());
+}
+
+TEST(Stream, OtherTypesAreRefusedByNameOnBothSides) {
+  StreamWriter::Options options = WriterOptions();
+  options.schema_hash = 99;
+  Pair pair(options);
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+  pair.Run(2000 * kMs);
+  EXPECT_EQ(pair.reader.state(), StreamReader::State::kRefusedVersion);
+  EXPECT_NE(pair.reader.problem().find("writer"), std::string::npos);
+  EXPECT_NE(pair.writer.refusal().find("reader 1"), std::string::npos);
+  EXPECT_FALSE(pair.reader.Take().has_value());
+}
+
+TEST(Stream, AWriterThatHearsAHigherTermStops) {
+  StreamWriter low(WriterOptions(), Term{1000, 5}, Version{});
+  StreamWriter high(WriterOptions(), Term{1000, 6}, Version{});
+  low.Advance(0);
+  high.Advance(0);
+  for (const Outgoing& out : high.TakeOutgoing()) low.Receive(out.channel, *out.bytes, 0);
+  for (const Outgoing& out : low.TakeOutgoing()) high.Receive(out.channel, *out.bytes, 0);
+  EXPECT_EQ(low.superseded_by(), "writer");
+  EXPECT_FALSE(high.superseded_by());
+  low.Publish("DMSLAM_TEST_X", MakeRecord(1), kMs);
+  low.Advance(1000 * kMs);
+  EXPECT_TRUE(low.TakeOutgoing().empty());
+}
+
+TEST(Stream, MemoryStaysWithinTheBoundAndFullSaysSo) {
+  StreamWriter::Options options = WriterOptions();
+  options.roles = {{"reader", true}};
+  options.max_records = 10;
+  StreamWriter writer(options, Term{1000, 5}, Version{});
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_FALSE(writer.Full());
+    writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  }
+  EXPECT_TRUE(writer.Full());
+  writer.Publish("DMSLAM_TEST_X", MakeRecord(10), 0);
+  EXPECT_EQ(writer.statistics().kept_records, 10u);
+  EXPECT_EQ(writer.statistics().overrun, 1);
+}
+
+TEST(Stream, AReaderThatStartsFromAVersionGoesOnBehindIt) {
+  Pair pair;
+  for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  StreamReader::Options options = ReaderOptions();
+  options.start = {1000, 3};
+  pair.reader = StreamReader(options);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{4, 5}));
+}
+
+TEST(Stream, WithoutSnapshotsALateReaderSkipsAndCounts) {
+  StreamWriter::Options options = WriterOptions();
+  options.max_records = 3;
+  Pair pair(options);
+  for (int i = 1; i <= 8; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{6, 7, 8}));
+  EXPECT_EQ(pair.reader.statistics().lost, 5);
+}
+
+// Values 1..n as pieces of three.
+struct CountingSource : SnapshotSource {
+  int64_t cut = 0, next = 1;
+  void BeginSnapshot(int64_t c) override {
+    cut = c;
+    next = 1;
+  }
+  Piece NextPiece() override {
+    Piece piece{"DMSLAM_TEST_X", MakeRecord(-next, 3000), false};
+    next += 3;
+    piece.last = next > cut;
+    return piece;
+  }
+};
+
+TEST(Stream, ALateReaderGetsASnapshotAndGoesOnBehindIt) {
+  for (const Link link : {Link::kHost, Link::kLan}) {
+    StreamWriter::Options options = WriterOptions(link);
+    options.max_records = 4;
+    CountingSource source;
+    Pair pair(options, &source);
+    for (int i = 1; i <= 100; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+    int count = 0;
+    pair.drop = [&](const Outgoing& out) { return out.bytes->size() > 500 && ++count % 4 == 0; };
+    std::vector<int64_t> taken;
+    for (int i = 101; i <= 110; ++i) {
+      pair.Run(100 * kMs);
+      pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), pair.now_ns);
+      while (std::optional<Record> record = pair.reader.Take()) {
+        EXPECT_EQ(record->begins_anew(), taken.empty());
+        taken.push_back(ValueOf(*record));
+      }
+      pair.reader.AcceptTaken();
+    }
+    pair.Run(1000 * kMs);
+    for (const int64_t value : pair.TakeAll()) taken.push_back(value);
+    const int64_t cut = source.cut;
+    ASSERT_GE(cut, 100);
+    std::vector<int64_t> expected;
+    for (int64_t v = 1; v <= cut; v += 3) expected.push_back(-v);
+    for (int64_t v = cut + 1; v <= 110; ++v) expected.push_back(v);
+    EXPECT_EQ(taken, expected);
+    EXPECT_EQ(pair.writer.statistics().snapshots, 1);
+    EXPECT_EQ(pair.reader.held(), (Version{1000, 110}));
+  }
+}
+
+TEST(Stream, ASuccessorIsFollowedWhenItKnowsWhatIsHeld) {
+  Pair pair;
+  for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll().size(), 5u);
+  pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{1000, 5});
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(6), pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), std::vector<int64_t>{6});
+  EXPECT_EQ(pair.reader.held(), (Version{2000, 1}));
+}
+
+TEST(Stream, WhatTheSuccessorDoesNotKnowIsNotHandedOut) {
+  Pair pair;
+  for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{1000, 3});
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(6), pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{1, 2, 3, 6}));
+}
+
+TEST(Stream, ASuccessorThatKnowsLessIsRefusedAndHearsIt) {
+  Pair pair;
+  for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll().size(), 5u);
+  CountingSource source;
+  pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{1000, 4}, &source);
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(6), pair.now_ns);
+  pair.Run(2000 * kMs);
+  EXPECT_EQ(pair.reader.state(), StreamReader::State::kRefusedBehind);
+  EXPECT_EQ(pair.TakeAll().size(), 0u);
+  EXPECT_EQ(pair.writer.newer_replica(), (Version{1000, 5}));
+  pair.reader.Forget();
+  pair.Run(2000 * kMs);
+  EXPECT_EQ(pair.TakeAll().at(0), -1);
+  EXPECT_EQ(pair.reader.held(), (Version{2000, 1}));
+}
+
+TEST(Stream, ClosingWaitsForTheReadersAndTellsThem) {
+  Pair pair;
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+  pair.Run(200 * kMs);
+  pair.writer.Close(pair.now_ns);
+  pair.Run(500 * kMs);
+  EXPECT_FALSE(pair.writer.closed());
+  EXPECT_FALSE(pair.reader.AtEnd());
+  EXPECT_EQ(pair.TakeAll().size(), 1u);
+  pair.reader.AcceptTaken();
+  pair.Run(500 * kMs);
+  EXPECT_TRUE(pair.writer.closed());
+  EXPECT_TRUE(pair.reader.AtEnd());
+}
+
+TEST(Codec, CountsAndLengthsThatDoNotFitAreRefused) {
+  ack_t ack{};
+  ack.header.session = 1;
+  ack.role = "r";
+  ack.num_missing = 2;
+  ack.missing_first_seq = ack.missing_last_seq = {1, 2};
+  ack.missing_first_byte = ack.missing_end_byte = {0, 0};
+  const Outgoing sealed = SealedMessage("A", ack);
+  ASSERT_TRUE(DecodeAck("A", *sealed.bytes));
+  EXPECT_FALSE(DecodeAck("B", *sealed.bytes));
+  for (const int32_t count : {-1, 3, 33, 1 << 29, INT32_MAX, INT32_MIN}) {
+    Bytes bytes = *sealed.bytes;
+    PutInt(count, kHeaderOffset + kHeaderBytes, bytes);
+    Seal(*ParseHeader(bytes), "A", bytes);
+    EXPECT_FALSE(DecodeAck("A", bytes)) << count;
+  }
+}
+
+TEST(Codec, NoBytesWhateverMakeTheDecodersThrowOrAccept) {
+  Random random(3);
+  ack_t ack{};
+  ack.role = "role";
+  head_t head{};
+  part_t part{};
+  part.num_bytes = part.total_bytes = 20;
+  part.data.resize(20);
+  const std::vector<Bytes> valid = {*SealedMessage("A", ack).bytes, *SealedMessage("A", head).bytes,
+                                    EncodePart(part)};
+  ASSERT_TRUE(DecodePart(valid[2]));
+  for (int i = 0; i < 30000; ++i) {
+    Bytes bytes = valid[random.Below(3)];
+    const Bytes before = bytes;
+    for (uint32_t n = 1 + random.Below(16); n > 0; --n) {
+      bytes[random.Below(static_cast<uint32_t>(bytes.size()))] = static_cast<uint8_t>(random.Next());
+    }
+    if (random.Below(4) == 0) bytes.resize(random.Below(static_cast<uint32_t>(bytes.size())));
+    if (bytes == before) continue;
+    if (bytes.size() > kHeaderOffset + kHeaderBytes && random.Below(2) == 0) {  // past the checksum as well
+      Seal(*ParseHeader(bytes), "A", bytes);
+      DecodeAck("A", bytes);
+      DecodeHead("A", bytes);
+    } else {
+      EXPECT_FALSE(DecodeAck("A", bytes) || DecodeHead("A", bytes) || DecodePart(bytes));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dmslam

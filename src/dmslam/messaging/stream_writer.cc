@@ -1,0 +1,391 @@
+#include "dmslam/messaging/stream_writer.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "dmslam/head_t.hpp"
+#include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/take_over_t.hpp"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+constexpr size_t kMaxReaders = 64;        // more ids than this are noise
+constexpr size_t kMaxPieceBytes = 65536;  // of a snapshot
+constexpr int kFarewells = 3;
+
+SendWindow::Options WindowOptions(const StreamWriter::Options& options) {
+  return {options.link, PartChannel(options.owner), options.part_bytes, options.resend_after_ns};
+}
+
+}  // namespace
+
+StreamWriter::StreamWriter(Options options, Term term, Version parent, SnapshotSource* snapshots)
+    : options_(std::move(options)),
+      term_(term),
+      parent_(parent),
+      source_(snapshots),
+      window_(WindowOptions(options_), StreamKey(options_.session, options_.stream, term, 0)) {
+  DMSLAM_CHECK(term.valid(), "a writer needs a term of office");
+  DMSLAM_CHECK(options_.part_bytes >= 64 && options_.part_bytes <= 1400, "a part must fit one datagram");
+  for (const Role& role : options_.roles) {
+    if (role.required) role_floor_[role.name] = 0;
+  }
+}
+
+// ---- what the owner does
+
+int64_t StreamWriter::Publish(const std::string& channel, Bytes message, int64_t now_ns) {
+  DMSLAM_CHECK(state_ == State::kLive, "a stream that closes takes no more records");
+  const int64_t seq = window_.last() + 1;
+  Seal(HeaderOf(seq), channel, message);
+  ++statistics_.records;
+  statistics_.payload_bytes += static_cast<int64_t>(message.size());
+  window_.Append(channel, std::make_shared<const Bytes>(std::move(message)));
+  ForgetAccepted();
+  if (!IsSilent()) SendPaced(now_ns);
+  return seq;
+}
+
+void StreamWriter::Advance(int64_t now_ns) {
+  ForgetSilentReaders(now_ns);
+  ForgetAccepted();
+  if (IsSilent()) return;
+  AdvanceClosing(now_ns);
+  AdvanceSnapshot();
+  SendPaced(now_ns);
+  if (beacon_due_ || now_ns >= next_beacon_ns_) Beacon(now_ns);
+}
+
+int64_t StreamWriter::deadline_ns() const {
+  if (IsSilent()) return INT64_MAX;
+  const bool idle = window_.idle() && (!snapshot_ || snapshot_->window.idle());
+  int64_t deadline = beacon_due_ ? INT64_MIN : next_beacon_ns_;
+  if (!idle) deadline = std::min(deadline, burst_left_ > 0 ? INT64_MIN : next_burst_ns_);
+  if (state_ == State::kClosing) deadline = std::min(deadline, close_deadline_ns_);
+  return deadline;
+}
+
+std::vector<Outgoing> StreamWriter::TakeOutgoing() { return std::exchange(outgoing_, {}); }
+
+void StreamWriter::Close(int64_t now_ns) {
+  if (state_ != State::kLive) return;
+  state_ = State::kClosing;
+  close_deadline_ns_ = now_ns + options_.close_timeout_ns;
+  beacon_due_ = true;
+}
+
+void StreamWriter::AdvanceClosing(int64_t now_ns) {
+  if (state_ != State::kClosing || (!AllAccepted() && now_ns < close_deadline_ns_)) return;
+  state_ = State::kClosed;
+  beacon_due_ = true;
+}
+
+// ---- what comes in
+
+void StreamWriter::Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
+  const std::optional<int64_t> type = FingerprintOf(bytes);
+  if (type == ack_t::getHash()) {
+    ReceiveAck(channel, bytes, now_ns);
+  } else if (type == head_t::getHash() && channel == HeadChannel(options_.owner)) {
+    ReceiveHead(channel, bytes);
+  } else if (type == take_over_t::getHash()) {
+    ReceiveTakeOver(channel, bytes);
+  }
+}
+
+void StreamWriter::ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes) {
+  const std::optional<head_t> head = DecodeHead(channel, bytes);
+  if (!head) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  if (head->header.stream != static_cast<int32_t>(options_.stream)) return;
+  if (head->header.session != options_.session) {
+    ++statistics_.dropped_foreign;
+    return;
+  }
+  const Term other{head->header.epoch, head->header.writer};
+  if (other > term_) superseded_by_ = head->name;
+}
+
+void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes) {
+  const std::optional<take_over_t> request = DecodeTakeOver(channel, bytes);
+  if (!request) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  if (request->header.stream != static_cast<int32_t>(options_.stream)) return;
+  if (request->header.session != options_.session) {
+    ++statistics_.dropped_foreign;
+  } else if (Term{request->header.epoch, request->header.writer} == term_) {
+    close_requested_by_ = request->name;
+  } else {
+    ++statistics_.dropped_stale;
+  }
+}
+
+void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
+  const std::optional<ack_t> ack = DecodeAck(channel, bytes);
+  if (!ack) {
+    ++statistics_.dropped_bad;
+    return;
+  }
+  if (ack->header.stream != static_cast<int32_t>(options_.stream)) return;
+  if (ack->header.session != options_.session) {
+    ++statistics_.dropped_foreign;
+    return;
+  }
+  if (ack->protocol_version != kProtocolVersion || ack->schema_hash != options_.schema_hash) {
+    ++statistics_.refused;
+    refusal_ = "reader " + ack->name + " speaks protocol " + std::to_string(ack->protocol_version) +
+               (ack->protocol_version == kProtocolVersion ? " with other message types" : "") +
+               ", this writer protocol " + std::to_string(kProtocolVersion) + ": run the same build everywhere";
+    return;
+  }
+  ++statistics_.acks;
+  if ((ack->header.flags & RecordHeader::FLAG_SNAPSHOT) != 0) return ReceiveSnapshotAck(*ack, now_ns);
+
+  Reader* reader = Meet(*ack, now_ns);
+  if (reader == nullptr) return;
+  const Term followed{ack->header.epoch, ack->header.writer};
+  if (followed > term_) superseded_by_ = "the writer that " + ack->name + " follows";
+  reader->following = followed == term_;
+  reader->wants_snapshot = ack->wants == ack_t::WANTS_SNAPSHOT && reader->following;
+  if (!reader->following) {
+    ++statistics_.dropped_stale;
+    return;
+  }
+  reader->accepted = std::clamp<int64_t>(ack->header.seq, 0, window_.last());
+  reader->floor = std::max(reader->floor, reader->accepted);
+  if (snapshot_ && !reader->wants_snapshot) snapshot_->received.erase(ack->reader);
+  window_.Repair(*ack, now_ns);
+}
+
+StreamWriter::Reader* StreamWriter::Meet(const ack_t& ack, int64_t now_ns) {
+  if (!readers_.contains(ack.reader) && readers_.size() >= kMaxReaders) return nullptr;
+  Reader& reader = readers_[ack.reader];
+  reader.last_heard_ns = now_ns;
+  if (ack.utime < reader.last_utime) return nullptr;  // late
+  reader.last_utime = ack.utime;
+  reader.role = ack.role;
+  reader.lossless = std::any_of(options_.roles.begin(), options_.roles.end(),
+                                [&](const Role& role) { return role.name == ack.role; });
+  const Version held{ack.header.parent_epoch, ack.header.parent_seq};
+  if (held.epoch < term_.epoch && held > parent_ && !held.empty() && !parent_.empty()) newer_replica_ = held;
+  return &reader;
+}
+
+// ---- snapshots
+
+void StreamWriter::ReceiveSnapshotAck(const ack_t& ack, int64_t now_ns) {
+  const auto reader = readers_.find(ack.reader);
+  if (reader != readers_.end()) reader->second.last_heard_ns = now_ns;
+  if (!snapshot_ || Term{ack.header.epoch, ack.header.writer} != term_ ||
+      ack.header.parent_epoch != snapshot_->number) {
+    ++statistics_.dropped_stale;
+    return;
+  }
+  const auto part = snapshot_->received.find(ack.reader);
+  if (part == snapshot_->received.end()) return;
+  part->second = std::clamp(ack.header.seq, part->second, snapshot_->window.last());
+  if (part->second == snapshot_->total && reader != readers_.end()) reader->second.wants_snapshot = false;
+  snapshot_->window.Repair(ack, now_ns);
+}
+
+void StreamWriter::AdvanceSnapshot() {
+  if (source_ == nullptr) return;
+  const bool wanted = std::any_of(readers_.begin(), readers_.end(),
+                                  [](const auto& entry) { return entry.second.wants_snapshot; });
+  if (!snapshot_ && wanted) BeginSnapshot();
+  if (!snapshot_) return;
+  for (auto& [id, reader] : readers_) {  // who comes before the first piece is forgotten may join
+    if (!reader.wants_snapshot || snapshot_->window.first() != 1) continue;
+    snapshot_->received.emplace(id, 0);
+    reader.floor = std::max(reader.floor, snapshot_->cut);
+  }
+  MakePieces();
+  std::erase_if(snapshot_->received, [&](const auto& entry) {
+    return !readers_.contains(entry.first) || (snapshot_->total > 0 && entry.second == snapshot_->total);
+  });
+  int64_t received = snapshot_->window.last();
+  for (const auto& [id, seq] : snapshot_->received) received = std::min(received, seq);
+  if (snapshot_->received.empty()) {
+    EndSnapshot();
+    return;
+  }
+  snapshot_->window.DiscardThrough(received);
+  MakePieces();
+}
+
+void StreamWriter::BeginSnapshot() {
+  const int64_t number = ++snapshots_begun_;
+  const int32_t key = StreamKey(options_.session, options_.stream, term_, number);
+  snapshot_.emplace(Snapshot{number, window_.last(), 0, SendWindow(WindowOptions(options_), key), {}});
+  source_->BeginSnapshot(snapshot_->cut);
+  ++statistics_.snapshots;
+  beacon_due_ = true;
+}
+
+void StreamWriter::EndSnapshot() {
+  for (auto& [id, reader] : readers_) reader.wants_snapshot = false;  // who still lacks one says so again
+  statistics_.parts += snapshot_->window.parts_sent;
+  statistics_.parts_repaired += snapshot_->window.parts_repaired;
+  statistics_.sent_bytes += snapshot_->window.bytes_sent;
+  snapshot_.reset();
+  beacon_due_ = true;
+}
+
+void StreamWriter::MakePieces() {
+  SendWindow& window = snapshot_->window;
+  while (snapshot_->total == 0 && window.kept() < static_cast<size_t>(options_.snapshot_ahead)) {
+    SnapshotSource::Piece piece = source_->NextPiece();
+    DMSLAM_CHECK(piece.message.size() <= kMaxPieceBytes, "a piece of a snapshot has at most 64 KiB");
+    RecordHeader header = HeaderOf(window.last() + 1);
+    header.flags = RecordHeader::FLAG_SNAPSHOT | (piece.last ? RecordHeader::FLAG_SNAPSHOT_LAST : 0);
+    header.parent_epoch = snapshot_->number;
+    header.parent_seq = snapshot_->cut;
+    Seal(header, piece.channel, piece.message);
+    window.Append(std::move(piece.channel), std::make_shared<const Bytes>(std::move(piece.message)));
+    if (piece.last) {
+      snapshot_->total = window.last();
+      beacon_due_ = true;
+    }
+  }
+}
+
+// ---- what goes out
+
+void StreamWriter::SendPaced(int64_t now_ns) {
+  if (now_ns >= next_burst_ns_) {
+    burst_left_ = options_.parts_per_burst;
+    next_burst_ns_ = now_ns + options_.burst_ns;
+  }
+  burst_left_ = window_.Send(burst_left_, now_ns, &outgoing_);
+  if (snapshot_) burst_left_ = snapshot_->window.Send(burst_left_, now_ns, &outgoing_);
+}
+
+void StreamWriter::Beacon(int64_t now_ns) {
+  head_t head{};
+  head.utime = now_ns / 1000;
+  head.header = HeaderOf(window_.sent());
+  head.protocol_version = kProtocolVersion;
+  head.state = head_t::STATE_LIVE;
+  if (state_ == State::kClosing) head.state = head_t::STATE_CLOSING;
+  if (state_ == State::kClosed) head.state = head_t::STATE_CLOSED;
+  head.schema_hash = options_.schema_hash;
+  head.first_seq = window_.first();
+  head.snapshots = snapshots_begun_;
+  if (snapshot_) {
+    head.snapshot_total = static_cast<int32_t>(snapshot_->total);
+    head.snapshot_cut = snapshot_->cut;
+    head.snapshot_first = snapshot_->window.first();
+    head.snapshot_last = snapshot_->window.sent();
+  }
+  head.offers = source_ != nullptr ? head_t::OFFERS_SNAPSHOT : 0;
+  head.name = options_.name;
+  outgoing_.push_back(SealedMessage(HeadChannel(options_.owner), head));
+  statistics_.sent_bytes += static_cast<int64_t>(outgoing_.back().bytes->size());
+  beacon_due_ = false;
+  next_beacon_ns_ = now_ns + options_.beacon_ns;
+  if (state_ == State::kClosed) {
+    --farewells_;
+    next_beacon_ns_ = now_ns + options_.beacon_ns / kFarewells;
+  }
+}
+
+RecordHeader StreamWriter::HeaderOf(int64_t seq) const {
+  RecordHeader header{};
+  header.session = options_.session;
+  header.stream = static_cast<int32_t>(options_.stream);
+  header.flags = parent_.empty() ? RecordHeader::FLAG_FRESH : 0;
+  header.epoch = term_.epoch;
+  header.writer = term_.writer;
+  header.seq = seq;
+  header.parent_epoch = parent_.epoch;
+  header.parent_seq = parent_.seq;
+  return header;
+}
+
+// ---- what is kept, and for whom
+
+void StreamWriter::ForgetSilentReaders(int64_t now_ns) {
+  std::erase_if(readers_, [&](const auto& entry) {
+    return now_ns - entry.second.last_heard_ns > options_.reader_timeout_ns;
+  });
+}
+
+int64_t StreamWriter::Floor(bool followers_only) const {
+  std::map<std::string, int64_t> floors = role_floor_;
+  std::map<std::string, bool> known;
+  for (const auto& [id, reader] : readers_) {
+    if (!reader.lossless || reader.wants_snapshot || (followers_only && !reader.following)) continue;
+    const auto [it, first] = known.emplace(reader.role, true);
+    int64_t& floor = floors[reader.role];
+    floor = first ? reader.floor : std::min(floor, reader.floor);
+  }
+  if (floors.empty()) return followers_only ? window_.last() : 0;
+  return std::min_element(floors.begin(), floors.end(), [](const auto& a, const auto& b) {
+           return a.second < b.second;
+         })->second;
+}
+
+void StreamWriter::ForgetAccepted() {
+  for (auto& [role, floor] : role_floor_) floor = std::max(floor, AcknowledgedBy(role).value_or(0));
+  const int64_t floor = Floor(false);
+  while (window_.first() <= floor &&
+         (window_.kept() > options_.spare_records || window_.bytes() > options_.spare_bytes)) {
+    window_.DiscardThrough(window_.first());
+  }
+  while (window_.kept() > 1 &&
+         (window_.kept() > options_.max_records || window_.bytes() > options_.max_bytes)) {
+    if (window_.first() > Floor(true)) ++statistics_.overrun;
+    window_.DiscardThrough(window_.first());
+  }
+}
+
+bool StreamWriter::Full() const {
+  const bool at_bound = window_.kept() >= options_.max_records || window_.bytes() >= options_.max_bytes;
+  return at_bound && window_.first() > Floor(true);
+}
+
+bool StreamWriter::AllAccepted() const {
+  for (const auto& [id, reader] : readers_) {
+    if (reader.lossless && reader.following && reader.accepted < window_.last()) return false;
+  }
+  return std::all_of(role_floor_.begin(), role_floor_.end(),
+                     [&](const auto& entry) { return entry.second >= window_.last(); });
+}
+
+bool StreamWriter::AcknowledgedByAny(int64_t seq) const {
+  return std::any_of(readers_.begin(), readers_.end(), [&](const auto& entry) {
+    return entry.second.lossless && entry.second.following && entry.second.accepted >= seq;
+  });
+}
+
+std::optional<int64_t> StreamWriter::AcknowledgedBy(const std::string& role) const {
+  std::optional<int64_t> accepted;
+  for (const auto& [id, reader] : readers_) {
+    if (reader.role != role || !reader.following) continue;
+    accepted = std::min(accepted.value_or(INT64_MAX), reader.accepted);
+  }
+  return accepted;
+}
+
+int64_t StreamWriter::Backlog(const std::string& role) const {
+  return window_.last() - AcknowledgedBy(role).value_or(0);
+}
+
+WriterStatistics StreamWriter::statistics() const {
+  WriterStatistics result = statistics_;
+  result.parts += window_.parts_sent + (snapshot_ ? snapshot_->window.parts_sent : 0);
+  result.parts_repaired += window_.parts_repaired + (snapshot_ ? snapshot_->window.parts_repaired : 0);
+  result.sent_bytes += window_.bytes_sent + (snapshot_ ? snapshot_->window.bytes_sent : 0);
+  result.kept_records = window_.kept();
+  result.kept_bytes = window_.bytes();
+  return result;
+}
+
+}  // namespace dmslam
