@@ -1,0 +1,140 @@
+// dmslam-eval: the errors of a trajectory against its ground truth.
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "dmslam/evaluation/report.h"
+#include "dmslam/evaluation/trajectory_plot.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
+
+namespace dmslam {
+namespace {
+
+struct Arguments {
+  std::string ground_truth;
+  std::string estimate;
+  std::string align = "sim3";
+  double max_difference_s = 0.02;
+  std::vector<std::string> rpe_deltas = {"1f", "1s", "1m"};
+  bool all_pairs = false;
+  std::string frames;
+  size_t frame_count = 0;
+  std::string json;
+  std::string plot;
+  std::string title;
+};
+
+RpeOptions ParseDelta(const std::string& text, bool all_pairs) {
+  RpeOptions options;
+  options.all_pairs = all_pairs;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), options.delta);
+  const std::string unit(end, text.data() + text.size());
+  if (unit == "s") options.unit = RpeUnit::kSeconds;
+  if (unit == "m") options.unit = RpeUnit::kMetres;
+  const bool known = unit == "f" || unit == "s" || unit == "m";
+  if (error != std::errc() || !known || !(options.delta > 0) || !std::isfinite(options.delta) ||
+      (unit == "f" && options.delta != std::floor(options.delta))) {
+    throw InputError("--rpe-delta " + text + ": write a positive number and f, s or m, as 1f, 0.5s or 1m");
+  }
+  return options;
+}
+
+EvaluationOptions ParseOptions(const Arguments& arguments) {
+  EvaluationOptions options;
+  const auto alignment = ParseAlignment(arguments.align);
+  if (!alignment) throw InputError("--align " + arguments.align + ": choose sim3, se3, scale or none");
+  options.alignment = *alignment;
+  if (!(arguments.max_difference_s >= 0) || arguments.max_difference_s > 1e6) {
+    throw InputError("--max-diff: write seconds, not less than 0");
+  }
+  options.max_difference_ns = std::llround(arguments.max_difference_s * 1e9);
+  for (const std::string& delta : arguments.rpe_deltas) {
+    options.rpe.push_back(ParseDelta(delta, arguments.all_pairs));
+  }
+  return options;
+}
+
+Coverage FindCoverage(const Arguments& arguments, const std::vector<StampedPose>& estimate) {
+  if (arguments.frames.empty()) return ComputeCoverage(estimate, arguments.frame_count);
+  std::filesystem::path list = arguments.frames;
+  if (std::filesystem::is_directory(list)) list /= "rgb.txt";
+  return ComputeCoverage(estimate, ReadFrameStamps(list.string()));
+}
+
+void WriteText(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.flush();
+  if (!file) throw InputError(path + ": cannot be written; check that the folder exists and has space");
+}
+
+void Run(const Arguments& arguments) {
+  const EvaluationOptions options = ParseOptions(arguments);
+  const GroundTruth truth = ReadGroundTruth(arguments.ground_truth);
+  for (const std::string& where : truth.repeated) {
+    std::cerr << "dmslam-eval: " << where << " repeats the stamp before it and is left out\n";
+  }
+  const std::vector<StampedPose> estimate = ReadTrajectory(arguments.estimate);
+  const Evaluation evaluation = Evaluate(truth.poses, estimate, options, FindCoverage(arguments, estimate));
+  if (!evaluation.ate.usable()) {
+    throw InputError(arguments.estimate + " against " + arguments.ground_truth + ": " +
+                     evaluation.ate.reason);
+  }
+  std::cout << EvaluationTable(evaluation);
+  if (!arguments.json.empty()) WriteText(arguments.json, EvaluationJson(evaluation));
+  if (arguments.plot.empty()) return;
+  const std::string title = arguments.title.empty()
+                                ? std::filesystem::path(arguments.estimate).filename().string()
+                                : arguments.title;
+  const PlotFigure figure =
+      TrajectoryFigure(truth.poses, estimate, evaluation.ate, title, EvaluationSummary(evaluation));
+  WritePng(figure, arguments.plot + ".png");
+  WriteSvg(figure, arguments.plot + ".svg");
+  std::cout << "\nwritten: " << arguments.plot << ".png, " << arguments.plot << ".svg\n";
+}
+
+void Declare(CLI::App* app, Arguments* arguments) {
+  app->add_option("GT", arguments->ground_truth, "ground truth, TUM format")->required();
+  app->add_option("EST", arguments->estimate, "estimated trajectory, TUM format")->required();
+  app->add_option("--align", arguments->align,
+                  "how the estimate is laid onto the ground truth: sim3, se3, scale, none")
+      ->capture_default_str();
+  app->add_option("--max-diff", arguments->max_difference_s, "poses further apart in time are no pair [s]")
+      ->capture_default_str();
+  app->add_option("--rpe-delta", arguments->rpe_deltas,
+                  "lengths of the relative motions: a number and f (frames), s (seconds) or m (metres)")
+      ->capture_default_str();
+  app->add_flag("--rpe-all-pairs", arguments->all_pairs,
+                "in frames and metres, motions from every pose instead of end to end");
+  app->add_option("--frames", arguments->frames, "image list (rgb.txt) or its folder, for the share covered");
+  app->add_option("--frame-count", arguments->frame_count, "number of frames, where there is no list");
+  app->add_option("--json", arguments->json, "write the figures to this file");
+  app->add_option("--plot", arguments->plot,
+                  "draw PREFIX.png and PREFIX.svg: top and side view, error over time");
+  app->add_option("--title", arguments->title, "title of the plot (default: the estimate's file name)");
+  app->set_version_flag("--version", kVersion);
+}
+
+}  // namespace
+}  // namespace dmslam
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Errors of a trajectory against its ground truth: ATE, RPE and coverage, as text, JSON and pictures.",
+      "dmslam-eval");
+  dmslam::Arguments arguments;
+  dmslam::Declare(&app, &arguments);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    dmslam::Run(arguments);
+  } catch (const std::exception& error) {
+    std::cerr << "dmslam-eval: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
