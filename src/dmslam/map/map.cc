@@ -460,6 +460,7 @@ MapDelta Map::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
   delta.about = about;
   delta.map_id = map_id;
   delta.version = ++version_;
+  if (const Keyframe* keyframe = FindKeyframe(about)) delta.stamp_ns = keyframe->stamp_ns;
   for (const auto& [id, dirty] : dirty_keyframes_) {
     const Keyframe& keyframe = keyframes_.at(id);
     if (dirty & (kKeyframeStateDirty | kFeaturesDirty)) {
