@@ -77,6 +77,7 @@ enum class Link { kHost, kLan };
 inline std::string HeadChannel(const std::string& owner) { return "DMSLAM_" + owner + "_HEAD"; }
 inline std::string PartChannel(const std::string& owner) { return "DMSLAM_" + owner + "_PART"; }
 inline std::string AckChannel(const std::string& reader) { return "DMSLAM_" + reader + "_ACK"; }
+inline std::string TakeOverChannel(const std::string& owner) { return "DMSLAM_" + owner + "_TAKE_OVER"; }
 
 /// Version of the protocol: beacons and acknowledgements of another one are refused by name.
 inline constexpr int32_t kProtocolVersion = 1;

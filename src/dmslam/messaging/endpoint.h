@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "dmslam/messaging/bus.h"
+#include "dmslam/messaging/stream_reader.h"
+#include "dmslam/messaging/stream_writer.h"
+
+namespace dmslam {
+
+/// Connects the streams of one process to its bus: subscribes to their channels, gives each message to those it may
+/// concern, and sends what they have to say. The streams stay their owner's and must outlive the endpoint.
+class Endpoint {
+ public:
+  using Clock = std::function<int64_t()>;
+
+  /// `clock`: monotonic nanoseconds (EventLoop::now_ns), or virtual time in one process.
+  Endpoint(Bus* bus, Clock clock);
+
+  /// `record_channels`: all channels on which the stream's records travel.
+  void AddReader(StreamReader* reader, const std::string& owner, const std::vector<std::string>& record_channels);
+  /// `readers`: who may acknowledge, by the upper-case names of their processes ("FRONTEND").
+  void AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers);
+  /// Takes a stream off again.
+  void Remove(const StreamReader* reader);
+  void Remove(const StreamWriter* writer);
+
+  /// Messages that belong to no stream: also called for every other one, so the handler looks at the channel.
+  void SetOtherHandler(const std::vector<std::string>& channels, Bus::Handler handler);
+
+  /// Advances all streams and sends what they have. Call it after every delivery, publication and deadline.
+  void Advance();
+  int64_t deadline_ns() const;
+  Bus& bus() { return *bus_; }
+
+ private:
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void Subscribe(const std::string& channel);
+
+  Bus* bus_;
+  Clock clock_;
+  std::vector<StreamReader*> readers_;
+  std::vector<StreamWriter*> writers_;
+  std::vector<std::string> subscribed_;
+  std::vector<std::string> other_channels_;
+  Bus::Handler other_;
+};
+
+}  // namespace dmslam

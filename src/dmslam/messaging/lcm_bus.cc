@@ -1,0 +1,127 @@
+#include "dmslam/messaging/lcm_bus.h"
+
+#include <algorithm>
+#include <fstream>
+#include <lcm/lcm-cpp.hpp>
+#include <optional>
+#include <regex>
+#include <utility>
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kWantedReceiveBuffer = 4 << 20;
+
+bool IsUdp(const std::string& url) { return url.rfind("udpm://", 0) == 0; }
+
+// The value of `key` in the URL's query.
+std::optional<std::string> QueryValue(const std::string& url, const std::string& key) {
+  std::smatch match;
+  if (!std::regex_search(url, match, std::regex("[?&]" + key + "=([^&]*)"))) return std::nullopt;
+  return match[1];
+}
+
+std::string WithQuery(const std::string& url, const std::string& key, const std::string& value) {
+  if (QueryValue(url, key)) return std::regex_replace(url, std::regex("([?&]" + key + "=)[^&]*"), "$01" + value);
+  return url + (url.find('?') == std::string::npos ? "?" : "&") + key + "=" + value;
+}
+
+std::string UrlWithBuffer(const std::string& url) {
+  if (!IsUdp(url) || QueryValue(url, "recv_buf_size")) return url;
+  return WithQuery(url, "recv_buf_size", std::to_string(kWantedReceiveBuffer));
+}
+
+std::string CureFor(const std::string& url) {
+  if (IsUdp(url)) {
+    return "is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` makes one on this host; "
+           "the form is udpm://239.255.76.67:PORT?ttl=0";
+  }
+  if (url.rfind("tcpq://", 0) == 0) return "is its server running? See docs/two-machines.md";
+  return "known are udpm://GROUP:PORT?ttl=N, tcpq://HOST:PORT and memq://";
+}
+
+std::string NoteOnReceiveBuffer(const std::string& url) {
+  if (!IsUdp(url)) return "";
+  const int64_t wanted = std::atoll(QueryValue(url, "recv_buf_size").value_or("0").c_str());
+  int64_t allowed = wanted;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
+  std::string note = "receive buffer " + std::to_string(std::min(wanted, allowed)) + " bytes";
+  if (allowed < wanted) {
+    note += " instead of " + std::to_string(wanted) + ": large messages are lost and repaired; `sysctl -w net.core.rmem_max=" +
+            std::to_string(wanted) + "` cures it";
+  }
+  return note;
+}
+
+std::string EscapedForRegex(const std::string& name) {
+  return std::regex_replace(name, std::regex(R"([.\\+*?\[\]^$(){}|])"), R"(\$&)");
+}
+
+}  // namespace
+
+struct LcmBus::Impl {
+  explicit Impl(const std::string& url) : lcm(url) {}
+  void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+    owner->Receive(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
+  }
+  LcmBus* owner = nullptr;
+  lcm::LCM lcm;
+  std::unique_ptr<lcm::LCM> tap;  // with ttl 0, where the bus itself leaves the host
+};
+
+LcmBus::LcmBus(Options options) : options_(std::move(options)) {
+  options_.url = UrlWithBuffer(options_.url);
+  impl_ = std::make_unique<Impl>(options_.url);
+  impl_->owner = this;
+  const auto refuse = [this] {
+    throw InputError("LCM at " + options_.url + " cannot be used: " + CureFor(options_.url));
+  };
+  if (!impl_->lcm.good()) refuse();
+  if (IsUdp(options_.url) && QueryValue(options_.url, "ttl").value_or("0") != "0") {
+    impl_->tap = std::make_unique<lcm::LCM>(WithQuery(options_.url, "ttl", "0"));
+    if (!impl_->tap->good()) refuse();
+  }
+  receive_buffer_note_ = NoteOnReceiveBuffer(options_.url);
+}
+
+LcmBus::~LcmBus() = default;
+
+void LcmBus::Subscribe(const std::string& channel) {
+  const std::string pattern = EscapedForRegex(options_.prefix + channel);
+  lcm::Subscription* subscription = impl_->lcm.subscribe(pattern, &Impl::OnMessage, impl_.get());
+  if (subscription == nullptr || impl_->lcm.getFileno() < 0) {
+    throw InputError("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));
+  }
+  subscription->setQueueCapacity(options_.queue_capacity);
+}
+
+void LcmBus::Publish(const Outgoing& message) {
+  lcm::LCM& lcm = message.local && impl_->tap ? *impl_->tap : impl_->lcm;
+  // The result says little (0 even when a fragment could not be sent): the protocol repairs what does not arrive.
+  lcm.publish(options_.prefix + message.channel, message.bytes->data(),
+              static_cast<unsigned int>(message.bytes->size()));
+}
+
+int LcmBus::fd() const { return impl_->lcm.getFileno(); }
+
+int LcmBus::Deliver(int max_messages) {
+  int delivered = 0;
+  while (delivered < max_messages && impl_->lcm.handleTimeout(0) > 0) {
+    ++delivered;
+    if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
+  }
+  return delivered;
+}
+
+void LcmBus::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (!handler_) return;
+  try {
+    handler_(channel.substr(options_.prefix.size()), bytes);
+  } catch (...) {  // must not unwind through LCM
+    error_ = std::current_exception();
+  }
+}
+
+}  // namespace dmslam
