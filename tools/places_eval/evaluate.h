@@ -1,7 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,51 +20,63 @@ struct PlacesOptions {
   double min_gap_s = 5.0;     ///< views closer in time are not compared
   double max_distance = 0.3;  ///< same view: camera centres at most this far apart [unit of the ground truth]
   double max_angle_deg = 20.0;  ///< and at most this much turned
-  size_t max_candidates = 10;   ///< places that are verified per query
+  double near_distance =
+      1.0;  ///< near view, which shows much of the same: the same with wider bounds; neither right
+  double near_angle_deg = 45.0;  ///< nor a false place
+  double accept_margin =
+      0.1;  ///< an estimated pose must be closer than the bounds of the same view by this share
+  size_t max_candidates = 10;  ///< places that are verified per query
   uint64_t seed = 1;
 };
 
-/// What was answered for one query: the view that looks most alike, and the one with most verified matches.
+/// Which answers are compared: the place of the highest bag-of-words score; the one with most matches under
+/// common nodes that agree on an essential matrix; the one with most matches to its points that agree on a
+/// pose, among those whose pose makes them the same view. The points of a place are triangulated from views
+/// next to it in time with the true poses, as if a map had been made before; the pose of the query is
+/// estimated from them alone.
+enum class Stage { kScore, kEssential, kPose };
+inline constexpr size_t kNumStages = 3;
+
+/// What was answered for one query at one stage.
 struct PlaceAnswer {
-  double score = 0;  ///< L1 score of the best place; 0 = none
-  bool score_right = false;
-  int inliers = 0;  ///< verified matches of the best verified place; 0 = none
-  bool inliers_right = false;
-  bool expected = false;  ///< an earlier view that is the same exists
+  double confidence = 0;  ///< score or number of inliers; 0 = no answer
+  bool right = false;     ///< same view
+  bool near = false;      ///< near view
 };
 
 struct PlacesResult {
-  std::vector<PlaceAnswer> answers;  ///< one per view
-  size_t num_views = 0;
+  struct Query {
+    bool expected = false;  ///< an earlier view that is the same exists
+    std::array<PlaceAnswer, kNumStages> answers;
+  };
+  std::vector<Query> queries;
   size_t num_expected = 0;
   double query_ms = 0;  ///< mean of a query, without verification
 };
 
-/// Recognises every view of a sequence among the earlier ones: places by the bag of words, verified by
-/// matches under common nodes of the vocabulary that agree on an essential matrix. Throws InputError for
-/// wrong input.
+/// Recognises every view of a sequence among the earlier ones. Throws InputError for wrong input.
 PlacesResult EvaluatePlaces(const PlacesOptions& options);
 
 /// A point of a precision-recall curve: what results from accepting only answers with at least this
 /// confidence.
 struct CurvePoint {
   double threshold = 0;
-  double precision = 1;
-  double recall = 0;
+  double precision = 1;        ///< right answers among all
+  double place_precision = 1;  ///< right answers among right and false ones, near views left out
+  double recall = 0;           ///< right answers among the views that have an earlier same view
 };
 
-enum class Confidence { kScore, kInliers };
+/// Curve by falling threshold.
+std::vector<CurvePoint> PrecisionRecall(const PlacesResult& result, Stage stage);
 
-/// Curve by falling threshold. Recall: right answers among the views that have an earlier same view.
-std::vector<CurvePoint> PrecisionRecall(const PlacesResult& result, Confidence confidence);
+/// Largest recall without a wrong answer; `place`: near views are not counted as wrong. 0 when there is none.
+CurvePoint BestWithoutError(const std::vector<CurvePoint>& curve, bool place);
 
-/// The point of largest recall among those without a wrong answer; none when the first answer is wrong.
-std::optional<CurvePoint> BestWithoutError(const std::vector<CurvePoint>& curve);
+using Curves = std::array<std::vector<CurvePoint>, kNumStages>;
+const char* StageName(Stage stage);
 
-/// Writes the curves as "stage,threshold,precision,recall" and as a drawing.
-void WriteCurvesCsv(const std::string& path, const std::vector<CurvePoint>& by_score,
-                    const std::vector<CurvePoint>& by_inliers);
-void WriteCurvesSvg(const std::string& path, const std::vector<CurvePoint>& by_score,
-                    const std::vector<CurvePoint>& by_inliers);
+/// Writes the curves as "stage,threshold,precision,place_precision,recall" and as a drawing.
+void WriteCurvesCsv(const std::string& path, const Curves& curves);
+void WriteCurvesSvg(const std::string& path, const Curves& curves);
 
 }  // namespace dmslam

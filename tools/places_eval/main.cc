@@ -29,30 +29,37 @@ void AddOptions(CLI::App& app, dmslam::PlacesOptions& options, Outputs& outputs)
       ->capture_default_str();
   app.add_option("--max-distance", options.max_distance, "Same view: distance [m]")->capture_default_str();
   app.add_option("--max-angle", options.max_angle_deg, "Same view: turn [deg]")->capture_default_str();
+  app.add_option("--accept-margin", options.accept_margin, "An estimated pose must be closer by this share")
+      ->capture_default_str();
   app.add_option("--candidates", options.max_candidates, "Places verified per view")->capture_default_str();
   app.add_option("--seed", options.seed, "Seed of the verification")->capture_default_str();
   app.add_option("--csv", outputs.csv, "Write the curves as a table");
   app.add_option("--svg", outputs.svg, "Draw the curves");
 }
 
-void Print(const char* stage, const std::vector<dmslam::CurvePoint>& curve) {
-  const auto best = dmslam::BestWithoutError(curve);
+void Print(dmslam::Stage stage, const std::vector<dmslam::CurvePoint>& curve) {
+  const auto strict = dmslam::BestWithoutError(curve, false);
+  const auto place = dmslam::BestWithoutError(curve, true);
   const dmslam::CurvePoint all = curve.empty() ? dmslam::CurvePoint{} : curve.back();
-  std::printf(
-      "%-9s recall at 100 %% precision %.3f (threshold %.4g); all answers: precision %.3f, recall %.3f\n",
-      stage, best ? best->recall : 0.0, best ? best->threshold : 0.0, all.precision, all.recall);
+  std::printf("%-10s %10.3f (>= %5.4g) %10.3f (>= %5.4g) %10.3f %8.3f %8.3f\n", dmslam::StageName(stage),
+              strict.recall, strict.threshold, place.recall, place.threshold, all.precision,
+              all.place_precision, all.recall);
 }
 
 void Run(const dmslam::PlacesOptions& options, const Outputs& outputs) {
   const dmslam::PlacesResult result = dmslam::EvaluatePlaces(options);
-  const auto by_score = dmslam::PrecisionRecall(result, dmslam::Confidence::kScore);
-  const auto by_inliers = dmslam::PrecisionRecall(result, dmslam::Confidence::kInliers);
-  std::printf("views     %zu, of which %zu were seen before; query %.3f ms\n", result.num_views,
+  std::printf("%zu views, of which %zu were seen before; query %.3f ms\n", result.queries.size(),
               result.num_expected, result.query_ms);
-  Print("score", by_score);
-  Print("verified", by_inliers);
-  if (!outputs.csv.empty()) dmslam::WriteCurvesCsv(outputs.csv, by_score, by_inliers);
-  if (!outputs.svg.empty()) dmslam::WriteCurvesSvg(outputs.svg, by_score, by_inliers);
+  std::printf(
+      "           recall without a wrong answer ...  or a false place        all: precision  (place)  "
+      "recall\n");
+  dmslam::Curves curves;
+  for (size_t i = 0; i < dmslam::kNumStages; ++i) {
+    curves[i] = dmslam::PrecisionRecall(result, static_cast<dmslam::Stage>(i));
+    Print(static_cast<dmslam::Stage>(i), curves[i]);
+  }
+  if (!outputs.csv.empty()) dmslam::WriteCurvesCsv(outputs.csv, curves);
+  if (!outputs.svg.empty()) dmslam::WriteCurvesSvg(outputs.svg, curves);
 }
 
 }  // namespace

@@ -12,11 +12,7 @@ std::ofstream Open(const std::string& path) {
   return file;
 }
 
-void WriteRows(std::ofstream& file, const char* stage, const std::vector<CurvePoint>& curve) {
-  for (const CurvePoint& point : curve) {
-    file << stage << ',' << point.threshold << ',' << point.precision << ',' << point.recall << '\n';
-  }
-}
+constexpr std::array<const char*, kNumStages> kColours = {"#c60", "#06c", "#083"};
 
 constexpr double kPlotPx = 400;
 constexpr double kMarginPx = 50;
@@ -35,16 +31,23 @@ void DrawText(std::ofstream& file, double x, double y, const char* colour, const
 
 }  // namespace
 
-void WriteCurvesCsv(const std::string& path, const std::vector<CurvePoint>& by_score,
-                    const std::vector<CurvePoint>& by_inliers) {
-  std::ofstream file = Open(path);
-  file << "stage,threshold,precision,recall\n";
-  WriteRows(file, "score", by_score);
-  WriteRows(file, "verified", by_inliers);
+const char* StageName(Stage stage) {
+  constexpr std::array<const char*, kNumStages> kNames = {"score", "essential", "pose"};
+  return kNames[static_cast<size_t>(stage)];
 }
 
-void WriteCurvesSvg(const std::string& path, const std::vector<CurvePoint>& by_score,
-                    const std::vector<CurvePoint>& by_inliers) {
+void WriteCurvesCsv(const std::string& path, const Curves& curves) {
+  std::ofstream file = Open(path);
+  file << "stage,threshold,precision,place_precision,recall\n";
+  for (size_t stage = 0; stage < kNumStages; ++stage) {
+    for (const CurvePoint& point : curves[stage]) {
+      file << StageName(static_cast<Stage>(stage)) << ',' << point.threshold << ',' << point.precision << ','
+           << point.place_precision << ',' << point.recall << '\n';
+    }
+  }
+}
+
+void WriteCurvesSvg(const std::string& path, const Curves& curves) {
   std::ofstream file = Open(path);
   const double side = kPlotPx + 2 * kMarginPx;
   const double end = kMarginPx + kPlotPx;
@@ -52,15 +55,17 @@ void WriteCurvesSvg(const std::string& path, const std::vector<CurvePoint>& by_s
        << "' font-family='sans-serif' font-size='13'>\n<rect width='100%' height='100%' fill='white'/>\n"
        << "<rect x='" << kMarginPx << "' y='" << kMarginPx << "' width='" << kPlotPx << "' height='"
        << kPlotPx << "' fill='none' stroke='#888'/>\n";
-  DrawCurve(file, by_score, "#c60");
-  DrawCurve(file, by_inliers, "#06c");
   DrawText(file, kMarginPx, end + 18, "#444", "0");
   DrawText(file, end - 8, end + 18, "#444", "1");
   DrawText(file, kMarginPx + kPlotPx / 2 - 20, end + 30, "#444", "recall");
   DrawText(file, 4, kMarginPx - 10, "#444", "precision 1");
   DrawText(file, 30, end, "#444", "0");
-  DrawText(file, kMarginPx + 15, end - 35, "#c60", "by score alone");
-  DrawText(file, kMarginPx + 15, end - 15, "#06c", "by verified matches");
+  for (size_t stage = 0; stage < kNumStages; ++stage) {
+    DrawCurve(file, curves[stage], kColours[stage]);
+    const double y = end - 55 + 20 * static_cast<double>(stage);
+    DrawText(file, kMarginPx + 15, y, kColours[stage],
+             std::string("by ") + StageName(static_cast<Stage>(stage)));
+  }
   file << "</svg>\n";
 }
 
