@@ -140,6 +140,12 @@ double Extent(std::span<const StampedPose> trajectory, int axis) {
   return high - low;
 }
 
+// From zero to the 98th percentile: a few spikes would otherwise leave everything else in one colour.
+PlotRange ColorRange(std::vector<double> errors) {
+  std::sort(errors.begin(), errors.end());
+  return {0, std::max(errors[(errors.size() - 1) * 98 / 100], 1e-9)};
+}
+
 }  // namespace
 
 UpAxis FindUpAxis(std::span<const StampedPose> trajectory) {
@@ -162,8 +168,7 @@ PlotFigure TrajectoryFigure(std::span<const StampedPose> ground_truth, std::span
     right = {(up.axis + 2) % 3, 1};
     far = {(up.axis + 1) % 3, -up.sign};
   }
-  PlotColorBar bar{"position error [m]", {report.statistics.min, report.statistics.max}, false};
-  if (!(bar.range.high > bar.range.low)) bar.range.high = bar.range.low + 1e-9;
+  PlotColorBar bar{"position error [m]", ColorRange(report.errors), false};
 
   PlotFigure figure;
   figure.title = title;
