@@ -19,7 +19,7 @@ struct PoseObservation {
   double weight = 1.0;  ///< Trust in the landmark, multiplies its cost; the inlier test does not see it.
 };
 
-/// What is known of the pose beforehand. The residual is the tangent from the prior to the pose, order (w, v).
+/// What is known of the pose beforehand. Its error is (w, v) of T * T_prior^-1 = {Exp(w), v}.
 struct PosePrior {
   Rigid3d T_cam_world;
   Matrix6d information = Matrix6d::Zero();
@@ -55,5 +55,8 @@ void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init, std::s
 PoseOptimizationReport OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
                                     std::span<const PoseObservation> observations,
                                     const PoseOptimizationOptions& options = {});
+
+/// Derivative of the prior's error with respect to a left step on the pose.
+Matrix6d PosePriorJacobian(const Vector6d& error);
 
 }  // namespace dmslam

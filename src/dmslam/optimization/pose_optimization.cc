@@ -1,0 +1,208 @@
+#include "dmslam/optimization/pose_optimization.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dmslam/optimization/reprojection.h"
+
+namespace dmslam {
+namespace {
+
+constexpr double kMinDepth = 1e-9;
+constexpr double kCostBehind = 1e5;  ///< Of an observation behind the camera: no step is to gain by moving one there.
+
+/// The upper triangle of a 6x6 sum of row^T row, kept in scalars that the compiler holds in registers.
+class SymmetricSum {
+ public:
+  void Add(const double (&row)[6], double weight, double error) {
+    size_t at = 0;
+    for (size_t i = 0; i < 6; ++i) {
+      const double scaled = weight * row[i];
+      gradient_[i] += scaled * error;
+      for (size_t j = i; j < 6; ++j) upper_[at++] += scaled * row[j];
+    }
+  }
+  Matrix6d Hessian() const {
+    Matrix6d h;
+    size_t at = 0;
+    for (int i = 0; i < 6; ++i) {
+      for (int j = i; j < 6; ++j) h(i, j) = h(j, i) = upper_[at++];
+    }
+    return h;
+  }
+  Vector6d Gradient() const { return Eigen::Map<const Vector6d>(gradient_); }
+
+ private:
+  double upper_[21] = {};
+  double gradient_[6] = {};
+};
+
+struct Linearization {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0.0;
+};
+
+/// One pose-only problem: the data, and which observations count.
+class PoseProblem {
+ public:
+  PoseProblem(const Pinhole& camera, std::span<const PoseObservation> observations,
+              const PoseOptimizationOptions& options, const std::vector<char>& inliers)
+      : camera_(camera), observations_(observations), options_(options), inliers_(inliers) {}
+
+  /// Cost (sum of weight * rho(chi2), and the prior's), gradient and Gauss-Newton Hessian, tangent (w, v).
+  Linearization Linearize(const Rigid3d& T, bool robust) const {
+    const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
+    SymmetricSum sum;
+    Linearization result;
+    for (size_t i = 0; i < observations_.size(); ++i) {
+      if (!inliers_[i]) continue;
+      const PoseObservation& o = observations_[i];
+      const Eigen::Vector3d p = R * o.p_world + T.translation;
+      if (!(p.z() > kMinDepth)) {
+        result.cost += o.weight * kCostBehind;
+        continue;
+      }
+      const double w = 1.0 / p.z(), x = p.x() * w, y = p.y() * w;
+      const double fx = camera_.fx_px, fy = camera_.fy_px;
+      const double eu = fx * x + camera_.cx_px - o.uv_px.x(), ev = fy * y + camera_.cy_px - o.uv_px.y();
+      const auto [loss, slope] = Loss((eu * eu + ev * ev) * o.inv_sigma_squared, robust);
+      const double weight = o.weight * o.inv_sigma_squared * slope;
+      const double row_u[6] = {-fx * x * y, fx * (1.0 + x * x), -fx * y, fx * w, 0.0, -fx * x * w};
+      const double row_v[6] = {-fy * (1.0 + y * y), fy * x * y, fy * x, 0.0, fy * w, -fy * y * w};
+      sum.Add(row_u, weight, eu);
+      sum.Add(row_v, weight, ev);
+      result.cost += o.weight * loss;
+    }
+    result.hessian = sum.Hessian();
+    result.gradient = sum.Gradient();
+    AddPrior(T, result);
+    return result;
+  }
+
+  /// Tests all observations against the pose.
+  void Classify(const Rigid3d& T, PoseOptimizationReport& report) const {
+    const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
+    report.num_inliers = 0;
+    double sum = 0.0;
+    for (size_t i = 0; i < observations_.size(); ++i) {
+      const PoseObservation& o = observations_[i];
+      const Eigen::Vector3d p = R * o.p_world + T.translation;
+      const double chi2 = p.z() > kMinDepth ? Chi2(o, p) : std::numeric_limits<double>::infinity();
+      report.chi2[i] = chi2;
+      report.inliers[i] = chi2 <= options_.max_chi2;
+      if (!report.inliers[i]) continue;
+      ++report.num_inliers;
+      sum += chi2;
+    }
+    report.mean_chi2 = report.num_inliers > 0 ? sum / report.num_inliers : 0.0;
+  }
+
+ private:
+  double Chi2(const PoseObservation& o, const Eigen::Vector3d& p_cam) const {
+    return (camera_.Project(p_cam) - o.uv_px).squaredNorm() * o.inv_sigma_squared;
+  }
+
+  /// Huber's loss of a squared error in sigmas, and its slope.
+  std::pair<double, double> Loss(double chi2, bool robust) const {
+    if (!robust || chi2 <= options_.max_chi2) return {chi2, 1.0};
+    const double ratio = std::sqrt(options_.max_chi2 / chi2);
+    return {2.0 * chi2 * ratio - options_.max_chi2, ratio};
+  }
+
+  static Vector6d PriorError(const Rigid3d& T, const PosePrior& prior) {
+    const Rigid3d difference = T * prior.T_cam_world.Inverse();
+    Vector6d error;
+    error << LogSo3(difference.rotation), difference.translation;
+    return error;
+  }
+
+  void AddPrior(const Rigid3d& T, Linearization& result) const {
+    if (!options_.prior) return;
+    const Vector6d error = PriorError(T, *options_.prior);
+    const Matrix6d J = PosePriorJacobian(error);
+    const Matrix6d weighted = J.transpose() * options_.prior->information;
+    result.hessian += weighted * J;
+    result.gradient += weighted * error;
+    result.cost += error.dot(options_.prior->information * error);
+  }
+
+  const Pinhole& camera_;
+  std::span<const PoseObservation> observations_;
+  const PoseOptimizationOptions& options_;
+  const std::vector<char>& inliers_;
+};
+
+/// Levenberg-Marquardt until the step is tiny or the iterations are spent. Returns how many were made.
+int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options, bool robust, Rigid3d& T) {
+  double damping = 1e-6;
+  Linearization now = problem.Linearize(T, robust);
+  for (int k = 0; k < options.iterations; ++k) {
+    Matrix6d damped = now.hessian;
+    damped.diagonal() += damping * now.hessian.diagonal();
+    const Vector6d step = -damped.ldlt().solve(now.gradient);
+    if (!step.allFinite()) return k;
+    const Rigid3d candidate = StepPose(T, step);
+    const bool tiny = step.squaredNorm() < options.min_step * options.min_step;
+    Linearization next = problem.Linearize(candidate, robust);
+    if (next.cost <= now.cost) {
+      const bool settled = now.cost - next.cost < 1e-7 * now.cost;
+      T = candidate;
+      now = next;
+      damping = std::max(1e-9, damping * 0.1);
+      if (settled) return k + 1;
+    } else {
+      damping = std::max(1e-4, damping * 10.0);
+    }
+    if (tiny) return k + 1;
+  }
+  return options.iterations;
+}
+
+}  // namespace
+
+Matrix6d PosePriorJacobian(const Vector6d& error) {
+  const Eigen::Vector3d w = error.head<3>(), t = error.tail<3>();
+  const double angle_squared = w.squaredNorm(), angle = std::sqrt(angle_squared);
+  const double second = angle < 1e-4 ? 1.0 / 12.0 + angle_squared / 720.0
+                                     : 1.0 / angle_squared - 0.5 / (angle * std::tan(0.5 * angle));
+  const Eigen::Matrix3d hat = Hat(w);
+  Matrix6d J = Matrix6d::Identity();
+  J.block<3, 3>(0, 0) += -0.5 * hat + second * hat * hat;
+  J.block<3, 3>(3, 0) = -Hat(t);
+  return J;
+}
+
+void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init, std::span<const PoseObservation> observations,
+                  const PoseOptimizationOptions& options, PoseOptimizationReport& report) {
+  const size_t count = observations.size();
+  report.inliers.assign(count, 1);
+  report.chi2.assign(count, 0.0);
+  report.T_cam_world = T_cam_world_init;
+  report.iterations = 0;
+  const PoseProblem problem(camera, observations, options, report.inliers);
+  report.num_inliers = static_cast<int>(count);
+  for (int round = 0; round < options.rounds && report.num_inliers >= options.min_observations; ++round) {
+    report.iterations += Minimize(problem, options, round < options.robust_rounds, report.T_cam_world);
+    problem.Classify(report.T_cam_world, report);
+  }
+  report.usable = report.iterations > 0 && report.num_inliers >= options.min_observations &&
+                  report.T_cam_world.AllFinite();
+  if (!report.usable) {
+    report.T_cam_world = T_cam_world_init;
+    problem.Classify(T_cam_world_init, report);
+  }
+  report.information = problem.Linearize(report.T_cam_world, false).hessian;
+}
+
+PoseOptimizationReport OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
+                                    std::span<const PoseObservation> observations,
+                                    const PoseOptimizationOptions& options) {
+  PoseOptimizationReport report;
+  OptimizePose(camera, T_cam_world_init, observations, options, report);
+  return report;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,74 @@
+// Local bundle adjustment, pose optimisation and essential graph, on synthetic data of the sizes that the system meets.
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+#include "dmslam/geometry/synthetic_scene.h"
+#include "dmslam/optimization/bundle_adjustment.h"
+#include "dmslam/optimization/pose_optimization.h"
+
+namespace dmslam {
+namespace {
+
+/// Every point is seen by a run of `views` neighbouring keyframes; the first two keyframes are held.
+BundleProblem MakeLocalBundle(int num_keyframes, int num_points, int views) {
+  SyntheticScene scene = MakeSyntheticScene(
+      {.seed = 3, .num_cameras = num_keyframes, .num_points = num_points, .noise_px = 0.7, .step = 0.08});
+  BundleProblem problem;
+  Random random(4);
+  problem.camera = scene.camera;
+  for (int i = 0; i < num_keyframes; ++i) {
+    const Rigid3d& T = scene.T_cam_world[static_cast<size_t>(i)];
+    problem.T_cam_world.push_back(i < 2 ? T : RandomPose(random, 0.003, 0.01) * T);
+    problem.pose_fixed.push_back(i < 2);
+  }
+  for (const auto& p : scene.points) problem.points.push_back(p + RandomVector(random, 0.03));
+  for (const auto& o : scene.observations) {
+    const int first = o.point % (num_keyframes - views + 1);
+    if (o.camera < first || o.camera >= first + views) continue;
+    BundleObservation observation{o.camera, o.point, o.uv_px, 1.0};
+    if (random.Below(25) == 0) observation.uv_px += Eigen::Vector2d(15, -10);
+    problem.observations.push_back(observation);
+  }
+  return problem;
+}
+
+void BM_LocalBundle(benchmark::State& state) {
+  const BundleProblem start = MakeLocalBundle(20, 2000, static_cast<int>(state.range(0)));
+  int iterations = 0;
+  for (auto _ : state) {
+    BundleProblem problem = start;
+    const BundleReport report = AdjustBundle({}, problem);
+    iterations = report.iterations;
+    benchmark::DoNotOptimize(report.final_cost);
+  }
+  state.counters["observations"] = static_cast<double>(start.observations.size());
+  state.counters["iterations"] = iterations;
+}
+BENCHMARK(BM_LocalBundle)->Arg(4)->Arg(6)->Arg(10)->Unit(benchmark::kMillisecond);
+
+void BM_OptimizePose(benchmark::State& state) {
+  const SyntheticScene scene = MakeSyntheticScene(
+      {.seed = 5, .num_cameras = 1, .num_points = static_cast<int>(state.range(0)), .noise_px = 0.7});
+  std::vector<PoseObservation> observations;
+  Random random(6);
+  for (const auto& o : scene.observations) {
+    PoseObservation observation{scene.points[static_cast<size_t>(o.point)], o.uv_px};
+    if (random.Below(10) == 0) observation.uv_px += Eigen::Vector2d(20, 10);
+    observations.push_back(observation);
+  }
+  const Rigid3d start = RandomPose(random, 0.01, 0.03) * scene.T_cam_world[0];
+  PoseOptimizationReport report;
+  for (auto _ : state) {
+    OptimizePose(scene.camera, start, observations, {}, report);
+    benchmark::DoNotOptimize(report.T_cam_world);
+  }
+  state.counters["iterations"] = report.iterations;
+  state.counters["inliers"] = report.num_inliers;
+}
+BENCHMARK(BM_OptimizePose)->Arg(300)->Arg(1000)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace dmslam
+
+BENCHMARK_MAIN();
