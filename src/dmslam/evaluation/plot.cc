@@ -32,9 +32,11 @@ double Fraction(const PlotRange& range, double value) {
 /// From data to pixels, within one panel.
 struct Axes {
   PlotBox box;
-  PlotRange x, y;
+  PlotRange x, y;  // y in powers of ten where it is logarithmic
+  bool y_log = false;
   PlotPoint ToPixel(double data_x, double data_y) const {
-    return {box.x + Fraction(x, data_x) * box.width, box.bottom() - Fraction(y, data_y) * box.height};
+    const double height = y_log ? std::log10(data_y) : data_y;
+    return {box.x + Fraction(x, data_x) * box.width, box.bottom() - Fraction(y, height) * box.height};
   }
 };
 
@@ -65,22 +67,44 @@ void EqualiseAspect(Axes* axes) {
   *narrow = {middle - 0.5 * extent, middle + 0.5 * extent};
 }
 
+std::vector<double> LogOfPositive(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return !(value > 0); });
+  for (double& value : values) value = std::log10(value);
+  return values;
+}
+
+void ChooseRanges(const PlotPanel& panel, Axes* axes) {
+  std::optional<PlotRange> x, y;
+  for (const PlotSeries& series : panel.series) {
+    Extend(&x, series.x);
+    for (const auto* values : {&series.y, &series.y_low, &series.y_high}) {
+      Extend(&y, panel.y_log ? LogOfPositive(*values) : *values);
+    }
+  }
+  axes->x = panel.x_range.value_or(WithMargin(x, panel.equal_aspect ? 0.05 : 0.02));
+  axes->y = panel.y_range.value_or(WithMargin(y, 0.06));
+  if (panel.y_log && panel.y_range)
+    axes->y = {std::log10(panel.y_range->low), std::log10(panel.y_range->high)};
+  if (!panel.x_categories.empty()) axes->x = {-0.5, static_cast<double>(panel.x_categories.size()) - 0.5};
+  if (panel.y_from_zero && !panel.y_range && !panel.y_log) axes->y.low = 0;
+  if (panel.equal_aspect) EqualiseAspect(axes);
+}
+
 Axes MakeAxes(const PlotPanel& panel, const PlotBox& cell) {
   Axes axes;
   const bool has_bar = panel.color_bar && panel.color_bar->shown;
   axes.box = {cell.x + kLeftOfAxis, cell.y + kPanelTitleHeight,
               cell.width - kLeftOfAxis - kRightOfAxis - (has_bar ? kColorBarSpace : 0),
               cell.height - kPanelTitleHeight - kBelowAxis};
-  std::optional<PlotRange> x, y;
-  for (const PlotSeries& series : panel.series) {
-    Extend(&x, series.x);
-    for (const auto* values : {&series.y, &series.y_low, &series.y_high}) Extend(&y, *values);
-  }
-  axes.x = panel.x_range.value_or(WithMargin(x, panel.equal_aspect ? 0.05 : 0.02));
-  axes.y = panel.y_range.value_or(WithMargin(y, 0.06));
-  if (panel.y_from_zero && !panel.y_range) axes.y.low = 0;
-  if (panel.equal_aspect) EqualiseAspect(&axes);
+  axes.y_log = panel.y_log;
+  ChooseRanges(panel, &axes);
   return axes;
+}
+
+PlotTicks CategoryTicks(const std::vector<std::string>& categories) {
+  PlotTicks ticks{{}, categories};
+  for (size_t i = 0; i < categories.size(); ++i) ticks.positions.push_back(static_cast<double>(i));
+  return ticks;
 }
 
 size_t TicksFor(double length_px, double px_per_tick) {
@@ -89,10 +113,12 @@ size_t TicksFor(double length_px, double px_per_tick) {
 
 void DrawFrameAndTicks(const PlotPanel& panel, const Axes& axes, PlotCanvas* canvas) {
   const PlotBox& box = axes.box;
-  const PlotTicks x_ticks = MakeTicks(axes.x, TicksFor(box.width, 75));
-  const PlotTicks y_ticks = MakeTicks(axes.y, TicksFor(box.height, 48));
+  const PlotTicks x_ticks = panel.x_categories.empty() ? MakeTicks(axes.x, TicksFor(box.width, 75))
+                                                       : CategoryTicks(panel.x_categories);
+  const PlotTicks y_ticks = axes.y_log ? MakeLogTicks({std::pow(10, axes.y.low), std::pow(10, axes.y.high)})
+                                       : MakeTicks(axes.y, TicksFor(box.height, 48));
   for (size_t i = 0; i < x_ticks.positions.size(); ++i) {
-    const double x = axes.ToPixel(x_ticks.positions[i], axes.y.low).x;
+    const double x = axes.ToPixel(x_ticks.positions[i], 1).x;
     const std::array<PlotPoint, 2> line = {{{x, box.y}, {x, box.bottom() + 4}}};
     canvas->Polyline(line, kGridColor, 1, false);
     canvas->Text({x, box.bottom() + 18}, x_ticks.labels[i], {12, TextAnchor::kMiddle});
@@ -324,6 +350,26 @@ PlotTicks MakeTicks(const PlotRange& range, size_t wanted) {
     std::snprintf(label, sizeof(label), "%.*f", decimals, k * step + 0.0);
     ticks.positions.push_back(k * step);
     ticks.labels.emplace_back(label);
+  }
+  return ticks;
+}
+
+PlotTicks MakeLogTicks(const PlotRange& range) {
+  PlotTicks ticks;
+  if (!(range.low > 0) || !(range.high > range.low)) return ticks;
+  if (range.high < 4 * range.low) return MakeTicks(range, 6);
+  const bool between = range.high < 300 * range.low;
+  const double first = std::floor(std::log10(range.low)), last = std::ceil(std::log10(range.high));
+  for (double power = first; power <= last; ++power) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double value = factor * std::pow(10.0, power);
+      if ((factor != 1 && !between) || value < range.low * (1 - 1e-9) || value > range.high * (1 + 1e-9))
+        continue;
+      char label[64];
+      std::snprintf(label, sizeof(label), "%g", value);
+      ticks.positions.push_back(value);
+      ticks.labels.emplace_back(label);
+    }
   }
   return ticks;
 }

@@ -69,6 +69,10 @@ struct PlotPanel {
   std::optional<PlotRange> x_range;
   std::optional<PlotRange> y_range;
   bool y_from_zero = false;
+  // Logarithmic y axis; values that are not positive are not drawn.
+  bool y_log = false;
+  // Names along the x axis at 0, 1, 2, ... instead of numbers.
+  std::vector<std::string> x_categories;
   // One unit is as long in x as in y, as a map needs it.
   bool equal_aspect = false;
   std::optional<PlotColorBar> color_bar;
@@ -93,6 +97,10 @@ struct PlotTicks {
   std::vector<std::string> labels;
 };
 PlotTicks MakeTicks(const PlotRange& range, size_t wanted);
+
+/// Ticks of a logarithmic axis over positive values: powers of ten, with 2 and 5 times them (or 1.2, 1.4, ...
+/// evenly) where the range is short.
+PlotTicks MakeLogTicks(const PlotRange& range);
 
 /// The figure as SVG text. The same figure gives the same bytes.
 std::string RenderSvg(const PlotFigure& figure);

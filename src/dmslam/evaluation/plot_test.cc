@@ -52,6 +52,26 @@ TEST(Ticks, AreRoundAndWithinTheRange) {
   EXPECT_TRUE(MakeTicks({1, 1}, 5).positions.empty());
 }
 
+TEST(Ticks, OfALogarithmicAxis) {
+  EXPECT_EQ(MakeLogTicks({0.004, 0.6}).labels,
+            (std::vector<std::string>{"0.005", "0.01", "0.02", "0.05", "0.1", "0.2", "0.5"}));
+  EXPECT_EQ(MakeLogTicks({0.5, 20000}).labels, (std::vector<std::string>{"1", "10", "100", "1000", "10000"}));
+  EXPECT_GE(MakeLogTicks({0.010, 0.015}).labels.size(), 4u);
+  EXPECT_TRUE(MakeLogTicks({0, 1}).labels.empty());
+}
+
+TEST(Svg, LogarithmicAxisLeavesOutWhatIsNotPositive) {
+  PlotFigure figure = OneCurve({0, 1, 2, 3, 4}, {0.01, 0.1, 0, 1, 10});
+  figure.panels[0].y_log = true;
+  EXPECT_EQ(Count(RenderSvg(figure), "stroke=\"#010203\""), 2u);
+}
+
+TEST(Svg, NamesAlongTheXAxis) {
+  PlotFigure figure = OneCurve({0, 1}, {3, 4});
+  figure.panels[0].x_categories = {"first", "second"};
+  EXPECT_EQ(Count(RenderSvg(figure), ">second</text>"), 1u);
+}
+
 TEST(Svg, APointThatIsNotFiniteBreaksTheLine) {
   const double no_point = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(Count(RenderSvg(OneCurve({0, 1, 2, 3, 4}, {0, 1, 2, 1, 0})), "stroke=\"#010203\""), 1u);
