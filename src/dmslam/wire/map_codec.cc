@@ -8,7 +8,7 @@ namespace dmslam::wire {
 
 template <>
 struct EnumRange<MapEvent> {
-  static constexpr auto kFirst = MapEvent::kKeyframeInserted, kLast = MapEvent::kRefused;
+  static constexpr auto kFirst = MapEvent::kKeyframeInserted, kLast = MapEvent::kEnded;
   static constexpr const char* kName = "unknown event of the map";
 };
 

@@ -163,15 +163,15 @@ class Walker {
   Walker(const Schema& schema, std::span<const uint8_t> bytes) : schema_(schema), bytes_(bytes) {}
 
   std::string Run(const StructType& type) {
-    if (Struct(type) && left() != 0) Fault(type, nullptr, "more bytes than it has fields");
+    if (Struct(type) && left() != 0) fault_ = "more bytes than it has fields";
     return fault_;
   }
 
  private:
   size_t left() const { return bytes_.size() - at_; }
 
-  bool Fault(const StructType& type, const Field* field, const char* what) {
-    fault_ = type.name + (field == nullptr ? "" : "." + field->name) + ": " + what;
+  bool Fault(const Field& field, const char* what) {
+    fault_ = field.name + ": " + what;
     return false;
   }
   int64_t ReadInteger(int size_bytes) {
@@ -180,40 +180,38 @@ class Walker {
     const int unused_bits = 64 - 8 * size_bytes;
     return static_cast<int64_t>(value << unused_bits) >> unused_bits;
   }
-  bool String(const StructType& type, const Field& field) {
-    if (left() < 4) return Fault(type, &field, "too short");
+  bool String(const Field& field) {
+    if (left() < 4) return Fault(field, "too short");
     const int64_t length = ReadInteger(4);
     at_ += 4;
     if (length < 1 || static_cast<uint64_t>(length) > left())
-      return Fault(type, &field, "impossible length of a string");
+      return Fault(field, "impossible length of a string");
     const auto* begin = bytes_.data() + at_;
     const auto* zero = std::memchr(begin, 0, static_cast<size_t>(length));
-    if (zero != begin + length - 1)
-      return Fault(type, &field, "a string without its end, or with an end inside");
+    if (zero != begin + length - 1) return Fault(field, "a string without its end, or with an end inside");
     at_ += static_cast<size_t>(length);
     return true;
   }
   /// How many elements the field has; none when they cannot fit.
-  std::optional<size_t> Elements(const StructType& type, const Field& field,
-                                 const std::vector<int64_t>& values) {
+  std::optional<size_t> Elements(const Field& field, const std::vector<int64_t>& values) {
     size_t elements = 1;
     for (const Field::Dimension& dimension : field.dimensions) {
       const int64_t n =
           dimension.counted_by < 0 ? dimension.constant : values[static_cast<size_t>(dimension.counted_by)];
-      if (n < 0) return Fault(type, &field, "negative count"), std::nullopt;
+      if (n < 0) return Fault(field, "negative count"), std::nullopt;
       // Every element takes at least one byte, so no sound product can exceed what is left.
       if (n != 0 && elements > left() / static_cast<size_t>(n))
-        return Fault(type, &field, "too short"), std::nullopt;
+        return Fault(field, "too short"), std::nullopt;
       elements *= static_cast<size_t>(n);
     }
     return elements;
   }
-  bool FieldOf(const StructType& type, const Field& field, std::vector<int64_t>& values) {
-    const std::optional<size_t> elements = Elements(type, field, values);
+  bool FieldOf(const Field& field, std::vector<int64_t>& values) {
+    const std::optional<size_t> elements = Elements(field, values);
     if (!elements) return false;
     if (field.kind == Field::Kind::kInteger || field.kind == Field::Kind::kReal) {
       const auto size = static_cast<size_t>(field.size_bytes);
-      if (*elements > left() / size) return Fault(type, &field, "too short");
+      if (*elements > left() / size) return Fault(field, "too short");
       const bool may_count = field.kind == Field::Kind::kInteger && field.dimensions.empty();
       values.push_back(may_count ? ReadInteger(field.size_bytes) : 0);
       at_ += *elements * size;
@@ -221,8 +219,12 @@ class Walker {
     }
     values.push_back(0);
     for (size_t i = 0; i < *elements; ++i) {
-      if (field.kind == Field::Kind::kString ? !String(type, field) : !Struct(*schema_.Find(field.type)))
+      if (field.kind == Field::Kind::kString) {
+        if (!String(field)) return false;
+      } else if (!Struct(*schema_.Find(field.type))) {
+        fault_ = field.name + "." + fault_;
         return false;
+      }
     }
     return true;
   }
@@ -230,7 +232,7 @@ class Walker {
     std::vector<int64_t> values;  // of the fields so far
     values.reserve(type.fields.size());
     for (const Field& field : type.fields) {
-      if (!FieldOf(type, field, values)) return false;
+      if (!FieldOf(field, values)) return false;
     }
     return true;
   }
