@@ -281,6 +281,7 @@ BundleOptions GlobalBundleOptions(int iterations) {
   BundleOptions options;
   options.first_iterations = iterations;
   options.second_iterations = 0;
+  options.relative_tolerance = 1e-6;
   return options;
 }
 
