@@ -39,7 +39,9 @@ void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_
   MapDelta delta = map_.TakeDelta(event, about, map_id);
   delta.correction_id = correction_id;
   delta.note = std::move(note);
-  if (!delta.Empty() || event == MapEvent::kSettled || event == MapEvent::kRefused) sink_(delta);
+  const bool says_something = event == MapEvent::kSettled || event == MapEvent::kRefused ||
+                              event == MapEvent::kMapped || event == MapEvent::kEnded;
+  if (!delta.Empty() || says_something) sink_(delta);
 }
 
 LandmarkId MapperCore::AddLandmark(MapId map_id, KeyframeId reference, KeyframeId newest,
@@ -59,19 +61,20 @@ LandmarkId MapperCore::AddLandmark(MapId map_id, KeyframeId reference, KeyframeI
 
 // ---- A first map ---------------------------------------------------------------------------------------------------
 
-void MapperCore::OnInitialMap(const InitialMap& proposal) {
+bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   if (map_.FindKeyframe(proposal.second.id) != nullptr) {
     ++counters_.keyframes_repeated;
-    return;
+    return false;
   }
   if (BuildInitialMap(proposal)) {
     ++counters_.maps_started;
     Publish(MapEvent::kMapStarted, proposal.second.id, proposal.map_id);
-  } else {
-    ++counters_.maps_refused;
-    map_.DropMap(proposal.map_id);
-    Publish(MapEvent::kMapDropped, proposal.second.id, proposal.map_id, 0, "too few landmarks after bundle adjustment");
+    return true;
   }
+  ++counters_.maps_refused;
+  map_.DropMap(proposal.map_id);
+  Publish(MapEvent::kMapDropped, proposal.second.id, proposal.map_id, 0, "too few landmarks after bundle adjustment");
+  return false;
 }
 
 bool MapperCore::BuildInitialMap(const InitialMap& proposal) {
@@ -113,8 +116,8 @@ void MapperCore::ScaleToUnitDepth(MapId map_id, KeyframeId first) {
 
 // ---- A keyframe ----------------------------------------------------------------------------------------------------
 
-void MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
-  if (!Insert(proposal)) return;
+bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
+  if (!Insert(proposal)) return false;
   const KeyframeId id = proposal.id;
   const MapId map_id = proposal.map_id;
   Publish(MapEvent::kKeyframeInserted, id, map_id);
@@ -123,15 +126,20 @@ void MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   Publish(MapEvent::kLandmarksCreated, id, map_id);
   if (Interrupted()) {
     ++counters_.adjustments_interrupted;
-    return;
+  } else {
+    Refine(id, map_id);
+    counters_.keyframes_culled += static_cast<uint64_t>(CullRedundantKeyframes(map_, id, proposal.reference, options_));
   }
+  Publish(MapEvent::kMapped, id, map_id);
+  return true;
+}
+
+void MapperCore::Refine(KeyframeId id, MapId map_id) {
   counters_.fusions += static_cast<uint64_t>(FuseWithNeighbours(map_, id, options_));
   Publish(MapEvent::kFused, id, map_id);
   const LocalAdjustmentReport report = AdjustLocally(map_, id, options_, interrupt_);
   if (report.bundle.interrupted) ++counters_.adjustments_interrupted;
   Publish(MapEvent::kAdjusted, id, map_id);
-  counters_.keyframes_culled += static_cast<uint64_t>(CullRedundantKeyframes(map_, id, proposal.reference, options_));
-  Publish(MapEvent::kCulled, id, map_id);
 }
 
 Keyframe MapperCore::MakeKeyframe(const KeyframeProposal& proposal, const Rigid3d& T_cam_world) const {
@@ -211,6 +219,8 @@ void MapperCore::OnReset(const MapReset& reset) {
 }
 
 void MapperCore::Settle(KeyframeId id, MapId map_id) { Publish(MapEvent::kSettled, id, map_id); }
+
+void MapperCore::End() { Publish(MapEvent::kEnded, {}, 0); }
 
 // ---- Corrections ---------------------------------------------------------------------------------------------------
 

@@ -47,19 +47,24 @@ class MapperCore {
   /// Continues a map that others kept (after a restart) or that was saved.
   void Continue(Map map) { map_ = std::move(map); }
 
-  void OnInitialMap(const InitialMap& proposal);
-  void OnKeyframe(const KeyframeProposal& proposal);
+  /// Builds a map of the proposal; false when it is known already or does not hold (a record says so).
+  bool OnInitialMap(const InitialMap& proposal);
+  /// Inserts a keyframe and does the local mapping that follows; false when it is known already, or its reference is not.
+  bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
   /// A loop or a global adjustment, composed with the poses of now. Refused with a record where it no longer applies.
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says that all work that keyframe `id` caused is done.
   void Settle(KeyframeId id, MapId map_id);
+  /// Says that the sequence has ended and that all it caused is done.
+  void End();
 
   const Map& map() const { return map_; }
   const MapperCounters& counters() const { return counters_; }
 
  private:
+  void Refine(KeyframeId id, MapId map_id);
   bool Insert(const KeyframeProposal& proposal);
   Keyframe MakeKeyframe(const KeyframeProposal& proposal, const Rigid3d& T_cam_world) const;
   void AddMatches(const KeyframeProposal& proposal);

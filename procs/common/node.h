@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "dmslam/messaging/bus.h"
+
+namespace dmslam {
+
+/// What a node knows of the world around it.
+struct NodeContext {
+  Bus* bus = nullptr;
+  std::function<int64_t()> now_ns;   ///< monotonic; virtual in one process
+  std::function<int64_t()> wall_us;  ///< for utime and terms of office; reaches no result
+  std::function<void()> pump;        ///< delivers what has arrived, from within long work; may do nothing
+  int64_t random_id = 1;             ///< of this process: reader and writer id
+  std::string name;                  ///< "mapper on host (pid 17)"
+  bool fresh_system = false;         ///< nobody else can be writing: no listening before a stream begins
+};
+
+/// A process without its main: connects a core to the bus. Message handlers only store what comes; all work is done in
+/// Advance, one thread.
+class Node {
+ public:
+  virtual ~Node() = default;
+  /// Does what there is to do now.
+  virtual void Advance() = 0;
+  /// When Advance wants to be called next, whatever comes.
+  virtual int64_t deadline_ns() const = 0;
+  /// Asked to stop (SIGTERM): finishes cleanly within a moment.
+  virtual void Stop() = 0;
+  /// Set when the node is done: the process's exit code.
+  virtual std::optional<int> exit_code() const = 0;
+  /// Why it ended, when not well; one line with the cure.
+  virtual std::string problem() const { return {}; }
+};
+
+}  // namespace dmslam

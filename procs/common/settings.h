@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "dmslam/features/orb_extractor.h"
+#include "dmslam/motion_segmentation/initializer.h"
+#include "frontend/frontend_options.h"
+#include "mapper/mapper_options.h"
+
+namespace dmslam {
+
+/// Everything that can be set and that changes results: the same file and the same `--set`s go to every process.
+struct Settings {
+  uint64_t seed = 1;
+  std::string profile = "dm";
+  OrbExtractorOptions extractor;
+  InitializerOptions initializer;
+  FrontendOptions frontend;
+  MapperOptions mapper;
+  bool close_loops = true;
+
+  const Pyramid& pyramid() const { return extractor.pyramid; }
+};
+
+/// One setting as people see it.
+struct SettingInfo {
+  std::string key;    ///< "tracking.motion_belief"
+  std::string value;  ///< as it is set
+  std::string help;
+};
+
+/// Sets one value. Throws InputError that names the key (and the nearest one that exists) or what the value should be.
+/// "profile=baseline" sets several at once: plain RANSAC initialisation, no mutual exclusion, no motion belief.
+void ApplySetting(std::string_view key, std::string_view value, Settings* settings);
+
+/// Reads a configuration file (YAML: sections of keys) and then the overrides "key=value". Throws InputError that names
+/// file, key and cure.
+Settings LoadSettings(const std::string& path, const std::vector<std::string>& overrides);
+
+/// All settings with their values.
+std::vector<SettingInfo> ListSettings(const Settings& settings);
+
+/// Hash over all values: two processes with the same hash agree.
+uint64_t SettingsHash(const Settings& settings);
+
+}  // namespace dmslam
