@@ -1,10 +1,18 @@
 #include "dmslam/features/image_pyramid.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 
 #include "dmslam/util/check.h"
 
 namespace dmslam {
+namespace {
+
+/// Rounded up, so that no level is less than half of the one before.
+int LevelSize(int size, double scale) { return static_cast<int>(std::ceil(size / scale - 1e-9)); }
+
+}  // namespace
 
 void PaddedImage::Resize(int width, int height) {
   constexpr int kAlignment = 64;
@@ -54,6 +62,53 @@ ImageShrinker::Source ImageShrinker::SourceOf(int index, int from_size, int size
   const int64_t position = (numerator + size) / (2 * static_cast<int64_t>(size));
   const int64_t clamped = std::clamp<int64_t>(position, 0, static_cast<int64_t>(from_size - 1) * 64);
   return {static_cast<int>(clamped / 64), static_cast<int>(clamped % 64)};
+}
+
+void ImagePyramid::SetUp(int width, int height, const Pyramid& pyramid, int min_size_px) {
+  width_ = width;
+  height_ = height;
+  levels_.clear();
+  shrinkers_.clear();
+  for (int i = 0; i < pyramid.levels; ++i) {
+    const int level_width = LevelSize(width, pyramid.Scale(i));
+    const int level_height = LevelSize(height, pyramid.Scale(i));
+    if (std::min(level_width, level_height) <= min_size_px) break;
+    if (i > 0) {
+      const PaddedImage& before = levels_.back().image;
+      shrinkers_.emplace_back(before.width(), before.height(), level_width, level_height);
+    }
+    Level& level = levels_.emplace_back();
+    level.image.Resize(level_width, level_height);
+    level.scale_x = static_cast<double>(width) / level_width;
+    level.scale_y = static_cast<double>(height) / level_height;
+  }
+}
+
+void ImagePyramid::CopyFirst(const GrayView& image) {
+  DMSLAM_CHECK(image.width == width_ && image.height == height_, "image has another size than agreed");
+  if (levels_.empty()) return;
+  for (int y = 0; y < image.height; ++y) {
+    std::memcpy(levels_[0].image.row(y), image.row(y), static_cast<size_t>(image.width));
+  }
+}
+
+void ImagePyramid::ShrinkInto(size_t index, const ImageKernels& kernels) {
+  shrinkers_[index - 1].Shrink(levels_[index - 1].image, kernels, &levels_[index].image);
+}
+
+void ImageSmoother::Smooth(const PaddedImage& image, const ImageKernels& kernels, PaddedImage* smooth) {
+  const int width = image.width(), height = image.height();
+  smooth->Resize(width, height);
+  row_.resize(static_cast<size_t>(width + 2 * kRowPadding));
+  uint8_t* padded = row_.data() + kRowPadding;
+  for (int y = 0; y < height; ++y) {
+    const uint8_t* rows[7];
+    for (int i = 0; i < 7; ++i) rows[i] = image.row(std::clamp(y + i - 3, 0, height - 1));
+    kernels.blur_down(rows, width, padded);
+    std::memset(padded - 3, padded[0], 3);
+    std::memset(padded + width, padded[width - 1], 3);
+    kernels.blur_along(padded, width, smooth->row(y));
+  }
 }
 
 }  // namespace dmslam

@@ -50,4 +50,43 @@ class ImageShrinker {
   std::vector<uint8_t> blended_;
 };
 
+/// An image and its shrunken versions, each made from the one before.
+class ImagePyramid {
+ public:
+  struct Level {
+    PaddedImage image;
+    double scale_x = 1.0, scale_y = 1.0;  ///< size of a pixel in pixels of level 0
+  };
+
+  /// Sets sizes and memory for images of one size. Levels are left out whose smaller side is not above `min_size_px`.
+  void SetUp(int width, int height, const Pyramid& pyramid, int min_size_px);
+
+  /// Copies `image` into level 0; its size must be the one set up.
+  void CopyFirst(const GrayView& image);
+  /// Makes level `index` >= 1 from the one before.
+  void ShrinkInto(size_t index, const ImageKernels& kernels);
+
+  size_t size() const { return levels_.size(); }
+  const Level& level(size_t index) const { return levels_[index]; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<Level> levels_;
+  std::vector<ImageShrinker> shrinkers_;  ///< entry i makes level i + 1
+};
+
+/// Smooths images with the triangle filter of seven taps, (1 2 3 4 3 2 1) / 16 in both directions, sigma 1.58 px; beyond
+/// the edges the outermost pixels go on. Averages of pairs round up.
+class ImageSmoother {
+ public:
+  /// Reuses memory.
+  void Smooth(const PaddedImage& image, const ImageKernels& kernels, PaddedImage* smooth);
+
+ private:
+  std::vector<uint8_t> row_;
+};
+
 }  // namespace dmslam

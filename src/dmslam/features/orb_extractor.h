@@ -16,7 +16,7 @@ struct OrbExtractorOptions {
   int fast_threshold = 20;     ///< a corner's least difference to its circle [grey values], 1..254
   int min_fast_threshold = 7;  ///< the same for cells without any corner above `fast_threshold`, 1..fast_threshold
   int cell_size_px = 32;       ///< side of the cells over which keypoints are spread [px of the level], >= 8
-  double rank_decay = 0.8;     ///< worth of a cell's next corner relative to the one before, 0..1; see CornerSelector
+  double rank_decay = 0.9;     ///< worth of a cell's next corner relative to the one before, 0..1; see CornerSelector
   int border_px = 16;          ///< keypoints keep this far from the edges of their level [px of the level], >= 16
   SimdPath simd_path = SimdPath::kBest;
 
@@ -42,29 +42,21 @@ class OrbExtractor {
   const OrbExtractorOptions& options() const { return options_; }
 
  private:
-  struct Level {
-    PaddedImage image;
-    std::vector<ImageShrinker> shrinker;  ///< from the level before; empty for the first
-    double scale_x = 1.0, scale_y = 1.0;  ///< size of a pixel in pixels of level 0
-    int quota = 0;                        ///< keypoints asked of this level
-  };
-
-  void SetUpLevels(int width, int height);
-  void ReserveFor(int width, int height);
-  void FillLevel(size_t index, const GrayView& image);
-  void Blur(const PaddedImage& image);
-  void Describe(int octave, const Level& level, FeatureSet* features);
+  void SetUp(int width, int height);
+  void SetQuotas();
+  void Describe(size_t octave, FeatureSet* features);
 
   OrbExtractorOptions options_;
   const ImageKernels& kernels_;
   SteeredPattern pattern_;
-  std::vector<Level> levels_;
+  ImagePyramid pyramid_;
+  std::vector<int> quotas_;  ///< keypoints asked of each level
   CornerDetector detector_;
   CornerSelector selector_;
+  ImageSmoother smoother_;
+  PaddedImage smooth_;
   std::vector<Corner> corners_;
   std::vector<Corner> chosen_;
-  PaddedImage blurred_;
-  std::vector<uint8_t> blur_row_;
 };
 
 }  // namespace dmslam
