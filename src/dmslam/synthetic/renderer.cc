@@ -1,0 +1,404 @@
+#include "dmslam/synthetic/renderer.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "dmslam/util/check.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+constexpr float kNearM = 0.06f;
+constexpr uint32_t kNothing = std::numeric_limits<uint32_t>::max();
+
+/// A value that changes linearly over the canvas: value = a x + b y + c.
+struct Plane {
+  float a = 0, b = 0, c = 0;
+  float At(float x, float y) const { return a * x + b * y + c; }
+};
+
+/// A triangle as seen: everything over z is linear in the image.
+struct Facet {
+  Plane inverse_depth, u_over_z, v_over_z, light_over_z;
+  const Texture* texture = nullptr;
+  int actor = -1;
+};
+
+/// Log2 of a positive number to about 0.01, from the exponent and a parabola over the mantissa.
+float FastLog2(float value) {
+  const auto bits = std::bit_cast<uint32_t>(value);
+  const float exponent = static_cast<float>(static_cast<int>(bits >> 23) - 127);
+  const float mantissa = std::bit_cast<float>((bits & 0x007fffffu) | 0x3f800000u);
+  return exponent + (-0.34484843f * mantissa + 2.02466578f) * mantissa - 1.67487759f;
+}
+
+/// Standard normal numbers by lookup: quick and the same everywhere.
+class NoiseTable {
+ public:
+  NoiseTable() {
+    Random random(0x5eed);
+    for (float& value : values_) value = static_cast<float>(random.Gaussian());
+  }
+  float operator[](uint32_t index) const { return values_[index & (kSize - 1)]; }
+
+ private:
+  static constexpr uint32_t kSize = 1u << 15;
+  std::array<float, kSize> values_{};
+};
+
+}  // namespace
+
+/// The buffers and steps behind Renderer. The canvas is the ideal image: for a camera without distortion the image
+/// itself, otherwise as much of the ideal plane as the distorted image shows, twice as fine.
+class Renderer::Impl {
+ public:
+  Impl(const Camera& camera, const RenderOptions& options);
+
+  RenderedFrame Render(std::span<const Mesh> still, const TextureList& textures, double time_s, uint64_t index,
+                       const std::function<Instant(double)>& instant_at);
+  std::vector<float> RenderDepth(std::span<const Mesh> still, const Instant& instant, std::vector<int>* actor_of);
+
+ private:
+  void MakeLookup();
+  bool IsVisible(const Eigen::AlignedBox3f& bounds, const Rigid3d& T_cam_world) const;
+  void Rasterize(std::span<const Mesh> still, const Instant& instant, const TextureList* textures,
+                 const Eigen::Vector2d& jitter_px);
+  void AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const TextureList* textures,
+               const Eigen::Vector2d& jitter_px);
+  void AddTriangle(const std::array<const Vertex*, 3>& corners, const std::array<Vector3f, 3>& p_cam,
+                   const Texture* texture, int actor, const Eigen::Vector2d& jitter_px);
+  void FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low, int x_high,
+                 uint32_t facet);
+  void Shade();
+  uint32_t ShadePixel(const Facet& facet, float x, float y) const;
+  const Facet* FacetAt(size_t pixel, float& x, float& y) const;
+  void Develop(double time_s, uint64_t index, RenderedFrame& frame);
+  void MakeMask(const std::vector<bool>& moving, GrayImage& mask) const;
+
+  Camera camera_;
+  RenderOptions options_;
+  double canvas_scale_ = 1;
+  Eigen::Vector2d canvas_origin_px_{0, 0};
+  int canvas_width_ = 0, canvas_height_ = 0;
+  std::vector<Eigen::Vector2f> lookup_;        ///< Canvas position per pixel; empty where it is the pixel itself.
+  std::vector<float> vignette_;
+  std::vector<float> z_buffer_;                ///< Inverse depth.
+  std::vector<uint32_t> facet_of_;
+  std::vector<Facet> facets_;
+  std::vector<Vector3f> p_cam_;
+  std::vector<uint16_t> sum_;                  ///< Red, green, blue over the samples.
+  std::vector<uint8_t> actor_samples_;         ///< How many samples show an actor.
+  std::vector<int8_t> last_actor_;
+  NoiseTable noise_;
+};
+
+Renderer::Impl::Impl(const Camera& camera, const RenderOptions& options) : camera_(camera), options_(options) {
+  DMSLAM_CHECK(options.samples >= 1 && options.samples <= 64, "one to 64 samples per frame");
+  MakeLookup();
+  const size_t canvas = static_cast<size_t>(canvas_width_) * static_cast<size_t>(canvas_height_);
+  z_buffer_.resize(canvas);
+  facet_of_.resize(canvas);
+  const auto w = static_cast<float>(camera.width_px), h = static_cast<float>(camera.height_px);
+  for (int y = 0; y < camera.height_px; ++y) {
+    for (int x = 0; x < camera.width_px; ++x) {
+      const float dx = (static_cast<float>(x) - 0.5f * w) / (0.5f * w), dy = (static_cast<float>(y) - 0.5f * h) / (0.5f * w);
+      vignette_.push_back(1.0f - static_cast<float>(options.vignetting) * (dx * dx + dy * dy) * 0.64f);
+    }
+  }
+}
+
+void Renderer::Impl::MakeLookup() {
+  canvas_width_ = camera_.width_px;
+  canvas_height_ = camera_.height_px;
+  if (!camera_.HasDistortion()) return;
+  std::vector<Eigen::Vector2d> ideal;
+  Eigen::AlignedBox2d bounds;
+  for (int y = 0; y < camera_.height_px; ++y) {
+    for (int x = 0; x < camera_.width_px; ++x) {
+      const auto place = camera_.Undistort({x, y});
+      ideal.push_back(place.value_or(Eigen::Vector2d::Constant(std::nan(""))));
+      if (place) bounds.extend(*place);
+    }
+  }
+  canvas_scale_ = 2.0;
+  canvas_origin_px_ = bounds.min() - Eigen::Vector2d::Constant(2.0);
+  const Eigen::Vector2d size = canvas_scale_ * (bounds.sizes() + Eigen::Vector2d::Constant(4.0));
+  DMSLAM_CHECK(size.maxCoeff() < 16384, "the distortion spreads the image too far");
+  canvas_width_ = static_cast<int>(std::ceil(size.x())) + 1;
+  canvas_height_ = static_cast<int>(std::ceil(size.y())) + 1;
+  for (const Eigen::Vector2d& place : ideal) {
+    lookup_.push_back((canvas_scale_ * (place - canvas_origin_px_)).cast<float>());
+  }
+}
+
+bool Renderer::Impl::IsVisible(const Eigen::AlignedBox3f& bounds, const Rigid3d& T_cam_world) const {
+  // Outside of one of the frustum's planes with all eight corners, or not.
+  const double left = (canvas_origin_px_.x() - 2 - camera_.cx_px) / camera_.fx_px;
+  const double top = (canvas_origin_px_.y() - 2 - camera_.cy_px) / camera_.fy_px;
+  const double right = (canvas_origin_px_.x() + canvas_width_ / canvas_scale_ + 2 - camera_.cx_px) / camera_.fx_px;
+  const double bottom = (canvas_origin_px_.y() + canvas_height_ / canvas_scale_ + 2 - camera_.cy_px) / camera_.fy_px;
+  std::array<int, 5> outside{};
+  for (int i = 0; i < 8; ++i) {
+    const auto corner = bounds.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i));
+    const Vector3d p = T_cam_world * corner.cast<double>();
+    outside[0] += p.z() < kNearM;
+    outside[1] += p.x() < left * p.z();
+    outside[2] += p.x() > right * p.z();
+    outside[3] += p.y() < top * p.z();
+    outside[4] += p.y() > bottom * p.z();
+  }
+  return std::none_of(outside.begin(), outside.end(), [](int count) { return count == 8; });
+}
+
+void Renderer::Impl::Rasterize(std::span<const Mesh> still, const Instant& instant, const TextureList* textures,
+                               const Eigen::Vector2d& jitter_px) {
+  std::fill(z_buffer_.begin(), z_buffer_.end(), 0.0f);
+  std::fill(facet_of_.begin(), facet_of_.end(), kNothing);
+  facets_.clear();
+  const Rigid3d T_cam_world = instant.T_world_cam.Inverse();
+  // What moves is mostly near: drawn first, it hides what lies behind.
+  for (const Mesh& mesh : instant.actors) AddMesh(mesh, T_cam_world, textures, jitter_px);
+  for (const Mesh& mesh : still) AddMesh(mesh, T_cam_world, textures, jitter_px);
+}
+
+void Renderer::Impl::AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const TextureList* textures,
+                             const Eigen::Vector2d& jitter_px) {
+  if (!IsVisible(mesh.bounds, T_cam_world)) return;
+  const Eigen::Matrix3f R = T_cam_world.rotation.toRotationMatrix().cast<float>();
+  const Vector3f t = T_cam_world.translation.cast<float>();
+  p_cam_.clear();
+  for (const Vertex& vertex : mesh.vertices) p_cam_.push_back(R * vertex.position + t);
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = triangle.corners;
+    const Texture* texture = textures != nullptr ? (*textures)[triangle.texture].get() : nullptr;
+    AddTriangle({&mesh.vertices[a], &mesh.vertices[b], &mesh.vertices[c]}, {p_cam_[a], p_cam_[b], p_cam_[c]}, texture,
+                mesh.actor, jitter_px);
+  }
+}
+
+// Homogeneous rasterisation (Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates", 1997): with
+// the rows p0, p1, p2 of a matrix P and the ray r of a pixel, the barycentric coordinates over z are P^-T r, linear in the
+// pixel. Nothing has to be clipped.
+void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners, const std::array<Vector3f, 3>& p_cam,
+                                 const Texture* texture, int actor, const Eigen::Vector2d& jitter_px) {
+  const float z_max = std::max({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()});
+  const float z_min = std::min({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()});
+  if (z_max < kNearM) return;
+  const double fx = canvas_scale_ * camera_.fx_px, fy = canvas_scale_ * camera_.fy_px;
+  const double cx = canvas_scale_ * (camera_.cx_px - canvas_origin_px_.x() - jitter_px.x());
+  const double cy = canvas_scale_ * (camera_.cy_px - canvas_origin_px_.y() - jitter_px.y());
+  double x_low = 0, x_high = canvas_width_ - 1, y_low = 0, y_high = canvas_height_ - 1;
+  if (z_min > kNearM) {
+    double x0 = 1e9, x1 = -1e9, y0 = 1e9, y1 = -1e9;
+    for (const Vector3f& p : p_cam) {
+      const double x = fx * p.x() / p.z() + cx, y = fy * p.y() / p.z() + cy;
+      x0 = std::min(x0, x);
+      x1 = std::max(x1, x);
+      y0 = std::min(y0, y);
+      y1 = std::max(y1, y);
+    }
+    x_low = std::max(x_low, std::ceil(x0));
+    x_high = std::min(x_high, std::floor(x1));
+    y_low = std::max(y_low, std::ceil(y0));
+    y_high = std::min(y_high, std::floor(y1));
+    if (x_low > x_high || y_low > y_high) return;
+  }
+  const Vector3d p0 = p_cam[0].cast<double>(), p1 = p_cam[1].cast<double>(), p2 = p_cam[2].cast<double>();
+  const Vector3d n0 = p1.cross(p2), n1 = p2.cross(p0), n2 = p0.cross(p1);
+  const double determinant = p0.dot(n0);
+  if (std::abs(determinant) < 1e-12) return;
+  const auto plane = [&](const Vector3d& gradient) {
+    // gradient . ((x - cx) / fx, (y - cy) / fy, 1), as a function of the canvas position.
+    const double a = gradient.x() / fx, b = gradient.y() / fy;
+    return Plane{static_cast<float>(a), static_cast<float>(b), static_cast<float>(gradient.z() - a * cx - b * cy)};
+  };
+  const Vector3d g0 = n0 / determinant, g1 = n1 / determinant, g2 = n2 / determinant;
+  Facet facet;
+  facet.inverse_depth = plane(g0 + g1 + g2);
+  facet.actor = actor;
+  if (texture != nullptr) {
+    const auto blend = [&](double v0, double v1, double v2) { return plane(v0 * g0 + v1 * g1 + v2 * g2); };
+    const double w = texture->width(), h = texture->height();
+    facet.texture = texture;
+    facet.u_over_z = blend(w * corners[0]->u, w * corners[1]->u, w * corners[2]->u);
+    facet.v_over_z = blend(h * corners[0]->v, h * corners[1]->v, h * corners[2]->v);
+    facet.light_over_z = blend(corners[0]->light, corners[1]->light, corners[2]->light);
+  }
+  facets_.push_back(facet);
+  FillSpans({plane(g0), plane(g1), plane(g2)}, facet.inverse_depth, static_cast<int>(y_low), static_cast<int>(y_high),
+            static_cast<int>(x_low), static_cast<int>(x_high), static_cast<uint32_t>(facets_.size() - 1));
+}
+
+void Renderer::Impl::FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low,
+                               int x_high, uint32_t facet) {
+  // The pixels of a row where all edge functions and the inverse depth's limits hold form one interval. An edge may miss
+  // its neighbour by a rounding error: a tiny slack closes the seam.
+  const Plane limits[4] = {edges[0], edges[1], edges[2],
+                           {-inverse_depth.a, -inverse_depth.b, 1.0f / kNearM - inverse_depth.c}};
+  for (int y = y0; y <= y1; ++y) {
+    const auto fy = static_cast<float>(y);
+    auto from = static_cast<float>(x_low), to = static_cast<float>(x_high);
+    for (const Plane& limit : limits) {
+      const float at_zero = limit.b * fy + limit.c;
+      if (limit.a > 0) from = std::max(from, -at_zero / limit.a - 1e-3f);
+      else if (limit.a < 0) to = std::min(to, -at_zero / limit.a + 1e-3f);
+      else if (at_zero < 0) to = -1;
+    }
+    if (!(from <= to)) continue;
+    const int first = static_cast<int>(std::ceil(from)), last = static_cast<int>(to);
+    const size_t row = static_cast<size_t>(y) * static_cast<size_t>(canvas_width_);
+    float* z = z_buffer_.data() + row;
+    uint32_t* ids = facet_of_.data() + row;
+    const float base = inverse_depth.b * fy + inverse_depth.c, step = inverse_depth.a;
+    for (int x = first; x <= last; ++x) {
+      const float value = base + step * static_cast<float>(x);
+      const bool nearer = value > z[x];
+      z[x] = nearer ? value : z[x];
+      ids[x] = nearer ? facet : ids[x];
+    }
+  }
+}
+
+const Facet* Renderer::Impl::FacetAt(size_t pixel, float& x, float& y) const {
+  size_t at = pixel;
+  if (!lookup_.empty()) {
+    x = lookup_[pixel].x();
+    y = lookup_[pixel].y();
+    if (!(x >= 0 && y >= 0)) return nullptr;
+    at = static_cast<size_t>(y + 0.5f) * static_cast<size_t>(canvas_width_) + static_cast<size_t>(x + 0.5f);
+  }
+  const uint32_t facet = facet_of_[at];
+  return facet == kNothing ? nullptr : &facets_[facet];
+}
+
+uint32_t Renderer::Impl::ShadePixel(const Facet& facet, float x, float y) const {
+  const float z = 1.0f / std::max(facet.inverse_depth.At(x, y), 1e-4f);
+  const float u = z * facet.u_over_z.At(x, y), v = z * facet.v_over_z.At(x, y);
+  // How far one steps over the texture with one pixel, along x and along y.
+  const float du_dx = z * (facet.u_over_z.a - u * facet.inverse_depth.a), dv_dx = z * (facet.v_over_z.a - v * facet.inverse_depth.a);
+  const float du_dy = z * (facet.u_over_z.b - u * facet.inverse_depth.b), dv_dy = z * (facet.v_over_z.b - v * facet.inverse_depth.b);
+  const float along_x = du_dx * du_dx + dv_dx * dv_dx, along_y = du_dy * du_dy + dv_dy * dv_dy;
+  // At a grazing view the longer step would blur the shorter one away; the samples within a pixel cover some of it.
+  const float longer = std::max(along_x, along_y), shorter = std::min(along_x, along_y);
+  const auto per_pixel = static_cast<float>(canvas_scale_ * canvas_scale_);
+  const float squared = per_pixel * std::max(shorter, longer * (1.0f / 6.0f));
+  const float level = squared > 1e-20f ? 0.5f * FastLog2(squared) - 0.35f : 0.0f;
+  const uint32_t texel = facet.texture->Sample(u, v, level);
+  const auto light = static_cast<uint32_t>(std::clamp(z * facet.light_over_z.At(x, y), 0.0f, 1.5f) * 256.0f);
+  const auto lit = [&](uint32_t shift) { return std::min<uint32_t>(255, (((texel >> shift) & 0xff) * light) >> 8); };
+  return lit(0) | (lit(8) << 8) | (lit(16) << 16);
+}
+
+void Renderer::Impl::Shade() {
+  size_t pixel = 0;
+  for (int y = 0; y < camera_.height_px; ++y) {
+    for (int x = 0; x < camera_.width_px; ++x, ++pixel) {
+      float at_x = static_cast<float>(x), at_y = static_cast<float>(y);
+      const Facet* facet = FacetAt(pixel, at_x, at_y);
+      if (facet == nullptr) continue;
+      const uint32_t color = ShadePixel(*facet, at_x, at_y);
+      sum_[3 * pixel] = static_cast<uint16_t>(sum_[3 * pixel] + (color & 0xff));
+      sum_[3 * pixel + 1] = static_cast<uint16_t>(sum_[3 * pixel + 1] + ((color >> 8) & 0xff));
+      sum_[3 * pixel + 2] = static_cast<uint16_t>(sum_[3 * pixel + 2] + ((color >> 16) & 0xff));
+      if (facet->actor >= 0) {
+        ++actor_samples_[pixel];
+        last_actor_[pixel] = static_cast<int8_t>(facet->actor);
+      }
+    }
+  }
+}
+
+void Renderer::Impl::Develop(double time_s, uint64_t index, RenderedFrame& frame) {
+  const size_t pixels = vignette_.size();
+  frame.color = {camera_.width_px, camera_.height_px, std::vector<uint8_t>(3 * pixels)};
+  frame.gray = GrayImage(camera_.width_px, camera_.height_px);
+  const auto phase = static_cast<double>(options_.seed % 1000);
+  const double gain = 1.0 + options_.gain_swing * (0.6 * std::sin(0.7 * time_s + phase) + 0.4 * std::sin(1.9 * time_s + 2 * phase));
+  const float scale = static_cast<float>(gain) / static_cast<float>(options_.samples);
+  const auto read = static_cast<float>(options_.read_noise), shot = static_cast<float>(options_.shot_noise);
+  Random random(DeriveSeed(options_.seed, index, "noise"));
+  for (size_t i = 0; i < pixels; ++i) {
+    const uint64_t bits = random.Next();
+    const float gray_noise = noise_[static_cast<uint32_t>(bits)];
+    std::array<uint32_t, 3> rgb{};
+    for (size_t k = 0; k < 3; ++k) {
+      const float value = static_cast<float>(sum_[3 * i + k]) * scale * vignette_[i];
+      // Most of the noise is common to the colours, as after a sensor's demosaicing.
+      const float own = noise_[static_cast<uint32_t>(bits >> (16 + 15 * k))];
+      const float noise = (read + shot * std::sqrt(value)) * (0.85f * gray_noise + 0.5f * own);
+      rgb[k] = static_cast<uint32_t>(std::clamp(value + noise + 0.5f, 0.0f, 255.0f));
+      frame.color.data[3 * i + k] = static_cast<uint8_t>(rgb[k]);
+    }
+    frame.gray.data[i] = static_cast<uint8_t>((19595u * rgb[0] + 38470u * rgb[1] + 7471u * rgb[2] + 32768u) >> 16);
+  }
+}
+
+void Renderer::Impl::MakeMask(const std::vector<bool>& moving, GrayImage& mask) const {
+  mask = GrayImage(camera_.width_px, camera_.height_px);
+  for (size_t i = 0; i < mask.data.size(); ++i) {
+    if (2 * actor_samples_[i] < options_.samples || actor_samples_[i] == 0) continue;
+    mask.data[i] = moving[static_cast<size_t>(last_actor_[i])] ? 255 : 128;
+  }
+}
+
+RenderedFrame Renderer::Impl::Render(std::span<const Mesh> still, const TextureList& textures, double time_s,
+                                     uint64_t index, const std::function<Instant(double)>& instant_at) {
+  const size_t pixels = vignette_.size();
+  sum_.assign(3 * pixels, 0);
+  actor_samples_.assign(pixels, 0);
+  last_actor_.assign(pixels, -1);
+  for (int i = 0; i < options_.samples; ++i) {
+    const double t = (i + 0.5) / options_.samples;
+    // Places within the pixel by the golden ratio: even over any number of samples.
+    const double px = t - 0.5, py = (i + 0.5) * 0.6180339887 - std::floor((i + 0.5) * 0.6180339887) - 0.5;
+    const Eigen::Vector2d jitter_px = options_.samples == 1 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.2 * px, 1.2 * py);
+    Rasterize(still, instant_at(time_s + (t - 0.5) * options_.exposure_s), &textures, jitter_px);
+    Shade();
+  }
+  RenderedFrame frame;
+  Develop(time_s, index, frame);
+  const Instant middle = instant_at(time_s);
+  MakeMask(middle.moving, frame.mask);
+  if (options_.depth) frame.depth_m = RenderDepth(still, middle, nullptr);
+  return frame;
+}
+
+std::vector<float> Renderer::Impl::RenderDepth(std::span<const Mesh> still, const Instant& instant,
+                                               std::vector<int>* actor_of) {
+  Rasterize(still, instant, nullptr, {0, 0});
+  const size_t pixels = vignette_.size();
+  std::vector<float> depth_m(pixels, 0.0f);
+  if (actor_of != nullptr) actor_of->assign(pixels, -1);
+  for (size_t i = 0; i < pixels; ++i) {
+    const auto width = static_cast<size_t>(camera_.width_px);
+    float x = static_cast<float>(i % width), y = static_cast<float>(i / width);
+    const Facet* facet = FacetAt(i, x, y);
+    if (facet == nullptr) continue;
+    depth_m[i] = 1.0f / facet->inverse_depth.At(x, y);
+    if (actor_of != nullptr) (*actor_of)[i] = facet->actor;
+  }
+  return depth_m;
+}
+
+Renderer::Renderer(const Camera& camera, const RenderOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+RenderedFrame Renderer::Render(std::span<const Mesh> still, const TextureList& textures, double time_s, uint64_t index,
+                               const std::function<Instant(double)>& instant_at) {
+  return impl_->Render(still, textures, time_s, index, instant_at);
+}
+
+std::vector<float> Renderer::RenderDepth(std::span<const Mesh> still, const Instant& instant, std::vector<int>* actor_of) {
+  return impl_->RenderDepth(still, instant, actor_of);
+}
+
+}  // namespace dmslam
