@@ -24,21 +24,35 @@ void Endpoint::Subscribe(const std::string& channel) {
 
 void Endpoint::AddReader(StreamReader* reader, const std::string& owner,
                          const std::vector<std::string>& record_channels) {
-  readers_.push_back(reader);
+  machines_.push_back(reader);
   for (const std::string& channel : record_channels) Subscribe(channel);
   Subscribe(PartChannel(owner));
   Subscribe(HeadChannel(owner));
 }
 
 void Endpoint::AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers) {
-  writers_.push_back(writer);
+  machines_.push_back(writer);
   for (const std::string& reader : readers) Subscribe(AckChannel(reader));
   Subscribe(HeadChannel(owner));  // of a second writer
   Subscribe(TakeOverChannel(owner));
 }
 
-void Endpoint::Remove(const StreamReader* reader) { std::erase(readers_, reader); }
-void Endpoint::Remove(const StreamWriter* writer) { std::erase(writers_, writer); }
+void Endpoint::AddElection(WriterElection* election, const std::string& owner) {
+  machines_.push_back(election);
+  Subscribe(HeadChannel(owner));
+}
+
+void Endpoint::AddSearch(ReplicaSearch* search, const std::vector<std::string>& holders) {
+  machines_.push_back(search);
+  for (const std::string& holder : holders) Subscribe(ReplicaChannel(holder));
+}
+
+void Endpoint::AddHolder(ReplicaHolder* holder, const std::string& owner) {
+  machines_.push_back(holder);
+  Subscribe(HandOverChannel(owner));
+}
+
+void Endpoint::Remove(const StateMachine* machine) { std::erase(machines_, machine); }
 
 void Endpoint::SetOtherHandler(const std::vector<std::string>& channels, Bus::Handler handler) {
   other_ = std::move(handler);
@@ -48,27 +62,21 @@ void Endpoint::SetOtherHandler(const std::vector<std::string>& channels, Bus::Ha
 
 void Endpoint::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
   const int64_t now = clock_();
-  for (StreamWriter* writer : writers_) writer->Receive(channel, bytes, now);
-  for (StreamReader* reader : readers_) reader->Receive(channel, bytes, now);
+  for (StateMachine* machine : machines_) machine->Receive(channel, bytes, now);
   if (other_ && Contains(other_channels_, channel)) other_(channel, bytes);
 }
 
 void Endpoint::Advance() {
   const int64_t now = clock_();
-  for (StreamWriter* writer : writers_) {
-    writer->Advance(now);
-    for (const Outgoing& message : writer->TakeOutgoing()) bus_->Publish(message);
-  }
-  for (StreamReader* reader : readers_) {
-    reader->Advance(now);
-    for (const Outgoing& message : reader->TakeOutgoing()) bus_->Publish(message);
+  for (StateMachine* machine : machines_) {
+    machine->Advance(now);
+    for (const Outgoing& message : machine->TakeOutgoing()) bus_->Publish(message);
   }
 }
 
 int64_t Endpoint::deadline_ns() const {
   int64_t deadline = INT64_MAX;
-  for (const StreamWriter* writer : writers_) deadline = std::min(deadline, writer->deadline_ns());
-  for (const StreamReader* reader : readers_) deadline = std::min(deadline, reader->deadline_ns());
+  for (const StateMachine* machine : machines_) deadline = std::min(deadline, machine->deadline_ns());
   return deadline;
 }
 

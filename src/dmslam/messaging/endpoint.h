@@ -6,13 +6,15 @@
 #include <vector>
 
 #include "dmslam/messaging/bus.h"
+#include "dmslam/messaging/election.h"
+#include "dmslam/messaging/hand_over.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
 
 namespace dmslam {
 
-/// Connects the streams of one process to its bus: subscribes to their channels, gives each message to those it may
-/// concern, and sends what they have to say. The streams stay their owner's and must outlive the endpoint.
+/// Connects the state machines of one process to its bus: subscribes to their channels, gives each message to all of
+/// them, and sends what they have to say. They stay their owner's, and must be removed before they die.
 class Endpoint {
  public:
   using Clock = std::function<int64_t()>;
@@ -24,14 +26,16 @@ class Endpoint {
   void AddReader(StreamReader* reader, const std::string& owner, const std::vector<std::string>& record_channels);
   /// `readers`: who may acknowledge, by the upper-case names of their processes ("FRONTEND").
   void AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers);
-  /// Takes a stream off again.
-  void Remove(const StreamReader* reader);
-  void Remove(const StreamWriter* writer);
+  /// An election hears the beacons of its owner; a search the holders' answers; a holder the owner's questions.
+  void AddElection(WriterElection* election, const std::string& owner);
+  void AddSearch(ReplicaSearch* search, const std::vector<std::string>& holders);
+  void AddHolder(ReplicaHolder* holder, const std::string& owner);
+  void Remove(const StateMachine* machine);
 
   /// Messages that belong to no stream: also called for every other one, so the handler looks at the channel.
   void SetOtherHandler(const std::vector<std::string>& channels, Bus::Handler handler);
 
-  /// Advances all streams and sends what they have. Call it after every delivery, publication and deadline.
+  /// Advances all of them and sends what they have. Call it after every delivery, publication and deadline.
   void Advance();
   int64_t deadline_ns() const;
   Bus& bus() { return *bus_; }
@@ -42,8 +46,7 @@ class Endpoint {
 
   Bus* bus_;
   Clock clock_;
-  std::vector<StreamReader*> readers_;
-  std::vector<StreamWriter*> writers_;
+  std::vector<StateMachine*> machines_;
   std::vector<std::string> subscribed_;
   std::vector<std::string> other_channels_;
   Bus::Handler other_;

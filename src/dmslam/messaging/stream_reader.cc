@@ -56,6 +56,8 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
     ++statistics_.dropped_stale;
     return;
   }
+  if (term == term_ && head->utime < last_head_utime_) return;  // late
+  last_head_utime_ = head->utime;
   last_head_ns_ = now_ns;
   if (!SpeaksOurLanguage(*head)) return;
   if (term > term_ || state_ == State::kRefusedVersion) BeginTerm(*head);
@@ -361,6 +363,7 @@ std::vector<Outgoing> StreamReader::TakeOutgoing() { return std::exchange(outgoi
 ReaderStatistics StreamReader::statistics() const {
   ReaderStatistics result = statistics_;
   result.backlog = window_.newest() - window_.next() + 1 + static_cast<int64_t>(former_.size());
+  result.kept_bytes = window_.bytes() + (snapshot_ ? snapshot_->window.bytes() : 0);
   return result;
 }
 

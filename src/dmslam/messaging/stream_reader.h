@@ -9,6 +9,7 @@
 
 #include "dmslam/head_t.hpp"
 #include "dmslam/messaging/receive_window.h"
+#include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
 
 namespace dmslam {
@@ -27,12 +28,13 @@ struct ReaderStatistics {
   int64_t dropped_no_room = 0;   ///< beyond what is kept ahead; they come again
   int64_t acks = 0;              ///< sent
   int64_t backlog = 0;           ///< records known to exist and not yet taken
+  size_t kept_bytes = 0;         ///< waiting to be taken, whole or in pieces
 };
 
 /// The receiving end of a stream: hands out its records once each, strictly in order, whatever is lost, doubled or late
 /// on the way; follows the writer with the highest term; takes a snapshot when it lacks more than the writer keeps. A
 /// pure state machine: no clock, no I/O, no threads.
-class StreamReader {
+class StreamReader : public StateMachine {
  public:
   struct Options {
     int64_t session = 1;
@@ -59,8 +61,7 @@ class StreamReader {
 
   explicit StreamReader(Options options);
 
-  /// Takes in any message of the bus; those of other streams are ignored.
-  void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) override;
 
   /// The next record in order. The owner applies it now. When `begins_anew()` it forgets what it held before.
   std::optional<Record> Take();
@@ -74,9 +75,9 @@ class StreamReader {
   /// Gives up what is held, so that a snapshot of the present writer is taken.
   void Forget();
 
-  void Advance(int64_t now_ns);
-  std::vector<Outgoing> TakeOutgoing();
-  int64_t deadline_ns() const;
+  void Advance(int64_t now_ns) override;
+  std::vector<Outgoing> TakeOutgoing() override;
+  int64_t deadline_ns() const override;
 
   State state() const { return state_; }
   /// The writer's beacon was heard lately.
@@ -127,6 +128,7 @@ class StreamReader {
   std::vector<MissingRange> named_missing_;  // in the last acknowledgement
   bool writer_closed_ = false;
   int64_t last_head_ns_ = INT64_MIN / 2;
+  int64_t last_head_utime_ = INT64_MIN;
   int64_t last_ack_ns_ = INT64_MIN / 2;
   int64_t acked_ = -1, acked_received_ = -1;
   bool ack_due_ = false;

@@ -54,7 +54,7 @@ void StreamWriter::Advance(int64_t now_ns) {
   ForgetAccepted();
   if (IsSilent()) return;
   AdvanceClosing(now_ns);
-  AdvanceSnapshot();
+  AdvanceSnapshot(now_ns);
   SendPaced(now_ns);
   if (beacon_due_ || now_ns >= next_beacon_ns_) Beacon(now_ns);
 }
@@ -160,7 +160,7 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
   }
   reader->accepted = std::clamp<int64_t>(ack->header.seq, 0, window_.last());
   reader->floor = std::max(reader->floor, reader->accepted);
-  if (snapshot_ && !reader->wants_snapshot) snapshot_->received.erase(ack->reader);
+  if (snapshot_ && !reader->wants_snapshot) snapshot_->takers.erase(ack->reader);
   window_.Repair(*ack, now_ns);
 }
 
@@ -188,14 +188,16 @@ void StreamWriter::ReceiveSnapshotAck(const ack_t& ack, int64_t now_ns) {
     ++statistics_.dropped_stale;
     return;
   }
-  const auto part = snapshot_->received.find(ack.reader);
-  if (part == snapshot_->received.end()) return;
-  part->second = std::clamp(ack.header.seq, part->second, snapshot_->window.last());
-  if (part->second == snapshot_->total && reader != readers_.end()) reader->second.wants_snapshot = false;
+  const auto taker = snapshot_->takers.find(ack.reader);
+  if (taker == snapshot_->takers.end()) return;
+  int64_t& received = taker->second.received;
+  received = std::clamp(ack.header.seq, received, snapshot_->window.last());
+  taker->second.last_heard_ns = now_ns;
+  if (received == snapshot_->total && reader != readers_.end()) reader->second.wants_snapshot = false;
   snapshot_->window.Repair(ack, now_ns);
 }
 
-void StreamWriter::AdvanceSnapshot() {
+void StreamWriter::AdvanceSnapshot(int64_t now_ns) {
   if (source_ == nullptr) return;
   const bool wanted = std::any_of(readers_.begin(), readers_.end(),
                                   [](const auto& entry) { return entry.second.wants_snapshot; });
@@ -203,16 +205,17 @@ void StreamWriter::AdvanceSnapshot() {
   if (!snapshot_) return;
   for (auto& [id, reader] : readers_) {  // who comes before the first piece is forgotten may join
     if (!reader.wants_snapshot || snapshot_->window.first() != 1) continue;
-    snapshot_->received.emplace(id, 0);
+    snapshot_->takers.emplace(id, Snapshot::Taker{0, now_ns});
     reader.floor = std::max(reader.floor, snapshot_->cut);
   }
   MakePieces();
-  std::erase_if(snapshot_->received, [&](const auto& entry) {
-    return !readers_.contains(entry.first) || (snapshot_->total > 0 && entry.second == snapshot_->total);
+  std::erase_if(snapshot_->takers, [&](const auto& entry) {
+    return (snapshot_->total > 0 && entry.second.received == snapshot_->total) ||
+           now_ns - entry.second.last_heard_ns > options_.taker_timeout_ns;
   });
   int64_t received = snapshot_->window.last();
-  for (const auto& [id, seq] : snapshot_->received) received = std::min(received, seq);
-  if (snapshot_->received.empty()) {
+  for (const auto& [id, taker] : snapshot_->takers) received = std::min(received, taker.received);
+  if (snapshot_->takers.empty()) {
     EndSnapshot();
     return;
   }

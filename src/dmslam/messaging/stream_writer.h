@@ -9,6 +9,7 @@
 
 #include "dmslam/ack_t.hpp"
 #include "dmslam/messaging/send_window.h"
+#include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
 
 namespace dmslam {
@@ -50,7 +51,7 @@ struct WriterStatistics {
 /// The sending end of a stream that loses nothing: numbers and seals records, sends each once, beacons how far it is,
 /// keeps records until the lossless readers have accepted them, repairs what readers name as missing, and sends a
 /// snapshot to a reader that lacks more than is kept. A pure state machine: no clock, no I/O, no threads.
-class StreamWriter {
+class StreamWriter : public StateMachine {
  public:
   /// A lossless reader, by its role in the system. Other readers never hold the writer back.
   struct Role {
@@ -74,6 +75,7 @@ class StreamWriter {
     int64_t burst_ns = 2'000'000;           ///< ... in so much time
     int64_t resend_after_ns = 20'000'000;   ///< a part sent this recently is not repaired again
     int64_t beacon_ns = 100'000'000;        ///< between beacons
+    int64_t taker_timeout_ns = 2'000'000'000;   ///< who takes a snapshot must say so that often
     int64_t reader_timeout_ns = 5'000'000'000;  ///< a reader is known so long after its last word
     int64_t close_timeout_ns = 2'000'000'000;   ///< closing waits for the readers at most so long
     int snapshot_ahead = 16;                ///< pieces of a snapshot kept at a time
@@ -85,17 +87,10 @@ class StreamWriter {
   /// Publishes an encoded message whose second field is a record header. Returns its seq. Ask Full() before.
   int64_t Publish(const std::string& channel, Bytes message, int64_t now_ns);
 
-  /// Takes in any message of the bus; those that are not for this stream are ignored.
-  void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
-
-  /// Does what is due: beacons, paced parts, snapshots, forgetting.
-  void Advance(int64_t now_ns);
-
-  /// What is to be sent, in order. To be called after each of the above.
-  std::vector<Outgoing> TakeOutgoing();
-
-  /// When Advance has something to do next.
-  int64_t deadline_ns() const;
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) override;
+  void Advance(int64_t now_ns) override;
+  std::vector<Outgoing> TakeOutgoing() override;
+  int64_t deadline_ns() const override;
 
   /// Ends the stream: waits for the known lossless readers, tells everybody, then closed() is true.
   void Close(int64_t now_ns);
@@ -143,7 +138,11 @@ class StreamWriter {
     int64_t cut = 0;
     int64_t total = 0;            // known once the last piece is made
     SendWindow window;
-    std::map<int64_t, int64_t> received;  // by reader: up to which piece
+    struct Taker {
+      int64_t received = 0;       // up to which piece
+      int64_t last_heard_ns = 0;
+    };
+    std::map<int64_t, Taker> takers;  // by reader
   };
 
   void ReceiveAck(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
@@ -153,7 +152,7 @@ class StreamWriter {
   void ReceiveSnapshotAck(const ack_t& ack, int64_t now_ns);
   void ForgetSilentReaders(int64_t now_ns);
   void ForgetAccepted();
-  void AdvanceSnapshot();
+  void AdvanceSnapshot(int64_t now_ns);
   void BeginSnapshot();
   void EndSnapshot();
   void MakePieces();

@@ -78,6 +78,8 @@ inline std::string HeadChannel(const std::string& owner) { return "DMSLAM_" + ow
 inline std::string PartChannel(const std::string& owner) { return "DMSLAM_" + owner + "_PART"; }
 inline std::string AckChannel(const std::string& reader) { return "DMSLAM_" + reader + "_ACK"; }
 inline std::string TakeOverChannel(const std::string& owner) { return "DMSLAM_" + owner + "_TAKE_OVER"; }
+inline std::string HandOverChannel(const std::string& owner) { return "DMSLAM_" + owner + "_HAND_OVER"; }
+inline std::string ReplicaChannel(const std::string& holder) { return "DMSLAM_" + holder + "_REPLICA"; }
 
 /// Version of the protocol: beacons and acknowledgements of another one are refused by name.
 inline constexpr int32_t kProtocolVersion = 1;
