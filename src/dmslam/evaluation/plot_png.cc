@@ -11,7 +11,7 @@ namespace dmslam {
 namespace {
 
 // Everything is drawn that many times larger and then averaged down, which smooths edges.
-constexpr int kOversampling = 3;
+constexpr int kOversampling = 2;
 // Drawing functions take coordinates in 1/16 pixel.
 constexpr int kFractionBits = 4;
 

@@ -1,0 +1,131 @@
+// dmslam-report: what scripts/reproduce.sh has to run, and the report of what it has run.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "dmslam/dataset/text_table.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
+#include "figures.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::vector<std::string> roots;
+  std::string out;
+  int seeds = 10;
+  std::vector<std::string> only;
+  std::string publish;
+};
+
+void WriteText(const fs::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.flush();
+  if (!file)
+    throw InputError(path.string() + ": cannot be written; check that the folder exists and has space");
+}
+
+// One line per run: its folder, the sequence's folder, camera file, profile, seed, and what to --set ("-":
+// nothing).
+void PrintRuns(const Plan& plan) {
+  for (const RunKey& key : Runs(plan)) {
+    const auto sequence = std::find_if(plan.sequences.begin(), plan.sequences.end(),
+                                       [&](const PlannedSequence& s) { return s.info.name == key.sequence; });
+    const auto setting = std::find_if(plan.settings.begin(), plan.settings.end(),
+                                      [&](const Setting& s) { return s.name == key.setting; });
+    std::cout << key.Folder().string() << '\t' << sequence->folder.string() << '\t' << sequence->info.camera
+              << '\t' << key.profile << '\t' << key.seed << '\t'
+              << (setting->argument.empty() ? "-" : setting->argument) << '\n';
+  }
+}
+
+void RunPlan(const Arguments& arguments) {
+  PlanOptions options;
+  for (const std::string& root : arguments.roots) options.roots.emplace_back(root);
+  options.seeds = arguments.seeds;
+  options.only = arguments.only;
+  const Plan plan = MakePlan(options);
+  SavePlan(plan, arguments.out);
+  for (const PlannedSequence& sequence : plan.sequences) {
+    if (!sequence.present()) {
+      std::cerr << "absent: " << sequence.info.name << " (" << sequence.info.source << ")\n";
+    }
+  }
+  PrintRuns(plan);
+}
+
+std::optional<IterationTimes> ReadTimes(const fs::path& path) {
+  if (!fs::exists(path)) return std::nullopt;
+  try {
+    const auto json = nlohmann::json::parse(ReadTextFile(path.string()));
+    return IterationTimes{json.at("ransac_ms").get<double>(), json.at("arsac_ms").get<double>(),
+                          json.at("dlrsac_ms").get<double>(), json.at("machine").get<std::string>()};
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(path.string() + ": needs ransac_ms, arsac_ms, dlrsac_ms and machine (" + error.what() +
+                     ")");
+  }
+}
+
+// The report for docs/: all numbers, but pictures of rendered sequences only, copied beside it.
+void Publish(const fs::path& page, const fs::path& out, const Results& results,
+             const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
+  const fs::path folder = page.parent_path() / "pictures";
+  std::vector<ReportPicture> rendered;
+  for (const ReportPicture& picture : pictures) {
+    const bool real = !picture.sequence.empty() &&
+                      FindSequence(picture.sequence).group != SequenceGroup::kStandIn &&
+                      FindSequence(picture.sequence).group != SequenceGroup::kStandInStill;
+    if (real) continue;
+    fs::create_directories(folder);
+    fs::copy_file(out / picture.file, folder / fs::path(picture.file).filename(),
+                  fs::copy_options::overwrite_existing);
+    rendered.push_back(picture);
+  }
+  WriteText(page, ReportMarkdown(results, times, rendered));
+}
+
+void RunWrite(const Arguments& arguments) {
+  const fs::path out = arguments.out;
+  const Results results = ReadResults(LoadPlan(out), out);
+  const auto times = ReadTimes(out / "table1.json");
+  const std::vector<ReportPicture> pictures = DrawPictures(results, out);
+  WriteText(out / "report.md", ReportMarkdown(results, times, pictures));
+  WriteText(out / "report.json", ReportJson(results, times));
+  if (!arguments.publish.empty()) Publish(arguments.publish, out, results, times, pictures);
+  std::cout << (out / "report.md").string() << "\n" << (out / "report.json").string() << "\n";
+}
+
+}  // namespace
+}  // namespace dmslam
+
+int main(int argc, char** argv) {
+  CLI::App app("The reproduction of the DM-SLAM paper's tables: what to run, and the report of what was run.",
+               "dmslam-report");
+  app.set_version_flag("--version", dmslam::kVersion);
+  app.require_subcommand(1);
+  dmslam::Arguments arguments;
+  CLI::App* plan = app.add_subcommand("plan", "find the sequences, write plan.json, print one line per run");
+  plan->add_option("--root", arguments.roots, "folder that holds sequences; may be repeated")->required();
+  plan->add_option("--out", arguments.out, "the reproduction's folder")->required();
+  plan->add_option("--seeds", arguments.seeds, "runs of each sequence")->capture_default_str();
+  plan->add_option("--only", arguments.only, "only these sequences");
+  CLI::App* write =
+      app.add_subcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
+  write->add_option("--out", arguments.out, "the reproduction's folder")->required();
+  write->add_option("--publish", arguments.publish,
+                    "also write this page, with pictures of rendered sequences only");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    plan->parsed() ? dmslam::RunPlan(arguments) : dmslam::RunWrite(arguments);
+  } catch (const std::exception& error) {
+    std::cerr << "dmslam-report: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

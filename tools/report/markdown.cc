@@ -1,0 +1,264 @@
+#include "markdown.h"
+
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "text.h"
+
+namespace dmslam {
+namespace {
+
+using State = RunResult::State;
+constexpr const char* kNone = "–";
+
+std::string Number(double value, int decimals) { return Format("%.*f", decimals, value); }
+
+std::string Number(const std::optional<Spread>& spread, int decimals) {
+  return spread ? Number(spread->median, decimals) : kNone;
+}
+
+std::string WithEnds(const std::optional<Spread>& spread, int decimals) {
+  if (!spread) return kNone;
+  return Format("%.*f (%.*f–%.*f)", decimals, spread->median, decimals, spread->min, decimals, spread->max);
+}
+
+// By how many percent the second is smaller than the first.
+std::string Improvement(const std::optional<Spread>& before, const std::optional<Spread>& after) {
+  if (!before || !after || !(before->median > 0)) return kNone;
+  return Number(100 * (1 - after->median / before->median), 1);
+}
+
+std::string RunsText(const Cell& cell) {
+  const size_t run = cell.runs.size() - cell.Count(State::kMissing);
+  return Format("%zu/%zu", cell.Count(State::kDone), run);
+}
+
+/// One of the paper's tables: a row per sequence with both systems and the improvement.
+struct ErrorTable {
+  std::string title;
+  Metric metric;
+  int decimals;
+};
+
+std::string ErrorTableHead() {
+  std::string head = "| sequence |";
+  std::string rule = "|---|";
+  for (const char* system : {"baseline", "dm"}) {
+    for (const char* column : {"RMSE", "mean", "median", "S.D.", "tracked %", "first map [s]", "runs"}) {
+      head += Format(" %s %s |", system, column);
+      rule += "---:|";
+    }
+  }
+  for (const char* column : {"RMSE", "mean", "median", "S.D."}) {
+    head += Format(" better by %% (%s) |", column);
+    rule += "---:|";
+  }
+  return head + "\n" + rule + "\n";
+}
+
+std::string SystemCells(const Cell& cell, const ErrorTable& table) {
+  const Metric metric = table.metric;
+  return Format(" %s | %s | %s | %s | %s | %s | %s |", Number(cell.Rmse(metric), table.decimals).c_str(),
+                Number(cell.Mean(metric), table.decimals).c_str(),
+                Number(cell.Median(metric), table.decimals).c_str(),
+                Number(cell.Std(metric), table.decimals).c_str(), Number(cell.TrackedPercent(), 1).c_str(),
+                Number(cell.FirstMapSeconds(), 2).c_str(), RunsText(cell).c_str());
+}
+
+std::string PaperRow(const PaperFigures& paper) {
+  const double better = 100 * (1 - paper.dm_slam_ate_rmse_m / paper.orb_slam2_ate_rmse_m);
+  return Format(
+      "| *the paper: ORB-SLAM2, DM-SLAM* | *%.3f* | | | | *not given* | *not given* | *10* | *%.3f* | | | | "
+      "*not given* | *not given* | *10* | *%.1f* | | | |\n",
+      paper.orb_slam2_ate_rmse_m, paper.dm_slam_ate_rmse_m, better);
+}
+
+std::string ErrorRow(const Cell& baseline, const Cell& dm, const ErrorTable& table) {
+  const Metric metric = table.metric;
+  return "| " + baseline.sequence + " |" + SystemCells(baseline, table) + SystemCells(dm, table) +
+         Format(" %s | %s | %s | %s |\n", Improvement(baseline.Rmse(metric), dm.Rmse(metric)).c_str(),
+                Improvement(baseline.Mean(metric), dm.Mean(metric)).c_str(),
+                Improvement(baseline.Median(metric), dm.Median(metric)).c_str(),
+                Improvement(baseline.Std(metric), dm.Std(metric)).c_str());
+}
+
+std::string RenderErrorTable(const Results& results, const Setting& setting, const ErrorTable& table) {
+  std::string text = "#### " + table.title + "\n\n" + ErrorTableHead();
+  for (const PlannedSequence& sequence : results.plan.sequences) {
+    const std::string name(sequence.info.name);
+    const Cell* baseline = results.Find(name, setting.name, "baseline");
+    const Cell* dm = results.Find(name, setting.name, "dm");
+    if (baseline != nullptr && dm != nullptr) {
+      text += ErrorRow(*baseline, *dm, table);
+    } else {
+      text += "| " + name + " | *absent* |" + std::string(17, '|') + "\n";
+    }
+    if (sequence.info.paper && table.metric == Metric::kAte) text += PaperRow(*sequence.info.paper);
+  }
+  return text + "\n";
+}
+
+std::string SpreadTable(const Results& results, const Setting& setting) {
+  std::string text =
+      "#### Over the seeds: median (least–most)\n\n| sequence | profile | runs with a trajectory | ATE RMSE "
+      "[m] | "
+      "tracked % | tracked as it came % | the same after the first map % | first map [s] |\n"
+      "|---|---|---:|---:|---:|---:|---:|---:|\n";
+  for (const Cell& cell : results.cells) {
+    if (cell.setting != setting.name) continue;
+    text +=
+        Format("| %s | %s | %s | %s | %s | %s | %s | %s |\n", cell.sequence.c_str(), cell.profile.c_str(),
+               RunsText(cell).c_str(), WithEnds(cell.Rmse(Metric::kAte), 4).c_str(),
+               WithEnds(cell.TrackedPercent(), 1).c_str(), WithEnds(cell.TrackedOnlinePercent(), 1).c_str(),
+               WithEnds(cell.TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
+               WithEnds(cell.FirstMapSeconds(), 2).c_str());
+  }
+  return text + "\n";
+}
+
+const PlannedSequence* StillTwin(const Results& results, const SequenceInfo& info) {
+  for (const PlannedSequence& sequence : results.plan.sequences) {
+    if (sequence.info.group == SequenceGroup::kStandInStill && sequence.info.like == info.like)
+      return &sequence;
+  }
+  return nullptr;
+}
+
+std::string PaperImprovement(const SequenceInfo& info) {
+  const std::optional<PaperFigures>& paper = FindSequence(info.like).paper;
+  if (!paper) return kNone;
+  return Number(100 * (1 - paper->dm_slam_ate_rmse_m / paper->orb_slam2_ate_rmse_m), 0);
+}
+
+// The rendered stand-ins: dm with actors against dm without, and its gain over the baseline beside the
+// paper's.
+std::string StandInTable(const Results& results, const Setting& setting) {
+  std::string rows;
+  for (const PlannedSequence& sequence : results.plan.sequences) {
+    if (sequence.info.group != SequenceGroup::kStandIn || !sequence.present()) continue;
+    const std::string name(sequence.info.name);
+    const Cell* dm = results.Find(name, setting.name, "dm");
+    const Cell* baseline = results.Find(name, setting.name, "baseline");
+    const PlannedSequence* twin = StillTwin(results, sequence.info);
+    const Cell* still =
+        twin == nullptr ? nullptr : results.Find(std::string(twin->info.name), setting.name, "dm");
+    if (dm == nullptr || baseline == nullptr) continue;
+    const auto with = dm->Rmse(Metric::kAte);
+    const auto without = still == nullptr ? std::nullopt : still->Rmse(Metric::kAte);
+    const std::string ratio =
+        with && without && without->median > 0 ? Number(with->median / without->median, 2) : kNone;
+    rows += Format(
+        "| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", name.c_str(),
+        std::string(sequence.info.like).c_str(), Number(with, 4).c_str(), Number(without, 4).c_str(),
+        ratio.c_str(), Number(dm->TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
+        Number(baseline->Rmse(Metric::kAte), 4).c_str(),
+        Improvement(baseline->Rmse(Metric::kAte), with).c_str(), PaperImprovement(sequence.info).c_str());
+  }
+  if (rows.empty()) return {};
+  return "#### Rendered stand-ins: dm with actors against dm without\n\n| sequence | stands for | dm ATE [m] "
+         "| dm ATE "
+         "without actors [m] | ratio | dm tracked after the first map % | baseline ATE [m] | dm better by % "
+         "| the paper's "
+         "gain on its sequence % |\n|---|---|---:|---:|---:|---:|---:|---:|---:|\n" +
+         rows + "\n";
+}
+
+std::string Troubles(const Results& results) {
+  std::string text;
+  for (const Cell& cell : results.cells) {
+    for (const RunResult& run : cell.runs) {
+      if (run.state != State::kFailed && run.state != State::kNoTrajectory) continue;
+      text += Format("| %s | %s | %s | %d | %s: %s |\n", cell.sequence.c_str(), cell.setting.c_str(),
+                     cell.profile.c_str(), run.key.seed,
+                     run.state == State::kFailed ? "the run failed" : "no trajectory", run.reason.c_str());
+    }
+  }
+  if (text.empty()) return {};
+  return "## Runs without a trajectory\n\n| sequence | settings | profile | seed | why "
+         "|\n|---|---|---|---:|---|\n" +
+         text + "\n";
+}
+
+std::string SequenceList(const Results& results) {
+  static const std::map<SequenceGroup, const char*> kKinds = {
+      {SequenceGroup::kPaper, "the paper's, real"},
+      {SequenceGroup::kReal, "real"},
+      {SequenceGroup::kStandIn, "rendered, two actors"},
+      {SequenceGroup::kStandInStill, "rendered, nobody"}};
+  std::string text = "## Sequences\n\n| sequence | kind | here |\n|---|---|---|\n";
+  for (const PlannedSequence& sequence : results.plan.sequences) {
+    const std::string source(sequence.info.source);
+    text +=
+        Format("| %s | %s | %s |\n", std::string(sequence.info.name).c_str(), kKinds.at(sequence.info.group),
+               sequence.present() ? "yes" : ("**absent**: " + source).c_str());
+  }
+  return text + "\n";
+}
+
+std::string TimesTable(const std::optional<IterationTimes>& times) {
+  std::string text =
+      "## Table 1. Time of 2000 iterations [ms]\n\n| | RANSAC | ARSAC | DLRSAC |\n|---|---:|---:|---:|\n";
+  if (times) {
+    text += Format("| here (%s) | %.1f | %.1f | %.1f |\n", times->machine.c_str(), times->ransac_ms,
+                   times->arsac_ms, times->dlrsac_ms);
+  } else {
+    text += "| here | not measured | not measured | not measured |\n";
+  }
+  return text + Format("| *the paper (an i7)* | *%.1f* | *%.1f* | *%.1f* |\n\n", kPaperRansacMs,
+                       kPaperArsacMs, kPaperDlrsacMs);
+}
+
+std::string Introduction(const Results& results) {
+  size_t planned = 0, done = 0;
+  for (const Cell& cell : results.cells) {
+    planned += cell.runs.size();
+    done += cell.runs.size() - cell.Count(State::kMissing);
+  }
+  return "# Results beside the DM-SLAM paper's\n\n"
+         "Lu, Wang, Tang, Huang, Li: *DM-SLAM: Monocular SLAM in Dynamic Environments*, Appl. Sci. 2020, "
+         "10(12), 4252. " +
+         Format(
+             "`baseline` stands where the paper has ORB-SLAM2, `dm` where it has DM-SLAM. %zu of %zu runs "
+             "are done "
+             "(%d seeds). ",
+             done, planned, results.plan.seeds) +
+         "Each figure is the median over the seeds; trajectories are aligned by Sim3, as monocular ones must "
+         "be. "
+         "Lengths are metres, angles degrees. *Tracked* is the share of the sequence's frames that have a "
+         "pose in the "
+         "final trajectory (none for a run without one): an error without it is no result. *Runs* are those "
+         "with a "
+         "trajectory, of those that were run.\n\n"
+         "Of the paper's figures only the RMSE of ATE and its Table 1 are recorded here; its other columns "
+         "are left "
+         "out rather than guessed, and it gives no coverage.\n\n";
+}
+
+std::string SettingSection(const Results& results, const Setting& setting) {
+  static const std::vector<ErrorTable> kTables = {
+      {"Table 2a. Rotational RPE per frame [deg]", Metric::kRpeRotationPerFrame, 4},
+      {"Table 2b. Rotational RPE per second [deg]", Metric::kRpeRotationPerSecond, 3},
+      {"Table 3a. Translational RPE per frame [m]", Metric::kRpeTranslationPerFrame, 5},
+      {"Table 3b. Translational RPE per second [m]", Metric::kRpeTranslationPerSecond, 4},
+      {"Table 4. ATE [m]", Metric::kAte, 4}};
+  std::string text = "## With " + setting.title + "\n\n";
+  for (const ErrorTable& table : kTables) text += RenderErrorTable(results, setting, table);
+  return text + SpreadTable(results, setting) + StandInTable(results, setting);
+}
+
+}  // namespace
+
+std::string ReportMarkdown(const Results& results, const std::optional<IterationTimes>& times,
+                           const std::vector<ReportPicture>& pictures) {
+  std::string text = Introduction(results) + SequenceList(results) + TimesTable(times);
+  for (const Setting& setting : results.plan.settings) text += SettingSection(results, setting);
+  text += Troubles(results);
+  if (!pictures.empty()) text += "## Pictures\n\n";
+  for (const ReportPicture& picture : pictures) {
+    text += "**" + picture.title + "**\n\n![" + picture.title + "](" + picture.file + ")\n\n";
+  }
+  return text;
+}
+
+}  // namespace dmslam

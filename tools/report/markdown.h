@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "results.h"
+
+namespace dmslam {
+
+/// A picture of the report.
+struct ReportPicture {
+  std::string sequence;  // empty: about all of them
+  std::string title;
+  std::string file;  // relative to the report
+};
+
+/// Times of 2000 iterations [ms], as the paper's Table 1 has them, measured on this machine.
+struct IterationTimes {
+  double ransac_ms = 0;
+  double arsac_ms = 0;
+  double dlrsac_ms = 0;
+  std::string machine;
+};
+
+/// The paper's Tables 1 to 4 with the paper's own figures beside ours, coverage beside every error, and what
+/// is absent.
+std::string ReportMarkdown(const Results& results, const std::optional<IterationTimes>& times,
+                           const std::vector<ReportPicture>& pictures);
+
+/// The same numbers as a JSON document, with those of every run.
+std::string ReportJson(const Results& results, const std::optional<IterationTimes>& times);
+
+}  // namespace dmslam

@@ -1,0 +1,127 @@
+#include "plan.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+bool IsSequence(const fs::path& folder) { return fs::exists(folder / "rgb.txt"); }
+
+// In the root itself, in the root as the sequence, or one folder deeper.
+fs::path FindFolder(const fs::path& root, const std::string& name) {
+  if (IsSequence(root / name)) return fs::canonical(root / name);
+  if (root.filename() == name && IsSequence(root)) return fs::canonical(root);
+  std::vector<fs::path> deeper;
+  for (const auto& entry : fs::directory_iterator(root, fs::directory_options::skip_permission_denied)) {
+    if (entry.is_directory() && IsSequence(entry.path() / name)) deeper.push_back(entry.path() / name);
+  }
+  std::sort(deeper.begin(), deeper.end());
+  return deeper.empty() ? fs::path() : fs::canonical(deeper.front());
+}
+
+fs::path FindFolder(const std::vector<fs::path>& roots, const std::string& name) {
+  for (const fs::path& root : roots) {
+    if (const fs::path folder = FindFolder(root, name); !folder.empty()) return folder;
+  }
+  return {};
+}
+
+std::vector<Setting> PaperSettings() {
+  return {{"features3000", "3000 features per frame, as in the paper", "features.count=3000"},
+          {"defaults", "default settings", ""}};
+}
+
+}  // namespace
+
+fs::path RunKey::Folder() const {
+  return fs::path("runs") / sequence / setting / profile / ("seed_" + std::to_string(seed));
+}
+
+Plan MakePlan(const PlanOptions& options) {
+  if (options.seeds < 1) throw InputError("--seeds: write a number of at least 1");
+  for (const fs::path& root : options.roots) {
+    if (!fs::is_directory(root))
+      throw InputError(root.string() + ": is no folder; name the one that holds the sequences");
+  }
+  for (const std::string& name : options.only) FindSequence(name);
+  Plan plan;
+  plan.seeds = options.seeds;
+  plan.settings = PaperSettings();
+  plan.profiles = {"baseline", "dm"};
+  for (const SequenceInfo& info : KnownSequences()) {
+    const bool wanted = options.only.empty() ||
+                        std::find(options.only.begin(), options.only.end(), info.name) != options.only.end();
+    if (wanted) plan.sequences.push_back({info, FindFolder(options.roots, std::string(info.folder))});
+  }
+  return plan;
+}
+
+std::vector<RunKey> Runs(const Plan& plan) {
+  std::vector<RunKey> runs;
+  for (int seed = 1; seed <= plan.seeds; ++seed) {
+    for (const Setting& setting : plan.settings) {
+      for (const PlannedSequence& sequence : plan.sequences) {
+        if (!sequence.present()) continue;
+        for (const std::string& profile : plan.profiles) {
+          runs.push_back({std::string(sequence.info.name), setting.name, profile, seed});
+        }
+      }
+    }
+  }
+  return runs;
+}
+
+void SavePlan(const Plan& plan, const fs::path& out) {
+  Json json;
+  json["seeds"] = plan.seeds;
+  json["profiles"] = plan.profiles;
+  json["settings"] = Json::array();
+  for (const Setting& setting : plan.settings) {
+    json["settings"].push_back(
+        {{"name", setting.name}, {"title", setting.title}, {"argument", setting.argument}});
+  }
+  json["sequences"] = Json::array();
+  for (const PlannedSequence& sequence : plan.sequences) {
+    json["sequences"].push_back(
+        {{"name", sequence.info.name},
+         {"folder", sequence.present() ? Json(sequence.folder.string()) : Json(nullptr)}});
+  }
+  std::error_code error;
+  fs::create_directories(out, error);
+  std::ofstream file(out / "plan.json", std::ios::binary);
+  file << json.dump(1) << "\n";
+  file.flush();
+  if (!file) throw InputError((out / "plan.json").string() + ": cannot be written; check --out");
+}
+
+Plan LoadPlan(const fs::path& out) {
+  const std::string path = (out / "plan.json").string();
+  std::ifstream file(path);
+  if (!file) throw InputError(path + ": cannot be opened; run 'dmslam-report plan' first");
+  Plan plan;
+  try {
+    const Json json = Json::parse(file);
+    plan.seeds = json.at("seeds").get<int>();
+    plan.profiles = json.at("profiles").get<std::vector<std::string>>();
+    for (const Json& setting : json.at("settings")) {
+      plan.settings.push_back({setting.at("name").get<std::string>(), setting.at("title").get<std::string>(),
+                               setting.at("argument").get<std::string>()});
+    }
+    for (const Json& sequence : json.at("sequences")) {
+      const fs::path folder = sequence.at("folder").is_null() ? "" : sequence.at("folder").get<std::string>();
+      plan.sequences.push_back({FindSequence(sequence.at("name").get<std::string>()), folder});
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(path + ": is no plan of dmslam-report (" + error.what() + "); remove it");
+  }
+  return plan;
+}
+
+}  // namespace dmslam

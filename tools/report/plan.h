@@ -1,0 +1,63 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "paper.h"
+
+namespace dmslam {
+
+/// A sequence as it is on this machine.
+struct PlannedSequence {
+  SequenceInfo info;
+  // Its folder; empty where it is absent.
+  std::filesystem::path folder;
+  bool present() const { return !folder.empty(); }
+};
+
+/// A set of settings under which everything is run.
+struct Setting {
+  std::string name;      // a folder's name
+  std::string title;     // as tables call it
+  std::string argument;  // for `--set`; empty: defaults
+};
+
+/// What is to be run.
+struct Plan {
+  int seeds = 10;
+  std::vector<PlannedSequence> sequences;
+  std::vector<Setting> settings;
+  std::vector<std::string> profiles;  // "baseline", "dm"
+};
+
+/// One run of it.
+struct RunKey {
+  std::string sequence;
+  std::string setting;
+  std::string profile;
+  int seed = 1;
+
+  /// Its folder under the output folder: runs/<sequence>/<setting>/<profile>/seed_<n>.
+  std::filesystem::path Folder() const;
+};
+
+struct PlanOptions {
+  std::vector<std::filesystem::path> roots;  // searched in this order for the sequences' folders
+  int seeds = 10;
+  std::vector<std::string> only;  // names of sequences; empty: all
+};
+
+/// Looks for the sequences under the roots (a folder of the sequence's name, in a root or one folder deeper,
+/// that holds an rgb.txt). Throws InputError for a name that is not known, seeds below one, or a root that is
+/// no folder.
+Plan MakePlan(const PlanOptions& options);
+
+/// All runs of the sequences that are present, seed by seed: stopped early, all tables have equally many.
+std::vector<RunKey> Runs(const Plan& plan);
+
+/// Kept as plan.json in the output folder. LoadPlan throws InputError that names the file.
+void SavePlan(const Plan& plan, const std::filesystem::path& out);
+Plan LoadPlan(const std::filesystem::path& out);
+
+}  // namespace dmslam

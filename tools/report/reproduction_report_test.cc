@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "dmslam/util/check.h"
+#include "dmslam/util/random.h"
+#include "figures.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<StampedPose> Path(double noise, uint64_t seed) {
+  Random random(seed);
+  std::vector<StampedPose> path;
+  for (int i = 0; i < 150; ++i) {
+    const double t = i / 30.0;
+    const Eigen::Vector3d jitter(random.Gaussian(), random.Gaussian(), random.Gaussian());
+    path.push_back(
+        {i * 33'333'000LL, Rigid3d(ExpSo3({0.1 * t, 0, noise * random.Gaussian()}),
+                                   Eigen::Vector3d(std::sin(t), std::cos(t), 0.2 * t) + noise * jitter)});
+  }
+  return path;
+}
+
+/// A folder with two made-up sequences and, where asked for, results of runs on them.
+class Reproduction : public ::testing::Test {
+ protected:
+  Reproduction() {
+    root_ = fs::temp_directory_path() /
+            (std::string("dmslam_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(root_);
+    for (const char* name :
+         {"tum/rgbd_dataset_freiburg3_walking_xyz", "tum/more/synth_walking_xyz", "tum/synth_still_xyz"}) {
+      fs::create_directories(root_ / name);
+      WriteTrajectory((root_ / name / "groundtruth.txt").string(), Path(0, 1));
+      std::ofstream list(root_ / name / "rgb.txt");
+      for (const StampedPose& pose : Path(0, 1)) list << FormatPose(pose).substr(0, 8) << " a.png\n";
+    }
+    options_.roots = {root_ / "tum"};
+    options_.seeds = 3;
+  }
+  ~Reproduction() override { fs::remove_all(root_); }
+
+  void WriteRun(const RunKey& key, double noise, const std::string& summary) {
+    const fs::path folder = root_ / "out" / key.Folder();
+    fs::create_directories(folder);
+    std::ofstream(folder / "summary.json") << summary;
+    if (noise < 0) return;
+    const auto path = Path(noise, static_cast<uint64_t>(key.seed));
+    WriteTrajectory((folder / "trajectory.txt").string(), path);
+    WriteTrajectory((folder / "trajectory_online.txt").string(), std::span(path).subspan(50, 75));
+  }
+  void WriteAllRuns(const Plan& plan) {
+    for (const RunKey& key : Runs(plan)) {
+      WriteRun(key, key.profile == "dm" ? 0.01 : 0.04, R"({"tracked_percent": 97.5, "first_init_s": 1.25})");
+    }
+  }
+
+  fs::path root_;
+  PlanOptions options_;
+};
+
+TEST_F(Reproduction, FindsSequencesInTheRootAndOneFolderDeeper) {
+  const Plan plan = MakePlan(options_);
+  EXPECT_EQ(plan.sequences.size(), KnownSequences().size());
+  size_t present = 0;
+  for (const PlannedSequence& sequence : plan.sequences) present += sequence.present() ? 1 : 0;
+  EXPECT_EQ(present, 3u);
+  EXPECT_EQ(Runs(plan).size(), 3u * 2 * 2 * 3);
+  SavePlan(plan, root_ / "out");
+  EXPECT_EQ(Runs(LoadPlan(root_ / "out")).size(), Runs(plan).size());
+  options_.only = {"kitchen", "fr3_walking_xyz"};
+  EXPECT_EQ(MakePlan(options_).sequences.size(), 2u);
+}
+
+TEST_F(Reproduction, BadInputIsNamed) {
+  options_.only = {"kitchin"};
+  EXPECT_THROW(MakePlan(options_), InputError);
+  options_.only.clear();
+  options_.seeds = 0;
+  EXPECT_THROW(MakePlan(options_), InputError);
+  options_.seeds = 1;
+  options_.roots = {root_ / "nowhere"};
+  EXPECT_THROW(MakePlan(options_), InputError);
+  EXPECT_THROW(LoadPlan(root_), InputError);
+}
+
+TEST_F(Reproduction, ReportHoldsOurFiguresThePapersAndWhatIsAbsent) {
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  const Results results = ReadResults(plan, root_ / "out");
+  const Cell& dm = *results.Find("fr3_walking_xyz", "defaults", "dm");
+  EXPECT_EQ(dm.Count(RunResult::State::kDone), 3u);
+  EXPECT_NEAR(dm.Rmse(Metric::kAte)->median, 0.01 * std::sqrt(3.0), 0.002);
+  EXPECT_NEAR(dm.TrackedOnlineAfterFirstMapPercent()->median, 75.0, 1e-9);
+  const std::string text = ReportMarkdown(results, std::nullopt, {});
+  for (const char* part : {"*0.329*", "*0.143*", "*56.5*", "Table 2b", "Table 4", "97.5", "1.25",
+                           "**absent**: https://cvg.cit.tum.de", "| fr1_xyz | *absent*",
+                           "| synth_walking_xyz | fr3_walking_xyz |"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
+  }
+  const auto json = nlohmann::json::parse(ReportJson(results, std::nullopt));
+  EXPECT_EQ(json["results"].size(), 3u * 2 * 2);
+  EXPECT_EQ(json["results"][0]["runs"].size(), 3u);
+}
+
+// Every row of a table has as many cells as its head.
+TEST_F(Reproduction, TablesAreEven) {
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  std::istringstream text(
+      ReportMarkdown(ReadResults(plan, root_ / "out"), IterationTimes{1, 2, 3, "here"}, {}));
+  std::string line;
+  long wanted = 0;
+  while (std::getline(text, line)) {
+    const long bars = std::count(line.begin(), line.end(), '|');
+    if (bars == 0) wanted = 0;
+    if (wanted == 0) wanted = bars;
+    EXPECT_EQ(bars, wanted) << line;
+  }
+}
+
+TEST_F(Reproduction, RunsWithoutATrajectoryCountAndAreListed) {
+  const Plan plan = MakePlan(options_);
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 1}, 0.01, R"({"tracked_percent": 90})");
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 2}, -1, R"({"tracked_percent": null})");
+  const RunKey failed{"fr3_walking_xyz", "defaults", "dm", 3};
+  fs::create_directories(root_ / "out" / failed.Folder());
+  std::ofstream(root_ / "out" / failed.Folder() / "failed.txt") << "it fell over\n";
+  const Results results = ReadResults(plan, root_ / "out");
+  const Cell& cell = *results.Find("fr3_walking_xyz", "defaults", "dm");
+  EXPECT_EQ(cell.Count(RunResult::State::kNoTrajectory), 1u);
+  EXPECT_EQ(cell.Count(RunResult::State::kFailed), 1u);
+  EXPECT_EQ(cell.TrackedPercent()->min, 0);
+  const std::string text = ReportMarkdown(results, std::nullopt, {});
+  EXPECT_NE(text.find("it fell over"), std::string::npos);
+  EXPECT_NE(text.find("| 1/3 |"), std::string::npos);
+}
+
+TEST_F(Reproduction, PicturesAreDrawn) {
+  options_.only = {"fr3_walking_xyz"};
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  const auto pictures = DrawPictures(ReadResults(plan, root_ / "out"), root_ / "out");
+  ASSERT_EQ(pictures.size(), 4u);
+  for (const ReportPicture& picture : pictures)
+    EXPECT_GT(fs::file_size(root_ / "out" / picture.file), 10000u);
+}
+
+}  // namespace
+}  // namespace dmslam
