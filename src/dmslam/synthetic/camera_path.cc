@@ -154,7 +154,6 @@ CameraPath::View CameraPath::AlongLoop(double path_time_s) const {
   const bool ring = options_.kind == PathKind::kRing;
   const double start = ring ? 0.0 : phase_ * loop_.arc_m.back();
   const double s = start + options_.speed_mps * path_time_s;
-  const int round = static_cast<int>(std::floor((s - start) / loop_.arc_m.back()));
   const Eigen::Vector2d position = loop_.At(s);
   const double steps_rad_s = 2.0 * kPi * 0.9;
   View view;
@@ -162,11 +161,12 @@ CameraPath::View CameraPath::AlongLoop(double path_time_s) const {
   // Heading over a longer stretch turns the camera before the corner, as people do.
   const double h0 = loop_.Heading(s - 0.4), h1 = loop_.Heading(s + 0.4), h2 = loop_.Heading(s + 1.0);
   const double heading = h1 + 0.3 * (WrapAngle(h0 - h1) + WrapAngle(h2 - h1));
-  // Loops run against the clock: outwards is to the right. Rounds differ a little in where one looks.
+  // Loops run against the clock: outwards is to the right. The sway does not fit the loop's length, so that rounds
+  // differ a little in where one looks.
   const double outwards = ring ? 28 : 62;
-  const double sway = (ring ? 9.0 : 12.0) * std::sin(0.31 * s + 1.7 * round + 6.28 * phase_);
+  const double sway = (ring ? 9.0 : 12.0) * std::sin(0.31 * s + 6.28 * phase_);
   view.yaw_rad = heading - (outwards + sway) * kDegree;
-  view.pitch_rad = (-5.0 + 4.0 * std::sin(0.23 * s + 0.9 * round)) * kDegree;
+  view.pitch_rad = (-5.0 + 4.0 * std::sin(0.23 * s)) * kDegree;
   view.roll_rad = 1.2 * kDegree * std::sin(steps_rad_s * path_time_s);
   return view;
 }

@@ -76,8 +76,8 @@ class Renderer::Impl {
                    const Texture* texture, int actor, const Eigen::Vector2d& jitter_px);
   void FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low, int x_high,
                  uint32_t facet);
-  void Shade();
-  uint32_t ShadePixel(const Facet& facet, float x, float y) const;
+  void Shade(float level_bias);
+  int MipLevel(const Facet& facet, float x, float y, float bias) const;
   const Facet* FacetAt(size_t pixel, float& x, float& y) const;
   void Develop(double time_s, uint64_t index, RenderedFrame& frame);
   void MakeMask(const std::vector<bool>& moving, GrayImage& mask) const;
@@ -278,35 +278,43 @@ const Facet* Renderer::Impl::FacetAt(size_t pixel, float& x, float& y) const {
   return facet == kNothing ? nullptr : &facets_[facet];
 }
 
-uint32_t Renderer::Impl::ShadePixel(const Facet& facet, float x, float y) const {
+int Renderer::Impl::MipLevel(const Facet& facet, float x, float y, float bias) const {
   const float z = 1.0f / std::max(facet.inverse_depth.At(x, y), 1e-4f);
   const float u = z * facet.u_over_z.At(x, y), v = z * facet.v_over_z.At(x, y);
   // How far one steps over the texture with one pixel, along x and along y.
-  const float du_dx = z * (facet.u_over_z.a - u * facet.inverse_depth.a), dv_dx = z * (facet.v_over_z.a - v * facet.inverse_depth.a);
-  const float du_dy = z * (facet.u_over_z.b - u * facet.inverse_depth.b), dv_dy = z * (facet.v_over_z.b - v * facet.inverse_depth.b);
+  const Plane &w = facet.inverse_depth, &s = facet.u_over_z, &t = facet.v_over_z;
+  const float du_dx = z * (s.a - u * w.a), dv_dx = z * (t.a - v * w.a);
+  const float du_dy = z * (s.b - u * w.b), dv_dy = z * (t.b - v * w.b);
   const float along_x = du_dx * du_dx + dv_dx * dv_dx, along_y = du_dy * du_dy + dv_dy * dv_dy;
   // At a grazing view the longer step would blur the shorter one away; the samples within a pixel cover some of it.
   const float longer = std::max(along_x, along_y), shorter = std::min(along_x, along_y);
   const auto per_pixel = static_cast<float>(canvas_scale_ * canvas_scale_);
   const float squared = per_pixel * std::max(shorter, longer * (1.0f / 6.0f));
-  const float level = squared > 1e-20f ? 0.5f * FastLog2(squared) - 0.35f : 0.0f;
-  const uint32_t texel = facet.texture->Sample(u, v, level);
-  const auto light = static_cast<uint32_t>(std::clamp(z * facet.light_over_z.At(x, y), 0.0f, 1.5f) * 256.0f);
-  const auto lit = [&](uint32_t shift) { return std::min<uint32_t>(255, (((texel >> shift) & 0xff) * light) >> 8); };
-  return lit(0) | (lit(8) << 8) | (lit(16) << 16);
+  if (!(squared > 1.0f)) return 0;
+  return std::clamp(static_cast<int>(0.5f * FastLog2(squared) + bias), 0, facet.texture->levels() - 1);
 }
 
-void Renderer::Impl::Shade() {
+void Renderer::Impl::Shade(float level_bias) {
+  constexpr int kLevelRun = 8;  // The mip level is worked out once for so many pixels of a facet.
   size_t pixel = 0;
   for (int y = 0; y < camera_.height_px; ++y) {
+    const Facet* last = nullptr;
+    int level = 0;
     for (int x = 0; x < camera_.width_px; ++x, ++pixel) {
       float at_x = static_cast<float>(x), at_y = static_cast<float>(y);
       const Facet* facet = FacetAt(pixel, at_x, at_y);
       if (facet == nullptr) continue;
-      const uint32_t color = ShadePixel(*facet, at_x, at_y);
-      sum_[3 * pixel] = static_cast<uint16_t>(sum_[3 * pixel] + (color & 0xff));
-      sum_[3 * pixel + 1] = static_cast<uint16_t>(sum_[3 * pixel + 1] + ((color >> 8) & 0xff));
-      sum_[3 * pixel + 2] = static_cast<uint16_t>(sum_[3 * pixel + 2] + ((color >> 16) & 0xff));
+      if (facet != last || x % kLevelRun == 0) level = MipLevel(*facet, at_x, at_y, level_bias);
+      last = facet;
+      const float z = 1.0f / std::max(facet->inverse_depth.At(at_x, at_y), 1e-4f);
+      const uint32_t texel =
+          facet->texture->Sample(z * facet->u_over_z.At(at_x, at_y), z * facet->v_over_z.At(at_x, at_y), level);
+      const auto light =
+          static_cast<uint32_t>(std::clamp(z * facet->light_over_z.At(at_x, at_y), 0.0f, 1.5f) * 256.0f);
+      for (size_t k = 0; k < 3; ++k) {
+        const uint32_t lit = std::min<uint32_t>(255, (((texel >> (8 * k)) & 0xff) * light) >> 8);
+        sum_[3 * pixel + k] = static_cast<uint16_t>(sum_[3 * pixel + k] + lit);
+      }
       if (facet->actor >= 0) {
         ++actor_samples_[pixel];
         last_actor_[pixel] = static_cast<int8_t>(facet->actor);
@@ -358,9 +366,10 @@ RenderedFrame Renderer::Impl::Render(std::span<const Mesh> still, const TextureL
     const double t = (i + 0.5) / options_.samples;
     // Places within the pixel by the golden ratio: even over any number of samples.
     const double px = t - 0.5, py = (i + 0.5) * 0.6180339887 - std::floor((i + 0.5) * 0.6180339887) - 0.5;
-    const Eigen::Vector2d jitter_px = options_.samples == 1 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.2 * px, 1.2 * py);
+    const Eigen::Vector2d jitter_px = options_.samples == 1 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.4 * px, 1.4 * py);
     Rasterize(still, instant_at(time_s + (t - 0.5) * options_.exposure_s), &textures, jitter_px);
-    Shade();
+    // The samples round the mip level at different thresholds: their mean lies between two levels.
+    Shade(static_cast<float>(t) - 0.35f);
   }
   RenderedFrame frame;
   Develop(time_s, index, frame);

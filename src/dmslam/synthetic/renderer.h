@@ -16,8 +16,8 @@ namespace dmslam {
 struct RenderOptions {
   int samples = 4;                 ///< Pictures per frame, each at its own instant and its own place within the pixel.
   double exposure_s = 0.010;       ///< The shutter is open for so long around a frame's stamp.
-  double read_noise = 1.3;         ///< Standard deviation of what is added to every pixel, in grey values.
-  double shot_noise = 0.17;        ///< Times the root of the grey value: the noise of light itself.
+  double read_noise = 0.7;         ///< Standard deviation of what is added to every pixel, in grey values.
+  double shot_noise = 0.09;        ///< Times the root of the grey value: the noise of light itself.
   double vignetting = 0.18;        ///< How much darker the corners are than the middle.
   double gain_swing = 0.03;        ///< Automatic exposure: how much the brightness wanders.
   uint64_t seed = 1;               ///< Of the noise.

@@ -14,20 +14,6 @@ uint32_t Pack(const Rgb& color) {
   return byte(color.x()) | (byte(color.y()) << 8) | (byte(color.z()) << 16);
 }
 
-/// Between two packed colours, `t` in 0..256.
-uint32_t Mix(uint32_t a, uint32_t b, uint32_t t) {
-  constexpr uint32_t kRedBlue = 0x00ff00ff;
-  const uint32_t red_blue = (((a & kRedBlue) * (256 - t) + (b & kRedBlue) * t) >> 8) & kRedBlue;
-  const uint32_t green = (((a >> 8) & 0xff) * (256 - t) + ((b >> 8) & 0xff) * t) & 0xff00;
-  return red_blue | green;
-}
-
-/// std::floor without the library call that it costs where the CPU's own instruction may not be assumed.
-int32_t FloorToInt(float value) {
-  const auto truncated = static_cast<int32_t>(value);
-  return truncated - (value < static_cast<float>(truncated) ? 1 : 0);
-}
-
 /// Half the size along the sides that are longer than one pixel.
 Canvas Halve(const Canvas& from) {
   const int step_x = from.width() > 1 ? 2 : 1, step_y = from.height() > 1 ? 2 : 1;
@@ -117,39 +103,16 @@ Texture::Texture(const Canvas& canvas) : width_(canvas.width()), height_(canvas.
                "the sides of a texture must be powers of two");
   Canvas level = canvas;
   while (true) {
-    levels_.push_back({texels_.size(), std::countr_zero(static_cast<unsigned>(level.width())),
-                       std::countr_zero(static_cast<unsigned>(level.height()))});
+    const auto level_width = static_cast<uint32_t>(level.width()), level_height = static_cast<uint32_t>(level.height());
+    levels_.push_back({texels_.size(), level_width - 1, level_height - 1,
+                       static_cast<uint32_t>(std::countr_zero(level_width)),
+                       1.0f / static_cast<float>(1u << levels_.size())});
     for (int y = 0; y < level.height(); ++y) {
       for (int x = 0; x < level.width(); ++x) texels_.push_back(Pack(level.at(x, y)));
     }
     if (level.width() == 1 && level.height() == 1) break;
     level = Halve(level);
   }
-}
-
-uint32_t Texture::SampleLevel(const Level& level, float scale, float u_texels, float v_texels) const {
-  // Texel centres lie at half-integers; fixed point with eight bits of fraction.
-  const auto u = FloorToInt((u_texels * scale - 0.5f) * 256.0f);
-  const auto v = FloorToInt((v_texels * scale - 0.5f) * 256.0f);
-  const uint32_t mask_x = (1u << level.width_bits) - 1, mask_y = (1u << level.height_bits) - 1;
-  const auto x0 = static_cast<uint32_t>(u >> 8) & mask_x, y0 = static_cast<uint32_t>(v >> 8) & mask_y;
-  const uint32_t x1 = (x0 + 1) & mask_x, y1 = (y0 + 1) & mask_y;
-  const auto tx = static_cast<uint32_t>(u) & 0xff, ty = static_cast<uint32_t>(v) & 0xff;
-  const uint32_t* row0 = texels_.data() + level.offset + (static_cast<size_t>(y0) << level.width_bits);
-  const uint32_t* row1 = texels_.data() + level.offset + (static_cast<size_t>(y1) << level.width_bits);
-  return Mix(Mix(row0[x0], row0[x1], tx), Mix(row1[x0], row1[x1], tx), ty);
-}
-
-uint32_t Texture::Sample(float u_texels, float v_texels, float level_of_detail) const {
-  const auto top = static_cast<int>(levels_.size()) - 1;
-  if (!(level_of_detail > 0.0f)) return SampleLevel(levels_[0], 1.0f, u_texels, v_texels);
-  const int level = std::min(static_cast<int>(level_of_detail), top);
-  const float scale = 1.0f / static_cast<float>(1 << level);
-  const uint32_t fine = SampleLevel(levels_[static_cast<size_t>(level)], scale, u_texels, v_texels);
-  if (level == top) return fine;
-  const auto t = static_cast<uint32_t>((level_of_detail - static_cast<float>(level)) * 256.0f);
-  if (t == 0) return fine;
-  return Mix(fine, SampleLevel(levels_[static_cast<size_t>(level) + 1], 0.5f * scale, u_texels, v_texels), t);
 }
 
 }  // namespace dmslam
