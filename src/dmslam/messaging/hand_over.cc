@@ -59,6 +59,7 @@ void ReplicaSearch::Choose() {
 
 void ReplicaSearch::TryAgain(int64_t now_ns) {
   answers_.clear();
+  ++options_.asker;
   state_ = State::kAsking;
   give_up_ns_ = now_ns + options_.absent_ns;
   next_ask_ns_ = now_ns;

@@ -228,7 +228,7 @@ class ReaderProcess : public Process {
     options.name = ReaderName(index_);
     handed_ = history;
     source_.emplace(&handed_);
-    hand_over_.emplace(options, Term{now_ns, id_}, reader_.held(), &*source_);
+    hand_over_.emplace(options, Term{now_ns, *served_}, reader_.held(), &*source_);
   }
 
   int index_;
@@ -268,6 +268,7 @@ class OwnerProcess : public Process {
   }
 
   void Work(int64_t now_ns) override {
+    if (phase_ < Phase::kWriting && election_.state() == WriterElection::State::kRefused) phase_ = Phase::kEnded;
     if (phase_ == Phase::kElecting) Elect(now_ns);
     if (phase_ == Phase::kSearching) Search(now_ns);
     if (phase_ == Phase::kReceiving) ReceiveReplica(now_ns);
@@ -297,7 +298,6 @@ class OwnerProcess : public Process {
   }
 
   void Elect(int64_t now_ns) {
-    if (election_.state() == WriterElection::State::kRefused) phase_ = Phase::kEnded;
     if (election_.state() != WriterElection::State::kWon) return;
     ReplicaSearch::Options options;
     options.session = kSession;
@@ -310,10 +310,6 @@ class OwnerProcess : public Process {
   }
 
   void Search(int64_t now_ns) {
-    if (election_.state() == WriterElection::State::kRefused) {
-      phase_ = Phase::kEnded;
-      return;
-    }
     if (search_->state() == ReplicaSearch::State::kNone) return BeginWriting(Version{}, now_ns);
     if (search_->state() != ReplicaSearch::State::kFound) return;
     StreamReader::Options options;
@@ -323,6 +319,7 @@ class OwnerProcess : public Process {
     options.reader = "OWNER";
     options.role = "owner";
     options.id = id_;
+    options.only_writer = search_->asker();
     options.limits = {500, kReaderBytes, 60'000};
     replica_reader_.emplace(options);
     receiving_since_ns_ = now_ns;
@@ -335,7 +332,7 @@ class OwnerProcess : public Process {
       if (!ApplyEntries(*record, &history)) failure = "a replica was handed over out of order";
       if (!record->ends_snapshot()) continue;
       from_replica_ = true;
-      return BeginWriting(search_->replica().version, now_ns);
+      return BeginWriting(replica_reader_->parent(), now_ns);
     }
     if (now_ns - receiving_since_ns_ < 6 * kSecond) return;
     history.clear();

@@ -52,7 +52,8 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
     return;
   }
   const Term term{head->header.epoch, head->header.writer};
-  if (term < term_ || term.epoch < held_.epoch || !term.valid()) {
+  const bool wanted = options_.only_writer == 0 || term.writer == options_.only_writer;
+  if (!wanted || term < term_ || term.epoch < held_.epoch || !term.valid()) {
     ++statistics_.dropped_stale;
     return;
   }
@@ -84,6 +85,7 @@ void StreamReader::BeginTerm(const head_t& head) {
   const Version parent = ParentOf(head);
   const Version end = same_epoch ? held_ : DrainFormerTerm(parent, fresh);
   term_ = {head.header.epoch, head.header.writer};
+  parent_ = parent;
   window_.Reset(same_epoch ? held_.seq + 1 : 1);
   snapshot_.reset();
   named_missing_.clear();

@@ -46,6 +46,7 @@ class StreamReader : public StateMachine {
     int64_t id = 0;                    ///< random, not zero
     int64_t schema_hash = 0;           ///< over all message types; writers with another one are refused
     Version start;                     ///< what the owner holds already
+    int64_t only_writer = 0;           ///< follows terms of this writer id alone (a hand-over); 0: of any
     ReceiveWindow::Limits limits;
     int64_t ack_ns = 30'000'000;       ///< between acknowledgements while something is new or missing
     int64_t idle_ack_ns = 1'000'000'000;     ///< ... and otherwise
@@ -90,6 +91,8 @@ class StreamReader : public StateMachine {
   const Version& held() const { return held_; }
   const Version& accepted() const { return accepted_; }
   const Term& term() const { return term_; }
+  /// What the term that is followed continues; empty when it is fresh.
+  const Version& parent() const { return parent_; }
 
   ReaderStatistics statistics() const;
 
@@ -121,7 +124,7 @@ class StreamReader : public StateMachine {
   Options options_;
   State state_ = State::kNoWriter;
   Term term_;
-  Version held_, accepted_;
+  Version parent_, held_, accepted_;
   ReceiveWindow window_;
   std::deque<Record> former_;  // of the former term: complete, in order, not yet taken
   std::optional<Snapshot> snapshot_;
