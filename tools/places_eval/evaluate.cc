@@ -271,7 +271,7 @@ PlacesResult::Query Answer(const std::vector<View>& views, size_t index,
 }  // namespace
 
 PlacesResult EvaluatePlaces(const PlacesOptions& options) {
-  const Vocabulary vocabulary = Vocabulary::Load(options.vocabulary);
+  const Vocabulary vocabulary = LoadOrbVocabulary(options.vocabulary);
   std::vector<View> views = LoadViews(options, vocabulary);
   TriangulateAll(options, views);
   KeyframeDatabase database;

@@ -20,6 +20,11 @@ void PrintInfo(const std::string& path) {
   std::printf("weighting  tf-idf, L1 score\n");
   std::printf("idf        min %.3f, median %.3f, max %.3f\n", static_cast<double>(weights.front()),
               static_cast<double>(weights[weights.size() / 2]), static_cast<double>(weights.back()));
+  const uint32_t descriptors = vocabulary.descriptor_id();
+  const bool ours = descriptors == OrbDescriptorId();
+  std::printf("made for   %s\n", ours               ? "this extractor"
+                                 : descriptors == 0 ? "unknown descriptors"
+                                                    : "other descriptors");
   std::printf("checksum   %08x\n", vocabulary.checksum());
 }
 

@@ -97,6 +97,7 @@ void Train(const TrainCommand& command) {
   options.levels = command.levels;
   options.seed = command.seed;
   options.min_split = command.min_split;
+  options.descriptor_id = OrbDescriptorId();
   options.Check();
   const TrainingSet training = ExtractAll(ImagesIn(command.images), command);
   ProgressLine progress("clusters");

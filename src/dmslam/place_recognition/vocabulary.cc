@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "dmslam/features/brief_pattern.h"
 #include "dmslam/place_recognition/output_file.h"
 #include "dmslam/place_recognition/vocabulary_format.h"
 #include "dmslam/util/check.h"
@@ -77,10 +78,13 @@ uint32_t ChecksumOf(uint32_t branching, uint32_t levels, std::span<const uint8_t
 
 /// Checks everything of a header that can be checked without the rest.
 void CheckHeader(const format::Header& header, size_t file_size, const std::string& name) {
+  if (header.magic != format::kMagic) Fail(name, "file does not begin as a vocabulary does");
   if (header.version != format::kVersion) {
     Fail(name, "version is " + std::to_string(header.version) + ", this program reads " +
                    std::to_string(format::kVersion));
   }
+  if (header.header_crc != format::HeaderCrc(header))
+    Fail(name, "header's checksum does not match, file is damaged");
   if (header.branching < 2 || header.branching > format::kMaxBranching) Fail(name, "branching is not 2..64");
   if (header.levels < 1 || header.levels > format::kMaxLevels) Fail(name, "levels is not 1..10");
   if (header.num_nodes < 3 || header.num_nodes > format::kMaxNodes) Fail(name, "num_nodes is out of range");
@@ -124,6 +128,7 @@ Vocabulary::Vocabulary(VocabularyTree tree, const std::string& name)
   const VocabularyTree& owned = shared->owned;
   shared->branching = owned.branching;
   shared->levels = owned.levels;
+  shared->descriptor_id = owned.descriptor_id;
   shared->child_counts = owned.child_counts;
   shared->descriptors = owned.descriptors;
   shared->weights = owned.weights;
@@ -160,14 +165,14 @@ Vocabulary Vocabulary::FromMapping(const std::filesystem::path& path,
   auto shared = std::make_shared<Shared>();
   shared->branching = header.branching;
   shared->levels = header.levels;
+  shared->descriptor_id = header.descriptor_id;
   shared->child_counts = mapping->Array<uint8_t>(layout.child_counts, header.num_nodes);
   shared->descriptors = mapping->Array<Descriptor>(layout.descriptors, header.num_nodes);
   shared->weights = mapping->Array<float>(layout.weights, header.num_words);
   shared->checksum =
       ChecksumOf(header.branching, header.levels, shared->child_counts, shared->descriptors, shared->weights);
   const size_t counts_end = layout.child_counts + header.num_nodes;
-  const bool padding_zero =
-      AllZero(bytes.subspan(counts_end, layout.descriptors - counts_end)) && AllZero(header.reserved);
+  const bool padding_zero = AllZero(bytes.subspan(counts_end, layout.descriptors - counts_end));
   if (shared->checksum != header.checksum || !padding_zero)
     Fail(name, "checksum does not match, file is damaged");
   CheckValues(*shared, name);
@@ -218,6 +223,8 @@ void Vocabulary::SaveBinary(const std::filesystem::path& path) const {
   header.num_nodes = static_cast<uint32_t>(num_nodes());
   header.num_words = static_cast<uint32_t>(num_words());
   header.checksum = checksum();
+  header.descriptor_id = descriptor_id();
+  header.header_crc = format::HeaderCrc(header);
   const format::Layout layout(header);
   const std::vector<std::byte> padding(layout.descriptors - layout.child_counts - num_nodes());
   OutputFile file(path);
@@ -295,6 +302,21 @@ Vocabulary Vocabulary::WithPath(HammingPath path) const {
   Vocabulary other = *this;
   other.nearest_child_ = NearestChildOn(path);
   return other;
+}
+
+uint32_t OrbDescriptorId() {
+  const auto& pattern = BriefPattern();
+  return Crc32c({reinterpret_cast<const uint8_t*>(pattern.data()), pattern.size() * sizeof(pattern[0])});
+}
+
+Vocabulary LoadOrbVocabulary(const std::filesystem::path& path) {
+  Vocabulary vocabulary = Vocabulary::Load(path);
+  if (vocabulary.descriptor_id() != 0 && vocabulary.descriptor_id() != OrbDescriptorId()) {
+    throw InputError(path.string() +
+                     ": vocabulary was trained on other descriptors than this program makes; " +
+                     "train it again (scripts/train_vocabulary.sh)");
+  }
+  return vocabulary;
 }
 
 }  // namespace dmslam

@@ -20,6 +20,7 @@ namespace dmslam {
 struct VocabularyTree {
   uint32_t branching = 0;               ///< most children of a node, 2..64
   uint32_t levels = 0;                  ///< most steps from the root to a leaf, 1..10
+  uint32_t descriptor_id = 0;           ///< kind of descriptors it was trained on; 0 = unknown
   std::vector<uint8_t> child_counts;    ///< per node; 0 = leaf, which is a word
   std::vector<Descriptor> descriptors;  ///< per node; the root's is unused (zero)
   std::vector<float> weights;  ///< per word, breadth first: inverse document frequency, >= 0; 0 = ignored
@@ -77,6 +78,10 @@ class Vocabulary {
   /// from.
   uint32_t checksum() const { return shared_->checksum; }
 
+  /// Which kind of descriptors it was trained on; 0 where the file does not say (DBoW2's format). Not in the
+  /// checksum.
+  uint32_t descriptor_id() const { return shared_->descriptor_id; }
+
   /// The same vocabulary, descending with other instructions (for tests and measurements).
   Vocabulary WithPath(HammingPath path) const;
 
@@ -86,6 +91,7 @@ class Vocabulary {
     uint32_t branching = 0;
     uint32_t levels = 0;
     uint32_t checksum = 0;
+    uint32_t descriptor_id = 0;
     std::span<const uint8_t> child_counts;
     std::span<const Descriptor> descriptors;
     std::span<const float> weights;
@@ -105,5 +111,12 @@ class Vocabulary {
   std::shared_ptr<const Shared> shared_;
   NearestChildFunction nearest_child_;
 };
+
+/// Names the descriptors that OrbExtractor makes: a hash of its pattern of comparisons.
+uint32_t OrbDescriptorId();
+
+/// Vocabulary::Load, which also refuses a vocabulary that was trained on descriptors of another pattern: its
+/// words would mean nothing.
+Vocabulary LoadOrbVocabulary(const std::filesystem::path& path);
 
 }  // namespace dmslam

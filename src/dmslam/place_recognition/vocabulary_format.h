@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "dmslam/place_recognition/vocabulary.h"
+#include "dmslam/util/crc32c.h"
 
 namespace dmslam::vocabulary_format {
 
@@ -36,9 +37,15 @@ struct Header {
   uint32_t num_nodes = 0;
   uint32_t num_words = 0;
   uint32_t checksum = 0;
-  std::array<uint8_t, 32> reserved{};
+  uint32_t descriptor_id = 0;
+  std::array<uint8_t, 24> reserved{};
+  uint32_t header_crc = 0;  ///< CRC-32C over what is above
 };
 static_assert(sizeof(Header) == 64 && std::is_trivially_copyable_v<Header>);
+
+inline uint32_t HeaderCrc(const Header& header) {
+  return Crc32c({reinterpret_cast<const uint8_t*>(&header), offsetof(Header, header_crc)});
+}
 
 inline constexpr size_t PaddedTo64(size_t bytes) { return (bytes + 63) / 64 * 64; }
 

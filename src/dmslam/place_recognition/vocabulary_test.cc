@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -325,6 +326,36 @@ TEST_F(VocabularyTest, RefusesTreesThatAreNone) {
   broken([](VocabularyTree& tree) { tree.weights[1] = -1; });
   broken([](VocabularyTree& tree) { tree.weights[1] = std::numeric_limits<float>::quiet_NaN(); });
   broken([](VocabularyTree& tree) { tree.descriptors.pop_back(); });
+}
+
+TEST_F(VocabularyTest, RefusesVocabulariesOfOtherDescriptors) {
+  const auto with_id = [&](uint32_t id) {
+    VocabularyTree tree;
+    tree.branching = 2;
+    tree.levels = 1;
+    tree.descriptor_id = id;
+    tree.child_counts = {2, 0, 0};
+    tree.descriptors.resize(3);
+    tree.weights = {1, 1};
+    Vocabulary(std::move(tree)).SaveBinary(Path("id.dmv"));
+    return Path("id.dmv");
+  };
+  EXPECT_EQ(LoadOrbVocabulary(with_id(OrbDescriptorId())).descriptor_id(), OrbDescriptorId());
+  EXPECT_EQ(LoadOrbVocabulary(with_id(0)).descriptor_id(), 0U);
+  const fs::path other = with_id(OrbDescriptorId() ^ 1U);
+  EXPECT_THROW(LoadOrbVocabulary(other), InputError);
+  EXPECT_EQ(Vocabulary::Load(other).checksum(), Vocabulary::Load(with_id(0)).checksum());
+}
+
+TEST_F(VocabularyTest, TheShippedVocabularyFitsTheExtractor) {
+  const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+  if (source == nullptr) GTEST_SKIP() << "DMSLAM_SOURCE_DIR is not set";
+  const fs::path path = fs::path(source) / "data/vocabulary.dmv";
+  ASSERT_TRUE(fs::exists(path)) << "scripts/train_vocabulary.sh makes it";
+  EXPECT_LE(fs::file_size(path), 4U << 20);
+  const Vocabulary vocabulary = LoadOrbVocabulary(path);
+  EXPECT_EQ(vocabulary.descriptor_id(), OrbDescriptorId());
+  EXPECT_GT(vocabulary.num_words(), 50000U);
 }
 
 TEST_F(VocabularyTest, NamesFilesThatCannotBeReadOrWritten) {

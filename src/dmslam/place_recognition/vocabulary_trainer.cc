@@ -256,6 +256,7 @@ Vocabulary TrainVocabulary(const TrainingSet& training, const VocabularyTraining
   if (tree.descriptors.size() < 3) {
     throw InputError("vocabulary training: fewer than two different descriptors; give more images");
   }
+  tree.descriptor_id = options.descriptor_id;
   const Vocabulary unweighted(tree);
   const std::vector<uint32_t> images = CountImages(unweighted, training);
   const auto total = static_cast<double>(training.num_images());

@@ -12,11 +12,12 @@ namespace dmslam {
 
 /// How a vocabulary is trained.
 struct VocabularyTrainingOptions {
-  int branching = 10;       ///< children per node, 2..64
-  int levels = 5;           ///< steps from the root to a word, 1..10; up to branching^levels words
-  uint64_t seed = 1;        ///< same descriptors, options and seed: same vocabulary
-  int max_iterations = 10;  ///< rounds of k-medians per node
-  int min_split = 4;        ///< a node with fewer training descriptors stays a word
+  int branching = 10;          ///< children per node, 2..64
+  int levels = 5;              ///< steps from the root to a word, 1..10; up to branching^levels words
+  uint64_t seed = 1;           ///< same descriptors, options and seed: same vocabulary
+  int max_iterations = 10;     ///< rounds of k-medians per node
+  int min_split = 4;           ///< a node with fewer training descriptors stays a word
+  uint32_t descriptor_id = 0;  ///< kind of the descriptors (see OrbDescriptorId); 0 = unknown
   /// Called now and then with the share of the work that is done, 0..1.
   std::function<void(double)> progress;
 
