@@ -1,4 +1,5 @@
-// Local bundle adjustment, pose optimisation and essential graph, on synthetic data of the sizes that the system meets.
+// Local bundle adjustment, pose optimisation and essential graph, on synthetic data of the sizes that the
+// system meets.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -71,8 +72,8 @@ void BM_OptimizePose(benchmark::State& state) {
 }
 BENCHMARK(BM_OptimizePose)->Arg(300)->Arg(1000)->Unit(benchmark::kMicrosecond);
 
-/// Two turns on a ring with drift in rotation and scale: every keyframe is tied to the four before it, and on the second
-/// turn to one of the first.
+/// Two turns on a ring with drift in rotation and scale: every keyframe is tied to the four before it, and on
+/// the second turn to one of the first.
 EssentialGraphProblem MakeDriftedRings(int num_keyframes) {
   EssentialGraphProblem problem;
   std::vector<Sim3d> truth;
@@ -80,14 +81,16 @@ EssentialGraphProblem MakeDriftedRings(int num_keyframes) {
   for (int i = 0; i < num_keyframes; ++i) {
     const double angle = 2.0 * 6.283185307179586 * i / num_keyframes;
     const Eigen::Quaterniond rotation = ExpSo3({0.0, angle, 0.0});
-    truth.emplace_back(rotation, rotation * Eigen::Vector3d(-10.0 * std::sin(angle), 0.0, -10.0 * std::cos(angle)), 1.0);
+    truth.emplace_back(
+        rotation, rotation * Eigen::Vector3d(-10.0 * std::sin(angle), 0.0, -10.0 * std::cos(angle)), 1.0);
   }
   problem.S_cam_world.push_back(truth[0]);
   for (int i = 1; i < num_keyframes; ++i) {
     const auto n = static_cast<size_t>(i);
     Vector7d drift;
     drift << 3e-4 * random.Gaussian(), 3e-4, 3e-4 * random.Gaussian(), 0.0, 0.0, 0.0, 3e-4;
-    problem.S_cam_world.push_back(ExpSim3(drift) * truth[n] * truth[n - 1].Inverse() * problem.S_cam_world[n - 1]);
+    problem.S_cam_world.push_back(ExpSim3(drift) * truth[n] * truth[n - 1].Inverse() *
+                                  problem.S_cam_world[n - 1]);
     for (int back = 1; back <= std::min(4, i); ++back) {
       const Sim3d& earlier = problem.S_cam_world[n - static_cast<size_t>(back)];
       problem.edges.push_back({i - back, i, problem.S_cam_world[n] * earlier.Inverse(), 1.0});

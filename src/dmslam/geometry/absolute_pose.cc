@@ -11,12 +11,14 @@
 namespace dmslam {
 namespace {
 
-/// The three squared sides a and the cosines b of the rays: l_i^2 + l_j^2 - 2 b_ij l_i l_j = a_ij for the depths l.
+/// The three squared sides a and the cosines b of the rays: l_i^2 + l_j^2 - 2 b_ij l_i l_j = a_ij for the
+/// depths l.
 struct Triangle {
   double a12, a13, a23, b12, b13, b23;
 };
 
-/// The symmetric D with l^T D l = (M12 a23 - M23 a12) forms of the paper's Eq. 8; M_ij is the left side above.
+/// The symmetric D with l^T D l = (M12 a23 - M23 a12) forms of the paper's Eq. 8; M_ij is the left side
+/// above.
 Eigen::Matrix3d FirstForm(const Triangle& t) {
   Eigen::Matrix3d D;
   D << t.a23, -t.a23 * t.b12, 0.0, -t.a23 * t.b12, t.a23 - t.a12, t.a12 * t.b23, 0.0, t.a12 * t.b23, -t.a12;
@@ -39,7 +41,8 @@ Eigen::Matrix3d Adjugate(const Eigen::Matrix3d& m) {
 
 /// Unit null vector of a singular symmetric matrix: the largest cross product of two rows.
 Eigen::Vector3d NullVector(const Eigen::Matrix3d& m) {
-  const Eigen::Vector3d a = m.row(0).cross(m.row(1)), b = m.row(0).cross(m.row(2)), c = m.row(1).cross(m.row(2));
+  const Eigen::Vector3d a = m.row(0).cross(m.row(1)), b = m.row(0).cross(m.row(2)),
+                        c = m.row(1).cross(m.row(2));
   const double na = a.squaredNorm(), nb = b.squaredNorm(), nc = c.squaredNorm();
   if (na >= nb && na >= nc) return a / std::sqrt(na);
   return nb >= nc ? Eigen::Vector3d(b / std::sqrt(nb)) : Eigen::Vector3d(c / std::sqrt(nc));
@@ -64,7 +67,8 @@ bool SplitSingularForm(const Eigen::Matrix3d& D, std::array<Eigen::Vector3d, 2>&
 void RefineDepths(const Triangle& t, Eigen::Vector3d& l) {
   for (int k = 0; k < 3; ++k) {
     const double x = l.x(), y = l.y(), z = l.z();
-    const Eigen::Vector3d error(x * x + y * y - 2 * t.b12 * x * y - t.a12, x * x + z * z - 2 * t.b13 * x * z - t.a13,
+    const Eigen::Vector3d error(x * x + y * y - 2 * t.b12 * x * y - t.a12,
+                                x * x + z * z - 2 * t.b13 * x * z - t.a13,
                                 y * y + z * z - 2 * t.b23 * y * z - t.a23);
     Eigen::Matrix3d jacobian;
     jacobian << 2 * (x - t.b12 * y), 2 * (y - t.b12 * x), 0, 2 * (x - t.b13 * z), 0, 2 * (z - t.b13 * x), 0,
@@ -85,7 +89,8 @@ int DepthsOnPlane(const Eigen::Vector3d& normal, const Eigen::Matrix3d& form, co
   if (discriminant < 0.0) return 0;
   const double r = -(b + std::copysign(std::sqrt(discriminant), b));
   // Roots of a tau^2 + 2 b tau + c as directions p + tau q, written without division: (a, r) and (r, c).
-  const std::array<Eigen::Vector3d, 2> directions{Eigen::Vector3d(a * p + r * q), Eigen::Vector3d(r * p + c * q)};
+  const std::array<Eigen::Vector3d, 2> directions{Eigen::Vector3d(a * p + r * q),
+                                                  Eigen::Vector3d(r * p + c * q)};
   int count = 0;
   for (Eigen::Vector3d d : directions) {
     if (d.sum() < 0.0) d = -d;
@@ -101,9 +106,8 @@ int DepthsOnPlane(const Eigen::Vector3d& normal, const Eigen::Matrix3d& form, co
 
 double SingularCombination(const Eigen::Matrix3d& D1, const Eigen::Matrix3d& D2) {
   std::array<double, 3> roots;
-  const int count = RealRootsCubic({D2.determinant(), (Adjugate(D2) * D1).trace(), (Adjugate(D1) * D2).trace(),
-                                    D1.determinant()},
-                                   roots);
+  const int count = RealRootsCubic(
+      {D2.determinant(), (Adjugate(D2) * D1).trace(), (Adjugate(D1) * D2).trace(), D1.determinant()}, roots);
   return count > 0 ? roots[0] : 0.0;
 }
 
@@ -114,7 +118,8 @@ int SolveP3p(std::span<const Eigen::Vector3d, 3> rays, std::span<const Eigen::Ve
   const Eigen::Vector3d y1 = rays[0].normalized(), y2 = rays[1].normalized(), y3 = rays[2].normalized();
   const Eigen::Vector3d d12 = points_world[0] - points_world[1], d13 = points_world[0] - points_world[2];
   const Eigen::Vector3d d23 = points_world[1] - points_world[2], across = d12.cross(d13);
-  const Triangle t{d12.squaredNorm(), d13.squaredNorm(), d23.squaredNorm(), y1.dot(y2), y1.dot(y3), y2.dot(y3)};
+  const Triangle t{d12.squaredNorm(), d13.squaredNorm(), d23.squaredNorm(),
+                   y1.dot(y2),        y1.dot(y3),        y2.dot(y3)};
   if (!(across.squaredNorm() > 1e-12 * t.a12 * t.a13) || !(t.a23 > 0.0)) return 0;
   Eigen::Matrix3d D1 = FirstForm(t), D2 = SecondForm(t);
   if (std::abs(D1.determinant()) > std::abs(D2.determinant())) std::swap(D1, D2);
@@ -149,8 +154,10 @@ struct NormalEquations {
 };
 
 /// Sums over the matches, tangent (w, v); infinite cost if a point is behind the camera.
-NormalEquations BuildNormalEquations(const Pinhole& camera, const Rigid3d& T, std::span<const Eigen::Vector3d> points,
-                                     std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
+NormalEquations BuildNormalEquations(const Pinhole& camera, const Rigid3d& T,
+                                     std::span<const Eigen::Vector3d> points,
+                                     std::span<const Eigen::Vector2d> uv_px,
+                                     std::span<const double> inv_sigma_squared,
                                      std::span<const int> indices) {
   NormalEquations n;
   const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
@@ -177,9 +184,9 @@ NormalEquations BuildNormalEquations(const Pinhole& camera, const Rigid3d& T, st
 
 }  // namespace
 
-Rigid3d RefinePose(const Pinhole& camera, const Rigid3d& T_cam_world, std::span<const Eigen::Vector3d> points_world,
-                   std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
-                   std::span<const int> indices, int iterations) {
+Rigid3d RefinePose(const Pinhole& camera, const Rigid3d& T_cam_world,
+                   std::span<const Eigen::Vector3d> points_world, std::span<const Eigen::Vector2d> uv_px,
+                   std::span<const double> inv_sigma_squared, std::span<const int> indices, int iterations) {
   Rigid3d T = T_cam_world;
   NormalEquations now = BuildNormalEquations(camera, T, points_world, uv_px, inv_sigma_squared, indices);
   for (int k = 0; k < iterations; ++k) {
@@ -187,7 +194,8 @@ Rigid3d RefinePose(const Pinhole& camera, const Rigid3d& T_cam_world, std::span<
     const Vector6d step = -now.hessian.ldlt().solve(now.gradient);
     if (!step.allFinite()) return T;
     const Rigid3d candidate = StepPose(T, step);
-    NormalEquations next = BuildNormalEquations(camera, candidate, points_world, uv_px, inv_sigma_squared, indices);
+    NormalEquations next =
+        BuildNormalEquations(camera, candidate, points_world, uv_px, inv_sigma_squared, indices);
     if (!(next.cost < now.cost)) return T;
     const bool settled = next.cost > now.cost * (1.0 - 1e-6);
     T = candidate;

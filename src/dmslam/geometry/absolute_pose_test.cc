@@ -21,7 +21,8 @@ struct PnpData {
 };
 
 PnpData DataOf(uint64_t seed, double noise_px) {
-  const SyntheticScene scene = MakeSyntheticScene({.seed = seed, .num_cameras = 1, .num_points = 80, .noise_px = noise_px});
+  const SyntheticScene scene =
+      MakeSyntheticScene({.seed = seed, .num_cameras = 1, .num_points = 80, .noise_px = noise_px});
   PnpData data{scene.T_cam_world[0], {}, {}};
   for (const auto& o : scene.observations) {
     data.points.push_back(scene.points[static_cast<size_t>(o.point)]);
@@ -58,7 +59,8 @@ TEST(P3p, OneOfTheSolutionsIsTrueAndAllReproject) {
 }
 
 TEST(P3p, CollinearPointsGiveNothing) {
-  const std::array<Eigen::Vector3d, 3> points{Eigen::Vector3d(0, 0, 4), Eigen::Vector3d(1, 0, 4), Eigen::Vector3d(2, 0, 4)};
+  const std::array<Eigen::Vector3d, 3> points{Eigen::Vector3d(0, 0, 4), Eigen::Vector3d(1, 0, 4),
+                                              Eigen::Vector3d(2, 0, 4)};
   std::array<Rigid3d, 4> poses;
   EXPECT_EQ(SolveP3p(points, points, poses), 0);
 }

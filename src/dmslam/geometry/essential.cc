@@ -12,11 +12,13 @@ Eigen::Matrix3d ProjectToEssential(const Eigen::Matrix3d& E) {
   return svd.matrixU() * Eigen::Vector3d(size, size, 0.0).asDiagonal() * svd.matrixV().transpose();
 }
 
-Eigen::Matrix3d EssentialFromFundamental(const Eigen::Matrix3d& F, const Pinhole& camera1, const Pinhole& camera2) {
+Eigen::Matrix3d EssentialFromFundamental(const Eigen::Matrix3d& F, const Pinhole& camera1,
+                                         const Pinhole& camera2) {
   return ProjectToEssential(camera2.K().transpose() * F * camera1.K());
 }
 
-Eigen::Matrix3d FundamentalFromEssential(const Eigen::Matrix3d& E, const Pinhole& camera1, const Pinhole& camera2) {
+Eigen::Matrix3d FundamentalFromEssential(const Eigen::Matrix3d& E, const Pinhole& camera1,
+                                         const Pinhole& camera2) {
   const Eigen::Matrix3d F = camera2.K().inverse().transpose() * E * camera1.K().inverse();
   return F / F.norm();
 }
@@ -60,8 +62,8 @@ namespace {
 
 /// How many rays meet in front of both cameras with the translation `t`, and how many with `-t`.
 std::pair<int, int> CountInFront(const Eigen::Matrix3d& R, const Eigen::Vector3d& t,
-                                 std::span<const Eigen::Vector3d> rays1, std::span<const Eigen::Vector3d> rays2,
-                                 std::span<const int> indices) {
+                                 std::span<const Eigen::Vector3d> rays1,
+                                 std::span<const Eigen::Vector3d> rays2, std::span<const int> indices) {
   int forward = 0, backward = 0;
   for (const int index : indices) {
     const Eigen::Vector3d turned = R * rays1[static_cast<size_t>(index)];
@@ -78,12 +80,13 @@ std::pair<int, int> CountInFront(const Eigen::Matrix3d& R, const Eigen::Vector3d
 }  // namespace
 
 int PoseFromEssential(const Eigen::Matrix3d& E, std::span<const Eigen::Vector3d> rays1,
-                      std::span<const Eigen::Vector3d> rays2, std::span<const int> indices, Rigid3d& T_cam2_cam1) {
+                      std::span<const Eigen::Vector3d> rays2, std::span<const int> indices,
+                      Rigid3d& T_cam2_cam1) {
   const std::array<Rigid3d, 4> candidates = DecomposeEssential(E);
   int best = -1;
   for (const size_t k : {size_t{0}, size_t{2}}) {
-    const auto [forward, backward] = CountInFront(candidates[k].rotation.toRotationMatrix(), candidates[k].translation,
-                                                  rays1, rays2, indices);
+    const auto [forward, backward] = CountInFront(candidates[k].rotation.toRotationMatrix(),
+                                                  candidates[k].translation, rays1, rays2, indices);
     if (forward > best) best = forward, T_cam2_cam1 = candidates[k];
     if (backward > best) best = backward, T_cam2_cam1 = candidates[k + 1];
   }

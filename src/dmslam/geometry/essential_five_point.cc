@@ -8,23 +8,33 @@
 namespace dmslam {
 namespace {
 
-// Polynomials in (x, y, z). Degree one: coefficients of x, y, z, 1. Degree two: the ten of kQuadratic. Degree three: the
-// twenty of kCubic, in the order that Nister's elimination wants.
+// Polynomials in (x, y, z). Degree one: coefficients of x, y, z, 1. Degree two: the ten of kQuadratic. Degree
+// three: the twenty of kCubic, in the order that Nister's elimination wants.
 using Linear = std::array<double, 4>;
 using Quadratic = std::array<double, 10>;
 using Cubic = std::array<double, 20>;
 using Exponents = std::array<int, 3>;
 
 constexpr std::array<Exponents, 4> kLinear{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
-constexpr std::array<Exponents, 10> kQuadratic{{{2, 0, 0}, {1, 1, 0}, {0, 2, 0}, {1, 0, 1}, {0, 1, 1},
-                                                {0, 0, 2}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
-constexpr std::array<Exponents, 20> kCubic{{{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1},
-                                            {0, 2, 0}, {1, 1, 1}, {1, 1, 0}, {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2},
-                                            {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
+constexpr std::array<Exponents, 10> kQuadratic{{{2, 0, 0},
+                                                {1, 1, 0},
+                                                {0, 2, 0},
+                                                {1, 0, 1},
+                                                {0, 1, 1},
+                                                {0, 0, 2},
+                                                {1, 0, 0},
+                                                {0, 1, 0},
+                                                {0, 0, 1},
+                                                {0, 0, 0}}};
+constexpr std::array<Exponents, 20> kCubic{{{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1},
+                                            {2, 0, 0}, {0, 2, 1}, {0, 2, 0}, {1, 1, 1}, {1, 1, 0},
+                                            {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2}, {0, 1, 1},
+                                            {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
 
 /// Where the product of monomial i of `a` and monomial j of the linear ones stands in `product`.
 template <size_t kA, size_t kProduct>
-constexpr auto ProductTable(const std::array<Exponents, kA>& a, const std::array<Exponents, kProduct>& product) {
+constexpr auto ProductTable(const std::array<Exponents, kA>& a,
+                            const std::array<Exponents, kProduct>& product) {
   std::array<std::array<size_t, 4>, kA> table{};
   for (size_t i = 0; i < kA; ++i) {
     for (size_t j = 0; j < 4; ++j) {
@@ -120,8 +130,8 @@ double Evaluate(const Poly<kN>& p, double z) {
   return value;
 }
 
-/// One row of Nister's B(z): the equation (upper row) - z (lower row) of the reduced system, as polynomials that multiply
-/// x, y and 1.
+/// One row of Nister's B(z): the equation (upper row) - z (lower row) of the reduced system, as polynomials
+/// that multiply x, y and 1.
 struct HiddenRow {
   Poly<4> x, y;
   Poly<5> one;
@@ -134,7 +144,8 @@ HiddenRow MakeHiddenRow(const Reduced& r, int upper) {
   HiddenRow row;
   row.x = {r(upper, 2), r(upper, 1) - r(lower, 2), r(upper, 0) - r(lower, 1), -r(lower, 0)};
   row.y = {r(upper, 5), r(upper, 4) - r(lower, 5), r(upper, 3) - r(lower, 4), -r(lower, 3)};
-  row.one = {r(upper, 9), r(upper, 8) - r(lower, 9), r(upper, 7) - r(lower, 8), r(upper, 6) - r(lower, 7), -r(lower, 6)};
+  row.one = {r(upper, 9), r(upper, 8) - r(lower, 9), r(upper, 7) - r(lower, 8), r(upper, 6) - r(lower, 7),
+             -r(lower, 6)};
   return row;
 }
 
@@ -146,8 +157,8 @@ Eigen::Matrix3d BasisMatrix(const std::array<double, 9>& b) {
   return m;
 }
 
-/// Gauss-Newton on 2 E E^T E = trace(E E^T) E within the span of the basis, for the solutions that the elimination left
-/// inaccurate. `v` are the coordinates, of unit length.
+/// Gauss-Newton on 2 E E^T E = trace(E E^T) E within the span of the basis, for the solutions that the
+/// elimination left inaccurate. `v` are the coordinates, of unit length.
 void PolishEssential(const Basis& basis, Eigen::Vector4d& v, Eigen::Matrix3d& E) {
   for (int round = 0; round < 4; ++round) {
     const Eigen::Matrix3d gram = E * E.transpose();
@@ -200,8 +211,7 @@ int EssentialFivePoint(std::span<const Eigen::Vector3d> rays1, std::span<const E
   LinearMatrix e;
   for (size_t k = 0; k < 9; ++k) e[k / 3][k % 3] = {basis[0][k], basis[1][k], basis[2][k], basis[3][k]};
   const Matrix10x20 system = EssentialConstraints(e);
-  const Reduced reduced =
-      system.leftCols<10>().eval().partialPivLu().solve(system.rightCols<10>().eval());
+  const Reduced reduced = system.leftCols<10>().eval().partialPivLu().solve(system.rightCols<10>().eval());
   if (!reduced.allFinite()) return 0;
   // Rows 4..9 have the leading monomials x^2 z, x^2, y^2 z, y^2, xyz, xy.
   const HiddenRow k = MakeHiddenRow(reduced, 4), l = MakeHiddenRow(reduced, 6), m = MakeHiddenRow(reduced, 8);

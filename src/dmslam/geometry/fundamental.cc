@@ -34,8 +34,8 @@ Eigen::Matrix3d FromRows(const Vector& f) {
   return m;
 }
 
-/// The matrix of rank two that is nearest but for the accuracy of the direct eigen solver: F - F v v^T with the smallest
-/// right singular vector v is singular whatever v is.
+/// The matrix of rank two that is nearest but for the accuracy of the direct eigen solver: F - F v v^T with
+/// the smallest right singular vector v is singular whatever v is.
 Eigen::Matrix3d MakeRankTwo(const Eigen::Matrix3d& F) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
   solver.computeDirect(F.transpose() * F);
@@ -48,7 +48,8 @@ Eigen::Matrix3d Denormalize(const Eigen::Matrix3d& F, const Normalization& n1, c
   return raw / raw.norm();
 }
 
-std::optional<Vector9d> LeastSquaresEpipolar(std::span<const Eigen::Vector2d> x1, std::span<const Eigen::Vector2d> x2,
+std::optional<Vector9d> LeastSquaresEpipolar(std::span<const Eigen::Vector2d> x1,
+                                             std::span<const Eigen::Vector2d> x2,
                                              std::span<const int> indices, std::span<const double> weights,
                                              const Normalization& n1, const Normalization& n2) {
   Matrix9d normal = Matrix9d::Zero();
@@ -82,7 +83,8 @@ std::optional<Eigen::Matrix3d> FundamentalEightPointMinimal(std::span<const Eige
 
 std::optional<Eigen::Matrix3d> FundamentalEightPoint(std::span<const Eigen::Vector2d> x1_px,
                                                      std::span<const Eigen::Vector2d> x2_px,
-                                                     std::span<const int> indices, std::span<const double> weights) {
+                                                     std::span<const int> indices,
+                                                     std::span<const double> weights) {
   std::vector<int> all;
   if (indices.empty()) {
     all.resize(x1_px.size());

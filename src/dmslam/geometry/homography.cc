@@ -15,7 +15,8 @@ namespace {
 template <typename Row>
 void TransferRows(const Eigen::Vector2d& x1, const Eigen::Vector2d& x2, Row& first, Row& second) {
   const double x = x1.x(), y = x1.y(), u = x2.x(), v = x2.y();
-  const std::array<double, 9> a{-x, -y, -1, 0, 0, 0, u * x, u * y, u}, b{0, 0, 0, -x, -y, -1, v * x, v * y, v};
+  const std::array<double, 9> a{-x, -y, -1, 0, 0, 0, u * x, u * y, u},
+      b{0, 0, 0, -x, -y, -1, v * x, v * y, v};
   for (int k = 0; k < 9; ++k) {
     first[static_cast<size_t>(k)] = a[static_cast<size_t>(k)];
     second[static_cast<size_t>(k)] = b[static_cast<size_t>(k)];
@@ -48,7 +49,8 @@ std::optional<Eigen::Matrix3d> HomographyFourPoint(std::span<const Eigen::Vector
                                                    std::span<const int, 4> indices) {
   const auto n1 = Normalization::Of(x1_px, indices), n2 = Normalization::Of(x2_px, indices);
   if (!n1 || !n2) return std::nullopt;
-  if (ThreeCollinear(x1_px, indices, n1->scale) || ThreeCollinear(x2_px, indices, n2->scale)) return std::nullopt;
+  if (ThreeCollinear(x1_px, indices, n1->scale) || ThreeCollinear(x2_px, indices, n2->scale))
+    return std::nullopt;
   Equations<8> rows;
   for (size_t k = 0; k < 4; ++k) {
     const auto i = static_cast<size_t>(indices[k]);
@@ -60,7 +62,8 @@ std::optional<Eigen::Matrix3d> HomographyFourPoint(std::span<const Eigen::Vector
 }
 
 std::optional<Eigen::Matrix3d> HomographyLinear(std::span<const Eigen::Vector2d> x1_px,
-                                                std::span<const Eigen::Vector2d> x2_px, std::span<const int> indices) {
+                                                std::span<const Eigen::Vector2d> x2_px,
+                                                std::span<const int> indices) {
   std::vector<int> all;
   if (indices.empty()) {
     all.resize(x1_px.size());
@@ -109,7 +112,8 @@ std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& H_px, const 
   if (!(squares(0) > 1e-14 * squares(2))) return {};
   H /= std::sqrt(squares(1));
   const double s1 = squares(2) / squares(1), s3 = squares(0) / squares(1);
-  if (s1 - s3 < 1e-8) return {PlaneMotion{Rigid3d(Eigen::Quaterniond(H).normalized(), Eigen::Vector3d::Zero()), {0, 0, 1}}};
+  if (s1 - s3 < 1e-8)
+    return {PlaneMotion{Rigid3d(Eigen::Quaterniond(H).normalized(), Eigen::Vector3d::Zero()), {0, 0, 1}}};
   const Eigen::Matrix3d V = solver.eigenvectors().rowwise().reverse();
   const double along1 = std::sqrt(std::max(0.0, 1.0 - s3) / (s1 - s3));
   const double along3 = std::sqrt(std::max(0.0, s1 - 1.0) / (s1 - s3));

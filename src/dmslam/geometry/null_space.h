@@ -6,12 +6,14 @@
 
 namespace dmslam {
 
-/// A homogeneous linear system of `kRows` equations in nine unknowns, as the small solvers of two-view geometry meet it.
+/// A homogeneous linear system of `kRows` equations in nine unknowns, as the small solvers of two-view
+/// geometry meet it.
 template <int kRows>
 using Equations = std::array<std::array<double, 9>, static_cast<size_t>(kRows)>;
 
-/// A basis of its null space, 9 - kRows vectors, by Gauss-Jordan elimination with full pivoting (the matrix is
-/// destroyed). False if the rank is smaller than kRows, with pivots compared to `tolerance` times the largest one.
+/// A basis of its null space, 9 - kRows vectors, by Gauss-Jordan elimination with full pivoting (the matrix
+/// is destroyed). False if the rank is smaller than kRows, with pivots compared to `tolerance` times the
+/// largest one.
 template <int kRows>
 bool NullSpace(Equations<kRows>& a, std::array<std::array<double, 9>, static_cast<size_t>(9 - kRows)>& basis,
                double tolerance = 1e-9) {

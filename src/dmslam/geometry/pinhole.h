@@ -7,8 +7,8 @@
 
 namespace dmslam {
 
-/// The four numbers of an ideal pinhole camera [pixels]. Solvers and optimisers work on undistorted pixels and need no
-/// more than this.
+/// The four numbers of an ideal pinhole camera [pixels]. Solvers and optimisers work on undistorted pixels
+/// and need no more than this.
 struct Pinhole {
   double fx_px = 1.0, fy_px = 1.0, cx_px = 0.0, cy_px = 0.0;
 
@@ -28,10 +28,10 @@ struct Pinhole {
   }
 };
 
-/// Squared distance [px^2] between the projection of a world point and its undistorted pixel; infinite for a point at or
-/// behind the camera.
-inline double ReprojectionErrorSquared(const Pinhole& camera, const Rigid3d& T_cam_world, const Eigen::Vector3d& p_world,
-                                       const Eigen::Vector2d& uv_px) {
+/// Squared distance [px^2] between the projection of a world point and its undistorted pixel; infinite for a
+/// point at or behind the camera.
+inline double ReprojectionErrorSquared(const Pinhole& camera, const Rigid3d& T_cam_world,
+                                       const Eigen::Vector3d& p_world, const Eigen::Vector2d& uv_px) {
   const Eigen::Vector3d p_cam = T_cam_world * p_world;
   if (!(p_cam.z() > 1e-9)) return std::numeric_limits<double>::infinity();
   return (camera.Project(p_cam) - uv_px).squaredNorm();

@@ -34,8 +34,8 @@ double PolishCubicRoot(double b, double c, double d, double x) {
 constexpr int kMaxDegree = 10;
 using Coefficients = std::array<double, kMaxDegree + 1>;
 
-/// Sturm's chain of one polynomial, p[k] = (slope x + offset) p[k+1] - scale p[k+2], so that all of its members are
-/// evaluated with a few products each.
+/// Sturm's chain of one polynomial, p[k] = (slope x + offset) p[k+1] - scale p[k+2], so that all of its
+/// members are evaluated with a few products each.
 class SturmChain {
  public:
   /// `c` has degree `degree` >= 2 and leading coefficient 1.
@@ -159,7 +159,8 @@ int IsolateAndRefine(const SturmChain& chain, double bound, std::array<double, 1
 int RealRootsCubic(const std::array<double, 4>& coefficients, std::array<double, 3>& roots) {
   const double lead = coefficients[0];
   const double size = std::abs(coefficients[1]) + std::abs(coefficients[2]) + std::abs(coefficients[3]);
-  if (std::abs(lead) <= 1e-14 * size) return RealRootsQuadratic(coefficients[1], coefficients[2], coefficients[3], roots);
+  if (std::abs(lead) <= 1e-14 * size)
+    return RealRootsQuadratic(coefficients[1], coefficients[2], coefficients[3], roots);
   const double b = coefficients[1] / lead, c = coefficients[2] / lead, d = coefficients[3] / lead;
   const double p = c - b * b / 3.0;
   const double q = (2.0 * b * b / 27.0 - c / 3.0) * b + d;
@@ -175,10 +176,12 @@ int RealRootsCubic(const std::array<double, 4>& coefficients, std::array<double,
     const double cosine = radius > 0.0 ? std::clamp(3.0 * q / (p * radius), -1.0, 1.0) : 1.0;
     const double angle = std::acos(cosine) / 3.0;
     constexpr double kThirdTurn = 2.0943951023931953;
-    for (int k = 0; k < 3; ++k) roots[static_cast<size_t>(k)] = radius * std::cos(angle - kThirdTurn * k) - b / 3.0;
+    for (int k = 0; k < 3; ++k)
+      roots[static_cast<size_t>(k)] = radius * std::cos(angle - kThirdTurn * k) - b / 3.0;
     count = 3;
   }
-  for (int k = 0; k < count; ++k) roots[static_cast<size_t>(k)] = PolishCubicRoot(b, c, d, roots[static_cast<size_t>(k)]);
+  for (int k = 0; k < count; ++k)
+    roots[static_cast<size_t>(k)] = PolishCubicRoot(b, c, d, roots[static_cast<size_t>(k)]);
   return count;
 }
 
@@ -194,7 +197,8 @@ int RealRootsDegree10(const std::array<double, 11>& c, std::array<double, 10>& r
   for (int k = 0; k <= degree; ++k) {
     monic[static_cast<size_t>(k)] = c[static_cast<size_t>(k)] / c[static_cast<size_t>(degree)];
     // Fujiwara's bound on the size of the roots.
-    if (k < degree) bound = std::max(bound, std::pow(std::abs(monic[static_cast<size_t>(k)]), 1.0 / (degree - k)));
+    if (k < degree)
+      bound = std::max(bound, std::pow(std::abs(monic[static_cast<size_t>(k)]), 1.0 / (degree - k)));
   }
   bound = 2.0 * bound + 1e-9;
   if (degree == 1) {

@@ -28,7 +28,8 @@ Support CountSupport(const Rigid3d& T_cam2_cam1, const Matches& m, const PoseCho
   const Eigen::Vector3d center2 = T_cam2_cam1.Center();
   for (size_t i = 0; i < m.x1_px.size(); ++i) {
     if (!m.mask.empty() && !m.mask[i]) continue;
-    const auto point = TriangulatePointInFirst(T_cam2_cam1, m.camera.Ray(m.x1_px[i]), m.camera.Ray(m.x2_px[i]));
+    const auto point =
+        TriangulatePointInFirst(T_cam2_cam1, m.camera.Ray(m.x1_px[i]), m.camera.Ray(m.x2_px[i]));
     if (!point) continue;
     const double bound =
         options.max_reprojection_error_squared_px * (m.sigma_squared.empty() ? 1.0 : m.sigma_squared[i]);
@@ -47,8 +48,9 @@ Support CountSupport(const Rigid3d& T_cam2_cam1, const Matches& m, const PoseCho
 }  // namespace
 
 std::optional<PoseChoice> ChoosePose(std::span<const Rigid3d> candidates_cam2_cam1, const Pinhole& camera,
-                                     std::span<const Eigen::Vector2d> x1_px, std::span<const Eigen::Vector2d> x2_px,
-                                     std::span<const char> mask, std::span<const double> sigma_squared,
+                                     std::span<const Eigen::Vector2d> x1_px,
+                                     std::span<const Eigen::Vector2d> x2_px, std::span<const char> mask,
+                                     std::span<const double> sigma_squared,
                                      const PoseChoiceOptions& options) {
   if (candidates_cam2_cam1.empty()) return std::nullopt;
   const Matches matches{camera, x1_px, x2_px, mask, sigma_squared};

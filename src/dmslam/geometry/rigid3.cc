@@ -21,7 +21,8 @@ Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& rotation_vector) {
 }
 
 Eigen::Vector3d LogSo3(const Eigen::Quaterniond& rotation) {
-  const Eigen::Vector3d v = rotation.w() < 0 ? Eigen::Vector3d(-rotation.vec()) : Eigen::Vector3d(rotation.vec());
+  const Eigen::Vector3d v =
+      rotation.w() < 0 ? Eigen::Vector3d(-rotation.vec()) : Eigen::Vector3d(rotation.vec());
   const double sine = v.norm();
   if (sine < 1e-8) return 2.0 * v;
   return 2.0 * std::atan2(sine, std::abs(rotation.w())) / sine * v;

@@ -5,8 +5,8 @@
 
 namespace dmslam {
 
-/// A rigid transform `b_from_a`: p_b = rotation * p_a + translation. Poses are written T_cam_world (takes world points
-/// into the camera), so that adjacent names cancel: T_c_a = T_c_b * T_b_a.
+/// A rigid transform `b_from_a`: p_b = rotation * p_a + translation. Poses are written T_cam_world (takes
+/// world points into the camera), so that adjacent names cancel: T_c_a = T_c_b * T_b_a.
 struct Rigid3d {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -35,7 +35,8 @@ struct Sim3d {
   double scale = 1.0;
 
   Sim3d() = default;
-  Sim3d(const Eigen::Quaterniond& q, const Eigen::Vector3d& t, double s) : rotation(q), translation(t), scale(s) {}
+  Sim3d(const Eigen::Quaterniond& q, const Eigen::Vector3d& t, double s)
+      : rotation(q), translation(t), scale(s) {}
   explicit Sim3d(const Rigid3d& T) : rotation(T.rotation), translation(T.translation) {}
 
   Sim3d Inverse() const {
@@ -46,7 +47,9 @@ struct Sim3d {
     return {(rotation * other.rotation).normalized(), scale * (rotation * other.translation) + translation,
             scale * other.scale};
   }
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return scale * (rotation * point) + translation; }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
+    return scale * (rotation * point) + translation;
+  }
   /// The pose with the scale taken out of the translation (ORB-SLAM's convention for corrected keyframes).
   Rigid3d ToRigid() const { return {rotation, translation / scale}; }
 };

@@ -36,8 +36,9 @@ Moments ComputeMoments(std::span<const Eigen::Vector3d> a, std::span<const Eigen
 
 }  // namespace
 
-std::optional<Sim3d> AlignSim3(std::span<const Eigen::Vector3d> points_a, std::span<const Eigen::Vector3d> points_b,
-                               std::span<const int> indices, bool fix_scale) {
+std::optional<Sim3d> AlignSim3(std::span<const Eigen::Vector3d> points_a,
+                               std::span<const Eigen::Vector3d> points_b, std::span<const int> indices,
+                               bool fix_scale) {
   if ((indices.empty() ? points_a.size() : indices.size()) < 3) return std::nullopt;
   const Moments m = ComputeMoments(points_a, points_b, indices);
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -46,7 +47,8 @@ std::optional<Sim3d> AlignSim3(std::span<const Eigen::Vector3d> points_a, std::s
   Eigen::Vector3d signs(1, 1, 1);
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
   Sim3d S;
-  S.rotation = Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
+  S.rotation =
+      Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
   S.rotation.normalize();
   S.scale = fix_scale ? 1.0 : values.dot(signs) / m.spread_a;
   if (!(S.scale > 0.0)) return std::nullopt;
@@ -73,7 +75,8 @@ Integrals IntegrateClosed(double sigma, double theta_squared) {
 
 /// By Gauss-Legendre quadrature with eight nodes, the trigonometric parts as series, where theta is small.
 Integrals IntegrateNumerically(double sigma, double theta_squared) {
-  constexpr std::array<double, 4> kNodes{0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
+  constexpr std::array<double, 4> kNodes{0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
+                                         0.9602898564975363};
   constexpr std::array<double, 4> kWeights{0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
                                            0.1012285362903763};
   Integrals sum{0.0, 0.0, 0.0};
@@ -92,8 +95,8 @@ Integrals IntegrateNumerically(double sigma, double theta_squared) {
 /// Translation = W(rotation vector, log scale) * translation part of the tangent.
 Eigen::Matrix3d TranslationFactor(const Eigen::Vector3d& w, double sigma) {
   const double theta_squared = w.squaredNorm();
-  const Integrals i =
-      theta_squared > 0.01 ? IntegrateClosed(sigma, theta_squared) : IntegrateNumerically(sigma, theta_squared);
+  const Integrals i = theta_squared > 0.01 ? IntegrateClosed(sigma, theta_squared)
+                                           : IntegrateNumerically(sigma, theta_squared);
   const Eigen::Matrix3d hat = Hat(w);
   return i.constant * Eigen::Matrix3d::Identity() + i.sine * hat + i.cosine * hat * hat;
 }
@@ -130,7 +133,7 @@ namespace {
 
 /// B_2k / (2k)!, k >= 1: tabulated, and for k > 6 as 2 (-1)^(k+1) zeta(2k) / (2 pi)^2k.
 double BernoulliOverFactorial(int k) {
-  constexpr std::array<double, 6> kFirst{1.0 / 12,         -1.0 / 720,           1.0 / 30240,
+  constexpr std::array<double, 6> kFirst{1.0 / 12,         -1.0 / 720,       1.0 / 30240,
                                          -1.0 / 1209600.0, 1.0 / 47900160.0, -691.0 / 1307674368000.0};
   if (k <= 6) return kFirst[static_cast<size_t>(k - 1)];
   const double n = 2.0 * k;

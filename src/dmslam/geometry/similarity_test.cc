@@ -21,7 +21,8 @@ Vector7d RandomTangent(Random& random, double rotation_rad, double log_scale) {
 }
 
 double Distance(const Sim3d& a, const Sim3d& b) {
-  return AngleBetween(a.rotation, b.rotation) + (a.translation - b.translation).norm() + std::abs(a.scale - b.scale);
+  return AngleBetween(a.rotation, b.rotation) + (a.translation - b.translation).norm() +
+         std::abs(a.scale - b.scale);
 }
 
 TEST(AlignSim3, RecoversTheSimilarity) {
@@ -29,7 +30,8 @@ TEST(AlignSim3, RecoversTheSimilarity) {
   for (int k = 0; k < 200; ++k) {
     const Sim3d truth = RandomSim3(random);
     std::vector<Eigen::Vector3d> a, b;
-    for (int i = 0; i < 3 + k % 10; ++i) a.push_back(RandomVector(random, 2.0)), b.push_back(truth * a.back());
+    for (int i = 0; i < 3 + k % 10; ++i)
+      a.push_back(RandomVector(random, 2.0)), b.push_back(truth * a.back());
     const auto S = AlignSim3(a, b);
     ASSERT_TRUE(S.has_value());
     EXPECT_LT(Distance(*S, truth), 1e-8);
@@ -91,7 +93,8 @@ TEST(Sim3Group, LeftJacobianInverseMatchesDifferences) {
       Vector7d d = Vector7d::Zero();
       d(c) = 1e-5;
       const Vector7d slope = (LogSim3(ExpSim3(d) * ExpSim3(x)) - LogSim3(ExpSim3(-d) * ExpSim3(x))) / 2e-5;
-      EXPECT_LT((slope - J.col(c)).norm(), 2e-8 * (1.0 + J.col(c).norm())) << "column " << c << " at " << x.transpose();
+      EXPECT_LT((slope - J.col(c)).norm(), 2e-8 * (1.0 + J.col(c).norm()))
+          << "column " << c << " at " << x.transpose();
     }
   }
 }

@@ -10,16 +10,17 @@
 
 namespace dmslam {
 
-/// Scenes for tests: cameras on an arc around a cloud of points, and what they see. World and camera units are arbitrary.
+/// Scenes for tests: cameras on an arc around a cloud of points, and what they see. World and camera units
+/// are arbitrary.
 struct SyntheticSceneOptions {
   uint64_t seed = 1;
   int num_cameras = 2;
   int num_points = 100;
-  double noise_px = 0.0;       ///< Standard deviation of every pixel coordinate.
-  double step = 0.25;          ///< Distance of neighbouring cameras.
-  double depth = 4.0;          ///< Of the cloud's middle, from the cameras.
-  double thickness = 4.0;      ///< Of the cloud along the view; 0 makes it a (slanted) plane.
-  double rotation_rad = 0.1;   ///< Size of the random part of the cameras' rotation.
+  double noise_px = 0.0;      ///< Standard deviation of every pixel coordinate.
+  double step = 0.25;         ///< Distance of neighbouring cameras.
+  double depth = 4.0;         ///< Of the cloud's middle, from the cameras.
+  double thickness = 4.0;     ///< Of the cloud along the view; 0 makes it a (slanted) plane.
+  double rotation_rad = 0.1;  ///< Size of the random part of the cameras' rotation.
 };
 
 struct SyntheticObservation {
@@ -37,7 +38,8 @@ struct SyntheticScene {
 };
 
 inline Eigen::Vector3d RandomVector(Random& random, double size) {
-  const double x = random.Uniform(-size, size), y = random.Uniform(-size, size), z = random.Uniform(-size, size);
+  const double x = random.Uniform(-size, size), y = random.Uniform(-size, size),
+               z = random.Uniform(-size, size);
   return {x, y, z};
 }
 
@@ -47,7 +49,8 @@ inline Rigid3d RandomPose(Random& random, double rotation_rad, double translatio
 }
 
 inline Eigen::Vector3d RandomScenePoint(Random& random, const SyntheticSceneOptions& options) {
-  const double x = random.Uniform(-1.0, 1.0), y = random.Uniform(-1.0, 1.0), along = random.Uniform(-0.5, 0.5);
+  const double x = random.Uniform(-1.0, 1.0), y = random.Uniform(-1.0, 1.0),
+               along = random.Uniform(-0.5, 0.5);
   const double slant = options.thickness == 0.0 ? 0.3 * x + 0.2 * y : 0.0;
   const double z = options.depth * (1.0 + slant) + options.thickness * along;
   return {0.6 * x * options.depth, 0.45 * y * options.depth, z};
@@ -58,7 +61,8 @@ inline SyntheticScene MakeSyntheticScene(const SyntheticSceneOptions& options) {
   Random random(options.seed);
   for (int c = 0; c < options.num_cameras; ++c) {
     const double along = options.step * (c - 0.5 * (options.num_cameras - 1));
-    const Eigen::Vector3d center(along, 0.3 * options.step * random.Gaussian(), 0.2 * options.step * random.Gaussian());
+    const Eigen::Vector3d center(along, 0.3 * options.step * random.Gaussian(),
+                                 0.2 * options.step * random.Gaussian());
     // Turned towards the middle of the cloud, and a little beside it.
     const Eigen::Vector3d towards(0.0, -std::atan2(-along, options.depth), 0.0);
     const Eigen::Quaterniond rotation = ExpSo3(RandomVector(random, options.rotation_rad)) * ExpSo3(towards);
@@ -67,12 +71,14 @@ inline SyntheticScene MakeSyntheticScene(const SyntheticSceneOptions& options) {
   for (int p = 0; p < options.num_points; ++p) scene.points.push_back(RandomScenePoint(random, options));
   for (int c = 0; c < options.num_cameras; ++c) {
     for (int p = 0; p < options.num_points; ++p) {
-      const Eigen::Vector3d p_cam = scene.T_cam_world[static_cast<size_t>(c)] * scene.points[static_cast<size_t>(p)];
+      const Eigen::Vector3d p_cam =
+          scene.T_cam_world[static_cast<size_t>(c)] * scene.points[static_cast<size_t>(p)];
       if (p_cam.z() < 0.1) continue;
       Eigen::Vector2d uv = scene.camera.Project(p_cam);
       uv.x() += options.noise_px * random.Gaussian();
       uv.y() += options.noise_px * random.Gaussian();
-      if (uv.x() < 0 || uv.y() < 0 || uv.x() > SyntheticScene::kWidth || uv.y() > SyntheticScene::kHeight) continue;
+      if (uv.x() < 0 || uv.y() < 0 || uv.x() > SyntheticScene::kWidth || uv.y() > SyntheticScene::kHeight)
+        continue;
       scene.observations.push_back({c, p, uv});
     }
   }
@@ -89,8 +95,8 @@ struct SyntheticPair {
 
 inline SyntheticPair MakeSyntheticPair(const SyntheticScene& scene, int camera1 = 0, int camera2 = 1) {
   SyntheticPair pair;
-  pair.T_cam2_cam1 =
-      scene.T_cam_world[static_cast<size_t>(camera2)] * scene.T_cam_world[static_cast<size_t>(camera1)].Inverse();
+  pair.T_cam2_cam1 = scene.T_cam_world[static_cast<size_t>(camera2)] *
+                     scene.T_cam_world[static_cast<size_t>(camera1)].Inverse();
   std::vector<const SyntheticObservation*> seen(scene.points.size(), nullptr);
   for (const auto& o : scene.observations) {
     if (o.camera == camera1) seen[static_cast<size_t>(o.point)] = &o;

@@ -38,7 +38,8 @@ std::optional<Eigen::Vector3d> TriangulateInSecond(const Rigid3d& T_cam2_cam1, c
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> TriangulatePointInFirst(const Rigid3d& T_cam2_cam1, const Eigen::Vector3d& ray1,
+std::optional<Eigen::Vector3d> TriangulatePointInFirst(const Rigid3d& T_cam2_cam1,
+                                                       const Eigen::Vector3d& ray1,
                                                        const Eigen::Vector3d& ray2) {
   const auto in_second = TriangulateInSecond(T_cam2_cam1, ray1, ray2);
   if (!in_second || !(in_second->z() > 0.0)) return std::nullopt;
@@ -73,8 +74,10 @@ std::optional<Eigen::Vector3d> NearestToRays(std::span<const Rigid3d> T_cam_worl
   return Eigen::Vector3d(normal.ldlt().solve(right));
 }
 
-/// One Gauss-Newton step on the reprojection errors in normalised coordinates. False if the point is behind a camera.
-bool RefineOnce(std::span<const Rigid3d> T_cam_world, std::span<const Eigen::Vector3d> rays, Eigen::Vector3d& point) {
+/// One Gauss-Newton step on the reprojection errors in normalised coordinates. False if the point is behind a
+/// camera.
+bool RefineOnce(std::span<const Rigid3d> T_cam_world, std::span<const Eigen::Vector3d> rays,
+                Eigen::Vector3d& point) {
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   for (size_t i = 0; i < rays.size(); ++i) {

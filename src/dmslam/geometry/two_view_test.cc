@@ -134,7 +134,8 @@ TEST(Fundamental, OneOfTheSevenPointSolutionsIsTrue) {
     std::array<Eigen::Matrix3d, 3> models;
     const int count = FundamentalSevenPoint(pair.x1_px, pair.x2_px, FirstIndices<7>(), models);
     double best = 1.0;
-    for (int k = 0; k < count; ++k) best = std::min(best, ProjectiveDistance(models[static_cast<size_t>(k)], TrueF(pair)));
+    for (int k = 0; k < count; ++k)
+      best = std::min(best, ProjectiveDistance(models[static_cast<size_t>(k)], TrueF(pair)));
     EXPECT_LT(best, 1e-6) << "seed " << seed;
   }
 }
@@ -211,6 +212,39 @@ TEST(Essential, EightPointOnRaysIsExact) {
   EXPECT_LT(ProjectiveDistance(*E, EssentialFromPose(pair.T_cam2_cam1)), 1e-8);
 }
 
+TEST(RelativePose, RefinementReachesTheTruthAlsoOnPlanes) {
+  Random random(31);
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    const SyntheticPair pair = PairOf(seed, 0.0, seed % 2 ? 4.0 : 0.0);
+    std::vector<int> all(pair.x1_px.size());
+    std::iota(all.begin(), all.end(), 0);
+    Rigid3d start = pair.T_cam2_cam1;
+    start.rotation = ExpSo3(RandomVector(random, 0.003)) * start.rotation;
+    start.translation += RandomVector(random, 0.02);
+    const Rigid3d T = RefineRelativePose(kCamera, start, pair.x1_px, pair.x2_px, all, {}, 0.0, 20);
+    EXPECT_LT(AngleBetween(T.rotation, pair.T_cam2_cam1.rotation), 1e-5) << "seed " << seed;
+    EXPECT_LT(AngleBetweenRays(T.translation, pair.T_cam2_cam1.translation), 1e-4) << "seed " << seed;
+    EXPECT_NEAR(T.translation.norm(), start.translation.norm(), 1e-12);
+  }
+}
+
+TEST(RelativePose, RefinementBeatsTheLinearFitUnderNoise) {
+  double linear = 0.0, refined = 0.0;
+  for (uint64_t seed = 1; seed <= 30; ++seed) {
+    const SyntheticPair pair = PairOf(seed, 0.7);
+    std::vector<int> all(pair.x1_px.size());
+    std::iota(all.begin(), all.end(), 0);
+    const auto E = EssentialEightPoint(pair.rays1, pair.rays2);
+    ASSERT_TRUE(E.has_value());
+    Rigid3d start;
+    PoseFromEssential(*E, pair.rays1, pair.rays2, all, start);
+    const Rigid3d T = RefineRelativePose(kCamera, start, pair.x1_px, pair.x2_px, all);
+    linear += AngleBetweenRays(start.translation, pair.T_cam2_cam1.translation);
+    refined += AngleBetweenRays(T.translation, pair.T_cam2_cam1.translation);
+  }
+  EXPECT_LT(refined, 0.7 * linear);
+}
+
 TEST(Homography, FourPointsAndLeastSquaresAreExactOnAPlane) {
   for (uint64_t seed = 1; seed <= 50; ++seed) {
     const SyntheticPair pair = PairOf(seed, 0.0, 0.0);
@@ -264,10 +298,12 @@ TEST(Residuals, SampsonIsTheDistanceForSmallErrors) {
   const Eigen::Matrix3d F = TrueF(pair);
   // Against the smallest move of both points that meets the constraint, by a few steps of linearisation.
   for (size_t i = 0; i < 20; ++i) {
-    const Eigen::Vector2d a = pair.x1_px[i] + Eigen::Vector2d(0.6, -0.4), b = pair.x2_px[i] + Eigen::Vector2d(-0.5, 0.7);
+    const Eigen::Vector2d a = pair.x1_px[i] + Eigen::Vector2d(0.6, -0.4),
+                          b = pair.x2_px[i] + Eigen::Vector2d(-0.5, 0.7);
     Eigen::Vector2d x = a, y = b;
     for (int k = 0; k < 5; ++k) {
-      const Eigen::Vector2d by = (F * x.homogeneous()).head<2>(), bx = (F.transpose() * y.homogeneous()).head<2>();
+      const Eigen::Vector2d by = (F * x.homogeneous()).head<2>(),
+                            bx = (F.transpose() * y.homogeneous()).head<2>();
       const double value = y.homogeneous().dot(F * x.homogeneous()) + bx.dot(a - x) + by.dot(b - y);
       const double step = value / (bx.squaredNorm() + by.squaredNorm());
       x = a - step * bx;
@@ -283,17 +319,21 @@ TEST(Triangulation, ExactWithoutNoiseAndNoneBehind) {
     const SyntheticScene scene = MakeSyntheticScene({.seed = seed});
     const SyntheticPair pair = MakeSyntheticPair(scene);
     for (size_t i = 0; i < pair.points.size(); ++i) {
-      const auto p = TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[1], pair.rays1[i], pair.rays2[i]);
+      const auto p =
+          TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[1], pair.rays1[i], pair.rays2[i]);
       ASSERT_TRUE(p.has_value());
       EXPECT_LT((*p - scene.points[static_cast<size_t>(pair.points[i])]).norm(), 1e-8);
-      EXPECT_FALSE(TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[1], -pair.rays1[i], -pair.rays2[i]));
-      EXPECT_FALSE(TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[0], pair.rays1[i], pair.rays1[i]));
+      EXPECT_FALSE(
+          TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[1], -pair.rays1[i], -pair.rays2[i]));
+      EXPECT_FALSE(
+          TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[0], pair.rays1[i], pair.rays1[i]));
     }
   }
 }
 
 TEST(Triangulation, MultiViewReducesTheErrorOfTwoViews) {
-  const SyntheticScene scene = MakeSyntheticScene({.seed = 3, .num_cameras = 8, .num_points = 60, .noise_px = 1.0, .step = 0.1});
+  const SyntheticScene scene =
+      MakeSyntheticScene({.seed = 3, .num_cameras = 8, .num_points = 60, .noise_px = 1.0, .step = 0.1});
   double multi = 0.0, two = 0.0;
   for (size_t p = 0; p < scene.points.size(); ++p) {
     std::vector<Rigid3d> poses;

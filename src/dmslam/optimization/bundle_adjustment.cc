@@ -229,7 +229,8 @@ class Adjustment {
     for (const char fixed : problem_.point_fixed) {
       if (fixed) return;
     }
-    const size_t held = At(static_cast<int>(std::find(pose_held_.begin(), pose_held_.end(), 1) - pose_held_.begin()));
+    const size_t held =
+        At(static_cast<int>(std::find(pose_held_.begin(), pose_held_.end(), 1) - pose_held_.begin()));
     const Eigen::Vector3d center = problem_.T_cam_world[held].Center();
     size_t farthest = held;
     double distance = 0.0;

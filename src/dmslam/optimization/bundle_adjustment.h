@@ -11,8 +11,8 @@
 namespace dmslam {
 
 struct BundleObservation {
-  int pose = 0;   ///< Index into BundleProblem::T_cam_world.
-  int point = 0;  ///< Index into BundleProblem::points.
+  int pose = 0;                                     ///< Index into BundleProblem::T_cam_world.
+  int point = 0;                                    ///< Index into BundleProblem::points.
   Eigen::Vector2d uv_px = Eigen::Vector2d::Zero();  ///< Undistorted.
   double inv_sigma_squared = 1.0;                   ///< [1 / px^2]
 };
@@ -21,30 +21,33 @@ struct BundleObservation {
 struct BundleProblem {
   Pinhole camera;
   std::vector<Rigid3d> T_cam_world;
-  std::vector<char> pose_fixed;   ///< Parallel to the poses, or empty: none is fixed.
+  std::vector<char> pose_fixed;  ///< Parallel to the poses, or empty: none is fixed.
   std::vector<Eigen::Vector3d> points;
   std::vector<char> point_fixed;  ///< Parallel to the points, or empty: none is fixed.
   std::vector<BundleObservation> observations;
 };
 
 struct BundleOptions {
-  /// Steps of the first stage, with Huber's loss, after which outliers are set aside, and of the second without it.
-  /// Zero for the second: one stage only, robust to the end.
+  /// Steps of the first stage, with Huber's loss, after which outliers are set aside, and of the second
+  /// without it. Zero for the second: one stage only, robust to the end.
   int first_iterations = 5;
   int second_iterations = 10;
-  double max_chi2 = 5.991;             ///< Outlier: squared error * inv_sigma_squared above this, or behind the camera.
-  double huber_delta = 2.447651936;    ///< sqrt(5.991), on the error in sigmas.
-  bool second_stage_robust = false;    ///< Keep Huber's loss in the second stage.
-  double relative_tolerance = 1e-4;    ///< A stage ends when a step gains less than this share of the cost.
-  /// Without a fixed pose, pose 0 is held. With exactly one pose held the scale is free as well; then, if this is set,
-  /// poses and points are rescaled about the held camera at the end, so that the farthest camera keeps its distance.
+  double max_chi2 = 5.991;  ///< Outlier: squared error * inv_sigma_squared above this, or behind the camera.
+  double huber_delta = 2.447651936;  ///< sqrt(5.991), on the error in sigmas.
+  bool second_stage_robust = false;  ///< Keep Huber's loss in the second stage.
+  double relative_tolerance = 1e-4;  ///< A stage ends when a step gains less than this share of the cost.
+  /// Without a fixed pose, pose 0 is held. With exactly one pose held the scale is free as well; then, if
+  /// this is set, poses and points are rescaled about the held camera at the end, so that the farthest camera
+  /// keeps its distance.
   bool keep_scale = true;
-  /// Asked before every step; true ends the adjustment early, with the best state so far (`interrupted` in the report).
+  /// Asked before every step; true ends the adjustment early, with the best state so far (`interrupted` in
+  /// the report).
   std::function<bool()> interrupt;
 };
 
 struct BundleReport {
-  bool usable = false;       ///< The state in the problem is at least as good as before. If not, the problem is untouched.
+  bool usable =
+      false;  ///< The state in the problem is at least as good as before. If not, the problem is untouched.
   bool interrupted = false;
   double initial_cost = 0.0;  ///< Robust cost (half the sum), over all observations.
   double final_cost = 0.0;    ///< Robust cost after, over all observations.
@@ -54,11 +57,13 @@ struct BundleReport {
   std::string message;         ///< Why it is not usable.
 };
 
-/// Bundle adjustment over poses and points, one thread, deterministic (same input, same bytes). Uses Ceres with a Schur
-/// complement; dense for few poses, sparse for many. Throws InvariantError for indices out of range.
+/// Bundle adjustment over poses and points, one thread, deterministic (same input, same bytes). Uses Ceres
+/// with a Schur complement; dense for few poses, sparse for many. Throws InvariantError for indices out of
+/// range.
 BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem);
 
-/// Options for the adjustment of a whole map or of the first two keyframes: one robust stage of so many steps.
+/// Options for the adjustment of a whole map or of the first two keyframes: one robust stage of so many
+/// steps.
 BundleOptions GlobalBundleOptions(int iterations);
 
 }  // namespace dmslam

@@ -18,7 +18,8 @@ struct BundleData {
   std::vector<char> is_outlier;
 };
 
-BundleData DataOf(uint64_t seed, double noise_px, int outlier_every = 0, int num_cameras = 6, int num_fixed = 2) {
+BundleData DataOf(uint64_t seed, double noise_px, int outlier_every = 0, int num_cameras = 6,
+                  int num_fixed = 2) {
   BundleData data;
   data.truth = MakeSyntheticScene(
       {.seed = seed, .num_cameras = num_cameras, .num_points = 200, .noise_px = noise_px, .step = 0.25});
@@ -68,8 +69,9 @@ TEST(ReprojectionCost, JacobiansMatchDifferences) {
     pose.start = RandomPose(random, 0.5, 0.5);
     for (double& s : pose.step) s = random.Uniform(-0.4, 0.4);
     pose.Update();
-    Eigen::Vector3d point = pose.Current().Inverse() *
-                            Eigen::Vector3d(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(1, 5));
+    Eigen::Vector3d point =
+        pose.Current().Inverse() *
+        Eigen::Vector3d(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(1, 5));
     const BundleObservation observation{0, 0, {300, 200}, 0.7};
     const ReprojectionCost<6, 3> cost(camera, pose, point, observation);
     double residual[2], jacobian_pose[12], jacobian_point[6];
@@ -149,17 +151,18 @@ TEST(AdjustBundle, HeldPosesAndPointsStayBitwise) {
 
 TEST(AdjustBundle, OneHeldPoseKeepsTheScale) {
   BundleData data = DataOf(4, 0.3, 0, 6, 1);
-  const double before =
-      (data.problem.T_cam_world[5].Center() - data.problem.T_cam_world[0].Center()).norm();
+  const double before = (data.problem.T_cam_world[5].Center() - data.problem.T_cam_world[0].Center()).norm();
   const BundleReport report = AdjustBundle(GlobalBundleOptions(20), data.problem);
   ASSERT_TRUE(report.usable);
-  EXPECT_NEAR((data.problem.T_cam_world[5].Center() - data.problem.T_cam_world[0].Center()).norm(), before, 1e-9);
+  EXPECT_NEAR((data.problem.T_cam_world[5].Center() - data.problem.T_cam_world[0].Center()).norm(), before,
+              1e-9);
   // Rescaling changes no projection.
   double cost = 0.0;
   for (const auto& o : data.problem.observations) {
-    cost += 0.5 * std::min(1e4, ReprojectionErrorSquared(data.problem.camera,
-                                                         data.problem.T_cam_world[static_cast<size_t>(o.pose)],
-                                                         data.problem.points[static_cast<size_t>(o.point)], o.uv_px));
+    cost +=
+        0.5 * std::min(1e4, ReprojectionErrorSquared(
+                                data.problem.camera, data.problem.T_cam_world[static_cast<size_t>(o.pose)],
+                                data.problem.points[static_cast<size_t>(o.point)], o.uv_px));
   }
   EXPECT_NEAR(cost, report.final_cost, 0.05 * cost);
 }

@@ -18,8 +18,8 @@ namespace dmslam {
 inline constexpr double kMinBundleDepth = 1e-6;
 inline constexpr double kErrorBehind = 100.0;  ///< [sigma]
 
-/// A pose during the adjustment: the parameters are the step (w, v) from where it started, so that Ceres needs no
-/// manifold. What all its observations share is computed once per evaluation.
+/// A pose during the adjustment: the parameters are the step (w, v) from where it started, so that Ceres
+/// needs no manifold. What all its observations share is computed once per evaluation.
 struct PoseState {
   std::array<double, 6> step{};
   Rigid3d start;

@@ -11,8 +11,8 @@
 
 namespace dmslam {
 
-Vector7d EssentialGraphResidual(const Sim3d& S_j_i, const Sim3d& S_i_world, const Sim3d& S_j_world, Matrix7d* jacobian_i,
-                                Matrix7d* jacobian_j) {
+Vector7d EssentialGraphResidual(const Sim3d& S_j_i, const Sim3d& S_i_world, const Sim3d& S_j_world,
+                                Matrix7d* jacobian_i, Matrix7d* jacobian_j) {
   const Vector7d residual = LogSim3(S_j_i * S_i_world * S_j_world.Inverse());
   // Log(S_j_i Exp(d) S_i S_j^-1) = Log(Exp(Ad d) E), and Log(E Exp(-d)) turns with the right Jacobian.
   if (jacobian_i != nullptr) *jacobian_i = LeftJacobianInverseSim3(residual) * AdjointSim3(S_j_i);
@@ -36,8 +36,8 @@ void FromSim3(const Sim3d& S, double* x) {
   x[7] = std::log(S.scale);
 }
 
-/// Left steps on Sim(3), of the scale too or not. The cost functions write their Jacobians with respect to the step into
-/// the first columns of the eight, which this manifold's Jacobian picks.
+/// Left steps on Sim(3), of the scale too or not. The cost functions write their Jacobians with respect to
+/// the step into the first columns of the eight, which this manifold's Jacobian picks.
 template <int kTangent>
 class LeftStepManifold : public ceres::Manifold {
  public:
@@ -66,7 +66,8 @@ class LeftStepManifold : public ceres::Manifold {
 
 class EdgeCost : public ceres::SizedCostFunction<7, 8, 8> {
  public:
-  explicit EdgeCost(const EssentialGraphEdge& edge) : S_j_i_(edge.S_j_i), root_weight_(std::sqrt(edge.weight)) {}
+  explicit EdgeCost(const EssentialGraphEdge& edge)
+      : S_j_i_(edge.S_j_i), root_weight_(std::sqrt(edge.weight)) {}
 
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     Matrix7d wrt_i, wrt_j;
@@ -93,7 +94,8 @@ class EdgeCost : public ceres::SizedCostFunction<7, 8, 8> {
 
 void CheckGraph(const EssentialGraphProblem& problem) {
   const int count = static_cast<int>(problem.S_cam_world.size());
-  DMSLAM_CHECK(problem.fixed.empty() || problem.fixed.size() == problem.S_cam_world.size(), "one fixed flag per node");
+  DMSLAM_CHECK(problem.fixed.empty() || problem.fixed.size() == problem.S_cam_world.size(),
+               "one fixed flag per node");
   for (const EssentialGraphEdge& edge : problem.edges) {
     DMSLAM_CHECK(edge.i >= 0 && edge.i < count && edge.j >= 0 && edge.j < count, "edge names two nodes");
     DMSLAM_CHECK(edge.i != edge.j, "edge connects two different nodes");
@@ -177,7 +179,8 @@ class GraphSolver {
 
 }  // namespace
 
-EssentialGraphReport OptimizeEssentialGraph(const EssentialGraphOptions& options, EssentialGraphProblem& problem) {
+EssentialGraphReport OptimizeEssentialGraph(const EssentialGraphOptions& options,
+                                            EssentialGraphProblem& problem) {
   CheckGraph(problem);
   if (problem.edges.empty()) {
     EssentialGraphReport report;

@@ -20,7 +20,8 @@ struct EssentialGraphEdge {
 /// Keyframes as similarities S_cam_world and the edges between them. Adjusted in place.
 struct EssentialGraphProblem {
   std::vector<Sim3d> S_cam_world;
-  std::vector<char> fixed;  ///< Parallel to the nodes; at least one must be fixed (node 0 is taken if none is).
+  std::vector<char>
+      fixed;  ///< Parallel to the nodes; at least one must be fixed (node 0 is taken if none is).
   std::vector<EssentialGraphEdge> edges;
 };
 
@@ -40,12 +41,14 @@ struct EssentialGraphReport {
   std::string message;
 };
 
-/// Pose graph over Sim(3): minimises sum weight * |Log(S_j_i * S_i * S_j^-1)|^2 (Strasdat, Montiel, Davison, "Scale
-/// drift-aware large scale monocular SLAM", RSS 2010). One thread, deterministic.
-EssentialGraphReport OptimizeEssentialGraph(const EssentialGraphOptions& options, EssentialGraphProblem& problem);
+/// Pose graph over Sim(3): minimises sum weight * |Log(S_j_i * S_i * S_j^-1)|^2 (Strasdat, Montiel, Davison,
+/// "Scale drift-aware large scale monocular SLAM", RSS 2010). One thread, deterministic.
+EssentialGraphReport OptimizeEssentialGraph(const EssentialGraphOptions& options,
+                                            EssentialGraphProblem& problem);
 
-/// Residual of one edge and its Jacobians with respect to left steps Exp(d) * S of the two nodes (null to skip).
-Vector7d EssentialGraphResidual(const Sim3d& S_j_i, const Sim3d& S_i_world, const Sim3d& S_j_world, Matrix7d* jacobian_i,
-                                Matrix7d* jacobian_j);
+/// Residual of one edge and its Jacobians with respect to left steps Exp(d) * S of the two nodes (null to
+/// skip).
+Vector7d EssentialGraphResidual(const Sim3d& S_j_i, const Sim3d& S_i_world, const Sim3d& S_j_world,
+                                Matrix7d* jacobian_i, Matrix7d* jacobian_j);
 
 }  // namespace dmslam

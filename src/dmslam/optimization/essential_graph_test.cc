@@ -22,7 +22,8 @@ struct Ring {
   EssentialGraphProblem drifted;
 };
 
-/// Keyframes on a circle that look outwards; odometry drifts in scale and rotation, and one edge closes the ring.
+/// Keyframes on a circle that look outwards; odometry drifts in scale and rotation, and one edge closes the
+/// ring.
 Ring MakeRing(int count, bool with_scale_drift) {
   Ring ring;
   Random random(3);
@@ -63,9 +64,11 @@ TEST(EssentialGraph, JacobiansMatchDifferences) {
       Vector7d d = Vector7d::Zero();
       d(c) = 1e-5;
       const Vector7d slope_i = (EssentialGraphResidual(measured, ExpSim3(d) * i, j, nullptr, nullptr) -
-                                EssentialGraphResidual(measured, ExpSim3(-d) * i, j, nullptr, nullptr)) / 2e-5;
+                                EssentialGraphResidual(measured, ExpSim3(-d) * i, j, nullptr, nullptr)) /
+                               2e-5;
       const Vector7d slope_j = (EssentialGraphResidual(measured, i, ExpSim3(d) * j, nullptr, nullptr) -
-                                EssentialGraphResidual(measured, i, ExpSim3(-d) * j, nullptr, nullptr)) / 2e-5;
+                                EssentialGraphResidual(measured, i, ExpSim3(-d) * j, nullptr, nullptr)) /
+                               2e-5;
       EXPECT_LT((slope_i - wrt_i.col(c)).norm(), 1e-7 * (1.0 + wrt_i.col(c).norm()));
       EXPECT_LT((slope_j - wrt_j.col(c)).norm(), 1e-7 * (1.0 + wrt_j.col(c).norm()));
     }
@@ -78,7 +81,8 @@ TEST(EssentialGraph, ConsistentEdgesRestoreTheTruth) {
   problem.S_cam_world = ring.drifted.S_cam_world;
   for (int i = 0; i < 60; ++i) {
     const int j = (i + 1) % 60;
-    problem.edges.push_back({i, j, ring.truth[static_cast<size_t>(j)] * ring.truth[static_cast<size_t>(i)].Inverse(), 1.0});
+    problem.edges.push_back(
+        {i, j, ring.truth[static_cast<size_t>(j)] * ring.truth[static_cast<size_t>(i)].Inverse(), 1.0});
   }
   const EssentialGraphReport report = OptimizeEssentialGraph({}, problem);
   ASSERT_TRUE(report.usable) << report.message;

@@ -11,7 +11,8 @@ namespace dmslam {
 namespace {
 
 constexpr double kMinDepth = 1e-9;
-constexpr double kCostBehind = 1e5;  ///< Of an observation behind the camera: no step is to gain by moving one there.
+constexpr double kCostBehind =
+    1e5;  ///< Of an observation behind the camera: no step is to gain by moving one there.
 
 /// The upper triangle of a 6x6 sum of row^T row, kept in scalars that the compiler holds in registers.
 class SymmetricSum {
@@ -175,8 +176,9 @@ Matrix6d PosePriorJacobian(const Vector6d& error) {
   return J;
 }
 
-void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init, std::span<const PoseObservation> observations,
-                  const PoseOptimizationOptions& options, PoseOptimizationReport& report) {
+void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
+                  std::span<const PoseObservation> observations, const PoseOptimizationOptions& options,
+                  PoseOptimizationReport& report) {
   const size_t count = observations.size();
   report.inliers.assign(count, 1);
   report.chi2.assign(count, 0.0);

@@ -26,12 +26,12 @@ struct PosePrior {
 };
 
 struct PoseOptimizationOptions {
-  int rounds = 4;                 ///< After each round every observation is tested again.
-  int iterations = 10;            ///< Steps per round at most; a round ends early when the step is tiny.
-  int robust_rounds = 2;          ///< Rounds with Huber's loss; later ones trust the inlier test alone.
-  double max_chi2 = 5.991;        ///< Inlier: squared error * inv_sigma_squared at most this (95 %, 2 dof).
-  double min_step = 1e-7;         ///< A step shorter than this (rad and map units) ends the round.
-  int min_observations = 3;       ///< Fewer: the report is not usable and the pose is the initial one.
+  int rounds = 4;            ///< After each round every observation is tested again.
+  int iterations = 10;       ///< Steps per round at most; a round ends early when the step is tiny.
+  int robust_rounds = 2;     ///< Rounds with Huber's loss; later ones trust the inlier test alone.
+  double max_chi2 = 5.991;   ///< Inlier: squared error * inv_sigma_squared at most this (95 %, 2 dof).
+  double min_step = 1e-7;    ///< A step shorter than this (rad and map units) ends the round.
+  int min_observations = 3;  ///< Fewer: the report is not usable and the pose is the initial one.
   std::optional<PosePrior> prior;
 };
 
@@ -39,19 +39,21 @@ struct PoseOptimizationReport {
   bool usable = false;
   Rigid3d T_cam_world;
   int num_inliers = 0;
-  std::vector<char> inliers;       ///< Parallel to the observations.
-  std::vector<double> chi2;        ///< Parallel to the observations; infinite behind the camera.
-  double mean_chi2 = 0.0;          ///< Over the inliers.
+  std::vector<char> inliers;  ///< Parallel to the observations.
+  std::vector<double> chi2;   ///< Parallel to the observations; infinite behind the camera.
+  double mean_chi2 = 0.0;     ///< Over the inliers.
   /// Gauss-Newton Hessian over the inliers (and the prior) at the solution, tangent (w, v).
   Matrix6d information = Matrix6d::Zero();
   int iterations = 0;
 };
 
-/// Pose-only optimisation: minimises the reprojection errors over T_cam_world, re-testing the observations between the
-/// rounds (ORB-SLAM2's scheme). Levenberg-Marquardt on six unknowns. All start as inliers. Deterministic. The report is
-/// overwritten; its vectors keep their memory, so that calls in the steady state do not allocate.
-void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init, std::span<const PoseObservation> observations,
-                  const PoseOptimizationOptions& options, PoseOptimizationReport& report);
+/// Pose-only optimisation: minimises the reprojection errors over T_cam_world, re-testing the observations
+/// between the rounds (ORB-SLAM2's scheme). Levenberg-Marquardt on six unknowns. All start as inliers.
+/// Deterministic. The report is overwritten; its vectors keep their memory, so that calls in the steady state
+/// do not allocate.
+void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
+                  std::span<const PoseObservation> observations, const PoseOptimizationOptions& options,
+                  PoseOptimizationReport& report);
 PoseOptimizationReport OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
                                     std::span<const PoseObservation> observations,
                                     const PoseOptimizationOptions& options = {});

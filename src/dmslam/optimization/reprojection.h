@@ -25,8 +25,8 @@ inline Matrix26 PoseJacobian(const Pinhole& camera, const Eigen::Vector3d& p_cam
   const double x = p_cam.x() * inverse_z, y = p_cam.y() * inverse_z;
   Matrix26 J;
   J << -camera.fx_px * x * y, camera.fx_px * (1.0 + x * x), -camera.fx_px * y, camera.fx_px * inverse_z, 0.0,
-      -camera.fx_px * x * inverse_z, -camera.fy_px * (1.0 + y * y), camera.fy_px * x * y, camera.fy_px * x, 0.0,
-      camera.fy_px * inverse_z, -camera.fy_px * y * inverse_z;
+      -camera.fx_px * x * inverse_z, -camera.fy_px * (1.0 + y * y), camera.fy_px * x * y, camera.fy_px * x,
+      0.0, camera.fy_px * inverse_z, -camera.fy_px * y * inverse_z;
   return J;
 }
 

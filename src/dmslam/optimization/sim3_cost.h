@@ -8,7 +8,8 @@
 
 namespace dmslam {
 
-/// A reprojection error [px] on one side, and its derivative with respect to the step (w, v, log scale) of StepSim3.
+/// A reprojection error [px] on one side, and its derivative with respect to the step (w, v, log scale) of
+/// StepSim3.
 struct Sim3SideError {
   Eigen::Vector2d error;
   Eigen::Matrix<double, 2, 7> jacobian;

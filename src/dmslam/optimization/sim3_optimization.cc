@@ -76,8 +76,8 @@ class Sim3Problem {
 
 }  // namespace
 
-Sim3Report EstimateSim3Ransac(const Pinhole& camera1, const Pinhole& camera2, std::span<const Sim3Match> matches,
-                              const Sim3RansacOptions& options) {
+Sim3Report EstimateSim3Ransac(const Pinhole& camera1, const Pinhole& camera2,
+                              std::span<const Sim3Match> matches, const Sim3RansacOptions& options) {
   const TwoSides sides{camera1, camera2, matches};
   auto found = Ransac(Sim3Problem(sides, options), {.max_iterations = options.max_iterations,
                                                     .confidence = options.confidence,
@@ -137,7 +137,8 @@ void AddSide(const Sim3SideError& side, double inv_sigma_squared, double huber_s
 }
 
 /// Over the inliers; a match behind a camera makes the cost infinite.
-Sums Linearize(const TwoSides& sides, const Sim3d& S_12, const std::vector<char>& inliers, double huber_squared) {
+Sums Linearize(const TwoSides& sides, const Sim3d& S_12, const std::vector<char>& inliers,
+               double huber_squared) {
   Sums sums;
   const Sim3d S_21 = S_12.Inverse();
   for (size_t i = 0; i < sides.matches.size(); ++i) {
@@ -204,12 +205,12 @@ Sim3Report OptimizeSim3(const Pinhole& camera1, const Pinhole& camera2, std::spa
   report.inliers.assign(matches.size(), 1);
   Classify(sides, 100.0 * options.max_chi2, report);
   if (report.num_inliers < 3) return report;
-  report.iterations = Minimize(sides, report.inliers, options.first_iterations, options.max_chi2, options.fix_scale,
-                               report.S_cam1_cam2);
+  report.iterations = Minimize(sides, report.inliers, options.first_iterations, options.max_chi2,
+                               options.fix_scale, report.S_cam1_cam2);
   Classify(sides, options.max_chi2, report);
   if (report.num_inliers < std::max(3, options.min_inliers)) return report;
-  report.iterations +=
-      Minimize(sides, report.inliers, options.second_iterations, kNoLimit, options.fix_scale, report.S_cam1_cam2);
+  report.iterations += Minimize(sides, report.inliers, options.second_iterations, kNoLimit, options.fix_scale,
+                                report.S_cam1_cam2);
   Classify(sides, options.max_chi2, report);
   report.success = report.num_inliers >= options.min_inliers;
   return report;

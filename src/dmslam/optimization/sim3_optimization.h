@@ -10,8 +10,8 @@
 
 namespace dmslam {
 
-/// A landmark of keyframe 1 and the landmark of keyframe 2 that should be the same: each in the frame of its own camera,
-/// with the keypoint in its own image.
+/// A landmark of keyframe 1 and the landmark of keyframe 2 that should be the same: each in the frame of its
+/// own camera, with the keypoint in its own image.
 struct Sim3Match {
   Eigen::Vector3d p_cam1 = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_cam2 = Eigen::Vector3d::Zero();
@@ -46,10 +46,10 @@ struct Sim3Report {
   int iterations = 0;
 };
 
-/// RANSAC over samples of three pairs (AlignSim3). A match is an inlier when p_cam2 carried into camera 1 meets uv1, and
-/// p_cam1 carried into camera 2 meets uv2. The best model is refitted to its inliers.
-Sim3Report EstimateSim3Ransac(const Pinhole& camera1, const Pinhole& camera2, std::span<const Sim3Match> matches,
-                              const Sim3RansacOptions& options);
+/// RANSAC over samples of three pairs (AlignSim3). A match is an inlier when p_cam2 carried into camera 1
+/// meets uv1, and p_cam1 carried into camera 2 meets uv2. The best model is refitted to its inliers.
+Sim3Report EstimateSim3Ransac(const Pinhole& camera1, const Pinhole& camera2,
+                              std::span<const Sim3Match> matches, const Sim3RansacOptions& options);
 
 /// Refines S_cam1_cam2 by the reprojection errors on both sides; the points stay as they are.
 Sim3Report OptimizeSim3(const Pinhole& camera1, const Pinhole& camera2, std::span<const Sim3Match> matches,

@@ -54,8 +54,9 @@ TEST(Sim3Cost, JacobiansMatchDifferences) {
         for (int c = 0; c < 7; ++c) {
           Vector7d d = Vector7d::Zero();
           d(c) = 1e-6;
-          const Eigen::Vector2d slope =
-              (side(kCamera, StepSim3(data.S_12, d), m).error - side(kCamera, StepSim3(data.S_12, -d), m).error) / 2e-6;
+          const Eigen::Vector2d slope = (side(kCamera, StepSim3(data.S_12, d), m).error -
+                                         side(kCamera, StepSim3(data.S_12, -d), m).error) /
+                                        2e-6;
           EXPECT_LT((slope - at.jacobian.col(c)).norm(), 1e-4 * (1.0 + slope.norm()));
         }
       }

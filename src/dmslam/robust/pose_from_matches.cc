@@ -15,9 +15,14 @@ class PoseProblem {
   static constexpr int kSampleSize = 3;
   static constexpr int kMaxModels = 4;
 
-  PoseProblem(const Pinhole& camera, std::span<const Eigen::Vector3d> points, std::span<const Eigen::Vector2d> uv_px,
-              std::span<const double> inv_sigma_squared, double max_chi2)
-      : camera_(camera), points_(points), uv_px_(uv_px), inv_sigma_squared_(inv_sigma_squared), max_chi2_(max_chi2) {
+  PoseProblem(const Pinhole& camera, std::span<const Eigen::Vector3d> points,
+              std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
+              double max_chi2)
+      : camera_(camera),
+        points_(points),
+        uv_px_(uv_px),
+        inv_sigma_squared_(inv_sigma_squared),
+        max_chi2_(max_chi2) {
     rays_.reserve(uv_px.size());
     for (const Eigen::Vector2d& uv : uv_px) rays_.push_back(camera.Ray(uv));
   }
@@ -56,7 +61,8 @@ class PoseProblem {
 }  // namespace
 
 RansacReport<Rigid3d> PoseFromMatches(const Pinhole& camera, std::span<const Eigen::Vector3d> points_world,
-                                      std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
+                                      std::span<const Eigen::Vector2d> uv_px,
+                                      std::span<const double> inv_sigma_squared,
                                       const PoseRansacOptions& options) {
   DMSLAM_CHECK(points_world.size() == uv_px.size(), "one pixel per point");
   DMSLAM_CHECK(inv_sigma_squared.empty() || inv_sigma_squared.size() == uv_px.size(), "one sigma per pixel");

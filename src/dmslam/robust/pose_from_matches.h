@@ -18,10 +18,12 @@ struct PoseRansacOptions {
   uint64_t seed = 0;
 };
 
-/// T_cam_world from world points and their undistorted pixels, with outliers: P3P samples, truncated quadratic score,
-/// every new best pose refined on its inliers. `inv_sigma_squared` is parallel to the points or empty (all 1).
+/// T_cam_world from world points and their undistorted pixels, with outliers: P3P samples, truncated
+/// quadratic score, every new best pose refined on its inliers. `inv_sigma_squared` is parallel to the points
+/// or empty (all 1).
 RansacReport<Rigid3d> PoseFromMatches(const Pinhole& camera, std::span<const Eigen::Vector3d> points_world,
-                                      std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
+                                      std::span<const Eigen::Vector2d> uv_px,
+                                      std::span<const double> inv_sigma_squared,
                                       const PoseRansacOptions& options);
 
 }  // namespace dmslam

@@ -35,21 +35,25 @@ struct RansacReport {
 /// A problem for Ransac(): data held by the problem, models fitted to samples of indices.
 template <typename P>
 concept RansacProblem = requires(const P& p, std::span<const int, P::kSampleSize> sample,
-                                 std::array<typename P::Model, P::kMaxModels>& models, const typename P::Model& model) {
-  { p.size() } -> std::convertible_to<int>;                     // How many data.
-  { p.Fit(sample, models) } -> std::convertible_to<int>;        // How many models the sample gave.
-  { p.NormalizedErrorSquared(model, 0) } -> std::convertible_to<double>;  // r^2 / threshold: an inlier below 1.
+                                 std::array<typename P::Model, P::kMaxModels>& models,
+                                 const typename P::Model& model) {
+  { p.size() } -> std::convertible_to<int>;               // How many data.
+  { p.Fit(sample, models) } -> std::convertible_to<int>;  // How many models the sample gave.
+  {
+    p.NormalizedErrorSquared(model, 0)
+    } -> std::convertible_to<double>;  // r^2 / threshold: an inlier below 1.
 };
 
-/// Problems that can fit a model to any number of inliers, starting from the model: bool Refit(span<const int>, Model&).
+/// Problems that can fit a model to any number of inliers, starting from the model: bool Refit(span<const
+/// int>, Model&).
 template <typename P>
-concept RefittingProblem =
-    RansacProblem<P> && requires(const P& p, std::span<const int> indices, typename P::Model& model) {
-      { p.Refit(indices, model) } -> std::convertible_to<bool>;
-    };
+concept RefittingProblem = RansacProblem<P> &&
+    requires(const P& p, std::span<const int> indices, typename P::Model& model) {
+  { p.Refit(indices, model) } -> std::convertible_to<bool>;
+};
 
-/// Samples needed to draw one free of outliers with this confidence (the paper's Eq. 4: log(1 - p) / log(1 - w^m)),
-/// at most `limit`.
+/// Samples needed to draw one free of outliers with this confidence (the paper's Eq. 4: log(1 - p) / log(1 -
+/// w^m)), at most `limit`.
 inline int RansacIterations(double inlier_share, int sample_size, double confidence, int limit) {
   const double all_good = std::pow(inlier_share, sample_size);
   if (all_good >= 1.0) return 1;
@@ -66,7 +70,8 @@ void DrawSample(Random& random, int count, std::array<int, kSize>& sample) {
     bool fresh;
     do {
       sample[static_cast<size_t>(k)] = static_cast<int>(random.Below(static_cast<uint32_t>(count)));
-      fresh = std::find(sample.begin(), sample.begin() + k, sample[static_cast<size_t>(k)]) == sample.begin() + k;
+      fresh =
+          std::find(sample.begin(), sample.begin() + k, sample[static_cast<size_t>(k)]) == sample.begin() + k;
     } while (!fresh);
   }
 }
@@ -115,8 +120,8 @@ void RefitBest(const P& problem, std::vector<int>& indices, RansacReport<typenam
   }
 }
 
-/// RANSAC (Fischler and Bolles 1981) with the truncated quadratic score of MSAC (Torr and Zisserman 2000), local
-/// refitting of every new best model, and adaptive stopping. Deterministic in (problem, options).
+/// RANSAC (Fischler and Bolles 1981) with the truncated quadratic score of MSAC (Torr and Zisserman 2000),
+/// local refitting of every new best model, and adaptive stopping. Deterministic in (problem, options).
 template <RansacProblem P>
 RansacReport<typename P::Model> Ransac(const P& problem, const RansacOptions& options) {
   RansacReport<typename P::Model> report;

@@ -45,7 +45,8 @@ double ShareFound(const OutlierPair& data, const std::vector<char>& inliers) {
 }
 
 TEST(RansacLoop, IterationsFollowTheFormula) {
-  EXPECT_EQ(RansacIterations(0.5, 8, 0.99, 100000), static_cast<int>(std::ceil(std::log(0.01) / std::log(1 - 1.0 / 256))));
+  EXPECT_EQ(RansacIterations(0.5, 8, 0.99, 100000),
+            static_cast<int>(std::ceil(std::log(0.01) / std::log(1 - 1.0 / 256))));
   EXPECT_EQ(RansacIterations(1.0, 8, 0.99, 500), 1);
   EXPECT_EQ(RansacIterations(0.0, 8, 0.99, 500), 500);
 }
@@ -72,7 +73,8 @@ TEST(RansacLoop, TooFewDataIsNoSuccess) {
 TEST(TwoViewRansac, FundamentalFindsTheInliers) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const OutlierPair data = PairWithOutliers(seed);
-    const auto report = FundamentalFromMatches(data.pair.x1_px, data.pair.x2_px, {}, {.ransac = {.seed = seed}});
+    const auto report =
+        FundamentalFromMatches(data.pair.x1_px, data.pair.x2_px, {}, {.ransac = {.seed = seed}});
     ASSERT_TRUE(report.success);
     EXPECT_GT(ShareFound(data, report.inliers), 0.95);
     EXPECT_LT(report.iterations, 1000);
@@ -82,7 +84,8 @@ TEST(TwoViewRansac, FundamentalFindsTheInliers) {
 TEST(TwoViewRansac, EssentialFindsInliersAndPose) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const OutlierPair data = PairWithOutliers(seed);
-    const auto report = EssentialFromMatches(kCamera, data.pair.x1_px, data.pair.x2_px, {}, {.ransac = {.seed = seed}});
+    const auto report =
+        EssentialFromMatches(kCamera, data.pair.x1_px, data.pair.x2_px, {}, {.ransac = {.seed = seed}});
     ASSERT_TRUE(report.success);
     EXPECT_GT(ShareFound(data, report.inliers), 0.95);
     std::vector<int> inliers;
@@ -106,7 +109,8 @@ TEST(TwoViewRansac, HomographyFindsTheInliersOfAPlane) {
 TEST(TwoViewRansac, SigmaWidensTheBound) {
   const OutlierPair data = PairWithOutliers(4);
   const std::vector<double> large(data.pair.x1_px.size(), 1e8);
-  const auto report = FundamentalFromMatches(data.pair.x1_px, data.pair.x2_px, large, {.ransac = {.seed = 3}});
+  const auto report =
+      FundamentalFromMatches(data.pair.x1_px, data.pair.x2_px, large, {.ransac = {.seed = 3}});
   EXPECT_EQ(report.num_inliers, static_cast<int>(data.pair.x1_px.size()));
 }
 
@@ -117,12 +121,14 @@ struct PnpData {
 };
 
 PnpData PnpWithOutliers(uint64_t seed) {
-  const SyntheticScene scene = MakeSyntheticScene({.seed = seed, .num_cameras = 1, .num_points = 150, .noise_px = 0.7});
+  const SyntheticScene scene =
+      MakeSyntheticScene({.seed = seed, .num_cameras = 1, .num_points = 150, .noise_px = 0.7});
   PnpData data{scene.T_cam_world[0], {}, {}};
   Random random(seed + 77);
   for (const auto& o : scene.observations) {
     data.points.push_back(scene.points[static_cast<size_t>(o.point)]);
-    data.uv_px.push_back(o.point % 2 ? Eigen::Vector2d(random.Uniform(0, 640), random.Uniform(0, 480)) : o.uv_px);
+    data.uv_px.push_back(o.point % 2 ? Eigen::Vector2d(random.Uniform(0, 640), random.Uniform(0, 480))
+                                     : o.uv_px);
   }
   return data;
 }

@@ -42,7 +42,8 @@ struct FundamentalProblem {
   }
   double NormalizedErrorSquared(const Eigen::Matrix3d& F, int i) const { return matches.Sampson(F, i); }
   bool Refit(std::span<const int> indices, Eigen::Matrix3d& F) const {
-    const auto refitted = FundamentalEightPoint(matches.x1_px, matches.x2_px, indices, matches.inverse_threshold);
+    const auto refitted =
+        FundamentalEightPoint(matches.x1_px, matches.x2_px, indices, matches.inverse_threshold);
     if (refitted) F = *refitted;
     return refitted.has_value();
   }
@@ -69,9 +70,13 @@ struct EssentialProblem {
   }
   double NormalizedErrorSquared(const Eigen::Matrix3d& F, int i) const { return matches.Sampson(F, i); }
   bool Refit(std::span<const int> indices, Eigen::Matrix3d& F) const {
-    const auto E = indices.size() < 16 ? std::nullopt : EssentialEightPoint(rays1, rays2, indices);
-    if (E) F = FundamentalFromEssential(*E, camera, camera);
-    return E.has_value();
+    if (indices.size() < 8) return false;
+    Rigid3d T;
+    PoseFromEssential(EssentialFromFundamental(F, camera, camera), rays1, rays2, indices, T);
+    T = RefineRelativePose(camera, T, matches.x1_px, matches.x2_px, indices, matches.inverse_threshold, 0.0,
+                           3);
+    F = FundamentalFromEssential(EssentialFromPose(T), camera, camera);
+    return true;
   }
 };
 
@@ -114,7 +119,8 @@ RansacReport<Eigen::Matrix3d> FundamentalFromMatches(std::span<const Eigen::Vect
   return Ransac(FundamentalProblem{matches}, options.ransac);
 }
 
-RansacReport<Eigen::Matrix3d> EssentialFromMatches(const Pinhole& camera, std::span<const Eigen::Vector2d> x1_px,
+RansacReport<Eigen::Matrix3d> EssentialFromMatches(const Pinhole& camera,
+                                                   std::span<const Eigen::Vector2d> x1_px,
                                                    std::span<const Eigen::Vector2d> x2_px,
                                                    std::span<const double> sigma_squared,
                                                    const TwoViewRansacOptions& options) {
