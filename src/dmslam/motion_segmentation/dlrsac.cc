@@ -65,6 +65,8 @@ class Segmentation {
   void Measure(CoupledSet* set) const;
   std::optional<CoupledSet> ChooseSet();
   void Select(const CoupledSet& set);
+  void KeepLayer(const TwoViewModel& model, std::vector<uint8_t>* flags) const;
+  void RefitOnAll(TwoViewModel* model, std::vector<uint8_t>* flags) const;
   void VoteWithNeighbors(std::vector<uint8_t>* flags) const;
 
   int NumModels() const {
@@ -84,6 +86,7 @@ class Segmentation {
   const Camera& camera_;
   std::vector<uint32_t> order_;
   MatchArrays arrays_;
+  std::vector<Eigen::Vector2d> positions_px_;  ///< uv0, parallel to arrays_
   std::vector<Cell> kept_;
   StaticSelection out_;
 };
@@ -103,6 +106,7 @@ void Segmentation::SortIntoCells() {
   std::stable_sort(order_.begin(), order_.end(),
                    [&](uint32_t a, uint32_t b) { return cell_of(matches_[a]) < cell_of(matches_[b]); });
   arrays_ = MakeArrays(matches_, order_, camera_, options_.inlier);
+  for (const uint32_t i : order_) positions_px_.push_back(matches_[i].uv0_px);
   const int needed = std::max(options_.min_cell_matches, SampleSize(kind()));
   size_t next = 0;
   for (int index = 0; index < out_.columns * out_.rows; ++index) {
@@ -239,6 +243,7 @@ CoupledSet Segmentation::MakeSet(size_t leader) {
     if (settled || round >= options_.set_refit_rounds) break;
     std::vector<uint8_t> use(arrays_.size(), 0);
     for (const size_t j : set.members) FlagInliers(set.model.M, arrays_, kept_[j].range, use);
+    KeepLayer(set.model, &use);
     if (!Refine(kind(), arrays_, use, 5, &set.model)) break;
   }
   Measure(&set);
@@ -298,7 +303,7 @@ void Segmentation::Select(const CoupledSet& set) {
   TwoViewModel model = set.model;
   std::vector<uint8_t> flags(arrays_.size(), 0);
   if (options_.scope == StaticScope::kImage) {
-    RefitOnAll(kind(), arrays_, options_.sampling.refit_rounds, &model, &flags);
+    RefitOnAll(&model, &flags);
     if (options_.neighbor_share > 0) VoteWithNeighbors(&flags);
   } else {
     for (const size_t j : set.members) FlagInliers(model.M, arrays_, kept_[j].range, flags);
@@ -312,6 +317,24 @@ void Segmentation::Select(const CoupledSet& set) {
   for (const Cell& cell : kept_) {
     CellReport& report = out_.cells[static_cast<size_t>(cell.index)];
     for (size_t k = cell.range.begin; k < cell.range.end; ++k) report.num_static += out_.is_static[order_[k]];
+  }
+}
+
+void Segmentation::KeepLayer(const TwoViewModel& model, std::vector<uint8_t>* flags) const {
+  if (kind() != ModelKind::kEssential || !options_.layers.enabled) return;
+  KeepWidestLayer(options_.layers, model, arrays_, positions_px_, 0.5 * (camera_.fx_px + camera_.fy_px), *flags);
+}
+
+/// Selects over the whole image, within the widest layer, and refits to what was selected.
+void Segmentation::RefitOnAll(TwoViewModel* model, std::vector<uint8_t>* flags) const {
+  const Range all{0, arrays_.size()};
+  for (int round = 0;; ++round) {
+    std::vector<uint8_t> selected(arrays_.size());
+    FlagInliers(model->M, arrays_, all, selected);
+    KeepLayer(*model, &selected);
+    const bool settled = round > 0 && selected == *flags;
+    *flags = std::move(selected);
+    if (settled || round >= options_.sampling.refit_rounds || !Refine(kind(), arrays_, *flags, 5, model)) break;
   }
 }
 
@@ -334,6 +357,7 @@ DlrsacOptions DlrsacOptions::Paper() {
   options.set_refit_rounds = 0;
   options.scope = StaticScope::kCoupledCells;
   options.degenerate_vote = DegenerateVote::kAlways;
+  options.layers.enabled = false;
   options.neighbor_share = 0.0;
   return options;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dmslam/motion_segmentation/depth_layers.h"
 #include "dmslam/motion_segmentation/ransac.h"
 #include "dmslam/motion_segmentation/static_selector.h"
 
@@ -48,6 +49,9 @@ struct DlrsacOptions {
   DegenerateVote degenerate_vote = DegenerateVote::kWhenNoneIsGeneral;
   double degenerate_share = 0.95;  ///< share of a cell's inliers that a plane or a rotation must explain
   double collinear_px = 4.0;       ///< spread across the main direction below this: collinear
+
+  /// Keeps the widest layer of disparities only (essential matrices); off: all that agree with the model (the paper).
+  LayerOptions layers;
 
   /// A match is called static only if this share of its neighbours in the image agrees with the model too. What moves
   /// agrees by accident, and not all of it together. 0: not asked.

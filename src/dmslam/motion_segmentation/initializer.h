@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -16,6 +15,7 @@
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/motion_segmentation/dlrsac.h"
 #include "dmslam/motion_segmentation/match_frames.h"
+#include "dmslam/motion_segmentation/pair_agreement.h"
 #include "dmslam/motion_segmentation/two_view_reconstruction.h"
 
 namespace dmslam {
@@ -73,35 +73,39 @@ struct InitializerReport {
   double parallax_rad = 0;
 };
 
-/// Poses and points adjusted together; T_cam_world[0] is held. The bundle adjustment lives in a room above this one, so
-/// the caller hands it in. Returns false when it has failed.
+/// A point seen in a view, for AdjustFunction.
 struct InitialObservation {
   int pose = 0;
   int point = 0;
   Eigen::Vector2d uv_px = Eigen::Vector2d::Zero();
   double inv_sigma_squared = 1.0;
 };
+/// Poses and points adjusted together; T_cam_world[0] is held. The bundle adjustment lives in a room above this one, so
+/// the caller hands it in. Returns false when it has failed.
 using AdjustFunction = std::function<bool(std::vector<Rigid3d>* T_cam_world, std::vector<Eigen::Vector3d>* points,
                                           std::span<const InitialObservation> observations)>;
 
 struct InitializerOptions {
+  InitializerOptions();  ///< fewer samples in the selector than its own default: a frame has some 15 ms
+
   DlrsacOptions selector;            ///< which matches are static, per pair of frames
+  AgreementOptions agreement;        ///< what several pairs must agree on
   ReconstructionOptions reconstruction;
   MatchingOptions matching;
 
   int min_features = 100;            ///< a frame with fewer takes no part
-  int frame_step = 2;                ///< every so manieth frame is looked at; the others cost nothing
+  int frame_step = 2;                ///< every so manieth frame is matched; between them only what was left over
   int num_pairs = 3;                 ///< pairs with the reference frame that must agree
-  double max_gap_s = 1.2;            ///< older than this, the reference frame is given up for a newer one
-  int min_matches = 100;             ///< of the frame with the reference frame; fewer: a new reference frame
-  double min_displacement_px = 12.0;  ///< median displacement of the matches before a pair is worth its cost
+  int min_pair_step = 3;             ///< the frames of two such pairs are apart by so much at least [frames]
+  double max_age_s = 0.9;            ///< an older reference frame is given up for a newer one
+  int min_matches = 120;             ///< of a frame with the reference frame; fewer: a newer reference frame
+  double min_displacement_px = 8.0;  ///< median displacement of the matches before a pair is worth its cost
 
-  double min_agreement = 0.8;        ///< Jaccard index of static sets, over features matched in both pairs
-  double max_composition_rad = 0.0175;  ///< rotation between two frames, straight and by way of the reference
-  double min_distribution_px = 120;  ///< root of D over the static matches
-  int min_static = 100;              ///< matches static in all pairs
   double min_parallax_rad = 0.026;   ///< median over the points; below it the direction is chance
-  double min_consistent_share = 0.7;  ///< of the pair's points that the views between see where they should be
+  double max_direction_sigma_rad = 0.10;  ///< standard deviation of the direction of translation, from the residuals
+  double max_view_chi2 = 9.0;        ///< a view agrees with a point: squared reprojection error / variance
+  double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
+  int min_points = 80;               ///< points that all views agree on
 };
 
 /// Makes the first map out of a stream of frames: keeps a reference frame, asks DLRSAC for the static matches between it

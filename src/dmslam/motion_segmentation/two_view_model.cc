@@ -1,6 +1,7 @@
 #include "dmslam/motion_segmentation/two_view_model.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -240,6 +241,28 @@ bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, in
   model->M = Hat(model->t) * model->R;
   model->M /= model->M.norm();
   return model->M.allFinite();
+}
+
+double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, double chi2,
+                      const TwoViewModel& model) {
+  const Eigen::Matrix<double, 3, 2> B = Tangent(model.t);
+  const Eigen::Matrix3d M = Hat(model.t) * model.R;
+  Matrix5d information = Matrix5d::Zero();
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (!use[i]) continue;
+    const double variance = SampsonBound(M, arrays, i) / chi2;
+    if (!(variance > 0)) continue;
+    const EssentialRow row = MakeEssentialRow(model.R * arrays.ray0[i], arrays.ray1[i], model.t, B);
+    information.noalias() += row.jacobian * (row.jacobian.transpose() / variance);
+  }
+  // Rotation eliminated.
+  const Eigen::Matrix3d rotation = information.topLeftCorner<3, 3>() + 1e-9 * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix<double, 3, 2> mixed = information.topRightCorner<3, 2>();
+  const Eigen::Matrix2d direction =
+      information.bottomRightCorner<2, 2>() - mixed.transpose() * rotation.ldlt().solve(mixed);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(direction);
+  const double weakest = eigen.eigenvalues()[0];
+  return weakest > 0.1 ? std::min(M_PI, 1.0 / std::sqrt(weakest)) : M_PI;
 }
 
 bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, Eigen::Matrix3d* R) {

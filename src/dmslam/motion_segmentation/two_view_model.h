@@ -76,6 +76,10 @@ bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, in
 /// The rotation that takes rays of frame 0 best into those of frame 1, over the matches flagged; starts from R.
 bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, Eigen::Matrix3d* R);
 
+/// Standard deviation [rad] of the direction of translation along which it is least certain, from the residuals of the
+/// matches flagged (their bounds are chi2 times their variance); pi where it is not determined at all.
+double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, double chi2, const TwoViewModel& model);
+
 /// Writes F, E and kind of `model` into `selection`.
 void StoreModel(const TwoViewModel& model, ModelKind kind, const Camera& camera, StaticSelection* selection);
 

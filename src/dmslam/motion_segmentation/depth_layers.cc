@@ -1,0 +1,79 @@
+#include "dmslam/motion_segmentation/depth_layers.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dmslam {
+namespace {
+
+struct Layer {
+  double low = 0, high = 0;  // [px]
+};
+
+/// Runs of bins that are not empty, closer ones joined.
+std::vector<Layer> FindLayers(const LayerOptions& options, std::span<const double> disparity_px) {
+  const auto [low, high] = std::minmax_element(disparity_px.begin(), disparity_px.end());
+  const double origin = *low;
+  const auto bins = static_cast<size_t>((*high - origin) / options.bin_px) + 1;
+  std::vector<int> count(bins, 0);
+  for (const double d : disparity_px) ++count[static_cast<size_t>((d - origin) / options.bin_px)];
+  const double empty = options.noise_share * *std::max_element(count.begin(), count.end());
+  std::vector<Layer> layers;
+  for (size_t b = 0; b < bins; ++b) {
+    if (count[b] <= empty) continue;
+    const double begin = origin + static_cast<double>(b) * options.bin_px, end = begin + options.bin_px;
+    if (!layers.empty() && begin - layers.back().high < options.gap_px) {
+      layers.back().high = end;
+    } else {
+      layers.push_back({begin, end});
+    }
+  }
+  return layers;
+}
+
+}  // namespace
+
+double Disparity(const TwoViewModel& model, const MatchArrays& arrays, size_t i) {
+  const Eigen::Vector3d y = model.R * arrays.ray0[i];
+  if (!(y.z() > 1e-6)) return 0;
+  const Eigen::Vector2d at_infinity = y.hnormalized();
+  const Eigen::Vector2d direction = model.t.head<2>() - at_infinity * model.t.z();
+  const double length = direction.norm();
+  if (!(length > 1e-9)) return 0;
+  return (arrays.p1[i] - at_infinity).dot(direction) / length;
+}
+
+int KeepWidestLayer(const LayerOptions& options, const TwoViewModel& model, const MatchArrays& arrays,
+                    std::span<const Eigen::Vector2d> positions_px, double focal_px, std::span<uint8_t> flags) {
+  std::vector<double> disparity_px;
+  std::vector<size_t> index;
+  for (size_t i = 0; i < flags.size(); ++i) {
+    if (!flags[i]) continue;
+    index.push_back(i);
+    disparity_px.push_back(std::clamp(focal_px * Disparity(model, arrays, i), -1e4, 1e4));
+  }
+  if (index.empty()) return 0;
+  double best_score = -1;
+  Layer best;
+  std::vector<Eigen::Vector2d> points;
+  for (const Layer& layer : FindLayers(options, disparity_px)) {
+    points.clear();
+    for (size_t k = 0; k < index.size(); ++k) {
+      if (disparity_px[k] >= layer.low && disparity_px[k] <= layer.high) points.push_back(positions_px[index[k]]);
+    }
+    const double spread = Spread(points);
+    const double score = spread * spread * static_cast<double>(points.size());
+    if (score <= best_score) continue;
+    best_score = score;
+    best = layer;
+  }
+  int kept = 0;
+  for (size_t k = 0; k < index.size(); ++k) {
+    const bool in_layer = disparity_px[k] >= best.low && disparity_px[k] <= best.high;
+    flags[index[k]] = in_layer ? 1 : 0;
+    kept += in_layer ? 1 : 0;
+  }
+  return kept;
+}
+
+}  // namespace dmslam

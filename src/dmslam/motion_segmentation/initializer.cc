@@ -1,0 +1,442 @@
+#include "dmslam/motion_segmentation/initializer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <numeric>
+#include <utility>
+
+#include "dmslam/geometry/absolute_pose.h"
+#include "dmslam/geometry/triangulation.h"
+#include "dmslam/motion_segmentation/two_view_model.h"
+
+namespace dmslam {
+namespace {
+
+double MedianDisplacement(std::span<const Match> matches) {
+  std::vector<double> squared;
+  for (const Match& match : matches) squared.push_back((match.uv1_px - match.uv0_px).squaredNorm());
+  const auto middle = squared.begin() + static_cast<ptrdiff_t>(squared.size() / 2);
+  std::nth_element(squared.begin(), middle, squared.end());
+  return squared.empty() ? 0.0 : std::sqrt(*middle);
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+WaitReason FromAgreement(AgreementRefusal refusal) {
+  switch (refusal) {
+    case AgreementRefusal::kNone: return WaitReason::kNone;
+    case AgreementRefusal::kSelectionRefused: return WaitReason::kSelectionRefused;
+    case AgreementRefusal::kTooFewCommon: return WaitReason::kTooFewMatches;
+    case AgreementRefusal::kDisagreement: return WaitReason::kDisagreement;
+    case AgreementRefusal::kTooFewStatic: return WaitReason::kTooFewStatic;
+    case AgreementRefusal::kDistributionTooSmall: return WaitReason::kDistributionTooSmall;
+  }
+  return WaitReason::kNone;
+}
+
+std::string Degrees(double rad) { return std::to_string(rad * 180.0 / M_PI) + " degrees"; }
+
+}  // namespace
+
+std::string_view ToString(WaitReason reason) {
+  switch (reason) {
+    case WaitReason::kNone: return "none";
+    case WaitReason::kTooFewFeatures: return "too few features";
+    case WaitReason::kTooFewFrames: return "too few frames";
+    case WaitReason::kTooFewMatches: return "too few matches";
+    case WaitReason::kTooLittleMotion: return "too little motion";
+    case WaitReason::kSelectionRefused: return "selection refused";
+    case WaitReason::kDistributionTooSmall: return "distribution too small";
+    case WaitReason::kDisagreement: return "disagreement between pairs";
+    case WaitReason::kTooFewStatic: return "too few static matches";
+    case WaitReason::kParallaxTooSmall: return "parallax too small";
+    case WaitReason::kNoReconstruction: return "no reconstruction";
+    case WaitReason::kInconsistent: return "views inconsistent";
+  }
+  return "unknown";
+}
+
+InitializerOptions::InitializerOptions() {
+  selector.sampling.max_iterations = 600;
+  selector.sampling.stop_confidence = 0.999;
+}
+
+/// The work of one stream of frames.
+class Initializer::Impl {
+ public:
+  Impl(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust)
+      : options_(options), camera_(camera), seed_(seed), adjust_(std::move(adjust)), selector_(options.selector) {}
+
+  InitializerReport AddFrame(const InitializerFrame& frame) {
+    InitializerReport report = Consider(frame);
+    if (report.result) {
+      StartOver();
+    } else {
+      last_wait_ = report;
+    }
+    return report;
+  }
+
+ private:
+  /// A frame with its matches to the reference frame.
+  struct View {
+    InitializerFrame frame;
+    PairView pair;
+    bool moved = false;  ///< far enough for the selector to be asked
+  };
+  /// A view's place in the map to be.
+  struct Placed {
+    const View* view = nullptr;
+    Rigid3d T_k_0;
+    double consistent_share = 1;
+  };
+  struct Candidate {
+    std::vector<Eigen::Vector3d> points;  ///< parallel to the last view's matches
+    std::vector<uint8_t> use;             ///< points that stand
+    std::vector<Placed> placed;           ///< the last view first
+  };
+
+  void StartOver() {
+    reference_.reset();
+    views_.clear();
+    pending_.clear();
+  }
+  InitializerReport Wait(WaitReason reason, std::string text) const {
+    InitializerReport report;
+    report.wait = reason;
+    report.reason = std::string(ToString(reason)) + (text.empty() ? "" : ": " + text);
+    return report;
+  }
+
+  InitializerReport Consider(const InitializerFrame& frame);
+  void TakeNewerReference(const InitializerFrame& frame);
+  View MakeView(const InitializerFrame& frame);
+  std::vector<const View*> ChooseViews() const;
+  InitializerReport TryMap();
+  std::optional<Candidate> Reconstruct(std::span<const View* const> views, const Agreement& agreement,
+                                       InitializerReport* report) const;
+  void PlaceView(const View& view, double fraction, Candidate* candidate) const;
+  void KeepConsistent(Candidate* candidate) const;
+  bool AdjustAll(Candidate* candidate) const;
+  double CandidateDirectionSigma(const Candidate& candidate) const;
+  double CandidateParallax(const Candidate& candidate) const;
+  FirstMap MakeMap(const Candidate& candidate, const Agreement& agreement) const;
+  bool Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, const Match& match) const;
+
+  InitializerOptions options_;
+  Camera camera_;
+  uint64_t seed_;
+  AdjustFunction adjust_;
+  Dlrsac selector_;
+  FeatureMatcher matcher_;
+  std::optional<InitializerFrame> reference_;
+  std::deque<View> views_;              ///< in order of index
+  std::deque<InitializerFrame> pending_;  ///< frames older than the newest, not matched with the reference yet
+  uint32_t last_looked_ = 0;
+  InitializerReport last_wait_;
+};
+
+InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
+  if (static_cast<int>(frame.features->size()) < options_.min_features) {
+    return Wait(WaitReason::kTooFewFeatures, std::to_string(frame.features->size()) + " of " +
+                                                 std::to_string(options_.min_features));
+  }
+  if (!reference_) {
+    reference_ = frame;
+    last_looked_ = frame.index;
+    return Wait(WaitReason::kTooFewFrames, "this is the first");
+  }
+  if (frame.index - last_looked_ < static_cast<uint32_t>(options_.frame_step)) {
+    // A frame between: time for what was left over.
+    if (!pending_.empty()) {
+      View view = MakeView(pending_.back());
+      pending_.pop_back();
+      const auto place = std::find_if(views_.begin(), views_.end(), [&](const View& other) {
+        return other.frame.index > view.frame.index;
+      });
+      views_.insert(place, std::move(view));
+    }
+    return last_wait_;
+  }
+  last_looked_ = frame.index;
+  const double age_s = static_cast<double>(frame.stamp_ns - reference_->stamp_ns) * 1e-9;
+  if (age_s > options_.max_age_s) TakeNewerReference(frame);
+  if (reference_->index == frame.index) return Wait(WaitReason::kTooFewFrames, "a new reference frame");
+  View view = MakeView(frame);
+  if (static_cast<int>(view.pair.matches.size()) < options_.min_matches) {
+    const std::string found = std::to_string(view.pair.matches.size()) + " with the reference frame";
+    TakeNewerReference(frame);
+    return Wait(WaitReason::kTooFewMatches, found);
+  }
+  const bool moved = view.moved;
+  views_.push_back(std::move(view));
+  if (!moved) return Wait(WaitReason::kTooLittleMotion, "");
+  return TryMap();
+}
+
+/// The frame in the middle of the window becomes the reference; those after it are matched again, one by one.
+void Initializer::Impl::TakeNewerReference(const InitializerFrame& frame) {
+  std::deque<View> old = std::exchange(views_, {});
+  pending_.clear();
+  if (old.empty()) {
+    reference_ = frame;
+    return;
+  }
+  const size_t middle = old.size() / 2;
+  reference_ = old[middle].frame;
+  for (size_t k = middle + 1; k < old.size(); ++k) pending_.push_back(old[k].frame);
+}
+
+Initializer::Impl::View Initializer::Impl::MakeView(const InitializerFrame& frame) {
+  View view;
+  view.frame = frame;
+  view.pair.matches = MatchFrames(*reference_->features, *frame.features, options_.matching, &matcher_);
+  view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_px;
+  if (view.moved) {
+    const uint64_t seed = DeriveSeed(seed_, (uint64_t{reference_->index} << 32) | frame.index, "initializer");
+    view.pair.selection = selector_.Select(view.pair.matches, camera_, seed);
+  }
+  return view;
+}
+
+/// The newest view last, and as many before it as there must be, spread evenly over those that moved.
+std::vector<const Initializer::Impl::View*> Initializer::Impl::ChooseViews() const {
+  std::vector<const View*> moved;
+  for (const View& view : views_) {
+    if (view.moved) moved.push_back(&view);
+  }
+  const auto asked = static_cast<size_t>(options_.num_pairs);
+  std::vector<const View*> chosen;
+  if (moved.size() < asked) return chosen;
+  const uint32_t span = moved.back()->frame.index - moved.front()->frame.index;
+  if (span < static_cast<uint32_t>(options_.min_pair_step) * (asked - 1)) return chosen;
+  for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
+  return chosen;
+}
+
+InitializerReport Initializer::Impl::TryMap() {
+  const std::vector<const View*> views = ChooseViews();
+  if (views.empty()) return Wait(WaitReason::kTooFewFrames, "too few pairs yet");
+  std::vector<const PairView*> pairs;
+  for (const View* view : views) pairs.push_back(&view->pair);
+  const Agreement agreement = Agree(pairs, options_.agreement);
+  InitializerReport report;
+  if (!agreement.IsUsable()) {
+    report = Wait(FromAgreement(agreement.refusal), agreement.explanation);
+  } else if (const auto candidate = Reconstruct(views, agreement, &report)) {
+    report.wait = WaitReason::kNone;
+    report.reason = "first map";
+    report.result = MakeMap(*candidate, agreement);
+    report.parallax_rad = report.result->median_parallax_rad;
+  }
+  report.num_matches = static_cast<int>(pairs.back()->matches.size());
+  report.num_static = agreement.num_static;
+  report.distribution_px = agreement.distribution_px;
+  report.agreement = agreement.agreement;
+  return report;
+}
+
+bool Initializer::Impl::Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, const Match& match) const {
+  const double variance = options_.selector.inlier.pyramid.SigmaSquared(match.octave1);
+  return ReprojectionErrorSquared(camera_.Ideal(), T_k_0, point, match.uv1_px) <= options_.max_view_chi2 * variance;
+}
+
+std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(std::span<const View* const> views,
+                                                                           const Agreement& agreement,
+                                                                           InitializerReport* report) const {
+  const View& last = *views.back();
+  StaticSelection selection = last.pair.selection;
+  selection.is_static = agreement.is_static;
+  const TwoViewReconstruction pair =
+      ReconstructFromStatic(last.pair.matches, selection, camera_, options_.reconstruction);
+  if (!pair.IsUsable()) {
+    const bool parallax = pair.refusal == ReconstructionRefusal::kParallaxTooSmall;
+    *report = Wait(parallax ? WaitReason::kParallaxTooSmall : WaitReason::kNoReconstruction, pair.explanation);
+    return std::nullopt;
+  }
+  Candidate candidate;
+  candidate.points = pair.points_cam0;
+  candidate.use = pair.has_point;
+  candidate.placed.push_back({&last, pair.T_1_0, 1.0});
+  const double length = static_cast<double>(last.frame.index - reference_->index);
+  for (const View& view : views_) {
+    if (&view == &last || view.pair.matches.empty()) continue;
+    PlaceView(view, static_cast<double>(view.frame.index - reference_->index) / length, &candidate);
+  }
+  for (const Placed& placed : candidate.placed) {
+    if (placed.consistent_share >= options_.min_consistent_share) continue;
+    *report = Wait(WaitReason::kInconsistent, "frame " + std::to_string(placed.view->frame.index) + " sees " +
+                                                  std::to_string(placed.consistent_share) +
+                                                  " of the points where they should be");
+    return std::nullopt;
+  }
+  KeepConsistent(&candidate);
+  if (adjust_ && !AdjustAll(&candidate)) {
+    *report = Wait(WaitReason::kInconsistent, "the adjustment failed");
+    return std::nullopt;
+  }
+  KeepConsistent(&candidate);
+  const auto points = std::accumulate(candidate.use.begin(), candidate.use.end(), 0);
+  if (points < options_.min_points) {
+    *report = Wait(WaitReason::kTooFewStatic, std::to_string(points) + " points are seen consistently");
+    return std::nullopt;
+  }
+  const double parallax = CandidateParallax(candidate), sigma = CandidateDirectionSigma(candidate);
+  if (parallax < options_.min_parallax_rad || sigma > options_.max_direction_sigma_rad) {
+    *report = Wait(WaitReason::kParallaxTooSmall,
+                   "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma));
+    return std::nullopt;
+  }
+  return candidate;
+}
+
+/// Finds the pose of a view between from the points of the pair, and how many it sees where they should be.
+void Initializer::Impl::PlaceView(const View& view, double fraction, Candidate* candidate) const {
+  const View& last = *candidate->placed.front().view;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> uv;
+  std::vector<double> information;
+  std::vector<int> all;
+  std::vector<const Match*> seen;
+  for (size_t k = 0, i = 0; k < last.pair.matches.size(); ++k) {
+    if (!candidate->use[k]) continue;
+    const auto& matches = view.pair.matches;
+    while (i < matches.size() && matches[i].index0 < last.pair.matches[k].index0) ++i;
+    if (i == matches.size()) break;
+    if (matches[i].index0 != last.pair.matches[k].index0) continue;
+    all.push_back(static_cast<int>(points.size()));
+    points.push_back(candidate->points[k]);
+    uv.push_back(matches[i].uv1_px);
+    information.push_back(1.0 / options_.selector.inlier.pyramid.SigmaSquared(matches[i].octave1));
+    seen.push_back(&matches[i]);
+  }
+  if (points.size() < 20) return;  // says nothing
+  const Rigid3d& T_last = candidate->placed.front().T_k_0;
+  Rigid3d T(Eigen::Quaterniond::Identity().slerp(fraction, T_last.rotation), fraction * T_last.translation);
+  T = RefinePose(camera_.Ideal(), T, points, uv, information, all, 5);
+  std::vector<int> inliers;
+  for (int round = 0; round < 3; ++round) {
+    inliers.clear();
+    const double slack = round == 0 ? 3.0 : 1.0;  // the first fit is pulled by what does not belong
+    for (const int i : all) {
+      const auto k = static_cast<size_t>(i);
+      if (ReprojectionErrorSquared(camera_.Ideal(), T, points[k], uv[k]) * information[k] <=
+          slack * options_.max_view_chi2) {
+        inliers.push_back(i);
+      }
+    }
+    if (inliers.size() < 10) break;
+    if (round < 2) T = RefinePose(camera_.Ideal(), T, points, uv, information, inliers, 5);
+  }
+  candidate->placed.push_back({&view, T, static_cast<double>(inliers.size()) / static_cast<double>(all.size())});
+}
+
+/// Drops points that some view does not see where they should be.
+void Initializer::Impl::KeepConsistent(Candidate* candidate) const {
+  const auto& matches = candidate->placed.front().view->pair.matches;
+  for (size_t k = 0; k < matches.size(); ++k) {
+    if (candidate->use[k] && !(candidate->points[k].z() > 0 && candidate->points[k].allFinite())) {
+      candidate->use[k] = 0;
+    }
+  }
+  for (const Placed& placed : candidate->placed) {
+    size_t i = 0;
+    for (size_t k = 0; k < matches.size(); ++k) {
+      const auto& seen = placed.view->pair.matches;
+      while (i < seen.size() && seen[i].index0 < matches[k].index0) ++i;
+      if (i == seen.size()) break;
+      if (seen[i].index0 != matches[k].index0 || !candidate->use[k]) continue;
+      if (!Sees(placed.T_k_0, candidate->points[k], seen[i])) candidate->use[k] = 0;
+    }
+  }
+}
+
+bool Initializer::Impl::AdjustAll(Candidate* candidate) const {
+  const auto& matches = candidate->placed.front().view->pair.matches;
+  std::vector<Rigid3d> poses{Rigid3d()};
+  std::vector<Eigen::Vector3d> points;
+  std::vector<int> point_of(matches.size(), -1);
+  std::vector<InitialObservation> observations;
+  const Pyramid& pyramid = options_.selector.inlier.pyramid;
+  for (size_t k = 0; k < matches.size(); ++k) {
+    if (!candidate->use[k]) continue;
+    point_of[k] = static_cast<int>(points.size());
+    points.push_back(candidate->points[k]);
+    observations.push_back({0, point_of[k], matches[k].uv0_px, 1.0 / pyramid.SigmaSquared(matches[k].octave0)});
+  }
+  for (const Placed& placed : candidate->placed) {
+    const int pose = static_cast<int>(poses.size());
+    poses.push_back(placed.T_k_0);
+    const auto& seen = placed.view->pair.matches;
+    for (size_t k = 0, i = 0; k < matches.size(); ++k) {
+      while (i < seen.size() && seen[i].index0 < matches[k].index0) ++i;
+      if (i == seen.size()) break;
+      if (seen[i].index0 != matches[k].index0 || point_of[k] < 0) continue;
+      observations.push_back({pose, point_of[k], seen[i].uv1_px, 1.0 / pyramid.SigmaSquared(seen[i].octave1)});
+    }
+  }
+  if (!adjust_(&poses, &points, observations)) return false;
+  for (size_t p = 0; p < candidate->placed.size(); ++p) candidate->placed[p].T_k_0 = poses[p + 1];
+  for (size_t k = 0; k < matches.size(); ++k) {
+    if (point_of[k] >= 0) candidate->points[k] = points[static_cast<size_t>(point_of[k])];
+  }
+  return true;
+}
+
+double Initializer::Impl::CandidateParallax(const Candidate& candidate) const {
+  const Eigen::Vector3d center = candidate.placed.front().T_k_0.Center();
+  std::vector<double> parallax;
+  for (size_t k = 0; k < candidate.use.size(); ++k) {
+    if (candidate.use[k]) parallax.push_back(ParallaxAngle(Eigen::Vector3d::Zero(), center, candidate.points[k]));
+  }
+  return Median(std::move(parallax));
+}
+
+double Initializer::Impl::CandidateDirectionSigma(const Candidate& candidate) const {
+  const auto& matches = candidate.placed.front().view->pair.matches;
+  std::vector<uint32_t> order(matches.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const MatchArrays arrays = MakeArrays(matches, order, camera_, options_.selector.inlier);
+  TwoViewModel model;
+  model.R = candidate.placed.front().T_k_0.rotation.toRotationMatrix();
+  model.t = candidate.placed.front().T_k_0.translation.normalized();
+  return DirectionSigma(arrays, candidate.use, options_.selector.inlier.chi2, model);
+}
+
+FirstMap Initializer::Impl::MakeMap(const Candidate& candidate, const Agreement& agreement) const {
+  const View& last = *candidate.placed.front().view;
+  FirstMap map;
+  map.frame0 = *reference_;
+  map.frame1 = last.frame;
+  map.matches = last.pair.matches;
+  map.is_static = agreement.is_static;
+  map.num_views = static_cast<int>(candidate.placed.size()) + 1;
+  map.median_parallax_rad = CandidateParallax(candidate);
+  std::vector<double> depths;
+  for (size_t k = 0; k < candidate.use.size(); ++k) {
+    if (candidate.use[k]) depths.push_back(candidate.points[k].z());
+  }
+  const double unit = Median(std::move(depths));
+  map.T_1_0 = candidate.placed.front().T_k_0;
+  map.T_1_0.translation /= unit;
+  for (size_t k = 0; k < candidate.use.size(); ++k) {
+    if (!candidate.use[k]) continue;
+    const Match& match = last.pair.matches[k];
+    map.points.push_back({match.index0, match.index1, candidate.points[k] / unit});
+  }
+  return map;
+}
+
+Initializer::Initializer(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust)
+    : impl_(std::make_unique<Impl>(options, camera, seed, std::move(adjust))) {}
+Initializer::~Initializer() = default;
+
+InitializerReport Initializer::AddFrame(const InitializerFrame& frame) { return impl_->AddFrame(frame); }
+
+}  // namespace dmslam
