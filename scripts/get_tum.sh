@@ -155,7 +155,7 @@ main() {
   done
   ((${#names[@]})) || { usage >&2; die "name at least one sequence, as fr3_walking_xyz, or 'paper'"; }
   mkdir -p -- "$TO" || die "$TO cannot be made"
-  scratch=
+  scratch=''
   trap '[[ -z $scratch ]] || rm -rf -- "$scratch"' EXIT
   trap 'say "interrupted; the same command continues"; exit 130' INT TERM
   for short in "${names[@]}"; do

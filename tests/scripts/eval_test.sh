@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # dmslam-eval as users call it: results, pictures, and every kind of bad input.
+# shellcheck source-path=SCRIPTDIR source=expect.sh
 source "$(dirname "$0")/expect.sh"
 eval=$1
 

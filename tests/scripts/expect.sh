@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # What the script tests share. Sourced, not run.
 set -uo pipefail
 failures=0

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # scripts/get_tum.sh: arguments, refusal without a network, whole and broken archives (from a file:// mirror).
+# shellcheck source-path=SCRIPTDIR source=expect.sh
 source "$(dirname "$0")/expect.sh"
 get_tum=$DMSLAM_SOURCE_DIR/scripts/get_tum.sh
 unset DMSLAM_TUM DMSLAM_TUM_URL

@@ -31,16 +31,24 @@ void WriteText(const fs::path& path, const std::string& text) {
     throw InputError(path.string() + ": cannot be written; check that the folder exists and has space");
 }
 
-// One line per run: its folder, the sequence's folder, camera file, profile, seed, and what to --set ("-":
-// nothing).
+// The camera file that a rendered sequence brings, or the one under config/.
+std::string CameraOf(const PlannedSequence& sequence) {
+  const fs::path own = sequence.folder / "camera.yaml";
+  return fs::exists(own) ? own.string() : "config/" + std::string(sequence.info.camera);
+}
+
+// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, and what
+// to
+// --set ("-": nothing).
 void PrintRuns(const Plan& plan) {
   for (const RunKey& key : Runs(plan)) {
     const auto sequence = std::find_if(plan.sequences.begin(), plan.sequences.end(),
                                        [&](const PlannedSequence& s) { return s.info.name == key.sequence; });
     const auto setting = std::find_if(plan.settings.begin(), plan.settings.end(),
                                       [&](const Setting& s) { return s.name == key.setting; });
-    std::cout << key.Folder().string() << '\t' << sequence->folder.string() << '\t' << sequence->info.camera
-              << '\t' << key.profile << '\t' << key.seed << '\t'
+    const size_t frames = ReadFrameStamps((sequence->folder / "rgb.txt").string()).size();
+    std::cout << key.Folder().string() << '\t' << sequence->folder.string() << '\t' << frames << '\t'
+              << CameraOf(*sequence) << '\t' << key.profile << '\t' << key.seed << '\t'
               << (setting->argument.empty() ? "-" : setting->argument) << '\n';
   }
 }
@@ -76,13 +84,14 @@ std::optional<IterationTimes> ReadTimes(const fs::path& path) {
 void Publish(const fs::path& page, const fs::path& out, const Results& results,
              const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
   const fs::path folder = page.parent_path() / "pictures";
+  std::error_code error;
+  fs::create_directories(folder, error);
   std::vector<ReportPicture> rendered;
   for (const ReportPicture& picture : pictures) {
     const bool real = !picture.sequence.empty() &&
                       FindSequence(picture.sequence).group != SequenceGroup::kStandIn &&
                       FindSequence(picture.sequence).group != SequenceGroup::kStandInStill;
     if (real) continue;
-    fs::create_directories(folder);
     fs::copy_file(out / picture.file, folder / fs::path(picture.file).filename(),
                   fs::copy_options::overwrite_existing);
     rendered.push_back(picture);

@@ -35,7 +35,7 @@ constexpr std::array<SequenceInfo, 14> kSequences = {{
      "fr3_walking_halfsphere",
      kRendered,
      {}},
-    {"synth_xyz", "synth_xyz", "synthetic.yaml", kStandIn, "fr1_xyz", kRendered, {}},
+    {"synth_xyz", "synth_xyz", "TUM1.yaml", kStandIn, "fr1_xyz", kRendered, {}},
     {"synth_still_xyz", "synth_still_xyz", "synthetic.yaml", kStill, "fr3_walking_xyz", kRendered, {}},
     {"synth_still_rpy", "synth_still_rpy", "synthetic.yaml", kStill, "fr3_walking_rpy", kRendered, {}},
     {"synth_still_halfsphere",

@@ -1,0 +1,206 @@
+#!/usr/bin/env bash
+# Runs everything that the DM-SLAM paper's tables need and writes the tables. See --help.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+readonly root
+readonly MAX_FAILURES_IN_A_ROW=3
+
+tum='' out='' seeds=10 data=${DMSLAM_DATA:-$root/../shared/data} render=1 run=1 publish='' runner=$root/scripts/run.sh
+only=()
+
+usage() {
+  cat <<EOF
+Usage: reproduce.sh --tum DIR --out DIR [--seeds 10] [options]
+
+Runs 'baseline' and 'dm' with 3000 features per frame (as the DM-SLAM paper did) and with the defaults on the paper's
+four TUM RGB-D sequences, on the kitchen sequences and on rendered stand-ins, each with as many seeds as said, and writes
+DIR/report.md, DIR/report.json and DIR/pictures. Stopped at any time, the same command continues. Sequences that are not
+there are listed in the report with the address to get them from (scripts/get_tum.sh paper does it).
+
+  --tum DIR       folder that holds the TUM RGB-D sequences
+  --out DIR       where runs and report go
+  --seeds N       runs of each (default 10)
+  --only NAME     only this sequence (may be repeated), as fr3_walking_xyz, kitchen_walk2, synth_walking_rpy
+  --data DIR      folder that holds the kitchen sequences (default: \$DMSLAM_DATA, else ../shared/data)
+  --no-render     do not render the stand-ins (about ten minutes, once)
+  --report-only   write the report from the runs that are there
+  --publish FILE  also write the report to this page, with pictures of rendered sequences only
+  --runner CMD    program to run instead of scripts/run.sh (the same arguments)
+  --help          this text
+EOF
+}
+
+say() { printf 'reproduce: %s\n' "$*" >&2; }
+die() { say "$*"; exit 1; }
+
+parse() {
+  while (($#)); do
+    case $1 in
+      --help | -h) usage; exit 0 ;;
+      --no-render) render=0; shift; continue ;;
+      --report-only) run=0; shift; continue ;;
+      --tum | --out | --seeds | --only | --data | --publish | --runner) ;;
+      *) die "unknown argument $1; see --help" ;;
+    esac
+    (($# > 1)) || die "$1 needs a value; see --help"
+    case $1 in
+      --only) only+=("$2") ;;
+      *) printf -v "${1#--}" %s "$2" ;;
+    esac
+    shift 2
+  done
+  [[ -n $out ]] || die "--out DIR is missing; see --help"
+  [[ -n $tum || $run == 0 ]] || die "--tum DIR is missing (an empty folder serves where there are none); see --help"
+  [[ -z $tum || -d $tum ]] || die "--tum $tum: no such folder; scripts/get_tum.sh --to $tum paper fills it"
+  [[ $seeds =~ ^[1-9][0-9]{0,3}$ ]] || die "--seeds $seeds: write a number of at least 1"
+}
+
+# Sets `bin` to the folder with the programs, built where they are not there.
+find_programs() {
+  bin=${DMSLAM_BIN:-$root/build/release/bin}
+  local programs=(dmslam-report) program missing=()
+  ((run == 0 || render == 0)) || programs+=(dmslam-synth)
+  for program in "${programs[@]}"; do
+    [[ -x $bin/$program ]] || missing+=("$program")
+  done
+  ((${#missing[@]})) || return 0
+  [[ -z ${DMSLAM_BIN:-} ]] || die "$bin does not hold ${missing[*]}; build them or unset DMSLAM_BIN"
+  say "building ${missing[*]}"
+  (cd "$root" && cmake --preset release && cmake --build --preset release --target "${missing[@]}") >&2
+}
+
+wanted() { ((${#only[@]} == 0)) || [[ " ${only[*]} " == *" $1 "* ]]; }
+
+# render NAME ARGUMENTS...: a stand-in, unless it is there.
+render() {
+  local name=$1
+  shift
+  wanted "$name" && [[ ! -e $out/synthetic/$name/rgb.txt ]] || return 0
+  say "rendering $name"
+  rm -rf -- "$out/synthetic/$name.part"
+  start "$bin/dmslam-synth" --out "$out/synthetic/$name.part" --seed 1 "$@" || die "$name cannot be rendered"
+  mv -- "$out/synthetic/$name.part" "$out/synthetic/$name"
+}
+
+render_stand_ins() {
+  mkdir -p -- "$out/synthetic"
+  local motion frames
+  for motion in xyz:859 rpy:910 halfsphere:1067; do
+    frames=${motion#*:} motion=${motion%:*}
+    render "synth_walking_$motion" --preset "walking_$motion"
+    render "synth_still_$motion" --path "$motion" --frames "$frames"
+  done
+  render synth_xyz --preset static_xyz --camera "$root/config/TUM1.yaml"
+}
+
+# start COMMAND...: runs it in a process group of its own, so that an interrupt reaches it through us alone.
+child=''
+start() {
+  local status=0
+  set -m
+  "$@" </dev/null 8>&- 9>&- &
+  child=$!
+  set +m
+  wait "$child" || status=$?
+  child=''
+  return "$status"
+}
+
+interrupted() {
+  trap '' INT TERM
+  exec 2>&8  # a run's output may be redirected at this moment
+  if [[ -n $child ]]; then
+    kill -TERM "$child" 2>/dev/null || true
+    wait "$child" 2>/dev/null || true
+  fi
+  progress_end
+  say "stopped; the same command continues"
+  exit 130
+}
+
+duration() {
+  local s=$1
+  if ((s < 90)); then printf '%d s' "$s"
+  elif ((s < 5400)); then printf '%d min' $(((s + 30) / 60))
+  else printf '%d h %02d min' $((s / 3600)) $((s % 3600 / 60)); fi
+}
+
+# On a terminal only: which run this is and how long the rest takes, by the frames done so far.
+progress() {
+  [[ -t 2 ]] || return 0
+  local left=''
+  ((frames_done == 0)) || left=", $(duration $(((SECONDS - began) * frames_left / frames_done))) left"
+  printf '\r\033[K[%d/%d] %s%s' "$number" "$total" "$1" "$left" >&2
+}
+progress_end() { [[ ! -t 2 ]] || printf '\r\033[K' >&2; }
+
+# one_run FOLDER SEQUENCE CAMERA PROFILE SEED SET
+one_run() {
+  local folder=$out/$1 part=$out/$1.part log=$out/$1.log status=0
+  local arguments=(--sequence "$2" --camera "$3" --out "$part" --lockstep --profile "$4" --seed "$5")
+  [[ $6 == - ]] || arguments+=(--set "$6")
+  rm -rf -- "$part" "$folder"
+  mkdir -p -- "$(dirname "$folder")"
+  start "$runner" "${arguments[@]}" >"$log" 2>&1 || status=$?
+  mkdir -p -- "$part"
+  mv -- "$log" "$part/log.txt"
+  if [[ ! -s $part/summary.json ]]; then
+    rm -f -- "$part/summary.json"
+    { printf 'exit status %d: ' "$status"; grep -v '^ *$' "$part/log.txt" | tail -n 1 || true; echo; } >"$part/failed.txt"
+  fi
+  mv -- "$part" "$folder"
+  [[ -s $folder/summary.json ]]
+}
+
+run_all() {
+  local lines=("$@") line folder sequence frames camera profile seed set in_a_row=0
+  total=${#lines[@]} number=0 began=$SECONDS frames_done=0 frames_left=0
+  local todo=()
+  for line in "${lines[@]}"; do
+    IFS=$'\t' read -r folder sequence frames camera profile seed set <<<"$line"
+    [[ ! -s $out/$folder/summary.json ]] || { number=$((number + 1)); continue; }
+    todo+=("$line")
+    frames_left=$((frames_left + frames))
+  done
+  for line in ${todo[@]+"${todo[@]}"}; do
+    IFS=$'\t' read -r folder sequence frames camera profile seed set <<<"$line"
+    number=$((number + 1))
+    progress "${folder#runs/}"
+    [[ $camera == /* ]] || camera=$root/$camera
+    if one_run "$folder" "$sequence" "$camera" "$profile" "$seed" "$set"; then
+      in_a_row=0
+    else
+      progress_end
+      say "$folder: $(head -n 1 "$out/$folder/failed.txt")"
+      in_a_row=$((in_a_row + 1))
+      ((in_a_row < MAX_FAILURES_IN_A_ROW)) || die "$in_a_row runs failed in a row; see $out/$folder/log.txt"
+    fi
+    frames_done=$((frames_done + frames)) frames_left=$((frames_left - frames))
+  done
+  progress_end
+}
+
+main() {
+  parse "$@"
+  mkdir -p -- "$out" || die "$out cannot be made"
+  out=$(cd "$out" && pwd)
+  find_programs
+  exec 8>&2 9>"$out/.lock"
+  flock -n 9 || die "another reproduce.sh is working in $out"
+  trap interrupted INT TERM
+  if ((run)); then
+    ((render == 0)) || render_stand_ins
+    local roots=(--root "$tum") plan
+    [[ ! -d $data ]] || roots+=(--root "$data")
+    [[ ! -d $out/synthetic ]] || roots+=(--root "$out/synthetic")
+    plan=$("$bin/dmslam-report" plan "${roots[@]}" --out "$out" --seeds "$seeds" ${only[@]+--only "${only[@]}"})
+    local lines=()
+    [[ -z $plan ]] || mapfile -t lines <<<"$plan"
+    ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
+    run_all ${lines[@]+"${lines[@]}"}
+  fi
+  "$bin/dmslam-report" write --out "$out" ${publish:+--publish "$publish"}
+}
+
+main "$@"

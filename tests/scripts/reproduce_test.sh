@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# scripts/reproduce.sh with a runner that only pretends: arguments, continuing, failures, stopping, the report.
+# shellcheck source-path=SCRIPTDIR source=expect.sh
+source "$(dirname "$0")/expect.sh"
+DMSLAM_BIN=$(dirname "$1")
+export DMSLAM_BIN
+reproduce=$DMSLAM_SOURCE_DIR/scripts/reproduce.sh
+
+# Two sequences of four seconds; the others are absent.
+tum=$work/tum
+for name in rgbd_dataset_freiburg3_walking_xyz rgbd_dataset_freiburg1_xyz; do
+  mkdir -p "$tum/$name"
+  awk 'BEGIN { for (i = 0; i < 120; ++i) { t = i / 30;
+    printf "%.6f %.9f %.9f %.9f 0 0 0 1\n", 100 + t, sin(t), cos(t), 0.3 * t > "'"$tum/$name"'/groundtruth.txt";
+    printf "%.6f rgb/%d.png\n", 100 + t, i > "'"$tum/$name"'/rgb.txt" } }'
+done
+
+# Takes the arguments of scripts/run.sh, writes them down, and gives the ground truth back with an error that the seed
+# and the profile decide.
+cat >"$work/runner" <<'EOF'
+#!/usr/bin/env bash
+echo "$*" >>"$CALLS"
+while (($#)); do
+  case $1 in
+    --lockstep) shift ;;
+    --sequence | --out | --profile | --seed | --camera | --set) printf -v "${1#--}" %s "$2"; shift 2 ;;
+    *) echo "unknown $1"; exit 2 ;;
+  esac
+done
+[[ -s $camera ]] || { echo "no camera $camera"; exit 2; }
+[[ ${SLOW:-} != "$seed" ]] || { echo $$ >"$CALLS.pid"; exec sleep 60; }
+[[ ${FAIL:-} != "$profile" ]] || { echo "it fell over"; exit 7; }
+mkdir -p "$out"
+error=0.04
+[[ $profile == dm ]] && error=0.01
+awk -v e=$error -v s="$seed" '{ $2 += e * s * sin(9 * NR); print }' "$sequence/groundtruth.txt" >"$out/trajectory.txt"
+tail -n +31 "$out/trajectory.txt" >"$out/trajectory_online.txt"
+echo '{"tracked_percent": 98.5, "tracked_online_percent": 75.0, "first_init_s": 1.0}' >"$out/summary.json"
+EOF
+chmod +x "$work/runner"
+export CALLS=$work/calls
+run=("$reproduce" --tum "$tum" --no-render --data "$work/none" --runner "$work/runner")
+
+expect 0 'Usage' "$reproduce" --help
+expect 1 '--out DIR is missing' "$reproduce" --tum "$tum"
+expect 1 '--tum DIR is missing' "$reproduce" --out "$work/o"
+expect 1 'no such folder.*get_tum.sh' "$reproduce" --tum "$work/nowhere" --out "$work/o"
+expect 1 '--seeds none' "$reproduce" --tum "$tum" --out "$work/o" --seeds none
+expect 1 '--seeds needs a value' "$reproduce" --tum "$tum" --out "$work/o" --seeds
+expect 1 'unknown argument --frob' "$reproduce" --frob
+expect 1 "no sequence is called 'fr3'" "${run[@]}" --out "$work/o" --only fr3
+
+# A whole run: 2 sequences x 2 profiles x 2 settings x 2 seeds. In a pipe, nothing is said but what is absent.
+expect 0 'report.json' "${run[@]}" --out "$work/a" --seeds 2
+check "16 runs" test "$(wc -l <"$CALLS")" -eq 16
+check "half of them with 3000 features" test "$(grep -c 'features.count=3000' "$CALLS")" -eq 8
+check "freiburg1 with its own camera" test "$(grep 'freiburg1_xyz' "$CALLS" | grep -c 'config/TUM1.yaml')" -eq 8
+check "no progress in a pipe" test -z "$(grep -F '[1/16]' <<<"$output")"
+for what in '\*0\.329\*' '\*0\.143\*' 'fr3_walking_rpy \| \*absent\*' 'cvg\.cit\.tum\.de' 'kitchen_walk2' '\| 98\.5 \| 1\.00 \| 2/2' \
+  'pictures/fr3_walking_xyz_defaults.png' '16 of 16 runs'; do
+  check "the report has $what" grep -qE -- "$what" "$work/a/report.md"
+done
+check "a picture" test -s "$work/a/pictures/fr1_xyz_features3000.png"
+
+# Again: nothing is run twice. One more seed: only that one.
+: >"$CALLS"
+expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 2
+check "nothing is run twice" test ! -s "$CALLS"
+expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 3
+check "only the new seed is run" test "$(grep -c -- '--seed 3' "$CALLS")" -eq "$(wc -l <"$CALLS")"
+expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
+check "the page has no picture of real images" test ! -e "$work/docs/pictures/fr1_xyz_defaults.png"
+check "it has that of all runs" test -s "$work/docs/pictures/all_defaults.png"
+
+# Stopped in the middle: exit 130, the runner is gone, and the same command goes on where it was.
+: >"$CALLS"
+SLOW=2 "${run[@]}" --out "$work/b" --seeds 2 --only fr1_xyz >"$work/b.txt" 2>&1 &
+pid=$!
+for _ in $(seq 200); do [[ -s $CALLS.pid ]] && break; read -rt 0.1 <> <(:) || true; done
+kill -TERM "$pid"
+wait "$pid"
+check "a stopped run exits with 130" test $? -eq 130
+check "it says how to go on" grep -q 'the same command continues' "$work/b.txt"
+check "its runner is gone" test ! -d "/proc/$(cat "$CALLS.pid")"
+before=$(wc -l <"$CALLS")
+expect 0 'report.md' "${run[@]}" --out "$work/b" --seeds 2 --only fr1_xyz
+check "it goes on where it was" test $(($(wc -l <"$CALLS") - before)) -eq 4
+
+# Runs that fail are reported, tried again the next time, and three in a row end it.
+expect 0 'dm/seed_1: exit status 7: it fell over' env FAIL=dm "${run[@]}" --out "$work/c" --seeds 1
+check "the report lists them" grep -q 'the run failed: exit status 7: it fell over' "$work/c/report.md"
+expect 0 'report.md' "${run[@]}" --out "$work/c" --seeds 1
+check "the second time they are well" test -z "$(grep 'the run failed' "$work/c/report.md")"
+printf '#!/bin/sh\necho it fell over\nexit 7\n' >"$work/broken"
+chmod +x "$work/broken"
+expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --runner "$work/broken"
+
+# Nothing is there: a report that lists what is absent.
+mkdir "$work/empty"
+expect 0 'none of the sequences is there' "$reproduce" --tum "$work/empty" --no-render --data "$work/none" --out "$work/e"
+check "all are listed as absent" test "$(grep -c '\*\*absent\*\*' "$work/e/report.md")" -eq 14
+
+finish
