@@ -42,14 +42,20 @@ void Endpoint::AddElection(WriterElection* election, const std::string& owner) {
   Subscribe(HeadChannel(owner));
 }
 
-void Endpoint::AddSearch(ReplicaSearch* search, const std::vector<std::string>& holders) {
-  machines_.push_back(search);
-  for (const std::string& holder : holders) Subscribe(ReplicaChannel(holder));
+void Endpoint::AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels) {
+  machines_.push_back(fetch);
+  for (const std::string& channel : record_channels) Subscribe(channel);
+  for (const ReplicaFetch::Holder& holder : fetch->holders()) {
+    Subscribe(ReplicaChannel(holder.channel));
+    Subscribe(HeadChannel(holder.channel));
+    Subscribe(PartChannel(holder.channel));
+  }
 }
 
-void Endpoint::AddHolder(ReplicaHolder* holder, const std::string& owner) {
-  machines_.push_back(holder);
+void Endpoint::AddServer(ReplicaServer* server, const std::string& owner) {
+  machines_.push_back(server);
   Subscribe(HandOverChannel(owner));
+  Subscribe(AckChannel(owner));
 }
 
 void Endpoint::Remove(const StateMachine* machine) { std::erase(machines_, machine); }

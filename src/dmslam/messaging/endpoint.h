@@ -7,9 +7,9 @@
 
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/election.h"
-#include "dmslam/messaging/hand_over.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
+#include "dmslam/messaging/succession.h"
 
 namespace dmslam {
 
@@ -26,10 +26,11 @@ class Endpoint {
   void AddReader(StreamReader* reader, const std::string& owner, const std::vector<std::string>& record_channels);
   /// `readers`: who may acknowledge, by the upper-case names of their processes ("FRONTEND").
   void AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers);
-  /// An election hears the beacons of its owner; a search the holders' answers; a holder the owner's questions.
+  /// An election hears the beacons of its owner; a fetch the holders' answers and records; a server the owner's questions
+  /// and acknowledgements.
   void AddElection(WriterElection* election, const std::string& owner);
-  void AddSearch(ReplicaSearch* search, const std::vector<std::string>& holders);
-  void AddHolder(ReplicaHolder* holder, const std::string& owner);
+  void AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels);
+  void AddServer(ReplicaServer* server, const std::string& owner);
   void Remove(const StateMachine* machine);
 
   /// Messages that belong to no stream: also called for every other one, so the handler looks at the channel.

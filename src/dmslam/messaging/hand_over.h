@@ -84,11 +84,12 @@ class ReplicaHolder : public StateMachine {
   void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) override;
   void Advance(int64_t) override {}
   std::vector<Outgoing> TakeOutgoing() override;
-  int64_t deadline_ns() const override { return INT64_MAX; }
+  int64_t deadline_ns() const override { return has_outgoing() ? INT64_MIN : INT64_MAX; }
 
   /// Id of the asker that chose this replica: open the hand-over stream for it, once per asker, with this id as its
   /// writer's and the version held as its parent.
   const std::optional<int64_t>& chosen_by() const { return chosen_by_; }
+  bool has_outgoing() const { return !outgoing_.empty(); }
 
  private:
   Options options_;

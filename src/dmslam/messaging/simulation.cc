@@ -12,10 +12,10 @@
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/election.h"
-#include "dmslam/messaging/hand_over.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
+#include "dmslam/messaging/succession.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -163,16 +163,14 @@ class ReaderProcess : public Process {
  public:
   ReaderProcess(int index, bool lossless, Random* random, std::string* failure)
       : index_(index), lossless_(lossless), failure_(failure), id_(RandomId(random)), reader_(Reading()),
-        holder_({kSession, StreamId::kTest, "OWNER", ReaderName(index), RoleOf(index), id_},
-                [this] { return reader_.held(); }) {}
+        source_(&history), server_(Serving(), [this] { return reader_.held(); }, &source_) {}
 
   static int64_t RandomId(Random* random) { return 1 + static_cast<int64_t>(random->Next() >> 2); }
   static std::string RoleOf(int index) { return "role" + std::to_string(index); }
 
   std::vector<StateMachine*> Machines() override {
     std::vector<StateMachine*> machines = {&reader_};
-    if (lossless_) machines.push_back(&holder_);
-    if (hand_over_) machines.push_back(&*hand_over_);
+    if (lossless_) machines.push_back(&server_);
     return machines;
   }
 
@@ -189,7 +187,6 @@ class ReaderProcess : public Process {
     if (reader_.statistics().kept_bytes > 2 * kReaderBytes + 60'000) *failure_ = "a reader kept too much";
     if (reader_.statistics().lost > 0) *failure_ = "a reader gave records up";
     GiveInWhenRefused(now_ns);
-    OpenHandOver(now_ns);
   }
 
   const StreamReader& reader() const { return reader_; }
@@ -218,17 +215,8 @@ class ReaderProcess : public Process {
     }
   }
 
-  void OpenHandOver(int64_t now_ns) {
-    if (!holder_.chosen_by() || holder_.chosen_by() == served_) return;
-    served_ = holder_.chosen_by();
-    StreamWriter::Options options;
-    options.session = kSession;
-    options.stream = StreamId::kHandOver;
-    options.owner = ReaderName(index_);
-    options.name = ReaderName(index_);
-    handed_ = history;
-    source_.emplace(&handed_);
-    hand_over_.emplace(options, Term{now_ns, *served_}, reader_.held(), &*source_);
+  ReplicaServer::Options Serving() const {
+    return {{kSession, StreamId::kTest, "OWNER", ReaderName(index_), RoleOf(index_), id_}, ReaderName(index_), 0, Link::kHost};
   }
 
   int index_;
@@ -236,18 +224,15 @@ class ReaderProcess : public Process {
   std::string* failure_;
   int64_t id_;
   StreamReader reader_;
-  ReplicaHolder holder_;
-  std::optional<int64_t> served_;
-  History handed_;
-  std::optional<HistorySnapshot> source_;
-  std::optional<StreamWriter> hand_over_;
+  HistorySnapshot source_;
+  ReplicaServer server_;
   int64_t refused_since_ns_ = 0;
 };
 
 // A process that wants to write: listens, looks for the newest replica, takes it, writes.
 class OwnerProcess : public Process {
  public:
-  enum class Phase { kElecting, kSearching, kReceiving, kWriting, kEnded };
+  enum class Phase { kElecting, kFetching, kWriting, kEnded };
 
   OwnerProcess(const Conditions& conditions, int num_lossless, bool take_over, int64_t* next_entry,
                Random* random, int64_t now_ns)
@@ -255,23 +240,15 @@ class OwnerProcess : public Process {
         election_(Electing(take_over), now_ns) {}
 
   std::vector<StateMachine*> Machines() override {
-    switch (phase_) {
-      case Phase::kElecting:
-        return {&election_};
-      case Phase::kSearching:
-        return {&election_, &*search_};
-      case Phase::kReceiving:
-        return {&election_, &*search_, &*replica_reader_};
-      default:
-        return writer_ ? std::vector<StateMachine*>{&*writer_} : std::vector<StateMachine*>{};
-    }
+    if (writer_) return {&*writer_};
+    if (fetch_) return {&election_, &*fetch_};
+    return {&election_};
   }
 
   void Work(int64_t now_ns) override {
     if (phase_ < Phase::kWriting && election_.state() == WriterElection::State::kRefused) phase_ = Phase::kEnded;
     if (phase_ == Phase::kElecting) Elect(now_ns);
-    if (phase_ == Phase::kSearching) Search(now_ns);
-    if (phase_ == Phase::kReceiving) ReceiveReplica(now_ns);
+    if (phase_ == Phase::kFetching) Fetch(now_ns);
     if (phase_ == Phase::kWriting) Write(now_ns);
   }
 
@@ -299,45 +276,25 @@ class OwnerProcess : public Process {
 
   void Elect(int64_t now_ns) {
     if (election_.state() != WriterElection::State::kWon) return;
-    ReplicaSearch::Options options;
+    ReplicaFetch::Options options;
     options.session = kSession;
     options.stream = StreamId::kTest;
     options.owner = "OWNER";
-    options.asker = id_;
-    for (int i = 0; i < num_lossless_; ++i) options.roles.push_back(ReaderProcess::RoleOf(i));
-    search_.emplace(options, now_ns);
-    phase_ = Phase::kSearching;
-  }
-
-  void Search(int64_t now_ns) {
-    if (search_->state() == ReplicaSearch::State::kNone) return BeginWriting(Version{}, now_ns);
-    if (search_->state() != ReplicaSearch::State::kFound) return;
-    StreamReader::Options options;
-    options.session = kSession;
-    options.stream = StreamId::kHandOver;
-    options.owner = ReaderName(std::stoi(search_->replica().role.substr(4)));
-    options.reader = "OWNER";
-    options.role = "owner";
     options.id = id_;
-    options.only_writer = search_->asker();
+    for (int i = 0; i < num_lossless_; ++i) options.holders.push_back({ReaderProcess::RoleOf(i), ReaderName(i)});
     options.limits = {500, kReaderBytes, 60'000};
-    replica_reader_.emplace(options);
-    receiving_since_ns_ = now_ns;
-    phase_ = Phase::kReceiving;
+    fetch_.emplace(options, now_ns);
+    phase_ = Phase::kFetching;
   }
 
-  void ReceiveReplica(int64_t now_ns) {
-    while (std::optional<Record> record = replica_reader_->Take()) {
+  void Fetch(int64_t now_ns) {
+    while (std::optional<Record> record = fetch_->Take()) {
       if (record->begins_anew()) history.clear();
       if (!ApplyEntries(*record, &history)) failure = "a replica was handed over out of order";
-      if (!record->ends_snapshot()) continue;
-      from_replica_ = true;
-      return BeginWriting(replica_reader_->parent(), now_ns);
     }
-    if (now_ns - receiving_since_ns_ < 6 * kSecond) return;
-    history.clear();
-    search_->TryAgain(now_ns);
-    phase_ = Phase::kSearching;
+    from_replica_ = fetch_->state() == ReplicaFetch::State::kDone;
+    if (fetch_->state() == ReplicaFetch::State::kNone) history.clear();
+    if (from_replica_ || fetch_->state() == ReplicaFetch::State::kNone) BeginWriting(fetch_->version(), now_ns);
   }
 
   void BeginWriting(const Version& parent, int64_t now_ns) {
@@ -387,12 +344,11 @@ class OwnerProcess : public Process {
   int64_t id_;
   Phase phase_ = Phase::kElecting;
   WriterElection election_;
-  std::optional<ReplicaSearch> search_;
-  std::optional<StreamReader> replica_reader_;
+  std::optional<ReplicaFetch> fetch_;
   std::optional<HistorySnapshot> source_;
   std::optional<StreamWriter> writer_;
   size_t base_ = 0;  // length of the history this term began with
-  int64_t receiving_since_ns_ = 0, next_record_ns_ = 0, confirmed_seq_ = 0;
+  int64_t next_record_ns_ = 0, confirmed_seq_ = 0;
   bool closing_ = false, from_replica_ = false;
 };
 

@@ -12,8 +12,7 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kMaxReaders = 64;        // more ids than this are noise
-constexpr size_t kMaxPieceBytes = 65536;  // of a snapshot
+constexpr size_t kMaxReaders = 64;  // more ids than this are noise
 constexpr int kFarewells = 3;
 
 SendWindow::Options WindowOptions(const StreamWriter::Options& options) {
@@ -245,7 +244,6 @@ void StreamWriter::MakePieces() {
   SendWindow& window = snapshot_->window;
   while (snapshot_->total == 0 && window.kept() < static_cast<size_t>(options_.snapshot_ahead)) {
     SnapshotSource::Piece piece = source_->NextPiece();
-    DMSLAM_CHECK(piece.message.size() <= kMaxPieceBytes, "a piece of a snapshot has at most 64 KiB");
     RecordHeader header = HeaderOf(window.last() + 1);
     header.flags = RecordHeader::FLAG_SNAPSHOT | (piece.last ? RecordHeader::FLAG_SNAPSHOT_LAST : 0);
     header.parent_epoch = snapshot_->number;

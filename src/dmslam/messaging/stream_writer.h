@@ -15,7 +15,7 @@
 namespace dmslam {
 
 /// Where a writer gets a snapshot of its owner's state from, for a reader that lacks more than is kept: successive
-/// records of at most 64 KiB, the most wanted first (of a map: the local map). Implemented by the owner.
+/// records of about 64 KiB at most, the most wanted first (of a map: the local map). Implemented by the owner.
 class SnapshotSource {
  public:
   struct Piece {
