@@ -35,6 +35,9 @@ struct MessageInfo {
 template <typename Message>
 MessageInfo Info();
 
+/// Over the fingerprints of all `Messages`: two programs with the same one understand each other's messages.
+int64_t SchemaHash();
+
 /// Encodes one of `Messages`: the bytes of its LCM type. The header of a record is zero, for the stream to
 /// fill in. Text is made clean (valid UTF-8 without control characters, at most kMaxTextBytes). Throws
 /// InvariantError that names the value when the message holds one that Decode would refuse.
