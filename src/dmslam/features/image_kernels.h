@@ -60,6 +60,9 @@ struct ImageKernels {
   /// The same along a row; reads `source` from -3 to width + 2.
   void (*blur_along)(const uint8_t* source, int width, uint8_t* out);
 
+  /// FAST-9 scores, whatever their size, of the 3 x 3 pixels around `pixel`, in reading order.
+  void (*scores_around)(const uint8_t* pixel, ptrdiff_t stride, uint8_t* scores);
+
   /// First moments of the disc of radius 15 around `center`: sums of x * pixel and of y * pixel.
   void (*disc_moments)(const uint8_t* center, ptrdiff_t stride, int* moment_x, int* moment_y);
 

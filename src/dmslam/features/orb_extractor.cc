@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "dmslam/features/subpixel.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -92,11 +93,15 @@ void OrbExtractor::Describe(size_t octave, FeatureSet* features) {
   const ImagePyramid::Level& level = pyramid_.level(octave);
   smoother_.Smooth(level.image, kernels_, &smooth_);
   for (const Corner& corner : chosen_) {
+    const uint8_t* pixel = level.image.row(corner.y) + corner.x;
+    uint8_t scores[9];
+    kernels_.scores_around(pixel, level.image.stride(), scores);
+    const SubpixelOffset offset = RefineMaximum(scores);
     int moment_x = 0, moment_y = 0;
-    kernels_.disc_moments(level.image.row(corner.y) + corner.x, level.image.stride(), &moment_x, &moment_y);
+    kernels_.disc_moments(pixel, level.image.stride(), &moment_x, &moment_y);
     Keypoint keypoint;
-    keypoint.x_q4 = FullResolutionQ4(corner.x, level.scale_x);
-    keypoint.y_q4 = FullResolutionQ4(corner.y, level.scale_y);
+    keypoint.x_q4 = FullResolutionQ4(corner.x + offset.x, level.scale_x);
+    keypoint.y_q4 = FullResolutionQ4(corner.y + offset.y, level.scale_y);
     keypoint.octave = static_cast<uint8_t>(octave);
     keypoint.angle = Orientation(moment_x, moment_y);
     features->keypoints.push_back(keypoint);
