@@ -163,10 +163,10 @@ CameraPath::View CameraPath::AlongLoop(double path_time_s) const {
   const double heading = h1 + 0.3 * (WrapAngle(h0 - h1) + WrapAngle(h2 - h1));
   // Loops run against the clock: outwards is to the right. The sway does not fit the loop's length, so that rounds
   // differ a little in where one looks.
-  const double outwards = ring ? 28 : 62;
+  const double outwards = ring ? 28 : 42;
   const double sway = (ring ? 9.0 : 12.0) * std::sin(0.31 * s + 6.28 * phase_);
   view.yaw_rad = heading - (outwards + sway) * kDegree;
-  view.pitch_rad = (-5.0 + 4.0 * std::sin(0.23 * s)) * kDegree;
+  view.pitch_rad = ((ring ? -5.0 : -9.0) + 4.0 * std::sin(0.23 * s)) * kDegree;
   view.roll_rad = 1.2 * kDegree * std::sin(steps_rad_s * path_time_s);
   return view;
 }

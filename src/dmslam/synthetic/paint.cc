@@ -106,7 +106,7 @@ void DrawPhoto(Canvas& canvas, int x0, int y0, int x1, int y1, Random& random) {
   if (width < 8 || height < 8) return;
   const std::vector<float> field = FractalNoise(width, height, 4, 7, 0.62f, random);
   const std::vector<float> hue = FractalNoise(width, height, 3, 3, 0.5f, random);
-  const Rgb dark = 0.35f * RandomColor(random), light = RandomColor(random) + Grey(60), other = RandomColor(random);
+  const Rgb dark = 0.5f * RandomColor(random), light = RandomColor(random) + Grey(75), other = RandomColor(random);
   Canvas part(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -234,8 +234,8 @@ Rgb RandomColor(Random& random) {
 
 Canvas PaintPlaster(int size, const Rgb& base, Random& random) {
   Canvas canvas(size, size, base);
-  AddNoise(canvas, 3, 8, 0.75f, Rgb(7, 7, 7.5f), random);
-  AddMarks(canvas, size / 7, 0.22f, random);
+  AddNoise(canvas, 3, 8, 0.8f, Rgb(9, 9, 9.5f), random);
+  AddMarks(canvas, size / 4, 0.3f, random);
   canvas.Smooth();
   return canvas;
 }

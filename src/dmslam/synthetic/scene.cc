@@ -82,16 +82,20 @@ class PosterDeck {
   size_t next_ = 0;
 };
 
-/// Hangs pictures at one place of a wall: one large, or one above another, or two side by side.
+/// Hangs pictures at one place of a wall, from `low` upwards: columns of one large or two small ones.
 void HangPosters(SceneBuilder& builder, PosterDeck& deck, const Vector2f& foot, const Wall& wall, float low, float slot) {
-  const float size = std::min(builder.Uniform(0.55f, 0.9f), 0.85f * slot), bottom = low + builder.Uniform(0.0f, 0.35f);
-  const Affine3f frame = FrameFacing(foot, wall.inward());
-  AddPoster(builder, deck.Next(), frame, size, std::min(size * builder.Uniform(0.8f, 1.2f), 2.45f - bottom), bottom);
-  if (slot > 1.2f && builder.Chance(0.5)) {
-    const float small = builder.Uniform(0.28f, 0.42f), side = builder.Chance(0.5) ? 1.0f : -1.0f;
-    const Affine3f beside =
-        FrameFacing(foot + side * (0.5f * size + 0.5f * small + 0.06f) * wall.along(), wall.inward());
-    AddPoster(builder, deck.Next(), beside, small, small, bottom + builder.Uniform(0.0f, 0.4f));
+  const float top = 2.45f;
+  float at = -0.46f * slot;
+  while (at < 0.46f * slot - 0.3f) {
+    const float width = std::min(builder.Uniform(0.36f, 0.8f), 0.46f * slot - at);
+    float bottom = low + builder.Uniform(0.0f, 0.2f);
+    while (bottom + 0.3f < top) {
+      const float height = std::min(width * builder.Uniform(0.75f, 1.3f), top - bottom);
+      const Affine3f frame = FrameFacing(foot + (at + 0.5f * width) * wall.along(), wall.inward());
+      AddPoster(builder, deck.Next(), frame, width, height, bottom);
+      bottom += height + builder.Uniform(0.06f, 0.25f);
+    }
+    at += width + builder.Uniform(0.06f, 0.3f);
   }
 }
 
@@ -122,7 +126,7 @@ void FurnishPlace(SceneBuilder& builder, const Assets& assets, PosterDeck& deck,
   } else if (kind < 0.83) {
     AddDoor(builder, assets, FrameFacing(foot, wall.inward()));
   } else {
-    HangPosters(builder, deck, foot, wall, builder.Uniform(0.7f, 1.1f), slot);
+    HangPosters(builder, deck, foot, wall, builder.Uniform(0.4f, 0.9f), slot);
   }
 }
 
@@ -132,10 +136,15 @@ void FurnishWall(SceneBuilder& builder, const Assets& assets, PosterDeck& deck, 
   const float slot = usable / static_cast<float>(places);
   for (int i = 0; i < places; ++i) {
     const float at = margin + (static_cast<float>(i) + 0.5f) * slot;
-    const bool doorway = std::any_of(wall.openings.begin(), wall.openings.end(), [&](float middle) {
-      return std::abs(middle - at) < 0.5f * (slot + kDoorwayWidth) - 0.1f;
-    });
-    if (!doorway) FurnishPlace(builder, assets, deck, wall, at, slot);
+    float from = at - 0.5f * slot, to = at + 0.5f * slot;
+    for (const float middle : wall.openings) {
+      const float left = middle - 0.5f * kDoorwayWidth - 0.05f, right = middle + 0.5f * kDoorwayWidth + 0.05f;
+      if (right <= from || left >= to) continue;
+      (left - from > to - right ? to : from) = left - from > to - right ? left : right;
+    }
+    const float width = to - from;
+    if (width > slot - 0.01f) FurnishPlace(builder, assets, deck, wall, at, slot);
+    else if (width > 0.4f) HangPosters(builder, deck, wall.a + 0.5f * (from + to) * wall.along(), wall, 0.5f, width);
   }
 }
 
@@ -160,7 +169,7 @@ void AddDeskGroup(SceneBuilder& builder, const Assets& assets, const Vector2f& c
     AddDesk(builder, assets, FrameFacing(front, {-1, 0}), 1.55f, 0.76f);
     scene.obstacles.push_back({center + Vector2f(0, 0.82f * side), 0.78f});
     for (const float facing : {-1.0f, 1.0f}) {
-      const Vector2f seat = center + Vector2f(facing * builder.Uniform(0.72f, 0.82f), side * builder.Uniform(0.75f, 1.05f));
+      const Vector2f seat = center + Vector2f(facing * builder.Uniform(0.72f, 0.82f), side * builder.Uniform(0.42f, 0.65f));
       const float heading = facing < 0 ? 0.0f : kPi;
       // The chair's back is behind the sitter; its frame's +y points there.
       AddChair(builder, assets, Translation3f(On(seat, 0)) * AngleAxisf(heading + 0.5f * kPi, Vector3f::UnitZ()));
@@ -195,14 +204,14 @@ std::vector<Vector3f> RoomLamps(const Vector2f& low) {
 }
 
 void BuildOneRoom(const SceneOptions& options, Scene& scene) {
-  const Assets assets = PaintAssets(options.seed, 24, options.texture_halvings, scene.textures);
+  const Assets assets = PaintAssets(options.seed, 44, options.texture_halvings, scene.textures);
   SceneBuilder builder(DeriveSeed(options.seed, 0, "layout"), RoomLamps({0, 0}));
   BuildRoom(builder, assets, {0, 0}, {}, {}, scene);
   scene.meshes = builder.TakeMeshes();
 }
 
 void BuildTwoRooms(const SceneOptions& options, Scene& scene) {
-  const Assets assets = PaintAssets(options.seed, 16, options.texture_halvings, scene.textures);
+  const Assets assets = PaintAssets(options.seed, 36, options.texture_halvings, scene.textures);
   const Vector2f second(0, kRoomWidth + 0.12f);
   std::vector<Vector3f> lamps = RoomLamps({0, 0});
   for (const Vector3f& lamp : RoomLamps(second)) lamps.push_back(lamp);
@@ -224,7 +233,7 @@ void BuildCorridor(const SceneOptions& options, Scene& scene) {
   const auto half_sum = static_cast<float>(0.5 * options.ring_length_m);
   const Vector2f size(0.63f * half_sum, 0.37f * half_sum);
   scene.ring_size_m = size;
-  const int posters = std::clamp(static_cast<int>(options.ring_length_m * 1.9), 30, 3000);
+  const int posters = std::clamp(static_cast<int>(options.ring_length_m * 3.5), 60, 4000);
   const Assets assets = PaintAssets(options.seed, posters, options.texture_halvings, scene.textures);
   std::vector<Vector3f> lamps;
   for (float at = 1.5f; at < size.x(); at += 4.0f) {

@@ -55,15 +55,15 @@ Assets PaintAssets(uint64_t seed, int posters, int halvings, TextureList& textur
 }
 
 float SceneBuilder::LightAt(const Vector3f& point, const Vector3f& normal) const {
-  float light = 0.42f + 0.06f * normal.z() + 0.04f * normal.x();
+  float light = 0.52f + 0.06f * normal.z() + 0.04f * normal.x();
   for (const Vector3f& lamp : lamps_) {
     const Vector3f to_lamp = lamp - point;
     const float distance_squared = to_lamp.squaredNorm();
     if (distance_squared > 64.0f) continue;
     const float facing = std::max(0.0f, normal.dot(to_lamp) / std::sqrt(distance_squared + 1e-6f));
-    light += 0.62f * (0.25f + 0.75f * facing) / (1.0f + 0.35f * distance_squared);
+    light += 0.75f * (0.25f + 0.75f * facing) / (1.0f + 0.35f * distance_squared);
   }
-  return std::min(light, 1.25f);
+  return std::min(light, 1.35f);
 }
 
 void SceneBuilder::AddQuad(const Vector3f& origin, const Vector3f& along_u, const Vector3f& along_v, const Skin& skin,

@@ -190,7 +190,8 @@ SequenceReport WriteSequence(const SequenceOptions& given, const std::string& fo
   writer.Finish(report);
   WriteTrajectory((root / "groundtruth.txt").string(), poses);
   WriteCamera(options.camera, root / "camera.yaml");
-  const RevisitOptions revisit_options;
+  RevisitOptions revisit_options;
+  revisit_options.frame_step = std::max(1, static_cast<int>(std::lround(options.camera.fps / 3)));  // As keyframes come.
   const std::vector<Revisit> revisits = FindRevisits(world.scene(), options.camera, T_world_cam, revisit_options);
   report.revisits = revisits.size();
   WriteLoops(revisits, poses, revisit_options, root / "loops.json");
