@@ -19,6 +19,9 @@ class TrajectoryBuilder {
   void OnFramePose(const FramePose& pose);
   void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
 
+  /// The map is void: a fresh stream, or a snapshot, begins.
+  void ForgetMap() { map_ = Map(map_.camera(), map_.pyramid()); }
+
   struct Trajectories {
     MapId map_id = 0;                     ///< the map that holds most frames
     std::vector<StampedPose> final;       ///< every placed frame, by its reference keyframe's final pose

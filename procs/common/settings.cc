@@ -93,7 +93,7 @@ std::vector<Entry> GeneralEntries() {
            [](Settings& s) -> auto& { return s.extractor.fast_threshold; }, 1, 254),
       Make("features.min_fast_threshold", "the same where there is no such corner",
            [](Settings& s) -> auto& { return s.extractor.min_fast_threshold; }, 1, 254),
-      Make("loop.enabled", "close loops", [](Settings& s) -> auto& { return s.close_loops; }),
+      Make("loop.enabled", "close loops", [](Settings& s) -> auto& { return s.loop.enabled; }),
   };
 }
 
@@ -104,11 +104,11 @@ std::vector<Entry> InitializerEntries() {
       Make("initializer.num_pairs", "pairs of frames that must agree",
            [](Settings& s) -> auto& { return s.initializer.num_pairs; }, 1, 20),
       Make("initializer.min_agreement", "smallest Jaccard index of the pairs' static sets",
-           [](Settings& s) -> auto& { return s.initializer.min_agreement; }, 0, 1),
+           [](Settings& s) -> auto& { return s.initializer.agreement.min_agreement; }, 0, 1),
       Make("initializer.min_parallax_rad", "median parallax of the first map's points",
            [](Settings& s) -> auto& { return s.initializer.min_parallax_rad; }, 0, 1),
       Make("initializer.min_distribution_px", "root of the static matches' distribution D",
-           [](Settings& s) -> auto& { return s.initializer.min_distribution_px; }, 0, 10000),
+           [](Settings& s) -> auto& { return s.initializer.agreement.min_distribution_px; }, 0, 10000),
       Make("initializer.cell_px", "side of DLRSAC's cells",
            [](Settings& s) -> auto& { return s.initializer.selector.cell_px; }, 16, 4096),
       Make("initializer.min_cell_matches", "matches that a cell needs",

@@ -9,6 +9,7 @@
 #include "dmslam/features/orb_extractor.h"
 #include "dmslam/motion_segmentation/initializer.h"
 #include "frontend/frontend_options.h"
+#include "loopcloser/loopcloser_core.h"
 #include "mapper/mapper_options.h"
 
 namespace dmslam {
@@ -21,7 +22,7 @@ struct Settings {
   InitializerOptions initializer;
   FrontendOptions frontend;
   MapperOptions mapper;
-  bool close_loops = true;
+  LoopcloserOptions loop;
 
   const Pyramid& pyramid() const { return extractor.pyramid; }
 };

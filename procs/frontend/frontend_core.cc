@@ -45,6 +45,12 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   if (delta.event == MapEvent::kSettled && delta.about == awaited_) awaited_ = {};
 }
 
+void FrontendCore::ForgetMap() {
+  map_ = Map(camera_, pyramid_);
+  relocalizer_.Clear();
+  tracker_.Reset();
+}
+
 void FrontendCore::ProcessImage(uint32_t frame_index, int64_t stamp_ns, const GrayView& image,
                                 std::vector<FrontendEvent>* events) {
   const auto start = std::chrono::steady_clock::now();

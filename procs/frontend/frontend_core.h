@@ -52,6 +52,8 @@ class FrontendCore {
 
   /// A record of the map stream; call between frames.
   void ApplyMapDelta(const MapDelta& delta);
+  /// The replica is void: a fresh map stream, or a snapshot, begins.
+  void ForgetMap();
   /// Whether a keyframe was proposed whose settled record has not come: lock-step waits for it.
   KeyframeId awaited() const { return awaited_; }
   /// Told by the node: no more keyframes now (too many are not acknowledged).

@@ -26,8 +26,6 @@ struct TrackingOptions {
   double young_trust = 0.3;          ///< weight of a landmark that was just made...
   double trusted_age_s = 4.0;        ///< ...which grows to one when it stood still for so long
   int min_cells = 6;                 ///< inliers must lie in at least so many cells of an 8 x 6 grid
-
-  std::optional<std::string> Problem() const;
 };
 
 /// When a frame becomes a keyframe.
@@ -36,8 +34,6 @@ struct KeyframeOptions {
   double min_interval_s = 0.1;       ///< never closer, unless tracking is weak
   double tracked_ratio = 0.9;        ///< of the reference keyframe's landmarks: fewer tracked asks for a keyframe
   int min_inliers = 15;
-
-  std::optional<std::string> Problem() const;
 };
 
 struct FrontendOptions {
@@ -47,8 +43,6 @@ struct FrontendOptions {
   double new_map_after_s = 5.0;      ///< lost for so long: a new map is started, the old one is kept
   int evidence_every_frames = 10;
   int max_kept_frames = 300;         ///< unplaced frames kept for localisation at the end
-
-  std::optional<std::string> Problem() const;
 };
 
 }  // namespace dmslam

@@ -16,6 +16,11 @@ constexpr int kMinInliers = 12;
 Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera, const Pyramid& pyramid)
     : vocabulary_(std::move(vocabulary)), camera_(camera), pyramid_(pyramid) {}
 
+void Relocalizer::Clear() {
+  database_.Clear();
+  nodes_.clear();
+}
+
 void Relocalizer::Update(const Map& map) {
   if (!vocabulary_) return;
   for (const KeyframeId id : map.applied_removed_keyframes()) {

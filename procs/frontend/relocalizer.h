@@ -20,6 +20,7 @@ class Relocalizer {
 
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Map& map);
+  void Clear();
   /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
   bool Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, TrackedFrame* frame) const;
 

@@ -19,8 +19,6 @@ struct LandmarkCreationOptions {
   double max_parallax_cos = 0.9998;
   double reprojection_sigmas_squared = 5.991;
   double scale_ratio_slack = 1.5;     ///< times the pyramid's factor
-
-  std::optional<std::string> Problem() const;
 };
 
 /// What each landmark's evidence does to the belief that it moves.
@@ -31,8 +29,6 @@ struct MotionBeliefOptions {
   float floor = -4.0F;          ///< however long it stood still, it may start to move
   float ceiling = 4.0F;
   float remove_above = 2.5F;    ///< beyond this it leaves the map
-
-  std::optional<std::string> Problem() const;
 };
 
 struct MapperOptions {
@@ -46,8 +42,6 @@ struct MapperOptions {
   int local_fixed_keyframes = 40;        ///< at most this many hold the window in place
   int min_covisibility = 15;             ///< landmarks in common that make two keyframes neighbours
   double fuse_radius_px = 3.0;           ///< times the scale of the predicted octave
-
-  std::optional<std::string> Problem() const;
 };
 
 }  // namespace dmslam

@@ -1,0 +1,146 @@
+#include "collector/collector_node.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
+
+}  // namespace
+
+CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
+    : StreamNode(std::move(context), std::move(options), "collector"), collector_(std::move(collector)) {
+  Listen({channels::kEndOfSequence, channels::kFrameTrace, channels::kPlayerStatus, channels::kFrontendStatus,
+          channels::kMapperStatus, channels::kLoopcloserStatus});
+}
+
+void CollectorNode::Begin(const CameraInfo& info) {
+  builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.pyramid());
+  run_.sequence = info.sequence;
+  run_.mode = info.mode == PlaybackMode::kLockstep ? "lockstep" : "realtime";
+  run_.profile = options_.settings.profile;
+  run_.seed = options_.settings.seed;
+  run_.ground_truth = collector_.ground_truth;
+  frames_total_ = info.num_frames;
+  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
+                                {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+                                 channels::kFrameEvidence, channels::kMapReset});
+  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+}
+
+void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (channel == channels::kFrameTrace) {
+    if (const auto trace = Read<FrameTrace>(bytes)) run_.traces.push_back(*trace);
+  } else if (channel == channels::kEndOfSequence) {
+    if (auto end = Read<EndOfSequence>(bytes)) end_ = std::move(end);
+  } else if (channel == channels::kPlayerStatus) {
+    if (const auto status = Read<PlayerStatus>(bytes)) OnHealth("player", status->head);
+  } else if (channel == channels::kFrontendStatus) {
+    if (auto status = Read<FrontendStatus>(bytes)) {
+      OnHealth("frontend", status->head);
+      run_.frontend = std::move(*status);
+    }
+  } else if (channel == channels::kMapperStatus) {
+    if (auto status = Read<MapperStatus>(bytes)) {
+      OnHealth("mapper", status->head);
+      run_.mapper = std::move(*status);
+    }
+  } else if (channel == channels::kLoopcloserStatus) {
+    if (auto status = Read<LoopcloserStatus>(bytes)) {
+      OnHealth("loopcloser", status->head);
+      run_.loopcloser = std::move(*status);
+    }
+  }
+}
+
+void CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
+  if (head.session != 0 && head.session != session_) return;
+  ProcessHealth& health = run_.health[process];
+  const double largest = std::max(health.rss_mb, head.health.rss_mb);
+  health = head.health;
+  health.rss_mb = largest;
+  if (process_ids_[process].insert(head.health.pid).second && process_ids_[process].size() > 1) ++run_.restarts;
+}
+
+bool CollectorNode::TakeFrontendRecord() {
+  const std::optional<Record> record = frontend_reader_->Take();
+  if (!record) return false;
+  if (record->channel == channels::kFramePose) {
+    if (const auto pose = Read<FramePose>(*record->bytes)) {
+      builder_->OnFramePose(*pose);
+      frames_seen_ = static_cast<int64_t>(builder_->frame_poses().size());
+    }
+  } else if (record->channel == channels::kMapReset) {
+    ++run_.resets;
+  }
+  frontend_reader_->AcceptTaken();
+  return true;
+}
+
+bool CollectorNode::TakeMapRecord() {
+  const std::optional<Record> record = map_reader_->Take();
+  if (!record) return false;
+  if (record->begins_anew()) builder_->ForgetMap();
+  if (const auto delta = Read<MapDelta>(*record->bytes)) {
+    builder_->OnMapDelta(*delta);
+    map_ended_ = map_ended_ || delta->event == MapEvent::kEnded;
+  }
+  map_reader_->AcceptTaken();
+  return true;
+}
+
+bool CollectorNode::WorkOnce() {
+  const bool any = TakeFrontendRecord() || TakeMapRecord();
+  return any ? true : EndIfDone();
+}
+
+bool CollectorNode::EndIfDone() {
+  const bool drained = map_ended_ && frontend_reader_->AtEnd() && map_reader_->AtEnd();
+  if (!drained) return false;
+  if (drained_ns_ == 0) drained_ns_ = context_.now_ns();
+  if (context_.now_ns() - drained_ns_ < kLastStatusesNs) return false;
+  Write();
+  const bool any_pose = std::any_of(builder_->frame_poses().begin(), builder_->frame_poses().end(),
+                                    [](const auto& item) { return item.second.HasPose(); });
+  std::string why = run_.frontend.head.reason;
+  Exit(any_pose ? 0 : 6, any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
+  return false;
+}
+
+void CollectorNode::Write() {
+  if (written_ || !builder_) return;
+  written_ = true;
+  run_.frames_published = frames_seen_;
+  if (end_) {
+    run_.frames_published = end_->frames_published;
+    run_.frames_missing = end_->frames_missing;
+    run_.frames_blacked = end_->frames_blacked;
+    run_.frames_jumped = end_->frames_jumped;
+  }
+  const std::string table = WriteResults(collector_.out_dir, run_, *builder_);
+  if (collector_.progress) std::fputs("\n", stderr);
+  std::fputs(table.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+void CollectorNode::Stop() {
+  Write();
+  Exit(0);
+}
+
+void CollectorNode::PublishStatus() {
+  if (!collector_.progress || !builder_ || written_) return;
+  std::fprintf(stderr, "\r%s: frame %lld of %lld, %s, %d static, %zu keyframes, %zu landmarks   ", run_.sequence.c_str(),
+               static_cast<long long>(frames_seen_), static_cast<long long>(frames_total_),
+               run_.frontend.inliers > 0 ? "tracking" : "waiting", run_.frontend.inliers,
+               builder_->map().keyframes().size(), builder_->map().num_landmarks());
+  std::fflush(stderr);
+}
+
+}  // namespace dmslam

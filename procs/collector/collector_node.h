@@ -1,0 +1,57 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "collector/results.h"
+#include "collector/trajectory_builder.h"
+#include "common/stream_node.h"
+
+namespace dmslam {
+
+struct CollectorOptions {
+  std::string out_dir;
+  std::string ground_truth;  ///< TUM trajectory; empty: none
+  bool progress = false;     ///< show progress on the terminal
+};
+
+/// Reads the frontend's and the mapper's streams and everybody's statuses, and writes the run's results when the sequence
+/// has drained through all streams. A reader like any other.
+class CollectorNode : public StreamNode {
+ public:
+  CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector);
+
+  /// Writes what there is.
+  void Stop() override;
+
+ protected:
+  void Begin(const CameraInfo& info) override;
+  bool WorkOnce() override;
+  void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
+  void PublishStatus() override;
+
+ private:
+  bool TakeFrontendRecord();
+  bool TakeMapRecord();
+  void OnHealth(const std::string& process, const StatusHead& head);
+  bool EndIfDone();
+  void Write();
+
+  CollectorOptions collector_;
+  RunRecord run_;
+  std::unique_ptr<TrajectoryBuilder> builder_;
+  std::unique_ptr<StreamReader> frontend_reader_, map_reader_;
+  std::map<std::string, std::set<int32_t>> process_ids_;
+  std::optional<EndOfSequence> end_;
+  int64_t frames_total_ = 0;
+  int64_t frames_seen_ = 0;
+  int64_t drained_ns_ = 0;
+  bool map_ended_ = false;
+  bool written_ = false;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,243 @@
+#include "collector/results.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "dmslam/evaluation/trajectory_plot.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
+
+namespace dmslam {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double Percent(size_t part, int64_t whole) {
+  return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+double Quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[std::min(values.size() - 1, static_cast<size_t>(q * static_cast<double>(values.size())))];
+}
+
+Json Quantiles(const std::vector<double>& values) {
+  return {{"p50", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"p99", Quantile(values, 0.99)}};
+}
+
+/// Differences of two of the trace's times over all frames [ms].
+std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t FrameTrace::*from, int64_t FrameTrace::*to) {
+  std::vector<double> durations;
+  for (const FrameTrace& trace : traces) {
+    if (trace.*to > 0) durations.push_back(static_cast<double>(trace.*to - trace.*from) * 1e-3);
+  }
+  return durations;
+}
+
+/// The map that holds most frames, as coloured points: landmarks grey to red by motion belief, cameras blue.
+void WritePly(const std::string& path, const Map& map, MapId map_id) {
+  std::ofstream file(path);
+  std::vector<const Landmark*> landmarks;
+  for (const LandmarkId id : map.LandmarkIdsSorted()) {
+    const Landmark* landmark = map.FindLandmark(id);
+    if (landmark->map_id == map_id) landmarks.push_back(landmark);
+  }
+  std::vector<const Keyframe*> keyframes;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (keyframe.map_id == map_id) keyframes.push_back(&keyframe);
+  }
+  file << "ply\nformat ascii 1.0\ncomment map units; cameras are blue\nelement vertex "
+       << landmarks.size() + keyframes.size()
+       << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n"
+          "property uchar blue\nend_header\n";
+  char line[160];
+  for (const Landmark* landmark : landmarks) {
+    const bool moving = landmark->evidence.motion_belief > 0;
+    std::snprintf(line, sizeof(line), "%.17g %.17g %.17g %d %d %d\n", landmark->p_world.x(), landmark->p_world.y(),
+                  landmark->p_world.z(), moving ? 230 : 120, moving ? 40 : 120, moving ? 40 : 120);
+    file << line;
+  }
+  for (const Keyframe* keyframe : keyframes) {
+    const Eigen::Vector3d center = keyframe->T_cam_world.Center();
+    std::snprintf(line, sizeof(line), "%.17g %.17g %.17g 30 90 230\n", center.x(), center.y(), center.z());
+    file << line;
+  }
+  if (!file.flush()) throw InputError(path + ": cannot be written; check the folder given with --out");
+}
+
+struct Errors {
+  std::optional<AteReport> final, online;
+  std::vector<StampedPose> ground_truth;
+};
+
+Errors Evaluate(const std::string& ground_truth, const TrajectoryBuilder::Trajectories& trajectories) {
+  Errors errors;
+  if (ground_truth.empty()) return errors;
+  errors.ground_truth = ReadTrajectory(ground_truth);
+  AteReport final = EvaluateAte(errors.ground_truth, trajectories.final);
+  AteReport online = EvaluateAte(errors.ground_truth, trajectories.online);
+  if (final.usable()) errors.final = std::move(final);
+  if (online.usable()) errors.online = std::move(online);
+  return errors;
+}
+
+PlotFigure FigureOf(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories, const Errors& errors) {
+  const std::string title = run.sequence + ", " + run.mode + ", seed " + std::to_string(run.seed);
+  if (errors.final) {
+    char subtitle[120];
+    std::snprintf(subtitle, sizeof(subtitle), "ATE RMSE %.4f m, %.1f %% of %lld frames placed", errors.final->rmse(),
+                  Percent(trajectories.final.size(), run.frames_published), static_cast<long long>(run.frames_published));
+    return TrajectoryFigure(errors.ground_truth, trajectories.final, *errors.final, title, subtitle);
+  }
+  PlotFigure figure;
+  figure.title = title;
+  figure.subtitle = "no ground truth: map units";
+  PlotSeries path;
+  path.label = "camera";
+  for (const StampedPose& pose : trajectories.final) {
+    path.x.push_back(pose.T_world_cam.translation.x());
+    path.y.push_back(pose.T_world_cam.translation.z());
+  }
+  PlotPanel panel;
+  panel.title = "seen from above";
+  panel.x_label = "x [map units]";
+  panel.y_label = "z [map units]";
+  panel.equal_aspect = true;
+  panel.series = {path};
+  figure.panels = {panel};
+  return figure;
+}
+
+Json HealthJson(const RunRecord& run, double ProcessHealth::*field) {
+  Json json = Json::object();
+  for (const auto& [process, health] : run.health) json[process] = health.*field;
+  return json;
+}
+
+Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder, const TrajectoryBuilder::Trajectories& t) {
+  Json json;
+  size_t after_first = 0;
+  const auto& poses = builder.frame_poses();
+  if (!t.online.empty()) {
+    after_first = static_cast<size_t>(std::count_if(poses.begin(), poses.end(), [&](const auto& item) {
+      return item.second.stamp_ns >= t.online.front().stamp_ns;
+    }));
+  }
+  json["tracked_online_percent"] = Percent(t.online.size(), run.frames_published);
+  json["tracked_online_after_first_map_percent"] = Percent(t.online.size(), static_cast<int64_t>(after_first));
+  json["tracked_percent"] = Percent(t.final.size(), run.frames_published);
+  if (!t.online.empty() && !poses.empty()) {
+    json["first_init_s"] = static_cast<double>(t.online.front().stamp_ns - poses.begin()->second.stamp_ns) * 1e-9;
+  } else {
+    json["first_init_s"] = nullptr;
+  }
+  Json others = Json::array();
+  for (const auto& [map_id, frames] : t.other_maps) others.push_back({{"map", map_id}, {"frames", frames}});
+  json["map"] = t.map_id;
+  json["other_maps"] = others;
+  return json;
+}
+
+Json TimingJson(const RunRecord& run) {
+  const std::vector<double> step = Durations(run.traces, &FrameTrace::begin_us, &FrameTrace::tracked_us);
+  const std::vector<double> apart = Durations(run.traces, &FrameTrace::decoded_us, &FrameTrace::tracked_us);
+  Json json;
+  json["frontend_ms_median"] = Quantile(step, 0.5);
+  json["frontend_ms_p95"] = Quantile(step, 0.95);
+  json["frontend_without_decoding_ms"] = Quantiles(apart);
+  json["decode_ms"] = Quantiles(Durations(run.traces, &FrameTrace::begin_us, &FrameTrace::decoded_us));
+  json["extract_ms"] = Quantiles(Durations(run.traces, &FrameTrace::decoded_us, &FrameTrace::extracted_us));
+  json["image_to_pose_ms"] = Quantiles(Durations(run.traces, &FrameTrace::publish_us, &FrameTrace::published_us));
+  json["keyframe_to_landmarks_ms"] = {{"p50", run.mapper.landmarks_p50_ms}, {"p95", run.mapper.landmarks_p95_ms}};
+  json["keyframe_to_adjusted_ms"] = {{"p50", run.mapper.adjusted_p50_ms}, {"p95", run.mapper.adjusted_p95_ms}};
+  return json;
+}
+
+Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder, const TrajectoryBuilder::Trajectories& t,
+                 const Errors& errors) {
+  Json json;
+  json["version"] = kVersion;
+  json["sequence"] = run.sequence;
+  json["seed"] = run.seed;
+  json["mode"] = run.mode;
+  json["profile"] = run.profile;
+  json["frames"] = run.frames_published;
+  json["frames_missing"] = run.frames_missing;
+  json["frames_blacked_out"] = run.frames_blacked;
+  json["frames_jumped"] = run.frames_jumped;
+  json["frames_processed"] = run.frontend.frames_processed;
+  json["frames_skipped"] = run.frontend.frames_skipped;
+  json.update(TrackingJson(run, builder, t));
+  json["resets"] = run.resets;
+  json["relocalisations"] = run.frontend.relocalisations;
+  json["keyframes"] = t.keyframes.size();
+  json["landmarks"] = builder.map().num_landmarks();
+  json["loops"] = run.loopcloser.loops_closed;
+  json["ate_rmse_final"] = errors.final ? Json(errors.final->rmse()) : Json(nullptr);
+  json["ate_rmse_online"] = errors.online ? Json(errors.online->rmse()) : Json(nullptr);
+  json["scale_final"] = errors.final ? Json(errors.final->scale()) : Json(nullptr);
+  json.update(TimingJson(run));
+  int64_t lost = 0, repaired = 0;
+  for (const auto& [process, health] : run.health) {
+    lost += health.records_lost;
+    repaired += health.records_repaired;
+  }
+  json["records_lost"] = lost;
+  json["records_repaired"] = repaired;
+  json["restarts"] = run.restarts;
+  json["max_rss_mb"] = HealthJson(run, &ProcessHealth::rss_mb);
+  return json;
+}
+
+std::string Table(const Json& summary) {
+  std::string table;
+  const auto row = [&](const char* name, const std::string& value) {
+    char line[160];
+    std::snprintf(line, sizeof(line), "  %-34s %s\n", name, value.c_str());
+    table += line;
+  };
+  const auto number = [&](const char* key, const char* format) {
+    if (!summary.contains(key) || summary[key].is_null()) return std::string("-");
+    char text[40];
+    std::snprintf(text, sizeof(text), format, summary[key].get<double>());
+    return std::string(text);
+  };
+  row("sequence", summary["sequence"].get<std::string>());
+  row("frames published / skipped", number("frames", "%.0f") + " / " + number("frames_skipped", "%.0f"));
+  row("tracked online / in the end [%]", number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
+  row("first map after [s]", number("first_init_s", "%.2f"));
+  row("ATE RMSE final / online [m]", number("ate_rmse_final", "%.4f") + " / " + number("ate_rmse_online", "%.4f"));
+  row("keyframes / landmarks / loops",
+      number("keyframes", "%.0f") + " / " + number("landmarks", "%.0f") + " / " + number("loops", "%.0f"));
+  row("resets / relocalisations", number("resets", "%.0f") + " / " + number("relocalisations", "%.0f"));
+  row("frontend median / p95 [ms]", number("frontend_ms_median", "%.1f") + " / " + number("frontend_ms_p95", "%.1f"));
+  row("records lost / repaired", number("records_lost", "%.0f") + " / " + number("records_repaired", "%.0f"));
+  return table;
+}
+
+}  // namespace
+
+std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder) {
+  std::filesystem::create_directories(dir);
+  const TrajectoryBuilder::Trajectories trajectories = builder.Build();
+  WriteTrajectory(dir + "/trajectory.txt", trajectories.final);
+  WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online);
+  WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes);
+  WritePly(dir + "/map.ply", builder.map(), trajectories.map_id);
+  const Errors errors = Evaluate(run.ground_truth, trajectories);
+  if (!trajectories.final.empty()) WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png");
+  const Json summary = SummaryJson(run, builder, trajectories, errors);
+  std::ofstream file(dir + "/summary.json");
+  file << summary.dump(2) << "\n";
+  if (!file.flush()) throw InputError(dir + "/summary.json: cannot be written; check the folder given with --out");
+  return Table(summary);
+}
+
+}  // namespace dmslam

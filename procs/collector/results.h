@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "collector/trajectory_builder.h"
+#include "dmslam/wire/frontend_messages.h"
+#include "dmslam/wire/status.h"
+
+namespace dmslam {
+
+/// All that the summary of a run is made of.
+struct RunRecord {
+  std::string sequence, mode, profile, ground_truth;
+  uint64_t seed = 0;
+  int64_t frames_published = 0, frames_missing = 0, frames_blacked = 0, frames_jumped = 0;
+  FrontendStatus frontend;
+  MapperStatus mapper;
+  LoopcloserStatus loopcloser;
+  std::map<std::string, ProcessHealth> health;
+  std::vector<FrameTrace> traces;
+  uint64_t resets = 0;
+  int restarts = 0;
+};
+
+/// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, trajectory.png and summary.json into `dir`, and
+/// returns the summary as a table for people. Throws InputError naming what cannot be written.
+std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder);
+
+}  // namespace dmslam

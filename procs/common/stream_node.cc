@@ -1,0 +1,244 @@
+#include "common/stream_node.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <tuple>
+
+#include "common/process_info.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kStatusEveryNs = 1'000'000'000;
+
+std::string UpperCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
+  return text;
+}
+
+template <typename... Message>
+int64_t HashOf(const std::tuple<Message...>*) {
+  uint64_t hash = 0;
+  ((hash = Mix64(hash ^ static_cast<uint64_t>(wire::Info<Message>().fingerprint))), ...);
+  return static_cast<int64_t>(hash);
+}
+
+}  // namespace
+
+bool NodeOptions::HasPeer(std::string_view name) const {
+  return std::find(peers.begin(), peers.end(), name) != peers.end();
+}
+
+int64_t SchemaHash() { return HashOf(static_cast<const wire::Messages*>(nullptr)); }
+
+StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string role)
+    : context_(std::move(context)),
+      options_(std::move(options)),
+      role_(std::move(role)),
+      endpoint_(context_.bus, context_.now_ns),
+      session_(options_.session),
+      started_ns_(context_.now_ns()) {
+  Listen({channels::kCameraInfo});
+}
+
+void StreamNode::OnMessage(const std::string&, std::span<const uint8_t>) {}
+
+void StreamNode::Listen(const std::vector<std::string>& channels) {
+  other_channels_.insert(other_channels_.end(), channels.begin(), channels.end());
+  endpoint_.SetOtherHandler(other_channels_, [this](const std::string& channel, std::span<const uint8_t> bytes) {
+    Receive(channel, bytes);
+  });
+}
+
+void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  ++received_;
+  received_bytes_ += static_cast<int64_t>(bytes.size());
+  if (channel == channels::kCameraInfo) {
+    OnCameraInfo(bytes);
+  } else if (std::find(other_channels_.begin(), other_channels_.end(), channel) != other_channels_.end()) {
+    OnMessage(channel, bytes);
+  }
+}
+
+void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
+  std::optional<CameraInfo> info = Read<CameraInfo>(bytes);
+  if (!info) return;
+  if (session_ == 0) session_ = info->session;
+  if (IsForeign(info->session) || camera_info_) return;
+  camera_info_ = std::move(info);
+}
+
+bool StreamNode::IsForeign(uint32_t session) {
+  if (session == session_) return false;
+  if (dropped_foreign_++ == 0) spdlog::warn("{}: dropped a message of session {}; ours is {}", role_, session, session_);
+  return true;
+}
+
+void StreamNode::CountMalformed(const std::string& channel, const std::string& reason) {
+  ++dropped_malformed_;
+  if (std::find(logged_.begin(), logged_.end(), channel) != logged_.end()) return;
+  logged_.push_back(channel);
+  spdlog::warn("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
+}
+
+std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
+                                                     const std::vector<std::string>& record_channels, Version start) {
+  StreamReader::Options options;
+  options.session = session_;
+  options.stream = stream;
+  options.owner = owner;
+  options.reader = UpperCase(role_);
+  options.role = role_;
+  options.name = context_.name;
+  options.id = context_.random_id;
+  options.schema_hash = SchemaHash();
+  options.start = start;
+  auto reader = std::make_unique<StreamReader>(options);
+  endpoint_.AddReader(reader.get(), owner, record_channels);
+  return reader;
+}
+
+void StreamNode::RunElection() {
+  if (!plan_ || writer_ || !ReadyToWrite()) return;
+  if (!election_) {
+    WriterElection::Options options;
+    options.session = session_;
+    options.stream = plan_->stream;
+    options.owner = UpperCase(role_);
+    options.name = context_.name;
+    options.writer = context_.random_id;
+    options.schema_hash = SchemaHash();
+    options.take_over = options_.take_over;
+    if (context_.fresh_system) options.listen_ns = 0;
+    election_ = std::make_unique<WriterElection>(options, context_.now_ns());
+    endpoint_.AddElection(election_.get(), UpperCase(role_));
+    election_->Advance(context_.now_ns());
+  }
+  if (election_->state() == WriterElection::State::kRefused) Exit(3, election_->refusal());
+  if (election_->state() == WriterElection::State::kWon) OpenWriter();
+}
+
+void StreamNode::OpenWriter() {
+  StreamWriter::Options options;
+  options.session = session_;
+  options.stream = plan_->stream;
+  options.owner = UpperCase(role_);
+  options.name = context_.name;
+  options.schema_hash = SchemaHash();
+  options.link = options_.link;
+  std::vector<std::string> reader_names;
+  for (const std::string& reader : plan_->readers) {
+    options.roles.push_back({reader, options_.HasPeer(reader)});
+    reader_names.push_back(UpperCase(reader));
+  }
+  const Term term = election_->Win(context_.wall_us());
+  endpoint_.Remove(election_.get());
+  writer_ = std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots);
+  endpoint_.AddWriter(writer_.get(), UpperCase(role_), reader_names);
+  OnWriterOpen();
+}
+
+void StreamNode::WatchWriter() {
+  if (!writer_) return;
+  if (writer_->superseded_by()) Exit(4, "another writer has taken over the stream: " + *writer_->superseded_by());
+  if (writer_->close_requested_by() && !stopping_) {
+    spdlog::info("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
+    Stop();
+  }
+  if (stopping_ && writer_->closed() && !exit_code_) Exit(0);
+}
+
+void StreamNode::Advance() {
+  endpoint_.Advance();
+  if (exit_code_) return;
+  if (camera_info_ && !begun_) {
+    begun_ = true;
+    Begin(*camera_info_);
+  }
+  RunElection();
+  WatchWriter();
+  if (exit_code_) return;
+  if (begun_ && (!plan_ || writer_)) {
+    while (!exit_code_ && !stopping_ && WorkOnce()) PumpWithinWork();
+  }
+  if (context_.now_ns() >= next_status_ns_) {
+    next_status_ns_ = context_.now_ns() + kStatusEveryNs;
+    PublishStatus();
+  }
+  endpoint_.Advance();
+}
+
+void StreamNode::PumpWithinWork() {
+  if (context_.pump) context_.pump();
+  endpoint_.Advance();
+}
+
+int64_t StreamNode::deadline_ns() const {
+  return std::min({endpoint_.deadline_ns(), next_status_ns_, WorkDeadline()});
+}
+
+void StreamNode::Stop() {
+  if (stopping_) return;
+  stopping_ = true;
+  if (writer_) {
+    writer_->Close(context_.now_ns());
+  } else {
+    Exit(0);
+  }
+}
+
+void StreamNode::Exit(int code, std::string problem) {
+  if (exit_code_) return;
+  exit_code_ = code;
+  problem_ = std::move(problem);
+}
+
+StatusHead StreamNode::MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const {
+  StatusHead head;
+  head.utime = context_.wall_us();
+  head.session = session_;
+  head.reason = reason;
+  ProcessHealth& health = head.health;
+  health = MeasureProcess();
+  health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;
+  health.received = received_;
+  health.received_bytes = received_bytes_;
+  health.dropped_foreign = dropped_foreign_;
+  health.dropped_malformed = dropped_malformed_;
+  for (const StreamReader* reader : readers) {
+    if (reader == nullptr) continue;
+    const ReaderStatistics s = reader->statistics();
+    health.queue_depth += static_cast<int32_t>(s.backlog);
+    health.received += s.records;
+    health.received_bytes += s.payload_bytes;
+    health.dropped_foreign += s.dropped_foreign;
+    health.dropped_checksum += s.dropped_bad;
+    health.dropped_overflow += s.dropped_no_room;
+    health.dropped_duplicate += s.duplicates;
+    health.records_repaired += s.repaired;
+    health.records_lost += s.lost;
+  }
+  if (!writer_) return head;
+  const WriterStatistics s = writer_->statistics();
+  health.epoch = writer_->term().epoch;
+  health.written = s.records;
+  health.written_bytes = s.payload_bytes;
+  health.resent = s.parts_repaired;
+  health.kept_bytes = static_cast<int64_t>(s.kept_bytes);
+  health.readers = static_cast<int32_t>(writer_->num_readers());
+  health.snapshots = static_cast<int32_t>(s.snapshots);
+  health.refused_peers = s.refused;
+  for (const std::string& role : plan_->readers) {
+    health.unacknowledged = std::max(health.unacknowledged, static_cast<int32_t>(writer_->Backlog(role)));
+    if (options_.HasPeer(role) && !writer_->AcknowledgedBy(role)) {
+      health.waiting_for += (health.waiting_for.empty() ? "" : ", ") + role;
+    }
+  }
+  return head;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,272 @@
+#include "frontend/frontend_node.h"
+
+#include <spdlog/spdlog.h>
+
+#include <limits>
+#include <utility>
+
+#include "dmslam/util/check.h"
+#include "frontend/pictures.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kMaxUnacceptedKeyframes = 64;
+
+ImageEncoding ToImageEncoding(FrameEncoding encoding) {
+  switch (encoding) {
+    case FrameEncoding::kJpeg: return ImageEncoding::kJpeg;
+    case FrameEncoding::kPng: return ImageEncoding::kPng;
+    case FrameEncoding::kGray8: return ImageEncoding::kGray8;
+    case FrameEncoding::kRgb8: return ImageEncoding::kRgb8;
+    case FrameEncoding::kBgr8: return ImageEncoding::kBgr8;
+  }
+  return ImageEncoding::kFile;
+}
+
+}  // namespace
+
+FrontendNode::FrontendNode(NodeContext context, NodeOptions options, Extras extras)
+    : StreamNode(std::move(context), std::move(options), "frontend"), extras_(std::move(extras)) {
+  Listen({channels::kFrame, channels::kEndOfSequence});
+}
+
+void FrontendNode::Begin(const CameraInfo& info) {
+  lockstep_ = info.mode == PlaybackMode::kLockstep;
+  FrontendCore::Setup setup;
+  const Settings& settings = options_.settings;
+  setup.options = settings.frontend;
+  setup.extractor = settings.extractor;
+  setup.initializer = settings.initializer;
+  setup.camera = info.camera;
+  setup.pyramid = settings.pyramid();
+  setup.session = session_;
+  setup.seed = settings.seed;
+  setup.vocabulary = extras_.vocabulary;
+  core_ = std::make_unique<FrontendCore>(setup);
+  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
+}
+
+void FrontendNode::OnWriterOpen() {
+  SessionStart start;
+  start.session = session_;
+  start.first_stamp_ns = 0;
+  start.seed = options_.settings.seed;
+  start.configuration_hash = SettingsHash(options_.settings);
+  start.vocabulary_checksum = extras_.vocabulary ? extras_.vocabulary->checksum() : 0;
+  start.mode = camera_info_->mode;
+  start.camera = camera_info_->camera;
+  start.pyramid = options_.settings.pyramid();
+  start.sequence = camera_info_->sequence;
+  start.profile = options_.settings.profile;
+  PublishRecord(start);
+}
+
+void FrontendNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (channel == channels::kFrame) OnFrame(bytes);
+  if (channel == channels::kEndOfSequence) OnEndOfSequence(bytes);
+}
+
+void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
+  if (!camera_info_) return;  // it comes again, or it is too early
+  std::optional<Frame> frame = Read<Frame>(bytes);
+  if (!frame || IsForeign(frame->session)) return;
+  const int64_t index = frame->frame_index;
+  if (index <= last_index_) {
+    // A repeat: say again that it is done, unless it is still being worked on.
+    if (index == last_index_ && !frame_open_) PublishLoose(FrameDone{session_, frame->frame_index, frame->stamp_ns});
+    return;
+  }
+  if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return;
+  ++frames_received_;
+  if (waiting_) ++frames_skipped_;
+  waiting_ = Waiting{std::move(*frame), context_.wall_us()};
+}
+
+void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
+  std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
+  if (end && camera_info_ && !IsForeign(end->session)) end_ = std::move(end);
+}
+
+bool FrontendNode::TakeMapRecords() {
+  bool any = false;
+  while (std::optional<Record> record = map_reader_->Take()) {
+    if (record->begins_anew()) core_->ForgetMap();
+    if (const auto delta = Read<MapDelta>(*record->bytes)) core_->ApplyMapDelta(*delta);
+    map_reader_->AcceptTaken();
+    any = true;
+  }
+  return any;
+}
+
+int FrontendNode::UnacceptedKeyframes() {
+  const std::optional<int64_t> accepted = writer_->AcknowledgedBy("mapper");
+  while (accepted && !keyframe_seqs_.empty() && keyframe_seqs_.front() <= *accepted) keyframe_seqs_.pop_front();
+  return static_cast<int>(keyframe_seqs_.size());
+}
+
+bool FrontendNode::HoldsBack() const { return lockstep_ && core_->awaited().valid(); }
+
+bool FrontendNode::WorkOnce() {
+  TakeMapRecords();
+  if (HoldsBack()) return false;
+  if (frame_open_) FinishFrame();
+  if (waiting_) return ProcessWaiting();
+  return end_ ? Finish() : false;
+}
+
+bool FrontendNode::DecodeImage(const Frame& frame) {
+  const std::string name = "frame " + std::to_string(frame.frame_index);
+  try {
+    decoder_.Decode(ToImageEncoding(frame.encoding), frame.width_px, frame.height_px, frame.data, name, image_);
+  } catch (const InputError& error) {
+    if (frames_bad_++ == 0) spdlog::warn("frontend: {} (further ones are only counted)", error.what());
+    return false;
+  }
+  const Camera& camera = camera_info_->camera;
+  if (image_.width == camera.width_px && image_.height == camera.height_px) return true;
+  Exit(2, name + " is " + std::to_string(image_.width) + "x" + std::to_string(image_.height) +
+              " pixels, but the camera file says " + std::to_string(camera.width_px) + "x" +
+              std::to_string(camera.height_px) + "; give the camera file that belongs to the sequence (--camera)");
+  return false;
+}
+
+bool FrontendNode::ProcessWaiting() {
+  const Waiting waiting = std::move(*waiting_);
+  waiting_.reset();
+  last_index_ = waiting.frame.frame_index;
+  last_stamp_ns_ = waiting.frame.stamp_ns;
+  if (first_stamp_ns_ == 0) first_stamp_ns_ = last_stamp_ns_;
+  frame_open_ = true;
+  FrameTrace trace{session_, waiting.frame.frame_index, waiting.frame.stamp_ns, waiting.frame.capture_us,
+                   waiting.frame.publish_us, waiting.receive_us, context_.wall_us()};
+  if (!DecodeImage(waiting.frame)) return true;
+  trace.decoded_us = context_.wall_us();
+  core_->SetWithheld(UnacceptedKeyframes() >= kMaxUnacceptedKeyframes);
+  std::vector<FrontendEvent> events;
+  core_->ProcessImage(waiting.frame.frame_index, waiting.frame.stamp_ns,
+                      {image_.data.data(), image_.width, image_.height, image_.width}, &events);
+  trace.tracked_us = context_.wall_us();
+  trace.extracted_us = trace.decoded_us + static_cast<int64_t>(1000.0 * core_->extract_ms());
+  PublishEvents(events);
+  endpoint_.Advance();
+  ++frames_processed_;
+  PublishViews(waiting, last_pose_, trace);
+  DrawPicture();
+  if (!HoldsBack()) FinishFrame();
+  return true;
+}
+
+void FrontendNode::PublishEvents(const std::vector<FrontendEvent>& events) {
+  for (const FrontendEvent& event : events) {
+    const int64_t seq = std::visit([this](const auto& record) { return PublishRecord(record); }, event);
+    if (std::holds_alternative<KeyframeProposal>(event) || std::holds_alternative<InitialMap>(event)) {
+      keyframe_seqs_.push_back(seq);
+    }
+    if (const auto* pose = std::get_if<FramePose>(&event)) {
+      last_pose_ = *pose;
+      if (first_map_s_ < 0 && pose->HasPose()) {
+        first_map_s_ = static_cast<double>(pose->stamp_ns - first_stamp_ns_) * 1e-9;
+      }
+    }
+    if (std::holds_alternative<MapReset>(event)) first_map_s_ = -1;
+  }
+}
+
+void FrontendNode::PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace) {
+  trace.published_us = context_.wall_us();
+  latency_.Add(static_cast<double>(trace.published_us - waiting.frame.publish_us) * 1e-3);
+  decode_.Add(static_cast<double>(trace.decoded_us - trace.begin_us) * 1e-3);
+  extract_.Add(core_->extract_ms());
+  step_.Add(static_cast<double>(trace.tracked_us - trace.begin_us) * 1e-3);
+  PublishLoose(trace);
+  PoseView view;
+  view.session = session_;
+  view.frame_index = pose.frame_index;
+  view.stamp_ns = pose.stamp_ns;
+  view.state = pose.state;
+  view.map_id = pose.map_id;
+  view.has_pose = pose.HasPose();
+  if (pose.HasPose()) view.T_world_cam = pose.T_cam_world.Inverse();
+  view.inliers = pose.num_static;
+  view.moving = pose.num_moving;
+  view.unknown = pose.num_unknown;
+  view.moving_share = pose.moving_image_share;
+  view.latency_ms = static_cast<double>(trace.published_us - waiting.frame.publish_us) * 1e-3;
+  PublishLoose(view);
+  FeatureView features{session_, pose.frame_index, pose.stamp_ns, {}};
+  const TrackedFrame& frame = core_->frame();
+  features.items.reserve(frame.classes.size());
+  for (size_t i = 0; i < frame.classes.size(); ++i) {
+    const Keypoint& keypoint = frame.features->set.keypoints[i];
+    features.items.push_back({keypoint.x_q4, keypoint.y_q4, static_cast<FeatureView::Kind>(frame.classes[i])});
+  }
+  PublishLoose(features);
+}
+
+void FrontendNode::FinishFrame() {
+  frame_open_ = false;
+  PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
+}
+
+void FrontendNode::DrawPicture() {
+  if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
+  WritePicture(extras_.picture_dir, image_, core_->frame(), last_pose_);
+}
+
+bool FrontendNode::Finish() {
+  std::vector<FrontendEvent> events;
+  core_->Finish(&events);
+  PublishEvents(events);
+  PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
+  PublishStatus();
+  Stop();
+  return false;
+}
+
+void FrontendNode::PublishStatus() {
+  FrontendStatus status;
+  status.head = MakeStatusHead(core_ ? last_pose_.reason : "waiting for a camera", {map_reader_.get()});
+  status.head.health.dropped_malformed += frames_bad_;
+  if (HoldsBackForStatus()) status.head.health.waiting_for = "mapper";
+  status.frames_received = frames_received_;
+  status.frames_processed = frames_processed_;
+  status.frames_skipped = frames_skipped_;
+  status.fps = static_cast<double>(frames_processed_ - std::exchange(status_frames_, frames_processed_));
+  status.frame_index = static_cast<int32_t>(last_index_);
+  status.latency_p50_ms = latency_.Quantile(0.5);
+  status.latency_p95_ms = latency_.Quantile(0.95);
+  status.latency_p99_ms = latency_.Quantile(0.99);
+  status.decode_ms = decode_.Quantile(0.5);
+  status.extract_ms = extract_.Quantile(0.5);
+  status.step_ms = step_.Quantile(0.5);
+  status.step_p95_ms = step_.Quantile(0.95);
+  status.track_ms = status.step_ms - status.decode_ms - status.extract_ms;
+  status.first_map_s = first_map_s_;
+  if (core_) FillCoreStatus(&status);
+  PublishLoose(status);
+}
+
+bool FrontendNode::HoldsBackForStatus() const { return core_ != nullptr && HoldsBack(); }
+
+void FrontendNode::FillCoreStatus(FrontendStatus* status) const {
+  status->state = core_->state();
+  status->features = last_pose_.num_features;
+  status->inliers = last_pose_.num_static;
+  status->moving = last_pose_.num_moving;
+  status->unknown = last_pose_.num_unknown;
+  status->moving_share = last_pose_.moving_image_share;
+  status->map_id = last_pose_.map_id;
+  status->map_version = static_cast<int64_t>(core_->map().version());
+  status->map_keyframes = static_cast<int32_t>(core_->map().keyframes().size());
+  status->map_landmarks = static_cast<int32_t>(core_->map().num_landmarks());
+  const FrontendCounters& counters = core_->counters();
+  status->keyframes_proposed = static_cast<int64_t>(counters.keyframes_proposed);
+  status->keyframes_withheld = static_cast<int64_t>(counters.keyframes_withheld);
+  status->keyframes_unacknowledged = static_cast<int32_t>(keyframe_seqs_.size());
+  status->resets = static_cast<int64_t>(counters.resets);
+  status->relocalisations = static_cast<int64_t>(counters.relocalizations);
+}
+
+}  // namespace dmslam

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/latency_window.h"
+#include "common/stream_node.h"
+#include "dmslam/dataset/image.h"
+#include "frontend/frontend_core.h"
+
+namespace dmslam {
+
+/// The frontend on the bus: frames in; session, poses, keyframes and evidence out; its map comes from the map stream.
+class FrontendNode : public StreamNode {
+ public:
+  struct Extras {
+    std::shared_ptr<const Vocabulary> vocabulary;
+    std::string picture_dir;   ///< empty: no pictures
+    int picture_every = 0;     ///< every so manieth frame
+  };
+  FrontendNode(NodeContext context, NodeOptions options, Extras extras);
+
+ protected:
+  void Begin(const CameraInfo& info) override;
+  void OnWriterOpen() override;
+  bool WorkOnce() override;
+  void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
+  void PublishStatus() override;
+
+ private:
+  struct Waiting {
+    Frame frame;
+    int64_t receive_us = 0;
+  };
+
+  void OnFrame(std::span<const uint8_t> bytes);
+  void OnEndOfSequence(std::span<const uint8_t> bytes);
+  bool TakeMapRecords();
+  bool HoldsBack() const;
+  bool ProcessWaiting();
+  bool DecodeImage(const Frame& frame);
+  void PublishEvents(const std::vector<FrontendEvent>& events);
+  void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);
+  void FinishFrame();
+  void DrawPicture();
+  bool Finish();
+  int UnacceptedKeyframes();
+  bool HoldsBackForStatus() const;
+  void FillCoreStatus(FrontendStatus* status) const;
+
+  Extras extras_;
+  std::unique_ptr<FrontendCore> core_;
+  std::unique_ptr<StreamReader> map_reader_;
+  std::optional<Waiting> waiting_;
+  std::optional<EndOfSequence> end_;
+  bool lockstep_ = false;
+  bool frame_open_ = false;   ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
+  int64_t last_index_ = -1;
+  int64_t last_stamp_ns_ = 0;
+  GrayDecoder decoder_;
+  GrayImage image_;
+  std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
+  FramePose last_pose_;
+  int64_t frames_received_ = 0, frames_processed_ = 0, frames_skipped_ = 0, frames_bad_ = 0;
+  int64_t status_frames_ = 0;
+  int64_t first_stamp_ns_ = 0;
+  double first_map_s_ = -1;
+  LatencyWindow latency_, decode_, extract_, step_;
+};
+
+}  // namespace dmslam

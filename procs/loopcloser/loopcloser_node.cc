@@ -1,0 +1,66 @@
+#include "loopcloser/loopcloser_node.h"
+
+#include <utility>
+
+namespace dmslam {
+
+LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options, std::shared_ptr<const Vocabulary> vocabulary)
+    : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {}
+
+void LoopcloserNode::Begin(const CameraInfo& info) {
+  const Settings& settings = options_.settings;
+  core_ = std::make_unique<LoopcloserCore>(settings.loop, info.camera, settings.pyramid(), settings.seed, vocabulary_);
+  if (info.mode == PlaybackMode::kRealtime) core_->SetPump([this] { PumpWithinWork(); });
+  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  WantWriter({StreamId::kLoopCloser, {"mapper", "collector"}, {}, nullptr});
+}
+
+void LoopcloserNode::Apply(const MapDelta& delta) {
+  core_->ApplyMapDelta(delta);
+  ended_ = ended_ || delta.event == MapEvent::kEnded;
+  const bool asks = delta.event == MapEvent::kMapped || delta.event == MapEvent::kMapStarted;
+  if (!asks) return;
+  const int64_t begin_ns = context_.now_ns();
+  PublishRecord(core_->Check(delta.about));
+  check_.Add(static_cast<double>(context_.now_ns() - begin_ns) * 1e-6);
+}
+
+bool LoopcloserNode::WorkOnce() {
+  const std::optional<Record> record = map_reader_->Take();
+  if (!record) {
+    if (ended_) {
+      PublishStatus();
+      Stop();
+    }
+    return false;
+  }
+  if (record->begins_anew()) core_->ForgetMap();
+  if (const auto delta = Read<MapDelta>(*record->bytes)) Apply(*delta);
+  map_reader_->AcceptTaken();
+  return true;
+}
+
+void LoopcloserNode::PublishStatus() {
+  LoopcloserStatus status;
+  status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {map_reader_.get()});
+  status.state = core_ ? LoopcloserStatus::State::kWatching : LoopcloserStatus::State::kStarting;
+  status.vocabulary_checksum = vocabulary_ ? vocabulary_->checksum() : 0;
+  status.check_p50_ms = check_.Quantile(0.5);
+  status.check_p95_ms = check_.Quantile(0.95);
+  if (core_) {
+    const LoopcloserCounters& counters = core_->counters();
+    status.replica_version = static_cast<int64_t>(core_->map().version());
+    status.indexed_keyframes = static_cast<int32_t>(core_->map().keyframes().size());
+    status.keyframes_checked = static_cast<int64_t>(counters.checked);
+    status.candidates = static_cast<int64_t>(counters.candidates);
+    status.refused_consistency = static_cast<int64_t>(counters.refused_consistency);
+    status.refused_geometry = static_cast<int64_t>(counters.refused_geometry);
+    status.loops_closed = static_cast<int64_t>(counters.loops);
+    status.global_adjustments = static_cast<int64_t>(counters.global_adjustments);
+    status.last_keyframe = counters.last_keyframe;
+    status.last_loop_keyframe = counters.last_loop_keyframe;
+  }
+  PublishLoose(status);
+}
+
+}  // namespace dmslam

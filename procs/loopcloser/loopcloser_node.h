@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "common/latency_window.h"
+#include "common/stream_node.h"
+#include "loopcloser/loopcloser_core.h"
+
+namespace dmslam {
+
+/// The loop closer on the bus: keeps a replica of the map, and answers every keyframe with a correction or none.
+class LoopcloserNode : public StreamNode {
+ public:
+  LoopcloserNode(NodeContext context, NodeOptions options, std::shared_ptr<const Vocabulary> vocabulary);
+
+ protected:
+  void Begin(const CameraInfo& info) override;
+  bool WorkOnce() override;
+  void PublishStatus() override;
+
+ private:
+  void Apply(const MapDelta& delta);
+
+  std::shared_ptr<const Vocabulary> vocabulary_;
+  std::unique_ptr<LoopcloserCore> core_;
+  std::unique_ptr<StreamReader> map_reader_;
+  bool ended_ = false;
+  LatencyWindow check_;
+};
+
+}  // namespace dmslam

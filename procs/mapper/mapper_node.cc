@@ -1,0 +1,177 @@
+#include "mapper/mapper_node.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace dmslam {
+
+MapperNode::MapperNode(NodeContext context, NodeOptions options)
+    : StreamNode(std::move(context), std::move(options), "mapper") {}
+
+void MapperNode::Begin(const CameraInfo& info) {
+  lockstep_ = info.mode == PlaybackMode::kLockstep;
+  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(), uint16_t{1},
+                                       [this](const MapDelta& delta) { PublishDelta(delta); });
+  if (!lockstep_) {
+    core_->SetInterrupt([this] {
+      PumpWithinWork();
+      return KeyframeWaits();
+    });
+  }
+  snapshots_ = std::make_unique<MapSnapshots>(&core_->map());
+  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
+                                {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+                                 channels::kFrameEvidence, channels::kMapReset});
+  loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked});
+  WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
+}
+
+void MapperNode::PublishDelta(const MapDelta& delta) {
+  PublishRecord(delta);
+  endpoint_.Advance();
+  const double elapsed_ms = static_cast<double>(context_.now_ns() - keyframe_begin_ns_) * 1e-6;
+  if (delta.event == MapEvent::kLandmarksCreated) to_landmarks_.Add(elapsed_ms);
+  if (delta.event == MapEvent::kAdjusted) to_adjusted_.Add(elapsed_ms);
+}
+
+bool MapperNode::KeyframeWaits() const {
+  return std::any_of(taken_.begin(), taken_.end(),
+                     [](const Record& record) { return record.channel == channels::kKeyframe; }) ||
+         frontend_reader_->statistics().backlog > 60;
+}
+
+void MapperNode::TakeLoopAnswers() {
+  while (std::optional<Record> record = loop_reader_->Take()) {
+    if (auto answer = Read<LoopAnswer>(*record->bytes)) answers_.push_back(std::move(*answer));
+    loop_reader_->AcceptTaken();
+  }
+}
+
+bool MapperNode::WorkOnce() {
+  TakeLoopAnswers();
+  while (std::optional<Record> record = frontend_reader_->Take()) taken_.push_back(std::move(*record));
+  AcceptWhatIsSafe();
+  if (awaited_.valid()) {
+    SettleAwaited();
+    return !awaited_.valid();
+  }
+  if (!lockstep_ && !answers_.empty()) {
+    core_->OnLoopAnswer(answers_.front());
+    answers_.pop_front();
+    return true;
+  }
+  if (taken_.empty()) return EndIfDone();
+  const Record record = std::move(taken_.front());
+  taken_.pop_front();
+  Handle(record);
+  pending_.push_back({record.version(), writer_->last_seq()});
+  AcceptWhatIsSafe();
+  return true;
+}
+
+void MapperNode::Handle(const Record& record) {
+  if (record.channel == channels::kInitialMap) {
+    if (const auto proposal = Read<InitialMap>(*record.bytes)) HandleInitialMap(*proposal);
+  } else if (record.channel == channels::kKeyframe) {
+    if (const auto proposal = Read<KeyframeProposal>(*record.bytes)) HandleKeyframe(*proposal);
+  } else if (record.channel == channels::kFrameEvidence) {
+    if (const auto evidence = Read<FrameEvidence>(*record.bytes)) core_->OnEvidence(*evidence);
+  } else if (record.channel == channels::kMapReset) {
+    if (const auto reset = Read<MapReset>(*record.bytes)) core_->OnReset(*reset);
+  }
+}
+
+void MapperNode::HandleInitialMap(const InitialMap& proposal) {
+  keyframe_begin_ns_ = context_.now_ns();
+  const bool started = core_->OnInitialMap(proposal);
+  AfterKeyframe(proposal.second.id, proposal.map_id, started);
+}
+
+void MapperNode::HandleKeyframe(const KeyframeProposal& proposal) {
+  keyframe_begin_ns_ = context_.now_ns();
+  const bool inserted = core_->OnKeyframe(proposal);
+  AfterKeyframe(proposal.id, proposal.map_id, inserted);
+}
+
+void MapperNode::AfterKeyframe(KeyframeId id, MapId map_id, bool checked_by_loopcloser) {
+  awaited_ = id;
+  awaited_map_ = map_id;
+  const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer("loopcloser");
+  if (wait) return;
+  core_->Settle(id, map_id);
+  last_settled_ = std::exchange(awaited_, {});
+}
+
+/// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be due.
+void MapperNode::SettleAwaited() {
+  while (!answers_.empty() && awaited_.valid()) {
+    const LoopAnswer answer = std::move(answers_.front());
+    answers_.pop_front();
+    core_->OnLoopAnswer(answer);
+    if (answer.keyframe != awaited_) continue;
+    core_->Settle(awaited_, awaited_map_);
+    last_settled_ = std::exchange(awaited_, {});
+  }
+}
+
+void MapperNode::AcceptWhatIsSafe() {
+  while (!pending_.empty() && writer_->AcknowledgedByAny(pending_.front().map_seq)) {
+    frontend_reader_->Accept(pending_.front().of_frontend);
+    pending_.pop_front();
+  }
+}
+
+bool MapperNode::EndIfDone() {
+  if (ended_ || !frontend_reader_->AtEnd()) return false;
+  const bool loop_done = !options_.HasPeer("loopcloser") || loop_reader_->AtEnd();
+  if (!end_announced_) {
+    end_announced_ = true;
+    core_->End();
+    return true;
+  }
+  if (!loop_done) return false;
+  ended_ = true;
+  PublishStatus();
+  Stop();
+  return false;
+}
+
+void MapperNode::PublishStatus() {
+  MapperStatus status;
+  status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
+  status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
+  status.keyframe_queue = static_cast<int32_t>(taken_.size());
+  status.keyframes_unaccepted = static_cast<int32_t>(pending_.size());
+  status.last_settled = last_settled_;
+  status.landmarks_p50_ms = to_landmarks_.Quantile(0.5);
+  status.landmarks_p95_ms = to_landmarks_.Quantile(0.95);
+  status.adjusted_p50_ms = to_adjusted_.Quantile(0.5);
+  status.adjusted_p95_ms = to_adjusted_.Quantile(0.95);
+  if (core_) FillCoreStatus(&status);
+  PublishLoose(status);
+}
+
+void MapperNode::FillCoreStatus(MapperStatus* status) const {
+  const Map& map = core_->map();
+  const MapperCounters& counters = core_->counters();
+  status->version = static_cast<int64_t>(map.version());
+  status->maps = static_cast<int32_t>(counters.maps_started - counters.maps_dropped);
+  status->keyframes = static_cast<int32_t>(map.keyframes().size());
+  status->landmarks = static_cast<int32_t>(map.num_landmarks());
+  status->keyframes_inserted = static_cast<int64_t>(counters.keyframes_inserted);
+  status->keyframes_culled = static_cast<int64_t>(counters.keyframes_culled);
+  status->landmarks_created = counters.creation.created;
+  status->landmarks_culled = static_cast<int64_t>(counters.landmarks_culled);
+  status->landmarks_fused = static_cast<int64_t>(counters.fusions);
+  status->observations_dropped = static_cast<int64_t>(counters.observations_dropped);
+  status->refused_neighbourhood = counters.creation.refused_neighbourhood + counters.creation.refused_count;
+  status->refused_motion = static_cast<int64_t>(counters.landmarks_moving_removed);
+  status->refused_geometry = counters.creation.refused_parallax + counters.creation.refused_depth +
+                             counters.creation.refused_reprojection + counters.creation.refused_scale;
+  status->corrections_applied = static_cast<int64_t>(counters.corrections_applied);
+  status->corrections_refused = static_cast<int64_t>(counters.corrections_refused);
+}
+
+}  // namespace dmslam

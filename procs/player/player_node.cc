@@ -1,0 +1,252 @@
+#include "player/player_node.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+
+#include "common/process_info.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kInfoEveryNs = 500'000'000;
+constexpr int64_t kRepeatEveryNs = 300'000'000;
+constexpr int64_t kStatusEveryNs = 1'000'000'000;
+constexpr int64_t kEndEveryNs = 200'000'000;
+constexpr int64_t kEndTimeoutNs = 60'000'000'000;
+constexpr uint32_t kEndIndex = std::numeric_limits<uint32_t>::max();
+
+std::string SequenceName(const std::string& path) {
+  const std::filesystem::path p = std::filesystem::path(path).lexically_normal();
+  return p.filename().empty() ? p.parent_path().filename().string() : p.filename().string();
+}
+
+FrameEncoding ToFrameEncoding(ImageEncoding encoding) {
+  switch (encoding) {
+    case ImageEncoding::kPng: return FrameEncoding::kPng;
+    case ImageEncoding::kGray8: return FrameEncoding::kGray8;
+    case ImageEncoding::kRgb8: return FrameEncoding::kRgb8;
+    case ImageEncoding::kBgr8: return FrameEncoding::kBgr8;
+    default: return FrameEncoding::kJpeg;
+  }
+}
+
+/// Frames in the order of play: jumps taken out.
+std::vector<size_t> OrderOfPlay(const PlayerOptions& options, size_t available, size_t* jumped) {
+  std::vector<size_t> order;
+  for (size_t i = options.start; i < available && order.size() < options.frames; ++i) {
+    order.push_back(i);
+    for (const PlayerOptions::Jump& jump : options.jumps) {
+      if (jump.from == i && jump.to > i) {
+        *jumped += jump.to - i - 1;
+        i = jump.to - 1;
+        break;
+      }
+    }
+  }
+  return order;
+}
+
+}  // namespace
+
+PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_ptr<FrameSource> source)
+    : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
+  order_ = OrderOfPlay(options_, source_->size(), &jumped_);
+  if (order_.empty()) {
+    throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) + " leaves no frame of " +
+                     std::to_string(source_->size()));
+  }
+  if (const auto path = source_->GroundTruthPath()) ground_truth_ = ReadTrajectory(*path);
+  context_.bus->Subscribe(channels::kFrameDone);
+  context_.bus->SetHandler(
+      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
+  start_ns_ = context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
+}
+
+template <typename Message>
+void PlayerNode::Publish(const Message& message) {
+  context_.bus->Publish({wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
+}
+
+void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (channel != channels::kFrameDone) return;
+  const std::optional<FrameDone> done = wire::Decode<FrameDone>(bytes);
+  if (!done || done->session != options_.session) return;
+  if (done->frame_index == kEndIndex) end_heard_ = true;
+  if (awaiting_done_ && done->frame_index == frame_.frame_index) awaiting_done_ = false;
+}
+
+void PlayerNode::PublishCameraInfo() {
+  CameraInfo info;
+  info.utime = context_.wall_us();
+  info.session = options_.session;
+  info.camera = options_.camera;
+  info.sequence = SequenceName(options_.sequence);
+  info.num_frames = static_cast<int64_t>(order_.size());
+  info.first_frame = static_cast<uint32_t>(order_.front());
+  info.mode = options_.mode;
+  info.speed = options_.speed;
+  Publish(info);
+}
+
+int64_t PlayerNode::DueNs(size_t position) const {
+  if (options_.mode == PlaybackMode::kLockstep || options_.speed <= 0) return start_ns_;
+  const int64_t since_first = source_->StampNs(order_[position]) - source_->StampNs(order_.front());
+  return start_ns_ + static_cast<int64_t>(static_cast<double>(since_first) / options_.speed);
+}
+
+bool PlayerNode::FrameIsDue() const {
+  return position_ < order_.size() && !awaiting_done_ && context_.now_ns() >= DueNs(position_);
+}
+
+bool PlayerNode::IsBlack(size_t index) const {
+  const double seconds = static_cast<double>(source_->StampNs(index)) * 1e-9;
+  return std::any_of(options_.black_outs.begin(), options_.black_outs.end(), [&](const PlayerOptions::BlackOut& b) {
+    const size_t from = std::min(b.from, source_->size() - 1);
+    const double begin = static_cast<double>(source_->StampNs(from)) * 1e-9;
+    return index >= from && seconds < begin + b.seconds;
+  });
+}
+
+void PlayerNode::Encode(const EncodedImage& image, size_t index) {
+  const bool compressed = image.encoding == ImageEncoding::kJpeg || image.encoding == ImageEncoding::kPng;
+  if (compressed && !options_.reencode) {
+    frame_.encoding = ToFrameEncoding(image.encoding);
+    frame_.data = image.bytes;
+    return;
+  }
+  const GrayImage gray = DecodeGray(image, source_->Name(index));
+  frame_.encoding = options_.encoding;
+  switch (options_.encoding) {
+    case FrameEncoding::kPng: frame_.data = EncodePng(gray); break;
+    case FrameEncoding::kGray8:
+      frame_.data = gray.data;
+      frame_.width_px = gray.width;
+      frame_.height_px = gray.height;
+      break;
+    default:
+      frame_.encoding = FrameEncoding::kJpeg;
+      frame_.data = EncodeJpeg(gray, options_.jpeg_quality);
+  }
+}
+
+bool PlayerNode::MakeFrame(size_t index) {
+  frame_ = Frame();
+  frame_.session = options_.session;
+  frame_.frame_index = static_cast<uint32_t>(index);
+  frame_.stamp_ns = source_->StampNs(index);
+  frame_.capture_us = context_.wall_us();
+  try {
+    if (IsBlack(index)) {
+      ++black_;
+      frame_.data = EncodePng(GrayImage(options_.camera.width_px, options_.camera.height_px));
+      frame_.encoding = FrameEncoding::kPng;
+    } else {
+      EncodedImage image = source_->Read(index);
+      if (image.encoding == ImageEncoding::kFile) image.encoding = DetectEncoding(image.bytes);
+      Encode(image, index);
+    }
+  } catch (const InputError& error) {
+    if (unreadable_++ == 0) spdlog::warn("{} (left out; further ones are only counted)", error.what());
+    if (unreadable_ == order_.size()) problem_ = std::string(error.what()) + "; no frame could be read";
+    return false;
+  }
+  return true;
+}
+
+void PlayerNode::PublishFrame() {
+  const size_t index = order_[position_];
+  late_ms_ = static_cast<double>(context_.now_ns() - DueNs(position_)) * 1e-6;
+  ++position_;
+  if (!MakeFrame(index)) {
+    if (!problem_.empty()) exit_code_ = 1;
+    return;
+  }
+  frame_.publish_us = context_.wall_us();
+  frame_bytes_ = std::make_shared<const Bytes>(wire::Encode(frame_));
+  context_.bus->Publish({channels::kFrame, frame_bytes_, false});
+  ++published_;
+  PublishGroundTruth(index);
+  awaiting_done_ = options_.mode == PlaybackMode::kLockstep;
+  next_repeat_ns_ = context_.now_ns() + kRepeatEveryNs;
+}
+
+void PlayerNode::PublishGroundTruth(size_t index) {
+  const int64_t stamp_ns = source_->StampNs(index);
+  const auto at = std::lower_bound(ground_truth_.begin(), ground_truth_.end(), stamp_ns,
+                                   [](const StampedPose& pose, int64_t stamp) { return pose.stamp_ns < stamp; });
+  if (at == ground_truth_.end() || at->stamp_ns - stamp_ns > 10'000'000) return;
+  Publish(GroundTruthPose{options_.session, static_cast<uint32_t>(index), at->stamp_ns, at->T_world_cam});
+}
+
+void PlayerNode::PublishEnd() {
+  EndOfSequence end;
+  end.utime = context_.wall_us();
+  end.session = options_.session;
+  end.frames_published = published_;
+  end.frames_listed = static_cast<int64_t>(source_->size() + source_->missing());
+  end.frames_missing = static_cast<int64_t>(source_->missing() + unreadable_);
+  end.frames_blacked = static_cast<int64_t>(black_);
+  end.frames_jumped = static_cast<int64_t>(jumped_);
+  end.last_frame_index = static_cast<int32_t>(frame_.frame_index);
+  end.last_stamp_ns = frame_.stamp_ns;
+  Publish(end);
+}
+
+void PlayerNode::PublishStatus(PlayerStatus::State state) {
+  PlayerStatus status;
+  status.head.utime = context_.wall_us();
+  status.head.session = options_.session;
+  status.head.health = MeasureProcess();
+  if (awaiting_done_) status.head.health.waiting_for = "frontend";
+  status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
+  status.frames_published = published_;
+  status.frames_total = static_cast<int64_t>(order_.size());
+  status.frames_missing = static_cast<int64_t>(source_->missing() + unreadable_);
+  status.repeats = repeats_;
+  status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  status.late_ms = late_ms_;
+  Publish(status);
+}
+
+void PlayerNode::Advance() {
+  const int64_t now = context_.now_ns();
+  if (exit_code_) return;
+  if (now >= next_info_ns_) {
+    next_info_ns_ = now + kInfoEveryNs;
+    PublishCameraInfo();
+  }
+  if (now >= next_status_ns_) {
+    next_status_ns_ = now + kStatusEveryNs;
+    PublishStatus(position_ < order_.size() ? PlayerStatus::State::kPlaying : PlayerStatus::State::kDone);
+  }
+  if (FrameIsDue()) PublishFrame();
+  if (awaiting_done_ && now >= next_repeat_ns_) {
+    next_repeat_ns_ = now + kRepeatEveryNs;
+    ++repeats_;
+    context_.bus->Publish({channels::kFrame, frame_bytes_, false});
+  }
+  if (position_ < order_.size() || awaiting_done_) return;
+  if (end_since_ns_ == 0) end_since_ns_ = now;
+  if (end_heard_) exit_code_ = 0;
+  if (now >= next_end_ns_) {
+    next_end_ns_ = now + kEndEveryNs;
+    PublishEnd();
+  }
+  if (now - end_since_ns_ > kEndTimeoutNs) {
+    exit_code_ = 5;
+    problem_ = "no frontend answered the end of the sequence; is it running on the same bus?";
+  }
+}
+
+int64_t PlayerNode::deadline_ns() const {
+  int64_t deadline = std::min(next_info_ns_, next_status_ns_);
+  if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
+  if (position_ < order_.size()) return std::min(deadline, DueNs(position_));
+  return std::min(deadline, next_end_ns_);
+}
+
+}  // namespace dmslam

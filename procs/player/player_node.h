@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/node.h"
+#include "dmslam/camera/camera.h"
+#include "dmslam/dataset/frame_source.h"
+#include "dmslam/dataset/trajectory.h"
+#include "dmslam/messaging/bus.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+
+/// What is played, and how.
+struct PlayerOptions {
+  std::string sequence;        ///< path of what is played; its last part names it
+  Camera camera;
+  uint32_t session = 1;
+  PlaybackMode mode = PlaybackMode::kRealtime;
+  double speed = 1.0;          ///< factor on the recorded rate; 0: as fast as possible
+  size_t start = 0;            ///< first frame
+  size_t frames = SIZE_MAX;    ///< at most so many
+  FrameEncoding encoding = FrameEncoding::kJpeg;
+  int jpeg_quality = 90;
+  bool reencode = false;       ///< files that are JPEG or PNG travel as they are, unless this is set
+  double lead_s = 0.5;         ///< between the first camera info and the first frame, so that others can get ready
+  struct BlackOut {
+    size_t from = 0;
+    double seconds = 0;
+  };
+  std::vector<BlackOut> black_outs;
+  struct Jump {
+    size_t from = 0;
+    size_t to = 0;
+  };
+  std::vector<Jump> jumps;
+};
+
+/// Feeds frames to the bus, in real time or in lock-step.
+class PlayerNode : public Node {
+ public:
+  PlayerNode(NodeContext context, PlayerOptions options, std::unique_ptr<FrameSource> source);
+
+  void Advance() override;
+  int64_t deadline_ns() const override;
+  void Stop() override { exit_code_ = 0; }
+  std::optional<int> exit_code() const override { return exit_code_; }
+  std::string problem() const override { return problem_; }
+
+  int64_t published() const { return published_; }
+  size_t total() const { return order_.size(); }
+
+ private:
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void PublishCameraInfo();
+  bool FrameIsDue() const;
+  void PublishFrame();
+  bool MakeFrame(size_t index);
+  void Encode(const EncodedImage& image, size_t index);
+  void PublishGroundTruth(size_t index);
+  void PublishEnd();
+  void PublishStatus(PlayerStatus::State state);
+  int64_t DueNs(size_t position) const;
+  bool IsBlack(size_t index) const;
+  template <typename Message>
+  void Publish(const Message& message);
+
+  NodeContext context_;
+  PlayerOptions options_;
+  std::unique_ptr<FrameSource> source_;
+  std::vector<StampedPose> ground_truth_;
+  std::vector<size_t> order_;   ///< indices into the source, in order of play
+  size_t jumped_ = 0, black_ = 0, unreadable_ = 0;
+  size_t position_ = 0;         ///< next of `order_`
+  Frame frame_;                 ///< the newest one published
+  SharedBytes frame_bytes_;
+  bool awaiting_done_ = false;  ///< lock-step
+  bool end_heard_ = false;
+  int64_t start_ns_ = 0;        ///< when the first frame is due
+  int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0, next_end_ns_ = 0;
+  int64_t end_since_ns_ = 0;
+  int64_t published_ = 0, repeats_ = 0;
+  double late_ms_ = 0;
+  std::optional<int> exit_code_;
+  std::string problem_;
+};
+
+}  // namespace dmslam

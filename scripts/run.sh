@@ -1,0 +1,151 @@
+#!/usr/bin/env bash
+# Plays a sequence through the real processes and writes the results. See --help.
+set -euo pipefail
+
+top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+usage() {
+  cat <<'EOF'
+Usage: scripts/run.sh --sequence DIR --out DIR [options]
+
+Plays a sequence (TUM RGB-D folder, EuRoC folder, numbered images, video) through player, frontend, mapper and loop
+closer, four processes on a private LCM port, and writes into the --out folder: trajectory.txt (final, TUM format),
+trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs.
+
+  --camera FILE       camera file (YAML); found by itself for TUM freiburg1/2/3
+  --lockstep          wait for every frame: the same input and seed give the same bytes
+  --speed X           real time at X times the recorded rate (default 1)
+  --seed N            seed of everything random (default 1)
+  --start I           first frame
+  --frames N          at most so many frames
+  --config FILE       settings (YAML)
+  --set KEY=VALUE     one setting; may be repeated (docs/configuration.md)
+  --profile NAME      dm (default) or baseline: plain RANSAC start, no mutual exclusion, no motion belief
+  --no-loop           do not close loops
+  --pictures N        draw the features of every Nth frame into DIR/pictures
+  --record            record everything with lcm-logger into DIR/run.lcmlog
+  --black-out F,S     black frames from frame F on for S seconds; may be repeated
+  --jump F,T          after frame F go on with frame T; may be repeated
+  --port N            UDP port (default: a free one)
+  --build-dir DIR     where the programs are (default: build/release, built first where needed)
+EOF
+}
+fail() { echo "run.sh: $*" >&2; exit 1; }
+
+sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build=""
+player=() common=()
+need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --sequence) need "$@"; sequence=$2; shift 2 ;;
+    --out) need "$@"; out=$2; shift 2 ;;
+    --camera) need "$@"; camera=$2; shift 2 ;;
+    --lockstep) lockstep=1; shift ;;
+    --speed) need "$@"; player+=(--speed "$2"); shift 2 ;;
+    --seed) need "$@"; seed=$2; shift 2 ;;
+    --start | --frames | --black-out | --jump) need "$@"; player+=("$1" "$2"); shift 2 ;;
+    --config) need "$@"; common+=(--config "$2"); shift 2 ;;
+    --set) need "$@"; common+=(--set "$2"); shift 2 ;;
+    --profile) need "$@"; profile=$2; shift 2 ;;
+    --no-loop) common+=(--set loop.enabled=off); shift ;;
+    --pictures) need "$@"; pictures=$2; shift 2 ;;
+    --record) record=1; shift ;;
+    --port) need "$@"; port=$2; shift 2 ;;
+    --build-dir) need "$@"; build=$2; shift 2 ;;
+    -h | --help) usage; exit 0 ;;
+    *) fail "unknown option $1 (see --help)" ;;
+  esac
+done
+[ -n "$sequence" ] || fail "--sequence is missing (see --help)"
+[ -n "$out" ] || fail "--out is missing (see --help)"
+[ -e "$sequence" ] || fail "$sequence: no such folder or file; check --sequence"
+[ "$profile" = "" ] || [ "$profile" = dm ] || [ "$profile" = baseline ] || fail "--profile $profile: write dm or baseline"
+
+if [ -z "$build" ]; then
+  build="$top/build/release"
+  "$top/scripts/build.sh" >&2 || fail "the build failed; its log is above"
+fi
+bin="$build/bin"
+[ -x "$bin/dmslam-frontend" ] || fail "$bin has no dmslam-frontend; build first, or leave --build-dir out"
+
+port_taken() { grep -qi ":$(printf '%04X' "$1") " /proc/net/udp /proc/net/udp6 2>/dev/null; }
+if [ -n "$port" ]; then
+  [[ "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1024 ] && [ "$port" -le 65535 ] || fail "--port $port: write a port between 1024 and 65535"
+  if port_taken "$port"; then fail "UDP port $port is taken; choose another with --port, or leave it out"; fi
+else
+  for _ in $(seq 50); do
+    port=$((20000 + RANDOM % 30000))
+    port_taken "$port" || break
+  done
+fi
+url="udpm://239.255.76.67:$port?ttl=0&recv_buf_size=4194304"
+
+mkdir -p "$out/log" || fail "$out cannot be made; check --out"
+session=$((RANDOM * 32768 + RANDOM + 1))
+common+=(--set "seed=$seed" --lcm-url "$url" --session "$session" --fresh-system
+  --peers frontend,mapper,loopcloser,collector)
+[ -n "$profile" ] && common=(--set "profile=$profile" "${common[@]}")
+[ -n "$camera" ] && player+=(--camera "$camera")
+[ "$lockstep" = 1 ] && player+=(--lockstep)
+ground_truth=()
+[ -f "$sequence/groundtruth.txt" ] && ground_truth=(--ground-truth "$sequence/groundtruth.txt")
+drawing=()
+if [ "$pictures" != 0 ]; then
+  mkdir -p "$out/pictures"
+  drawing=(--picture-dir "$out/pictures" --picture-every "$pictures")
+fi
+
+declare -A pid_of=()
+logger=""
+stop_all() {
+  trap - INT TERM EXIT
+  local p
+  for p in "${pid_of[@]}"; do kill -TERM "$p" 2>/dev/null || true; done
+  [ -n "$logger" ] && kill -INT "$logger" 2>/dev/null || true
+  for p in "${pid_of[@]}" $logger; do
+    timeout 5 tail --pid="$p" -f /dev/null 2>/dev/null || kill -KILL "$p" 2>/dev/null || true
+  done
+}
+trap 'stop_all; exit 130' INT TERM
+trap stop_all EXIT
+
+launch() { # name, arguments...
+  local name=$1; shift
+  "$bin/dmslam-$name" "$@" >"$out/log/$name.log" 2>&1 &
+  pid_of[$name]=$!
+}
+if [ "$record" = 1 ]; then
+  command -v lcm-logger >/dev/null || fail "lcm-logger is missing; run scripts/setup.sh tools"
+  rm -f "$out/run.lcmlog"
+  lcm-logger --lcm-url="$url" "$out/run.lcmlog" >"$out/log/logger.log" 2>&1 &
+  logger=$!
+fi
+launch mapper "${common[@]}"
+launch loopcloser "${common[@]}"
+launch frontend "${common[@]}" "${drawing[@]}"
+if [ -t 2 ]; then errors=/dev/stderr; else errors="$out/log/collector.log"; fi
+"$bin/dmslam-collector" "${common[@]}" --out "$out" "${ground_truth[@]}" >"$out/log/table.txt" 2>"$errors" &
+pid_of[collector]=$!
+launch player "${common[@]}" "${player[@]}" --sequence "$sequence"
+
+# The collector ends last. Whoever fails before it ends the run.
+why() { grep -hE "error|critical" "$out/log/$1.log" 2>/dev/null | tail -n 1 | sed 's/^[0-9:.]* //'; }
+code=0
+while [ ${#pid_of[@]} -gt 0 ]; do
+  ended=""
+  wait -n -p ended "${pid_of[@]}" && status=0 || status=$?
+  for name in "${!pid_of[@]}"; do
+    if [ "${pid_of[$name]}" = "$ended" ]; then break; fi
+  done
+  unset "pid_of[$name]"
+  if [ "$status" != 0 ]; then
+    message=$(why "$name")
+    echo "run.sh: ${message:-$name ended with code $status; its log is $out/log/$name.log}" >&2
+    code=$status
+    break
+  fi
+  [ "$name" = collector ] && break
+done
+stop_all
+cat "$out/log/table.txt"
+[ "$code" = 0 ] && echo "results: $out (picture: $out/trajectory.png)"
+exit "$code"

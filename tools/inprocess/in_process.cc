@@ -1,0 +1,81 @@
+#include "in_process.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "frontend/frontend_node.h"
+#include "loopcloser/loopcloser_node.h"
+#include "mapper/mapper_node.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kClockStartNs = 1'000'000'000;
+
+/// The nodes, their ports, and the time they share.
+class System {
+ public:
+  NodeContext ContextFor(const std::string& name) {
+    NodeContext context;
+    context.bus = &bus_.AddPort();
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    context.random_id = static_cast<int64_t>(nodes_.size()) + 1;
+    context.name = name;
+    context.fresh_system = true;
+    return context;
+  }
+  void Add(std::unique_ptr<Node> node) { nodes_.push_back(std::move(node)); }
+
+  /// Runs until all are done, or one fails. Returns the first exit code that is not zero.
+  int Run(std::string* problem) {
+    while (true) {
+      bool all_done = true;
+      for (const auto& node : nodes_) {
+        if (!node->exit_code()) node->Advance();
+        if (!node->exit_code()) all_done = false;
+        if (node->exit_code().value_or(0) != 0) {
+          *problem = node->problem();
+          return *node->exit_code();
+        }
+      }
+      if (all_done) return 0;
+      bool delivered = false;
+      while (bus_.DeliverOne()) delivered = true;
+      if (!delivered) AdvanceClock();
+    }
+  }
+
+ private:
+  void AdvanceClock() {
+    int64_t next = INT64_MAX;
+    for (const auto& node : nodes_) {
+      if (!node->exit_code()) next = std::min(next, node->deadline_ns());
+    }
+    now_ns_ = std::max(now_ns_ + 1000, next == INT64_MAX ? now_ns_ + 1'000'000 : next);
+  }
+
+  MemoryBus bus_;
+  int64_t now_ns_ = kClockStartNs;
+  std::vector<std::unique_ptr<Node>> nodes_;
+};
+
+}  // namespace
+
+int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem) {
+  options.player.mode = PlaybackMode::kLockstep;
+  options.node.session = options.player.session;
+  options.node.peers = {"frontend", "mapper", "loopcloser", "collector"};
+  System system;
+  system.Add(std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
+  system.Add(std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
+  system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node));
+  system.Add(std::make_unique<FrontendNode>(
+      system.ContextFor("frontend"), options.node,
+      FrontendNode::Extras{options.vocabulary, options.picture_dir, options.picture_every}));
+  system.Add(std::make_unique<PlayerNode>(system.ContextFor("player"), options.player, std::move(source)));
+  return system.Run(problem);
+}
+
+}  // namespace dmslam

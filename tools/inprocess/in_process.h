@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "collector/collector_node.h"
+#include "player/player_node.h"
+
+namespace dmslam {
+
+/// A whole run in one process: the nodes of the four processes and of the collector on a bus in memory, in lock-step,
+/// under a virtual clock, one thread. Gives the same bytes as the processes do.
+struct InProcessOptions {
+  NodeOptions node;                                ///< settings; session and peers are set by the run
+  PlayerOptions player;
+  CollectorOptions collector;
+  std::shared_ptr<const Vocabulary> vocabulary;
+  std::string picture_dir;
+  int picture_every = 0;
+  bool progress = false;
+};
+
+/// Returns the collector's exit code; what went wrong is in `problem`.
+int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem);
+
+}  // namespace dmslam

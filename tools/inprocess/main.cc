@@ -1,0 +1,86 @@
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+
+#include "common/process_main.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
+#include "in_process.h"
+
+namespace {
+
+struct Arguments {
+  std::string sequence, out, camera, config, vocabulary, profile;
+  std::vector<std::string> overrides;
+  size_t start = 0, frames = SIZE_MAX;
+  uint64_t seed = 1;
+  int pictures = 0;
+  bool no_loop = false;
+};
+
+void Declare(CLI::App& app, Arguments& a) {
+  app.set_version_flag("--version", dmslam::kVersion);
+  app.add_option("--sequence", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video")->required();
+  app.add_option("--out", a.out, "folder for the results")->required();
+  app.add_option("--camera", a.camera, "camera file (YAML); found by itself for TUM freiburg1/2/3");
+  app.add_option("--config", a.config, "settings (YAML)");
+  app.add_option("--set", a.overrides, "one setting: key=value; may be repeated");
+  app.add_option("--profile", a.profile, "dm or baseline")->check(CLI::IsMember({"dm", "baseline"}));
+  app.add_option("--seed", a.seed)->capture_default_str();
+  app.add_option("--start", a.start, "first frame");
+  app.add_option("--frames", a.frames, "at most so many frames");
+  app.add_option("--pictures", a.pictures, "draw every so manieth frame");
+  app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
+  app.add_flag("--no-loop", a.no_loop, "do not close loops");
+}
+
+dmslam::Camera ChooseCamera(const Arguments& a) {
+  if (!a.camera.empty()) return dmslam::LoadCamera(a.camera);
+  if (const auto found = dmslam::FindCamera(a.sequence, dmslam::FindDataFolder("config"))) return *found;
+  throw dmslam::InputError(a.sequence + ": which camera took this is not known; name its file with --camera");
+}
+
+int Run(const Arguments& a) {
+  dmslam::InProcessOptions options;
+  std::vector<std::string> overrides;
+  if (!a.profile.empty()) overrides.push_back("profile=" + a.profile);
+  overrides.push_back("seed=" + std::to_string(a.seed));
+  if (a.no_loop) overrides.push_back("loop.enabled=off");
+  overrides.insert(overrides.end(), a.overrides.begin(), a.overrides.end());
+  options.node.settings = dmslam::LoadSettings(a.config, overrides);
+  auto source = dmslam::OpenFrameSource(a.sequence);
+  options.player.sequence = a.sequence;
+  options.player.camera = ChooseCamera(a);
+  options.player.start = a.start;
+  options.player.frames = a.frames;
+  options.collector.out_dir = a.out;
+  options.collector.ground_truth = source->GroundTruthPath().value_or("");
+  options.vocabulary = dmslam::LoadVocabulary(a.vocabulary);
+  options.picture_every = a.pictures;
+  options.picture_dir = a.out + "/pictures";
+  std::filesystem::create_directories(a.pictures > 0 ? options.picture_dir : a.out);
+  std::string problem;
+  const int code = dmslam::RunInProcess(std::move(options), std::move(source), &problem);
+  if (!problem.empty()) spdlog::error("{}", problem);
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Runs frontend, mapper, loop closer and player in one process, in lock-step.", "dmslam-inprocess");
+  Arguments arguments;
+  Declare(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  spdlog::set_default_logger(spdlog::stderr_color_mt("dmslam-inprocess"));
+  try {
+    return Run(arguments);
+  } catch (const dmslam::InputError& error) {
+    spdlog::error("{}", error.what());
+    return 1;
+  }
+}
