@@ -56,10 +56,14 @@ class Adjustment {
     if (BuildCeresProblem() == 0) {
       report.message = "nothing to adjust";
     } else {
-      bool sound = SolveStage(options_.first_iterations, true, report);
-      if (sound && !report.interrupted && options_.second_iterations > 0) {
+      const bool two_stages = options_.second_iterations > 0;
+      const double tolerance = options_.relative_tolerance;
+      // The first of two stages only has to tell the outliers.
+      bool sound =
+          SolveStage(options_.first_iterations, two_stages ? 10.0 * tolerance : tolerance, true, report);
+      if (sound && !report.interrupted && two_stages) {
         SetAsideOutliers();
-        sound = SolveStage(options_.second_iterations, options_.second_stage_robust, report);
+        sound = SolveStage(options_.second_iterations, tolerance, options_.second_stage_robust, report);
       }
       report.usable = sound && AllFinite();
     }
@@ -170,11 +174,11 @@ class Adjustment {
     if (!PoseHeld(o.pose)) ordering_->AddElementToGroup(pose.step.data(), 1);
   }
 
-  bool SolveStage(int iterations, bool robust, BundleReport& report) {
+  bool SolveStage(int iterations, double tolerance, bool robust, BundleReport& report) {
     loss_.robust = robust;
     ceres::Solver::Options options = QuietSolverOptions();
     options.max_num_iterations = iterations;
-    options.function_tolerance = options_.relative_tolerance;
+    options.function_tolerance = tolerance;
     const int free_poses = static_cast<int>(problem_.T_cam_world.size()) - num_held_;
     options.linear_solver_type = free_poses <= kMaxPosesDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>(*ordering_);

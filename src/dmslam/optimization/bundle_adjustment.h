@@ -35,7 +35,9 @@ struct BundleOptions {
   double max_chi2 = 5.991;  ///< Outlier: squared error * inv_sigma_squared above this, or behind the camera.
   double huber_delta = 2.447651936;  ///< sqrt(5.991), on the error in sigmas.
   bool second_stage_robust = false;  ///< Keep Huber's loss in the second stage.
-  double relative_tolerance = 1e-4;  ///< A stage ends when a step gains less than this share of the cost.
+  /// A stage ends when a step gains less than this share of the cost (ten times it in the first of two
+  /// stages).
+  double relative_tolerance = 1e-4;
   /// Without a fixed pose, pose 0 is held. With exactly one pose held the scale is free as well; then, if
   /// this is set, poses and points are rescaled about the held camera at the end, so that the farthest camera
   /// keeps its distance.
