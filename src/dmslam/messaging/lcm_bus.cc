@@ -1,10 +1,11 @@
 #include "dmslam/messaging/lcm_bus.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
-#include <regex>
+#include <string_view>
 #include <utility>
 
 #include "dmslam/util/check.h"
@@ -16,15 +17,24 @@ constexpr int64_t kWantedReceiveBuffer = 4 << 20;
 
 bool IsUdp(const std::string& url) { return url.rfind("udpm://", 0) == 0; }
 
-// The value of `key` in the URL's query.
-std::optional<std::string> QueryValue(const std::string& url, const std::string& key) {
-  std::smatch match;
-  if (!std::regex_search(url, match, std::regex("[?&]" + key + "=([^&]*)"))) return std::nullopt;
-  return match[1];
+// Where the value of `key` stands in the URL's query: its offset and length.
+std::optional<std::pair<size_t, size_t>> FindQueryValue(const std::string& url, const std::string& key) {
+  for (size_t at = url.find('?'); at != std::string::npos; at = url.find('&', at + 1)) {
+    if (url.compare(at + 1, key.size() + 1, key + "=") != 0) continue;
+    const size_t begin = at + key.size() + 2;
+    return std::pair(begin, std::min(url.find('&', begin), url.size()) - begin);
+  }
+  return std::nullopt;
 }
 
-std::string WithQuery(const std::string& url, const std::string& key, const std::string& value) {
-  if (QueryValue(url, key)) return std::regex_replace(url, std::regex("([?&]" + key + "=)[^&]*"), "$01" + value);
+std::optional<std::string> QueryValue(const std::string& url, const std::string& key) {
+  const auto place = FindQueryValue(url, key);
+  if (!place) return std::nullopt;
+  return url.substr(place->first, place->second);
+}
+
+std::string WithQuery(std::string url, const std::string& key, const std::string& value) {
+  if (const auto place = FindQueryValue(url, key)) return url.replace(place->first, place->second, value);
   return url + (url.find('?') == std::string::npos ? "?" : "&") + key + "=" + value;
 }
 
@@ -55,8 +65,14 @@ std::string NoteOnReceiveBuffer(const std::string& url) {
   return note;
 }
 
-std::string EscapedForRegex(const std::string& name) {
-  return std::regex_replace(name, std::regex(R"([.\\+*?\[\]^$(){}|])"), R"(\$&)");
+// LCM takes a channel to subscribe to for a regular expression.
+std::string Literally(const std::string& name) {
+  std::string pattern;
+  for (const char c : name) {
+    if (std::string_view(".\\+*?[]^$(){}|").find(c) != std::string_view::npos) pattern += '\\';
+    pattern += c;
+  }
+  return pattern;
 }
 
 }  // namespace
@@ -89,7 +105,7 @@ LcmBus::LcmBus(Options options) : options_(std::move(options)) {
 LcmBus::~LcmBus() = default;
 
 void LcmBus::Subscribe(const std::string& channel) {
-  const std::string pattern = EscapedForRegex(options_.prefix + channel);
+  const std::string pattern = Literally(options_.prefix + channel);
   lcm::Subscription* subscription = impl_->lcm.subscribe(pattern, &Impl::OnMessage, impl_.get());
   if (subscription == nullptr || impl_->lcm.getFileno() < 0) {
     throw InputError("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));

@@ -36,10 +36,19 @@ uint32_t PartChecksum(std::span<const uint8_t> bytes) {
   return Crc32c(bytes.subspan(kPartDataOffset), Crc32c(bytes.first(kPartCrcOffset)));
 }
 
+bool IsCount(int64_t value) { return value >= 0 && value < kMaxSeq; }
+
+bool IsPlausible(const head_t& head) {
+  return IsCount(head.header.seq) && IsCount(head.first_seq) && head.first_seq <= head.header.seq + 1 &&
+         head.snapshots >= 0 && head.snapshot_total >= 0 && IsCount(head.snapshot_cut) &&
+         IsCount(head.snapshot_first) && IsCount(head.snapshot_last) && head.header.epoch < 2 * kMaxSeq;
+}
+
 }  // namespace
 
 std::optional<head_t> DecodeHead(std::string_view channel, std::span<const uint8_t> bytes) {
-  return DecodeSealed<head_t>(channel, bytes, FixedThenStrings(bytes, 4 * 4 + 6 * 8, 1));
+  std::optional<head_t> head = DecodeSealed<head_t>(channel, bytes, FixedThenStrings(bytes, 4 * 4 + 6 * 8, 1));
+  return head && IsPlausible(*head) ? head : std::nullopt;
 }
 
 std::optional<ack_t> DecodeAck(std::string_view channel, std::span<const uint8_t> bytes) {
@@ -66,7 +75,7 @@ std::optional<part_t> DecodePart(std::span<const uint8_t> bytes) {
   const int64_t num_bytes = walk.Skip(8).Count();
   if (!walk.Skip(4 + 8 + 4 + 4 + 4).Array(num_bytes, 1).complete()) return std::nullopt;
   std::optional<part_t> part = DecodeWalked<part_t>(bytes);
-  if (part && (part->num_bytes == 0 || part->offset < 0 || part->total_bytes < part->num_bytes ||
+  if (part && (part->num_bytes == 0 || part->seq < 1 || part->seq >= kMaxSeq || part->offset < 0 || part->total_bytes < part->num_bytes ||
                part->offset > part->total_bytes - part->num_bytes)) {
     return std::nullopt;
   }

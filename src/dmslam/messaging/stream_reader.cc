@@ -179,7 +179,7 @@ void StreamReader::ReceivePart(std::span<const uint8_t> bytes) {
   const bool in_snapshot = snapshot_ && snapshot_->number != 0;
   if (in_snapshot && part->stream_key == KeyOf(snapshot_->number)) window = &snapshot_->window;
   if ((state_ == State::kFollowing || in_snapshot) && part->stream_key == KeyOf(0)) window = &window_;
-  if (window == nullptr || part->seq < 1) {
+  if (window == nullptr) {
     ++statistics_.dropped_stale;
     return;
   }
@@ -217,9 +217,8 @@ void StreamReader::ReceiveRecord(const std::string& channel, std::span<const uin
 
 // Where a record belongs: the stream's window or the snapshot's, if it is of the term that is followed.
 ReceiveWindow* StreamReader::WindowOf(const RecordHeader& header) {
-  if (Term{header.epoch, header.writer} != term_ || header.seq < 1 || header.session != options_.session) {
-    return nullptr;
-  }
+  if (Term{header.epoch, header.writer} != term_ || header.session != options_.session) return nullptr;
+  if (header.seq < 1 || header.seq >= kMaxSeq) return nullptr;
   const bool in_snapshot = snapshot_ && snapshot_->number != 0;
   if ((header.flags & RecordHeader::FLAG_SNAPSHOT) != 0) {
     return in_snapshot && header.parent_epoch == snapshot_->number ? &snapshot_->window : nullptr;
