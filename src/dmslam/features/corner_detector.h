@@ -33,7 +33,7 @@ class CornerSelector {
   struct Options {
     int cell_size_px = 32;
     int strong_threshold = 20;
-    double rank_decay = 0.9;
+    double rank_decay = 0.8;
   };
 
   /// At most `count` of `corners` (in reading order), into `chosen` in reading order. Ties go to the earlier corner.

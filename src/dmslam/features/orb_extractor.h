@@ -16,7 +16,7 @@ struct OrbExtractorOptions {
   int fast_threshold = 20;     ///< a corner's least difference to its circle [grey values], 1..254
   int min_fast_threshold = 7;  ///< the same for cells without any corner above `fast_threshold`, 1..fast_threshold
   int cell_size_px = 32;       ///< side of the cells over which keypoints are spread [px of the level], >= 8
-  double rank_decay = 0.9;     ///< worth of a cell's next corner relative to the one before, 0..1; see CornerSelector
+  double rank_decay = 0.8;     ///< worth of a cell's next corner relative to the one before, 0..1; see CornerSelector
   int border_px = 16;          ///< keypoints keep this far from the edges of their level [px of the level], >= 16
   SimdPath simd_path = SimdPath::kBest;
 

@@ -1,0 +1,276 @@
+#include "dmslam/features/orb_extractor.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "dmslam/features/gray_image.h"
+#include "dmslam/features/subpixel.h"
+#include "dmslam/features/testing/allocation_counter.h"
+#include "dmslam/features/testing/synthetic_images.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+using testing::RandomRectangles;
+using testing::Turned;
+
+FeatureSet Extract(const GrayImage& image, const OrbExtractorOptions& options = {}) {
+  FeatureSet features;
+  OrbExtractor(options).Extract(image.View(), &features);
+  return features;
+}
+
+TEST(OrbExtractor, FindsTheCornersOfASquare) {
+  GrayImage image(200, 160, 60);
+  for (int y = 50; y < 110; ++y) {
+    for (int x = 60; x < 140; ++x) image.at(x, y) = 200;
+  }
+  const FeatureSet features = Extract(image);
+  const double corners[4][2] = {{60, 50}, {139, 50}, {60, 109}, {139, 109}};
+  for (const auto& corner : corners) {
+    double nearest = 1e9;
+    for (const Keypoint& k : features.keypoints) {
+      if (k.octave == 0) nearest = std::min(nearest, std::hypot(k.x_px() - corner[0], k.y_px() - corner[1]));
+    }
+    EXPECT_LT(nearest, 2.5);  // scores around a perfect corner are equal: the first counts
+  }
+  for (const Keypoint& k : features.keypoints) {
+    double nearest = 1e9;
+    for (const auto& corner : corners) nearest = std::min(nearest, std::hypot(k.x_px() - corner[0], k.y_px() - corner[1]));
+    EXPECT_LT(nearest, 4.0 * std::pow(1.2, k.octave)) << "a keypoint away from every corner";
+  }
+}
+
+TEST(OrbExtractor, OrientationPointsToTheBrightSide) {
+  GrayImage image(120, 120, 40);
+  for (int y = 60; y < 120; ++y) {
+    for (int x = 60; x < 120; ++x) image.at(x, y) = 220;  // bright towards +x +y: an eighth of a turn
+  }
+  OrbExtractorOptions options;
+  options.pyramid.levels = 1;
+  const FeatureSet features = Extract(image, options);
+  ASSERT_GE(features.size(), 1U);
+  for (const Keypoint& k : features.keypoints) EXPECT_NEAR(k.angle, 32, 3);
+}
+
+TEST(OrbExtractor, GivesTheNumberAskedAndUniqueKeypoints) {
+  const FeatureSet features = Extract(RandomRectangles(640, 480, 600, 1));
+  EXPECT_EQ(features.size(), 1000U);
+  EXPECT_EQ(features.descriptors.size(), 1000U);
+  std::set<Keypoint> unique(features.keypoints.begin(), features.keypoints.end());
+  EXPECT_EQ(unique.size(), 1000U);
+  std::array<int, 8> per_octave{};
+  for (const Keypoint& k : features.keypoints) ++per_octave[k.octave];
+  for (size_t i = 0; i < 8; ++i) {
+    const double share = std::pow(1 / 1.2, static_cast<double>(i)) * (1 - 1 / 1.2) / (1 - std::pow(1 / 1.2, 8));
+    EXPECT_NEAR(per_octave[i], 1000 * share, 0.25 * 1000 * share) << "octave " << i;
+  }
+}
+
+TEST(OrbExtractor, DescriptorsTurnWithTheImage) {
+  const GrayImage image = RandomRectangles(400, 400, 250, 2);
+  const FeatureSet upright = Extract(image);
+  for (const double degrees : {20.0, 90.0, 145.0}) {
+    const double radians = degrees * std::numbers::pi / 180.0;
+    const FeatureSet turned = Extract(Turned(image, radians));
+    int repeated = 0, alike = 0;
+    double turn_error = 0.0;
+    for (size_t i = 0; i < upright.size(); ++i) {
+      const double dx = upright.keypoints[i].x_px() - 199.5, dy = upright.keypoints[i].y_px() - 199.5;
+      const double x = std::cos(radians) * dx - std::sin(radians) * dy + 199.5;
+      const double y = std::sin(radians) * dx + std::cos(radians) * dy + 199.5;
+      for (size_t j = 0; j < turned.size(); ++j) {
+        const Keypoint& k = turned.keypoints[j];
+        if (k.octave != upright.keypoints[i].octave || std::hypot(k.x_px() - x, k.y_px() - y) > 1.0) continue;
+        ++repeated;
+        if (HammingDistance(upright.descriptors[i], turned.descriptors[j]) <= 50) ++alike;
+        const int turn = (k.angle - upright.keypoints[i].angle - static_cast<int>(std::lround(degrees / 360 * 256))) & 255;
+        turn_error += std::min(turn, 256 - turn);
+        break;
+      }
+    }
+    EXPECT_GT(repeated, 250) << degrees;
+    EXPECT_GT(alike, 0.8 * repeated) << degrees;
+    EXPECT_LT(turn_error / repeated, 8.0) << degrees;
+  }
+}
+
+TEST(OrbExtractor, KeypointsSpreadOverTheImage) {
+  // Strong corners on the left, weak ones on the right: with rank_decay the right side gets its share.
+  GrayImage image = RandomRectangles(640, 480, 900, 3);
+  for (int y = 0; y < 480; ++y) {
+    for (int x = 320; x < 640; ++x) image.at(x, y) = static_cast<uint8_t>(96 + image.at(x, y) / 4);
+  }
+  const auto share_on_the_right = [&](double rank_decay) {
+    OrbExtractorOptions options;
+    options.rank_decay = rank_decay;
+    const FeatureSet features = Extract(image, options);
+    int right = 0;
+    for (const Keypoint& k : features.keypoints) right += k.x_px() > 330 ? 1 : 0;
+    return static_cast<double>(right) / static_cast<double>(features.size());
+  };
+  EXPECT_LT(share_on_the_right(1.0), 0.1);
+  EXPECT_GT(share_on_the_right(0.7), share_on_the_right(1.0) + 0.02);
+  EXPECT_GT(share_on_the_right(0.0), 0.4);
+}
+
+TEST(OrbExtractor, WeakCornersServeOnlyWhereThereAreNoStrongOnes) {
+  GrayImage image(300, 200, 100);
+  const auto square = [&](int x0, int y0, int value) {
+    for (int y = y0; y < y0 + 12; ++y) {
+      for (int x = x0; x < x0 + 12; ++x) image.at(x, y) = static_cast<uint8_t>(value);
+    }
+  };
+  square(50, 50, 200);
+  square(74, 74, 112);    // contrast 12, in the cell of the strong square's corner
+  square(170, 120, 112);  // contrast 12, alone
+  OrbExtractorOptions options;
+  options.pyramid.levels = 1;
+  options.cell_size_px = 96;
+  const FeatureSet features = Extract(image, options);
+  int strong = 0, shadowed = 0, alone = 0;
+  for (const Keypoint& k : features.keypoints) {
+    strong += k.x_px() < 66 ? 1 : 0;
+    shadowed += k.x_px() > 70 && k.x_px() < 90 ? 1 : 0;
+    alone += k.x_px() > 160 ? 1 : 0;
+  }
+  EXPECT_GT(strong, 3);
+  EXPECT_EQ(shadowed, 0);
+  EXPECT_GT(alone, 3);
+}
+
+TEST(OrbExtractor, IsTheSameOnEveryPathAndEveryTime) {
+  for (const auto& [width, height] : {std::pair(640, 480), std::pair(333, 251), std::pair(97, 61)}) {
+    const GrayImage image = RandomRectangles(width, height, width, 4);
+    OrbExtractorOptions options;
+    options.simd_path = SimdPath::kPortable;
+    const FeatureSet portable = Extract(image, options);
+    ASSERT_GT(portable.size(), 20U);
+    for (const SimdPath path : {SimdPath::kSse2, SimdPath::kAvx2, SimdPath::kBest}) {
+      if (!HasSimdPath(path)) continue;
+      options.simd_path = path;
+      OrbExtractor extractor(options);
+      for (int repeat = 0; repeat < 2; ++repeat) {
+        FeatureSet features;
+        extractor.Extract(image.View(), &features);
+        EXPECT_EQ(features.keypoints, portable.keypoints);
+        EXPECT_EQ(features.descriptors, portable.descriptors);
+      }
+    }
+  }
+}
+
+TEST(OrbExtractor, DoesNotDependOnWhatItSawBefore) {
+  const GrayImage image = RandomRectangles(320, 240, 200, 5), other = RandomRectangles(500, 300, 300, 6);
+  OrbExtractor extractor;
+  FeatureSet features;
+  extractor.Extract(other.View(), &features);
+  extractor.Extract(image.View(), &features);
+  const FeatureSet fresh = Extract(image);
+  EXPECT_EQ(features.keypoints, fresh.keypoints);
+  EXPECT_EQ(features.descriptors, fresh.descriptors);
+}
+
+TEST(OrbExtractor, ReadsNothingBesideTheView) {
+  // The same pixels inside a larger picture with another surrounding.
+  const GrayImage image = RandomRectangles(200, 150, 120, 7);
+  GrayImage larger = RandomRectangles(260, 170, 200, 8);
+  for (int y = 0; y < 150; ++y) {
+    for (int x = 0; x < 200; ++x) larger.at(x + 30, y + 10) = image.at(x, y);
+  }
+  const GrayView inside{larger.pixels.data() + 10 * 260 + 30, 200, 150, 260};
+  FeatureSet features;
+  OrbExtractor().Extract(inside, &features);
+  EXPECT_EQ(features.descriptors, Extract(image).descriptors);
+}
+
+TEST(OrbExtractor, AllocatesNothingOnceItKnowsTheSize) {
+  const GrayImage plain = RandomRectangles(640, 480, 20, 9), rich = RandomRectangles(640, 480, 2000, 10);
+  OrbExtractor extractor;
+  FeatureSet features;
+  extractor.Extract(plain.View(), &features);
+  const size_t before = testing::NumAllocations();
+  extractor.Extract(rich.View(), &features);
+  extractor.Extract(plain.View(), &features);
+  EXPECT_EQ(testing::NumAllocations(), before);
+  FeatureSet another;
+  another.keypoints.reserve(1);
+  EXPECT_GT(testing::NumAllocations(), before) << "the counter must count";
+}
+
+TEST(OrbExtractor, SmallAndBlankImagesGiveNothing) {
+  FeatureSet features;
+  OrbExtractor extractor;
+  for (const auto& [width, height] : {std::pair(0, 0), std::pair(1, 1), std::pair(32, 32), std::pair(500, 7)}) {
+    const GrayImage image(width, height, 7);
+    extractor.Extract(image.View(), &features);
+    EXPECT_EQ(features.size(), 0U) << width << "x" << height;
+  }
+  for (const auto& [width, height] : {std::pair(33, 33), std::pair(640, 480), std::pair(641, 479)}) {
+    extractor.Extract(GrayImage(width, height, 200).View(), &features);
+    EXPECT_EQ(features.size(), 0U) << width << "x" << height;
+  }
+}
+
+TEST(OrbExtractor, WideImagesUseEverySixteenth) {
+  const GrayImage image = RandomRectangles(4095, 64, 400, 11);
+  const FeatureSet features = Extract(image);
+  ASSERT_GT(features.size(), 100U);
+  double rightmost = 0.0;
+  for (const Keypoint& k : features.keypoints) rightmost = std::max(rightmost, k.x_px());
+  EXPECT_GT(rightmost, 3800.0);
+  EXPECT_THROW(Extract(GrayImage(4096, 64)), InvariantError);
+}
+
+TEST(OrbExtractor, ScaleFactorTwoAndOddSizes) {
+  OrbExtractorOptions options;
+  options.pyramid = {6, 2.0};
+  EXPECT_GT(Extract(RandomRectangles(641, 483, 500, 12), options).size(), 300U);
+}
+
+TEST(OrbExtractorOptions, NamesTheFieldThatIsWrong) {
+  const auto message_of = [](auto change) -> std::string {
+    OrbExtractorOptions options;
+    change(options);
+    try {
+      options.Check();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message_of([](OrbExtractorOptions&) {}), "");
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.num_features = 0; }).find("num_features"), std::string::npos);
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.border_px = 15; }).find("border_px"), std::string::npos);
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.pyramid.scale_factor = 2.5; }).find("scale_factor"),
+            std::string::npos);
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.min_fast_threshold = 21; }).find("min_fast_threshold"),
+            std::string::npos);
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.rank_decay = std::nan(""); }).find("rank_decay"),
+            std::string::npos);
+}
+
+TEST(RefineMaximum, FindsThePeakOfAParabola) {
+  for (const auto& [px, py] : {std::pair(0.0, 0.0), std::pair(0.3, -0.2), std::pair(-0.45, 0.4)}) {
+    uint8_t scores[9];
+    for (int i = 0; i < 9; ++i) {
+      const double dx = i % 3 - 1 - px, dy = i / 3 - 1 - py;
+      scores[i] = static_cast<uint8_t>(std::lround(220 - 25 * dx * dx - 18 * dy * dy - 8 * dx * dy));
+    }
+    const SubpixelOffset offset = RefineMaximum(scores);
+    EXPECT_NEAR(offset.x, px, 0.02);
+    EXPECT_NEAR(offset.y, py, 0.02);
+  }
+  const uint8_t flat[9] = {5, 5, 5, 5, 5, 5, 5, 5, 5};
+  EXPECT_EQ(RefineMaximum(flat).x, 0.0);
+  const uint8_t valley[9] = {9, 9, 9, 9, 1, 9, 9, 9, 9};
+  EXPECT_EQ(RefineMaximum(valley).y, 0.0);
+}
+
+}  // namespace
+}  // namespace dmslam
