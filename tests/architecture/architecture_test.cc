@@ -1,0 +1,200 @@
+// The direction between rooms, read from the includes: who may use whom, and where third-party libraries may appear.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+using Names = std::set<std::string>;
+
+/// The rooms that a room may use besides itself.
+const std::map<std::string, Names>& AllowedRooms() {
+  static const std::map<std::string, Names> allowed = [] {
+    std::map<std::string, Names> a;
+    a["util"] = {};
+    a["geometry"] = {"util"};
+    a["camera"] = a["robust"] = {"util", "geometry"};
+    a["features"] = {"util", "geometry", "camera", "robust"};
+    a["motion_segmentation"] = a["map"] = {"util", "geometry", "camera", "robust", "features"};
+    a["optimization"] = a["place_recognition"] = {"util",     "geometry",           "camera", "robust",
+                                                  "features", "motion_segmentation", "map"};
+    a["dataset"] = {"util", "geometry", "camera"};
+    a["synthetic"] = a["evaluation"] = {"util", "geometry", "camera", "dataset"};
+    a["messaging"] = {"util"};
+    a["wire"] = {"util", "geometry", "camera", "features", "map", "messaging"};
+    return a;
+  }();
+  return allowed;
+}
+
+struct Include {
+  std::string file;  ///< relative to the project
+  int line = 0;
+  std::string target;  ///< as written between the quotes or brackets
+};
+
+fs::path SourceDir() {
+  const char* dir = std::getenv("DMSLAM_SOURCE_DIR");
+  return dir != nullptr ? fs::path(dir) : fs::current_path();
+}
+
+bool IsSource(const fs::path& path) {
+  return path.extension() == ".h" || path.extension() == ".cc" || path.extension() == ".cpp" || path.extension() == ".hpp";
+}
+
+std::vector<Include> ReadIncludes(const std::string& text, const std::string& file) {
+  static const std::regex pattern(R"re(^\s*#\s*include\s*[<"]([^>"]+)[>"])re");
+  std::vector<Include> includes;
+  std::istringstream lines(text);
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    std::smatch match;
+    if (std::regex_search(line, match, pattern)) includes.push_back({file, number, match[1]});
+  }
+  return includes;
+}
+
+std::vector<Include> ReadFolder(const std::string& folder) {
+  std::vector<Include> all;
+  if (!fs::is_directory(SourceDir() / folder)) return all;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(SourceDir() / folder)) {
+    if (!entry.is_regular_file() || !IsSource(entry.path())) continue;
+    std::ifstream stream(entry.path());
+    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    const std::vector<Include> found = ReadIncludes(text, fs::relative(entry.path(), SourceDir()).string());
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  return all;
+}
+
+bool StartsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
+bool EndsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+/// "geometry" of "src/dmslam/geometry/rigid3.h" and of "dmslam/geometry/rigid3.h"; empty for other paths.
+std::string RoomOf(const std::string& path) {
+  static const std::regex pattern(R"(^(?:src/)?dmslam/([a-z_0-9]+)/)");
+  std::smatch match;
+  return std::regex_search(path, match, pattern) ? match[1].str() : "";
+}
+
+std::string FileName(const std::string& path) { return fs::path(path).filename().string(); }
+
+/// Why an include of a room is an arrow in the wrong direction; empty where it is not.
+std::string Upward(const Include& include) {
+  const std::string room = RoomOf(include.file);
+  const auto allowed = AllowedRooms().find(room);
+  if (allowed == AllowedRooms().end()) return "the room '" + room + "' has no place in the order";
+  const std::string used = RoomOf(include.target);
+  if (used.empty() || used == room || allowed->second.count(used) > 0) return "";
+  return room + " may not use " + used;
+}
+
+/// Why a third-party header may not be included here; empty where it may.
+std::string Misplaced(const Include& include) {
+  const std::string room = RoomOf(include.file);
+  const std::string& target = include.target;
+  if (StartsWith(target, "ceres/")) {
+    if (room == "optimization" || (room == "geometry" && target == "ceres/tiny_solver.h")) return "";
+    return "Ceres belongs to optimization";
+  }
+  if (StartsWith(target, "lcm/") || EndsWith(target, "_t.hpp")) {
+    return room == "messaging" || room == "wire" ? "" : "LCM and its generated types belong to messaging and wire";
+  }
+  if (StartsWith(target, "opencv2/")) {
+    const bool drawing = FileName(include.file).find("plot") != std::string::npos ||
+                         FileName(include.file).find("picture") != std::string::npos ||
+                         FileName(include.file).find("draw") != std::string::npos;
+    if (room == "features" || room == "dataset" || drawing || StartsWith(include.file, "tools/")) return "";
+    return "OpenCV belongs to features, dataset and drawing code";
+  }
+  return "";
+}
+
+/// A process's core knows no bus, no threads and no other process's files.
+std::string NotForCores(const Include& include) {
+  static const std::regex core(R"(^procs/[a-z]+/.*_core\.(h|cc)$)");
+  if (!std::regex_search(include.file, core)) return "";
+  const std::string used = RoomOf(include.target);
+  if (used == "messaging" || used == "wire") return "a core knows no " + used;
+  static const Names threads = {"thread", "mutex", "condition_variable", "future", "atomic"};
+  return threads.count(include.target) > 0 ? "a core knows no threads" : "";
+}
+
+/// Processes share only procs/common and each other's options (for the settings).
+std::string Neighbour(const Include& include) {
+  static const std::regex place(R"(^procs/([a-z_]+)/)");
+  static const std::regex used(R"(^([a-z_]+)/[a-z_0-9]+\.h$)");
+  std::smatch from, to;
+  if (!std::regex_search(include.file, from, place) || !std::regex_search(include.target, to, used)) return "";
+  static const Names processes = {"player", "frontend", "mapper", "loopcloser", "collector", "viewer"};
+  if (processes.count(to[1]) == 0 || to[1] == from[1]) return "";
+  if (from[1] == "common") return "";  // the settings hold the options of all
+  return "procs/" + from[1].str() + " may not use procs/" + to[1].str();
+}
+
+using Rule = std::string (*)(const Include&);
+
+void ExpectNone(const std::vector<Include>& includes, Rule rule) {
+  for (const Include& include : includes) {
+    const std::string why = rule(include);
+    EXPECT_EQ(why, "") << include.file << ":" << include.line << " includes " << include.target;
+  }
+}
+
+TEST(ArchitectureTest, RoomsUseOnlyRoomsBelowThem) {
+  const std::vector<Include> includes = ReadFolder("src/dmslam");
+  ASSERT_GT(includes.size(), 200u) << "no sources under " << SourceDir() << "; set DMSLAM_SOURCE_DIR";
+  ExpectNone(includes, &Upward);
+}
+
+TEST(ArchitectureTest, TheOrderHasNoCircle) {
+  for (const auto& [room, below] : AllowedRooms()) {
+    for (const std::string& other : below) {
+      ASSERT_TRUE(AllowedRooms().count(other)) << other;
+      EXPECT_EQ(AllowedRooms().at(other).count(room), 0u) << room << " and " << other;
+    }
+  }
+}
+
+TEST(ArchitectureTest, ThirdPartyLibrariesStayInTheirRooms) {
+  for (const char* folder : {"src", "procs", "tools"}) ExpectNone(ReadFolder(folder), &Misplaced);
+}
+
+TEST(ArchitectureTest, CoresKnowNoBusAndNoThreads) { ExpectNone(ReadFolder("procs"), &NotForCores); }
+
+TEST(ArchitectureTest, ProcessesDoNotUseEachOther) { ExpectNone(ReadFolder("procs"), &Neighbour); }
+
+TEST(ArchitectureTest, RulesSeeWhatIsWrong) {
+  const auto one = [](const std::string& file, const std::string& target) {
+    const std::vector<Include> found = ReadIncludes("// text\n  # include \"" + target + "\"\n", file);
+    EXPECT_EQ(found.size(), 1u);
+    EXPECT_EQ(found.at(0).line, 2);
+    return found.at(0);
+  };
+  EXPECT_NE(Upward(one("src/dmslam/geometry/x.cc", "dmslam/map/map.h")), "");
+  EXPECT_NE(Upward(one("src/dmslam/messaging/x.cc", "dmslam/wire/codec.h")), "");
+  EXPECT_NE(Upward(one("src/dmslam/unheard/x.cc", "dmslam/util/check.h")), "");
+  EXPECT_EQ(Upward(one("src/dmslam/map/x.cc", "dmslam/geometry/rigid3.h")), "");
+  EXPECT_NE(Misplaced(one("src/dmslam/map/x.cc", "ceres/ceres.h")), "");
+  EXPECT_NE(Misplaced(one("procs/mapper/mapper_core.cc", "opencv2/core.hpp")), "");
+  EXPECT_NE(Misplaced(one("procs/mapper/mapper_node.cc", "dmslam/map_record_t.hpp")), "");
+  EXPECT_EQ(Misplaced(one("src/dmslam/optimization/x.cc", "ceres/ceres.h")), "");
+  EXPECT_NE(NotForCores(one("procs/mapper/mapper_core.cc", "dmslam/messaging/bus.h")), "");
+  EXPECT_NE(NotForCores(one("procs/frontend/frontend_core.h", "thread")), "");
+  EXPECT_NE(Neighbour(one("procs/frontend/frontend_core.cc", "mapper/mapper_core.h")), "");
+}
+
+}  // namespace
