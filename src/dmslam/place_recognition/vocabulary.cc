@@ -284,7 +284,9 @@ std::vector<WordIndex> Vocabulary::Quantize(std::span<const Descriptor> features
   return nodes;
 }
 
-BowImage Vocabulary::Transform(std::span<const Descriptor> features, int node_level) const {
+BowImage Vocabulary::Transform(std::span<const Descriptor> features, int node_level,
+                               std::span<const uint8_t> counted) const {
+  DMSLAM_CHECK(counted.empty() || counted.size() == features.size(), "one flag per descriptor, or none");
   DMSLAM_CHECK(node_level >= 0, "levels are counted from the root, which is 0");
   std::vector<NodeIndex> leaves;
   std::vector<NodeIndex> at_level;
@@ -293,8 +295,12 @@ BowImage Vocabulary::Transform(std::span<const Descriptor> features, int node_le
   image.nodes.reserve(features.size());
   for (uint32_t i = 0; i < features.size(); ++i) image.nodes.push_back({at_level[i], i});
   std::sort(image.nodes.begin(), image.nodes.end());
-  for (NodeIndex& leaf : leaves) leaf = word_of_leaf(leaf);
-  image.words = WeighWords(std::move(leaves), *this);
+  std::vector<WordIndex> words;
+  words.reserve(leaves.size());
+  for (size_t i = 0; i < leaves.size(); ++i) {
+    if (counted.empty() || counted[i] != 0) words.push_back(word_of_leaf(leaves[i]));
+  }
+  image.words = WeighWords(std::move(words), *this);
   return image;
 }
 

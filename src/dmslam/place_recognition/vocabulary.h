@@ -50,9 +50,11 @@ class Vocabulary {
   void Save(const std::filesystem::path& path) const;
 
   /// Words (tf-idf, L1-normalised) and direct index of an image. `node_level`: the level, counted from the
-  /// root, whose nodes the direct index names; leaves above that level stand for themselves. Words of weight
-  /// zero are left out of the words, never of the direct index.
-  BowImage Transform(std::span<const Descriptor> descriptors, int node_level = kDirectIndexLevel) const;
+  /// root, whose nodes the direct index names; leaves above that level stand for themselves. `counted`, when
+  /// not empty, has one entry per descriptor: those with 0 (seen to move, say) do not enter the words.
+  /// Neither do words of weight zero. The direct index has every feature.
+  BowImage Transform(std::span<const Descriptor> descriptors, int node_level = kDirectIndexLevel,
+                     std::span<const uint8_t> counted = {}) const;
 
   /// The word of each descriptor.
   std::vector<WordIndex> Quantize(std::span<const Descriptor> descriptors) const;

@@ -141,6 +141,19 @@ TEST_F(VocabularyTest, WordsAreTfIdfOfSumOne) {
   EXPECT_TRUE(vocabulary.Transform({}).nodes.empty());
 }
 
+TEST_F(VocabularyTest, WhatIsNotCountedIsInTheDirectIndexAlone) {
+  const Vocabulary vocabulary = SmallVocabulary();
+  SyntheticWorld world(400, 7);
+  const auto image = world.Image(0, 100, 10);
+  std::vector<uint8_t> counted(image.size(), 1);
+  std::fill(counted.begin() + 40, counted.end(), uint8_t{0});
+  const BowImage some = vocabulary.Transform(image, 1, counted);
+  EXPECT_EQ(some.words, vocabulary.Transform(std::span(image).first(40)).words);
+  EXPECT_EQ(some.nodes, vocabulary.Transform(image, 1).nodes);
+  EXPECT_TRUE(vocabulary.Transform(image, 1, std::vector<uint8_t>(image.size(), 0)).words.empty());
+  EXPECT_THROW(vocabulary.Transform(image, 1, std::span(counted).first(3)), InvariantError);
+}
+
 TEST_F(VocabularyTest, DirectIndexLevelsRunFromRootToLeaf) {
   const Vocabulary vocabulary = SmallVocabulary();
   SyntheticWorld world(400, 7);
