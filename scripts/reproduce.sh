@@ -6,7 +6,8 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly root
 readonly MAX_FAILURES_IN_A_ROW=3
 
-tum='' out='' seeds=10 data=${DMSLAM_DATA:-$root/../shared/data} render=1 run=1 publish='' runner=$root/scripts/run.sh
+tum='' out='' seeds=10 data=${DMSLAM_DATA:-$root/../shared/data} render=1 run=1 publish='' runner=''
+processes=0
 only=()
 
 usage() {
@@ -26,7 +27,8 @@ there are listed in the report with the address to get them from (scripts/get_tu
   --no-render     do not render the stand-ins (about ten minutes, once)
   --report-only   write the report from the runs that are there
   --publish FILE  also write the report to this page, with pictures of rendered sequences only
-  --runner CMD    program to run instead of scripts/run.sh (the same arguments)
+  --processes     run the real processes in lock-step (scripts/run.sh), not dmslam-inprocess; the bytes are the same
+  --runner CMD    program to run instead (it gets the arguments of scripts/run.sh)
   --help          this text
 EOF
 }
@@ -40,6 +42,7 @@ parse() {
       --help | -h) usage; exit 0 ;;
       --no-render) render=0; shift; continue ;;
       --report-only) run=0; shift; continue ;;
+      --processes) processes=1; shift; continue ;;
       --tum | --out | --seeds | --only | --data | --publish | --runner) ;;
       *) die "unknown argument $1; see --help" ;;
     esac
@@ -61,6 +64,7 @@ find_programs() {
   bin=${DMSLAM_BIN:-$root/build/release/bin}
   local programs=(dmslam-report) program missing=()
   ((run == 0 || render == 0)) || programs+=(dmslam-synth)
+  [[ $run == 0 || $processes == 1 || -n $runner ]] || programs+=(dmslam-inprocess)
   for program in "${programs[@]}"; do
     [[ -x $bin/$program ]] || missing+=("$program")
   done
@@ -92,6 +96,13 @@ render_stand_ins() {
     render "synth_still_$motion" --path "$motion" --frames "$frames"
   done
   render synth_xyz --preset static_xyz --camera "$root/config/TUM1.yaml"
+}
+
+# Sets `command` to what runs a sequence.
+choose_command() {
+  if [[ -n $runner ]]; then command=("$runner" --lockstep)
+  elif ((processes)); then command=("$root/scripts/run.sh" --lockstep)
+  else command=("$bin/dmslam-inprocess"); fi
 }
 
 # start COMMAND...: runs it in a process group of its own, so that an interrupt reaches it through us alone.
@@ -135,14 +146,15 @@ progress() {
 }
 progress_end() { [[ ! -t 2 ]] || printf '\r\033[K' >&2; }
 
-# one_run FOLDER SEQUENCE CAMERA PROFILE SEED SET
+# one_run FOLDER SEQUENCE FRAMES CAMERA PROFILE SEED SET. The first seed leaves a few pictures.
 one_run() {
   local folder=$out/$1 part=$out/$1.part log=$out/$1.log status=0
-  local arguments=(--sequence "$2" --camera "$3" --out "$part" --lockstep --profile "$4" --seed "$5")
-  [[ $6 == - ]] || arguments+=(--set "$6")
+  local arguments=(--sequence "$2" --camera "$4" --out "$part" --profile "$5" --seed "$6")
+  [[ $7 == - ]] || arguments+=(--set "$7")
+  [[ $6 != 1 ]] || arguments+=(--pictures $(($3 / 4 + 1)))
   rm -rf -- "$part" "$folder"
   mkdir -p -- "$(dirname "$folder")"
-  start "$runner" "${arguments[@]}" >"$log" 2>&1 || status=$?
+  start "${command[@]}" "${arguments[@]}" >"$log" 2>&1 || status=$?
   mkdir -p -- "$part"
   mv -- "$log" "$part/log.txt"
   if [[ ! -s $part/summary.json ]]; then
@@ -168,7 +180,7 @@ run_all() {
     number=$((number + 1))
     progress "${folder#runs/}"
     [[ $camera == /* ]] || camera=$root/$camera
-    if one_run "$folder" "$sequence" "$camera" "$profile" "$seed" "$set"; then
+    if one_run "$folder" "$sequence" "$frames" "$camera" "$profile" "$seed" "$set"; then
       in_a_row=0
     else
       progress_end
@@ -189,6 +201,7 @@ main() {
   exec 8>&2 9>"$out/.lock"
   flock -n 9 || die "another reproduce.sh is working in $out"
   trap interrupted INT TERM
+  choose_command
   if ((run)); then
     ((render == 0)) || render_stand_ins
     local roots=(--root "$tum") plan

@@ -23,7 +23,7 @@ echo "$*" >>"$CALLS"
 while (($#)); do
   case $1 in
     --lockstep) shift ;;
-    --sequence | --out | --profile | --seed | --camera | --set) printf -v "${1#--}" %s "$2"; shift 2 ;;
+    --sequence | --out | --profile | --seed | --camera | --set | --pictures) printf -v "${1#--}" %s "$2"; shift 2 ;;
     *) echo "unknown $1"; exit 2 ;;
   esac
 done
@@ -55,6 +55,7 @@ expect 0 'report.json' "${run[@]}" --out "$work/a" --seeds 2
 check "16 runs" test "$(wc -l <"$CALLS")" -eq 16
 check "half of them with 3000 features" test "$(grep -c 'features.count=3000' "$CALLS")" -eq 8
 check "freiburg1 with its own camera" test "$(grep 'freiburg1_xyz' "$CALLS" | grep -c 'config/TUM1.yaml')" -eq 8
+check "pictures of the first seed only" test "$(grep -c -- '--pictures 31' "$CALLS")" -eq 8
 check "no progress in a pipe" test -z "$(grep -F '[1/16]' <<<"$output")"
 for what in '\*0\.329\*' '\*0\.143\*' 'fr3_walking_rpy \| \*absent\*' 'cvg\.cit\.tum\.de' 'kitchen_walk2' '\| 98\.5 \| 1\.00 \| 2/2' \
   'pictures/fr3_walking_xyz_defaults.png' '16 of 16 runs'; do

@@ -84,12 +84,12 @@ PlotPanel RelativePanel(const std::vector<Drawn>& drawn, bool rotation) {
   return panel;
 }
 
-ReportPicture Save(const PlotFigure& figure, const std::string& sequence, const std::string& name,
-                   const fs::path& out) {
+ReportPicture Save(const PlotFigure& figure, FigureSection section, const std::string& sequence,
+                   const std::string& name, const fs::path& out) {
   const std::string file = "pictures/" + name + ".png";
   WritePng(figure, (out / file).string());
   WriteSvg(figure, (out / ("pictures/" + name + ".svg")).string());
-  return {sequence, figure.title, file};
+  return {section, sequence, figure.title, file};
 }
 
 void DrawSequence(const Results& results, const PlannedSequence& sequence, const Setting& setting,
@@ -109,7 +109,7 @@ void DrawSequence(const Results& results, const PlannedSequence& sequence, const
   for (const Drawn& one : drawn) figure.panels.push_back(OverlayPanel(one));
   if (drawn.size() == 1) figure.panels[0].column_span = 2;
   for (const bool rotation : {false, true}) figure.panels.push_back(RelativePanel(drawn, rotation));
-  pictures->push_back(Save(figure, name, name + "_" + setting.name, out));
+  pictures->push_back(Save(figure, FigureSection::kTrajectories, name, name + "_" + setting.name, out));
 }
 
 /// One point per seed, both profiles side by side above each sequence's name.
@@ -167,7 +167,36 @@ void DrawSeeds(const Results& results, const Setting& setting, const fs::path& o
   figure.panels.back().title = "Coverage";
   figure.panels.back().y_label = "tracked [%]";
   figure.panels.back().y_range = PlotRange{0, 105};
-  pictures->push_back(Save(figure, "", "all_" + setting.name, out));
+  pictures->push_back(Save(figure, FigureSection::kSeeds, "", "all_" + setting.name, out));
+}
+
+std::vector<fs::path> PicturesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  if (!fs::is_directory(folder)) return files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == ".png") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// Frames with their features, that the first seed's run of `dm` with default settings left.
+void AddFramePictures(const Results& results, const std::string& sequence, const fs::path& out,
+                      std::vector<ReportPicture>* pictures) {
+  const Cell* cell = results.Find(sequence, "defaults", "dm");
+  if (cell == nullptr || cell->runs.empty()) return;
+  for (const fs::path& file : PicturesIn(out / cell->runs.front().key.Folder() / "pictures")) {
+    pictures->push_back({FigureSection::kFeatures, sequence, sequence + ", " + file.stem().string(),
+                         file.lexically_relative(out).string()});
+  }
+}
+
+void AddSelectionPictures(const std::string& sequence, const fs::path& out,
+                          std::vector<ReportPicture>* pictures) {
+  for (const fs::path& file : PicturesIn(out / "figures" / sequence)) {
+    pictures->push_back({FigureSection::kSelection, sequence, sequence + ": " + file.stem().string(),
+                         file.lexically_relative(out).string()});
+  }
 }
 
 }  // namespace
@@ -177,6 +206,11 @@ std::vector<ReportPicture> DrawPictures(const Results& results, const fs::path& 
   fs::create_directories(out / "pictures", error);
   if (error) throw InputError((out / "pictures").string() + ": cannot be made; check --out");
   std::vector<ReportPicture> pictures;
+  for (const PlannedSequence& sequence : results.plan.sequences) {
+    if (!sequence.present()) continue;
+    AddSelectionPictures(std::string(sequence.info.name), out, &pictures);
+    AddFramePictures(results, std::string(sequence.info.name), out, &pictures);
+  }
   for (const Setting& setting : results.plan.settings) {
     DrawSeeds(results, setting, out, &pictures);
     for (const PlannedSequence& sequence : results.plan.sequences) {

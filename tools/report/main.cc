@@ -80,23 +80,28 @@ std::optional<IterationTimes> ReadTimes(const fs::path& path) {
   }
 }
 
+bool IsRendered(const std::string& sequence) {
+  const SequenceGroup group = FindSequence(sequence).group;
+  return group == SequenceGroup::kStandIn || group == SequenceGroup::kStandInStill;
+}
+
 // The report for docs/: all numbers, but pictures of rendered sequences only, copied beside it.
 void Publish(const fs::path& page, const fs::path& out, const Results& results,
              const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
   const fs::path folder = page.parent_path() / "pictures";
   std::error_code error;
   fs::create_directories(folder, error);
-  std::vector<ReportPicture> rendered;
-  for (const ReportPicture& picture : pictures) {
-    const bool real = !picture.sequence.empty() &&
-                      FindSequence(picture.sequence).group != SequenceGroup::kStandIn &&
-                      FindSequence(picture.sequence).group != SequenceGroup::kStandInStill;
-    if (real) continue;
-    fs::copy_file(out / picture.file, folder / fs::path(picture.file).filename(),
-                  fs::copy_options::overwrite_existing);
-    rendered.push_back(picture);
+  std::vector<ReportPicture> copied;
+  for (ReportPicture picture : pictures) {
+    if (!picture.sequence.empty() && !IsRendered(picture.sequence)) continue;
+    const std::string name = fs::path(picture.file).filename().string();
+    const bool named = picture.sequence.empty() || name.starts_with(picture.sequence);
+    const std::string target = named ? name : picture.sequence + "_" + name;
+    fs::copy_file(out / picture.file, folder / target, fs::copy_options::overwrite_existing);
+    picture.file = "pictures/" + target;
+    copied.push_back(picture);
   }
-  WriteText(page, ReportMarkdown(results, times, rendered));
+  WriteText(page, ReportMarkdown(results, times, copied));
 }
 
 void RunWrite(const Arguments& arguments) {

@@ -247,6 +247,41 @@ std::string SettingSection(const Results& results, const Setting& setting) {
   return text + SpreadTable(results, setting) + StandInTable(results, setting);
 }
 
+const char* SectionTitle(FigureSection section) {
+  switch (section) {
+    case FigureSection::kSelection:
+      return "Figures 2 to 5. Which matches are taken for static";
+    case FigureSection::kFeatures:
+      return "Figure 6. Features as they are tracked: used (green), rejected (yellow), moving (red)";
+    case FigureSection::kTrajectories:
+      return "Figure 7. Trajectories over the ground truth, and relative errors";
+    case FigureSection::kSeeds:
+      return "All runs";
+  }
+  return "";
+}
+
+std::string Image(const ReportPicture& picture) { return "![" + picture.title + "](" + picture.file + ")"; }
+
+// Frames stand side by side, two to a row; figures one below the other.
+std::string Pictures(const std::vector<ReportPicture>& pictures, FigureSection section) {
+  std::string text;
+  size_t column = 0;
+  for (const ReportPicture& picture : pictures) {
+    if (picture.section != section) continue;
+    if (section != FigureSection::kFeatures) {
+      text += "**" + picture.title + "**\n\n" + Image(picture) + "\n\n";
+      continue;
+    }
+    if (text.empty()) text = "| | |\n|---|---|\n";
+    text +=
+        (column == 0 ? "| " : " ") + picture.title + "<br>" + Image(picture) + (column == 0 ? " |" : " |\n");
+    column = 1 - column;
+  }
+  if (column == 1) text += " |\n";
+  return text.empty() ? text : "## " + std::string(SectionTitle(section)) + "\n\n" + text + "\n";
+}
+
 }  // namespace
 
 std::string ReportMarkdown(const Results& results, const std::optional<IterationTimes>& times,
@@ -254,9 +289,9 @@ std::string ReportMarkdown(const Results& results, const std::optional<Iteration
   std::string text = Introduction(results) + SequenceList(results) + TimesTable(times);
   for (const Setting& setting : results.plan.settings) text += SettingSection(results, setting);
   text += Troubles(results);
-  if (!pictures.empty()) text += "## Pictures\n\n";
-  for (const ReportPicture& picture : pictures) {
-    text += "**" + picture.title + "**\n\n![" + picture.title + "](" + picture.file + ")\n\n";
+  for (const FigureSection section : {FigureSection::kSelection, FigureSection::kFeatures,
+                                      FigureSection::kTrajectories, FigureSection::kSeeds}) {
+    text += Pictures(pictures, section);
   }
   return text;
 }

@@ -7,8 +7,17 @@
 
 namespace dmslam {
 
+/// The sections of the report's figures, in their order.
+enum class FigureSection {
+  kSelection,     // which matches are taken for static: the paper's Figures 2 to 5
+  kFeatures,      // features of frames as they are tracked: its Figure 6
+  kTrajectories,  // trajectories and relative errors: its Figure 7
+  kSeeds          // every run's error and coverage
+};
+
 /// A picture of the report.
 struct ReportPicture {
+  FigureSection section;
   std::string sequence;  // empty: about all of them
   std::string title;
   std::string file;  // relative to the report

@@ -146,8 +146,19 @@ TEST_F(Reproduction, PicturesAreDrawn) {
   options_.only = {"fr3_walking_xyz"};
   const Plan plan = MakePlan(options_);
   WriteAllRuns(plan);
-  const auto pictures = DrawPictures(ReadResults(plan, root_ / "out"), root_ / "out");
-  ASSERT_EQ(pictures.size(), 4u);
+  const fs::path frames =
+      root_ / "out" / RunKey{"fr3_walking_xyz", "defaults", "dm", 1}.Folder() / "pictures";
+  fs::create_directories(frames);
+  for (const char* name : {"b.png", "a.png", "c.png"})
+    std::ofstream(frames / name) << std::string(20000, 'x');
+  const Results results = ReadResults(plan, root_ / "out");
+  const auto pictures = DrawPictures(results, root_ / "out");
+  ASSERT_EQ(pictures.size(), 7u);
+  EXPECT_TRUE(pictures[0].file.ends_with("a.png"));
+  const std::string text = ReportMarkdown(results, std::nullopt, pictures);
+  EXPECT_LT(text.find("## Figure 6"), text.find("## Figure 7"));
+  for (const ReportPicture& picture : pictures)
+    EXPECT_NE(text.find("(" + picture.file + ")"), std::string::npos);
   for (const ReportPicture& picture : pictures)
     EXPECT_GT(fs::file_size(root_ / "out" / picture.file), 10000u);
 }

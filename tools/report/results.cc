@@ -108,11 +108,12 @@ RunResult ReadRun(const RunKey& key, const fs::path& out, const fs::path& sequen
   }
   run.tracked_percent = NumberIn(summary, "tracked_percent");
   run.tracked_online_percent = NumberIn(summary, "tracked_online_percent");
+  run.tracked_online_after_first_map_percent = NumberIn(summary, "tracked_online_after_first_map_percent");
   run.first_map_s = NumberIn(summary, "first_init_s");
   run.frontend_ms_median = NumberIn(summary, "frontend_ms_median");
   ReadTrajectoryOf(folder, sequence, &run);
   // What gave no trajectory covered nothing: it counts among the shares.
-  if (run.state == State::kNoTrajectory) run.tracked_percent = run.tracked_online_percent = 0;
+  if (run.state == State::kNoTrajectory) run.tracked_percent = run.tracked_percent.value_or(0);
   return run;
 }
 
