@@ -29,27 +29,35 @@ void AddOptions(CLI::App& app, Arguments& args) {
   app.add_option("--out", args.out, "Folder to write into (it is made where it is not there)")->required();
   app.add_option("--scene", args.scene, "room | corridor | aliased (default: what the path needs)");
   app.add_option("--path", args.path, "static | xyz | rpy | halfsphere | tour | ring (default: xyz)");
-  app.add_option("--preset", args.preset,
-                 "walking_xyz | walking_rpy | walking_halfsphere | static_xyz: as the sequences of the TUM benchmark: "
-                 "same kind of motion, length and rate, two people who walk and sit (none in static_xyz)");
-  app.add_option("--frames", args.frames, "Frames to render (default: 300; tour and ring: 1.15 rounds, 1500 at least)");
+  app.add_option(
+      "--preset", args.preset,
+      "walking_xyz | walking_rpy | walking_halfsphere | static_xyz: as the sequences of the TUM benchmark: "
+      "same kind of motion, length and rate, two people who walk and sit (none in static_xyz)");
+  app.add_option("--frames", args.frames,
+                 "Frames to render (default: 300; tour and ring: 1.15 rounds, 1500 at least)");
   app.add_option("--fps", args.fps, "Frames per second")->capture_default_str();
-  app.add_option("--seed", args.seed, "Seed of everything: scene, path, people, noise")->capture_default_str();
+  app.add_option("--seed", args.seed, "Seed of everything: scene, path, people, noise")
+      ->capture_default_str();
   app.add_option("--moving-share", args.moving_share, "Mean share of the image covered by people, 0..0.7");
   app.add_option("--actors", args.actors, "How many people (default: as many as the moving share takes)");
   app.add_option("--behaviour", args.behaviour, "walk | stop-and-go | sit")->capture_default_str();
-  app.add_option("--stand-first", args.sequence.world.actor.stand_first_s, "Seconds that people stand still at first");
-  app.add_option("--static-start", args.sequence.world.path.static_start_s, "Seconds that the camera stands still at first");
+  app.add_option("--stand-first", args.sequence.world.actor.stand_first_s,
+                 "Seconds that people stand still at first");
+  app.add_option("--static-start", args.sequence.world.path.static_start_s,
+                 "Seconds that the camera stands still at first");
   app.add_option("--speed", args.sequence.world.path.speed_mps, "Walking speed of tour and ring [m/s]");
-  app.add_option("--ring-length", args.sequence.world.scene.ring_length_m, "Length of the ring of corridors [m]")
+  app.add_option("--ring-length", args.sequence.world.scene.ring_length_m,
+                 "Length of the ring of corridors [m]")
       ->capture_default_str();
-  app.add_option("--camera", args.camera, "Camera file; its distortion is applied (default: 640x480, fx = fy = 525)");
+  app.add_option("--camera", args.camera,
+                 "Camera file; its distortion is applied (default: 640x480, fx = fy = 525)");
   app.add_option("--samples", args.sequence.render.samples, "Pictures averaged per frame: 1 quick, 4 smooth")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
   app.add_option("--exposure", args.sequence.render.exposure_s, "Exposure time [s]: how much motion blurs")
       ->capture_default_str();
-  app.add_option("--tremor", args.sequence.world.path.tremor, "How much the hand shakes (1 = ordinary)")->capture_default_str();
+  app.add_option("--tremor", args.sequence.world.path.tremor, "How much the hand shakes (1 = ordinary)")
+      ->capture_default_str();
   app.add_flag("--png", args.sequence.png, "Write PNG instead of JPEG");
   app.add_flag("--gray", args.sequence.gray, "Write grey images");
   app.add_option("--quality", args.sequence.jpeg_quality, "JPEG quality")->capture_default_str();
@@ -79,8 +87,9 @@ void ApplyPreset(Arguments& args) {
     }
     return;
   }
-  throw dmslam::InputError("--preset: '" + args.preset +
-                           "' is not known; choose walking_xyz, walking_rpy, walking_halfsphere or static_xyz");
+  throw dmslam::InputError(
+      "--preset: '" + args.preset +
+      "' is not known; choose walking_xyz, walking_rpy, walking_halfsphere or static_xyz");
 }
 
 dmslam::SequenceOptions ToSequenceOptions(Arguments& args) {
@@ -88,14 +97,16 @@ dmslam::SequenceOptions ToSequenceOptions(Arguments& args) {
   dmslam::SequenceOptions options = args.sequence;
   if (!args.camera.empty()) options.camera = dmslam::LoadCamera(args.camera);
   options.camera.fps = args.fps;
-  if (args.path.empty()) args.path = args.scene == "corridor" ? "ring" : args.scene == "aliased" ? "tour" : "xyz";
+  if (args.path.empty())
+    args.path = args.scene == "corridor" ? "ring" : args.scene == "aliased" ? "tour" : "xyz";
   if (args.scene.empty()) args.scene = args.path == "ring" ? "corridor" : "room";
   options.world.path.kind = dmslam::ParsePathKind(args.path);
   options.world.scene.kind = dmslam::ParseSceneKind(args.scene);
   options.world.actor.behaviour = dmslam::ParseBehaviour(args.behaviour);
   options.world.actors = args.actors;
   options.world.moving_share = args.moving_share;
-  options.world.scene.seed = options.world.path.seed = options.world.actor.seed = options.render.seed = args.seed;
+  options.world.scene.seed = options.world.path.seed = options.world.actor.seed = options.render.seed =
+      args.seed;
   options.frames = args.frames;
   if (options.frames == 0) {
     const bool round = args.path == "tour" || args.path == "ring";
@@ -109,25 +120,31 @@ void Run(Arguments& args) {
   const dmslam::SequenceOptions options = ToSequenceOptions(args);
   const auto start = std::chrono::steady_clock::now();
   const bool show = !args.quiet && isatty(STDERR_FILENO) != 0;
-  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
   const dmslam::SequenceReport report = dmslam::WriteSequence(options, args.out, [&](int done) {
     if (show && (done % 10 == 0 || done == options.frames)) {
-      std::fprintf(stderr, "\r%d of %d frames, %.0f s left  ", done, options.frames, seconds() / done * (options.frames - done));
+      std::fprintf(stderr, "\r%d of %d frames, %.0f s left  ", done, options.frames,
+                   seconds() / done * (options.frames - done));
     }
     return true;
   });
   if (show) std::fprintf(stderr, "\n");
   if (args.quiet) return;
-  std::printf("%s: %d frames, path %.1f m, people cover %.1f %% (moving %.1f %%), %zu revisits, %.1f frames/s\n", args.out.c_str(),
-              report.frames, report.path_m, 100 * report.mean_coverage, 100 * report.mean_moving_coverage, report.revisits,
-              report.frames / seconds());
+  std::printf(
+      "%s: %d frames, path %.1f m, people cover %.1f %% (moving %.1f %%), %zu revisits, %.1f frames/s\n",
+      args.out.c_str(), report.frames, report.path_m, 100 * report.mean_coverage,
+      100 * report.mean_moving_coverage, report.revisits, report.frames / seconds());
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Renders a synthetic sequence (textured room, hand-held camera, walking people, exact ground truth) into a "
-               "folder in the format of the TUM RGB-D benchmark.");
+  CLI::App app(
+      "Renders a synthetic sequence (textured room, hand-held camera, walking people, exact ground truth) "
+      "into a "
+      "folder in the format of the TUM RGB-D benchmark.");
   app.set_version_flag("--version", dmslam::kVersion);
   Arguments args;
   AddOptions(app, args);

@@ -25,7 +25,10 @@ double WrapAngle(double angle) { return std::remainder(angle, 2.0 * kPi); }
 class Simulation {
  public:
   Simulation(const Scene& scene, const CameraPath& path, const ActorOptions& options, int index)
-      : scene_(scene), path_(path), options_(options), random_(DeriveSeed(options.seed, static_cast<uint64_t>(index), "actor")) {
+      : scene_(scene),
+        path_(path),
+        options_(options),
+        random_(DeriveSeed(options.seed, static_cast<uint64_t>(index), "actor")) {
     side_ = index % 2 == 0 ? 1.0 : -1.0;
     if (options.behaviour == Behaviour::kSit && !scene.seats.empty()) {
       seat_ = scene.seats[static_cast<size_t>(index) % scene.seats.size()];
@@ -79,7 +82,8 @@ class Simulation {
   Vector2d KeepClear(Vector2d place, const Vector2d& camera) const {
     for (const Obstacle& obstacle : scene_.obstacles) {
       const Vector2d away = place - obstacle.center.cast<double>();
-      if (away.norm() < obstacle.radius_m) place += (obstacle.radius_m / std::max(away.norm(), 1e-3) - 1.0) * away;
+      if (away.norm() < obstacle.radius_m)
+        place += (obstacle.radius_m / std::max(away.norm(), 1e-3) - 1.0) * away;
     }
     if (scene_.kind == SceneKind::kCorridor) place = IntoCorridor(place);
     for (const Eigen::AlignedBox2f& room : scene_.rooms) {
@@ -97,7 +101,8 @@ class Simulation {
     const double reach = kCorridorHalfWidthM - 0.45;
     const Vector2d low = Vector2d::Constant(reach), high = scene_.ring_size_m.cast<double>() - low;
     if ((place.array() <= low.array()).any() || (place.array() >= high.array()).any()) return place;
-    const double gaps[4] = {place.x() - low.x(), high.x() - place.x(), place.y() - low.y(), high.y() - place.y()};
+    const double gaps[4] = {place.x() - low.x(), high.x() - place.x(), place.y() - low.y(),
+                            high.y() - place.y()};
     const auto nearest = std::min_element(gaps, gaps + 4) - gaps;
     if (nearest == 0) place.x() = low.x();
     if (nearest == 1) place.x() = high.x();
@@ -189,7 +194,8 @@ class Simulation {
     SetSpeed(kWalkSpeed * slow * std::clamp(1.4 - off, 0.25, 1.0));
     Advance();
     if (going_to_seat_) return;
-    const Vector2d push = KeepClear(state_.position, path_.Nominal(now_s).translation.head<2>()) - state_.position;
+    const Vector2d push =
+        KeepClear(state_.position, path_.Nominal(now_s).translation.head<2>()) - state_.position;
     constexpr double kMostPushMps = 1.0;
     state_.position += std::min(1.0, kMostPushMps * kStepS / std::max(push.norm(), 1e-9)) * push;
   }
@@ -209,13 +215,15 @@ class Simulation {
 };
 
 /// Light on a body: brighter from above and from one side.
-float BodyLight(const Vector3f& normal) { return 0.78f + 0.18f * normal.z() + 0.10f * normal.x() - 0.08f * normal.y(); }
+float BodyLight(const Vector3f& normal) {
+  return 0.78f + 0.18f * normal.z() + 0.10f * normal.x() - 0.08f * normal.y();
+}
 
 /// Builds limbs: tubes with round ends.
 class BodyBuilder {
  public:
-  /// From `a` to `b`, with radii; `front` gives the direction that shows the middle of the texture; `flatness` < 1
-  /// makes the tube thinner from front to back.
+  /// From `a` to `b`, with radii; `front` gives the direction that shows the middle of the texture;
+  /// `flatness` < 1 makes the tube thinner from front to back.
   void AddTube(const Vector3f& a, const Vector3f& b, float radius_a, float radius_b, const Vector3f& front,
                float flatness, uint32_t texture, float repeat_m) {
     const Vector3f axis = (b - a).normalized();
@@ -229,7 +237,8 @@ class BodyBuilder {
         const Vector3f out = std::cos(angle) * flatness * ahead + std::sin(angle) * side;
         Vertex vertex;
         vertex.position = a + along * axis + radius * out;
-        vertex.u = repeat_m > 0 ? static_cast<float>(i) / kSegments * std::max(1.0f, std::round(6.28f * radius_a / repeat_m))
+        vertex.u = repeat_m > 0 ? static_cast<float>(i) / kSegments *
+                                      std::max(1.0f, std::round(6.28f * radius_a / repeat_m))
                                 : static_cast<float>(i) / kSegments;
         const float total = length + radius_a + radius_b;
         vertex.v = (along + radius_a) / (repeat_m > 0 ? repeat_m : total);
@@ -241,7 +250,8 @@ class BodyBuilder {
   }
   void AddBall(const Vector3f& center, float radius, float height, const Vector3f& front, uint32_t texture) {
     const float half = std::max(0.5f * height - radius, 0.005f);
-    AddTube(center + half * Vector3f::UnitZ(), center - half * Vector3f::UnitZ(), radius, radius, front, 1.1f, texture, 0);
+    AddTube(center + half * Vector3f::UnitZ(), center - half * Vector3f::UnitZ(), radius, radius, front, 1.1f,
+            texture, 0);
   }
   Mesh Take(int actor) {
     mesh_.actor = actor;
@@ -263,7 +273,8 @@ class BodyBuilder {
     }
     if (ring >= kRings - kCapRings) {
       const float angle = 0.5f * static_cast<float>(kPi) * static_cast<float>(kRings - 1 - ring) / kCapRings;
-      return {length + radius_b * std::cos(angle), std::max(radius_b * std::sin(angle), 1e-4f), std::cos(angle)};
+      return {length + radius_b * std::cos(angle), std::max(radius_b * std::sin(angle), 1e-4f),
+              std::cos(angle)};
     }
     const float t = static_cast<float>(ring - kCapRings) / (kRings - 2 * kCapRings - 1);
     return {t * length, radius_a + t * (radius_b - radius_a), 0.0f};
@@ -287,7 +298,9 @@ struct BodyAxes {
 };
 
 /// A direction in the body's plane of symmetry: straight down, turned by `angle` to the front.
-Vector3f Down(const BodyAxes& axes, float angle) { return std::sin(angle) * axes.ahead - std::cos(angle) * axes.up; }
+Vector3f Down(const BodyAxes& axes, float angle) {
+  return std::sin(angle) * axes.ahead - std::cos(angle) * axes.up;
+}
 
 }  // namespace
 
@@ -298,8 +311,8 @@ Behaviour ParseBehaviour(const std::string& name) {
   throw InputError("--behaviour: '" + name + "' is not known; choose walk, stop-and-go or sit");
 }
 
-ActorTimeline::ActorTimeline(const Scene& scene, const CameraPath& path, const ActorOptions& options, int index,
-                             double duration_s) {
+ActorTimeline::ActorTimeline(const Scene& scene, const CameraPath& path, const ActorOptions& options,
+                             int index, double duration_s) {
   Simulation simulation(scene, path, options, index);
   const int steps = static_cast<int>(std::ceil(duration_s / kStepS)) + 20;
   samples_.reserve(static_cast<size_t>(steps));
@@ -344,41 +357,55 @@ Mesh BuildActorMesh(const ActorLook& look, const ActorState& state, int index) {
   BodyBuilder body;
   const auto h = static_cast<float>(look.height_m), w = static_cast<float>(look.width);
   const auto sit = static_cast<float>(state.sitting * state.sitting * (3.0 - 2.0 * state.sitting));
-  const auto stride = static_cast<float>(state.stride), gait = static_cast<float>(std::remainder(state.gait_rad, 2.0 * kPi));
+  const auto stride = static_cast<float>(state.stride),
+             gait = static_cast<float>(std::remainder(state.gait_rad, 2.0 * kPi));
   BodyAxes axes;
-  axes.ahead = {static_cast<float>(std::cos(state.heading_rad)), static_cast<float>(std::sin(state.heading_rad)), 0};
+  axes.ahead = {static_cast<float>(std::cos(state.heading_rad)),
+                static_cast<float>(std::sin(state.heading_rad)), 0};
   axes.left = {-axes.ahead.y(), axes.ahead.x(), 0};
   const float thigh = 0.245f * h, shin = 0.245f * h, bob = 0.015f * stride * std::cos(2.0f * gait);
-  const float hip_height = (1 - sit) * (thigh + shin + 0.035f * h) + sit * (0.50f) + bob;
-  const Vector3f hip = Vector3f(static_cast<float>(state.position.x()), static_cast<float>(state.position.y()), hip_height);
+  constexpr float kSeatedThighRad = 1.5f;
+  const float hip_height = thigh * std::cos(kSeatedThighRad * sit) + shin + 0.035f * h + bob;
+  const Vector3f hip =
+      Vector3f(static_cast<float>(state.position.x()), static_cast<float>(state.position.y()), hip_height);
   const Vector3f lean = (axes.up + (0.05f * stride + 0.06f * sit) * axes.ahead).normalized();
-  const Vector3f chest = hip + 0.20f * h * lean, neck = hip + 0.31f * h * lean, head = hip + 0.415f * h * lean;
+  const Vector3f chest = hip + 0.20f * h * lean, neck = hip + 0.31f * h * lean,
+                 head = hip + 0.415f * h * lean;
 
-  body.AddTube(hip, hip + 0.06f * h * lean, 0.105f * h * w * 0.95f, 0.1f * h * w, axes.ahead, 0.72f, look.trousers, 0.4f);
-  body.AddTube(neck - 0.03f * h * lean, hip + 0.09f * h * lean, 0.098f * h * w, 0.1f * h * w, axes.ahead, 0.7f, look.shirt, 0);
-  body.AddTube(chest + 0.085f * h * lean + 0.075f * h * w * axes.left, chest + 0.085f * h * lean - 0.075f * h * w * axes.left,
-               0.045f * h * w, 0.045f * h * w, axes.ahead, 1.0f, look.shirt, 0.3f);
+  body.AddTube(hip, hip + 0.06f * h * lean, 0.105f * h * w * 0.95f, 0.1f * h * w, axes.ahead, 0.72f,
+               look.trousers, 0.4f);
+  body.AddTube(neck - 0.03f * h * lean, hip + 0.09f * h * lean, 0.098f * h * w, 0.1f * h * w, axes.ahead,
+               0.7f, look.shirt, 0);
+  body.AddTube(chest + 0.085f * h * lean + 0.075f * h * w * axes.left,
+               chest + 0.085f * h * lean - 0.075f * h * w * axes.left, 0.045f * h * w, 0.045f * h * w,
+               axes.ahead, 1.0f, look.shirt, 0.3f);
   body.AddTube(neck, head, 0.033f * h, 0.033f * h, axes.ahead, 1.0f, look.skin, 0);
   body.AddBall(head + 0.035f * h * axes.up, 0.047f * h, 0.135f * h, axes.ahead, look.face);
-  body.AddBall(head + 0.058f * h * axes.up - 0.016f * h * axes.ahead, 0.049f * h, 0.115f * h, axes.ahead, look.hair);
+  body.AddBall(head + 0.058f * h * axes.up - 0.016f * h * axes.ahead, 0.049f * h, 0.115f * h, axes.ahead,
+               look.hair);
   for (const float side : {1.0f, -1.0f}) {
     const float swing = 0.5f * stride * std::sin(gait) * side;
     const float lift = stride * std::max(0.0f, std::cos(gait) * side);
-    const float thigh_angle = (1 - sit) * (swing + 0.25f * lift) + sit * 1.5f;
-    const float shin_angle = thigh_angle - (1 - sit) * (0.12f * stride + 0.9f * lift) - sit * 1.5f;
+    const float thigh_angle = (1 - sit) * (swing + 0.25f * lift) + sit * kSeatedThighRad;
+    const float shin_angle = thigh_angle - (1 - sit) * (0.12f * stride + 0.9f * lift) - sit * kSeatedThighRad;
     const Vector3f joint = hip + 0.052f * h * w * side * axes.left;
-    const Vector3f knee = joint + thigh * Down(axes, thigh_angle), ankle = knee + shin * Down(axes, shin_angle);
+    const Vector3f knee = joint + thigh * Down(axes, thigh_angle),
+                   ankle = knee + shin * Down(axes, shin_angle);
     body.AddTube(joint, knee, 0.053f * h * w, 0.036f * h * w, axes.ahead, 1.0f, look.trousers, 0.35f);
     body.AddTube(knee, ankle, 0.035f * h * w, 0.025f * h, axes.ahead, 1.0f, look.trousers, 0.35f);
-    body.AddTube(ankle, ankle + 0.085f * h * axes.ahead - 0.012f * h * axes.up, 0.026f * h, 0.022f * h, axes.up, 1.0f,
-                 look.shoes, 0);
+    body.AddTube(ankle, ankle + 0.085f * h * axes.ahead - 0.012f * h * axes.up, 0.026f * h, 0.022f * h,
+                 axes.up, 1.0f, look.shoes, 0);
     const Vector3f shoulder = neck - 0.025f * h * lean + 0.108f * h * w * side * axes.left;
-    const float arm_angle = -0.75f * swing * (1 - sit) + 0.35f * sit, bend = 0.25f + 0.25f * stride + 0.9f * sit;
-    const Vector3f elbow = shoulder + 0.165f * h * (Down(axes, arm_angle) + 0.12f * side * axes.left).normalized();
-    const Vector3f wrist = elbow + 0.15f * h * (Down(axes, arm_angle + bend) - 0.05f * side * axes.left).normalized();
+    const float arm_angle = -0.75f * swing * (1 - sit) + 0.35f * sit,
+                bend = 0.25f + 0.25f * stride + 0.9f * sit;
+    const Vector3f elbow =
+        shoulder + 0.165f * h * (Down(axes, arm_angle) + 0.12f * side * axes.left).normalized();
+    const Vector3f wrist =
+        elbow + 0.15f * h * (Down(axes, arm_angle + bend) - 0.05f * side * axes.left).normalized();
     body.AddTube(shoulder, elbow, 0.031f * h * w, 0.026f * h, axes.ahead, 1.0f, look.shirt, 0.3f);
     body.AddTube(elbow, wrist, 0.025f * h, 0.018f * h, axes.ahead, 1.0f, look.shirt, 0.3f);
-    body.AddTube(wrist, wrist + 0.05f * h * (wrist - elbow).normalized(), 0.021f * h, 0.016f * h, axes.ahead, 0.8f, look.skin, 0);
+    body.AddTube(wrist, wrist + 0.05f * h * (wrist - elbow).normalized(), 0.021f * h, 0.016f * h, axes.ahead,
+                 0.8f, look.skin, 0);
   }
   return body.Take(index);
 }

@@ -14,7 +14,8 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180.0;
 constexpr double kEyeHeight = 1.42;
 
-/// How much of the pattern's k-th of three movements is on at a phase in 0..1: one after another, softly exchanged.
+/// How much of the pattern's k-th of three movements is on at a phase in 0..1: one after another, softly
+/// exchanged.
 double Share(double phase, int k) {
   double distance = std::abs(phase - (k + 0.5) / 3.0);
   distance = std::min(distance, 1.0 - distance);
@@ -68,7 +69,8 @@ SmoothNoise::SmoothNoise(uint64_t seed, double low_hz, double high_hz) {
 
 double SmoothNoise::At(double time_s) const {
   double sum = 0;
-  for (int i = 0; i < kTerms; ++i) sum += amplitude_[i] * std::sin(frequency_rad_s_[i] * time_s + phase_rad_[i]);
+  for (int i = 0; i < kTerms; ++i)
+    sum += amplitude_[i] * std::sin(frequency_rad_s_[i] * time_s + phase_rad_[i]);
   return sum;
 }
 
@@ -94,10 +96,11 @@ CameraPath::Loop CameraPath::MakeLoop(const Scene& scene, PathKind kind) {
   } else if (scene.kind == SceneKind::kAliased) {
     // Around the first room, through the door at x = 1.6, around the second, and back.
     const Eigen::Vector2d shift = (scene.rooms[1].min() - scene.rooms[0].min()).cast<double>();
-    loop.points = {{1.5, 4.6}, {1.35, 3.6}, {1.4, 2.2}, {2.0, 1.35}, {3.2, 1.1}, {4.6, 1.1}, {5.6, 1.6}, {5.9, 3.0},
-                   {5.6, 4.4}, {4.6, 4.9}, {3.2, 4.9}, {2.2, 5.0}, {1.65, 5.6}, {1.6, 6.4}};
-    const std::vector<Eigen::Vector2d> second = {{1.8, 1.2}, {3.2, 1.1}, {4.6, 1.1}, {5.6, 1.6}, {5.9, 3.0}, {5.6, 4.4},
-                                                 {4.6, 4.9}, {3.2, 4.9}, {2.0, 4.7}, {1.4, 3.8}, {1.3, 2.4}, {1.5, 1.0}};
+    loop.points = {{1.5, 4.6}, {1.35, 3.6}, {1.4, 2.2}, {2.0, 1.35}, {3.2, 1.1}, {4.6, 1.1},  {5.6, 1.6},
+                   {5.9, 3.0}, {5.6, 4.4},  {4.6, 4.9}, {3.2, 4.9},  {2.2, 5.0}, {1.65, 5.6}, {1.6, 6.4}};
+    const std::vector<Eigen::Vector2d> second = {{1.8, 1.2}, {3.2, 1.1}, {4.6, 1.1}, {5.6, 1.6},
+                                                 {5.9, 3.0}, {5.6, 4.4}, {4.6, 4.9}, {3.2, 4.9},
+                                                 {2.0, 4.7}, {1.4, 3.8}, {1.3, 2.4}, {1.5, 1.0}};
     for (const Eigen::Vector2d& point : second) loop.points.push_back(point + shift);
     loop.points.push_back({1.55, 5.6});
     loop.points.push_back({1.5, 4.6});
@@ -112,8 +115,10 @@ CameraPath::Loop CameraPath::MakeLoop(const Scene& scene, PathKind kind) {
       loop.points = std::move(finer);
     }
   } else {
-    const Eigen::Vector2d low = scene.rooms[0].min().cast<double>(), high = scene.rooms[0].max().cast<double>();
-    AppendRoundedRectangle(low + Eigen::Vector2d(1.6, 1.15), high - Eigen::Vector2d(1.3, 1.15), 1.1, loop.points);
+    const Eigen::Vector2d low = scene.rooms[0].min().cast<double>(),
+                          high = scene.rooms[0].max().cast<double>();
+    AppendRoundedRectangle(low + Eigen::Vector2d(1.6, 1.15), high - Eigen::Vector2d(1.3, 1.15), 1.1,
+                           loop.points);
   }
   double arc = 0;
   for (size_t i = 0; i < loop.points.size(); ++i) {
@@ -126,7 +131,8 @@ CameraPath::Loop CameraPath::MakeLoop(const Scene& scene, PathKind kind) {
 CameraPath::CameraPath(const Scene& scene, const CameraPathOptions& options) : options_(options) {
   const bool ring = options.kind == PathKind::kRing;
   if (ring != (scene.kind == SceneKind::kCorridor)) {
-    throw InputError("--path: the ring belongs to --scene corridor, all other paths to a room; change one of them");
+    throw InputError(
+        "--path: the ring belongs to --scene corridor, all other paths to a room; change one of them");
   }
   const Eigen::Vector2f low = scene.rooms.front().min();
   home_ = {low.x() + 2.0, low.y() + 3.0, kEyeHeight};
@@ -157,12 +163,13 @@ CameraPath::View CameraPath::AlongLoop(double path_time_s) const {
   const Eigen::Vector2d position = loop_.At(s);
   const double steps_rad_s = 2.0 * kPi * 0.9;
   View view;
-  view.position = {position.x(), position.y(), kEyeHeight + 0.06 * std::sin(0.5 * s) + 0.012 * std::sin(2.0 * steps_rad_s * path_time_s)};
+  view.position = {position.x(), position.y(),
+                   kEyeHeight + 0.06 * std::sin(0.5 * s) + 0.012 * std::sin(2.0 * steps_rad_s * path_time_s)};
   // Heading over a longer stretch turns the camera before the corner, as people do.
   const double h0 = loop_.Heading(s - 0.4), h1 = loop_.Heading(s + 0.4), h2 = loop_.Heading(s + 1.0);
   const double heading = h1 + 0.3 * (WrapAngle(h0 - h1) + WrapAngle(h2 - h1));
-  // Loops run against the clock: outwards is to the right. The sway does not fit the loop's length, so that rounds
-  // differ a little in where one looks.
+  // Loops run against the clock: outwards is to the right. The sway does not fit the loop's length, so that
+  // rounds differ a little in where one looks.
   const double outwards = ring ? 28 : 42;
   const double sway = (ring ? 9.0 : 12.0) * std::sin(0.31 * s + 6.28 * phase_);
   view.yaw_rad = heading - (outwards + sway) * kDegree;
@@ -198,8 +205,9 @@ CameraPath::View CameraPath::ViewAt(double path_time_s) const {
       const double azimuth = 70.0 * kDegree * std::sin(2.0 * kPi * t / 9.0);
       const double elevation = (25.0 - 30.0 * std::cos(2.0 * kPi * t / 6.3)) * kDegree;
       constexpr double kRadius = 0.5;
-      view.position += kRadius * Eigen::Vector3d(-std::cos(azimuth) * std::cos(elevation) + 0.5,
-                                                 -std::sin(azimuth) * std::cos(elevation), std::sin(elevation) - 0.2);
+      view.position +=
+          kRadius * Eigen::Vector3d(-std::cos(azimuth) * std::cos(elevation) + 0.5,
+                                    -std::sin(azimuth) * std::cos(elevation), std::sin(elevation) - 0.2);
       view.yaw_rad = 0.42 * azimuth;
       view.pitch_rad = -0.35 * elevation;
       break;

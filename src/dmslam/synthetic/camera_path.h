@@ -15,8 +15,8 @@ enum class PathKind {
   kXyz,         ///< Moves along its axes in turn, looks the same way.
   kRpy,         ///< Rolls, pitches and yaws in turn, stays where it is.
   kHalfsphere,  ///< On a half sphere of one metre diameter.
-  kTour,        ///< Around the room (kAliased: around both, through the door), looking outwards, again and again.
-  kRing,        ///< Along the ring of corridors, again and again.
+  kTour,  ///< Around the room (kAliased: around both, through the door), looking outwards, again and again.
+  kRing,  ///< Along the ring of corridors, again and again.
 };
 
 /// "static", "xyz", "rpy", "halfsphere", "tour" or "ring"; throws InputError for another name.
@@ -25,12 +25,13 @@ PathKind ParsePathKind(const std::string& name);
 struct CameraPathOptions {
   PathKind kind = PathKind::kXyz;
   uint64_t seed = 1;
-  double static_start_s = 0;   ///< The camera stands on something for so long, then is taken up.
-  double speed_mps = 0;        ///< kTour and kRing: walking speed; 0 is 0.55 m/s for tours and 0.9 m/s for rings.
-  double tremor = 1.0;         ///< How much the hand shakes; 0 is a perfect rig, 1 an ordinary hand.
+  double static_start_s = 0;  ///< The camera stands on something for so long, then is taken up.
+  double speed_mps = 0;  ///< kTour and kRing: walking speed; 0 is 0.55 m/s for tours and 0.9 m/s for rings.
+  double tremor = 1.0;   ///< How much the hand shakes; 0 is a perfect rig, 1 an ordinary hand.
 };
 
-/// Sum of sinusoids of random phase between two frequencies, the slower the stronger: smooth, bounded, of unit variance.
+/// Sum of sinusoids of random phase between two frequencies, the slower the stronger: smooth, bounded, of
+/// unit variance.
 class SmoothNoise {
  public:
   SmoothNoise(uint64_t seed, double low_hz, double high_hz);

@@ -10,8 +10,8 @@
 
 namespace dmslam {
 
-/// A corner of a triangle: where it is (world, metres), what it shows (texture coordinates, 1 = once across the
-/// texture), and how bright it is lit (1 = the texture as it is).
+/// A corner of a triangle: where it is (world, metres), what it shows (texture coordinates, 1 = once across
+/// the texture), and how bright it is lit (1 = the texture as it is).
 struct Vertex {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();
   float u = 0, v = 0;

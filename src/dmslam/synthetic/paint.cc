@@ -21,7 +21,8 @@ Rgb Around(Random& random, const Rgb& color, float spread) {
 }
 
 /// Adds one layer of smooth noise on a lattice of nx x ny cells that wraps around.
-void AddLattice(std::vector<float>& out, int width, int height, int nx, int ny, float amplitude, Random& random) {
+void AddLattice(std::vector<float>& out, int width, int height, int nx, int ny, float amplitude,
+                Random& random) {
   std::vector<float> lattice(static_cast<size_t>(nx) * static_cast<size_t>(ny));
   for (float& value : lattice) value = amplitude * Uniform(random, -1.7f, 1.7f);
   const auto smooth = [](float t) { return t * t * (3.0f - 2.0f * t); };
@@ -49,7 +50,8 @@ void AddLattice(std::vector<float>& out, int width, int height, int nx, int ny, 
 }
 
 void AddNoise(Canvas& canvas, int cells, int octaves, float gain, const Rgb& amplitude, Random& random) {
-  const std::vector<float> noise = FractalNoise(canvas.width(), canvas.height(), cells, octaves, gain, random);
+  const std::vector<float> noise =
+      FractalNoise(canvas.width(), canvas.height(), cells, octaves, gain, random);
   size_t i = 0;
   for (int y = 0; y < canvas.height(); ++y) {
     for (int x = 0; x < canvas.width(); ++x) canvas.at(x, y) += amplitude * noise[i++];
@@ -66,8 +68,8 @@ void AddMarks(Canvas& canvas, int count, float contrast, Random& random) {
       canvas.FillEllipse(x, y, Uniform(random, 1.0f, 4.0f), Uniform(random, 1.0f, 4.0f), color, opacity);
     } else {
       const float angle = Uniform(random, 0, 6.28f), length = Uniform(random, 6, 40);
-      canvas.DrawLine({x, y}, {x + length * std::cos(angle), y + length * std::sin(angle)}, Uniform(random, 1.0f, 2.5f),
-                      color, opacity);
+      canvas.DrawLine({x, y}, {x + length * std::cos(angle), y + length * std::sin(angle)},
+                      Uniform(random, 1.0f, 2.5f), color, opacity);
     }
   }
 }
@@ -77,13 +79,15 @@ void DrawGlyph(Canvas& canvas, float x, float y, float size, const Rgb& color, R
   const float thickness = std::max(1.2f, 0.17f * size);
   const int strokes = Between(random, 2, 4);
   const auto point = [&] {
-    return Eigen::Vector2f(x + 0.27f * size * F(Between(random, 0, 2)), y + 0.25f * size * F(Between(random, 0, 4)));
+    return Eigen::Vector2f(x + 0.27f * size * F(Between(random, 0, 2)),
+                           y + 0.25f * size * F(Between(random, 0, 4)));
   };
   for (int i = 0; i < strokes; ++i) canvas.DrawLine(point(), point(), thickness, color, 0.9f);
 }
 
 /// Lines of text in a box; the last line of a paragraph is shorter.
-void DrawText(Canvas& canvas, float x0, float y0, float x1, float y1, float size, const Rgb& color, Random& random) {
+void DrawText(Canvas& canvas, float x0, float y0, float x1, float y1, float size, const Rgb& color,
+              Random& random) {
   for (float y = y0; y + size < y1; y += 1.65f * size) {
     const float end = Chance(random, 0.2) ? x0 + Uniform(random, 0.3f, 0.8f) * (x1 - x0) : x1;
     for (float x = x0; x + 0.8f * size < end; x += 0.85f * size) {
@@ -106,12 +110,14 @@ void DrawPhoto(Canvas& canvas, int x0, int y0, int x1, int y1, Random& random) {
   if (width < 8 || height < 8) return;
   const std::vector<float> field = FractalNoise(width, height, 4, 7, 0.62f, random);
   const std::vector<float> hue = FractalNoise(width, height, 3, 3, 0.5f, random);
-  const Rgb dark = 0.5f * RandomColor(random), light = RandomColor(random) + Grey(75), other = RandomColor(random);
+  const Rgb dark = 0.5f * RandomColor(random), light = RandomColor(random) + Grey(75),
+            other = RandomColor(random);
   Canvas part(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
-      const float t = std::clamp(0.5f + 0.3f * field[i], 0.0f, 1.0f), s = std::clamp(0.3f + 0.4f * hue[i], 0.0f, 0.8f);
+      const float t = std::clamp(0.5f + 0.3f * field[i], 0.0f, 1.0f),
+                  s = std::clamp(0.3f + 0.4f * hue[i], 0.0f, 0.8f);
       part.at(x, y) = (1 - s) * (dark + t * (light - dark)) + s * t * other;
     }
   }
@@ -121,7 +127,9 @@ void DrawPhoto(Canvas& canvas, int x0, int y0, int x1, int y1, Random& random) {
     const float r = F(std::min(width, height)) * Uniform(random, 0.02f, 0.2f);
     const Rgb color = Around(random, Chance(random, 0.5) ? dark : light, 50);
     const float opacity = Uniform(random, 0.5f, 1.0f);
-    const auto corner = [&] { return Eigen::Vector2f(cx + Uniform(random, -r, r), cy + Uniform(random, -r, r)); };
+    const auto corner = [&] {
+      return Eigen::Vector2f(cx + Uniform(random, -r, r), cy + Uniform(random, -r, r));
+    };
     if (Chance(random, 0.4)) {
       part.FillEllipse(cx, cy, r, r * Uniform(random, 0.4f, 1.0f), color, opacity);
     } else {
@@ -144,12 +152,15 @@ void DrawMosaic(Canvas& canvas, Random& random) {
   const int rows = static_cast<int>(F(canvas.height()) / step) + 2;
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i <= columns; ++i) {
-      grid.emplace_back((F(i) + Uniform(random, -0.3f, 0.3f)) * step, (F(j) + Uniform(random, -0.3f, 0.3f)) * step);
+      grid.emplace_back((F(i) + Uniform(random, -0.3f, 0.3f)) * step,
+                        (F(j) + Uniform(random, -0.3f, 0.3f)) * step);
     }
   }
   for (int j = 0; j + 1 < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
-      const auto at = [&](int di, int dj) { return grid[static_cast<size_t>((j + dj) * (columns + 1) + i + di)]; };
+      const auto at = [&](int di, int dj) {
+        return grid[static_cast<size_t>((j + dj) * (columns + 1) + i + di)];
+      };
       canvas.FillTriangle(at(0, 0), at(1, 0), at(0, 1), Around(random, base, 70));
       canvas.FillTriangle(at(1, 0), at(1, 1), at(0, 1), Around(random, base, 70));
     }
@@ -173,7 +184,8 @@ void DrawMap(Canvas& canvas, Random& random) {
     const Rgb color = Chance(random, 0.5) ? Rgb(200, 70, 50) : Rgb(60, 60, 70);
     for (int leg = 0; leg < 14; ++leg) {
       angle += Uniform(random, -0.6f, 0.6f);
-      const Eigen::Vector2f next = at + Uniform(random, 10, 40) * Eigen::Vector2f(std::cos(angle), std::sin(angle));
+      const Eigen::Vector2f next =
+          at + Uniform(random, 10, 40) * Eigen::Vector2f(std::cos(angle), std::sin(angle));
       canvas.DrawLine(at, next, 2.2f, color);
       at = next;
     }
@@ -199,7 +211,8 @@ void DrawNotices(Canvas& canvas, Random& random) {
       canvas.FillRect(x + 0.1f * w, y + 0.08f * h, x + 0.9f * w, y + 0.45f * h, RandomColor(random));
       DrawText(canvas, x + 0.1f * w, y + 0.5f * h, x + 0.9f * w, y + 0.95f * h, 6, Grey(40), random);
     } else {
-      DrawText(canvas, x + 0.1f * w, y + 0.1f * h, x + 0.9f * w, y + 0.95f * h, Uniform(random, 5, 9), Grey(40), random);
+      DrawText(canvas, x + 0.1f * w, y + 0.1f * h, x + 0.9f * w, y + 0.95f * h, Uniform(random, 5, 9),
+               Grey(40), random);
     }
     canvas.FillEllipse(x + 0.5f * w, y + 3, 2.5f, 2.5f, RandomColor(random));
   }
@@ -223,7 +236,8 @@ std::vector<float> FractalNoise(int width, int height, int cells, int octaves, f
 }
 
 Rgb RandomColor(Random& random) {
-  const float value = Uniform(random, 50, 210), saturation = Uniform(random, 0.1f, 0.75f), hue = Uniform(random, 0, 3);
+  const float value = Uniform(random, 50, 210), saturation = Uniform(random, 0.1f, 0.75f),
+              hue = Uniform(random, 0, 3);
   Rgb color;
   for (int i = 0; i < 3; ++i) {
     const float distance = std::min(std::abs(hue - F(i)), 3.0f - std::abs(hue - F(i)));
@@ -250,7 +264,8 @@ Canvas PaintWallpaper(int size, const Rgb& base, Random& random) {
       const float cx = (F(i) + 0.5f) * step, cy = (F(j) + 0.5f * F(1 + i % 2)) * step;
       for (int petal = 0; petal < 6; ++petal) {
         const float angle = F(petal) * 1.0472f + Uniform(random, -0.1f, 0.1f), r = 0.22f * step;
-        canvas.FillEllipse(cx + r * std::cos(angle), cy + r * std::sin(angle), 0.10f * step, 0.07f * step, motif, 0.6f);
+        canvas.FillEllipse(cx + r * std::cos(angle), cy + r * std::sin(angle), 0.10f * step, 0.07f * step,
+                           motif, 0.6f);
       }
       canvas.FillEllipse(cx, cy, 0.08f * step, 0.08f * step, motif - Grey(25), 0.7f);
     }
@@ -271,7 +286,8 @@ Canvas PaintBricks(int size, Random& random) {
       const float x = (F(i) + 0.5f * F(j % 2)) * w, y = F(j) * h;
       const Rgb color = Around(random, base, 32);
       for (const float shift : {0.0f, -F(size)}) {
-        canvas.FillRect(x + shift + gap, y + gap, x + shift + w - gap * Uniform(random, 0.6f, 1.4f), y + h - gap, color);
+        canvas.FillRect(x + shift + gap, y + gap, x + shift + w - gap * Uniform(random, 0.6f, 1.4f),
+                        y + h - gap, color);
       }
     }
   }
@@ -286,7 +302,8 @@ Canvas PaintWood(int width, int height, const Rgb& base, bool planks, Random& ra
   // Grain: noise stretched along x.
   std::vector<float> grain(static_cast<size_t>(width) * static_cast<size_t>(height), 0.0f);
   for (int octave = 0; octave < 5; ++octave) {
-    AddLattice(grain, width, height, 2 << octave, std::min(height / 2, 12 << octave), std::pow(0.8f, F(octave)), random);
+    AddLattice(grain, width, height, 2 << octave, std::min(height / 2, 12 << octave),
+               std::pow(0.8f, F(octave)), random);
   }
   size_t index = 0;
   for (int y = 0; y < height; ++y) {
@@ -298,14 +315,16 @@ Canvas PaintWood(int width, int height, const Rgb& base, bool planks, Random& ra
     for (int j = 0; j < rows; ++j) {
       canvas.FillRect(0, F(j) * h, F(width), F(j + 1) * h, Around(random, base, 45), 0.35f);
       canvas.FillRect(0, F(j) * h, F(width), F(j) * h + 2, Grey(35), 0.7f);
-      for (float x = Uniform(random, 0, 0.5f) * F(width); x < F(width); x += Uniform(random, 0.4f, 0.8f) * F(width)) {
+      for (float x = Uniform(random, 0, 0.5f) * F(width); x < F(width);
+           x += Uniform(random, 0.4f, 0.8f) * F(width)) {
         canvas.FillRect(x, F(j) * h, x + 2, F(j + 1) * h, Grey(30), 0.7f);
       }
     }
   }
   const int knots = (width * height) >> 14;
   for (int i = 0; i < knots; ++i) {
-    const float x = Uniform(random, 0, F(width)), y = Uniform(random, 0, F(height)), r = Uniform(random, 2, 7);
+    const float x = Uniform(random, 0, F(width)), y = Uniform(random, 0, F(height)),
+                r = Uniform(random, 2, 7);
     canvas.FillEllipse(x, y, 1.6f * r, r, base - Grey(50), 0.5f);
     canvas.FillEllipse(x, y, 0.8f * r, 0.5f * r, base - Grey(80), 0.6f);
   }
@@ -354,7 +373,8 @@ Canvas PaintPage(int width, int height, Random& random) {
     const bool picture_left = Chance(random, 0.5);
     const float px0 = picture_left ? margin : split + 4, px1 = picture_left ? split - 4 : w - margin;
     const float tx0 = picture_left ? split + 4 : margin, tx1 = picture_left ? w - margin : split - 4;
-    DrawPhoto(canvas, static_cast<int>(px0), static_cast<int>(y0), static_cast<int>(px1), static_cast<int>(y1), random);
+    DrawPhoto(canvas, static_cast<int>(px0), static_cast<int>(y0), static_cast<int>(px1),
+              static_cast<int>(y1), random);
     DrawText(canvas, tx0, y0, tx1, y1, text_size, Grey(40), random);
   }
   canvas.Smooth();
@@ -364,13 +384,19 @@ Canvas PaintPage(int width, int height, Random& random) {
 Canvas PaintPoster(int width, int height, Random& random) {
   const double kind = random.Uniform();
   Canvas canvas(width, height, Grey(128));
-  if (kind < 0.22) canvas = PaintPage(width, height, random);
-  else if (kind < 0.40) DrawMosaic(canvas, random);
-  else if (kind < 0.55) DrawMap(canvas, random);
-  else if (kind < 0.75) DrawNotices(canvas, random);
-  else DrawPhoto(canvas, 0, 0, width, height, random);
+  if (kind < 0.22)
+    canvas = PaintPage(width, height, random);
+  else if (kind < 0.40)
+    DrawMosaic(canvas, random);
+  else if (kind < 0.55)
+    DrawMap(canvas, random);
+  else if (kind < 0.75)
+    DrawNotices(canvas, random);
+  else
+    DrawPhoto(canvas, 0, 0, width, height, random);
   AddNoise(canvas, 16, 5, 0.9f, Grey(4), random);
-  DrawFrame(canvas, 0.025f * F(width), Around(random, Chance(random, 0.5) ? Grey(45) : Rgb(150, 110, 70), 20));
+  DrawFrame(canvas, 0.025f * F(width),
+            Around(random, Chance(random, 0.5) ? Grey(45) : Rgb(150, 110, 70), 20));
   canvas.Smooth();
   return canvas;
 }
@@ -385,7 +411,8 @@ Canvas PaintBookSpine(int width, int height, Random& random) {
   }
   // The title runs along the spine: glyphs below one another.
   const float size = 0.55f * w, end = Uniform(random, 0.5f, 0.8f) * h;
-  for (float y = 0.17f * h; y < end; y += 0.75f * size) DrawGlyph(canvas, 0.2f * w, y, size * 0.65f, ink, random);
+  for (float y = 0.17f * h; y < end; y += 0.75f * size)
+    DrawGlyph(canvas, 0.2f * w, y, size * 0.65f, ink, random);
   if (Chance(random, 0.5)) canvas.FillEllipse(0.5f * w, 0.92f * h, 0.25f * w, 0.25f * w, ink, 0.7f);
   canvas.FillRect(0, 0, 2, h, Grey(20), 0.6f);
   canvas.FillRect(w - 2, 0, w, h, Grey(20), 0.6f);
@@ -404,7 +431,8 @@ Canvas PaintPackage(int width, int height, Random& random) {
                        Uniform(random, 0.05f, 0.3f) * h, RandomColor(random), cardboard ? 0.1f : 0.8f);
   }
   DrawText(canvas, 0.08f * w, 0.08f * h, 0.92f * w, 0.4f * h, Uniform(random, 0.12f, 0.22f) * h, ink, random);
-  DrawText(canvas, 0.08f * w, 0.6f * h, Uniform(random, 0.4f, 0.7f) * w, 0.93f * h, Uniform(random, 6, 10), ink, random);
+  DrawText(canvas, 0.08f * w, 0.6f * h, Uniform(random, 0.4f, 0.7f) * w, 0.93f * h, Uniform(random, 6, 10),
+           ink, random);
   for (float x = 0.72f * w; x < 0.92f * w; x += Uniform(random, 2.5f, 6.0f)) {
     canvas.FillRect(x, 0.7f * h, x + Uniform(random, 1.5f, 3.5f), 0.92f * h, Grey(25));
   }
@@ -424,7 +452,8 @@ Canvas PaintScreen(int width, int height, Random& random) {
     const bool dark = Chance(random, 0.4);
     canvas.FillRect(x, y, x1, y1, dark ? Grey(35) : Grey(225));
     canvas.FillRect(x, y, x1, y + 0.04f * h, RandomColor(random));
-    DrawText(canvas, x + 5, y + 0.06f * h, x1 - 5, y1 - 5, Uniform(random, 6, 9), dark ? Grey(190) : Grey(50), random);
+    DrawText(canvas, x + 5, y + 0.06f * h, x1 - 5, y1 - 5, Uniform(random, 6, 9), dark ? Grey(190) : Grey(50),
+             random);
   }
   canvas.FillRect(0, 0.95f * h, w, h, Grey(50));
   DrawFrame(canvas, 0.03f * w, Grey(28));

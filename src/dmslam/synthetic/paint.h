@@ -7,12 +7,13 @@
 
 namespace dmslam {
 
-/// Fractal value noise that tiles: `octaves` layers, the first with `cells` cells along the longer side, each next one
-/// twice as fine and `gain` times as strong. Mean about 0, standard deviation 1; row by row.
+/// Fractal value noise that tiles: `octaves` layers, the first with `cells` cells along the longer side, each
+/// next one twice as fine and `gain` times as strong. Mean about 0, standard deviation 1; row by row.
 std::vector<float> FractalNoise(int width, int height, int cells, int octaves, float gain, Random& random);
 
-/// Pictures of things in rooms. Each draws all it needs from `random`; sizes in texels, powers of two. They hold detail at
-/// every scale down to about two texels, in mixed contrast, as photographs of real surfaces do.
+/// Pictures of things in rooms. Each draws all it needs from `random`; sizes in texels, powers of two. They
+/// hold detail at every scale down to about two texels, in mixed contrast, as photographs of real surfaces
+/// do.
 Canvas PaintPlaster(int size, const Rgb& base, Random& random);
 Canvas PaintWallpaper(int size, const Rgb& base, Random& random);
 Canvas PaintBricks(int size, Random& random);

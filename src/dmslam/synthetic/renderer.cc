@@ -39,6 +39,8 @@ float FastLog2(float value) {
   return exponent + (-0.34484843f * mantissa + 2.02466578f) * mantissa - 1.67487759f;
 }
 
+float Fraction(float value) { return value - std::floor(value); }
+
 /// Standard normal numbers by lookup: quick and the same everywhere.
 class NoiseTable {
  public:
@@ -55,15 +57,16 @@ class NoiseTable {
 
 }  // namespace
 
-/// The buffers and steps behind Renderer. The canvas is the ideal image: for a camera without distortion the image
-/// itself, otherwise as much of the ideal plane as the distorted image shows, twice as fine.
+/// The buffers and steps behind Renderer. The canvas is the ideal image: for a camera without distortion the
+/// image itself, otherwise as much of the ideal plane as the distorted image shows, twice as fine.
 class Renderer::Impl {
  public:
   Impl(const Camera& camera, const RenderOptions& options);
 
-  RenderedFrame Render(std::span<const Mesh> still, const TextureList& textures, double time_s, uint64_t index,
-                       const std::function<Instant(double)>& instant_at);
-  std::vector<float> RenderDepth(std::span<const Mesh> still, const Instant& instant, std::vector<int>* actor_of);
+  RenderedFrame Render(std::span<const Mesh> still, const TextureList& textures, double time_s,
+                       uint64_t index, const std::function<Instant(double)>& instant_at);
+  std::vector<float> RenderDepth(std::span<const Mesh> still, const Instant& instant,
+                                 std::vector<int>* actor_of);
 
  private:
   void MakeLookup();
@@ -74,8 +77,8 @@ class Renderer::Impl {
                const Eigen::Vector2d& jitter_px);
   void AddTriangle(const std::array<const Vertex*, 3>& corners, const std::array<Vector3f, 3>& p_cam,
                    const Texture* texture, int actor, const Eigen::Vector2d& jitter_px);
-  void FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low, int x_high,
-                 uint32_t facet);
+  void FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low,
+                 int x_high, uint32_t facet);
   void Shade(float level_bias);
   int MipLevel(const Facet& facet, float x, float y, float bias) const;
   const Facet* FacetAt(size_t pixel, float& x, float& y) const;
@@ -87,19 +90,23 @@ class Renderer::Impl {
   double canvas_scale_ = 1;
   Eigen::Vector2d canvas_origin_px_{0, 0};
   int canvas_width_ = 0, canvas_height_ = 0;
-  std::vector<Eigen::Vector2f> lookup_;        ///< Canvas position per pixel; empty where it is the pixel itself.
+  std::vector<Eigen::Vector2f> lookup_;  ///< Canvas position per pixel; empty where it is the pixel itself.
+  /// Added to a canvas position before it is cut down to whole pixels; 0.5 rounds. The samples of a frame
+  /// take it evenly from 0..1, so that edges of things are on average where they belong.
+  Eigen::Vector2f canvas_dither_{0.5f, 0.5f};
   std::vector<float> vignette_;
-  std::vector<float> z_buffer_;                ///< Inverse depth.
+  std::vector<float> z_buffer_;  ///< Inverse depth.
   std::vector<uint32_t> facet_of_;
   std::vector<Facet> facets_;
   std::vector<Vector3f> p_cam_;
-  std::vector<uint16_t> sum_;                  ///< Red, green, blue over the samples.
-  std::vector<uint8_t> actor_samples_;         ///< How many samples show an actor.
+  std::vector<uint16_t> sum_;           ///< Red, green, blue over the samples.
+  std::vector<uint8_t> actor_samples_;  ///< How many samples show an actor.
   std::vector<int8_t> last_actor_;
   NoiseTable noise_;
 };
 
-Renderer::Impl::Impl(const Camera& camera, const RenderOptions& options) : camera_(camera), options_(options) {
+Renderer::Impl::Impl(const Camera& camera, const RenderOptions& options)
+    : camera_(camera), options_(options) {
   DMSLAM_CHECK(options.samples >= 1 && options.samples <= 64, "one to 64 samples per frame");
   MakeLookup();
   const size_t canvas = static_cast<size_t>(canvas_width_) * static_cast<size_t>(canvas_height_);
@@ -108,7 +115,8 @@ Renderer::Impl::Impl(const Camera& camera, const RenderOptions& options) : camer
   const auto w = static_cast<float>(camera.width_px), h = static_cast<float>(camera.height_px);
   for (int y = 0; y < camera.height_px; ++y) {
     for (int x = 0; x < camera.width_px; ++x) {
-      const float dx = (static_cast<float>(x) - 0.5f * w) / (0.5f * w), dy = (static_cast<float>(y) - 0.5f * h) / (0.5f * w);
+      const float dx = (static_cast<float>(x) - 0.5f * w) / (0.5f * w),
+                  dy = (static_cast<float>(y) - 0.5f * h) / (0.5f * w);
       vignette_.push_back(1.0f - static_cast<float>(options.vignetting) * (dx * dx + dy * dy) * 0.64f);
     }
   }
@@ -142,8 +150,10 @@ bool Renderer::Impl::IsVisible(const Eigen::AlignedBox3f& bounds, const Rigid3d&
   // Outside of one of the frustum's planes with all eight corners, or not.
   const double left = (canvas_origin_px_.x() - 2 - camera_.cx_px) / camera_.fx_px;
   const double top = (canvas_origin_px_.y() - 2 - camera_.cy_px) / camera_.fy_px;
-  const double right = (canvas_origin_px_.x() + canvas_width_ / canvas_scale_ + 2 - camera_.cx_px) / camera_.fx_px;
-  const double bottom = (canvas_origin_px_.y() + canvas_height_ / canvas_scale_ + 2 - camera_.cy_px) / camera_.fy_px;
+  const double right =
+      (canvas_origin_px_.x() + canvas_width_ / canvas_scale_ + 2 - camera_.cx_px) / camera_.fx_px;
+  const double bottom =
+      (canvas_origin_px_.y() + canvas_height_ / canvas_scale_ + 2 - camera_.cy_px) / camera_.fy_px;
   std::array<int, 5> outside{};
   for (int i = 0; i < 8; ++i) {
     const auto corner = bounds.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i));
@@ -157,8 +167,8 @@ bool Renderer::Impl::IsVisible(const Eigen::AlignedBox3f& bounds, const Rigid3d&
   return std::none_of(outside.begin(), outside.end(), [](int count) { return count == 8; });
 }
 
-void Renderer::Impl::Rasterize(std::span<const Mesh> still, const Instant& instant, const TextureList* textures,
-                               const Eigen::Vector2d& jitter_px) {
+void Renderer::Impl::Rasterize(std::span<const Mesh> still, const Instant& instant,
+                               const TextureList* textures, const Eigen::Vector2d& jitter_px) {
   std::fill(z_buffer_.begin(), z_buffer_.end(), 0.0f);
   std::fill(facet_of_.begin(), facet_of_.end(), kNothing);
   facets_.clear();
@@ -178,16 +188,17 @@ void Renderer::Impl::AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const
   for (const Triangle& triangle : mesh.triangles) {
     const auto [a, b, c] = triangle.corners;
     const Texture* texture = textures != nullptr ? (*textures)[triangle.texture].get() : nullptr;
-    AddTriangle({&mesh.vertices[a], &mesh.vertices[b], &mesh.vertices[c]}, {p_cam_[a], p_cam_[b], p_cam_[c]}, texture,
-                mesh.actor, jitter_px);
+    AddTriangle({&mesh.vertices[a], &mesh.vertices[b], &mesh.vertices[c]}, {p_cam_[a], p_cam_[b], p_cam_[c]},
+                texture, mesh.actor, jitter_px);
   }
 }
 
-// Homogeneous rasterisation (Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates", 1997): with
-// the rows p0, p1, p2 of a matrix P and the ray r of a pixel, the barycentric coordinates over z are P^-T r, linear in the
-// pixel. Nothing has to be clipped.
-void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners, const std::array<Vector3f, 3>& p_cam,
-                                 const Texture* texture, int actor, const Eigen::Vector2d& jitter_px) {
+// Homogeneous rasterisation (Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates",
+// 1997): with the rows p0, p1, p2 of a matrix P and the ray r of a pixel, the barycentric coordinates over z
+// are P^-T r, linear in the pixel. Nothing has to be clipped.
+void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners,
+                                 const std::array<Vector3f, 3>& p_cam, const Texture* texture, int actor,
+                                 const Eigen::Vector2d& jitter_px) {
   const float z_max = std::max({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()});
   const float z_min = std::min({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()});
   if (z_max < kNearM) return;
@@ -217,7 +228,8 @@ void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners, co
   const auto plane = [&](const Vector3d& gradient) {
     // gradient . ((x - cx) / fx, (y - cy) / fy, 1), as a function of the canvas position.
     const double a = gradient.x() / fx, b = gradient.y() / fy;
-    return Plane{static_cast<float>(a), static_cast<float>(b), static_cast<float>(gradient.z() - a * cx - b * cy)};
+    return Plane{static_cast<float>(a), static_cast<float>(b),
+                 static_cast<float>(gradient.z() - a * cx - b * cy)};
   };
   const Vector3d g0 = n0 / determinant, g1 = n1 / determinant, g2 = n2 / determinant;
   Facet facet;
@@ -232,24 +244,28 @@ void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners, co
     facet.light_over_z = blend(corners[0]->light, corners[1]->light, corners[2]->light);
   }
   facets_.push_back(facet);
-  FillSpans({plane(g0), plane(g1), plane(g2)}, facet.inverse_depth, static_cast<int>(y_low), static_cast<int>(y_high),
-            static_cast<int>(x_low), static_cast<int>(x_high), static_cast<uint32_t>(facets_.size() - 1));
+  FillSpans({plane(g0), plane(g1), plane(g2)}, facet.inverse_depth, static_cast<int>(y_low),
+            static_cast<int>(y_high), static_cast<int>(x_low), static_cast<int>(x_high),
+            static_cast<uint32_t>(facets_.size() - 1));
 }
 
-void Renderer::Impl::FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low,
-                               int x_high, uint32_t facet) {
-  // The pixels of a row where all edge functions and the inverse depth's limits hold form one interval. An edge may miss
-  // its neighbour by a rounding error: a tiny slack closes the seam.
-  const Plane limits[4] = {edges[0], edges[1], edges[2],
-                           {-inverse_depth.a, -inverse_depth.b, 1.0f / kNearM - inverse_depth.c}};
+void Renderer::Impl::FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1,
+                               int x_low, int x_high, uint32_t facet) {
+  // The pixels of a row where all edge functions and the inverse depth's limits hold form one interval. An
+  // edge may miss its neighbour by a rounding error: a tiny slack closes the seam.
+  const Plane limits[4] = {
+      edges[0], edges[1], edges[2], {-inverse_depth.a, -inverse_depth.b, 1.0f / kNearM - inverse_depth.c}};
   for (int y = y0; y <= y1; ++y) {
     const auto fy = static_cast<float>(y);
     auto from = static_cast<float>(x_low), to = static_cast<float>(x_high);
     for (const Plane& limit : limits) {
       const float at_zero = limit.b * fy + limit.c;
-      if (limit.a > 0) from = std::max(from, -at_zero / limit.a - 1e-3f);
-      else if (limit.a < 0) to = std::min(to, -at_zero / limit.a + 1e-3f);
-      else if (at_zero < 0) to = -1;
+      if (limit.a > 0)
+        from = std::max(from, -at_zero / limit.a - 1e-3f);
+      else if (limit.a < 0)
+        to = std::min(to, -at_zero / limit.a + 1e-3f);
+      else if (at_zero < 0)
+        to = -1;
     }
     if (!(from <= to)) continue;
     const int first = static_cast<int>(std::ceil(from)), last = static_cast<int>(to);
@@ -272,7 +288,8 @@ const Facet* Renderer::Impl::FacetAt(size_t pixel, float& x, float& y) const {
     x = lookup_[pixel].x();
     y = lookup_[pixel].y();
     if (!(x >= 0 && y >= 0)) return nullptr;
-    at = static_cast<size_t>(y + 0.5f) * static_cast<size_t>(canvas_width_) + static_cast<size_t>(x + 0.5f);
+    at = static_cast<size_t>(y + canvas_dither_.y()) * static_cast<size_t>(canvas_width_) +
+         static_cast<size_t>(x + canvas_dither_.x());
   }
   const uint32_t facet = facet_of_[at];
   return facet == kNothing ? nullptr : &facets_[facet];
@@ -286,7 +303,8 @@ int Renderer::Impl::MipLevel(const Facet& facet, float x, float y, float bias) c
   const float du_dx = z * (s.a - u * w.a), dv_dx = z * (t.a - v * w.a);
   const float du_dy = z * (s.b - u * w.b), dv_dy = z * (t.b - v * w.b);
   const float along_x = du_dx * du_dx + dv_dx * dv_dx, along_y = du_dy * du_dy + dv_dy * dv_dy;
-  // At a grazing view the longer step would blur the shorter one away; the samples within a pixel cover some of it.
+  // At a grazing view the longer step would blur the shorter one away; the samples within a pixel cover some
+  // of it.
   const float longer = std::max(along_x, along_y), shorter = std::min(along_x, along_y);
   const auto per_pixel = static_cast<float>(canvas_scale_ * canvas_scale_);
   const float squared = per_pixel * std::max(shorter, longer * (1.0f / 6.0f));
@@ -307,8 +325,8 @@ void Renderer::Impl::Shade(float level_bias) {
       if (facet != last || x % kLevelRun == 0) level = MipLevel(*facet, at_x, at_y, level_bias);
       last = facet;
       const float z = 1.0f / std::max(facet->inverse_depth.At(at_x, at_y), 1e-4f);
-      const uint32_t texel =
-          facet->texture->Sample(z * facet->u_over_z.At(at_x, at_y), z * facet->v_over_z.At(at_x, at_y), level);
+      const uint32_t texel = facet->texture->Sample(z * facet->u_over_z.At(at_x, at_y),
+                                                    z * facet->v_over_z.At(at_x, at_y), level);
       const auto light =
           static_cast<uint32_t>(std::clamp(z * facet->light_over_z.At(at_x, at_y), 0.0f, 1.5f) * 256.0f);
       for (size_t k = 0; k < 3; ++k) {
@@ -328,7 +346,8 @@ void Renderer::Impl::Develop(double time_s, uint64_t index, RenderedFrame& frame
   frame.color = {camera_.width_px, camera_.height_px, std::vector<uint8_t>(3 * pixels)};
   frame.gray = GrayImage(camera_.width_px, camera_.height_px);
   const auto phase = static_cast<double>(options_.seed % 1000);
-  const double gain = 1.0 + options_.gain_swing * (0.6 * std::sin(0.7 * time_s + phase) + 0.4 * std::sin(1.9 * time_s + 2 * phase));
+  const double gain = 1.0 + options_.gain_swing * (0.6 * std::sin(0.7 * time_s + phase) +
+                                                   0.4 * std::sin(1.9 * time_s + 2 * phase));
   const float scale = static_cast<float>(gain) / static_cast<float>(options_.samples);
   const auto read = static_cast<float>(options_.read_noise), shot = static_cast<float>(options_.shot_noise);
   Random random(DeriveSeed(options_.seed, index, "noise"));
@@ -344,7 +363,8 @@ void Renderer::Impl::Develop(double time_s, uint64_t index, RenderedFrame& frame
       rgb[k] = static_cast<uint32_t>(std::clamp(value + noise + 0.5f, 0.0f, 255.0f));
       frame.color.data[3 * i + k] = static_cast<uint8_t>(rgb[k]);
     }
-    frame.gray.data[i] = static_cast<uint8_t>((19595u * rgb[0] + 38470u * rgb[1] + 7471u * rgb[2] + 32768u) >> 16);
+    frame.gray.data[i] =
+        static_cast<uint8_t>((19595u * rgb[0] + 38470u * rgb[1] + 7471u * rgb[2] + 32768u) >> 16);
   }
 }
 
@@ -366,8 +386,11 @@ RenderedFrame Renderer::Impl::Render(std::span<const Mesh> still, const TextureL
     const double t = (i + 0.5) / options_.samples;
     // Places within the pixel by the golden ratio: even over any number of samples.
     const double px = t - 0.5, py = (i + 0.5) * 0.6180339887 - std::floor((i + 0.5) * 0.6180339887) - 0.5;
-    const Eigen::Vector2d jitter_px = options_.samples == 1 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.4 * px, 1.4 * py);
+    const Eigen::Vector2d jitter_px =
+        options_.samples == 1 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.4 * px, 1.4 * py);
     Rasterize(still, instant_at(time_s + (t - 0.5) * options_.exposure_s), &textures, jitter_px);
+    canvas_dither_ = {Fraction(0.5f + 0.7548777f * static_cast<float>(i)),
+                      Fraction(0.5f + 0.5698403f * static_cast<float>(i))};
     // The samples round the mip level at different thresholds: their mean lies between two levels.
     Shade(static_cast<float>(t) - 0.35f);
   }
@@ -382,6 +405,7 @@ RenderedFrame Renderer::Impl::Render(std::span<const Mesh> still, const TextureL
 std::vector<float> Renderer::Impl::RenderDepth(std::span<const Mesh> still, const Instant& instant,
                                                std::vector<int>* actor_of) {
   Rasterize(still, instant, nullptr, {0, 0});
+  canvas_dither_ = {0.5f, 0.5f};
   const size_t pixels = vignette_.size();
   std::vector<float> depth_m(pixels, 0.0f);
   if (actor_of != nullptr) actor_of->assign(pixels, -1);
@@ -396,17 +420,19 @@ std::vector<float> Renderer::Impl::RenderDepth(std::span<const Mesh> still, cons
   return depth_m;
 }
 
-Renderer::Renderer(const Camera& camera, const RenderOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
+Renderer::Renderer(const Camera& camera, const RenderOptions& options)
+    : impl_(std::make_unique<Impl>(camera, options)) {}
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
-RenderedFrame Renderer::Render(std::span<const Mesh> still, const TextureList& textures, double time_s, uint64_t index,
-                               const std::function<Instant(double)>& instant_at) {
+RenderedFrame Renderer::Render(std::span<const Mesh> still, const TextureList& textures, double time_s,
+                               uint64_t index, const std::function<Instant(double)>& instant_at) {
   return impl_->Render(still, textures, time_s, index, instant_at);
 }
 
-std::vector<float> Renderer::RenderDepth(std::span<const Mesh> still, const Instant& instant, std::vector<int>* actor_of) {
+std::vector<float> Renderer::RenderDepth(std::span<const Mesh> still, const Instant& instant,
+                                         std::vector<int>* actor_of) {
   return impl_->RenderDepth(still, instant, actor_of);
 }
 

@@ -11,18 +11,22 @@ namespace dmslam {
 namespace {
 
 /// The cubes of space that a view sees into, sorted.
-std::vector<uint64_t> SeenVoxels(const Scene& scene, const Camera& camera, Renderer& renderer, const Rigid3d& T_world_cam,
-                                 double voxel_m) {
-  const std::vector<float> depth_m = renderer.RenderDepth(scene.meshes, Instant{T_world_cam, {}, {}}, nullptr);
+std::vector<uint64_t> SeenVoxels(const Scene& scene, const Camera& camera, Renderer& renderer,
+                                 const Rigid3d& T_world_cam, const RevisitOptions& options) {
+  const std::vector<float> depth_m =
+      renderer.RenderDepth(scene.meshes, Instant{T_world_cam, {}, {}}, nullptr);
   std::vector<uint64_t> voxels;
   for (int y = 0; y < camera.height_px; ++y) {
     for (int x = 0; x < camera.width_px; ++x) {
-      const float depth = depth_m[static_cast<size_t>(y) * static_cast<size_t>(camera.width_px) + static_cast<size_t>(x)];
-      if (depth <= 0) continue;
+      const float depth =
+          depth_m[static_cast<size_t>(y) * static_cast<size_t>(camera.width_px) + static_cast<size_t>(x)];
+      if (depth <= 0 || depth > options.max_depth_m) continue;
       const Eigen::Vector3d p_world = T_world_cam * (static_cast<double>(depth) * camera.Ray({x, y}));
       uint64_t key = 0;
       for (int k = 0; k < 3; ++k) {
-        key = (key << 21) | (static_cast<uint64_t>(static_cast<int64_t>(std::floor(p_world[k] / voxel_m)) + (1 << 20)) & 0x1fffff);
+        key = (key << 21) | (static_cast<uint64_t>(
+                                 static_cast<int64_t>(std::floor(p_world[k] / options.voxel_m)) + (1 << 20)) &
+                             0x1fffff);
       }
       voxels.push_back(key);
     }
@@ -87,8 +91,8 @@ class ViewGraph {
 
 }  // namespace
 
-std::vector<Revisit> FindRevisits(const Scene& scene, const Camera& camera, std::span<const Rigid3d> T_world_cam,
-                                  const RevisitOptions& options) {
+std::vector<Revisit> FindRevisits(const Scene& scene, const Camera& camera,
+                                  std::span<const Rigid3d> T_world_cam, const RevisitOptions& options) {
   Camera small = camera;
   small.k1 = small.k2 = small.p1 = small.p2 = small.k3 = 0;
   const double shrink = 96.0 / camera.width_px;
@@ -102,9 +106,11 @@ std::vector<Revisit> FindRevisits(const Scene& scene, const Camera& camera, std:
   ViewGraph graph(options);
   std::vector<Revisit> revisits;
   const auto step = static_cast<size_t>(options.frame_step);
-  const auto angle_to = [&](size_t a, size_t b) { return AngleBetween(T_world_cam[a].rotation, T_world_cam[b].rotation); };
+  const auto angle_to = [&](size_t a, size_t b) {
+    return AngleBetween(T_world_cam[a].rotation, T_world_cam[b].rotation);
+  };
   for (size_t frame = 0; frame < T_world_cam.size(); frame += step) {
-    const std::vector<uint64_t> voxels = SeenVoxels(scene, small, renderer, T_world_cam[frame], options.voxel_m);
+    const std::vector<uint64_t> voxels = SeenVoxels(scene, small, renderer, T_world_cam[frame], options);
     const std::vector<double> shares = graph.Shares(voxels);
     const std::vector<int> distances = shares.empty() ? std::vector<int>() : graph.DistancesFromLast();
     std::vector<size_t> near, far;
@@ -115,8 +121,12 @@ std::vector<Revisit> FindRevisits(const Scene& scene, const Camera& camera, std:
       (is_far ? far : near).push_back(i);
       if (!is_far || shares[i] < options.revisit_share || shares[i] <= best.shared_share) continue;
       if (angle_to(frame, i * step) > options.max_angle_rad) continue;
-      best = {frame, i * step, shares[i], (T_world_cam[frame].translation - T_world_cam[i * step].translation).norm(),
-              angle_to(frame, i * step), distances[i] < 0 ? -1 : distances[i] + 1};
+      best = {frame,
+              i * step,
+              shares[i],
+              (T_world_cam[frame].translation - T_world_cam[i * step].translation).norm(),
+              angle_to(frame, i * step),
+              distances[i] < 0 ? -1 : distances[i] + 1};
     }
     if (best.shared_share > 0) {
       revisits.push_back(best);

@@ -31,9 +31,9 @@ Affine3f FrameFacing(const Vector2f& position, const Vector2f& facing) {
 /// A wall from `a` to `b` with the room on its left; openings are left out.
 struct Wall {
   Vector2f a, b;
-  uint32_t skin = 0;              ///< Index into Assets::walls.
-  float max_depth = 0.45f;        ///< How far furniture may stand out.
-  std::vector<float> openings;    ///< Middles of doorways, metres from `a`.
+  uint32_t skin = 0;            ///< Index into Assets::walls.
+  float max_depth = 0.45f;      ///< How far furniture may stand out.
+  std::vector<float> openings;  ///< Middles of doorways, metres from `a`.
   Vector2f along() const { return (b - a).normalized(); }
   Vector2f inward() const { return {-along().y(), along().x()}; }
   float length() const { return (b - a).norm(); }
@@ -41,7 +41,8 @@ struct Wall {
 
 constexpr float kDoorwayWidth = 1.1f, kDoorwayHeight = 2.1f;
 
-void AddWallPanel(SceneBuilder& builder, const Wall& wall, const Skin& skin, float from, float to, float z0, float z1) {
+void AddWallPanel(SceneBuilder& builder, const Wall& wall, const Skin& skin, float from, float to, float z0,
+                  float z1) {
   if (to - from < 0.01f) return;
   // Long walls are cut into meshes, so that what is out of view is skipped.
   const int parts = std::max(1, static_cast<int>(std::ceil((to - from) / 3.0f)));
@@ -59,8 +60,8 @@ void BuildWall(SceneBuilder& builder, const Assets& assets, const Wall& wall) {
   float from = 0;
   for (const float middle : wall.openings) {
     AddWallPanel(builder, wall, skin, from, middle - 0.5f * kDoorwayWidth, 0, kRoomHeight);
-    AddWallPanel(builder, wall, skin, middle - 0.5f * kDoorwayWidth, middle + 0.5f * kDoorwayWidth, kDoorwayHeight,
-                 kRoomHeight);
+    AddWallPanel(builder, wall, skin, middle - 0.5f * kDoorwayWidth, middle + 0.5f * kDoorwayWidth,
+                 kDoorwayHeight, kRoomHeight);
     from = middle + 0.5f * kDoorwayWidth;
   }
   AddWallPanel(builder, wall, skin, from, wall.length(), 0, kRoomHeight);
@@ -83,7 +84,8 @@ class PosterDeck {
 };
 
 /// Hangs pictures at one place of a wall, from `low` upwards: columns of one large or two small ones.
-void HangPosters(SceneBuilder& builder, PosterDeck& deck, const Vector2f& foot, const Wall& wall, float low, float slot) {
+void HangPosters(SceneBuilder& builder, PosterDeck& deck, const Vector2f& foot, const Wall& wall, float low,
+                 float slot) {
   const float top = 2.45f;
   float at = -0.46f * slot;
   while (at < 0.46f * slot - 0.3f) {
@@ -100,7 +102,8 @@ void HangPosters(SceneBuilder& builder, PosterDeck& deck, const Vector2f& foot, 
 }
 
 /// Furnishes one place of a wall, about `slot` metres wide.
-void FurnishPlace(SceneBuilder& builder, const Assets& assets, PosterDeck& deck, const Wall& wall, float at, float slot) {
+void FurnishPlace(SceneBuilder& builder, const Assets& assets, PosterDeck& deck, const Wall& wall, float at,
+                  float slot) {
   const Vector2f foot = wall.a + at * wall.along();
   const auto standing = [&](float depth) {
     return FrameFacing(foot + (depth + 0.02f) * wall.inward(), wall.inward());
@@ -111,7 +114,8 @@ void FurnishPlace(SceneBuilder& builder, const Assets& assets, PosterDeck& deck,
     const float width = std::min(slot - 0.15f, builder.Uniform(0.8f, 1.3f));
     AddShelf(builder, assets, standing(depth), width, builder.Uniform(1.3f, 2.2f), depth);
   } else if (kind < 0.45) {
-    const float width = std::min(slot - 0.15f, builder.Uniform(0.8f, 1.3f)), height = builder.Uniform(0.75f, 1.1f);
+    const float width = std::min(slot - 0.15f, builder.Uniform(0.8f, 1.3f)),
+                height = builder.Uniform(0.75f, 1.1f);
     AddCabinet(builder, assets, standing(depth), width, height, depth);
     HangPosters(builder, deck, foot, wall, height + 0.35f, slot);
   } else if (kind < 0.55) {
@@ -143,14 +147,18 @@ void FurnishWall(SceneBuilder& builder, const Assets& assets, PosterDeck& deck, 
       (left - from > to - right ? to : from) = left - from > to - right ? left : right;
     }
     const float width = to - from;
-    if (width > slot - 0.01f) FurnishPlace(builder, assets, deck, wall, at, slot);
-    else if (width > 0.4f) HangPosters(builder, deck, wall.a + 0.5f * (from + to) * wall.along(), wall, 0.5f, width);
+    if (width > slot - 0.01f)
+      FurnishPlace(builder, assets, deck, wall, at, slot);
+    else if (width > 0.4f)
+      HangPosters(builder, deck, wall.a + 0.5f * (from + to) * wall.along(), wall, 0.5f, width);
   }
 }
 
-void AddFloorAndCeiling(SceneBuilder& builder, const Assets& assets, const Vector2f& low, const Vector2f& high) {
+void AddFloorAndCeiling(SceneBuilder& builder, const Assets& assets, const Vector2f& low,
+                        const Vector2f& high) {
   const Vector2f size = high - low;
-  const int nx = std::max(1, static_cast<int>(std::ceil(size.x() / 3))), ny = std::max(1, static_cast<int>(std::ceil(size.y() / 3)));
+  const int nx = std::max(1, static_cast<int>(std::ceil(size.x() / 3))),
+            ny = std::max(1, static_cast<int>(std::ceil(size.y() / 3)));
   const float dx = size.x() / static_cast<float>(nx), dy = size.y() / static_cast<float>(ny);
   for (int j = 0; j < ny; ++j) {
     for (int i = 0; i < nx; ++i) {
@@ -169,17 +177,20 @@ void AddDeskGroup(SceneBuilder& builder, const Assets& assets, const Vector2f& c
     AddDesk(builder, assets, FrameFacing(front, {-1, 0}), 1.55f, 0.76f);
     scene.obstacles.push_back({center + Vector2f(0, 0.82f * side), 0.78f});
     for (const float facing : {-1.0f, 1.0f}) {
-      const Vector2f seat = center + Vector2f(facing * builder.Uniform(0.72f, 0.82f), side * builder.Uniform(0.42f, 0.65f));
+      const Vector2f seat =
+          center + Vector2f(facing * builder.Uniform(0.72f, 0.82f), side * builder.Uniform(0.42f, 0.65f));
       const float heading = facing < 0 ? 0.0f : kPi;
       // The chair's back is behind the sitter; its frame's +y points there.
-      AddChair(builder, assets, Translation3f(On(seat, 0)) * AngleAxisf(heading + 0.5f * kPi, Vector3f::UnitZ()));
+      AddChair(builder, assets,
+               Translation3f(On(seat, 0)) * AngleAxisf(heading + 0.5f * kPi, Vector3f::UnitZ()));
       scene.seats.push_back({seat, heading});
     }
   }
 }
 
-void BuildRoom(SceneBuilder& builder, const Assets& assets, const Vector2f& low, const std::vector<float>& doors_at_end,
-               const std::vector<float>& doors_at_start, Scene& scene) {
+void BuildRoom(SceneBuilder& builder, const Assets& assets, const Vector2f& low,
+               const std::vector<float>& doors_at_end, const std::vector<float>& doors_at_start,
+               Scene& scene) {
   const Vector2f high = low + Vector2f(kRoomLength, kRoomWidth);
   const uint32_t skin = builder.random().Below(4);
   PosterDeck deck(assets.posters);
@@ -200,7 +211,8 @@ void BuildRoom(SceneBuilder& builder, const Assets& assets, const Vector2f& low,
 }
 
 std::vector<Vector3f> RoomLamps(const Vector2f& low) {
-  return {On(low + Vector2f(1.8f, 3.0f), 2.55f), On(low + Vector2f(5.0f, 2.0f), 2.55f), On(low + Vector2f(5.0f, 4.4f), 2.55f)};
+  return {On(low + Vector2f(1.8f, 3.0f), 2.55f), On(low + Vector2f(5.0f, 2.0f), 2.55f),
+          On(low + Vector2f(5.0f, 4.4f), 2.55f)};
 }
 
 void BuildOneRoom(const SceneOptions& options, Scene& scene) {
@@ -221,7 +233,8 @@ void BuildTwoRooms(const SceneOptions& options, Scene& scene) {
   BuildRoom(builder, assets, {0, 0}, {kRoomLength - door}, {}, scene);
   builder.random() = Random(DeriveSeed(options.seed, 1, "layout"));
   BuildRoom(builder, assets, second, {}, {door}, scene);
-  const float gap = second.y() - kRoomWidth, x0 = door - 0.5f * kDoorwayWidth, x1 = door + 0.5f * kDoorwayWidth;
+  const float gap = second.y() - kRoomWidth, x0 = door - 0.5f * kDoorwayWidth,
+              x1 = door + 0.5f * kDoorwayWidth;
   builder.AddQuad({x0, kRoomWidth, kDoorwayHeight}, {0, gap, 0}, {0, 0, -kDoorwayHeight}, assets.woods[0]);
   builder.AddQuad({x1, second.y(), kDoorwayHeight}, {0, -gap, 0}, {0, 0, -kDoorwayHeight}, assets.woods[0]);
   builder.AddQuad({x0, kRoomWidth, kDoorwayHeight}, {kDoorwayWidth, 0, 0}, {0, gap, 0}, assets.woods[0]);

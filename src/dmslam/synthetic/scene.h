@@ -12,7 +12,7 @@ namespace dmslam {
 enum class SceneKind {
   kRoom,      ///< One furnished room of 7 x 6 m with a desk in its middle.
   kCorridor,  ///< A closed ring of corridors.
-  kAliased,   ///< Two rooms, side by side, with a door between them: the same things, put up in another order.
+  kAliased,  ///< Two rooms, side by side, with a door between them: the same things, put up in another order.
 };
 
 /// "room", "corridor" or "aliased"; throws InputError for another name.
@@ -20,9 +20,10 @@ SceneKind ParseSceneKind(const std::string& name);
 
 struct SceneOptions {
   SceneKind kind = SceneKind::kRoom;
-  uint64_t seed = 1;           ///< Everything in it: pictures, where things stand, how they are lit.
-  double ring_length_m = 60;   ///< kCorridor: length of the centre line.
-  int texture_halvings = 0;    ///< Textures of half (1), quarter (2) ... the resolution: quick scenes for tests.
+  uint64_t seed = 1;          ///< Everything in it: pictures, where things stand, how they are lit.
+  double ring_length_m = 60;  ///< kCorridor: length of the centre line.
+  int texture_halvings =
+      0;  ///< Textures of half (1), quarter (2) ... the resolution: quick scenes for tests.
 };
 
 /// Where someone may sit: the middle of the seat, and the direction the sitter looks [rad, from +x to +y].

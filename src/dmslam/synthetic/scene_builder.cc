@@ -28,7 +28,8 @@ Assets PaintAssets(uint64_t seed, int posters, int halvings, TextureList& textur
     Random r = random("poster", static_cast<uint64_t>(i));
     assets.posters.push_back(paint(PaintPoster(poster_size, poster_size, r)));
   }
-  Random books = random("book"), packages = random("package"), screens = random("screen"), cloths = random("cloth");
+  Random books = random("book"), packages = random("package"), screens = random("screen"),
+         cloths = random("cloth");
   for (int i = 0; i < 28; ++i) assets.books.push_back(paint(PaintBookSpine(size(64), size(256), books)));
   for (int i = 0; i < 14; ++i) assets.packages.push_back(paint(PaintPackage(size(256), size(256), packages)));
   for (int i = 0; i < 3; ++i) assets.screens.push_back(paint(PaintScreen(size(512), size(256), screens)));
@@ -66,8 +67,8 @@ float SceneBuilder::LightAt(const Vector3f& point, const Vector3f& normal) const
   return std::min(light, 1.35f);
 }
 
-void SceneBuilder::AddQuad(const Vector3f& origin, const Vector3f& along_u, const Vector3f& along_v, const Skin& skin,
-                           float tile_m) {
+void SceneBuilder::AddQuad(const Vector3f& origin, const Vector3f& along_u, const Vector3f& along_v,
+                           const Skin& skin, float tile_m) {
   const float length_u = along_u.norm(), length_v = along_v.norm();
   const Vector3f normal = along_v.cross(along_u).normalized();
   const int nu = std::max(1, static_cast<int>(std::ceil(length_u / tile_m)));
@@ -79,7 +80,8 @@ void SceneBuilder::AddQuad(const Vector3f& origin, const Vector3f& along_u, cons
   const auto first = static_cast<uint32_t>(mesh_.vertices.size());
   for (int j = 0; j <= nv; ++j) {
     for (int i = 0; i <= nu; ++i) {
-      const float s = static_cast<float>(i) / static_cast<float>(nu), t = static_cast<float>(j) / static_cast<float>(nv);
+      const float s = static_cast<float>(i) / static_cast<float>(nu),
+                  t = static_cast<float>(j) / static_cast<float>(nv);
       const Vector3f position = origin + s * along_u + t * along_v;
       mesh_.vertices.push_back(
           {position, shift_u + s * scale_u, shift_v + t * scale_v, LightAt(position, normal)});
@@ -94,14 +96,16 @@ void SceneBuilder::AddQuad(const Vector3f& origin, const Vector3f& along_u, cons
   }
 }
 
-void SceneBuilder::AddBox(const Eigen::Affine3f& frame, const Vector3f& low, const Vector3f& high, const Skin& front,
-                          const Skin& sides) {
+void SceneBuilder::AddBox(const Eigen::Affine3f& frame, const Vector3f& low, const Vector3f& high,
+                          const Skin& front, const Skin& sides) {
   const auto corner = [&](bool x, bool y, bool z) {
     return Vector3f(frame * Vector3f(x ? high.x() : low.x(), y ? high.y() : low.y(), z ? high.z() : low.z()));
   };
   // Each face from its top left corner, as seen from outside: u to the right, v down.
   const auto face = [&](const Vector3f& top_left, const Vector3f& top_right, const Vector3f& bottom_left,
-                        const Skin& skin) { AddQuad(top_left, top_right - top_left, bottom_left - top_left, skin); };
+                        const Skin& skin) {
+    AddQuad(top_left, top_right - top_left, bottom_left - top_left, skin);
+  };
   face(corner(false, false, true), corner(true, false, true), corner(false, false, false), front);
   face(corner(true, true, true), corner(false, true, true), corner(true, true, false), sides);
   face(corner(false, true, true), corner(false, false, true), corner(false, true, false), sides);

@@ -24,8 +24,8 @@ struct Assets {
 /// Paints all pictures. `posters` is how many different ones; `halvings` lowers the resolution.
 Assets PaintAssets(uint64_t seed, int posters, int halvings, TextureList& textures);
 
-/// Builds meshes out of lit quads and boxes. Frames put a thing into the world: x to its right, y into it, z up, as seen
-/// by who stands before it; the origin is on the floor, in the middle of its front.
+/// Builds meshes out of lit quads and boxes. Frames put a thing into the world: x to its right, y into it, z
+/// up, as seen by who stands before it; the origin is on the floor, in the middle of its front.
 class SceneBuilder {
  public:
   SceneBuilder(uint64_t seed, std::vector<Eigen::Vector3f> lamps) : random_(seed), lamps_(std::move(lamps)) {}
@@ -42,8 +42,8 @@ class SceneBuilder {
   void AddQuad(const Eigen::Vector3f& origin, const Eigen::Vector3f& along_u, const Eigen::Vector3f& along_v,
                const Skin& skin, float tile_m = 0.7f);
   /// A box from `low` to `high` in `frame`; `front` is what shows to -y, `sides` everything else.
-  void AddBox(const Eigen::Affine3f& frame, const Eigen::Vector3f& low, const Eigen::Vector3f& high, const Skin& front,
-              const Skin& sides);
+  void AddBox(const Eigen::Affine3f& frame, const Eigen::Vector3f& low, const Eigen::Vector3f& high,
+              const Skin& front, const Skin& sides);
   /// Ends the mesh under construction; what follows goes into a new one.
   void FinishMesh();
   std::vector<Mesh> TakeMeshes();
@@ -58,15 +58,16 @@ class SceneBuilder {
 };
 
 /// Furniture, each into a mesh of its own.
-void AddShelf(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width, float height,
-              float depth);
-void AddDesk(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width, float depth);
+void AddShelf(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width,
+              float height, float depth);
+void AddDesk(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width,
+             float depth);
 void AddChair(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame);
 void AddPlant(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float height);
-void AddCabinet(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width, float height,
-                float depth);
-void AddPoster(SceneBuilder& builder, uint32_t texture, const Eigen::Affine3f& frame, float width, float height,
-               float bottom);
+void AddCabinet(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width,
+                float height, float depth);
+void AddPoster(SceneBuilder& builder, uint32_t texture, const Eigen::Affine3f& frame, float width,
+               float height, float bottom);
 void AddDoor(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame);
 void AddRadiator(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame, float width);
 void AddPileOfBoxes(SceneBuilder& builder, const Assets& assets, const Eigen::Affine3f& frame);

@@ -36,18 +36,19 @@ class TextFile {
 void WriteCamera(const Camera& camera, const fs::path& path) {
   TextFile file(path);
   file.out().precision(12);
-  file.out() << "model: pinhole\nwidth: " << camera.width_px << "\nheight: " << camera.height_px << "\nfx: " << camera.fx_px
-             << "\nfy: " << camera.fy_px << "\ncx: " << camera.cx_px << "\ncy: " << camera.cy_px << "\n";
+  file.out() << "model: pinhole\nwidth: " << camera.width_px << "\nheight: " << camera.height_px
+             << "\nfx: " << camera.fx_px << "\nfy: " << camera.fy_px << "\ncx: " << camera.cx_px
+             << "\ncy: " << camera.cy_px << "\n";
   if (camera.HasDistortion()) {
-    file.out() << "distortion: [" << camera.k1 << ", " << camera.k2 << ", " << camera.p1 << ", " << camera.p2 << ", "
-               << camera.k3 << "]\n";
+    file.out() << "distortion: [" << camera.k1 << ", " << camera.k2 << ", " << camera.p1 << ", " << camera.p2
+               << ", " << camera.k3 << "]\n";
   }
   file.out() << "fps: " << camera.fps << "\n";
   file.Finish();
 }
 
-void WriteLoops(const std::vector<Revisit>& revisits, const std::vector<StampedPose>& poses, const RevisitOptions& options,
-                const fs::path& path) {
+void WriteLoops(const std::vector<Revisit>& revisits, const std::vector<StampedPose>& poses,
+                const RevisitOptions& options, const fs::path& path) {
   nlohmann::ordered_json loops = nlohmann::ordered_json::array();
   for (const Revisit& revisit : revisits) {
     loops.push_back({{"frame", revisit.frame},
@@ -68,20 +69,23 @@ void WriteLoops(const std::vector<Revisit>& revisits, const std::vector<StampedP
 }
 
 double ShareOf(const GrayImage& mask, int at_least) {
-  const auto count = std::count_if(mask.data.begin(), mask.data.end(), [&](uint8_t value) { return value >= at_least; });
+  const auto count =
+      std::count_if(mask.data.begin(), mask.data.end(), [&](uint8_t value) { return value >= at_least; });
   return static_cast<double>(count) / static_cast<double>(mask.data.size());
 }
 
 std::vector<uint8_t> Encode(const RenderedFrame& frame, const SequenceOptions& options) {
   if (options.png) return options.gray ? EncodePng(frame.gray) : EncodePng(frame.color);
-  return options.gray ? EncodeJpeg(frame.gray, options.jpeg_quality) : EncodeJpeg(frame.color, options.jpeg_quality);
+  return options.gray ? EncodeJpeg(frame.gray, options.jpeg_quality)
+                      : EncodeJpeg(frame.color, options.jpeg_quality);
 }
 
 void MakeFolders(const fs::path& root, bool masks) {
   std::error_code error;
   fs::create_directories(root / "rgb", error);
   if (!error && masks) fs::create_directories(root / "mask", error);
-  if (error) throw InputError(root.string() + ": cannot be made (" + error.message() + "); choose another --out");
+  if (error)
+    throw InputError(root.string() + ": cannot be made (" + error.message() + "); choose another --out");
 }
 
 /// Stamps in whole microseconds, as the benchmark writes them.
@@ -93,14 +97,20 @@ int64_t StampOf(const SequenceOptions& options, int frame) {
 class FrameWriter {
  public:
   FrameWriter(const SequenceOptions& options, const fs::path& root, bool masks)
-      : options_(options), root_(root), masks_(masks), rgb_list_(root / "rgb.txt"), coverage_(root / "coverage.txt") {
+      : options_(options),
+        root_(root),
+        masks_(masks),
+        rgb_list_(root / "rgb.txt"),
+        coverage_(root / "coverage.txt") {
     rgb_list_.out() << "# color images\n# timestamp filename\n";
     if (!masks_) return;
     mask_list_.emplace(root / "mask.txt");
-    mask_list_->out() << "# actors (255 = moving in this frame, 128 = standing still)\n# timestamp filename\n";
+    mask_list_->out()
+        << "# actors (255 = moving in this frame, 128 = standing still)\n# timestamp filename\n";
   }
   void Write(const RenderedFrame& frame, int64_t stamp_ns, SequenceReport& report) {
-    const std::string stamp = FormatStampNs(stamp_ns), name = "rgb/" + stamp + (options_.png ? ".png" : ".jpg");
+    const std::string stamp = FormatStampNs(stamp_ns),
+                      name = "rgb/" + stamp + (options_.png ? ".png" : ".jpg");
     WriteFileBytes((root_ / name).string(), Encode(frame, options_));
     rgb_list_.out() << stamp << ' ' << name << '\n';
     const double covered = ShareOf(frame.mask, 128), moving = ShareOf(frame.mask, 255);
@@ -130,7 +140,8 @@ class FrameWriter {
   std::optional<TextFile> mask_list_;
 };
 
-void WriteDescription(const SequenceOptions& options, const World& world, const SequenceReport& report, const fs::path& path) {
+void WriteDescription(const SequenceOptions& options, const World& world, const SequenceReport& report,
+                      const fs::path& path) {
   const nlohmann::ordered_json root = {{"frames", report.frames},
                                        {"fps", options.camera.fps},
                                        {"scene_seed", options.world.scene.seed},
@@ -150,7 +161,8 @@ void WriteDescription(const SequenceOptions& options, const World& world, const 
 
 void CheckOptions(const SequenceOptions& options) {
   if (options.frames < 1) throw InputError("--frames: must be at least 1");
-  if (options.jpeg_quality < 1 || options.jpeg_quality > 100) throw InputError("--quality: must lie in 1..100");
+  if (options.jpeg_quality < 1 || options.jpeg_quality > 100)
+    throw InputError("--quality: must lie in 1..100");
   if (const auto problem = options.camera.Problem()) throw InputError("camera: " + *problem);
 }
 
@@ -184,15 +196,20 @@ SequenceReport WriteSequence(const SequenceOptions& given, const std::string& fo
     writer.Write(RenderFrame(world, renderer, time_s, static_cast<uint64_t>(i)), stamp_ns, report);
     T_world_cam.push_back(world.path().T_world_cam(time_s));
     poses.push_back({stamp_ns, T_world_cam.back()});
-    if (i > 0) report.path_m += (poses[poses.size() - 1].T_world_cam.translation - poses[poses.size() - 2].T_world_cam.translation).norm();
+    if (i > 0)
+      report.path_m +=
+          (poses[poses.size() - 1].T_world_cam.translation - poses[poses.size() - 2].T_world_cam.translation)
+              .norm();
     if (progress && !progress(i + 1)) break;
   }
   writer.Finish(report);
   WriteTrajectory((root / "groundtruth.txt").string(), poses);
   WriteCamera(options.camera, root / "camera.yaml");
   RevisitOptions revisit_options;
-  revisit_options.frame_step = std::max(1, static_cast<int>(std::lround(options.camera.fps / 3)));  // As keyframes come.
-  const std::vector<Revisit> revisits = FindRevisits(world.scene(), options.camera, T_world_cam, revisit_options);
+  revisit_options.frame_step =
+      std::max(1, static_cast<int>(std::lround(options.camera.fps / 3)));  // As keyframes come.
+  const std::vector<Revisit> revisits =
+      FindRevisits(world.scene(), options.camera, T_world_cam, revisit_options);
   report.revisits = revisits.size();
   WriteLoops(revisits, poses, revisit_options, root / "loops.json");
   WriteDescription(options, world, report, root / "synthetic.json");

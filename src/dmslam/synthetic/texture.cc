@@ -30,20 +30,27 @@ Canvas Halve(const Canvas& from) {
 }  // namespace
 
 Canvas::Canvas(int width, int height, const Rgb& fill)
-    : width_(width), height_(height), pixels_(static_cast<size_t>(width) * static_cast<size_t>(height), fill) {}
+    : width_(width),
+      height_(height),
+      pixels_(static_cast<size_t>(width) * static_cast<size_t>(height), fill) {}
 
-void Canvas::Blend(int x, int y, const Rgb& color, float opacity) { at(x, y) += opacity * (color - at(x, y)); }
+void Canvas::Blend(int x, int y, const Rgb& color, float opacity) {
+  at(x, y) += opacity * (color - at(x, y));
+}
 
 void Canvas::FillRect(float x0, float y0, float x1, float y1, const Rgb& color, float opacity) {
-  const int left = std::max(0, static_cast<int>(std::ceil(x0))), right = std::min(width_, static_cast<int>(std::ceil(x1)));
-  const int top = std::max(0, static_cast<int>(std::ceil(y0))), bottom = std::min(height_, static_cast<int>(std::ceil(y1)));
+  const int left = std::max(0, static_cast<int>(std::ceil(x0))),
+            right = std::min(width_, static_cast<int>(std::ceil(x1)));
+  const int top = std::max(0, static_cast<int>(std::ceil(y0))),
+            bottom = std::min(height_, static_cast<int>(std::ceil(y1)));
   for (int y = top; y < bottom; ++y) {
     for (int x = left; x < right; ++x) Blend(x, y, color, opacity);
   }
 }
 
 void Canvas::FillEllipse(float cx, float cy, float rx, float ry, const Rgb& color, float opacity) {
-  const int top = std::max(0, static_cast<int>(cy - ry)), bottom = std::min(height_ - 1, static_cast<int>(cy + ry) + 1);
+  const int top = std::max(0, static_cast<int>(cy - ry)),
+            bottom = std::min(height_ - 1, static_cast<int>(cy + ry) + 1);
   for (int y = top; y <= bottom; ++y) {
     const float dy = (static_cast<float>(y) - cy) / ry;
     const float half = 1.0f - dy * dy;
@@ -61,8 +68,10 @@ void Canvas::FillTriangle(const Eigen::Vector2f& a, const Eigen::Vector2f& b, co
   const auto side = [](const Eigen::Vector2f& p, const Eigen::Vector2f& q, float x, float y) {
     return (q.x() - p.x()) * (y - p.y()) - (q.y() - p.y()) * (x - p.x());
   };
-  for (int y = std::max(0, static_cast<int>(low.y())); y <= std::min(height_ - 1, static_cast<int>(high.y())); ++y) {
-    for (int x = std::max(0, static_cast<int>(low.x())); x <= std::min(width_ - 1, static_cast<int>(high.x())); ++x) {
+  for (int y = std::max(0, static_cast<int>(low.y())); y <= std::min(height_ - 1, static_cast<int>(high.y()));
+       ++y) {
+    for (int x = std::max(0, static_cast<int>(low.x()));
+         x <= std::min(width_ - 1, static_cast<int>(high.x())); ++x) {
       const auto fx = static_cast<float>(x), fy = static_cast<float>(y);
       const float s0 = side(a, b, fx, fy), s1 = side(b, c, fx, fy), s2 = side(c, a, fx, fy);
       if ((s0 >= 0 && s1 >= 0 && s2 >= 0) || (s0 <= 0 && s1 <= 0 && s2 <= 0)) Blend(x, y, color, opacity);
@@ -99,11 +108,13 @@ void Canvas::Smooth() {
 }
 
 Texture::Texture(const Canvas& canvas) : width_(canvas.width()), height_(canvas.height()) {
-  DMSLAM_CHECK(std::has_single_bit(static_cast<unsigned>(width_)) && std::has_single_bit(static_cast<unsigned>(height_)),
+  DMSLAM_CHECK(std::has_single_bit(static_cast<unsigned>(width_)) &&
+                   std::has_single_bit(static_cast<unsigned>(height_)),
                "the sides of a texture must be powers of two");
   Canvas level = canvas;
   while (true) {
-    const auto level_width = static_cast<uint32_t>(level.width()), level_height = static_cast<uint32_t>(level.height());
+    const auto level_width = static_cast<uint32_t>(level.width()),
+               level_height = static_cast<uint32_t>(level.height());
     levels_.push_back({texels_.size(), level_width - 1, level_height - 1,
                        static_cast<uint32_t>(std::countr_zero(level_width)),
                        1.0f / static_cast<float>(1u << levels_.size())});

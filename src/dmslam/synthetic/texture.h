@@ -20,12 +20,12 @@ class Canvas {
   Rgb& at(int x, int y) { return pixels_[Index(x, y)]; }
   const Rgb& at(int x, int y) const { return pixels_[Index(x, y)]; }
 
-  /// Fills the part of a rectangle, disc, triangle or line that lies on the canvas; sizes and positions in pixels.
-  /// `opacity` 1 replaces, 0 leaves.
+  /// Fills the part of a rectangle, disc, triangle or line that lies on the canvas; sizes and positions in
+  /// pixels. `opacity` 1 replaces, 0 leaves.
   void FillRect(float x0, float y0, float x1, float y1, const Rgb& color, float opacity = 1.0f);
   void FillEllipse(float cx, float cy, float rx, float ry, const Rgb& color, float opacity = 1.0f);
-  void FillTriangle(const Eigen::Vector2f& a, const Eigen::Vector2f& b, const Eigen::Vector2f& c, const Rgb& color,
-                    float opacity = 1.0f);
+  void FillTriangle(const Eigen::Vector2f& a, const Eigen::Vector2f& b, const Eigen::Vector2f& c,
+                    const Rgb& color, float opacity = 1.0f);
   void DrawLine(const Eigen::Vector2f& a, const Eigen::Vector2f& b, float thickness, const Rgb& color,
                 float opacity = 1.0f);
   /// Blurs with (1 2 1)/4 in both directions, wrapping around: takes out what one pixel cannot hold.
@@ -42,7 +42,8 @@ class Canvas {
   std::vector<Rgb> pixels_;
 };
 
-/// An immutable picture with its halvings (mip levels), that repeats in both directions. Sides are powers of two.
+/// An immutable picture with its halvings (mip levels), that repeats in both directions. Sides are powers of
+/// two.
 class Texture {
  public:
   explicit Texture(const Canvas& canvas);
@@ -50,8 +51,8 @@ class Texture {
   int width() const { return width_; }
   int height() const { return height_; }
   int levels() const { return static_cast<int>(levels_.size()); }
-  /// Colour at (u, v), in texels of level 0, as the given level has it (0 sharp, 1 half the resolution, ...; 0 <= level <
-  /// levels()), interpolated between its texels. Packed 0x00BBGGRR.
+  /// Colour at (u, v), in texels of level 0, as the given level has it (0 sharp, 1 half the resolution, ...;
+  /// 0 <= level < levels()), interpolated between its texels. Packed 0x00BBGGRR.
   uint32_t Sample(float u_texels, float v_texels, int level) const {
     const Level& at = levels_[static_cast<size_t>(level)];
     // Texel centres lie at half-integers; fixed point with eight bits of fraction.
@@ -66,8 +67,10 @@ class Texture {
     // Weights that sum to 256; red and blue share a multiplication, sixteen bits apart.
     const uint32_t wd = (tx * ty) >> 8, wb = tx - wd, wc = ty - wd, wa = 256 - tx - ty + wd;
     constexpr uint32_t kRedBlue = 0x00ff00ff, kGreen = 0xff;
-    const uint32_t red_blue = (a & kRedBlue) * wa + (b & kRedBlue) * wb + (c & kRedBlue) * wc + (d & kRedBlue) * wd;
-    const uint32_t green = ((a >> 8) & kGreen) * wa + ((b >> 8) & kGreen) * wb + ((c >> 8) & kGreen) * wc + ((d >> 8) & kGreen) * wd;
+    const uint32_t red_blue =
+        (a & kRedBlue) * wa + (b & kRedBlue) * wb + (c & kRedBlue) * wc + (d & kRedBlue) * wd;
+    const uint32_t green = ((a >> 8) & kGreen) * wa + ((b >> 8) & kGreen) * wb + ((c >> 8) & kGreen) * wc +
+                           ((d >> 8) & kGreen) * wd;
     return ((red_blue >> 8) & kRedBlue) | (green & 0xff00);
   }
 

@@ -28,7 +28,8 @@ void CheckOptions(const WorldOptions& options) {
     throw InputError("--moving-share: must lie in 0..0.7");
   }
   if (options.actors < 0 || options.actors > 12) throw InputError("--actors: must lie in 0..12");
-  if (!(options.duration_s > 0 && options.duration_s < 1e5)) throw InputError("--frames: the sequence is empty or too long");
+  if (!(options.duration_s > 0 && options.duration_s < 1e5))
+    throw InputError("--frames: the sequence is empty or too long");
 }
 
 }  // namespace
@@ -41,13 +42,18 @@ World::World(const WorldOptions& options, const Camera& camera)
     : scene_((CheckOptions(options), BuildScene(options.scene))), path_(scene_, options.path) {
   int actors = options.actors;
   if (options.moving_share > 0 && actors == 0) {
-    actors = options.moving_share < 0.15 ? 1 : options.moving_share < 0.38 ? 2 : options.moving_share < 0.55 ? 3 : 4;
+    actors = options.moving_share < 0.15   ? 1
+             : options.moving_share < 0.38 ? 2
+             : options.moving_share < 0.55 ? 3
+                                           : 4;
   }
   for (int i = 0; i < actors; ++i) {
     looks_.push_back(DressActor(options.actor.seed, i, options.scene.texture_halvings, scene_.textures));
   }
-  if (options.moving_share > 0) FitMovingShare(options, camera, actors);
-  else CastActors(options, actors, options.actor.near_m, options.actor.far_m);
+  if (options.moving_share > 0)
+    FitMovingShare(options, camera, actors);
+  else
+    CastActors(options, actors, options.actor.near_m, options.actor.far_m);
 }
 
 void World::CastActors(const WorldOptions& options, int actors, double near_m, double far_m) {
@@ -60,9 +66,9 @@ void World::CastActors(const WorldOptions& options, int actors, double near_m, d
 
 void World::FitMovingShare(const WorldOptions& options, const Camera& camera, int actors) {
   // The nearer they walk, the more they cover: bisection over the distance, on small pictures.
-  const Camera small = Thumbnail(camera, 8);
+  const Camera small = Thumbnail(camera, 10);
   double near_m = 0.75, far_m = 5.0, best_m = near_m, best_error = 1e9;
-  for (int i = 0; i < 9; ++i) {
+  for (int i = 0; i < 8; ++i) {
     const double distance_m = i == 0 ? near_m : std::sqrt(near_m * far_m);
     CastActors(options, actors, 0.85 * distance_m, 1.2 * distance_m);
     const double share = MeasureShare(small, options.duration_s);
@@ -78,12 +84,13 @@ void World::FitMovingShare(const WorldOptions& options, const Camera& camera, in
 
 double World::MeasureShare(const Camera& camera, double duration_s) const {
   Renderer renderer(camera, RenderOptions{});
-  const int samples = std::clamp(static_cast<int>(duration_s * 3), 12, 150);
+  const int samples = std::clamp(static_cast<int>(duration_s * 2), 20, 80);
   size_t covered = 0, all = 0;
   for (int i = 0; i < samples; ++i) {
     std::vector<int> actor_of;
     renderer.RenderDepth({}, At(duration_s * (i + 0.5) / samples), &actor_of);
-    covered += static_cast<size_t>(std::count_if(actor_of.begin(), actor_of.end(), [](int actor) { return actor >= 0; }));
+    covered += static_cast<size_t>(
+        std::count_if(actor_of.begin(), actor_of.end(), [](int actor) { return actor >= 0; }));
     all += actor_of.size();
   }
   return static_cast<double>(covered) / static_cast<double>(all);
@@ -105,8 +112,8 @@ RenderedFrame RenderFrame(const World& world, Renderer& renderer, double time_s,
                          [&world](double instant_s) { return world.At(instant_s); });
 }
 
-RenderedFrame RenderFrame(const World& world, const Camera& camera, const RenderOptions& options, double time_s,
-                          uint64_t index) {
+RenderedFrame RenderFrame(const World& world, const Camera& camera, const RenderOptions& options,
+                          double time_s, uint64_t index) {
   Renderer renderer(camera, options);
   return RenderFrame(world, renderer, time_s, index);
 }
@@ -114,8 +121,10 @@ RenderedFrame RenderFrame(const World& world, const Camera& camera, const Render
 RenderedFrame RenderFrame(const Scene& scene, const Rigid3d& T_world_cam, const Camera& camera,
                           const RenderOptions& options, double time_s) {
   Renderer renderer(camera, options);
-  return renderer.Render(scene.meshes, scene.textures, time_s, static_cast<uint64_t>(std::llround(time_s * 1e6)),
-                         [&T_world_cam](double) { return Instant{T_world_cam, {}, {}}; });
+  return renderer.Render(scene.meshes, scene.textures, time_s,
+                         static_cast<uint64_t>(std::llround(time_s * 1e6)), [&T_world_cam](double) {
+                           return Instant{T_world_cam, {}, {}};
+                         });
 }
 
 }  // namespace dmslam

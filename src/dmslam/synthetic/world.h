@@ -17,20 +17,21 @@ struct WorldOptions {
   SceneOptions scene;
   CameraPathOptions path;
   ActorOptions actor;
-  int actors = 0;            ///< How many people. With a moving share and 0 here, as many as it takes.
-  double moving_share = 0;   ///< Mean share of the image that people cover, 0..0.7; 0 leaves ActorOptions' distances.
-  double duration_s = 10;    ///< For so long the people's doings are simulated.
+  int actors = 0;  ///< How many people. With a moving share and 0 here, as many as it takes.
+  double moving_share =
+      0;  ///< Mean share of the image that people cover, 0..0.7; 0 leaves ActorOptions' distances.
+  double duration_s = 10;  ///< For so long the people's doings are simulated.
 };
 
 /// The camera of config/synthetic.yaml.
 Camera SyntheticCamera();
 
-/// A scene, a camera path through it and the people who walk before the camera: all that a sequence shows, at any
-/// instant. Everything follows from the options.
+/// A scene, a camera path through it and the people who walk before the camera: all that a sequence shows, at
+/// any instant. Everything follows from the options.
 class World {
  public:
-  /// `camera` is needed to see how much of the image people cover. Throws InputError for options that do not fit
-  /// together.
+  /// `camera` is needed to see how much of the image people cover. Throws InputError for options that do not
+  /// fit together.
   World(const WorldOptions& options, const Camera& camera);
 
   const Scene& scene() const { return scene_; }
@@ -49,9 +50,10 @@ class World {
   std::vector<ActorTimeline> timelines_;
 };
 
-/// One frame of a world, as the camera at `time_s` sees it. Makes a renderer for it: for many frames, keep one.
-RenderedFrame RenderFrame(const World& world, const Camera& camera, const RenderOptions& options, double time_s,
-                          uint64_t index);
+/// One frame of a world, as the camera at `time_s` sees it. Makes a renderer for it: for many frames, keep
+/// one.
+RenderedFrame RenderFrame(const World& world, const Camera& camera, const RenderOptions& options,
+                          double time_s, uint64_t index);
 
 /// The same with a renderer at hand.
 RenderedFrame RenderFrame(const World& world, Renderer& renderer, double time_s, uint64_t index);
