@@ -80,7 +80,7 @@ struct Errors {
 Errors Evaluate(const std::string& ground_truth, const TrajectoryBuilder::Trajectories& trajectories) {
   Errors errors;
   if (ground_truth.empty()) return errors;
-  errors.ground_truth = ReadTrajectory(ground_truth);
+  errors.ground_truth = ReadGroundTruth(ground_truth).poses;
   AteReport final = EvaluateAte(errors.ground_truth, trajectories.final);
   AteReport online = EvaluateAte(errors.ground_truth, trajectories.online);
   if (final.usable()) errors.final = std::move(final);

@@ -98,7 +98,7 @@ expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --r
 
 # Nothing is there: a report that lists what is absent.
 mkdir "$work/empty"
-expect 0 'none of the sequences is there' "$reproduce" --tum "$work/empty" --no-render --data "$work/none" --out "$work/e"
+expect 0 'none of the sequences is there' "$reproduce" --tum "$work/empty" --no-render --runner "$work/runner" --data "$work/none" --out "$work/e"
 check "all are listed as absent" test "$(grep -c '\*\*absent\*\*' "$work/e/report.md")" -eq 14
 
 finish
