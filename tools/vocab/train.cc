@@ -87,6 +87,12 @@ TrainingSet ExtractAll(const std::vector<std::string>& images, const TrainComman
   return training;
 }
 
+Vocabulary Cluster(const TrainingSet& training, VocabularyTrainingOptions options) {
+  ProgressLine progress("clusters");
+  options.progress = [&progress](double share) { progress.Show(share); };
+  return TrainVocabulary(training, options);
+}
+
 }  // namespace
 
 void Train(const TrainCommand& command) {
@@ -100,9 +106,7 @@ void Train(const TrainCommand& command) {
   options.descriptor_id = OrbDescriptorId();
   options.Check();
   const TrainingSet training = ExtractAll(ImagesIn(command.images), command);
-  ProgressLine progress("clusters");
-  options.progress = [&progress](double share) { progress.Show(share); };
-  const Vocabulary vocabulary = TrainVocabulary(training, options);
+  const Vocabulary vocabulary = Cluster(training, options);
   vocabulary.Save(command.out);
   std::printf("%zu images, %zu features, %zu words, checksum %08x\n", training.num_images(),
               training.descriptors.size(), vocabulary.num_words(), vocabulary.checksum());
