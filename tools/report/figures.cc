@@ -34,6 +34,24 @@ std::optional<Drawn> Load(const Cell* cell, const PlannedSequence& sequence, con
                ReadTrajectory((out / run->key.Folder() / "trajectory.txt").string())};
 }
 
+// From every few poses of the estimate to where the ground truth has them.
+PlotSeries Differences(const PlotSeries& ground_truth, const PlotSeries& estimate, const AteReport& ate) {
+  PlotSeries series;
+  series.label = "difference";
+  series.color = {200, 40, 60};
+  series.line_width_px = 1;
+  const size_t step = std::max<size_t>(1, ate.pairs.size() / 200);
+  size_t pair = 0;
+  for (size_t i = 0; i < estimate.x.size(); ++i) {
+    if (std::isnan(estimate.x[i])) continue;
+    const size_t truth = ate.pairs[pair].ground_truth;
+    if (pair++ % step != 0) continue;
+    series.x.insert(series.x.end(), {estimate.x[i], ground_truth.x[truth], kNoPoint});
+    series.y.insert(series.y.end(), {estimate.y[i], ground_truth.y[truth], kNoPoint});
+  }
+  return series;
+}
+
 // Ground truth, estimate and, every few poses, the line between the two.
 PlotPanel OverlayPanel(const Drawn& drawn) {
   const AteReport& ate = drawn.run->evaluation->ate;
@@ -46,7 +64,9 @@ PlotPanel OverlayPanel(const Drawn& drawn) {
   estimate.values.clear();
   estimate.color = ColorOfProfile(drawn.run->key.profile);
   estimate.label = drawn.run->key.profile;
+  estimate.marker_radius_px = 0;
   panel.series.pop_back();  // the first pose
+  panel.series.insert(panel.series.begin() + 1, Differences(panel.series[0], panel.series[1], ate));
   return panel;
 }
 
