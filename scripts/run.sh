@@ -26,12 +26,13 @@ trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and
   --black-out F,S     black frames from frame F on for S seconds; may be repeated
   --jump F,T          after frame F go on with frame T; may be repeated
   --port N            UDP port (default: a free one)
+  --receive-buffer N  bytes that the kernel is asked to hold for each process (default 4194304)
   --build-dir DIR     where the programs are (default: build/release, built first where needed)
 EOF
 }
 fail() { echo "run.sh: $*" >&2; exit 1; }
 
-sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build=""
+sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304
 player=() common=()
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
@@ -50,6 +51,7 @@ while [ $# -gt 0 ]; do
     --pictures) need "$@"; pictures=$2; shift 2 ;;
     --record) record=1; shift ;;
     --port) need "$@"; port=$2; shift 2 ;;
+    --receive-buffer) need "$@"; receive_buffer=$2; shift 2 ;;
     --build-dir) need "$@"; build=$2; shift 2 ;;
     -h | --help) usage; exit 0 ;;
     *) fail "unknown option $1 (see --help)" ;;
@@ -57,12 +59,17 @@ while [ $# -gt 0 ]; do
 done
 [ -n "$sequence" ] || fail "--sequence is missing (see --help)"
 [ -n "$out" ] || fail "--out is missing (see --help)"
+is_number() { [[ "$2" =~ ^[0-9]+$ ]] || fail "$1 $2: write a whole number"; }
+is_number --seed "$seed"
+is_number --pictures "$pictures"
+is_number --receive-buffer "$receive_buffer"
 [ -e "$sequence" ] || fail "$sequence: no such folder or file; check --sequence"
 [ "$profile" = "" ] || [ "$profile" = dm ] || [ "$profile" = baseline ] || fail "--profile $profile: write dm or baseline"
 
 if [ -z "$build" ]; then
   build="$top/build/release"
-  "$top/scripts/build.sh" >&2 || fail "the build failed; its log is above"
+  "$top/scripts/build.sh" release dmslam-{player,frontend,mapper,loopcloser,collector} >&2 ||
+    fail "the build failed; its log is above"
 fi
 bin="$build/bin"
 [ -x "$bin/dmslam-frontend" ] || fail "$bin has no dmslam-frontend; build first, or leave --build-dir out"
@@ -77,7 +84,7 @@ else
     port_taken "$port" || break
   done
 fi
-url="udpm://239.255.76.67:$port?ttl=0&recv_buf_size=4194304"
+url="udpm://239.255.76.67:$port?ttl=0&recv_buf_size=$receive_buffer"
 
 mkdir -p "$out/log" || fail "$out cannot be made; check --out"
 session=$((RANDOM * 32768 + RANDOM + 1))
@@ -96,56 +103,90 @@ fi
 
 declare -A pid_of=()
 logger=""
+alive() { # of these pids
+  local p
+  for p in "$@"; do kill -0 "$p" 2>/dev/null && return 0; done
+  return 1
+}
+wait_for() { # at most so many twentieths of a second, for these pids
+  local i most=$1; shift
+  for ((i = 0; i < most; ++i)); do alive "$@" || return 0; sleep 0.05; done
+  return 1
+}
 stop_all() {
-  trap - INT TERM EXIT
+  trap '' INT TERM
+  trap - EXIT
   local p
   for p in "${pid_of[@]}"; do kill -TERM "$p" 2>/dev/null || true; done
   [ -n "$logger" ] && kill -INT "$logger" 2>/dev/null || true
-  for p in "${pid_of[@]}" $logger; do
-    timeout 5 tail --pid="$p" -f /dev/null 2>/dev/null || kill -KILL "$p" 2>/dev/null || true
-  done
+  wait_for 100 "${pid_of[@]}" $logger || for p in "${pid_of[@]}" $logger; do kill -KILL "$p" 2>/dev/null || true; done
 }
-trap 'stop_all; exit 130' INT TERM
+trap 'stop_all; echo "run.sh: interrupted; what was tracked is in $out" >&2; exit 130' INT
+trap 'stop_all; exit 143' TERM HUP
 trap stop_all EXIT
 
+# Whatever becomes of this script, its processes end with it.
+guard=()
+command -v setpriv >/dev/null && guard=(setpriv --pdeathsig TERM --)
 launch() { # name, arguments...
   local name=$1; shift
-  "$bin/dmslam-$name" "$@" >"$out/log/$name.log" 2>&1 &
+  "${guard[@]}" "$bin/dmslam-$name" "$@" </dev/null >"$out/log/$name.log" 2>&1 &
   pid_of[$name]=$!
 }
 if [ "$record" = 1 ]; then
-  command -v lcm-logger >/dev/null || fail "lcm-logger is missing; run scripts/setup.sh tools"
+  command -v lcm-logger >/dev/null || fail "lcm-logger is missing; run scripts/setup.sh core"
   rm -f "$out/run.lcmlog"
-  lcm-logger --lcm-url="$url" "$out/run.lcmlog" >"$out/log/logger.log" 2>&1 &
+  "${guard[@]}" lcm-logger --quiet --lcm-url="$url" "$out/run.lcmlog" </dev/null >"$out/log/logger.log" 2>&1 &
   logger=$!
 fi
 launch mapper "${common[@]}"
 launch loopcloser "${common[@]}"
 launch frontend "${common[@]}" "${drawing[@]}"
-if [ -t 2 ]; then errors=/dev/stderr; else errors="$out/log/collector.log"; fi
-"$bin/dmslam-collector" "${common[@]}" --out "$out" "${ground_truth[@]}" >"$out/log/table.txt" 2>"$errors" &
+quiet=()
+if [ -t 2 ]; then errors=/dev/stderr quiet=(--quiet); else errors="$out/log/collector.log"; fi
+"${guard[@]}" "$bin/dmslam-collector" "${common[@]}" "${quiet[@]}" --out "$out" "${ground_truth[@]}" </dev/null \
+  >"$out/log/table.txt" 2>"$errors" &
 pid_of[collector]=$!
 launch player "${common[@]}" "${player[@]}" --sequence "$sequence"
 
+# What a process said before it failed: its error, or what its command line lacked.
+why() {
+  local log="$out/log/$1.log" line
+  [ -f "$log" ] || return 0
+  line=$(grep -hE " (error|critical): " "$log" | tail -n 1 | sed -E 's/^[0-9:.]* //; s/ (error|critical): /: /' || true)
+  [ -n "$line" ] || line=$(grep -vE '^[0-9:.]+ |^ *$' "$log" | head -n 1 | sed "s/^/$1: /" || true)
+  echo "$line"
+}
+report() { # name, status
+  local message
+  message=$(why "$1")
+  if [ "$1" = collector ] && [ -t 2 ]; then return; fi  # it has spoken on the terminal itself
+  if [ "$2" -gt 128 ]; then message="$1 was ended by signal $(($2 - 128)) (${message:-its log is $out/log/$1.log})"; fi
+  echo "run.sh: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&2
+}
+
 # The collector ends last. Whoever fails before it ends the run.
-why() { grep -hE "error|critical" "$out/log/$1.log" 2>/dev/null | tail -n 1 | sed 's/^[0-9:.]* //'; }
 code=0
+collected=0
 while [ ${#pid_of[@]} -gt 0 ]; do
   ended=""
-  wait -n -p ended "${pid_of[@]}" && status=0 || status=$?
+  status=0
+  wait -n -p ended "${pid_of[@]}" || status=$?
   for name in "${!pid_of[@]}"; do
     if [ "${pid_of[$name]}" = "$ended" ]; then break; fi
   done
   unset "pid_of[$name]"
-  if [ "$status" != 0 ]; then
-    message=$(why "$name")
-    echo "run.sh: ${message:-$name ended with code $status; its log is $out/log/$name.log}" >&2
+  if [ "$status" != 0 ] && [ "$code" = 0 ]; then
+    report "$name" "$status"
     code=$status
-    break
   fi
-  [ "$name" = collector ] && break
+  [ "$name" = collector ] && collected=1
+  # Once the results are there the others have a moment to end by themselves; after a failure they are told to.
+  if [ "$code" != 0 ] || { [ "$collected" = 1 ] && ! wait_for 40 "${pid_of[@]}"; }; then break; fi
 done
 stop_all
-cat "$out/log/table.txt"
-[ "$code" = 0 ] && echo "results: $out (picture: $out/trajectory.png)"
+[ ! -s "$out/log/table.txt" ] || cat "$out/log/table.txt"
+if [ "$code" = 0 ]; then
+  echo "results: $out (picture: $out/trajectory.png)"
+fi
 exit "$code"

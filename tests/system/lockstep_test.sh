@@ -1,0 +1,30 @@
+# The four processes on a rendered sequence in lock-step; the same seed again, with a receive buffer of 212992 bytes; and
+# in one process: the same bytes each time.
+source "$(dirname "$0")/lib.sh"
+need_synthetic
+multicast
+
+sequence=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --seed 3)
+check "the run ends with 0" run "${sequence[@]}" --lockstep --out "$work/first" --pictures 40
+no_orphans "the run"
+for file in trajectory.txt trajectory_online.txt keyframes.txt map.ply trajectory.png summary.json; do
+  check "$file is there" test -s "$work/first/$file"
+done
+check "pictures are drawn" test -n "$(ls "$work/first/pictures")"
+expect "most of the sequence is tracked" "$work/first" tracked_online_percent ">= 50"
+expect "the trajectory is right" "$work/first" ate_rmse_final "<= 0.05"
+expect "nothing is skipped" "$work/first" frames_skipped "== 0"
+expect "nothing is lost" "$work/first" records_lost "== 0"
+expect "nobody was restarted" "$work/first" restarts "== 0"
+
+check "a run with a small buffer ends with 0" run "${sequence[@]}" --lockstep --out "$work/small" --receive-buffer 212992
+expect "nothing is lost with a small buffer" "$work/small" records_lost "== 0"
+check "in one process it ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]}" --out "$work/one"
+for other in small one; do
+  for file in trajectory.txt trajectory_online.txt keyframes.txt map.ply; do
+    check "$file of '$other' has the same bytes" cmp "$work/first/$file" "$work/$other/$file"
+  done
+done
+check "another seed ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]:0:4}" --seed 4 --out "$work/other"
+cmp -s "$work/one/trajectory.txt" "$work/other/trajectory.txt" && failed "another seed gives the same bytes: is it used?"
+finish
