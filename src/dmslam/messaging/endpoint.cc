@@ -22,43 +22,42 @@ void Endpoint::Subscribe(const std::string& channel) {
   bus_->Subscribe(channel);
 }
 
+void Endpoint::Add(StateMachine* machine, std::vector<std::string> channels) {
+  for (const std::string& channel : channels) Subscribe(channel);
+  machines_.push_back({machine, std::move(channels)});
+}
+
 void Endpoint::AddReader(StreamReader* reader, const std::string& owner,
                          const std::vector<std::string>& record_channels) {
-  machines_.push_back(reader);
-  for (const std::string& channel : record_channels) Subscribe(channel);
-  Subscribe(PartChannel(owner));
-  Subscribe(HeadChannel(owner));
+  std::vector<std::string> channels = record_channels;
+  channels.insert(channels.end(), {PartChannel(owner), HeadChannel(owner)});
+  Add(reader, std::move(channels));
 }
 
 void Endpoint::AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers) {
-  machines_.push_back(writer);
-  for (const std::string& reader : readers) Subscribe(AckChannel(reader));
-  Subscribe(HeadChannel(owner));  // of a second writer
-  Subscribe(TakeOverChannel(owner));
+  std::vector<std::string> channels = {HeadChannel(owner), TakeOverChannel(owner)};  // HEAD: of a second writer
+  for (const std::string& reader : readers) channels.push_back(AckChannel(reader));
+  Add(writer, std::move(channels));
 }
 
-void Endpoint::AddElection(WriterElection* election, const std::string& owner) {
-  machines_.push_back(election);
-  Subscribe(HeadChannel(owner));
-}
+void Endpoint::AddElection(WriterElection* election, const std::string& owner) { Add(election, {HeadChannel(owner)}); }
 
 void Endpoint::AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels) {
-  machines_.push_back(fetch);
-  for (const std::string& channel : record_channels) Subscribe(channel);
+  std::vector<std::string> channels = record_channels;
   for (const ReplicaFetch::Holder& holder : fetch->holders()) {
-    Subscribe(ReplicaChannel(holder.channel));
-    Subscribe(HeadChannel(holder.channel));
-    Subscribe(PartChannel(holder.channel));
+    channels.insert(channels.end(),
+                    {ReplicaChannel(holder.channel), HeadChannel(holder.channel), PartChannel(holder.channel)});
   }
+  Add(fetch, std::move(channels));
 }
 
 void Endpoint::AddServer(ReplicaServer* server, const std::string& owner) {
-  machines_.push_back(server);
-  Subscribe(HandOverChannel(owner));
-  Subscribe(AckChannel(owner));
+  Add(server, {HandOverChannel(owner), AckChannel(owner)});
 }
 
-void Endpoint::Remove(const StateMachine* machine) { std::erase(machines_, machine); }
+void Endpoint::Remove(const StateMachine* machine) {
+  std::erase_if(machines_, [machine](const Added& added) { return added.machine == machine; });
+}
 
 void Endpoint::SetOtherHandler(const std::vector<std::string>& channels, Bus::Handler handler) {
   other_ = std::move(handler);
@@ -68,21 +67,23 @@ void Endpoint::SetOtherHandler(const std::vector<std::string>& channels, Bus::Ha
 
 void Endpoint::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
   const int64_t now = clock_();
-  for (StateMachine* machine : machines_) machine->Receive(channel, bytes, now);
+  for (const Added& added : machines_) {
+    if (Contains(added.channels, channel)) added.machine->Receive(channel, bytes, now);
+  }
   if (other_ && Contains(other_channels_, channel)) other_(channel, bytes);
 }
 
 void Endpoint::Advance() {
   const int64_t now = clock_();
-  for (StateMachine* machine : machines_) {
-    machine->Advance(now);
-    for (const Outgoing& message : machine->TakeOutgoing()) bus_->Publish(message);
+  for (const Added& added : machines_) {
+    added.machine->Advance(now);
+    for (const Outgoing& message : added.machine->TakeOutgoing()) bus_->Publish(message);
   }
 }
 
 int64_t Endpoint::deadline_ns() const {
   int64_t deadline = INT64_MAX;
-  for (const StateMachine* machine : machines_) deadline = std::min(deadline, machine->deadline_ns());
+  for (const Added& added : machines_) deadline = std::min(deadline, added.machine->deadline_ns());
   return deadline;
 }
 

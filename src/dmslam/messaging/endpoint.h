@@ -13,8 +13,8 @@
 
 namespace dmslam {
 
-/// Connects the state machines of one process to its bus: subscribes to their channels, gives each message to all of
-/// them, and sends what they have to say. They stay their owner's, and must be removed before they die.
+/// Connects the state machines of one process to its bus: subscribes to their channels, gives each message to those that
+/// want its channel, and sends what they have to say. They stay their owner's, and must be removed before they die.
 class Endpoint {
  public:
   using Clock = std::function<int64_t()>;
@@ -33,7 +33,7 @@ class Endpoint {
   void AddServer(ReplicaServer* server, const std::string& owner);
   void Remove(const StateMachine* machine);
 
-  /// Messages that belong to no stream: also called for every other one, so the handler looks at the channel.
+  /// Messages that belong to no stream, by their channels.
   void SetOtherHandler(const std::vector<std::string>& channels, Bus::Handler handler);
 
   /// Advances all of them and sends what they have. Call it after every delivery, publication and deadline.
@@ -42,12 +42,17 @@ class Endpoint {
   Bus& bus() { return *bus_; }
 
  private:
+  struct Added {
+    StateMachine* machine;
+    std::vector<std::string> channels;
+  };
+  void Add(StateMachine* machine, std::vector<std::string> channels);
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void Subscribe(const std::string& channel);
 
   Bus* bus_;
   Clock clock_;
-  std::vector<StateMachine*> machines_;
+  std::vector<Added> machines_;
   std::vector<std::string> subscribed_;
   std::vector<std::string> other_channels_;
   Bus::Handler other_;

@@ -57,8 +57,10 @@ int SendWindow::Send(int budget, int64_t now_ns, std::vector<Outgoing>* out) {
   while (budget > 0 && !repairs_.empty()) {
     const auto [seq, part] = *repairs_.begin();
     repairs_.erase(repairs_.begin());
+    const int64_t before = bytes_sent;
     SendPart(seq, part, now_ns, out);
     ++parts_repaired;
+    bytes_repaired += bytes_sent - before;
     --budget;
   }
   return SendNew(budget, now_ns, out);

@@ -48,6 +48,7 @@ class SendWindow {
   int64_t parts_sent = 0;      ///< statistics: parts of first transmissions
   int64_t parts_repaired = 0;  ///< parts sent again
   int64_t bytes_sent = 0;      ///< bytes of all messages that leave the host
+  int64_t bytes_repaired = 0;  ///< of them, those of parts sent again
 
  private:
   struct Kept {

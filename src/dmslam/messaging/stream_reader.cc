@@ -346,6 +346,7 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
     missing = window.Missing(kMaxMissing);
   }
   ack.num_missing = static_cast<int32_t>(missing.size());
+  statistics_.requested += ack.num_missing;
   for (const MissingRange& range : missing) {
     ack.missing_first_seq.push_back(range.first_seq);
     ack.missing_last_seq.push_back(range.last_seq);

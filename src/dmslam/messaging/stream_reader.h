@@ -19,6 +19,7 @@ struct ReaderStatistics {
   int64_t payload_bytes = 0;     ///< of them
   int64_t parts = 0;             ///< that arrived
   int64_t duplicates = 0;        ///< records and parts that were here already
+  int64_t requested = 0;         ///< ranges of bytes or records named as missing
   int64_t repaired = 0;          ///< records that came late or in pieces, after they had been named as missing
   int64_t lost = 0;              ///< records given up: no longer kept, and the writer offers no snapshot
   int64_t snapshots = 0;         ///< received whole

@@ -235,6 +235,7 @@ void StreamWriter::EndSnapshot() {
   for (auto& [id, reader] : readers_) reader.wants_snapshot = false;  // who still lacks one says so again
   statistics_.parts += snapshot_->window.parts_sent;
   statistics_.parts_repaired += snapshot_->window.parts_repaired;
+  statistics_.repaired_bytes += snapshot_->window.bytes_repaired;
   statistics_.sent_bytes += snapshot_->window.bytes_sent;
   snapshot_.reset();
   beacon_due_ = true;
@@ -383,6 +384,7 @@ WriterStatistics StreamWriter::statistics() const {
   WriterStatistics result = statistics_;
   result.parts += window_.parts_sent + (snapshot_ ? snapshot_->window.parts_sent : 0);
   result.parts_repaired += window_.parts_repaired + (snapshot_ ? snapshot_->window.parts_repaired : 0);
+  result.repaired_bytes += window_.bytes_repaired + (snapshot_ ? snapshot_->window.bytes_repaired : 0);
   result.sent_bytes += window_.bytes_sent + (snapshot_ ? snapshot_->window.bytes_sent : 0);
   result.kept_records = window_.kept();
   result.kept_bytes = window_.bytes();

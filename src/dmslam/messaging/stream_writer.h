@@ -37,6 +37,7 @@ struct WriterStatistics {
   int64_t sent_bytes = 0;        ///< of all messages sent for them, beacons included, local taps not
   int64_t parts = 0;             ///< parts of first transmissions
   int64_t parts_repaired = 0;    ///< parts sent again
+  int64_t repaired_bytes = 0;    ///< of them
   int64_t overrun = 0;           ///< records forgotten that a known lossless reader still lacked
   int64_t snapshots = 0;         ///< begun
   int64_t acks = 0;
