@@ -50,8 +50,10 @@ void ReadTrajectoryOf(const fs::path& folder, const fs::path& sequence, RunResul
       run->reason = evaluation.ate.reason;
       return;
     }
-    run->tracked_online_after_first_map_percent =
-        OnlineAfterFirstMap(folder / "trajectory_online.txt", sequence);
+    if (!run->tracked_online_after_first_map_percent) {
+      run->tracked_online_after_first_map_percent =
+          OnlineAfterFirstMap(folder / "trajectory_online.txt", sequence);
+    }
     if (!run->tracked_percent) run->tracked_percent = evaluation.coverage.percent;
     run->evaluation = std::move(evaluation);
     run->state = State::kDone;
