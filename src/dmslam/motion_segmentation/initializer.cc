@@ -100,7 +100,19 @@ class Initializer::Impl {
     std::vector<Eigen::Vector3d> points;  ///< parallel to the last view's matches
     std::vector<uint8_t> use;             ///< points that stand
     std::vector<Placed> placed;           ///< the last view first
+    double cost = 1;                      ///< mean truncated squared error over all views
   };
+
+  /// Calls visit(k, match) for every feature of the pair's `matches` that the view matched too.
+  template <typename Visit>
+  static void ForEachSeen(const Placed& placed, std::span<const Match> matches, Visit visit) {
+    const auto& seen = placed.view->pair.matches;
+    for (size_t k = 0, i = 0; k < matches.size(); ++k) {
+      while (i < seen.size() && seen[i].index0 < matches[k].index0) ++i;
+      if (i == seen.size()) break;
+      if (seen[i].index0 == matches[k].index0) visit(k, seen[i]);
+    }
+  }
 
   void StartOver() {
     reference_.reset();
@@ -119,8 +131,12 @@ class Initializer::Impl {
   View MakeView(const InitializerFrame& frame);
   std::vector<const View*> ChooseViews() const;
   InitializerReport TryMap();
-  std::optional<Candidate> Reconstruct(std::span<const View* const> views, const Agreement& agreement,
-                                       InitializerReport* report) const;
+  std::optional<Candidate> Reconstruct(const View& last, const Agreement& agreement, InitializerReport* report) const;
+  std::optional<Candidate> BuildCandidate(const View& last, const Agreement& agreement, const TwoViewModel& model,
+                                          InitializerReport* report) const;
+  bool SameMotion(const Candidate& a, const Candidate& b) const;
+  bool Passes(const Candidate& candidate, InitializerReport* report) const;
+  double CandidateCost(const Candidate& candidate, std::span<const uint8_t> is_static) const;
   void PlaceView(const View& view, double fraction, Candidate* candidate) const;
   void KeepConsistent(Candidate* candidate) const;
   bool AdjustAll(Candidate* candidate) const;
@@ -229,7 +245,7 @@ InitializerReport Initializer::Impl::TryMap() {
   InitializerReport report;
   if (!agreement.IsUsable()) {
     report = Wait(FromAgreement(agreement.refusal), agreement.explanation);
-  } else if (const auto candidate = Reconstruct(views, agreement, &report)) {
+  } else if (const auto candidate = Reconstruct(*views.back(), agreement, &report)) {
     report.wait = WaitReason::kNone;
     report.reason = "first map";
     report.result = MakeMap(*candidate, agreement);
@@ -247,18 +263,63 @@ bool Initializer::Impl::Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point,
   return ReprojectionErrorSquared(camera_.Ideal(), T_k_0, point, match.uv1_px) <= options_.max_view_chi2 * variance;
 }
 
-std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(std::span<const View* const> views,
+/// Every minimum of the pair's epipolar cost that is about as low as the lowest is carried through all views; what they
+/// say decides. Two different motions that explain them about equally well: wait.
+std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(const View& last,
                                                                            const Agreement& agreement,
                                                                            InitializerReport* report) const {
-  const View& last = *views.back();
+  std::vector<uint32_t> order(last.pair.matches.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const MatchArrays arrays = MakeArrays(last.pair.matches, order, camera_, options_.selector.inlier);
+  const std::vector<EssentialMinimum> minima =
+      FindEssentialMinima(arrays, agreement.is_static, options_.minima, DeriveSeed(seed_, last.frame.index, "minima"));
+  std::optional<Candidate> best;
+  double runner_up = 1e9;
+  *report = Wait(WaitReason::kNoReconstruction, "the static matches determine no motion");
+  for (const EssentialMinimum& minimum : minima) {
+    if (minimum.cost > options_.minima_slack * minima.front().cost) break;
+    std::optional<Candidate> candidate = BuildCandidate(last, agreement, minimum.model, best ? nullptr : report);
+    if (!candidate) continue;
+    if (best && SameMotion(*best, *candidate)) {
+      if (candidate->cost < best->cost) best = std::move(candidate);
+      continue;
+    }
+    runner_up = std::min(runner_up, best ? std::max(best->cost, candidate->cost) : 1e9);
+    if (!best || candidate->cost < best->cost) best = std::move(candidate);
+  }
+  if (!best) return std::nullopt;
+  if (runner_up < options_.min_runner_up_cost * best->cost) {
+    *report = Wait(WaitReason::kNoReconstruction, "two motions explain the views about equally well");
+    return std::nullopt;
+  }
+  if (!Passes(*best, report)) return std::nullopt;
+  return best;
+}
+
+bool Initializer::Impl::SameMotion(const Candidate& a, const Candidate& b) const {
+  const Rigid3d &T_a = a.placed.front().T_k_0, &T_b = b.placed.front().T_k_0;
+  return AngleBetween(T_a.rotation, T_b.rotation) < 0.01 &&
+         T_a.translation.normalized().dot(T_b.translation.normalized()) > std::cos(0.1);
+}
+
+/// The map under one motion of the pair: points, poses of the views between, adjusted.
+std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(const View& last,
+                                                                              const Agreement& agreement,
+                                                                              const TwoViewModel& model,
+                                                                              InitializerReport* report) const {
   StaticSelection selection = last.pair.selection;
   selection.is_static = agreement.is_static;
+  selection.kind = ModelKind::kEssential;
+  selection.E = model.M;
+  const auto refuse = [&](WaitReason reason, const std::string& text) {
+    if (report) *report = Wait(reason, text);
+    return std::nullopt;
+  };
   const TwoViewReconstruction pair =
       ReconstructFromStatic(last.pair.matches, selection, camera_, options_.reconstruction);
   if (!pair.IsUsable()) {
     const bool parallax = pair.refusal == ReconstructionRefusal::kParallaxTooSmall;
-    *report = Wait(parallax ? WaitReason::kParallaxTooSmall : WaitReason::kNoReconstruction, pair.explanation);
-    return std::nullopt;
+    return refuse(parallax ? WaitReason::kParallaxTooSmall : WaitReason::kNoReconstruction, pair.explanation);
   }
   Candidate candidate;
   candidate.points = pair.points_cam0;
@@ -271,29 +332,54 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(std::
   }
   for (const Placed& placed : candidate.placed) {
     if (placed.consistent_share >= options_.min_consistent_share) continue;
-    *report = Wait(WaitReason::kInconsistent, "frame " + std::to_string(placed.view->frame.index) + " sees " +
-                                                  std::to_string(placed.consistent_share) +
-                                                  " of the points where they should be");
-    return std::nullopt;
+    return refuse(WaitReason::kInconsistent, "frame " + std::to_string(placed.view->frame.index) + " sees " +
+                                                 std::to_string(placed.consistent_share) +
+                                                 " of the points where they should be");
   }
   KeepConsistent(&candidate);
-  if (adjust_ && !AdjustAll(&candidate)) {
-    *report = Wait(WaitReason::kInconsistent, "the adjustment failed");
-    return std::nullopt;
-  }
+  if (adjust_ && !AdjustAll(&candidate)) return refuse(WaitReason::kInconsistent, "the adjustment failed");
   KeepConsistent(&candidate);
+  candidate.cost = CandidateCost(candidate, agreement.is_static);
+  return candidate;
+}
+
+bool Initializer::Impl::Passes(const Candidate& candidate, InitializerReport* report) const {
   const auto points = std::accumulate(candidate.use.begin(), candidate.use.end(), 0);
   if (points < options_.min_points) {
     *report = Wait(WaitReason::kTooFewStatic, std::to_string(points) + " points are seen consistently");
-    return std::nullopt;
+    return false;
   }
   const double parallax = CandidateParallax(candidate), sigma = CandidateDirectionSigma(candidate);
   if (parallax < options_.min_parallax_rad || sigma > options_.max_direction_sigma_rad) {
     *report = Wait(WaitReason::kParallaxTooSmall,
                    "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma));
-    return std::nullopt;
+    return false;
   }
-  return candidate;
+  return true;
+}
+
+/// Mean over the static matches of the squared errors in all views that see them, truncated at the bound and in units
+/// of it; a match without a point counts as the bound.
+double Initializer::Impl::CandidateCost(const Candidate& candidate, std::span<const uint8_t> is_static) const {
+  const auto& matches = candidate.placed.front().view->pair.matches;
+  std::vector<double> sum(matches.size(), 0.0), count(matches.size(), 0.0);
+  for (const Placed& placed : candidate.placed) {
+    ForEachSeen(placed, matches, [&](size_t k, const Match& seen) {
+      if (!candidate.use[k]) return;
+      const double variance = options_.selector.inlier.pyramid.SigmaSquared(seen.octave1);
+      const double error =
+          ReprojectionErrorSquared(camera_.Ideal(), placed.T_k_0, candidate.points[k], seen.uv1_px);
+      sum[k] += std::min(1.0, error / (variance * options_.max_view_chi2));
+      count[k] += 1.0;
+    });
+  }
+  double total = 0, asked = 0;
+  for (size_t k = 0; k < matches.size(); ++k) {
+    if (!is_static[k]) continue;
+    total += count[k] > 0 ? sum[k] / count[k] : 1.0;
+    asked += 1.0;
+  }
+  return asked > 0 ? total / asked : 1.0;
 }
 
 /// Finds the pose of a view between from the points of the pair, and how many it sees where they should be.
@@ -303,19 +389,14 @@ void Initializer::Impl::PlaceView(const View& view, double fraction, Candidate* 
   std::vector<Eigen::Vector2d> uv;
   std::vector<double> information;
   std::vector<int> all;
-  std::vector<const Match*> seen;
-  for (size_t k = 0, i = 0; k < last.pair.matches.size(); ++k) {
-    if (!candidate->use[k]) continue;
-    const auto& matches = view.pair.matches;
-    while (i < matches.size() && matches[i].index0 < last.pair.matches[k].index0) ++i;
-    if (i == matches.size()) break;
-    if (matches[i].index0 != last.pair.matches[k].index0) continue;
+  const Placed placed_view{&view, Rigid3d(), 1.0};
+  ForEachSeen(placed_view, last.pair.matches, [&](size_t k, const Match& seen) {
+    if (!candidate->use[k]) return;
     all.push_back(static_cast<int>(points.size()));
     points.push_back(candidate->points[k]);
-    uv.push_back(matches[i].uv1_px);
-    information.push_back(1.0 / options_.selector.inlier.pyramid.SigmaSquared(matches[i].octave1));
-    seen.push_back(&matches[i]);
-  }
+    uv.push_back(seen.uv1_px);
+    information.push_back(1.0 / options_.selector.inlier.pyramid.SigmaSquared(seen.octave1));
+  });
   if (points.size() < 20) return;  // says nothing
   const Rigid3d& T_last = candidate->placed.front().T_k_0;
   Rigid3d T(Eigen::Quaterniond::Identity().slerp(fraction, T_last.rotation), fraction * T_last.translation);
@@ -346,14 +427,9 @@ void Initializer::Impl::KeepConsistent(Candidate* candidate) const {
     }
   }
   for (const Placed& placed : candidate->placed) {
-    size_t i = 0;
-    for (size_t k = 0; k < matches.size(); ++k) {
-      const auto& seen = placed.view->pair.matches;
-      while (i < seen.size() && seen[i].index0 < matches[k].index0) ++i;
-      if (i == seen.size()) break;
-      if (seen[i].index0 != matches[k].index0 || !candidate->use[k]) continue;
-      if (!Sees(placed.T_k_0, candidate->points[k], seen[i])) candidate->use[k] = 0;
-    }
+    ForEachSeen(placed, matches, [&](size_t k, const Match& seen) {
+      if (candidate->use[k] && !Sees(placed.T_k_0, candidate->points[k], seen)) candidate->use[k] = 0;
+    });
   }
 }
 
@@ -373,13 +449,10 @@ bool Initializer::Impl::AdjustAll(Candidate* candidate) const {
   for (const Placed& placed : candidate->placed) {
     const int pose = static_cast<int>(poses.size());
     poses.push_back(placed.T_k_0);
-    const auto& seen = placed.view->pair.matches;
-    for (size_t k = 0, i = 0; k < matches.size(); ++k) {
-      while (i < seen.size() && seen[i].index0 < matches[k].index0) ++i;
-      if (i == seen.size()) break;
-      if (seen[i].index0 != matches[k].index0 || point_of[k] < 0) continue;
-      observations.push_back({pose, point_of[k], seen[i].uv1_px, 1.0 / pyramid.SigmaSquared(seen[i].octave1)});
-    }
+    ForEachSeen(placed, matches, [&](size_t k, const Match& seen) {
+      if (point_of[k] < 0) return;
+      observations.push_back({pose, point_of[k], seen.uv1_px, 1.0 / pyramid.SigmaSquared(seen.octave1)});
+    });
   }
   if (!adjust_(&poses, &points, observations)) return false;
   for (size_t p = 0; p < candidate->placed.size(); ++p) candidate->placed[p].T_k_0 = poses[p + 1];

@@ -16,6 +16,7 @@
 #include "dmslam/motion_segmentation/dlrsac.h"
 #include "dmslam/motion_segmentation/match_frames.h"
 #include "dmslam/motion_segmentation/pair_agreement.h"
+#include "dmslam/motion_segmentation/two_view_model.h"
 #include "dmslam/motion_segmentation/two_view_reconstruction.h"
 
 namespace dmslam {
@@ -101,6 +102,9 @@ struct InitializerOptions {
   int min_matches = 120;             ///< of a frame with the reference frame; fewer: a newer reference frame
   double min_displacement_px = 8.0;  ///< median displacement of the matches before a pair is worth its cost
 
+  MinimaOptions minima;              ///< how the motion of the pair is searched
+  double minima_slack = 1.5;         ///< a minimum with up to so many times the lowest cost is looked at, too
+  double min_runner_up_cost = 1.15;  ///< another motion must cost all views this many times as much
   double min_parallax_rad = 0.026;   ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad = 0.10;  ///< standard deviation of the direction of translation, from the residuals
   double max_view_chi2 = 9.0;        ///< a view agrees with a point: squared reprojection error / variance

@@ -209,8 +209,8 @@ bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, 
   return model->M.allFinite();
 }
 
-bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
-                     TwoViewModel* model) {
+bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, TwoViewModel* model,
+                     double bound_scale) {
   double damping = 1e-6;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
@@ -220,7 +220,7 @@ bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, in
     int used = 0;
     for (size_t i = 0; i < use.size(); ++i) {
       if (!use[i]) continue;
-      const double bound = SampsonBound(M, arrays, i);
+      const double bound = bound_scale * SampsonBound(M, arrays, i);
       if (!(bound > 0)) continue;
       const EssentialRow row =
           MakeEssentialRow(model->R * arrays.ray0[i], arrays.ray1[i], model->t, B);
@@ -241,6 +241,114 @@ bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, in
   model->M = Hat(model->t) * model->R;
   model->M /= model->M.norm();
   return model->M.allFinite();
+}
+
+namespace {
+
+/// Of the flags set keeps every k-th, so that at most about `most` remain.
+std::vector<uint8_t> Thin(std::span<const uint8_t> use, size_t most) {
+  const auto total = static_cast<size_t>(std::count_if(use.begin(), use.end(), [](uint8_t u) { return u != 0; }));
+  const size_t stride = std::max<size_t>(1, (total + most - 1) / std::max<size_t>(1, most));
+  std::vector<uint8_t> thin(use.size(), 0);
+  size_t seen = 0;
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (use[i] && seen++ % stride == 0) thin[i] = 1;
+  }
+  return thin;
+}
+
+double EpipolarCost(const MatchArrays& arrays, std::span<const uint8_t> use, const Eigen::Matrix3d& M) {
+  double sum = 0, count = 0;
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (!use[i]) continue;
+    const double squared = NormalizedSampson(M, arrays, i);
+    sum += squared / (1.0 + squared);
+    count += 1;
+  }
+  return count > 0 ? sum / count : 1.0;
+}
+
+/// Two models whose rotations and directions are about the same.
+bool SameMotion(const TwoViewModel& a, const TwoViewModel& b) {
+  const double turn = std::acos(std::clamp(((a.R.transpose() * b.R).trace() - 1.0) / 2.0, -1.0, 1.0));
+  return turn < 0.01 && std::abs(a.t.dot(b.t)) > std::cos(0.1);
+}
+
+}  // namespace
+
+namespace {
+
+/// Starts spread over the half sphere of directions (Fibonacci's spiral), with the rotation that fits best alone.
+void StartFromSphere(const MatchArrays& arrays, std::span<const uint8_t> use, int starts,
+                     std::vector<TwoViewModel>* models) {
+  TwoViewModel model;
+  if (!RefineRotation(arrays, use, 10, &model.R)) return;
+  for (int k = 0; k < starts; ++k) {
+    const double z = (k + 0.5) / starts, phi = 2.399963229728653 * k, r = std::sqrt(1.0 - z * z);
+    model.t = Eigen::Vector3d(r * std::cos(phi), r * std::sin(phi), z);
+    // From coarse to fine, so that far matches pull at first.
+    TwoViewModel start = model;
+    if (RefineEssential(arrays, use, 6, &start, 100.0) && RefineEssential(arrays, use, 6, &start, 10.0)) {
+      models->push_back(start);
+    }
+  }
+}
+
+/// Starts from the best of many samples of five.
+void StartFromSamples(const MatchArrays& arrays, std::span<const uint8_t> use, int samples, size_t kept, Random& random,
+                      std::vector<TwoViewModel>* models) {
+  std::vector<int> indices;
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (use[i]) indices.push_back(static_cast<int>(i));
+  }
+  if (indices.size() < 8) return;
+  std::vector<std::pair<double, Eigen::Matrix3d>> ranked;
+  std::array<Eigen::Matrix3d, kMaxModels> solutions;
+  for (int k = 0; k < samples; ++k) {
+    std::array<int, 5> sample;
+    DrawSample<5>(random, static_cast<int>(indices.size()), sample);
+    for (int& index : sample) index = indices[static_cast<size_t>(index)];
+    const int count = EssentialFivePoint(arrays.ray0, arrays.ray1, sample, solutions);
+    for (int s = 0; s < count; ++s) {
+      const Eigen::Matrix3d& M = solutions[static_cast<size_t>(s)];
+      ranked.emplace_back(EpipolarCost(arrays, use, M), M);
+    }
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (size_t k = 0; k < std::min(kept, ranked.size()); ++k) {
+    TwoViewModel model;
+    model.M = ranked[k].second;
+    ChooseEssentialPose(arrays, use, &model);
+    models->push_back(model);
+  }
+}
+
+}  // namespace
+
+std::vector<EssentialMinimum> FindEssentialMinima(const MatchArrays& arrays, std::span<const uint8_t> use,
+                                                  const MinimaOptions& options, uint64_t seed) {
+  const std::vector<uint8_t> thin = Thin(use, options.max_matches);
+  std::vector<TwoViewModel> starts;
+  StartFromSphere(arrays, thin, options.directions, &starts);
+  Random random(DeriveSeed(seed, 0, "essential-minima"));
+  StartFromSamples(arrays, thin, options.samples, options.samples_kept, random, &starts);
+  std::vector<EssentialMinimum> minima;
+  for (const TwoViewModel& start : starts) {
+    EssentialMinimum minimum{start, 0};
+    if (!RefineEssential(arrays, thin, 15, &minimum.model)) continue;
+    minimum.cost = EpipolarCost(arrays, thin, minimum.model.M);
+    const auto same = std::find_if(minima.begin(), minima.end(), [&](const EssentialMinimum& other) {
+      return SameMotion(other.model, minimum.model);
+    });
+    if (same == minima.end()) {
+      minima.push_back(minimum);
+    } else if (minimum.cost < same->cost) {
+      *same = minimum;
+    }
+  }
+  std::stable_sort(minima.begin(), minima.end(),
+                   [](const EssentialMinimum& a, const EssentialMinimum& b) { return a.cost < b.cost; });
+  return minima;
 }
 
 double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, double chi2,

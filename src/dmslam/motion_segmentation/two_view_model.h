@@ -71,10 +71,28 @@ void ChooseEssentialPose(const MatchArrays& arrays, std::span<const uint8_t> use
 /// A model refitted to the matches flagged (RefineFundamental or RefineEssential).
 bool Refine(ModelKind kind, const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, TwoViewModel* model);
 bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, TwoViewModel* model);
-bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, TwoViewModel* model);
+/// `bound_scale` widens the robust cost's bounds (squared).
+bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, TwoViewModel* model,
+                     double bound_scale = 1.0);
 
 /// The rotation that takes rays of frame 0 best into those of frame 1, over the matches flagged; starts from R.
 bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, Eigen::Matrix3d* R);
+
+/// A local minimum of the robust epipolar cost: mean over the matches of s / (1 + s), s the normalised Sampson distance.
+struct EssentialMinimum {
+  TwoViewModel model;
+  double cost = 0;
+};
+struct MinimaOptions {
+  int directions = 8;         ///< starts spread over the half sphere of directions
+  int samples = 60;           ///< samples of five matches
+  size_t samples_kept = 8;    ///< the best models of which are starts, too
+  size_t max_matches = 300;   ///< of more matches every k-th takes part
+};
+/// The epipolar cost has several minima when the parallax is small or the scene nearly flat, and a sample may lead to any
+/// of them. Descends from many starts and returns the distinct minima, the lowest first.
+std::vector<EssentialMinimum> FindEssentialMinima(const MatchArrays& arrays, std::span<const uint8_t> use,
+                                                  const MinimaOptions& options, uint64_t seed);
 
 /// Standard deviation [rad] of the direction of translation along which it is least certain, from the residuals of the
 /// matches flagged (their bounds are chi2 times their variance); pi where it is not determined at all.
