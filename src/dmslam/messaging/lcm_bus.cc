@@ -124,9 +124,11 @@ int LcmBus::fd() const { return impl_->lcm.getFileno(); }
 
 int LcmBus::Deliver(int max_messages) {
   int delivered = 0;
-  while (delivered < max_messages && impl_->lcm.handleTimeout(0) > 0) {
-    ++delivered;
+  for (; delivered < max_messages; ++delivered) {
+    const int result = impl_->lcm.handleTimeout(0);
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
+    if (result == 0) break;
+    if (result < 0) throw InputError("LCM at " + options_.url + " is lost: " + CureFor(options_.url));
   }
   return delivered;
 }

@@ -30,7 +30,7 @@ class LcmBus : public Bus {
   /// Readable when Deliver has something to do.
   int fd() const;
   /// Hands all that has arrived, up to `max_messages`, to the handler without waiting. What a handler throws comes out
-  /// here, after LCM has returned.
+  /// here, after LCM has returned. Throws InputError when the connection is gone (tcpq).
   int Deliver(int max_messages = 1000);
 
   /// How large the receive buffer really is, and how to raise it if that is less than was asked for; empty without UDP.
