@@ -23,7 +23,7 @@ int64_t RandomId() {
 
 void SetUpLogging(const std::string& role, bool quiet) {
   spdlog::set_default_logger(spdlog::stderr_color_mt(role));
-  spdlog::set_pattern("%H:%M:%S.%e %n: %^%v%$");
+  spdlog::set_pattern("%H:%M:%S.%e %n %l: %^%v%$");
   spdlog::set_level(quiet ? spdlog::level::warn : spdlog::level::info);
 }
 
@@ -104,7 +104,7 @@ std::string FindDataFolder(const std::string& name) {
 
 std::shared_ptr<const Vocabulary> LoadVocabulary(const std::string& path) {
   const std::string file = path.empty() ? FindDataFolder("data") + "/vocabulary.dmv" : path;
-  return std::make_shared<const Vocabulary>(Vocabulary::Load(file));
+  return std::make_shared<const Vocabulary>(LoadOrbVocabulary(file));
 }
 
 }  // namespace dmslam

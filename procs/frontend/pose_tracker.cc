@@ -12,6 +12,7 @@ namespace dmslam {
 namespace {
 
 constexpr int kCellColumns = 8, kCellRows = 6;
+constexpr int kSeenColumns = 20, kSeenRows = 15;
 constexpr int kTurnBins = 30;
 constexpr float kStrongBelief = 0.0F;  // log odds above which a landmark has no vote
 constexpr int kStreakWithoutVote = 3;  // frames in a row seen elsewhere: no vote, before the mapper says so
@@ -141,28 +142,84 @@ bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint
   return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
 }
 
+/// The landmarks that stood still for longest decide first; the others only refine what agrees with them, and never weigh
+/// more. People who stood still while they were mapped are younger than the room around them, so they cannot carry the
+/// camera away when they walk on, however much of the image they fill.
+void PoseTracker::OptimizeElders(const TrackedFrame& frame, const PoseOptimizationOptions& options) {
+  std::vector<double> sorted = ages_s_;
+  const size_t wanted = std::max(static_cast<size_t>(options_.min_elders),
+                                 static_cast<size_t>(options_.elder_share * static_cast<double>(sorted.size())));
+  if (sorted.size() <= wanted) return;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<ptrdiff_t>(wanted), sorted.end(), std::greater<>());
+  const double elder_age_s = std::min(sorted[wanted], options_.trusted_age_s);
+  elders_.clear();
+  for (size_t i = 0; i < matches_.size(); ++i) {
+    if (ages_s_[i] >= elder_age_s) elders_.push_back(observations_[i]);
+  }
+  if (elders_.size() == observations_.size()) return;
+  OptimizePose(camera_.Ideal(), frame.T_cam_world, elders_, options, optimized_);
+  const int needed = static_cast<int>(options_.elder_agreement * static_cast<double>(elders_.size()));
+  if (!optimized_.usable || optimized_.num_inliers < needed) return;
+  KeepWhatAgrees(optimized_.T_cam_world, elder_age_s, optimized_.num_inliers);
+}
+
+void PoseTracker::KeepWhatAgrees(const Rigid3d& T_cam_world, double elder_age_s, int elders) {
+  size_t kept = 0;
+  int young = 0;
+  for (size_t i = 0; i < matches_.size(); ++i) {
+    const PoseObservation& o = observations_[i];
+    const double chi2 = ReprojectionErrorSquared(camera_.Ideal(), T_cam_world, o.p_world, o.uv_px) * o.inv_sigma_squared;
+    if (ages_s_[i] < elder_age_s) {
+      if (chi2 > options_.elder_chi2) {
+        rejected_.push_back({matches_[i], chi2});
+        continue;
+      }
+      ++young;
+    }
+    matches_[kept] = matches_[i];
+    ages_s_[kept] = ages_s_[i];
+    observations_[kept++] = o;
+  }
+  matches_.resize(kept);
+  ages_s_.resize(kept);
+  observations_.resize(kept);
+  const double factor = std::min(1.0, options_.young_to_elder_weight * elders / std::max(1, young));
+  for (size_t i = 0; i < kept; ++i) {
+    if (ages_s_[i] < elder_age_s) observations_[i].weight *= factor;
+  }
+}
+
 int PoseTracker::OptimizeMatches(const Map& map, TrackedFrame* frame) {
   observations_.clear();
   matches_.clear();
+  ages_s_.clear();
+  rejected_.clear();
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     if (!frame->landmarks[i].valid()) continue;
     const Landmark* landmark = map.FindLandmark(frame->landmarks[i]);
     if (landmark == nullptr) continue;
     matches_.push_back({landmark->id, static_cast<uint16_t>(i)});
+    ages_s_.push_back(static_cast<double>(frame->stamp_ns - landmark->first_ns) * 1e-9);
     observations_.push_back({landmark->p_world, frame->features->uv_px[i],
                              1.0 / pyramid_.SigmaSquared(frame->features->set.keypoints[i].octave),
                              Trust(*landmark, frame->stamp_ns)});
   }
   PoseOptimizationOptions options;
   options.max_chi2 = options_.chi2;
+  if (options_.motion_belief) OptimizeElders(*frame, options);
   OptimizePose(camera_.Ideal(), frame->T_cam_world, observations_, options, optimized_);
   if (!optimized_.usable) return 0;
   frame->T_cam_world = optimized_.T_cam_world;
   for (size_t i = 0; i < matches_.size(); ++i) {
-    const size_t feature = matches_[i].feature;
-    const bool inlier = optimized_.inliers[i] != 0;
-    frame->classes[feature] = inlier ? FeatureClass::kUsed : FeatureClass::kRejected;
-    if (!inlier) frame->landmarks[feature] = LandmarkId{};
+    if (optimized_.inliers[i] != 0) {
+      frame->classes[matches_[i].feature] = FeatureClass::kUsed;
+    } else {
+      rejected_.push_back({matches_[i], optimized_.chi2[i]});
+    }
+  }
+  for (const Rejected& rejected : rejected_) {
+    frame->classes[rejected.match.feature] = FeatureClass::kRejected;
+    frame->landmarks[rejected.match.feature] = LandmarkId{};
   }
   return optimized_.num_inliers;
 }
@@ -243,8 +300,18 @@ void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
     used.push_back(frame->landmarks[i]);
     taken_[i] = 1;
   }
-  std::sort(used.begin(), used.end());
   moved_.clear();
+  for (const Rejected& rejected : rejected_) {
+    const Landmark* landmark = map.FindLandmark(rejected.match.landmark);
+    const size_t feature = rejected.match.feature;
+    const int distance = HammingDistance(landmark->descriptor, frame->features->set.descriptors[feature]);
+    if (rejected.chi2 < options_.moved_near_chi2 || distance > options_.moved_near_distance) continue;
+    moved_.push_back(rejected.match.landmark);
+    used.push_back(rejected.match.landmark);
+    taken_[feature] = 1;
+    frame->classes[feature] = FeatureClass::kMoving;
+  }
+  std::sort(used.begin(), used.end());
   for (const auto& [id, guess] : visible_) {
     if (std::binary_search(used.begin(), used.end(), id)) continue;
     const Landmark& landmark = *map.FindLandmark(id);
@@ -262,15 +329,66 @@ void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
   }
 }
 
+/// A landmark that is missing while what lies behind it is seen all around has gone: nothing hides it.
+void PoseTracker::FindSeenThrough(const Map& map, const TrackedFrame& frame) {
+  struct Found {
+    Eigen::Vector2d uv_px;
+    double depth;
+  };
+  std::array<std::vector<Found>, kSeenColumns * kSeenRows> cells;
+  const double cell_width = static_cast<double>(camera_.width_px) / kSeenColumns;
+  const double cell_height = static_cast<double>(camera_.height_px) / kSeenRows;
+  const auto column_of = [&](double x) { return std::clamp(static_cast<int>(x / cell_width), 0, kSeenColumns - 1); };
+  const auto row_of = [&](double y) { return std::clamp(static_cast<int>(y / cell_height), 0, kSeenRows - 1); };
+  std::vector<LandmarkId> used = moved_;
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].valid()) continue;
+    used.push_back(frame.landmarks[i]);
+    const Eigen::Vector2d& uv = frame.features->uv_px[i];
+    const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
+    cells[static_cast<size_t>(row_of(uv.y()) * kSeenColumns + column_of(uv.x()))].push_back({uv, depth});
+  }
+  std::sort(used.begin(), used.end());
+  seen_through_.clear();
+  hidden_.clear();
+  const double reach = options_.seen_through_px;
+  for (const auto& [id, view] : visible_) {
+    if (std::binary_search(used.begin(), used.end(), id)) continue;
+    int behind = 0, beside = 0, before = 0;
+    for (int row = row_of(view.uv_px.y() - reach); row <= row_of(view.uv_px.y() + reach); ++row) {
+      for (int column = column_of(view.uv_px.x() - reach); column <= column_of(view.uv_px.x() + reach); ++column) {
+        for (const Found& found : cells[static_cast<size_t>(row * kSeenColumns + column)]) {
+          if ((found.uv_px - view.uv_px).squaredNorm() > reach * reach) continue;
+          if (found.depth > options_.seen_through_depth * view.depth) {
+            ++behind;
+          } else if (found.depth * options_.seen_through_depth > view.depth) {
+            ++beside;
+          } else {
+            ++before;
+          }
+        }
+      }
+    }
+    if (behind >= options_.seen_through_min && beside == 0) seen_through_.push_back(id);
+    if (before > 0 && beside == 0) hidden_.push_back(id);
+  }
+}
+
 void PoseTracker::CountEvidence(const Map& map, const TrackedFrame& frame) {
   for (const auto& [id, view] : visible_) {
+    if (std::binary_search(hidden_.begin(), hidden_.end(), id)) continue;
     FrameEvidence::Item& item = evidence_[id];
     item.landmark = id;
     ++item.visible;
   }
   for (const LandmarkId id : moved_) {
+    evidence_[id].landmark = id;
     ++evidence_[id].moved;
     ++recent_motion_[id].streak;
+  }
+  for (const LandmarkId id : seen_through_) {
+    evidence_[id].landmark = id;
+    ++evidence_[id].moved;
   }
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     const LandmarkId id = frame.landmarks[i];
@@ -323,6 +441,7 @@ TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, Trac
   SearchLocalLandmarks(map, relocalized, frame);
   const int inliers = OptimizeMatches(map, frame);
   FindMoved(map, frame);
+  FindSeenThrough(map, *frame);
   TrackingReport report = Summarize(*frame, inliers, relocalized);
   if (report.ok) CountEvidence(map, *frame);
   return report;

@@ -50,6 +50,10 @@ class PoseTracker {
     LandmarkId landmark;
     uint16_t feature = 0;
   };
+  struct Rejected {
+    Match match;
+    double chi2 = 0;
+  };
   struct RecentMotion {
     int streak = 0;  ///< frames in a row that saw it elsewhere
   };
@@ -59,10 +63,13 @@ class PoseTracker {
   void MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double radius_px,
                          const TrackedFrame& frame);
   void KeepConsistentTurns(const TrackedFrame& last, const TrackedFrame& frame);
+  void OptimizeElders(const TrackedFrame& frame, const PoseOptimizationOptions& options);
+  void KeepWhatAgrees(const Rigid3d& T_cam_world, double elder_age_s, int elders);
   int OptimizeMatches(const Map& map, TrackedFrame* frame);
   void CollectLocalMap(const Map& map, const TrackedFrame& frame);
   void SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame);
   void FindMoved(const Map& map, TrackedFrame* frame);
+  void FindSeenThrough(const Map& map, const TrackedFrame& frame);
   void SpreadMotion(TrackedFrame* frame);
   void CountEvidence(const Map& map, const TrackedFrame& frame);
   TrackingReport Summarize(const TrackedFrame& frame, int inliers, bool relocalized) const;
@@ -75,12 +82,17 @@ class PoseTracker {
   std::vector<Match> matches_;
   std::vector<float> match_turns_;
   std::vector<PoseObservation> observations_;
+  std::vector<PoseObservation> elders_;
+  std::vector<double> ages_s_;              ///< of the matched landmarks
+  std::vector<Rejected> rejected_;          ///< by the optimisation done last
   PoseOptimizationReport optimized_;
   std::vector<uint8_t> taken_;
   std::vector<KeyframeId> local_keyframes_;
   std::vector<LandmarkId> local_landmarks_;
   std::vector<std::pair<LandmarkId, LandmarkView>> visible_;  ///< local landmarks that this frame should see
-  std::vector<LandmarkId> moved_;
+  std::vector<LandmarkId> moved_;         ///< seen elsewhere by this frame
+  std::vector<LandmarkId> hidden_;        ///< missing, with something nearer seen in their place; sorted
+  std::vector<LandmarkId> seen_through_;  ///< what lies behind them was seen instead
   std::unordered_map<LandmarkId, RecentMotion> recent_motion_;
   std::unordered_map<LandmarkId, FrameEvidence::Item> evidence_;
 };

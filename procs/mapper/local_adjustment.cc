@@ -62,7 +62,7 @@ std::vector<KeyframeId> FixedObservers(const Map& map, const Window& window, int
   return fixed;
 }
 
-void AddObservations(const Map& map, Window& window) {
+void AddObservations(const Map& map, double sigma_px, Window& window) {
   for (size_t point = 0; point < window.landmarks.size(); ++point) {
     const Landmark& landmark = *map.FindLandmark(window.landmarks[point]);
     window.problem.points.push_back(landmark.p_world);
@@ -72,7 +72,7 @@ void AddObservations(const Map& map, Window& window) {
       const FrameFeatures& features = *map.FindKeyframe(o.keyframe)->features;
       const int octave = features.set.keypoints[o.feature].octave;
       window.problem.observations.push_back({pose->second, static_cast<int>(point), features.uv_px[o.feature],
-                                             1.0 / map.pyramid().SigmaSquared(octave)});
+                                             1.0 / (sigma_px * sigma_px * map.pyramid().SigmaSquared(octave))});
       window.sources.push_back({o.keyframe, o.feature});
     }
   }
@@ -95,7 +95,7 @@ void WriteBack(Map& map, const Window& window, const BundleReport& report) {
 }  // namespace
 
 LocalAdjustmentReport AdjustKeyframes(Map& map, const std::vector<KeyframeId>& keyframes, int max_fixed,
-                                      const BundleOptions& options) {
+                                      double sigma_px, const BundleOptions& options) {
   Window window;
   window.problem.camera = map.camera().Ideal();
   for (const KeyframeId id : keyframes) {
@@ -104,7 +104,7 @@ LocalAdjustmentReport AdjustKeyframes(Map& map, const std::vector<KeyframeId>& k
   }
   window.landmarks = LandmarksSeenBy(map, keyframes);
   for (const KeyframeId id : FixedObservers(map, window, max_fixed)) window.AddPose(*map.FindKeyframe(id), true);
-  AddObservations(map, window);
+  AddObservations(map, sigma_px, window);
   LocalAdjustmentReport report;
   report.keyframes = window.free_keyframes;
   report.fixed_keyframes = static_cast<int>(window.keyframes.size()) - window.free_keyframes;
@@ -122,17 +122,18 @@ LocalAdjustmentReport AdjustLocally(Map& map, KeyframeId id, const MapperOptions
   std::sort(window.begin(), window.end());
   BundleOptions bundle;
   bundle.interrupt = interrupt;
-  return AdjustKeyframes(map, window, options.local_fixed_keyframes, bundle);
+  return AdjustKeyframes(map, window, options.local_fixed_keyframes, options.keypoint_sigma_px, bundle);
 }
 
-LocalAdjustmentReport AdjustWholeMap(Map& map, MapId map_id, int iterations, const std::function<bool()>& interrupt) {
+LocalAdjustmentReport AdjustWholeMap(Map& map, MapId map_id, int iterations, double sigma_px,
+                                     const std::function<bool()>& interrupt) {
   std::vector<KeyframeId> all;
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (keyframe.map_id == map_id) all.push_back(id);
   }
   BundleOptions bundle = GlobalBundleOptions(iterations);
   bundle.interrupt = interrupt;
-  return AdjustKeyframes(map, all, 0, bundle);
+  return AdjustKeyframes(map, all, 0, sigma_px, bundle);
 }
 
 }  // namespace dmslam

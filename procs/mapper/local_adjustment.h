@@ -17,15 +17,16 @@ struct LocalAdjustmentReport {
 };
 
 /// Bundle adjustment of a set of keyframes and of all landmarks they see, held in place by the other observers of those
-/// landmarks. Results and outliers are written into the map; landmarks left with fewer than two observers are removed.
+/// landmarks. `sigma_px`: standard deviation of a keypoint of octave 0. Results and outliers are written into the map; landmarks left with fewer than two observers are removed.
 LocalAdjustmentReport AdjustKeyframes(Map& map, const std::vector<KeyframeId>& window, int max_fixed,
-                                      const BundleOptions& options);
+                                      double sigma_px, const BundleOptions& options);
 
 /// The window around keyframe `id`: itself and its best covisible keyframes.
 LocalAdjustmentReport AdjustLocally(Map& map, KeyframeId id, const MapperOptions& options,
                                     const std::function<bool()>& interrupt);
 
 /// All keyframes and landmarks of a map, the first keyframe held.
-LocalAdjustmentReport AdjustWholeMap(Map& map, MapId map_id, int iterations, const std::function<bool()>& interrupt);
+LocalAdjustmentReport AdjustWholeMap(Map& map, MapId map_id, int iterations, double sigma_px,
+                                     const std::function<bool()>& interrupt);
 
 }  // namespace dmslam

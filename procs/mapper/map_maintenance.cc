@@ -5,6 +5,8 @@
 namespace dmslam {
 namespace {
 
+constexpr uint32_t kEvidenceWindow = 20;  // frames
+
 /// How many keyframes were inserted after `id`, up to `most`; culled ones count.
 int KeyframesSince(const Map& map, KeyframeId id, int most) {
   int count = 0;
@@ -61,6 +63,10 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
   state.visible += item.visible;
   state.found += item.found;
   state.moved += item.moved;
+  if (state.visible > 2 * kEvidenceWindow) {  // older frames count half, so that the share speaks of the present
+    state.visible /= 2;
+    state.found /= 2;
+  }
   if (item.moved > 0) state.last_moved_ns = stamp_ns;
   if (options.enabled) {
     const float change = options.moved_step * static_cast<float>(item.moved) -
@@ -118,7 +124,9 @@ EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const Moti
     }
     const LandmarkEvidence updated = Updated(map.FindLandmark(*id)->evidence, item, evidence.stamp_ns, options);
     ++report.applied;
-    if (options.enabled && updated.motion_belief > options.remove_above) {
+    const bool gone = updated.visible >= kEvidenceWindow &&
+                      static_cast<double>(updated.found) < options.min_found_share * updated.visible;
+    if (options.enabled && (gone || updated.motion_belief > options.remove_above)) {
       map.RemoveLandmark(*id);
       ++report.removed;
     } else {

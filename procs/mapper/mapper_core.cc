@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "mapper/landmark_fusion.h"
@@ -52,6 +53,7 @@ LandmarkId MapperCore::AddLandmark(MapId map_id, KeyframeId reference, KeyframeI
   landmark.p_world = p_world;
   landmark.reference = reference;
   landmark.first_keyframe = newest;
+  landmark.first_ns = map_.FindKeyframe(newest)->stamp_ns;
   landmark.evidence.visible = 1;
   landmark.evidence.found = 1;
   const LandmarkId id = landmark.id;
@@ -93,7 +95,7 @@ bool MapperCore::BuildInitialMap(const InitialMap& proposal) {
     map_.SetObservation(second, point.feature_second, id);
     map_.UpdateDescriptor(id);
   }
-  AdjustWholeMap(map_, proposal.map_id, kInitialAdjustmentIterations, nullptr);
+  AdjustWholeMap(map_, proposal.map_id, kInitialAdjustmentIterations, 1.0, nullptr);
   if (map_.CountTracked(*map_.FindKeyframe(second), 2) < kMinInitialLandmarks) return false;
   ScaleToUnitDepth(proposal.map_id, first);
   return true;
@@ -220,7 +222,15 @@ void MapperCore::OnReset(const MapReset& reset) {
 
 void MapperCore::Settle(KeyframeId id, MapId map_id) { Publish(MapEvent::kSettled, id, map_id); }
 
-void MapperCore::End() { Publish(MapEvent::kEnded, {}, 0); }
+void MapperCore::End() {
+  std::set<MapId> maps;
+  for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
+  for (const MapId map_id : maps) {
+    AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
+    Publish(MapEvent::kGloballyAdjusted, {}, map_id);
+  }
+  Publish(MapEvent::kEnded, {}, 0);
+}
 
 // ---- Corrections ---------------------------------------------------------------------------------------------------
 

@@ -29,6 +29,7 @@ struct MotionBeliefOptions {
   float floor = -4.0F;          ///< however long it stood still, it may start to move
   float ceiling = 4.0F;
   float remove_above = 2.5F;    ///< beyond this it leaves the map
+  double min_found_share = 0.0; ///< a landmark found in fewer of the recent frames that should see it leaves the map too
 };
 
 struct MapperOptions {
@@ -38,8 +39,10 @@ struct MapperOptions {
   int probation_keyframes = 3;           ///< a landmark is on probation until this many keyframes followed
   int probation_min_observations = 3;    ///< from the second keyframe on, a landmark on probation needs as many observers
   double redundant_share = 0.9;          ///< a keyframe goes when this share of its landmarks is seen by three others
-  int local_keyframes = 25;              ///< at most this many keyframes are adjusted at a time (most covisible first)
-  int local_fixed_keyframes = 40;        ///< at most this many hold the window in place
+  double keypoint_sigma_px = 0.7;        ///< of octave 0, in bundle adjustment
+  int local_keyframes = 40;              ///< at most this many keyframes are adjusted at a time (most covisible first)
+  int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
+  int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
   int min_covisibility = 15;             ///< landmarks in common that make two keyframes neighbours
   double fuse_radius_px = 3.0;           ///< times the scale of the predicted octave
 };
