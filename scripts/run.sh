@@ -121,7 +121,8 @@ stop_all() {
   [ -n "$logger" ] && kill -INT "$logger" 2>/dev/null || true
   wait_for 100 "${pid_of[@]}" $logger || for p in "${pid_of[@]}" $logger; do kill -KILL "$p" 2>/dev/null || true; done
 }
-trap 'stop_all; echo "run.sh: interrupted; what was tracked is in $out" >&2; exit 130' INT
+exec 3>&2  # where we speak; what bash says about its jobs goes nowhere
+trap 'stop_all; echo "run.sh: interrupted; what was tracked is in $out" >&3; exit 130' INT
 trap 'stop_all; exit 143' TERM HUP
 trap stop_all EXIT
 
@@ -160,11 +161,12 @@ why() {
 report() { # name, status
   local message
   message=$(why "$1")
-  if [ "$1" = collector ] && [ -t 2 ]; then return; fi  # it has spoken on the terminal itself
+  if [ "$1" = collector ] && [ -t 3 ]; then return; fi  # it has spoken on the terminal itself
   if [ "$2" -gt 128 ]; then message="$1 was ended by signal $(($2 - 128)) (${message:-its log is $out/log/$1.log})"; fi
-  echo "run.sh: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&2
+  echo "run.sh: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&3
 }
 
+exec 2>/dev/null
 # The collector ends last. Whoever fails before it ends the run.
 code=0
 collected=0

@@ -17,18 +17,17 @@ multicast() { ip link set lo up && ip link set lo multicast on && ip route repla
 
 work=$(mktemp -d)
 failures=0
-mine() { # what runs with this test's folder in its command line, this script apart
-  local dir
+mine() { # the project's programs in this namespace: "PID: COMMAND LINE"
+  local dir line
   for dir in /proc/[0-9]*; do
-    [[ ${dir#/proc/} != "$$" && ${dir#/proc/} != "$BASHPID" ]] || continue
-    if tr '\0' ' ' <"$dir/cmdline" 2>/dev/null | grep -qF -- "$work"; then
-      printf '%s: %s\n' "${dir#/proc/}" "$(tr '\0' ' ' <"$dir/cmdline" 2>/dev/null)"
-    fi
+    [[ $dir/ns/net -ef /proc/self/ns/net ]] || continue
+    line=$({ tr '\0' ' ' <"$dir/cmdline"; } 2>/dev/null) || continue
+    [[ $line != *bin/dmslam-* ]] || printf '%s: %s\n' "${dir#/proc/}" "$line"
   done
 }
 cleanup() {
   local pid
-  while IFS=: read -r pid _; do kill -KILL "$pid" 2>/dev/null; done < <(mine | grep dmslam-)
+  while IFS=: read -r pid _; do kill -KILL "$pid" 2>/dev/null; done < <(mine)
   rm -rf -- "$work"
 }
 trap cleanup EXIT
@@ -50,10 +49,10 @@ finish() {
 # run ARGUMENTS...: scripts/run.sh with the programs under test.
 run() { "$root/scripts/run.sh" --build-dir "$build" "$@"; }
 
-no_orphans() { # within two seconds
+no_orphans() { # within some seconds
   local i
-  for ((i = 0; i < 40; ++i)); do
-    [[ -n $(mine | grep dmslam-) ]] || return 0
+  for ((i = 0; i < 200; ++i)); do
+    [[ -n $(mine) ]] || return 0
     sleep 0.05
   done
   failed "processes are left after: $1"
