@@ -16,6 +16,8 @@ namespace dmslam {
 
 /// Everything that can be set and that changes results: the same file and the same `--set`s go to every process.
 struct Settings {
+  Settings() { extractor.num_features = 2000; }
+
   uint64_t seed = 1;
   std::string profile = "dm";
   OrbExtractorOptions extractor;

@@ -143,6 +143,10 @@ bool FrontendCore::FindPose() {
   const std::optional<Rigid3d> predicted = PredictPose();
   const bool recent = frame_.stamp_ns - last_tracked_ns_ < ToNs(kPredictionValid_s);
   relocalized_ = false;
+  const Keyframe* reference = map_.FindKeyframe(last_placed_.reference);
+  const std::optional<double> depth = reference != nullptr ? map_.MedianDepth(*reference) : std::nullopt;
+  const bool trusted = velocity_ && predicted && frame_.index - last_.index == 1;
+  tracker_.SetMotionPrior(trusted ? predicted : std::nullopt, depth.value_or(1.0));
   if (predicted && recent) {
     if (tracker_.TrackFromFrame(map_, last_, *predicted, &frame_)) return true;
     const uint64_t seed = DeriveSeed(seed_, frame_.index, "track_keyframe");
@@ -159,6 +163,7 @@ void FrontendCore::Track(std::vector<FrontendEvent>* events) {
     report = tracker_.TrackLocalMap(map_, careful, &frame_);
   }
   if (!report.ok && state_ != TrackingState::kTrial) {
+    tracker_.SetMotionPrior(std::nullopt, 1.0);
     TrackedFrame attempt(frame_.index, frame_.stamp_ns, frame_.features);
     if (relocalizer_.Relocalize(map_, map_id_, DeriveSeed(seed_, frame_.index, "relocalize"), &tracker_, &attempt)) {
       frame_ = std::move(attempt);
@@ -321,6 +326,7 @@ bool FrontendCore::LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighb
 
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
   std::optional<TrackedFrame> neighbour;
+  tracker_.SetMotionPrior(std::nullopt, 1.0);
   for (auto it = unplaced_.rbegin(); it != unplaced_.rend(); ++it) {  // from the newest back: the map lies after them
     TrackedFrame& frame = *it;
     const bool adjacent = neighbour && neighbour->index - frame.index <= 3;

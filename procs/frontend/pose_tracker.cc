@@ -39,6 +39,18 @@ void PoseTracker::Reset() {
   evidence_.clear();
 }
 
+void PoseTracker::SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth) {
+  prior_.reset();
+  if (!T_cam_world) return;
+  PosePrior prior;
+  prior.T_cam_world = *T_cam_world;
+  const double rotation = 1.0 / options_.prior_rotation_rad;
+  const double translation = 1.0 / (options_.prior_translation * depth);
+  prior.information.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
+      Eigen::Vector3d::Constant(translation * translation);
+  prior_ = prior;
+}
+
 bool PoseTracker::HasVote(const Landmark& landmark) const {
   if (!options_.motion_belief) return true;
   if (landmark.evidence.motion_belief > kStrongBelief) return false;
@@ -206,6 +218,7 @@ int PoseTracker::OptimizeMatches(const Map& map, TrackedFrame* frame) {
   }
   PoseOptimizationOptions options;
   options.max_chi2 = options_.chi2;
+  options.prior = prior_;
   if (options_.motion_belief) OptimizeElders(*frame, options);
   OptimizePose(camera_.Ideal(), frame->T_cam_world, observations_, options, optimized_);
   if (!optimized_.usable) return 0;

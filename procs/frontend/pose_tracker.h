@@ -31,6 +31,9 @@ class PoseTracker {
  public:
   PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid);
 
+  /// Where the motion model expects the camera, for the frame that follows; none after a loss. `depth`: of the scene, in
+  /// map units.
+  void SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth);
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
   bool TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, TrackedFrame* frame);
   /// Matches a keyframe's landmarks by descriptor alone, and finds the pose from nothing.
@@ -78,6 +81,7 @@ class PoseTracker {
   Camera camera_;
   Pyramid pyramid_;
   KeyframeId reference_;
+  std::optional<PosePrior> prior_;
 
   std::vector<Match> matches_;
   std::vector<float> match_turns_;

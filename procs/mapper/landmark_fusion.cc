@@ -16,7 +16,8 @@ bool Sees(const Landmark& landmark, KeyframeId keyframe) {
   return at != landmark.observations.end() && at->keyframe == keyframe;
 }
 
-std::vector<KeyframeId> NeighboursOfNeighbours(const Map& map, KeyframeId id, int min_covisibility) {
+std::vector<KeyframeId> NeighboursOfNeighbours(const Map& map, KeyframeId id, int min_covisibility,
+                                               std::set<KeyframeId>* out_listed) {
   std::vector<KeyframeId> targets = map.BestCovisible(id, 20, min_covisibility);
   std::set<KeyframeId> listed(targets.begin(), targets.end());
   listed.insert(id);
@@ -26,7 +27,28 @@ std::vector<KeyframeId> NeighboursOfNeighbours(const Map& map, KeyframeId id, in
       if (listed.insert(second).second) targets.push_back(second);
     }
   }
+  *out_listed = std::move(listed);
   return targets;
+}
+
+/// Keyframes that look at the same place from nearby, whether they share landmarks or not: where drift is small, a place
+/// that is seen again is joined with itself here, without a loop.
+void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& options, std::set<KeyframeId>* listed,
+                        std::vector<KeyframeId>* targets) {
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  const double depth = map.MedianDepth(keyframe).value_or(0.0);
+  std::vector<std::pair<double, KeyframeId>> near;
+  for (const auto& [other_id, other] : map.keyframes()) {
+    if (other.map_id != keyframe.map_id || listed->contains(other_id)) continue;
+    const double distance = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
+    const double angle = AngleBetween(other.T_cam_world.rotation, keyframe.T_cam_world.rotation);
+    if (distance < options.nearby_distance * depth && angle < options.nearby_angle_rad) near.emplace_back(distance, other_id);
+  }
+  std::sort(near.begin(), near.end());
+  for (size_t i = 0; i < near.size() && i < static_cast<size_t>(options.nearby_keyframes); ++i) {
+    listed->insert(near[i].second);
+    targets->push_back(near[i].second);
+  }
 }
 
 std::vector<LandmarkId> LandmarksOf(const Keyframe& keyframe) {
@@ -80,7 +102,9 @@ int FuseInto(Map& map, KeyframeId id, const Rigid3d& T_cam_world, const std::vec
 }
 
 int FuseWithNeighbours(Map& map, KeyframeId id, const MapperOptions& options) {
-  const std::vector<KeyframeId> targets = NeighboursOfNeighbours(map, id, options.min_covisibility);
+  std::set<KeyframeId> listed;
+  std::vector<KeyframeId> targets = NeighboursOfNeighbours(map, id, options.min_covisibility, &listed);
+  AddKeyframesNearby(map, id, options, &listed, &targets);
   int joined = 0;
   for (const KeyframeId target : targets) {
     const std::vector<LandmarkId> mine = LandmarksOf(*map.FindKeyframe(id));

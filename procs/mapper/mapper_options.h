@@ -44,6 +44,9 @@ struct MapperOptions {
   int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
   int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
   int min_covisibility = 15;             ///< landmarks in common that make two keyframes neighbours
+  int nearby_keyframes = 10;             ///< at most so many that look at the same place are fused with, covisible or not
+  double nearby_distance = 0.5;          ///< how far they may be, as a share of the scene's depth
+  double nearby_angle_rad = 0.6;         ///< how far they may be turned
   double fuse_radius_px = 3.0;           ///< times the scale of the predicted octave
 };
 
