@@ -1,0 +1,145 @@
+#!/usr/bin/env bash
+# The long bars. Stopped at any time, the same command continues. See --help.
+set -euo pipefail
+top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+readonly SCHEDULES=10000 SCHEDULES_PER_STEP=1000 SEEDS=5
+out=$top/out/nightly data=${DMSLAM_DATA:-$top/../shared/data} fuzz_seconds=60
+only=""
+usage() {
+  cat <<EOF
+Usage: scripts/nightly.sh [--out DIR] [--data DIR] [--only PATTERN] [--fuzz-seconds N] [--list]
+
+Runs what takes too long for every commit, each step once, and writes DIR/table.md with what was reached and what is asked:
+all tests; kitchen seeds 1..$SEEDS in lock-step, the same seed twice, kitchen in real time; kitchen_walk1 and kitchen_walk2;
+$SCHEDULES seeded schedules of the stream protocol; a run under AddressSanitizer and UBSan; fuzzing of every reader of bytes.
+A step that is done (DIR/<step>/done) is not done again; remove DIR to begin anew.
+
+  --out DIR           default: out/nightly in the project
+  --data DIR          the kitchen sequences (default: \$DMSLAM_DATA, else ../shared/data); without them those steps are skipped
+  --only PATTERN      only the steps whose name matches, as 'kitchen*'
+  --fuzz-seconds N    per target (default 60)
+  --list              names the steps
+EOF
+}
+say() { echo "nightly: $*" >&2; }
+die() { say "$*"; exit 1; }
+list=0
+while (($#)); do
+  case $1 in
+    -h | --help) usage; exit 0 ;;
+    --list) list=1; shift ;;
+    --out | --data | --only | --fuzz-seconds)
+      (($# > 1)) || die "$1 needs a value; see --help"
+      name=${1#--}
+      printf -v "${name//-/_}" %s "$2"
+      shift 2
+      ;;
+    *) die "unknown option $1; see --help" ;;
+  esac
+done
+
+# Runs in the step's own folder; what it returns decides. Everything a step says goes into its log.
+step_tests() { "$top/scripts/test.sh"; }
+kitchen_run() { # FOLDER SEQUENCE MODE SEED
+  local mode=()
+  [[ $3 == realtime ]] || mode=(--lockstep)
+  "$top/scripts/run.sh" --sequence "$data/$2" --camera "$top/config/kitchen.yaml" "${mode[@]}" --seed "$4" --out "$1"
+}
+step_kitchen() { kitchen_run "$1" kitchen lockstep "$2"; }
+step_walk1() { kitchen_run "$1" kitchen_walk1 lockstep "$2"; }
+step_walk2() { kitchen_run "$1" kitchen_walk2 lockstep "$2"; }
+step_realtime() { kitchen_run "$1" kitchen realtime 1; }
+step_again() { # the first seed once more: the same bytes
+  kitchen_run "$1" kitchen lockstep 1
+  cmp "$1/trajectory.txt" "$out/kitchen_1/trajectory.txt"
+}
+step_notexture() { # a sound trajectory, or the reason why there is none; never a crash
+  local code=0
+  "$top/scripts/run.sh" --sequence "$data/rgbd_dataset_freiburg3_structure_notexture_far" --lockstep --out "$1" || code=$?
+  ((code < 64))
+}
+step_schedules() { # FOLDER FIRST
+  DMSLAM_FIRST_SCHEDULE=$2 DMSLAM_SCHEDULES=$SCHEDULES_PER_STEP "$top/build/release/bin/simulation_test" \
+    --gtest_filter=Simulation.EverySchedulesPromisesAreKept
+}
+step_sanitizers() {
+  "$top/scripts/build.sh" asan-ubsan dmslam-inprocess dmslam-synth
+  local bin=$top/build/asan-ubsan/bin
+  "$top/build/release/bin/dmslam-synth" --quiet --frames 90 --moving-share 0.15 --seed 1 --out "$1/sequence"
+  "$bin/dmslam-inprocess" --sequence "$1/sequence" --camera "$top/config/synthetic.yaml" --out "$1"
+}
+step_fuzz() { "$top/scripts/fuzz.sh" --seconds "$fuzz_seconds"; }
+
+steps=("tests")
+for ((seed = 1; seed <= SEEDS; ++seed)); do steps+=("kitchen_$seed $seed"); done
+steps+=("again" "realtime" "notexture")
+for name in walk1 walk2; do
+  for ((seed = 1; seed <= SEEDS; ++seed)); do steps+=("${name}_$seed $seed"); done
+done
+for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
+steps+=("sanitizers" "fuzz")
+if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi
+
+needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture) ]]; }
+run_step() { # NAME [ARGUMENT]
+  local folder=$out/$1 status=0
+  [[ ! -e $folder/done ]] || return 0
+  rm -rf -- "$folder"
+  mkdir -p -- "$folder"
+  say "$1"
+  local began=$SECONDS
+  set -m # a group of its own: an interrupt reaches it through us
+  ("step_${1%%_*}" "$folder" "${2:-}") >"$folder/log.txt" 2>&1 </dev/null &
+  child=$!
+  set +m
+  wait "$child" || status=$?
+  child=""
+  echo "$status $((SECONDS - began))" >"$folder/done"
+  ((status == 0)) || say "$1 failed (code $status); see $folder/log.txt"
+}
+
+value() { sed -nE "s/^ *\"$2\": *([^,]*),?$/\1/p" "$out/$1/summary.json" 2>/dev/null | head -n 1; }
+write_table() {
+  local name status seconds
+  {
+    echo "| step | result | seconds | tracked online / in the end [%] | ATE final / online [m] | skipped | frontend median / p95 [ms] |"
+    echo "|---|---|---|---|---|---|---|"
+    for name in "${steps[@]%% *}"; do
+      [[ -e $out/$name/done ]] || continue
+      read -r status seconds <"$out/$name/done"
+      [[ $status == 0 ]] && status=passed || status="failed ($status)"
+      if [[ -s $out/$name/summary.json ]]; then
+        printf '| %s | %s | %s | %.1f / %.1f | %s / %s | %s | %.1f / %.1f |\n' "$name" "$status" "$seconds" \
+          "$(value "$name" tracked_online_percent)" "$(value "$name" tracked_percent)" \
+          "$(value "$name" ate_rmse_final | cut -c1-7)" "$(value "$name" ate_rmse_online | cut -c1-7)" \
+          "$(value "$name" frames_skipped)" "$(value "$name" frontend_ms_median)" "$(value "$name" frontend_ms_p95)"
+      else
+        echo "| $name | $status | $seconds | | | | |"
+      fi
+    done
+    echo
+    echo "Bars: kitchen_1..$SEEDS tracked online >= 96, in the end >= 97, median ATE final <= 0.008, none above 0.012;"
+    echo "again: the same bytes as kitchen_1; realtime: nothing skipped, ATE at most 15 % above the median of lock-step."
+  } >"$out/table.md"
+}
+
+child=""
+trap '[[ -z $child ]] || kill -TERM -- "-$child" 2>/dev/null; wait 2>/dev/null; rm -f "$out/.lock"; say "stopped; the same command continues"; exit 130' INT TERM
+mkdir -p -- "$out" || die "$out cannot be made"
+out=$(cd "$out" && pwd)
+exec 9>"$out/.lock"
+flock -n 9 || die "another nightly.sh is working in $out"
+"$top/scripts/setup.sh" test
+"$top/scripts/build.sh" --tests release
+[[ -d $data/kitchen ]] || say "$data/kitchen is not there: the steps that need it are skipped; set --data or DMSLAM_DATA"
+for step in "${steps[@]}"; do
+  read -r name argument <<<"$step"
+  # shellcheck disable=SC2053
+  [[ -z $only || $name == $only ]] || continue
+  if needs_data "$name" && [[ ! -d $data/kitchen ]]; then continue; fi
+  run_step "$name" "$argument"
+  write_table
+done
+write_table
+cat "$out/table.md"
+! grep -qs -v '^0 ' "$out"/*/done

@@ -1,0 +1,25 @@
+// dmslam-settings: writes the page of all settings.
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <string>
+
+#include "dmslam/util/version.h"
+#include "settings_page.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Lists every setting with its default, as the page docs/configuration.md", "dmslam-settings");
+  app.set_version_flag("--version", dmslam::kVersion);
+  std::string out;
+  app.add_option("--out", out, "file to write; without it the page goes to standard output");
+  CLI11_PARSE(app, argc, argv);
+  const std::string page = dmslam::SettingsPage();
+  if (out.empty()) {
+    std::fputs(page.c_str(), stdout);
+  } else if (!(std::ofstream(out) << page).flush()) {
+    std::fprintf(stderr, "dmslam-settings: %s cannot be written; is its folder there, and writable?\n", out.c_str());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,47 @@
+#include "settings_page.h"
+
+#include "common/settings.h"
+
+namespace dmslam {
+namespace {
+
+constexpr const char* kHead =
+    "# Configuration\n"
+    "\n"
+    "Written by `dmslam-settings --out docs/configuration.md`; change `procs/common/settings.cc` instead of this page.\n"
+    "\n"
+    "A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with `motion_belief: off`\n"
+    "below it) or from the command line (`--set tracking.motion_belief=off`, which goes before the file). The same\n"
+    "settings go to every process; a process whose settings differ from the session's is told so by name.\n"
+    "`profile=baseline` is the same system with a plain RANSAC two-view start, without mutual exclusion of new\n"
+    "landmarks and without motion belief.\n";
+
+std::string SectionOf(const std::string& key) {
+  const size_t dot = key.find('.');
+  return dot == std::string::npos ? "general" : key.substr(0, dot);
+}
+
+std::string Escaped(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '|') escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
+
+}  // namespace
+
+std::string SettingsPage() {
+  std::string page = kHead, section;
+  for (const SettingInfo& info : ListSettings(Settings{})) {
+    if (SectionOf(info.key) != section) {
+      section = SectionOf(info.key);
+      page += "\n## " + section + "\n\n| setting | default | what it does |\n|---|---|---|\n";
+    }
+    page += "| `" + info.key + "` | " + Escaped(info.value) + " | " + Escaped(info.help) + " |\n";
+  }
+  return page;
+}
+
+}  // namespace dmslam
