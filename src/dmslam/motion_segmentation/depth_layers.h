@@ -15,7 +15,7 @@ namespace dmslam {
 struct LayerOptions {
   bool enabled = true;
   double bin_px = 2.0;        ///< bins of the histogram of disparities
-  double gap_px = 6.0;        ///< layers are apart by at least this much of (nearly) no disparity
+  double gap_px = 8.0;        ///< layers are apart by at least this much of (nearly) no disparity
   double noise_share = 0.02;  ///< bins with less than this share of the fullest count as empty
 };
 

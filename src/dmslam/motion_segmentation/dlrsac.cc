@@ -21,6 +21,7 @@ struct Cell {
   std::vector<uint8_t> own;  ///< inliers of its own model, parallel to range
   int num_own = 0;
   CellState state = CellState::kNoModel;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< for kPureRotation
   Eigen::Vector2d centroid_px = Eigen::Vector2d::Zero();
 };
 
@@ -39,13 +40,14 @@ class Segmentation {
       : options_(options), matches_(matches), camera_(camera) {}
 
   StaticSelection Run(uint64_t seed) {
+    seed_ = seed;
     SortIntoCells();
     if (Refused(static_cast<int>(kept_.size()), "enough matches")) return std::move(out_);
     FitCells(seed);
     if (Refused(NumModels(), "a model")) return std::move(out_);
     FillCoupleMatrix();
     const std::optional<CoupledSet> set = ChooseSet();
-    if (!set) return Refuse(Refusal::kNoModel, "no cell may lead a coupled set", matches_.size());
+    if (!set) return Refuse(Refusal::kNoModel, "no cell determines a motion: all are degenerate", matches_.size());
     Select(*set);
     return std::move(out_);
   }
@@ -56,9 +58,12 @@ class Segmentation {
   void SortIntoCells();
   void FitCells(uint64_t seed);
   void FitCell(int iterations, Random& random, Cell* cell);
-  CellState Classify(const Cell& cell) const;
+  CellState Classify(Cell* cell) const;
+  bool MayLead(const Cell& cell) const;
+  double CoupleByRotation(const Eigen::Matrix3d& R, const Cell& cell) const;
+  bool SearchSetModel(CoupledSet* set) const;
   bool ExplainedByPlane(std::span<const int> own) const;
-  bool ExplainedByRotation(const Cell& cell) const;
+  bool ExplainedByRotation(Cell* cell) const;
   void FillCoupleMatrix();
   double Couple(const Eigen::Matrix3d& M, const Cell& cell) const;
   CoupledSet MakeSet(size_t leader);
@@ -67,6 +72,8 @@ class Segmentation {
   void Select(const CoupledSet& set);
   void KeepLayer(const TwoViewModel& model, std::vector<uint8_t>* flags) const;
   void RefitOnAll(TwoViewModel* model, std::vector<uint8_t>* flags) const;
+  double SpreadScore(std::span<const uint8_t> flags) const;
+  void SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags) const;
   void VoteWithNeighbors(std::vector<uint8_t>* flags) const;
 
   int NumModels() const {
@@ -89,6 +96,7 @@ class Segmentation {
   std::vector<Eigen::Vector2d> positions_px_;  ///< uv0, parallel to arrays_
   std::vector<Cell> kept_;
   StaticSelection out_;
+  uint64_t seed_ = 0;
 };
 
 /// Steps 2: cells, kept ones and their centroids.
@@ -159,17 +167,17 @@ void Segmentation::FitCell(int iterations, Random& random, Cell* cell) {
   cell->own.assign(flags.begin() + static_cast<ptrdiff_t>(cell->range.begin),
                    flags.begin() + static_cast<ptrdiff_t>(cell->range.end));
   if (kind() == ModelKind::kEssential) ChooseEssentialPose(arrays_, flags, &cell->model);
-  cell->state = Classify(*cell);
+  cell->state = Classify(cell);
 }
 
-CellState Segmentation::Classify(const Cell& cell) const {
-  if (options_.degenerate_vote == DegenerateVote::kAlways) return CellState::kGeneral;
+CellState Segmentation::Classify(Cell* cell) const {
+  if (!options_.tell_degenerate) return CellState::kGeneral;
   std::vector<int> own;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (size_t k = 0; k < cell.own.size(); ++k) {
-    if (!cell.own[k]) continue;
-    own.push_back(static_cast<int>(cell.range.begin + k));
-    mean += matches_[order_[cell.range.begin + k]].uv0_px;
+  for (size_t k = 0; k < cell->own.size(); ++k) {
+    if (!cell->own[k]) continue;
+    own.push_back(static_cast<int>(cell->range.begin + k));
+    mean += matches_[order_[cell->range.begin + k]].uv0_px;
   }
   const double n = static_cast<double>(own.size());
   mean /= n;
@@ -185,12 +193,11 @@ CellState Segmentation::Classify(const Cell& cell) const {
   return CellState::kGeneral;
 }
 
-bool Segmentation::ExplainedByRotation(const Cell& cell) const {
+bool Segmentation::ExplainedByRotation(Cell* cell) const {
   std::vector<uint8_t> use(arrays_.size(), 0);
-  std::copy(cell.own.begin(), cell.own.end(), use.begin() + static_cast<ptrdiff_t>(cell.range.begin));
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  if (!RefineRotation(arrays_, use, 5, &R)) return false;
-  return CountRotationInliers(R, arrays_, cell.range) >= options_.degenerate_share * cell.num_own;
+  std::copy(cell->own.begin(), cell->own.end(), use.begin() + static_cast<ptrdiff_t>(cell->range.begin));
+  if (!RefineRotation(arrays_, use, 5, &cell->rotation)) return false;
+  return CountRotationInliers(cell->rotation, arrays_, cell->range) >= options_.degenerate_share * cell->num_own;
 }
 
 bool Segmentation::ExplainedByPlane(std::span<const int> own) const {
@@ -223,8 +230,40 @@ void Segmentation::FillCoupleMatrix() {
   out_.couple = Eigen::MatrixXd::Zero(n, n);
   for (const Cell& leader : kept_) {
     if (leader.num_own == 0) continue;
-    for (const Cell& other : kept_) out_.couple(leader.index, other.index) = Couple(leader.model.M, other);
+    const bool rotation = leader.state == CellState::kPureRotation;
+    for (const Cell& other : kept_) {
+      out_.couple(leader.index, other.index) =
+          rotation ? CoupleByRotation(leader.rotation, other) : Couple(leader.model.M, other);
+    }
   }
+}
+
+/// A cell without visible parallax knows its rotation only: which share of the other cell's own inliers it explains.
+double Segmentation::CoupleByRotation(const Eigen::Matrix3d& R, const Cell& cell) const {
+  if (cell.num_own == 0) return 0;
+  int shared = 0;
+  for (size_t k = 0; k < cell.own.size(); ++k) {
+    const size_t i = cell.range.begin + k;
+    if (cell.own[k]) shared += CountRotationInliers(R, arrays_, {i, i + 1});
+  }
+  return shared / static_cast<double>(cell.num_own);
+}
+
+/// The motion of a set whose leader knows none: the lowest minimum of the epipolar cost over the members.
+bool Segmentation::SearchSetModel(CoupledSet* set) const {
+  std::vector<uint8_t> use(arrays_.size(), 0);
+  for (const size_t j : set->members) {
+    std::copy(kept_[j].own.begin(), kept_[j].own.end(), use.begin() + static_cast<ptrdiff_t>(kept_[j].range.begin));
+  }
+  MinimaOptions options = options_.minima;
+  options.samples /= 3;  // as there may be many sets
+  options.samples_kept /= 2;
+  options.directions /= 2;
+  options.max_matches /= 2;
+  const std::vector<EssentialMinimum> minima = FindEssentialMinima(arrays_, use, options, seed_);
+  if (minima.empty()) return false;
+  set->model = minima.front().model;
+  return true;
 }
 
 /// Step 5: the set that `leader` couples with, refined as the options say.
@@ -239,7 +278,9 @@ CoupledSet Segmentation::MakeSet(size_t leader) {
       if (j == leader || degree > options_.couple_threshold) members.push_back(j);
     }
     const bool settled = round > 0 && members == set.members;
+    const bool search = round == 0 && kept_[leader].state == CellState::kPureRotation;
     set.members = std::move(members);
+    if (search && SearchSetModel(&set)) continue;
     if (settled || round >= options_.set_refit_rounds) break;
     std::vector<uint8_t> use(arrays_.size(), 0);
     for (const size_t j : set.members) FlagInliers(set.model.M, arrays_, kept_[j].range, use);
@@ -268,16 +309,18 @@ void Segmentation::Measure(CoupledSet* set) const {
   set->distribution_px = std::sqrt(sum / total);
 }
 
+bool Segmentation::MayLead(const Cell& cell) const {
+  if (cell.num_own == 0) return false;
+  if (cell.state == CellState::kGeneral) return true;
+  const bool essential = kind() == ModelKind::kEssential;
+  return essential && (cell.state == CellState::kPlane || cell.state == CellState::kPureRotation);
+}
+
 /// Step 6: the widest set; of equally wide ones that with more support.
 std::optional<CoupledSet> Segmentation::ChooseSet() {
-  const bool general = std::any_of(kept_.begin(), kept_.end(),
-                                   [](const Cell& cell) { return cell.state == CellState::kGeneral; });
   std::optional<CoupledSet> best;
   for (size_t i = 0; i < kept_.size(); ++i) {
-    if (kept_[i].num_own == 0) continue;
-    const bool may_lead = kept_[i].state == CellState::kGeneral ||
-                          (options_.degenerate_vote == DegenerateVote::kWhenNoneIsGeneral && !general);
-    if (!may_lead) continue;
+    if (!MayLead(kept_[i])) continue;
     CoupledSet set = MakeSet(i);
     out_.cells[static_cast<size_t>(kept_[i].index)].coupled_distribution_px = set.distribution_px;
     const bool better = !best || set.distribution_px > best->distribution_px ||
@@ -304,6 +347,7 @@ void Segmentation::Select(const CoupledSet& set) {
   std::vector<uint8_t> flags(arrays_.size(), 0);
   if (options_.scope == StaticScope::kImage) {
     RefitOnAll(&model, &flags);
+    SearchMinima(&model, &flags);
     if (options_.neighbor_share > 0) VoteWithNeighbors(&flags);
   } else {
     for (const size_t j : set.members) FlagInliers(model.M, arrays_, kept_[j].range, flags);
@@ -338,6 +382,37 @@ void Segmentation::RefitOnAll(TwoViewModel* model, std::vector<uint8_t>* flags) 
   }
 }
 
+/// D over the flagged matches, times their number.
+double Segmentation::SpreadScore(std::span<const uint8_t> flags) const {
+  std::vector<Eigen::Vector2d> points;
+  for (size_t k = 0; k < flags.size(); ++k) {
+    if (flags[k]) points.push_back(positions_px_[k]);
+  }
+  const double spread = Spread(points);
+  return spread * spread * static_cast<double>(points.size());
+}
+
+void Segmentation::SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags) const {
+  if (kind() != ModelKind::kEssential || !options_.search_minima) return;
+  std::vector<uint8_t> loose(arrays_.size(), 0);
+  for (size_t k = 0; k < arrays_.size(); ++k) {
+    loose[k] = NormalizedSampson(model->M, arrays_, k) <= options_.loose_bound ? 1 : 0;
+  }
+  const std::vector<EssentialMinimum> minima = FindEssentialMinima(arrays_, loose, options_.minima, seed_);
+  double best = SpreadScore(*flags);
+  for (const EssentialMinimum& minimum : minima) {
+    if (minimum.cost > options_.minima_slack * minima.front().cost) break;
+    TwoViewModel other = minimum.model;
+    std::vector<uint8_t> other_flags;
+    RefitOnAll(&other, &other_flags);
+    const double score = SpreadScore(other_flags);
+    if (score <= best) continue;
+    best = score;
+    *model = other;
+    *flags = std::move(other_flags);
+  }
+}
+
 void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
   std::vector<Match> sorted(matches_.size());
   for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
@@ -349,15 +424,19 @@ void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
 
 }  // namespace
 
+DlrsacOptions::DlrsacOptions() { sampling.stop_confidence = 0.999; }
+
 DlrsacOptions DlrsacOptions::Paper() {
   DlrsacOptions options;
+  options.sampling.stop_confidence = 0.0;
   options.sampling.kind = ModelKind::kFundamental;
   options.sampling.refit_rounds = 0;
   options.inlier.scale_by_octave = false;
   options.set_refit_rounds = 0;
   options.scope = StaticScope::kCoupledCells;
-  options.degenerate_vote = DegenerateVote::kAlways;
+  options.tell_degenerate = false;
   options.layers.enabled = false;
+  options.search_minima = false;
   options.neighbor_share = 0.0;
   return options;
 }

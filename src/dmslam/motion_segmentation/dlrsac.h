@@ -3,6 +3,7 @@
 #include "dmslam/motion_segmentation/depth_layers.h"
 #include "dmslam/motion_segmentation/ransac.h"
 #include "dmslam/motion_segmentation/static_selector.h"
+#include "dmslam/motion_segmentation/two_view_model.h"
 
 namespace dmslam {
 
@@ -19,18 +20,14 @@ enum class StaticScope : uint8_t {
   kImage,         ///< every match of the image that agrees with the model
 };
 
-/// When degenerate cells (plane, pure rotation, collinear) lead a coupled set.
-enum class DegenerateVote : uint8_t {
-  kAlways,            ///< they are not told apart (the paper)
-  kWhenNoneIsGeneral,  ///< only in pictures in which no cell is general
-  kNever,
-};
-
 /// DLRSAC (Lu et al., Appl. Sci. 2020, 10(12), 4252, Sec. 2.1): the static world is the motion whose support is spread
 /// widest over the image. What the paper leaves open is a field here; `Paper()` is the paper as written, the defaults
 /// are what selects better (docs/dlrsac.md has the numbers).
 struct DlrsacOptions {
-  SamplingOptions sampling;  ///< max_iterations is shared by the cells kept; stop_confidence works per cell
+  DlrsacOptions();
+
+  /// max_iterations is shared by the cells kept; stop_confidence works per cell and is 0.999 unless set otherwise.
+  SamplingOptions sampling;
   InputOptions input;
   InlierOptions inlier;
 
@@ -46,12 +43,24 @@ struct DlrsacOptions {
   int set_refit_rounds = 2;
   StaticScope scope = StaticScope::kImage;
 
-  DegenerateVote degenerate_vote = DegenerateVote::kWhenNoneIsGeneral;
+  /// Cells that do not determine the motion do not vote for one: collinear ones never lead a set; planes lead only with
+  /// essential matrices, which five points of a plane determine; cells without visible parallax vote for their rotation,
+  /// which they do determine, and the motion is searched in the whole set that shares it. Off: told apart nowhere (the
+  /// paper).
+  bool tell_degenerate = true;
   double degenerate_share = 0.95;  ///< share of a cell's inliers that a plane or a rotation must explain
   double collinear_px = 4.0;       ///< spread across the main direction below this: collinear
 
   /// Keeps the widest layer of disparities only (essential matrices); off: all that agree with the model (the paper).
   LayerOptions layers;
+
+  /// After the choice the motion is searched again among all minima of the epipolar cost of what nearly agrees with it
+  /// (essential matrices): a model from one cell's sample is often a wrong local one. That with the largest D times
+  /// number of static matches is taken.
+  bool search_minima = true;
+  MinimaOptions minima;
+  double loose_bound = 9.0;  ///< nearly agrees: squared Sampson distance up to so many times its bound
+  double minima_slack = 3.0;  ///< minima with up to so many times the lowest cost are tried
 
   /// A match is called static only if this share of its neighbours in the image agrees with the model too. What moves
   /// agrees by accident, and not all of it together. 0: not asked.

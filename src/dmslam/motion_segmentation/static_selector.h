@@ -34,7 +34,8 @@ enum class Refusal : uint8_t {
 };
 std::string_view ToString(Refusal refusal);
 
-/// What a cell's matches look like. Only kGeneral cells vote for a motion; the others can still be voted for.
+/// What a cell's matches look like. What does not determine a motion does not vote for one (DlrsacOptions), but can be
+/// voted for.
 enum class CellState : uint8_t {
   kTooFew = 0,     ///< fewer matches than a model needs
   kNoModel,        ///< RANSAC found nothing that enough matches agree with
