@@ -13,7 +13,8 @@
 
 namespace dmslam {
 
-/// Where messages go and come from: all that a process knows of the world. Names of channels carry no prefix here.
+/// Where messages go and come from: all that a process knows of the world. Names of channels carry no prefix
+/// here.
 class Bus {
  public:
   using Handler = std::function<void(const std::string& channel, std::span<const uint8_t> bytes)>;
@@ -26,8 +27,8 @@ class Bus {
   virtual void Publish(const Outgoing& message) = 0;
 };
 
-/// A bus within one process: lossless, first in first out, delivered when asked to. Each process has a port of its own
-/// and does not hear itself.
+/// A bus within one process: lossless, first in first out, delivered when asked to. Each process has a port
+/// of its own and does not hear itself.
 class MemoryBus {
  public:
   class Port : public Bus {

@@ -27,7 +27,8 @@ LcmBus::Options Options(int port, const std::string& prefix = "") {
 template <typename Done>
 void PumpUntil(EventLoop* loop, const Done& done) {
   const int64_t limit = EventLoop::now_ns() + 10'000'000'000;
-  while (!done() && EventLoop::now_ns() < limit) loop->PumpOnce(std::min(limit, EventLoop::now_ns() + 100'000'000));
+  while (!done() && EventLoop::now_ns() < limit)
+    loop->PumpOnce(std::min(limit, EventLoop::now_ns() + 100'000'000));
 }
 
 TEST(MemoryBus, DeliversInOrderToAllOthersThatSubscribed) {
@@ -37,7 +38,8 @@ TEST(MemoryBus, DeliversInOrderToAllOthersThatSubscribed) {
   MemoryBus::Port& b = bus.AddPort();
   MemoryBus::Port& c = bus.AddPort();
   for (auto [port, name] : {std::pair{&a, 'a'}, {&b, 'b'}, {&c, 'c'}}) {
-    port->SetHandler([&log, n = name](const std::string& channel, std::span<const uint8_t>) { log += n + channel + " "; });
+    port->SetHandler(
+        [&log, n = name](const std::string& channel, std::span<const uint8_t>) { log += n + channel + " "; });
   }
   a.Subscribe("X");
   b.Subscribe("X");
@@ -81,7 +83,8 @@ TEST(LcmBus, CarriesMessagesAndKeepsPrefixesApart) {
 TEST(LcmBus, WhatAHandlerThrowsComesOutOfDeliver) {
   EventLoop loop;
   LcmBus bus(Options(17702));
-  bus.SetHandler([](const std::string&, std::span<const uint8_t>) { throw std::runtime_error("from the handler"); });
+  bus.SetHandler(
+      [](const std::string&, std::span<const uint8_t>) { throw std::runtime_error("from the handler"); });
   bus.Subscribe("X");
   bool caught = false;
   loop.Watch(bus.fd(), [&] {

@@ -53,7 +53,8 @@ std::optional<RecordHeader> ParseHeader(std::span<const uint8_t> message) {
   if (message.size() < kHeaderOffset + kHeaderBytes) return std::nullopt;
   RecordHeader header{};
   const auto size = static_cast<int>(kHeaderBytes);
-  if (header._decodeNoHash(message.data(), static_cast<int>(kHeaderOffset), size) != size) return std::nullopt;
+  if (header._decodeNoHash(message.data(), static_cast<int>(kHeaderOffset), size) != size)
+    return std::nullopt;
   return header;
 }
 

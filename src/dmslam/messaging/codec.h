@@ -40,8 +40,8 @@ Bytes Encode(const Message& message) {
   return bytes;
 }
 
-/// Walks the layout of an encoded message and stops at the first count or length that does not fit. The generated
-/// decoders trust the counts they read, so a message is walked before it is decoded:
+/// Walks the layout of an encoded message and stops at the first count or length that does not fit. The
+/// generated decoders trust the counts they read, so a message is walked before it is decoded:
 ///
 ///   LayoutWalker walk(bytes);
 ///   const int64_t n = walk.Skip(kAfterHeader).Count();
@@ -70,13 +70,14 @@ class LayoutWalker {
 /// Fingerprint of the type some bytes claim to be; nothing if there are not even that many.
 std::optional<int64_t> FingerprintOf(std::span<const uint8_t> bytes);
 
-/// Decodes a message whose layout was walked and found complete: the fingerprint must be the type's and the decoder must
-/// consume exactly the bytes received.
+/// Decodes a message whose layout was walked and found complete: the fingerprint must be the type's and the
+/// decoder must consume exactly the bytes received.
 template <typename Message>
 std::optional<Message> DecodeWalked(std::span<const uint8_t> bytes) {
   const auto size = static_cast<int>(bytes.size());
   Message message{};
-  if (FingerprintOf(bytes) != Message::getHash() || message.decode(bytes.data(), 0, size) != size) return std::nullopt;
+  if (FingerprintOf(bytes) != Message::getHash() || message.decode(bytes.data(), 0, size) != size)
+    return std::nullopt;
   return message;
 }
 

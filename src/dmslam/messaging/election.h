@@ -11,24 +11,25 @@
 
 namespace dmslam {
 
-/// Decides whether a newcomer may write a stream: it listens first; a live beacon means that it refuses, or, when told to
-/// take over, asks the present writer to hand over and waits until that has closed. Two newcomers that both win meet
-/// through their beacons: the lower term stops (StreamWriter::superseded_by). Until the stream is opened it goes on
-/// listening: a writer that is heard only then turns the victory into a refusal.
+/// Decides whether a newcomer may write a stream: it listens first; a live beacon means that it refuses, or,
+/// when told to take over, asks the present writer to hand over and waits until that has closed. Two
+/// newcomers that both win meet through their beacons: the lower term stops (StreamWriter::superseded_by).
+/// Until the stream is opened it goes on listening: a writer that is heard only then turns the victory into a
+/// refusal.
 class WriterElection : public StateMachine {
  public:
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kTest;
-    std::string owner;       ///< names the beacon's channel
-    std::string name;        ///< for messages to people
-    int64_t writer = 0;      ///< random id, positive
+    std::string owner;   ///< names the beacon's channel
+    std::string name;    ///< for messages to people
+    int64_t writer = 0;  ///< random id, positive
     int64_t schema_hash = 0;
-    bool take_over = false;  ///< asks a live writer to close instead of refusing
-    int64_t listen_ns = 2'000'000'000;             ///< 0: a private system, wins at once
-    int64_t ask_ns = 200'000'000;                  ///< between requests
-    int64_t silence_ns = 1'000'000'000;            ///< a writer not heard for so long while asked is gone
-    int64_t take_over_timeout_ns = 10'000'000'000; ///< then the higher term decides
+    bool take_over = false;                         ///< asks a live writer to close instead of refusing
+    int64_t listen_ns = 2'000'000'000;              ///< 0: a private system, wins at once
+    int64_t ask_ns = 200'000'000;                   ///< between requests
+    int64_t silence_ns = 1'000'000'000;             ///< a writer not heard for so long while asked is gone
+    int64_t take_over_timeout_ns = 10'000'000'000;  ///< then the higher term decides
   };
   enum class State { kListening, kAsking, kRefused, kWon };
 

@@ -141,7 +141,8 @@ struct Holders {
     return options;
   }
   void Add(const std::string& role, int64_t id, Version held) {
-    holders.emplace_back(ReplicaHolder::Options{1, StreamId::kMap, "MAPPER", role, role, id}, [held] { return held; });
+    holders.emplace_back(ReplicaHolder::Options{1, StreamId::kMap, "MAPPER", role, role, id},
+                         [held] { return held; });
   }
   void Pump(int64_t from_ns, int64_t to_ns) {
     for (int64_t now = from_ns; now < to_ns; now += 10 * kMs) {

@@ -13,7 +13,8 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
 }  // namespace
 
 Endpoint::Endpoint(Bus* bus, Clock clock) : bus_(bus), clock_(std::move(clock)) {
-  bus_->SetHandler([this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
+  bus_->SetHandler(
+      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
 }
 
 void Endpoint::Subscribe(const std::string& channel) {
@@ -34,19 +35,23 @@ void Endpoint::AddReader(StreamReader* reader, const std::string& owner,
   Add(reader, std::move(channels));
 }
 
-void Endpoint::AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers) {
-  std::vector<std::string> channels = {HeadChannel(owner), TakeOverChannel(owner)};  // HEAD: of a second writer
+void Endpoint::AddWriter(StreamWriter* writer, const std::string& owner,
+                         const std::vector<std::string>& readers) {
+  std::vector<std::string> channels = {HeadChannel(owner),
+                                       TakeOverChannel(owner)};  // HEAD: of a second writer
   for (const std::string& reader : readers) channels.push_back(AckChannel(reader));
   Add(writer, std::move(channels));
 }
 
-void Endpoint::AddElection(WriterElection* election, const std::string& owner) { Add(election, {HeadChannel(owner)}); }
+void Endpoint::AddElection(WriterElection* election, const std::string& owner) {
+  Add(election, {HeadChannel(owner)});
+}
 
 void Endpoint::AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels) {
   std::vector<std::string> channels = record_channels;
   for (const ReplicaFetch::Holder& holder : fetch->holders()) {
-    channels.insert(channels.end(),
-                    {ReplicaChannel(holder.channel), HeadChannel(holder.channel), PartChannel(holder.channel)});
+    channels.insert(channels.end(), {ReplicaChannel(holder.channel), HeadChannel(holder.channel),
+                                     PartChannel(holder.channel)});
   }
   Add(fetch, std::move(channels));
 }

@@ -13,8 +13,9 @@
 
 namespace dmslam {
 
-/// Connects the state machines of one process to its bus: subscribes to their channels, gives each message to those that
-/// want its channel, and sends what they have to say. They stay their owner's, and must be removed before they die.
+/// Connects the state machines of one process to its bus: subscribes to their channels, gives each message to
+/// those that want its channel, and sends what they have to say. They stay their owner's, and must be removed
+/// before they die.
 class Endpoint {
  public:
   using Clock = std::function<int64_t()>;
@@ -23,11 +24,12 @@ class Endpoint {
   Endpoint(Bus* bus, Clock clock);
 
   /// `record_channels`: all channels on which the stream's records travel.
-  void AddReader(StreamReader* reader, const std::string& owner, const std::vector<std::string>& record_channels);
+  void AddReader(StreamReader* reader, const std::string& owner,
+                 const std::vector<std::string>& record_channels);
   /// `readers`: who may acknowledge, by the upper-case names of their processes ("FRONTEND").
   void AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers);
-  /// An election hears the beacons of its owner; a fetch the holders' answers and records; a server the owner's questions
-  /// and acknowledgements.
+  /// An election hears the beacons of its owner; a fetch the holders' answers and records; a server the
+  /// owner's questions and acknowledgements.
   void AddElection(WriterElection* election, const std::string& owner);
   void AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels);
   void AddServer(ReplicaServer* server, const std::string& owner);

@@ -7,8 +7,9 @@
 
 namespace dmslam {
 
-/// Waits for file descriptors, a deadline or a signal to stop: the one place where a process sleeps. One thread.
-/// SIGTERM and SIGINT are taken from the whole process, so make it before anything that starts threads (LcmBus).
+/// Waits for file descriptors, a deadline or a signal to stop: the one place where a process sleeps. One
+/// thread. SIGTERM and SIGINT are taken from the whole process, so make it before anything that starts
+/// threads (LcmBus).
 class EventLoop {
  public:
   EventLoop();
@@ -19,8 +20,8 @@ class EventLoop {
   /// Calls `on_readable` from PumpOnce whenever `fd` can be read. It must read.
   void Watch(int fd, std::function<void()> on_readable);
 
-  /// Waits until something is readable, `deadline_ns` of now_ns() has come (in the past: does not wait), or a signal asks
-  /// to stop; handles what there is. Returns whether to go on.
+  /// Waits until something is readable, `deadline_ns` of now_ns() has come (in the past: does not wait), or a
+  /// signal asks to stop; handles what there is. Returns whether to go on.
   bool PumpOnce(int64_t deadline_ns);
 
   /// Handles what there is and does not wait: keeps the protocol alive within long work.

@@ -13,20 +13,21 @@
 
 namespace dmslam {
 
-/// An owner that starts looks for the newest replica of its stream: it asks all holders, waits until each configured role
-/// has answered or is known to be absent, and chooses the newest. The chosen holder then opens a stream
-/// (StreamId::kHandOver) with nothing but a snapshot: its writer id is asker(), its parent the version it hands over. A
-/// StreamReader of the asker with `only_writer = asker()` takes it; its parent() is the version that was taken.
+/// An owner that starts looks for the newest replica of its stream: it asks all holders, waits until each
+/// configured role has answered or is known to be absent, and chooses the newest. The chosen holder then
+/// opens a stream (StreamId::kHandOver) with nothing but a snapshot: its writer id is asker(), its parent the
+/// version it hands over. A StreamReader of the asker with `only_writer = asker()` takes it; its parent() is
+/// the version that was taken.
 class ReplicaSearch : public StateMachine {
  public:
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kMap;
-    std::string owner = "MAPPER";        ///< of the stream: names the questions' channel
-    int64_t asker = 0;                   ///< random id, not zero; the next few are used as well
-    std::vector<std::string> roles;      ///< who may hold a replica
-    int64_t absent_ns = 5'000'000'000;   ///< a role that does not answer for so long is absent
-    int64_t ask_ns = 100'000'000;        ///< between questions
+    std::string owner = "MAPPER";       ///< of the stream: names the questions' channel
+    int64_t asker = 0;                  ///< random id, not zero; the next few are used as well
+    std::vector<std::string> roles;     ///< who may hold a replica
+    int64_t absent_ns = 5'000'000'000;  ///< a role that does not answer for so long is absent
+    int64_t ask_ns = 100'000'000;       ///< between questions
   };
   struct Replica {
     std::string role;
@@ -75,7 +76,7 @@ class ReplicaHolder : public StateMachine {
     std::string owner = "MAPPER";  ///< of the stream
     std::string holder;            ///< this process: names the answers' channel, "FRONTEND"
     std::string role;
-    int64_t id = 0;                ///< random, not zero: the one its reader of the stream uses
+    int64_t id = 0;  ///< random, not zero: the one its reader of the stream uses
   };
 
   /// `held`: the version of the replica now; empty while it is not whole.
@@ -86,8 +87,8 @@ class ReplicaHolder : public StateMachine {
   std::vector<Outgoing> TakeOutgoing() override;
   int64_t deadline_ns() const override { return has_outgoing() ? INT64_MIN : INT64_MAX; }
 
-  /// Id of the asker that chose this replica: open the hand-over stream for it, once per asker, with this id as its
-  /// writer's and the version held as its parent.
+  /// Id of the asker that chose this replica: open the hand-over stream for it, once per asker, with this id
+  /// as its writer's and the version held as its parent.
   const std::optional<int64_t>& chosen_by() const { return chosen_by_; }
   bool has_outgoing() const { return !outgoing_.empty(); }
 

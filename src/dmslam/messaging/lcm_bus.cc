@@ -45,7 +45,8 @@ std::string UrlWithBuffer(const std::string& url) {
 
 std::string CureFor(const std::string& url) {
   if (IsUdp(url)) {
-    return "is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` makes one on this host; "
+    return "is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` makes one on "
+           "this host; "
            "the form is udpm://239.255.76.67:PORT?ttl=0";
   }
   if (url.rfind("tcpq://", 0) == 0) return "is its server running? See docs/two-machines.md";
@@ -59,8 +60,9 @@ std::string NoteOnReceiveBuffer(const std::string& url) {
   std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
   std::string note = "receive buffer " + std::to_string(std::min(wanted, allowed)) + " bytes";
   if (allowed < wanted) {
-    note += " instead of " + std::to_string(wanted) + ": large messages are lost and repaired; `sysctl -w net.core.rmem_max=" +
-            std::to_string(wanted) + "` cures it";
+    note += " instead of " + std::to_string(wanted) +
+            ": large messages are lost and repaired; `sysctl -w net.core.rmem_max=" + std::to_string(wanted) +
+            "` cures it";
   }
   return note;
 }
@@ -115,7 +117,8 @@ void LcmBus::Subscribe(const std::string& channel) {
 
 void LcmBus::Publish(const Outgoing& message) {
   lcm::LCM& lcm = message.local && impl_->tap ? *impl_->tap : impl_->lcm;
-  // The result says little (0 even when a fragment could not be sent): the protocol repairs what does not arrive.
+  // The result says little (0 even when a fragment could not be sent): the protocol repairs what does not
+  // arrive.
   lcm.publish(options_.prefix + message.channel, message.bytes->data(),
               static_cast<unsigned int>(message.bytes->size()));
 }

@@ -8,12 +8,13 @@
 
 namespace dmslam {
 
-/// The bus of processes: LCM. Its receiving thread only copies datagrams; handlers run in the thread that calls Deliver.
+/// The bus of processes: LCM. Its receiving thread only copies datagrams; handlers run in the thread that
+/// calls Deliver.
 class LcmBus : public Bus {
  public:
   struct Options {
-    /// udpm://GROUP:PORT?ttl=N&recv_buf_size=BYTES, tcpq://HOST:PORT or memq://. Separate systems by port, not by group.
-    /// 4 MB of receive buffer are asked for where the URL names none.
+    /// udpm://GROUP:PORT?ttl=N&recv_buf_size=BYTES, tcpq://HOST:PORT or memq://. Separate systems by port,
+    /// not by group. 4 MB of receive buffer are asked for where the URL names none.
     std::string url = "udpm://239.255.76.67:7670?ttl=0";
     std::string prefix;          ///< of every channel: separates systems that must share a port
     int queue_capacity = 10000;  ///< messages per subscription; LCM's own 30 would lose records silently
@@ -29,11 +30,12 @@ class LcmBus : public Bus {
 
   /// Readable when Deliver has something to do.
   int fd() const;
-  /// Hands all that has arrived, up to `max_messages`, to the handler without waiting. What a handler throws comes out
-  /// here, after LCM has returned. Throws InputError when the connection is gone (tcpq).
+  /// Hands all that has arrived, up to `max_messages`, to the handler without waiting. What a handler throws
+  /// comes out here, after LCM has returned. Throws InputError when the connection is gone (tcpq).
   int Deliver(int max_messages = 1000);
 
-  /// How large the receive buffer really is, and how to raise it if that is less than was asked for; empty without UDP.
+  /// How large the receive buffer really is, and how to raise it if that is less than was asked for; empty
+  /// without UDP.
   const std::string& receive_buffer_note() const { return receive_buffer_note_; }
 
  private:

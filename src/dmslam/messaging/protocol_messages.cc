@@ -20,7 +20,8 @@ bool FixedThenStrings(std::span<const uint8_t> bytes, int64_t fixed_bytes, int n
 }
 
 template <typename Message>
-std::optional<Message> DecodeSealed(std::string_view channel, std::span<const uint8_t> bytes, bool layout_fits) {
+std::optional<Message> DecodeSealed(std::string_view channel, std::span<const uint8_t> bytes,
+                                    bool layout_fits) {
   if (!layout_fits || !IsIntact(channel, bytes)) return std::nullopt;
   return DecodeWalked<Message>(bytes);
 }
@@ -47,7 +48,8 @@ bool IsPlausible(const head_t& head) {
 }  // namespace
 
 std::optional<head_t> DecodeHead(std::string_view channel, std::span<const uint8_t> bytes) {
-  std::optional<head_t> head = DecodeSealed<head_t>(channel, bytes, FixedThenStrings(bytes, 4 * 4 + 6 * 8, 1));
+  std::optional<head_t> head =
+      DecodeSealed<head_t>(channel, bytes, FixedThenStrings(bytes, 4 * 4 + 6 * 8, 1));
   return head && IsPlausible(*head) ? head : std::nullopt;
 }
 
@@ -75,8 +77,8 @@ std::optional<part_t> DecodePart(std::span<const uint8_t> bytes) {
   const int64_t num_bytes = walk.Skip(8).Count();
   if (!walk.Skip(4 + 8 + 4 + 4 + 4).Array(num_bytes, 1).complete()) return std::nullopt;
   std::optional<part_t> part = DecodeWalked<part_t>(bytes);
-  if (part && (part->num_bytes == 0 || part->seq < 1 || part->seq >= kMaxSeq || part->offset < 0 || part->total_bytes < part->num_bytes ||
-               part->offset > part->total_bytes - part->num_bytes)) {
+  if (part && (part->num_bytes == 0 || part->seq < 1 || part->seq >= kMaxSeq || part->offset < 0 ||
+               part->total_bytes < part->num_bytes || part->offset > part->total_bytes - part->num_bytes)) {
     return std::nullopt;
   }
   return part;

@@ -17,8 +17,8 @@ namespace dmslam {
 /// No stream gets this far: larger numbers are noise, and are kept out of all arithmetic.
 inline constexpr int64_t kMaxSeq = int64_t{1} << 60;
 
-/// Decode one of the protocol's own messages: nothing unless its checksum, its counts, its lengths and its total length
-/// are right. Nothing here throws, whatever the bytes.
+/// Decode one of the protocol's own messages: nothing unless its checksum, its counts, its lengths and its
+/// total length are right. Nothing here throws, whatever the bytes.
 std::optional<head_t> DecodeHead(std::string_view channel, std::span<const uint8_t> bytes);
 std::optional<ack_t> DecodeAck(std::string_view channel, std::span<const uint8_t> bytes);
 std::optional<part_t> DecodePart(std::span<const uint8_t> bytes);

@@ -11,8 +11,8 @@
 
 namespace dmslam {
 
-/// What a reader lacks: the records first..last, or of the one record first = last the bytes [first_byte, end_byte) when
-/// end_byte > 0.
+/// What a reader lacks: the records first..last, or of the one record first = last the bytes [first_byte,
+/// end_byte) when end_byte > 0.
 struct MissingRange {
   int64_t first_seq = 0;
   int64_t last_seq = 0;
@@ -20,14 +20,14 @@ struct MissingRange {
   int32_t end_byte = 0;
 };
 
-/// Puts the records of one numbering in order, from whole messages and from parts in any order. Used for the stream
-/// itself and for its snapshot.
+/// Puts the records of one numbering in order, from whole messages and from parts in any order. Used for the
+/// stream itself and for its snapshot.
 class ReceiveWindow {
  public:
   struct Limits {
-    int64_t records_ahead = 8192;        ///< how far behind the next record to hand out others are kept
-    size_t bytes = 64u << 20;            ///< of all that is kept, whole or in pieces
-    size_t record_bytes = 16u << 20;     ///< of one record
+    int64_t records_ahead = 8192;     ///< how far behind the next record to hand out others are kept
+    size_t bytes = 64u << 20;         ///< of all that is kept, whole or in pieces
+    size_t record_bytes = 16u << 20;  ///< of one record
   };
   enum class Result { kNew, kDuplicate, kNoRoom, kIncomplete };
 
@@ -45,8 +45,8 @@ class ReceiveWindow {
   /// Adds a whole record, already found intact.
   Result Add(Record record);
 
-  /// Adds a piece. When it completes a record, its channel and bytes are returned for inspection; call Add with the
-  /// record if it is intact, and nothing otherwise: then it counts as missing.
+  /// Adds a piece. When it completes a record, its channel and bytes are returned for inspection; call Add
+  /// with the record if it is intact, and nothing otherwise: then it counts as missing.
   struct PartResult {
     Result result = Result::kIncomplete;
     std::optional<std::pair<std::string, Bytes>> whole;

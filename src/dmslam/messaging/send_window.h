@@ -12,15 +12,15 @@
 
 namespace dmslam {
 
-/// The records of one numbering that a writer keeps for repair, and what of them waits to be sent. Used for the stream
-/// itself and for its snapshot. Knows nothing of readers.
+/// The records of one numbering that a writer keeps for repair, and what of them waits to be sent. Used for
+/// the stream itself and for its snapshot. Knows nothing of readers.
 class SendWindow {
  public:
   struct Options {
     Link link = Link::kHost;
     std::string part_channel;
-    int32_t part_bytes = 1200;       ///< of a record in one part
-    int64_t resend_after_ns = 0;     ///< a part sent this recently is on its way and not sent again
+    int32_t part_bytes = 1200;    ///< of a record in one part
+    int64_t resend_after_ns = 0;  ///< a part sent this recently is on its way and not sent again
   };
 
   SendWindow(const Options& options, int32_t stream_key) : options_(options), stream_key_(stream_key) {}
@@ -34,7 +34,8 @@ class SendWindow {
   /// Queues what a reader lacks, unless it was sent a moment ago or waits anyway.
   void Repair(const ack_t& ack, int64_t now_ns);
 
-  /// Sends up to `budget` datagrams: repairs first, then what was never sent. Returns what is left of the budget.
+  /// Sends up to `budget` datagrams: repairs first, then what was never sent. Returns what is left of the
+  /// budget.
   int Send(int budget, int64_t now_ns, std::vector<Outgoing>* out);
 
   bool idle() const { return repairs_.empty() && next_seq_ > last(); }
@@ -69,8 +70,8 @@ class SendWindow {
   std::deque<Kept> kept_;
   int64_t first_ = 1;
   size_t bytes_ = 0;
-  int64_t next_seq_ = 1;   // the first record not wholly sent ...
-  int64_t next_part_ = 0;  // ... and the first of its parts not sent
+  int64_t next_seq_ = 1;                           // the first record not wholly sent ...
+  int64_t next_part_ = 0;                          // ... and the first of its parts not sent
   std::set<std::pair<int64_t, int64_t>> repairs_;  // (seq, part)
 };
 

@@ -33,7 +33,8 @@ const char kChannel[] = "DMSLAM_OWNER_RECORD";
 // The replicated state: every record appends one entry.
 using History = std::vector<int64_t>;
 
-// A record says where its entries belong; replica_t serves as a message with a header, two numbers and a text.
+// A record says where its entries belong; replica_t serves as a message with a header, two numbers and a
+// text.
 Bytes EncodeEntries(size_t place, std::span<const int64_t> entries, size_t padding) {
   replica_t message{};
   message.asker = static_cast<int64_t>(place);
@@ -90,9 +91,9 @@ struct Conditions {
     overlapping = random->Below(5) == 0;
   }
   std::string ToText() const {
-    return std::string(link == Link::kHost ? "host" : "lan") + ", loss " + std::to_string(loss) + ", duplication " +
-           std::to_string(duplication) + ", delay " + std::to_string(delay_ns / kMs) + " ms, " +
-           std::to_string(num_readers) + " readers, " + std::to_string(num_faults) + " faults" +
+    return std::string(link == Link::kHost ? "host" : "lan") + ", loss " + std::to_string(loss) +
+           ", duplication " + std::to_string(duplication) + ", delay " + std::to_string(delay_ns / kMs) +
+           " ms, " + std::to_string(num_readers) + " readers, " + std::to_string(num_faults) + " faults" +
            (overlapping ? ", overlapping" : "");
   }
   Link link;
@@ -117,7 +118,10 @@ class Network {
       for (int copy = 0; copy < copies; ++copy) {
         bool lost = false;
         for (size_t i = 0; i < fragments && !healed; ++i) lost |= random_->Uniform() < conditions_.loss;
-        const int64_t delay = healed ? kMs : 100'000 + static_cast<int64_t>(random_->Uniform() * static_cast<double>(conditions_.delay_ns));
+        const int64_t delay =
+            healed ? kMs
+                   : 100'000 +
+                         static_cast<int64_t>(random_->Uniform() * static_cast<double>(conditions_.delay_ns));
         if (!lost) events_.push({now_ns + delay, order_++, node, message});
       }
     }
@@ -127,7 +131,9 @@ class Network {
     int64_t order;
     int node;
     Outgoing message;
-    bool operator<(const Event& other) const { return std::tie(at_ns, order) > std::tie(other.at_ns, other.order); }
+    bool operator<(const Event& other) const {
+      return std::tie(at_ns, order) > std::tie(other.at_ns, other.order);
+    }
   };
   std::optional<Event> Next(int64_t now_ns) {
     if (events_.empty() || events_.top().at_ns > now_ns) return std::nullopt;
@@ -162,8 +168,14 @@ std::string ReaderName(int index) { return "READER" + std::to_string(index); }
 class ReaderProcess : public Process {
  public:
   ReaderProcess(int index, bool lossless, Random* random, std::string* failure)
-      : index_(index), lossless_(lossless), failure_(failure), id_(RandomId(random)), reader_(Reading()),
-        source_(&history), server_(Serving(), [this] { return reader_.held(); }, &source_) {}
+      : index_(index),
+        lossless_(lossless),
+        failure_(failure),
+        id_(RandomId(random)),
+        reader_(Reading()),
+        source_(&history),
+        server_(
+            Serving(), [this] { return reader_.held(); }, &source_) {}
 
   static int64_t RandomId(Random* random) { return 1 + static_cast<int64_t>(random->Next() >> 2); }
   static std::string RoleOf(int index) { return "role" + std::to_string(index); }
@@ -216,7 +228,10 @@ class ReaderProcess : public Process {
   }
 
   ReplicaServer::Options Serving() const {
-    return {{kSession, StreamId::kTest, "OWNER", ReaderName(index_), RoleOf(index_), id_}, ReaderName(index_), 0, Link::kHost};
+    return {{kSession, StreamId::kTest, "OWNER", ReaderName(index_), RoleOf(index_), id_},
+            ReaderName(index_),
+            0,
+            Link::kHost};
   }
 
   int index_;
@@ -236,7 +251,11 @@ class OwnerProcess : public Process {
 
   OwnerProcess(const Conditions& conditions, int num_lossless, bool take_over, int64_t* next_entry,
                Random* random, int64_t now_ns)
-      : conditions_(conditions), num_lossless_(num_lossless), next_entry_(next_entry), random_(random), id_(ReaderProcess::RandomId(random)),
+      : conditions_(conditions),
+        num_lossless_(num_lossless),
+        next_entry_(next_entry),
+        random_(random),
+        id_(ReaderProcess::RandomId(random)),
         election_(Electing(take_over), now_ns) {}
 
   std::vector<StateMachine*> Machines() override {
@@ -246,7 +265,8 @@ class OwnerProcess : public Process {
   }
 
   void Work(int64_t now_ns) override {
-    if (phase_ < Phase::kWriting && election_.state() == WriterElection::State::kRefused) phase_ = Phase::kEnded;
+    if (phase_ < Phase::kWriting && election_.state() == WriterElection::State::kRefused)
+      phase_ = Phase::kEnded;
     if (phase_ == Phase::kElecting) Elect(now_ns);
     if (phase_ == Phase::kFetching) Fetch(now_ns);
     if (phase_ == Phase::kWriting) Write(now_ns);
@@ -281,7 +301,8 @@ class OwnerProcess : public Process {
     options.stream = StreamId::kTest;
     options.owner = "OWNER";
     options.id = id_;
-    for (int i = 0; i < num_lossless_; ++i) options.holders.push_back({ReaderProcess::RoleOf(i), ReaderName(i)});
+    for (int i = 0; i < num_lossless_; ++i)
+      options.holders.push_back({ReaderProcess::RoleOf(i), ReaderName(i)});
     options.limits = {500, kReaderBytes, 60'000};
     fetch_.emplace(options, now_ns);
     phase_ = Phase::kFetching;
@@ -294,7 +315,8 @@ class OwnerProcess : public Process {
     }
     from_replica_ = fetch_->state() == ReplicaFetch::State::kDone;
     if (fetch_->state() == ReplicaFetch::State::kNone) history.clear();
-    if (from_replica_ || fetch_->state() == ReplicaFetch::State::kNone) BeginWriting(fetch_->version(), now_ns);
+    if (from_replica_ || fetch_->state() == ReplicaFetch::State::kNone)
+      BeginWriting(fetch_->version(), now_ns);
   }
 
   void BeginWriting(const Version& parent, int64_t now_ns) {
@@ -317,7 +339,8 @@ class OwnerProcess : public Process {
 
   void Write(int64_t now_ns) {
     while (!quiet && !closing_ && now_ns >= next_record_ns_) {
-      next_record_ns_ += static_cast<int64_t>(random_->Uniform(0.0, 2.0) * 1e9 / conditions_.records_per_second);
+      next_record_ns_ +=
+          static_cast<int64_t>(random_->Uniform(0.0, 2.0) * 1e9 / conditions_.records_per_second);
       const int64_t entry = ++*next_entry_;
       const size_t padding = random_->Below(8) == 0 ? random_->Below(30000) : random_->Below(1500);
       Bytes record = EncodeEntries(history.size(), std::span(&entry, 1), padding);
@@ -325,11 +348,13 @@ class OwnerProcess : public Process {
       writer_->Publish(kChannel, std::move(record), now_ns);
       ++published;
     }
-    for (; writer_->AcknowledgedByAny(confirmed_seq_ + 1) && confirmed_seq_ < writer_->last_seq(); ++confirmed_seq_) {
+    for (; writer_->AcknowledgedByAny(confirmed_seq_ + 1) && confirmed_seq_ < writer_->last_seq();
+         ++confirmed_seq_) {
       confirmed.insert(history[base_ + static_cast<size_t>(confirmed_seq_)]);
     }
     const WriterStatistics statistics = writer_->statistics();
-    if (statistics.kept_records > kMaxRecords || statistics.kept_bytes > kMaxBytes) failure = "a writer kept too much";
+    if (statistics.kept_records > kMaxRecords || statistics.kept_bytes > kMaxBytes)
+      failure = "a writer kept too much";
     if (writer_->close_requested_by() && !closing_) {
       closing_ = true;
       writer_->Close(now_ns);
@@ -351,7 +376,6 @@ class OwnerProcess : public Process {
   int64_t next_record_ns_ = 0, confirmed_seq_ = 0;
   bool closing_ = false, from_replica_ = false;
 };
-
 
 // Everything together, one tick after the other.
 class World {
@@ -396,7 +420,8 @@ class World {
   }
   void StartOwner(size_t slot, bool take_over) {
     EndOwner(slot);
-    owners_[slot] = std::make_unique<OwnerProcess>(conditions_, num_lossless_, take_over, &next_entry_, &random_, now_ns_);
+    owners_[slot] = std::make_unique<OwnerProcess>(conditions_, num_lossless_, take_over, &next_entry_,
+                                                   &random_, now_ns_);
   }
   void EndOwner(size_t slot) {
     if (!owners_[slot]) return;
@@ -549,7 +574,8 @@ class World {
       }
       return true;
     }
-    if (now_ns_ > healed_ns_ + 60 * kSecond) report_.failure = "no agreement a minute after the network healed: " + Describe();
+    if (now_ns_ > healed_ns_ + 60 * kSecond)
+      report_.failure = "no agreement a minute after the network healed: " + Describe();
     return false;
   }
 

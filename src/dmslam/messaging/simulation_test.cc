@@ -19,7 +19,8 @@ TEST(Simulation, EverySchedulesPromisesAreKept) {
   SimulationReport sum;
   for (int64_t seed = first; seed < first + count; ++seed) {
     const SimulationReport report = SimulateSchedule(static_cast<uint64_t>(seed));
-    ASSERT_TRUE(report.failure.empty()) << "schedule " << seed << " (" << report.conditions << "): " << report.failure;
+    ASSERT_TRUE(report.failure.empty())
+        << "schedule " << seed << " (" << report.conditions << "): " << report.failure;
     sum.published += report.published;
     sum.delivered += report.delivered;
     sum.confirmed += report.confirmed;
@@ -29,12 +30,13 @@ TEST(Simulation, EverySchedulesPromisesAreKept) {
     sum.hand_overs += report.hand_overs;
     sum.faults += report.faults;
   }
-  std::printf("%ld schedules: %ld records, %ld delivered, %ld confirmed, %ld datagrams, %ld parts repaired, "
-              "%ld snapshots, %ld hand-overs, %ld faults\n",
-              static_cast<long>(count), static_cast<long>(sum.published), static_cast<long>(sum.delivered),
-              static_cast<long>(sum.confirmed), static_cast<long>(sum.datagrams),
-              static_cast<long>(sum.parts_repaired), static_cast<long>(sum.snapshots),
-              static_cast<long>(sum.hand_overs), static_cast<long>(sum.faults));
+  std::printf(
+      "%ld schedules: %ld records, %ld delivered, %ld confirmed, %ld datagrams, %ld parts repaired, "
+      "%ld snapshots, %ld hand-overs, %ld faults\n",
+      static_cast<long>(count), static_cast<long>(sum.published), static_cast<long>(sum.delivered),
+      static_cast<long>(sum.confirmed), static_cast<long>(sum.datagrams),
+      static_cast<long>(sum.parts_repaired), static_cast<long>(sum.snapshots),
+      static_cast<long>(sum.hand_overs), static_cast<long>(sum.faults));
   EXPECT_GT(sum.confirmed, 0);
   if (count >= 100) {  // the schedules really try what they are for
     EXPECT_GT(sum.parts_repaired, 1000);

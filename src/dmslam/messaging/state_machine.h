@@ -9,8 +9,8 @@
 
 namespace dmslam {
 
-/// One part of the protocol: bytes and time in, bytes out. No clock, no I/O, no threads. Time is monotonic nanoseconds
-/// of the caller's choosing.
+/// One part of the protocol: bytes and time in, bytes out. No clock, no I/O, no threads. Time is monotonic
+/// nanoseconds of the caller's choosing.
 class StateMachine {
  public:
   virtual ~StateMachine() = default;

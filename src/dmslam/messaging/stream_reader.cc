@@ -23,7 +23,10 @@ std::string ToText(const Version& version) {
 }  // namespace
 
 StreamReader::StreamReader(Options options)
-    : options_(std::move(options)), held_(options_.start), accepted_(options_.start), window_(options_.limits) {
+    : options_(std::move(options)),
+      held_(options_.start),
+      accepted_(options_.start),
+      window_(options_.limits) {
   DMSLAM_CHECK(options_.id != 0, "a reader needs an id");
 }
 
@@ -286,7 +289,8 @@ void StreamReader::Accept(const Version& version) {
 }
 
 bool StreamReader::AtEnd() const {
-  return writer_closed_ && state_ == State::kFollowing && former_.empty() && window_.next() > window_.newest();
+  return writer_closed_ && state_ == State::kFollowing && former_.empty() &&
+         window_.next() > window_.newest();
 }
 
 // ---- acknowledgements

@@ -15,42 +15,42 @@
 namespace dmslam {
 
 struct ReaderStatistics {
-  int64_t records = 0;           ///< handed out
-  int64_t payload_bytes = 0;     ///< of them
-  int64_t parts = 0;             ///< that arrived
-  int64_t duplicates = 0;        ///< records and parts that were here already
-  int64_t requested = 0;         ///< ranges of bytes or records named as missing
-  int64_t repaired = 0;          ///< records that came late or in pieces, after they had been named as missing
-  int64_t lost = 0;              ///< records given up: no longer kept, and the writer offers no snapshot
-  int64_t snapshots = 0;         ///< received whole
-  int64_t dropped_bad = 0;       ///< messages with wrong bytes
-  int64_t dropped_foreign = 0;   ///< of other sessions
-  int64_t dropped_stale = 0;     ///< of other terms, or before any beacon was heard
-  int64_t dropped_no_room = 0;   ///< beyond what is kept ahead; they come again
-  int64_t acks = 0;              ///< sent
-  int64_t backlog = 0;           ///< records known to exist and not yet taken
-  size_t kept_bytes = 0;         ///< waiting to be taken, whole or in pieces
+  int64_t records = 0;          ///< handed out
+  int64_t payload_bytes = 0;    ///< of them
+  int64_t parts = 0;            ///< that arrived
+  int64_t duplicates = 0;       ///< records and parts that were here already
+  int64_t requested = 0;        ///< ranges of bytes or records named as missing
+  int64_t repaired = 0;         ///< records that came late or in pieces, after they had been named as missing
+  int64_t lost = 0;             ///< records given up: no longer kept, and the writer offers no snapshot
+  int64_t snapshots = 0;        ///< received whole
+  int64_t dropped_bad = 0;      ///< messages with wrong bytes
+  int64_t dropped_foreign = 0;  ///< of other sessions
+  int64_t dropped_stale = 0;    ///< of other terms, or before any beacon was heard
+  int64_t dropped_no_room = 0;  ///< beyond what is kept ahead; they come again
+  int64_t acks = 0;             ///< sent
+  int64_t backlog = 0;          ///< records known to exist and not yet taken
+  size_t kept_bytes = 0;        ///< waiting to be taken, whole or in pieces
 };
 
-/// The receiving end of a stream: hands out its records once each, strictly in order, whatever is lost, doubled or late
-/// on the way; follows the writer with the highest term; takes a snapshot when it lacks more than the writer keeps. A
-/// pure state machine: no clock, no I/O, no threads.
+/// The receiving end of a stream: hands out its records once each, strictly in order, whatever is lost,
+/// doubled or late on the way; follows the writer with the highest term; takes a snapshot when it lacks more
+/// than the writer keeps. A pure state machine: no clock, no I/O, no threads.
 class StreamReader : public StateMachine {
  public:
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kTest;
-    std::string owner;                 ///< of the stream: names its channels, "MAPPER"
-    std::string reader;                ///< this process: names the channel of its acknowledgements, "FRONTEND"
-    std::string role;                  ///< as the writer's configuration names it
-    std::string name;                  ///< for messages to people: process, host and process id
-    int64_t id = 0;                    ///< random, not zero
-    int64_t schema_hash = 0;           ///< over all message types; writers with another one are refused
-    Version start;                     ///< what the owner holds already
-    int64_t only_writer = 0;           ///< follows terms of this writer id alone (a hand-over); 0: of any
+    std::string owner;        ///< of the stream: names its channels, "MAPPER"
+    std::string reader;       ///< this process: names the channel of its acknowledgements, "FRONTEND"
+    std::string role;         ///< as the writer's configuration names it
+    std::string name;         ///< for messages to people: process, host and process id
+    int64_t id = 0;           ///< random, not zero
+    int64_t schema_hash = 0;  ///< over all message types; writers with another one are refused
+    Version start;            ///< what the owner holds already
+    int64_t only_writer = 0;  ///< follows terms of this writer id alone (a hand-over); 0: of any
     ReceiveWindow::Limits limits;
-    int64_t ack_ns = 30'000'000;       ///< between acknowledgements while something is new or missing
-    int64_t idle_ack_ns = 1'000'000'000;     ///< ... and otherwise
+    int64_t ack_ns = 30'000'000;          ///< between acknowledgements while something is new or missing
+    int64_t idle_ack_ns = 1'000'000'000;  ///< ... and otherwise
     int64_t writer_timeout_ns = 1'000'000'000;  ///< a writer is there so long after its last word
   };
   enum class State {
@@ -68,8 +68,8 @@ class StreamReader : public StateMachine {
   /// The next record in order. The owner applies it now. When `begins_anew()` it forgets what it held before.
   std::optional<Record> Take();
 
-  /// The owner has all records up to this version safe: this is what the writer hears. Versions of earlier terms and
-  /// those that were not yet taken are ignored.
+  /// The owner has all records up to this version safe: this is what the writer hears. Versions of earlier
+  /// terms and those that were not yet taken are ignored.
   void Accept(const Version& version);
   /// Accepts all that was taken.
   void AcceptTaken() { Accept(held_); }

@@ -22,9 +22,7 @@ Bytes MakeRecord(int64_t value, size_t size = 100) {
   message.role.assign(size, 'x');
   return Encode(message);
 }
-int64_t ValueOf(const Record& record) {
-  return DecodeReplica(record.channel, *record.bytes).value().holder;
-}
+int64_t ValueOf(const Record& record) { return DecodeReplica(record.channel, *record.bytes).value().holder; }
 
 StreamWriter::Options WriterOptions(Link link = Link::kHost) {
   StreamWriter::Options options;
@@ -383,8 +381,8 @@ LinkCost MeasureLink(double loss) {
 TEST(Stream, RepairCostsLittleMoreThanWhatWasLost) {
   for (const auto& [loss, bound] : {std::pair{0.0, 1.08}, {0.05, 1.15}, {0.2, 1.40}, {0.5, 2.3}}) {
     const LinkCost cost = MeasureLink(loss);
-    std::printf("loss %2.0f %%: bytes on the link / payload %.3f, latency p50 %ld ms, p99 %ld ms\n", 100 * loss, cost.ratio,
-                static_cast<long>(cost.p50_ms), static_cast<long>(cost.p99_ms));
+    std::printf("loss %2.0f %%: bytes on the link / payload %.3f, latency p50 %ld ms, p99 %ld ms\n",
+                100 * loss, cost.ratio, static_cast<long>(cost.p50_ms), static_cast<long>(cost.p99_ms));
     EXPECT_LT(cost.ratio, bound) << loss;
     EXPECT_LT(cost.p99_ms, 2500) << loss;
   }

@@ -141,7 +141,8 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
     ++statistics_.refused;
     refusal_ = "reader " + ack->name + " speaks protocol " + std::to_string(ack->protocol_version) +
                (ack->protocol_version == kProtocolVersion ? " with other message types" : "") +
-               ", this writer protocol " + std::to_string(kProtocolVersion) + ": run the same build everywhere";
+               ", this writer protocol " + std::to_string(kProtocolVersion) +
+               ": run the same build everywhere";
     return;
   }
   ++statistics_.acks;
@@ -329,9 +330,9 @@ int64_t StreamWriter::Floor(bool followers_only) const {
     floor = first ? reader.floor : std::min(floor, reader.floor);
   }
   if (floors.empty()) return followers_only ? window_.last() : 0;
-  return std::min_element(floors.begin(), floors.end(), [](const auto& a, const auto& b) {
-           return a.second < b.second;
-         })->second;
+  return std::min_element(floors.begin(), floors.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->second;
 }
 
 void StreamWriter::ForgetAccepted() {

@@ -14,8 +14,9 @@
 
 namespace dmslam {
 
-/// Where a writer gets a snapshot of its owner's state from, for a reader that lacks more than is kept: successive
-/// records of about 64 KiB at most, the most wanted first (of a map: the local map). Implemented by the owner.
+/// Where a writer gets a snapshot of its owner's state from, for a reader that lacks more than is kept:
+/// successive records of about 64 KiB at most, the most wanted first (of a map: the local map). Implemented
+/// by the owner.
 class SnapshotSource {
  public:
   struct Piece {
@@ -24,8 +25,9 @@ class SnapshotSource {
     bool last = false;
   };
   virtual ~SnapshotSource() = default;
-  /// A snapshot begins. It is cut at `cut`: readers go on with the next record of the stream. Later pieces may show later
-  /// states as long as applying the records from `cut + 1` on ends in the right one (absolute values do).
+  /// A snapshot begins. It is cut at `cut`: readers go on with the next record of the stream. Later pieces
+  /// may show later states as long as applying the records from `cut + 1` on ends in the right one (absolute
+  /// values do).
   virtual void BeginSnapshot(int64_t cut) = 0;
   /// The next piece. Called a few times per burst while the snapshot goes on; a snapshot has at least one.
   virtual Piece NextPiece() = 0;
@@ -33,25 +35,26 @@ class SnapshotSource {
 
 struct WriterStatistics {
   int64_t records = 0;
-  int64_t payload_bytes = 0;     ///< of the records published
-  int64_t sent_bytes = 0;        ///< of all messages sent for them, beacons included, local taps not
-  int64_t parts = 0;             ///< parts of first transmissions
-  int64_t parts_repaired = 0;    ///< parts sent again
-  int64_t repaired_bytes = 0;    ///< of them
-  int64_t overrun = 0;           ///< records forgotten that a known lossless reader still lacked
-  int64_t snapshots = 0;         ///< begun
+  int64_t payload_bytes = 0;   ///< of the records published
+  int64_t sent_bytes = 0;      ///< of all messages sent for them, beacons included, local taps not
+  int64_t parts = 0;           ///< parts of first transmissions
+  int64_t parts_repaired = 0;  ///< parts sent again
+  int64_t repaired_bytes = 0;  ///< of them
+  int64_t overrun = 0;         ///< records forgotten that a known lossless reader still lacked
+  int64_t snapshots = 0;       ///< begun
   int64_t acks = 0;
-  int64_t dropped_bad = 0;       ///< acknowledgements and beacons with wrong bytes
-  int64_t dropped_foreign = 0;   ///< of other sessions
-  int64_t dropped_stale = 0;     ///< of other terms
-  int64_t refused = 0;           ///< from readers of another protocol version or schema
+  int64_t dropped_bad = 0;      ///< acknowledgements and beacons with wrong bytes
+  int64_t dropped_foreign = 0;  ///< of other sessions
+  int64_t dropped_stale = 0;    ///< of other terms
+  int64_t refused = 0;          ///< from readers of another protocol version or schema
   size_t kept_records = 0;
   size_t kept_bytes = 0;
 };
 
-/// The sending end of a stream that loses nothing: numbers and seals records, sends each once, beacons how far it is,
-/// keeps records until the lossless readers have accepted them, repairs what readers name as missing, and sends a
-/// snapshot to a reader that lacks more than is kept. A pure state machine: no clock, no I/O, no threads.
+/// The sending end of a stream that loses nothing: numbers and seals records, sends each once, beacons how
+/// far it is, keeps records until the lossless readers have accepted them, repairs what readers name as
+/// missing, and sends a snapshot to a reader that lacks more than is kept. A pure state machine: no clock, no
+/// I/O, no threads.
 class StreamWriter : public StateMachine {
  public:
   /// A lossless reader, by its role in the system. Other readers never hold the writer back.
@@ -62,24 +65,24 @@ class StreamWriter : public StateMachine {
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kTest;
-    std::string owner;                      ///< names the beacon's and the parts' channels: "MAPPER"
-    std::string name;                       ///< for messages to people: process, host and process id
-    int64_t schema_hash = 0;                ///< over all message types; readers with another one are refused
-    std::vector<Role> roles;                ///< the lossless readers
+    std::string owner;        ///< names the beacon's and the parts' channels: "MAPPER"
+    std::string name;         ///< for messages to people: process, host and process id
+    int64_t schema_hash = 0;  ///< over all message types; readers with another one are refused
+    std::vector<Role> roles;  ///< the lossless readers
     Link link = Link::kHost;
-    size_t max_records = 65536;             ///< kept at most; beyond them the oldest are forgotten
-    size_t max_bytes = 64u << 20;           ///< ... and of bytes
-    size_t spare_records = 64;              ///< kept though accepted, for readers that are not lossless ...
-    size_t spare_bytes = 1u << 20;          ///< ... within so many bytes
-    int32_t part_bytes = 1200;              ///< of a record in one datagram
-    int parts_per_burst = 40;               ///< pace: at most so many datagrams ...
-    int64_t burst_ns = 2'000'000;           ///< ... in so much time
-    int64_t resend_after_ns = 20'000'000;   ///< a part sent this recently is not repaired again
-    int64_t beacon_ns = 100'000'000;        ///< between beacons
+    size_t max_records = 65536;            ///< kept at most; beyond them the oldest are forgotten
+    size_t max_bytes = 64u << 20;          ///< ... and of bytes
+    size_t spare_records = 64;             ///< kept though accepted, for readers that are not lossless ...
+    size_t spare_bytes = 1u << 20;         ///< ... within so many bytes
+    int32_t part_bytes = 1200;             ///< of a record in one datagram
+    int parts_per_burst = 40;              ///< pace: at most so many datagrams ...
+    int64_t burst_ns = 2'000'000;          ///< ... in so much time
+    int64_t resend_after_ns = 20'000'000;  ///< a part sent this recently is not repaired again
+    int64_t beacon_ns = 100'000'000;       ///< between beacons
     int64_t taker_timeout_ns = 2'000'000'000;   ///< who takes a snapshot must say so that often
     int64_t reader_timeout_ns = 5'000'000'000;  ///< a reader is known so long after its last word
     int64_t close_timeout_ns = 2'000'000'000;   ///< closing waits for the readers at most so long
-    int snapshot_ahead = 16;                ///< pieces of a snapshot kept at a time
+    int snapshot_ahead = 16;                    ///< pieces of a snapshot kept at a time
   };
 
   /// Writes from seq 1 of `term`, which continues `parent`; an empty parent makes the term fresh.
@@ -97,11 +100,13 @@ class StreamWriter : public StateMachine {
   void Close(int64_t now_ns);
   bool closed() const { return state_ == State::kClosed && farewells_ == 0; }
 
-  /// Set when another writer has a higher term: this one is silent from then on, and its owner must stop. Names the other.
+  /// Set when another writer has a higher term: this one is silent from then on, and its owner must stop.
+  /// Names the other.
   const std::optional<std::string>& superseded_by() const { return superseded_by_; }
   /// Set when a newcomer asked for the stream: finish what is pending, then Close.
   const std::optional<std::string>& close_requested_by() const { return close_requested_by_; }
-  /// Names the last reader that was refused because of its protocol version or schema; empty when there was none.
+  /// Names the last reader that was refused because of its protocol version or schema; empty when there was
+  /// none.
   const std::string& refusal() const { return refusal_; }
 
   const Term& term() const { return term_; }
@@ -116,8 +121,8 @@ class StreamWriter : public StateMachine {
   int64_t Backlog(const std::string& role) const;
   /// How many readers are known, lossless or not.
   size_t num_readers() const { return readers_.size(); }
-  /// The newest version that a reader said it holds of another term, while that lies beyond this term's parent: somebody
-  /// knows more than this writer did when it began.
+  /// The newest version that a reader said it holds of another term, while that lies beyond this term's
+  /// parent: somebody knows more than this writer did when it began.
   const std::optional<Version>& newer_replica() const { return newer_replica_; }
 
   WriterStatistics statistics() const;
@@ -127,20 +132,20 @@ class StreamWriter : public StateMachine {
   struct Reader {
     std::string role;
     bool lossless = false;
-    bool following = false;       // of this term
+    bool following = false;  // of this term
     bool wants_snapshot = false;
     int64_t accepted = 0;
-    int64_t floor = 0;            // needs nothing up to here (accepted, or covered by the snapshot it receives)
+    int64_t floor = 0;  // needs nothing up to here (accepted, or covered by the snapshot it receives)
     int64_t last_heard_ns = 0;
     int64_t last_utime = INT64_MIN;  // of its newest word: older ones that come late are ignored
   };
   struct Snapshot {
     int64_t number = 0;
     int64_t cut = 0;
-    int64_t total = 0;            // known once the last piece is made
+    int64_t total = 0;  // known once the last piece is made
     SendWindow window;
     struct Taker {
-      int64_t received = 0;       // up to which piece
+      int64_t received = 0;  // up to which piece
       int64_t last_heard_ns = 0;
     };
     std::map<int64_t, Taker> takers;  // by reader
@@ -173,8 +178,8 @@ class StreamWriter : public StateMachine {
   SendWindow window_;
   std::optional<Snapshot> snapshot_;
   int32_t snapshots_begun_ = 0;
-  std::map<int64_t, Reader> readers_;            // by reader id
-  std::map<std::string, int64_t> role_floor_;    // of required roles: what they last accepted
+  std::map<int64_t, Reader> readers_;          // by reader id
+  std::map<std::string, int64_t> role_floor_;  // of required roles: what they last accepted
   std::optional<std::string> superseded_by_, close_requested_by_;
   std::optional<Version> newer_replica_;
   std::string refusal_;
@@ -182,7 +187,7 @@ class StreamWriter : public StateMachine {
   int64_t next_beacon_ns_ = INT64_MIN;
   int64_t next_burst_ns_ = INT64_MIN;
   int64_t close_deadline_ns_ = INT64_MAX;
-  int farewells_ = 3;                            // beacons that still say goodbye
+  int farewells_ = 3;  // beacons that still say goodbye
   int burst_left_ = 0;
   bool beacon_due_ = true;
   WriterStatistics statistics_;

@@ -50,9 +50,9 @@ void ReplicaFetch::Advance(int64_t now_ns) {
 }
 
 void ReplicaFetch::OpenReader(int64_t now_ns) {
-  const auto holder = std::find_if(options_.holders.begin(), options_.holders.end(), [&](const Holder& candidate) {
-    return candidate.role == search_.replica().role;
-  });
+  const auto holder =
+      std::find_if(options_.holders.begin(), options_.holders.end(),
+                   [&](const Holder& candidate) { return candidate.role == search_.replica().role; });
   if (holder == options_.holders.end()) {  // answered, but was not asked: not one of ours
     search_.TryAgain(now_ns);
     return;
@@ -96,7 +96,10 @@ int64_t ReplicaFetch::deadline_ns() const {
 }
 
 ReplicaServer::ReplicaServer(Options options, std::function<Version()> held, SnapshotSource* snapshots)
-    : options_(std::move(options)), held_(held), source_(snapshots), holder_(options_.holder, std::move(held)) {}
+    : options_(std::move(options)),
+      held_(held),
+      source_(snapshots),
+      holder_(options_.holder, std::move(held)) {}
 
 void ReplicaServer::Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
   holder_.Receive(channel, bytes, now_ns);

@@ -15,8 +15,9 @@
 
 namespace dmslam {
 
-/// How an owner that starts gets the newest state of its stream from those that hold replicas: search, choice and
-/// transfer in one. To be begun after the election is won, since a writer that is being taken over still publishes.
+/// How an owner that starts gets the newest state of its stream from those that hold replicas: search, choice
+/// and transfer in one. To be begun after the election is won, since a writer that is being taken over still
+/// publishes.
 class ReplicaFetch : public StateMachine {
  public:
   struct Holder {
@@ -26,14 +27,14 @@ class ReplicaFetch : public StateMachine {
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kMap;
-    std::string owner = "MAPPER";       ///< upper-case name of this process
-    std::string name;                   ///< for messages to people
-    int64_t id = 0;                     ///< random, not zero
+    std::string owner = "MAPPER";  ///< upper-case name of this process
+    std::string name;              ///< for messages to people
+    int64_t id = 0;                ///< random, not zero
     int64_t schema_hash = 0;
-    std::vector<Holder> holders;        ///< who is waited for; none: nothing to fetch
+    std::vector<Holder> holders;  ///< who is waited for; none: nothing to fetch
     ReceiveWindow::Limits limits;
-    int64_t absent_ns = 5'000'000'000;  ///< a holder that does not answer for so long is absent
-    int64_t stalled_ns = 6'000'000'000; ///< a transfer that does not advance for so long is begun again
+    int64_t absent_ns = 5'000'000'000;   ///< a holder that does not answer for so long is absent
+    int64_t stalled_ns = 6'000'000'000;  ///< a transfer that does not advance for so long is begun again
   };
   enum class State {
     kSearching,
@@ -75,7 +76,7 @@ class ReplicaServer : public StateMachine {
  public:
   struct Options {
     ReplicaHolder::Options holder;
-    std::string name;        ///< for messages to people
+    std::string name;  ///< for messages to people
     int64_t schema_hash = 0;
     Link link = Link::kHost;
   };

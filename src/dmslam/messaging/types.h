@@ -35,7 +35,8 @@ struct Term {
   auto operator<=>(const Term&) const = default;
 };
 
-/// How far a replica is: all records of `epoch` up to `seq`, and whatever that epoch continued. Zero: holds nothing.
+/// How far a replica is: all records of `epoch` up to `seq`, and whatever that epoch continued. Zero: holds
+/// nothing.
 struct Version {
   int64_t epoch = 0;
   int64_t seq = 0;
@@ -43,7 +44,8 @@ struct Version {
   auto operator<=>(const Version&) const = default;
 };
 
-/// A message to be sent. `local` ones are a tap for spy and logger on this host: they must not leave it (ttl 0).
+/// A message to be sent. `local` ones are a tap for spy and logger on this host: they must not leave it (ttl
+/// 0).
 struct Outgoing {
   std::string channel;
   SharedBytes bytes;
@@ -59,8 +61,8 @@ struct Record {
   bool fresh() const { return (header.flags & RecordHeader::FLAG_FRESH) != 0; }
   bool in_snapshot() const { return (header.flags & RecordHeader::FLAG_SNAPSHOT) != 0; }
   bool ends_snapshot() const { return (header.flags & RecordHeader::FLAG_SNAPSHOT_LAST) != 0; }
-  /// Whether what the reader's owner holds is void from here on: the first record of a term that continues nothing, or
-  /// of a snapshot.
+  /// Whether what the reader's owner holds is void from here on: the first record of a term that continues
+  /// nothing, or of a snapshot.
   bool begins_anew() const { return header.seq == 1 && (fresh() || in_snapshot()); }
   /// What its owner holds once it has applied this; inside a snapshot nothing that is whole.
   Version version() const {
@@ -69,8 +71,8 @@ struct Record {
   }
 };
 
-/// Whether records leave the host. On a host they travel whole, as one typed message each; on a LAN in parts that fit
-/// one datagram, since a message of many datagrams dies with any of them.
+/// Whether records leave the host. On a host they travel whole, as one typed message each; on a LAN in parts
+/// that fit one datagram, since a message of many datagrams dies with any of them.
 enum class Link { kHost, kLan };
 
 /// Names of the protocol's channels. `owner` is the upper-case name of a process: "MAPPER".
