@@ -292,14 +292,78 @@ class BodyBuilder {
   Mesh mesh_;
 };
 
-/// The directions of a standing body.
-struct BodyAxes {
+/// A body's measures [m], directions and joints at one instant.
+struct Skeleton {
+  float h = 0, w = 0;  ///< Height; breadth, which is the height times the stoutness.
+  float sit = 0, stride = 0, gait = 0;
   Vector3f ahead, left, up = Vector3f::UnitZ();
+  Vector3f lean, hip, chest, neck, head;
+  float thigh = 0, shin = 0;
+
+  /// A direction in the body's plane of symmetry: straight down, turned by `angle` to the front.
+  Vector3f Down(float angle) const { return std::sin(angle) * ahead - std::cos(angle) * up; }
+  /// How far the leg of a side swings to the front [rad].
+  float Swing(float side) const { return 0.5f * stride * std::sin(gait) * side; }
 };
 
-/// A direction in the body's plane of symmetry: straight down, turned by `angle` to the front.
-Vector3f Down(const BodyAxes& axes, float angle) {
-  return std::sin(angle) * axes.ahead - std::cos(angle) * axes.up;
+constexpr float kSeatedThighRad = 1.5f;
+
+Skeleton Pose(const ActorLook& look, const ActorState& state) {
+  Skeleton s;
+  s.h = static_cast<float>(look.height_m);
+  s.w = s.h * static_cast<float>(look.width);
+  s.sit = static_cast<float>(state.sitting * state.sitting * (3.0 - 2.0 * state.sitting));
+  s.stride = static_cast<float>(state.stride);
+  s.gait = static_cast<float>(std::remainder(state.gait_rad, 2.0 * kPi));
+  s.ahead = {static_cast<float>(std::cos(state.heading_rad)), static_cast<float>(std::sin(state.heading_rad)),
+             0};
+  s.left = {-s.ahead.y(), s.ahead.x(), 0};
+  s.thigh = s.shin = 0.245f * s.h;
+  const float bob = 0.015f * s.stride * std::cos(2.0f * s.gait);
+  const float hip_height = s.thigh * std::cos(kSeatedThighRad * s.sit) + s.shin + 0.035f * s.h + bob;
+  s.hip = {static_cast<float>(state.position.x()), static_cast<float>(state.position.y()), hip_height};
+  s.lean = (s.up + (0.05f * s.stride + 0.06f * s.sit) * s.ahead).normalized();
+  s.chest = s.hip + 0.285f * s.h * s.lean;
+  s.neck = s.hip + 0.31f * s.h * s.lean;
+  s.head = s.hip + 0.415f * s.h * s.lean;
+  return s;
+}
+
+void AddTrunk(const ActorLook& look, const Skeleton& s, BodyBuilder& body) {
+  const float h = s.h, w = s.w;
+  body.AddTube(s.hip, s.hip + 0.06f * h * s.lean, 0.1f * w, 0.1f * w, s.ahead, 0.72f, look.trousers, 0.4f);
+  body.AddTube(s.neck - 0.03f * h * s.lean, s.hip + 0.09f * h * s.lean, 0.098f * w, 0.1f * w, s.ahead, 0.7f,
+               look.shirt, 0);
+  body.AddTube(s.chest + 0.075f * w * s.left, s.chest - 0.075f * w * s.left, 0.045f * w, 0.045f * w, s.ahead,
+               1.0f, look.shirt, 0.3f);
+  body.AddTube(s.neck, s.head, 0.033f * h, 0.033f * h, s.ahead, 1.0f, look.skin, 0);
+  body.AddBall(s.head + 0.035f * h * s.up, 0.047f * h, 0.135f * h, s.ahead, look.face);
+  body.AddBall(s.head + 0.058f * h * s.up - 0.016f * h * s.ahead, 0.049f * h, 0.115f * h, s.ahead, look.hair);
+}
+
+void AddLeg(const ActorLook& look, const Skeleton& s, float side, BodyBuilder& body) {
+  const float lift = s.stride * std::max(0.0f, std::cos(s.gait) * side);
+  const float thigh_angle = (1 - s.sit) * (s.Swing(side) + 0.25f * lift) + s.sit * kSeatedThighRad;
+  const float shin_angle =
+      thigh_angle - (1 - s.sit) * (0.12f * s.stride + 0.9f * lift) - s.sit * kSeatedThighRad;
+  const Vector3f joint = s.hip + 0.052f * s.w * side * s.left;
+  const Vector3f knee = joint + s.thigh * s.Down(thigh_angle), ankle = knee + s.shin * s.Down(shin_angle);
+  const Vector3f toes = ankle + 0.085f * s.h * s.ahead - 0.012f * s.h * s.up;
+  body.AddTube(joint, knee, 0.053f * s.w, 0.036f * s.w, s.ahead, 1.0f, look.trousers, 0.35f);
+  body.AddTube(knee, ankle, 0.035f * s.w, 0.025f * s.h, s.ahead, 1.0f, look.trousers, 0.35f);
+  body.AddTube(ankle, toes, 0.026f * s.h, 0.022f * s.h, s.up, 1.0f, look.shoes, 0);
+}
+
+void AddArm(const ActorLook& look, const Skeleton& s, float side, BodyBuilder& body) {
+  const float angle = -0.75f * s.Swing(side) * (1 - s.sit) + 0.35f * s.sit;
+  const float bend = 0.25f + 0.25f * s.stride + 0.9f * s.sit;
+  const Vector3f shoulder = s.neck - 0.025f * s.h * s.lean + 0.108f * s.w * side * s.left;
+  const Vector3f elbow = shoulder + 0.165f * s.h * (s.Down(angle) + 0.12f * side * s.left).normalized();
+  const Vector3f forearm = (s.Down(angle + bend) - 0.05f * side * s.left).normalized();
+  const Vector3f wrist = elbow + 0.15f * s.h * forearm;
+  body.AddTube(shoulder, elbow, 0.031f * s.w, 0.026f * s.h, s.ahead, 1.0f, look.shirt, 0.3f);
+  body.AddTube(elbow, wrist, 0.025f * s.h, 0.018f * s.h, s.ahead, 1.0f, look.shirt, 0.3f);
+  body.AddTube(wrist, wrist + 0.05f * s.h * forearm, 0.021f * s.h, 0.016f * s.h, s.ahead, 0.8f, look.skin, 0);
 }
 
 }  // namespace
@@ -354,58 +418,12 @@ ActorLook DressActor(uint64_t seed, int index, int texture_halvings, TextureList
 }
 
 Mesh BuildActorMesh(const ActorLook& look, const ActorState& state, int index) {
+  const Skeleton skeleton = Pose(look, state);
   BodyBuilder body;
-  const auto h = static_cast<float>(look.height_m), w = static_cast<float>(look.width);
-  const auto sit = static_cast<float>(state.sitting * state.sitting * (3.0 - 2.0 * state.sitting));
-  const auto stride = static_cast<float>(state.stride),
-             gait = static_cast<float>(std::remainder(state.gait_rad, 2.0 * kPi));
-  BodyAxes axes;
-  axes.ahead = {static_cast<float>(std::cos(state.heading_rad)),
-                static_cast<float>(std::sin(state.heading_rad)), 0};
-  axes.left = {-axes.ahead.y(), axes.ahead.x(), 0};
-  const float thigh = 0.245f * h, shin = 0.245f * h, bob = 0.015f * stride * std::cos(2.0f * gait);
-  constexpr float kSeatedThighRad = 1.5f;
-  const float hip_height = thigh * std::cos(kSeatedThighRad * sit) + shin + 0.035f * h + bob;
-  const Vector3f hip =
-      Vector3f(static_cast<float>(state.position.x()), static_cast<float>(state.position.y()), hip_height);
-  const Vector3f lean = (axes.up + (0.05f * stride + 0.06f * sit) * axes.ahead).normalized();
-  const Vector3f chest = hip + 0.20f * h * lean, neck = hip + 0.31f * h * lean,
-                 head = hip + 0.415f * h * lean;
-
-  body.AddTube(hip, hip + 0.06f * h * lean, 0.105f * h * w * 0.95f, 0.1f * h * w, axes.ahead, 0.72f,
-               look.trousers, 0.4f);
-  body.AddTube(neck - 0.03f * h * lean, hip + 0.09f * h * lean, 0.098f * h * w, 0.1f * h * w, axes.ahead,
-               0.7f, look.shirt, 0);
-  body.AddTube(chest + 0.085f * h * lean + 0.075f * h * w * axes.left,
-               chest + 0.085f * h * lean - 0.075f * h * w * axes.left, 0.045f * h * w, 0.045f * h * w,
-               axes.ahead, 1.0f, look.shirt, 0.3f);
-  body.AddTube(neck, head, 0.033f * h, 0.033f * h, axes.ahead, 1.0f, look.skin, 0);
-  body.AddBall(head + 0.035f * h * axes.up, 0.047f * h, 0.135f * h, axes.ahead, look.face);
-  body.AddBall(head + 0.058f * h * axes.up - 0.016f * h * axes.ahead, 0.049f * h, 0.115f * h, axes.ahead,
-               look.hair);
+  AddTrunk(look, skeleton, body);
   for (const float side : {1.0f, -1.0f}) {
-    const float swing = 0.5f * stride * std::sin(gait) * side;
-    const float lift = stride * std::max(0.0f, std::cos(gait) * side);
-    const float thigh_angle = (1 - sit) * (swing + 0.25f * lift) + sit * kSeatedThighRad;
-    const float shin_angle = thigh_angle - (1 - sit) * (0.12f * stride + 0.9f * lift) - sit * kSeatedThighRad;
-    const Vector3f joint = hip + 0.052f * h * w * side * axes.left;
-    const Vector3f knee = joint + thigh * Down(axes, thigh_angle),
-                   ankle = knee + shin * Down(axes, shin_angle);
-    body.AddTube(joint, knee, 0.053f * h * w, 0.036f * h * w, axes.ahead, 1.0f, look.trousers, 0.35f);
-    body.AddTube(knee, ankle, 0.035f * h * w, 0.025f * h, axes.ahead, 1.0f, look.trousers, 0.35f);
-    body.AddTube(ankle, ankle + 0.085f * h * axes.ahead - 0.012f * h * axes.up, 0.026f * h, 0.022f * h,
-                 axes.up, 1.0f, look.shoes, 0);
-    const Vector3f shoulder = neck - 0.025f * h * lean + 0.108f * h * w * side * axes.left;
-    const float arm_angle = -0.75f * swing * (1 - sit) + 0.35f * sit,
-                bend = 0.25f + 0.25f * stride + 0.9f * sit;
-    const Vector3f elbow =
-        shoulder + 0.165f * h * (Down(axes, arm_angle) + 0.12f * side * axes.left).normalized();
-    const Vector3f wrist =
-        elbow + 0.15f * h * (Down(axes, arm_angle + bend) - 0.05f * side * axes.left).normalized();
-    body.AddTube(shoulder, elbow, 0.031f * h * w, 0.026f * h, axes.ahead, 1.0f, look.shirt, 0.3f);
-    body.AddTube(elbow, wrist, 0.025f * h, 0.018f * h, axes.ahead, 1.0f, look.shirt, 0.3f);
-    body.AddTube(wrist, wrist + 0.05f * h * (wrist - elbow).normalized(), 0.021f * h, 0.016f * h, axes.ahead,
-                 0.8f, look.skin, 0);
+    AddLeg(look, skeleton, side, body);
+    AddArm(look, skeleton, side, body);
   }
   return body.Take(index);
 }

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
@@ -69,16 +70,22 @@ class Renderer::Impl {
                                  std::vector<int>* actor_of);
 
  private:
+  /// The pixels of the canvas that a triangle may touch.
+  struct Extent {
+    int x_low = 0, x_high = 0, y_low = 0, y_high = 0;
+  };
+
   void MakeLookup();
   bool IsVisible(const Eigen::AlignedBox3f& bounds, const Rigid3d& T_cam_world) const;
   void Rasterize(std::span<const Mesh> still, const Instant& instant, const TextureList* textures,
                  const Eigen::Vector2d& jitter_px);
   void AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const TextureList* textures,
-               const Eigen::Vector2d& jitter_px);
+               const Pinhole& canvas);
   void AddTriangle(const std::array<const Vertex*, 3>& corners, const std::array<Vector3f, 3>& p_cam,
-                   const Texture* texture, int actor, const Eigen::Vector2d& jitter_px);
-  void FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1, int x_low,
-                 int x_high, uint32_t facet);
+                   const Texture* texture, int actor, const Pinhole& canvas);
+  std::optional<Extent> ExtentOf(const std::array<Vector3f, 3>& p_cam, const Pinhole& canvas) const;
+  void FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, const Extent& extent,
+                 uint32_t facet);
   void Shade(float level_bias);
   int MipLevel(const Facet& facet, float x, float y, float bias) const;
   const Facet* FacetAt(size_t pixel, float& x, float& y) const;
@@ -169,17 +176,20 @@ bool Renderer::Impl::IsVisible(const Eigen::AlignedBox3f& bounds, const Rigid3d&
 
 void Renderer::Impl::Rasterize(std::span<const Mesh> still, const Instant& instant,
                                const TextureList* textures, const Eigen::Vector2d& jitter_px) {
+  const Pinhole canvas{canvas_scale_ * camera_.fx_px, canvas_scale_ * camera_.fy_px,
+                       canvas_scale_ * (camera_.cx_px - canvas_origin_px_.x() - jitter_px.x()),
+                       canvas_scale_ * (camera_.cy_px - canvas_origin_px_.y() - jitter_px.y())};
   std::fill(z_buffer_.begin(), z_buffer_.end(), 0.0f);
   std::fill(facet_of_.begin(), facet_of_.end(), kNothing);
   facets_.clear();
   const Rigid3d T_cam_world = instant.T_world_cam.Inverse();
   // What moves is mostly near: drawn first, it hides what lies behind.
-  for (const Mesh& mesh : instant.actors) AddMesh(mesh, T_cam_world, textures, jitter_px);
-  for (const Mesh& mesh : still) AddMesh(mesh, T_cam_world, textures, jitter_px);
+  for (const Mesh& mesh : instant.actors) AddMesh(mesh, T_cam_world, textures, canvas);
+  for (const Mesh& mesh : still) AddMesh(mesh, T_cam_world, textures, canvas);
 }
 
 void Renderer::Impl::AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const TextureList* textures,
-                             const Eigen::Vector2d& jitter_px) {
+                             const Pinhole& canvas) {
   if (!IsVisible(mesh.bounds, T_cam_world)) return;
   const Eigen::Matrix3f R = T_cam_world.rotation.toRotationMatrix().cast<float>();
   const Vector3f t = T_cam_world.translation.cast<float>();
@@ -189,8 +199,31 @@ void Renderer::Impl::AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const
     const auto [a, b, c] = triangle.corners;
     const Texture* texture = textures != nullptr ? (*textures)[triangle.texture].get() : nullptr;
     AddTriangle({&mesh.vertices[a], &mesh.vertices[b], &mesh.vertices[c]}, {p_cam_[a], p_cam_[b], p_cam_[c]},
-                texture, mesh.actor, jitter_px);
+                texture, mesh.actor, canvas);
   }
+}
+
+std::optional<Renderer::Impl::Extent> Renderer::Impl::ExtentOf(const std::array<Vector3f, 3>& p_cam,
+                                                               const Pinhole& canvas) const {
+  if (std::max({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()}) < kNearM) return std::nullopt;
+  Extent extent{0, canvas_width_ - 1, 0, canvas_height_ - 1};
+  if (std::min({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()}) <= kNearM) return extent;
+  double x0 = 1e9, x1 = -1e9, y0 = 1e9, y1 = -1e9;
+  for (const Vector3f& p : p_cam) {
+    const double x = canvas.fx_px * p.x() / p.z() + canvas.cx_px,
+                 y = canvas.fy_px * p.y() / p.z() + canvas.cy_px;
+    x0 = std::min(x0, x);
+    x1 = std::max(x1, x);
+    y0 = std::min(y0, y);
+    y1 = std::max(y1, y);
+  }
+  if (x1 < 0 || y1 < 0 || x0 > extent.x_high || y0 > extent.y_high) return std::nullopt;
+  extent.x_low = std::max(extent.x_low, static_cast<int>(std::ceil(std::max(x0, 0.0))));
+  extent.y_low = std::max(extent.y_low, static_cast<int>(std::ceil(std::max(y0, 0.0))));
+  extent.x_high = static_cast<int>(std::floor(std::min<double>(x1, extent.x_high)));
+  extent.y_high = static_cast<int>(std::floor(std::min<double>(y1, extent.y_high)));
+  if (extent.x_low > extent.x_high || extent.y_low > extent.y_high) return std::nullopt;
+  return extent;
 }
 
 // Homogeneous rasterisation (Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates",
@@ -198,38 +231,18 @@ void Renderer::Impl::AddMesh(const Mesh& mesh, const Rigid3d& T_cam_world, const
 // are P^-T r, linear in the pixel. Nothing has to be clipped.
 void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners,
                                  const std::array<Vector3f, 3>& p_cam, const Texture* texture, int actor,
-                                 const Eigen::Vector2d& jitter_px) {
-  const float z_max = std::max({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()});
-  const float z_min = std::min({p_cam[0].z(), p_cam[1].z(), p_cam[2].z()});
-  if (z_max < kNearM) return;
-  const double fx = canvas_scale_ * camera_.fx_px, fy = canvas_scale_ * camera_.fy_px;
-  const double cx = canvas_scale_ * (camera_.cx_px - canvas_origin_px_.x() - jitter_px.x());
-  const double cy = canvas_scale_ * (camera_.cy_px - canvas_origin_px_.y() - jitter_px.y());
-  double x_low = 0, x_high = canvas_width_ - 1, y_low = 0, y_high = canvas_height_ - 1;
-  if (z_min > kNearM) {
-    double x0 = 1e9, x1 = -1e9, y0 = 1e9, y1 = -1e9;
-    for (const Vector3f& p : p_cam) {
-      const double x = fx * p.x() / p.z() + cx, y = fy * p.y() / p.z() + cy;
-      x0 = std::min(x0, x);
-      x1 = std::max(x1, x);
-      y0 = std::min(y0, y);
-      y1 = std::max(y1, y);
-    }
-    x_low = std::max(x_low, std::ceil(x0));
-    x_high = std::min(x_high, std::floor(x1));
-    y_low = std::max(y_low, std::ceil(y0));
-    y_high = std::min(y_high, std::floor(y1));
-    if (x_low > x_high || y_low > y_high) return;
-  }
+                                 const Pinhole& canvas) {
+  const std::optional<Extent> extent = ExtentOf(p_cam, canvas);
+  if (!extent) return;
   const Vector3d p0 = p_cam[0].cast<double>(), p1 = p_cam[1].cast<double>(), p2 = p_cam[2].cast<double>();
   const Vector3d n0 = p1.cross(p2), n1 = p2.cross(p0), n2 = p0.cross(p1);
   const double determinant = p0.dot(n0);
   if (std::abs(determinant) < 1e-12) return;
   const auto plane = [&](const Vector3d& gradient) {
     // gradient . ((x - cx) / fx, (y - cy) / fy, 1), as a function of the canvas position.
-    const double a = gradient.x() / fx, b = gradient.y() / fy;
+    const double a = gradient.x() / canvas.fx_px, b = gradient.y() / canvas.fy_px;
     return Plane{static_cast<float>(a), static_cast<float>(b),
-                 static_cast<float>(gradient.z() - a * cx - b * cy)};
+                 static_cast<float>(gradient.z() - a * canvas.cx_px - b * canvas.cy_px)};
   };
   const Vector3d g0 = n0 / determinant, g1 = n1 / determinant, g2 = n2 / determinant;
   Facet facet;
@@ -244,20 +257,19 @@ void Renderer::Impl::AddTriangle(const std::array<const Vertex*, 3>& corners,
     facet.light_over_z = blend(corners[0]->light, corners[1]->light, corners[2]->light);
   }
   facets_.push_back(facet);
-  FillSpans({plane(g0), plane(g1), plane(g2)}, facet.inverse_depth, static_cast<int>(y_low),
-            static_cast<int>(y_high), static_cast<int>(x_low), static_cast<int>(x_high),
+  FillSpans({plane(g0), plane(g1), plane(g2)}, facet.inverse_depth, *extent,
             static_cast<uint32_t>(facets_.size() - 1));
 }
 
-void Renderer::Impl::FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth, int y0, int y1,
-                               int x_low, int x_high, uint32_t facet) {
+void Renderer::Impl::FillSpans(const std::array<Plane, 3>& edges, const Plane& inverse_depth,
+                               const Extent& extent, uint32_t facet) {
   // The pixels of a row where all edge functions and the inverse depth's limits hold form one interval. An
   // edge may miss its neighbour by a rounding error: a tiny slack closes the seam.
   const Plane limits[4] = {
       edges[0], edges[1], edges[2], {-inverse_depth.a, -inverse_depth.b, 1.0f / kNearM - inverse_depth.c}};
-  for (int y = y0; y <= y1; ++y) {
+  for (int y = extent.y_low; y <= extent.y_high; ++y) {
     const auto fy = static_cast<float>(y);
-    auto from = static_cast<float>(x_low), to = static_cast<float>(x_high);
+    auto from = static_cast<float>(extent.x_low), to = static_cast<float>(extent.x_high);
     for (const Plane& limit : limits) {
       const float at_zero = limit.b * fy + limit.c;
       if (limit.a > 0)

@@ -83,7 +83,7 @@ class Texture {
   };
   /// std::floor without the library call that it costs where the CPU's own instruction may not be assumed.
   static int32_t FloorToInt(float value) {
-    const auto truncated = static_cast<int32_t>(value);
+    const auto truncated = static_cast<int32_t>(value < -2e9f ? -2e9f : value > 2e9f ? 2e9f : value);
     return truncated - (value < static_cast<float>(truncated) ? 1 : 0);
   }
 
