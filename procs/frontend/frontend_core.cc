@@ -94,10 +94,17 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
     initial_second_ = proposal.second.id;
     last_keyframe_ = awaited_ = initial_second_;
     last_keyframe_ns_ = proposal.second.stamp_ns;
-    events->push_back(std::move(proposal));
-    ++counters_.keyframes_proposed;
     state_ = TrackingState::kWaitingForMap;
     status.reason = "a first map was proposed";
+    FramePose pose = MakePose(state_, status);
+    if (proposal.second.id.frame_index() == frame_.index) {  // its own pose is part of the proposal
+      pose.reference = proposal.second.id;
+      pose.T_cam_world = proposal.second.T_cam_reference;
+    }
+    events->push_back(std::move(proposal));
+    events->push_back(pose);
+    ++counters_.keyframes_proposed;
+    return;
   }
   events->push_back(MakePose(state_, status));
 }

@@ -342,48 +342,84 @@ void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
   }
 }
 
-/// A landmark that is missing while what lies behind it is seen all around has gone: nothing hides it.
-void PoseTracker::FindSeenThrough(const Map& map, const TrackedFrame& frame) {
-  struct Found {
-    Eigen::Vector2d uv_px;
-    double depth;
-  };
-  std::array<std::vector<Found>, kSeenColumns * kSeenRows> cells;
-  const double cell_width = static_cast<double>(camera_.width_px) / kSeenColumns;
-  const double cell_height = static_cast<double>(camera_.height_px) / kSeenRows;
-  const auto column_of = [&](double x) { return std::clamp(static_cast<int>(x / cell_width), 0, kSeenColumns - 1); };
-  const auto row_of = [&](double y) { return std::clamp(static_cast<int>(y / cell_height), 0, kSeenRows - 1); };
-  std::vector<LandmarkId> used = moved_;
-  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
-    if (!frame.landmarks[i].valid()) continue;
-    used.push_back(frame.landmarks[i]);
-    const Eigen::Vector2d& uv = frame.features->uv_px[i];
-    const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
-    cells[static_cast<size_t>(row_of(uv.y()) * kSeenColumns + column_of(uv.x()))].push_back({uv, depth});
-  }
-  std::sort(used.begin(), used.end());
-  seen_through_.clear();
-  hidden_.clear();
-  const double reach = options_.seen_through_px;
-  for (const auto& [id, view] : visible_) {
-    if (std::binary_search(used.begin(), used.end(), id)) continue;
-    int behind = 0, beside = 0, before = 0;
-    for (int row = row_of(view.uv_px.y() - reach); row <= row_of(view.uv_px.y() + reach); ++row) {
-      for (int column = column_of(view.uv_px.x() - reach); column <= column_of(view.uv_px.x() + reach); ++column) {
-        for (const Found& found : cells[static_cast<size_t>(row * kSeenColumns + column)]) {
-          if ((found.uv_px - view.uv_px).squaredNorm() > reach * reach) continue;
-          if (found.depth > options_.seen_through_depth * view.depth) {
-            ++behind;
-          } else if (found.depth * options_.seen_through_depth > view.depth) {
-            ++beside;
-          } else {
-            ++before;
-          }
+namespace {
+
+/// What this frame knows of a place in the image.
+struct Witness {
+  Eigen::Vector2d uv_px;
+  double depth;
+  bool moves;
+};
+
+/// Witnesses by image cell.
+class Witnesses {
+ public:
+  explicit Witnesses(const Camera& camera)
+      : cell_width_(static_cast<double>(camera.width_px) / kSeenColumns),
+        cell_height_(static_cast<double>(camera.height_px) / kSeenRows) {}
+
+  void Add(const Witness& witness) { cells_[Index(Column(witness.uv_px.x()), Row(witness.uv_px.y()))].push_back(witness); }
+
+  template <typename Visit>
+  void ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const {
+    for (int row = Row(uv_px.y() - reach_px); row <= Row(uv_px.y() + reach_px); ++row) {
+      for (int column = Column(uv_px.x() - reach_px); column <= Column(uv_px.x() + reach_px); ++column) {
+        for (const Witness& witness : cells_[Index(column, row)]) {
+          if ((witness.uv_px - uv_px).squaredNorm() <= reach_px * reach_px) visit(witness);
         }
       }
     }
-    if (behind >= options_.seen_through_min && beside == 0) seen_through_.push_back(id);
-    if (before > 0 && beside == 0) hidden_.push_back(id);
+  }
+
+ private:
+  int Column(double x) const { return std::clamp(static_cast<int>(x / cell_width_), 0, kSeenColumns - 1); }
+  int Row(double y) const { return std::clamp(static_cast<int>(y / cell_height_), 0, kSeenRows - 1); }
+  static size_t Index(int column, int row) { return static_cast<size_t>(row * kSeenColumns + column); }
+
+  double cell_width_, cell_height_;
+  std::array<std::vector<Witness>, kSeenColumns * kSeenRows> cells_;
+};
+
+}  // namespace
+
+/// Judges the landmarks that are missing by what is seen around them. What lies behind is seen: nothing hides them, they
+/// have gone. Their neighbours move: they go together. Something nearer is seen: they are hidden, and nothing is said.
+void PoseTracker::JudgeMissing(const Map& map, const TrackedFrame& frame) {
+  Witnesses witnesses(camera_);
+  std::vector<LandmarkId> known = moved_;
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].valid()) continue;
+    known.push_back(frame.landmarks[i]);
+    const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
+    witnesses.Add({frame.features->uv_px[i], depth, false});
+  }
+  for (const LandmarkId id : moved_) {
+    const Eigen::Vector3d p_cam = frame.T_cam_world * map.FindLandmark(id)->p_world;
+    if (const auto uv = camera_.Project(p_cam)) witnesses.Add({*uv, p_cam.z(), true});
+  }
+  std::sort(known.begin(), known.end());
+  gone_.clear();
+  hidden_.clear();
+  for (const auto& [id, view] : visible_) {
+    if (std::binary_search(known.begin(), known.end(), id)) continue;
+    int behind = 0, beside = 0, before = 0, moving_beside = 0;
+    witnesses.ForEachNear(view.uv_px, options_.seen_through_px, [&, depth = view.depth](const Witness& witness) {
+      const bool farther = witness.depth > options_.seen_through_depth * depth;
+      const bool nearer = witness.depth * options_.seen_through_depth < depth;
+      if (witness.moves) {
+        if (!farther && !nearer) ++moving_beside;
+        if (nearer) ++before;
+        return;
+      }
+      ++(farther ? behind : nearer ? before : beside);
+    });
+    const bool seen_through = behind >= options_.seen_through_min && beside == 0;
+    const bool goes_with_others = moving_beside >= options_.moving_together_min && moving_beside > 2 * beside;
+    if (seen_through || goes_with_others) {
+      gone_.push_back(id);
+    } else if (before > 0 && beside == 0) {
+      hidden_.push_back(id);
+    }
   }
 }
 
@@ -399,7 +435,7 @@ void PoseTracker::CountEvidence(const Map& map, const TrackedFrame& frame) {
     ++evidence_[id].moved;
     ++recent_motion_[id].streak;
   }
-  for (const LandmarkId id : seen_through_) {
+  for (const LandmarkId id : gone_) {
     evidence_[id].landmark = id;
     ++evidence_[id].moved;
   }
@@ -454,7 +490,7 @@ TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, Trac
   SearchLocalLandmarks(map, relocalized, frame);
   const int inliers = OptimizeMatches(map, frame);
   FindMoved(map, frame);
-  FindSeenThrough(map, *frame);
+  JudgeMissing(map, *frame);
   TrackingReport report = Summarize(*frame, inliers, relocalized);
   if (report.ok) CountEvidence(map, *frame);
   return report;

@@ -72,7 +72,7 @@ class PoseTracker {
   void CollectLocalMap(const Map& map, const TrackedFrame& frame);
   void SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame);
   void FindMoved(const Map& map, TrackedFrame* frame);
-  void FindSeenThrough(const Map& map, const TrackedFrame& frame);
+  void JudgeMissing(const Map& map, const TrackedFrame& frame);
   void SpreadMotion(TrackedFrame* frame);
   void CountEvidence(const Map& map, const TrackedFrame& frame);
   TrackingReport Summarize(const TrackedFrame& frame, int inliers, bool relocalized) const;
@@ -96,7 +96,7 @@ class PoseTracker {
   std::vector<std::pair<LandmarkId, LandmarkView>> visible_;  ///< local landmarks that this frame should see
   std::vector<LandmarkId> moved_;         ///< seen elsewhere by this frame
   std::vector<LandmarkId> hidden_;        ///< missing, with something nearer seen in their place; sorted
-  std::vector<LandmarkId> seen_through_;  ///< what lies behind them was seen instead
+  std::vector<LandmarkId> gone_;          ///< missing: what lies behind them is seen, or their neighbours move
   std::unordered_map<LandmarkId, RecentMotion> recent_motion_;
   std::unordered_map<LandmarkId, FrameEvidence::Item> evidence_;
 };

@@ -63,10 +63,6 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
   state.visible += item.visible;
   state.found += item.found;
   state.moved += item.moved;
-  if (state.visible > 2 * kEvidenceWindow) {  // older frames count half, so that the share speaks of the present
-    state.visible /= 2;
-    state.found /= 2;
-  }
   if (item.moved > 0) state.last_moved_ns = stamp_ns;
   if (options.enabled) {
     const float change = options.moved_step * static_cast<float>(item.moved) -
