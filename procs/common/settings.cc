@@ -80,6 +80,21 @@ Entry Make(std::string key, std::string help, Access at, double low = -std::nume
   return entry;
 }
 
+/// A text that must be one of `choices`.
+template <typename Access>
+Entry MakeChoice(std::string key, std::string help, Access at, std::vector<std::string> choices) {
+  Entry entry = Make(key, std::move(help), at);
+  entry.set = [key, at, choices](std::string_view text, Settings* settings) {
+    if (std::find(choices.begin(), choices.end(), text) == choices.end()) {
+      std::string wanted;
+      for (const std::string& choice : choices) wanted += (wanted.empty() ? "'" : " or '") + choice + "'";
+      BadValue(key, text, wanted);
+    }
+    at(*settings) = std::string(text);
+  };
+  return entry;
+}
+
 std::vector<Entry> GeneralEntries() {
   return {
       Make("seed", "seed of everything random", [](Settings& s) -> auto& { return s.seed; }),
@@ -99,6 +114,8 @@ std::vector<Entry> GeneralEntries() {
 
 std::vector<Entry> InitializerEntries() {
   return {
+      MakeChoice("initializer.method", "dlrsac, or ransac: two frames and plain RANSAC",
+                 [](Settings& s) -> auto& { return s.frontend.initializer_method; }, {"dlrsac", "ransac"}),
       Make("initializer.min_matches", "matches a frame must have with the reference frame",
            [](Settings& s) -> auto& { return s.initializer.min_matches; }, 8, 10000),
       Make("initializer.num_pairs", "pairs of frames that must agree",
@@ -184,6 +201,7 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   const bool dm = name == "dm";
   settings->mapper.creation.mutual_exclusion = dm;
   settings->frontend.tracking.motion_belief = dm;
+  settings->frontend.initializer_method = dm ? "dlrsac" : "ransac";
 }
 
 size_t EditDistance(std::string_view a, std::string_view b) {

@@ -35,8 +35,14 @@ FrontendCore::FrontendCore(Setup setup)
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
       relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {}
 
-std::unique_ptr<Initializer> FrontendCore::MakeInitializer() const {
-  return std::make_unique<Initializer>(initializer_options_, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
+FrontendCore::FirstMapSearch FrontendCore::MakeInitializer() const {
+  if (options_.initializer_method == "ransac") {
+    auto baseline = std::make_shared<BaselineInitializer>(BaselineInitializerOptions(), camera_, seed_);
+    return [baseline](const InitializerFrame& frame) { return baseline->AddFrame(frame); };
+  }
+  auto initializer =
+      std::make_shared<Initializer>(initializer_options_, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
+  return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
 }
 
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
@@ -85,7 +91,7 @@ void FrontendCore::KeepUnplaced() {
 
 void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
   KeepUnplaced();
-  const InitializerReport report = initializer_->AddFrame({frame_.index, frame_.stamp_ns, frame_.features});
+  const InitializerReport report = initializer_({frame_.index, frame_.stamp_ns, frame_.features});
   TrackingReport status;
   status.reason = report.reason.c_str();
   if (report.result) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 #include "dmslam/map/proposals.h"
 #include "dmslam/motion_segmentation/initializer.h"
 #include "frontend/tracked_frame.h"
+#include "frontend/baseline_initializer.h"
 #include "frontend/frontend_options.h"
 #include "frontend/pose_tracker.h"
 #include "frontend/relocalizer.h"
@@ -78,7 +80,8 @@ class FrontendCore {
     double scale = 1.0;
   };
 
-  std::unique_ptr<Initializer> MakeInitializer() const;
+  using FirstMapSearch = std::function<InitializerReport(const InitializerFrame&)>;
+  FirstMapSearch MakeInitializer() const;
   void Initialize(std::vector<FrontendEvent>* events);
   void AwaitMap(std::vector<FrontendEvent>* events);
   void Track(std::vector<FrontendEvent>* events);
@@ -104,7 +107,7 @@ class FrontendCore {
   Map map_;
   OrbExtractor extractor_;
   InitializerOptions initializer_options_;
-  std::unique_ptr<Initializer> initializer_;
+  FirstMapSearch initializer_;
   PoseTracker tracker_;
   Relocalizer relocalizer_;
 

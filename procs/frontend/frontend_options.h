@@ -50,6 +50,7 @@ struct KeyframeOptions {
 };
 
 struct FrontendOptions {
+  std::string initializer_method = "dlrsac";  ///< dlrsac, or ransac: two frames and plain RANSAC (the baseline)
   TrackingOptions tracking;
   KeyframeOptions keyframe;
   double trial_s = 0.5;              ///< a first map must predict the frames of this time, else it is dropped
