@@ -81,10 +81,9 @@ std::string Literally(const std::string& name) {
 
 struct LcmBus::Impl {
   explicit Impl(const std::string& url) : lcm(url) {}
-  void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  static void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel, LcmBus* owner) {
     owner->Receive(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
   }
-  LcmBus* owner = nullptr;
   lcm::LCM lcm;
   std::unique_ptr<lcm::LCM> tap;  // with ttl 0, where the bus itself leaves the host
 };
@@ -92,7 +91,6 @@ struct LcmBus::Impl {
 LcmBus::LcmBus(Options options) : options_(std::move(options)) {
   options_.url = UrlWithBuffer(options_.url);
   impl_ = std::make_unique<Impl>(options_.url);
-  impl_->owner = this;
   const auto refuse = [this] {
     throw InputError("LCM at " + options_.url + " cannot be used: " + CureFor(options_.url));
   };
@@ -108,7 +106,7 @@ LcmBus::~LcmBus() = default;
 
 void LcmBus::Subscribe(const std::string& channel) {
   const std::string pattern = Literally(options_.prefix + channel);
-  lcm::Subscription* subscription = impl_->lcm.subscribe(pattern, &Impl::OnMessage, impl_.get());
+  lcm::Subscription* subscription = impl_->lcm.subscribeFunction(pattern, &Impl::OnMessage, this);
   if (subscription == nullptr || impl_->lcm.getFileno() < 0) {
     throw InputError("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));
   }
