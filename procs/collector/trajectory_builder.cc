@@ -6,7 +6,9 @@ namespace dmslam {
 
 void TrajectoryBuilder::OnFramePose(const FramePose& pose) {
   const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
-  if (!inserted && (pose.HasPose() || !it->second.HasPose())) it->second = pose;
+  if (inserted) return;
+  const bool later = pose.state == TrackingState::kLocalizedLater;
+  if (!it->second.HasPose() || (pose.HasPose() && !later)) it->second = pose;
 }
 
 MapId TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {

@@ -102,15 +102,9 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
     last_keyframe_ns_ = proposal.second.stamp_ns;
     state_ = TrackingState::kWaitingForMap;
     status.reason = "a first map was proposed";
-    FramePose pose = MakePose(state_, status);
-    if (proposal.second.id.frame_index() == frame_.index) {  // its own pose is part of the proposal
-      pose.reference = proposal.second.id;
-      pose.T_cam_world = proposal.second.T_cam_reference;
-    }
     events->push_back(std::move(proposal));
-    events->push_back(pose);
     ++counters_.keyframes_proposed;
-    return;
+    proposing_frame_ = frame_;
   }
   events->push_back(MakePose(state_, status));
 }
@@ -133,7 +127,15 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   last_tracked_ns_ = second->stamp_ns;
   trial_until_ns_ = second->stamp_ns + ToNs(options_.trial_s);
   state_ = TrackingState::kTrial;
+  // The frame that made the map is the first one to be placed in it; then this one.
+  TrackedFrame present = std::exchange(frame_, std::exchange(proposing_frame_, TrackedFrame()));
   Track(events);
+  frame_ = std::move(present);
+  if (state_ == TrackingState::kNotInitialized) {
+    Initialize(events);
+  } else {
+    Track(events);
+  }
 }
 
 TrackedFrame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {

@@ -114,6 +114,7 @@ class FrontendCore {
   TrackingState state_ = TrackingState::kNotInitialized;
   MapId map_id_ = 1;
   TrackedFrame frame_;
+  TrackedFrame proposing_frame_;  ///< the frame with which the first map was proposed
   TrackedFrame last_;                 ///< the frame tracked last
   Placed last_placed_;
   std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the frame tracked last
