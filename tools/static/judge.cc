@@ -1,0 +1,315 @@
+#include "judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <map>
+#include <sstream>
+
+#include "dmslam/motion_segmentation/dlrsac.h"
+#include "dmslam/motion_segmentation/match_frames.h"
+#include "dmslam/motion_segmentation/ransac.h"
+#include "dmslam/optimization/bundle_adjustment.h"
+
+namespace dmslam {
+namespace {
+
+constexpr double kBadPrecision = 0.8;
+constexpr double kDegrees = 180.0 / M_PI;
+
+double Quantile(std::vector<double> values, double q) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values[std::min(values.size() - 1, static_cast<size_t>(q * static_cast<double>(values.size())))];
+}
+
+std::string Number(double value, int decimals) {
+  if (!std::isfinite(value)) return "-";
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(decimals) << value;
+  return text.str();
+}
+
+/// Answers of one selector over many pairs or windows.
+struct Tally {
+  int asked = 0;
+  int bad = 0;
+  std::vector<double> precision, recall;
+
+  void Add(const SelectionScore& score) {
+    precision.push_back(score.precision());
+    recall.push_back(score.recall());
+    bad += score.precision() < kBadPrecision ? 1 : 0;
+  }
+  double accepted() const { return asked == 0 ? 0.0 : static_cast<double>(precision.size()) / asked; }
+  double bad_share() const {
+    return precision.empty() ? std::nan("") : bad / static_cast<double>(precision.size());
+  }
+  std::string Cells() const {
+    return Number(accepted(), 3) + " | " + Number(bad_share(), 3) + " | " + Number(Quantile(precision, 0.5), 3) +
+           " | " + Number(Quantile(precision, 0.1), 3) + " | " + Number(Quantile(recall, 0.5), 3);
+  }
+};
+
+constexpr const char* kTallyHead = "accepted | bad | median precision | 10th percentile | median recall";
+constexpr const char* kTallyRule = "---|---|---|---|---";
+
+NamedSelector MakeDlrsac(std::string name, const DlrsacOptions& options) {
+  return {std::move(name), std::make_unique<Dlrsac>(options)};
+}
+
+size_t StartOf(size_t k, size_t count, size_t frames, size_t reach) {
+  return frames <= reach ? 0 : (frames - reach) * k / count;
+}
+
+}  // namespace
+
+std::vector<NamedSelector> AllSelectors() {
+  std::vector<NamedSelector> selectors;
+  selectors.push_back({"RANSAC, F", MakeSelector("ransac", ModelKind::kFundamental)});
+  selectors.push_back({"RANSAC, E", MakeSelector("ransac", ModelKind::kEssential)});
+  selectors.push_back({"ARSAC, F", MakeSelector("arsac", ModelKind::kFundamental)});
+  selectors.push_back({"ARSAC, E", MakeSelector("arsac", ModelKind::kEssential)});
+  selectors.push_back({"DLRSAC as written", MakeSelector("dlrsac-paper", ModelKind::kFundamental)});
+  selectors.push_back({"DLRSAC", MakeSelector("dlrsac", ModelKind::kEssential)});
+  return selectors;
+}
+
+std::vector<NamedSelector> DlrsacAblations() {
+  std::vector<NamedSelector> selectors;
+  selectors.push_back(MakeDlrsac("as written", DlrsacOptions::Paper()));
+  DlrsacOptions essential = DlrsacOptions::Paper();
+  essential.sampling.kind = ModelKind::kEssential;
+  selectors.push_back(MakeDlrsac("as written, with E", essential));
+  essential.scope = StaticScope::kImage;
+  essential.sampling.refit_rounds = 3;
+  essential.set_refit_rounds = 2;
+  selectors.push_back(MakeDlrsac("+ refit to the set, selection over the image", essential));
+  essential.inlier.scale_by_octave = true;
+  selectors.push_back(MakeDlrsac("+ threshold by octave", essential));
+  essential.layers.enabled = true;
+  selectors.push_back(MakeDlrsac("+ disparity layers", essential));
+  essential.search_minima = true;
+  selectors.push_back(MakeDlrsac("+ search of all minima", essential));
+  selectors.push_back(MakeDlrsac("+ degenerate cells told apart, stop by Eq. 4 (the default)", DlrsacOptions()));
+  DlrsacOptions other;
+  other.layers.enabled = false;
+  selectors.push_back(MakeDlrsac("default without disparity layers", other));
+  other = DlrsacOptions();
+  other.distribution_weight = DistributionWeight::kMatches;
+  selectors.push_back(MakeDlrsac("default, D weighted by matches", other));
+  other = DlrsacOptions();
+  other.neighbor_share = 0.6;
+  selectors.push_back(MakeDlrsac("default with the neighbours' vote, 0.6", other));
+  other = DlrsacOptions();
+  other.couple_over_own_inliers = false;
+  selectors.push_back(MakeDlrsac("default, couple degree over all matches", other));
+  for (const int cell : {120, 240}) {
+    other = DlrsacOptions();
+    other.cell_px = cell;
+    selectors.push_back(MakeDlrsac("default, cells of " + std::to_string(cell) + " px", other));
+  }
+  return selectors;
+}
+
+void JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
+                const std::vector<NamedSelector>& selectors, std::ostream& out) {
+  MatchingOptions matching;
+  if (!window_and_orientation) {
+    matching.use_window = false;
+    matching.check_orientation = false;
+  }
+  FeatureMatcher matcher;
+  std::vector<Tally> tallies(selectors.size());
+  std::vector<double> moving;
+  for (int k = 0; k < count; ++k) {
+    const size_t frame = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
+                                 static_cast<size_t>(gap) + 1);
+    const size_t other = frame + static_cast<size_t>(gap);
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, &matcher);
+    const auto truth = sequence.Judge(frame, other, matches);
+    for (size_t s = 0; s < selectors.size(); ++s) {
+      const StaticSelection selection = selectors[s].selector->Select(matches, sequence.camera(), frame);
+      ++tallies[s].asked;
+      const SelectionScore score = ScoreSelection(truth, selection.is_static);
+      if (s == 0) moving.push_back(score.moving_share());
+      if (selection.IsUsable()) tallies[s].Add(score);
+    }
+    sequence.ForgetBefore(frame);
+  }
+  out << "Gap " << gap << (window_and_orientation ? ", search window and orientation check" : ", neither window nor orientation check")
+      << "; " << count << " pairs; moving share of the matches: median " << Number(Quantile(moving, 0.5), 2)
+      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead << " |\n|---|"
+      << kTallyRule << "|\n";
+  for (size_t s = 0; s < selectors.size(); ++s) {
+    out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
+  }
+  out << '\n';
+}
+
+namespace {
+
+struct Window {
+  Agreement agreement;
+  SelectionScore score;
+};
+
+/// One selector's answer for one window, over matches made before.
+Window RunWindow(const std::vector<std::vector<Match>>& matches, std::span<const MatchTruth> truth,
+                 const StaticSelector& selector, const Camera& camera, const AgreementOptions& options, size_t frame) {
+  std::vector<PairView> pairs(matches.size());
+  std::vector<const PairView*> pointers;
+  for (size_t p = 0; p < matches.size(); ++p) {
+    pairs[p] = {matches[p], selector.Select(matches[p], camera, DeriveSeed(frame, p, "window"))};
+    pointers.push_back(&pairs[p]);
+  }
+  Window window;
+  window.agreement = Agree(pointers, options);
+  window.score = ScoreSelection(truth, window.agreement.is_static);
+  return window;
+}
+
+void PrintWindowTable(const std::vector<NamedSelector>& selectors, const std::vector<Tally>& tallies,
+                      const std::string& title, std::ostream& out) {
+  out << title << "\n\n| method | windows | " << kTallyHead << " |\n|---|---|" << kTallyRule << "|\n";
+  for (size_t s = 0; s < selectors.size(); ++s) {
+    out << "| " << selectors[s].name << " | " << tallies[s].asked << " | " << tallies[s].Cells() << " |\n";
+  }
+  out << '\n';
+}
+
+}  // namespace
+
+void JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
+                  const std::vector<NamedSelector>& selectors, std::ostream& out) {
+  FeatureMatcher matcher;
+  std::vector<Tally> all(selectors.size()), parallax(selectors.size()), hard(selectors.size());
+  std::vector<std::map<std::string, int>> refusals(selectors.size());
+  for (int k = 0; k < count; ++k) {
+    const size_t frame = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
+                                 static_cast<size_t>(options.gaps.back()) + 1);
+    std::vector<std::vector<Match>> matches;
+    for (const int gap : options.gaps) {
+      matches.push_back(MatchFrames(*sequence.Features(frame), *sequence.Features(frame + static_cast<size_t>(gap)),
+                                    options.matching, &matcher));
+    }
+    const size_t last = frame + static_cast<size_t>(options.gaps.back());
+    const auto truth = sequence.Judge(frame, last, matches.back());
+    const auto motion = sequence.TrueMotion(frame, last);
+    const bool has_parallax = motion && motion->translation.norm() >= options.min_baseline_m;
+    for (size_t s = 0; s < selectors.size(); ++s) {
+      const Window window =
+          RunWindow(matches, truth, *selectors[s].selector, sequence.camera(), options.agreement, frame);
+      ++refusals[s][std::string(ToString(window.agreement.refusal))];
+      for (Tally* tally : {&all[s], has_parallax ? &parallax[s] : nullptr,
+                           window.score.moving_share() > options.hard_moving_share ? &hard[s] : nullptr}) {
+        if (!tally) continue;
+        ++tally->asked;
+        if (window.agreement.IsUsable()) tally->Add(window.score);
+      }
+    }
+    sequence.ForgetBefore(frame);
+  }
+  PrintWindowTable(selectors, all, "All windows.", out);
+  PrintWindowTable(selectors, parallax, "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m.",
+                   out);
+  if (hard[0].asked > 0) {
+    PrintWindowTable(selectors, hard, "Hard windows: more than " + Number(options.hard_moving_share, 2) +
+                                          " of the matches moving.", out);
+  }
+  out << "Why windows were refused:\n\n";
+  for (size_t s = 0; s < selectors.size(); ++s) {
+    out << "- " << selectors[s].name << ":";
+    for (const auto& [reason, number] : refusals[s]) out << ' ' << reason << ' ' << number << ';';
+    out << '\n';
+  }
+  out << '\n';
+}
+
+AdjustFunction MakeAdjustment(const Camera& camera) {
+  return [pinhole = camera.Ideal()](std::vector<Rigid3d>* poses, std::vector<Eigen::Vector3d>* points,
+                                    std::span<const InitialObservation> observations) {
+    BundleProblem problem;
+    problem.camera = pinhole;
+    problem.T_cam_world = *poses;
+    problem.pose_fixed.assign(poses->size(), 0);
+    problem.pose_fixed[0] = 1;
+    problem.points = *points;
+    for (const InitialObservation& o : observations) {
+      problem.observations.push_back({o.pose, o.point, o.uv_px, o.inv_sigma_squared});
+    }
+    if (!AdjustBundle(GlobalBundleOptions(10), problem).usable) return false;
+    *poses = problem.T_cam_world;
+    *points = problem.points;
+    return true;
+  };
+}
+
+namespace {
+
+struct Start {
+  bool found = false;
+  double wait_s = 0, rotation_deg = 0, direction_deg = 0;
+  bool IsGood() const { return found && rotation_deg < 2.0 && direction_deg < 10.0; }
+};
+
+Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size_t first, uint64_t seed,
+               std::map<std::string, int>* reasons) {
+  Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
+  Start start;
+  for (size_t frame = first; frame < sequence.size(); ++frame) {
+    const InitializerReport report = initializer.AddFrame(
+        {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
+    if (!report.result) {
+      ++(*reasons)[std::string(ToString(report.wait))];
+      continue;
+    }
+    start.found = true;
+    start.wait_s = static_cast<double>(sequence.StampNs(frame) - sequence.StampNs(first)) * 1e-9;
+    const FirstMap& map = *report.result;
+    if (const auto truth = sequence.TrueMotion(map.frame0.index, map.frame1.index)) {
+      start.rotation_deg = kDegrees * AngleBetween(truth->rotation, map.T_1_0.rotation);
+      const double cosine = truth->translation.normalized().dot(map.T_1_0.translation.normalized());
+      const bool scored = truth->translation.norm() >= 0.05;
+      start.direction_deg = scored ? kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0)) : 0.0;
+    }
+    break;
+  }
+  return start;
+}
+
+}  // namespace
+
+void JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
+                 std::ostream& out) {
+  std::vector<Start> starts;
+  std::map<std::string, int> reasons;
+  for (int k = 0; k < count; ++k) {
+    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), 100);
+    starts.push_back(RunStart(sequence, options, first, seed, &reasons));
+    sequence.ForgetBefore(first);
+  }
+  int found = 0, good = 0;
+  std::vector<double> wait, rotation, direction;
+  for (const Start& start : starts) {
+    good += start.IsGood() ? 1 : 0;
+    wait.push_back(start.found ? start.wait_s : 1e9);
+    if (!start.found) continue;
+    ++found;
+    rotation.push_back(start.rotation_deg);
+    direction.push_back(start.direction_deg);
+  }
+  out << "| starts | first map | right | of all starts | median wait [s] | 75th | 90th | median rotation error "
+         "[deg] | median direction error [deg] | 90th |\n|---|---|---|---|---|---|---|---|---|---|\n| "
+      << count << " | " << found << " | " << good << " | " << Number(good / static_cast<double>(count), 2);
+  for (const double q : {0.5, 0.75, 0.9}) {
+    const double value = Quantile(wait, q);
+    out << " | " << (value > 1e8 ? "none" : Number(value, 2));
+  }
+  out << " | " << Number(Quantile(rotation, 0.5), 2) << " | " << Number(Quantile(direction, 0.5), 1) << " | "
+      << Number(Quantile(direction, 0.9), 1) << " |\n\nWhat was waited for [frames]:";
+  for (const auto& [reason, number] : reasons) out << ' ' << reason << ' ' << number << ';';
+  out << "\n\n";
+}
+
+}  // namespace dmslam

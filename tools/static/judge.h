@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "dmslam/motion_segmentation/initializer.h"
+#include "dmslam/motion_segmentation/pair_agreement.h"
+#include "dmslam/motion_segmentation/static_selector.h"
+#include "judged_sequence.h"
+
+namespace dmslam {
+
+/// A selector with the name that the tables give it.
+struct NamedSelector {
+  std::string name;
+  std::unique_ptr<StaticSelector> selector;
+};
+/// RANSAC, ARSAC (each with F and with E), DLRSAC as the paper writes it, DLRSAC.
+std::vector<NamedSelector> AllSelectors();
+/// DLRSAC with one of its parts taken away or exchanged, each.
+std::vector<NamedSelector> DlrsacAblations();
+
+/// A window: a reference frame against frames some gaps later.
+struct WindowOptions {
+  std::vector<int> gaps{4, 8, 12};
+  AgreementOptions agreement;
+  MatchingOptions matching;
+  double min_baseline_m = 0.05;  ///< of the last pair, for a window to count as one with parallax
+  double hard_moving_share = 0.3;  ///< of the last pair's matches, for a window to count as hard
+};
+
+/// Each prints one Markdown table.
+void JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
+                const std::vector<NamedSelector>& selectors, std::ostream& out);
+void JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
+                  const std::vector<NamedSelector>& selectors, std::ostream& out);
+void JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
+                 std::ostream& out);
+
+/// The bundle adjustment that the initialiser is given.
+AdjustFunction MakeAdjustment(const Camera& camera);
+
+}  // namespace dmslam

@@ -1,0 +1,282 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "dmslam/dataset/frame_source.h"
+#include "dmslam/map/keyframe.h"
+#include "dmslam/motion_segmentation/match_frames.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
+#include "draw.h"
+#include "judge.h"
+
+namespace dmslam {
+namespace {
+
+struct Settings {
+  std::vector<std::string> images;
+  std::string sequence;
+  std::string camera;
+  std::string gap = "auto";
+  std::string method = "dlrsac";
+  std::string model = "e";
+  std::string out = "static";
+  int pairs = 8;
+  int features = 3000;
+  uint64_t seed = 1;
+  bool no_window = false;
+};
+
+struct JudgeSettings {
+  std::string sequence;
+  std::string camera;
+  std::string table = "windows";
+  std::string out;
+  std::vector<int> gaps{3, 5, 8, 12};
+  int count = 100;
+  int features = 3000;
+  uint64_t seed = 1;
+  bool no_window = false;
+};
+
+Camera ChooseCamera(const std::string& file, const std::string& sequence) {
+  if (!file.empty()) return LoadCamera(file);
+  if (const auto found = FindCamera(sequence, "config")) return *found;
+  throw InputError("no camera is known for '" + sequence + "': give one with --camera FILE");
+}
+
+nlohmann::json Describe(const StaticSelection& selection, size_t num_matches) {
+  nlohmann::json json;
+  json["accepted"] = selection.IsUsable();
+  json["refusal"] = ToString(selection.refusal);
+  json["explanation"] = selection.explanation;
+  json["matches"] = num_matches;
+  json["static"] = selection.num_static;
+  json["distribution_px"] = selection.distribution_px;
+  json["iterations"] = selection.iterations;
+  return json;
+}
+
+double MedianDisplacement(const std::vector<Match>& matches) {
+  std::vector<double> lengths;
+  for (const Match& match : matches) lengths.push_back((match.uv1_px - match.uv0_px).norm());
+  std::sort(lengths.begin(), lengths.end());
+  return lengths.empty() ? 0.0 : lengths[lengths.size() / 2];
+}
+
+/// The frame that goes with `frame`: so many later, or with "auto" the first whose picture has moved by 20 px while 150
+/// matches remain (at most 24 frames later).
+size_t Partner(JudgedSequence& sequence, size_t frame, const std::string& gap, const MatchingOptions& matching,
+               FeatureMatcher* matcher) {
+  if (gap != "auto") return frame + static_cast<size_t>(std::stoi(gap));
+  size_t best = frame + 1;
+  for (size_t other = frame + 2; other < std::min(sequence.size(), frame + 25); other += 2) {
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, matcher);
+    if (matches.size() < 150) break;
+    best = other;
+    if (MedianDisplacement(matches) >= 20.0) break;
+  }
+  return best;
+}
+
+class Run {
+ public:
+  explicit Run(const Settings& settings)
+      : settings_(settings),
+        selector_(MakeSelector(settings.method,
+                               settings.model == "f" ? ModelKind::kFundamental : ModelKind::kEssential)) {
+    matching_.use_window = matching_.check_orientation = !settings.no_window;
+    std::filesystem::create_directories(settings.out);
+  }
+
+  void OnImages() {
+    const Camera camera = ChooseCamera(settings_.camera, settings_.images[0]);
+    OrbExtractorOptions options;
+    options.num_features = settings_.features;
+    OrbExtractor extractor(options);
+    std::vector<std::shared_ptr<const FrameFeatures>> features;
+    std::vector<ColorImage> pictures;
+    for (const std::string& path : settings_.images) {
+      const GrayImage gray = LoadGray(path);
+      if (gray.width != camera.width_px || gray.height != camera.height_px) {
+        throw InputError(path + ": " + std::to_string(gray.width) + "x" + std::to_string(gray.height) +
+                         " pixels, but the camera has " + std::to_string(camera.width_px) + "x" +
+                         std::to_string(camera.height_px));
+      }
+      FeatureSet set;
+      extractor.Extract({gray.data.data(), gray.width, gray.height, gray.width}, &set);
+      features.push_back(MakeFrameFeatures(std::move(set), camera, options.pyramid));
+      EncodedImage encoded;
+      encoded.bytes = ReadFileBytes(path);
+      encoded.encoding = DetectEncoding(encoded.bytes);
+      pictures.push_back(DecodeColor(encoded, path));
+    }
+    const auto matches = MatchFrames(*features[0], *features[1], matching_, &matcher_);
+    const StaticSelection selection = selector_->Select(matches, camera, settings_.seed);
+    Write("pair", DrawSelection(pictures[0], pictures[1], matches, selection));
+    report_["pairs"].push_back(Describe(selection, matches.size()));
+    Save();
+  }
+
+  void OnSequence() {
+    const Camera camera = ChooseCamera(settings_.camera, settings_.sequence);
+    JudgedSequence sequence(settings_.sequence, camera, settings_.features);
+    const size_t reach = settings_.gap == "auto" ? 3 : static_cast<size_t>(std::stoi(settings_.gap)) + 1;
+    if (sequence.size() < reach) throw InputError(settings_.sequence + ": fewer frames than the gap asks for");
+    SelectionScore total;
+    int accepted = 0;
+    for (int k = 0; k < settings_.pairs; ++k) {
+      const size_t frame = (sequence.size() - reach) * static_cast<size_t>(k) / static_cast<size_t>(settings_.pairs);
+      accepted += OnPair(sequence, frame, &total) ? 1 : 0;
+      sequence.ForgetBefore(frame);
+    }
+    report_["accept_rate"] = accepted / static_cast<double>(settings_.pairs);
+    if (sequence.HasMasks()) {
+      report_["precision"] = total.precision();
+      report_["recall"] = total.recall();
+    }
+    Save();
+  }
+
+ private:
+  bool OnPair(JudgedSequence& sequence, size_t frame, SelectionScore* total) {
+    const size_t other = Partner(sequence, frame, settings_.gap, matching_, &matcher_);
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching_, &matcher_);
+    const StaticSelection selection = selector_->Select(matches, sequence.camera(), settings_.seed + frame);
+    const std::string name = "pair_" + std::to_string(frame) + "_" + std::to_string(other);
+    Write(name, DrawSelection(sequence.Color(frame), sequence.Color(other), matches, selection));
+    nlohmann::json json = Describe(selection, matches.size());
+    json["frames"] = {frame, other};
+    if (sequence.HasMasks() && selection.IsUsable()) {
+      const SelectionScore score = ScoreSelection(sequence.Judge(frame, other, matches), selection.is_static);
+      json["precision"] = score.precision();
+      json["recall"] = score.recall();
+      json["moving_share"] = score.moving_share();
+      total->num_static += score.num_static;
+      total->num_right += score.num_right;
+      total->num_true += score.num_true;
+      total->num_true_found += score.num_true_found;
+    }
+    std::cout << name << ": " << selection.num_static << " static of " << matches.size()
+              << (selection.IsUsable() ? "" : ", refused: " + selection.explanation) << '\n';
+    report_["pairs"].push_back(std::move(json));
+    return selection.IsUsable();
+  }
+  void Write(const std::string& name, const ColorImage& picture) const {
+    WriteFileBytes(settings_.out + "/" + name + ".png", EncodePng(picture));
+  }
+  void Save() {
+    report_["method"] = settings_.method;
+    report_["seed"] = settings_.seed;
+    std::ofstream file(settings_.out + "/static.json");
+    file << report_.dump(2) << '\n';
+    if (!file) throw InputError(settings_.out + "/static.json: cannot be written");
+    std::cout << "wrote " << settings_.out << "/static.json and its pictures\n";
+  }
+
+  const Settings& settings_;
+  std::unique_ptr<StaticSelector> selector_;
+  MatchingOptions matching_;
+  FeatureMatcher matcher_;
+  nlohmann::json report_;
+};
+
+void RunJudge(const JudgeSettings& settings) {
+  JudgedSequence sequence(settings.sequence, ChooseCamera(settings.camera, settings.sequence), settings.features);
+  std::ofstream file;
+  if (!settings.out.empty()) {
+    file.open(settings.out, std::ios::app);
+    if (!file) throw InputError(settings.out + ": cannot be written");
+  }
+  std::ostream& out = settings.out.empty() ? std::cout : file;
+  out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table << "\n\n";
+  if (settings.table == "pairs" || settings.table == "ablation") {
+    const auto selectors = settings.table == "pairs" ? AllSelectors() : DlrsacAblations();
+    for (const int gap : settings.gaps) {
+      JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out);
+    }
+  } else if (settings.table == "windows") {
+    WindowOptions options;
+    options.matching.use_window = options.matching.check_orientation = !settings.no_window;
+    JudgeWindows(sequence, options, settings.count, AllSelectors(), out);
+  } else if (settings.table == "starts") {
+    JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
+  } else {
+    throw InputError("unknown table '" + settings.table + "': use pairs, ablation, windows or starts");
+  }
+}
+
+void AddOptions(CLI::App& app, Settings& s) {
+  app.add_option("images", s.images, "Two images of the same camera")->expected(0, 2);
+  app.add_option("--sequence", s.sequence, "TUM RGB-D folder, instead of two images");
+  app.add_option("--gap", s.gap, "Frames between the two of a pair, or auto")->capture_default_str();
+  app.add_option("--pairs", s.pairs, "Pairs spread over the sequence")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--method", s.method, "dlrsac, dlrsac-paper, arsac or ransac")->capture_default_str();
+  app.add_option("--model", s.model, "e (essential matrix, five points) or f (fundamental matrix, eight points)")
+      ->check(CLI::IsMember({"e", "f"}))
+      ->capture_default_str();
+  app.add_option("--camera", s.camera, "Camera file (YAML)");
+  app.add_option("--features", s.features, "Most features per image")->capture_default_str();
+  app.add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
+  app.add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
+  app.add_option("--out", s.out, "Folder for pictures and static.json")->capture_default_str();
+}
+
+void AddJudge(CLI::App& app, JudgeSettings& s) {
+  CLI::App* judge = app.add_subcommand("judge", "Measure against masks and true poses; prints Markdown tables");
+  judge->add_option("--sequence", s.sequence, "TUM RGB-D folder with groundtruth.txt, and mask.txt where there are movers")
+      ->required();
+  judge->add_option("--table", s.table, "pairs, ablation, windows or starts")->capture_default_str();
+  judge->add_option("--count", s.count, "Pairs, windows or starts, spread over the sequence")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  judge->add_option("--gaps", s.gaps, "Gaps of the pairs [frames]")->capture_default_str();
+  judge->add_option("--camera", s.camera, "Camera file (YAML)");
+  judge->add_option("--features", s.features, "Most features per image")->capture_default_str();
+  judge->add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
+  judge->add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
+  judge->add_option("--out", s.out, "File to append to, instead of standard output");
+  judge->callback([&s] { RunJudge(s); });
+}
+
+void RunSelection(const Settings& settings) {
+  if (settings.gap != "auto" && (settings.gap.find_first_not_of("0123456789") != std::string::npos ||
+                                 settings.gap.empty() || settings.gap.size() > 6 || settings.gap == "0")) {
+    throw InputError("--gap '" + settings.gap + "': give a number of frames, at least 1, or auto");
+  }
+  Run run(settings);
+  if (!settings.sequence.empty()) {
+    run.OnSequence();
+  } else if (settings.images.size() == 2) {
+    run.OnImages();
+  } else {
+    throw InputError("give two images, or --sequence DIR");
+  }
+}
+
+}  // namespace
+}  // namespace dmslam
+
+int main(int argc, char** argv) {
+  CLI::App app("Finds which matches of two frames belong to the static world", "dmslam-static");
+  app.set_version_flag("--version", dmslam::kVersion);
+  dmslam::Settings settings;
+  dmslam::JudgeSettings judge;
+  dmslam::AddOptions(app, settings);
+  dmslam::AddJudge(app, judge);
+  try {
+    app.parse(argc, argv);
+    if (app.get_subcommands().empty()) dmslam::RunSelection(settings);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    std::cerr << "dmslam-static: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
