@@ -156,6 +156,7 @@ why() {
   [ -f "$log" ] || return 0
   line=$(grep -hE " (error|critical): " "$log" | tail -n 1 | sed -E 's/^[0-9:.]* //; s/ (error|critical): /: /' || true)
   [ -n "$line" ] || line=$(grep -vE '^[0-9:.]+ |^ *$' "$log" | head -n 1 | sed "s/^/$1: /" || true)
+  [ -n "$line" ] || line=$(tail -n 1 "$log" | sed -E 's/^[0-9:.]* //' || true)
   echo "$line"
 }
 report() { # name, status
