@@ -8,7 +8,7 @@ Usage: scripts/fuzz.sh [--seconds N] [--mutations N] [--jobs N] [TARGET...]
   --seconds N    libFuzzer for N seconds per target (default 60; needs clang)
   --mutations N  instead: N fixed mutations per target under AddressSanitizer and UBSan, with any compiler
   --jobs N       compile with N jobs (default: all cores)
-  TARGET         such as MapDelta or streams (default: all)
+  TARGET         such as messages, streams, vocabulary; with --seconds also MapDelta and others (default: all)
 Builds in build/fuzz (or build/asan-ubsan), keeps corpora in build/fuzz/corpus and findings in build/fuzz/findings.
 EOF
 }
@@ -28,10 +28,13 @@ while (($# > 0)); do
     *) targets+=("$1"); shift ;;
   esac
 done
+cmake_file="$root/tests/fuzz/CMakeLists.txt"
 if ((${#targets[@]} == 0)); then
-  list="$(sed -n '/^foreach(message/,/)/p' "$root/tests/fuzz/CMakeLists.txt" | tr -d ')' | sed 's/foreach(message//')"
-  named="$(sed -n 's/^dmslam_fuzz(\([a-z_]*\) .*/\1/p' "$root/tests/fuzz/CMakeLists.txt")"
-  read -r -a targets <<<"$(echo $list $named)"
+  mapfile -t targets < <(sed -n 's/^dmslam_fuzz(\([a-z_]*\) .*/\1/p' "$cmake_file")
+  if ((mutations == 0)); then  # libFuzzer goes deeper with one type at a time
+    read -r -a messages <<<"$(sed -n '/foreach(message/,/)/p' "$cmake_file" | tr -d ')\n' | sed 's/.*foreach(message//')"
+    targets+=("${messages[@]}")
+  fi
 fi
 
 cd "$root"
