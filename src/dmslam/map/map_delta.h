@@ -18,7 +18,7 @@ enum class MapEvent : uint8_t {
   kLandmarksCreated = 2,
   kFused = 3,
   kAdjusted = 4,       ///< local bundle adjustment
-  kCulled = 5,
+  kMapped = 5,         ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
   kEvidence = 6,
   kCorrected = 7,      ///< a loop correction was applied
   kGloballyAdjusted = 8,
@@ -26,7 +26,9 @@ enum class MapEvent : uint8_t {
   kMapDropped = 10,
   kSettled = 11,       ///< all work that keyframe `about` caused is done
   kSnapshot = 12,      ///< part of a snapshot
+
   kRefused = 13,       ///< a correction that was not applied; `note` says why
+  kEnded = 14,         ///< the sequence has ended, nothing follows
 };
 
 /// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.
