@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README, docs/images, from a rendered sequence: scripts/pictures.sh [FRAME] (default 150).
+# Makes the pictures of the README, docs/images, from a rendered sequence: scripts/pictures.sh [FRAME] (default 100).
 set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-frame=${1:-150}
+frame=${1:-100}
 [[ $frame =~ ^[1-9][0-9]*$ ]] || { echo "pictures.sh: $frame is not the number of a frame" >&2; exit 2; }
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 "$top/scripts/build.sh" release dmslam-synth dmslam-inprocess
 bin=$top/build/release/bin
-"$bin/dmslam-synth" --quiet --out "$work/sequence" --path xyz --frames 300 --moving-share 0.2 --seed 1
+"$bin/dmslam-synth" --quiet --out "$work/sequence" --path xyz --frames 150 --moving-share 0.15 --actors 1 --seed 1
 "$bin/dmslam-inprocess" --sequence "$work/sequence" --camera "$top/config/synthetic.yaml" --seed 1 --pictures "$frame" \
   --out "$work/run" >/dev/null
 mkdir -p "$top/docs/images"
