@@ -64,19 +64,23 @@ size_t StartOf(size_t k, size_t count, size_t frames, size_t reach) {
 
 }  // namespace
 
-std::vector<NamedSelector> AllSelectors() {
+std::vector<NamedSelector> AllSelectors(bool gated) {
   std::vector<NamedSelector> selectors;
   selectors.push_back({"RANSAC, F", MakeSelector("ransac", ModelKind::kFundamental)});
   selectors.push_back({"RANSAC, E", MakeSelector("ransac", ModelKind::kEssential)});
   selectors.push_back({"ARSAC, F", MakeSelector("arsac", ModelKind::kFundamental)});
   selectors.push_back({"ARSAC, E", MakeSelector("arsac", ModelKind::kEssential)});
   selectors.push_back({"DLRSAC as written", MakeSelector("dlrsac-paper", ModelKind::kFundamental)});
-  selectors.push_back({"DLRSAC", MakeSelector("dlrsac", ModelKind::kEssential)});
+  DlrsacOptions options;
+  if (!gated) options.min_distribution_share = 0;
+  selectors.push_back(MakeDlrsac("DLRSAC", options));
   return selectors;
 }
 
 std::vector<NamedSelector> DlrsacAblations() {
   std::vector<NamedSelector> selectors;
+  DlrsacOptions ungated;
+  ungated.min_distribution_share = 0;
   selectors.push_back(MakeDlrsac("as written", DlrsacOptions::Paper()));
   DlrsacOptions essential = DlrsacOptions::Paper();
   essential.sampling.kind = ModelKind::kEssential;
@@ -91,21 +95,21 @@ std::vector<NamedSelector> DlrsacAblations() {
   selectors.push_back(MakeDlrsac("+ disparity layers", essential));
   essential.search_minima = true;
   selectors.push_back(MakeDlrsac("+ search of all minima", essential));
-  selectors.push_back(MakeDlrsac("+ degenerate cells told apart, stop by Eq. 4 (the default)", DlrsacOptions()));
-  DlrsacOptions other;
+  selectors.push_back(MakeDlrsac("+ degenerate cells told apart, stop by Eq. 4 (the default)", ungated));
+  DlrsacOptions other = ungated;
   other.layers.enabled = false;
   selectors.push_back(MakeDlrsac("default without disparity layers", other));
-  other = DlrsacOptions();
+  other = ungated;
   other.distribution_weight = DistributionWeight::kMatches;
   selectors.push_back(MakeDlrsac("default, D weighted by matches", other));
-  other = DlrsacOptions();
+  other = ungated;
   other.neighbor_share = 0.6;
   selectors.push_back(MakeDlrsac("default with the neighbours' vote, 0.6", other));
-  other = DlrsacOptions();
+  other = ungated;
   other.couple_over_own_inliers = false;
   selectors.push_back(MakeDlrsac("default, couple degree over all matches", other));
   for (const int cell : {120, 240}) {
-    other = DlrsacOptions();
+    other = ungated;
     other.cell_px = cell;
     selectors.push_back(MakeDlrsac("default, cells of " + std::to_string(cell) + " px", other));
   }

@@ -17,8 +17,9 @@ struct NamedSelector {
   std::string name;
   std::unique_ptr<StaticSelector> selector;
 };
-/// RANSAC, ARSAC (each with F and with E), DLRSAC as the paper writes it, DLRSAC.
-std::vector<NamedSelector> AllSelectors();
+/// RANSAC, ARSAC (each with F and with E), DLRSAC as the paper writes it, DLRSAC; DLRSAC's own gate on the distribution
+/// is off if `gated` is not set.
+std::vector<NamedSelector> AllSelectors(bool gated);
 /// DLRSAC with one of its parts taken away or exchanged, each.
 std::vector<NamedSelector> DlrsacAblations();
 

@@ -196,14 +196,14 @@ void RunJudge(const JudgeSettings& settings) {
   std::ostream& out = settings.out.empty() ? std::cout : file;
   out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table << "\n\n";
   if (settings.table == "pairs" || settings.table == "ablation") {
-    const auto selectors = settings.table == "pairs" ? AllSelectors() : DlrsacAblations();
+    const auto selectors = settings.table == "pairs" ? AllSelectors(false) : DlrsacAblations();
     for (const int gap : settings.gaps) {
       JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out);
     }
   } else if (settings.table == "windows") {
     WindowOptions options;
     options.matching.use_window = options.matching.check_orientation = !settings.no_window;
-    JudgeWindows(sequence, options, settings.count, AllSelectors(), out);
+    JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
   } else if (settings.table == "starts") {
     JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
   } else {

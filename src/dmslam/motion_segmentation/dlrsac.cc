@@ -335,11 +335,11 @@ std::optional<CoupledSet> Segmentation::ChooseSet() {
 /// The answer: model and flags of the chosen set.
 void Segmentation::Select(const CoupledSet& set) {
   for (const size_t j : set.members) out_.cells[static_cast<size_t>(kept_[j].index)].chosen = true;
-  const double set_distribution_px = set.distribution_px;
-  if (set_distribution_px < options_.min_distribution_px) {
+  const double asked_px = options_.min_distribution_share * std::hypot(camera_.width_px, camera_.height_px);
+  if (set.distribution_px < asked_px) {
     out_.refusal = Refusal::kDistributionTooSmall;
-    out_.explanation = "the widest coupled set spreads over " + std::to_string(set_distribution_px) + " px, " +
-                       std::to_string(options_.min_distribution_px) + " asked for";
+    out_.explanation = "the widest coupled set spreads over " + std::to_string(set.distribution_px) + " px, " +
+                       std::to_string(asked_px) + " asked for";
     out_.is_static.assign(matches_.size(), 0);
     return;
   }
@@ -438,6 +438,7 @@ DlrsacOptions DlrsacOptions::Paper() {
   options.layers.enabled = false;
   options.search_minima = false;
   options.neighbor_share = 0.0;
+  options.min_distribution_share = 0.0;
   return options;
 }
 

@@ -68,7 +68,9 @@ struct DlrsacOptions {
   int neighbors = 10;              ///< how many nearest matches are asked at most
   double neighbor_reach_px = 40;   ///< and how far they may be, about
 
-  double min_distribution_px = 0.0;  ///< root of D of the chosen set below this: refused, motion too complex
+  /// Root of D of the chosen set below this share of the image's diagonal: refused, the motion is too complex (paper
+  /// 2.3.1). Two neighbouring cells stay below it.
+  double min_distribution_share = 0.12;
   int min_static = 12;               ///< fewer static matches: refused
 
   /// The paper as written: fundamental matrices, no octaves, no degeneracy, all features of the chosen cells.

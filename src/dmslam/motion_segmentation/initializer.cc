@@ -64,7 +64,8 @@ std::string_view ToString(WaitReason reason) {
 
 InitializerOptions::InitializerOptions() {
   selector.sampling.max_iterations = 600;
-  selector.sampling.stop_confidence = 0.999;
+  agreement.min_agreement = 0.87;
+  agreement.min_distribution_px = 140;
 }
 
 /// The work of one stream of frames.

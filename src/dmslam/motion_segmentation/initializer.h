@@ -87,7 +87,7 @@ using AdjustFunction = std::function<bool(std::vector<Rigid3d>* T_cam_world, std
                                           std::span<const InitialObservation> observations)>;
 
 struct InitializerOptions {
-  InitializerOptions();  ///< fewer samples in the selector than its own default: a frame has some 15 ms
+  InitializerOptions();  ///< fewer samples than the selector's own default, stricter agreement
 
   DlrsacOptions selector;            ///< which matches are static, per pair of frames
   AgreementOptions agreement;        ///< what several pairs must agree on
@@ -97,7 +97,7 @@ struct InitializerOptions {
   int min_features = 100;            ///< a frame with fewer takes no part
   int frame_step = 2;                ///< every so manieth frame is matched; between them only what was left over
   int num_pairs = 3;                 ///< pairs with the reference frame that must agree
-  int min_pair_step = 3;             ///< the frames of two such pairs are apart by so much at least [frames]
+  int min_pair_step = 6;             ///< the frames of two such pairs are apart by so much at least [frames]
   double max_age_s = 0.9;            ///< an older reference frame is given up for a newer one
   int min_matches = 120;             ///< of a frame with the reference frame; fewer: a newer reference frame
   double min_displacement_px = 8.0;  ///< median displacement of the matches before a pair is worth its cost
@@ -105,7 +105,7 @@ struct InitializerOptions {
   MinimaOptions minima;              ///< how the motion of the pair is searched
   double minima_slack = 1.5;         ///< a minimum with up to so many times the lowest cost is looked at, too
   double min_runner_up_cost = 1.15;  ///< another motion must cost all views this many times as much
-  double min_parallax_rad = 0.026;   ///< median over the points; below it the direction is chance
+  double min_parallax_rad = 0.028;   ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad = 0.10;  ///< standard deviation of the direction of translation, from the residuals
   double max_view_chi2 = 9.0;        ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be

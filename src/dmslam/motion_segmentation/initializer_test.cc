@@ -1,0 +1,172 @@
+#include "dmslam/motion_segmentation/initializer.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/motion_segmentation/synthetic_pair.h"
+
+namespace dmslam {
+namespace {
+
+/// A room of points with descriptors of their own, and a walker in it.
+class SyntheticRoom {
+ public:
+  explicit SyntheticRoom(int num_static, int num_moving) : camera_(SyntheticCamera()) {
+    Random random(7);
+    for (int k = 0; k < num_static + num_moving; ++k) {
+      Point point;
+      point.moves = k >= num_static;
+      const double depth = point.moves ? random.Uniform(1.9, 2.1) : random.Uniform(2.0, 5.0);
+      const double x = point.moves ? random.Uniform(-0.25, 0.25) : random.Uniform(-0.65, 0.65);
+      const double y = point.moves ? random.Uniform(-0.25, 0.25) : random.Uniform(-0.5, 0.5);
+      point.p_world = depth * Eigen::Vector3d(x, y, 1.0);
+      for (uint64_t& word : point.descriptor.words) word = random.Next();
+      points_.push_back(point);
+    }
+  }
+
+  const Camera& camera() const { return camera_; }
+  Rigid3d TruePose(uint32_t frame) const {
+    return Rigid3d(ExpSo3({0.0, 0.002 * frame, 0.0}), speed_ * frame * Eigen::Vector3d(1.0, 0.1, 0.2));
+  }
+  void SetSpeed(double speed) { speed_ = speed; }
+
+  InitializerFrame Frame(uint32_t index) const {
+    auto features = std::make_shared<FrameFeatures>();
+    Random random(DeriveSeed(3, index, "frame"));
+    for (const Point& point : points_) {
+      const double turn = 0.15 * index;
+      const Eigen::Vector3d walk(0.02 * index, 0.05 * std::sin(turn), 0.0);
+      const auto uv = camera_.Project(TruePose(index) * (point.p_world + (point.moves ? walk : Eigen::Vector3d::Zero())));
+      const double dx = 0.4 * random.Gaussian(), dy = 0.4 * random.Gaussian();
+      if (!uv) continue;
+      const Eigen::Vector2d seen = *uv + Eigen::Vector2d(dx, dy);
+      if (!(seen.x() > 1 && seen.y() > 1 && seen.x() < 638 && seen.y() < 478)) continue;
+      Keypoint keypoint;
+      keypoint.x_q4 = static_cast<uint16_t>(seen.x() * 16);
+      keypoint.y_q4 = static_cast<uint16_t>(seen.y() * 16);
+      features->set.keypoints.push_back(keypoint);
+      features->set.descriptors.push_back(point.descriptor);
+      features->uv_px.push_back(seen);
+    }
+    features->grid.Build(features->uv_px, features->set.keypoints, camera_.width_px, camera_.height_px);
+    return {index, int64_t{index} * 33'333'333, features};
+  }
+
+ private:
+  struct Point {
+    Eigen::Vector3d p_world;
+    Descriptor descriptor;
+    bool moves = false;
+  };
+  Camera camera_;
+  std::vector<Point> points_;
+  double speed_ = 0.012;
+};
+
+TEST(Initializer, MapsTheRoomAndNotTheWalker) {
+  const SyntheticRoom room(600, 150);
+  Initializer initializer({}, room.camera(), 1);
+  std::optional<FirstMap> map;
+  for (uint32_t frame = 0; frame < 60 && !map; ++frame) {
+    InitializerReport report = initializer.AddFrame(room.Frame(frame));
+    EXPECT_EQ(report.wait == WaitReason::kNone, report.result.has_value());
+    EXPECT_FALSE(report.reason.empty());
+    map = std::move(report.result);
+  }
+  ASSERT_TRUE(map.has_value());
+  const Rigid3d truth = room.TruePose(map->frame1.index) * room.TruePose(map->frame0.index).Inverse();
+  EXPECT_LT(AngleBetween(truth.rotation, map->T_1_0.rotation), 0.02);
+  EXPECT_GT(truth.translation.normalized().dot(map->T_1_0.translation.normalized()), 0.985);
+  EXPECT_GE(map->points.size(), 80U);
+  EXPECT_EQ(map->matches.size(), map->is_static.size());
+  for (const FirstMap::Point& point : map->points) {
+    EXPECT_GT(point.p_world.z(), 0);
+    const auto uv = room.camera().Project(point.p_world);
+    ASSERT_TRUE(uv.has_value());
+    EXPECT_LT((*uv - map->frame0.features->uv_px[point.feature0]).norm(), 4.0);
+  }
+}
+
+TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
+  SyntheticRoom room(600, 0);
+  room.SetSpeed(0.0);
+  Initializer initializer({}, room.camera(), 1);
+  for (uint32_t frame = 0; frame < 40; ++frame) {
+    EXPECT_FALSE(initializer.AddFrame(room.Frame(frame)).result.has_value()) << frame;
+  }
+}
+
+TEST(Initializer, WaitsForFramesWithoutFeatures) {
+  Initializer initializer({}, SyntheticCamera(), 1);
+  const InitializerReport report =
+      initializer.AddFrame({0, 0, std::make_shared<const FrameFeatures>()});
+  EXPECT_EQ(report.wait, WaitReason::kTooFewFeatures);
+}
+
+TEST(Initializer, IsDeterministic) {
+  const SyntheticRoom room(400, 100);
+  std::vector<FirstMap> maps;
+  for (int run = 0; run < 2; ++run) {
+    Initializer initializer({}, room.camera(), 5);
+    for (uint32_t frame = 0; frame < 60; ++frame) {
+      InitializerReport report = initializer.AddFrame(room.Frame(frame));
+      if (!report.result) continue;
+      maps.push_back(std::move(*report.result));
+      break;
+    }
+  }
+  ASSERT_EQ(maps.size(), 2U);
+  EXPECT_EQ(maps[0].frame1.index, maps[1].frame1.index);
+  EXPECT_EQ(maps[0].T_1_0.translation, maps[1].T_1_0.translation);
+  ASSERT_EQ(maps[0].points.size(), maps[1].points.size());
+  for (size_t k = 0; k < maps[0].points.size(); ++k) EXPECT_EQ(maps[0].points[k].p_world, maps[1].points[k].p_world);
+}
+
+TEST(ReconstructBaseline, FindsThePoseOfARoom) {
+  const SyntheticPair pair = MakeSyntheticPair({}, 21);
+  const TwoViewReconstruction map = ReconstructBaseline(pair.matches, pair.camera, {}, 1);
+  ASSERT_TRUE(map.IsUsable()) << map.explanation;
+  EXPECT_FALSE(map.from_homography);
+  EXPECT_GT(map.T_1_0.translation.dot(pair.T_1_0.translation.normalized()), 0.97);
+  EXPECT_LT(AngleBetween(map.T_1_0.rotation, pair.T_1_0.rotation), 0.02);
+}
+
+TEST(ReconstructBaseline, TakesAHomographyForAPlane) {
+  SyntheticPairOptions options;
+  options.flat = true;
+  options.translation = {0.4, 0.05, 0.02};
+  const SyntheticPair pair = MakeSyntheticPair(options, 22);
+  EXPECT_TRUE(ReconstructBaseline(pair.matches, pair.camera, {}, 1).from_homography);
+}
+
+TEST(ReconstructBaseline, RefusesARotation) {
+  SyntheticPairOptions options;
+  options.translation.setZero();
+  const SyntheticPair pair = MakeSyntheticPair(options, 23);
+  EXPECT_FALSE(ReconstructBaseline(pair.matches, pair.camera, {}, 1).IsUsable());
+  EXPECT_FALSE(ReconstructBaseline({}, pair.camera, {}, 1).IsUsable());
+}
+
+TEST(ReconstructFromStatic, TriangulatesWhatIsStatic) {
+  SyntheticPairOptions options;
+  options.num_moving = 100;
+  const SyntheticPair pair = MakeSyntheticPair(options, 24);
+  const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1);
+  const TwoViewReconstruction map = ReconstructFromStatic(pair.matches, selection, pair.camera, {});
+  ASSERT_TRUE(map.IsUsable()) << map.explanation;
+  EXPECT_GT(map.num_points, 400);
+  for (size_t i = 0; i < pair.matches.size(); ++i) {
+    if (!map.has_point[i]) continue;
+    EXPECT_TRUE(selection.is_static[i]);
+    EXPECT_GT(map.points_cam0[i].z(), 0);
+  }
+}
+
+TEST(ReconstructFromStatic, PassesARefusalOn) {
+  StaticSelection refused;
+  refused.refusal = Refusal::kTooFewCells;
+  EXPECT_FALSE(ReconstructFromStatic({}, refused, SyntheticCamera(), {}).IsUsable());
+}
+
+}  // namespace
+}  // namespace dmslam

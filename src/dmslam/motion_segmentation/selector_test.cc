@@ -1,0 +1,259 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "dmslam/geometry/two_view.h"
+#include "dmslam/motion_segmentation/depth_layers.h"
+#include "dmslam/motion_segmentation/dlrsac.h"
+#include "dmslam/motion_segmentation/pair_agreement.h"
+#include "dmslam/motion_segmentation/ransac.h"
+#include "dmslam/motion_segmentation/synthetic_pair.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+struct Score {
+  double precision = 0, recall = 0;
+};
+
+Score ScoreOf(const SyntheticPair& pair, const StaticSelection& selection) {
+  int called = 0, right = 0, all = 0;
+  for (size_t i = 0; i < pair.truth.size(); ++i) {
+    all += pair.truth[i];
+    called += selection.is_static[i];
+    right += selection.is_static[i] & pair.truth[i];
+  }
+  return {called == 0 ? 1.0 : right / static_cast<double>(called), right / static_cast<double>(all)};
+}
+
+class EverySelector : public testing::TestWithParam<std::pair<const char*, ModelKind>> {
+ protected:
+  std::unique_ptr<StaticSelector> Make() const { return MakeSelector(GetParam().first, GetParam().second); }
+};
+
+TEST_P(EverySelector, FindsTheStaticOfARoomWithASmallMover) {
+  SyntheticPairOptions options;
+  options.num_moving = 100;
+  options.num_mismatches = 40;
+  const SyntheticPair pair = MakeSyntheticPair(options, 1);
+  const StaticSelection selection = Make()->Select(pair.matches, pair.camera, 7);
+  ASSERT_TRUE(selection.IsUsable()) << selection.explanation;
+  const Score score = ScoreOf(pair, selection);
+  EXPECT_GT(score.precision, 0.9);
+  EXPECT_GT(score.recall, std::string(GetParam().first) == "dlrsac-paper" ? 0.3 : 0.85);
+  EXPECT_EQ(selection.is_static.size(), pair.matches.size());
+  EXPECT_NEAR(selection.F.norm(), 1.0, 1e-9);
+}
+
+TEST_P(EverySelector, IsDeterministicUnderASeed) {
+  SyntheticPairOptions options;
+  options.num_moving = 150;
+  const SyntheticPair pair = MakeSyntheticPair(options, 2);
+  const StaticSelection a = Make()->Select(pair.matches, pair.camera, 3);
+  const StaticSelection b = Make()->Select(pair.matches, pair.camera, 3);
+  EXPECT_EQ(a.F, b.F);
+  EXPECT_EQ(a.is_static, b.is_static);
+}
+
+TEST_P(EverySelector, RefusesTooFewMatches) {
+  SyntheticPairOptions options;
+  options.num_static = 7;
+  const SyntheticPair pair = MakeSyntheticPair(options, 3);
+  const StaticSelection selection = Make()->Select(pair.matches, pair.camera, 1);
+  EXPECT_EQ(selection.refusal, Refusal::kTooFewMatches);
+  EXPECT_EQ(selection.num_static, 0);
+  EXPECT_EQ(Make()->Select({}, pair.camera, 1).refusal, Refusal::kTooFewMatches);
+}
+
+TEST_P(EverySelector, RefusesWhatIsNotFiniteOrOutside) {
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -40.0, 5000.0}) {
+    SyntheticPair pair = MakeSyntheticPair({}, 4);
+    pair.matches[100].uv1_px.x() = bad;
+    const StaticSelection selection = Make()->Select(pair.matches, pair.camera, 1);
+    EXPECT_EQ(selection.refusal, Refusal::kBadInput) << bad;
+    EXPECT_NE(selection.explanation.find("100"), std::string::npos);
+    EXPECT_EQ(selection.F.norm(), 0.0);
+  }
+}
+
+TEST_P(EverySelector, RefusesIdenticalFrames) {
+  SyntheticPair pair = MakeSyntheticPair({}, 5);
+  for (Match& match : pair.matches) match.uv1_px = match.uv0_px;
+  EXPECT_EQ(Make()->Select(pair.matches, pair.camera, 1).refusal, Refusal::kNoMotion);
+}
+
+TEST_P(EverySelector, NeverThrowsForNoise) {
+  SyntheticPairOptions options;
+  options.num_static = 0;
+  options.num_mismatches = 300;
+  const SyntheticPair pair = MakeSyntheticPair(options, 6);
+  EXPECT_NO_THROW(Make()->Select(pair.matches, pair.camera, 1));
+  std::vector<Match> same(50, pair.matches[0]);
+  EXPECT_NO_THROW(Make()->Select(same, pair.camera, 1));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EverySelector,
+                         testing::Values(std::pair{"dlrsac", ModelKind::kEssential},
+                                         std::pair{"dlrsac-paper", ModelKind::kFundamental},
+                                         std::pair{"ransac", ModelKind::kFundamental},
+                                         std::pair{"ransac", ModelKind::kEssential},
+                                         std::pair{"arsac", ModelKind::kFundamental},
+                                         std::pair{"arsac", ModelKind::kEssential}));
+
+TEST(Dlrsac, PrefersTheWideMotionToTheOneWithMostMatches) {
+  SyntheticPairOptions options;
+  options.num_static = 260;
+  options.num_moving = 500;  // two thirds of the matches, on a third of the picture
+  int ransac_fooled = 0;
+  for (const uint64_t seed : {1, 2, 3, 4, 5}) {
+    const SyntheticPair pair = MakeSyntheticPair(options, seed);
+    const StaticSelection dlrsac = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, seed);
+    ASSERT_TRUE(dlrsac.IsUsable()) << dlrsac.explanation;
+    EXPECT_GT(ScoreOf(pair, dlrsac).precision, 0.95) << seed;
+    const StaticSelection ransac = RansacSelector(RansacSelectorOptions()).Select(pair.matches, pair.camera, seed);
+    ransac_fooled += ScoreOf(pair, ransac).precision < 0.5 ? 1 : 0;
+  }
+  EXPECT_GE(ransac_fooled, 4) << "the scene does not tell the methods apart";
+}
+
+TEST(Dlrsac, FindsTheMotion) {
+  const SyntheticPair pair = MakeSyntheticPair({}, 8);
+  const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 8);
+  ASSERT_TRUE(selection.IsUsable());
+  double nearest = 1e9;
+  for (const Rigid3d& pose : DecomposeEssential(selection.E)) {
+    nearest = std::min(nearest, AngleBetween(pose.rotation, pair.T_1_0.rotation) +
+                                    (pose.translation.normalized() - pair.T_1_0.translation.normalized()).norm());
+  }
+  EXPECT_LT(nearest, 0.05);
+}
+
+TEST(Dlrsac, ReportsCellsAndCoupleMatrix) {
+  SyntheticPairOptions options;
+  options.num_static = 800;
+  const SyntheticPair pair = MakeSyntheticPair(options, 9);
+  const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 9);
+  ASSERT_EQ(selection.cells.size(), 12U);
+  EXPECT_EQ(selection.columns, 4);
+  EXPECT_EQ(selection.rows, 3);
+  ASSERT_EQ(selection.couple.rows(), 12);
+  int matches = 0;
+  for (size_t k = 0; k < 12; ++k) {
+    matches += selection.cells[k].num_matches;
+    const auto i = static_cast<Eigen::Index>(k);
+    if (selection.cells[k].num_inliers > 0 && selection.cells[k].state != CellState::kPureRotation) {
+      EXPECT_DOUBLE_EQ(selection.couple(i, i), 1.0) << "a cell couples with itself";
+    }
+  }
+  EXPECT_EQ(matches, 800);
+  ASSERT_GE(selection.leading_cell, 0);
+  EXPECT_TRUE(selection.cells[static_cast<size_t>(selection.leading_cell)].chosen);
+}
+
+TEST(Dlrsac, RefusesMatchesInOneCell) {
+  SyntheticPair pair = MakeSyntheticPair({}, 10);
+  std::erase_if(pair.matches, [](const Match& m) { return m.uv0_px.x() > 155 || m.uv0_px.y() > 155; });
+  ASSERT_GE(pair.matches.size(), 16U);
+  const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1);
+  EXPECT_EQ(selection.refusal, Refusal::kTooFewCells);
+  EXPECT_FALSE(selection.explanation.empty());
+}
+
+TEST(Dlrsac, RefusesACompactSet) {
+  DlrsacOptions options;
+  options.min_distribution_share = 0.5;
+  const SyntheticPair pair = MakeSyntheticPair({}, 11);
+  EXPECT_EQ(Dlrsac(options).Select(pair.matches, pair.camera, 1).refusal, Refusal::kDistributionTooSmall);
+}
+
+TEST(Dlrsac, TellsDegenerateCells) {
+  const auto states = [](const SyntheticPair& pair, CellState state) {
+    const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1);
+    int found = 0, fitted = 0;
+    for (const CellReport& cell : selection.cells) {
+      fitted += cell.num_inliers > 0 ? 1 : 0;
+      found += cell.state == state ? 1 : 0;
+    }
+    return found / static_cast<double>(std::max(1, fitted));
+  };
+  SyntheticPairOptions options;
+  options.num_static = 800;
+  options.noise_px = 0.3;
+  EXPECT_GT(states(MakeSyntheticPair(options, 12), CellState::kGeneral), 0.7);
+  options.flat = true;
+  EXPECT_GT(states(MakeSyntheticPair(options, 12), CellState::kPlane), 0.7);
+  options.flat = false;
+  options.translation.setZero();
+  EXPECT_GT(states(MakeSyntheticPair(options, 12), CellState::kPureRotation), 0.7);
+}
+
+TEST(Dlrsac, CollinearCellsDoNotVote) {
+  SyntheticPairOptions options;
+  options.num_static = 2000;
+  SyntheticPair pair = MakeSyntheticPair(options, 13);
+  std::erase_if(pair.matches, [](const Match& m) {
+    return std::abs(m.uv0_px.y() - 80) > 2 && std::abs(m.uv0_px.y() - 240) > 2 && std::abs(m.uv0_px.y() - 400) > 2;
+  });
+  DlrsacOptions dlrsac;
+  dlrsac.min_cell_matches = 5;
+  const StaticSelection selection = Dlrsac(dlrsac).Select(pair.matches, pair.camera, 1);
+  for (const CellReport& cell : selection.cells) {
+    if (cell.num_inliers > 0) {
+      EXPECT_EQ(cell.state, CellState::kCollinear);
+    }
+  }
+  EXPECT_EQ(selection.leading_cell, -1);
+  EXPECT_FALSE(selection.IsUsable());
+}
+
+TEST(Dlrsac, DropsWhatMovesAlongItsEpipolarLines) {
+  SyntheticPairOptions options;
+  options.num_moving = 150;
+  options.rotation.setZero();
+  options.translation = {0.08, 0, 0};
+  options.mover_motion = {0.4, 0, 0};  // parallel to the camera's way: the epipolar geometry cannot tell
+  const SyntheticPair pair = MakeSyntheticPair(options, 14);
+  DlrsacOptions without;
+  without.layers.enabled = false;
+  EXPECT_LT(ScoreOf(pair, Dlrsac(without).Select(pair.matches, pair.camera, 1)).precision, 0.85);
+  EXPECT_GT(ScoreOf(pair, Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1)).precision, 0.98);
+}
+
+TEST(Dlrsac, StopsEarlyByEquationFour) {
+  const SyntheticPair pair = MakeSyntheticPair({}, 15);
+  DlrsacOptions options;
+  options.sampling.stop_confidence = 0;
+  EXPECT_GT(Dlrsac(options).Select(pair.matches, pair.camera, 1).iterations, 1900);
+  options.sampling.stop_confidence = 0.99;
+  EXPECT_LT(Dlrsac(options).Select(pair.matches, pair.camera, 1).iterations, 1000);
+}
+
+TEST(MakeSelector, RefusesUnknownNames) {
+  EXPECT_THROW(MakeSelector("magsac", ModelKind::kEssential), InputError);
+}
+
+TEST(Agree, KeepsWhatAllPairsCallStatic) {
+  PairView a, b;
+  for (uint32_t i = 0; i < 200; ++i) {
+    Match match;
+    match.index0 = i;
+    match.uv0_px = {3.0 * i, (i % 7) * 60.0};
+    a.matches.push_back(match);
+    b.matches.push_back(match);
+    a.selection.is_static.push_back(i < 190);
+    b.selection.is_static.push_back(i >= 5);
+  }
+  const PairView* pairs[] = {&a, &b};
+  const Agreement agreement = Agree(pairs, {});
+  ASSERT_TRUE(agreement.IsUsable()) << agreement.explanation;
+  EXPECT_EQ(agreement.num_static, 185);
+  EXPECT_DOUBLE_EQ(agreement.agreement, 185.0 / 200.0);
+  EXPECT_EQ(agreement.is_static[2], 0);
+  EXPECT_EQ(agreement.is_static[195], 0);
+  for (size_t i = 0; i < 60; ++i) b.selection.is_static[i] = 0;
+  EXPECT_EQ(Agree(pairs, {}).refusal, AgreementRefusal::kDisagreement);
+}
+
+}  // namespace
+}  // namespace dmslam
