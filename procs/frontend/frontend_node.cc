@@ -89,15 +89,23 @@ void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   if (end && camera_info_ && !IsForeign(end->session)) end_ = std::move(end);
 }
 
-bool FrontendNode::TakeMapRecords() {
-  bool any = false;
+/// In real time records are applied as they come. In lock-step they are applied up to a settled record, so that which
+/// frame sees what does not depend on how fast the mapper was with what nobody waits for (evidence).
+void FrontendNode::TakeMapRecords() {
   while (std::optional<Record> record = map_reader_->Take()) {
-    if (record->begins_anew()) core_->ForgetMap();
-    if (const auto delta = Read<MapDelta>(*record->bytes)) core_->ApplyMapDelta(*delta);
+    if (record->begins_anew()) {
+      held_deltas_.clear();
+      core_->ForgetMap();
+    }
+    if (auto delta = Read<MapDelta>(*record->bytes)) held_deltas_.push_back(std::move(*delta));
     map_reader_->AcceptTaken();
-    any = true;
   }
-  return any;
+  size_t ready = held_deltas_.size();
+  while (lockstep_ && ready > 0 && held_deltas_[ready - 1].event != MapEvent::kSettled) --ready;
+  for (; ready > 0; --ready) {
+    core_->ApplyMapDelta(held_deltas_.front());
+    held_deltas_.pop_front();
+  }
 }
 
 int FrontendNode::UnacceptedKeyframes() {

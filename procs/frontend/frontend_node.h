@@ -38,7 +38,7 @@ class FrontendNode : public StreamNode {
 
   void OnFrame(std::span<const uint8_t> bytes);
   void OnEndOfSequence(std::span<const uint8_t> bytes);
-  bool TakeMapRecords();
+  void TakeMapRecords();
   bool HoldsBack() const;
   bool ProcessWaiting();
   bool DecodeImage(const Frame& frame);
@@ -54,6 +54,7 @@ class FrontendNode : public StreamNode {
   Extras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
+  std::deque<MapDelta> held_deltas_;  ///< lock-step: not yet followed by a settled record
   std::optional<Waiting> waiting_;
   std::optional<EndOfSequence> end_;
   bool lockstep_ = false;

@@ -150,8 +150,11 @@ bool PlayerNode::MakeFrame(size_t index) {
       Encode(image, index);
     }
   } catch (const InputError& error) {
-    if (unreadable_++ == 0) spdlog::warn("{} (left out; further ones are only counted)", error.what());
-    if (unreadable_ == order_.size()) problem_ = std::string(error.what()) + "; no frame could be read";
+    if (unreadable_++ == 0) {
+      first_unreadable_ = error.what();
+      spdlog::warn("{} (left out; further ones are only counted)", error.what());
+    }
+    if (unreadable_ == order_.size()) problem_ = first_unreadable_ + "; no frame could be read";
     return false;
   }
   return true;

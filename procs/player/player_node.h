@@ -86,7 +86,7 @@ class PlayerNode : public Node {
   int64_t published_ = 0, repeats_ = 0;
   double late_ms_ = 0;
   std::optional<int> exit_code_;
-  std::string problem_;
+  std::string problem_, first_unreadable_;
 };
 
 }  // namespace dmslam
