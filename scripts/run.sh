@@ -163,7 +163,7 @@ report() { # name, status
   local message
   message=$(why "$1")
   if [ "$1" = collector ] && [ -t 3 ]; then return; fi  # it has spoken on the terminal itself
-  if [ "$2" -gt 128 ]; then message="$1 was ended by signal $(($2 - 128)) (${message:-its log is $out/log/$1.log})"; fi
+  if [ "$2" -gt 128 ]; then message="$1 was ended by signal $(($2 - 128)); its log is $out/log/$1.log"; fi
   echo "run.sh: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&3
 }
 
