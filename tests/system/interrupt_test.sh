@@ -8,7 +8,8 @@ arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --spee
 begin() {
   local i
   set -m # a process group of its own, with the interrupt signal not ignored
-  run "${arguments[@]}" --out "$work/$1" >"$work/$1.said" 2>&1 </dev/null &
+  # Not the function `run`: its subshell, not the runner, would get the signals.
+  "$root/scripts/run.sh" --build-dir "$build" "${arguments[@]}" --out "$work/$1" >"$work/$1.said" 2>&1 </dev/null &
   runner=$!
   set +m
   for ((i = 0; i < 400; ++i)); do
