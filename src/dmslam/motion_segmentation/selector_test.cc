@@ -38,11 +38,11 @@ TEST_P(EverySelector, FindsTheStaticOfARoomWithASmallMover) {
   options.num_mismatches = 40;
   const SyntheticPair pair = MakeSyntheticPair(options, 1);
   const StaticSelection selection = Make()->Select(pair.matches, pair.camera, 7);
-  if (std::string(GetParam().first) == "dlrsac-paper" && !selection.IsUsable()) return;  // it may refuse, not mislead
   ASSERT_TRUE(selection.IsUsable()) << selection.explanation;
   const Score score = ScoreOf(pair, selection);
-  EXPECT_GT(score.precision, 0.9);
-  EXPECT_GT(score.recall, std::string(GetParam().first) == "dlrsac-paper" ? 0.3 : 0.85);
+  const bool paper = std::string(GetParam().first) == "dlrsac-paper";  // as written, it takes whole cells
+  EXPECT_GT(score.precision, paper ? 0.85 : 0.9);
+  EXPECT_GT(score.recall, paper ? 0.3 : 0.85);
   EXPECT_EQ(selection.is_static.size(), pair.matches.size());
   EXPECT_NEAR(selection.F.norm(), 1.0, 1e-9);
 }
