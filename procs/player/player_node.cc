@@ -59,7 +59,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
     throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) + " leaves no frame of " +
                      std::to_string(source_->size()));
   }
-  if (const auto path = source_->GroundTruthPath()) ground_truth_ = ReadTrajectory(*path);
+  ground_truth_ = source_->GroundTruth();
   context_.bus->Subscribe(channels::kFrameDone);
   context_.bus->SetHandler(
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
@@ -86,7 +86,7 @@ void PlayerNode::PublishCameraInfo() {
   info.camera = options_.camera;
   info.sequence = SequenceName(options_.sequence);
   info.num_frames = static_cast<int64_t>(order_.size());
-  info.first_frame = static_cast<uint32_t>(order_.front());
+  info.first_frame = source_->FrameIndex(order_.front());
   info.mode = options_.mode;
   info.speed = options_.speed;
   Publish(info);
@@ -113,9 +113,11 @@ bool PlayerNode::IsBlack(size_t index) const {
 
 void PlayerNode::Encode(const EncodedImage& image, size_t index) {
   const bool compressed = image.encoding == ImageEncoding::kJpeg || image.encoding == ImageEncoding::kPng;
-  if (compressed && !options_.reencode) {
+  if ((compressed || source_->AsPublished()) && !options_.reencode) {
     frame_.encoding = ToFrameEncoding(image.encoding);
     frame_.data = image.bytes;
+    frame_.width_px = image.width;
+    frame_.height_px = image.height;
     return;
   }
   const GrayImage gray = DecodeGray(image, source_->Name(index));
@@ -136,7 +138,7 @@ void PlayerNode::Encode(const EncodedImage& image, size_t index) {
 bool PlayerNode::MakeFrame(size_t index) {
   frame_ = Frame();
   frame_.session = options_.session;
-  frame_.frame_index = static_cast<uint32_t>(index);
+  frame_.frame_index = source_->FrameIndex(index);
   frame_.stamp_ns = source_->StampNs(index);
   frame_.capture_us = context_.wall_us();
   try {
@@ -182,7 +184,7 @@ void PlayerNode::PublishGroundTruth(size_t index) {
   const auto at = std::lower_bound(ground_truth_.begin(), ground_truth_.end(), stamp_ns,
                                    [](const StampedPose& pose, int64_t stamp) { return pose.stamp_ns < stamp; });
   if (at == ground_truth_.end() || at->stamp_ns - stamp_ns > 10'000'000) return;
-  Publish(GroundTruthPose{options_.session, static_cast<uint32_t>(index), at->stamp_ns, at->T_world_cam});
+  Publish(GroundTruthPose{options_.session, source_->FrameIndex(index), at->stamp_ns, at->T_world_cam});
 }
 
 void PlayerNode::PublishEnd() {

@@ -32,6 +32,7 @@ const std::map<std::string, Names>& AllowedRooms() {
     a["synthetic"] = a["evaluation"] = {"util", "geometry", "camera", "dataset"};
     a["messaging"] = {"util"};
     a["wire"] = {"util", "geometry", "camera", "features", "map", "messaging"};
+    a["recording"] = {"util", "geometry", "camera", "features", "map", "dataset", "messaging", "wire"};
     return a;
   }();
   return allowed;

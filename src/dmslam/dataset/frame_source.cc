@@ -33,6 +33,11 @@ bool ContainsWord(const std::string& text, const std::string& word) {
 
 }  // namespace
 
+std::vector<StampedPose> FrameSource::GroundTruth() const {
+  const std::optional<std::string> path = GroundTruthPath();
+  return path ? ReadTrajectory(*path) : std::vector<StampedPose>();
+}
+
 std::unique_ptr<FrameSource> OpenFrameSource(const std::string& path, const FrameSourceOptions& options) {
   if (fs::is_regular_file(path)) return OpenVideo(path, options.fps);
   if (!fs::is_directory(path))

@@ -5,9 +5,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dmslam/camera/camera.h"
 #include "dmslam/dataset/image.h"
+#include "dmslam/dataset/trajectory.h"
 
 namespace dmslam {
 
@@ -26,6 +28,12 @@ class FrameSource {
   virtual size_t missing() const { return 0; }
   /// A trajectory in TUM format with the true poses, where there is one.
   virtual std::optional<std::string> GroundTruthPath() const { return std::nullopt; }
+  /// The true poses, where they are known: by default what stands at GroundTruthPath.
+  virtual std::vector<StampedPose> GroundTruth() const;
+  /// The number under which a frame is published: it counts the frames of the original recording.
+  virtual uint32_t FrameIndex(size_t index) const { return static_cast<uint32_t>(index); }
+  /// Whether Read gives what was published once: raw frames stay raw.
+  virtual bool AsPublished() const { return false; }
 };
 
 struct FrameSourceOptions {

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dmslam/messaging/event_log.h"
+#include "dmslam/messaging/types.h"
+#include "dmslam/wire/player_messages.h"
+
+namespace dmslam {
+
+/// A message of a log: where it stands, or its bytes where it was put together from parts.
+struct RecordedMessage {
+  int64_t utime_us = 0;  ///< wall time at which the logger received (the last part of) it
+  int64_t offset = -1;   ///< in the log; -1: see `bytes`
+  std::string channel;   ///< without prefix
+  SharedBytes bytes;     ///< null unless it travelled in parts
+  RecordHeader header;   ///< of a record; zero for other messages
+};
+
+/// What a log holds of one writer's term of office.
+struct RecordedTerm {
+  struct Snapshot {
+    std::map<int64_t, RecordedMessage> pieces;  ///< by number, from 1
+    int64_t cut = 0;                            ///< followed by the record after this one
+    int64_t last = 0;                           ///< number of the last piece; 0: it was not recorded
+    bool whole() const { return last > 0 && pieces.size() == static_cast<size_t>(last); }
+  };
+  std::map<int64_t, RecordedMessage> records;  ///< by seq
+  std::map<int64_t, Snapshot> snapshots;       ///< by number
+  bool fresh = false;                          ///< continues nothing
+  Version parent;                              ///< what it continues
+};
+
+/// A stream as recorded: its terms of office in their order.
+using RecordedStream = std::map<Term, RecordedTerm>;
+
+/// What a log holds of one session.
+struct RecordedSession {
+  uint32_t id = 0;
+  std::optional<CameraInfo> camera_info;            ///< the first one
+  std::map<uint32_t, RecordedMessage> frames;       ///< by index; the first of those that were repeated
+  std::map<uint32_t, int64_t> stamps_ns;            ///< of the frames
+  std::map<int64_t, GroundTruthPose> ground_truth;  ///< by stamp
+  std::optional<EndOfSequence> end;
+  std::map<StreamId, RecordedStream> streams;
+
+  const RecordedStream& Stream(StreamId id) const;
+};
+
+/// Reads a log of lcm-logger once and knows where everything in it stands. Records may have travelled whole
+/// or in parts. Bad messages are left out and counted.
+class LogIndex {
+ public:
+  /// Throws InputError for what is no log, or a log without any message of ours.
+  explicit LogIndex(const std::string& path);
+
+  /// The session `id`; 0: the only one there is. Throws InputError that names the sessions there are.
+  const RecordedSession& Session(uint32_t id = 0) const;
+  const std::map<uint32_t, RecordedSession>& sessions() const { return sessions_; }
+  /// The bytes of a message.
+  Bytes Read(const RecordedMessage& message) const;
+
+  const std::string& path() const { return reader_.path(); }
+  int64_t begin_us() const { return begin_us_; }  ///< wall time of the first message
+  int64_t end_us() const { return end_us_; }
+  int64_t num_messages() const { return num_messages_; }
+  int64_t bad_messages() const { return bad_messages_; }
+  /// What was skipped, for people, one line; empty when nothing was.
+  std::string DescribeDamage() const;
+
+ private:
+  struct Parts;
+  void Add(const LogEvent& event, Parts* parts);
+  void AddFrame(const LogEvent& event, RecordedMessage message);
+  void AddRecord(RecordedMessage message, std::span<const uint8_t> bytes);
+  void AddPart(const LogEvent& event, RecordedMessage message, Parts* parts);
+  template <typename Message>
+  std::optional<Message> Decode(std::span<const uint8_t> bytes);
+
+  mutable EventLogReader reader_;
+  std::map<uint32_t, RecordedSession> sessions_;
+  int64_t begin_us_ = 0, end_us_ = 0;
+  int64_t num_messages_ = 0, bad_messages_ = 0;
+};
+
+/// One step of a stream that is gone through again.
+struct ReplayStep {
+  const RecordedMessage* message = nullptr;
+  bool begins_anew = false;  ///< what was held before is void
+};
+
+struct Replay {
+  std::vector<ReplayStep> steps;
+  int64_t missing = 0;  ///< records that existed, are not in the log, and are not made up for by a snapshot
+};
+
+/// The records of a stream in their order, through terms that continue one another, up to a wall time. Where
+/// records are missing it begins at a snapshot behind them, if a whole one was recorded.
+Replay PlanReplay(const RecordedStream& stream, int64_t until_us = INT64_MAX);
+
+}  // namespace dmslam

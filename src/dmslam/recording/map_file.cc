@@ -1,0 +1,153 @@
+#include "dmslam/recording/map_file.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "dmslam/messaging/codec.h"
+#include "dmslam/util/check.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+constexpr size_t kPieceBytes = 56 * 1024;
+
+/// What the frontend said of itself, or where that was not recorded what the player said of its camera.
+std::optional<SessionStart> FindSessionStart(const LogIndex& log, const RecordedSession& session) {
+  for (const auto& [term, recorded] : session.Stream(StreamId::kFrontend)) {
+    for (const auto& [seq, message] : recorded.records) {
+      if (message.channel != channels::kSession) continue;
+      if (auto start = wire::Decode<SessionStart>(log.Read(message))) return start;
+    }
+  }
+  if (!session.camera_info) return std::nullopt;
+  SessionStart start;
+  start.session = session.id;
+  start.camera = session.camera_info->camera;
+  start.sequence = session.camera_info->sequence;
+  start.mode = session.camera_info->mode;
+  return start;
+}
+
+template <typename Message>
+void WriteRecord(EventLogWriter* log, int64_t utime_us, RecordHeader header, const Message& message) {
+  const char* channel = wire::Info<Message>().channel;
+  Bytes bytes = wire::Encode(message);
+  Seal(header, channel, bytes);
+  log->Write(utime_us, channel, bytes);
+}
+
+RecordHeader HeaderOf(uint32_t session, StreamId stream, int64_t seq) {
+  RecordHeader header{};
+  header.session = session;
+  header.stream = static_cast<int32_t>(stream);
+  header.flags = RecordHeader::FLAG_FRESH;
+  header.epoch = 1;
+  header.writer = 1;
+  header.seq = seq;
+  return header;
+}
+
+bool SameLens(const Camera& a, const Camera& b) {
+  return a.width_px == b.width_px && a.height_px == b.height_px && a.fx_px == b.fx_px && a.fy_px == b.fy_px &&
+         a.cx_px == b.cx_px && a.cy_px == b.cy_px && a.k1 == b.k1 && a.k2 == b.k2 && a.p1 == b.p1 &&
+         a.p2 == b.p2 && a.k3 == b.k3;
+}
+
+std::map<MapId, size_t> KeyframesOfMaps(const Map& map) {
+  std::map<MapId, size_t> sizes;
+  for (const auto& [id, keyframe] : map.keyframes()) ++sizes[keyframe.map_id];
+  return sizes;
+}
+
+}  // namespace
+
+RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us) {
+  const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
+  const std::optional<SessionStart> start = FindSessionStart(log, session);
+  if (replay.steps.empty()) {
+    throw InputError(log.path() + ": holds no map record of session " + std::to_string(session.id) +
+                     (until_us == INT64_MAX ? "; was the mapper recorded too?" : " up to that time"));
+  }
+  if (!start) throw InputError(log.path() + ": does not say which camera the map was made with");
+  RebuiltMap rebuilt{Map(start->camera, start->pyramid), *start};
+  rebuilt.missing = replay.missing;
+  for (const ReplayStep& step : replay.steps) {
+    if (step.begins_anew) rebuilt.map = Map(start->camera, start->pyramid);
+    const std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
+    if (!delta) {
+      ++rebuilt.missing;
+      continue;
+    }
+    rebuilt.map.Apply(*delta);
+    rebuilt.ended = delta->event == MapEvent::kEnded;
+    ++rebuilt.records;
+  }
+  rebuilt.skipped = rebuilt.map.skipped_references();
+  return rebuilt;
+}
+
+void SaveMap(const std::string& path, const Map& map, const SessionStart& session) {
+  if (map.keyframes().empty()) throw InputError(path + ": is not written: the map is empty");
+  const Keyframe& newest = map.keyframes().rbegin()->second;
+  const int64_t utime_us = newest.stamp_ns / 1000;
+  const std::string partial = path + ".part";
+  EventLogWriter log(partial);
+  WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), session);
+  int64_t seq = 0;
+  for (const MapDelta& delta : map.Snapshot(newest.id, kPieceBytes)) {
+    WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kMap, ++seq), delta);
+  }
+  log.Close();
+  if (std::rename(partial.c_str(), path.c_str()) != 0)
+    throw InputError(path + ": cannot be written; check the path");
+}
+
+RebuiltMap LoadMap(const std::string& path) {
+  const LogIndex log(path);
+  RebuiltMap map = RebuildMap(log, log.Session());
+  if (map.map.keyframes().empty()) throw InputError(path + ": holds a map without keyframes");
+  return map;
+}
+
+void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid) {
+  if (!SameLens(map.map.camera(), camera)) {
+    throw InputError(path +
+                     ": was made with another camera than the one that plays; give the same camera file");
+  }
+  const Pyramid& its = map.map.pyramid();
+  if (its.levels != pyramid.levels || its.scale_factor != pyramid.scale_factor) {
+    throw InputError(path + ": was made with features.levels=" + std::to_string(its.levels) +
+                     " and features.scale_factor=" + std::to_string(its.scale_factor) + "; set the same");
+  }
+}
+
+uint32_t NewestSession(const Map& map) {
+  uint32_t newest = 0;
+  for (const auto& [id, keyframe] : map.keyframes()) newest = std::max(newest, id.session());
+  for (const auto& [id, tombstone] : map.keyframe_tombstones()) newest = std::max(newest, id.session());
+  return newest;
+}
+
+uint16_t NewestOrdinal(const Map& map) {
+  uint16_t newest = 0;
+  for (const LandmarkId id : map.LandmarkIdsSorted()) newest = std::max(newest, id.epoch_ordinal());
+  for (const auto& [id, by] : map.landmark_tombstones()) newest = std::max(newest, id.epoch_ordinal());
+  return newest;
+}
+
+MapId NewestMap(const Map& map) {
+  const std::map<MapId, size_t> sizes = KeyframesOfMaps(map);
+  return sizes.empty() ? 0 : sizes.rbegin()->first;
+}
+
+MapId LargestMap(const Map& map) {
+  MapId largest = 0;
+  size_t most = 0;
+  for (const auto& [id, size] : KeyframesOfMaps(map)) {
+    if (size > most) largest = id, most = size;
+  }
+  return largest;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "dmslam/map/map.h"
+#include "dmslam/recording/log_index.h"
+#include "dmslam/wire/frontend_messages.h"
+
+namespace dmslam {
+
+/// A map with what it rests on.
+struct RebuiltMap {
+  Map map;
+  SessionStart session;  ///< camera, pyramid, vocabulary ... of the run that made it
+  int64_t records = 0;   ///< that were applied
+  int64_t missing = 0;   ///< records of the map that the log lacks: the map is as good as it can be
+  uint64_t skipped = 0;  ///< what records said of keyframes and landmarks that are not there, because of that
+  bool ended = false;    ///< the mapper had done all it wanted to do
+};
+
+/// Builds the map of a session from its recorded map records, up to `until_us` of wall time. With all records
+/// in the log it is the mapper's own map at that time. Throws InputError when the log holds no map of the
+/// session.
+RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us = INT64_MAX);
+
+/// Writes a map as a log: its session, then the whole map as records. The same map gives the same bytes.
+/// Throws InputError when that cannot be written.
+void SaveMap(const std::string& path, const Map& map, const SessionStart& session);
+
+/// Reads what SaveMap has written, or rebuilds the map of any other log of a run. Throws InputError.
+RebuiltMap LoadMap(const std::string& path);
+
+/// Throws InputError unless `map` can be continued with this camera and pyramid.
+void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid);
+
+/// The highest session and the highest epoch's ordinal that the map's ids name: new ids must lie above.
+uint32_t NewestSession(const Map& map);
+uint16_t NewestOrdinal(const Map& map);
+/// The highest number of a map, and the one that holds most keyframes (0: none).
+MapId NewestMap(const Map& map);
+MapId LargestMap(const Map& map);
+
+}  // namespace dmslam

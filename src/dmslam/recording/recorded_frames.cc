@@ -1,0 +1,64 @@
+#include "dmslam/recording/recorded_frames.h"
+
+#include "dmslam/util/check.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+ImageEncoding ToImageEncoding(FrameEncoding encoding) {
+  switch (encoding) {
+    case FrameEncoding::kJpeg:
+      return ImageEncoding::kJpeg;
+    case FrameEncoding::kPng:
+      return ImageEncoding::kPng;
+    case FrameEncoding::kGray8:
+      return ImageEncoding::kGray8;
+    case FrameEncoding::kRgb8:
+      return ImageEncoding::kRgb8;
+    case FrameEncoding::kBgr8:
+      return ImageEncoding::kBgr8;
+  }
+  return ImageEncoding::kFile;
+}
+
+}  // namespace
+
+RecordedFrames::RecordedFrames(std::shared_ptr<const LogIndex> log, uint32_t session)
+    : log_(std::move(log)), session_(&log_->Session(session)) {
+  if (session_->frames.empty())
+    throw InputError(log_->path() + ": holds no frames; was the player recorded too?");
+  if (!session_->camera_info) {
+    throw InputError(log_->path() +
+                     ": does not say which camera took its frames; record from before the player starts");
+  }
+  int64_t newest_ns = INT64_MIN;  // stamps increase strictly, or it is no sequence
+  for (const auto& [index, message] : session_->frames) {
+    const int64_t stamp_ns = session_->stamps_ns.at(index);
+    if (stamp_ns <= newest_ns) continue;
+    newest_ns = stamp_ns;
+    frames_.emplace_back(index, &message);
+  }
+}
+
+std::string RecordedFrames::Name(size_t index) const {
+  return log_->path() + ", frame " + std::to_string(FrameIndex(index));
+}
+
+EncodedImage RecordedFrames::Read(size_t index) {
+  const std::optional<Frame> frame = wire::Decode<Frame>(log_->Read(*frames_.at(index).second));
+  if (!frame) throw InputError(Name(index) + ": cannot be decoded");
+  return {ToImageEncoding(frame->encoding), frame->width_px, frame->height_px, frame->data};
+}
+
+size_t RecordedFrames::missing() const {
+  return session_->end ? static_cast<size_t>(session_->end->frames_missing) : 0;
+}
+
+std::vector<StampedPose> RecordedFrames::GroundTruth() const {
+  std::vector<StampedPose> poses;
+  for (const auto& [stamp_ns, pose] : session_->ground_truth) poses.push_back({stamp_ns, pose.T_world_cam});
+  return poses;
+}
+
+}  // namespace dmslam
