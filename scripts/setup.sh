@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what a part of the project needs, from Debian's packages only: scripts/setup.sh core|test|tools|viewer...
+# Installs what a part of the project needs, from Debian's packages only: scripts/setup.sh core|test|tools|viewer|browser...
 set -euo pipefail
 core=(build-essential cmake ninja-build ccache pkg-config
   liblcm-dev liblcm-bin libglib2.0-dev
@@ -9,15 +9,17 @@ core=(build-essential cmake ninja-build ccache pkg-config
 test=(libgtest-dev libbenchmark-dev iproute2 nftables python3-minimal)
 tools=(default-jre default-jdk-headless liblcm-java libjchart2d-java xvfb)
 viewer=(libcpp-httplib-dev libjs-three libjs-chart.js)
-usage() { echo "Usage: scripts/setup.sh PART...   with PART one of: core test tools viewer"; }
+browser=(chromium python3-websocket)
+usage() { echo "Usage: scripts/setup.sh PART...   with PART one of: core test tools viewer browser (to test the viewer)"; }
 [ $# -gt 0 ] || { usage >&2; exit 2; }
 packages=()
 for part in "$@"; do
   case "$part" in
     core) packages+=("${core[@]}") ;;
-    test) packages+=("${core[@]}" "${test[@]}") ;;
+    test) packages+=("${core[@]}" "${test[@]}" "${viewer[@]}" "${browser[@]}") ;;
     tools) packages+=("${tools[@]}") ;;
-    viewer) packages+=("${viewer[@]}") ;;
+    browser) packages+=("${browser[@]}") ;;
+    viewer) packages+=("${core[@]}" "${viewer[@]}") ;;
     -h | --help) usage; exit 0 ;;
     *) echo "setup.sh: there is no part '$part'" >&2; usage >&2; exit 2 ;;
   esac

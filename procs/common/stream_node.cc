@@ -135,6 +135,7 @@ void StreamNode::OpenWriter() {
     options.roles.push_back({reader, options_.HasPeer(reader)});
     reader_names.push_back(UpperCase(reader));
   }
+  for (const std::string& watcher : plan_->watchers) reader_names.push_back(UpperCase(watcher));
   const Term term = election_->Win(context_.wall_us());
   endpoint_.Remove(election_.get());
   writer_ = std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots);

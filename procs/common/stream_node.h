@@ -65,6 +65,7 @@ class StreamNode : public Node {
     std::vector<std::string> readers;  ///< roles of the lossless readers
     Version parent;
     SnapshotSource* snapshots = nullptr;
+    std::vector<std::string> watchers = {"viewer"};  ///< roles whose wishes are heard, but who hold nothing back
   };
   void WantWriter(WriterPlan plan) { plan_ = std::move(plan); }
   WriterPlan& writer_plan() { return *plan_; }

@@ -1,0 +1,92 @@
+#include "viewer/event_hub.h"
+
+#include <algorithm>
+
+namespace dmslam {
+namespace {
+
+constexpr std::array<const char*, kNumEventKinds> kNames = {"status", "pose", "features", "map"};
+
+}  // namespace
+
+std::string EventHub::Listener::Next(std::chrono::milliseconds wait) {
+  std::unique_lock lock(mutex_);
+  const auto any = [this] {
+    return closed_ ||
+           std::any_of(waiting_.begin(), waiting_.end(), [](const auto& text) { return text != nullptr; });
+  };
+  if (!changed_.wait_for(lock, wait, any)) return ":\n\n";
+  if (closed_) return {};
+  std::string all;
+  for (auto& text : waiting_) {
+    if (text) all += *text;
+    text.reset();
+  }
+  return all;
+}
+
+int64_t EventHub::Listener::skipped() const {
+  const std::lock_guard lock(mutex_);
+  return skipped_;
+}
+
+void EventHub::Put(Listener* listener, size_t kind, const std::shared_ptr<const std::string>& text) {
+  {
+    const std::lock_guard lock(listener->mutex_);
+    if (listener->waiting_[kind]) ++listener->skipped_;
+    listener->waiting_[kind] = text;
+  }
+  listener->changed_.notify_one();
+}
+
+std::shared_ptr<EventHub::Listener> EventHub::Join() {
+  const std::lock_guard lock(mutex_);
+  if (closed_ || listeners_.size() >= kMostListeners) return nullptr;
+  auto listener = std::make_shared<Listener>();
+  for (size_t kind = 0; kind < kNumEventKinds; ++kind) listener->waiting_[kind] = newest_[kind];
+  listeners_.push_back(listener);
+  return listener;
+}
+
+void EventHub::Leave(const std::shared_ptr<Listener>& listener) {
+  const std::lock_guard lock(mutex_);
+  const auto it = std::find(listeners_.begin(), listeners_.end(), listener);
+  if (it == listeners_.end()) return;
+  skipped_by_former_ += listener->skipped();
+  listeners_.erase(it);
+}
+
+void EventHub::Send(EventKind kind, const std::string& json) {
+  const auto index = static_cast<size_t>(kind);
+  const auto text = std::make_shared<const std::string>("event: " + std::string(kNames[index]) +
+                                                        "\ndata: " + json + "\n\n");
+  const std::lock_guard lock(mutex_);
+  newest_[index] = text;
+  for (const auto& listener : listeners_) Put(listener.get(), index, text);
+}
+
+void EventHub::Close() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+  for (const auto& listener : listeners_) {
+    {
+      const std::lock_guard inner(listener->mutex_);
+      listener->closed_ = true;
+    }
+    listener->changed_.notify_one();
+  }
+}
+
+size_t EventHub::num_listeners() const {
+  const std::lock_guard lock(mutex_);
+  return listeners_.size();
+}
+
+int64_t EventHub::skipped() const {
+  const std::lock_guard lock(mutex_);
+  int64_t sum = skipped_by_former_;
+  for (const auto& listener : listeners_) sum += listener->skipped();
+  return sum;
+}
+
+}  // namespace dmslam

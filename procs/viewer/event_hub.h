@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace dmslam {
+
+/// Kinds of events that browsers are told of.
+enum class EventKind : uint8_t { kStatus = 0, kPose = 1, kFeatures = 2, kMap = 3 };
+inline constexpr size_t kNumEventKinds = 4;
+
+/// Hands events to any number of listeners, each of which may be slow: a listener holds at most one event of
+/// each kind, and a newer one takes the place of one that was not yet fetched. Who sends never waits.
+class EventHub {
+ public:
+  class Listener {
+   public:
+    /// What is new, in the format of server-sent events; a comment line when nothing came within `wait`;
+    /// empty when the hub is closed.
+    std::string Next(std::chrono::milliseconds wait);
+    /// Events that were replaced before they were fetched.
+    int64_t skipped() const;
+
+   private:
+    friend class EventHub;
+    mutable std::mutex mutex_;
+    std::condition_variable changed_;
+    std::array<std::shared_ptr<const std::string>, kNumEventKinds> waiting_;
+    int64_t skipped_ = 0;
+    bool closed_ = false;
+  };
+
+  /// A new listener, who first gets the newest event of each kind. None when closed or when there are
+  /// `kMostListeners`.
+  std::shared_ptr<Listener> Join();
+  void Leave(const std::shared_ptr<Listener>& listener);
+  /// `json` in one line.
+  void Send(EventKind kind, const std::string& json);
+  void Close();
+  size_t num_listeners() const;
+  int64_t skipped() const;  ///< by all listeners, those that have left too
+
+  static constexpr size_t kMostListeners = 64;
+
+ private:
+  static void Put(Listener* listener, size_t kind, const std::shared_ptr<const std::string>& text);
+
+  mutable std::mutex mutex_;
+  std::vector<std::shared_ptr<Listener>> listeners_;
+  std::array<std::shared_ptr<const std::string>, kNumEventKinds> newest_;
+  int64_t skipped_by_former_ = 0;
+  bool closed_ = false;
+};
+
+}  // namespace dmslam

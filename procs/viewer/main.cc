@@ -1,0 +1,53 @@
+#include <spdlog/spdlog.h>
+
+#include <optional>
+
+#include "common/process_main.h"
+#include "viewer/viewer_node.h"
+#include "viewer/web_server.h"
+
+namespace {
+
+/// The viewer with all it needs, in the order in which it must die.
+class ServedViewer : public dmslam::Node {
+ public:
+  ServedViewer(dmslam::NodeContext context, dmslam::NodeOptions options, const dmslam::ViewerOptions& viewer,
+               const dmslam::WebServerOptions& web)
+      : node_(std::move(context), std::move(options), viewer, &exchange_), server_(web, &exchange_) {
+    spdlog::info("to be seen at {}", server_.address());
+  }
+  void Advance() override { node_.Advance(); }
+  int64_t deadline_ns() const override { return node_.deadline_ns(); }
+  void Stop() override { node_.Stop(); }
+  std::optional<int> exit_code() const override { return node_.exit_code(); }
+  std::string problem() const override { return node_.problem(); }
+
+ private:
+  dmslam::Exchange exchange_;
+  dmslam::ViewerNode node_;
+  dmslam::WebServer server_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  dmslam::ProcessMain process("viewer",
+                              "Shows a running system in browsers; reads the bus and writes nothing to it.");
+  dmslam::ViewerOptions viewer;
+  dmslam::WebServerOptions web;
+  web.three_dir = DMSLAM_THREE_DIR;
+  web.chart_dir = DMSLAM_CHART_DIR;
+  std::string http = "127.0.0.1:8080";
+  CLI::App& app = process.app();
+  app.add_option("--http", http, "HOST:PORT to serve on; port 0: any that is free")->capture_default_str();
+  app.add_option("--ground-truth", viewer.ground_truth,
+                 "trajectory in TUM format; default: what the player says");
+  app.add_option("--web", web.web_dir, "folder of the page; default: the one that ships");
+  app.add_option("--three", web.three_dir, "folder of three.js")->capture_default_str();
+  app.add_option("--chart", web.chart_dir, "folder of Chart.js")->capture_default_str();
+  return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
+    dmslam::ParseHttpAddress(http, &web);
+    if (web.web_dir.empty()) web.web_dir = dmslam::FindDataFolder("procs/viewer/web");
+    return std::make_unique<ServedViewer>(std::move(context), std::move(options), viewer, web);
+  });
+}

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "dmslam/util/ids.h"
+#include "viewer/slot_table.h"
+
+namespace dmslam {
+
+using Float3 = std::array<float, 3>;
+
+/// A landmark as it is drawn.
+struct ScenePoint {
+  Float3 position{};         ///< [map units]
+  float belief = 0;          ///< log odds that it moves, in steps of 1/8
+  uint32_t first_frame = 0;  ///< index of the newest frame when it was made
+  bool operator==(const ScenePoint&) const = default;
+};
+
+/// A keyframe as it is drawn.
+struct SceneKeyframe {
+  enum class LinkKind : uint8_t { kCovisible = 0, kParent = 1, kLoop = 2 };
+  struct Link {
+    uint32_t slot = 0;  ///< of the other keyframe, an older one
+    LinkKind kind = LinkKind::kCovisible;
+    bool operator==(const Link&) const = default;
+  };
+  Float3 center{};                  ///< [map units]
+  std::array<float, 4> rotation{};  ///< unit quaternion x, y, z, w: world from camera
+  std::vector<Link> links;
+  bool operator==(const SceneKeyframe&) const = default;
+};
+
+/// Where the camera was at a frame.
+struct ScenePathPoint {
+  Float3 position{};   ///< [map units]
+  bool later = false;  ///< placed after the fact
+  bool operator==(const ScenePathPoint&) const = default;
+};
+
+/// What browsers draw of a map: tables that they mirror. A browser says which version it has and gets what
+/// changed.
+class Scene {
+ public:
+  Scene() : points_(true), keyframes_(false), path_(false), truth_(false) {}
+
+  /// A new version begins; what is set from here on belongs to it.
+  void Advance() { ++version_; }
+  /// Everything that was drawn is void.
+  void Clear();
+
+  void SetPoint(LandmarkId id, const ScenePoint& point) { points_.Set(id, point, version_); }
+  void RemovePoint(LandmarkId id) { points_.Remove(id, version_); }
+  void SetKeyframe(KeyframeId id, const SceneKeyframe& keyframe) { keyframes_.Set(id, keyframe, version_); }
+  void RemoveKeyframe(KeyframeId id) { keyframes_.Remove(id, version_); }
+  void SetPath(uint32_t frame_index, const ScenePathPoint& point) { path_.Set(frame_index, point, version_); }
+  void RemovePath(uint32_t frame_index) { path_.Remove(frame_index, version_); }
+  /// `position` in the ground truth's own world [m].
+  void SetTruth(uint32_t number, const Float3& position) { truth_.Set(number, position, version_); }
+
+  using Points = SlotTable<LandmarkId, ScenePoint>;
+  using Keyframes = SlotTable<KeyframeId, SceneKeyframe>;
+  const Points& points() const { return points_; }
+  const Keyframes& keyframes() const { return keyframes_; }
+  const SlotTable<uint32_t, ScenePathPoint>& path() const { return path_; }
+  uint64_t version() const { return version_; }
+  /// Changes when everything was void: what a browser holds of another generation counts for nothing.
+  uint32_t generation() const { return generation_; }
+
+  /// What changed after version `since` of `generation`, or everything where that is of another generation
+  /// (flag 1), in little-endian words of 32 bits:
+  ///   "DMSV", layout 1, generation, flags, version, points, keyframes, links, path, truth  (ten words), then
+  ///   points     slot[n], id low[n], id high[n], x y z [3n] float, belief[n] float (NaN: removed), first
+  ///   frame[n] keyframes  slot[m], frame[m] (all ones: removed), x y z [3m], quaternion x y z w [4m] world
+  ///   from camera,
+  ///              end of its links[m], then of all links: slot[l], kind[l]
+  ///   path       frame[p], x y z [3p] (NaN: removed), placed later[p]
+  ///   truth      number[t], x y z [3t]
+  std::vector<uint8_t> Encode(uint32_t generation, uint64_t since) const;
+
+ private:
+  Points points_;
+  Keyframes keyframes_;
+  SlotTable<uint32_t, ScenePathPoint> path_;
+  SlotTable<uint32_t, Float3> truth_;
+  uint64_t version_ = 1;
+  uint32_t generation_ = 1;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,260 @@
+#include "viewer/viewer_core.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dmslam/evaluation/alignment.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kMostLinks = 6;     // covisible neighbours drawn per keyframe
+constexpr int kMinShared = 30;    // landmarks that such a neighbour shares
+constexpr size_t kMinPairs = 10;  // of path and ground truth
+constexpr size_t kMostPairs = 3000;
+constexpr int64_t kTruthStepNs = 30'000'000;  // of a ground truth from a file
+constexpr int64_t kTruthNearNs = 20'000'000;
+
+Float3 ToFloats(const Eigen::Vector3d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+}
+
+std::array<float, 4> ToFloats(const Eigen::Quaterniond& q) {
+  return {static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()),
+          static_cast<float>(q.w())};
+}
+
+/// In steps, so that what nobody sees changes nothing.
+float Step(float belief) { return std::round(std::clamp(belief, -8.0F, 8.0F) * 8.0F) / 8.0F; }
+
+}  // namespace
+
+void ViewerCore::OnMapDelta(const MapDelta& delta) {
+  map_.Apply(delta);
+  if (!delta.dropped_maps.empty()) {
+    ++resets_;
+    MarkAll();
+  }
+  Mark(delta);
+  HandFramesOn(delta);
+  ChooseMap();
+  dirty_ = true;
+}
+
+void ViewerCore::Mark(const MapDelta& delta) {
+  for (const auto& state : delta.landmarks) dirty_points_.insert(state.id);
+  for (const auto& state : delta.landmark_positions) dirty_points_.insert(state.id);
+  for (const auto& state : delta.landmark_evidence) dirty_points_.insert(state.id);
+  for (const auto& tombstone : delta.landmark_tombstones) dirty_points_.insert(tombstone.id);
+  for (const auto& state : delta.keyframes) dirty_keyframes_.insert(state.id);
+  for (const auto& state : delta.keyframe_poses) dirty_keyframes_.insert(state.id);
+  for (const auto& state : delta.observations) dirty_keyframes_.insert(state.keyframe);
+  for (const auto& tombstone : delta.keyframe_tombstones) dirty_keyframes_.insert(tombstone.id);
+}
+
+/// Frames that were told from a keyframe that is culled hang on the one that stands for it; those of a
+/// keyframe that moved move with it.
+void ViewerCore::HandFramesOn(const MapDelta& delta) {
+  for (const KeyframeTombstone& tombstone : delta.keyframe_tombstones) {
+    const auto it = frames_of_.find(tombstone.id);
+    const std::optional<KeyframeId> heir = map_.ResolveKeyframe(tombstone.id);
+    if (it == frames_of_.end() || !heir) continue;
+    const std::vector<uint32_t> frames = std::move(it->second);
+    frames_of_.erase(it);
+    frames_of_[*heir].insert(frames_of_[*heir].end(), frames.begin(), frames.end());
+    dirty_frames_.insert(frames.begin(), frames.end());
+  }
+  const auto moved = [this](KeyframeId id) {
+    const auto it = frames_of_.find(id);
+    if (it != frames_of_.end()) dirty_frames_.insert(it->second.begin(), it->second.end());
+  };
+  for (const auto& state : delta.keyframes) moved(state.id);
+  for (const auto& state : delta.keyframe_poses) moved(state.id);
+}
+
+void ViewerCore::OnFramePose(const FramePose& pose) {
+  newest_ns_ = std::max(newest_ns_, pose.stamp_ns);
+  dirty_ = true;
+  if (!pose.HasPose()) return;
+  frames_[pose.frame_index] = pose;
+  frames_of_[map_.ResolveKeyframe(pose.reference).value_or(pose.reference)].push_back(pose.frame_index);
+  dirty_frames_.insert(pose.frame_index);
+  if (pose.state != TrackingState::kLocalizedLater && pose.map_id != shown_map_) ChooseMap();
+}
+
+void ViewerCore::ForgetMap() {
+  map_ = Map(map_.camera(), map_.pyramid());
+  MarkAll();
+}
+
+void ViewerCore::MarkAll() {
+  void_ = true;
+  dirty_ = true;
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    dirty_keyframes_.insert(id);
+    for (const LandmarkId landmark : keyframe.landmarks) {
+      if (landmark.valid()) dirty_points_.insert(landmark);
+    }
+  }
+  for (const auto& [index, frame] : frames_) dirty_frames_.insert(index);
+}
+
+/// The map the camera was in last, as long as it is there; else the one with most keyframes.
+void ViewerCore::ChooseMap() {
+  std::map<MapId, size_t> keyframes_in;
+  for (const auto& [id, keyframe] : map_.keyframes()) ++keyframes_in[keyframe.map_id];
+  MapId chosen = 0;
+  if (!frames_.empty()) chosen = frames_.rbegin()->second.map_id;
+  if (!keyframes_in.contains(chosen)) {
+    chosen = 0;
+    for (const auto& [map_id, count] : keyframes_in) {
+      if (chosen == 0 || count > keyframes_in.at(chosen)) chosen = map_id;
+    }
+  }
+  if (chosen == shown_map_ || chosen == 0) return;
+  shown_map_ = chosen;
+  MarkAll();
+}
+
+void ViewerCore::OnTruth(uint32_t frame_index, const Rigid3d& T_world_cam) {
+  if (!truth_file_.empty()) return;
+  truth_.try_emplace(frame_index, Truth{T_world_cam.translation});
+  dirty_ = true;
+}
+
+void ViewerCore::Draw(Scene* scene) {
+  if (void_) {
+    scene->Clear();
+    positions_.clear();
+    truth_file_next_ = 0;
+    for (auto& [index, truth] : truth_) truth.drawn = false;
+  }
+  scene->Advance();
+  for (const LandmarkId id : dirty_points_) DrawPoint(id, scene);
+  if (scene->points().size() > map_.num_landmarks()) SweepPoints(scene);
+  for (const KeyframeId id : dirty_keyframes_) DrawKeyframe(id, scene);
+  for (const uint32_t index : dirty_frames_) DrawFrame(index, scene);
+  DrawTruth(scene);
+  if (!dirty_points_.empty()) {
+    num_moving_ = 0;
+    for (const auto& slot : scene->points().slots())
+      num_moving_ += slot.alive && slot.value.belief > 0 ? 1 : 0;
+  }
+  dirty_points_.clear();
+  dirty_keyframes_.clear();
+  dirty_frames_.clear();
+  void_ = dirty_ = false;
+}
+
+void ViewerCore::DrawPoint(LandmarkId id, Scene* scene) {
+  const Landmark* landmark = map_.FindLandmark(id);
+  if (landmark == nullptr || landmark->map_id != shown_map_) {
+    scene->RemovePoint(id);
+    return;
+  }
+  scene->SetPoint(id, {ToFloats(landmark->p_world), Step(landmark->evidence.motion_belief),
+                       landmark->first_keyframe.frame_index()});
+}
+
+/// Takes out what is no longer in the map although nobody said so (landmarks that went with their last
+/// keyframe).
+void ViewerCore::SweepPoints(Scene* scene) {
+  std::vector<LandmarkId> gone;
+  for (const auto& [id, slot] : scene->points().index()) {
+    if (map_.FindLandmark(id) == nullptr) gone.push_back(id);
+  }
+  for (const LandmarkId id : gone) scene->RemovePoint(id);
+}
+
+void ViewerCore::DrawKeyframe(KeyframeId id, Scene* scene) {
+  const Keyframe* keyframe = map_.FindKeyframe(id);
+  if (keyframe == nullptr || keyframe->map_id != shown_map_) {
+    scene->RemoveKeyframe(id);
+    return;
+  }
+  SceneKeyframe drawn;
+  drawn.center = ToFloats(keyframe->T_cam_world.Center());
+  drawn.rotation = ToFloats(keyframe->T_cam_world.rotation.conjugate());
+  const auto link = [&](KeyframeId other, SceneKeyframe::LinkKind kind) {
+    const int64_t slot = scene->keyframes().Find(other);
+    const bool known =
+        std::any_of(drawn.links.begin(), drawn.links.end(), [slot](const auto& l) { return l.slot == slot; });
+    if (slot >= 0 && !known) drawn.links.push_back({static_cast<uint32_t>(slot), kind});
+  };
+  for (const KeyframeId other : keyframe->loop_edges) link(other, SceneKeyframe::LinkKind::kLoop);
+  link(keyframe->parent, SceneKeyframe::LinkKind::kParent);
+  for (const KeyframeId other : map_.BestCovisible(id, kMostLinks, kMinShared)) {
+    if (other < id) link(other, SceneKeyframe::LinkKind::kCovisible);
+  }
+  scene->SetKeyframe(id, drawn);
+}
+
+void ViewerCore::DrawFrame(uint32_t frame_index, Scene* scene) {
+  const FramePose& pose = frames_.at(frame_index);
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
+  if (!reference || reference->map_id != shown_map_) {
+    scene->RemovePath(frame_index);
+    positions_.erase(frame_index);
+    return;
+  }
+  const Eigen::Vector3d position = reference->Compose(pose.T_cam_reference, pose.reference_scale).Center();
+  positions_[frame_index] = position;
+  scene->SetPath(frame_index, {ToFloats(position), pose.state == TrackingState::kLocalizedLater});
+}
+
+void ViewerCore::DrawTruth(Scene* scene) {
+  int64_t last_ns = truth_file_next_ > 0 ? truth_file_[truth_file_next_ - 1].stamp_ns : INT64_MIN / 2;
+  for (; truth_file_next_ < truth_file_.size(); ++truth_file_next_) {
+    const StampedPose& pose = truth_file_[truth_file_next_];
+    if (pose.stamp_ns > newest_ns_) break;
+    if (frames_.empty() || pose.stamp_ns < frames_.begin()->second.stamp_ns - kTruthStepNs) continue;
+    if (pose.stamp_ns - last_ns < kTruthStepNs) continue;
+    last_ns = pose.stamp_ns;
+    scene->SetTruth(static_cast<uint32_t>(truth_file_next_), ToFloats(pose.T_world_cam.translation));
+  }
+  for (auto it = truth_.rbegin(); it != truth_.rend() && !it->second.drawn; ++it) {
+    it->second.drawn = true;
+    scene->SetTruth(it->first, ToFloats(it->second.position));
+  }
+}
+
+std::optional<TruthAlignment> ViewerCore::AlignTruth() const {
+  std::vector<Eigen::Vector3d> on_map, on_truth;
+  const size_t step = positions_.size() / kMostPairs + 1;
+  size_t number = 0;
+  for (const auto& [index, position] : positions_) {
+    if (number++ % step != 0) continue;
+    if (const auto it = truth_.find(index); it != truth_.end()) {
+      on_map.push_back(position);
+      on_truth.push_back(it->second.position);
+      continue;
+    }
+    const int64_t stamp_ns = frames_.at(index).stamp_ns;
+    const auto near =
+        std::lower_bound(truth_file_.begin(), truth_file_.end(), stamp_ns - kTruthNearNs,
+                         [](const StampedPose& pose, int64_t ns) { return pose.stamp_ns < ns; });
+    if (near == truth_file_.end() || near->stamp_ns > stamp_ns + kTruthNearNs) continue;
+    on_map.push_back(position);
+    on_truth.push_back(near->T_world_cam.translation);
+  }
+  if (on_map.size() < kMinPairs) return std::nullopt;
+  const std::optional<Sim3d> truth_from_map = AlignPoints(on_map, on_truth, Alignment::kSim3);
+  if (!truth_from_map || !(truth_from_map->scale > 0)) return std::nullopt;
+  TruthAlignment alignment{truth_from_map->Inverse(), 0, on_map.size()};
+  for (size_t i = 0; i < on_map.size(); ++i)
+    alignment.rmse_m += (*truth_from_map * on_map[i] - on_truth[i]).squaredNorm();
+  alignment.rmse_m = std::sqrt(alignment.rmse_m / static_cast<double>(on_map.size()));
+  return alignment;
+}
+
+Eigen::Vector3d ViewerCore::Up(const std::optional<TruthAlignment>& alignment) const {
+  if (alignment) return alignment->map_from_truth.rotation * Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    if (keyframe.map_id == shown_map_)
+      up += keyframe.T_cam_world.rotation.conjugate() * -Eigen::Vector3d::UnitY();
+  }
+  return up.norm() > 1e-6 ? up.normalized() : -Eigen::Vector3d::UnitY();
+}
+
+}  // namespace dmslam

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dmslam/dataset/trajectory.h"
+#include "dmslam/geometry/rigid3.h"
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+#include "viewer/scene.h"
+
+namespace dmslam {
+
+/// How the ground truth lies on the map.
+struct TruthAlignment {
+  Sim3d map_from_truth;
+  double rmse_m = 0;  ///< of the camera's positions, after alignment
+  size_t pairs = 0;
+};
+
+/// A replica of the map with the camera's path, and what of it is drawn. Of several maps the one is drawn in
+/// which the camera was last.
+class ViewerCore {
+ public:
+  ViewerCore(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
+
+  void OnMapDelta(const MapDelta& delta);
+  void OnFramePose(const FramePose& pose);
+  /// The map is void: a fresh stream, or a snapshot, begins. Frames keep their poses until its keyframes are
+  /// there.
+  void ForgetMap();
+
+  /// Where the camera truly was at a frame.
+  void OnTruth(uint32_t frame_index, const Rigid3d& T_world_cam);
+  /// The whole ground truth; it is shown up to the newest frame.
+  void SetTruth(std::vector<StampedPose> poses) { truth_file_ = std::move(poses); }
+
+  /// Whether anything that is drawn has changed since the last Draw.
+  bool dirty() const { return dirty_; }
+  /// Brings the scene up to date.
+  void Draw(Scene* scene);
+
+  /// Lays the ground truth onto the path; costs a pass over the path. None with fewer than ten pairs, or on a
+  /// line.
+  std::optional<TruthAlignment> AlignTruth() const;
+  /// Unit vector [map] that is up for the one who held the camera: from the ground truth where it is aligned
+  /// (its z axis), else on average over the keyframes.
+  Eigen::Vector3d Up(const std::optional<TruthAlignment>& alignment) const;
+
+  const Map& map() const { return map_; }
+  MapId shown_map() const { return shown_map_; }
+  size_t num_moving() const { return num_moving_; }
+  uint32_t resets() const { return resets_; }
+
+ private:
+  void ChooseMap();
+  void MarkAll();
+  void Mark(const MapDelta& delta);
+  void HandFramesOn(const MapDelta& delta);
+  void DrawPoint(LandmarkId id, Scene* scene);
+  void DrawKeyframe(KeyframeId id, Scene* scene);
+  void DrawFrame(uint32_t frame_index, Scene* scene);
+  void DrawTruth(Scene* scene);
+  void SweepPoints(Scene* scene);
+
+  struct Truth {
+    Eigen::Vector3d position;
+    bool drawn = false;
+  };
+
+  Map map_;
+  MapId shown_map_ = 0;
+  std::map<uint32_t, FramePose> frames_;
+  std::map<KeyframeId, std::vector<uint32_t>>
+      frames_of_;                                  ///< told from this keyframe, or from one it stands for
+  std::map<uint32_t, Eigen::Vector3d> positions_;  ///< of the frames, as drawn
+  std::map<uint32_t, Truth> truth_;
+  std::vector<StampedPose> truth_file_;
+  size_t truth_file_next_ = 0;
+  int64_t newest_ns_ = 0;
+
+  bool dirty_ = true;
+  bool void_ = false;
+  std::set<LandmarkId> dirty_points_;
+  std::set<KeyframeId> dirty_keyframes_;
+  std::set<uint32_t> dirty_frames_;
+  size_t num_moving_ = 0;
+  uint32_t resets_ = 0;
+};
+
+}  // namespace dmslam

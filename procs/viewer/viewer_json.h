@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+
+#include "dmslam/wire/frontend_messages.h"
+#include "dmslam/wire/player_messages.h"
+#include "dmslam/wire/status.h"
+#include "viewer/process_board.h"
+#include "viewer/viewer_core.h"
+
+namespace dmslam {
+
+/// What the page's header, tables and charts are made of.
+struct StatusView {
+  int64_t now_ns = 0, wall_us = 0;
+  uint32_t session = 0;
+  const CameraInfo* camera = nullptr;  ///< null: not known yet
+  const PlayerStatus* player = nullptr;
+  const FrontendStatus* frontend = nullptr;
+  const MapperStatus* mapper = nullptr;
+  const LoopcloserStatus* loopcloser = nullptr;
+  const ProcessBoard* board = nullptr;
+  const TruthAlignment* alignment = nullptr;  ///< null: none
+  Eigen::Vector3d up{0, -1, 0};
+  bool ended = false;
+  int64_t loops = 0;
+  MapId map_id = 0;
+  size_t keyframes = 0, landmarks = 0, moving = 0;
+  uint64_t map_version = 0;
+  uint32_t resets = 0;
+  size_t browsers = 0;
+  int64_t skipped = 0;
+};
+
+/// What a process does, in a word.
+std::string StateWord(PlayerStatus::State state);
+std::string StateWord(TrackingState state);
+std::string StateWord(MapperStatus::State state);
+std::string StateWord(LoopcloserStatus::State state);
+
+std::string ToJson(const StatusView& view);
+std::string PoseJson(const PoseView& view);
+/// Features that were matched: "data" is base64 of five bytes each, u and v [px * 16] as little-endian 16 bit
+/// words, kind.
+std::string FeaturesJson(const FeatureView& view, int width_px, int height_px);
+
+std::string Base64(const std::vector<uint8_t>& bytes);
+
+}  // namespace dmslam

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/stream_node.h"
+#include "viewer/exchange.h"
+#include "viewer/process_board.h"
+#include "viewer/viewer_core.h"
+
+namespace dmslam {
+
+struct ViewerOptions {
+  std::string ground_truth;  ///< TUM trajectory; empty: what the player says
+};
+
+/// The viewer on the bus: a reader of all streams that holds nobody back, and hands what it sees to those who
+/// serve it. It publishes nothing but the acknowledgements of a reader.
+class ViewerNode : public StreamNode {
+ public:
+  /// `exchange` must outlive the node.
+  ViewerNode(NodeContext context, NodeOptions options, ViewerOptions viewer, Exchange* exchange);
+
+ protected:
+  void Begin(const CameraInfo& info) override;
+  bool WorkOnce() override;
+  void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
+  void PublishStatus() override;
+  int64_t WorkDeadline() const override;
+
+ private:
+  void OnLoose(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnStatusMessage(const std::string& channel, std::span<const uint8_t> bytes);
+  template <typename Status>
+  void Board(const std::string& name, const Status& status, const std::string& state);
+  bool TakeMapRecord();
+  bool TakeFrontendRecord();
+  bool TakeLoopRecord();
+  void NoteMapEvent(const MapDelta& delta);
+  void ShowPose(const PoseView& view);
+  void ShowFeatures(const FeatureView& view);
+  void DrawIfDue();
+  void ReportIfDue();
+  void Note(BoardEvent::Level level, const std::string& text) {
+    board_.Note(level, text, context_.wall_us());
+  }
+  std::string StatusJson() const;
+
+  ViewerOptions viewer_;
+  Exchange* exchange_;
+  std::unique_ptr<ViewerCore> core_;
+  std::unique_ptr<StreamReader> map_reader_, frontend_reader_, loop_reader_;
+  ProcessBoard board_;
+  PlayerStatus player_;
+  FrontendStatus frontend_;
+  MapperStatus mapper_;
+  LoopcloserStatus loopcloser_;
+  std::optional<TrackingState> shown_state_;
+  std::optional<TruthAlignment> alignment_;
+  Eigen::Vector3d up_{0, -1, 0};
+  bool map_ended_ = false;
+  bool ended_ = false;
+  int64_t loops_ = 0;
+  int64_t map_records_ = 0;
+  int64_t next_draw_ns_ = 0;
+  int64_t next_report_ns_ = 0;
+  int64_t next_align_ns_ = 0;
+};
+
+}  // namespace dmslam

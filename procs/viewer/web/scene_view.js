@@ -1,0 +1,609 @@
+// The map in three dimensions. Draws only when something has changed, and only as much as this machine can draw smoothly.
+import * as THREE from '/three/build/three.module.js';
+import {OrbitControls} from '/three/examples/jsm/controls/OrbitControls.js';
+import {WideLines} from '/wide_lines.js';
+
+const kMinBudget = 15000, kMaxBudget = 600000;
+const kNearKeyframes = 300;  // drawn as frusta where there are more; all others as dots
+const kMostEdges = 12000;
+const kMostPathSegments = 12000;
+const kSlowMs = 42, kFastMs = 28;  // of a picture
+
+const pointVertex = `
+  attribute vec2 value;  // belief, first frame
+  uniform mediump float size;
+  uniform float ages, newest;
+  uniform vec3 still, unsure, moving, age0, age1, age2, age3;
+  varying vec3 vColour;
+  void main() {
+    vec4 p = modelViewMatrix * vec4(position, 1.0);
+    gl_Position = projectionMatrix * p;
+    float belief = value.x;
+    vec3 motion = belief > 0.0 ? mix(unsure, moving, clamp(belief * 0.7 + 0.3, 0.0, 1.0))
+                               : mix(unsure, still, clamp(-belief * 1.5 + 0.5, 0.0, 1.0));
+    float a = clamp(value.y / max(newest, 1.0), 0.0, 1.0) * 3.0;
+    vec3 age = a < 1.0 ? mix(age0, age1, a) : a < 2.0 ? mix(age1, age2, a - 1.0) : mix(age2, age3, a - 2.0);
+    vColour = ages > 0.5 ? age : motion;
+    gl_PointSize = size * (belief > 0.0 && ages < 0.5 ? 1.35 : 1.0);
+  }`;
+const pointFragment = `
+  precision mediump float;
+  uniform mediump float size;
+  varying vec3 vColour;
+  void main() {
+    vec2 from = gl_PointCoord - 0.5;
+    if (size > 3.0 && dot(from, from) > 0.25) discard;
+    gl_FragColor = vec4(vColour, 1.0);
+  }`;
+
+function css(name) {
+  return new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+}
+
+/// Without a graphics processor smoothed edges cost more than all that is drawn.
+function isSoftware() {
+  const gl = document.createElement('canvas').getContext('webgl');
+  const extension = gl && gl.getExtension('WEBGL_debug_renderer_info');
+  return !extension || /swiftshader|llvmpipe|softpipe|software/i.test(gl.getParameter(extension.UNMASKED_RENDERER_WEBGL));
+}
+
+/// The edges of a camera's pyramid, in its own frame (x right, y down, z forward), as pairs of points.
+function frustumEdges(aspect, size) {
+  const w = 0.75 * size, h = w / aspect, d = size;
+  const c = [[-w, -h, d], [w, -h, d], [w, h, d], [-w, h, d]];
+  const o = [0, 0, 0];
+  return [[o, c[0]], [o, c[1]], [o, c[2]], [o, c[3]], [c[0], c[1]], [c[1], c[2]], [c[2], c[3]], [c[3], c[0]]];
+}
+
+export class SceneView {
+  constructor(canvas, store) {
+    this.canvas = canvas;
+    this.store = store;
+    const context = canvas.getContext('webgl', {antialias: !isSoftware() && window.devicePixelRatio < 1.5});
+    this.renderer = new THREE.WebGLRenderer({canvas, context});
+    this.scene = new THREE.Scene();
+    this.root = new THREE.Group();  // turned so that the map's up is up
+    this.scene.add(this.root);
+    this.camera = new THREE.PerspectiveCamera(50, 1, 0.01, 1000);
+    this.camera.position.set(2, 2, 4);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener('change', () => this.touch());
+    this.controls.addEventListener('start', () => { this.automatic = false; });
+    this.mode = 'orbit';
+    this.automatic = true;  // shows everything until somebody takes the mouse
+    this.layers = {keyframes: true, edges: true, path: true, truth: true};
+    this.aspect = 4 / 3;
+    this.radius = 1;
+    this.depth = 1;
+    this.pose = null;
+    this.budget = 120000;
+    this.pictures = {times: [], drawnPoints: 0, fps: 0};
+    this.needsPicture = true;
+    this.lastDrawn = 0;
+    this.makeObjects();
+    this.applyTheme();
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.resize();
+    requestAnimationFrame((now) => this.loop(now));
+  }
+
+  makeObjects() {
+    const uniforms = {size: {value: 2.5}, ages: {value: 0}, newest: {value: 1}};
+    for (const name of ['still', 'unsure', 'moving', 'age0', 'age1', 'age2', 'age3']) uniforms[name] = {value: new THREE.Color()};
+    this.pointMaterial = new THREE.ShaderMaterial({vertexShader: pointVertex, fragmentShader: pointFragment, uniforms});
+    this.points = new THREE.Group();
+    this.tileObjects = [];
+    this.dots = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 5, sizeAttenuation: false}));
+    this.dots.frustumCulled = false;
+    this.lines = {
+      edges: new WideLines({width: 1.2, opacity: 0.5, order: 1}),
+      loops: new WideLines({width: 3, order: 4}),
+      frusta: new WideLines({width: 1.4, opacity: 0.8, order: 2}),
+      path: new WideLines({width: 2.8, order: 5}),
+      truth: new WideLines({width: 2, opacity: 0.9, order: 3}),
+      camera: new WideLines({width: 2.6, order: 6}),
+    };
+    this.truthGroup = new THREE.Group();
+    this.truthGroup.matrixAutoUpdate = false;
+    this.truthGroup.add(this.lines.truth.object);
+    this.grid = new THREE.Group();
+    this.root.add(this.points, this.dots, this.truthGroup);
+    for (const name of ['edges', 'loops', 'frusta', 'path', 'camera']) this.root.add(this.lines[name].object);
+    this.scene.add(this.grid);
+  }
+
+  applyTheme() {
+    this.scene.background = css('--scene');
+    const u = this.pointMaterial.uniforms;
+    const names = {still: '--static', unsure: '--unsure', moving: '--dynamic', age0: '--age-0', age1: '--age-1', age2: '--age-2', age3: '--age-3'};
+    for (const [uniform, name] of Object.entries(names)) u[uniform].value = css(name);
+    const lines = {edges: '--edge', loops: '--loop', frusta: '--keyframe', path: '--path', truth: '--truth', camera: '--camera'};
+    for (const [line, name] of Object.entries(lines)) this.lines[line].material.uniforms.colour.value = css(name);
+    this.dots.material.color = css('--keyframe');
+    this.gridRadius = 0;
+    this.touch();
+  }
+
+  touch() { this.needsPicture = true; }
+
+  setLayer(name, on) {
+    this.layers[name] = on;
+    this.showLayers();
+    this.touch();
+  }
+
+  showLayers() {
+    this.lines.frusta.show(this.layers.keyframes);
+    this.dots.visible = this.layers.keyframes;
+    this.lines.edges.show(this.layers.edges);
+    this.lines.loops.show(this.layers.edges);
+    this.lines.path.show(this.layers.path);
+    this.lines.truth.show(this.layers.truth && this.truthKnown === true);
+  }
+
+  setColours(mode) {
+    this.pointMaterial.uniforms.ages.value = mode === 'age' ? 1 : 0;
+    this.touch();
+  }
+
+  resize() {
+    const box = this.canvas.parentElement.getBoundingClientRect();
+    const ratio = Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(Math.max(1, box.width), Math.max(1, box.height), false);
+    this.camera.aspect = Math.max(1, box.width) / Math.max(1, box.height);
+    this.camera.updateProjectionMatrix();
+    const larger = document.documentElement.dataset.text === 'large' ? 1.35 : 1;
+    this.pixel = ratio * larger;
+    this.touch();
+  }
+
+  // ---- What the viewer says ------------------------------------------------------------------------------------
+
+  /// The store has changed.
+  update() {
+    this.pointMaterial.uniforms.newest.value = this.store.newestFrame;
+    this.updateTiles();
+    if (this.store.keyframesDirty) this.updateKeyframes();
+    if (this.store.pathDirty || this.store.keyframesDirty) this.updatePath();
+    if (this.store.truthDirty) this.updateTruth();
+    this.store.keyframesDirty = this.store.pathDirty = this.store.truthDirty = false;
+    this.measure();
+    if (this.automatic) this.fit();
+    this.touch();
+  }
+
+  updateTiles() {
+    const tiles = this.store.tiles;
+    while (this.tileObjects.length > tiles.length) this.dropTile();
+    tiles.forEach((tile, i) => {
+      if (this.tileObjects[i] && this.tileObjects[i].tile !== tile) this.replaceTile(i, tile);
+      if (!this.tileObjects[i]) this.replaceTile(i, tile);
+      if (!tile.dirty) return;
+      tile.dirty = false;
+      tile.bound();
+      const {positions, values} = this.tileObjects[i];
+      positions.updateRange = {offset: 0, count: 3 * tile.count};
+      values.updateRange = {offset: 0, count: 2 * tile.count};
+      positions.needsUpdate = values.needsUpdate = true;
+    });
+  }
+
+  replaceTile(i, tile) {
+    if (this.tileObjects[i]) {
+      this.points.remove(this.tileObjects[i].object);
+      this.tileObjects[i].object.geometry.dispose();
+    }
+    const geometry = new THREE.BufferGeometry();
+    const positions = new THREE.BufferAttribute(tile.positions, 3), values = new THREE.BufferAttribute(tile.values, 2);
+    geometry.setAttribute('position', positions);
+    geometry.setAttribute('value', values);
+    const object = new THREE.Points(geometry, this.pointMaterial);
+    object.frustumCulled = false;  // done with the level of detail
+    this.points.add(object);
+    tile.dirty = true;
+    this.tileObjects[i] = {tile, object, positions, values};
+  }
+
+  dropTile() {
+    const {object} = this.tileObjects.pop();
+    this.points.remove(object);
+    object.geometry.dispose();
+  }
+
+  updateKeyframes() {
+    const alive = this.store.keyframes.filter((keyframe) => keyframe);
+    const centres = new Float32Array(3 * alive.length);
+    alive.forEach((keyframe, i) => centres.set(keyframe.centre, 3 * i));
+    this.dots.geometry.dispose();
+    this.dots.geometry = new THREE.BufferGeometry();
+    this.dots.geometry.setAttribute('position', new THREE.BufferAttribute(centres, 3));
+    this.frustaDirty = true;
+    this.updateEdges();
+  }
+
+  updateEdges() {
+    const frames = this.store.keyframes;
+    const count = frames.reduce((sum, keyframe) => sum + (keyframe ? keyframe.links.length : 0), 0);
+    const keep = Math.min(1, kMostEdges / Math.max(1, count));
+    const {edges, loops} = this.lines;
+    edges.start(count);
+    loops.start(count);
+    let number = 0;
+    for (const keyframe of frames) {
+      if (!keyframe) continue;
+      for (let i = 0; i < keyframe.links.length; ++i) {
+        const other = frames[keyframe.links[i]];
+        if (!other) continue;
+        if (keyframe.kinds[i] === 2) loops.add(keyframe.centre, other.centre);
+        else if (Math.floor(++number * keep) !== Math.floor((number - 1) * keep)) edges.add(keyframe.centre, other.centre);
+      }
+    }
+    edges.finish();
+    loops.finish();
+    edges.show(this.layers.edges);
+    loops.show(this.layers.edges);
+  }
+
+  updatePath() {
+    const places = this.store.trajectory();
+    const step = Math.max(1, Math.ceil(places.length / kMostPathSegments));
+    const path = this.lines.path;
+    path.start(places.length);
+    let last = null;
+    places.forEach((place, i) => {
+      if (i % step !== 0 && i !== places.length - 1) return;
+      if (last && place[0] - last[0] <= 90 * step) path.add(last.slice(1), place.slice(1));
+      last = place;
+    });
+    path.finish();
+    path.show(this.layers.path);
+  }
+
+  updateTruth() {
+    const places = [...this.store.truth].sort((a, b) => a[0] - b[0]);
+    const truth = this.lines.truth;
+    truth.start(places.length);
+    for (let i = 1; i < places.length; ++i) truth.add(places[i - 1][1], places[i][1]);
+    truth.finish();
+    this.showLayers();
+  }
+
+  /// How large everything is: for the sizes of what is drawn, and to fit it.
+  measure() {
+    this.takeSample();
+    if (this.places.length === 0) return;
+    const box = new THREE.Box3().setFromPoints(this.places), v = new THREE.Vector3();
+    const centre = box.getCenter(new THREE.Vector3());
+    const spread = this.sample.map((p) => p.distanceTo(centre)).sort((a, b) => a - b);
+    const walked = box.getSize(v).length() / 2;
+    const around = spread.length ? spread[Math.floor(spread.length * 0.8)] : 1;
+    this.centre = centre;
+    this.radius = Math.max(walked, around, 1e-3);
+    const size = Math.min(0.04 * this.radius, 0.08 * this.medianDepth());
+    if (!this.frustumSize || Math.abs(size / this.frustumSize - 1) > 0.15) {
+      this.frustumSize = size;
+      this.frustaDirty = true;
+      if (this.pose) this.setPose(this.pose);
+    }
+    this.controls.minDistance = this.radius * 0.01;
+    this.controls.maxDistance = this.radius * 30;
+    this.camera.near = this.radius * 0.004;
+    this.camera.far = this.radius * 80;
+    this.camera.updateProjectionMatrix();
+    this.placeGrid();
+  }
+
+  /// Some landmarks and keyframes, turned so that up is up: everything about sizes is measured with them.
+  takeSample() {
+    const q = this.root.quaternion, frames = this.store.keyframes.filter((keyframe) => keyframe);
+    const each = Math.max(1, Math.ceil(frames.length / 400));
+    this.places = frames.filter((_, i) => i % each === 0).map((k) => new THREE.Vector3().fromArray(k.centre).applyQuaternion(q));
+    this.sample = [];
+    const perTile = Math.max(6, Math.ceil(2500 / Math.max(1, this.store.tiles.length)));
+    for (const tile of this.store.tiles) {
+      for (let i = 0; i < Math.min(perTile, tile.count); ++i) {
+        this.sample.push(new THREE.Vector3().fromArray(tile.positions, 3 * i).applyQuaternion(q));
+      }
+    }
+  }
+
+  /// Of landmarks from the keyframe whose landmarks they are, roughly: tiles and keyframes of the same age.
+  medianDepth() {
+    const frames = this.store.keyframes, tiles = this.store.tiles;
+    const depths = [];
+    const v = new THREE.Vector3(), w = new THREE.Vector3();
+    tiles.forEach((tile, i) => {
+      if (tile.count === 0) return;
+      const keyframe = frames[Math.min(frames.length - 1, Math.floor((i + 0.5) / tiles.length * frames.length))];
+      if (!keyframe) return;
+      w.fromArray(keyframe.centre);
+      for (let k = 0; k < Math.min(15, tile.count); ++k) depths.push(v.fromArray(tile.positions, 3 * k).distanceTo(w));
+    });
+    depths.sort((a, b) => a - b);
+    return depths.length ? depths[Math.floor(depths.length / 2)] : this.radius;
+  }
+
+  /// Lines on the floor, which is where few landmarks are below.
+  placeGrid() {
+    if (this.sample.length < 20) return;
+    const heights = this.sample.map((p) => p.y).sort((a, b) => a - b);
+    const floor = heights[Math.floor(heights.length * 0.03)];
+    const centre = this.centre;
+    if (!this.gridRadius || Math.abs(this.radius / this.gridRadius - 1) > 0.2) {
+      this.gridRadius = this.radius;
+      this.grid.children.slice().forEach((child) => { this.grid.remove(child); child.geometry.dispose(); });
+      const cell = Math.pow(2, Math.round(Math.log2(this.radius / 6)));
+      const half = Math.ceil(1.8 * this.radius / cell);
+      this.grid.add(new THREE.GridHelper(2 * half * cell, 2 * half, css('--grid'), css('--grid')));
+      this.cell = cell;
+    }
+    this.grid.position.set(Math.round(centre.x / this.cell) * this.cell, floor, Math.round(centre.z / this.cell) * this.cell);
+  }
+
+  /// Which way of the map is up.
+  setUp(up) {
+    const wanted = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(...up).normalize(), new THREE.Vector3(0, 1, 0));
+    const turn = this.root.quaternion.angleTo(wanted);
+    if (this.upKnown && turn < 0.03) return;
+    this.root.quaternion.slerp(wanted, this.upKnown && turn < 0.5 ? 0.25 : 1);
+    this.upKnown = true;
+    this.touch();
+  }
+
+  /// Where the ground truth lies on the map: {rotation, translation, scale}, or null.
+  setTruth(truth) {
+    this.truthKnown = truth !== null;
+    if (truth) {
+      this.truthGroup.matrix.compose(new THREE.Vector3(...truth.translation), new THREE.Quaternion(...truth.rotation),
+                                     new THREE.Vector3(truth.scale, truth.scale, truth.scale));
+      this.truthGroup.matrixWorldNeedsUpdate = true;
+    }
+    this.showLayers();
+    this.touch();
+  }
+
+  /// Where the camera is now: {p, q} world from camera, or null.
+  setPose(pose) {
+    const moved = pose && this.pose ? new THREE.Vector3(...pose.p).sub(new THREE.Vector3(...this.pose.p)) : null;
+    this.pose = pose;
+    const lines = this.lines.camera;
+    lines.start(8);
+    if (pose) this.addFrustum(lines, pose.p, pose.q, 2.4 * (this.frustumSize || 0.05));
+    lines.finish();
+    if (moved && this.mode === 'follow') {
+      moved.applyQuaternion(this.root.quaternion);
+      this.camera.position.add(moved);
+      this.controls.target.add(moved);
+      this.controls.update();
+    }
+    this.touch();
+  }
+
+  addFrustum(lines, centre, rotation, size) {
+    const q = new THREE.Quaternion(...rotation), p = new THREE.Vector3(...centre), a = new THREE.Vector3(), b = new THREE.Vector3();
+    for (const [begin, end] of frustumEdges(this.aspect, size)) {
+      a.set(...begin).applyQuaternion(q).add(p);
+      b.set(...end).applyQuaternion(q).add(p);
+      lines.add([a.x, a.y, a.z], [b.x, b.y, b.z]);
+    }
+  }
+
+  // ---- The eye -------------------------------------------------------------------------------------------------
+
+  setMode(mode) {
+    if (mode === 'fit') {
+      this.automatic = true;
+      if (this.mode === 'follow') this.mode = 'orbit';
+      this.fit();
+      return;
+    }
+    this.mode = mode;
+    this.automatic = mode !== 'follow';
+    if (mode === 'follow') this.goBehind();
+    else this.fit();
+  }
+
+  /// A step behind and above the camera, looking where it looks.
+  goBehind() {
+    if (!this.pose) return;
+    const q = this.root.quaternion, size = Math.max(6 * (this.frustumSize || 0.1), 0.12 * this.radius);
+    const at = new THREE.Vector3(...this.pose.p).applyQuaternion(q);
+    const forward = new THREE.Vector3(0, 0, 1).applyQuaternion(new THREE.Quaternion(...this.pose.q)).applyQuaternion(q);
+    forward.y = 0;
+    forward.normalize();
+    this.camera.position.copy(at).addScaledVector(forward, -1.6 * size).add(new THREE.Vector3(0, 0.9 * size, 0));
+    this.controls.target.copy(at).addScaledVector(forward, 0.8 * size);
+    this.controls.update();
+    this.touch();
+  }
+
+  /// From behind the first camera, a little to the side and from above, so that nearly everything is in the picture.
+  fit() {
+    if (!this.centre) return;
+    const q = this.root.quaternion;
+    const direction = new THREE.Vector3(0.55, 0.62, 0.75);
+    const first = this.store.keyframes.find((keyframe) => keyframe);
+    if (first) {
+      const forward = new THREE.Vector3(0, 0, 1).applyQuaternion(new THREE.Quaternion(...first.rotation)).applyQuaternion(q);
+      forward.y = 0;
+      forward.normalize();
+      const side = new THREE.Vector3(0, 1, 0).cross(forward);
+      direction.set(0, 0.55, 0).addScaledVector(forward, -0.8).addScaledVector(side, -0.5);
+    }
+    if (this.mode === 'top') direction.set(0, 1, 0.001);
+    direction.normalize();
+    const {target, distance} = this.frame(direction);
+    this.camera.position.copy(target).addScaledVector(direction, distance);
+    this.controls.target.copy(target);
+    this.controls.update();
+    this.touch();
+  }
+
+  /// Where to look at, and from how far, to see all keyframes and nearly all landmarks from `direction`.
+  frame(direction) {
+    const right = new THREE.Vector3(0, 1, 0).cross(direction).normalize();
+    const up = direction.clone().cross(right);
+    const range = (axis) => {
+      const all = this.sample.map((p) => p.dot(axis)).sort((a, b) => a - b);
+      const own = this.places.map((p) => p.dot(axis));
+      const low = Math.min(all.length ? all[Math.floor(0.04 * all.length)] : Infinity, ...own);
+      const high = Math.max(all.length ? all[Math.floor(0.96 * (all.length - 1))] : -Infinity, ...own);
+      return {middle: (low + high) / 2, half: (high - low) / 2};
+    };
+    const [x, y, z] = [right, up, direction].map(range);
+    const target = new THREE.Vector3().addScaledVector(right, x.middle).addScaledVector(up, y.middle).addScaledVector(direction, z.middle);
+    const tangent = Math.tan(this.camera.fov * Math.PI / 360);
+    const distance = 1.04 * Math.max(y.half / (0.86 * tangent), x.half / (tangent * this.camera.aspect)) + 0.55 * z.half;
+    return {target, distance: Math.max(distance, 1e-3)};
+  }
+
+  // ---- Pictures ------------------------------------------------------------------------------------------------
+
+  loop(now) {
+    requestAnimationFrame((next) => this.loop(next));
+    if (this.turning) this.turn(now);
+    if (!this.needsPicture) {
+      this.settle(now);
+      return;
+    }
+    const since = now - this.lastDrawn;
+    this.adapt(since);
+    this.draw(now);
+  }
+
+  /// The budget follows what pictures cost, told by how long after one the next can come.
+  adapt(since) {
+    if (since > 400) return;  // there was a pause
+    this.pictures.times.push(since);
+    if (this.pictures.times.length > 40) this.pictures.times.shift();
+    const mean = this.pictures.times.reduce((a, b) => a + b, 0) / this.pictures.times.length;
+    this.pictures.fps = 1000 / mean;
+    if (this.pictures.times.length < 4) return;
+    const recent = this.pictures.times.slice(-4).reduce((a, b) => a + b, 0) / 4;
+    if (recent > kSlowMs) this.budget = Math.max(kMinBudget, this.budget * Math.max(0.6, 36 / recent));
+    if (recent < kFastMs && this.pictures.drawnPoints > 0.9 * this.budget) this.budget = Math.min(kMaxBudget, this.budget * 1.08);
+  }
+
+  /// Once nothing moves any more, one picture with everything in it.
+  settle(now) {
+    if (this.settled || now - this.lastDrawn < 600) return;
+    this.settled = true;
+    this.draw(now, kMaxBudget);
+    this.pictures.times.length = 0;
+  }
+
+  draw(now, budget) {
+    this.needsPicture = false;
+    this.settled = budget !== undefined;
+    this.lastDrawn = now;
+    this.root.updateMatrixWorld();
+    this.camera.updateMatrixWorld();
+    this.chooseDetail(budget || this.budget);
+    this.chooseFrusta();
+    const {width, height} = this.canvas;
+    for (const lines of Object.values(this.lines)) lines.setViewport(width, height, this.pixel, this.camera.near);
+    const drawn = this.pictures.drawnPoints;
+    this.pointMaterial.uniforms.size.value = (drawn > 60000 ? 1.8 : drawn > 10000 ? 2.6 : drawn > 3000 ? 3.4 : 4.2) * this.pixel;
+    this.dots.material.size = (this.store.numKeyframes > kNearKeyframes ? 3 : 4) * this.pixel;
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /// How many landmarks of each tile are drawn: those out of sight none, the others by the room they take.
+  chooseDetail(budget) {
+    const frustum = new THREE.Frustum().setFromMatrix(
+        new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse));
+    const sphere = new THREE.Sphere(), seen = [];
+    let weights = 0, total = 0;
+    for (const {tile, object} of this.tileObjects) {
+      object.visible = false;
+      if (tile.count === 0) continue;
+      sphere.center.fromArray(tile.centre).applyMatrix4(this.root.matrixWorld);
+      sphere.radius = tile.radius;
+      if (!frustum.intersectsSphere(sphere)) continue;
+      const distance = Math.max(0.3 * tile.radius, sphere.center.distanceTo(this.camera.position));
+      const weight = Math.min(4, tile.radius / distance) + 0.02;
+      weights += weight;
+      total += tile.count;
+      seen.push({tile, object, weight});
+    }
+    let drawn = 0, left = budget;
+    seen.sort((a, b) => a.tile.count / a.weight - b.tile.count / b.weight);
+    for (const {tile, object, weight} of seen) {
+      const share = total <= budget ? tile.count : Math.min(tile.count, Math.ceil(left * weight / weights));
+      weights -= weight;
+      left -= share;
+      object.geometry.setDrawRange(0, share);
+      object.visible = share > 0;
+      drawn += share;
+    }
+    this.pictures.drawnPoints = drawn;
+    this.pictures.inSight = total;
+  }
+
+  /// Frusta of the keyframes that are nearest to the eye, where there are too many for all.
+  chooseFrusta() {
+    const frames = this.store.keyframes;
+    const many = this.store.numKeyframes > kNearKeyframes;
+    const moved = !this.frustaFrom || this.frustaFrom.distanceTo(this.camera.position) > 0.05 * this.radius;
+    if (!this.frustaDirty && !(many && moved)) return;
+    this.frustaDirty = false;
+    this.frustaFrom = this.camera.position.clone();
+    const eye = this.camera.position.clone().applyQuaternion(this.root.quaternion.clone().conjugate());
+    let chosen = frames.filter((keyframe) => keyframe);
+    if (many) {
+      const v = new THREE.Vector3();
+      for (const keyframe of chosen) keyframe.distance = v.fromArray(keyframe.centre).distanceToSquared(eye);
+      chosen = chosen.sort((a, b) => a.distance - b.distance).slice(0, kNearKeyframes);
+    }
+    const lines = this.lines.frusta;
+    lines.start(8 * chosen.length);
+    for (const keyframe of chosen) this.addFrustum(lines, keyframe.centre, keyframe.rotation, this.frustumSize || 0.05);
+    lines.finish();
+    lines.show(this.layers.keyframes);
+  }
+
+  // ---- For measurements and tests ------------------------------------------------------------------------------
+
+  /// Turns for ever: what moving costs.
+  turn(now) {
+    const angle = (now - (this.turned || now)) * 0.0004;
+    this.turned = now;
+    this.automatic = false;
+    const offset = this.camera.position.clone().sub(this.controls.target).applyAxisAngle(new THREE.Vector3(0, 1, 0), angle);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.touch();
+  }
+
+  /// Draws these objects alone and counts the pixels that are not background: {points, frusta, dots, path, truth, camera}.
+  countPixels() {
+    const {points, dots, lines, grid} = this;
+    const objects = {points, dots, grid, frusta: lines.frusta.object, path: lines.path.object, truth: lines.truth.object,
+                     camera: lines.camera.object, edges: lines.edges.object, loops: lines.loops.object};
+    const visible = Object.fromEntries(Object.entries(objects).map(([name, object]) => [name, object.visible]));
+    const counts = {};
+    for (const name of Object.keys(objects)) {
+      for (const [other, object] of Object.entries(objects)) object.visible = other === name && visible[name];
+      this.draw(performance.now(), kMaxBudget);
+      counts[name] = this.countForeground();
+    }
+    for (const [name, object] of Object.entries(objects)) object.visible = visible[name];
+    this.touch();
+    return counts;
+  }
+
+  countForeground() {
+    const gl = this.renderer.getContext(), {width, height} = this.canvas;
+    const pixels = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    const back = this.scene.background;
+    const [r, g, b] = [back.r, back.g, back.b].map((x) => Math.round(255 * x));
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      if (Math.abs(pixels[i] - r) + Math.abs(pixels[i + 1] - g) + Math.abs(pixels[i + 2] - b) > 30) count++;
+    }
+    return count;
+  }
+}

@@ -1,0 +1,106 @@
+// Line segments of a width in pixels: what WebGL's own lines cannot do. One quad per segment, instanced.
+import * as THREE from '/three/build/three.module.js';
+
+const vertex = `
+  attribute vec3 begin, end;
+  uniform vec2 viewport;
+  uniform mediump float width;
+  uniform float near;
+  varying float vAcross;
+  void main() {
+    vec4 a = modelViewMatrix * vec4(begin, 1.0);
+    vec4 b = modelViewMatrix * vec4(end, 1.0);
+    float limit = -near;
+    if (a.z > limit && b.z > limit) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
+    if (a.z > limit) a = mix(b, a, (limit - b.z) / (a.z - b.z));
+    if (b.z > limit) b = mix(a, b, (limit - a.z) / (b.z - a.z));
+    vec4 ca = projectionMatrix * a, cb = projectionMatrix * b;
+    vec2 sa = ca.xy / ca.w * viewport, sb = cb.xy / cb.w * viewport;
+    vec2 along = sb - sa;
+    float length2 = dot(along, along);
+    along = length2 > 1e-8 ? along * inversesqrt(length2) : vec2(1.0, 0.0);
+    vec4 here = position.x < 0.5 ? ca : cb;
+    float broad = width + 1.0;  // a pixel to fade out in
+    vAcross = position.y * broad;
+    vec2 offset = vec2(-along.y, along.x) * position.y * broad + along * (position.x * 2.0 - 1.0) * width * 0.45;
+    here.xy += offset / viewport * here.w;
+    gl_Position = here;
+  }`;
+
+const fragment = `
+  precision mediump float;
+  uniform vec3 colour;
+  uniform float opacity;
+  uniform mediump float width;
+  varying float vAcross;
+  void main() { gl_FragColor = vec4(colour, opacity * clamp(0.5 * (width + 1.0 - abs(vAcross)), 0.0, 1.0)); }`;
+
+export class WideLines {
+  /// `width` in CSS pixels; `order`: what is drawn later.
+  constructor({width = 2, opacity = 1, order = 0} = {}) {
+    this.width = width;
+    this.material = new THREE.ShaderMaterial({
+      vertexShader: vertex, fragmentShader: fragment, transparent: true, depthWrite: false, side: THREE.DoubleSide,
+      uniforms: {
+        colour: {value: new THREE.Color()}, opacity: {value: opacity}, viewport: {value: new THREE.Vector2(1, 1)},
+        width: {value: width}, near: {value: 0.01},
+      },
+    });
+    this.capacity = 0;
+    this.count = 0;
+    this.object = new THREE.Mesh(new THREE.InstancedBufferGeometry(), this.material);
+    this.object.frustumCulled = false;
+    this.object.renderOrder = order;
+    this.object.visible = false;
+    this.shown = true;
+    this.grow(64);
+  }
+
+  grow(capacity) {
+    this.capacity = capacity;
+    const geometry = new THREE.InstancedBufferGeometry();
+    geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array([0, -1, 0, 0, 1, 0, 1, 1, 0, 1, -1, 0]), 3));
+    geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    this.begin = new THREE.InstancedBufferAttribute(new Float32Array(3 * capacity), 3);
+    this.end = new THREE.InstancedBufferAttribute(new Float32Array(3 * capacity), 3);
+    geometry.setAttribute('begin', this.begin);
+    geometry.setAttribute('end', this.end);
+    this.object.geometry.dispose();
+    this.object.geometry = geometry;
+  }
+
+  /// Begins anew; then `add` each segment, then `finish`.
+  start(capacity) {
+    if (capacity > this.capacity) this.grow(Math.ceil(capacity * 1.5));
+    this.count = 0;
+  }
+
+  add(a, b) {
+    const i = 3 * this.count++;
+    for (let k = 0; k < 3; ++k) {
+      this.begin.array[i + k] = a[k];
+      this.end.array[i + k] = b[k];
+    }
+  }
+
+  finish() {
+    for (const attribute of [this.begin, this.end]) {
+      attribute.updateRange = {offset: 0, count: 3 * this.count};
+      attribute.needsUpdate = true;
+    }
+    this.object.geometry.maxInstancedCount = this.count;
+    this.show(this.shown);
+  }
+
+  show(shown) {
+    this.shown = shown;
+    this.object.visible = shown && this.count > 0;
+  }
+
+  /// Pixels of the canvas, and how many of them make a CSS pixel.
+  setViewport(width, height, ratio, near) {
+    this.material.uniforms.viewport.value.set(width, height);
+    this.material.uniforms.width.value = this.width * ratio;
+    this.material.uniforms.near.value = near;
+  }
+}
