@@ -16,7 +16,7 @@ constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processe
 
 CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
     : StreamNode(std::move(context), std::move(options), "collector"), collector_(std::move(collector)) {
-  Listen({channels::kEndOfSequence, channels::kFrameTrace, channels::kPlayerStatus, channels::kFrontendStatus,
+  Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace, channels::kPlayerStatus, channels::kFrontendStatus,
           channels::kMapperStatus, channels::kLoopcloserStatus});
 }
 
@@ -39,6 +39,8 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
     if (const auto trace = Read<FrameTrace>(bytes)) run_.traces.push_back(*trace);
   } else if (channel == channels::kEndOfSequence) {
     if (auto end = Read<EndOfSequence>(bytes)) end_ = std::move(end);
+  } else if (channel == channels::kGroundTruthPose) {
+    if (const auto pose = Read<GroundTruthPose>(bytes)) OnGroundTruth(*pose);
   } else if (channel == channels::kPlayerStatus) {
     if (const auto status = Read<PlayerStatus>(bytes)) OnHealth("player", status->head);
   } else if (channel == channels::kFrontendStatus) {
@@ -57,6 +59,12 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
       run_.loopcloser = std::move(*status);
     }
   }
+}
+
+void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
+  std::vector<StampedPose>& heard = run_.heard_ground_truth;
+  if (!heard.empty() && pose.stamp_ns <= heard.back().stamp_ns) return;
+  heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
 
 void CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {

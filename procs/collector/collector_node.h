@@ -37,6 +37,7 @@ class CollectorNode : public StreamNode {
  private:
   bool TakeFrontendRecord();
   bool TakeMapRecord();
+  void OnGroundTruth(const GroundTruthPose& pose);
   void OnHealth(const std::string& process, const StatusHead& head);
   bool EndIfDone();
   void Write();

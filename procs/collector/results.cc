@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "collector/map_ply.h"
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
@@ -41,46 +42,15 @@ std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t Fra
   return durations;
 }
 
-/// The map that holds most frames, as coloured points: landmarks grey to red by motion belief, cameras blue.
-void WritePly(const std::string& path, const Map& map, MapId map_id) {
-  std::ofstream file(path);
-  std::vector<const Landmark*> landmarks;
-  for (const LandmarkId id : map.LandmarkIdsSorted()) {
-    const Landmark* landmark = map.FindLandmark(id);
-    if (landmark->map_id == map_id) landmarks.push_back(landmark);
-  }
-  std::vector<const Keyframe*> keyframes;
-  for (const auto& [id, keyframe] : map.keyframes()) {
-    if (keyframe.map_id == map_id) keyframes.push_back(&keyframe);
-  }
-  file << "ply\nformat ascii 1.0\ncomment map units; cameras are blue\nelement vertex "
-       << landmarks.size() + keyframes.size()
-       << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n"
-          "property uchar blue\nend_header\n";
-  char line[160];
-  for (const Landmark* landmark : landmarks) {
-    const bool moving = landmark->evidence.motion_belief > 0;
-    std::snprintf(line, sizeof(line), "%.17g %.17g %.17g %d %d %d\n", landmark->p_world.x(), landmark->p_world.y(),
-                  landmark->p_world.z(), moving ? 230 : 120, moving ? 40 : 120, moving ? 40 : 120);
-    file << line;
-  }
-  for (const Keyframe* keyframe : keyframes) {
-    const Eigen::Vector3d center = keyframe->T_cam_world.Center();
-    std::snprintf(line, sizeof(line), "%.17g %.17g %.17g 30 90 230\n", center.x(), center.y(), center.z());
-    file << line;
-  }
-  if (!file.flush()) throw InputError(path + ": cannot be written; check the folder given with --out");
-}
-
 struct Errors {
   std::optional<AteReport> final, online;
   std::vector<StampedPose> ground_truth;
 };
 
-Errors Evaluate(const std::string& ground_truth, const TrajectoryBuilder::Trajectories& trajectories) {
+Errors Evaluate(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories) {
   Errors errors;
-  if (ground_truth.empty()) return errors;
-  errors.ground_truth = ReadGroundTruth(ground_truth).poses;
+  if (run.ground_truth.empty() && run.heard_ground_truth.empty()) return errors;
+  errors.ground_truth = run.ground_truth.empty() ? run.heard_ground_truth : ReadGroundTruth(run.ground_truth).poses;
   AteReport final = EvaluateAte(errors.ground_truth, trajectories.final);
   AteReport online = EvaluateAte(errors.ground_truth, trajectories.online);
   if (final.usable()) errors.final = std::move(final);
@@ -230,8 +200,8 @@ std::string WriteResults(const std::string& dir, const RunRecord& run, const Tra
   WriteTrajectory(dir + "/trajectory.txt", trajectories.final);
   WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online);
   WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes);
-  WritePly(dir + "/map.ply", builder.map(), trajectories.map_id);
-  const Errors errors = Evaluate(run.ground_truth, trajectories);
+  WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id);
+  const Errors errors = Evaluate(run, trajectories);
   if (!trajectories.final.empty()) WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png");
   const Json summary = SummaryJson(run, builder, trajectories, errors);
   std::ofstream file(dir + "/summary.json");

@@ -14,6 +14,7 @@ namespace dmslam {
 /// All that the summary of a run is made of.
 struct RunRecord {
   std::string sequence, mode, profile, ground_truth;
+  std::vector<StampedPose> heard_ground_truth;  ///< as the player told it: used where there is no file
   uint64_t seed = 0;
   int64_t frames_published = 0, frames_missing = 0, frames_blacked = 0, frames_jumped = 0;
   FrontendStatus frontend;

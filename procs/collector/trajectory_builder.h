@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "dmslam/dataset/trajectory.h"
@@ -19,6 +20,8 @@ class TrajectoryBuilder {
   void OnFramePose(const FramePose& pose);
   void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
 
+  /// The map as it is known from elsewhere.
+  void SetMap(Map map) { map_ = std::move(map); }
   /// The map is void: a fresh stream, or a snapshot, begins.
   void ForgetMap() { map_ = Map(map_.camera(), map_.pyramid()); }
 

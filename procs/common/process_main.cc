@@ -68,6 +68,9 @@ int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
 int ProcessMain::RunNode(const Factory& factory) {
   options_.settings = LoadSettings(config_, overrides_);
   options_.link = link_ == "lan" ? Link::kLan : Link::kHost;
+  if (offline_) {
+    if (const std::optional<int> code = offline_(options_)) return *code;
+  }
   EventLoop loop;
   LcmBus bus({lcm_url_, prefix_});
   if (!bus.receive_buffer_note().empty()) spdlog::info("{}", bus.receive_buffer_note());

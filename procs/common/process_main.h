@@ -3,7 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/node.h"
@@ -21,6 +23,9 @@ class ProcessMain {
 
   /// For the process's own options.
   CLI::App& app() { return app_; }
+  /// Work that needs no bus, if the options ask for it: done after parsing, instead of running a node, where it returns
+  /// an exit code.
+  void SetOffline(std::function<std::optional<int>(const NodeOptions&)> offline) { offline_ = std::move(offline); }
   /// Parses, makes the node, and runs it until it is done. Returns the exit code.
   int Run(int argc, char** argv, const Factory& factory);
 
@@ -37,6 +42,7 @@ class ProcessMain {
   NodeOptions options_;
   bool fresh_system_ = false;
   bool quiet_ = false;
+  std::function<std::optional<int>(const NodeOptions&)> offline_;
 };
 
 /// The vocabulary at `path`, or where that is empty the one that ships with the programs. Throws InputError.

@@ -109,6 +109,10 @@ std::vector<Entry> GeneralEntries() {
       Make("features.min_fast_threshold", "the same where there is no such corner",
            [](Settings& s) -> auto& { return s.extractor.min_fast_threshold; }, 1, 254),
       Make("loop.enabled", "close loops", [](Settings& s) -> auto& { return s.loop.enabled; }),
+      Make("map.saved", "the run begins in the map that the mapper loads (--map)",
+           [](Settings& s) -> auto& { return s.start.saved_map; }),
+      Make("map.localize_only", "nothing changes that map",
+           [](Settings& s) -> auto& { return s.start.localize_only; }),
   };
 }
 

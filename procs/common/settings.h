@@ -14,6 +14,12 @@
 
 namespace dmslam {
 
+/// With which map a run begins.
+struct StartOptions {
+  bool saved_map = false;      ///< the mapper has loaded one: the frontend waits for it and finds itself in it
+  bool localize_only = false;  ///< ... and nothing changes it
+};
+
 /// Everything that can be set and that changes results: the same file and the same `--set`s go to every process.
 struct Settings {
   Settings() { extractor.num_features = 2000; }
@@ -25,6 +31,7 @@ struct Settings {
   FrontendOptions frontend;
   MapperOptions mapper;
   LoopcloserOptions loop;
+  StartOptions start;
 
   const Pyramid& pyramid() const { return extractor.pyramid; }
 };

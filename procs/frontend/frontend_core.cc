@@ -28,12 +28,17 @@ FrontendCore::FrontendCore(Setup setup)
       pyramid_(setup.pyramid),
       session_(setup.session),
       seed_(setup.seed),
+      localize_only_(setup.localize_only),
       map_(setup.camera, setup.pyramid),
       extractor_(setup.extractor),
       initializer_options_(setup.initializer),
       initializer_(MakeInitializer()),
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
-      relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {}
+      relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {
+  if (!setup.in_saved_map) return;
+  state_ = TrackingState::kLost;
+  map_id_ = 0;  // any, until it has found itself in one
+}
 
 FrontendCore::FirstMapSearch FrontendCore::MakeInitializer() const {
   if (options_.initializer_method == "ransac") {
@@ -70,6 +75,7 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
                                    std::vector<FrontendEvent>* events) {
   ++counters_.frames;
   frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
+  if (counters_.frames == 1) last_tracked_ns_ = stamp_ns;  // in a saved map it is lost from now on
   switch (state_) {
     case TrackingState::kNotInitialized:
       Initialize(events);
@@ -187,6 +193,8 @@ void FrontendCore::Track(std::vector<FrontendEvent>* events) {
         ++counters_.relocalizations;
         relocalized_ = true;
         relocalized_ns_ = frame_.stamp_ns;
+        const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
+        if (map_id_ == 0 && reference != nullptr) map_id_ = reference->map_id;
       }
     }
   }
@@ -239,7 +247,7 @@ void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<Fronte
   const bool lost = missing_ns > ToNs(kLostAfterFrames / camera_.fps);
   state_ = lost ? TrackingState::kLost : TrackingState::kUncertain;
   ++(lost ? counters_.lost : counters_.uncertain);
-  if (missing_ns > ToNs(options_.new_map_after_s)) {
+  if (missing_ns > ToNs(options_.new_map_after_s) && !localize_only_) {
     GiveUpMap(false, "lost for too long", events);
   }
   events->push_back(MakePose(state_, report));
@@ -247,13 +255,19 @@ void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<Fronte
 
 void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<FrontendEvent>* events) {
   ++counters_.resets;
-  events->push_back(MapReset{map_id_, drop, reason});
-  ++map_id_;
+  if (map_id_ != 0) events->push_back(MapReset{map_id_, drop, reason});
+  NextMapId();
   tracker_.Reset();
   velocity_.reset();
   initializer_ = MakeInitializer();
   state_ = TrackingState::kNotInitialized;
   awaited_ = {};
+}
+
+/// A number that no map has had: those of a saved one are taken.
+void FrontendCore::NextMapId() {
+  for (const auto& [id, keyframe] : map_.keyframes()) map_id_ = std::max(map_id_, keyframe.map_id);
+  ++map_id_;
 }
 
 FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& report) const {
@@ -281,7 +295,7 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
 bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
   const KeyframeOptions& o = options_.keyframe;
   const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
-  if (reference == nullptr || report.num_static <= o.min_inliers) return false;
+  if (localize_only_ || reference == nullptr || report.num_static <= o.min_inliers) return false;
   const int min_observations = map_.keyframes().size() <= 2 ? 2 : 3;
   const int expected = map_.CountTracked(*reference, min_observations);
   const int64_t since_ns = frame_.stamp_ns - last_keyframe_ns_;
@@ -322,7 +336,7 @@ void FrontendCore::ProposeKeyframe(std::vector<FrontendEvent>* events) {
 void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
   frames_since_evidence_ = 0;
   FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
-  if (!evidence.items.empty()) events->push_back(std::move(evidence));
+  if (!evidence.items.empty() && !localize_only_) events->push_back(std::move(evidence));
 }
 
 // ---- After the end -------------------------------------------------------------------------------------------------

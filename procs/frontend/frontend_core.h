@@ -48,6 +48,8 @@ class FrontendCore {
     Pyramid pyramid;
     uint32_t session = 1;
     uint64_t seed = 0;
+    bool in_saved_map = false;   ///< begins lost in a map that is there already
+    bool localize_only = false;  ///< ... and adds nothing to it
     std::shared_ptr<const Vocabulary> vocabulary;  ///< for relocalisation; without one only the newest places are tried
   };
   explicit FrontendCore(Setup setup);
@@ -98,12 +100,14 @@ class FrontendCore {
   TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
   bool LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighbour);
   void KeepUnplaced();
+  void NextMapId();
 
   FrontendOptions options_;
   Camera camera_;
   Pyramid pyramid_;
   uint32_t session_;
   uint64_t seed_;
+  bool localize_only_;
   Map map_;
   OrbExtractor extractor_;
   InitializerOptions initializer_options_;

@@ -42,6 +42,8 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.pyramid = settings.pyramid();
   setup.session = session_;
   setup.seed = settings.seed;
+  setup.in_saved_map = settings.start.saved_map;
+  setup.localize_only = settings.start.localize_only;
   setup.vocabulary = extras_.vocabulary;
   core_ = std::make_unique<FrontendCore>(setup);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
@@ -116,9 +118,14 @@ int FrontendNode::UnacceptedKeyframes() {
 
 bool FrontendNode::HoldsBack() const { return lockstep_ && core_->awaited().valid(); }
 
+/// Nothing can be done before a saved map has come.
+bool FrontendNode::AwaitsSavedMap() const {
+  return options_.settings.start.saved_map && core_->map().keyframes().empty();
+}
+
 bool FrontendNode::WorkOnce() {
   TakeMapRecords();
-  if (HoldsBack()) return false;
+  if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
   if (waiting_) return ProcessWaiting();
   return end_ ? Finish() : false;
@@ -256,7 +263,7 @@ void FrontendNode::PublishStatus() {
   PublishLoose(status);
 }
 
-bool FrontendNode::HoldsBackForStatus() const { return core_ != nullptr && HoldsBack(); }
+bool FrontendNode::HoldsBackForStatus() const { return core_ != nullptr && (HoldsBack() || AwaitsSavedMap()); }
 
 void FrontendNode::FillCoreStatus(FrontendStatus* status) const {
   status->state = core_->state();

@@ -40,6 +40,7 @@ class FrontendNode : public StreamNode {
   void OnEndOfSequence(std::span<const uint8_t> bytes);
   void TakeMapRecords();
   bool HoldsBack() const;
+  bool AwaitsSavedMap() const;
   bool ProcessWaiting();
   bool DecodeImage(const Frame& frame);
   void PublishEvents(const std::vector<FrontendEvent>& events);

@@ -222,9 +222,11 @@ void MapperCore::OnReset(const MapReset& reset) {
 
 void MapperCore::Settle(KeyframeId id, MapId map_id) { Publish(MapEvent::kSettled, id, map_id); }
 
-void MapperCore::End() {
+void MapperCore::End(bool as_it_is) {
   std::set<MapId> maps;
-  for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    if (!as_it_is) maps.insert(keyframe.map_id);
+  }
   for (const MapId map_id : maps) {
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);

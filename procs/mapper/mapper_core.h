@@ -57,8 +57,9 @@ class MapperCore {
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says that all work that keyframe `id` caused is done.
   void Settle(KeyframeId id, MapId map_id);
-  /// Says that the sequence has ended and that all it caused is done.
-  void End();
+  /// Says that the sequence has ended and that all it caused is done; first adjusts all maps, unless it
+  /// is to leave them as they are.
+  void End(bool as_it_is = false);
 
   const Map& map() const { return map_; }
   const MapperCounters& counters() const { return counters_; }

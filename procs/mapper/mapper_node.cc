@@ -5,15 +5,48 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/util/check.h"
+
 namespace dmslam {
 
-MapperNode::MapperNode(NodeContext context, NodeOptions options)
-    : StreamNode(std::move(context), std::move(options), "mapper") {}
+MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
+    : StreamNode(std::move(context), std::move(options), "mapper"), files_(std::move(files)) {
+  const StartOptions& start = options_.settings.start;
+  if (start.saved_map == files_.load.empty()) {
+    throw InputError(files_.load.empty() ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
+                                         : "--map " + files_.load +
+                                               ": set map.saved=on for every process (scripts/run.sh --map does)");
+  }
+  if (start.localize_only && !start.saved_map) {
+    throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
+  }
+  if (!files_.load.empty()) saved_ = LoadMap(files_.load);
+}
+
+/// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
+uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
+  CheckFits(files_.load, *saved_, info.camera, options_.settings.pyramid());
+  const Map& map = saved_->map;
+  if (session_ <= NewestSession(map)) {
+    throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
+                     "; give all processes a higher one with --session");
+  }
+  if (saved_->missing > 0) {
+    spdlog::warn("{}: {} map records are missing in it; the map is as good as it can be", files_.load, saved_->missing);
+  }
+  const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
+  const std::vector<MapDelta> parts = map.Snapshot(map.keyframes().rbegin()->first, 56 * 1024);
+  saved_parts_.assign(parts.begin(), parts.end());
+  spdlog::info("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(), map.num_landmarks());
+  return ordinal;
+}
 
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
-  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(), uint16_t{1},
+  const uint16_t ordinal = saved_ ? ContinueSavedMap(info) : uint16_t{1};
+  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(), ordinal,
                                        [this](const MapDelta& delta) { PublishDelta(delta); });
+  if (saved_) core_->Continue(std::exchange(saved_, std::nullopt)->map);
   if (!lockstep_) {
     core_->SetInterrupt([this] {
       PumpWithinWork();
@@ -49,7 +82,18 @@ void MapperNode::TakeLoopAnswers() {
   }
 }
 
+/// The loaded map goes out as records like any other, and is settled: then lock-step goes on.
+bool MapperNode::PublishSavedMap() {
+  if (writer_->Full()) return false;
+  PublishDelta(saved_parts_.front());
+  saved_parts_.pop_front();
+  const Keyframe& newest = core_->map().keyframes().rbegin()->second;
+  if (saved_parts_.empty()) core_->Settle(newest.id, newest.map_id);
+  return true;
+}
+
 bool MapperNode::WorkOnce() {
+  if (!saved_parts_.empty()) return PublishSavedMap();
   TakeLoopAnswers();
   while (std::optional<Record> record = frontend_reader_->Take()) taken_.push_back(std::move(*record));
   AcceptWhatIsSafe();
@@ -72,6 +116,10 @@ bool MapperNode::WorkOnce() {
 }
 
 void MapperNode::Handle(const Record& record) {
+  if (record.channel == channels::kSession) {
+    if (const auto start = Read<SessionStart>(*record.bytes)) session_start_ = *start;
+  }
+  if (options_.settings.start.localize_only) return;
   if (record.channel == channels::kInitialMap) {
     if (const auto proposal = Read<InitialMap>(*record.bytes)) HandleInitialMap(*proposal);
   } else if (record.channel == channels::kKeyframe) {
@@ -128,7 +176,7 @@ bool MapperNode::EndIfDone() {
   const bool loop_done = !options_.HasPeer("loopcloser") || loop_reader_->AtEnd();
   if (!end_announced_) {
     end_announced_ = true;
-    core_->End();
+    core_->End(options_.settings.start.localize_only);
     return true;
   }
   if (!loop_done) return false;
@@ -136,6 +184,17 @@ bool MapperNode::EndIfDone() {
   PublishStatus();
   Stop();
   return false;
+}
+
+void MapperNode::Save() {
+  const std::string path = std::exchange(files_.save, "");
+  if (path.empty() || !core_ || core_->map().keyframes().empty()) return;
+  SaveMap(path, core_->map(), session_start_);
+}
+
+void MapperNode::Stop() {
+  Save();
+  StreamNode::Stop();
 }
 
 void MapperNode::PublishStatus() {

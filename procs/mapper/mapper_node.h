@@ -8,6 +8,7 @@
 
 #include "common/latency_window.h"
 #include "common/stream_node.h"
+#include "dmslam/recording/map_file.h"
 #include "mapper/map_snapshots.h"
 #include "mapper/mapper_core.h"
 
@@ -17,7 +18,15 @@ namespace dmslam {
 /// accepted only when the map record that holds its effect was acknowledged by another process.
 class MapperNode : public StreamNode {
  public:
-  MapperNode(NodeContext context, NodeOptions options);
+  /// Maps as files; empty: none.
+  struct Files {
+    std::string load;  ///< a saved map, or a log: the map to begin with
+    std::string save;  ///< where the map is written at the end
+  };
+  MapperNode(NodeContext context, NodeOptions options, Files files = {});
+
+  /// Also saves the map where that is asked for.
+  void Stop() override;
 
  protected:
   void Begin(const CameraInfo& info) override;
@@ -30,6 +39,9 @@ class MapperNode : public StreamNode {
     int64_t map_seq = 0;
   };
 
+  uint16_t ContinueSavedMap(const CameraInfo& info);
+  bool PublishSavedMap();
+  void Save();
   void TakeLoopAnswers();
   void Handle(const Record& record);
   void HandleKeyframe(const KeyframeProposal& proposal);
@@ -42,6 +54,10 @@ class MapperNode : public StreamNode {
   bool EndIfDone();
   void FillCoreStatus(MapperStatus* status) const;
 
+  Files files_;
+  std::optional<RebuiltMap> saved_;      ///< loaded, not yet taken over
+  std::deque<MapDelta> saved_parts_;     ///< of that map, not yet published
+  SessionStart session_start_;           ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   std::unique_ptr<StreamReader> frontend_reader_, loop_reader_;

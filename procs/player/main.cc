@@ -1,7 +1,11 @@
-#include <filesystem>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 
 #include "common/process_main.h"
+#include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
+#include "player/log_output.h"
 #include "player/player_node.h"
 
 namespace {
@@ -17,6 +21,15 @@ std::pair<double, double> ParsePair(const std::string& option, const std::string
   }
 }
 
+/// What the command line says.
+struct Arguments {
+  dmslam::PlayerOptions options;
+  std::string camera_file, encoding = "jpeg", log, to_log;
+  uint32_t log_session = 0;
+  bool lockstep = false;
+  std::vector<std::string> black_outs, jumps;
+};
+
 dmslam::Camera ChooseCamera(const std::string& camera_file, const std::string& sequence) {
   if (!camera_file.empty()) return dmslam::LoadCamera(camera_file);
   const auto found = dmslam::FindCamera(sequence, dmslam::FindDataFolder("config"));
@@ -24,43 +37,101 @@ dmslam::Camera ChooseCamera(const std::string& camera_file, const std::string& s
   throw dmslam::InputError(sequence + ": which camera took this is not known; name its file with --camera");
 }
 
+std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, dmslam::PlayerOptions* options) {
+  auto log = std::make_shared<const dmslam::LogIndex>(a.log);
+  if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
+  auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
+  options->sequence = frames->camera_info().sequence;
+  options->camera = a.camera_file.empty() ? frames->camera_info().camera : dmslam::LoadCamera(a.camera_file);
+  return frames;
+}
+
+/// The recording, and in `options` how it is to be played.
+std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::NodeOptions& node,
+                                          dmslam::PlayerOptions* options) {
+  *options = a.options;
+  options->mode = a.lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
+  options->session = node.session == 0 ? 1 : node.session;
+  options->encoding = a.encoding == "png"   ? dmslam::FrameEncoding::kPng
+                      : a.encoding == "raw" ? dmslam::FrameEncoding::kGray8
+                                            : dmslam::FrameEncoding::kJpeg;
+  for (const std::string& text : a.black_outs) {
+    const auto [from, seconds] = ParsePair("--black-out", text);
+    options->black_outs.push_back({static_cast<size_t>(from), seconds});
+  }
+  for (const std::string& text : a.jumps) {
+    const auto [from, to] = ParsePair("--jump", text);
+    options->jumps.push_back({static_cast<size_t>(from), static_cast<size_t>(to)});
+  }
+  if (options->sequence.empty() == a.log.empty()) {
+    throw dmslam::InputError("give either --sequence or --log: what shall be played?");
+  }
+  if (!a.log.empty()) return OpenLog(a, options);
+  auto source = dmslam::OpenFrameSource(options->sequence);
+  options->camera = ChooseCamera(a.camera_file, options->sequence);
+  return source;
+}
+
+/// Writes what the player would publish into a log, under the recording's own clock.
+int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options) {
+  dmslam::PlayerOptions options;
+  auto source = Open(a, node_options, &options);
+  options.mode = dmslam::PlaybackMode::kRealtime;
+  options.speed = 1.0;
+  const int64_t lead_ns = static_cast<int64_t>(options.lead_s * 1e9);
+  const int64_t first_ns = source->size() > options.start ? source->StampNs(options.start) : 0;
+  dmslam::LogOutput output(a.to_log, std::max<int64_t>(0, first_ns - lead_ns));
+  dmslam::NodeContext context;
+  context.bus = &output;
+  context.now_ns = [&output] { return output.now_ns(); };
+  context.wall_us = [&output] { return output.now_ns() / 1000; };
+  dmslam::PlayerNode node(std::move(context), options, std::move(source));
+  while (!node.exit_code() && !output.ended()) {
+    node.Advance();
+    output.AdvanceTo(std::max(output.now_ns(), node.deadline_ns()));
+  }
+  output.Close();
+  if (!node.problem().empty()) throw dmslam::InputError(node.problem());
+  spdlog::info("{} frames written to {}", node.published(), a.to_log);
+  return 0;
+}
+
+void Declare(CLI::App& app, Arguments& a) {
+  app.add_option("--sequence", a.options.sequence,
+                 "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.add_option("--log", a.log,
+                 "log of lcm-logger: its frames are played, with their indices, stamps and bytes");
+  app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
+  app.add_option("--to-log", a.to_log, "write camera and frames into this log instead of publishing them");
+  app.add_option("--camera", a.camera_file,
+                 "camera file (YAML); found by itself for TUM freiburg1/2/3 and logs");
+  app.add_flag("--lockstep", a.lockstep, "wait for the frontend after each frame");
+  app.add_option("--speed", a.options.speed, "factor on the recorded rate; 0: as fast as possible")
+      ->capture_default_str();
+  app.add_option("--start", a.options.start, "first frame");
+  app.add_option("--frames", a.options.frames, "at most so many frames");
+  app.add_option("--encoding", a.encoding, "of re-encoded frames: jpeg, png, raw")
+      ->check(CLI::IsMember({"jpeg", "png", "raw"}));
+  app.add_option("--jpeg-quality", a.options.jpeg_quality)->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_flag("--reencode", a.options.reencode, "encode frames anew even where files hold JPEG or PNG");
+  app.add_option("--lead", a.options.lead_s, "seconds before the first frame")->capture_default_str();
+  app.add_option("--black-out", a.black_outs,
+                 "FROM,SECONDS: black frames from frame FROM on; may be repeated");
+  app.add_option("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   dmslam::ProcessMain process("player", "Feeds the frames of a recording to the bus.");
-  dmslam::PlayerOptions options;
-  std::string camera_file, encoding = "jpeg";
-  bool lockstep = false;
-  std::vector<std::string> black_outs, jumps;
-  CLI::App& app = process.app();
-  app.add_option("--sequence", options.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video")->required();
-  app.add_option("--camera", camera_file, "camera file (YAML); found by itself for TUM freiburg1/2/3");
-  app.add_flag("--lockstep", lockstep, "wait for the frontend after each frame");
-  app.add_option("--speed", options.speed, "factor on the recorded rate; 0: as fast as possible")->capture_default_str();
-  app.add_option("--start", options.start, "first frame");
-  app.add_option("--frames", options.frames, "at most so many frames");
-  app.add_option("--encoding", encoding, "of re-encoded frames: jpeg, png, raw")->check(CLI::IsMember({"jpeg", "png", "raw"}));
-  app.add_option("--jpeg-quality", options.jpeg_quality)->check(CLI::Range(1, 100))->capture_default_str();
-  app.add_flag("--reencode", options.reencode, "encode frames anew even where files hold JPEG or PNG");
-  app.add_option("--lead", options.lead_s, "seconds before the first frame")->capture_default_str();
-  app.add_option("--black-out", black_outs, "FROM,SECONDS: black frames from frame FROM on; may be repeated");
-  app.add_option("--jump", jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
+  Arguments arguments;
+  Declare(process.app(), arguments);
+  process.SetOffline([&](const dmslam::NodeOptions& node) {
+    return arguments.to_log.empty() ? std::nullopt : std::optional(WriteLog(arguments, node));
+  });
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions node) {
-    options.mode = lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
-    options.session = node.session == 0 ? 1 : node.session;
-    options.encoding = encoding == "png"   ? dmslam::FrameEncoding::kPng
-                       : encoding == "raw" ? dmslam::FrameEncoding::kGray8
-                                           : dmslam::FrameEncoding::kJpeg;
-    for (const std::string& text : black_outs) {
-      const auto [from, seconds] = ParsePair("--black-out", text);
-      options.black_outs.push_back({static_cast<size_t>(from), seconds});
-    }
-    for (const std::string& text : jumps) {
-      const auto [from, to] = ParsePair("--jump", text);
-      options.jumps.push_back({static_cast<size_t>(from), static_cast<size_t>(to)});
-    }
-    auto source = dmslam::OpenFrameSource(options.sequence);
-    options.camera = ChooseCamera(camera_file, options.sequence);
+    dmslam::PlayerOptions options;
+    auto source = Open(arguments, node, &options);
     return std::make_unique<dmslam::PlayerNode>(std::move(context), options, std::move(source));
   });
 }

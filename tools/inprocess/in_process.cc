@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <tuple>
 #include <vector>
 
+#include "dmslam/messaging/event_log.h"
 #include "frontend/frontend_node.h"
 #include "loopcloser/loopcloser_node.h"
 #include "mapper/mapper_node.h"
@@ -12,6 +14,26 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kClockStartNs = 1'000'000'000;
+
+template <typename... Message>
+void SubscribeToAll(Bus* bus, const std::tuple<Message...>*) {
+  (bus->Subscribe(wire::Info<Message>().channel), ...);
+}
+
+/// Keeps all typed messages in a log, as lcm-logger does beside processes.
+class Recorder {
+ public:
+  Recorder(Bus* bus, const std::string& path, std::function<int64_t()> now_us) : log_(path) {
+    SubscribeToAll(bus, static_cast<const wire::Messages*>(nullptr));
+    bus->SetHandler([this, now_us](const std::string& channel, std::span<const uint8_t> bytes) {
+      log_.Write(now_us(), channel, bytes);
+    });
+  }
+  void Close() { log_.Close(); }
+
+ private:
+  EventLogWriter log_;
+};
 
 /// The nodes, their ports, and the time they share.
 class System {
@@ -27,9 +49,19 @@ class System {
     return context;
   }
   void Add(std::unique_ptr<Node> node) { nodes_.push_back(std::move(node)); }
+  void Record(const std::string& path) {
+    recorder_ = std::make_unique<Recorder>(&bus_.AddPort(), path, [this] { return now_ns_ / 1000; });
+  }
 
   /// Runs until all are done, or one fails. Returns the first exit code that is not zero.
   int Run(std::string* problem) {
+    const int code = RunNodes(problem);
+    if (recorder_) recorder_->Close();
+    return code;
+  }
+
+ private:
+  int RunNodes(std::string* problem) {
     while (true) {
       bool all_done = true;
       for (const auto& node : nodes_) {
@@ -47,7 +79,6 @@ class System {
     }
   }
 
- private:
   void AdvanceClock() {
     int64_t next = INT64_MAX;
     for (const auto& node : nodes_) {
@@ -59,6 +90,7 @@ class System {
   MemoryBus bus_;
   int64_t now_ns_ = kClockStartNs;
   std::vector<std::unique_ptr<Node>> nodes_;
+  std::unique_ptr<Recorder> recorder_;
 };
 
 }  // namespace
@@ -68,9 +100,10 @@ int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, 
   options.node.session = options.player.session;
   options.node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   System system;
+  if (!options.record.empty()) system.Record(options.record);
   system.Add(std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
   system.Add(std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
-  system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node));
+  system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node, options.map_files));
   system.Add(std::make_unique<FrontendNode>(
       system.ContextFor("frontend"), options.node,
       FrontendNode::Extras{options.vocabulary, options.picture_dir, options.picture_every}));

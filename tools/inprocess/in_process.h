@@ -4,6 +4,7 @@
 #include <string>
 
 #include "collector/collector_node.h"
+#include "mapper/mapper_node.h"
 #include "player/player_node.h"
 
 namespace dmslam {
@@ -18,6 +19,8 @@ struct InProcessOptions {
   std::string picture_dir;
   int picture_every = 0;
   bool progress = false;
+  MapperNode::Files map_files;                     ///< maps to begin with and to save
+  std::string record;                              ///< log of all that is said; empty: none
 };
 
 /// Returns the collector's exit code; what went wrong is in `problem`.

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "common/process_main.h"
+#include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "in_process.h"
@@ -14,17 +15,23 @@
 namespace {
 
 struct Arguments {
-  std::string sequence, out, camera, config, vocabulary, profile;
+  std::string sequence, log, record, out, camera, config, vocabulary, profile;
+  uint32_t log_session = 0;
   std::vector<std::string> overrides;
   size_t start = 0, frames = SIZE_MAX;
   uint64_t seed = 1;
   int pictures = 0;
-  bool no_loop = false;
+  dmslam::MapperNode::Files map_files;
+  uint32_t session = 0;
+  bool no_loop = false, localize = false;
 };
 
 void Declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", dmslam::kVersion);
-  app.add_option("--sequence", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video")->required();
+  app.add_option("--sequence", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.add_option("--log", a.log, "log of lcm-logger: its frames are played");
+  app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
+  app.add_option("--record", a.record, "write all that is said into this log");
   app.add_option("--out", a.out, "folder for the results")->required();
   app.add_option("--camera", a.camera, "camera file (YAML); found by itself for TUM freiburg1/2/3");
   app.add_option("--config", a.config, "settings (YAML)");
@@ -35,6 +42,10 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--frames", a.frames, "at most so many frames");
   app.add_option("--pictures", a.pictures, "draw every so manieth frame");
   app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
+  app.add_option("--map", a.map_files.load, "saved map or log: begin in this map");
+  app.add_flag("--localize", a.localize, "with --map: find the camera in the map, and leave the map as it is");
+  app.add_option("--save-map", a.map_files.save, "write the map into this file at the end");
+  app.add_option("--session", a.session, "of this run; default: 1, with --map one more than the map's");
   app.add_flag("--no-loop", a.no_loop, "do not close loops");
 }
 
@@ -44,17 +55,39 @@ dmslam::Camera ChooseCamera(const Arguments& a) {
   throw dmslam::InputError(a.sequence + ": which camera took this is not known; name its file with --camera");
 }
 
+std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOptions* player) {
+  if (a.sequence.empty() == a.log.empty()) throw dmslam::InputError("give either --sequence or --log");
+  if (a.log.empty()) {
+    player->sequence = a.sequence;
+    player->camera = ChooseCamera(a);
+    return dmslam::OpenFrameSource(a.sequence);
+  }
+  auto log = std::make_shared<const dmslam::LogIndex>(a.log);
+  if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
+  auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
+  player->sequence = frames->camera_info().sequence;
+  player->camera = a.camera.empty() ? frames->camera_info().camera : dmslam::LoadCamera(a.camera);
+  return frames;
+}
+
 int Run(const Arguments& a) {
   dmslam::InProcessOptions options;
   std::vector<std::string> overrides;
   if (!a.profile.empty()) overrides.push_back("profile=" + a.profile);
   overrides.push_back("seed=" + std::to_string(a.seed));
+  if (!a.map_files.load.empty()) overrides.push_back("map.saved=on");
+  if (a.localize) overrides.push_back("map.localize_only=on");
   if (a.no_loop) overrides.push_back("loop.enabled=off");
   overrides.insert(overrides.end(), a.overrides.begin(), a.overrides.end());
   options.node.settings = dmslam::LoadSettings(a.config, overrides);
-  auto source = dmslam::OpenFrameSource(a.sequence);
-  options.player.sequence = a.sequence;
-  options.player.camera = ChooseCamera(a);
+  auto source = Open(a, &options.player);
+  options.record = a.record;
+  options.map_files = a.map_files;
+  options.player.session = a.session;
+  if (a.session == 0) {
+    const bool continued = !a.map_files.load.empty();
+    options.player.session = continued ? dmslam::NewestSession(dmslam::LoadMap(a.map_files.load).map) + 1 : 1;
+  }
   options.player.start = a.start;
   options.player.frames = a.frames;
   options.collector.out_dir = a.out;

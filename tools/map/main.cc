@@ -1,0 +1,107 @@
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+
+#include "collector/map_ply.h"
+#include "collector/trajectory_builder.h"
+#include "dmslam/recording/map_file.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
+#include "dmslam/wire/codec.h"
+
+namespace {
+
+struct Arguments {
+  std::string log, ply, trajectory, online, keyframes, save;
+  uint32_t session = 0;
+  double at_s = -1;
+};
+
+void Declare(CLI::App& app, Arguments& a) {
+  app.set_version_flag("--version", dmslam::kVersion);
+  app.add_option("--log", a.log, "log of a run, or a saved map")->required();
+  app.add_option("--log-session", a.session, "which of the log's sessions, where it holds several");
+  app.add_option("--at", a.at_s, "seconds after the log's beginning: the map as it was then")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--ply", a.ply, "write the map as coloured points");
+  app.add_option("--trajectory", a.trajectory, "write where the camera was, by the map (TUM format)");
+  app.add_option("--trajectory-online", a.online, "write where the camera was, as told frame by frame");
+  app.add_option("--keyframes", a.keyframes, "write the keyframes' poses (TUM format)");
+  app.add_option("--save", a.save, "write the map as a file that the mapper can load (--map)");
+}
+
+/// The poses of the frames, as the frontend told them up to then.
+void AddFramePoses(const dmslam::LogIndex& log, const dmslam::RecordedSession& session, int64_t until_us,
+                   dmslam::TrajectoryBuilder* builder) {
+  for (const dmslam::ReplayStep& step :
+       dmslam::PlanReplay(session.Stream(dmslam::StreamId::kFrontend), until_us).steps) {
+    if (step.message->channel != dmslam::channels::kFramePose) continue;
+    if (const auto pose = dmslam::wire::Decode<dmslam::FramePose>(log.Read(*step.message)))
+      builder->OnFramePose(*pose);
+  }
+}
+
+void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
+           const dmslam::RebuiltMap& rebuilt, const dmslam::TrajectoryBuilder::Trajectories& trajectories,
+           dmslam::MapId map_id) {
+  const double seconds = static_cast<double>(log.end_us() - log.begin_us()) * 1e-6;
+  std::printf("log         %lld messages, %.1f s, session %u, sequence %s\n",
+              static_cast<long long>(log.num_messages()), seconds, session.id,
+              rebuilt.session.sequence.c_str());
+  std::printf("map         number %u, version %llu, %zu keyframes, %zu landmarks%s\n", map_id,
+              static_cast<unsigned long long>(rebuilt.map.version()), rebuilt.map.keyframes().size(),
+              rebuilt.map.num_landmarks(), rebuilt.ended ? ", complete" : "");
+  std::printf("records     %lld applied, %lld missing\n", static_cast<long long>(rebuilt.records),
+              static_cast<long long>(rebuilt.missing));
+  std::printf("trajectory  %zu frames\n", trajectories.final.size());
+}
+
+int Run(const Arguments& a) {
+  const dmslam::LogIndex log(a.log);
+  if (!log.DescribeDamage().empty()) spdlog::warn("{}", log.DescribeDamage());
+  const dmslam::RecordedSession& session = log.Session(a.session);
+  const int64_t until_us = a.at_s < 0 ? INT64_MAX : log.begin_us() + std::llround(a.at_s * 1e6);
+  const dmslam::RebuiltMap rebuilt = dmslam::RebuildMap(log, session, until_us);
+  if (rebuilt.missing > 0) {
+    spdlog::warn("{}: {} map records are missing; what they said is lost, {} references lead nowhere", a.log,
+                 rebuilt.missing, rebuilt.skipped);
+  }
+  dmslam::TrajectoryBuilder builder(rebuilt.session.camera, rebuilt.session.pyramid);
+  builder.SetMap(rebuilt.map);
+  AddFramePoses(log, session, until_us, &builder);
+  dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build();
+  const dmslam::MapId map_id =
+      trajectories.map_id != 0 ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);
+  if (trajectories.map_id == 0) {
+    for (const auto& [id, keyframe] : rebuilt.map.keyframes()) {
+      if (keyframe.map_id == map_id)
+        trajectories.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
+    }
+  }
+  if (!a.ply.empty()) dmslam::WriteMapPly(a.ply, rebuilt.map, map_id);
+  if (!a.trajectory.empty()) dmslam::WriteTrajectory(a.trajectory, trajectories.final);
+  if (!a.online.empty()) dmslam::WriteTrajectory(a.online, trajectories.online);
+  if (!a.keyframes.empty()) dmslam::WriteTrajectory(a.keyframes, trajectories.keyframes);
+  if (!a.save.empty()) dmslam::SaveMap(a.save, rebuilt.map, rebuilt.session);
+  Print(log, session, rebuilt, trajectories, map_id);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Rebuilds the map of a run from its log, and writes it out.", "dmslam-map");
+  Arguments arguments;
+  Declare(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  spdlog::set_default_logger(spdlog::stderr_color_mt("dmslam-map"));
+  try {
+    return Run(arguments);
+  } catch (const dmslam::InputError& error) {
+    spdlog::error("{}", error.what());
+    return 1;
+  }
+}
