@@ -22,7 +22,7 @@ class Browser:
     ARGUMENTS = [
         "--headless=new", "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-sync",
         "--disable-extensions", "--disable-component-update", "--disable-dev-shm-usage", "--hide-scrollbars",
-        "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--mute-audio",
+        "--disable-gpu", "--enable-unsafe-swiftshader", "--mute-audio",
         "--disable-features=Translate,MediaRouter,OptimizationHints", "--no-proxy-server",
         "--remote-debugging-port=0", "--remote-allow-origins=*",
     ]

@@ -3,24 +3,24 @@ import * as THREE from '/three/build/three.module.js';
 import {OrbitControls} from '/three/examples/jsm/controls/OrbitControls.js';
 import {WideLines} from '/wide_lines.js';
 
-const kMinBudget = 15000, kMaxBudget = 600000;
-const kNearKeyframes = 300;  // drawn as frusta where there are more; all others as dots
-const kMostEdges = 12000;
-const kMostPathSegments = 12000;
-const kSlowMs = 42, kFastMs = 28;  // of a picture
+const kMinBudget = 6000, kMaxBudget = 400000, kRestBudget = 110000;
+const kNearKeyframes = 130;  // where there are more, these are drawn with their edges, and all others as dots
+const kMostPathPoints = 1500;
+const kSlowMs = 46, kFastMs = 38;  // of a picture
 
 const pointVertex = `
   attribute vec2 value;  // belief, first frame
   uniform mediump float size;
-  uniform float ages, newest;
-  uniform vec3 still, unsure, moving, age0, age1, age2, age3;
+  uniform float ages, newest, floorAt, roofAt;
+  uniform vec3 up, low, still, unsure, moving, age0, age1, age2, age3;
   varying vec3 vColour;
   void main() {
     vec4 p = modelViewMatrix * vec4(position, 1.0);
     gl_Position = projectionMatrix * p;
     float belief = value.x;
+    float height = clamp((dot(up, position) - floorAt) / max(roofAt - floorAt, 1e-6), 0.0, 1.0);
     vec3 motion = belief > 0.0 ? mix(unsure, moving, clamp(belief * 0.7 + 0.3, 0.0, 1.0))
-                               : mix(unsure, still, clamp(-belief * 1.5 + 0.5, 0.0, 1.0));
+                               : mix(unsure, mix(low, still, height), clamp(-belief * 1.5 + 0.5, 0.0, 1.0));
     float a = clamp(value.y / max(newest, 1.0), 0.0, 1.0) * 3.0;
     vec3 age = a < 1.0 ? mix(age0, age1, a) : a < 2.0 ? mix(age1, age2, a - 1.0) : mix(age2, age3, a - 2.0);
     vColour = ages > 0.5 ? age : motion;
@@ -45,6 +45,29 @@ function isSoftware() {
   const gl = document.createElement('canvas').getContext('webgl');
   const extension = gl && gl.getExtension('WEBGL_debug_renderer_info');
   return !extension || /swiftshader|llvmpipe|softpipe|software/i.test(gl.getParameter(extension.UNMASKED_RENDERER_WEBGL));
+}
+
+/// The points of a line that deviate from it by more than `tolerance` (Douglas and Peucker's way), first and last included.
+function simplify(points, tolerance) {
+  const keep = new Uint8Array(points.length);
+  const todo = [[0, points.length - 1]];
+  keep[0] = keep[points.length - 1] = 1;
+  while (todo.length > 0) {
+    const [from, to] = todo.pop();
+    const a = points[from], d = points[to].map((x, k) => x - a[k]);
+    const length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    let worst = tolerance * tolerance, at = -1;
+    for (let i = from + 1; i < to; ++i) {
+      const e = points[i].map((x, k) => x - a[k]);
+      const along = length2 > 0 ? Math.min(1, Math.max(0, (e[0] * d[0] + e[1] * d[1] + e[2] * d[2]) / length2)) : 0;
+      const off = (e[0] - along * d[0]) ** 2 + (e[1] - along * d[1]) ** 2 + (e[2] - along * d[2]) ** 2;
+      if (off > worst) [worst, at] = [off, i];
+    }
+    if (at < 0) continue;
+    keep[at] = 1;
+    todo.push([from, at], [at, to]);
+  }
+  return points.filter((_, i) => keep[i]);
 }
 
 /// The edges of a camera's pyramid, in its own frame (x right, y down, z forward), as pairs of points.
@@ -77,10 +100,11 @@ export class SceneView {
     this.radius = 1;
     this.depth = 1;
     this.pose = null;
-    this.budget = 120000;
+    this.budget = 60000;
+    this.adapted = 0;
     this.pictures = {times: [], drawnPoints: 0, fps: 0};
     this.needsPicture = true;
-    this.lastDrawn = 0;
+    this.lastDrawn = this.lastCall = 0;
     this.makeObjects();
     this.applyTheme();
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
@@ -89,8 +113,9 @@ export class SceneView {
   }
 
   makeObjects() {
-    const uniforms = {size: {value: 2.5}, ages: {value: 0}, newest: {value: 1}};
-    for (const name of ['still', 'unsure', 'moving', 'age0', 'age1', 'age2', 'age3']) uniforms[name] = {value: new THREE.Color()};
+    const uniforms = {size: {value: 2.5}, ages: {value: 0}, newest: {value: 1}, up: {value: new THREE.Vector3(0, -1, 0)},
+                      floorAt: {value: -1}, roofAt: {value: 1}};
+    for (const name of ['low', 'still', 'unsure', 'moving', 'age0', 'age1', 'age2', 'age3']) uniforms[name] = {value: new THREE.Color()};
     this.pointMaterial = new THREE.ShaderMaterial({vertexShader: pointVertex, fragmentShader: pointFragment, uniforms});
     this.points = new THREE.Group();
     this.tileObjects = [];
@@ -116,7 +141,7 @@ export class SceneView {
   applyTheme() {
     this.scene.background = css('--scene');
     const u = this.pointMaterial.uniforms;
-    const names = {still: '--static', unsure: '--unsure', moving: '--dynamic', age0: '--age-0', age1: '--age-1', age2: '--age-2', age3: '--age-3'};
+    const names = {low: '--static-low', still: '--static', unsure: '--unsure', moving: '--dynamic', age0: '--age-0', age1: '--age-1', age2: '--age-2', age3: '--age-3'};
     for (const [uniform, name] of Object.entries(names)) u[uniform].value = css(name);
     const lines = {edges: '--edge', loops: '--loop', frusta: '--keyframe', path: '--path', truth: '--truth', camera: '--camera'};
     for (const [line, name] of Object.entries(lines)) this.lines[line].material.uniforms.colour.value = css(name);
@@ -135,7 +160,7 @@ export class SceneView {
 
   showLayers() {
     this.lines.frusta.show(this.layers.keyframes);
-    this.dots.visible = this.layers.keyframes;
+    this.dots.visible = this.layers.keyframes && this.store.numKeyframes > kNearKeyframes;
     this.lines.edges.show(this.layers.edges);
     this.lines.loops.show(this.layers.edges);
     this.lines.path.show(this.layers.path);
@@ -220,43 +245,23 @@ export class SceneView {
     this.dots.geometry = new THREE.BufferGeometry();
     this.dots.geometry.setAttribute('position', new THREE.BufferAttribute(centres, 3));
     this.frustaDirty = true;
-    this.updateEdges();
   }
 
-  updateEdges() {
-    const frames = this.store.keyframes;
-    const count = frames.reduce((sum, keyframe) => sum + (keyframe ? keyframe.links.length : 0), 0);
-    const keep = Math.min(1, kMostEdges / Math.max(1, count));
-    const {edges, loops} = this.lines;
-    edges.start(count);
-    loops.start(count);
-    let number = 0;
-    for (const keyframe of frames) {
-      if (!keyframe) continue;
-      for (let i = 0; i < keyframe.links.length; ++i) {
-        const other = frames[keyframe.links[i]];
-        if (!other) continue;
-        if (keyframe.kinds[i] === 2) loops.add(keyframe.centre, other.centre);
-        else if (Math.floor(++number * keep) !== Math.floor((number - 1) * keep)) edges.add(keyframe.centre, other.centre);
-      }
-    }
-    edges.finish();
-    loops.finish();
-    edges.show(this.layers.edges);
-    loops.show(this.layers.edges);
-  }
-
+  /// What was walked, without the points that lie on the line between others where there are many.
   updatePath() {
     const places = this.store.trajectory();
-    const step = Math.max(1, Math.ceil(places.length / kMostPathSegments));
     const path = this.lines.path;
-    path.start(places.length);
-    let last = null;
+    const pieces = [];
     places.forEach((place, i) => {
-      if (i % step !== 0 && i !== places.length - 1) return;
-      if (last && place[0] - last[0] <= 90 * step) path.add(last.slice(1), place.slice(1));
-      last = place;
+      if (i === 0 || place[0] - places[i - 1][0] > 90) pieces.push([]);
+      pieces[pieces.length - 1].push(place.slice(1));
     });
+    let drawn = pieces;
+    for (let tolerance = 5e-4; drawn.reduce((sum, piece) => sum + piece.length, 0) > kMostPathPoints && tolerance < 0.02; tolerance *= 2) {
+      drawn = pieces.map((piece) => simplify(piece, tolerance * this.radius));
+    }
+    path.start(drawn.reduce((sum, piece) => sum + piece.length, 0));
+    for (const piece of drawn) for (let i = 1; i < piece.length; ++i) path.add(piece[i - 1], piece[i]);
     path.finish();
     path.show(this.layers.path);
   }
@@ -330,6 +335,10 @@ export class SceneView {
     if (this.sample.length < 20) return;
     const heights = this.sample.map((p) => p.y).sort((a, b) => a - b);
     const floor = heights[Math.floor(heights.length * 0.03)];
+    const uniforms = this.pointMaterial.uniforms;
+    uniforms.floorAt.value = floor;
+    uniforms.roofAt.value = heights[Math.floor(heights.length * 0.9)];
+    uniforms.up.value.set(0, 1, 0).applyQuaternion(this.root.quaternion.clone().conjugate());
     const centre = this.centre;
     if (!this.gridRadius || Math.abs(this.radius / this.gridRadius - 1) > 0.2) {
       this.gridRadius = this.radius;
@@ -354,6 +363,9 @@ export class SceneView {
 
   /// Where the ground truth lies on the map: {rotation, translation, scale}, or null.
   setTruth(truth) {
+    const said = JSON.stringify(truth);
+    if (said === this.truthSaid) return;
+    this.truthSaid = said;
     this.truthKnown = truth !== null;
     if (truth) {
       this.truthGroup.matrix.compose(new THREE.Vector3(...truth.translation), new THREE.Quaternion(...truth.rotation),
@@ -445,53 +457,55 @@ export class SceneView {
   frame(direction) {
     const right = new THREE.Vector3(0, 1, 0).cross(direction).normalize();
     const up = direction.clone().cross(right);
-    const range = (axis) => {
+    const axes = [right, up, direction];
+    const target = new THREE.Vector3();
+    for (const axis of axes) {
       const all = this.sample.map((p) => p.dot(axis)).sort((a, b) => a - b);
       const own = this.places.map((p) => p.dot(axis));
       const low = Math.min(all.length ? all[Math.floor(0.04 * all.length)] : Infinity, ...own);
       const high = Math.max(all.length ? all[Math.floor(0.96 * (all.length - 1))] : -Infinity, ...own);
-      return {middle: (low + high) / 2, half: (high - low) / 2};
-    };
-    const [x, y, z] = [right, up, direction].map(range);
-    const target = new THREE.Vector3().addScaledVector(right, x.middle).addScaledVector(up, y.middle).addScaledVector(direction, z.middle);
+      target.addScaledVector(axis, (low + high) / 2);
+    }
     const tangent = Math.tan(this.camera.fov * Math.PI / 360);
-    const distance = 1.04 * Math.max(y.half / (0.86 * tangent), x.half / (tangent * this.camera.aspect)) + 0.55 * z.half;
-    return {target, distance: Math.max(distance, 1e-3)};
+    const needs = (p) => {  // how far the eye must be for this point to be within the picture, and clear of its edges
+      const [x, y, z] = axes.map((axis) => p.dot(axis) - target.dot(axis));
+      return z + Math.max(Math.abs(x) / (0.92 * tangent * this.camera.aspect), (y < 0 ? 1.0 / 0.78 : 1.0 / 0.84) * Math.abs(y) / tangent);
+    };
+    const all = this.sample.map(needs).sort((a, b) => a - b);
+    const distance = Math.max(all.length ? all[Math.floor(0.97 * (all.length - 1))] : 0, ...this.places.map(needs), 1e-3);
+    return {target, distance};
   }
 
   // ---- Pictures ------------------------------------------------------------------------------------------------
 
   loop(now) {
     requestAnimationFrame((next) => this.loop(next));
+    const since = now - this.lastCall;
+    this.lastCall = now;
+    if (this.drewLast) this.adapt(since);
+    this.drewLast = this.needsPicture || this.turning;
     if (this.turning) this.turn(now);
-    if (!this.needsPicture) {
-      this.settle(now);
-      return;
-    }
-    const since = now - this.lastDrawn;
-    this.adapt(since);
-    this.draw(now);
+    if (this.needsPicture) this.draw(now);
+    else this.settle(now);
   }
 
-  /// The budget follows what pictures cost, told by how long after one the next can come.
-  adapt(since) {
-    if (since > 400) return;  // there was a pause
-    this.pictures.times.push(since);
-    if (this.pictures.times.length > 40) this.pictures.times.shift();
-    const mean = this.pictures.times.reduce((a, b) => a + b, 0) / this.pictures.times.length;
-    this.pictures.fps = 1000 / mean;
-    if (this.pictures.times.length < 4) return;
-    const recent = this.pictures.times.slice(-4).reduce((a, b) => a + b, 0) / 4;
-    if (recent > kSlowMs) this.budget = Math.max(kMinBudget, this.budget * Math.max(0.6, 36 / recent));
-    if (recent < kFastMs && this.pictures.drawnPoints > 0.9 * this.budget) this.budget = Math.min(kMaxBudget, this.budget * 1.08);
+  /// The budget follows what pictures cost, told by how long after one the browser can go on.
+  adapt(milliseconds) {
+    const {times} = this.pictures;
+    times.push(milliseconds);
+    if (times.length > 60) times.shift();
+    this.pictures.fps = 1000 * times.length / times.reduce((a, b) => a + b, 0);
+    if (++this.adapted % 5 !== 0) return;
+    const recent = times.slice(-5).reduce((a, b) => a + b, 0) / Math.min(5, times.length);
+    if (recent > kSlowMs) this.budget = Math.max(kMinBudget, this.budget * Math.max(0.7, 40 / recent));
+    if (recent < kFastMs && this.pictures.drawnPoints > 0.9 * this.budget) this.budget = Math.min(kMaxBudget, this.budget * 1.15);
   }
 
-  /// Once nothing moves any more, one picture with everything in it.
+  /// Once nothing moves any more, one picture with as much as can be told apart.
   settle(now) {
     if (this.settled || now - this.lastDrawn < 600) return;
     this.settled = true;
-    this.draw(now, kMaxBudget);
-    this.pictures.times.length = 0;
+    this.draw(now, Math.max(kRestBudget, this.budget));
   }
 
   draw(now, budget) {
@@ -501,12 +515,12 @@ export class SceneView {
     this.root.updateMatrixWorld();
     this.camera.updateMatrixWorld();
     this.chooseDetail(budget || this.budget);
-    this.chooseFrusta();
+    this.chooseKeyframes();
     const {width, height} = this.canvas;
     for (const lines of Object.values(this.lines)) lines.setViewport(width, height, this.pixel, this.camera.near);
     const drawn = this.pictures.drawnPoints;
     this.pointMaterial.uniforms.size.value = (drawn > 60000 ? 1.8 : drawn > 10000 ? 2.6 : drawn > 3000 ? 3.4 : 4.2) * this.pixel;
-    this.dots.material.size = (this.store.numKeyframes > kNearKeyframes ? 3 : 4) * this.pixel;
+    this.dots.material.size = 2.5 * this.pixel;
     this.renderer.render(this.scene, this.camera);
   }
 
@@ -542,26 +556,39 @@ export class SceneView {
     this.pictures.inSight = total;
   }
 
-  /// Frusta of the keyframes that are nearest to the eye, where there are too many for all.
-  chooseFrusta() {
-    const frames = this.store.keyframes;
-    const many = this.store.numKeyframes > kNearKeyframes;
-    const moved = !this.frustaFrom || this.frustaFrom.distanceTo(this.camera.position) > 0.05 * this.radius;
+  /// Frusta and edges of the keyframes, of those nearest to the eye where there are too many for all; loops always.
+  chooseKeyframes() {
+    const many = this.store.numKeyframes > 2 * kNearKeyframes;
+    const moved = !this.chosenFrom || this.chosenFrom.distanceTo(this.camera.position) > 0.05 * this.radius;
     if (!this.frustaDirty && !(many && moved)) return;
     this.frustaDirty = false;
-    this.frustaFrom = this.camera.position.clone();
-    const eye = this.camera.position.clone().applyQuaternion(this.root.quaternion.clone().conjugate());
-    let chosen = frames.filter((keyframe) => keyframe);
-    if (many) {
-      const v = new THREE.Vector3();
-      for (const keyframe of chosen) keyframe.distance = v.fromArray(keyframe.centre).distanceToSquared(eye);
-      chosen = chosen.sort((a, b) => a.distance - b.distance).slice(0, kNearKeyframes);
+    this.chosenFrom = this.camera.position.clone();
+    const all = this.store.keyframes.filter((keyframe) => keyframe);
+    const chosen = many ? this.nearest(all, kNearKeyframes) : all;
+    const {frusta, edges, loops} = this.lines;
+    frusta.start(8 * chosen.length);
+    for (const keyframe of chosen) this.addFrustum(frusta, keyframe.centre, keyframe.rotation, this.frustumSize || 0.05);
+    this.addLinks(edges, chosen, (kind) => kind !== 2);
+    this.addLinks(loops, all, (kind) => kind === 2);
+    for (const lines of [frusta, edges, loops]) lines.finish();
+    this.showLayers();
+  }
+
+  nearest(keyframes, most) {
+    const eye = this.camera.position.clone().applyQuaternion(this.root.quaternion.clone().conjugate()), v = new THREE.Vector3();
+    const distances = keyframes.map((keyframe) => v.fromArray(keyframe.centre).distanceToSquared(eye));
+    const order = [...keyframes.keys()].sort((a, b) => distances[a] - distances[b]).slice(0, most);
+    return order.map((i) => keyframes[i]);
+  }
+
+  addLinks(lines, keyframes, wanted) {
+    lines.start(keyframes.reduce((sum, keyframe) => sum + keyframe.links.length, 0));
+    for (const keyframe of keyframes) {
+      keyframe.links.forEach((slot, i) => {
+        const other = this.store.keyframes[slot];
+        if (other && wanted(keyframe.kinds[i])) lines.add(keyframe.centre, other.centre);
+      });
     }
-    const lines = this.lines.frusta;
-    lines.start(8 * chosen.length);
-    for (const keyframe of chosen) this.addFrustum(lines, keyframe.centre, keyframe.rotation, this.frustumSize || 0.05);
-    lines.finish();
-    lines.show(this.layers.keyframes);
   }
 
   // ---- For measurements and tests ------------------------------------------------------------------------------

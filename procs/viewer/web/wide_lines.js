@@ -1,8 +1,9 @@
-// Line segments of a width in pixels: what WebGL's own lines cannot do. One quad per segment, instanced.
+// Line segments of a width in pixels: what WebGL's own lines cannot do. One quad per segment.
 import * as THREE from '/three/build/three.module.js';
 
 const vertex = `
   attribute vec3 begin, end;
+  attribute vec2 corner;  // which end: 0 or 1, which side: -1 or 1
   uniform vec2 viewport;
   uniform mediump float width;
   uniform float near;
@@ -19,10 +20,10 @@ const vertex = `
     vec2 along = sb - sa;
     float length2 = dot(along, along);
     along = length2 > 1e-8 ? along * inversesqrt(length2) : vec2(1.0, 0.0);
-    vec4 here = position.x < 0.5 ? ca : cb;
+    vec4 here = corner.x < 0.5 ? ca : cb;
     float broad = width + 1.0;  // a pixel to fade out in
-    vAcross = position.y * broad;
-    vec2 offset = vec2(-along.y, along.x) * position.y * broad + along * (position.x * 2.0 - 1.0) * width * 0.45;
+    vAcross = corner.y * broad;
+    vec2 offset = vec2(-along.y, along.x) * corner.y * broad + along * (corner.x * 2.0 - 1.0) * width * 0.45;
     here.xy += offset / viewport * here.w;
     gl_Position = here;
   }`;
@@ -34,6 +35,8 @@ const fragment = `
   uniform mediump float width;
   varying float vAcross;
   void main() { gl_FragColor = vec4(colour, opacity * clamp(0.5 * (width + 1.0 - abs(vAcross)), 0.0, 1.0)); }`;
+
+const kMostSegments = 16000;  // what 16 bits can number
 
 export class WideLines {
   /// `width` in CSS pixels; `order`: what is drawn later.
@@ -48,7 +51,7 @@ export class WideLines {
     });
     this.capacity = 0;
     this.count = 0;
-    this.object = new THREE.Mesh(new THREE.InstancedBufferGeometry(), this.material);
+    this.object = new THREE.Mesh(new THREE.BufferGeometry(), this.material);
     this.object.frustumCulled = false;
     this.object.renderOrder = order;
     this.object.visible = false;
@@ -57,14 +60,20 @@ export class WideLines {
   }
 
   grow(capacity) {
-    this.capacity = capacity;
-    const geometry = new THREE.InstancedBufferGeometry();
-    geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array([0, -1, 0, 0, 1, 0, 1, 1, 0, 1, -1, 0]), 3));
-    geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    this.begin = new THREE.InstancedBufferAttribute(new Float32Array(3 * capacity), 3);
-    this.end = new THREE.InstancedBufferAttribute(new Float32Array(3 * capacity), 3);
+    this.capacity = Math.min(capacity, kMostSegments);
+    const geometry = new THREE.BufferGeometry();
+    const corners = new Float32Array(8 * this.capacity), index = new Uint16Array(6 * this.capacity);
+    for (let i = 0; i < this.capacity; ++i) {
+      corners.set([0, -1, 0, 1, 1, 1, 1, -1], 8 * i);
+      index.set([0, 1, 2, 0, 2, 3].map((k) => 4 * i + k), 6 * i);
+    }
+    this.begin = new THREE.BufferAttribute(new Float32Array(12 * this.capacity), 3);
+    this.end = new THREE.BufferAttribute(new Float32Array(12 * this.capacity), 3);
+    geometry.setAttribute('position', this.begin);
     geometry.setAttribute('begin', this.begin);
     geometry.setAttribute('end', this.end);
+    geometry.setAttribute('corner', new THREE.BufferAttribute(corners, 2));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
     this.object.geometry.dispose();
     this.object.geometry = geometry;
   }
@@ -76,19 +85,22 @@ export class WideLines {
   }
 
   add(a, b) {
-    const i = 3 * this.count++;
-    for (let k = 0; k < 3; ++k) {
-      this.begin.array[i + k] = a[k];
-      this.end.array[i + k] = b[k];
+    if (this.count === this.capacity) return;
+    const at = 12 * this.count++;
+    for (let i = at; i < at + 12; i += 3) {
+      for (let k = 0; k < 3; ++k) {
+        this.begin.array[i + k] = a[k];
+        this.end.array[i + k] = b[k];
+      }
     }
   }
 
   finish() {
     for (const attribute of [this.begin, this.end]) {
-      attribute.updateRange = {offset: 0, count: 3 * this.count};
+      attribute.updateRange = {offset: 0, count: 12 * this.count};
       attribute.needsUpdate = true;
     }
-    this.object.geometry.maxInstancedCount = this.count;
+    this.object.geometry.setDrawRange(0, 6 * this.count);
     this.show(this.shown);
   }
 
