@@ -27,12 +27,13 @@ trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and
   --jump F,T          after frame F go on with frame T; may be repeated
   --port N            UDP port (default: a free one)
   --receive-buffer N  bytes that the kernel is asked to hold for each process (default 4194304)
+  --no-restart        a process that dies ends the run (default: it is started again, and goes on where it was)
   --build-dir DIR     where the programs are (default: build/release, built first where needed)
 EOF
 }
 fail() { echo "run.sh: $*" >&2; exit 1; }
 
-sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304
+sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304 restart=1
 player=() common=()
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
@@ -52,6 +53,7 @@ while [ $# -gt 0 ]; do
     --record) record=1; shift ;;
     --port) need "$@"; port=$2; shift 2 ;;
     --receive-buffer) need "$@"; receive_buffer=$2; shift 2 ;;
+    --no-restart) restart=0; shift ;;
     --build-dir) need "$@"; build=$2; shift 2 ;;
     -h | --help) usage; exit 0 ;;
     *) fail "unknown option $1 (see --help)" ;;
@@ -88,7 +90,7 @@ url="udpm://239.255.76.67:$port?ttl=0&recv_buf_size=$receive_buffer"
 
 mkdir -p "$out/log" || fail "$out cannot be made; check --out"
 session=$((RANDOM * 32768 + RANDOM + 1))
-common+=(--set "seed=$seed" --lcm-url "$url" --session "$session" --fresh-system
+common+=(--set "seed=$seed" --lcm-url "$url" --session "$session"
   --peers frontend,mapper,loopcloser,collector)
 [ -n "$profile" ] && common=(--set "profile=$profile" "${common[@]}")
 [ -n "$camera" ] && player+=(--camera "$camera")
@@ -129,26 +131,32 @@ trap stop_all EXIT
 # Whatever becomes of this script, its processes end with it.
 guard=()
 command -v setpriv >/dev/null && guard=(setpriv --pdeathsig TERM --)
-launch() { # name, arguments...
-  local name=$1; shift
-  "${guard[@]}" "$bin/dmslam-$name" "$@" </dev/null >"$out/log/$name.log" 2>&1 &
+quiet=() errors=""
+[ ! -t 2 ] || quiet=(--quiet) errors=/dev/fd/3
+declare -A restarts_of=() began_at=() short_lives=()
+mapper_arguments=("${common[@]}")
+loopcloser_arguments=("${common[@]}")
+frontend_arguments=("${common[@]}" "${drawing[@]}")
+collector_arguments=("${common[@]}" "${quiet[@]}" --out "$out" "${ground_truth[@]}")
+player_arguments=("${common[@]}" "${player[@]}" --sequence "$sequence")
+launch() { # name: begins a process, or begins it again; only at the beginning nobody else can be writing
+  local name=$1 log="$out/log/$1.log" said="$out/log/$1.log"
+  local -n arguments="${name}_arguments"
+  local fresh=(--fresh-system)
+  if [ -n "${began_at[$name]:-}" ]; then fresh=(); else : >"$log"; fi
+  if [ "$name" = collector ]; then said="$out/log/table.txt" log=${errors:-$log}; fi
+  "${guard[@]}" "$bin/dmslam-$name" "${arguments[@]}" "${fresh[@]}" </dev/null >>"$said" 2>>"$log" &
   pid_of[$name]=$!
+  began_at[$name]=$SECONDS
 }
+rm -f "$out/log/table.txt"
 if [ "$record" = 1 ]; then
   command -v lcm-logger >/dev/null || fail "lcm-logger is missing; run scripts/setup.sh core"
   rm -f "$out/run.lcmlog"
   "${guard[@]}" lcm-logger --quiet --lcm-url="$url" "$out/run.lcmlog" </dev/null >"$out/log/logger.log" 2>&1 &
   logger=$!
 fi
-launch mapper "${common[@]}"
-launch loopcloser "${common[@]}"
-launch frontend "${common[@]}" "${drawing[@]}"
-quiet=()
-if [ -t 2 ]; then errors=/dev/stderr quiet=(--quiet); else errors="$out/log/collector.log"; fi
-"${guard[@]}" "$bin/dmslam-collector" "${common[@]}" "${quiet[@]}" --out "$out" "${ground_truth[@]}" </dev/null \
-  >"$out/log/table.txt" 2>"$errors" &
-pid_of[collector]=$!
-launch player "${common[@]}" "${player[@]}" --sequence "$sequence"
+for name in mapper loopcloser frontend collector player; do launch "$name"; done
 
 # What a process said before it failed: its error, or what its command line lacked.
 why() {
@@ -167,8 +175,25 @@ report() { # name, status
   echo "run.sh: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&3
 }
 
+# Died of a signal or an internal error, or found that another process knows more: the others go on, and so can it.
+# What it refuses to do, as with a wrong option, it would refuse again; and what dies as soon as it lives is past help.
+may_restart() { # name, status
+  [ "$restart" = 1 ] && [ "$collected" = 0 ] && [ "$code" = 0 ] || return 1
+  [ "$2" -gt 128 ] || [ "$2" = 70 ] || [ "$2" = 8 ] || return 1
+  if [ $((SECONDS - began_at[$1])) -ge 3 ]; then short_lives[$1]=0; fi
+  short_lives[$1]=$((${short_lives[$1]:-0} + 1))
+  [ "${short_lives[$1]}" -le 3 ]
+}
+restart_it() { # name, status
+  restarts_of[$1]=$((${restarts_of[$1]:-0} + 1))
+  local how="ended with code $2"
+  if [ "$2" -gt 128 ]; then how="was ended by signal $(($2 - 128))"; fi
+  echo "run.sh: $1 $how; started again (${restarts_of[$1]})" >&3
+  launch "$1"
+}
+
 exec 2>/dev/null
-# The collector ends last. Whoever fails before it ends the run.
+# The collector ends last. Whoever dies before it is started again; whoever fails ends the run.
 code=0
 collected=0
 while [ ${#pid_of[@]} -gt 0 ]; do
@@ -179,6 +204,10 @@ while [ ${#pid_of[@]} -gt 0 ]; do
     if [ "${pid_of[$name]}" = "$ended" ]; then break; fi
   done
   unset "pid_of[$name]"
+  if [ "$status" != 0 ] && may_restart "$name" "$status"; then
+    restart_it "$name" "$status"
+    continue
+  fi
   if [ "$status" != 0 ] && [ "$code" = 0 ]; then
     report "$name" "$status"
     code=$status

@@ -32,6 +32,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
                                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
                                  channels::kFrameEvidence, channels::kMapReset});
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  ServeReplica(&builder_->map(), [this] { return map_reader_->held(); });
 }
 
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -95,10 +96,7 @@ bool CollectorNode::TakeMapRecord() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return false;
   if (record->begins_anew()) builder_->ForgetMap();
-  if (const auto delta = Read<MapDelta>(*record->bytes)) {
-    builder_->OnMapDelta(*delta);
-    map_ended_ = map_ended_ || delta->event == MapEvent::kEnded;
-  }
+  if (const auto delta = Read<MapDelta>(*record->bytes)) builder_->OnMapDelta(*delta);
   map_reader_->AcceptTaken();
   return true;
 }
@@ -109,8 +107,8 @@ bool CollectorNode::WorkOnce() {
 }
 
 bool CollectorNode::EndIfDone() {
-  const bool drained = map_ended_ && frontend_reader_->AtEnd() && map_reader_->AtEnd();
-  if (!drained) return false;
+  frontend_ended_ = frontend_ended_ || frontend_reader_->AtEnd();
+  if (!frontend_ended_ || !MapIsOver(builder_->map(), *map_reader_)) return false;
   if (drained_ns_ == 0) drained_ns_ = context_.now_ns();
   if (context_.now_ns() - drained_ns_ < kLastStatusesNs) return false;
   Write();

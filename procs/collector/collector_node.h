@@ -51,7 +51,7 @@ class CollectorNode : public StreamNode {
   int64_t frames_total_ = 0;
   int64_t frames_seen_ = 0;
   int64_t drained_ns_ = 0;
-  bool map_ended_ = false;
+  bool frontend_ended_ = false;
   bool written_ = false;
 };
 

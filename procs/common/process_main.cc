@@ -43,6 +43,7 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
   app_.add_option("--config", config_, "settings (YAML)");
   app_.add_option("--set", overrides_, "one setting: key=value; may be repeated");
   app_.add_flag("--take-over", options_.take_over, "ask a present writer of the same stream to close, and follow it");
+  app_.add_flag("--fresh", options_.fresh, "a mapper begins with an empty map, whatever the others hold");
   app_.add_flag("--fresh-system", fresh_system_, "nobody else can be writing: begin without listening first");
   app_.add_flag("--quiet", quiet_, "log warnings only");
 }

@@ -14,6 +14,7 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
+constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 
 std::string UpperCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -99,27 +100,51 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   options.start = start;
   auto reader = std::make_unique<StreamReader>(options);
   endpoint_.AddReader(reader.get(), owner, record_channels);
+  readers_.push_back({reader.get(), {}});
   return reader;
 }
 
+void StreamNode::ServeReplica(const Map* map, std::function<Version()> held) {
+  replica_snapshots_ = std::make_unique<MapSnapshots>(map);
+  ReplicaServer::Options options;
+  options.holder.session = session_;
+  options.holder.holder = UpperCase(role_);
+  options.holder.role = role_;
+  options.holder.id = context_.random_id;
+  options.name = context_.name;
+  options.schema_hash = SchemaHash();
+  options.link = options_.link;
+  replica_server_ = std::make_unique<ReplicaServer>(options, std::move(held), replica_snapshots_.get());
+  endpoint_.AddServer(replica_server_.get(), "MAPPER");
+}
+
+bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader) const {
+  if (!map.progress().ended) return false;
+  return map_reader.AtEnd() || map_reader.silent_ns(context_.now_ns()) > kSilentAfterEndNs;
+}
+
+void StreamNode::StartElection() {
+  WriterElection::Options options;
+  options.session = session_;
+  options.stream = plan_->stream;
+  options.owner = UpperCase(role_);
+  options.name = context_.name;
+  options.writer = context_.random_id;
+  options.schema_hash = SchemaHash();
+  options.take_over = options_.take_over;
+  if (context_.fresh_system) options.listen_ns = 0;
+  election_ = std::make_unique<WriterElection>(options, context_.now_ns());
+  endpoint_.AddElection(election_.get(), UpperCase(role_));
+  election_->Advance(context_.now_ns());
+}
+
+/// The election goes on until the writer is open: another one that is heard meanwhile turns the victory into
+/// a refusal.
 void StreamNode::RunElection() {
-  if (!plan_ || writer_ || !ReadyToWrite()) return;
-  if (!election_) {
-    WriterElection::Options options;
-    options.session = session_;
-    options.stream = plan_->stream;
-    options.owner = UpperCase(role_);
-    options.name = context_.name;
-    options.writer = context_.random_id;
-    options.schema_hash = SchemaHash();
-    options.take_over = options_.take_over;
-    if (context_.fresh_system) options.listen_ns = 0;
-    election_ = std::make_unique<WriterElection>(options, context_.now_ns());
-    endpoint_.AddElection(election_.get(), UpperCase(role_));
-    election_->Advance(context_.now_ns());
-  }
+  if (!plan_ || writer_) return;
+  if (!election_) StartElection();
+  if (election_->state() == WriterElection::State::kWon && ReadyToWrite() && !exit_code_) OpenWriter();
   if (election_->state() == WriterElection::State::kRefused) Exit(3, election_->refusal());
-  if (election_->state() == WriterElection::State::kWon) OpenWriter();
 }
 
 void StreamNode::OpenWriter() {
@@ -146,11 +171,24 @@ void StreamNode::OpenWriter() {
 void StreamNode::WatchWriter() {
   if (!writer_) return;
   if (writer_->superseded_by()) Exit(4, "another writer has taken over the stream: " + *writer_->superseded_by());
+  if (const std::optional<Version>& newer = writer_->newer_replica()) {
+    Exit(8, "another process holds version " + std::to_string(newer->epoch) + ":" +
+                std::to_string(newer->seq) +
+                ", which is newer than what this one began with; start it again");
+  }
   if (writer_->close_requested_by() && !stopping_) {
     spdlog::info("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
     Stop();
   }
   if (stopping_ && writer_->closed() && !exit_code_) Exit(0);
+}
+
+void StreamNode::WatchReaders() {
+  for (Watched& watched : readers_) {
+    if (watched.reader->problem() == watched.problem) continue;
+    watched.problem = watched.reader->problem();
+    if (!watched.problem.empty()) spdlog::warn("{}: {}", role_, watched.problem);
+  }
 }
 
 void StreamNode::Advance() {
@@ -162,6 +200,7 @@ void StreamNode::Advance() {
   }
   RunElection();
   WatchWriter();
+  WatchReaders();
   if (exit_code_) return;
   if (begun_ && (!plan_ || writer_)) {
     while (!exit_code_ && !stopping_ && WorkOnce()) PumpWithinWork();
@@ -221,6 +260,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason, const std::vect
     health.dropped_overflow += s.dropped_no_room;
     health.dropped_duplicate += s.duplicates;
     health.records_repaired += s.repaired;
+    health.repairs_requested += s.requested;
     health.records_lost += s.lost;
   }
   if (!writer_) return head;
@@ -229,6 +269,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason, const std::vect
   health.written = s.records;
   health.written_bytes = s.payload_bytes;
   health.resent = s.parts_repaired;
+  health.resent_bytes = s.repaired_bytes;
   health.kept_bytes = static_cast<int64_t>(s.kept_bytes);
   health.readers = static_cast<int32_t>(writer_->num_readers());
   health.snapshots = static_cast<int32_t>(s.snapshots);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/map_snapshots.h"
 #include "common/node.h"
 #include "common/settings.h"
 #include "dmslam/messaging/endpoint.h"
@@ -21,6 +22,7 @@ struct NodeOptions {
   std::vector<std::string> peers;   ///< processes that take part: they are waited for, and hold their streams' writers back
   Link link = Link::kHost;
   bool take_over = false;           ///< asks a present writer of its stream to close
+  bool fresh = false;               ///< a mapper begins with an empty map, whatever replicas there are
   Settings settings;
 
   bool HasPeer(std::string_view name) const;
@@ -45,7 +47,8 @@ class StreamNode : public Node {
 
   /// The camera is known: makes readers, and asks for a writer with WantWriter.
   virtual void Begin(const CameraInfo& info) = 0;
-  /// Whether the writer may be opened now (a mapper first looks for replicas).
+  /// The election is won: whether the writer may be opened now. A mapper first fetches the newest replica, a
+  /// frontend the map. Asked again and again.
   virtual bool ReadyToWrite() { return true; }
   /// The writer is open: the node may work.
   virtual void OnWriterOpen() {}
@@ -67,6 +70,12 @@ class StreamNode : public Node {
     SnapshotSource* snapshots = nullptr;
     std::vector<std::string> watchers = {"viewer"};  ///< roles whose wishes are heard, but who hold nothing back
   };
+  /// Offers the replica of the map that this process holds to a mapper that starts. `held`: its version,
+  /// empty while it is not whole. `map` must stay where it is.
+  void ServeReplica(const Map* map, std::function<Version()> held);
+  /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence.
+  bool MapIsOver(const Map& map, const StreamReader& map_reader) const;
+
   void WantWriter(WriterPlan plan) { plan_ = std::move(plan); }
   WriterPlan& writer_plan() { return *plan_; }
 
@@ -108,8 +117,10 @@ class StreamNode : public Node {
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(std::span<const uint8_t> bytes);
   void RunElection();
+  void StartElection();
   void OpenWriter();
   void WatchWriter();
+  void WatchReaders();
   void CountMalformed(const std::string& channel, const std::string& reason);
 
   bool begun_ = false;
@@ -122,6 +133,13 @@ class StreamNode : public Node {
   int64_t started_ns_ = 0;
   int64_t received_ = 0, received_bytes_ = 0, dropped_foreign_ = 0, dropped_malformed_ = 0;
   std::vector<std::string> logged_;
+  struct Watched {
+    const StreamReader* reader;
+    std::string problem;  ///< last one logged
+  };
+  std::vector<Watched> readers_;
+  std::unique_ptr<MapSnapshots> replica_snapshots_;
+  std::unique_ptr<ReplicaServer> replica_server_;
 };
 
 }  // namespace dmslam

@@ -53,7 +53,16 @@ FrontendCore::FirstMapSearch FrontendCore::MakeInitializer() const {
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   relocalizer_.Update(map_);
-  if (delta.event == MapEvent::kSettled && delta.about == awaited_) awaited_ = {};
+  if (delta.progress.settled >= awaited_) awaited_ = {};
+}
+
+void FrontendCore::Resume() {
+  if (map_.keyframes().empty()) return;
+  const Keyframe& newest = map_.keyframes().rbegin()->second;
+  state_ = TrackingState::kLost;
+  map_id_ = newest.map_id;
+  last_keyframe_ = newest.id;
+  last_keyframe_ns_ = newest.stamp_ns;
 }
 
 void FrontendCore::ForgetMap() {
@@ -76,6 +85,8 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
   ++counters_.frames;
   frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
   if (counters_.frames == 1) last_tracked_ns_ = stamp_ns;  // in a saved map it is lost from now on
+  const bool tracks = state_ != TrackingState::kNotInitialized && state_ != TrackingState::kWaitingForMap;
+  if (tracks && map_.keyframes().empty()) GiveUpMap(true, "the mapper began with an empty map", events);
   switch (state_) {
     case TrackingState::kNotInitialized:
       Initialize(events);

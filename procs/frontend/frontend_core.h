@@ -58,6 +58,8 @@ class FrontendCore {
   void ApplyMapDelta(const MapDelta& delta);
   /// The replica is void: a fresh map stream, or a snapshot, begins.
   void ForgetMap();
+  /// Joins a system that has been running: it is lost in the newest map that it was given.
+  void Resume();
   /// Whether a keyframe was proposed whose settled record has not come: lock-step waits for it.
   KeyframeId awaited() const { return awaited_; }
   /// Told by the node: no more keyframes now (too many are not acknowledged).

@@ -47,7 +47,33 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.vocabulary = extras_.vocabulary;
   core_ = std::make_unique<FrontendCore>(setup);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  ServeReplica(&core_->map(), [this] { return HandOverVersion(); });
   WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
+}
+
+/// Into a running system a frontend comes with the map; where nobody has one it begins with a first.
+bool FrontendNode::ReadyToWrite() {
+  if (context_.fresh_system) return true;
+  if (!map_reader_->term().valid()) return !options_.HasPeer("mapper");
+  TakeMapRecords(true);
+  const bool caught_up = map_reader_->state() == StreamReader::State::kFollowing &&
+                         map_reader_->statistics().backlog == 0 && held_.empty();
+  if (!caught_up) return false;
+  const Map& map = core_->map();
+  if (map.progress().ended) {
+    Exit(0);
+    return false;
+  }
+  core_->Resume();
+  if (map.keyframes().empty()) return true;
+  last_index_ = static_cast<int64_t>(map.keyframes().rbegin()->first.frame_index()) - 1;
+  spdlog::info("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
+  return true;
+}
+
+Version FrontendNode::HandOverVersion() {
+  TakeMapRecords(true);
+  return applied_;
 }
 
 void FrontendNode::OnWriterOpen() {
@@ -76,8 +102,8 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   if (!frame || IsForeign(frame->session)) return;
   const int64_t index = frame->frame_index;
   if (index <= last_index_) {
-    // A repeat: say again that it is done, unless it is still being worked on.
-    if (index == last_index_ && !frame_open_) PublishLoose(FrameDone{session_, frame->frame_index, frame->stamp_ns});
+    // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
+    if (!frame_open_) PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
     return;
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return;
@@ -88,26 +114,44 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
 
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
-  if (end && camera_info_ && !IsForeign(end->session)) end_ = std::move(end);
+  if (!end || !camera_info_ || IsForeign(end->session)) return;
+  if (finished_) PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
+  end_ = std::move(end);
 }
 
-/// In real time records are applied as they come. In lock-step they are applied up to a settled record, so that which
-/// frame sees what does not depend on how fast the mapper was with what nobody waits for (evidence).
-void FrontendNode::TakeMapRecords() {
+/// In real time records are applied as they come. In lock-step they are applied up to a settled record, so
+/// that which frame sees what does not depend on how fast the mapper was with what nobody waits for
+/// (evidence). A snapshot takes the place of the replica when all of it is here.
+void FrontendNode::TakeMapRecords(bool all) {
   while (std::optional<Record> record = map_reader_->Take()) {
-    if (record->begins_anew()) {
-      held_deltas_.clear();
-      core_->ForgetMap();
-    }
-    if (auto delta = Read<MapDelta>(*record->bytes)) held_deltas_.push_back(std::move(*delta));
-    map_reader_->AcceptTaken();
+    if (record->begins_anew()) held_.clear();
+    auto delta = Read<MapDelta>(*record->bytes);
+    held_.push_back({delta ? std::move(*delta) : MapDelta(), record->version(), record->begins_anew(),
+                     record->in_snapshot(), record->ends_snapshot()});
   }
-  size_t ready = held_deltas_.size();
-  while (lockstep_ && ready > 0 && held_deltas_[ready - 1].event != MapEvent::kSettled) --ready;
-  for (; ready > 0; --ready) {
-    core_->ApplyMapDelta(held_deltas_.front());
-    held_deltas_.pop_front();
+  ApplyHeldRecords(NumReadyRecords(all));
+}
+
+size_t FrontendNode::NumReadyRecords(bool all) const {
+  size_t ready = held_.size();
+  const auto is_ready = [&](const HeldRecord& held) {
+    if (held.in_snapshot) return held.ends_snapshot;
+    return all || !lockstep_ || held.delta.event == MapEvent::kSettled;
+  };
+  while (ready > 0 && !is_ready(held_[ready - 1])) --ready;
+  return ready;
+}
+
+/// Only what is applied is accepted: what is held back could not be handed over.
+void FrontendNode::ApplyHeldRecords(size_t count) {
+  for (; count > 0; --count) {
+    const HeldRecord& held = held_.front();
+    if (held.begins_anew) core_->ForgetMap();
+    core_->ApplyMapDelta(held.delta);
+    applied_ = held.version;
+    held_.pop_front();
   }
+  map_reader_->Accept(applied_);
 }
 
 int FrontendNode::UnacceptedKeyframes() {
@@ -124,7 +168,11 @@ bool FrontendNode::AwaitsSavedMap() const {
 }
 
 bool FrontendNode::WorkOnce() {
-  TakeMapRecords();
+  TakeMapRecords(finished_);
+  if (finished_) {
+    if (!options_.HasPeer("mapper") || MapIsOver(core_->map(), *map_reader_)) Stop();
+    return false;
+  }
   if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
   if (waiting_) return ProcessWaiting();
@@ -236,8 +284,9 @@ bool FrontendNode::Finish() {
   PublishEvents(events);
   PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
   PublishStatus();
-  Stop();
-  return false;
+  writer_->Complete(context_.now_ns());
+  finished_ = true;
+  return true;
 }
 
 void FrontendNode::PublishStatus() {

@@ -25,6 +25,7 @@ class FrontendNode : public StreamNode {
 
  protected:
   void Begin(const CameraInfo& info) override;
+  bool ReadyToWrite() override;
   void OnWriterOpen() override;
   bool WorkOnce() override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
@@ -38,7 +39,19 @@ class FrontendNode : public StreamNode {
 
   void OnFrame(std::span<const uint8_t> bytes);
   void OnEndOfSequence(std::span<const uint8_t> bytes);
-  void TakeMapRecords();
+  /// A map record that is here but not yet applied.
+  struct HeldRecord {
+    MapDelta delta;
+    Version version;
+    bool begins_anew = false;
+    bool in_snapshot = false;
+    bool ends_snapshot = false;
+  };
+
+  void TakeMapRecords(bool all);
+  size_t NumReadyRecords(bool all) const;
+  void ApplyHeldRecords(size_t count);
+  Version HandOverVersion();
   bool HoldsBack() const;
   bool AwaitsSavedMap() const;
   bool ProcessWaiting();
@@ -55,10 +68,13 @@ class FrontendNode : public StreamNode {
   Extras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
-  std::deque<MapDelta> held_deltas_;  ///< lock-step: not yet followed by a settled record
+  std::deque<HeldRecord>
+      held_;         ///< lock-step: not yet followed by a settled record; or an unfinished snapshot
+  Version applied_;  ///< of the replica
   std::optional<Waiting> waiting_;
   std::optional<EndOfSequence> end_;
   bool lockstep_ = false;
+  bool finished_ = false;     ///< everything is said; stays until the mapper has ended
   bool frame_open_ = false;   ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
   int64_t last_index_ = -1;
   int64_t last_stamp_ns_ = 0;

@@ -12,32 +12,44 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
   core_ = std::make_unique<LoopcloserCore>(settings.loop, info.camera, settings.pyramid(), settings.seed, vocabulary_);
   if (info.mode == PlaybackMode::kRealtime) core_->SetPump([this] { PumpWithinWork(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  WantWriter({StreamId::kLoopCloser, {"mapper", "collector"}, {}, nullptr});
+  ServeReplica(&core_->map(), [this] { return map_reader_->held(); });
+  WantWriter({StreamId::kLoopCloser, {"mapper"}, {}, nullptr});
 }
 
 void LoopcloserNode::Apply(const MapDelta& delta) {
   core_->ApplyMapDelta(delta);
-  ended_ = ended_ || delta.event == MapEvent::kEnded;
-  const bool asks = delta.event == MapEvent::kMapped || delta.event == MapEvent::kMapStarted;
-  if (!asks) return;
+  if (delta.event == MapEvent::kMapped || delta.event == MapEvent::kMapStarted) Answer(delta.about);
+}
+
+void LoopcloserNode::Answer(KeyframeId keyframe) {
   const int64_t begin_ns = context_.now_ns();
-  PublishRecord(core_->Check(delta.about));
+  PublishRecord(core_->Check(keyframe));
   check_.Add(static_cast<double>(context_.now_ns() - begin_ns) * 1e-6);
 }
 
 bool LoopcloserNode::WorkOnce() {
   const std::optional<Record> record = map_reader_->Take();
-  if (!record) {
-    if (ended_) {
-      PublishStatus();
-      Stop();
-    }
-    return false;
-  }
+  if (!record) return EndIfDone();
   if (record->begins_anew()) core_->ForgetMap();
   if (const auto delta = Read<MapDelta>(*record->bytes)) Apply(*delta);
+  // The newest keyframe of a snapshot may be waiting for an answer that the one before this process did not
+  // give.
+  const Map& map = core_->map();
+  const bool may_wait = record->ends_snapshot() && !map.keyframes().empty() && !map.progress().ended;
+  if (may_wait) Answer(map.keyframes().rbegin()->first);
   map_reader_->AcceptTaken();
   return true;
+}
+
+bool LoopcloserNode::EndIfDone() {
+  if (!core_->map().progress().ended) return false;
+  if (!ended_) {
+    ended_ = true;
+    PublishStatus();
+    writer_->Complete(context_.now_ns());
+  }
+  if (MapIsOver(core_->map(), *map_reader_)) Stop();
+  return false;
 }
 
 void LoopcloserNode::PublishStatus() {

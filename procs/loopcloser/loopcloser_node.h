@@ -20,6 +20,8 @@ class LoopcloserNode : public StreamNode {
 
  private:
   void Apply(const MapDelta& delta);
+  void Answer(KeyframeId keyframe);
+  bool EndIfDone();
 
   std::shared_ptr<const Vocabulary> vocabulary_;
   std::unique_ptr<LoopcloserCore> core_;

@@ -36,6 +36,13 @@ MapperCore::MapperCore(const MapperOptions& options, const Camera& camera, const
                        uint16_t epoch_ordinal, Sink sink)
     : options_(options), map_(camera, pyramid), epoch_ordinal_(epoch_ordinal), sink_(std::move(sink)) {}
 
+void MapperCore::Continue(Map map) {
+  map_ = std::move(map);
+  epoch_ordinal_ = static_cast<uint16_t>(std::max<int>(map_.HighestOrdinal(), epoch_ordinal_) + 1);
+  next_landmark_ = 1;
+  maybe_unfinished_ = map_.keyframes().empty() ? KeyframeId{} : map_.keyframes().rbegin()->first;
+}
+
 void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id, std::string note) {
   MapDelta delta = map_.TakeDelta(event, about, map_id);
   delta.correction_id = correction_id;
@@ -119,10 +126,20 @@ void MapperCore::ScaleToUnitDepth(MapId map_id, KeyframeId first) {
 // ---- A keyframe ----------------------------------------------------------------------------------------------------
 
 bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
-  if (!Insert(proposal)) return false;
+  const bool again =
+      proposal.id == std::exchange(maybe_unfinished_, {}) && map_.FindKeyframe(proposal.id) != nullptr;
+  if (!again) {
+    if (!Insert(proposal)) return false;
+    Publish(MapEvent::kKeyframeInserted, proposal.id, proposal.map_id);
+  }
+  MapAround(proposal);
+  return true;
+}
+
+/// Local mapping around a keyframe that is in the map.
+void MapperCore::MapAround(const KeyframeProposal& proposal) {
   const KeyframeId id = proposal.id;
   const MapId map_id = proposal.map_id;
-  Publish(MapEvent::kKeyframeInserted, id, map_id);
   counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, options_));
   CreateLandmarks(id, proposal.moving);
   Publish(MapEvent::kLandmarksCreated, id, map_id);
@@ -133,7 +150,6 @@ bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
     counters_.keyframes_culled += static_cast<uint64_t>(CullRedundantKeyframes(map_, id, proposal.reference, options_));
   }
   Publish(MapEvent::kMapped, id, map_id);
-  return true;
 }
 
 void MapperCore::Refine(KeyframeId id, MapId map_id) {
@@ -220,7 +236,12 @@ void MapperCore::OnReset(const MapReset& reset) {
   Publish(MapEvent::kMapDropped, {}, reset.map_id, 0, reset.reason);
 }
 
-void MapperCore::Settle(KeyframeId id, MapId map_id) { Publish(MapEvent::kSettled, id, map_id); }
+void MapperCore::Settle(KeyframeId id, MapId map_id) {
+  MapProgress progress = map_.progress();
+  progress.settled = id;
+  map_.SetProgress(progress);
+  Publish(MapEvent::kSettled, id, map_id);
+}
 
 void MapperCore::End(bool as_it_is) {
   std::set<MapId> maps;
@@ -231,6 +252,9 @@ void MapperCore::End(bool as_it_is) {
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);
   }
+  MapProgress progress = map_.progress();
+  progress.ended = true;
+  map_.SetProgress(progress);
   Publish(MapEvent::kEnded, {}, 0);
 }
 

@@ -44,8 +44,12 @@ class MapperCore {
   /// Asked now and then during long work; true: finish early (a keyframe waits). May be empty (lock-step).
   void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
 
-  /// Continues a map that others kept (after a restart) or that was saved.
-  void Continue(Map map) { map_ = std::move(map); }
+  /// Continues a map that others kept (after a restart) or that was saved: new landmarks get ids of an
+  /// ordinal that the map does not know, and the newest keyframe's local mapping is done again when it is
+  /// proposed again.
+  void Continue(Map map);
+  /// What of the streams is worked into the map; travels with the next deltas.
+  void SetProgress(const MapProgress& progress) { map_.SetProgress(progress); }
 
   /// Builds a map of the proposal; false when it is known already or does not hold (a record says so).
   bool OnInitialMap(const InitialMap& proposal);
@@ -65,6 +69,7 @@ class MapperCore {
   const MapperCounters& counters() const { return counters_; }
 
  private:
+  void MapAround(const KeyframeProposal& proposal);
   void Refine(KeyframeId id, MapId map_id);
   bool Insert(const KeyframeProposal& proposal);
   Keyframe MakeKeyframe(const KeyframeProposal& proposal, const Rigid3d& T_cam_world) const;
@@ -83,6 +88,8 @@ class MapperCore {
   Map map_;
   uint16_t epoch_ordinal_;
   uint64_t next_landmark_ = 1;
+  KeyframeId maybe_unfinished_;  ///< newest of a map that is continued: its mapper may have ended in the
+                                 ///< middle of it
   Sink sink_;
   std::function<bool()> interrupt_;
   MapperCounters counters_;

@@ -26,6 +26,7 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
 /// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
 uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
   CheckFits(files_.load, *saved_, info.camera, options_.settings.pyramid());
+  saved_->map.SetProgress({});  // the streams it was made of are not today's
   const Map& map = saved_->map;
   if (session_ <= NewestSession(map)) {
     throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
@@ -54,12 +55,74 @@ void MapperNode::Begin(const CameraInfo& info) {
     });
   }
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map());
-  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
-                                {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-                                 channels::kFrameEvidence, channels::kMapReset});
-  loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked});
   WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
 }
+
+// ---- Continuing what another mapper began
+// -------------------------------------------------------------------------
+
+void MapperNode::BeginFetch() {
+  ReplicaFetch::Options options;
+  options.session = session_;
+  options.owner = "MAPPER";
+  options.name = context_.name;
+  options.id = context_.random_id;
+  options.schema_hash = SchemaHash();
+  const std::vector<ReplicaFetch::Holder> holders = {
+      {"frontend", "FRONTEND"}, {"loopcloser", "LOOPCLOSER"}, {"collector", "COLLECTOR"}};
+  for (const ReplicaFetch::Holder& holder : holders) {
+    if (options_.peers.empty() || options_.HasPeer(holder.role)) options.holders.push_back(holder);
+  }
+  fetch_ = std::make_unique<ReplicaFetch>(options, context_.now_ns());
+  endpoint_.AddFetch(fetch_.get(), {channels::kMap});
+}
+
+/// Takes the newest replica, if there is one; true when that is done.
+bool MapperNode::FetchReplica() {
+  while (std::optional<Record> record = fetch_->Take()) {
+    if (record->begins_anew()) fetched_.emplace(core_->map().camera(), core_->map().pyramid());
+    if (const auto delta = Read<MapDelta>(*record->bytes)) fetched_->Apply(*delta);
+  }
+  if (fetch_->state() == ReplicaFetch::State::kNone) return true;
+  if (fetch_->state() != ReplicaFetch::State::kDone) return false;
+  const Version version = fetch_->version();
+  spdlog::info("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch,
+               version.seq, fetched_->keyframes().size(), fetched_->num_landmarks());
+  core_->Continue(std::move(*fetched_));
+  saved_parts_.clear();  // what the others hold is newer
+  writer_plan().parent = version;
+  return true;
+}
+
+bool MapperNode::ReadyToWrite() {
+  if (context_.fresh_system || options_.fresh) return true;
+  if (!fetch_) BeginFetch();
+  if (!FetchReplica()) return false;
+  endpoint_.Remove(fetch_.get());
+  return true;
+}
+
+void MapperNode::OnWriterOpen() {
+  fetch_.reset();
+  fetched_.reset();
+  const MapProgress progress = core_->map().progress();
+  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
+                                {channels::kSession, channels::kInitialMap, channels::kKeyframe,
+                                 channels::kFramePose, channels::kFrameEvidence, channels::kMapReset},
+                                {progress.frontend.epoch, progress.frontend.seq});
+  loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
+                            {progress.loopcloser.epoch, progress.loopcloser.seq});
+  if (progress.ended) {  // the one before could not say goodbye
+    end_announced_ = completing_ = true;
+    Stop();
+  } else if (progress.settled.valid()) {  // somebody may not have heard it
+    const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(progress.settled);
+    core_->Settle(progress.settled, settled ? settled->map_id : 0);
+  }
+}
+
+// ---- The frontend's and the loop closer's records
+// -----------------------------------------------------------------
 
 void MapperNode::PublishDelta(const MapDelta& delta) {
   PublishRecord(delta);
@@ -77,8 +140,8 @@ bool MapperNode::KeyframeWaits() const {
 
 void MapperNode::TakeLoopAnswers() {
   while (std::optional<Record> record = loop_reader_->Take()) {
-    if (auto answer = Read<LoopAnswer>(*record->bytes)) answers_.push_back(std::move(*answer));
-    loop_reader_->AcceptTaken();
+    if (auto answer = Read<LoopAnswer>(*record->bytes))
+      answers_.push_back({std::move(*answer), record->version()});
   }
 }
 
@@ -92,7 +155,21 @@ bool MapperNode::PublishSavedMap() {
   return true;
 }
 
+void MapperNode::ApplyFirstAnswer() {
+  const PendingAnswer pending = std::move(answers_.front());
+  answers_.pop_front();
+  MapProgress progress = core_->map().progress();
+  progress.loopcloser = {pending.version.epoch, pending.version.seq};
+  core_->SetProgress(progress);
+  core_->OnLoopAnswer(pending.answer);
+  pending_answers_.push_back({pending.version, writer_->last_seq()});
+}
+
 bool MapperNode::WorkOnce() {
+  if (completing_) {
+    DrainAfterEnd();
+    return false;
+  }
   if (!saved_parts_.empty()) return PublishSavedMap();
   TakeLoopAnswers();
   while (std::optional<Record> record = frontend_reader_->Take()) taken_.push_back(std::move(*record));
@@ -102,20 +179,30 @@ bool MapperNode::WorkOnce() {
     return !awaited_.valid();
   }
   if (!lockstep_ && !answers_.empty()) {
-    core_->OnLoopAnswer(answers_.front());
-    answers_.pop_front();
+    ApplyFirstAnswer();
     return true;
   }
   if (taken_.empty()) return EndIfDone();
   const Record record = std::move(taken_.front());
   taken_.pop_front();
+  current_ = record.version();
   Handle(record);
-  pending_.push_back({record.version(), writer_->last_seq()});
+  if (!awaited_.valid()) pending_.push_back({current_, writer_->last_seq()});
   AcceptWhatIsSafe();
   return true;
 }
 
+/// The records up to here are worked into the map: the next map record says so.
+void MapperNode::MarkFrontend(const Version& version) {
+  MapProgress progress = core_->map().progress();
+  progress.frontend = {version.epoch, version.seq};
+  core_->SetProgress(progress);
+}
+
 void MapperNode::Handle(const Record& record) {
+  // A keyframe makes several map records: only the last one says that it is done.
+  const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
+  if (!many) MarkFrontend(current_);
   if (record.channel == channels::kSession) {
     if (const auto start = Read<SessionStart>(*record.bytes)) session_start_ = *start;
   }
@@ -144,46 +231,63 @@ void MapperNode::HandleKeyframe(const KeyframeProposal& proposal) {
 }
 
 void MapperNode::AfterKeyframe(KeyframeId id, MapId map_id, bool checked_by_loopcloser) {
+  const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer("loopcloser");
+  if (!wait) return Settle(id, map_id, current_);
   awaited_ = id;
   awaited_map_ = map_id;
-  const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer("loopcloser");
-  if (wait) return;
+  awaited_version_ = current_;
+}
+
+void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend) {
+  MarkFrontend(of_frontend);
   core_->Settle(id, map_id);
-  last_settled_ = std::exchange(awaited_, {});
+  last_settled_ = id;
 }
 
 /// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be due.
 void MapperNode::SettleAwaited() {
   while (!answers_.empty() && awaited_.valid()) {
-    const LoopAnswer answer = std::move(answers_.front());
-    answers_.pop_front();
-    core_->OnLoopAnswer(answer);
-    if (answer.keyframe != awaited_) continue;
-    core_->Settle(awaited_, awaited_map_);
-    last_settled_ = std::exchange(awaited_, {});
+    const KeyframeId answered = answers_.front().answer.keyframe;
+    ApplyFirstAnswer();
+    if (answered != awaited_) continue;
+    Settle(std::exchange(awaited_, {}), awaited_map_, awaited_version_);
+    pending_.push_back({awaited_version_, writer_->last_seq()});
   }
 }
 
 void MapperNode::AcceptWhatIsSafe() {
   while (!pending_.empty() && writer_->AcknowledgedByAny(pending_.front().map_seq)) {
-    frontend_reader_->Accept(pending_.front().of_frontend);
+    frontend_reader_->Accept(pending_.front().version);
     pending_.pop_front();
+  }
+  while (!pending_answers_.empty() && writer_->AcknowledgedByAny(pending_answers_.front().map_seq)) {
+    loop_reader_->Accept(pending_answers_.front().version);
+    pending_answers_.pop_front();
   }
 }
 
+// ---- The end
+// -------------------------------------------------------------------------------------------------------
+
 bool MapperNode::EndIfDone() {
-  if (ended_ || !frontend_reader_->AtEnd()) return false;
-  const bool loop_done = !options_.HasPeer("loopcloser") || loop_reader_->AtEnd();
+  frontend_ended_ = frontend_ended_ || frontend_reader_->AtEnd();
+  if (!frontend_ended_) return false;
   if (!end_announced_) {
     end_announced_ = true;
+    while (!answers_.empty()) ApplyFirstAnswer();
     core_->End(options_.settings.start.localize_only);
-    return true;
   }
-  if (!loop_done) return false;
-  ended_ = true;
+  writer_->Complete(context_.now_ns());
+  completing_ = true;
   PublishStatus();
-  Stop();
-  return false;
+  return true;
+}
+
+/// All readers take the last record before this process leaves. What still comes in changes nothing any more.
+void MapperNode::DrainAfterEnd() {
+  while (frontend_reader_->Take()) frontend_reader_->AcceptTaken();
+  while (loop_reader_->Take()) loop_reader_->AcceptTaken();
+  if (writer_->completed()) Stop();
 }
 
 void MapperNode::Save() {
@@ -201,8 +305,9 @@ void MapperNode::PublishStatus() {
   MapperStatus status;
   status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
   status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
+  if (completing_) status.state = MapperStatus::State::kDone;
   status.keyframe_queue = static_cast<int32_t>(taken_.size());
-  status.keyframes_unaccepted = static_cast<int32_t>(pending_.size());
+  status.keyframes_unaccepted = static_cast<int32_t>(pending_.size()) + (awaited_.valid() ? 1 : 0);
   status.last_settled = last_settled_;
   status.landmarks_p50_ms = to_landmarks_.Quantile(0.5);
   status.landmarks_p95_ms = to_landmarks_.Quantile(0.95);

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "common/latency_window.h"
+#include "common/map_snapshots.h"
 #include "common/stream_node.h"
 #include "dmslam/recording/map_file.h"
-#include "mapper/map_snapshots.h"
 #include "mapper/mapper_core.h"
 
 namespace dmslam {
@@ -30,24 +30,37 @@ class MapperNode : public StreamNode {
 
  protected:
   void Begin(const CameraInfo& info) override;
+  bool ReadyToWrite() override;
+  void OnWriterOpen() override;
   bool WorkOnce() override;
   void PublishStatus() override;
 
  private:
+  /// A record whose effect is in the map, and the map record that must be safe before it is accepted.
   struct Pending {
-    Version of_frontend;
+    Version version;
     int64_t map_seq = 0;
+  };
+  struct PendingAnswer {
+    LoopAnswer answer;
+    Version version;
   };
 
   uint16_t ContinueSavedMap(const CameraInfo& info);
   bool PublishSavedMap();
   void Save();
+  void BeginFetch();
+  bool FetchReplica();
   void TakeLoopAnswers();
+  void ApplyFirstAnswer();
+  void DrainAfterEnd();
   void Handle(const Record& record);
   void HandleKeyframe(const KeyframeProposal& proposal);
   void HandleInitialMap(const InitialMap& proposal);
   void AfterKeyframe(KeyframeId id, MapId map_id, bool checked_by_loopcloser);
+  void Settle(KeyframeId id, MapId map_id, const Version& of_frontend);
   void SettleAwaited();
+  void MarkFrontend(const Version& version);
   void AcceptWhatIsSafe();
   bool KeyframeWaits() const;
   void PublishDelta(const MapDelta& delta);
@@ -61,14 +74,20 @@ class MapperNode : public StreamNode {
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   std::unique_ptr<StreamReader> frontend_reader_, loop_reader_;
+  std::unique_ptr<ReplicaFetch> fetch_;  ///< while the newest replica is looked for
+  std::optional<Map> fetched_;
   bool lockstep_ = false;
-  bool ended_ = false;
+  bool frontend_ended_ = false;
   bool end_announced_ = false;
+  bool completing_ = false;              ///< nothing follows; the readers are waited for
   std::deque<Record> taken_;             ///< records of the frontend, taken and not yet handled
-  std::deque<Pending> pending_;          ///< handled, not yet safe
-  std::deque<LoopAnswer> answers_;
+  std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
+  std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
+  std::deque<PendingAnswer> answers_;
+  Version current_;                      ///< the frontend's record that is handled
   KeyframeId awaited_;                   ///< lock-step: the loop closer's answer to this keyframe is due
   MapId awaited_map_ = 0;
+  Version awaited_version_;  ///< of the record that brought it
   KeyframeId last_settled_;
   int64_t keyframe_begin_ns_ = 0;
   LatencyWindow to_landmarks_, to_adjusted_;

@@ -17,6 +17,7 @@ constexpr int64_t kRepeatEveryNs = 300'000'000;
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
 constexpr int64_t kEndEveryNs = 200'000'000;
 constexpr int64_t kEndTimeoutNs = 60'000'000'000;
+constexpr int64_t kMapperSilentNs = 5'000'000'000;  // after the end: nobody to wait for
 constexpr uint32_t kEndIndex = std::numeric_limits<uint32_t>::max();
 
 std::string SequenceName(const std::string& path) {
@@ -61,6 +62,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
   }
   ground_truth_ = source_->GroundTruth();
   context_.bus->Subscribe(channels::kFrameDone);
+  context_.bus->Subscribe(channels::kMapperStatus);
   context_.bus->SetHandler(
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
   start_ns_ = context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
@@ -72,11 +74,36 @@ void PlayerNode::Publish(const Message& message) {
 }
 
 void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
-  if (channel != channels::kFrameDone) return;
-  const std::optional<FrameDone> done = wire::Decode<FrameDone>(bytes);
-  if (!done || done->session != options_.session) return;
-  if (done->frame_index == kEndIndex) end_heard_ = true;
-  if (awaiting_done_ && done->frame_index == frame_.frame_index) awaiting_done_ = false;
+  if (channel == channels::kFrameDone) {
+    if (const auto done = wire::Decode<FrameDone>(bytes)) OnFrameDone(*done);
+  } else if (channel == channels::kMapperStatus) {
+    const auto status = wire::Decode<MapperStatus>(bytes);
+    if (!status || status->head.session != options_.session) return;
+    mapper_heard_ns_ = context_.now_ns();
+    mapper_done_ = status->state == MapperStatus::State::kDone;
+  }
+}
+
+void PlayerNode::OnFrameDone(const FrameDone& done) {
+  if (done.session != options_.session) return;
+  if (done.frame_index == kEndIndex) {
+    end_heard_ = true;
+    position_ = order_.size();
+    awaiting_done_ = false;
+  } else if (published_ > 0 && done.frame_index > frame_.frame_index) {
+    SkipBehind(done.frame_index);
+  } else if (awaiting_done_ && done.frame_index == frame_.frame_index) {
+    awaiting_done_ = false;
+  }
+}
+
+/// The frontend is further than this player, which was started again: goes on where the one before was.
+void PlayerNode::SkipBehind(uint32_t frame_index) {
+  const auto next = std::upper_bound(order_.begin(), order_.end(), size_t{frame_index});
+  spdlog::info("player: the frontend has frame {} already; goes on behind it", frame_index);
+  position_ = static_cast<size_t>(next - order_.begin());
+  awaiting_done_ = false;
+  if (position_ < order_.size()) start_ns_ += context_.now_ns() - DueNs(position_);
 }
 
 void PlayerNode::PublishCameraInfo() {
@@ -236,12 +263,20 @@ void PlayerNode::Advance() {
   }
   if (position_ < order_.size() || awaiting_done_) return;
   if (end_since_ns_ == 0) end_since_ns_ = now;
-  if (end_heard_) exit_code_ = 0;
   if (now >= next_end_ns_) {
     next_end_ns_ = now + kEndEveryNs;
     PublishEnd();
   }
-  if (now - end_since_ns_ > kEndTimeoutNs) {
+  EndIfHeard(now);
+}
+
+/// Stays until the map is done, since a frontend that is started again at the end needs camera and end of the
+/// sequence.
+void PlayerNode::EndIfHeard(int64_t now) {
+  if (end_heard_) {
+    const bool mapper_silent = now - std::max(mapper_heard_ns_, end_since_ns_) > kMapperSilentNs;
+    if (mapper_done_ || mapper_silent) exit_code_ = 0;
+  } else if (now - end_since_ns_ > kEndTimeoutNs) {
     exit_code_ = 5;
     problem_ = "no frontend answered the end of the sequence; is it running on the same bus?";
   }

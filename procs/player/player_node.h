@@ -56,6 +56,9 @@ class PlayerNode : public Node {
 
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnFrameDone(const FrameDone& done);
+  void SkipBehind(uint32_t frame_index);
+  void EndIfHeard(int64_t now);
   void PublishCameraInfo();
   bool FrameIsDue() const;
   void PublishFrame();
@@ -80,6 +83,8 @@ class PlayerNode : public Node {
   SharedBytes frame_bytes_;
   bool awaiting_done_ = false;  ///< lock-step
   bool end_heard_ = false;
+  bool mapper_done_ = false;
+  int64_t mapper_heard_ns_ = 0;
   int64_t start_ns_ = 0;        ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0, next_end_ns_ = 0;
   int64_t end_since_ns_ = 0;

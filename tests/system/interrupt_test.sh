@@ -40,6 +40,7 @@ begin killed
 kill -KILL "$runner"
 ended_with 137 "the runner's own death"
 
+arguments+=(--no-restart)
 begin died
 pid=$(mine | grep 'bin/dmslam-mapper ' | grep -v setpriv | head -n 1 | cut -d: -f1)
 kill -KILL "$pid"

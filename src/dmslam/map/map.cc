@@ -49,6 +49,13 @@ std::vector<LandmarkId> Map::LandmarkIdsSorted() const {
   return ids;
 }
 
+uint16_t Map::HighestOrdinal() const {
+  uint16_t highest = 0;
+  for (const LandmarkId id : LandmarkIdsSorted()) highest = std::max(highest, id.epoch_ordinal());
+  for (const auto& [id, by] : landmark_tombstones_) highest = std::max(highest, id.epoch_ordinal());
+  return highest;
+}
+
 std::optional<LandmarkId> Map::Resolve(LandmarkId id) const {
   for (int steps = 0; steps < 1000; ++steps) {
     if (landmarks_.contains(id)) return id;
@@ -460,6 +467,7 @@ MapDelta Map::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
   delta.about = about;
   delta.map_id = map_id;
   delta.version = ++version_;
+  delta.progress = progress_;
   if (const Keyframe* keyframe = FindKeyframe(about)) delta.stamp_ns = keyframe->stamp_ns;
   for (const auto& [id, dirty] : dirty_keyframes_) {
     const Keyframe& keyframe = keyframes_.at(id);
@@ -621,6 +629,7 @@ void Map::Apply(const MapDelta& delta) {
   ApplyLandmarks(delta);
   ApplyTombstones(delta);
   version_ = std::max(version_, delta.version);
+  progress_ = delta.progress;
   ClearJournal();
 }
 
@@ -660,6 +669,7 @@ std::vector<MapDelta> Map::Snapshot(KeyframeId center, size_t max_bytes_hint) co
   for (MapDelta& part : parts) {
     part.event = MapEvent::kSnapshot;
     part.version = version_;
+    part.progress = progress_;
     part.about = center;
   }
   return parts;

@@ -92,6 +92,11 @@ class Map {
   MapDelta TakeDelta(MapEvent event, KeyframeId about, MapId map_id);
   /// Applies a delta of a writer's map to this replica. What refers to unknown ids is skipped and counted.
   void Apply(const MapDelta& delta);
+  /// How far the streams are that the map is made of; travels with every delta and snapshot.
+  const MapProgress& progress() const { return progress_; }
+  void SetProgress(const MapProgress& progress) { progress_ = progress; }
+  /// Highest ordinal of an epoch of which the map knows a landmark, living or dead; 0: of none.
+  uint16_t HighestOrdinal() const;
   uint64_t skipped_references() const { return skipped_references_; }
   /// The whole map as deltas with at most `max_bytes_hint` of payload each, keyframes near `center` first. Applying all
   /// of them to an empty map gives this one.
@@ -125,6 +130,7 @@ class Map {
   Camera camera_;
   Pyramid pyramid_;
   uint64_t version_ = 0;
+  MapProgress progress_;
   uint64_t skipped_references_ = 0;
   std::map<KeyframeId, Keyframe> keyframes_;
   mutable std::unordered_map<LandmarkId, Landmark> landmarks_;

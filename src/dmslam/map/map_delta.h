@@ -95,6 +95,22 @@ struct LandmarkTombstone {
   LandmarkId replaced_by;  ///< invalid: culled
 };
 
+/// A place in a stream of records: all of `epoch` up to `seq`. Zero: before the first.
+struct StreamPosition {
+  int64_t epoch = 0;
+  int64_t seq = 0;
+  auto operator<=>(const StreamPosition&) const = default;
+};
+
+/// What a map contains of the streams it is made of: whoever continues it goes on from here.
+struct MapProgress {
+  StreamPosition frontend;    ///< records of the frontend's stream up to here are worked into it
+  StreamPosition loopcloser;  ///< the loop closer's
+  KeyframeId settled;         ///< the newest keyframe all of whose work is done
+  bool ended = false;         ///< the sequence has ended, nothing follows
+  bool operator==(const MapProgress&) const = default;
+};
+
 /// A change of the map as absolute values: applying it twice is applying it once. One delta becomes one map record.
 struct MapDelta {
   MapEvent event = MapEvent::kSettled;
@@ -104,6 +120,7 @@ struct MapDelta {
   uint64_t correction_id = 0;
   int64_t stamp_ns = 0;    ///< capture time of `about`; 0: not known
   std::string note;
+  MapProgress progress;
   std::vector<KeyframeState> keyframes;
   std::vector<KeyframePose> keyframe_poses;
   std::vector<LandmarkState> landmarks;

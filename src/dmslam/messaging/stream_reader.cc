@@ -138,12 +138,14 @@ void StreamReader::Follow(const head_t& head) {
     return;
   }
   window_.Expose(head.header.seq);
+  const bool joins = !std::exchange(joined_, true);
   if (head.first_seq <= window_.received() + 1) return;
   if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
     NeedSnapshot();
     FollowSnapshot(head);
   } else {
-    statistics_.lost += window_.GiveUpBefore(head.first_seq);
+    const int64_t given_up = window_.GiveUpBefore(head.first_seq);
+    if (!joins) statistics_.lost += given_up;
   }
 }
 

@@ -21,7 +21,8 @@ struct ReaderStatistics {
   int64_t duplicates = 0;       ///< records and parts that were here already
   int64_t requested = 0;        ///< ranges of bytes or records named as missing
   int64_t repaired = 0;         ///< records that came late or in pieces, after they had been named as missing
-  int64_t lost = 0;             ///< records given up: no longer kept, and the writer offers no snapshot
+  int64_t lost = 0;  ///< records given up: no longer kept, and the writer offers no snapshot; those that
+                     ///< were gone when this reader came are not counted
   int64_t snapshots = 0;        ///< received whole
   int64_t dropped_bad = 0;      ///< messages with wrong bytes
   int64_t dropped_foreign = 0;  ///< of other sessions
@@ -84,6 +85,8 @@ class StreamReader : public StateMachine {
   State state() const { return state_; }
   /// The writer's beacon was heard lately.
   bool writer_present(int64_t now_ns) const { return now_ns - last_head_ns_ <= options_.writer_timeout_ns; }
+  /// For how long no writer was heard.
+  int64_t silent_ns(int64_t now_ns) const { return now_ns - last_head_ns_; }
   /// The writer said that its stream is complete, and all of it was taken.
   bool AtEnd() const;
   /// What keeps this reader from following; empty when nothing does. Names the writer and the cure.
@@ -131,6 +134,7 @@ class StreamReader : public StateMachine {
   std::optional<Snapshot> snapshot_;
   std::vector<MissingRange> named_missing_;  // in the last acknowledgement
   bool writer_closed_ = false;
+  bool joined_ = false;  // has followed a writer: what was there before is another's
   int64_t last_head_ns_ = INT64_MIN / 2;
   int64_t last_head_utime_ = INT64_MIN;
   int64_t last_ack_ns_ = INT64_MIN / 2;

@@ -236,14 +236,46 @@ TEST(Stream, AReaderThatStartsFromAVersionGoesOnBehindIt) {
   EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{4, 5}));
 }
 
-TEST(Stream, WithoutSnapshotsALateReaderSkipsAndCounts) {
+TEST(Stream, WithoutSnapshotsAReaderSkipsWhatIsGoneAndCountsWhatItMissed) {
   StreamWriter::Options options = WriterOptions();
   options.max_records = 3;
   Pair pair(options);
   for (int i = 1; i <= 8; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
   pair.Run(300 * kMs);
   EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{6, 7, 8}));
-  EXPECT_EQ(pair.reader.statistics().lost, 5);
+  EXPECT_EQ(pair.reader.statistics().lost, 0) << "gone before it came";
+  pair.drop = [](const Outgoing&) { return true; };
+  for (int i = 9; i <= 13; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), pair.now_ns);
+  pair.Run(300 * kMs);
+  pair.drop = [](const Outgoing&) { return false; };
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{11, 12, 13}));
+  EXPECT_EQ(pair.reader.statistics().lost, 2);
+}
+
+TEST(Stream, ACompleteStreamStaysUntilItIsClosed) {
+  StreamWriter::Options options = WriterOptions();
+  options.roles = {{"reader", true}};
+  Pair pair(options);
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+  pair.drop = [](const Outgoing&) { return true; };
+  pair.writer.Complete(pair.now_ns);
+  pair.Run(20'000 * kMs);
+  EXPECT_FALSE(pair.writer.completed()) << "a reader that it needs has not been there";
+  pair.drop = [](const Outgoing&) { return false; };
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{1}));
+  pair.reader.AcceptTaken();
+  pair.Run(20'000 * kMs);
+  EXPECT_TRUE(pair.writer.completed());
+  EXPECT_FALSE(pair.writer.closed());
+  pair.reader = StreamReader(ReaderOptions(2));  // comes late: hears all the same that this is the end
+  pair.Run(300 * kMs);
+  pair.TakeAll();
+  EXPECT_TRUE(pair.reader.AtEnd());
+  pair.writer.Close(pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_TRUE(pair.writer.closed());
 }
 
 // Values 1..n as pieces of three.

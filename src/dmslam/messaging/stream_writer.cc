@@ -70,9 +70,16 @@ int64_t StreamWriter::deadline_ns() const {
 std::vector<Outgoing> StreamWriter::TakeOutgoing() { return std::exchange(outgoing_, {}); }
 
 void StreamWriter::Close(int64_t now_ns) {
+  if (state_ == State::kLive) state_ = State::kClosing;
+  lingers_ = false;
+  close_deadline_ns_ = std::min(close_deadline_ns_, now_ns + options_.close_timeout_ns);
+  beacon_due_ = !closed();
+}
+
+void StreamWriter::Complete(int64_t) {
   if (state_ != State::kLive) return;
   state_ = State::kClosing;
-  close_deadline_ns_ = now_ns + options_.close_timeout_ns;
+  lingers_ = true;
   beacon_due_ = true;
 }
 
@@ -293,7 +300,7 @@ void StreamWriter::Beacon(int64_t now_ns) {
   statistics_.sent_bytes += static_cast<int64_t>(outgoing_.back().bytes->size());
   beacon_due_ = false;
   next_beacon_ns_ = now_ns + options_.beacon_ns;
-  if (state_ == State::kClosed) {
+  if (state_ == State::kClosed && !lingers_) {
     --farewells_;
     next_beacon_ns_ = now_ns + options_.beacon_ns / kFarewells;
   }

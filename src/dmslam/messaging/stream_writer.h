@@ -96,8 +96,13 @@ class StreamWriter : public StateMachine {
   std::vector<Outgoing> TakeOutgoing() override;
   int64_t deadline_ns() const override;
 
-  /// Ends the stream: waits for the known lossless readers, tells everybody, then closed() is true.
+  /// Ends the stream: waits a while for the known lossless readers, tells everybody, then closed() is true.
   void Close(int64_t now_ns);
+  /// Nothing follows, but the writer stays: it waits for its lossless readers however long they take, then
+  /// says that the stream is complete, again and again, and repairs, until Close.
+  void Complete(int64_t now_ns);
+  /// The lossless readers have accepted all of a stream that is complete.
+  bool completed() const { return state_ == State::kClosed; }
   bool closed() const { return state_ == State::kClosed && farewells_ == 0; }
 
   /// Set when another writer has a higher term: this one is silent from then on, and its owner must stop.
@@ -187,7 +192,8 @@ class StreamWriter : public StateMachine {
   int64_t next_beacon_ns_ = INT64_MIN;
   int64_t next_burst_ns_ = INT64_MIN;
   int64_t close_deadline_ns_ = INT64_MAX;
-  int farewells_ = 3;  // beacons that still say goodbye
+  bool lingers_ = false;  // complete, and not yet told to close
+  int farewells_ = 3;     // beacons that still say goodbye
   int burst_left_ = 0;
   bool beacon_due_ = true;
   WriterStatistics statistics_;

@@ -342,6 +342,12 @@ struct Codec<MapDelta> {
     s(m.stamp_ns, w.stamp_ns);
     s(m.version, w.version);
     s(m.correction_id, w.correction_id);
+    s(m.progress.frontend.epoch, w.frontend_epoch);
+    s(m.progress.frontend.seq, w.frontend_seq);
+    s(m.progress.loopcloser.epoch, w.loopcloser_epoch);
+    s(m.progress.loopcloser.seq, w.loopcloser_seq);
+    s(m.progress.settled, w.settled);
+    s(m.progress.ended, w.ended);
     Flat flat;
     if constexpr (Copy::kToWire) flat = Flatten(m);
     KeyframeColumns(s, m, flat, w);
@@ -359,6 +365,7 @@ struct Codec<MapDelta> {
   }
   static void Validate(const MapDelta& m, Checker& check) {
     check.OptionalId(m.about, "impossible id of the keyframe it is about");
+    check.OptionalId(m.progress.settled, "impossible id of the newest settled keyframe");
     check.Stamp(m.stamp_ns);
     ValidateKeyframes(m, check);
     ValidateLandmarks(m, check);

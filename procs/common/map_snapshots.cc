@@ -1,4 +1,4 @@
-#include "mapper/map_snapshots.h"
+#include "common/map_snapshots.h"
 
 #include "dmslam/wire/codec.h"
 
