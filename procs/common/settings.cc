@@ -120,6 +120,8 @@ std::vector<Entry> InitializerEntries() {
   return {
       MakeChoice("initializer.method", "dlrsac, or ransac: two frames and plain RANSAC",
                  [](Settings& s) -> auto& { return s.frontend.initializer_method; }, {"dlrsac", "ransac"}),
+      Make("initializer.feature_factor", "features of a frame while there is no map, times features.count",
+           [](Settings& s) -> auto& { return s.frontend.initializer_feature_factor; }, 0.5, 5),
       Make("initializer.min_matches", "matches a frame must have with the reference frame",
            [](Settings& s) -> auto& { return s.initializer.min_matches; }, 8, 10000),
       Make("initializer.num_pairs", "pairs of frames that must agree",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "dmslam/util/random.h"
@@ -20,6 +21,11 @@ double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
+OrbExtractorOptions WithMoreFeatures(OrbExtractorOptions options, double factor) {
+  options.num_features = static_cast<int>(std::lround(factor * options.num_features));
+  return options;
+}
+
 }  // namespace
 
 FrontendCore::FrontendCore(Setup setup)
@@ -31,6 +37,7 @@ FrontendCore::FrontendCore(Setup setup)
       localize_only_(setup.localize_only),
       map_(setup.camera, setup.pyramid),
       extractor_(setup.extractor),
+      first_map_extractor_(WithMoreFeatures(setup.extractor, setup.options.initializer_feature_factor)),
       initializer_options_(setup.initializer),
       initializer_(MakeInitializer()),
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
@@ -75,7 +82,7 @@ void FrontendCore::ProcessImage(uint32_t frame_index, int64_t stamp_ns, const Gr
                                 std::vector<FrontendEvent>* events) {
   const auto start = std::chrono::steady_clock::now();
   FeatureSet features;
-  extractor_.Extract(image, &features);
+  (state_ == TrackingState::kNotInitialized ? first_map_extractor_ : extractor_).Extract(image, &features);
   extract_ms_ = MillisecondsSince(start);
   ProcessFeatures(frame_index, stamp_ns, std::move(features), events);
 }

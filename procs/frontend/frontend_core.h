@@ -112,6 +112,7 @@ class FrontendCore {
   bool localize_only_;
   Map map_;
   OrbExtractor extractor_;
+  OrbExtractor first_map_extractor_;  ///< more features while there is no map
   InitializerOptions initializer_options_;
   FirstMapSearch initializer_;
   PoseTracker tracker_;

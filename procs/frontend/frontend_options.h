@@ -51,6 +51,7 @@ struct KeyframeOptions {
 
 struct FrontendOptions {
   std::string initializer_method = "dlrsac";  ///< dlrsac, or ransac: two frames and plain RANSAC (the baseline)
+  double initializer_feature_factor = 2.0;  ///< features of a frame while there is no map, times those of others
   TrackingOptions tracking;
   KeyframeOptions keyframe;
   double trial_s = 0.5;              ///< a first map must predict the frames of this time, else it is dropped

@@ -117,6 +117,7 @@ class Initializer::Impl {
 
   void StartOver() {
     reference_.reset();
+    promising_ = false;
     views_.clear();
     pending_.clear();
   }
@@ -131,6 +132,7 @@ class Initializer::Impl {
   void TakeNewerReference(const InitializerFrame& frame);
   View MakeView(const InitializerFrame& frame);
   std::vector<const View*> ChooseViews() const;
+  std::vector<const View*> ViewsBetween(const View& last) const;
   InitializerReport TryMap();
   std::optional<Candidate> Reconstruct(const View& last, const Agreement& agreement, InitializerReport* report) const;
   std::optional<Candidate> BuildCandidate(const View& last, const Agreement& agreement, const TwoViewModel& model,
@@ -140,6 +142,8 @@ class Initializer::Impl {
   double CandidateCost(const Candidate& candidate, std::span<const uint8_t> is_static) const;
   void PlaceView(const View& view, double fraction, Candidate* candidate) const;
   void KeepConsistent(Candidate* candidate) const;
+  static void KeepEvery(int most, Candidate* candidate);
+  void AddMissing(std::span<const uint8_t> is_static, Candidate* candidate) const;
   bool AdjustAll(Candidate* candidate) const;
   double CandidateDirectionSigma(const Candidate& candidate) const;
   double CandidateParallax(const Candidate& candidate) const;
@@ -155,6 +159,7 @@ class Initializer::Impl {
   std::optional<InitializerFrame> reference_;
   std::deque<View> views_;              ///< in order of index
   std::deque<InitializerFrame> pending_;  ///< frames older than the newest, not matched with the reference yet
+  bool promising_ = false;  ///< the pairs agreed the last time; only their parallax did not suffice
   uint32_t last_looked_ = 0;
   InitializerReport last_wait_;
 };
@@ -183,7 +188,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   }
   last_looked_ = frame.index;
   const double age_s = static_cast<double>(frame.stamp_ns - reference_->stamp_ns) * 1e-9;
-  if (age_s > options_.max_age_s) TakeNewerReference(frame);
+  if (age_s > (promising_ ? options_.max_promising_age_s : options_.max_age_s)) TakeNewerReference(frame);
   if (reference_->index == frame.index) return Wait(WaitReason::kTooFewFrames, "a new reference frame");
   View view = MakeView(frame);
   if (static_cast<int>(view.pair.matches.size()) < options_.min_matches) {
@@ -194,13 +199,16 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   const bool moved = view.moved;
   views_.push_back(std::move(view));
   if (!moved) return Wait(WaitReason::kTooLittleMotion, "");
-  return TryMap();
+  InitializerReport report = TryMap();
+  promising_ = report.wait == WaitReason::kParallaxTooSmall || report.wait == WaitReason::kNoReconstruction;
+  return report;
 }
 
 /// The frame in the middle of the window becomes the reference; those after it are matched again, one by one.
 void Initializer::Impl::TakeNewerReference(const InitializerFrame& frame) {
   std::deque<View> old = std::exchange(views_, {});
   pending_.clear();
+  promising_ = false;
   if (old.empty()) {
     reference_ = frame;
     return;
@@ -234,6 +242,19 @@ std::vector<const Initializer::Impl::View*> Initializer::Impl::ChooseViews() con
   const uint32_t span = moved.back()->frame.index - moved.front()->frame.index;
   if (span < static_cast<uint32_t>(options_.min_pair_step) * (asked - 1)) return chosen;
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
+  return chosen;
+}
+
+/// The views that a map is made of besides `last`: of more than there may be an even choice.
+std::vector<const Initializer::Impl::View*> Initializer::Impl::ViewsBetween(const View& last) const {
+  std::vector<const View*> all;
+  for (const View& view : views_) {
+    if (&view != &last && !view.pair.matches.empty()) all.push_back(&view);
+  }
+  const auto most = static_cast<size_t>(std::max(0, options_.max_views - 1));
+  if (all.size() <= most) return all;
+  std::vector<const View*> chosen;
+  for (size_t k = 0; k < most; ++k) chosen.push_back(all[k * all.size() / most]);
   return chosen;
 }
 
@@ -294,6 +315,12 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(const
     return std::nullopt;
   }
   if (!Passes(*best, report)) return std::nullopt;
+  if (adjust_ && !AdjustAll(&*best)) {
+    *report = Wait(WaitReason::kInconsistent, "the adjustment failed");
+    return std::nullopt;
+  }
+  KeepConsistent(&*best);
+  if (!Passes(*best, report)) return std::nullopt;
   return best;
 }
 
@@ -316,20 +343,19 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(co
     if (report) *report = Wait(reason, text);
     return std::nullopt;
   };
-  const TwoViewReconstruction pair =
-      ReconstructFromStatic(last.pair.matches, selection, camera_, options_.reconstruction);
-  if (!pair.IsUsable()) {
-    const bool parallax = pair.refusal == ReconstructionRefusal::kParallaxTooSmall;
-    return refuse(parallax ? WaitReason::kParallaxTooSmall : WaitReason::kNoReconstruction, pair.explanation);
-  }
+  // Little parallax refuses the winner only (Passes): the right motion may have less of it than its wrong rivals.
+  ReconstructionOptions reconstruction = options_.reconstruction;
+  reconstruction.min_parallax_rad = 0;
+  reconstruction.max_runner_up = 1;
+  const TwoViewReconstruction pair = ReconstructFromStatic(last.pair.matches, selection, camera_, reconstruction);
+  if (!pair.IsUsable()) return refuse(WaitReason::kNoReconstruction, pair.explanation);
   Candidate candidate;
   candidate.points = pair.points_cam0;
   candidate.use = pair.has_point;
   candidate.placed.push_back({&last, pair.T_1_0, 1.0});
   const double length = static_cast<double>(last.frame.index - reference_->index);
-  for (const View& view : views_) {
-    if (&view == &last || view.pair.matches.empty()) continue;
-    PlaceView(view, static_cast<double>(view.frame.index - reference_->index) / length, &candidate);
+  for (const View* view : ViewsBetween(last)) {
+    PlaceView(*view, static_cast<double>(view->frame.index - reference_->index) / length, &candidate);
   }
   for (const Placed& placed : candidate.placed) {
     if (placed.consistent_share >= options_.min_consistent_share) continue;
@@ -338,8 +364,9 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(co
                                                  " of the points where they should be");
   }
   KeepConsistent(&candidate);
+  KeepEvery(options_.max_adjusted, &candidate);
   if (adjust_ && !AdjustAll(&candidate)) return refuse(WaitReason::kInconsistent, "the adjustment failed");
-  KeepConsistent(&candidate);
+  AddMissing(agreement.is_static, &candidate);
   candidate.cost = CandidateCost(candidate, agreement.is_static);
   return candidate;
 }
@@ -432,6 +459,33 @@ void Initializer::Impl::KeepConsistent(Candidate* candidate) const {
       if (candidate->use[k] && !Sees(placed.T_k_0, candidate->points[k], seen)) candidate->use[k] = 0;
     });
   }
+}
+
+/// Of more than `most` points keeps an even choice.
+void Initializer::Impl::KeepEvery(int most, Candidate* candidate) {
+  const auto have = std::accumulate(candidate->use.begin(), candidate->use.end(), 0);
+  if (have <= most) return;
+  int seen = 0;
+  for (uint8_t& use : candidate->use) {
+    if (!use) continue;
+    use = (seen + 1) * most / have > seen * most / have ? 1 : 0;
+    ++seen;
+  }
+}
+
+/// Static matches that had no point under the poses before they were adjusted may have one under them now.
+void Initializer::Impl::AddMissing(std::span<const uint8_t> is_static, Candidate* candidate) const {
+  const Rigid3d& T_last = candidate->placed.front().T_k_0;
+  const auto& matches = candidate->placed.front().view->pair.matches;
+  for (size_t k = 0; k < matches.size(); ++k) {
+    if (!is_static[k] || candidate->use[k]) continue;
+    const auto point =
+        TriangulatePointInFirst(T_last, camera_.Ray(matches[k].uv0_px), camera_.Ray(matches[k].uv1_px));
+    if (!point) continue;
+    candidate->points[k] = *point;
+    candidate->use[k] = 1;
+  }
+  KeepConsistent(candidate);
 }
 
 bool Initializer::Impl::AdjustAll(Candidate* candidate) const {

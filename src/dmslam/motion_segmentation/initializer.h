@@ -97,16 +97,19 @@ struct InitializerOptions {
   int min_features = 100;            ///< a frame with fewer takes no part
   int frame_step = 2;                ///< every so manieth frame is matched; between them only what was left over
   int num_pairs = 3;                 ///< pairs with the reference frame that must agree
-  int min_pair_step = 6;             ///< the frames of two such pairs are apart by so much at least [frames]
+  int min_pair_step = 5;             ///< the frames of two such pairs are apart by so much at least [frames]
   double max_age_s = 0.9;            ///< an older reference frame is given up for a newer one
+  double max_promising_age_s = 2.0;  ///< the same where the pairs agree and only parallax is missing
+  int max_views = 8;                 ///< frames after the reference frame that a map is made of, at most
+  int max_adjusted = 300;            ///< points that rival motions are adjusted with; the winner takes all
   int min_matches = 120;             ///< of a frame with the reference frame; fewer: a newer reference frame
   double min_displacement_px = 8.0;  ///< median displacement of the matches before a pair is worth its cost
 
   MinimaOptions minima;              ///< how the motion of the pair is searched
   double minima_slack = 1.5;         ///< a minimum with up to so many times the lowest cost is looked at, too
-  double min_runner_up_cost = 1.15;  ///< another motion must cost all views this many times as much
-  double min_parallax_rad = 0.028;   ///< median over the points; below it the direction is chance
-  double max_direction_sigma_rad = 0.10;  ///< standard deviation of the direction of translation, from the residuals
+  double min_runner_up_cost = 1.5;   ///< another motion must cost all views this many times as much
+  double min_parallax_rad = 0.020;   ///< median over the points; below it the direction is chance
+  double max_direction_sigma_rad = 0.035;  ///< standard deviation of the direction of translation, from the residuals
   double max_view_chi2 = 9.0;        ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
   int min_points = 80;               ///< points that all views agree on
