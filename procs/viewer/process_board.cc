@@ -37,8 +37,8 @@ void ProcessBoard::OnStatus(const std::string& name, const StatusHead& head, con
   process->heard_ns = now_ns;
   if (restarted) {
     Note(BoardEvent::Level::kGood,
-         name + " is back: process " + std::to_string(process->health.pid) + " was replaced by " +
-             std::to_string(head.health.pid),
+         name + " is back, restarted (" + std::to_string(process->health.pid) + " → " +
+             std::to_string(head.health.pid) + ")",
          wall_us);
     ++process->restarts;
     process->restart_ns = now_ns;

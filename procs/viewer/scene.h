@@ -65,6 +65,7 @@ class Scene {
   const Points& points() const { return points_; }
   const Keyframes& keyframes() const { return keyframes_; }
   const SlotTable<uint32_t, ScenePathPoint>& path() const { return path_; }
+  const SlotTable<uint32_t, Float3>& truth() const { return truth_; }
   uint64_t version() const { return version_; }
   /// Changes when everything was void: what a browser holds of another generation counts for nothing.
   uint32_t generation() const { return generation_; }

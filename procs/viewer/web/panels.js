@@ -90,7 +90,7 @@ export class FramePanel {
 
   drawKind(view, bytes, kind, zoom) {
     const context = this.context;
-    const radius = (kind === 2 ? 2.2 : 3) * zoom;
+    const radius = (kind === 2 ? 3.2 : 4.4) * zoom;
     context.beginPath();
     for (let i = 0; i + 4 < bytes.length; i += 5) {
       if (bytes[i + 4] !== kind) continue;
@@ -98,10 +98,10 @@ export class FramePanel {
       context.moveTo(u + radius, v);
       context.arc(u, v, radius, 0, 2 * Math.PI);
     }
-    context.lineWidth = 3.4 * zoom / 2;
+    context.lineWidth = 2.6 * zoom;
     context.strokeStyle = 'rgba(0, 0, 0, 0.55)';
     context.stroke();
-    context.lineWidth = 1.9 * zoom / 2;
+    context.lineWidth = 1.5 * zoom;
     context.strokeStyle = this.colours[kind];
     context.stroke();
     if (kind !== 3) return;

@@ -469,7 +469,7 @@ export class SceneView {
     const tangent = Math.tan(this.camera.fov * Math.PI / 360);
     const needs = (p) => {  // how far the eye must be for this point to be within the picture, and clear of its edges
       const [x, y, z] = axes.map((axis) => p.dot(axis) - target.dot(axis));
-      return z + Math.max(Math.abs(x) / (0.92 * tangent * this.camera.aspect), (y < 0 ? 1.0 / 0.78 : 1.0 / 0.84) * Math.abs(y) / tangent);
+      return z + Math.max(Math.abs(x) / (0.92 * tangent * this.camera.aspect), Math.abs(y) / (0.78 * tangent));
     };
     const all = this.sample.map(needs).sort((a, b) => a - b);
     const distance = Math.max(all.length ? all[Math.floor(0.97 * (all.length - 1))] : 0, ...this.places.map(needs), 1e-3);

@@ -1,0 +1,170 @@
+#include "viewer/viewer_core.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr MapId kMapId = 3;
+
+Camera TestCamera() {
+  Camera camera;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  camera.fx_px = camera.fy_px = 500;
+  camera.cx_px = 320;
+  camera.cy_px = 240;
+  return camera;
+}
+
+/// A mapper's map of cameras on a circle, and what it says.
+class ViewerCoreTest : public testing::Test {
+ protected:
+  ViewerCoreTest() : map_(TestCamera(), Pyramid()), core_(TestCamera(), Pyramid()) {}
+
+  static KeyframeId Kf(int i) { return KeyframeId::Make(1, static_cast<uint32_t>(10 * i)); }
+  static Rigid3d PoseAt(int i) {
+    const double angle = 0.3 * i;
+    return Rigid3d(ExpSo3({0, angle, 0}), {2 * std::cos(angle), 0.1 * i, 2 * std::sin(angle)}).Inverse();
+  }
+  void AddKeyframe(int i, size_t features = 40) {
+    FeatureSet set;
+    Random random(static_cast<uint64_t>(i));
+    for (size_t k = 0; k < features; ++k) {
+      set.keypoints.push_back(
+          {static_cast<uint16_t>(random.Below(10000)), static_cast<uint16_t>(random.Below(7000)), 0, 0});
+      set.descriptors.push_back({{random.Next(), random.Next(), random.Next(), random.Next()}});
+    }
+    Keyframe keyframe;
+    keyframe.id = Kf(i);
+    keyframe.map_id = kMapId;
+    keyframe.T_cam_world = PoseAt(i);
+    if (i > 0) keyframe.parent = Kf(i - 1);
+    keyframe.features = MakeFrameFeatures(set, map_.camera(), map_.pyramid());
+    map_.AddKeyframe(keyframe);
+  }
+  void AddLandmark(uint64_t number, int seen_by, uint16_t feature, float belief = -1) {
+    Landmark landmark;
+    landmark.id = LandmarkId::Make(1, number);
+    landmark.map_id = kMapId;
+    landmark.p_world = {1.0 * static_cast<double>(number), 0, 5};
+    landmark.reference = landmark.first_keyframe = Kf(seen_by);
+    landmark.evidence.motion_belief = belief;
+    map_.AddLandmark(landmark);
+    map_.SetObservation(Kf(seen_by), feature, landmark.id);
+  }
+  void Say(MapEvent event = MapEvent::kMapped) {
+    core_.OnMapDelta(map_.TakeDelta(event, map_.keyframes().rbegin()->first, kMapId));
+    core_.Draw(&scene_);
+  }
+  void SayFrame(uint32_t index, int reference, const Rigid3d& T_cam_reference = {}) {
+    FramePose pose;
+    pose.frame_index = index;
+    pose.stamp_ns = static_cast<int64_t>(index) * 33'000'000;
+    pose.state = TrackingState::kTracking;
+    pose.map_id = kMapId;
+    pose.reference = Kf(reference);
+    pose.T_cam_reference = T_cam_reference;
+    core_.OnFramePose(pose);
+  }
+  Eigen::Vector3d PathAt(uint32_t frame) {
+    const int64_t slot = scene_.path().Find(frame);
+    EXPECT_GE(slot, 0);
+    const Float3 p = scene_.path().slots()[static_cast<size_t>(slot)].value.position;
+    return {p[0], p[1], p[2]};
+  }
+
+  Map map_;
+  ViewerCore core_;
+  Scene scene_;
+};
+
+TEST_F(ViewerCoreTest, DrawsWhatTheMapHolds) {
+  AddKeyframe(0);
+  AddKeyframe(1);
+  for (uint64_t i = 1; i <= 35; ++i) AddLandmark(i, 0, static_cast<uint16_t>(i), i == 4 ? 2.0F : -1.0F);
+  for (uint16_t i = 1; i <= 35; ++i) map_.SetObservation(Kf(1), i, LandmarkId::Make(1, i));
+  Say();
+  EXPECT_EQ(scene_.points().size(), 35u);
+  EXPECT_EQ(scene_.keyframes().size(), 2u);
+  EXPECT_EQ(core_.num_moving(), 1u);
+  const auto& second = scene_.keyframes().slots()[1].value;
+  ASSERT_EQ(second.links.size(), 1u) << "its parent, which it shares landmarks with, is linked once";
+  EXPECT_EQ(second.links[0].slot, 0u);
+  EXPECT_NEAR(
+      (Eigen::Vector3d(second.center[0], second.center[1], second.center[2]) - PoseAt(1).Center()).norm(), 0,
+      1e-6);
+}
+
+TEST_F(ViewerCoreTest, LandmarksGoWithTheirTombstonesOrTheirKeyframe) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  for (uint64_t i = 1; i <= 20; ++i) AddLandmark(i, static_cast<int>(i % 3), static_cast<uint16_t>(i));
+  Say();
+  map_.RemoveLandmark(LandmarkId::Make(1, 6));
+  map_.RemoveKeyframe(Kf(1));
+  Say();
+  EXPECT_EQ(scene_.points().size(), map_.num_landmarks());
+  EXPECT_EQ(scene_.keyframes().size(), 2u);
+}
+
+TEST_F(ViewerCoreTest, FramesFollowTheirReferenceEvenWhenItIsCulled) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  SayFrame(11, 1, Rigid3d(Eigen::Quaterniond::Identity(), {0, 0, 0.5}));
+  Say();
+  const Eigen::Vector3d before = PathAt(11);
+  map_.RemoveKeyframe(Kf(1));
+  Say();
+  EXPECT_NEAR((PathAt(11) - before).norm(), 0, 1e-6);
+  const Eigen::Vector3d shift(0.3, -0.2, 0.1);
+  const Rigid3d T = map_.FindKeyframe(Kf(0))->T_cam_world;
+  map_.SetPose(Kf(0), T * Rigid3d(Eigen::Quaterniond::Identity(), -shift));
+  Say();
+  EXPECT_NEAR((PathAt(11) - before - shift).norm(), 0, 1e-6) << "the parent that stands for it has moved";
+}
+
+TEST_F(ViewerCoreTest, TruthIsAlignedByASimilarity) {
+  for (int i = 0; i < 20; ++i) AddKeyframe(i);
+  const Sim3d truth_from_map(ExpSo3({0.1, -0.4, 0.2}), {3, 1, -2}, 2.5);
+  for (int i = 0; i < 20; ++i) {
+    SayFrame(static_cast<uint32_t>(10 * i), i);
+    core_.OnTruth(static_cast<uint32_t>(10 * i),
+                  Rigid3d(Eigen::Quaterniond::Identity(), truth_from_map * PoseAt(i).Center()));
+  }
+  Say();
+  EXPECT_EQ(scene_.truth().size(), 20u);
+  const auto alignment = core_.AlignTruth();
+  ASSERT_TRUE(alignment);
+  EXPECT_EQ(alignment->pairs, 20u);
+  EXPECT_LT(alignment->rmse_m, 1e-4);
+  EXPECT_NEAR(alignment->map_from_truth.scale, 1 / 2.5, 1e-4);
+  const Eigen::Vector3d back = alignment->map_from_truth * (truth_from_map * PoseAt(5).Center());
+  EXPECT_NEAR((back - PoseAt(5).Center()).norm(), 0, 1e-3);
+}
+
+TEST_F(ViewerCoreTest, AVoidMapIsTakenOffAndASnapshotBringsTheFramesBack) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  for (uint64_t i = 1; i <= 20; ++i) AddLandmark(i, 0, static_cast<uint16_t>(i));
+  SayFrame(15, 1);
+  Say();
+  const uint32_t generation = scene_.generation();
+  core_.ForgetMap();
+  core_.Draw(&scene_);
+  EXPECT_NE(scene_.generation(), generation);
+  EXPECT_EQ(scene_.points().size() + scene_.keyframes().size() + scene_.path().size(), 0u);
+  for (const MapDelta& part : map_.Snapshot(Kf(2), 4000)) core_.OnMapDelta(part);
+  core_.Draw(&scene_);
+  EXPECT_EQ(scene_.points().size(), 20u);
+  EXPECT_EQ(scene_.keyframes().size(), 3u);
+  EXPECT_EQ(scene_.path().size(), 1u);
+}
+
+TEST_F(ViewerCoreTest, UpIsWhereTheCamerasHeadsAre) {
+  for (int i = 0; i < 5; ++i) AddKeyframe(i);
+  Say();
+  EXPECT_GT(core_.Up(std::nullopt).dot(Eigen::Vector3d(0, -1, 0)), 0.999);
+}
+
+}  // namespace
+}  // namespace dmslam

@@ -1,0 +1,193 @@
+"""Runs the system by hand, opens the viewer's page, kills and restarts processes, and looks at what the page shows."""
+
+import argparse
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from browser import Browser  # noqa: E402
+
+URL = "udpm://239.255.76.67:27431?ttl=0&recv_buf_size=4194304"
+FAILURES = []
+
+
+def check(condition, what):
+    print(("ok:     " if condition else "FAILED: ") + what, flush=True)
+    if not condition:
+        FAILURES.append(what)
+    return condition
+
+
+class System:
+    """The processes of a run, started one by one."""
+
+    def __init__(self, options):
+        self.options = options
+        self.processes = {}
+
+    def start(self, name, *arguments, role=None):
+        log = open(os.path.join(self.options.logs, name + ".log"), "a", encoding="utf-8")
+        self.processes[name] = subprocess.Popen(
+            [os.path.join(self.options.bin, "dmslam-" + (role or name)), "--lcm-url", URL, "--session", "7", *arguments],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+
+    def start_peer(self, name):
+        self.start(name, "--peers", "frontend,mapper,loopcloser")
+
+    def kill(self, name):
+        self.processes[name].kill()
+        self.processes[name].wait()
+
+    def address(self, name):
+        """What a viewer says of where it can be seen."""
+        path = os.path.join(self.options.logs, name + ".log")
+        for _ in range(200):
+            found = re.search(r"http://\S+/", open(path, encoding="utf-8").read())
+            if found:
+                return found.group(0)
+            time.sleep(0.05)
+        raise RuntimeError("the viewer says no address: " + open(path, encoding="utf-8").read())
+
+    def stop(self):
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+        for process in self.processes.values():
+            try:
+                process.wait(timeout=5)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def fetch(address, data=None):
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    with opener.open(urllib.request.Request(address, data=data), timeout=20) as answer:
+        return answer.read()
+
+
+def points_of(address):
+    words = struct.unpack("<10I", fetch(address + "api/map")[:40])
+    return words[5], words[6]
+
+
+def stall(address):
+    """A browser that asks for everything and reads nothing."""
+    host, port = re.match(r"http://([^:/]+):(\d+)/", address).groups()
+    sockets = []
+    for path in ("/api/events", "/api/map", "/three/build/three.module.js"):
+        s = socket.create_connection((host, int(port)), timeout=5)
+        s.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        sockets.append(s)
+    return sockets
+
+
+def check_drawn(page, has_truth):
+    drawn = page.wait("dmslam.store.numPoints > 150 && dmslam.store.numKeyframes >= 4 && dmslam.store.path.size >= 20 &&"
+                      " dmslam.seen.features > 5", 150)
+    if not check(drawn, "landmarks, keyframes and frames arrive"):
+        print(page.eval("document.body.innerText"))
+    pixels = page.eval("dmslam.scene.countPixels()")
+    print("pixels:", pixels)
+    for name, least in (("points", 200), ("frusta", 100), ("path", 40), ("camera", 60)):
+        check(pixels[name] >= least, f"{name} are drawn: {pixels[name]} pixels")
+    if has_truth:
+        check(page.wait("dmslam.scene.countPixels().truth >= 20", 30), "the ground truth is drawn, aligned")
+
+
+def check_counters(page):
+    read = ("({frame: parseInt(document.getElementById('count-frame').textContent), poses: dmslam.seen.poses,"
+            " series: dmslam.series.end, statuses: dmslam.seen.statuses, shown: dmslam.frame.shown})")
+    before = page.eval(read)
+    moved = page.wait(f"(() => {{ const n = {read}, b = {before}; return Object.keys(b).every((k) => n[k] > b[k]); }})()"
+                      .replace("'", '"'), 30)
+    check(moved, f"the counters move: {before} -> {page.eval(read)}")
+    green = ("(() => { const c = document.getElementById('frame'); const d = c.getContext('2d').getImageData(0, 0, c.width,"
+             " c.height).data; let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i] < 110 && d[i + 1] > 190 &&"
+             " d[i + 2] < 140) n++; return n; })()")
+    check(page.wait(f"{green} > 200", 10), "used features are drawn over the frame in green")
+    check(page.eval("dmslam.series.charts.every((c) => c.chart.data.datasets[0].data.length > 3)"), "charts have points")
+
+
+def life(name):
+    return f"(document.querySelector('#processes tr[data-name={name}]') || {{dataset: {{}}}}).dataset.life"
+
+
+def check_restart(page, system, name, picture):
+    check(page.wait(f"{life(name)} === 'up'", 10), f"{name} is up")
+    system.kill(name)
+    check(page.wait(f"{life(name)} === 'down'", 12), f"the killed {name} shows as down")
+    page.screenshot(picture)
+    system.start_peer(name)
+    check(page.wait(f"{life(name)} === 'back'", 20), f"the restarted {name} shows as back: {page.eval(life(name))}")
+
+
+def run(options, system):
+    has_truth = os.path.exists(os.path.join(options.sequence, "groundtruth.txt"))
+    picture = lambda name: os.path.join(options.pictures, name)  # noqa: E731
+    system.start("viewer", "--http", "127.0.0.1:0")
+    address = system.address("viewer")
+    with Browser() as page:
+        page.open(address + "?theme=dark")
+        check(page.wait("dmslam.seen.statuses > 0", 20), "the page is connected before there is a camera")
+        for name in ("mapper", "loopcloser", "frontend"):
+            system.start_peer(name)
+        system.start("player", "--sequence", options.sequence, "--camera", options.camera, "--speed", options.speed, "--lead", "4",
+                     "--frames", options.frames)
+        check_drawn(page, has_truth)
+        check_counters(page)
+        page.screenshot(picture("run_dark.png"))
+        stalled = stall(address)
+        check_restart(page, system, "loopcloser", picture("loopcloser_down.png"))
+        system.start("late_viewer", "--http", "127.0.0.1:0", role="viewer")
+        late = system.address("late_viewer")
+        for _ in range(100):
+            points, keyframes = points_of(late)
+            if points > 100:
+                break
+            time.sleep(0.1)
+        check(points > 100 and keyframes >= 4, f"who comes late has the map: {points} landmarks, {keyframes} keyframes")
+        page.eval("dmslam.setTheme('light')")
+        page.screenshot(picture("run_light.png"))
+        check_restart(page, system, "mapper", picture("mapper_down.png"))
+        page.screenshot(picture("mapper_back.png"))
+        before = page.eval("dmslam.seen.statuses")
+        check(page.wait(f"dmslam.seen.statuses > {before} + 4", 10), "browsers that do not read slow nobody")
+        for s in stalled:
+            s.close()
+        try:
+            fetch(address + "api/map", data=b"x")
+            check(False, "nothing can be sent to the viewer")
+        except urllib.error.HTTPError as error:
+            check(error.code in (404, 405), f"what is sent to the viewer is refused ({error.code})")
+        errors = page.errors()
+        check(not errors, f"no error on the console: {errors}")
+        check(page.eval("dmslam.seen.errors") == 0, "no error in the page")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("bin", "logs", "pictures", "sequence", "camera"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--speed", default="0.35")
+    parser.add_argument("--frames", default="600")
+    options = parser.parse_args()
+    system = System(options)
+    try:
+        run(options, system)
+    finally:
+        system.stop()
+    for name in ("viewer", "late_viewer"):
+        check(system.processes[name].returncode == 0, f"{name} ends with {system.processes[name].returncode}")
+    return 1 if FAILURES else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
