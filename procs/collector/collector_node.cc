@@ -96,7 +96,10 @@ bool CollectorNode::TakeMapRecord() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return false;
   if (record->begins_anew()) builder_->ForgetMap();
-  if (const auto delta = Read<MapDelta>(*record->bytes)) builder_->OnMapDelta(*delta);
+  if (const auto delta = Read<MapDelta>(*record->bytes)) {
+    builder_->OnMapDelta(*delta);
+    if (delta->correction_id != 0) run_.corrections.push_back({delta->event, delta->about, delta->note});
+  }
   map_reader_->AcceptTaken();
   return true;
 }

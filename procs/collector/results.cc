@@ -42,6 +42,41 @@ std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t Fra
   return durations;
 }
 
+/// The covisibility graph: a line "frame frame landmarks" for each two keyframes that share landmarks; "loop" behind it
+/// where a loop was closed between them.
+void WriteGraph(const std::string& path, const Map& map) {
+  std::ofstream file(path);
+  file << "# frame frame shared_landmarks [loop]\n";
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    for (const auto& [other, shared] : keyframe.covisible) {
+      if (other < id) continue;
+      const auto& loops = keyframe.loop_edges;
+      const bool loop = std::binary_search(loops.begin(), loops.end(), other);
+      file << id.frame_index() << " " << other.frame_index() << " " << shared << (loop ? " loop\n" : "\n");
+    }
+  }
+  if (!file.flush()) throw InputError(path + ": cannot be written; check the folder given with --out");
+}
+
+Json LoopJson(const RunRecord& run) {
+  const LoopcloserStatus& status = run.loopcloser;
+  Json json;
+  json["places_named"] = status.candidates;
+  json["refused_consistency"] = status.refused_consistency;
+  json["refused_geometry"] = status.refused_geometry;
+  json["global_adjustments"] = status.global_adjustments;
+  Json corrections = Json::array();
+  for (const CorrectionRecord& correction : run.corrections) {
+    const char* kind = correction.event == MapEvent::kCorrected          ? "loop"
+                       : correction.event == MapEvent::kGloballyAdjusted ? "global adjustment"
+                                                                         : "refused";
+    corrections.push_back(
+        {{"frame", correction.keyframe.frame_index()}, {"kind", kind}, {"note", correction.note}});
+  }
+  json["corrections"] = corrections;
+  return json;
+}
+
 struct Errors {
   std::optional<AteReport> final, online;
   std::vector<StampedPose> ground_truth;
@@ -150,6 +185,7 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder, const T
   json["keyframes"] = t.keyframes.size();
   json["landmarks"] = builder.map().num_landmarks();
   json["loops"] = run.loopcloser.loops_closed;
+  json["loop_closing"] = LoopJson(run);
   json["ate_rmse_final"] = errors.final ? Json(errors.final->rmse()) : Json(nullptr);
   json["ate_rmse_online"] = errors.online ? Json(errors.online->rmse()) : Json(nullptr);
   json["scale_final"] = errors.final ? Json(errors.final->scale()) : Json(nullptr);
@@ -201,6 +237,7 @@ std::string WriteResults(const std::string& dir, const RunRecord& run, const Tra
   WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online);
   WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes);
   WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id);
+  WriteGraph(dir + "/graph.txt", builder.map());
   const Errors errors = Evaluate(run, trajectories);
   if (!trajectories.final.empty()) WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png");
   const Json summary = SummaryJson(run, builder, trajectories, errors);

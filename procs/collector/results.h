@@ -11,6 +11,13 @@
 
 namespace dmslam {
 
+/// A loop or a global adjustment that the mapper applied, or a correction that it refused.
+struct CorrectionRecord {
+  MapEvent event = MapEvent::kCorrected;
+  KeyframeId keyframe;
+  std::string note;
+};
+
 /// All that the summary of a run is made of.
 struct RunRecord {
   std::string sequence, mode, profile, ground_truth;
@@ -22,11 +29,12 @@ struct RunRecord {
   LoopcloserStatus loopcloser;
   std::map<std::string, ProcessHealth> health;
   std::vector<FrameTrace> traces;
+  std::vector<CorrectionRecord> corrections;
   uint64_t resets = 0;
   int restarts = 0;
 };
 
-/// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, trajectory.png and summary.json into `dir`, and
+/// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, graph.txt, trajectory.png and summary.json into `dir`, and
 /// returns the summary as a table for people. Throws InputError naming what cannot be written.
 std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder);
 

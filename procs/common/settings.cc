@@ -116,6 +116,23 @@ std::vector<Entry> GeneralEntries() {
   };
 }
 
+std::vector<Entry> LoopEntries() {
+  return {
+      Make("loop.consistency", "keyframes in a row that must name places that belong together",
+           [](Settings& s) -> auto& { return s.loop.consistency; }, 1, 100),
+      Make("loop.min_matches", "landmarks of a place that must be found in the keyframe",
+           [](Settings& s) -> auto& { return s.loop.min_matches; }, 10, 10000),
+      Make("loop.min_share", "of what should be seen of a place: enough to be followed",
+           [](Settings& s) -> auto& { return s.loop.min_share; }, 0, 1),
+      Make("loop.min_confirmed_share", "of what should be seen of a place: enough to close the loop",
+           [](Settings& s) -> auto& { return s.loop.min_confirmed_share; }, 0, 1),
+      Make("loop.plausible_drift", "a loop that moves more than this share of its path needs more",
+           [](Settings& s) -> auto& { return s.loop.plausible_drift; }, 0, 10),
+      Make("loop.global_adjustment", "adjust the whole map after a loop",
+           [](Settings& s) -> auto& { return s.loop.global_adjustment; }),
+  };
+}
+
 std::vector<Entry> InitializerEntries() {
   return {
       MakeChoice("initializer.method", "dlrsac, or ransac: two frames and plain RANSAC",
@@ -193,7 +210,7 @@ std::vector<Entry> MappingEntries() {
 
 std::vector<Entry> AllEntries() {
   std::vector<Entry> entries = GeneralEntries();
-  for (auto* make : {&InitializerEntries, &TrackingEntries, &MappingEntries}) {
+  for (auto* make : {&InitializerEntries, &TrackingEntries, &MappingEntries, &LoopEntries}) {
     for (Entry& entry : make()) entries.push_back(std::move(entry));
   }
   return entries;

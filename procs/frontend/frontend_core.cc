@@ -175,7 +175,10 @@ std::optional<Rigid3d> FrontendCore::PredictPose() const {
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(last_placed_.reference);
   if (!reference) return std::nullopt;
   const Rigid3d T_last_world = reference->Compose(last_placed_.T_cam_reference, last_placed_.scale);
-  return velocity_ ? *velocity_ * T_last_world : T_last_world;
+  if (!velocity_) return T_last_world;
+  // The map may have been scaled since the velocity was measured.
+  const double growth = reference->scale / last_placed_.scale;
+  return Rigid3d(velocity_->rotation, velocity_->translation * growth) * T_last_world;
 }
 
 bool FrontendCore::FindPose() {

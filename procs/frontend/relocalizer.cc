@@ -1,6 +1,5 @@
 #include "frontend/relocalizer.h"
 
-#include "dmslam/optimization/pose_optimization.h"
 #include "dmslam/robust/pose_from_matches.h"
 #include "dmslam/util/random.h"
 
@@ -10,41 +9,21 @@ namespace {
 constexpr size_t kMaxCandidates = 8;
 constexpr size_t kMinWordMatches = 15;
 constexpr int kMinInliers = 12;
+constexpr int kMinCovisibility = 15;
 
 }  // namespace
 
 Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera, const Pyramid& pyramid)
-    : vocabulary_(std::move(vocabulary)), camera_(camera), pyramid_(pyramid) {}
+    : camera_(camera), pyramid_(pyramid), places_(std::move(vocabulary)) {}
 
-void Relocalizer::Clear() {
-  database_.Clear();
-  nodes_.clear();
-}
+void Relocalizer::Clear() { places_.Clear(); }
 
-void Relocalizer::Update(const Map& map) {
-  if (!vocabulary_) return;
-  for (const KeyframeId id : map.applied_removed_keyframes()) {
-    database_.Remove(id);
-    nodes_.erase(id);
-  }
-  for (const KeyframeId id : map.applied_new_keyframes()) {
-    const Keyframe* keyframe = map.FindKeyframe(id);
-    if (keyframe == nullptr) continue;
-    BowImage image = vocabulary_->Transform(keyframe->features->set.descriptors);
-    database_.Add(id, std::move(image.words));
-    nodes_[id] = std::move(image.nodes);
-  }
-}
+void Relocalizer::Update(const Map& map) { places_.Update(map); }
 
 std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, const BowImage& image) const {
-  PlaceQuery query;
-  query.excluded = [&](KeyframeId id) {
-    const Keyframe* keyframe = map.FindKeyframe(id);
-    return keyframe == nullptr || (map_id != 0 && keyframe->map_id != map_id);
-  };
-  query.neighbours = [&](KeyframeId id) { return map.BestCovisible(id, 10, 15); };
+  const auto of_another_map = [&](const Keyframe& keyframe) { return map_id != 0 && keyframe.map_id != map_id; };
   std::vector<KeyframeId> ids;
-  for (const PlaceCandidate& candidate : database_.Query(image.words, query)) {
+  for (const PlaceCandidate& candidate : places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
     if (ids.size() < kMaxCandidates) ids.push_back(candidate.keyframe);
   }
   return ids;
@@ -52,12 +31,8 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, co
 
 bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                               TrackedFrame* frame) const {
-  std::vector<uint8_t> usable(keyframe.landmarks.size(), 0);
-  for (size_t i = 0; i < usable.size(); ++i) {
-    const Landmark* landmark = keyframe.landmarks[i].valid() ? map.FindLandmark(keyframe.landmarks[i]) : nullptr;
-    usable[i] = landmark != nullptr && landmark->evidence.motion_belief <= 0.0F;
-  }
-  const std::vector<BowMatch> matches = MatchByNodes({&keyframe.features->set, &nodes_.at(keyframe.id), usable},
+  const std::vector<uint8_t> usable = StaticFeatures(map, keyframe);
+  const std::vector<BowMatch> matches = MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
                                                      {&frame->features->set, &image.nodes, {}});
   if (matches.size() < kMinWordMatches) return false;
   std::vector<Eigen::Vector3d> points;
@@ -82,8 +57,8 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
 }
 
 bool Relocalizer::Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, TrackedFrame* frame) const {
-  if (!vocabulary_) return false;
-  const BowImage image = vocabulary_->Transform(frame->features->set.descriptors);
+  if (!places_.usable()) return false;
+  const BowImage image = places_.Transform(frame->features->set);
   for (const KeyframeId id : Candidates(map, map_id, image)) {
     if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
     if (tracker->TrackLocalMap(map, true, frame).ok) return true;

@@ -1,12 +1,10 @@
 #pragma once
 
-#include <map>
 #include <memory>
 #include <vector>
 
 #include "dmslam/map/map.h"
-#include "dmslam/place_recognition/keyframe_database.h"
-#include "dmslam/place_recognition/vocabulary.h"
+#include "dmslam/place_recognition/map_places.h"
 #include "frontend/tracked_frame.h"
 #include "frontend/pose_tracker.h"
 
@@ -28,11 +26,9 @@ class Relocalizer {
   std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed, TrackedFrame* frame) const;
 
-  std::shared_ptr<const Vocabulary> vocabulary_;
   Camera camera_;
   Pyramid pyramid_;
-  KeyframeDatabase database_;
-  std::map<KeyframeId, FeatureVector> nodes_;
+  MapPlaces places_;
 };
 
 }  // namespace dmslam

@@ -4,12 +4,14 @@
 
 namespace dmslam {
 
-LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options, std::shared_ptr<const Vocabulary> vocabulary)
+LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
+                               std::shared_ptr<const Vocabulary> vocabulary)
     : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {}
 
 void LoopcloserNode::Begin(const CameraInfo& info) {
   const Settings& settings = options_.settings;
-  core_ = std::make_unique<LoopcloserCore>(settings.loop, info.camera, settings.pyramid(), settings.seed, vocabulary_);
+  core_ = std::make_unique<LoopcloserCore>(settings.loop, info.camera, settings.pyramid(), settings.seed,
+                                           vocabulary_);
   if (info.mode == PlaybackMode::kRealtime) core_->SetPump([this] { PumpWithinWork(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&core_->map(), [this] { return map_reader_->held(); });

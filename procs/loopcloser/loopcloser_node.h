@@ -8,7 +8,8 @@
 
 namespace dmslam {
 
-/// The loop closer on the bus: keeps a replica of the map, and answers every keyframe with a correction or none.
+/// The loop closer on the bus: keeps a replica of the map, and answers every keyframe with a correction or
+/// none.
 class LoopcloserNode : public StreamNode {
  public:
   LoopcloserNode(NodeContext context, NodeOptions options, std::shared_ptr<const Vocabulary> vocabulary);

@@ -155,7 +155,7 @@ void MapperCore::MapAround(const KeyframeProposal& proposal) {
 void MapperCore::Refine(KeyframeId id, MapId map_id) {
   counters_.fusions += static_cast<uint64_t>(FuseWithNeighbours(map_, id, options_));
   Publish(MapEvent::kFused, id, map_id);
-  const LocalAdjustmentReport report = AdjustLocally(map_, id, options_, interrupt_);
+  const MapAdjustmentReport report = AdjustLocally(map_, id, options_, interrupt_);
   if (report.bundle.interrupted) ++counters_.adjustments_interrupted;
   Publish(MapEvent::kAdjusted, id, map_id);
 }
@@ -280,18 +280,16 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
 void MapperCore::Correct(const LoopAnswer& answer) {
   std::map<KeyframeId, Sim3d> corrections;
   for (const auto& c : answer.corrections) corrections[c.keyframe] = c.corrected_from_base;
-  std::map<LandmarkId, Eigen::Vector3d> positions;
-  for (const auto& c : answer.landmark_positions) positions[c.landmark] = c.p_world;
+  std::map<LandmarkId, Eigen::Vector3d> offsets;
+  for (const auto& o : answer.landmark_offsets) offsets[o.landmark] = o.offset_world;
 
   for (const LandmarkId id : map_.LandmarkIdsSorted()) {
-    const auto given = positions.find(id);
-    if (given != positions.end()) {
-      map_.SetPosition(id, given->second);
-      continue;
-    }
     const Landmark& landmark = *map_.FindLandmark(id);
     const Sim3d* correction = CorrectionOf(map_, landmark.reference, corrections);
-    if (correction != nullptr) map_.SetPosition(id, *correction * landmark.p_world);
+    if (correction == nullptr) continue;
+    const auto offset = offsets.find(id);
+    const Eigen::Vector3d beyond = offset == offsets.end() ? Eigen::Vector3d::Zero() : offset->second;
+    map_.SetPosition(id, *correction * landmark.p_world + beyond);
   }
   std::vector<std::pair<KeyframeId, Sim3d>> moved;
   for (const auto& [id, keyframe] : map_.keyframes()) {
@@ -302,15 +300,34 @@ void MapperCore::Correct(const LoopAnswer& answer) {
     const Sim3d corrected = Sim3d(map_.FindKeyframe(id)->T_cam_world) * correction.Inverse();
     map_.SetPoseAndScale(id, corrected.ToRigid(), correction.scale);
   }
-  const Keyframe* here = map_.FindKeyframe(answer.keyframe);
-  const Keyframe* there = map_.FindKeyframe(answer.matched);
-  if (here != nullptr && there != nullptr && answer.kind == LoopAnswer::Kind::kLoop) {
-    if (here->map_id != there->map_id) JoinMaps(here->map_id, there->map_id);
-    map_.AddLoopEdge(answer.keyframe, answer.matched);
+  if (answer.kind == LoopAnswer::Kind::kLoop) Connect(answer);
+}
+
+/// What the two ends of a loop have in common becomes one.
+void MapperCore::Connect(const LoopAnswer& answer) {
+  const std::optional<KeyframeId> here = map_.ResolveKeyframe(answer.keyframe);
+  const std::optional<KeyframeId> there = map_.ResolveKeyframe(answer.matched);
+  if (!here || !there || *here == *there) return;
+  const MapId from = map_.FindKeyframe(*here)->map_id, into = map_.FindKeyframe(*there)->map_id;
+  if (from != into) {
+    JoinMaps(from, into);
+    Reroot(*here, *there);
   }
+  map_.AddLoopEdge(*here, *there);
   for (const auto& fusion : answer.fusions) {
-    const auto from = map_.Resolve(fusion.from), into = map_.Resolve(fusion.into);
-    if (from && into) map_.Fuse(*from, *into);
+    const auto gone = map_.Resolve(fusion.from), kept = map_.Resolve(fusion.into);
+    if (gone && kept && *gone != *kept) map_.Fuse(*gone, *kept);
+  }
+  counters_.fusions += static_cast<uint64_t>(FuseWithNeighbours(map_, *here, options_));
+}
+
+/// Turns the spanning tree of `id` around, so that it hangs from `parent`.
+void MapperCore::Reroot(KeyframeId id, KeyframeId parent) {
+  while (id.valid()) {
+    const KeyframeId next = map_.FindKeyframe(id)->parent;
+    map_.SetParent(id, parent);
+    parent = id;
+    id = next;
   }
 }
 

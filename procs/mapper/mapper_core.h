@@ -80,6 +80,8 @@ class MapperCore {
   bool BuildInitialMap(const InitialMap& proposal);
   void ScaleToUnitDepth(MapId map_id, KeyframeId first);
   void Correct(const LoopAnswer& answer);
+  void Connect(const LoopAnswer& answer);
+  void Reroot(KeyframeId id, KeyframeId parent);
   void JoinMaps(MapId from, MapId into);
   void Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id = 0, std::string note = {});
   bool Interrupted() const { return interrupt_ && interrupt_(); }

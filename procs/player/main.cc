@@ -10,17 +10,6 @@
 
 namespace {
 
-/// What --black-out and --jump say: two numbers with a comma.
-std::pair<double, double> ParsePair(const std::string& option, const std::string& text) {
-  const size_t comma = text.find(',');
-  try {
-    if (comma == std::string::npos) throw std::invalid_argument(text);
-    return {std::stod(text.substr(0, comma)), std::stod(text.substr(comma + 1))};
-  } catch (const std::exception&) {
-    throw dmslam::InputError(option + " " + text + ": write two numbers with a comma between them");
-  }
-}
-
 /// What the command line says.
 struct Arguments {
   dmslam::PlayerOptions options;
@@ -55,14 +44,8 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::Node
   options->encoding = a.encoding == "png"   ? dmslam::FrameEncoding::kPng
                       : a.encoding == "raw" ? dmslam::FrameEncoding::kGray8
                                             : dmslam::FrameEncoding::kJpeg;
-  for (const std::string& text : a.black_outs) {
-    const auto [from, seconds] = ParsePair("--black-out", text);
-    options->black_outs.push_back({static_cast<size_t>(from), seconds});
-  }
-  for (const std::string& text : a.jumps) {
-    const auto [from, to] = ParsePair("--jump", text);
-    options->jumps.push_back({static_cast<size_t>(from), static_cast<size_t>(to)});
-  }
+  for (const std::string& text : a.black_outs) options->black_outs.push_back(dmslam::ParseBlackOut(text));
+  for (const std::string& text : a.jumps) options->jumps.push_back(dmslam::ParseJump(text));
   if (options->sequence.empty() == a.log.empty()) {
     throw dmslam::InputError("give either --sequence or --log: what shall be played?");
   }

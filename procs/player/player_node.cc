@@ -3,8 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
+#include <sstream>
+#include <utility>
 
 #include "common/process_info.h"
 #include "dmslam/util/check.h"
@@ -52,6 +55,36 @@ std::vector<size_t> OrderOfPlay(const PlayerOptions& options, size_t available, 
 }
 
 }  // namespace
+
+namespace {
+
+/// Two numbers with a comma between them and nothing else.
+std::optional<std::pair<double, double>> ParsePair(const std::string& text) {
+  std::istringstream stream(text);
+  double first = 0, second = 0;
+  char comma = 0;
+  const bool whole = stream >> first >> comma >> second && comma == ',' && (stream >> std::ws).eof();
+  if (!whole || first < 0 || first != std::floor(first)) return std::nullopt;
+  return std::pair(first, second);
+}
+
+}  // namespace
+
+PlayerOptions::BlackOut ParseBlackOut(const std::string& text) {
+  const auto pair = ParsePair(text);
+  if (!pair || pair->second <= 0) {
+    throw InputError("--black-out " + text + ": write FROM,SECONDS: a frame and a time above zero, as 300,1.5");
+  }
+  return {static_cast<size_t>(pair->first), pair->second};
+}
+
+PlayerOptions::Jump ParseJump(const std::string& text) {
+  const auto pair = ParsePair(text);
+  if (!pair || pair->second <= pair->first || pair->second != std::floor(pair->second)) {
+    throw InputError("--jump " + text + ": write FROM,TO: two frames, the second one later, as 300,360");
+  }
+  return {static_cast<size_t>(pair->first), static_cast<size_t>(pair->second)};
+}
 
 PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_ptr<FrameSource> source)
     : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {

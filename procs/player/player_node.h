@@ -40,6 +40,10 @@ struct PlayerOptions {
   std::vector<Jump> jumps;
 };
 
+/// What --black-out ("FROM,SECONDS") and --jump ("FROM,TO") say. Throw InputError that names what is wrong.
+PlayerOptions::BlackOut ParseBlackOut(const std::string& text);
+PlayerOptions::Jump ParseJump(const std::string& text);
+
 /// Feeds frames to the bus, in real time or in lock-step.
 class PlayerNode : public Node {
  public:

@@ -17,7 +17,7 @@ namespace {
 struct Arguments {
   std::string sequence, log, record, out, camera, config, vocabulary, profile;
   uint32_t log_session = 0;
-  std::vector<std::string> overrides;
+  std::vector<std::string> overrides, black_outs, jumps;
   size_t start = 0, frames = SIZE_MAX;
   uint64_t seed = 1;
   int pictures = 0;
@@ -40,6 +40,8 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--seed", a.seed)->capture_default_str();
   app.add_option("--start", a.start, "first frame");
   app.add_option("--frames", a.frames, "at most so many frames");
+  app.add_option("--black-out", a.black_outs, "FROM,SECONDS: black frames from frame FROM on; may be repeated");
+  app.add_option("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
   app.add_option("--pictures", a.pictures, "draw every so manieth frame");
   app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
   app.add_option("--map", a.map_files.load, "saved map or log: begin in this map");
@@ -90,6 +92,8 @@ int Run(const Arguments& a) {
   }
   options.player.start = a.start;
   options.player.frames = a.frames;
+  for (const std::string& text : a.black_outs) options.player.black_outs.push_back(dmslam::ParseBlackOut(text));
+  for (const std::string& text : a.jumps) options.player.jumps.push_back(dmslam::ParseJump(text));
   options.collector.out_dir = a.out;
   options.collector.ground_truth = source->GroundTruthPath().value_or("");
   options.vocabulary = dmslam::LoadVocabulary(a.vocabulary);

@@ -111,11 +111,12 @@ struct LoopAnswer {
     LandmarkId into;
   };
   std::vector<LandmarkFusion> fusions;
-  struct LandmarkCorrection {
+  /// Landmarks follow their reference keyframe; of a global adjustment, what is left beyond that.
+  struct LandmarkOffset {
     LandmarkId landmark;
-    Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+    Eigen::Vector3d offset_world = Eigen::Vector3d::Zero();
   };
-  std::vector<LandmarkCorrection> landmark_positions;  ///< of a global adjustment
+  std::vector<LandmarkOffset> landmark_offsets;
   std::string note;
   int64_t stamp_ns = 0;  ///< capture time of `keyframe`; 0: not known
 };

@@ -40,7 +40,7 @@ struct Codec<LoopAnswer> {
 
   static void Fields(auto& s, auto& m, auto& w) {
     using Fusion = LoopAnswer::LandmarkFusion;
-    using Position = LoopAnswer::LandmarkCorrection;
+    using Offset = LoopAnswer::LandmarkOffset;
     s.Utime(m.stamp_ns, w.utime);
     s(m.kind, w.kind);
     s(m.keyframe, w.keyframe);
@@ -53,11 +53,11 @@ struct Codec<LoopAnswer> {
     s.Count(m.fusions, w.num_fusions);
     s.Column(m.fusions, w.fuse_from, &Fusion::from);
     s.Column(m.fusions, w.fuse_into, &Fusion::into);
-    s.Count(m.landmark_positions, w.num_positions);
-    s.Column(m.landmark_positions, w.position_landmark, &Position::landmark);
-    s.Column(m.landmark_positions, w.position_x, Coordinate<0, &Position::p_world>());
-    s.Column(m.landmark_positions, w.position_y, Coordinate<1, &Position::p_world>());
-    s.Column(m.landmark_positions, w.position_z, Coordinate<2, &Position::p_world>());
+    s.Count(m.landmark_offsets, w.num_offsets);
+    s.Column(m.landmark_offsets, w.offset_landmark, &Offset::landmark);
+    s.Column(m.landmark_offsets, w.offset_x, Coordinate<0, &Offset::offset_world>());
+    s.Column(m.landmark_offsets, w.offset_y, Coordinate<1, &Offset::offset_world>());
+    s.Column(m.landmark_offsets, w.offset_z, Coordinate<2, &Offset::offset_world>());
     s(m.note, w.note);
   }
   static void Validate(const LoopAnswer& m, Checker& check) {
@@ -75,9 +75,9 @@ struct Codec<LoopAnswer> {
       check.Id(fusion.into, "a fusion into an impossible landmark");
       check.Require(fusion.from != fusion.into, "a landmark fused into itself");
     }
-    for (const LoopAnswer::LandmarkCorrection& position : m.landmark_positions) {
-      check.Id(position.landmark, "a position of an impossible landmark");
-      check.Position(position.p_world, "position of a landmark is not finite");
+    for (const LoopAnswer::LandmarkOffset& offset : m.landmark_offsets) {
+      check.Id(offset.landmark, "an offset of an impossible landmark");
+      check.Position(offset.offset_world, "offset of a landmark is not finite");
     }
   }
 };

@@ -1,0 +1,41 @@
+#pragma once
+
+namespace dmslam {
+
+/// Loop closing. Where a number is not explained, it is ORB-SLAM2's.
+struct LoopcloserOptions {
+  bool enabled = true;
+
+  // Which places are looked at.
+  int min_covisibility = 15;       ///< landmarks in common that make two keyframes neighbours
+  int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
+  int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
+
+  // What makes a place the same.
+  int min_word_matches = 20;         ///< of landmarks, between the two keyframes
+  int min_sim3_inliers = 20;         ///< of them, that agree with one similarity
+  double search_radius_px = 7.5;     ///< of the guided search, times the scale of the predicted octave
+  int max_descriptor_distance = 60;  ///< of the guided search [bits]
+  int min_matches = 40;              ///< landmarks of the place found in the keyframe
+  int min_cells = 8;                 ///< cells of the image (of 48) in which landmarks are found
+  // Shares: of the place's landmarks that the keyframe should see, those that it does see, over the same
+  // share of its own surroundings. A picture that hangs in two places reached 0.27; true returns begin at 0.3
+  // and grow as the camera goes on.
+  double min_share = 0.22;            ///< enough to be believed if the next keyframes agree
+  double min_confirmed_share = 0.35;  ///< of a keyframe that sees the place where an earlier one said it is
+  double min_implausible_share =
+      0.7;                       ///< the same where the loop moves the keyframe by more than drift would
+  double plausible_drift = 0.1;  ///< of the path since the place
+  double certain_drift =
+      0.03;  ///< a confirmed share needs no second keyframe where the loop moves it by less than this
+  int confirm_within = 4;  ///< keyframes
+
+  // What is done about it.
+  int essential_covisibility = 100;  ///< landmarks in common that make an edge of the essential graph
+  int essential_iterations = 20;
+  bool global_adjustment = true;  ///< after a loop, bundle adjustment of the whole map
+  int global_iterations = 10;
+  double keypoint_sigma_px = 0.7;  ///< of octave 0, in the global adjustment; the mapper's
+};
+
+}  // namespace dmslam

@@ -1,0 +1,242 @@
+#include "loopcloser/loop_verifier.h"
+
+#include <algorithm>
+#include <bitset>
+#include <cstdio>
+#include <map>
+
+#include "dmslam/map/projection.h"
+#include "dmslam/optimization/sim3_optimization.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kCellColumns = 8, kCellRows = 6;
+constexpr int kPlaceNeighbours = 15;
+constexpr ViewLimits kSurelySeen{.min_view_cos = 0.7, .distance_slack = 1.0, .border_px = 0};
+
+size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
+  const int column =
+      std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
+  const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
+  return static_cast<size_t>(row * kCellColumns + column);
+}
+
+/// A landmark of each keyframe that should be the same one.
+Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const Keyframe& b,
+                    size_t feature_b) {
+  Sim3Match match;
+  match.p_cam1 = a.T_cam_world * map.FindLandmark(a.landmarks[feature_a])->p_world;
+  match.p_cam2 = b.T_cam_world * map.FindLandmark(b.landmarks[feature_b])->p_world;
+  match.uv1_px = a.features->uv_px[feature_a];
+  match.uv2_px = b.features->uv_px[feature_b];
+  match.inv_sigma_squared1 = 1.0 / map.pyramid().SigmaSquared(a.features->set.keypoints[feature_a].octave);
+  match.inv_sigma_squared2 = 1.0 / map.pyramid().SigmaSquared(b.features->set.keypoints[feature_b].octave);
+  return match;
+}
+
+/// Along the keyframes from one to a later one [map units]; 0 where they belong to two maps.
+double PathLength(const Map& map, const Keyframe& from, const Keyframe& to) {
+  if (from.map_id != to.map_id) return 0.0;
+  double length = 0.0;
+  const Keyframe* last = &from;
+  for (auto at = map.keyframes().find(from.id); at != map.keyframes().end() && last->id < to.id; ++at) {
+    if (at->second.map_id != from.map_id) continue;
+    length += (at->second.T_cam_world.Center() - last->T_cam_world.Center()).norm();
+    last = &at->second;
+  }
+  return length;
+}
+
+/// The keyframe that sees most of what was found and is no neighbour of `keyframe`; null where there is none.
+const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const PlaceSupport& support) {
+  std::map<KeyframeId, int> votes;
+  for (const PlaceMatch& match : support.matches) {
+    for (const Observation& o : map.FindLandmark(match.landmark)->observations) {
+      if (o.keyframe != keyframe.id && !keyframe.covisible.contains(o.keyframe)) ++votes[o.keyframe];
+    }
+  }
+  const auto best = std::max_element(votes.begin(), votes.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return best == votes.end() ? nullptr : map.FindKeyframe(best->first);
+}
+
+template <typename... Values>
+std::string Text(const char* format, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof(text), format, values...);
+  return text;
+}
+
+}  // namespace
+
+std::vector<LandmarkId> LandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared) {
+  std::vector<KeyframeId> keyframes = map.BestCovisible(id, neighbours, min_shared);
+  keyframes.push_back(id);
+  std::vector<LandmarkId> landmarks;
+  for (const KeyframeId keyframe : keyframes) {
+    for (const LandmarkId landmark : map.FindKeyframe(keyframe)->landmarks) {
+      if (landmark.valid() && IsStatic(map.FindLandmark(landmark))) landmarks.push_back(landmark);
+    }
+  }
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  return landmarks;
+}
+
+std::optional<Sim3d> LoopVerifier::FirstSimilarity(const Map& map, const MapPlaces& places,
+                                                   const Keyframe& keyframe, const Keyframe& place,
+                                                   std::string* why) const {
+  const std::vector<uint8_t> usable1 = StaticFeatures(map, keyframe), usable2 = StaticFeatures(map, place);
+  const std::vector<BowMatch> pairs =
+      MatchByNodes({&keyframe.features->set, places.Nodes(keyframe.id), usable1},
+                   {&place.features->set, places.Nodes(place.id), usable2});
+  if (static_cast<int>(pairs.size()) < options_.min_word_matches) {
+    *why = Text("%zu matches by words", pairs.size());
+    return std::nullopt;
+  }
+  std::vector<Sim3Match> matches;
+  for (const BowMatch& pair : pairs) matches.push_back(MakeMatch(map, keyframe, pair.a, place, pair.b));
+  Sim3RansacOptions options;
+  options.min_inliers = options_.min_sim3_inliers;
+  options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop");
+  const Pinhole camera = map.camera().Ideal();
+  const Sim3Report report = EstimateSim3Ransac(camera, camera, matches, options);
+  if (!report.success) {
+    *why = Text("%d of %zu matches agree on a similarity", report.num_inliers, matches.size());
+    return std::nullopt;
+  }
+  return report.S_cam1_cam2;
+}
+
+/// Landmarks of the place, looked for where the similarity says, with what the keyframe itself sees there:
+/// pairs of landmarks, of which both sides must agree.
+std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyframe& keyframe,
+                                                     const Keyframe& place, const Sim3d& S_keyframe_place,
+                                                     std::string* why) const {
+  std::vector<LandmarkId> seen;
+  for (const LandmarkId id : place.landmarks) {
+    if (id.valid() && IsStatic(map.FindLandmark(id))) seen.push_back(id);
+  }
+  std::sort(seen.begin(), seen.end());
+  const Rigid3d T_cam_world = (S_keyframe_place * Sim3d(place.T_cam_world)).ToRigid();
+  const PlaceSupport support = Look(map, keyframe, T_cam_world, seen, options_.search_radius_px);
+  std::vector<Sim3Match> matches;
+  for (const PlaceMatch& match : support.matches) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
+    const auto at = std::find(place.landmarks.begin(), place.landmarks.end(), match.landmark);
+    matches.push_back(
+        MakeMatch(map, keyframe, match.feature, place, static_cast<size_t>(at - place.landmarks.begin())));
+  }
+  const Pinhole camera = map.camera().Ideal();
+  Sim3OptimizationOptions options;
+  options.min_inliers = options_.min_sim3_inliers;
+  const Sim3Report report = OptimizeSim3(camera, camera, matches, S_keyframe_place, options);
+  if (!report.success) {
+    *why = Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
+    return std::nullopt;
+  }
+  return report.S_cam1_cam2;
+}
+
+PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                                const std::vector<LandmarkId>& landmarks, double radius_px) const {
+  PlaceSupport support;
+  std::vector<uint8_t> taken(keyframe.features->size(), 0);
+  std::bitset<kCellColumns * kCellRows> cells;
+  for (const LandmarkId id : landmarks) {
+    const Landmark& landmark = *map.FindLandmark(id);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world, kSurelySeen);
+    if (!view) continue;
+    ++support.expected;
+    const FeatureHit hit =
+        FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
+                    std::max(0, view->octave - 1), view->octave + 1, landmark.descriptor, taken);
+    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
+    const size_t feature = static_cast<size_t>(hit.feature);
+    taken[feature] = 1;
+    support.matches.push_back({static_cast<uint16_t>(feature), id});
+    cells.set(CellOf(map.camera(), keyframe.features->uv_px[feature]));
+  }
+  std::sort(support.matches.begin(), support.matches.end(),
+            [](const PlaceMatch& a, const PlaceMatch& b) { return a.feature < b.feature; });
+  support.found = static_cast<int>(support.matches.size());
+  support.cells = static_cast<int>(cells.count());
+  return support;
+}
+
+VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                   const Sim3d& S_keyframe_place, std::string* why) const {
+  VerifiedLoop loop;
+  loop.keyframe = keyframe.id;
+  loop.place = place.id;
+  loop.S_keyframe_place = S_keyframe_place;
+  loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
+  loop.landmarks = LandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
+  const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
+  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks, options_.search_radius_px);
+  const PlaceSupport own =
+      Look(map, keyframe, keyframe.T_cam_world,
+           LandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
+           options_.search_radius_px);
+  if (own.found > 0) loop.share = loop.support.Share() / own.Share();
+  const double path = PathLength(map, place, keyframe);
+  const double moved = (T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
+  if (path > 0) loop.drift = moved / path;
+  *why = Text("%d of %d landmarks found in %d cells, share %.2f; drift %.3f, scale %.3f", loop.support.found,
+              loop.support.expected, loop.support.cells, loop.share, loop.drift,
+              1.0 / loop.S_keyframe_world.scale);
+  return loop;
+}
+
+bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
+  return loop.support.found >= options_.min_matches && loop.support.cells >= options_.min_cells &&
+         loop.share >= min_share;
+}
+
+bool LoopVerifier::IsCertain(const Map& map, const VerifiedLoop& loop) const {
+  const bool one_map = map.FindKeyframe(loop.keyframe)->map_id == map.FindKeyframe(loop.place)->map_id;
+  return one_map && loop.drift <= options_.certain_drift && Holds(loop, options_.min_confirmed_share);
+}
+
+std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,
+                                                  const Keyframe& keyframe, const Keyframe& place,
+                                                  std::string* why) const {
+  const std::optional<Sim3d> first = FirstSimilarity(map, places, keyframe, place, why);
+  if (!first) return std::nullopt;
+  const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, place, *first, why);
+  if (!refined) return std::nullopt;
+  VerifiedLoop loop = Measure(map, keyframe, place, *refined, why);
+  if (!Holds(loop, options_.min_share)) return std::nullopt;
+  return loop;
+}
+
+std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe& keyframe,
+                                                  const VerifiedLoop& earlier, std::string* why) const {
+  const Keyframe* before = map.FindKeyframe(earlier.keyframe);
+  const Keyframe* place_before = map.FindKeyframe(earlier.place);
+  if (before == nullptr || place_before == nullptr || before->map_id != keyframe.map_id) return std::nullopt;
+  const Sim3d S_before_world = earlier.S_keyframe_place * Sim3d(place_before->T_cam_world);
+  const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
+  const std::vector<LandmarkId> landmarks =
+      LandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
+  const PlaceSupport seen =
+      Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks, 2 * options_.search_radius_px);
+  const Keyframe* place = BestObserver(map, keyframe, seen);
+  if (place == nullptr) {
+    *why = "nothing of the place is seen";
+    return std::nullopt;
+  }
+  const Sim3d S_keyframe_place = S_keyframe_world * Sim3d(place->T_cam_world).Inverse();
+  const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, *place, S_keyframe_place, why);
+  if (!refined) return std::nullopt;
+  VerifiedLoop loop = Measure(map, keyframe, *place, *refined, why);
+  const bool plausible = place->map_id != keyframe.map_id || loop.drift <= options_.plausible_drift;
+  if (!Holds(loop, plausible ? options_.min_confirmed_share : options_.min_implausible_share))
+    return std::nullopt;
+  return loop;
+}
+
+}  // namespace dmslam
