@@ -26,6 +26,8 @@ trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and
   --black-out F,S     black frames from frame F on for S seconds; may be repeated
   --jump F,T          after frame F go on with frame T; may be repeated
   --port N            UDP port (default: a free one)
+  --share-port        the port may be in use: the system on it has another --prefix
+  --prefix NAME       put before every channel: separates systems on one port
   --receive-buffer N  bytes that the kernel is asked to hold for each process (default 4194304)
   --no-restart        a process that dies ends the run (default: it is started again, and goes on where it was)
   --build-dir DIR     where the programs are (default: build/release, built first where needed)
@@ -33,7 +35,7 @@ EOF
 }
 fail() { echo "run.sh: $*" >&2; exit 1; }
 
-sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304 restart=1
+sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304 restart=1 share_port=0
 player=() common=()
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
@@ -52,6 +54,8 @@ while [ $# -gt 0 ]; do
     --pictures) need "$@"; pictures=$2; shift 2 ;;
     --record) record=1; shift ;;
     --port) need "$@"; port=$2; shift 2 ;;
+    --share-port) share_port=1; shift ;;
+    --prefix) need "$@"; common+=(--prefix "$2"); shift 2 ;;
     --receive-buffer) need "$@"; receive_buffer=$2; shift 2 ;;
     --no-restart) restart=0; shift ;;
     --build-dir) need "$@"; build=$2; shift 2 ;;
@@ -79,7 +83,7 @@ bin="$build/bin"
 port_taken() { grep -qi ":$(printf '%04X' "$1") " /proc/net/udp /proc/net/udp6 2>/dev/null; }
 if [ -n "$port" ]; then
   [[ "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1024 ] && [ "$port" -le 65535 ] || fail "--port $port: write a port between 1024 and 65535"
-  if port_taken "$port"; then fail "UDP port $port is taken; choose another with --port, or leave it out"; fi
+  if [ "$share_port" = 0 ] && port_taken "$port"; then fail "UDP port $port is taken; choose another with --port, or leave it out"; fi
 else
   for _ in $(seq 50); do
     port=$((20000 + RANDOM % 30000))

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 
+#include "dmslam/messaging/codec.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -28,9 +30,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
   run_.seed = options_.settings.seed;
   run_.ground_truth = collector_.ground_truth;
   frames_total_ = info.num_frames;
-  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
-                                {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-                                 channels::kFrameEvidence, channels::kMapReset});
+  OpenJournal();
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&builder_->map(), [this] { return map_reader_->held(); });
 }
@@ -45,10 +45,7 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
   } else if (channel == channels::kPlayerStatus) {
     if (const auto status = Read<PlayerStatus>(bytes)) OnHealth("player", status->head);
   } else if (channel == channels::kFrontendStatus) {
-    if (auto status = Read<FrontendStatus>(bytes)) {
-      OnHealth("frontend", status->head);
-      run_.frontend = std::move(*status);
-    }
+    if (auto status = Read<FrontendStatus>(bytes)) OnFrontendStatus(std::move(*status));
   } else if (channel == channels::kMapperStatus) {
     if (auto status = Read<MapperStatus>(bytes)) {
       OnHealth("mapper", status->head);
@@ -68,28 +65,93 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
 
+/// Counters begin at zero in a process that was started again: those of the ones before it are added.
 void CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
   if (head.session != 0 && head.session != session_) return;
   ProcessHealth& health = run_.health[process];
+  if (process_ids_[process].insert(head.health.pid).second && process_ids_[process].size() > 1) {
+    ++run_.restarts;
+    former_[process] = health;
+    if (process == "frontend") former_frontend_ = run_.frontend;
+  }
+  const ProcessHealth& former = former_[process];
   const double largest = std::max(health.rss_mb, head.health.rss_mb);
   health = head.health;
   health.rss_mb = largest;
-  if (process_ids_[process].insert(head.health.pid).second && process_ids_[process].size() > 1) ++run_.restarts;
+  for (int64_t ProcessHealth::*counter :
+       {&ProcessHealth::dropped_foreign, &ProcessHealth::dropped_malformed, &ProcessHealth::dropped_checksum,
+        &ProcessHealth::records_repaired, &ProcessHealth::records_lost, &ProcessHealth::repairs_requested,
+        &ProcessHealth::resent, &ProcessHealth::resent_bytes, &ProcessHealth::written,
+        &ProcessHealth::written_bytes}) {
+    health.*counter += former.*counter;
+  }
+}
+
+void CollectorNode::OnFrontendStatus(FrontendStatus status) {
+  OnHealth("frontend", status.head);
+  for (int64_t FrontendStatus::*counter :
+       {&FrontendStatus::frames_received, &FrontendStatus::frames_processed, &FrontendStatus::frames_skipped,
+        &FrontendStatus::keyframes_proposed, &FrontendStatus::keyframes_withheld,
+        &FrontendStatus::relocalisations}) {
+    status.*counter += former_frontend_.*counter;
+  }
+  run_.frontend = std::move(status);
+}
+
+void CollectorNode::OnProposal(KeyframeId id, MapId map_id) { proposed_[id] = map_id; }
+
+void CollectorNode::OnFramePose(const Record& record) {
+  const auto pose = Read<FramePose>(*record.bytes);
+  if (!pose) return;
+  builder_->OnFramePose(*pose);
+  frames_seen_ = static_cast<int64_t>(builder_->frame_poses().size());
+  journal_->Append(*record.bytes);
 }
 
 bool CollectorNode::TakeFrontendRecord() {
   const std::optional<Record> record = frontend_reader_->Take();
   if (!record) return false;
   if (record->channel == channels::kFramePose) {
-    if (const auto pose = Read<FramePose>(*record->bytes)) {
-      builder_->OnFramePose(*pose);
-      frames_seen_ = static_cast<int64_t>(builder_->frame_poses().size());
+    OnFramePose(*record);
+  } else if (record->channel == channels::kKeyframe) {
+    if (const auto proposal = Read<KeyframeProposal>(*record->bytes))
+      OnProposal(proposal->id, proposal->map_id);
+  } else if (record->channel == channels::kInitialMap) {
+    if (const auto proposal = Read<InitialMap>(*record->bytes)) {
+      OnProposal(proposal->first.id, proposal->map_id);
+      OnProposal(proposal->second.id, proposal->map_id);
     }
   } else if (record->channel == channels::kMapReset) {
     ++run_.resets;
   }
   frontend_reader_->AcceptTaken();
   return true;
+}
+
+/// What was proposed in a map that still stands must be in it, or have left it by being culled.
+void CollectorNode::CountMissingKeyframes() {
+  const Map& map = builder_->map();
+  run_.keyframes_proposed = proposed_.size();
+  for (const auto& [id, map_id] : proposed_) {
+    const bool known = map.FindKeyframe(id) != nullptr || map.keyframe_tombstones().contains(id);
+    if (!known && !dropped_maps_.contains(map_id)) ++run_.keyframes_missing;
+  }
+}
+
+/// The frame poses of a collector that was before this one.
+void CollectorNode::OpenJournal() {
+  std::filesystem::create_directories(collector_.out_dir);
+  journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
+  Version newest;
+  journal_->Resume(context_.fresh_system ? 0 : session_, [&](std::span<const uint8_t> record) {
+    if (const auto pose = Read<FramePose>(record)) builder_->OnFramePose(*pose);
+    const std::optional<RecordHeader> header = ParseHeader(record);
+    newest = {header->epoch, header->seq};
+  });
+  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
+                                {channels::kSession, channels::kInitialMap, channels::kKeyframe,
+                                 channels::kFramePose, channels::kFrameEvidence, channels::kMapReset},
+                                newest);
 }
 
 bool CollectorNode::TakeMapRecord() {
@@ -99,6 +161,7 @@ bool CollectorNode::TakeMapRecord() {
   if (const auto delta = Read<MapDelta>(*record->bytes)) {
     builder_->OnMapDelta(*delta);
     if (delta->correction_id != 0) run_.corrections.push_back({delta->event, delta->about, delta->note});
+    dropped_maps_.insert(delta->dropped_maps.begin(), delta->dropped_maps.end());
   }
   map_reader_->AcceptTaken();
   return true;
@@ -106,6 +169,7 @@ bool CollectorNode::TakeMapRecord() {
 
 bool CollectorNode::WorkOnce() {
   const bool any = TakeFrontendRecord() || TakeMapRecord();
+  SayProgress();
   return any ? true : EndIfDone();
 }
 
@@ -132,15 +196,26 @@ void CollectorNode::Write() {
     run_.frames_blacked = end_->frames_blacked;
     run_.frames_jumped = end_->frames_jumped;
   }
+  CountMissingKeyframes();
   const std::string table = WriteResults(collector_.out_dir, run_, *builder_);
   if (collector_.progress) std::fputs("\n", stderr);
   std::fputs(table.c_str(), stdout);
   std::fflush(stdout);
+  journal_->Remove();
 }
 
 void CollectorNode::Stop() {
   Write();
   Exit(0);
+}
+
+/// Into the log: where a first map stands, and every so many frames.
+void CollectorNode::SayProgress() {
+  constexpr int64_t kEveryFrames = 20;
+  if (frames_seen_ < next_progress_ || builder_->map().keyframes().empty()) return;
+  next_progress_ = frames_seen_ + kEveryFrames;
+  spdlog::info("frame {} of {}, {} keyframes", frames_seen_, frames_total_,
+               builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "collector/journal.h"
 #include "collector/results.h"
 #include "collector/trajectory_builder.h"
 #include "common/stream_node.h"
@@ -39,6 +40,12 @@ class CollectorNode : public StreamNode {
   bool TakeMapRecord();
   void OnGroundTruth(const GroundTruthPose& pose);
   void OnHealth(const std::string& process, const StatusHead& head);
+  void OnFrontendStatus(FrontendStatus status);
+  void OnProposal(KeyframeId id, MapId map_id);
+  void OnFramePose(const Record& record);
+  void CountMissingKeyframes();
+  void OpenJournal();
+  void SayProgress();
   bool EndIfDone();
   void Write();
 
@@ -47,6 +54,13 @@ class CollectorNode : public StreamNode {
   std::unique_ptr<TrajectoryBuilder> builder_;
   std::unique_ptr<StreamReader> frontend_reader_, map_reader_;
   std::map<std::string, std::set<int32_t>> process_ids_;
+  std::map<std::string, ProcessHealth>
+      former_;  ///< counters of processes that another has followed, together
+  FrontendStatus former_frontend_;
+  std::map<KeyframeId, MapId> proposed_;  ///< keyframes that the frontend said should be
+  std::set<MapId> dropped_maps_;
+  std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica
+  int64_t next_progress_ = 0;
   std::optional<EndOfSequence> end_;
   int64_t frames_total_ = 0;
   int64_t frames_seen_ = 0;

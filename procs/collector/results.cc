@@ -198,6 +198,20 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder, const T
   json["records_lost"] = lost;
   json["records_repaired"] = repaired;
   json["restarts"] = run.restarts;
+  json["keyframes_proposed"] = run.keyframes_proposed;
+  json["keyframes_missing"] = run.keyframes_missing;
+  int64_t dropped = 0;
+  for (const auto& [process, health] : run.health) {
+    dropped += health.dropped_malformed + health.dropped_checksum + health.dropped_foreign;
+  }
+  json["messages_dropped"] = dropped;
+  json["recovery_p50_ms"] = HealthJson(run, &ProcessHealth::recovery_p50_ms);
+  json["recovery_p99_ms"] = HealthJson(run, &ProcessHealth::recovery_p99_ms);
+  int64_t payload = 0, resent = 0;
+  for (const auto& [process, health] : run.health)
+    payload += health.written_bytes, resent += health.resent_bytes;
+  json["payload_bytes"] = payload;
+  json["resent_bytes"] = resent;
   json["max_rss_mb"] = HealthJson(run, &ProcessHealth::rss_mb);
   return json;
 }

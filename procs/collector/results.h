@@ -32,6 +32,8 @@ struct RunRecord {
   std::vector<CorrectionRecord> corrections;
   uint64_t resets = 0;
   int restarts = 0;
+  size_t keyframes_proposed = 0;
+  size_t keyframes_missing = 0;  ///< proposed for a map that stands, and neither in it nor culled from it
 };
 
 /// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, graph.txt, trajectory.png and summary.json into `dir`, and

@@ -260,6 +260,8 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason, const std::vect
     health.dropped_overflow += s.dropped_no_room;
     health.dropped_duplicate += s.duplicates;
     health.records_repaired += s.repaired;
+    health.recovery_p50_ms = std::max(health.recovery_p50_ms, s.recovery_p50_ms);
+    health.recovery_p99_ms = std::max(health.recovery_p99_ms, s.recovery_p99_ms);
     health.repairs_requested += s.requested;
     health.records_lost += s.lost;
   }
@@ -268,6 +270,8 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason, const std::vect
   health.epoch = writer_->term().epoch;
   health.written = s.records;
   health.written_bytes = s.payload_bytes;
+  health.dropped_checksum += s.dropped_bad;
+  health.dropped_foreign += s.dropped_foreign;
   health.resent = s.parts_repaired;
   health.resent_bytes = s.repaired_bytes;
   health.kept_bytes = static_cast<int64_t>(s.kept_bytes);

@@ -84,10 +84,11 @@ class StreamNode : public Node {
   int64_t PublishRecord(const Message& message) {
     return writer_->Publish(wire::Info<Message>().channel, wire::Encode(message), context_.now_ns());
   }
-  /// Publishes a message that may be lost.
+  /// Publishes a message that may be lost. `local`: large, and of use on this host only.
   template <typename Message>
-  void PublishLoose(const Message& message) {
-    context_.bus->Publish({wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
+  void PublishLoose(const Message& message, bool local = false) {
+    context_.bus->Publish(
+        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), local});
   }
   /// Decodes one of ours; bad and foreign ones are counted, the first of each kind is logged.
   template <typename Message>

@@ -56,8 +56,8 @@ bool FrontendNode::ReadyToWrite() {
   if (context_.fresh_system) return true;
   if (!map_reader_->term().valid()) return !options_.HasPeer("mapper");
   TakeMapRecords(true);
-  const bool caught_up = map_reader_->state() == StreamReader::State::kFollowing &&
-                         map_reader_->statistics().backlog == 0 && held_.empty();
+  const bool caught_up =
+      map_reader_->state() == StreamReader::State::kFollowing && map_reader_->backlog() == 0 && held_.empty();
   if (!caught_up) return false;
   const Map& map = core_->map();
   if (map.progress().ended) {
@@ -265,7 +265,7 @@ void FrontendNode::PublishViews(const Waiting& waiting, const FramePose& pose, F
     const Keypoint& keypoint = frame.features->set.keypoints[i];
     features.items.push_back({keypoint.x_q4, keypoint.y_q4, static_cast<FeatureView::Kind>(frame.classes[i])});
   }
-  PublishLoose(features);
+  PublishLoose(features, options_.link == Link::kLan);
 }
 
 void FrontendNode::FinishFrame() {

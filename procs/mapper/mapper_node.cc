@@ -135,7 +135,7 @@ void MapperNode::PublishDelta(const MapDelta& delta) {
 bool MapperNode::KeyframeWaits() const {
   return std::any_of(taken_.begin(), taken_.end(),
                      [](const Record& record) { return record.channel == channels::kKeyframe; }) ||
-         frontend_reader_->statistics().backlog > 60;
+         frontend_reader_->backlog() > 60;
 }
 
 void MapperNode::TakeLoopAnswers() {

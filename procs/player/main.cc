@@ -15,7 +15,7 @@ struct Arguments {
   dmslam::PlayerOptions options;
   std::string camera_file, encoding = "jpeg", log, to_log;
   uint32_t log_session = 0;
-  bool lockstep = false;
+  bool lockstep = false, remote_frontend = false;
   std::vector<std::string> black_outs, jumps;
 };
 
@@ -41,6 +41,7 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::Node
   *options = a.options;
   options->mode = a.lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
   options->session = node.session == 0 ? 1 : node.session;
+  options->local_frames = node.link == dmslam::Link::kLan && !a.remote_frontend;
   options->encoding = a.encoding == "png"   ? dmslam::FrameEncoding::kPng
                       : a.encoding == "raw" ? dmslam::FrameEncoding::kGray8
                                             : dmslam::FrameEncoding::kJpeg;
@@ -97,6 +98,8 @@ void Declare(CLI::App& app, Arguments& a) {
       ->check(CLI::IsMember({"jpeg", "png", "raw"}));
   app.add_option("--jpeg-quality", a.options.jpeg_quality)->check(CLI::Range(1, 100))->capture_default_str();
   app.add_flag("--reencode", a.options.reencode, "encode frames anew even where files hold JPEG or PNG");
+  app.add_flag("--remote-frontend", a.remote_frontend,
+               "with --link lan: the frontend runs on another host, so frames leave this one");
   app.add_option("--lead", a.options.lead_s, "seconds before the first frame")->capture_default_str();
   app.add_option("--black-out", a.black_outs,
                  "FROM,SECONDS: black frames from frame FROM on; may be repeated");

@@ -135,6 +135,7 @@ void PlayerNode::SkipBehind(uint32_t frame_index) {
   const auto next = std::upper_bound(order_.begin(), order_.end(), size_t{frame_index});
   spdlog::info("player: the frontend has frame {} already; goes on behind it", frame_index);
   position_ = static_cast<size_t>(next - order_.begin());
+  published_ = static_cast<int64_t>(position_);
   awaiting_done_ = false;
   if (position_ < order_.size()) start_ns_ += context_.now_ns() - DueNs(position_);
 }
@@ -232,7 +233,7 @@ void PlayerNode::PublishFrame() {
   }
   frame_.publish_us = context_.wall_us();
   frame_bytes_ = std::make_shared<const Bytes>(wire::Encode(frame_));
-  context_.bus->Publish({channels::kFrame, frame_bytes_, false});
+  context_.bus->Publish({channels::kFrame, frame_bytes_, options_.local_frames});
   ++published_;
   PublishGroundTruth(index);
   awaiting_done_ = options_.mode == PlaybackMode::kLockstep;
@@ -292,7 +293,7 @@ void PlayerNode::Advance() {
   if (awaiting_done_ && now >= next_repeat_ns_) {
     next_repeat_ns_ = now + kRepeatEveryNs;
     ++repeats_;
-    context_.bus->Publish({channels::kFrame, frame_bytes_, false});
+    context_.bus->Publish({channels::kFrame, frame_bytes_, options_.local_frames});
   }
   if (position_ < order_.size() || awaiting_done_) return;
   if (end_since_ns_ == 0) end_since_ns_ = now;

@@ -27,6 +27,7 @@ struct PlayerOptions {
   FrameEncoding encoding = FrameEncoding::kJpeg;
   int jpeg_quality = 90;
   bool reencode = false;       ///< files that are JPEG or PNG travel as they are, unless this is set
+  bool local_frames = false;   ///< frames stay on this host: the frontend runs here, and the bus leaves it
   double lead_s = 0.5;         ///< between the first camera info and the first frame, so that others can get ready
   struct BlackOut {
     size_t from = 0;

@@ -12,6 +12,7 @@
 namespace dmslam {
 namespace {
 
+constexpr size_t kMaxTimed = 1000;  // records whose recovery is timed
 constexpr size_t kMaxMissing = 32;  // ranges named in one acknowledgement: it must fit one datagram
 
 Version ParentOf(const head_t& head) { return {head.header.parent_epoch, head.header.parent_seq}; }
@@ -37,9 +38,9 @@ void StreamReader::Receive(const std::string& channel, std::span<const uint8_t> 
   if (type == head_t::getHash()) {
     if (channel == HeadChannel(options_.owner)) ReceiveHead(channel, bytes, now_ns);
   } else if (type == part_t::getHash()) {
-    if (channel == PartChannel(options_.owner)) ReceivePart(bytes);
+    if (channel == PartChannel(options_.owner)) ReceivePart(bytes, now_ns);
   } else if (type != ack_t::getHash()) {
-    ReceiveRecord(channel, bytes);
+    ReceiveRecord(channel, bytes, now_ns);
   }
 }
 
@@ -91,7 +92,7 @@ void StreamReader::BeginTerm(const head_t& head) {
   parent_ = parent;
   window_.Reset(same_epoch ? held_.seq + 1 : 1);
   snapshot_.reset();
-  named_missing_.clear();
+  missing_since_ns_.clear();
   problem_.clear();
   ack_due_ = true;
   state_ = State::kFollowing;
@@ -173,7 +174,7 @@ int32_t StreamReader::KeyOf(int64_t snapshot) const {
   return StreamKey(options_.session, options_.stream, term_, snapshot);
 }
 
-void StreamReader::ReceivePart(std::span<const uint8_t> bytes) {
+void StreamReader::ReceivePart(std::span<const uint8_t> bytes, int64_t now_ns) {
   const std::optional<part_t> part = DecodePart(bytes);
   if (!part) {
     ++statistics_.dropped_bad;
@@ -198,16 +199,16 @@ void StreamReader::ReceivePart(std::span<const uint8_t> bytes) {
     ++statistics_.dropped_bad;
     return;
   }
-  Add(window, channel, std::move(message), *header);
+  Add(window, channel, std::move(message), *header, now_ns);
 }
 
-void StreamReader::ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes) {
+void StreamReader::ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
   const std::optional<RecordHeader> header = ParseHeader(bytes);
-  if (!header || header->stream != static_cast<int32_t>(options_.stream)) return;
-  if (!IsIntact(channel, bytes)) {
+  if (!header || !IsIntact(channel, bytes)) {
     ++statistics_.dropped_bad;
     return;
   }
+  if (header->stream != static_cast<int32_t>(options_.stream)) return;
   if (header->session != options_.session) {
     ++statistics_.dropped_foreign;
     return;
@@ -217,7 +218,7 @@ void StreamReader::ReceiveRecord(const std::string& channel, std::span<const uin
     ++statistics_.dropped_stale;
     return;
   }
-  Add(window, channel, Bytes(bytes.begin(), bytes.end()), *header);
+  Add(window, channel, Bytes(bytes.begin(), bytes.end()), *header, now_ns);
 }
 
 // Where a record belongs: the stream's window or the snapshot's, if it is of the term that is followed.
@@ -232,7 +233,7 @@ ReceiveWindow* StreamReader::WindowOf(const RecordHeader& header) {
 }
 
 void StreamReader::Add(ReceiveWindow* window, const std::string& channel, Bytes bytes,
-                       const RecordHeader& header) {
+                       const RecordHeader& header, int64_t now_ns) {
   Record record{channel, std::make_shared<const Bytes>(std::move(bytes)), header};
   const ReceiveWindow::Result result = window->Add(record);
   if (result == ReceiveWindow::Result::kDuplicate) ++statistics_.duplicates;
@@ -243,12 +244,25 @@ void StreamReader::Add(ReceiveWindow* window, const std::string& channel, Bytes 
     if (record.ends_snapshot()) snapshot_->last = header.seq;
     return;
   }
-  for (const MissingRange& range : named_missing_) {
-    if (range.first_seq <= header.seq && header.seq <= range.last_seq) {
-      ++statistics_.repaired;
-      break;
+  NoteArrival(header.seq, now_ns);
+}
+
+void StreamReader::NoteMissing(const std::vector<MissingRange>& missing, int64_t now_ns) {
+  for (const MissingRange& range : missing) {
+    for (int64_t seq = range.first_seq; seq <= range.last_seq && missing_since_ns_.size() < kMaxTimed;
+         ++seq) {
+      missing_since_ns_.emplace(seq, now_ns);
     }
   }
+}
+
+void StreamReader::NoteArrival(int64_t seq, int64_t now_ns) {
+  const auto missing = missing_since_ns_.find(seq);
+  if (missing == missing_since_ns_.end()) return;
+  ++statistics_.repaired;
+  recovery_ms_.push_back(static_cast<double>(now_ns - missing->second) * 1e-6);
+  if (recovery_ms_.size() > kMaxTimed) recovery_ms_.pop_front();
+  missing_since_ns_.erase(missing);
 }
 
 // ---- what the owner does
@@ -359,7 +373,7 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
     ack.missing_first_byte.push_back(range.first_byte);
     ack.missing_end_byte.push_back(range.end_byte);
   }
-  if (!of_snapshot) named_missing_ = std::move(missing);
+  if (!of_snapshot) NoteMissing(missing, now_ns);
   ack.role = options_.role;
   ack.name = options_.name;
   outgoing_.push_back(SealedMessage(AckChannel(options_.reader), ack));
@@ -368,9 +382,19 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
 
 std::vector<Outgoing> StreamReader::TakeOutgoing() { return std::exchange(outgoing_, {}); }
 
+int64_t StreamReader::backlog() const {
+  return window_.newest() - window_.next() + 1 + static_cast<int64_t>(former_.size());
+}
+
 ReaderStatistics StreamReader::statistics() const {
   ReaderStatistics result = statistics_;
-  result.backlog = window_.newest() - window_.next() + 1 + static_cast<int64_t>(former_.size());
+  if (!recovery_ms_.empty()) {
+    std::vector<double> sorted(recovery_ms_.begin(), recovery_ms_.end());
+    std::sort(sorted.begin(), sorted.end());
+    result.recovery_p50_ms = sorted[sorted.size() / 2];
+    result.recovery_p99_ms = sorted[sorted.size() * 99 / 100];
+  }
+  result.backlog = backlog();
   result.kept_bytes = window_.bytes() + (snapshot_ ? snapshot_->window.bytes() : 0);
   return result;
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,6 +29,9 @@ struct ReaderStatistics {
   int64_t dropped_foreign = 0;  ///< of other sessions
   int64_t dropped_stale = 0;    ///< of other terms, or before any beacon was heard
   int64_t dropped_no_room = 0;  ///< beyond what is kept ahead; they come again
+  double recovery_p50_ms =
+      0;  ///< from a record's being named as missing to its being here, of the newest ones
+  double recovery_p99_ms = 0;
   int64_t acks = 0;             ///< sent
   int64_t backlog = 0;          ///< records known to exist and not yet taken
   size_t kept_bytes = 0;        ///< waiting to be taken, whole or in pieces
@@ -98,6 +102,8 @@ class StreamReader : public StateMachine {
   /// What the term that is followed continues; empty when it is fresh.
   const Version& parent() const { return parent_; }
 
+  /// Records known to exist and not yet taken.
+  int64_t backlog() const;
   ReaderStatistics statistics() const;
 
  private:
@@ -110,9 +116,12 @@ class StreamReader : public StateMachine {
   };
 
   void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
-  void ReceivePart(std::span<const uint8_t> bytes);
-  void ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes);
-  void Add(ReceiveWindow* window, const std::string& channel, Bytes bytes, const RecordHeader& header);
+  void ReceivePart(std::span<const uint8_t> bytes, int64_t now_ns);
+  void ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
+  void Add(ReceiveWindow* window, const std::string& channel, Bytes bytes, const RecordHeader& header,
+           int64_t now_ns);
+  void NoteMissing(const std::vector<MissingRange>& missing, int64_t now_ns);
+  void NoteArrival(int64_t seq, int64_t now_ns);
   ReceiveWindow* WindowOf(const RecordHeader& header);
   bool SpeaksOurLanguage(const head_t& head);
   void BeginTerm(const head_t& head);
@@ -132,7 +141,8 @@ class StreamReader : public StateMachine {
   ReceiveWindow window_;
   std::deque<Record> former_;  // of the former term: complete, in order, not yet taken
   std::optional<Snapshot> snapshot_;
-  std::vector<MissingRange> named_missing_;  // in the last acknowledgement
+  std::map<int64_t, int64_t> missing_since_ns_;  // by seq: when it was first named as missing
+  std::deque<double> recovery_ms_;               // of the newest records that were
   bool writer_closed_ = false;
   bool joined_ = false;  // has followed a writer: what was there before is another's
   int64_t last_head_ns_ = INT64_MIN / 2;

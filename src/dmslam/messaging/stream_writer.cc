@@ -99,6 +99,8 @@ void StreamWriter::Receive(const std::string& channel, std::span<const uint8_t> 
     ReceiveHead(channel, bytes);
   } else if (type == take_over_t::getHash()) {
     ReceiveTakeOver(channel, bytes);
+  } else {
+    ++statistics_.dropped_bad;
   }
 }
 

@@ -188,6 +188,17 @@ MessageInfo Info() {
   return {Codec<Message>::kChannel, Wire::getTypeName(), kIsRecord, Wire::getHash()};
 }
 
+/// Messages outside the streams carry a checksum of their own behind `utime`; a record's is in its header.
+template <typename Wire>
+concept HasChecksum = requires(Wire wire) {
+  wire.crc32c;
+};
+/// Of a whole encoded message, its own four bytes taken as zero.
+uint32_t ChecksumOf(std::span<const uint8_t> bytes);
+void PutChecksum(std::span<uint8_t> bytes);
+/// Zero stands for a sender that does not check.
+bool ChecksumFits(std::span<const uint8_t> bytes);
+
 template <typename Message>
 std::vector<uint8_t> Encode(const Message& message) {
   using Wire = typename Codec<Message>::Wire;
@@ -201,6 +212,7 @@ std::vector<uint8_t> Encode(const Message& message) {
   std::vector<uint8_t> bytes(static_cast<size_t>(wire.getEncodedSize()));
   const int size = static_cast<int>(bytes.size());
   DMSLAM_CHECK(wire.encode(bytes.data(), 0, size) == size, "a message must fill the size it announces");
+  if constexpr (HasChecksum<Wire>) PutChecksum(bytes);
   return bytes;
 }
 
@@ -225,6 +237,9 @@ std::optional<Message> Decode(std::span<const uint8_t> bytes, std::string* reaso
   };
   const std::string fault = LayoutFault<Wire>(bytes);
   if (!fault.empty()) return refuse(fault);
+  if constexpr (HasChecksum<Wire>) {
+    if (!ChecksumFits(bytes)) return refuse("its checksum does not fit");
+  }
   Wire wire{};
   const int size = static_cast<int>(bytes.size());
   if (wire.decode(bytes.data(), 0, size) != size)

@@ -46,6 +46,8 @@ void HealthFields(auto& s, auto& m, auto& w) {
   s(m.repairs_requested, w.repairs_requested);
   s(m.records_repaired, w.records_repaired);
   s(m.records_lost, w.records_lost);
+  s(m.recovery_p50_ms, w.recovery_p50_ms);
+  s(m.recovery_p99_ms, w.recovery_p99_ms);
   s(m.epoch, w.epoch);
   s(m.written, w.written);
   s(m.written_bytes, w.written_bytes);

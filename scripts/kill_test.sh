@@ -1,0 +1,140 @@
+#!/usr/bin/env bash
+# Kills processes of a run, and measures what it cost. See --help.
+set -euo pipefail
+
+top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+usage() {
+  cat <<'EOF'
+Usage: scripts/kill_test.sh --sequence DIR --out DIR [options]
+
+Plays a sequence in lock-step without disturbance, and then once per victim while the victim is ended by SIGKILL at seeded
+random frames; scripts/run.sh starts it again each time. Each run must end, hold every keyframe that was proposed (or have
+culled it), lose no record, track online as much as is asked for, and have at most 1.5 times the undisturbed error.
+Writes DIR/table.md; runs that are there already are not repeated.
+
+  --camera FILE      camera file (YAML)
+  --victims LIST     of frontend, mapper, loopcloser, player, collector, double (two at once, three times) and first (one
+                     kill before the first map), with commas; default: frontend,mapper,loopcloser,double,first
+  --kills N          per run (default 5)
+  --frames N         at most so many frames
+  --min-tracked P    least share tracked online [%] (default 90)
+  --seed N           of the moments (default 1)
+  --build-dir DIR    where the programs are (default: build/release)
+EOF
+}
+fail() { echo "kill_test.sh: $*" >&2; exit 1; }
+
+sequence="" out="" victims=frontend,mapper,loopcloser,double,first kills=5 min_tracked=90 seed=1
+build=$top/build/release arguments=()
+while (($#)); do
+  case $1 in
+    -h | --help) usage; exit 0 ;;
+    --sequence | --out | --victims | --kills | --min-tracked | --seed | --build-dir)
+      (($# > 1)) || fail "$1 needs a value (see --help)"
+      name=${1#--}
+      [[ $name != build-dir ]] || name=build
+      printf -v "${name//-/_}" %s "$2"
+      shift 2
+      ;;
+    --camera | --frames) arguments+=("$1" "$2"); shift 2 ;;
+    *) fail "unknown option $1 (see --help)" ;;
+  esac
+done
+[[ -n $sequence && -n $out ]] || fail "--sequence and --out are needed (see --help)"
+mkdir -p "$out"
+
+play() { # FOLDER PORT: a run; its processes can be found by the port
+  "$top/scripts/run.sh" --build-dir "$build" --port "$2" --sequence "$sequence" "${arguments[@]}" --lockstep --seed 1 \
+    --out "$1"
+}
+value() { sed -nE "s/^ *\"$2\": *([^,]*),?$/\1/p" "$out/$1/summary.json" 2>/dev/null | head -n 1; }
+free_port() {
+  local port
+  while :; do
+    port=$((20000 + RANDOM % 30000))
+    grep -qi ":$(printf '%04X' "$port") " /proc/net/udp || break
+  done
+  echo "$port"
+}
+frame_of() { # FOLDER: the newest frame that its collector has told of; -1 before the first map
+  local frame
+  frame=$(sed -nE 's/.*frame ([0-9]+) of .*/\1/p' "$1/log/collector.log" 2>/dev/null | tail -n 1)
+  echo "${frame:--1}"
+}
+pid_of() { # PROCESS PORT
+  local dir line
+  for dir in /proc/[0-9]*; do
+    line=$({ tr '\0' ' ' <"$dir/cmdline"; } 2>/dev/null) || continue
+    [[ $line == *bin/dmslam-$1\ * && $line == *:$2\?* && $line != *setpriv* ]] && echo "${dir#/proc/}"
+  done
+  return 0
+}
+strike() { # PORT PROCESS...
+  local port=$1 process pid
+  shift
+  for process in "$@"; do
+    for pid in $(pid_of "$process" "$port"); do kill -KILL "$pid" && echo "killed $process"; done
+  done
+}
+random() { awk -v seed="$1" -v low="$2" -v high="$3" 'BEGIN { srand(seed); for (i = 0; i < 7; ++i) x = rand(); printf "%d", low + x * (high - low) }'; }
+
+# disturbed NAME FIRST LAST: kills at random frames after FIRST.
+disturbed() {
+  local name=$1 first=$2 last=$3 port runner i at pairs=(frontend\ mapper mapper\ loopcloser frontend\ loopcloser) count=$kills
+  local whom
+  port=$(free_port)
+  [[ $name != double ]] || count=3
+  [[ $name != first ]] || count=1
+  play "$out/$name" "$port" >"$out/$name.said" 2>&1 &
+  runner=$!
+  for ((i = 0; i < count; ++i)); do
+    at=$((first + (last - first) * i / count))
+    at=$(random $((seed * 1000 + i * 17 + ${#name})) "$at" $((first + (last - first) * (i + 1) / count)))
+    [[ $name != first ]] || at=-2
+    while kill -0 "$runner" 2>/dev/null && (($(frame_of "$out/$name") < at)); do sleep 0.05; done
+    if [[ $name == first ]]; then sleep 1; else sleep "0.$(random $((seed + i)) 0 9)"; fi
+    whom=$name
+    [[ $name != double ]] || whom=${pairs[i]}
+    [[ $name != first ]] || whom=mapper
+    # shellcheck disable=SC2086
+    strike "$port" $whom >>"$out/$name.kills"
+  done
+  wait "$runner"
+}
+
+verdict() { # NAME: what is wrong with its run
+  local name=$1 wrong=""
+  [[ -s $out/$name/summary.json ]] || { echo "no results"; return; }
+  [[ $(value "$name" records_lost) == 0 ]] || wrong+="records lost; "
+  [[ $(value "$name" keyframes_missing) == 0 ]] || wrong+="keyframes missing; "
+  awk "BEGIN { exit !($(value "$name" tracked_online_percent) >= $min_tracked) }" || wrong+="tracked too little; "
+  awk "BEGIN { exit !($(value "$name" ate_rmse_final) <= 1.5 * $(value undisturbed ate_rmse_final)) }" || wrong+="error too large; "
+  [[ $name == undisturbed || $(value "$name" restarts) -ge 1 ]] || wrong+="nobody was restarted; "
+  [[ -z $(cut -d' ' -f1 "$out/$name/keyframes.txt" | grep -v '#' | sort | uniq -d) ]] || wrong+="a keyframe twice; "
+  echo "$wrong"
+}
+
+[[ -s $out/undisturbed/summary.json ]] || play "$out/undisturbed" "$(free_port)" >"$out/undisturbed.said" 2>&1 ||
+  fail "the undisturbed run failed; see $out/undisturbed.said"
+frames=$(value undisturbed frames)
+failed=0
+for name in ${victims//,/ }; do
+  if [[ ! -s $out/$name/summary.json ]]; then
+    rm -rf "${out:?}/$name" "$out/$name.kills"
+    first=$(awk "BEGIN { print int($(value undisturbed first_init_s) * 30) + 15 }")
+    disturbed "$name" "$first" $((frames * 9 / 10)) || echo "run ended with $?" >>"$out/$name.said"
+  fi
+done
+{
+  echo "| run | kills | restarts | tracked online [%] | ATE final [m] | keyframes | missing | records lost | verdict |"
+  echo "|---|---|---|---|---|---|---|---|---|"
+  for name in undisturbed ${victims//,/ }; do
+    wrong=$(verdict "$name")
+    [[ -z $wrong ]] || failed=1
+    printf '| %s | %s | %s | %.1f | %s | %s | %s | %s | %s |\n' "$name" "$(grep -c . "$out/$name.kills" 2>/dev/null || true)" \
+      "$(value "$name" restarts)" "$(value "$name" tracked_online_percent)" "$(value "$name" ate_rmse_final | cut -c1-7)" \
+      "$(value "$name" keyframes)" "$(value "$name" keyframes_missing)" "$(value "$name" records_lost)" "${wrong:-good}"
+  done
+} >"$out/table.md"
+cat "$out/table.md"
+exit "$failed"

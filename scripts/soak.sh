@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# Plays a sequence forwards and backwards for a long time, and watches the memory of each process. See --help.
+set -euo pipefail
+
+top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+usage() {
+  cat <<'EOF'
+Usage: scripts/soak.sh --sequence DIR --out DIR [options]
+
+Plays a TUM RGB-D folder in real time forwards, backwards, forwards ... for an hour, and writes the resident memory of each
+process every ten seconds into DIR/memory.csv. Once the map is built (after a third of the time) memory must stay flat: the
+mean of the last quarter may exceed that of the quarter before it by 3 % and 8 MB at most. Writes DIR/table.md.
+
+  --camera FILE      camera file (YAML)
+  --seconds N        how long (default 3600)
+  --speed X          factor on the recorded rate (default 1)
+  --build-dir DIR    where the programs are (default: build/release)
+EOF
+}
+fail() { echo "soak.sh: $*" >&2; exit 1; }
+
+sequence="" out="" seconds=3600 speed=1 build=$top/build/release camera=()
+while (($#)); do
+  case $1 in
+    -h | --help) usage; exit 0 ;;
+    --sequence) sequence=$2; shift 2 ;;
+    --out) out=$2; shift 2 ;;
+    --seconds) seconds=$2; shift 2 ;;
+    --speed) speed=$2; shift 2 ;;
+    --build-dir) build=$2; shift 2 ;;
+    --camera) camera=(--camera "$2"); shift 2 ;;
+    *) fail "unknown option $1 (see --help)" ;;
+  esac
+done
+[[ -f $sequence/rgb.txt ]] || fail "$sequence has no rgb.txt: give a TUM RGB-D folder with --sequence"
+mkdir -p "$out/sequence"
+ln -sfn "$(cd "$sequence" && pwd)/rgb" "$out/sequence/rgb"
+# To and fro at the mean rate of the recording, as one list with ascending stamps.
+awk -v seconds="$seconds" -v speed="$speed" '!/^#/ && NF >= 2 { stamp[n] = $1; file[n++] = $2 }
+  END { period = (stamp[n - 1] - stamp[0]) / (n - 1); at = 0; step = 1
+    for (i = 0; i * period < seconds * speed; ++i) {
+      printf "%.6f %s\n", 1 + i * period, file[at]
+      if (at + step < 0 || at + step >= n) step = -step
+      at += step } }' "$sequence/rgb.txt" >"$out/sequence/rgb.txt"
+
+port=$((20000 + RANDOM % 30000))
+"$top/scripts/run.sh" --build-dir "$build" --port "$port" --sequence "$out/sequence" "${camera[@]}" --speed "$speed" \
+  --out "$out/run" >"$out/said.txt" 2>&1 &
+runner=$!
+trap 'kill -TERM "$runner" 2>/dev/null; wait; exit 130' INT TERM
+echo "seconds,player,frontend,mapper,loopcloser,collector" >"$out/memory.csv"
+resident() { # PROCESS: KiB; 0 when it is not there
+  local dir line kib=0
+  for dir in /proc/[0-9]*; do
+    line=$({ tr '\0' ' ' <"$dir/cmdline"; } 2>/dev/null) || continue
+    [[ $line == *bin/dmslam-$1\ * && $line == *:$port\?* ]] || continue
+    kib=$(sed -nE 's/^VmRSS:[^0-9]*([0-9]+).*/\1/p' "$dir/status" 2>/dev/null)
+  done
+  echo "${kib:-0}"
+}
+began=$SECONDS
+while kill -0 "$runner" 2>/dev/null; do
+  echo "$((SECONDS - began)),$(resident player),$(resident frontend),$(resident mapper),$(resident loopcloser),$(resident collector)" \
+    >>"$out/memory.csv"
+  sleep 10
+done
+status=0
+wait "$runner" || status=$?
+awk -F, 'NR > 1 && $2 * $3 * $4 * $5 * $6 > 0 { for (c = 2; c <= 6; ++c) kib[n, c] = $c; ++n }
+  NR == 1 { for (c = 2; c <= 6; ++c) name[c] = $c }
+  END { print "| process | third quarter [MB] | last quarter [MB] | verdict |\n|---|---|---|---|"
+    for (c = 2; c <= 6; ++c) { a = b = na = nb = 0
+      for (i = 0; i < n; ++i) { if (i >= n * 3 / 4) { b += kib[i, c]; ++nb } else if (i >= n / 2) { a += kib[i, c]; ++na } }
+      if (na == 0 || nb == 0) { print "too short"; exit 1 }
+      a /= na * 1024; b /= nb * 1024; bad = b > a * 1.03 && b > a + 8
+      if (bad) worst = 1
+      printf "| %s | %.1f | %.1f | %s |\n", name[c], a, b, bad ? "grows" : "flat" }
+    exit worst }' "$out/memory.csv" >"$out/table.md" || status=1
+cat "$out/table.md"
+exit "$status"
