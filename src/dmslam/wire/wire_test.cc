@@ -155,18 +155,33 @@ TYPED_TEST(WireTest, HeaderIsSecondAndZero) {
 TEST(WireTest, BytesOfAFrameDone) {
   const FrameDone done{.session = 3, .frame_index = 0x01020304, .stamp_ns = 1'305'031'102'175'304'001};
   const std::vector<uint8_t> bytes = Encode(done);
-  ASSERT_EQ(bytes.size(), 36U);
+  ASSERT_EQ(bytes.size(), 40U);
   const std::vector<uint8_t> expected = {
       0x00, 0x04, 0xa2, 0xeb, 0x3b, 0x44, 0x18, 0x48,   // 1305031102175304 us
       0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x03,   // session
       0x01, 0x02, 0x03, 0x04,                           // frame index
       0x12, 0x1c, 0x66, 0xdf, 0x81, 0xfe, 0xd9, 0x41};  // nanoseconds
-  EXPECT_EQ(std::vector<uint8_t>(bytes.begin() + 8, bytes.end()), expected);
+  std::vector<uint8_t> content(bytes.begin() + 8, bytes.end());
+  content.erase(content.begin() + 8, content.begin() + 12);  // the checksum
+  EXPECT_EQ(content, expected);
+}
+
+TEST(WireTest, DamageOutsideTheStreamsIsFound) {
+  const FrameDone done{.session = 3, .frame_index = 17, .stamp_ns = 1'305'031'102'175'304'001};
+  const std::vector<uint8_t> sound = Encode(done);
+  for (size_t at = 8; at < sound.size(); ++at) {
+    std::vector<uint8_t> bytes = sound;
+    bytes[at] ^= 0x04;
+    EXPECT_FALSE(Decode<FrameDone>(bytes).has_value()) << at;
+  }
+  std::vector<uint8_t> unchecked = sound;
+  std::fill(unchecked.begin() + 16, unchecked.begin() + 20, uint8_t{0});  // of a program that computes none
+  EXPECT_TRUE(Decode<FrameDone>(unchecked).has_value());
 }
 
 TEST(WireTest, ReasonNamesTheField) {
   std::vector<uint8_t> bytes = Encode(RandomMessage<Frame>(1));
-  bytes[16] = 0xff;  // num_bytes
+  bytes[20] = 0xff;  // num_bytes
   std::string reason;
   EXPECT_FALSE(Decode<Frame>(bytes, &reason).has_value());
   EXPECT_EQ(reason, "frame_t: data: negative count");
