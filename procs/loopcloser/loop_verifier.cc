@@ -62,6 +62,21 @@ const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const Pla
   return best == votes.end() ? nullptr : map.FindKeyframe(best->first);
 }
 
+/// Where the camera has come back to nearly the same place, pixels do not tell the scale: the farther the
+/// points, the farther the image, and nothing moves. The landmarks' distances do: the median of their ratios.
+Sim3d WithScaleOfDepths(const std::vector<Sim3Match>& matches, const Sim3Report& report) {
+  const Sim3d& S = report.S_cam1_cam2;
+  std::vector<double> ratios;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (!report.inliers[i]) continue;
+    const Eigen::Vector3d ray = S.rotation * matches[i].p_cam2 + S.translation / S.scale;
+    ratios.push_back(matches[i].p_cam1.dot(ray) / ray.squaredNorm());
+  }
+  const auto middle = ratios.begin() + static_cast<ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return Sim3d(S.rotation, S.translation * (*middle / S.scale), *middle);
+}
+
 template <typename... Values>
 std::string Text(const char* format, Values... values) {
   char text[160];
@@ -133,7 +148,11 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   const Pinhole camera = map.camera().Ideal();
   Sim3OptimizationOptions options;
   options.min_inliers = options_.min_sim3_inliers;
-  const Sim3Report report = OptimizeSim3(camera, camera, matches, S_keyframe_place, options);
+  Sim3Report report = OptimizeSim3(camera, camera, matches, S_keyframe_place, options);
+  if (report.success) {
+    options.fix_scale = true;
+    report = OptimizeSim3(camera, camera, matches, WithScaleOfDepths(matches, report), options);
+  }
   if (!report.success) {
     *why = Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
     return std::nullopt;
