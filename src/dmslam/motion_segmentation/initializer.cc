@@ -364,9 +364,12 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(co
                                                  " of the points where they should be");
   }
   KeepConsistent(&candidate);
-  KeepEvery(options_.max_adjusted, &candidate);
-  if (adjust_ && !AdjustAll(&candidate)) return refuse(WaitReason::kInconsistent, "the adjustment failed");
-  AddMissing(agreement.is_static, &candidate);
+  // Twice: what had no point under the first poses has a say, too. A motion half way to its minimum would lose unfairly.
+  for (int round = 0; round < 2; ++round) {
+    KeepEvery(options_.max_adjusted, &candidate);
+    if (adjust_ && !AdjustAll(&candidate)) return refuse(WaitReason::kInconsistent, "the adjustment failed");
+    AddMissing(agreement.is_static, &candidate);
+  }
   candidate.cost = CandidateCost(candidate, agreement.is_static);
   return candidate;
 }
