@@ -135,8 +135,8 @@ std::vector<Entry> LoopEntries() {
 
 std::vector<Entry> InitializerEntries() {
   return {
-      MakeChoice("initializer.method", "dlrsac, or ransac: two frames and plain RANSAC",
-                 [](Settings& s) -> auto& { return s.frontend.initializer_method; }, {"dlrsac", "ransac"}),
+      MakeChoice("initializer.method", "dlrsac; arsac behind the same gates; or ransac: two frames and plain RANSAC",
+                 [](Settings& s) -> auto& { return s.frontend.initializer_method; }, {"dlrsac", "arsac", "ransac"}),
       Make("initializer.feature_factor", "features of a frame while there is no map, times features.count",
            [](Settings& s) -> auto& { return s.frontend.initializer_feature_factor; }, 0.5, 5),
       Make("initializer.min_matches", "matches a frame must have with the reference frame",

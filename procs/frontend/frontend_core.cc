@@ -52,8 +52,9 @@ FrontendCore::FirstMapSearch FrontendCore::MakeInitializer() const {
     auto baseline = std::make_shared<BaselineInitializer>(BaselineInitializerOptions(), camera_, seed_);
     return [baseline](const InitializerFrame& frame) { return baseline->AddFrame(frame); };
   }
-  auto initializer =
-      std::make_shared<Initializer>(initializer_options_, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
+  InitializerOptions options = initializer_options_;
+  options.method = options_.initializer_method;
+  auto initializer = std::make_shared<Initializer>(options, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
   return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
 }
 

@@ -50,7 +50,8 @@ struct KeyframeOptions {
 };
 
 struct FrontendOptions {
-  std::string initializer_method = "dlrsac";  ///< dlrsac, or ransac: two frames and plain RANSAC (the baseline)
+  /// dlrsac; arsac, behind the same gates; or ransac: two frames and plain RANSAC without gates (the baseline).
+  std::string initializer_method = "dlrsac";
   double initializer_feature_factor = 2.0;  ///< features of a frame while there is no map, times those of others
   TrackingOptions tracking;
   KeyframeOptions keyframe;

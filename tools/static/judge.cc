@@ -45,11 +45,26 @@ struct Tally {
   double bad_share() const {
     return precision.empty() ? std::nan("") : bad / static_cast<double>(precision.size());
   }
+  nlohmann::json ToJson(const std::string& method) const {
+    return {{"method", method},
+            {"asked", asked},
+            {"accepted", accepted()},
+            {"bad", bad_share()},
+            {"median_precision", Quantile(precision, 0.5)},
+            {"p10_precision", Quantile(precision, 0.1)},
+            {"median_recall", Quantile(recall, 0.5)}};
+  }
   std::string Cells() const {
     return Number(accepted(), 3) + " | " + Number(bad_share(), 3) + " | " + Number(Quantile(precision, 0.5), 3) +
            " | " + Number(Quantile(precision, 0.1), 3) + " | " + Number(Quantile(recall, 0.5), 3);
   }
 };
+
+nlohmann::json ToJson(const std::vector<NamedSelector>& selectors, const std::vector<Tally>& tallies) {
+  nlohmann::json json = nlohmann::json::array();
+  for (size_t s = 0; s < selectors.size(); ++s) json.push_back(tallies[s].ToJson(selectors[s].name));
+  return json;
+}
 
 constexpr const char* kTallyHead = "accepted | bad | median precision | 10th percentile | median recall";
 constexpr const char* kTallyRule = "---|---|---|---|---";
@@ -116,8 +131,8 @@ std::vector<NamedSelector> DlrsacAblations() {
   return selectors;
 }
 
-void JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
-                const std::vector<NamedSelector>& selectors, std::ostream& out) {
+nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
+                          const std::vector<NamedSelector>& selectors, std::ostream& out) {
   MatchingOptions matching;
   if (!window_and_orientation) {
     matching.use_window = false;
@@ -149,6 +164,10 @@ void JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, 
     out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
   }
   out << '\n';
+  return {{"gap", gap},
+          {"window_and_orientation", window_and_orientation},
+          {"median_moving_share", Quantile(moving, 0.5)},
+          {"methods", ToJson(selectors, tallies)}};
 }
 
 namespace {
@@ -184,8 +203,8 @@ void PrintWindowTable(const std::vector<NamedSelector>& selectors, const std::ve
 
 }  // namespace
 
-void JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
-                  const std::vector<NamedSelector>& selectors, std::ostream& out) {
+nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
+                            const std::vector<NamedSelector>& selectors, std::ostream& out) {
   FeatureMatcher matcher;
   std::vector<Tally> all(selectors.size()), parallax(selectors.size()), hard(selectors.size());
   std::vector<std::map<std::string, int>> refusals(selectors.size());
@@ -228,6 +247,7 @@ void JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int co
     out << '\n';
   }
   out << '\n';
+  return {{"all", ToJson(selectors, all)}, {"with_parallax", ToJson(selectors, parallax)}, {"hard", ToJson(selectors, hard)}};
 }
 
 AdjustFunction MakeAdjustment(const Camera& camera) {
@@ -252,15 +272,25 @@ AdjustFunction MakeAdjustment(const Camera& camera) {
 namespace {
 
 struct Start {
+  size_t first = 0;  ///< frame it began with
   bool found = false;
   double wait_s = 0, rotation_deg = 0, direction_deg = 0;
   bool IsGood() const { return found && rotation_deg < 2.0 && direction_deg < 10.0; }
+  nlohmann::json ToJson() const {
+    return {{"first", first},
+            {"found", found},
+            {"wait_s", wait_s},
+            {"rotation_deg", rotation_deg},
+            {"direction_deg", direction_deg},
+            {"right", IsGood()}};
+  }
 };
 
 Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size_t first, uint64_t seed,
                std::map<std::string, int>* reasons) {
   Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
   Start start;
+  start.first = first;
   for (size_t frame = first; frame < sequence.size(); ++frame) {
     const InitializerReport report = initializer.AddFrame(
         {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
@@ -284,8 +314,8 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
 
 }  // namespace
 
-void JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
-                 std::ostream& out) {
+nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
+                           std::ostream& out) {
   std::vector<Start> starts;
   std::map<std::string, int> reasons;
   for (int k = 0; k < count; ++k) {
@@ -314,6 +344,9 @@ void JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, in
       << Number(Quantile(direction, 0.9), 1) << " |\n\nWhat was waited for [frames]:";
   for (const auto& [reason, number] : reasons) out << ' ' << reason << ' ' << number << ';';
   out << "\n\n";
+  nlohmann::json json{{"starts", count}, {"first_map", found}, {"right", good}, {"waited_for_frames", reasons}};
+  for (const Start& start : starts) json["each"].push_back(start.ToJson());
+  return json;
 }
 
 }  // namespace dmslam

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -26,19 +27,19 @@ std::vector<NamedSelector> DlrsacAblations();
 /// A window: a reference frame against frames some gaps later.
 struct WindowOptions {
   std::vector<int> gaps{4, 8, 12};
-  AgreementOptions agreement;
+  AgreementOptions agreement = InitializerOptions().agreement;  ///< the gates of the system
   MatchingOptions matching;
   double min_baseline_m = 0.05;  ///< of the last pair, for a window to count as one with parallax
   double hard_moving_share = 0.3;  ///< of the last pair's matches, for a window to count as hard
 };
 
-/// Each prints one Markdown table.
-void JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
-                const std::vector<NamedSelector>& selectors, std::ostream& out);
-void JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
-                  const std::vector<NamedSelector>& selectors, std::ostream& out);
-void JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
-                 std::ostream& out);
+/// Each prints Markdown tables and returns the same numbers.
+nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
+                                    const std::vector<NamedSelector>& selectors, std::ostream& out);
+nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
+                                      const std::vector<NamedSelector>& selectors, std::ostream& out);
+nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
+                           std::ostream& out);
 
 /// The bundle adjustment that the initialiser is given.
 AdjustFunction MakeAdjustment(const Camera& camera);

@@ -37,6 +37,7 @@ struct JudgeSettings {
   std::string camera;
   std::string table = "windows";
   std::string out;
+  std::string json;
   std::vector<int> gaps{3, 5, 8, 12};
   int count = 100;
   int features = 3000;
@@ -194,21 +195,29 @@ void RunJudge(const JudgeSettings& settings) {
     if (!file) throw InputError(settings.out + ": cannot be written");
   }
   std::ostream& out = settings.out.empty() ? std::cout : file;
+  nlohmann::json json{{"sequence", std::filesystem::path(settings.sequence).filename().string()},
+                      {"table", settings.table},
+                      {"count", settings.count},
+                      {"features", settings.features}};
   out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table << "\n\n";
   if (settings.table == "pairs" || settings.table == "ablation") {
     const auto selectors = settings.table == "pairs" ? AllSelectors(false) : DlrsacAblations();
     for (const int gap : settings.gaps) {
-      JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out);
+      json["gaps"].push_back(JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out));
     }
   } else if (settings.table == "windows") {
     WindowOptions options;
     options.matching.use_window = options.matching.check_orientation = !settings.no_window;
-    JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
+    json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
   } else if (settings.table == "starts") {
-    JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
+    json["starts"] = JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
   } else {
     throw InputError("unknown table '" + settings.table + "': use pairs, ablation, windows or starts");
   }
+  if (settings.json.empty()) return;
+  std::ofstream json_file(settings.json);
+  json_file << json.dump(2) << '\n';
+  if (!json_file) throw InputError(settings.json + ": cannot be written");
 }
 
 void AddOptions(CLI::App& app, Settings& s) {
@@ -241,6 +250,7 @@ void AddJudge(CLI::App& app, JudgeSettings& s) {
   judge->add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
   judge->add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
   judge->add_option("--out", s.out, "File to append to, instead of standard output");
+  judge->add_option("--json", s.json, "File for the same numbers as JSON");
   judge->callback([&s] { RunJudge(s); });
 }
 

@@ -9,6 +9,7 @@
 #include "dmslam/geometry/absolute_pose.h"
 #include "dmslam/geometry/triangulation.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -68,11 +69,28 @@ InitializerOptions::InitializerOptions() {
   agreement.min_distribution_px = 140;
 }
 
+namespace {
+
+std::unique_ptr<StaticSelector> MakeInitializerSelector(const InitializerOptions& options) {
+  const auto share = [&](auto own) {
+    own.sampling = options.selector.sampling;
+    own.input = options.selector.input;
+    own.inlier = options.selector.inlier;
+    return own;
+  };
+  if (options.method == "dlrsac") return std::make_unique<Dlrsac>(options.selector);
+  if (options.method == "arsac") return std::make_unique<Arsac>(share(ArsacOptions()));
+  if (options.method == "ransac") return std::make_unique<RansacSelector>(share(RansacSelectorOptions()));
+  throw InputError("unknown method '" + options.method + "': use dlrsac, arsac or ransac");
+}
+
+}  // namespace
+
 /// The work of one stream of frames.
 class Initializer::Impl {
  public:
   Impl(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust)
-      : options_(options), camera_(camera), seed_(seed), adjust_(std::move(adjust)), selector_(options.selector) {}
+      : options_(options), camera_(camera), seed_(seed), adjust_(std::move(adjust)), selector_(MakeInitializerSelector(options)) {}
 
   InitializerReport AddFrame(const InitializerFrame& frame) {
     InitializerReport report = Consider(frame);
@@ -154,7 +172,7 @@ class Initializer::Impl {
   Camera camera_;
   uint64_t seed_;
   AdjustFunction adjust_;
-  Dlrsac selector_;
+  std::unique_ptr<StaticSelector> selector_;
   FeatureMatcher matcher_;
   std::optional<InitializerFrame> reference_;
   std::deque<View> views_;              ///< in order of index
@@ -225,7 +243,7 @@ Initializer::Impl::View Initializer::Impl::MakeView(const InitializerFrame& fram
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_px;
   if (view.moved) {
     const uint64_t seed = DeriveSeed(seed_, (uint64_t{reference_->index} << 32) | frame.index, "initializer");
-    view.pair.selection = selector_.Select(view.pair.matches, camera_, seed);
+    view.pair.selection = selector_->Select(view.pair.matches, camera_, seed);
   }
   return view;
 }

@@ -89,7 +89,8 @@ using AdjustFunction = std::function<bool(std::vector<Rigid3d>* T_cam_world, std
 struct InitializerOptions {
   InitializerOptions();  ///< fewer samples than the selector's own default, stricter agreement
 
-  DlrsacOptions selector;            ///< which matches are static, per pair of frames
+  std::string method = "dlrsac";     ///< which matches are static, per pair of frames: dlrsac, arsac or ransac
+  DlrsacOptions selector;            ///< of DLRSAC; its sampling, input and inlier options hold for the others, too
   AgreementOptions agreement;        ///< what several pairs must agree on
   ReconstructionOptions reconstruction;
   MatchingOptions matching;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/motion_segmentation/synthetic_pair.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -10,8 +11,8 @@ namespace {
 /// A room of points with descriptors of their own, and a walker in it.
 class SyntheticRoom {
  public:
-  explicit SyntheticRoom(int num_static, int num_moving) : camera_(SyntheticCamera()) {
-    Random random(7);
+  SyntheticRoom(int num_static, int num_moving, uint64_t seed = 7) : camera_(SyntheticCamera()) {
+    Random random(seed);
     for (int k = 0; k < num_static + num_moving; ++k) {
       Point point;
       point.moves = k >= num_static;
@@ -93,6 +94,43 @@ TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
   Initializer initializer({}, room.camera(), 1);
   for (uint32_t frame = 0; frame < 40; ++frame) {
     EXPECT_FALSE(initializer.AddFrame(room.Frame(frame)).result.has_value()) << frame;
+  }
+}
+
+TEST(Initializer, TakesOtherSelectorsBehindTheSameGates) {
+  const SyntheticRoom room(600, 100);
+  for (const char* method : {"arsac", "ransac"}) {
+    InitializerOptions options;
+    options.method = method;
+    Initializer initializer(options, room.camera(), 1);
+    std::optional<FirstMap> map;
+    for (uint32_t frame = 0; frame < 60 && !map; ++frame) {
+      map = std::move(initializer.AddFrame(room.Frame(frame)).result);
+    }
+    ASSERT_TRUE(map.has_value()) << method;
+    const Rigid3d truth = room.TruePose(map->frame1.index) * room.TruePose(map->frame0.index).Inverse();
+    EXPECT_LT(AngleBetween(truth.rotation, map->T_1_0.rotation), 0.02) << method;
+  }
+  InitializerOptions unknown;
+  unknown.method = "magsac";
+  EXPECT_THROW(Initializer(unknown, room.camera(), 1), InputError);
+}
+
+TEST(Initializer, AbsurdFramesGiveReasonsAndNoMap) {
+  const SyntheticRoom room(600, 0);
+  Initializer same(InitializerOptions(), room.camera(), 1);  // the same picture again and again
+  for (uint32_t frame = 0; frame < 20; ++frame) {
+    InitializerFrame still = room.Frame(3);
+    still.index = frame;
+    still.stamp_ns = int64_t{frame} * 33'333'333;
+    const InitializerReport report = same.AddFrame(still);
+    EXPECT_FALSE(report.result.has_value());
+    EXPECT_FALSE(report.reason.empty());
+  }
+  Initializer unlike(InitializerOptions(), room.camera(), 1);  // no picture has anything of the one before
+  for (uint32_t frame = 0; frame < 20; ++frame) {
+    const SyntheticRoom other(600, 0, 100 + frame);
+    EXPECT_FALSE(unlike.AddFrame(other.Frame(frame)).result.has_value());
   }
 }
 
