@@ -15,6 +15,7 @@ be recovered, and bytes on the link per byte of payload.
   --camera FILE      camera file (YAML)
   --drop LIST        shares of packets dropped [%], with commas (default 0,5,20)
   --frames N         at most so many frames
+  --speed X          factor on the recorded rate (default 1)
   --lockstep         instead of real time
   --move-mapper S    after S seconds the mapper is killed on B and started on A
   --build-dir DIR    where the programs are (default: build/release)
@@ -31,7 +32,7 @@ while (($#)); do
     --drop) drops=$2; shift 2 ;;
     --build-dir) build=$2; shift 2 ;;
     --move-mapper) move=$2; shift 2 ;;
-    --camera | --frames) player+=("$1" "$2"); shift 2 ;;
+    --camera | --frames | --speed) player+=("$1" "$2"); shift 2 ;;
     --lockstep) player+=("$1"); shift ;;
     *) fail "unknown option $1 (see --help)" ;;
   esac

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dmslam/messaging/packing.h"
+
 namespace dmslam {
 
 void ReceiveWindow::Reset(int64_t next) {
@@ -89,10 +91,8 @@ ReceiveWindow::PartResult ReceiveWindow::AddPart(const part_t& part) {
       pieces.have.begin()->second < part.total_bytes) {
     return {Result::kIncomplete, {}};
   }
-  const auto name_end = std::find(pieces.data.begin(), pieces.data.end(), uint8_t{0});
-  PartResult result{Result::kNew, std::pair<std::string, Bytes>{}};
-  result.whole->first.assign(pieces.data.begin(), name_end);
-  if (name_end != pieces.data.end()) result.whole->second.assign(name_end + 1, pieces.data.end());
+  PartResult result{Result::kNew, ParseContent(pieces.data, limits_.record_bytes)};
+  if (!result.whole) result.whole.emplace();  // whoever looks at it finds that it is no record
   Discard(part.seq);
   return result;
 }

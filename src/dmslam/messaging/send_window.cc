@@ -2,19 +2,20 @@
 
 #include <algorithm>
 
+#include "dmslam/messaging/packing.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/part_t.hpp"
 
 namespace dmslam {
 
 void SendWindow::Append(std::string channel, SharedBytes record) {
-  kept_.push_back({std::move(channel), std::move(record), INT64_MIN / 2, {}});
-  bytes_ += kept_.back().total_bytes();
+  kept_.push_back({std::move(channel), std::move(record), INT64_MIN / 2, {}, {}});
+  bytes_ += kept_.back().plain_bytes();
 }
 
 void SendWindow::DiscardThrough(int64_t seq) {
   for (; !kept_.empty() && first_ <= seq; ++first_) {
-    bytes_ -= kept_.front().total_bytes();
+    bytes_ -= kept_.front().plain_bytes();
     kept_.pop_front();
   }
   if (next_seq_ < first_) {
@@ -24,8 +25,17 @@ void SendWindow::DiscardThrough(int64_t seq) {
   repairs_.erase(repairs_.begin(), repairs_.lower_bound({first_, 0}));
 }
 
+/// On a host always, on a LAN where it fits one datagram.
+bool SendWindow::TravelsWhole(const Kept& kept) const {
+  return options_.link == Link::kHost || kept.plain_bytes() <= static_cast<size_t>(options_.part_bytes);
+}
+
+void SendWindow::Cut(Kept& kept) const {
+  if (kept.content.empty()) kept.content = ContentOf(kept.channel, *kept.record, options_.pack);
+}
+
 int64_t SendWindow::NumParts(const Kept& kept) const {
-  return (static_cast<int64_t>(kept.total_bytes()) + options_.part_bytes - 1) / options_.part_bytes;
+  return (static_cast<int64_t>(kept.content.size()) + options_.part_bytes - 1) / options_.part_bytes;
 }
 
 void SendWindow::Repair(const ack_t& ack, int64_t now_ns) {
@@ -43,7 +53,8 @@ void SendWindow::Repair(const ack_t& ack, int64_t now_ns) {
 void SendWindow::RepairRange(int64_t seq, int64_t first_byte, int64_t end_byte, int64_t now_ns) {
   Kept& kept = at(seq);
   if (now_ns - kept.sent_ns < options_.resend_after_ns) return;
-  const int64_t end = std::min(end_byte, static_cast<int64_t>(kept.total_bytes()));
+  Cut(kept);
+  const int64_t end = std::min(end_byte, static_cast<int64_t>(kept.content.size()));
   for (int64_t part = first_byte / options_.part_bytes; part * options_.part_bytes < end; ++part) {
     if (seq == next_seq_ && part >= next_part_) return;  // will be sent anyway
     const auto index = static_cast<size_t>(part);
@@ -69,13 +80,12 @@ int SendWindow::Send(int budget, int64_t now_ns, std::vector<Outgoing>* out) {
 int SendWindow::SendNew(int budget, int64_t now_ns, std::vector<Outgoing>* out) {
   while (budget > 0 && next_seq_ <= last()) {
     Kept& kept = at(next_seq_);
-    const int64_t num_parts = NumParts(kept);
-    if (next_part_ == 0 && (options_.link == Link::kHost || num_parts == 1)) {
-      // Whole: on a host always, on a LAN where it fits one datagram.
+    if (next_part_ == 0 && TravelsWhole(kept)) {
       out->push_back({kept.channel, kept.record, false});
       kept.sent_ns = now_ns;
       bytes_sent += static_cast<int64_t>(kept.record->size());
-      budget -= static_cast<int>(std::min<int64_t>(num_parts, budget));
+      const size_t datagrams = 1 + kept.plain_bytes() / static_cast<size_t>(options_.part_bytes);
+      budget -= static_cast<int>(std::min<size_t>(datagrams, static_cast<size_t>(budget)));
       ++next_seq_;
       continue;
     }
@@ -83,7 +93,7 @@ int SendWindow::SendNew(int budget, int64_t now_ns, std::vector<Outgoing>* out) 
     SendPart(next_seq_, next_part_, now_ns, out);
     ++parts_sent;
     --budget;
-    if (++next_part_ == num_parts) {
+    if (++next_part_ == NumParts(kept)) {
       ++next_seq_;
       next_part_ = 0;
     }
@@ -93,6 +103,7 @@ int SendWindow::SendNew(int budget, int64_t now_ns, std::vector<Outgoing>* out) 
 
 void SendWindow::SendPart(int64_t seq, int64_t part_index, int64_t now_ns, std::vector<Outgoing>* out) {
   Kept& kept = at(seq);
+  Cut(kept);
   if (kept.part_sent_ns.empty()) {
     kept.part_sent_ns.assign(static_cast<size_t>(NumParts(kept)), INT64_MIN / 2);
   }
@@ -102,21 +113,11 @@ void SendWindow::SendPart(int64_t seq, int64_t part_index, int64_t now_ns, std::
   part.utime = now_ns / 1000;
   part.stream_key = stream_key_;
   part.seq = seq;
-  part.total_bytes = static_cast<int32_t>(kept.total_bytes());
+  part.total_bytes = static_cast<int32_t>(kept.content.size());
   part.offset = static_cast<int32_t>(part_index) * options_.part_bytes;
   part.num_bytes = std::min(options_.part_bytes, part.total_bytes - part.offset);
-  part.data.resize(static_cast<size_t>(part.num_bytes));
-  const size_t name_bytes = kept.channel.size() + 1;
-  for (size_t i = 0; i < part.data.size();) {
-    const size_t at_byte = static_cast<size_t>(part.offset) + i;
-    if (at_byte < name_bytes) {
-      part.data[i++] = static_cast<uint8_t>(kept.channel.c_str()[at_byte]);
-    } else {
-      std::copy_n(kept.record->begin() + static_cast<ptrdiff_t>(at_byte - name_bytes), part.data.size() - i,
-                  part.data.begin() + static_cast<ptrdiff_t>(i));
-      break;
-    }
-  }
+  const auto begin = kept.content.begin() + part.offset;
+  part.data.assign(begin, begin + part.num_bytes);
   auto bytes = std::make_shared<const Bytes>(EncodePart(part));
   bytes_sent += static_cast<int64_t>(bytes->size());
   out->push_back({options_.part_channel, std::move(bytes), false});

@@ -20,6 +20,7 @@ class SendWindow {
     Link link = Link::kHost;
     std::string part_channel;
     int32_t part_bytes = 1200;    ///< of a record in one part
+    bool pack = true;             ///< deflates what travels in parts
     int64_t resend_after_ns = 0;  ///< a part sent this recently is on its way and not sent again
   };
 
@@ -57,9 +58,12 @@ class SendWindow {
     SharedBytes record;
     int64_t sent_ns = INT64_MIN / 2;    // as a whole
     std::vector<int64_t> part_sent_ns;  // per part; empty until the first one is sent
-    size_t total_bytes() const { return channel.size() + 1 + record->size(); }
+    Bytes content;                      // what the parts are pieces of; empty until they are needed
+    size_t plain_bytes() const { return channel.size() + 1 + record->size(); }
   };
   Kept& at(int64_t seq) { return kept_[static_cast<size_t>(seq - first_)]; }
+  void Cut(Kept& kept) const;
+  bool TravelsWhole(const Kept& kept) const;
   int64_t NumParts(const Kept& kept) const;
   void RepairRange(int64_t seq, int64_t first_byte, int64_t end_byte, int64_t now_ns);
   int SendNew(int budget, int64_t now_ns, std::vector<Outgoing>* out);

@@ -326,6 +326,7 @@ class OwnerProcess : public Process {
     options.name = "owner " + std::to_string(id_);
     for (int i = 0; i < num_lossless_; ++i) options.roles.push_back({ReaderProcess::RoleOf(i), false});
     options.link = conditions_.link;
+    options.pack = (id_ & 2) != 0;
     options.max_records = kMaxRecords;
     options.max_bytes = kMaxBytes;
     options.spare_records = 20;

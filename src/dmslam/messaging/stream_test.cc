@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/packing.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
@@ -31,6 +32,7 @@ StreamWriter::Options WriterOptions(Link link = Link::kHost) {
   options.name = "writer";
   options.link = link;
   options.roles = {{"reader", false}};
+  options.pack = false;
   return options;
 }
 
@@ -129,6 +131,36 @@ TEST(Stream, OnALanOnlyTheLostPartsAreSentAgain) {
   const WriterStatistics statistics = pair.writer.statistics();
   EXPECT_EQ(statistics.parts, 220);
   EXPECT_EQ(statistics.parts_repaired, parts / 10);
+}
+
+TEST(Stream, PartsArePiecesOfTheDeflatedRecord) {
+  StreamWriter::Options options = WriterOptions(Link::kLan);
+  options.pack = true;
+  Pair pair(options);
+  pair.Step();
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(7, 30000), pair.now_ns);
+  pair.Run(100 * kMs);
+  EXPECT_EQ(pair.TakeAll(), std::vector<int64_t>{7});
+  EXPECT_EQ(pair.writer.statistics().parts, 1);
+}
+
+TEST(Packing, ContentComesBackAndDamageDoesNot) {
+  Bytes record(5000, 3);
+  for (const bool pack : {false, true}) {
+    Bytes content = ContentOf("DMSLAM_TEST_X", record, pack);
+    EXPECT_EQ(content.size() < 200, pack);
+    const auto parsed = ParseContent(content, 10000);
+    ASSERT_TRUE(parsed.has_value());
+    EXPECT_EQ(parsed->first, "DMSLAM_TEST_X");
+    EXPECT_EQ(parsed->second, record);
+  }
+  Bytes content = ContentOf("DMSLAM_TEST_X", record, true);
+  EXPECT_FALSE(ParseContent(content, 5000).has_value()) << "longer than allowed";
+  content[content.size() / 2] ^= 1;
+  EXPECT_FALSE(ParseContent(content, 10000).has_value());
+  EXPECT_FALSE(ParseContent({}, 10000).has_value());
+  content.resize(5);
+  EXPECT_FALSE(ParseContent(content, 10000).has_value());
 }
 
 TEST(Stream, OnALanNothingIsSentAgainWhenNothingIsLost) {

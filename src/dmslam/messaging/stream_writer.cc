@@ -16,7 +16,8 @@ constexpr size_t kMaxReaders = 64;  // more ids than this are noise
 constexpr int kFarewells = 3;
 
 SendWindow::Options WindowOptions(const StreamWriter::Options& options) {
-  return {options.link, PartChannel(options.owner), options.part_bytes, options.resend_after_ns};
+  return {options.link, PartChannel(options.owner), options.part_bytes, options.pack,
+          options.resend_after_ns};
 }
 
 }  // namespace

@@ -75,6 +75,7 @@ class StreamWriter : public StateMachine {
     size_t spare_records = 64;             ///< kept though accepted, for readers that are not lossless ...
     size_t spare_bytes = 1u << 20;         ///< ... within so many bytes
     int32_t part_bytes = 1380;             ///< of a record in one datagram: with all headers below 1500
+    bool pack = true;                      ///< parts are pieces of the deflated record
     int parts_per_burst = 40;              ///< pace: at most so many datagrams ...
     int64_t burst_ns = 2'000'000;          ///< ... in so much time
     int64_t resend_after_ns = 20'000'000;  ///< a part sent this recently is not repaired again
