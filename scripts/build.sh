@@ -35,6 +35,12 @@ if [ ! -f "$folder/build.ninja" ]; then
 elif [ -n "$tests" ] && ! has_tests; then
   cmake --preset "$preset" -DDMSLAM_BUILD_TESTS=ON >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
 fi
+# A target that is not there may be one whose packages were missing when the folder was configured.
+for target in "$@"; do
+  ninja -C "$folder" -t query "$target" >/dev/null 2>&1 && continue
+  cmake --preset "$preset" >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
+  break
+done
 
 ninja=(ninja -C "$folder" -j "${DMSLAM_JOBS:-$(nproc)}" "$@")
 if [ -t 2 ]; then

@@ -11,7 +11,8 @@ Usage: scripts/nightly.sh [--out DIR] [--data DIR] [--only PATTERN] [--fuzz-seco
 
 Runs what takes too long for every commit, each step once, and writes DIR/table.md with what was reached and what is asked:
 all tests; kitchen seeds 1..$SEEDS in lock-step, the same seed twice, kitchen in real time; kitchen_walk1 and kitchen_walk2;
-$SCHEDULES seeded schedules of the stream protocol; a run under AddressSanitizer and UBSan; fuzzing of every reader of bytes.
+$SCHEDULES seeded schedules of the stream protocol; 5,000 keyframes and 300,000 landmarks in the viewer; a run under
+AddressSanitizer and UBSan; fuzzing of every reader of bytes.
 A step that is done (DIR/<step>/done) is not done again; remove DIR to begin anew.
 
   --out DIR           default: out/nightly in the project
@@ -68,6 +69,9 @@ step_sanitizers() {
   "$top/build/release/bin/dmslam-synth" --quiet --frames 90 --moving-share 0.15 --seed 1 --out "$1/sequence"
   "$bin/dmslam-inprocess" --sequence "$1/sequence" --camera "$top/config/synthetic.yaml" --out "$1"
 }
+step_viewer() { # a large map in a browser without a graphics processor
+  /usr/bin/python3 "$top/tests/system/viewer_load.py" --bin "$top/build/release/bin" --picture "$1/viewer.png"
+}
 step_fuzz() { "$top/scripts/fuzz.sh" --seconds "$fuzz_seconds"; }
 
 steps=("tests")
@@ -77,7 +81,7 @@ for name in walk1 walk2; do
   for ((seed = 1; seed <= SEEDS; ++seed)); do steps+=("${name}_$seed $seed"); done
 done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
-steps+=("sanitizers" "fuzz")
+steps+=("viewer" "sanitizers" "fuzz")
 if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi
 
 needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture) ]]; }

@@ -22,6 +22,8 @@ trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and
   --profile NAME      dm (default) or baseline: plain RANSAC start, no mutual exclusion, no motion belief
   --no-loop           do not close loops
   --pictures N        draw the features of every Nth frame into DIR/pictures
+  --viewer            show it live in a browser; the address is printed, and opened where there is a desktop
+  --http HOST:PORT    where the viewer serves (default 127.0.0.1:8080, or any port that is free)
   --record            record everything with lcm-logger into DIR/run.lcmlog
   --black-out F,S     black frames from frame F on for S seconds; may be repeated
   --jump F,T          after frame F go on with frame T; may be repeated
@@ -36,6 +38,7 @@ EOF
 fail() { echo "run.sh: $*" >&2; exit 1; }
 
 sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304 restart=1 share_port=0
+viewer=0 http=()
 player=() common=()
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
@@ -53,6 +56,8 @@ while [ $# -gt 0 ]; do
     --no-loop) common+=(--set loop.enabled=off); shift ;;
     --pictures) need "$@"; pictures=$2; shift 2 ;;
     --record) record=1; shift ;;
+    --viewer) viewer=1; shift ;;
+    --http) need "$@"; http=(--http "$2") viewer=1; shift 2 ;;
     --port) need "$@"; port=$2; shift 2 ;;
     --share-port) share_port=1; shift ;;
     --prefix) need "$@"; common+=(--prefix "$2"); shift 2 ;;
@@ -76,9 +81,13 @@ if [ -z "$build" ]; then
   build="$top/build/release"
   "$top/scripts/build.sh" release dmslam-{player,frontend,mapper,loopcloser,collector} >&2 ||
     fail "the build failed; its log is above"
+  [ "$viewer" = 0 ] || "$top/scripts/build.sh" release dmslam-viewer >&2 ||
+    fail "the viewer could not be built; scripts/setup.sh viewer installs what it needs"
 fi
 bin="$build/bin"
 [ -x "$bin/dmslam-frontend" ] || fail "$bin has no dmslam-frontend; build first, or leave --build-dir out"
+[ "$viewer" = 0 ] || [ -x "$bin/dmslam-viewer" ] ||
+  fail "$bin has no dmslam-viewer; install what it needs with scripts/setup.sh viewer and build again"
 
 port_taken() { grep -qi ":$(printf '%04X' "$1") " /proc/net/udp /proc/net/udp6 2>/dev/null; }
 if [ -n "$port" ]; then
@@ -108,7 +117,7 @@ if [ "$pictures" != 0 ]; then
 fi
 
 declare -A pid_of=()
-logger=""
+logger="" viewer_pid=""
 alive() { # of these pids
   local p
   for p in "$@"; do kill -0 "$p" 2>/dev/null && return 0; done
@@ -125,7 +134,8 @@ stop_all() {
   local p
   for p in "${pid_of[@]}"; do kill -TERM "$p" 2>/dev/null || true; done
   [ -n "$logger" ] && kill -INT "$logger" 2>/dev/null || true
-  wait_for 100 "${pid_of[@]}" $logger || for p in "${pid_of[@]}" $logger; do kill -KILL "$p" 2>/dev/null || true; done
+  [ -n "$viewer_pid" ] && kill -TERM "$viewer_pid" 2>/dev/null || true
+  wait_for 100 "${pid_of[@]}" $logger $viewer_pid || for p in "${pid_of[@]}" $logger $viewer_pid; do kill -KILL "$p" 2>/dev/null || true; done
 }
 exec 3>&2  # where we speak; what bash says about its jobs goes nowhere
 trap 'stop_all; echo "run.sh: interrupted; what was tracked is in $out" >&3; exit 130' INT
@@ -160,8 +170,6 @@ if [ "$record" = 1 ]; then
   "${guard[@]}" lcm-logger --quiet --lcm-url="$url" "$out/run.lcmlog" </dev/null >"$out/log/logger.log" 2>&1 &
   logger=$!
 fi
-for name in mapper loopcloser frontend collector player; do launch "$name"; done
-
 # What a process said before it failed: its error, or what its command line lacked.
 why() {
   local log="$out/log/$1.log" line
@@ -171,6 +179,25 @@ why() {
   [ -n "$line" ] || line=$(tail -n 1 "$log" | sed -E 's/^[0-9:.]* //' || true)
   echo "$line"
 }
+# Nobody waits for the viewer, and its end is nobody's failure.
+open_viewer() {
+  local i address="" log="$out/log/viewer.log"
+  "${guard[@]}" "$bin/dmslam-viewer" "${common[@]}" "${http[@]}" "${ground_truth[@]}" </dev/null >"$log" 2>&1 &
+  viewer_pid=$!
+  for ((i = 0; i < 100; ++i)); do
+    address=$(sed -nE 's/.*to be seen at (http[^ ]*).*/\1/p' "$log")
+    if [ -n "$address" ] || ! alive "$viewer_pid"; then break; fi
+    sleep 0.05
+  done
+  if [ -z "$address" ]; then fail "the viewer did not start: $(why viewer)"; fi
+  echo "run.sh: to be seen at $address" >&3
+  if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ] && command -v xdg-open >/dev/null; then
+    xdg-open "$address" </dev/null >/dev/null 2>&1 &
+  fi
+}
+if [ "$viewer" = 1 ]; then open_viewer; fi
+for name in mapper loopcloser frontend collector player; do launch "$name"; done
+
 report() { # name, status
   local message
   message=$(why "$1")
@@ -220,6 +247,16 @@ while [ ${#pid_of[@]} -gt 0 ]; do
   # Once the results are there the others have a moment to end by themselves; after a failure they are told to.
   if [ "$code" != 0 ] || { [ "$collected" = 1 ] && ! wait_for 40 "${pid_of[@]}"; }; then break; fi
 done
+# Who has a terminal can go on looking at what was made.
+stay_open() {
+  [ -n "$viewer_pid" ] && [ "$code" = 0 ] && [ -t 0 ] && [ -t 3 ] && alive "$viewer_pid" || return 0
+  [ ! -s "$out/log/table.txt" ] || cat "$out/log/table.txt"
+  rm -f "$out/log/table.txt"
+  echo "run.sh: the results are in $out; the viewer stays until Ctrl-C" >&3
+  trap 'stop_all; exit 0' INT
+  wait "$viewer_pid" || true
+}
+stay_open
 stop_all
 [ ! -s "$out/log/table.txt" ] || cat "$out/log/table.txt"
 if [ "$code" = 0 ]; then

@@ -5,7 +5,7 @@
 namespace dmslam {
 namespace {
 
-constexpr std::array<const char*, kNumEventKinds> kNames = {"status", "pose", "features", "map"};
+constexpr std::array<const char*, kNumEventKinds> kNames = {"status", "pose", "features", "map", "playback"};
 
 }  // namespace
 

@@ -12,8 +12,8 @@
 namespace dmslam {
 
 /// Kinds of events that browsers are told of.
-enum class EventKind : uint8_t { kStatus = 0, kPose = 1, kFeatures = 2, kMap = 3 };
-inline constexpr size_t kNumEventKinds = 4;
+enum class EventKind : uint8_t { kStatus = 0, kPose = 1, kFeatures = 2, kMap = 3, kPlayback = 4 };
+inline constexpr size_t kNumEventKinds = 5;
 
 /// Hands events to any number of listeners, each of which may be slow: a listener holds at most one event of
 /// each kind, and a newer one takes the place of one that was not yet fetched. Who sends never waits.

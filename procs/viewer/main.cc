@@ -3,6 +3,8 @@
 #include <optional>
 
 #include "common/process_main.h"
+#include "dmslam/messaging/event_loop.h"
+#include "viewer/log_playback.h"
 #include "viewer/viewer_node.h"
 #include "viewer/web_server.h"
 
@@ -28,6 +30,20 @@ class ServedViewer : public dmslam::Node {
   dmslam::WebServer server_;
 };
 
+/// Shows a log until somebody asks to stop.
+int ShowLog(const std::string& log, const dmslam::NodeOptions& options, const dmslam::ViewerOptions& viewer,
+            const dmslam::WebServerOptions& web) {
+  dmslam::EventLoop loop;
+  dmslam::Exchange exchange;
+  dmslam::PlaybackControl control;
+  dmslam::LogPlayback playback(log, options, viewer, &exchange);
+  const dmslam::WebServer server(web, &exchange, &control);
+  spdlog::info("to be seen at {}", server.address());
+  loop.Watch(control.fd(), [&] { playback.Fulfil(control.Take(), dmslam::EventLoop::now_ns()); });
+  while (loop.PumpOnce(playback.deadline_ns())) playback.Advance(dmslam::EventLoop::now_ns());
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -37,17 +53,26 @@ int main(int argc, char** argv) {
   dmslam::WebServerOptions web;
   web.three_dir = DMSLAM_THREE_DIR;
   web.chart_dir = DMSLAM_CHART_DIR;
-  std::string http = "127.0.0.1:8080";
+  std::string http, log;
   CLI::App& app = process.app();
-  app.add_option("--http", http, "HOST:PORT to serve on; port 0: any that is free")->capture_default_str();
+  app.add_option(
+      "--http", http,
+      "HOST:PORT to serve on, port 0: any that is free; default: 127.0.0.1:8080, or any where that is taken");
+  app.add_option("--log", log, "show this log of lcm-logger instead of a running system");
   app.add_option("--ground-truth", viewer.ground_truth,
                  "trajectory in TUM format; default: what the player says");
   app.add_option("--web", web.web_dir, "folder of the page; default: the one that ships");
   app.add_option("--three", web.three_dir, "folder of three.js")->capture_default_str();
   app.add_option("--chart", web.chart_dir, "folder of Chart.js")->capture_default_str();
-  return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
-    dmslam::ParseHttpAddress(http, &web);
+  const auto complete = [&] {
+    if (!http.empty()) dmslam::ParseHttpAddress(http, &web);
     if (web.web_dir.empty()) web.web_dir = dmslam::FindDataFolder("procs/viewer/web");
+  };
+  process.SetOffline([&](const dmslam::NodeOptions& options) -> std::optional<int> {
+    complete();
+    return log.empty() ? std::nullopt : std::optional(ShowLog(log, options, viewer, web));
+  });
+  return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     return std::make_unique<ServedViewer>(std::move(context), std::move(options), viewer, web);
   });
 }

@@ -44,12 +44,25 @@ void ViewerNode::Begin(const CameraInfo& info) {
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked});
 }
 
+void ViewerNode::SetInHaste(bool in_haste) {
+  const bool over = in_haste_ && !in_haste;
+  in_haste_ = in_haste;
+  if (!over) return;
+  next_draw_ns_ = next_report_ns_ = next_align_ns_ = 0;
+  for (const auto& [channel, bytes] : std::exchange(passed_over_, {})) OnMessage(channel, bytes);
+}
+
 void ViewerNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   OnStatusMessage(channel, bytes);
   if (core_) OnLoose(channel, bytes);
 }
 
 void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> bytes) {
+  const bool is_picture = channel == channels::kFrame || channel == channels::kFeatureView;
+  if (in_haste_ && is_picture) {
+    passed_over_[channel].assign(bytes.begin(), bytes.end());
+    return;
+  }
   if (channel == channels::kFrame) {
     if (auto frame = Read<Frame>(bytes); frame && !IsForeign(frame->session))
       exchange_->AddImage(std::move(*frame));
@@ -174,7 +187,7 @@ int64_t ViewerNode::WorkDeadline() const {
 
 void ViewerNode::DrawIfDue() {
   const int64_t now = context_.now_ns();
-  if (!core_->dirty() || now < next_draw_ns_) return;
+  if (in_haste_ || !core_->dirty() || now < next_draw_ns_) return;
   next_draw_ns_ = now + kDrawEveryNs;
   uint64_t version = 0;
   uint32_t generation = 0;
@@ -193,7 +206,8 @@ void ViewerNode::DrawIfDue() {
 
 void ViewerNode::ShowPose(const PoseView& view) {
   exchange_->Change([&](Scene*, FrameSeries* series) { series->Add(view); });
-  exchange_->hub().Send(EventKind::kPose, PoseJson(view));
+  if (in_haste_) passed_over_[channels::kPoseView] = wire::Encode(view);
+  if (!in_haste_) exchange_->hub().Send(EventKind::kPose, PoseJson(view));
   if (shown_state_ != view.state) {
     const bool was_tracking = shown_state_ == TrackingState::kTracking;
     if (view.state == TrackingState::kLost) Note(BoardEvent::Level::kBad, "the camera is lost");
@@ -211,7 +225,7 @@ void ViewerNode::ShowFeatures(const FeatureView& view) {
 /// Heartbeats are told of even when nothing else happens.
 void ViewerNode::ReportIfDue() {
   const int64_t now = context_.now_ns();
-  if (now < next_report_ns_) return;
+  if (in_haste_ || now < next_report_ns_) return;
   next_report_ns_ = now + kReportEveryNs;
   if (map_reader_ && map_reader_->writer_present(now)) board_.OnSign("mapper", now);
   if (frontend_reader_ && frontend_reader_->writer_present(now)) board_.OnSign("frontend", now);

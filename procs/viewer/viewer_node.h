@@ -24,6 +24,9 @@ class ViewerNode : public StreamNode {
   /// `exchange` must outlive the node.
   ViewerNode(NodeContext context, NodeOptions options, ViewerOptions viewer, Exchange* exchange);
 
+  /// In haste everything is taken in and nothing is shown, for logs: afterwards it is shown at once.
+  void SetInHaste(bool in_haste);
+
  protected:
   void Begin(const CameraInfo& info) override;
   bool WorkOnce() override;
@@ -63,6 +66,8 @@ class ViewerNode : public StreamNode {
   Eigen::Vector3d up_{0, -1, 0};
   bool map_ended_ = false;
   bool ended_ = false;
+  bool in_haste_ = false;
+  std::map<std::string, Bytes> passed_over_;  ///< in haste: the newest of what is shown at its end
   int64_t loops_ = 0;
   int64_t map_records_ = 0;
   int64_t next_draw_ns_ = 0;

@@ -79,6 +79,7 @@ std::optional<Number> Query(const httplib::Request& request, const std::string& 
 }  // namespace
 
 void ParseHttpAddress(const std::string& text, WebServerOptions* options) {
+  options->or_any_port = false;
   const size_t colon = text.rfind(':');
   const InputError error("--http " + text + ": write HOST:PORT, as 127.0.0.1:8080");
   if (colon == std::string::npos || colon == 0) throw error;
@@ -92,13 +93,14 @@ void ParseHttpAddress(const std::string& text, WebServerOptions* options) {
 }
 
 struct WebServer::Impl {
-  explicit Impl(Exchange* the_exchange) : exchange(the_exchange) {}
+  Impl(Exchange* the_exchange, PlaybackControl* the_control) : exchange(the_exchange), control(the_control) {}
   void Route();
   void ServeScene(const httplib::Request& request, httplib::Response& response) const;
   void ServeImage(const httplib::Request& request, httplib::Response& response) const;
   void ServeEvents(httplib::Response& response) const;
 
   Exchange* exchange;
+  PlaybackControl* control;
   std::map<std::string, File> files;
   httplib::Server server;
   std::thread thread;
@@ -121,6 +123,13 @@ void WebServer::Impl::Route() {
                          "application/json");
   });
   server.Get("/api/events", [this](const auto&, auto& response) { ServeEvents(response); });
+  if (control == nullptr) return;
+  server.Post("/api/playback", [this](const auto& request, auto& response) {
+    PlaybackWish wish{Query<double>(request, "position"), std::nullopt, Query<double>(request, "speed")};
+    if (const auto playing = Query<int>(request, "playing")) wish.playing = *playing != 0;
+    control->Wish(wish);
+    response.status = 204;
+  });
 }
 
 void WebServer::Impl::ServeScene(const httplib::Request& request, httplib::Response& response) const {
@@ -158,7 +167,8 @@ void WebServer::Impl::ServeEvents(httplib::Response& response) const {
       [hub, listener](bool) { hub->Leave(listener); });
 }
 
-WebServer::WebServer(WebServerOptions options, Exchange* exchange) : impl_(std::make_unique<Impl>(exchange)) {
+WebServer::WebServer(WebServerOptions options, Exchange* exchange, PlaybackControl* control)
+    : impl_(std::make_unique<Impl>(exchange, control)) {
   impl_->files = LoadFiles(options);
   httplib::Server& server = impl_->server;
   std::promise<void> serving;  // only then can it be stopped
@@ -180,8 +190,12 @@ WebServer::WebServer(WebServerOptions options, Exchange* exchange) : impl_(std::
                               {"X-Content-Type-Options", "nosniff"},
                               {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:"}});
   impl_->Route();
-  const bool bound = options.port == 0 ? (options.port = server.bind_to_any_port(options.host)) > 0
-                                       : server.bind_to_port(options.host, options.port);
+  bool bound = options.port > 0 && server.bind_to_port(options.host, options.port);
+  if (!bound && (options.port == 0 || options.or_any_port)) {
+    const int port = server.bind_to_any_port(options.host);
+    bound = port > 0;
+    if (bound) options.port = port;
+  }
   const std::string host =
       options.host.find(':') == std::string::npos ? options.host : "[" + options.host + "]";
   if (!bound) {

@@ -5,26 +5,29 @@
 #include <string>
 
 #include "viewer/exchange.h"
+#include "viewer/playback_control.h"
 
 namespace dmslam {
 
 struct WebServerOptions {
   std::string host = "127.0.0.1";
-  int port = 8080;        ///< 0: any that is free
-  std::string web_dir;    ///< the page
-  std::string three_dir;  ///< three.js, as Debian's libjs-three lays it out
-  std::string chart_dir;  ///< Chart.js, as Debian's libjs-chart.js lays it out
+  int port = 8080;          ///< 0: any that is free
+  bool or_any_port = true;  ///< takes any free port where that one is taken
+  std::string web_dir;      ///< the page
+  std::string three_dir;    ///< three.js, as Debian's libjs-three lays it out
+  std::string chart_dir;    ///< Chart.js, as Debian's libjs-chart.js lays it out
 };
 
 /// "HOST:PORT", also "[::1]:8080". Throws InputError.
 void ParseHttpAddress(const std::string& text, WebServerOptions* options);
 
 /// Serves the page, the map and the events over HTTP, in threads of its own that touch nothing but the
-/// exchange. It only answers GET.
+/// exchange.
 class WebServer {
  public:
   /// Binds and begins to serve. Throws InputError that names what is missing and the cure.
-  WebServer(WebServerOptions options, Exchange* exchange);
+  /// With `control` browsers may say what part of a log they want to see; nothing else can be sent to it.
+  WebServer(WebServerOptions options, Exchange* exchange, PlaybackControl* control = nullptr);
   ~WebServer();
 
   /// "http://127.0.0.1:8080/"

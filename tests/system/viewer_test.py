@@ -39,6 +39,10 @@ class System:
             [os.path.join(self.options.bin, "dmslam-" + (role or name)), "--lcm-url", URL, "--session", "7", *arguments],
             stdin=subprocess.DEVNULL, stdout=log, stderr=log)
 
+    def record(self, path):
+        self.processes["logger"] = subprocess.Popen(["lcm-logger", "--quiet", "--lcm-url=" + URL, path], stdin=subprocess.DEVNULL,
+                                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
     def start_peer(self, name):
         self.start(name, "--peers", "frontend,mapper,loopcloser")
 
@@ -172,6 +176,38 @@ def run(options, system):
         check(page.eval("dmslam.seen.errors") == 0, "no error in the page")
 
 
+def show_log(options, system, log):
+    """The same again from the recording: forward, back, pause and play."""
+    system.start("log_viewer", "--http", "127.0.0.1:0", "--log", log, role="viewer")
+    address = system.address("log_viewer")
+    frames = "dmslam.series.data.frame.slice(-1)[0]"
+    with Browser() as page:
+        page.open(address + "?theme=dark")
+        check(page.wait("!document.getElementById('playback').hidden", 20), "a log has a slider")
+        duration = page.eval("dmslam.playback.state.duration")
+        slide = ("(() => {{ const t = document.getElementById('time'); t.value = {0}; t.dispatchEvent(new Event('input'));"
+                 " t.dispatchEvent(new Event('change')); }})()")
+        page.eval(slide.format(600))
+        there = page.wait(f"dmslam.playback.state.position > {0.58 * duration} && dmslam.store.numPoints > 150", 40)
+        check(there, f"pulled to 60 % of {duration} s the log shows {page.eval('dmslam.store.numPoints')} landmarks")
+        page.eval("document.getElementById('play').click()")
+        check(page.wait("!dmslam.playback.state.playing", 10), "it can be paused")
+        held = page.eval("dmslam.playback.state.position")
+        time.sleep(1)
+        check(page.eval("dmslam.playback.state.position") == held, "it stands still then")
+        page.wait("dmslam.frame.shown > 0", 10)
+        page.screenshot(os.path.join(options.pictures, "log.png"))
+        late = page.eval(frames)
+        page.eval(slide.format(350))
+        back = page.wait(f"dmslam.playback.state.position < {0.4 * duration} && {frames} < {late}", 40)
+        check(back, f"pulled back it shows an earlier time: frame {page.eval(frames)}, not {late}")
+        page.eval("document.getElementById('speed').value = '4'; document.getElementById('speed').dispatchEvent(new Event('change'));"
+                  " document.getElementById('play').click()")
+        check(page.wait(f"dmslam.playback.state.speed === 4 && dmslam.playback.state.position > {0.5 * duration}", 40), "it plays on, faster")
+        errors = page.errors()
+        check(not errors, f"no error on the console with a log: {errors}")
+
+
 def main():
     parser = argparse.ArgumentParser()
     for name in ("bin", "logs", "pictures", "sequence", "camera"):
@@ -180,11 +216,15 @@ def main():
     parser.add_argument("--frames", default="600")
     options = parser.parse_args()
     system = System(options)
+    log = os.path.join(options.logs, "run.lcmlog")
     try:
+        system.record(log)
         run(options, system)
+        system.stop()
+        show_log(options, system, log)
     finally:
         system.stop()
-    for name in ("viewer", "late_viewer"):
+    for name in ("viewer", "late_viewer", "log_viewer"):
         check(system.processes[name].returncode == 0, f"{name} ends with {system.processes[name].returncode}")
     return 1 if FAILURES else 0
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "common/stream_node.h"
-#include "mapper/map_snapshots.h"
+#include "common/map_snapshots.h"
 #include "tour_map.h"
 
 namespace dmslam {

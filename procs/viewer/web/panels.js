@@ -268,8 +268,9 @@ export class ProcessPanel {
 
   showEvents(events) {
     const newest = events.length ? events[events.length - 1].n : 0;
-    if (newest === this.newest) return;
-    this.newest = newest;
+    const key = events.length ? `${newest} ${events[events.length - 1].at}` : '';
+    if (key === this.newest) return;
+    this.newest = key;
     const list = byId('events');
     list.textContent = '';
     for (const event of events.slice(-12).reverse()) {
@@ -281,6 +282,56 @@ export class ProcessPanel {
       what.textContent = what.title = event.text;
       item.append(time, what);
       list.append(item);
+    }
+  }
+}
+
+/// The bar under everything, where a log is shown.
+export class PlaybackPanel {
+  constructor() {
+    this.state = null;
+    byId('play').addEventListener('click', () => this.toggle());
+    byId('time').addEventListener('input', () => this.seek());
+    byId('time').addEventListener('change', () => { this.held = false; });
+    byId('speed').addEventListener('change', () => this.wish(`speed=${byId('speed').value}`));
+  }
+
+  onState(state) {
+    this.state = state;
+    byId('playback').hidden = false;
+    text('play', state.playing ? '❚❚' : '▶');
+    if (!this.held) byId('time').value = String(Math.round(1000 * state.position / Math.max(state.duration, 1e-3)));
+    text('clock', `${this.clock(state.position)} / ${this.clock(state.duration)}`);
+    if (document.activeElement !== byId('speed')) byId('speed').value = String(state.speed);
+  }
+
+  clock(seconds) { return `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, '0')}`; }
+
+  toggle() {
+    if (this.state) this.wish(`playing=${this.state.playing ? 0 : 1}`);
+  }
+
+  /// While the slider is pulled the newest place counts, one request at a time.
+  seek() {
+    this.held = true;
+    this.wanted = `position=${(byId('time').value / 1000 * this.state.duration).toFixed(3)}`;
+    if (this.seeking) return;
+    this.seeking = true;
+    (async () => {
+      while (this.wanted) {
+        const wanted = this.wanted;
+        this.wanted = null;
+        await this.wish(wanted);
+      }
+      this.seeking = false;
+    })();
+  }
+
+  async wish(what) {
+    try {
+      await fetch(`/api/playback?${what}`, {method: 'POST'});
+    } catch (error) {
+      if (!(error instanceof TypeError)) throw error;  // no connection
     }
   }
 }

@@ -100,9 +100,9 @@ export class SceneView {
     this.radius = 1;
     this.depth = 1;
     this.pose = null;
-    this.budget = 60000;
+    this.budget = isSoftware() ? 20000 : 200000;
     this.adapted = 0;
-    this.pictures = {times: [], drawnPoints: 0, fps: 0};
+    this.pictures = {times: [], drawnPoints: 0, fps: 0, count: 0};
     this.needsPicture = true;
     this.lastDrawn = this.lastCall = 0;
     this.makeObjects();
@@ -510,6 +510,7 @@ export class SceneView {
 
   draw(now, budget) {
     this.needsPicture = false;
+    this.pictures.count++;
     this.settled = budget !== undefined;
     this.lastDrawn = now;
     this.root.updateMatrixWorld();

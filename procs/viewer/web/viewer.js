@@ -1,7 +1,7 @@
 // Connects the page to the viewer: events tell what is new, and what is large is fetched when there is time for it.
 import {MapStore} from '/map_store.js';
 import {SceneView} from '/scene_view.js';
-import {FramePanel, Header, ProcessPanel, SeriesPanel} from '/panels.js';
+import {FramePanel, Header, PlaybackPanel, ProcessPanel, SeriesPanel} from '/panels.js';
 
 const byId = (id) => document.getElementById(id);
 const kMapEveryMs = 160, kSeriesEveryMs = 500;
@@ -12,6 +12,7 @@ const header = new Header();
 const frame = new FramePanel();
 const series = new SeriesPanel();
 const processes = new ProcessPanel();
+const playback = new PlaybackPanel();
 const seen = {poses: 0, features: 0, statuses: 0, maps: 0, errors: 0, connected: false};
 
 function say(message) {
@@ -97,6 +98,7 @@ function connect() {
     say('no connection to the viewer; trying again');
   });
   on('status', (status) => { onStatus(status); wakeSeries(); });
+  on('playback', (state) => playback.onState(state));
   on('map', (version) => { told = version; wakeMap(); });
   on('features', (features) => { seen.features++; frame.onFeatures(features); });
   on('pose', (pose) => {
@@ -148,7 +150,9 @@ byId('larger').addEventListener('click', otherText);
 document.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || ['INPUT', 'SELECT'].includes(event.target.tagName)) return;
   const actions = {1: () => setMode('orbit'), 2: () => setMode('follow'), 3: () => setMode('top'), f: () => setMode('fit'),
-                   b: () => setColours('belief'), g: () => setColours('age'), t: otherTheme, l: otherText};
+                   b: () => setColours('belief'), g: () => setColours('age'), t: otherTheme, l: otherText,
+                   ' ': () => playback.toggle()};
+  if (event.key === ' ' && event.target.tagName !== 'BUTTON') event.preventDefault();
   if (actions[event.key]) actions[event.key]();
 });
 window.addEventListener('error', () => seen.errors++);
@@ -161,4 +165,4 @@ say('connecting');
 connect();
 
 /// For tests and measurements.
-window.dmslam = {store, scene, series, frame, seen, setMode, setColours, setTheme, setText, toggleLayer};
+window.dmslam = {store, scene, series, frame, playback, seen, setMode, setColours, setTheme, setText, toggleLayer};
