@@ -5,12 +5,17 @@ set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 usage() {
   cat <<'EOF'
-Usage: scripts/run.sh --sequence DIR --out DIR [options]
+Usage: scripts/run.sh --sequence DIR | --log FILE | --replay FILE  --out DIR [options]
 
 Plays a sequence (TUM RGB-D folder, EuRoC folder, numbered images, video) through player, frontend, mapper and loop
 closer, four processes on a private LCM port, and writes into the --out folder: trajectory.txt (final, TUM format),
 trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs.
 
+  --log FILE          instead of --sequence: the frames of a log of lcm-logger, by our player (any mode)
+  --replay FILE       instead of --sequence: the camera channels of such a log, by the real lcm-logplayer
+  --map FILE          begin in a saved map (or the map of a log), and go on with it
+  --localize          with --map: find the camera in it, and leave the map as it is
+  --save-map FILE     save the map at the end
   --camera FILE       camera file (YAML); found by itself for TUM freiburg1/2/3
   --lockstep          wait for every frame: the same input and seed give the same bytes
   --speed X           real time at X times the recorded rate (default 1)
@@ -28,7 +33,7 @@ trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and
   --black-out F,S     black frames from frame F on for S seconds; may be repeated
   --jump F,T          after frame F go on with frame T; may be repeated
   --port N            UDP port (default: a free one)
-  --share-port        the port may be in use: the system on it has another --prefix
+  --share-port        others may be on that port already: lcm-spy, a logger, a system with another --prefix
   --prefix NAME       put before every channel: separates systems on one port
   --receive-buffer N  bytes that the kernel is asked to hold for each process (default 4194304)
   --no-restart        a process that dies ends the run (default: it is started again, and goes on where it was)
@@ -37,17 +42,22 @@ EOF
 }
 fail() { echo "run.sh: $*" >&2; exit 1; }
 
-sequence="" out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" build="" receive_buffer=4194304 restart=1 share_port=0
+sequence="" log_file="" replay="" speed=1 map="" localize=0 mapper=() out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" share_port=0 build="" receive_buffer=4194304 restart=1
 viewer=0 http=()
 player=() common=()
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
   case "$1" in
     --sequence) need "$@"; sequence=$2; shift 2 ;;
+    --log) need "$@"; log_file=$2; shift 2 ;;
+    --replay) need "$@"; replay=$2; shift 2 ;;
+    --map) need "$@"; map=$2; shift 2 ;;
+    --localize) localize=1; shift ;;
+    --save-map) need "$@"; mapper+=(--save-map "$2"); shift 2 ;;
     --out) need "$@"; out=$2; shift 2 ;;
     --camera) need "$@"; camera=$2; shift 2 ;;
     --lockstep) lockstep=1; shift ;;
-    --speed) need "$@"; player+=(--speed "$2"); shift 2 ;;
+    --speed) need "$@"; speed=$2; player+=(--speed "$2"); shift 2 ;;
     --seed) need "$@"; seed=$2; shift 2 ;;
     --start | --frames | --black-out | --jump) need "$@"; player+=("$1" "$2"); shift 2 ;;
     --config) need "$@"; common+=(--config "$2"); shift 2 ;;
@@ -68,18 +78,26 @@ while [ $# -gt 0 ]; do
     *) fail "unknown option $1 (see --help)" ;;
   esac
 done
-[ -n "$sequence" ] || fail "--sequence is missing (see --help)"
+case "${sequence:+s}${log_file:+l}${replay:+r}" in
+  s | l | r) ;;
+  "") fail "--sequence is missing (see --help)" ;;
+  *) fail "give one of --sequence, --log and --replay" ;;
+esac
 [ -n "$out" ] || fail "--out is missing (see --help)"
 is_number() { [[ "$2" =~ ^[0-9]+$ ]] || fail "$1 $2: write a whole number"; }
 is_number --seed "$seed"
 is_number --pictures "$pictures"
 is_number --receive-buffer "$receive_buffer"
-[ -e "$sequence" ] || fail "$sequence: no such folder or file; check --sequence"
+[ -z "$sequence" ] || [ -e "$sequence" ] || fail "$sequence: no such folder or file; check --sequence"
+[ -z "$log_file" ] || [ -f "$log_file" ] || fail "$log_file: no such file; check --log"
+[ -z "$replay" ] || [ -f "$replay" ] || fail "$replay: no such file; check --replay"
+[ -z "$map" ] || [ -f "$map" ] || fail "$map: no such file; check --map"
+[ "$localize" = 0 ] || [ -n "$map" ] || fail "--localize needs a map: give it with --map"
 [ "$profile" = "" ] || [ "$profile" = dm ] || [ "$profile" = baseline ] || fail "--profile $profile: write dm or baseline"
 
 if [ -z "$build" ]; then
   build="$top/build/release"
-  "$top/scripts/build.sh" release dmslam-{player,frontend,mapper,loopcloser,collector} >&2 ||
+  "$top/scripts/build.sh" release dmslam-{player,frontend,mapper,loopcloser,collector,map} >&2 ||
     fail "the build failed; its log is above"
   [ "$viewer" = 0 ] || "$top/scripts/build.sh" release dmslam-viewer >&2 ||
     fail "the viewer could not be built; scripts/setup.sh viewer installs what it needs"
@@ -92,7 +110,7 @@ bin="$build/bin"
 port_taken() { grep -qi ":$(printf '%04X' "$1") " /proc/net/udp /proc/net/udp6 2>/dev/null; }
 if [ -n "$port" ]; then
   [[ "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1024 ] && [ "$port" -le 65535 ] || fail "--port $port: write a port between 1024 and 65535"
-  if [ "$share_port" = 0 ] && port_taken "$port"; then fail "UDP port $port is taken; choose another with --port, or leave it out"; fi
+  if [ "$share_port" = 0 ] && port_taken "$port"; then fail "UDP port $port is taken; choose another with --port, leave it out, or give --share-port"; fi
 else
   for _ in $(seq 50); do
     port=$((20000 + RANDOM % 30000))
@@ -103,10 +121,19 @@ url="udpm://239.255.76.67:$port?ttl=0&recv_buf_size=$receive_buffer"
 
 mkdir -p "$out/log" || fail "$out cannot be made; check --out"
 session=$((RANDOM * 32768 + RANDOM + 1))
+if [ -n "$map" ]; then # ids of this session come after those of the map
+  newest=$("$bin/dmslam-map" --log "$map" 2>"$out/log/map.log" | sed -nE 's/^log .* session ([0-9]+),.*/\1/p')
+  [ -n "$newest" ] || fail "$(tail -n 1 "$out/log/map.log" | sed 's/^\(\[[^]]*\] *\)*//')"
+  session=$((newest + 1))
+  mapper+=(--map "$map")
+  common+=(--set map.saved=on)
+  [ "$localize" = 0 ] || common+=(--set map.localize_only=on)
+fi
 common+=(--set "seed=$seed" --lcm-url "$url" --session "$session"
   --peers frontend,mapper,loopcloser,collector)
 [ -n "$profile" ] && common=(--set "profile=$profile" "${common[@]}")
 [ -n "$camera" ] && player+=(--camera "$camera")
+[ -n "$replay" ] && common+=(--accept-recorded)
 [ "$lockstep" = 1 ] && player+=(--lockstep)
 ground_truth=()
 [ -f "$sequence/groundtruth.txt" ] && ground_truth=(--ground-truth "$sequence/groundtruth.txt")
@@ -148,19 +175,46 @@ command -v setpriv >/dev/null && guard=(setpriv --pdeathsig TERM --)
 quiet=() errors=""
 [ ! -t 2 ] || quiet=(--quiet) errors=/dev/fd/3
 declare -A restarts_of=() began_at=() short_lives=()
-mapper_arguments=("${common[@]}")
+mapper_arguments=("${common[@]}" "${mapper[@]}")
 loopcloser_arguments=("${common[@]}")
 frontend_arguments=("${common[@]}" "${drawing[@]}")
 collector_arguments=("${common[@]}" "${quiet[@]}" --out "$out" "${ground_truth[@]}")
 player_arguments=("${common[@]}" "${player[@]}" --sequence "$sequence")
+player_program="$bin/dmslam-player"
+[ -z "$log_file" ] || player_arguments=("${common[@]}" "${player[@]}" --log "$log_file")
+# lcm-logplayer, and then the end of the sequence again until the frontend has heard it: it travels unacknowledged.
+replay_log='
+url=$1 speed=$2 log=$3 frontend_pid=$4
+port=$(sed -E "s/.*:([0-9]+)\?.*/\1/" <<<"$url")
+for ((i = 0; i < 200; ++i)); do
+  [ "$(grep -ci ":$(printf %04X "$port") " /proc/net/udp)" -lt 4 ] || break
+  sleep 0.05
+done
+sleep 0.5
+lcm-logplayer -s "$speed" -l "$url" -e "DMSLAM_PLAYER_(CAMERA_INFO|FRAME|GROUND_TRUTH|END_OF_SEQUENCE)$" "$log" || exit
+for ((i = 0; i < 60; ++i)); do
+  kill -0 "$(<"$frontend_pid")" 2>/dev/null || exit 0
+  [ $((i % 4)) != 3 ] || lcm-logplayer -s 1000 -l "$url" -e "DMSLAM_PLAYER_END_OF_SEQUENCE$" "$log"
+  sleep 0.25
+done
+echo "the log has no end of the sequence; the frontend is told to finish" >&2
+kill -TERM "$(<"$frontend_pid")"
+'
+if [ -n "$replay" ]; then
+  command -v lcm-logplayer >/dev/null || fail "lcm-logplayer is missing; run scripts/setup.sh core"
+  player_program=bash
+  player_arguments=(-c "$replay_log" replay "$url" "$speed" "$replay" "$out/log/frontend.pid")
+fi
 launch() { # name: begins a process, or begins it again; only at the beginning nobody else can be writing
-  local name=$1 log="$out/log/$1.log" said="$out/log/$1.log"
+  local name=$1 log="$out/log/$1.log" said="$out/log/$1.log" program="$bin/dmslam-$1"
+  [ "$name" != player ] || program=$player_program
   local -n arguments="${name}_arguments"
   local fresh=(--fresh-system)
   if [ -n "${began_at[$name]:-}" ]; then fresh=(); else : >"$log"; fi
   if [ "$name" = collector ]; then said="$out/log/table.txt" log=${errors:-$log}; fi
-  "${guard[@]}" "$bin/dmslam-$name" "${arguments[@]}" "${fresh[@]}" </dev/null >>"$said" 2>>"$log" &
+  "${guard[@]}" "$program" "${arguments[@]}" "${fresh[@]}" </dev/null >>"$said" 2>>"$log" &
   pid_of[$name]=$!
+  echo $! >"$out/log/$name.pid"
   began_at[$name]=$SECONDS
 }
 rm -f "$out/log/table.txt"

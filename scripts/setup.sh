@@ -7,7 +7,7 @@ core=(build-essential cmake ninja-build ccache pkg-config
   libopencv-videoio-dev libeigen3-dev libceres-dev libspdlog-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
   libturbojpeg0-dev zlib1g-dev)
 test=(libgtest-dev libbenchmark-dev iproute2 nftables python3-minimal)
-tools=(default-jre default-jdk-headless liblcm-java libjchart2d-java xvfb)
+tools=(default-jre default-jdk-headless liblcm-java libjchart2d-java xvfb xdotool imagemagick)
 viewer=(libcpp-httplib-dev libjs-three libjs-chart.js)
 browser=(chromium python3-websocket)
 usage() { echo "Usage: scripts/setup.sh PART...   with PART one of: core test tools viewer browser (to test the viewer)"; }

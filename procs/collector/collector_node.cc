@@ -37,25 +37,21 @@ void CollectorNode::Begin(const CameraInfo& info) {
 
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrameTrace) {
-    if (const auto trace = Read<FrameTrace>(bytes)) run_.traces.push_back(*trace);
+    if (const auto trace = Read<FrameTrace>(bytes); trace && !IsForeign(trace->session)) run_.traces.push_back(*trace);
   } else if (channel == channels::kEndOfSequence) {
-    if (auto end = Read<EndOfSequence>(bytes)) end_ = std::move(end);
+    if (auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session)) end_ = std::move(end);
   } else if (channel == channels::kGroundTruthPose) {
-    if (const auto pose = Read<GroundTruthPose>(bytes)) OnGroundTruth(*pose);
+    if (const auto pose = Read<GroundTruthPose>(bytes); pose && !IsForeignFrame(pose->session)) OnGroundTruth(*pose);
   } else if (channel == channels::kPlayerStatus) {
     if (const auto status = Read<PlayerStatus>(bytes)) OnHealth("player", status->head);
   } else if (channel == channels::kFrontendStatus) {
     if (auto status = Read<FrontendStatus>(bytes)) OnFrontendStatus(std::move(*status));
   } else if (channel == channels::kMapperStatus) {
-    if (auto status = Read<MapperStatus>(bytes)) {
-      OnHealth("mapper", status->head);
-      run_.mapper = std::move(*status);
-    }
+    auto status = Read<MapperStatus>(bytes);
+    if (status && OnHealth("mapper", status->head)) run_.mapper = std::move(*status);
   } else if (channel == channels::kLoopcloserStatus) {
-    if (auto status = Read<LoopcloserStatus>(bytes)) {
-      OnHealth("loopcloser", status->head);
-      run_.loopcloser = std::move(*status);
-    }
+    auto status = Read<LoopcloserStatus>(bytes);
+    if (status && OnHealth("loopcloser", status->head)) run_.loopcloser = std::move(*status);
   }
 }
 
@@ -65,9 +61,11 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
 
-/// Counters begin at zero in a process that was started again: those of the ones before it are added.
-void CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
-  if (head.session != 0 && head.session != session_) return;
+/// Counters begin at zero in a process that was started again: those of the ones before it are added. False for a
+/// process of another session.
+bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
+  const bool ours = head.session == 0 || (process == "player" ? !IsForeignFrame(head.session) : !IsForeign(head.session));
+  if (!ours) return false;
   ProcessHealth& health = run_.health[process];
   if (process_ids_[process].insert(head.health.pid).second && process_ids_[process].size() > 1) {
     ++run_.restarts;
@@ -85,10 +83,11 @@ void CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
         &ProcessHealth::written_bytes}) {
     health.*counter += former.*counter;
   }
+  return true;
 }
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
-  OnHealth("frontend", status.head);
+  if (!OnHealth("frontend", status.head)) return;
   for (int64_t FrontendStatus::*counter :
        {&FrontendStatus::frames_received, &FrontendStatus::frames_processed, &FrontendStatus::frames_skipped,
         &FrontendStatus::keyframes_proposed, &FrontendStatus::keyframes_withheld,

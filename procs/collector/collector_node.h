@@ -39,7 +39,7 @@ class CollectorNode : public StreamNode {
   bool TakeFrontendRecord();
   bool TakeMapRecord();
   void OnGroundTruth(const GroundTruthPose& pose);
-  void OnHealth(const std::string& process, const StatusHead& head);
+  bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);
   void OnProposal(KeyframeId id, MapId map_id);
   void OnFramePose(const Record& record);

@@ -190,13 +190,15 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder, const T
   json["ate_rmse_online"] = errors.online ? Json(errors.online->rmse()) : Json(nullptr);
   json["scale_final"] = errors.final ? Json(errors.final->scale()) : Json(nullptr);
   json.update(TimingJson(run));
-  int64_t lost = 0, repaired = 0;
+  int64_t lost = 0, repaired = 0, foreign = 0;
   for (const auto& [process, health] : run.health) {
     lost += health.records_lost;
     repaired += health.records_repaired;
+    foreign += health.dropped_foreign;
   }
   json["records_lost"] = lost;
   json["records_repaired"] = repaired;
+  json["dropped_of_other_sessions"] = foreign;
   json["restarts"] = run.restarts;
   json["keyframes_proposed"] = run.keyframes_proposed;
   json["keyframes_missing"] = run.keyframes_missing;

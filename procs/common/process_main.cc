@@ -42,6 +42,8 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
       ->delimiter(',');
   app_.add_option("--config", config_, "settings (YAML)");
   app_.add_option("--set", overrides_, "one setting: key=value; may be repeated");
+  app_.add_flag("--accept-recorded", options_.accept_recorded,
+                "take camera and frames of a recorded session, as lcm-logplayer plays them, for this session's");
   app_.add_flag("--take-over", options_.take_over, "ask a present writer of the same stream to close, and follow it");
   app_.add_flag("--fresh", options_.fresh, "a mapper begins with an empty map, whatever the others hold");
   app_.add_flag("--fresh-system", fresh_system_, "nobody else can be writing: begin without listening first");

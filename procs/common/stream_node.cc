@@ -69,8 +69,17 @@ void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
   std::optional<CameraInfo> info = Read<CameraInfo>(bytes);
   if (!info) return;
   if (session_ == 0) session_ = info->session;
-  if (IsForeign(info->session) || camera_info_) return;
+  if (options_.accept_recorded && !recorded_session_ && info->session != session_) {
+    recorded_session_ = info->session;
+    spdlog::info("{}: takes the frames of recorded session {} for its own {}", role_, info->session, session_);
+  }
+  if (IsForeignFrame(info->session) || camera_info_) return;
+  if (recorded_session_) info->mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
   camera_info_ = std::move(info);
+}
+
+bool StreamNode::IsForeignFrame(uint32_t session) {
+  return recorded_session_ ? session != *recorded_session_ && IsForeign(session) : IsForeign(session);
 }
 
 bool StreamNode::IsForeign(uint32_t session) {

@@ -21,6 +21,7 @@ struct NodeOptions {
   uint32_t session = 0;             ///< 0: that of the first camera heard
   std::vector<std::string> peers;   ///< processes that take part: they are waited for, and hold their streams' writers back
   Link link = Link::kHost;
+  bool accept_recorded = false;     ///< camera and frames of a recorded session (a log that is replayed) are ours
   bool take_over = false;           ///< asks a present writer of its stream to close
   bool fresh = false;               ///< a mapper begins with an empty map, whatever replicas there are
   Settings settings;
@@ -98,7 +99,10 @@ class StreamNode : public Node {
     if (!message) CountMalformed(wire::Info<Message>().channel, reason);
     return message;
   }
+  /// Counts messages of other sessions; the first is logged.
   bool IsForeign(uint32_t session);
+  /// The same for what the player says: a recorded session that was accepted is ours.
+  bool IsForeignFrame(uint32_t session);
 
   /// Keeps the protocol alive from within long work.
   void PumpWithinWork();
@@ -110,6 +114,7 @@ class StreamNode : public Node {
   std::string role_;
   Endpoint endpoint_;
   uint32_t session_ = 0;
+  std::optional<uint32_t> recorded_session_;  ///< whose camera and frames are played to us
   std::optional<CameraInfo> camera_info_;
   std::unique_ptr<StreamWriter> writer_;
   bool stopping_ = false;

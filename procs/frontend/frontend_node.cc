@@ -28,7 +28,7 @@ ImageEncoding ToImageEncoding(FrameEncoding encoding) {
 
 FrontendNode::FrontendNode(NodeContext context, NodeOptions options, Extras extras)
     : StreamNode(std::move(context), std::move(options), "frontend"), extras_(std::move(extras)) {
-  Listen({channels::kFrame, channels::kEndOfSequence});
+  Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose});
 }
 
 void FrontendNode::Begin(const CameraInfo& info) {
@@ -94,12 +94,15 @@ void FrontendNode::OnWriterOpen() {
 void FrontendNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrame) OnFrame(bytes);
   if (channel == channels::kEndOfSequence) OnEndOfSequence(bytes);
+  if (channel != channels::kGroundTruthPose) return;
+  const std::optional<GroundTruthPose> truth = Read<GroundTruthPose>(bytes);
+  if (truth && !IsForeignFrame(truth->session)) error_.OnTruth(truth->frame_index, truth->T_world_cam.translation);
 }
 
 void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   if (!camera_info_) return;  // it comes again, or it is too early
   std::optional<Frame> frame = Read<Frame>(bytes);
-  if (!frame || IsForeign(frame->session)) return;
+  if (!frame || IsForeignFrame(frame->session)) return;
   const int64_t index = frame->frame_index;
   if (index <= last_index_) {
     // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
@@ -114,7 +117,7 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
 
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
-  if (!end || !camera_info_ || IsForeign(end->session)) return;
+  if (!end || !camera_info_ || IsForeignFrame(end->session)) return;
   if (finished_) PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
   end_ = std::move(end);
 }
@@ -233,7 +236,10 @@ void FrontendNode::PublishEvents(const std::vector<FrontendEvent>& events) {
         first_map_s_ = static_cast<double>(pose->stamp_ns - first_stamp_ns_) * 1e-9;
       }
     }
-    if (std::holds_alternative<MapReset>(event)) first_map_s_ = -1;
+    if (std::holds_alternative<MapReset>(event)) {
+      first_map_s_ = -1;
+      error_.Reset();
+    }
   }
 }
 
@@ -251,7 +257,10 @@ void FrontendNode::PublishViews(const Waiting& waiting, const FramePose& pose, F
   view.state = pose.state;
   view.map_id = pose.map_id;
   view.has_pose = pose.HasPose();
-  if (pose.HasPose()) view.T_world_cam = pose.T_cam_world.Inverse();
+  if (pose.HasPose()) {
+    view.T_world_cam = pose.T_cam_world.Inverse();
+    view.error_m = error_.OnPose(pose.frame_index, view.T_world_cam.translation);
+  }
   view.inliers = pose.num_static;
   view.moving = pose.num_moving;
   view.unknown = pose.num_unknown;

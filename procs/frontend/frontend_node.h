@@ -10,6 +10,7 @@
 #include "common/stream_node.h"
 #include "dmslam/dataset/image.h"
 #include "frontend/frontend_core.h"
+#include "frontend/online_error.h"
 
 namespace dmslam {
 
@@ -82,6 +83,7 @@ class FrontendNode : public StreamNode {
   GrayImage image_;
   std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
   FramePose last_pose_;
+  OnlineError error_;
   int64_t frames_received_ = 0, frames_processed_ = 0, frames_skipped_ = 0, frames_bad_ = 0;
   int64_t status_frames_ = 0;
   int64_t first_stamp_ns_ = 0;

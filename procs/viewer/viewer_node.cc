@@ -64,7 +64,7 @@ void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> by
     return;
   }
   if (channel == channels::kFrame) {
-    if (auto frame = Read<Frame>(bytes); frame && !IsForeign(frame->session))
+    if (auto frame = Read<Frame>(bytes); frame && !IsForeignFrame(frame->session))
       exchange_->AddImage(std::move(*frame));
   } else if (channel == channels::kPoseView) {
     if (const auto view = Read<PoseView>(bytes); view && !IsForeign(view->session)) ShowPose(*view);
@@ -72,10 +72,10 @@ void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> by
     if (const auto view = Read<FeatureView>(bytes); view && !IsForeign(view->session)) ShowFeatures(*view);
   } else if (channel == channels::kGroundTruthPose) {
     const auto pose = Read<GroundTruthPose>(bytes);
-    if (pose && !IsForeign(pose->session)) core_->OnTruth(pose->frame_index, pose->T_world_cam);
+    if (pose && !IsForeignFrame(pose->session)) core_->OnTruth(pose->frame_index, pose->T_world_cam);
   } else if (channel == channels::kEndOfSequence) {
     const auto end = Read<EndOfSequence>(bytes);
-    if (!end || IsForeign(end->session) || std::exchange(ended_, true)) return;
+    if (!end || IsForeignFrame(end->session) || std::exchange(ended_, true)) return;
     board_.Expect("player");
     Note(BoardEvent::Level::kInfo,
          "the sequence has ended: " + std::to_string(end->frames_published) + " frames");

@@ -4,9 +4,13 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
+#include <map>
+#include <tuple>
 
 #include "collector/map_ply.h"
 #include "collector/trajectory_builder.h"
+#include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
@@ -18,6 +22,7 @@ struct Arguments {
   std::string log, ply, trajectory, online, keyframes, save;
   uint32_t session = 0;
   double at_s = -1;
+  bool channels = false;
 };
 
 void Declare(CLI::App& app, Arguments& a) {
@@ -26,11 +31,49 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--log-session", a.session, "which of the log's sessions, where it holds several");
   app.add_option("--at", a.at_s, "seconds after the log's beginning: the map as it was then")
       ->check(CLI::NonNegativeNumber);
+  app.add_flag("--channels", a.channels, "list what the log holds: channel, type, messages, bytes");
   app.add_option("--ply", a.ply, "write the map as coloured points");
   app.add_option("--trajectory", a.trajectory, "write where the camera was, by the map (TUM format)");
   app.add_option("--trajectory-online", a.online, "write where the camera was, as told frame by frame");
   app.add_option("--keyframes", a.keyframes, "write the keyframes' poses (TUM format)");
   app.add_option("--save", a.save, "write the map as a file that the mapper can load (--map)");
+}
+
+/// Names of all types by their fingerprints.
+std::map<int64_t, std::string> TypeNames() {
+  std::map<int64_t, std::string> names = {
+      {dmslam::head_t::getHash(), "head_t"},           {dmslam::ack_t::getHash(), "ack_t"},
+      {dmslam::part_t::getHash(), "part_t"},           {dmslam::take_over_t::getHash(), "take_over_t"},
+      {dmslam::hand_over_t::getHash(), "hand_over_t"}, {dmslam::replica_t::getHash(), "replica_t"}};
+  const auto add = [&]<typename... Message>(const std::tuple<Message...>*) {
+    (names.emplace(dmslam::wire::Info<Message>().fingerprint, dmslam::wire::Info<Message>().type), ...);
+  };
+  add(static_cast<const dmslam::wire::Messages*>(nullptr));
+  return names;
+}
+
+/// One line per channel. What is not ours has the type "?".
+int ListChannels(const std::string& path) {
+  struct Content {
+    std::string type;
+    int64_t messages = 0, bytes = 0;
+  };
+  const std::map<int64_t, std::string> names = TypeNames();
+  std::map<std::string, Content> contents;
+  dmslam::EventLogReader reader(path);
+  while (const auto event = reader.Next()) {
+    Content& content = contents[event->channel];
+    const auto name = names.find(dmslam::FingerprintOf(event->bytes).value_or(0));
+    content.type = name == names.end() ? "?" : name->second;
+    ++content.messages;
+    content.bytes += static_cast<int64_t>(event->bytes.size());
+  }
+  for (const auto& [channel, content] : contents) {
+    std::printf("%-36s %-20s %8lld messages %12lld bytes\n", channel.c_str(), content.type.c_str(),
+                static_cast<long long>(content.messages), static_cast<long long>(content.bytes));
+  }
+  if (!reader.gaps().empty()) spdlog::warn("{}", reader.DescribeGaps());
+  return 0;
 }
 
 /// The poses of the frames, as the frontend told them up to then.
@@ -60,6 +103,7 @@ void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
 }
 
 int Run(const Arguments& a) {
+  if (a.channels) return ListChannels(a.log);
   const dmslam::LogIndex log(a.log);
   if (!log.DescribeDamage().empty()) spdlog::warn("{}", log.DescribeDamage());
   const dmslam::RecordedSession& session = log.Session(a.session);

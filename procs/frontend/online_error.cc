@@ -1,0 +1,37 @@
+#include "frontend/online_error.h"
+
+#include <iterator>
+#include <optional>
+
+#include "dmslam/evaluation/alignment.h"
+
+namespace dmslam {
+namespace {
+
+constexpr size_t kMinAligned = 10;
+constexpr size_t kMaxWaiting = 1000;
+
+}  // namespace
+
+void OnlineError::OnTruth(uint32_t frame_index, const Eigen::Vector3d& p_world) {
+  truth_.emplace(frame_index, p_world);
+  if (truth_.size() > kMaxWaiting) truth_.erase(truth_.begin());
+}
+
+double OnlineError::OnPose(uint32_t frame_index, const Eigen::Vector3d& p_map) {
+  const auto truth = truth_.find(frame_index);
+  if (truth == truth_.end()) return -1;
+  tracked_.push_back(p_map);
+  true_.push_back(truth->second);
+  truth_.erase(truth_.begin(), std::next(truth));
+  if (tracked_.size() < kMinAligned) return -1;
+  const std::optional<Sim3d> true_from_map = AlignPoints(tracked_, true_, Alignment::kSim3);
+  return true_from_map ? (*true_from_map * tracked_.back() - true_.back()).norm() : -1;
+}
+
+void OnlineError::Reset() {
+  tracked_.clear();
+  true_.clear();
+}
+
+}  // namespace dmslam

@@ -1,0 +1,61 @@
+# Logs of a run are worth keeping: they play again byte for byte, hold the map, and do not disturb a system that is alive.
+source "$(dirname "$0")/lib.sh"
+need_synthetic
+multicast
+
+camera=$root/config/synthetic.yaml
+check "the recorded run ends with 0" run --sequence "$synthetic" --camera "$camera" --seed 3 --frames 110 --lockstep \
+  --record --save-map "$work/mapper.map" --out "$work/first"
+log=$work/first/run.lcmlog
+same_as_first() { # FOLDER
+  local file
+  for file in trajectory.txt trajectory_online.txt keyframes.txt map.ply; do
+    check "$file of '$1' has the same bytes" cmp "$work/first/$file" "$work/$1/$file"
+  done
+}
+
+check "the log plays in lock-step" run --log "$log" --seed 3 --lockstep --out "$work/again"
+same_as_first again
+expect "its ground truth is in the log" "$work/again" ate_rmse_final "<= 0.05"
+check "the log plays in one process" "$build/bin/dmslam-inprocess" --log "$log" --seed 3 --out "$work/one"
+same_as_first one
+check "a folder becomes a log" "$build/bin/dmslam-player" --sequence "$synthetic" --camera "$camera" --frames 110 \
+  --to-log "$work/made.lcmlog"
+check "that log plays" "$build/bin/dmslam-inprocess" --log "$work/made.lcmlog" --seed 3 --out "$work/made"
+same_as_first made
+
+map() { "$build/bin/dmslam-map" "$@"; }
+check "the map is rebuilt" map --log "$log" --save "$work/rebuilt.map" --ply "$work/rebuilt.ply" \
+  --trajectory "$work/rebuilt.txt" >"$work/said" 2>&1
+check "it is the mapper's own" cmp "$work/mapper.map" "$work/rebuilt.map"
+check "its points too" cmp "$work/first/map.ply" "$work/rebuilt.ply"
+check "its trajectory too" cmp "$work/first/trajectory.txt" "$work/rebuilt.txt"
+check "nothing is missing" grep -q " 0 missing" "$work/said"
+check "a part of it is a smaller map" map --log "$log" --at 2 --save "$work/part.map"
+check "... smaller" test "$(wc -c <"$work/part.map")" -lt "$(wc -c <"$work/mapper.map")"
+
+size=$(wc -c <"$log")
+head -c $((size * 2 / 3)) "$log" >"$work/cut.lcmlog"
+printf 'damage' | dd of="$work/cut.lcmlog" bs=1 seek=$((size / 2)) conv=notrunc 2>/dev/null
+check "a damaged log is read" map --log "$work/cut.lcmlog" --save "$work/cut.map" >"$work/said" 2>&1
+check "what was skipped is said" grep -q "skipped.*its end" "$work/said"
+refused "no LCM log" map --log "$camera"
+refused "several sessions|holds no session" map --log "$log" --log-session 5
+refused "higher one with --session" "$build/bin/dmslam-inprocess" --log "$log" --map "$log" --session 1 --out "$work/o"
+
+check "the map is found again" run --log "$log" --lockstep --map "$work/mapper.map" --localize --out "$work/localized"
+expect "frames are localised" "$work/localized" tracked_online_percent ">= 90"
+check "the map stays as it was" cmp "$work/first/map.ply" "$work/localized/map.ply"
+check "the map goes on" "$build/bin/dmslam-inprocess" --log "$log" --map "$log" --out "$work/goes_on"
+expect "frames are tracked in it" "$work/goes_on" tracked_online_percent ">= 90"
+
+# The whole log, with all its records and beacons, beside a run.
+port=23871
+run --sequence "$synthetic" --camera "$camera" --seed 3 --frames 110 --lockstep --port $port --out "$work/haunted" &
+runner=$!
+lcm-logplayer -s 2 -l "udpm://239.255.76.67:$port?ttl=0" "$log" >/dev/null 2>&1
+check "a run beside a ghost ends with 0" wait $runner
+same_as_first haunted
+expect "the ghost is counted" "$work/haunted" dropped_of_other_sessions ">= 100"
+no_orphans "the ghost"
+finish
