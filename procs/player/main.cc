@@ -7,13 +7,14 @@
 #include "dmslam/util/check.h"
 #include "player/log_output.h"
 #include "player/player_node.h"
+#include "player/records_node.h"
 
 namespace {
 
 /// What the command line says.
 struct Arguments {
   dmslam::PlayerOptions options;
-  std::string camera_file, encoding = "jpeg", log, to_log;
+  std::string camera_file, encoding = "jpeg", channels = "camera", log, to_log;
   uint32_t log_session = 0;
   bool lockstep = false, remote_frontend = false;
   std::vector<std::string> black_outs, jumps;
@@ -80,12 +81,25 @@ int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options) {
   return 0;
 }
 
+std::unique_ptr<dmslam::Node> EnterRecords(const Arguments& a, dmslam::NodeContext context,
+                                           const dmslam::NodeOptions& node) {
+  if (a.log.empty()) throw dmslam::InputError("--channels records needs a log: give it with --log");
+  auto log = std::make_shared<const dmslam::LogIndex>(a.log);
+  if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
+  return std::make_unique<dmslam::RecordsNode>(std::move(context), node, log, a.log_session);
+}
+
 void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--sequence", a.options.sequence,
                  "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
   app.add_option("--log", a.log,
                  "log of lcm-logger: its frames are played, with their indices, stamps and bytes");
   app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
+  app.add_option("--channels", a.channels,
+                 "of a log: camera, or records: the frontend's keyframes are entered as a writer of a new "
+                 "session, without a "
+                 "frontend and without images")
+      ->check(CLI::IsMember({"camera", "records"}));
   app.add_option("--to-log", a.to_log, "write camera and frames into this log instead of publishing them");
   app.add_option("--camera", a.camera_file,
                  "camera file (YAML); found by itself for TUM freiburg1/2/3 and logs");
@@ -115,9 +129,12 @@ int main(int argc, char** argv) {
   process.SetOffline([&](const dmslam::NodeOptions& node) {
     return arguments.to_log.empty() ? std::nullopt : std::optional(WriteLog(arguments, node));
   });
-  return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions node) {
-    dmslam::PlayerOptions options;
-    auto source = Open(arguments, node, &options);
-    return std::make_unique<dmslam::PlayerNode>(std::move(context), options, std::move(source));
-  });
+  return process.Run(
+      argc, argv,
+      [&](dmslam::NodeContext context, dmslam::NodeOptions node) -> std::unique_ptr<dmslam::Node> {
+        if (arguments.channels == "records") return EnterRecords(arguments, std::move(context), node);
+        dmslam::PlayerOptions options;
+        auto source = Open(arguments, node, &options);
+        return std::make_unique<dmslam::PlayerNode>(std::move(context), options, std::move(source));
+      });
 }

@@ -31,8 +31,11 @@ check "it is the mapper's own" cmp "$work/mapper.map" "$work/rebuilt.map"
 check "its points too" cmp "$work/first/map.ply" "$work/rebuilt.ply"
 check "its trajectory too" cmp "$work/first/trajectory.txt" "$work/rebuilt.txt"
 check "nothing is missing" grep -q " 0 missing" "$work/said"
-check "a part of it is a smaller map" map --log "$log" --at 2 --save "$work/part.map"
-check "... smaller" test "$(wc -c <"$work/part.map")" -lt "$(wc -c <"$work/mapper.map")"
+seconds=$(sed -nE 's/^log .* ([0-9.]+) s,.*/\1/p' "$work/said")
+for ((tenth = 1; tenth < 10; ++tenth)); do
+  map --log "$log" --at "$(awk "BEGIN { print $seconds * $tenth / 10 }")" --save "$work/part.map" >/dev/null 2>&1 && break
+done
+check "an earlier map is a smaller one" test "$(wc -c <"$work/part.map")" -lt "$(wc -c <"$work/mapper.map")"
 
 size=$(wc -c <"$log")
 head -c $((size * 2 / 3)) "$log" >"$work/cut.lcmlog"
@@ -48,6 +51,19 @@ expect "frames are localised" "$work/localized" tracked_online_percent ">= 90"
 check "the map stays as it was" cmp "$work/first/map.ply" "$work/localized/map.ply"
 check "the map goes on" "$build/bin/dmslam-inprocess" --log "$log" --map "$log" --out "$work/goes_on"
 expect "frames are tracked in it" "$work/goes_on" tracked_online_percent ">= 90"
+
+# A mapper alone makes the same map of the recorded keyframes, in one process and in two.
+check "the records are entered" "$build/bin/dmslam-inprocess" --records "$log" --session 9 --seed 3 --out "$work/records" \
+  --save-map "$work/records.map"
+check "they make the same map" cmp "$work/first/map.ply" "$work/records/map.ply"
+check "and the same trajectory" cmp "$work/first/trajectory.txt" "$work/records/trajectory.txt"
+bus=(--lcm-url "udpm://239.255.76.67:23872?ttl=0" --session 9 --peers frontend,mapper --fresh-system --set seed=3)
+"$build/bin/dmslam-mapper" "${bus[@]}" --save-map "$work/alone.map" 2>"$work/said" &
+mapper=$!
+check "the player enters them" "$build/bin/dmslam-player" "${bus[@]}" --log "$log" --channels records 2>>"$work/said"
+check "the mapper alone ends with 0" wait $mapper
+check "it saves a map" map --log "$work/alone.map" --ply "$work/alone.ply" >/dev/null
+check "the same one" cmp "$work/first/map.ply" "$work/alone.ply"
 
 # The whole log, with all its records and beacons, beside a run.
 port=23871

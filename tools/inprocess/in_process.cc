@@ -9,6 +9,7 @@
 #include "frontend/frontend_node.h"
 #include "loopcloser/loopcloser_node.h"
 #include "mapper/mapper_node.h"
+#include "player/records_node.h"
 
 namespace dmslam {
 namespace {
@@ -95,14 +96,30 @@ class System {
 
 }  // namespace
 
+int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex> log, uint32_t log_session,
+                        std::string* problem) {
+  options.node.session = options.player.session;
+  options.node.peers = {"frontend", "mapper", "collector"};
+  System system;
+  if (!options.record.empty()) system.Record(options.record);
+  system.Add(
+      std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
+  system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node, options.map_files));
+  system.Add(
+      std::make_unique<RecordsNode>(system.ContextFor("player"), options.node, std::move(log), log_session));
+  return system.Run(problem);
+}
+
 int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem) {
   options.player.mode = PlaybackMode::kLockstep;
   options.node.session = options.player.session;
   options.node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   System system;
   if (!options.record.empty()) system.Record(options.record);
-  system.Add(std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
-  system.Add(std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
+  system.Add(
+      std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
+  system.Add(
+      std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
   system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node, options.map_files));
   system.Add(std::make_unique<FrontendNode>(
       system.ContextFor("frontend"), options.node,

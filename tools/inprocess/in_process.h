@@ -4,24 +4,30 @@
 #include <string>
 
 #include "collector/collector_node.h"
+#include "dmslam/recording/log_index.h"
 #include "mapper/mapper_node.h"
 #include "player/player_node.h"
 
 namespace dmslam {
 
-/// A whole run in one process: the nodes of the four processes and of the collector on a bus in memory, in lock-step,
-/// under a virtual clock, one thread. Gives the same bytes as the processes do.
+/// A whole run in one process: the nodes of the four processes and of the collector on a bus in memory, in
+/// lock-step, under a virtual clock, one thread. Gives the same bytes as the processes do.
 struct InProcessOptions {
-  NodeOptions node;                                ///< settings; session and peers are set by the run
+  NodeOptions node;  ///< settings; session and peers are set by the run
   PlayerOptions player;
   CollectorOptions collector;
   std::shared_ptr<const Vocabulary> vocabulary;
   std::string picture_dir;
   int picture_every = 0;
   bool progress = false;
-  MapperNode::Files map_files;                     ///< maps to begin with and to save
-  std::string record;                              ///< log of all that is said; empty: none
+  MapperNode::Files map_files;  ///< maps to begin with and to save
+  std::string record;           ///< log of all that is said; empty: none
 };
+
+/// Returns the collector's exit code; what went wrong is in `problem`. Instead of frames the frontend's
+/// records of a log are entered: mapper and collector alone.
+int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex> log, uint32_t log_session,
+                        std::string* problem);
 
 /// Returns the collector's exit code; what went wrong is in `problem`.
 int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem);

@@ -15,7 +15,7 @@
 namespace {
 
 struct Arguments {
-  std::string sequence, log, record, out, camera, config, vocabulary, profile;
+  std::string sequence, log, records, record, out, camera, config, vocabulary, profile;
   uint32_t log_session = 0;
   std::vector<std::string> overrides, black_outs, jumps;
   size_t start = 0, frames = SIZE_MAX;
@@ -30,6 +30,8 @@ void Declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", dmslam::kVersion);
   app.add_option("--sequence", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
   app.add_option("--log", a.log, "log of lcm-logger: its frames are played");
+  app.add_option("--records", a.records,
+                 "such a log: its keyframes are entered, without images and without a frontend");
   app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
   app.add_option("--record", a.record, "write all that is said into this log");
   app.add_option("--out", a.out, "folder for the results")->required();
@@ -45,7 +47,8 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--pictures", a.pictures, "draw every so manieth frame");
   app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
   app.add_option("--map", a.map_files.load, "saved map or log: begin in this map");
-  app.add_flag("--localize", a.localize, "with --map: find the camera in the map, and leave the map as it is");
+  app.add_flag("--localize", a.localize,
+               "with --map: find the camera in the map, and leave the map as it is");
   app.add_option("--save-map", a.map_files.save, "write the map into this file at the end");
   app.add_option("--session", a.session, "of this run; default: 1, with --map one more than the map's");
   app.add_flag("--no-loop", a.no_loop, "do not close loops");
@@ -58,7 +61,9 @@ dmslam::Camera ChooseCamera(const Arguments& a) {
 }
 
 std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOptions* player) {
-  if (a.sequence.empty() == a.log.empty()) throw dmslam::InputError("give either --sequence or --log");
+  if (!a.records.empty()) return nullptr;
+  if (a.sequence.empty() == a.log.empty())
+    throw dmslam::InputError("give one of --sequence, --log and --records");
   if (a.log.empty()) {
     player->sequence = a.sequence;
     player->camera = ChooseCamera(a);
@@ -95,13 +100,16 @@ int Run(const Arguments& a) {
   for (const std::string& text : a.black_outs) options.player.black_outs.push_back(dmslam::ParseBlackOut(text));
   for (const std::string& text : a.jumps) options.player.jumps.push_back(dmslam::ParseJump(text));
   options.collector.out_dir = a.out;
-  options.collector.ground_truth = source->GroundTruthPath().value_or("");
+  options.collector.ground_truth = source ? source->GroundTruthPath().value_or("") : "";
   options.vocabulary = dmslam::LoadVocabulary(a.vocabulary);
   options.picture_every = a.pictures;
   options.picture_dir = a.out + "/pictures";
   std::filesystem::create_directories(a.pictures > 0 ? options.picture_dir : a.out);
   std::string problem;
-  const int code = dmslam::RunInProcess(std::move(options), std::move(source), &problem);
+  const int code = source ? dmslam::RunInProcess(std::move(options), std::move(source), &problem)
+                          : dmslam::RunRecordsInProcess(std::move(options),
+                                                        std::make_shared<const dmslam::LogIndex>(a.records),
+                                                        a.log_session, &problem);
   if (!problem.empty()) spdlog::error("{}", problem);
   return code;
 }
@@ -109,7 +117,8 @@ int Run(const Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs frontend, mapper, loop closer and player in one process, in lock-step.", "dmslam-inprocess");
+  CLI::App app("Runs frontend, mapper, loop closer and player in one process, in lock-step.",
+               "dmslam-inprocess");
   Arguments arguments;
   Declare(app, arguments);
   CLI11_PARSE(app, argc, argv);

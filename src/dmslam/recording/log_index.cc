@@ -67,6 +67,7 @@ std::optional<Message> LogIndex::Decode(std::span<const uint8_t> bytes) {
 void LogIndex::Add(const LogEvent& event, Parts* parts) {
   RecordedMessage message;
   message.utime_us = event.utime_us;
+  message.order = num_messages_;
   message.offset = event.offset;
   message.channel = WithoutPrefix(event.channel);
   if (message.channel == channels::kFrame) {

@@ -15,6 +15,7 @@ namespace dmslam {
 /// A message of a log: where it stands, or its bytes where it was put together from parts.
 struct RecordedMessage {
   int64_t utime_us = 0;  ///< wall time at which the logger received (the last part of) it
+  int64_t order = 0;     ///< counts the messages of the log
   int64_t offset = -1;   ///< in the log; -1: see `bytes`
   std::string channel;   ///< without prefix
   SharedBytes bytes;     ///< null unless it travelled in parts

@@ -12,23 +12,6 @@ namespace {
 
 constexpr size_t kPieceBytes = 56 * 1024;
 
-/// What the frontend said of itself, or where that was not recorded what the player said of its camera.
-std::optional<SessionStart> FindSessionStart(const LogIndex& log, const RecordedSession& session) {
-  for (const auto& [term, recorded] : session.Stream(StreamId::kFrontend)) {
-    for (const auto& [seq, message] : recorded.records) {
-      if (message.channel != channels::kSession) continue;
-      if (auto start = wire::Decode<SessionStart>(log.Read(message))) return start;
-    }
-  }
-  if (!session.camera_info) return std::nullopt;
-  SessionStart start;
-  start.session = session.id;
-  start.camera = session.camera_info->camera;
-  start.sequence = session.camera_info->sequence;
-  start.mode = session.camera_info->mode;
-  return start;
-}
-
 template <typename Message>
 void WriteRecord(EventLogWriter* log, int64_t utime_us, RecordHeader header, const Message& message) {
   const char* channel = wire::Info<Message>().channel;
@@ -61,6 +44,22 @@ std::map<MapId, size_t> KeyframesOfMaps(const Map& map) {
 }
 
 }  // namespace
+
+std::optional<SessionStart> FindSessionStart(const LogIndex& log, const RecordedSession& session) {
+  for (const auto& [term, recorded] : session.Stream(StreamId::kFrontend)) {
+    for (const auto& [seq, message] : recorded.records) {
+      if (message.channel != channels::kSession) continue;
+      if (auto start = wire::Decode<SessionStart>(log.Read(message))) return start;
+    }
+  }
+  if (!session.camera_info) return std::nullopt;
+  SessionStart start;
+  start.session = session.id;
+  start.camera = session.camera_info->camera;
+  start.sequence = session.camera_info->sequence;
+  start.mode = session.camera_info->mode;
+  return start;
+}
 
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us) {
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);

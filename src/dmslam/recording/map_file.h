@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "dmslam/map/map.h"
@@ -18,6 +19,9 @@ struct RebuiltMap {
   uint64_t skipped = 0;  ///< what records said of keyframes and landmarks that are not there, because of that
   bool ended = false;    ///< the mapper had done all it wanted to do
 };
+
+/// What the frontend said of itself when it began, or where that was not recorded what the player said of its camera.
+std::optional<SessionStart> FindSessionStart(const LogIndex& log, const RecordedSession& session);
 
 /// Builds the map of a session from its recorded map records, up to `until_us` of wall time. With all records
 /// in the log it is the mapper's own map at that time. Throws InputError when the log holds no map of the

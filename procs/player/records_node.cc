@@ -1,0 +1,190 @@
+#include "player/records_node.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+
+#include "dmslam/recording/map_file.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kInfoEveryNs = 500'000'000;
+
+}  // namespace
+
+RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_ptr<const LogIndex> log,
+                         uint32_t session)
+    : StreamNode(std::move(context), std::move(options), "frontend"),
+      log_(std::move(log)),
+      recorded_(Camera(), Pyramid()),
+      live_(Camera(), Pyramid()) {
+  const RecordedSession& recorded = log_->Session(session);
+  const std::optional<SessionStart> start = FindSessionStart(*log_, recorded);
+  records_ = PlanReplay(recorded.Stream(StreamId::kFrontend));
+  map_records_ = PlanReplay(recorded.Stream(StreamId::kMap));
+  if (!start || records_.steps.empty()) {
+    throw InputError(log_->path() + ": holds no records of a frontend; was the frontend recorded too?");
+  }
+  if (records_.missing > 0) {
+    spdlog::warn("{}: {} records of the frontend are missing in it", log_->path(), records_.missing);
+  }
+  recorded_ = Map(start->camera, start->pyramid);
+  live_ = recorded_;
+  if (session_ == 0) session_ = recorded.id + 1;
+  CameraInfo info;
+  info.session = session_;
+  info.camera = start->camera;
+  info.sequence = start->sequence;
+  info.mode = PlaybackMode::kLockstep;
+  camera_info_ = info;
+}
+
+void RecordsNode::PublishCameraInfo() {
+  camera_info_->utime = context_.wall_us();
+  PublishLoose(*camera_info_);
+  next_info_ns_ = context_.now_ns() + kInfoEveryNs;
+}
+
+void RecordsNode::Begin(const CameraInfo&) {
+  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
+  PublishCameraInfo();
+}
+
+/// Up to a settled record, so that what is translated does not depend on how fast the mapper was.
+void RecordsNode::TakeMapRecords() {
+  while (std::optional<Record> record = map_reader_->Take()) {
+    if (record->begins_anew()) {
+      held_.clear();
+      live_ = Map(live_.camera(), live_.pyramid());
+    }
+    if (auto delta = Read<MapDelta>(*record->bytes)) held_.push_back(std::move(*delta));
+    const bool settled = !held_.empty() && (held_.back().event == MapEvent::kSettled || finished_);
+    while (settled && !held_.empty()) {
+      live_.Apply(held_.front());
+      if (held_.front().event == MapEvent::kSettled && held_.front().about == awaited_) awaited_ = {};
+      held_.pop_front();
+    }
+    map_reader_->AcceptTaken();
+  }
+}
+
+bool RecordsNode::WorkOnce() {
+  if (context_.now_ns() >= next_info_ns_) PublishCameraInfo();
+  TakeMapRecords();
+  if (finished_) {
+    if (!options_.HasPeer("mapper") || MapIsOver(live_, *map_reader_)) Stop();
+    return false;
+  }
+  if (awaited_.valid()) return false;
+  if (next_record_ == records_.steps.size()) return Finish();
+  const RecordedMessage& message = *records_.steps[next_record_++].message;
+  AdvanceRecordedMap(message.order);
+  Enter(message);
+  return true;
+}
+
+void RecordsNode::AdvanceRecordedMap(int64_t until_order) {
+  for (; next_map_record_ < map_records_.steps.size(); ++next_map_record_) {
+    const ReplayStep& step = map_records_.steps[next_map_record_];
+    if (step.message->order > until_order) return;
+    if (step.begins_anew) recorded_ = Map(recorded_.camera(), recorded_.pyramid());
+    if (const auto delta = Read<MapDelta>(log_->Read(*step.message))) recorded_.Apply(*delta);
+  }
+}
+
+void RecordsNode::Enter(const RecordedMessage& message) {
+  const Bytes bytes = log_->Read(message);
+  if (message.channel == channels::kSession) {
+    if (auto start = Read<SessionStart>(bytes)) {
+      start->session = session_;
+      start->mode = PlaybackMode::kLockstep;
+      PublishRecord(*start);
+    }
+  } else if (message.channel == channels::kInitialMap) {
+    if (const auto proposal = Read<InitialMap>(bytes)) {
+      awaited_ = proposal->second.id;
+      ++keyframes_;
+      PublishRecord(*proposal);
+    }
+  } else if (message.channel == channels::kKeyframe) {
+    if (auto proposal = Read<KeyframeProposal>(bytes)) {
+      Translate(&*proposal);
+      awaited_ = proposal->id;
+      ++keyframes_;
+      PublishRecord(*proposal);
+    }
+  } else if (message.channel == channels::kFrameEvidence) {
+    if (auto evidence = Read<FrameEvidence>(bytes)) {
+      Translate(&*evidence);
+      if (!evidence->items.empty()) PublishRecord(*evidence);
+    }
+  } else if (message.channel == channels::kMapReset) {
+    if (const auto reset = Read<MapReset>(bytes)) PublishRecord(*reset);
+  } else if (message.channel == channels::kFramePose) {
+    if (const auto pose = Read<FramePose>(bytes)) PublishRecord(*pose);
+  }
+}
+
+/// The landmark that most of the recorded one's features see in the map of now; none if they see none. Where
+/// both maps are the same it keeps its name, whatever became of it.
+LandmarkId RecordsNode::Translate(LandmarkId recorded) const {
+  const std::optional<LandmarkId> known = recorded_.Resolve(recorded);
+  const Landmark* landmark = known ? recorded_.FindLandmark(*known) : nullptr;
+  const std::optional<LandmarkId> namesake = live_.Resolve(recorded);
+  if (landmark == nullptr) return namesake ? LandmarkId{} : recorded;
+  std::map<LandmarkId, int> votes;
+  for (const Observation& observation : landmark->observations) {
+    const Keyframe* keyframe = live_.FindKeyframe(observation.keyframe);
+    if (keyframe == nullptr || observation.feature >= keyframe->landmarks.size()) continue;
+    if (const LandmarkId now = keyframe->landmarks[observation.feature]; now.valid()) ++votes[now];
+  }
+  if (namesake && votes.contains(*namesake)) return recorded;
+  const auto most =
+      std::max_element(votes.begin(), votes.end(), [](auto& a, auto& b) { return a.second < b.second; });
+  return most == votes.end() ? LandmarkId{} : most->first;
+}
+
+void RecordsNode::Translate(KeyframeProposal* proposal) {
+  std::vector<KeyframeProposal::Match> matches;
+  for (const KeyframeProposal::Match& match : proposal->matches) {
+    const LandmarkId now = Translate(match.landmark);
+    const bool taken =
+        std::any_of(matches.begin(), matches.end(), [&](const auto& m) { return m.landmark == now; });
+    if (now.valid() && !taken) {
+      matches.push_back({match.feature, now});
+    } else {
+      ++dropped_;
+    }
+  }
+  proposal->matches = std::move(matches);
+}
+
+void RecordsNode::Translate(FrameEvidence* evidence) {
+  std::map<LandmarkId, FrameEvidence::Item> items;
+  for (const FrameEvidence::Item& item : evidence->items) {
+    const LandmarkId now = Translate(item.landmark);
+    if (!now.valid()) continue;
+    FrameEvidence::Item& sum = items[now];
+    sum.landmark = now;
+    sum.visible = static_cast<uint16_t>(std::min(0xffff, sum.visible + item.visible));
+    sum.found = static_cast<uint16_t>(std::min(0xffff, sum.found + item.found));
+    sum.moved = static_cast<uint16_t>(std::min(0xffff, sum.moved + item.moved));
+    sum.chi2_sum += item.chi2_sum;
+  }
+  evidence->items.clear();
+  for (const auto& [id, item] : items) evidence->items.push_back(item);
+}
+
+bool RecordsNode::Finish() {
+  spdlog::info("{} keyframes entered; {} of their matches are with landmarks that this map does not have",
+               keyframes_, dropped_);
+  writer_->Complete(context_.now_ns());
+  finished_ = true;
+  return true;
+}
+
+}  // namespace dmslam
