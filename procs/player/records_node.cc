@@ -142,7 +142,8 @@ LandmarkId RecordsNode::Translate(LandmarkId recorded) const {
     if (keyframe == nullptr || observation.feature >= keyframe->landmarks.size()) continue;
     if (const LandmarkId now = keyframe->landmarks[observation.feature]; now.valid()) ++votes[now];
   }
-  if (namesake && votes.contains(*namesake)) return recorded;
+  const bool unseen = landmark->observations.empty() && namesake && live_.FindLandmark(*namesake)->observations.empty();
+  if (unseen || (namesake && votes.contains(*namesake))) return recorded;
   const auto most =
       std::max_element(votes.begin(), votes.end(), [](auto& a, auto& b) { return a.second < b.second; });
   return most == votes.end() ? LandmarkId{} : most->first;
