@@ -26,15 +26,17 @@ def main():
     for name in ("top", "sequence", "work", "out"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--theme", default="dark")
+    parser.add_argument("--build-dir", default="", help="where the programs are; default: built where needed")
     options = parser.parse_args()
     with open(os.path.join(options.sequence, "rgb.txt"), encoding="utf-8") as listed:
         frames = sum(1 for line in listed if line.strip() and not line.startswith("#"))
     log = os.path.join(options.work, "run.log")
     camera = os.path.join(options.top, "config/synthetic.yaml")
+    build = ["--build-dir", options.build_dir] if options.build_dir else []
     with open(log, "w", encoding="utf-8") as said:
         run = subprocess.Popen(
             [os.path.join(options.top, "scripts/run.sh"), "--sequence", options.sequence, "--camera", camera, "--lockstep",
-             "--http", "127.0.0.1:0", "--out", os.path.join(options.work, "out")], stdin=subprocess.DEVNULL, stdout=said, stderr=said)
+             "--http", "127.0.0.1:0", *build, "--out", os.path.join(options.work, "out")], stdin=subprocess.DEVNULL, stdout=said, stderr=said)
         address = address_of(log, run)
     with Browser(width=1440, height=900) as page:
         page.open(address + "?theme=" + options.theme)
