@@ -19,16 +19,18 @@ A step that is done (DIR/<step>/done) is not done again; remove DIR to begin ane
   --data DIR          the kitchen sequences (default: \$DMSLAM_DATA, else ../shared/data); without them those steps are skipped
   --only PATTERN      only the steps whose name matches, as 'kitchen*'
   --fuzz-seconds N    per target (default 60)
+  --soak              also the sequence forwards and backwards for an hour
   --list              names the steps
 EOF
 }
 say() { echo "nightly: $*" >&2; }
 die() { say "$*"; exit 1; }
-list=0
+list=0 soak=0
 while (($#)); do
   case $1 in
     -h | --help) usage; exit 0 ;;
     --list) list=1; shift ;;
+    --soak) soak=1; shift ;;
     --out | --data | --only | --fuzz-seconds)
       (($# > 1)) || die "$1 needs a value; see --help"
       name=${1#--}
@@ -74,6 +76,26 @@ step_viewer() { # a large map in a browser without a graphics processor
 }
 step_localize() { "$top/scripts/localize.sh" --out "$1" --data "$data"; }
 step_replay() { "$top/scripts/replay.sh" --out "$1" --data "$data"; }
+step_kills() { # FOLDER SEQUENCE: processes die, and the run goes on
+  local tracked=90
+  [[ $2 == kitchen ]] || tracked=85
+  "$top/scripts/kill_test.sh" --sequence "$data/$2" --camera "$top/config/kitchen.yaml" --min-tracked "$tracked" --out "$1"
+}
+step_twohosts() { # a link that drops 0, 5 and 20 % of the packets, and a mapper that moves to the other host
+  local play=("$top/scripts/two_hosts.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml")
+  "${play[@]}" --out "$1/drops" && "${play[@]}" --lockstep --drop 5 --move-mapper 15 --out "$1/moved"
+}
+step_noise() { # 10^6 hostile messages, 20,000 a second
+  local port=$((20000 + RANDOM % 30000)) noise status=0
+  "$top/build/release/bin/dmslam-noise" --lcm-url "udpm://239.255.76.67:$port?ttl=0" --count 1000000 --rate 20000 &
+  noise=$!
+  "$top/scripts/run.sh" --share-port --port "$port" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml" --lockstep \
+    --seed 1 --out "$1" || status=$?
+  kill -TERM "$noise" 2>/dev/null || true
+  ((status == 0)) && cmp "$1/trajectory.txt" "$out/kitchen_1/trajectory.txt"
+}
+step_mutations() { "$top/scripts/fuzz.sh" --mutations 10000000 messages; }
+step_soak() { "$top/scripts/soak.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml" --out "$1"; }
 step_fuzz() { "$top/scripts/fuzz.sh" --seconds "$fuzz_seconds"; }
 
 steps=("tests")
@@ -83,10 +105,12 @@ for name in walk1 walk2; do
   for ((seed = 1; seed <= SEEDS; ++seed)); do steps+=("${name}_$seed $seed"); done
 done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
-steps+=("localize" "replay" "viewer" "sanitizers" "fuzz")
+steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "noise" "localize" "replay" "viewer" "sanitizers" "fuzz" "mutations")
+((EUID != 0)) || steps+=("twohosts") # it makes network namespaces
+((soak == 0)) || steps+=("soak")
 if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi
 
-needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|localize|replay) ]]; }
+needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|localize|replay|kills|noise|twohosts|soak) ]]; }
 run_step() { # NAME [ARGUMENT]
   local folder=$out/$1 status=0
   [[ ! -e $folder/done ]] || return 0

@@ -126,7 +126,7 @@ void MapperNode::OnWriterOpen() {
 
 void MapperNode::PublishDelta(const MapDelta& delta) {
   PublishRecord(delta);
-  endpoint_.Advance();
+  PumpWithinWork();
   const double elapsed_ms = static_cast<double>(context_.now_ns() - keyframe_begin_ns_) * 1e-6;
   if (delta.event == MapEvent::kLandmarksCreated) to_landmarks_.Add(elapsed_ms);
   if (delta.event == MapEvent::kAdjusted) to_adjusted_.Add(elapsed_ms);
