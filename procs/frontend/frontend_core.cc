@@ -208,7 +208,8 @@ void FrontendCore::Track(std::vector<FrontendEvent>* events) {
   if (!report.ok && state_ != TrackingState::kTrial) {
     tracker_.SetMotionPrior(std::nullopt, 1.0);
     TrackedFrame attempt(frame_.index, frame_.stamp_ns, frame_.features);
-    if (relocalizer_.Relocalize(map_, map_id_, DeriveSeed(seed_, frame_.index, "relocalize"), &tracker_, &attempt)) {
+    const uint64_t seed = DeriveSeed(seed_, frame_.index, "relocalize");
+    if (relocalizer_.Relocalize(map_, map_id_, last_placed_.reference, seed, &tracker_, &attempt)) {
       frame_ = std::move(attempt);
       report = tracker_.TrackLocalMap(map_, true, &frame_);
       if (report.ok) {
@@ -371,7 +372,7 @@ bool FrontendCore::LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighb
     }
   }
   frame->ClearMatches();
-  return relocalizer_.Relocalize(map_, 0, DeriveSeed(seed_, frame->index, "later"), &tracker_, frame) &&
+  return relocalizer_.Relocalize(map_, 0, {}, DeriveSeed(seed_, frame->index, "later"), &tracker_, frame) &&
          tracker_.TrackLocalMap(map_, true, frame).ok;
 }
 

@@ -1,5 +1,8 @@
 #include "frontend/relocalizer.h"
 
+#include <algorithm>
+#include <optional>
+
 #include "dmslam/robust/pose_from_matches.h"
 #include "dmslam/util/random.h"
 
@@ -10,6 +13,7 @@ constexpr size_t kMaxCandidates = 8;
 constexpr size_t kMinWordMatches = 15;
 constexpr int kMinInliers = 12;
 constexpr int kMinCovisibility = 15;
+constexpr int kNeighboursOfLast = 4;
 
 }  // namespace
 
@@ -20,11 +24,19 @@ void Relocalizer::Clear() { places_.Clear(); }
 
 void Relocalizer::Update(const Map& map) { places_.Update(map); }
 
-std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, const BowImage& image) const {
+std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
+                                                const BowImage& image) const {
   const auto of_another_map = [&](const Keyframe& keyframe) { return map_id != 0 && keyframe.map_id != map_id; };
   std::vector<KeyframeId> ids;
   for (const PlaceCandidate& candidate : places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
     if (ids.size() < kMaxCandidates) ids.push_back(candidate.keyframe);
+  }
+  const auto add = [&](KeyframeId id) {
+    if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  };
+  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) {
+    add(*last);
+    for (const KeyframeId id : map.BestCovisible(*last, kNeighboursOfLast, kMinCovisibility)) add(id);
   }
   return ids;
 }
@@ -56,10 +68,11 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
   return true;
 }
 
-bool Relocalizer::Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, TrackedFrame* frame) const {
+bool Relocalizer::Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed, PoseTracker* tracker,
+                             TrackedFrame* frame) const {
   if (!places_.usable()) return false;
   const BowImage image = places_.Transform(frame->features->set);
-  for (const KeyframeId id : Candidates(map, map_id, image)) {
+  for (const KeyframeId id : Candidates(map, map_id, last_seen, image)) {
     if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
     if (tracker->TrackLocalMap(map, true, frame).ok) return true;
   }

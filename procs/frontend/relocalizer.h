@@ -20,10 +20,12 @@ class Relocalizer {
   void Update(const Map& map);
   void Clear();
   /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
-  bool Relocalize(const Map& map, MapId map_id, uint64_t seed, PoseTracker* tracker, TrackedFrame* frame) const;
+  /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours.
+  bool Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed, PoseTracker* tracker,
+                  TrackedFrame* frame) const;
 
  private:
-  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, const BowImage& image) const;
+  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen, const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed, TrackedFrame* frame) const;
 
   Camera camera_;

@@ -94,25 +94,29 @@ std::vector<uint16_t> KeyframeDatabase::CountCommon(const BowVector& words) cons
 
 std::vector<PlaceCandidate> KeyframeDatabase::Score(const BowVector& words, const PlaceQuery& query) const {
   const std::vector<uint16_t> common = CountCommon(words);
-  // Keyframes with most words in common first (ties: the newer one, whatever its slot). Exclusion is asked
-  // only of those that could matter.
-  std::vector<std::tuple<int, KeyframeId, Slot>> sharing;
+  // Keyframes with most words in common first (ties: the newer one, whatever its slot), as if none had more words
+  // than the query: who has twice the words has twice as many in common by chance. Exclusion is asked only of
+  // those that could matter.
+  std::vector<std::tuple<double, KeyframeId, Slot>> sharing;
   for (Slot slot = 0; slot < common.size(); ++slot) {
-    if (common[slot] > 0) sharing.emplace_back(common[slot], entries_[slot].id, slot);
+    if (common[slot] == 0) continue;
+    const double excess = static_cast<double>(std::max(entries_[slot].words.size(), words.size())) /
+                          static_cast<double>(words.size());
+    sharing.emplace_back(common[slot] / excess, entries_[slot].id, slot);
   }
   std::vector<PlaceCandidate> scored;
   std::make_heap(sharing.begin(), sharing.end());
-  int most = 0;
+  double most = 0;
   while (!sharing.empty() && scored.size() < options_.max_scored) {
     std::pop_heap(sharing.begin(), sharing.end());
-    const auto [count, id, slot] = sharing.back();
+    const auto [rank, id, slot] = sharing.back();
     sharing.pop_back();
-    if (count < options_.min_common_share * most) break;
+    if (rank < options_.min_common_share * most) break;
     const Entry& entry = entries_[slot];
     if (query.excluded && query.excluded(entry.id)) continue;
-    most = std::max(most, count);
+    most = std::max(most, rank);
     const double score = L1Score(words, entry.words);
-    if (score >= query.min_score) scored.push_back({entry.id, score, score, count});
+    if (score >= query.min_score) scored.push_back({entry.id, score, score, common[slot]});
   }
   std::sort(scored.begin(), scored.end(),
             [](const PlaceCandidate& a, const PlaceCandidate& b) { return a.keyframe < b.keyframe; });
