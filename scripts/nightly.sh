@@ -96,6 +96,11 @@ step_noise() { # 10^6 hostile messages, 20,000 a second
 }
 step_mutations() { "$top/scripts/fuzz.sh" --mutations 10000000 messages; }
 step_soak() { "$top/scripts/soak.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml" --out "$1"; }
+step_loops() { # keeps what was played beside the step's folder, so that it continues where it was stopped
+  "$top/scripts/loops.sh" --out "$out/loops_played" --seeds "$SEEDS"
+  ! grep -qE 'missed|not tracked|/ [1-9]' "$out/loops_played/table.md"
+}
+step_lost() { "$top/scripts/lost.sh" --out "$1" --data "$data"; }
 step_fuzz() { "$top/scripts/fuzz.sh" --seconds "$fuzz_seconds"; }
 
 steps=("tests")
@@ -105,12 +110,13 @@ for name in walk1 walk2; do
   for ((seed = 1; seed <= SEEDS; ++seed)); do steps+=("${name}_$seed $seed"); done
 done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
+steps+=("lost" "loops")
 steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "noise" "localize" "replay" "viewer" "sanitizers" "fuzz" "mutations")
 ((EUID != 0)) || steps+=("twohosts") # it makes network namespaces
 ((soak == 0)) || steps+=("soak")
 if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi
 
-needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|localize|replay|kills|noise|twohosts|soak) ]]; }
+needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|localize|replay|kills|noise|twohosts|soak|lost) ]]; }
 run_step() { # NAME [ARGUMENT]
   local folder=$out/$1 status=0
   [[ ! -e $folder/done ]] || return 0
