@@ -236,7 +236,8 @@ why() {
 # Nobody waits for the viewer, and its end is nobody's failure.
 open_viewer() {
   local i address="" log="$out/log/viewer.log"
-  "${guard[@]}" "$bin/dmslam-viewer" "${common[@]}" "${http[@]}" "${ground_truth[@]}" </dev/null >"$log" 2>&1 &
+  : >"$log"
+  "${guard[@]}" "$bin/dmslam-viewer" "${common[@]}" "${http[@]}" "${ground_truth[@]}" </dev/null >>"$log" 2>&1 &
   viewer_pid=$!
   for ((i = 0; i < 100; ++i)); do
     address=$(sed -nE 's/.*to be seen at (http[^ ]*).*/\1/p' "$log")
