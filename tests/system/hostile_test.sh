@@ -7,7 +7,7 @@ sequence=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --seed 
 check "the run ends with 0" run "${sequence[@]}" --out "$work/quiet" --port 23401
 "$build/bin/dmslam-noise" --lcm-url "udpm://239.255.76.67:23402?ttl=0" --rate 2000 --count 1000000 >"$work/noise" 2>&1 &
 noise=$!
-check "the run in noise ends with 0" run "${sequence[@]}" --out "$work/noisy" --port 23402
+check "the run in noise ends with 0" run "${sequence[@]}" --out "$work/noisy" --port 23402 --share-port
 kill -TERM "$noise" 2>/dev/null
 wait "$noise"
 for file in trajectory.txt trajectory_online.txt keyframes.txt map.ply; do
