@@ -168,12 +168,13 @@ export class SeriesPanel {
     if (series.run !== this.run || series.end < this.end) {
       const anew = this.run !== 0 && this.end !== 0;
       this.clear(series.run);
-      if (anew) return;
+      if (anew) return this.poll();  // from the beginning
     }
-    if (series.end === this.end) return;
+    if (series.end === this.end) return undefined;
     for (const key of Object.keys(this.data)) this.data[key].push(...series[key]);
     this.end = series.end;
     this.draw();
+    return undefined;
   }
 
   draw() {
