@@ -8,6 +8,7 @@ void TrajectoryBuilder::OnFramePose(const FramePose& pose) {
   const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
   if (inserted) return;
   const bool later = pose.state == TrackingState::kLocalizedLater;
+  if (later && pose.HasPose() && it->second.HasPose()) refined_[pose.frame_index] = pose;
   if (!it->second.HasPose() || (pose.HasPose() && !later)) it->second = pose;
 }
 
@@ -32,15 +33,19 @@ TrajectoryBuilder::Trajectories TrajectoryBuilder::Build() const {
   }
   for (const auto& [index, pose] : poses_) {
     if (MapOfFrame(pose) != result.map_id || result.map_id == 0) continue;
-    const Map::ResolvedPose reference = *map_.ResolvePose(pose.reference);
-    const Rigid3d T_cam_world = reference.Compose(pose.T_cam_reference, pose.reference_scale);
+    const auto later = refined_.find(index);
+    const FramePose& best =
+        later != refined_.end() && MapOfFrame(later->second) == result.map_id ? later->second : pose;
+    const Map::ResolvedPose reference = *map_.ResolvePose(best.reference);
+    const Rigid3d T_cam_world = reference.Compose(best.T_cam_reference, best.reference_scale);
     result.final.push_back({pose.stamp_ns, T_cam_world.Inverse()});
     if (pose.state != TrackingState::kLocalizedLater) {
       result.online.push_back({pose.stamp_ns, pose.T_cam_world.Inverse()});
     }
   }
   for (const auto& [id, keyframe] : map_.keyframes()) {
-    if (keyframe.map_id == result.map_id) result.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
+    if (keyframe.map_id == result.map_id)
+      result.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
   }
   return result;
 }

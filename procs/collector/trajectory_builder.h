@@ -26,9 +26,9 @@ class TrajectoryBuilder {
   void ForgetMap() { map_ = Map(map_.camera(), map_.pyramid()); }
 
   struct Trajectories {
-    MapId map_id = 0;                     ///< the map that holds most frames
-    std::vector<StampedPose> final;       ///< every placed frame, by its reference keyframe's final pose
-    std::vector<StampedPose> online;      ///< as tracked, frames of a map that survived
+    MapId map_id = 0;                 ///< the map that holds most frames
+    std::vector<StampedPose> final;   ///< every placed frame, by its reference keyframe's final pose
+    std::vector<StampedPose> online;  ///< as tracked, frames of a map that survived
     std::vector<StampedPose> keyframes;
     std::vector<std::pair<MapId, size_t>> other_maps;  ///< and how many frames they hold
   };
@@ -42,7 +42,9 @@ class TrajectoryBuilder {
   MapId MapOfFrame(const FramePose& pose) const;
 
   Map map_;
-  std::map<uint32_t, FramePose> poses_;  ///< by frame index; a later placement does not replace an online one
+  std::map<uint32_t, FramePose>
+      poses_;  ///< by frame index; a later placement does not replace an online one...
+  std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory
 };
 
 }  // namespace dmslam

@@ -195,6 +195,10 @@ std::vector<Entry> MappingEntries() {
            [](Settings& s) -> auto& { return s.mapper.creation.alpha; }, 0, 100),
       Make("mapping.min_candidates", "candidates that are always allowed",
            [](Settings& s) -> auto& { return s.mapper.creation.min_candidates; }, 0, 10000),
+      Make("mapping.confirmed_views", "points seen in so many views for a second are free of the bound and the neighbourhood; 0: none",
+           [](Settings& s) -> auto& { return s.mapper.creation.confirmed_views; }, 0, 100),
+      Make("mapping.seen_through", "landmarks go that other keyframes see through (people who stood)",
+           [](Settings& s) -> auto& { return s.mapper.seen_through.enabled; }),
       Make("mapping.local_keyframes", "keyframes adjusted at a time",
            [](Settings& s) -> auto& { return s.mapper.local_keyframes; }, 2, 1000),
       Make("mapping.redundant_share", "a keyframe goes when so much of it is seen by three others",
@@ -223,6 +227,7 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   settings->profile = std::string(name);
   const bool dm = name == "dm";
   settings->mapper.creation.mutual_exclusion = dm;
+  settings->mapper.seen_through.enabled = dm;
   settings->frontend.tracking.motion_belief = dm;
   settings->frontend.initializer_method = dm ? "dlrsac" : "ransac";
 }

@@ -14,6 +14,9 @@ namespace {
 constexpr int64_t kNsPerSecond = 1'000'000'000;
 constexpr double kPredictionValid_s = 0.5;  // how long after the last pose the motion model is still tried
 constexpr int kLostAfterFrames = 10;
+constexpr uint32_t kNearFrames = 10;        // a placed frame so near bounds where a frame may be
+constexpr double kMaxShiftPerFrame = 0.05;  // share of the scene's depth
+constexpr double kMaxTurnPerFrame_rad = 0.1;
 
 int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * static_cast<double>(kNsPerSecond)); }
 
@@ -36,6 +39,7 @@ FrontendCore::FrontendCore(Setup setup)
       seed_(setup.seed),
       localize_only_(setup.localize_only),
       map_(setup.camera, setup.pyramid),
+      refiner_(setup.camera, setup.pyramid, static_cast<size_t>(setup.options.max_refined_frames)),
       extractor_(setup.extractor),
       first_map_extractor_(WithMoreFeatures(setup.extractor, setup.options.initializer_feature_factor)),
       initializer_options_(setup.initializer),
@@ -54,7 +58,8 @@ FrontendCore::FirstMapSearch FrontendCore::MakeInitializer() const {
   }
   InitializerOptions options = initializer_options_;
   options.method = options_.initializer_method;
-  auto initializer = std::make_shared<Initializer>(options, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
+  auto initializer =
+      std::make_shared<Initializer>(options, camera_, seed_, AdjustInitialMap(camera_.Ideal()));
   return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
 }
 
@@ -107,7 +112,8 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
   }
 }
 
-// ---- Initialisation ------------------------------------------------------------------------------------------------
+// ---- Initialisation
+// ------------------------------------------------------------------------------------------------
 
 void FrontendCore::KeepUnplaced() {
   unplaced_.push_back(frame_);
@@ -170,7 +176,8 @@ TrackedFrame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {
   return frame;
 }
 
-// ---- Tracking ------------------------------------------------------------------------------------------------------
+// ---- Tracking
+// ------------------------------------------------------------------------------------------------------
 
 std::optional<Rigid3d> FrontendCore::PredictPose() const {
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(last_placed_.reference);
@@ -228,7 +235,8 @@ void FrontendCore::Track(std::vector<FrontendEvent>* events) {
   }
 }
 
-std::optional<FrontendCore::Placed> FrontendCore::Place(const Rigid3d& T_cam_world, KeyframeId reference) const {
+std::optional<FrontendCore::Placed> FrontendCore::Place(const Rigid3d& T_cam_world,
+                                                        KeyframeId reference) const {
   const Keyframe* keyframe = map_.FindKeyframe(reference);
   if (keyframe == nullptr) return std::nullopt;
   return Placed{reference, T_cam_world * keyframe->T_cam_world.Inverse(), keyframe->scale};
@@ -251,11 +259,14 @@ void FrontendCore::OnTracked(const TrackingReport& report, std::vector<FrontendE
   if (successive && last_pose) velocity_ = frame_.T_cam_world * last_pose->Inverse();
   last_placed_ = *placed;
   last_tracked_ns_ = frame_.stamp_ns;
-  if (state_ != TrackingState::kTrial || frame_.stamp_ns >= trial_until_ns_) state_ = TrackingState::kTracking;
+  if (state_ != TrackingState::kTrial || frame_.stamp_ns >= trial_until_ns_)
+    state_ = TrackingState::kTracking;
   const bool keyframe = WantsKeyframe(report);
   if (++frames_since_evidence_ >= options_.evidence_every_frames || keyframe) FlushEvidence(events);
   if (keyframe) ProposeKeyframe(events);
-  events->push_back(MakePose(state_, report));
+  FramePose pose = MakePose(state_, report);
+  refiner_.Keep(frame_, pose);
+  events->push_back(std::move(pose));
   last_ = frame_;
 }
 
@@ -313,7 +324,8 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
   return pose;
 }
 
-// ---- Keyframes -----------------------------------------------------------------------------------------------------
+// ---- Keyframes
+// -----------------------------------------------------------------------------------------------------
 
 bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
   const KeyframeOptions& o = options_.keyframe;
@@ -362,35 +374,54 @@ void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
   if (!evidence.items.empty() && !localize_only_) events->push_back(std::move(evidence));
 }
 
-// ---- After the end -------------------------------------------------------------------------------------------------
+// ---- After the end
+// -------------------------------------------------------------------------------------------------
 
-bool FrontendCore::LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighbour) {
-  if (neighbour != nullptr) {
-    const Rigid3d predicted = neighbour->T_cam_world;
-    if (tracker_.TrackFromFrame(map_, *neighbour, predicted, frame) && tracker_.TrackLocalMap(map_, false, frame).ok) {
+bool FrontendCore::LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near) {
+  const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
+  const double depth = reference != nullptr ? map_.MedianDepth(*reference).value_or(1.0) : 1.0;
+  if (near.next) {
+    const std::optional<Rigid3d> predicted = near.Predict(frame->index);
+    tracker_.SetMotionPrior(predicted, depth);
+    const Rigid3d guess = predicted.value_or(near.next->T_cam_world);
+    if (tracker_.TrackFromFrame(map_, *near.next, guess, frame) &&
+        tracker_.TrackLocalMap(map_, false, frame).ok) {
       return true;
     }
   }
   frame->ClearMatches();
+  tracker_.SetMotionPrior(std::nullopt, 1.0);
   return relocalizer_.Relocalize(map_, 0, {}, DeriveSeed(seed_, frame->index, "later"), &tracker_, frame) &&
-         tracker_.TrackLocalMap(map_, true, frame).ok;
+         tracker_.TrackLocalMap(map_, true, frame).ok && (!near.next || near.Plausible(*frame, depth));
+}
+
+std::optional<Rigid3d> FrontendCore::LaterNeighbours::Predict(uint32_t index) const {
+  if (!after || after->index - next->index != 1 || next->index - index != 1) return std::nullopt;
+  return next->T_cam_world * after->T_cam_world.Inverse() * next->T_cam_world;
+}
+
+bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double depth) const {
+  const double frames = next->index - frame.index;
+  const Rigid3d motion = frame.T_cam_world * next->T_cam_world.Inverse();
+  return motion.translation.norm() <= kMaxShiftPerFrame * depth * frames &&
+         AngleBetween(motion.rotation, Eigen::Quaterniond::Identity()) <= kMaxTurnPerFrame_rad * frames;
 }
 
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
-  std::optional<TrackedFrame> neighbour;
-  tracker_.SetMotionPrior(std::nullopt, 1.0);
-  for (auto it = unplaced_.rbegin(); it != unplaced_.rend(); ++it) {  // from the newest back: the map lies after them
+  LaterNeighbours near;
+  for (auto it = unplaced_.rbegin(); it != unplaced_.rend();
+       ++it) {  // from the newest back: the map lies after them
     TrackedFrame& frame = *it;
-    const bool adjacent = neighbour && neighbour->index - frame.index <= 3;
-    if (!adjacent) {
-      neighbour.reset();
+    if (!near.next || near.next->index - frame.index > kNearFrames) {
+      near = {};
       const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, frame.index));
-      if (next != map_.keyframes().end()) neighbour = FrameOfKeyframe(next->second);
+      if (next != map_.keyframes().end()) near.next = FrameOfKeyframe(next->second);
     }
-    if (!LocalizeLater(&frame, neighbour ? &*neighbour : nullptr)) continue;
+    if (!LocalizeLater(&frame, near)) continue;
     const std::optional<Placed> placed = Place(frame.T_cam_world, tracker_.reference());
     if (!placed) continue;
-    neighbour = frame;
+    near.after = std::move(near.next);
+    near.next = frame;
     ++counters_.localized_later;
     FramePose pose;
     pose.frame_index = frame.index;
@@ -404,6 +435,7 @@ void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
     events->push_back(pose);
   }
   unplaced_.clear();
+  for (FramePose& pose : refiner_.Refine(map_)) events->push_back(std::move(pose));
 }
 
 }  // namespace dmslam

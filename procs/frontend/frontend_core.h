@@ -13,11 +13,12 @@
 #include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/motion_segmentation/initializer.h"
-#include "frontend/tracked_frame.h"
 #include "frontend/baseline_initializer.h"
+#include "frontend/frame_refiner.h"
 #include "frontend/frontend_options.h"
 #include "frontend/pose_tracker.h"
 #include "frontend/relocalizer.h"
+#include "frontend/tracked_frame.h"
 
 namespace dmslam {
 
@@ -36,8 +37,8 @@ struct FrontendCounters {
   uint64_t localized_later = 0;
 };
 
-/// Tracks the camera in a replica of the map and proposes keyframes. Knows no bus, no clock and no thread: images and
-/// map records in, records out. The same inputs give the same outputs.
+/// Tracks the camera in a replica of the map and proposes keyframes. Knows no bus, no clock and no thread:
+/// images and map records in, records out. The same inputs give the same outputs.
 class FrontendCore {
  public:
   struct Setup {
@@ -50,7 +51,8 @@ class FrontendCore {
     uint64_t seed = 0;
     bool in_saved_map = false;   ///< begins lost in a map that is there already
     bool localize_only = false;  ///< ... and adds nothing to it
-    std::shared_ptr<const Vocabulary> vocabulary;  ///< for relocalisation; without one only the newest places are tried
+    std::shared_ptr<const Vocabulary>
+        vocabulary;  ///< for relocalisation; without one only the newest places are tried
   };
   explicit FrontendCore(Setup setup);
 
@@ -65,9 +67,12 @@ class FrontendCore {
   /// Told by the node: no more keyframes now (too many are not acknowledged).
   void SetWithheld(bool withheld) { withheld_ = withheld; }
 
-  /// Tracks one frame; appends what there is to say, in order. The last FramePose in `events` is this frame's.
-  void ProcessImage(uint32_t frame_index, int64_t stamp_ns, const GrayView& image, std::vector<FrontendEvent>* events);
-  void ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features, std::vector<FrontendEvent>* events);
+  /// Tracks one frame; appends what there is to say, in order. The last FramePose in `events` is this
+  /// frame's.
+  void ProcessImage(uint32_t frame_index, int64_t stamp_ns, const GrayView& image,
+                    std::vector<FrontendEvent>* events);
+  void ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features,
+                       std::vector<FrontendEvent>* events);
   /// At the end of the sequence: places frames that had no pose when they came.
   void Finish(std::vector<FrontendEvent>* events);
 
@@ -78,6 +83,16 @@ class FrontendCore {
   double extract_ms() const { return extract_ms_; }
 
  private:
+  /// The placed frames that follow one to be placed: the next, and the one after it.
+  struct LaterNeighbours {
+    std::optional<TrackedFrame> next, after;
+
+    /// By constant velocity backwards, where the three frames are consecutive.
+    std::optional<Rigid3d> Predict(uint32_t index) const;
+    /// A hand-held camera can have come from the frame's pose to that of `next`; `depth` of the scene [map
+    /// units].
+    bool Plausible(const TrackedFrame& frame, double depth) const;
+  };
   struct Placed {
     KeyframeId reference;
     Rigid3d T_cam_reference;
@@ -100,7 +115,7 @@ class FrontendCore {
   std::optional<Placed> Place(const Rigid3d& T_cam_world, KeyframeId reference) const;
   FramePose MakePose(TrackingState state, const TrackingReport& report) const;
   TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
-  bool LocalizeLater(TrackedFrame* frame, const TrackedFrame* neighbour);
+  bool LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near);
   void KeepUnplaced();
   void NextMapId();
 
@@ -111,6 +126,7 @@ class FrontendCore {
   uint64_t seed_;
   bool localize_only_;
   Map map_;
+  FrameRefiner refiner_;
   OrbExtractor extractor_;
   OrbExtractor first_map_extractor_;  ///< more features while there is no map
   InitializerOptions initializer_options_;
@@ -122,7 +138,7 @@ class FrontendCore {
   MapId map_id_ = 1;
   TrackedFrame frame_;
   TrackedFrame proposing_frame_;  ///< the frame with which the first map was proposed
-  TrackedFrame last_;                 ///< the frame tracked last
+  TrackedFrame last_;             ///< the frame tracked last
   Placed last_placed_;
   std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the frame tracked last
   int64_t last_tracked_ns_ = 0;

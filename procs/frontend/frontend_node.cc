@@ -15,11 +15,16 @@ constexpr int kMaxUnacceptedKeyframes = 64;
 
 ImageEncoding ToImageEncoding(FrameEncoding encoding) {
   switch (encoding) {
-    case FrameEncoding::kJpeg: return ImageEncoding::kJpeg;
-    case FrameEncoding::kPng: return ImageEncoding::kPng;
-    case FrameEncoding::kGray8: return ImageEncoding::kGray8;
-    case FrameEncoding::kRgb8: return ImageEncoding::kRgb8;
-    case FrameEncoding::kBgr8: return ImageEncoding::kBgr8;
+    case FrameEncoding::kJpeg:
+      return ImageEncoding::kJpeg;
+    case FrameEncoding::kPng:
+      return ImageEncoding::kPng;
+    case FrameEncoding::kGray8:
+      return ImageEncoding::kGray8;
+    case FrameEncoding::kRgb8:
+      return ImageEncoding::kRgb8;
+    case FrameEncoding::kBgr8:
+      return ImageEncoding::kBgr8;
   }
   return ImageEncoding::kFile;
 }
@@ -96,7 +101,8 @@ void FrontendNode::OnMessage(const std::string& channel, std::span<const uint8_t
   if (channel == channels::kEndOfSequence) OnEndOfSequence(bytes);
   if (channel != channels::kGroundTruthPose) return;
   const std::optional<GroundTruthPose> truth = Read<GroundTruthPose>(bytes);
-  if (truth && !IsForeignFrame(truth->session)) error_.OnTruth(truth->frame_index, truth->T_world_cam.translation);
+  if (truth && !IsForeignFrame(truth->session))
+    error_.OnTruth(truth->frame_index, truth->T_world_cam.translation);
 }
 
 void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
@@ -151,6 +157,7 @@ void FrontendNode::ApplyHeldRecords(size_t count) {
     const HeldRecord& held = held_.front();
     if (held.begins_anew) core_->ForgetMap();
     core_->ApplyMapDelta(held.delta);
+    adjusted_ = adjusted_ || (asked_to_adjust_ && IsAnswerToAll(held.delta));
     applied_ = held.version;
     held_.pop_front();
   }
@@ -159,7 +166,8 @@ void FrontendNode::ApplyHeldRecords(size_t count) {
 
 int FrontendNode::UnacceptedKeyframes() {
   const std::optional<int64_t> accepted = writer_->AcknowledgedBy("mapper");
-  while (accepted && !keyframe_seqs_.empty() && keyframe_seqs_.front() <= *accepted) keyframe_seqs_.pop_front();
+  while (accepted && !keyframe_seqs_.empty() && keyframe_seqs_.front() <= *accepted)
+    keyframe_seqs_.pop_front();
   return static_cast<int>(keyframe_seqs_.size());
 }
 
@@ -171,7 +179,7 @@ bool FrontendNode::AwaitsSavedMap() const {
 }
 
 bool FrontendNode::WorkOnce() {
-  TakeMapRecords(finished_);
+  TakeMapRecords(finished_ || asked_to_adjust_);
   if (finished_) {
     if (!options_.HasPeer("mapper") || MapIsOver(core_->map(), *map_reader_)) Stop();
     return false;
@@ -179,13 +187,25 @@ bool FrontendNode::WorkOnce() {
   if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
   if (waiting_) return ProcessWaiting();
-  return end_ ? Finish() : false;
+  if (!end_) return false;
+  return MapsAreAdjusted() ? Finish() : false;
+}
+
+/// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.
+bool FrontendNode::MapsAreAdjusted() {
+  if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
+  if (!asked_to_adjust_) {
+    asked_to_adjust_ = true;
+    PublishRecord(MapReset{0, false, "the sequence has ended", last_stamp_ns_});
+  }
+  return adjusted_;
 }
 
 bool FrontendNode::DecodeImage(const Frame& frame) {
   const std::string name = "frame " + std::to_string(frame.frame_index);
   try {
-    decoder_.Decode(ToImageEncoding(frame.encoding), frame.width_px, frame.height_px, frame.data, name, image_);
+    decoder_.Decode(ToImageEncoding(frame.encoding), frame.width_px, frame.height_px, frame.data, name,
+                    image_);
   } catch (const InputError& error) {
     if (frames_bad_++ == 0) spdlog::warn("frontend: {} (further ones are only counted)", error.what());
     return false;
@@ -194,7 +214,8 @@ bool FrontendNode::DecodeImage(const Frame& frame) {
   if (image_.width == camera.width_px && image_.height == camera.height_px) return true;
   Exit(2, name + " is " + std::to_string(image_.width) + "x" + std::to_string(image_.height) +
               " pixels, but the camera file says " + std::to_string(camera.width_px) + "x" +
-              std::to_string(camera.height_px) + "; give the camera file that belongs to the sequence (--camera)");
+              std::to_string(camera.height_px) +
+              "; give the camera file that belongs to the sequence (--camera)");
   return false;
 }
 
@@ -205,8 +226,13 @@ bool FrontendNode::ProcessWaiting() {
   last_stamp_ns_ = waiting.frame.stamp_ns;
   if (first_stamp_ns_ == 0) first_stamp_ns_ = last_stamp_ns_;
   frame_open_ = true;
-  FrameTrace trace{session_, waiting.frame.frame_index, waiting.frame.stamp_ns, waiting.frame.capture_us,
-                   waiting.frame.publish_us, waiting.receive_us, context_.wall_us()};
+  FrameTrace trace{session_,
+                   waiting.frame.frame_index,
+                   waiting.frame.stamp_ns,
+                   waiting.frame.capture_us,
+                   waiting.frame.publish_us,
+                   waiting.receive_us,
+                   context_.wall_us()};
   if (!DecodeImage(waiting.frame)) return true;
   trace.decoded_us = context_.wall_us();
   core_->SetWithheld(UnacceptedKeyframes() >= kMaxUnacceptedKeyframes);
@@ -272,7 +298,8 @@ void FrontendNode::PublishViews(const Waiting& waiting, const FramePose& pose, F
   features.items.reserve(frame.classes.size());
   for (size_t i = 0; i < frame.classes.size(); ++i) {
     const Keypoint& keypoint = frame.features->set.keypoints[i];
-    features.items.push_back({keypoint.x_q4, keypoint.y_q4, static_cast<FeatureView::Kind>(frame.classes[i])});
+    features.items.push_back(
+        {keypoint.x_q4, keypoint.y_q4, static_cast<FeatureView::Kind>(frame.classes[i])});
   }
   PublishLoose(features, options_.link == Link::kLan);
 }
@@ -285,6 +312,11 @@ void FrontendNode::FinishFrame() {
 void FrontendNode::DrawPicture() {
   if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
   WritePicture(extras_.picture_dir, image_, core_->frame(), last_pose_);
+}
+
+/// The mapper's answer to the request to adjust its maps: settled, about no keyframe.
+bool FrontendNode::IsAnswerToAll(const MapDelta& delta) {
+  return delta.event == MapEvent::kSettled && !delta.about.valid();
 }
 
 bool FrontendNode::Finish() {
@@ -321,7 +353,9 @@ void FrontendNode::PublishStatus() {
   PublishLoose(status);
 }
 
-bool FrontendNode::HoldsBackForStatus() const { return core_ != nullptr && (HoldsBack() || AwaitsSavedMap()); }
+bool FrontendNode::HoldsBackForStatus() const {
+  return core_ != nullptr && (HoldsBack() || AwaitsSavedMap());
+}
 
 void FrontendNode::FillCoreStatus(FrontendStatus* status) const {
   status->state = core_->state();

@@ -14,13 +14,14 @@
 
 namespace dmslam {
 
-/// The frontend on the bus: frames in; session, poses, keyframes and evidence out; its map comes from the map stream.
+/// The frontend on the bus: frames in; session, poses, keyframes and evidence out; its map comes from the map
+/// stream.
 class FrontendNode : public StreamNode {
  public:
   struct Extras {
     std::shared_ptr<const Vocabulary> vocabulary;
-    std::string picture_dir;   ///< empty: no pictures
-    int picture_every = 0;     ///< every so manieth frame
+    std::string picture_dir;  ///< empty: no pictures
+    int picture_every = 0;    ///< every so manieth frame
   };
   FrontendNode(NodeContext context, NodeOptions options, Extras extras);
 
@@ -61,6 +62,8 @@ class FrontendNode : public StreamNode {
   void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);
   void FinishFrame();
   void DrawPicture();
+  bool MapsAreAdjusted();
+  static bool IsAnswerToAll(const MapDelta& delta);
   bool Finish();
   int UnacceptedKeyframes();
   bool HoldsBackForStatus() const;
@@ -75,8 +78,11 @@ class FrontendNode : public StreamNode {
   std::optional<Waiting> waiting_;
   std::optional<EndOfSequence> end_;
   bool lockstep_ = false;
-  bool finished_ = false;     ///< everything is said; stays until the mapper has ended
-  bool frame_open_ = false;   ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
+  bool asked_to_adjust_ = false;
+  bool adjusted_ = false;  ///< all maps, after the last keyframe
+  bool finished_ = false;  ///< everything is said; stays until the mapper has ended
+  bool frame_open_ =
+      false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
   int64_t last_index_ = -1;
   int64_t last_stamp_ns_ = 0;
   GrayDecoder decoder_;

@@ -59,6 +59,7 @@ struct FrontendOptions {
   double new_map_after_s = 5.0;      ///< lost for so long: a new map is started, the old one is kept
   int evidence_every_frames = 10;
   int max_kept_frames = 300;         ///< unplaced frames kept for localisation at the end
+  int max_refined_frames = 3600;     ///< tracked frames whose observations are kept to refine their poses at the end
 };
 
 }  // namespace dmslam

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Directions of features in the frame of the pencil of planes through both camera centres: the baseline is its axis.
+/// Directions of features in the frame of the pencil of planes through both camera centres: the baseline is
+/// its axis.
 struct Pencil {
   Eigen::Vector3d axis, u, v;
 
@@ -34,8 +35,8 @@ struct PlaneEntry {
   uint16_t feature;
 };
 
-std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector<uint8_t>& use, const Pencil& pencil,
-                                     const Map& map) {
+std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector<uint8_t>& use,
+                                     const Pencil& pencil, const Map& map) {
   const Camera& camera = map.camera();
   const Eigen::Matrix3d R_world_cam = keyframe.T_cam_world.rotation.conjugate().toRotationMatrix();
   std::vector<PlaneEntry> entries;
@@ -87,7 +88,8 @@ int BestPartner(const PlaneEntry& entry, const std::vector<PlaneEntry>& sorted_b
   const int octave = pair.a.features->set.keypoints[entry.feature].octave;
   const double sigmas = std::sqrt(pair.options.epipolar_sigmas_squared);
   const double reach = 6.0 * entry.tolerance + 0.02;
-  auto it = std::lower_bound(sorted_b.begin(), sorted_b.end(), PlaneEntry{entry.angle - reach, 0, 0, 0}, ByAngle);
+  auto it =
+      std::lower_bound(sorted_b.begin(), sorted_b.end(), PlaneEntry{entry.angle - reach, 0, 0, 0}, ByAngle);
   int best = 257, second = 257, best_feature = -1;
   for (; it != sorted_b.end() && it->angle <= entry.angle + reach; ++it) {
     // The error lies in the other image as in ORB-SLAM2, with this feature's own error added.
@@ -104,7 +106,8 @@ int BestPartner(const PlaneEntry& entry, const std::vector<PlaneEntry>& sorted_b
       second = distance;
     }
   }
-  const bool unambiguous = pair.options.descriptor_ratio >= 1.0 || best < pair.options.descriptor_ratio * second;
+  const bool unambiguous =
+      pair.options.descriptor_ratio >= 1.0 || best < pair.options.descriptor_ratio * second;
   return best <= pair.options.max_descriptor_distance && unambiguous ? best_feature : -1;
 }
 
@@ -130,8 +133,10 @@ std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t fe
     ++diagnostics->refused_depth;
     return std::nullopt;
   }
-  if (NormalizedErrorSquared(*pair.a.features, feature_a, *uv_a, pyramid) > pair.options.reprojection_sigmas_squared ||
-      NormalizedErrorSquared(*pair.b.features, feature_b, *uv_b, pyramid) > pair.options.reprojection_sigmas_squared) {
+  if (NormalizedErrorSquared(*pair.a.features, feature_a, *uv_a, pyramid) >
+          pair.options.reprojection_sigmas_squared ||
+      NormalizedErrorSquared(*pair.b.features, feature_b, *uv_b, pyramid) >
+          pair.options.reprojection_sigmas_squared) {
     ++diagnostics->refused_reprojection;
     return std::nullopt;
   }
@@ -202,10 +207,9 @@ CreationDiagnostics& CreationDiagnostics::operator+=(const CreationDiagnostics& 
   return *this;
 }
 
-std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(const Keyframe& a, const std::vector<uint8_t>& use_a,
-                                                                    const Keyframe& b, const std::vector<uint8_t>& use_b,
-                                                                    const Map& map,
-                                                                    const LandmarkCreationOptions& options) {
+std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
+    const Keyframe& a, const std::vector<uint8_t>& use_a, const Keyframe& b,
+    const std::vector<uint8_t>& use_b, const Map& map, const LandmarkCreationOptions& options) {
   const Pencil pencil = Pencil::Through(a.T_cam_world.Center(), b.T_cam_world.Center());
   std::vector<PlaneEntry> entries_a = PlaneEntries(a, use_a, pencil, map);
   const std::vector<PlaneEntry> sorted_b = SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5);
@@ -225,18 +229,35 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(const Keyfra
   }
   std::vector<std::pair<uint16_t, uint16_t>> matches;
   for (size_t i = 0; i < partner_of_b.size(); ++i) {
-    if (partner_of_b[i] >= 0) matches.emplace_back(static_cast<uint16_t>(partner_of_b[i]), static_cast<uint16_t>(i));
+    if (partner_of_b[i] >= 0)
+      matches.emplace_back(static_cast<uint16_t>(partner_of_b[i]), static_cast<uint16_t>(i));
   }
   std::sort(matches.begin(), matches.end());
   return matches;
 }
 
-std::vector<NewLandmark> ProposeLandmarks(const Map& map, KeyframeId id, const std::vector<uint16_t>& moving,
-                                          const LandmarkCreationOptions& options, CreationDiagnostics* diagnostics) {
+namespace {
+
+/// A feature of the new keyframe matched with one of a neighbour, and the point they make.
+struct PairCandidate {
+  NeighbourFeature seen_by;
+  Eigen::Vector3d p_world;
+  double parallax_cos;
+};
+
+struct Candidate {
+  NewLandmark landmark;
+  bool confirmed = false;  ///< in enough views, over enough time
+};
+
+/// All pairs of every free feature of keyframe `id`, by feature.
+std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, KeyframeId id,
+                                                        const std::vector<uint16_t>& moving,
+                                                        const LandmarkCreationOptions& options,
+                                                        CreationDiagnostics* diagnostics) {
   const Keyframe& keyframe = *map.FindKeyframe(id);
-  std::vector<uint8_t> use = FreeFeatures(keyframe, moving);
-  MutualExclusion gate(options, map.CountTracked(keyframe, 1));
-  std::vector<NewLandmark> created;
+  const std::vector<uint8_t> use = FreeFeatures(keyframe, moving);
+  std::vector<std::vector<PairCandidate>> pairs(keyframe.features->size());
   for (const KeyframeId neighbour_id : map.BestCovisible(id, options.neighbours, 1)) {
     const Keyframe& neighbour = *map.FindKeyframe(neighbour_id);
     const double baseline = (keyframe.T_cam_world.Center() - neighbour.T_cam_world.Center()).norm();
@@ -247,10 +268,60 @@ std::vector<NewLandmark> ProposeLandmarks(const Map& map, KeyframeId id, const s
          MatchAlongEpipolarPlanes(keyframe, use, neighbour, FreeFeatures(neighbour, {}), map, options)) {
       ++diagnostics->matched;
       const std::optional<Eigen::Vector3d> point = Triangulate(pair, feature, other, diagnostics);
-      if (!point || !gate.Admit(keyframe.features->uv_px[feature], diagnostics)) continue;
-      use[feature] = 0;
-      created.push_back({feature, neighbour_id, other, *point});
+      if (!point) continue;
+      const Eigen::Vector3d a = *point - keyframe.T_cam_world.Center(),
+                            b = *point - neighbour.T_cam_world.Center();
+      pairs[feature].push_back({{neighbour_id, other}, *point, a.dot(b) / (a.norm() * b.norm())});
     }
+  }
+  return pairs;
+}
+
+/// The point of the pair with the widest parallax, with all pairs of the feature that see it where they
+/// should.
+Candidate CombinePairs(const Map& map, KeyframeId id, uint16_t feature,
+                       const std::vector<PairCandidate>& pairs, const LandmarkCreationOptions& options) {
+  const auto widest = std::min_element(
+      pairs.begin(), pairs.end(),
+      [](const PairCandidate& a, const PairCandidate& b) { return a.parallax_cos < b.parallax_cos; });
+  Candidate candidate{{feature, {widest->seen_by}, widest->p_world}, false};
+  int64_t first_ns = map.FindKeyframe(id)->stamp_ns, last_ns = first_ns;
+  for (auto pair = pairs.begin(); pair != pairs.end(); ++pair) {
+    const Keyframe& keyframe = *map.FindKeyframe(pair->seen_by.keyframe);
+    const auto uv_px = map.camera().Project(keyframe.T_cam_world * widest->p_world);
+    const bool agrees = uv_px && NormalizedErrorSquared(*keyframe.features, pair->seen_by.feature, *uv_px,
+                                                        map.pyramid()) <= options.reprojection_sigmas_squared;
+    if (pair != widest && !agrees) continue;
+    if (pair != widest) candidate.landmark.seen_by.push_back(pair->seen_by);
+    first_ns = std::min(first_ns, keyframe.stamp_ns);
+    last_ns = std::max(last_ns, keyframe.stamp_ns);
+  }
+  candidate.confirmed = options.confirmed_views > 0 &&
+                        static_cast<int>(candidate.landmark.seen_by.size()) + 1 >= options.confirmed_views &&
+                        static_cast<double>(last_ns - first_ns) * 1e-9 >= options.confirmed_span_s;
+  return candidate;
+}
+
+}  // namespace
+
+std::vector<NewLandmark> ProposeLandmarks(const Map& map, KeyframeId id, const std::vector<uint16_t>& moving,
+                                          const LandmarkCreationOptions& options,
+                                          CreationDiagnostics* diagnostics) {
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  std::vector<Candidate> candidates;
+  const auto pairs = MatchNeighbours(map, id, moving, options, diagnostics);
+  for (size_t feature = 0; feature < pairs.size(); ++feature) {
+    if (pairs[feature].empty()) continue;
+    candidates.push_back(CombinePairs(map, id, static_cast<uint16_t>(feature), pairs[feature], options));
+  }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.landmark.seen_by.size() > b.landmark.seen_by.size();
+  });
+  MutualExclusion gate(options, map.CountTracked(keyframe, 1));
+  std::vector<NewLandmark> created;
+  for (const Candidate& candidate : candidates) {
+    const Eigen::Vector2d& uv_px = keyframe.features->uv_px[candidate.landmark.feature];
+    if (candidate.confirmed || gate.Admit(uv_px, diagnostics)) created.push_back(candidate.landmark);
   }
   diagnostics->created += static_cast<uint32_t>(created.size());
   return created;

@@ -31,10 +31,10 @@ std::vector<KeyframeId> NeighboursOfNeighbours(const Map& map, KeyframeId id, in
   return targets;
 }
 
-/// Keyframes that look at the same place from nearby, whether they share landmarks or not: where drift is small, a place
-/// that is seen again is joined with itself here, without a loop.
-void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& options, std::set<KeyframeId>* listed,
-                        std::vector<KeyframeId>* targets) {
+/// Keyframes that look at the same place from nearby, whether they share landmarks or not: where drift is
+/// small, a place that is seen again is joined with itself here, without a loop.
+void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& options,
+                        std::set<KeyframeId>* listed, std::vector<KeyframeId>* targets) {
   const Keyframe& keyframe = *map.FindKeyframe(id);
   const double depth = map.MedianDepth(keyframe).value_or(0.0);
   std::vector<std::pair<double, KeyframeId>> near;
@@ -42,7 +42,8 @@ void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& opti
     if (other.map_id != keyframe.map_id || listed->contains(other_id)) continue;
     const double distance = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
     const double angle = AngleBetween(other.T_cam_world.rotation, keyframe.T_cam_world.rotation);
-    if (distance < options.nearby_distance * depth && angle < options.nearby_angle_rad) near.emplace_back(distance, other_id);
+    if (distance < options.nearby_distance * depth && angle < options.nearby_angle_rad)
+      near.emplace_back(distance, other_id);
   }
   std::sort(near.begin(), near.end());
   for (size_t i = 0; i < near.size() && i < static_cast<size_t>(options.nearby_keyframes); ++i) {
@@ -108,7 +109,8 @@ int FuseWithNeighbours(Map& map, KeyframeId id, const MapperOptions& options) {
   int joined = 0;
   for (const KeyframeId target : targets) {
     const std::vector<LandmarkId> mine = LandmarksOf(*map.FindKeyframe(id));
-    joined += FuseInto(map, target, map.FindKeyframe(target)->T_cam_world, mine, options.fuse_radius_px, options);
+    joined +=
+        FuseInto(map, target, map.FindKeyframe(target)->T_cam_world, mine, options.fuse_radius_px, options);
   }
   std::set<LandmarkId> theirs;
   for (const KeyframeId target : targets) {

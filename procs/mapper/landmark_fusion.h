@@ -5,9 +5,10 @@
 
 namespace dmslam {
 
-/// Joins what is the same: landmarks of keyframe `id` are projected into its neighbours (20 best covisible and 5 of each
-/// of theirs), and the neighbours' landmarks into it. A feature without a landmark becomes an observation; two landmarks
-/// at one feature become one, the one with more observers. Returns how many observations and fusions were made.
+/// Joins what is the same: landmarks of keyframe `id` are projected into its neighbours (20 best covisible
+/// and 5 of each of theirs), and the neighbours' landmarks into it. A feature without a landmark becomes an
+/// observation; two landmarks at one feature become one, the one with more observers. Returns how many
+/// observations and fusions were made.
 int FuseWithNeighbours(Map& map, KeyframeId id, const MapperOptions& options);
 
 /// Projects `landmarks` into keyframe `id` at `T_cam_world` and joins them with what its features see.

@@ -10,16 +10,20 @@ constexpr uint32_t kEvidenceWindow = 20;  // frames
 /// How many keyframes were inserted after `id`, up to `most`; culled ones count.
 int KeyframesSince(const Map& map, KeyframeId id, int most) {
   int count = 0;
-  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && it->first > id && count < most; ++it) ++count;
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && it->first > id && count < most;
+       ++it)
+    ++count;
   const auto& tombstones = map.keyframe_tombstones();
-  for (auto it = tombstones.rbegin(); it != tombstones.rend() && it->first > id && count < most; ++it) ++count;
+  for (auto it = tombstones.rbegin(); it != tombstones.rend() && it->first > id && count < most; ++it)
+    ++count;
   return count;
 }
 
 /// The keyframes inserted last, as far back as probation reaches.
 std::vector<KeyframeId> YoungestKeyframes(const Map& map, MapId map_id, int most) {
   std::vector<KeyframeId> ids;
-  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && static_cast<int>(ids.size()) < most; ++it) {
+  for (auto it = map.keyframes().rbegin();
+       it != map.keyframes().rend() && static_cast<int>(ids.size()) < most; ++it) {
     if (it->second.map_id == map_id) ids.push_back(it->first);
   }
   return ids;
@@ -39,7 +43,8 @@ bool SeenByThreeOthers(const Map& map, const Landmark& landmark, KeyframeId self
   int others = 0;
   for (const Observation& o : landmark.observations) {
     if (o.keyframe == self) continue;
-    if (map.FindKeyframe(o.keyframe)->features->set.keypoints[o.feature].octave <= octave + 1 && ++others >= 3) {
+    if (map.FindKeyframe(o.keyframe)->features->set.keypoints[o.feature].octave <= octave + 1 &&
+        ++others >= 3) {
       return true;
     }
   }
@@ -53,7 +58,8 @@ bool IsRedundant(const Map& map, const Keyframe& keyframe, double share) {
     const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
     if (landmark == nullptr) continue;
     ++total;
-    if (SeenByThreeOthers(map, *landmark, keyframe.id, keyframe.features->set.keypoints[i].octave)) ++redundant;
+    if (SeenByThreeOthers(map, *landmark, keyframe.id, keyframe.features->set.keypoints[i].octave))
+      ++redundant;
   }
   return redundant > share * total;
 }
@@ -118,7 +124,8 @@ EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const Moti
       ++report.unknown;
       continue;
     }
-    const LandmarkEvidence updated = Updated(map.FindLandmark(*id)->evidence, item, evidence.stamp_ns, options);
+    const LandmarkEvidence updated =
+        Updated(map.FindLandmark(*id)->evidence, item, evidence.stamp_ns, options);
     ++report.applied;
     const bool gone = updated.visible >= kEvidenceWindow &&
                       static_cast<double>(updated.found) < options.min_found_share * updated.visible;

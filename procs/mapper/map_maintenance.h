@@ -6,12 +6,12 @@
 
 namespace dmslam {
 
-/// Removes landmarks that were made within the last keyframes and do not hold up (ORB-SLAM2's rule): found too rarely,
-/// or with too few observers after two keyframes. Returns how many.
+/// Removes landmarks that were made within the last keyframes and do not hold up (ORB-SLAM2's rule): found
+/// too rarely, or with too few observers after two keyframes. Returns how many.
 int CullYoungLandmarks(Map& map, MapId map_id, const MapperOptions& options);
 
-/// Removes neighbours of keyframe `id` whose landmarks others see as well. `keep` is never removed (the frontend tracks
-/// against it). Returns how many.
+/// Removes neighbours of keyframe `id` whose landmarks others see as well. `keep` is never removed (the
+/// frontend tracks against it). Returns how many.
 int CullRedundantKeyframes(Map& map, KeyframeId id, KeyframeId keep, const MapperOptions& options);
 
 struct EvidenceReport {

@@ -7,6 +7,7 @@
 
 #include "mapper/landmark_fusion.h"
 #include "mapper/map_maintenance.h"
+#include "mapper/seen_through.h"
 
 namespace dmslam {
 namespace {
@@ -43,7 +44,8 @@ void MapperCore::Continue(Map map) {
   maybe_unfinished_ = map_.keyframes().empty() ? KeyframeId{} : map_.keyframes().rbegin()->first;
 }
 
-void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id, std::string note) {
+void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id,
+                         std::string note) {
   MapDelta delta = map_.TakeDelta(event, about, map_id);
   delta.correction_id = correction_id;
   delta.note = std::move(note);
@@ -68,7 +70,8 @@ LandmarkId MapperCore::AddLandmark(MapId map_id, KeyframeId reference, KeyframeI
   return id;
 }
 
-// ---- A first map ---------------------------------------------------------------------------------------------------
+// ---- A first map
+// ---------------------------------------------------------------------------------------------------
 
 bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   if (map_.FindKeyframe(proposal.second.id) != nullptr) {
@@ -82,7 +85,8 @@ bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   }
   ++counters_.maps_refused;
   map_.DropMap(proposal.map_id);
-  Publish(MapEvent::kMapDropped, proposal.second.id, proposal.map_id, 0, "too few landmarks after bundle adjustment");
+  Publish(MapEvent::kMapDropped, proposal.second.id, proposal.map_id, 0,
+          "too few landmarks after bundle adjustment");
   return false;
 }
 
@@ -123,9 +127,11 @@ void MapperCore::ScaleToUnitDepth(MapId map_id, KeyframeId first) {
   }
 }
 
-// ---- A keyframe ----------------------------------------------------------------------------------------------------
+// ---- A keyframe
+// ----------------------------------------------------------------------------------------------------
 
 bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
+  adjusted_ = false;
   const bool again =
       proposal.id == std::exchange(maybe_unfinished_, {}) && map_.FindKeyframe(proposal.id) != nullptr;
   if (!again) {
@@ -142,12 +148,17 @@ void MapperCore::MapAround(const KeyframeProposal& proposal) {
   const MapId map_id = proposal.map_id;
   counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, options_));
   CreateLandmarks(id, proposal.moving);
+  if (options_.seen_through.enabled) {
+    counters_.landmarks_seen_through +=
+        static_cast<uint64_t>(RemoveSeenThrough(map_, id, options_.seen_through));
+  }
   Publish(MapEvent::kLandmarksCreated, id, map_id);
   if (Interrupted()) {
     ++counters_.adjustments_interrupted;
   } else {
     Refine(id, map_id);
-    counters_.keyframes_culled += static_cast<uint64_t>(CullRedundantKeyframes(map_, id, proposal.reference, options_));
+    counters_.keyframes_culled +=
+        static_cast<uint64_t>(CullRedundantKeyframes(map_, id, proposal.reference, options_));
   }
   Publish(MapEvent::kMapped, id, map_id);
 }
@@ -181,7 +192,8 @@ bool MapperCore::Insert(const KeyframeProposal& proposal) {
     ++counters_.keyframes_refused;
     return false;
   }
-  Keyframe keyframe = MakeKeyframe(proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
+  Keyframe keyframe =
+      MakeKeyframe(proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
   keyframe.scale = reference->scale;
   keyframe.parent = *parent;
   map_.AddKeyframe(std::move(keyframe));
@@ -213,11 +225,16 @@ void MapperCore::ChooseParent(KeyframeId id, KeyframeId fallback) {
 void MapperCore::CreateLandmarks(KeyframeId id, const std::vector<uint16_t>& moving) {
   const MapId map_id = map_.FindKeyframe(id)->map_id;
   for (const NewLandmark& made : ProposeLandmarks(map_, id, moving, options_.creation, &counters_.creation)) {
-    // An earlier one of the list may have taken the neighbour's feature.
-    if (map_.FindKeyframe(made.neighbour)->landmarks[made.neighbour_feature].valid()) continue;
+    // An earlier one of the list may have taken a neighbour's feature.
+    const auto taken = [&](const NeighbourFeature& seen_by) {
+      return map_.FindKeyframe(seen_by.keyframe)->landmarks[seen_by.feature].valid();
+    };
+    if (taken(made.seen_by.front())) continue;
     const LandmarkId landmark = AddLandmark(map_id, id, id, made.p_world);
     map_.SetObservation(id, made.feature, landmark);
-    map_.SetObservation(made.neighbour, made.neighbour_feature, landmark);
+    for (const NeighbourFeature& seen_by : made.seen_by) {
+      if (!taken(seen_by)) map_.SetObservation(seen_by.keyframe, seen_by.feature, landmark);
+    }
     map_.UpdateDescriptor(landmark);
   }
 }
@@ -230,6 +247,11 @@ void MapperCore::OnEvidence(const FrameEvidence& evidence) {
 }
 
 void MapperCore::OnReset(const MapReset& reset) {
+  if (reset.map_id == 0) {
+    AdjustMaps();
+    Settle({}, 0);
+    return;
+  }
   if (!reset.drop) return;
   ++counters_.maps_dropped;
   map_.DropMap(reset.map_id);
@@ -243,22 +265,30 @@ void MapperCore::Settle(KeyframeId id, MapId map_id) {
   Publish(MapEvent::kSettled, id, map_id);
 }
 
-void MapperCore::End(bool as_it_is) {
+void MapperCore::AdjustMaps() {
   std::set<MapId> maps;
-  for (const auto& [id, keyframe] : map_.keyframes()) {
-    if (!as_it_is) maps.insert(keyframe.map_id);
-  }
+  for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
+    if (options_.seen_through.enabled) {
+      counters_.landmarks_seen_through += static_cast<uint64_t>(
+          RemoveUnproven(map_, map_id, counters_.landmarks_seen_through, options_.seen_through));
+    }
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);
   }
+  adjusted_ = true;
+}
+
+void MapperCore::End(bool as_it_is) {
+  if (!as_it_is && !adjusted_) AdjustMaps();
   MapProgress progress = map_.progress();
   progress.ended = true;
   map_.SetProgress(progress);
   Publish(MapEvent::kEnded, {}, 0);
 }
 
-// ---- Corrections ---------------------------------------------------------------------------------------------------
+// ---- Corrections
+// ---------------------------------------------------------------------------------------------------
 
 void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   if (answer.kind == LoopAnswer::Kind::kNone) return;
@@ -273,8 +303,8 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   ++counters_.corrections_applied;
   const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(answer.keyframe);
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
-  Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe, anchor ? anchor->map_id : 0,
-          answer.correction_id, answer.note);
+  Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe,
+          anchor ? anchor->map_id : 0, answer.correction_id, answer.note);
 }
 
 void MapperCore::Correct(const LoopAnswer& answer) {

@@ -15,12 +15,13 @@ namespace dmslam {
 /// What the mapper did, for its status.
 struct MapperCounters {
   uint64_t keyframes_inserted = 0;
-  uint64_t keyframes_repeated = 0;   ///< proposed again, and recognised
-  uint64_t keyframes_refused = 0;    ///< their reference is unknown
+  uint64_t keyframes_repeated = 0;  ///< proposed again, and recognised
+  uint64_t keyframes_refused = 0;   ///< their reference is unknown
   uint64_t keyframes_culled = 0;
   uint64_t landmarks_culled = 0;
   uint64_t landmarks_moving_removed = 0;
-  uint64_t observations_dropped = 0; ///< of landmarks that are gone
+  uint64_t landmarks_seen_through = 0;  ///< removed because other keyframes see what lies behind them
+  uint64_t observations_dropped = 0;    ///< of landmarks that are gone
   uint64_t evidence_dropped = 0;
   uint64_t fusions = 0;
   uint64_t corrections_applied = 0;
@@ -32,14 +33,15 @@ struct MapperCounters {
   CreationDiagnostics creation;
 };
 
-/// The map's only writer: takes the frontend's records in order, edits the map, and hands every change out as a delta.
-/// Knows no bus, no clock and no thread. Paper 2.3 (local mapping), with landmark creation after Algorithm 1.
+/// The map's only writer: takes the frontend's records in order, edits the map, and hands every change out as
+/// a delta. Knows no bus, no clock and no thread. Paper 2.3 (local mapping), with landmark creation after
+/// Algorithm 1.
 class MapperCore {
  public:
   using Sink = std::function<void(const MapDelta&)>;
 
-  MapperCore(const MapperOptions& options, const Camera& camera, const Pyramid& pyramid, uint16_t epoch_ordinal,
-             Sink sink);
+  MapperCore(const MapperOptions& options, const Camera& camera, const Pyramid& pyramid,
+             uint16_t epoch_ordinal, Sink sink);
 
   /// Asked now and then during long work; true: finish early (a keyframe waits). May be empty (lock-step).
   void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
@@ -53,11 +55,13 @@ class MapperCore {
 
   /// Builds a map of the proposal; false when it is known already or does not hold (a record says so).
   bool OnInitialMap(const InitialMap& proposal);
-  /// Inserts a keyframe and does the local mapping that follows; false when it is known already, or its reference is not.
+  /// Inserts a keyframe and does the local mapping that follows; false when it is known already, or its
+  /// reference is not.
   bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
-  /// A loop or a global adjustment, composed with the poses of now. Refused with a record where it no longer applies.
+  /// A loop or a global adjustment, composed with the poses of now. Refused with a record where it no longer
+  /// applies.
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says that all work that keyframe `id` caused is done.
   void Settle(KeyframeId id, MapId map_id);
@@ -76,20 +80,24 @@ class MapperCore {
   void AddMatches(const KeyframeProposal& proposal);
   void ChooseParent(KeyframeId id, KeyframeId fallback);
   void CreateLandmarks(KeyframeId id, const std::vector<uint16_t>& moving);
-  LandmarkId AddLandmark(MapId map_id, KeyframeId reference, KeyframeId newest, const Eigen::Vector3d& p_world);
+  LandmarkId AddLandmark(MapId map_id, KeyframeId reference, KeyframeId newest,
+                         const Eigen::Vector3d& p_world);
   bool BuildInitialMap(const InitialMap& proposal);
   void ScaleToUnitDepth(MapId map_id, KeyframeId first);
   void Correct(const LoopAnswer& answer);
   void Connect(const LoopAnswer& answer);
   void Reroot(KeyframeId id, KeyframeId parent);
   void JoinMaps(MapId from, MapId into);
-  void Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id = 0, std::string note = {});
+  void AdjustMaps();
+  void Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id = 0,
+               std::string note = {});
   bool Interrupted() const { return interrupt_ && interrupt_(); }
 
   MapperOptions options_;
   Map map_;
   uint16_t epoch_ordinal_;
   uint64_t next_landmark_ = 1;
+  bool adjusted_ = false;        ///< as a whole, since the last keyframe
   KeyframeId maybe_unfinished_;  ///< newest of a map that is continued: its mapper may have ended in the
                                  ///< middle of it
   Sink sink_;

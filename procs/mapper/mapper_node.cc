@@ -13,9 +13,10 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), "mapper"), files_(std::move(files)) {
   const StartOptions& start = options_.settings.start;
   if (start.saved_map == files_.load.empty()) {
-    throw InputError(files_.load.empty() ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
-                                         : "--map " + files_.load +
-                                               ": set map.saved=on for every process (scripts/run.sh --map does)");
+    throw InputError(files_.load.empty()
+                         ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
+                         : "--map " + files_.load +
+                               ": set map.saved=on for every process (scripts/run.sh --map does)");
   }
   if (start.localize_only && !start.saved_map) {
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
@@ -33,20 +34,22 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
                      "; give all processes a higher one with --session");
   }
   if (saved_->missing > 0) {
-    spdlog::warn("{}: {} map records are missing in it; the map is as good as it can be", files_.load, saved_->missing);
+    spdlog::warn("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
+                 saved_->missing);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
   const std::vector<MapDelta> parts = map.Snapshot(map.keyframes().rbegin()->first, 56 * 1024);
   saved_parts_.assign(parts.begin(), parts.end());
-  spdlog::info("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(), map.num_landmarks());
+  spdlog::info("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
+               map.num_landmarks());
   return ordinal;
 }
 
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
   const uint16_t ordinal = saved_ ? ContinueSavedMap(info) : uint16_t{1};
-  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(), ordinal,
-                                       [this](const MapDelta& delta) { PublishDelta(delta); });
+  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(),
+                                       ordinal, [this](const MapDelta& delta) { PublishDelta(delta); });
   if (saved_) core_->Continue(std::exchange(saved_, std::nullopt)->map);
   if (!lockstep_) {
     core_->SetInterrupt([this] {
@@ -206,7 +209,11 @@ void MapperNode::Handle(const Record& record) {
   if (record.channel == channels::kSession) {
     if (const auto start = Read<SessionStart>(*record.bytes)) session_start_ = *start;
   }
-  if (options_.settings.start.localize_only) return;
+  if (options_.settings.start.localize_only) {
+    // The map stays as it is, but nobody is left waiting.
+    if (record.channel == channels::kMapReset) core_->Settle({}, 0);
+    return;
+  }
   if (record.channel == channels::kInitialMap) {
     if (const auto proposal = Read<InitialMap>(*record.bytes)) HandleInitialMap(*proposal);
   } else if (record.channel == channels::kKeyframe) {
@@ -244,7 +251,8 @@ void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend)
   last_settled_ = id;
 }
 
-/// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be due.
+/// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
+/// due.
 void MapperNode::SettleAwaited() {
   while (!answers_.empty() && awaited_.valid()) {
     const KeyframeId answered = answers_.front().answer.keyframe;
@@ -303,7 +311,8 @@ void MapperNode::Stop() {
 
 void MapperNode::PublishStatus() {
   MapperStatus status;
-  status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
+  status.head =
+      MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
   status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
   if (completing_) status.state = MapperStatus::State::kDone;
   status.keyframe_queue = static_cast<int32_t>(taken_.size());

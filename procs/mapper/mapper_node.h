@@ -14,8 +14,8 @@
 
 namespace dmslam {
 
-/// The mapper on the bus: the frontend's stream and the loop closer's in, the map stream out. A record of the frontend is
-/// accepted only when the map record that holds its effect was acknowledged by another process.
+/// The mapper on the bus: the frontend's stream and the loop closer's in, the map stream out. A record of the
+/// frontend is accepted only when the map record that holds its effect was acknowledged by another process.
 class MapperNode : public StreamNode {
  public:
   /// Maps as files; empty: none.
@@ -68,9 +68,9 @@ class MapperNode : public StreamNode {
   void FillCoreStatus(MapperStatus* status) const;
 
   Files files_;
-  std::optional<RebuiltMap> saved_;      ///< loaded, not yet taken over
-  std::deque<MapDelta> saved_parts_;     ///< of that map, not yet published
-  SessionStart session_start_;           ///< as the frontend said it
+  std::optional<RebuiltMap> saved_;   ///< loaded, not yet taken over
+  std::deque<MapDelta> saved_parts_;  ///< of that map, not yet published
+  SessionStart session_start_;        ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   std::unique_ptr<StreamReader> frontend_reader_, loop_reader_;
@@ -84,8 +84,8 @@ class MapperNode : public StreamNode {
   std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
-  Version current_;                      ///< the frontend's record that is handled
-  KeyframeId awaited_;                   ///< lock-step: the loop closer's answer to this keyframe is due
+  Version current_;     ///< the frontend's record that is handled
+  KeyframeId awaited_;  ///< lock-step: the loop closer's answer to this keyframe is due
   MapId awaited_map_ = 0;
   Version awaited_version_;  ///< of the record that brought it
   KeyframeId last_settled_;

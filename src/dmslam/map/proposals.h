@@ -87,6 +87,8 @@ struct FramePose {
 };
 
 /// The frontend gives a map up.
+/// With map 0 it gives up none: the sequence has ended, and the mapper is asked to adjust its maps as a whole. It answers
+/// with a settled record about no keyframe.
 struct MapReset {
   MapId map_id = 0;
   bool drop = false;  ///< true: it was wrong from the beginning; false: keep it, a new one follows

@@ -206,7 +206,6 @@ struct Codec<MapReset> {
   }
   static void Validate(const MapReset& m, Checker& check) {
     check.Stamp(m.stamp_ns);
-    check.Require(m.map_id >= 1, "no map id");
   }
 };
 

@@ -1,0 +1,104 @@
+#include "frontend/frame_refiner.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kLandmarks = 60;
+
+Camera TestCamera() {
+  Camera camera;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  camera.fx_px = camera.fy_px = 500;
+  camera.cx_px = 320;
+  camera.cy_px = 240;
+  return camera;
+}
+
+/// A keyframe at the origin and landmarks in front of it; a frame a little to the side sees them all.
+class Refining : public testing::Test {
+ protected:
+  Refining() : map_(TestCamera(), Pyramid()) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId::Make(1, 0);
+    keyframe.map_id = 1;
+    keyframe.features = MakeFrameFeatures(FeatureSet(), map_.camera(), map_.pyramid());
+    map_.AddKeyframe(std::move(keyframe));
+    truth_.translation = Eigen::Vector3d(-0.2, 0.05, 0.1);
+    Random random(7);
+    FeatureSet features;
+    std::vector<LandmarkId> ids;
+    for (uint32_t i = 0; i < kLandmarks; ++i) {
+      Landmark landmark;
+      landmark.id = LandmarkId::Make(1, i + 1);
+      landmark.map_id = 1;
+      landmark.p_world =
+          Eigen::Vector3d(random.Uniform(-1, 1), random.Uniform(-0.7, 0.7), random.Uniform(2, 4));
+      landmark.reference = landmark.first_keyframe = KeyframeId::Make(1, 0);
+      const Eigen::Vector2d uv_px = *map_.camera().Project(truth_ * landmark.p_world);
+      Keypoint keypoint;
+      keypoint.x_q4 = static_cast<uint16_t>(std::lround(16 * uv_px.x()));
+      keypoint.y_q4 = static_cast<uint16_t>(std::lround(16 * uv_px.y()));
+      features.keypoints.push_back(keypoint);
+      features.descriptors.emplace_back();
+      ids.push_back(landmark.id);
+      map_.AddLandmark(std::move(landmark));
+    }
+    frame_ = TrackedFrame(5, 1000, MakeFrameFeatures(features, map_.camera(), map_.pyramid()));
+    frame_.landmarks = ids;
+    frame_.classes.assign(kLandmarks, FeatureClass::kUsed);
+    told_.frame_index = 5;
+    told_.stamp_ns = 1000;
+    told_.state = TrackingState::kTracking;
+    told_.map_id = 1;
+    told_.reference = KeyframeId::Make(1, 0);
+    told_.T_cam_reference = truth_;
+    told_.T_cam_reference.translation += Eigen::Vector3d(0.03, -0.02, 0.02);  // as an immature map had it
+  }
+
+  Map map_;
+  Rigid3d truth_;
+  TrackedFrame frame_;
+  FramePose told_;
+};
+
+TEST_F(Refining, PoseComesFromTheMapAsItIsNow) {
+  FrameRefiner refiner(map_.camera(), map_.pyramid(), 10);
+  refiner.Keep(frame_, told_);
+  const std::vector<FramePose> refined = refiner.Refine(map_);
+  ASSERT_EQ(refined.size(), 1U);
+  EXPECT_EQ(refined[0].frame_index, 5U);
+  EXPECT_EQ(refined[0].state, TrackingState::kLocalizedLater);
+  EXPECT_LT((refined[0].T_cam_reference.translation - truth_.translation).norm(), 1e-3);
+  EXPECT_TRUE(refiner.Refine(map_).empty()) << "frames are told once";
+}
+
+TEST_F(Refining, FrameThatTheMapContradictsIsLeftOut) {
+  FrameRefiner refiner(map_.camera(), map_.pyramid(), 10);
+  refiner.Keep(frame_, told_);
+  Random random(3);
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) {
+    const Eigen::Vector3d shift(random.Uniform(-1, 1), random.Uniform(-1, 1), 0);
+    map_.SetPosition(id, map_.FindLandmark(id)->p_world + shift);
+  }
+  EXPECT_TRUE(refiner.Refine(map_).empty());
+}
+
+TEST_F(Refining, OldestIsDroppedBeyondTheBound) {
+  FrameRefiner refiner(map_.camera(), map_.pyramid(), 2);
+  for (uint32_t i = 0; i < 4; ++i) {
+    told_.frame_index = i;
+    refiner.Keep(frame_, told_);
+  }
+  const std::vector<FramePose> refined = refiner.Refine(map_);
+  ASSERT_EQ(refined.size(), 2U);
+  EXPECT_EQ(refined[0].frame_index, 2U);
+  EXPECT_EQ(refined[1].frame_index, 3U);
+}
+
+}  // namespace
+}  // namespace dmslam
