@@ -12,6 +12,7 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
+constexpr int64_t kAskAgainNs = 10'000'000'000;
 
 ImageEncoding ToImageEncoding(FrameEncoding encoding) {
   switch (encoding) {
@@ -194,8 +195,10 @@ bool FrontendNode::WorkOnce() {
 /// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.
 bool FrontendNode::MapsAreAdjusted() {
   if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
-  if (!asked_to_adjust_) {
+  const bool again = asked_to_adjust_ && !adjusted_ && context_.now_ns() - asked_ns_ > kAskAgainNs;
+  if (!asked_to_adjust_ || again) {
     asked_to_adjust_ = true;
+    asked_ns_ = context_.now_ns();
     PublishRecord(MapReset{0, false, "the sequence has ended", last_stamp_ns_});
   }
   return adjusted_;

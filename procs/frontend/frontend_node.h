@@ -79,6 +79,7 @@ class FrontendNode : public StreamNode {
   std::optional<EndOfSequence> end_;
   bool lockstep_ = false;
   bool asked_to_adjust_ = false;
+  int64_t asked_ns_ = 0;      ///< a mapper that died before it answered is asked again
   bool adjusted_ = false;  ///< all maps, after the last keyframe
   bool finished_ = false;  ///< everything is said; stays until the mapper has ended
   bool frame_open_ =

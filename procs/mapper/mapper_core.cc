@@ -248,7 +248,7 @@ void MapperCore::OnEvidence(const FrameEvidence& evidence) {
 
 void MapperCore::OnReset(const MapReset& reset) {
   if (reset.map_id == 0) {
-    AdjustMaps();
+    if (!adjusted_) AdjustMaps();
     Settle({}, 0);
     return;
   }
