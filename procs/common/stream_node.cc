@@ -15,6 +15,7 @@ namespace {
 
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
+constexpr int64_t kCameraSilentNs = 1'500'000'000;
 
 std::string UpperCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -73,9 +74,20 @@ void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
     recorded_session_ = info->session;
     spdlog::info("{}: takes the frames of recorded session {} for its own {}", role_, info->session, session_);
   }
-  if (IsForeignFrame(info->session) || camera_info_) return;
+  if (IsForeignFrame(info->session)) return;
+  camera_due_ns_ = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
+  if (camera_info_) return;
+  if (!recorded_session_) camera_message_.emplace(bytes.begin(), bytes.end());
   if (recorded_session_) info->mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
   camera_info_ = std::move(info);
+}
+
+/// A process that starts after the player has left still learns the camera, from those who write: one of them
+/// repeats what the player said.
+void StreamNode::KeepCameraKnown() {
+  if (!camera_message_ || !plan_ || context_.now_ns() < camera_due_ns_) return;
+  camera_due_ns_ = context_.now_ns() + kCameraSilentNs;
+  context_.bus->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(*camera_message_), false});
 }
 
 bool StreamNode::IsForeignFrame(uint32_t session) {
@@ -216,6 +228,7 @@ void StreamNode::Advance() {
   }
   if (context_.now_ns() >= next_status_ns_) {
     next_status_ns_ = context_.now_ns() + kStatusEveryNs;
+    KeepCameraKnown();
     PublishStatus();
   }
   endpoint_.Advance();

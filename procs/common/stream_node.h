@@ -122,6 +122,7 @@ class StreamNode : public Node {
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(std::span<const uint8_t> bytes);
+  void KeepCameraKnown();
   void RunElection();
   void StartElection();
   void OpenWriter();
@@ -130,6 +131,8 @@ class StreamNode : public Node {
   void CountMalformed(const std::string& channel, const std::string& reason);
 
   bool begun_ = false;
+  std::optional<Bytes> camera_message_;  ///< as the player sent it
+  int64_t camera_due_ns_ = 0;            ///< when it is repeated, unless somebody else says it before
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterElection> election_;
   std::optional<int> exit_code_;

@@ -260,7 +260,7 @@ void MapperCore::OnReset(const MapReset& reset) {
 
 void MapperCore::Settle(KeyframeId id, MapId map_id) {
   MapProgress progress = map_.progress();
-  progress.settled = id;
+  if (id.valid()) progress.settled = id;  // "the sequence has ended" is about no keyframe
   map_.SetProgress(progress);
   Publish(MapEvent::kSettled, id, map_id);
 }

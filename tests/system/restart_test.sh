@@ -8,5 +8,5 @@ else
   sequence=$synthetic camera=$root/config/synthetic.yaml frames=150 tracked=40
 fi
 check "killed processes go on" "$root/scripts/kill_test.sh" --sequence "$sequence" --camera "$camera" --frames "$frames" \
-  --kills 2 --victims frontend,mapper --min-tracked "$tracked" --out "$work/kills" --build-dir "$build"
+  --kills 2 --victims frontend,mapper,loopcloser --min-tracked "$tracked" --out "$work/kills" --build-dir "$build"
 finish

@@ -36,7 +36,7 @@ ChannelRow Row(const char* owner, const char* readers, const char* rate) {
 
 std::vector<ChannelRow> PlayerRows() {
   return {
-      Row<CameraInfo>("player", "frontend, viewer", "1 Hz"),
+      Row<CameraInfo>("player; while it is silent, any writer of a stream repeats it", "everybody", "1 Hz"),
       Row<Frame>("player", "frontend, viewer", "camera's rate; repeated in lock-step"),
       Row<EndOfSequence>("player", "frontend", "once, then 1 Hz"),
       Row<GroundTruthPose>("player", "frontend (for `error_m` only), viewer", "camera's rate, where known"),
