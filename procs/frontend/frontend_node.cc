@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
 #include "frontend/pictures.h"
 
@@ -13,22 +14,6 @@ namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
 constexpr int64_t kAskAgainNs = 10'000'000'000;
-
-ImageEncoding ToImageEncoding(FrameEncoding encoding) {
-  switch (encoding) {
-    case FrameEncoding::kJpeg:
-      return ImageEncoding::kJpeg;
-    case FrameEncoding::kPng:
-      return ImageEncoding::kPng;
-    case FrameEncoding::kGray8:
-      return ImageEncoding::kGray8;
-    case FrameEncoding::kRgb8:
-      return ImageEncoding::kRgb8;
-    case FrameEncoding::kBgr8:
-      return ImageEncoding::kBgr8;
-  }
-  return ImageEncoding::kFile;
-}
 
 }  // namespace
 

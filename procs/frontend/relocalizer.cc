@@ -56,7 +56,7 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
     inv_sigma_squared.push_back(1.0 / pyramid_.SigmaSquared(frame->features->set.keypoints[match.b].octave));
   }
   PoseRansacOptions options;
-  options.seed = DeriveSeed(seed, keyframe.id.value, "relocalize");
+  options.seed = DeriveSeed(seed, keyframe.id.frame_index(), "relocalize");
   options.min_inliers = kMinInliers;
   const auto report = PoseFromMatches(camera_.Ideal(), points, pixels, inv_sigma_squared, options);
   if (!report.success) return false;

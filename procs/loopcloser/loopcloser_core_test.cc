@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map.h"
 #include "dmslam/util/random.h"
 
@@ -21,16 +22,6 @@ constexpr int kPerRound = 48;
 constexpr int kPoints = 1600;  // on a cylinder around the path
 constexpr double kPathRadius = 2.0, kWallRadius = 5.0;
 constexpr double kDriftPerKeyframe = 0.004;  // of the scale, and of the position
-
-Camera TestCamera() {
-  Camera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 525;
-  camera.cx_px = 319.5;
-  camera.cy_px = 239.5;
-  return camera;
-}
 
 std::shared_ptr<const Vocabulary> ShippedVocabulary() {
   const char* source = std::getenv("DMSLAM_SOURCE_DIR");
@@ -69,7 +60,7 @@ struct WorldOptions {
 /// A camera that goes around a room; landmarks of the second round are not known to be those of the first.
 class Room {
  public:
-  explicit Room(const WorldOptions& options) : options_(options), map_(TestCamera(), Pyramid()) {
+  explicit Room(const WorldOptions& options) : options_(options), map_(TestCamera(525, 319.5, 239.5), Pyramid()) {
     Random random(7);
     for (int i = 0; i < kPoints; ++i) {
       const double angle = random.Uniform(0, 2 * std::numbers::pi);
@@ -183,7 +174,7 @@ Answers Play(Room& room, LoopcloserCore& core) {
 }
 
 LoopcloserCore MakeCore(const LoopcloserOptions& options = {}) {
-  return LoopcloserCore(options, TestCamera(), Pyramid(), 1, ShippedVocabulary());
+  return LoopcloserCore(options, TestCamera(525, 319.5, 239.5), Pyramid(), 1, ShippedVocabulary());
 }
 
 /// The pose of a keyframe after a correction.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/projection.h"
 
 namespace dmslam {
@@ -17,17 +18,7 @@ constexpr double kWallDepth = 4.0, kPersonDepth = 2.0;
 /// camera stands still; while the person is there, it hides the wall behind it.
 class StandingPerson : public testing::Test {
  protected:
-  StandingPerson() : map_(MakeCamera(), Pyramid()) {}
-
-  static Camera MakeCamera() {
-    Camera camera;
-    camera.width_px = 640;
-    camera.height_px = 480;
-    camera.fx_px = camera.fy_px = 500;
-    camera.cx_px = 320;
-    camera.cy_px = 240;
-    return camera;
-  }
+  StandingPerson() : map_(TestCamera(), Pyramid()) {}
 
   static bool OnPerson(const Eigen::Vector2d& uv_px) {
     return std::abs(uv_px.x() - 320) <= 70 && std::abs(uv_px.y() - 240) <= 70;

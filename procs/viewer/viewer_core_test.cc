@@ -2,22 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
 
 constexpr MapId kMapId = 3;
-
-Camera TestCamera() {
-  Camera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 500;
-  camera.cx_px = 320;
-  camera.cy_px = 240;
-  return camera;
-}
 
 /// A mapper's map of cameras on a circle, and what it says.
 class ViewerCoreTest : public testing::Test {

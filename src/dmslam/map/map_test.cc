@@ -4,21 +4,12 @@
 
 #include <set>
 
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
-
-Camera TestCamera() {
-  Camera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 500;
-  camera.cx_px = 320;
-  camera.cy_px = 240;
-  return camera;
-}
 
 std::shared_ptr<const FrameFeatures> RandomFeatures(Random& random, size_t count) {
   FeatureSet set;

@@ -4,8 +4,6 @@
 #include "dmslam/wire/codec.h"
 
 namespace dmslam {
-namespace {
-
 ImageEncoding ToImageEncoding(FrameEncoding encoding) {
   switch (encoding) {
     case FrameEncoding::kJpeg:
@@ -21,8 +19,6 @@ ImageEncoding ToImageEncoding(FrameEncoding encoding) {
   }
   return ImageEncoding::kFile;
 }
-
-}  // namespace
 
 RecordedFrames::RecordedFrames(std::shared_ptr<const LogIndex> log, uint32_t session)
     : log_(std::move(log)), session_(&log_->Session(session)) {

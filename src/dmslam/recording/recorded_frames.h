@@ -11,6 +11,9 @@
 
 namespace dmslam {
 
+/// How an image is to be read that a frame message holds.
+ImageEncoding ToImageEncoding(FrameEncoding encoding);
+
 /// The frames of a recorded session, with the indices, stamps and bytes with which they were published.
 class RecordedFrames : public FrameSource {
  public:

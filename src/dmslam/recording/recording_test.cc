@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_index.h"
@@ -17,16 +18,6 @@ namespace dmslam {
 namespace {
 
 constexpr uint32_t kSession = 7;
-
-Camera TestCamera() {
-  Camera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 500;
-  camera.cx_px = 320;
-  camera.cy_px = 240;
-  return camera;
-}
 
 FeatureSet RandomFeatures(Random& random, size_t count) {
   FeatureSet set;
