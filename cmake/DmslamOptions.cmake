@@ -19,14 +19,18 @@ set(DMSLAM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,und
 # The promise of identical bytes needs products and sums to be rounded one by one.
 add_library(dmslam_options INTERFACE)
 target_compile_options(dmslam_options INTERFACE
-  -Wall -Wextra -Wconversion -Wshadow -Werror -ffp-contract=off)
+  $<BUILD_INTERFACE:-Wall> $<BUILD_INTERFACE:-Wextra> $<BUILD_INTERFACE:-Wconversion> $<BUILD_INTERFACE:-Wshadow>
+  $<BUILD_INTERFACE:-Werror> $<BUILD_INTERFACE:-ffp-contract=off>)
+target_compile_features(dmslam_options INTERFACE cxx_std_20)
 if(DMSLAM_SANITIZE)
   target_compile_options(dmslam_options INTERFACE
     -fsanitize=${DMSLAM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(dmslam_options INTERFACE -fsanitize=${DMSLAM_SANITIZE})
 endif()
-target_include_directories(dmslam_options INTERFACE ${PROJECT_SOURCE_DIR}/src)
+target_include_directories(dmslam_options INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>)
 # Third-party headers are not held to our warnings.
 find_package(Eigen3 REQUIRED NO_MODULE)
 get_target_property(_eigen_include Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
-target_include_directories(dmslam_options SYSTEM INTERFACE ${_eigen_include})
+target_include_directories(dmslam_options SYSTEM INTERFACE $<BUILD_INTERFACE:${_eigen_include}>)
+target_link_libraries(dmslam_options INTERFACE $<INSTALL_INTERFACE:Eigen3::Eigen>)
+dmslam_export(dmslam_options options)

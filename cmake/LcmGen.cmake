@@ -1,12 +1,6 @@
 # lcm_generate(<target> <file.lcm>...): C++ types from .lcm files with lcm-gen, as a header-only SYSTEM target.
 # Headers land in <binary dir>/lcm_generated/dmslam/ and are included as "dmslam/<type>.hpp".
 find_program(LCM_GEN lcm-gen REQUIRED)
-find_library(LCM_LIBRARY lcm REQUIRED)
-find_path(LCM_INCLUDE_DIR lcm/lcm-cpp.hpp REQUIRED)
-
-add_library(dmslam_lcm INTERFACE)
-target_include_directories(dmslam_lcm SYSTEM INTERFACE ${LCM_INCLUDE_DIR})
-target_link_libraries(dmslam_lcm INTERFACE ${LCM_LIBRARY})
 
 function(lcm_generate target)
   set(out ${PROJECT_BINARY_DIR}/lcm_generated)
@@ -22,9 +16,11 @@ function(lcm_generate target)
       COMMENT "lcm-gen ${base}" VERBATIM)
     list(APPEND headers ${header})
   endforeach()
-  add_custom_target(${target}_headers DEPENDS ${headers})
+  add_custom_target(${target}_headers ALL DEPENDS ${headers})
   add_library(${target} INTERFACE)
   add_dependencies(${target} ${target}_headers)
-  target_include_directories(${target} SYSTEM INTERFACE ${out})
+  target_include_directories(${target} SYSTEM INTERFACE $<BUILD_INTERFACE:${out}>)
   target_link_libraries(${target} INTERFACE dmslam_lcm)
+  dmslam_install_headers(FILES ${headers})
+  dmslam_export(${target} lcmtypes)
 endfunction()

@@ -3,9 +3,11 @@
 set -euo pipefail
 
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+me=run.sh installed=0 build=""
+case "$(basename "$0")" in dmslam-*) me=$(basename "$0") installed=1 build=$top ;; esac  # beside the programs
 usage() {
-  cat <<'EOF'
-Usage: scripts/run.sh --sequence DIR | --log FILE | --replay FILE  --out DIR [options]
+  cat <<EOF
+Usage: $([ "$installed" = 1 ] || echo scripts/)$me --sequence DIR | --log FILE | --replay FILE  --out DIR [options]
 
 Plays a sequence (TUM RGB-D folder, EuRoC folder, numbered images, video) through player, frontend, mapper and loop
 closer, four processes on a private LCM port, and writes into the --out folder: trajectory.txt (final, TUM format),
@@ -40,9 +42,9 @@ trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and
   --build-dir DIR     where the programs are (default: build/release, built first where needed)
 EOF
 }
-fail() { echo "run.sh: $*" >&2; exit 1; }
+fail() { echo "$me: $*" >&2; exit 1; }
 
-sequence="" log_file="" replay="" speed=1 map="" localize=0 mapper=() out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" share_port=0 build="" receive_buffer=4194304 restart=1
+sequence="" log_file="" replay="" speed=1 map="" localize=0 mapper=() out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" share_port=0 receive_buffer=4194304 restart=1
 viewer=0 http=()
 player=() common=()
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
@@ -165,7 +167,7 @@ stop_all() {
   wait_for 100 "${pid_of[@]}" $logger $viewer_pid || for p in "${pid_of[@]}" $logger $viewer_pid; do kill -KILL "$p" 2>/dev/null || true; done
 }
 exec 3>&2  # where we speak; what bash says about its jobs goes nowhere
-trap 'stop_all; echo "run.sh: interrupted; what was tracked is in $out" >&3; exit 130' INT
+trap 'stop_all; echo "$me: interrupted; what was tracked is in $out" >&3; exit 130' INT
 trap 'stop_all; exit 143' TERM HUP
 trap stop_all EXIT
 
@@ -201,7 +203,7 @@ echo "the log has no end of the sequence; the frontend is told to finish" >&2
 kill -TERM "$(<"$frontend_pid")"
 '
 if [ -n "$replay" ]; then
-  command -v lcm-logplayer >/dev/null || fail "lcm-logplayer is missing; run scripts/setup.sh core"
+  command -v lcm-logplayer >/dev/null || fail "lcm-logplayer is missing; install liblcm-bin (scripts/setup.sh core)"
   player_program=bash
   player_arguments=(-c "$replay_log" replay "$url" "$speed" "$replay" "$out/log/frontend.pid")
 fi
@@ -219,7 +221,7 @@ launch() { # name: begins a process, or begins it again; only at the beginning n
 }
 rm -f "$out/log/table.txt"
 if [ "$record" = 1 ]; then
-  command -v lcm-logger >/dev/null || fail "lcm-logger is missing; run scripts/setup.sh core"
+  command -v lcm-logger >/dev/null || fail "lcm-logger is missing; install liblcm-bin (scripts/setup.sh core)"
   rm -f "$out/run.lcmlog"
   "${guard[@]}" lcm-logger --quiet --lcm-url="$url" "$out/run.lcmlog" </dev/null >"$out/log/logger.log" 2>&1 &
   logger=$!
@@ -245,7 +247,7 @@ open_viewer() {
     sleep 0.05
   done
   if [ -z "$address" ]; then fail "the viewer did not start: $(why viewer)"; fi
-  echo "run.sh: to be seen at $address" >&3
+  echo "$me: to be seen at $address" >&3
   if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ] && command -v xdg-open >/dev/null; then
     xdg-open "$address" </dev/null >/dev/null 2>&1 &
   fi
@@ -258,7 +260,7 @@ report() { # name, status
   message=$(why "$1")
   if [ "$1" = collector ] && [ -t 3 ]; then return; fi  # it has spoken on the terminal itself
   if [ "$2" -gt 128 ]; then message="$1 was ended by signal $(($2 - 128)); its log is $out/log/$1.log"; fi
-  echo "run.sh: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&3
+  echo "$me: ${message:-$1 ended with code $2; its log is $out/log/$1.log}" >&3
 }
 
 # Died of a signal or an internal error, or found that another process knows more: the others go on, and so can it.
@@ -274,7 +276,7 @@ restart_it() { # name, status
   restarts_of[$1]=$((${restarts_of[$1]:-0} + 1))
   local how="ended with code $2"
   if [ "$2" -gt 128 ]; then how="was ended by signal $(($2 - 128))"; fi
-  echo "run.sh: $1 $how; started again (${restarts_of[$1]})" >&3
+  echo "$me: $1 $how; started again (${restarts_of[$1]})" >&3
   launch "$1"
 }
 
@@ -307,7 +309,7 @@ stay_open() {
   [ -n "$viewer_pid" ] && [ "$code" = 0 ] && [ -t 0 ] && [ -t 3 ] && alive "$viewer_pid" || return 0
   [ ! -s "$out/log/table.txt" ] || cat "$out/log/table.txt"
   rm -f "$out/log/table.txt"
-  echo "run.sh: the results are in $out; the viewer stays until Ctrl-C" >&3
+  echo "$me: the results are in $out; the viewer stays until Ctrl-C" >&3
   trap 'stop_all; exit 0' INT
   wait "$viewer_pid" || true
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what a part of the project needs, from Debian's packages only: scripts/setup.sh core|test|tools|viewer|browser...
+# Installs what a part of the project needs, from Debian's packages only: scripts/setup.sh core|test|tools|viewer|browser|package...
 set -euo pipefail
 core=(build-essential cmake ninja-build ccache pkg-config
   liblcm-dev liblcm-bin libglib2.0-dev
@@ -10,7 +10,8 @@ test=(libgtest-dev libbenchmark-dev iproute2 nftables python3-minimal)
 tools=(default-jre default-jdk-headless liblcm-java libjchart2d-java xvfb xdotool imagemagick)
 viewer=(libcpp-httplib-dev libjs-three libjs-chart.js)
 browser=(chromium python3-websocket)
-usage() { echo "Usage: scripts/setup.sh PART...   with PART one of: core test tools viewer browser (to test the viewer)"; }
+package=(dpkg-dev file)
+usage() { echo "Usage: scripts/setup.sh PART...   with PART one of: core test tools viewer browser (to test the viewer) package"; }
 [ $# -gt 0 ] || { usage >&2; exit 2; }
 packages=()
 for part in "$@"; do
@@ -18,6 +19,7 @@ for part in "$@"; do
     core) packages+=("${core[@]}") ;;
     test) packages+=("${core[@]}" "${test[@]}" "${viewer[@]}" "${browser[@]}") ;;
     tools) packages+=("${tools[@]}") ;;
+    package) packages+=("${package[@]}") ;;
     browser) packages+=("${browser[@]}") ;;
     viewer) packages+=("${core[@]}" "${viewer[@]}") ;;
     -h | --help) usage; exit 0 ;;
