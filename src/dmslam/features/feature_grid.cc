@@ -44,6 +44,24 @@ void FeatureGrid::FindInRadius(const Eigen::Vector2d& center_px, double radius_p
                   [features](uint32_t feature) { features->push_back(feature); });
 }
 
+size_t FeatureGrid::CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
+                                    uint32_t* features) const {
+  const CellRange range = CellsOf(center_px, radius_px);
+  const double radius_squared = radius_px * radius_px, center_x = center_px.x(), center_y = center_px.y();
+  size_t count = 0;
+  for (int row = range.row_begin; row < range.row_end; ++row) {
+    const Entry* end = entries_.data() + starts_[CellIndex(range.column_end - 1, row) + 1];
+    for (const Entry* entry = entries_.data() + starts_[CellIndex(range.column_begin, row)]; entry < end; ++entry) {
+      const double dx = entry->x_px - center_x, dy = entry->y_px - center_y;
+      const bool wanted = static_cast<int>(entry->octave >= min_octave) & static_cast<int>(entry->octave <= max_octave) &
+                          static_cast<int>(dx * dx + dy * dy <= radius_squared);
+      features[count] = entry->feature;
+      count += static_cast<size_t>(wanted);
+    }
+  }
+  return count;
+}
+
 FeatureGrid::CellRange FeatureGrid::CellsOf(const Eigen::Vector2d& center_px, double radius_px) const {
   if (entries_.empty() || !(radius_px >= 0.0) || !center_px.allFinite()) return {};
   CellRange range;

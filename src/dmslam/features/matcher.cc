@@ -11,10 +11,10 @@ namespace {
 
 constexpr int kNoDistance = 257;
 
-/// Smaller distance first, then the smaller index.
-bool Nearer(int distance, uint32_t index, int other_distance, uint32_t other_index) {
-  return distance != other_distance ? distance < other_distance : index < other_index;
-}
+/// Distance and index in one number, which orders by distance and then by index.
+uint64_t KeyOf(int distance, uint32_t index) { return (static_cast<uint64_t>(distance) << 32) | index; }
+int DistanceOf(uint64_t key) { return static_cast<int>(key >> 32); }
+uint32_t IndexOf(uint64_t key) { return static_cast<uint32_t>(key); }
 
 bool ClearlyBetter(int distance, int second_distance, double max_ratio) {
   return max_ratio >= 1.0 || distance < max_ratio * second_distance;
@@ -68,7 +68,7 @@ void FeatureMatcher::MatchWindow(const MatchSide& a, const MatchSide& b, const F
     const SearchArea area = {predicted_px[i], options.window_px, octave - options.octave_slack,
                              octave + options.octave_slack};
     CompareInArea(a.descriptors[i], area, b, grid_b);
-    Propose(i, b, options.match, matches);
+    Propose(i, options.match, matches);
   }
   Finish(a, b, options.match, matches);
 }
@@ -83,7 +83,7 @@ void FeatureMatcher::MatchAll(const MatchSide& a, const MatchSide& b, const Matc
   for (uint32_t i = 0; i < a.size(); ++i) {
     if (!a.Usable(i)) continue;
     CompareWithCandidates(a.descriptors[i], b);
-    Propose(i, b, options, matches);
+    Propose(i, options, matches);
   }
   Finish(a, b, options, matches);
 }
@@ -104,7 +104,7 @@ void FeatureMatcher::MatchGroups(const MatchSide& a, std::span<const GroupedFeat
         const uint32_t feature = groups_a[i].feature;
         if (!a.Usable(feature)) continue;
         CompareWithCandidates(a.descriptors[feature], b);
-        Propose(feature, b, options, matches);
+        Propose(feature, options, matches);
       }
     }
     if (group_a <= group_b) begin_a = end_a;
@@ -117,24 +117,13 @@ std::optional<NearestFeatures> FeatureMatcher::FindNearest(const Descriptor& des
                                                            const MatchSide& side, const FeatureGrid& grid) {
   CompareInArea(descriptor, area, side, grid);
   if (candidates_.empty()) return std::nullopt;
+  const BestTwo two = BestTwoOfCandidates();
   NearestFeatures nearest;
-  uint32_t second_index = 0;
-  for (size_t i = 0; i < candidates_.size(); ++i) {
-    const int distance = distances_[i];
-    const uint32_t index = candidates_[i];
-    if (Nearer(distance, index, nearest.distance, nearest.index)) {
-      nearest.second_distance = nearest.distance;
-      nearest.second_octave = nearest.octave;
-      second_index = nearest.index;
-      nearest.distance = distance;
-      nearest.index = index;
-      nearest.octave = side.keypoints[index].octave;
-    } else if (Nearer(distance, index, nearest.second_distance, second_index)) {
-      nearest.second_distance = distance;
-      nearest.second_octave = side.keypoints[index].octave;
-      second_index = index;
-    }
-  }
+  nearest.index = IndexOf(two.best);
+  nearest.distance = DistanceOf(two.best);
+  nearest.octave = side.keypoints[nearest.index].octave;
+  nearest.second_distance = DistanceOf(two.second);
+  if (nearest.second_distance < kNoDistance) nearest.second_octave = side.keypoints[IndexOf(two.second)].octave;
   return nearest;
 }
 
@@ -152,49 +141,50 @@ void FeatureMatcher::Start(const MatchSide& a, const MatchSide& b, std::vector<F
   CheckSide(a);
   CheckSide(b);
   matches->clear();
-  nearest0_.assign(b.size(), Nearest());
+  nearest0_.assign(b.size(), KeyOf(kNoDistance, 0));
 }
 
-void FeatureMatcher::Propose(uint32_t index0, const MatchSide& b, const MatchOptions& options,
-                             std::vector<FeatureMatch>* matches) {
-  Nearest best;
-  int second_distance = kNoDistance;
-  for (size_t i = 0; i < candidates_.size(); ++i) {
-    const int distance = distances_[i];
-    const uint32_t index = candidates_[i];
-    if (options.mutual) NoteForSecondImage(index, distance, index0);
-    if (Nearer(distance, index, best.distance, best.index)) {
-      second_distance = best.distance;
-      best = {distance, index};
-    } else {
-      second_distance = std::min(second_distance, distance);
-    }
+void FeatureMatcher::Propose(uint32_t index0, const MatchOptions& options, std::vector<FeatureMatch>* matches) {
+  const auto [best, second] = BestTwoOfCandidates();
+  if (options.mutual) {
+    for (size_t i = 0; i < candidates_.size(); ++i) NoteForSecondImage(candidates_[i], distances_[i], index0);
   }
-  if (best.distance > options.max_distance) return;
-  if (!ClearlyBetter(best.distance, second_distance, options.max_ratio)) return;
-  if (!options.mutual) NoteForSecondImage(best.index, best.distance, index0);
-  DMSLAM_CHECK(best.index < b.size(), "a match names a feature of the second image");
-  matches->push_back({index0, best.index, best.distance});
+  const int distance = DistanceOf(best);
+  if (distance > std::min(options.max_distance, kNoDistance - 1)) return;
+  if (!ClearlyBetter(distance, DistanceOf(second), options.max_ratio)) return;
+  if (!options.mutual) NoteForSecondImage(IndexOf(best), distance, index0);
+  matches->push_back({index0, IndexOf(best), distance});
+}
+
+FeatureMatcher::BestTwo FeatureMatcher::BestTwoOfCandidates() const {
+  BestTwo two{KeyOf(kNoDistance, 0), KeyOf(kNoDistance, 0)};
+  for (size_t i = 0; i < candidates_.size(); ++i) {
+    const uint64_t key = KeyOf(distances_[i], candidates_[i]);
+    two.second = std::min(two.second, std::max(two.best, key));
+    two.best = std::min(two.best, key);
+  }
+  return two;
 }
 
 void FeatureMatcher::NoteForSecondImage(uint32_t index1, int distance, uint32_t index0) {
-  Nearest& nearest = nearest0_[index1];
-  if (Nearer(distance, index0, nearest.distance, nearest.index)) nearest = {distance, index0};
+  nearest0_[index1] = std::min(nearest0_[index1], KeyOf(distance, index0));
 }
 
 void FeatureMatcher::Finish(const MatchSide& a, const MatchSide& b, const MatchOptions& options,
                             std::vector<FeatureMatch>* matches) {
-  std::erase_if(*matches, [this](const FeatureMatch& m) { return nearest0_[m.index1].index != m.index0; });
+  std::erase_if(*matches, [this](const FeatureMatch& m) { return IndexOf(nearest0_[m.index1]) != m.index0; });
   if (options.check_orientation) KeepConsistentTurns(a.keypoints, b.keypoints, matches);
   std::sort(matches->begin(), matches->end());
 }
 
 void FeatureMatcher::CompareInArea(const Descriptor& descriptor, const SearchArea& area, const MatchSide& side,
                                    const FeatureGrid& grid) {
-  candidates_.clear();
-  grid.ForEachInRadius(area.center_px, area.radius_px, area.min_octave, area.max_octave, [&](uint32_t feature) {
-    if (side.Usable(feature)) candidates_.push_back(feature);
-  });
+  DMSLAM_CHECK(grid.size() == side.size(), "the grid must index the features of the side");
+  if (in_area_.size() < side.size()) in_area_.resize(side.size());
+  const size_t count =
+      grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave, area.max_octave, in_area_.data());
+  candidates_.assign(in_area_.data(), in_area_.data() + count);
+  if (!side.usable.empty()) std::erase_if(candidates_, [&](uint32_t feature) { return !side.Usable(feature); });
   CompareWithCandidates(descriptor, side);
 }
 

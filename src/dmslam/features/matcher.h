@@ -110,15 +110,16 @@ class FeatureMatcher {
                                         const FeatureGrid& grid, int max_distance, double max_ratio);
 
  private:
-  /// Distance to, and index of, the nearest feature of the other image.
-  struct Nearest {
-    int distance = 257;
-    uint32_t index = 0;
+  /// Distance (high 32 bits) and index of the two nearest candidates; distance 257 where there are fewer.
+  struct BestTwo {
+    uint64_t best;
+    uint64_t second;
   };
 
   void Start(const MatchSide& a, const MatchSide& b, std::vector<FeatureMatch>* matches);
   /// Compares feature `index0` with `candidates_` of b, whose distances are in `distances_`.
-  void Propose(uint32_t index0, const MatchSide& b, const MatchOptions& options, std::vector<FeatureMatch>* matches);
+  void Propose(uint32_t index0, const MatchOptions& options, std::vector<FeatureMatch>* matches);
+  BestTwo BestTwoOfCandidates() const;
   void NoteForSecondImage(uint32_t index1, int distance, uint32_t index0);
   /// Leaves each feature of b its nearest, checks turns, sorts.
   void Finish(const MatchSide& a, const MatchSide& b, const MatchOptions& options,
@@ -129,9 +130,10 @@ class FeatureMatcher {
   void CompareWithCandidates(const Descriptor& descriptor, const MatchSide& side);
 
   const HammingKernels& kernels_;
+  std::vector<uint32_t> in_area_;
   std::vector<uint32_t> candidates_;
   std::vector<uint16_t> distances_;
-  std::vector<Nearest> nearest0_;  ///< per feature of b: the nearest of a
+  std::vector<uint64_t> nearest0_;  ///< per feature of b: distance (high 32 bits) and index of the nearest of a
 };
 
 /// Removes matches whose turn (difference of the keypoints' angles) is not among the most common: a histogram of 30 bins,
