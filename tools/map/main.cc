@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <map>
 #include <tuple>
 
@@ -15,11 +16,12 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
+#include "purity.h"
 
 namespace {
 
 struct Arguments {
-  std::string log, ply, trajectory, online, keyframes, save;
+  std::string log, ply, trajectory, online, keyframes, save, masks, json;
   uint32_t session = 0;
   double at_s = -1;
   bool channels = false;
@@ -36,6 +38,9 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--trajectory", a.trajectory, "write where the camera was, by the map (TUM format)");
   app.add_option("--trajectory-online", a.online, "write where the camera was, as told frame by frame");
   app.add_option("--keyframes", a.keyframes, "write the keyframes' poses (TUM format)");
+  CLI::Option* masks = app.add_option(
+      "--masks", a.masks, "sequence's folder with masks: say how many landmarks are seen mostly on people");
+  app.add_option("--json", a.json, "also write that into this file")->needs(masks);
   app.add_option("--save", a.save, "write the map as a file that the mapper can load (--map)");
 }
 
@@ -102,6 +107,23 @@ void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
   std::printf("trajectory  %zu frames\n", trajectories.final.size());
 }
 
+/// Says how many landmarks lie on people, by the masks of the keyframes' images.
+void Judge(const Arguments& a, const dmslam::Map& map, dmslam::MapId map_id) {
+  const dmslam::MapPurity purity = dmslam::JudgeMap(map, map_id, dmslam::MasksIn(a.masks));
+  if (purity.landmarks == 0)
+    throw dmslam::InputError(a.masks + ": no mask belongs to a keyframe of " + a.log +
+                             "; is it this sequence?");
+  std::printf("on people   %zu of %zu landmarks (%.2f %%), ever %zu; %zu of %zu keyframes have no mask\n",
+              purity.on_people, purity.landmarks, purity.OnPeoplePercent(), purity.ever_on_people,
+              purity.keyframes_unjudged, purity.keyframes);
+  if (a.json.empty()) return;
+  std::ofstream file(a.json, std::ios::binary);
+  file << dmslam::PurityJson(purity);
+  file.flush();
+  if (!file)
+    throw dmslam::InputError(a.json + ": cannot be written; check that the folder exists and has space");
+}
+
 int Run(const Arguments& a) {
   if (a.channels) return ListChannels(a.log);
   const dmslam::LogIndex log(a.log);
@@ -131,6 +153,7 @@ int Run(const Arguments& a) {
   if (!a.keyframes.empty()) dmslam::WriteTrajectory(a.keyframes, trajectories.keyframes);
   if (!a.save.empty()) dmslam::SaveMap(a.save, rebuilt.map, rebuilt.session);
   Print(log, session, rebuilt, trajectories, map_id);
+  if (!a.masks.empty()) Judge(a, rebuilt.map, map_id);
   return 0;
 }
 
