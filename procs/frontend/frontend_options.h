@@ -16,7 +16,9 @@ struct TrackingOptions {
   double local_radius_frontal = 2.5; ///< the same where the view is nearly the mean view
   double local_ratio = 0.8;          ///< best over second best descriptor distance at the same octave
   int max_descriptor_distance = 100; ///< bits, with a position prior
-  int min_local_inliers = 30;        ///< fewer: the frame is not tracked
+  double hidden_distance = 40;       ///< so few bits are asked of a match where nothing else of the map is found...
+  double hidden_distance_slope = 200;  ///< ...and so many more are allowed, times the share that is found around it
+  int min_local_inliers = 20;        ///< fewer: the frame is not tracked
   int min_inliers_after_relocalization = 50;
   double chi2 = 5.991;
   double moved_chi2 = 4.0 * 5.991;   ///< a strong match farther off than this speaks for motion

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "dmslam/robust/pose_from_matches.h"
+#include "frontend/found_share.h"
 
 namespace dmslam {
 namespace {
@@ -305,6 +306,31 @@ void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, Tracked
   }
 }
 
+/// What is found where little else of the map is found is mostly found by chance, on whoever hides the map: within the
+/// search radius, and so in agreement with any pose, right or wrong. It must look like its landmark more closely than a
+/// match among many others.
+void PoseTracker::DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame) {
+  std::vector<LandmarkId> matched;
+  for (const LandmarkId id : frame->landmarks) {
+    if (id.valid()) matched.push_back(id);
+  }
+  std::sort(matched.begin(), matched.end());
+  FoundShare share(camera_);
+  for (const auto& [id, view] : visible_) {
+    if (!HasVote(*map.FindLandmark(id))) continue;
+    share.Add(view.uv_px, std::binary_search(matched.begin(), matched.end(), id));
+  }
+  for (size_t i = 0; i < frame->landmarks.size(); ++i) {
+    const Landmark* landmark = frame->landmarks[i].valid() ? map.FindLandmark(frame->landmarks[i]) : nullptr;
+    if (landmark == nullptr) continue;
+    const double allowed =
+        options_.hidden_distance + options_.hidden_distance_slope * share.Around(frame->features->uv_px[i]);
+    if (HammingDistance(landmark->descriptor, frame->features->set.descriptors[i]) > allowed) {
+      frame->landmarks[i] = LandmarkId{};
+    }
+  }
+}
+
 void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
   std::vector<LandmarkId> used;
   taken_.assign(frame->features->size(), 0);
@@ -488,6 +514,7 @@ TrackingReport PoseTracker::Summarize(const TrackedFrame& frame, int inliers, bo
 TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, TrackedFrame* frame) {
   CollectLocalMap(map, *frame);
   SearchLocalLandmarks(map, relocalized, frame);
+  if (options_.motion_belief) DropMatchesOfHiddenPlaces(map, frame);
   const int inliers = OptimizeMatches(map, frame);
   FindMoved(map, frame);
   JudgeMissing(map, *frame);

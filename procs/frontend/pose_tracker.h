@@ -71,6 +71,7 @@ class PoseTracker {
   int OptimizeMatches(const Map& map, TrackedFrame* frame);
   void CollectLocalMap(const Map& map, const TrackedFrame& frame);
   void SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame);
+  void DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame);
   void FindMoved(const Map& map, TrackedFrame* frame);
   void JudgeMissing(const Map& map, const TrackedFrame& frame);
   void SpreadMotion(TrackedFrame* frame);
