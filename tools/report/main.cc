@@ -9,6 +9,7 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "figures.h"
+#include "sweep.h"
 
 namespace dmslam {
 namespace {
@@ -21,6 +22,7 @@ struct Arguments {
   int seeds = 10;
   std::vector<std::string> only;
   std::string publish;
+  std::string data;
 };
 
 void WriteText(const fs::path& path, const std::string& text) {
@@ -115,6 +117,27 @@ void RunWrite(const Arguments& arguments) {
   std::cout << (out / "report.md").string() << "\n" << (out / "report.json").string() << "\n";
 }
 
+// The sweep's tables between the marks of a page, and its picture in the folder images beside that.
+void PublishSweep(const fs::path& page, const Sweep& sweep, const PlotFigure& figure) {
+  const std::string text = ReadTextFile(page.string());
+  std::error_code error;
+  fs::create_directories(page.parent_path() / "images", error);
+  const std::string picture = "images/" + page.stem().string() + ".png";
+  WritePng(figure, (page.parent_path() / picture).string());
+  WriteText(page, ReplaceBetweenMarks(text, SweepMarkdown(sweep, picture)));
+}
+
+void RunSweep(const Arguments& arguments) {
+  const fs::path out = arguments.out;
+  const Sweep sweep = ReadSweep(out, arguments.data, arguments.seeds);
+  const PlotFigure figure = SweepFigure(sweep);
+  WritePng(figure, (out / "dynamic-scenes.png").string());
+  WriteSvg(figure, (out / "dynamic-scenes.svg").string());
+  WriteText(out / "dynamic-scenes.md", SweepMarkdown(sweep, "dynamic-scenes.png"));
+  if (!arguments.publish.empty()) PublishSweep(arguments.publish, sweep, figure);
+  std::cout << (out / "dynamic-scenes.md").string() << "\n" << (out / "dynamic-scenes.png").string() << "\n";
+}
+
 }  // namespace
 }  // namespace dmslam
 
@@ -134,9 +157,16 @@ int main(int argc, char** argv) {
   write->add_option("--out", arguments.out, "the reproduction's folder")->required();
   write->add_option("--publish", arguments.publish,
                     "also write this page, with pictures of rendered sequences only");
+  CLI::App* sweep = app.add_subcommand("sweep", "write the tables and the picture of scripts/sweep.sh");
+  sweep->add_option("--out", arguments.out, "the sweep's folder")->required();
+  sweep->add_option("--seeds", arguments.seeds, "runs of each sequence")->capture_default_str();
+  sweep->add_option("--data", arguments.data, "folder that holds the kitchen sequences");
+  sweep->add_option("--publish", arguments.publish, "also put them between this page's marks");
   CLI11_PARSE(app, argc, argv);
   try {
-    plan->parsed() ? dmslam::RunPlan(arguments) : dmslam::RunWrite(arguments);
+    if (plan->parsed()) dmslam::RunPlan(arguments);
+    if (write->parsed()) dmslam::RunWrite(arguments);
+    if (sweep->parsed()) dmslam::RunSweep(arguments);
   } catch (const std::exception& error) {
     std::cerr << "dmslam-report: " << error.what() << "\n";
     return 1;

@@ -18,20 +18,10 @@ std::string Number(const std::optional<Spread>& spread, int decimals) {
   return spread ? Number(spread->median, decimals) : kNone;
 }
 
-std::string WithEnds(const std::optional<Spread>& spread, int decimals) {
-  if (!spread) return kNone;
-  return Format("%.*f (%.*f–%.*f)", decimals, spread->median, decimals, spread->min, decimals, spread->max);
-}
-
 // By how many percent the second is smaller than the first.
 std::string Improvement(const std::optional<Spread>& before, const std::optional<Spread>& after) {
   if (!before || !after || !(before->median > 0)) return kNone;
   return Number(100 * (1 - after->median / before->median), 1);
-}
-
-std::string RunsText(const Cell& cell) {
-  const size_t run = cell.runs.size() - cell.Count(State::kMissing);
-  return Format("%zu/%zu", cell.Count(State::kDone), run);
 }
 
 /// One of the paper's tables: a row per sequence with both systems and the improvement.
@@ -283,6 +273,17 @@ std::string Pictures(const std::vector<ReportPicture>& pictures, FigureSection s
 }
 
 }  // namespace
+
+std::string WithEnds(const std::optional<Spread>& spread, int decimals) {
+  if (!spread) return kNone;
+  if (spread->count < 2) return Number(spread->median, decimals);
+  return Format("%.*f (%.*f–%.*f)", decimals, spread->median, decimals, spread->min, decimals, spread->max);
+}
+
+std::string RunsText(const Cell& cell) {
+  const size_t run = cell.runs.size() - cell.Count(State::kMissing);
+  return Format("%zu/%zu", cell.Count(State::kDone), run);
+}
 
 std::string ReportMarkdown(const Results& results, const std::optional<IterationTimes>& times,
                            const std::vector<ReportPicture>& pictures) {

@@ -39,4 +39,9 @@ std::string ReportMarkdown(const Results& results, const std::optional<Iteration
 /// The same numbers as a JSON document, with those of every run.
 std::string ReportJson(const Results& results, const std::optional<IterationTimes>& times);
 
+/// Table cells: the median, and least and most where there are several values; runs with a trajectory of
+/// those done.
+std::string WithEnds(const std::optional<Spread>& spread, int decimals);
+std::string RunsText(const Cell& cell);
+
 }  // namespace dmslam
