@@ -338,7 +338,7 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
   const bool behind = report.num_static < o.tracked_ratio * expected;
   const bool due = since_ns >= ToNs(o.max_interval_s) || since_ns >= ToNs(o.min_interval_s) || weak;
   if (!behind || !due) return false;
-  if (withheld_ || (awaited_.valid() && !weak)) {
+  if (withheld_ || awaited_.valid()) {  // one at a time: the mapper adjusts each, and is never overrun
     ++counters_.keyframes_withheld;
     return false;
   }
