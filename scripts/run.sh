@@ -14,7 +14,8 @@ closer, four processes on a private LCM port, and writes into the --out folder: 
 trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs.
 
   --log FILE          instead of --sequence: the frames of a log of lcm-logger, by our player (any mode)
-  --replay FILE       instead of --sequence: the camera channels of such a log, by the real lcm-logplayer
+  --replay FILE       instead of --sequence: the camera channels of such a log, by the real lcm-logplayer, in real time
+                      (--start, --frames, --black-out, --jump, --camera and --prefix: of a copy of them)
   --map FILE          begin in a saved map (or the map of a log), and go on with it
   --localize          with --map: find the camera in it, and leave the map as it is
   --save-map FILE     save the map at the end
@@ -46,7 +47,7 @@ fail() { echo "$me: $*" >&2; exit 1; }
 
 sequence="" log_file="" replay="" speed=1 map="" localize=0 mapper=() out="" camera="" lockstep=0 seed=1 profile="" pictures=0 record=0 port="" share_port=0 receive_buffer=4194304 restart=1
 viewer=0 http=()
-player=() common=()
+player=() common=() changed=() prefix=""
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
   case "$1" in
@@ -61,7 +62,7 @@ while [ $# -gt 0 ]; do
     --lockstep) lockstep=1; shift ;;
     --speed) need "$@"; speed=$2; player+=(--speed "$2"); shift 2 ;;
     --seed) need "$@"; seed=$2; shift 2 ;;
-    --start | --frames | --black-out | --jump) need "$@"; player+=("$1" "$2"); shift 2 ;;
+    --start | --frames | --black-out | --jump) need "$@"; player+=("$1" "$2"); changed+=("$1" "$2"); shift 2 ;;
     --config) need "$@"; common+=(--config "$2"); shift 2 ;;
     --set) need "$@"; common+=(--set "$2"); shift 2 ;;
     --profile) need "$@"; profile=$2; shift 2 ;;
@@ -72,7 +73,7 @@ while [ $# -gt 0 ]; do
     --http) need "$@"; http=(--http "$2") viewer=1; shift 2 ;;
     --port) need "$@"; port=$2; shift 2 ;;
     --share-port) share_port=1; shift ;;
-    --prefix) need "$@"; common+=(--prefix "$2"); shift 2 ;;
+    --prefix) need "$@"; prefix=$2; common+=(--prefix "$2"); shift 2 ;;
     --receive-buffer) need "$@"; receive_buffer=$2; shift 2 ;;
     --no-restart) restart=0; shift ;;
     --build-dir) need "$@"; build=$2; shift 2 ;;
@@ -95,6 +96,7 @@ is_number --receive-buffer "$receive_buffer"
 [ -z "$replay" ] || [ -f "$replay" ] || fail "$replay: no such file; check --replay"
 [ -z "$map" ] || [ -f "$map" ] || fail "$map: no such file; check --map"
 [ "$localize" = 0 ] || [ -n "$map" ] || fail "--localize needs a map: give it with --map"
+[ "$lockstep" = 0 ] || [ -z "$replay" ] || fail "--replay plays in real time, since lcm-logplayer waits for nobody; in lock-step plays --log"
 [ "$profile" = "" ] || [ "$profile" = dm ] || [ "$profile" = baseline ] || fail "--profile $profile: write dm or baseline"
 
 if [ -z "$build" ]; then
@@ -134,7 +136,7 @@ fi
 common+=(--set "seed=$seed" --lcm-url "$url" --session "$session"
   --peers frontend,mapper,loopcloser,collector)
 [ -n "$profile" ] && common=(--set "profile=$profile" "${common[@]}")
-[ -n "$camera" ] && player+=(--camera "$camera")
+[ -n "$camera" ] && player+=(--camera "$camera") changed+=(--camera "$camera")
 [ -n "$replay" ] && common+=(--accept-recorded)
 [ "$lockstep" = 1 ] && player+=(--lockstep)
 ground_truth=()
@@ -184,6 +186,15 @@ collector_arguments=("${common[@]}" "${quiet[@]}" --out "$out" "${ground_truth[@
 player_arguments=("${common[@]}" "${player[@]}" --sequence "$sequence")
 player_program="$bin/dmslam-player"
 [ -z "$log_file" ] || player_arguments=("${common[@]}" "${player[@]}" --log "$log_file")
+# What a process said before it failed: its error, or what its command line lacked.
+why() {
+  local log="$out/log/$1.log" line
+  [ -f "$log" ] || return 0
+  line=$(grep -hE " (error|critical): " "$log" | tail -n 1 | sed -E 's/^[0-9:.]* //; s/ (error|critical): /: /' || true)
+  [ -n "$line" ] || line=$(grep -vE '^[0-9:.]+ |^ *$' "$log" | head -n 1 | sed "s/^/$1: /" || true)
+  [ -n "$line" ] || line=$(tail -n 1 "$log" | sed -E 's/^[0-9:.]* //' || true)
+  echo "$line"
+}
 # lcm-logplayer, and then the end of the sequence again until the frontend has heard it: it travels unacknowledged.
 replay_log='
 url=$1 speed=$2 log=$3 frontend_pid=$4
@@ -193,10 +204,10 @@ for ((i = 0; i < 200; ++i)); do
   sleep 0.05
 done
 sleep 0.5
-lcm-logplayer -s "$speed" -l "$url" -e "DMSLAM_PLAYER_(CAMERA_INFO|FRAME|GROUND_TRUTH|END_OF_SEQUENCE)$" "$log" || exit
+lcm-logplayer -s "$speed" -l "$url" -e ".*DMSLAM_PLAYER_(CAMERA_INFO|FRAME|GROUND_TRUTH|END_OF_SEQUENCE)$" "$log" || exit
 for ((i = 0; i < 60; ++i)); do
   kill -0 "$(<"$frontend_pid")" 2>/dev/null || exit 0
-  [ $((i % 4)) != 3 ] || lcm-logplayer -s 1000 -l "$url" -e "DMSLAM_PLAYER_END_OF_SEQUENCE$" "$log"
+  [ $((i % 4)) != 3 ] || lcm-logplayer -s 1000 -l "$url" -e ".*DMSLAM_PLAYER_END_OF_SEQUENCE$" "$log"
   sleep 0.25
 done
 echo "the log has no end of the sequence; the frontend is told to finish" >&2
@@ -204,6 +215,14 @@ kill -TERM "$(<"$frontend_pid")"
 '
 if [ -n "$replay" ]; then
   command -v lcm-logplayer >/dev/null || fail "lcm-logplayer is missing; install liblcm-bin (scripts/setup.sh core)"
+  channels=$("$bin/dmslam-map" --log "$replay" --channels 2>"$out/log/map.log") || fail "$(tail -n 1 "$out/log/map.log" | sed 's/^\(\[[^]]*\] *\)*//')"
+  grep -q 'DMSLAM_PLAYER_FRAME ' <<<"$channels" || fail "$replay: holds no frames of a camera; was the player recorded too?"
+  recorded_prefix=$(sed -nE '/DMSLAM_PLAYER_FRAME /{s/^(.*)DMSLAM_PLAYER_FRAME .*/\1/p;q}' <<<"$channels")
+  if [ ${#changed[@]} -gt 0 ] || [ "$recorded_prefix" != "$prefix" ]; then # lcm-logplayer plays whole logs, as they are
+    "$bin/dmslam-player" --prefix "$prefix" "${changed[@]}" --log "$replay" --to-log "$out/log/replayed.lcmlog" 2>"$out/log/player.log" ||
+      fail "$(why player)"
+    replay=$out/log/replayed.lcmlog
+  fi
   player_program=bash
   player_arguments=(-c "$replay_log" replay "$url" "$speed" "$replay" "$out/log/frontend.pid")
 fi
@@ -226,15 +245,6 @@ if [ "$record" = 1 ]; then
   "${guard[@]}" lcm-logger --quiet --lcm-url="$url" "$out/run.lcmlog" </dev/null >"$out/log/logger.log" 2>&1 &
   logger=$!
 fi
-# What a process said before it failed: its error, or what its command line lacked.
-why() {
-  local log="$out/log/$1.log" line
-  [ -f "$log" ] || return 0
-  line=$(grep -hE " (error|critical): " "$log" | tail -n 1 | sed -E 's/^[0-9:.]* //; s/ (error|critical): /: /' || true)
-  [ -n "$line" ] || line=$(grep -vE '^[0-9:.]+ |^ *$' "$log" | head -n 1 | sed "s/^/$1: /" || true)
-  [ -n "$line" ] || line=$(tail -n 1 "$log" | sed -E 's/^[0-9:.]* //' || true)
-  echo "$line"
-}
 # Nobody waits for the viewer, and its end is nobody's failure.
 open_viewer() {
   local i address="" log="$out/log/viewer.log"

@@ -14,7 +14,8 @@
 
 namespace dmslam {
 
-/// What the mains of all processes share: options, the bus, the loop, and one clear line where something is wrong.
+/// What the mains of all processes share: options, the bus, the loop, and one clear line where something is
+/// wrong.
 class ProcessMain {
  public:
   using Factory = std::function<std::unique_ptr<Node>(NodeContext, NodeOptions)>;
@@ -23,9 +24,13 @@ class ProcessMain {
 
   /// For the process's own options.
   CLI::App& app() { return app_; }
-  /// Work that needs no bus, if the options ask for it: done after parsing, instead of running a node, where it returns
-  /// an exit code.
-  void SetOffline(std::function<std::optional<int>(const NodeOptions&)> offline) { offline_ = std::move(offline); }
+  /// What the options put before every channel; known once they are parsed.
+  const std::string& prefix() const { return prefix_; }
+  /// Work that needs no bus, if the options ask for it: done after parsing, instead of running a node, where
+  /// it returns an exit code.
+  void SetOffline(std::function<std::optional<int>(const NodeOptions&)> offline) {
+    offline_ = std::move(offline);
+  }
   /// Parses, makes the node, and runs it until it is done. Returns the exit code.
   int Run(int argc, char** argv, const Factory& factory);
 

@@ -13,6 +13,8 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
+constexpr std::ptrdiff_t kPortion = 8;  // records told at once at the end
+constexpr int64_t kPortionEveryNs = 8'000'000;
 constexpr int64_t kAskAgainNs = 10'000'000'000;
 
 }  // namespace
@@ -307,10 +309,18 @@ bool FrontendNode::IsAnswerToAll(const MapDelta& delta) {
   return delta.event == MapEvent::kSettled && !delta.about.valid();
 }
 
+/// What is told at the end comes in portions: lcm-logger, which nobody repairs, loses what comes faster than
+/// it empties its queue of 30 messages.
 bool FrontendNode::Finish() {
-  std::vector<FrontendEvent> events;
-  core_->Finish(&events);
-  PublishEvents(events);
+  if (!last_events_) core_->Finish(&last_events_.emplace());
+  if (context_.now_ns() < next_portion_ns_) return false;
+  const auto begin = last_events_->begin() + static_cast<std::ptrdiff_t>(last_told_);
+  const auto end = begin + std::min(kPortion, last_events_->end() - begin);
+  PublishEvents({begin, end});
+  last_told_ += static_cast<size_t>(end - begin);
+  next_portion_ns_ = context_.now_ns() + kPortionEveryNs;
+  if (end != last_events_->end()) return false;
+  last_events_->clear();
   PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
   PublishStatus();
   writer_->Complete(context_.now_ns());

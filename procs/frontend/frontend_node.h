@@ -30,6 +30,7 @@ class FrontendNode : public StreamNode {
   bool ReadyToWrite() override;
   void OnWriterOpen() override;
   bool WorkOnce() override;
+  int64_t WorkDeadline() const override { return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX; }
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
 
@@ -79,8 +80,11 @@ class FrontendNode : public StreamNode {
   std::optional<EndOfSequence> end_;
   bool lockstep_ = false;
   bool asked_to_adjust_ = false;
-  int64_t asked_ns_ = 0;      ///< a mapper that died before it answered is asked again
+  int64_t asked_ns_ = 0;   ///< a mapper that died before it answered is asked again
   bool adjusted_ = false;  ///< all maps, after the last keyframe
+  std::optional<std::vector<FrontendEvent>> last_events_;  ///< what is told at the end, in portions
+  size_t last_told_ = 0;                                   ///< of them, already
+  int64_t next_portion_ns_ = 0;
   bool finished_ = false;  ///< everything is said; stays until the mapper has ended
   bool frame_open_ =
       false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)

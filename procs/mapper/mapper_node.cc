@@ -8,6 +8,11 @@
 #include "dmslam/util/check.h"
 
 namespace dmslam {
+namespace {
+
+constexpr int64_t kPartEveryNs = 3'000'000;
+
+}  // namespace
 
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), "mapper"), files_(std::move(files)) {
@@ -148,8 +153,11 @@ void MapperNode::TakeLoopAnswers() {
   }
 }
 
-/// The loaded map goes out as records like any other, and is settled: then lock-step goes on.
+/// The loaded map goes out as records like any other, and is settled: then lock-step goes on. One part at a
+/// time: a logger, which nobody repairs, keeps up.
 bool MapperNode::PublishSavedMap() {
+  if (context_.now_ns() < next_part_ns_) return false;
+  next_part_ns_ = context_.now_ns() + kPartEveryNs;
   if (writer_->Full()) return false;
   PublishDelta(saved_parts_.front());
   saved_parts_.pop_front();
@@ -166,6 +174,10 @@ void MapperNode::ApplyFirstAnswer() {
   core_->SetProgress(progress);
   core_->OnLoopAnswer(pending.answer);
   pending_answers_.push_back({pending.version, writer_->last_seq()});
+}
+
+int64_t MapperNode::WorkDeadline() const {
+  return writer_ && !saved_parts_.empty() ? next_part_ns_ : INT64_MAX;
 }
 
 bool MapperNode::WorkOnce() {

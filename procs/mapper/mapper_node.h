@@ -33,6 +33,7 @@ class MapperNode : public StreamNode {
   bool ReadyToWrite() override;
   void OnWriterOpen() override;
   bool WorkOnce() override;
+  int64_t WorkDeadline() const override;
   void PublishStatus() override;
 
  private:
@@ -68,7 +69,8 @@ class MapperNode : public StreamNode {
   void FillCoreStatus(MapperStatus* status) const;
 
   Files files_;
-  std::optional<RebuiltMap> saved_;   ///< loaded, not yet taken over
+  std::optional<RebuiltMap> saved_;  ///< loaded, not yet taken over
+  int64_t next_part_ns_ = 0;
   std::deque<MapDelta> saved_parts_;  ///< of that map, not yet published
   SessionStart session_start_;        ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;

@@ -9,7 +9,7 @@ void LogOutput::Publish(const Outgoing& message) {
   const bool of_camera = channel == channels::kCameraInfo || channel == channels::kFrame ||
                          channel == channels::kGroundTruthPose || channel == channels::kEndOfSequence;
   if (!of_camera || ended_) return;
-  log_.Write(now_ns_ / 1000, channel, *message.bytes);
+  log_.Write(now_ns_ / 1000, prefix_ + channel, *message.bytes);
   ended_ = channel == channels::kEndOfSequence;
 }
 

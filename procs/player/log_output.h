@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/event_log.h"
@@ -11,8 +12,9 @@ namespace dmslam {
 /// of the recording's own, without running anything. The same frames give the same bytes.
 class LogOutput : public Bus {
  public:
-  /// The clock starts at `start_ns`, capture time.
-  LogOutput(const std::string& path, int64_t start_ns) : log_(path), now_ns_(start_ns) {}
+  /// The clock starts at `start_ns`, capture time. `prefix` comes before every channel.
+  LogOutput(const std::string& path, std::string prefix, int64_t start_ns)
+      : log_(path), prefix_(std::move(prefix)), now_ns_(start_ns) {}
 
   void Subscribe(const std::string&) override {}
   void SetHandler(Handler) override {}
@@ -26,6 +28,7 @@ class LogOutput : public Bus {
 
  private:
   EventLogWriter log_;
+  std::string prefix_;
   int64_t now_ns_;
   bool ended_ = false;
 };

@@ -58,14 +58,14 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::Node
 }
 
 /// Writes what the player would publish into a log, under the recording's own clock.
-int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options) {
+int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options, const std::string& prefix) {
   dmslam::PlayerOptions options;
   auto source = Open(a, node_options, &options);
   options.mode = dmslam::PlaybackMode::kRealtime;
   options.speed = 1.0;
   const int64_t lead_ns = static_cast<int64_t>(options.lead_s * 1e9);
   const int64_t first_ns = source->size() > options.start ? source->StampNs(options.start) : 0;
-  dmslam::LogOutput output(a.to_log, std::max<int64_t>(0, first_ns - lead_ns));
+  dmslam::LogOutput output(a.to_log, prefix, std::max<int64_t>(0, first_ns - lead_ns));
   dmslam::NodeContext context;
   context.bus = &output;
   context.now_ns = [&output] { return output.now_ns(); };
@@ -127,7 +127,8 @@ int main(int argc, char** argv) {
   Arguments arguments;
   Declare(process.app(), arguments);
   process.SetOffline([&](const dmslam::NodeOptions& node) {
-    return arguments.to_log.empty() ? std::nullopt : std::optional(WriteLog(arguments, node));
+    return arguments.to_log.empty() ? std::nullopt
+                                    : std::optional(WriteLog(arguments, node, process.prefix()));
   });
   return process.Run(
       argc, argv,

@@ -142,7 +142,8 @@ LandmarkId RecordsNode::Translate(LandmarkId recorded) const {
     if (keyframe == nullptr || observation.feature >= keyframe->landmarks.size()) continue;
     if (const LandmarkId now = keyframe->landmarks[observation.feature]; now.valid()) ++votes[now];
   }
-  const bool unseen = landmark->observations.empty() && namesake && live_.FindLandmark(*namesake)->observations.empty();
+  const bool unseen =
+      landmark->observations.empty() && namesake && live_.FindLandmark(*namesake)->observations.empty();
   if (unseen || (namesake && votes.contains(*namesake))) return recorded;
   const auto most =
       std::max_element(votes.begin(), votes.end(), [](auto& a, auto& b) { return a.second < b.second; });
@@ -153,9 +154,7 @@ void RecordsNode::Translate(KeyframeProposal* proposal) {
   std::vector<KeyframeProposal::Match> matches;
   for (const KeyframeProposal::Match& match : proposal->matches) {
     const LandmarkId now = Translate(match.landmark);
-    const bool taken =
-        std::any_of(matches.begin(), matches.end(), [&](const auto& m) { return m.landmark == now; });
-    if (now.valid() && !taken) {
+    if (now.valid()) {
       matches.push_back({match.feature, now});
     } else {
       ++dropped_;

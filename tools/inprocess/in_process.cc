@@ -99,11 +99,13 @@ class System {
 int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex> log, uint32_t log_session,
                         std::string* problem) {
   options.node.session = options.player.session;
-  options.node.peers = {"frontend", "mapper", "collector"};
+  options.node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   System system;
   if (!options.record.empty()) system.Record(options.record);
   system.Add(
       std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
+  system.Add(
+      std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
   system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node, options.map_files));
   system.Add(
       std::make_unique<RecordsNode>(system.ContextFor("player"), options.node, std::move(log), log_session));

@@ -25,7 +25,7 @@ struct InProcessOptions {
 };
 
 /// Returns the collector's exit code; what went wrong is in `problem`. Instead of frames the frontend's
-/// records of a log are entered: mapper and collector alone.
+/// records of a log are entered: mapper, loop closer and collector, without frontend and player.
 int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex> log, uint32_t log_session,
                         std::string* problem);
 

@@ -81,15 +81,17 @@ int ListChannels(const std::string& path) {
   return 0;
 }
 
-/// The poses of the frames, as the frontend told them up to then.
-void AddFramePoses(const dmslam::LogIndex& log, const dmslam::RecordedSession& session, int64_t until_us,
-                   dmslam::TrajectoryBuilder* builder) {
-  for (const dmslam::ReplayStep& step :
-       dmslam::PlanReplay(session.Stream(dmslam::StreamId::kFrontend), until_us).steps) {
+/// The poses of the frames, as the frontend told them up to then. Returns how many of its records are
+/// missing.
+int64_t AddFramePoses(const dmslam::LogIndex& log, const dmslam::RecordedSession& session, int64_t until_us,
+                      dmslam::TrajectoryBuilder* builder) {
+  const dmslam::Replay replay = dmslam::PlanReplay(session.Stream(dmslam::StreamId::kFrontend), until_us);
+  for (const dmslam::ReplayStep& step : replay.steps) {
     if (step.message->channel != dmslam::channels::kFramePose) continue;
     if (const auto pose = dmslam::wire::Decode<dmslam::FramePose>(log.Read(*step.message)))
       builder->OnFramePose(*pose);
   }
+  return replay.missing;
 }
 
 void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
@@ -137,7 +139,10 @@ int Run(const Arguments& a) {
   }
   dmslam::TrajectoryBuilder builder(rebuilt.session.camera, rebuilt.session.pyramid);
   builder.SetMap(rebuilt.map);
-  AddFramePoses(log, session, until_us, &builder);
+  if (const int64_t missing = AddFramePoses(log, session, until_us, &builder); missing > 0) {
+    spdlog::warn("{}: {} records of the frontend are missing; some frames' poses are not the last word",
+                 a.log, missing);
+  }
   dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build();
   const dmslam::MapId map_id =
       trajectories.map_id != 0 ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);

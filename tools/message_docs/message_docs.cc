@@ -36,9 +36,9 @@ ChannelRow Row(const char* owner, const char* readers, const char* rate) {
 
 std::vector<ChannelRow> PlayerRows() {
   return {
-      Row<CameraInfo>("player; while it is silent, any writer of a stream repeats it", "everybody", "1 Hz"),
+      Row<CameraInfo>("player; while it is silent, any writer of a stream repeats it", "everybody", "2 Hz"),
       Row<Frame>("player", "frontend, viewer", "camera's rate; repeated in lock-step"),
-      Row<EndOfSequence>("player", "frontend", "once, then 1 Hz"),
+      Row<EndOfSequence>("player", "frontend", "5 Hz, until heard"),
       Row<GroundTruthPose>("player", "frontend (for `error_m` only), viewer", "camera's rate, where known"),
       Row<PlayerStatus>("player", "everybody", "1 Hz"),
   };
@@ -49,10 +49,10 @@ std::vector<ChannelRow> FrontendRows() {
       Row<SessionStart>("frontend", "mapper, collector", "once"),
       Row<InitialMap>("frontend", "mapper", "once per map"),
       Row<KeyframeProposal>("frontend", "mapper", "per keyframe"),
-      Row<FramePose>("frontend", "mapper, collector", "per frame"),
-      Row<FrameEvidence>("frontend", "mapper", "with keyframes"),
-      Row<MapReset>("frontend", "mapper, collector", "rare"),
-      Row<FrameDone>("frontend", "player", "per frame, in lock-step"),
+      Row<FramePose>("frontend", "mapper, collector", "per frame; once more where refined at the end"),
+      Row<FrameEvidence>("frontend", "mapper", "with keyframes, and between"),
+      Row<MapReset>("frontend", "mapper, collector", "at the end; else rare"),
+      Row<FrameDone>("frontend", "player", "per frame"),
       Row<PoseView>("frontend", "eyes and plots, viewer", "per frame"),
       Row<FeatureView>("frontend", "viewer, pictures", "per frame"),
       Row<FrameTrace>("frontend", "latency reports", "per frame"),

@@ -37,6 +37,19 @@ TEST(MessageDocsTest, EveryChannelIsTold) {
   }
 }
 
+TEST(MessageDocsTest, EveryTypeHasASectionAndAPlaceWhereItTravels) {
+  const std::string page = MessageDocs();
+  for (const auto& [name, type] : wire::Schema::OfProject().types()) {
+    EXPECT_NE(page.find("### " + name + "\n"), std::string::npos) << name;
+    const bool on_a_channel = page.find("` | [" + name + "](#" + name + ") |") != std::string::npos;
+    bool in_another = false;
+    for (const auto& [other, outer] : wire::Schema::OfProject().types()) {
+      for (const wire::Field& field : outer.fields) in_another |= field.type == name;
+    }
+    EXPECT_TRUE(on_a_channel || in_another) << name;
+  }
+}
+
 TEST(MessageDocsTest, DefinitionsFollowTheConventions) {
   for (const auto& [name, type] : wire::Schema::OfProject().types()) {
     EXPECT_FALSE(type.comment.empty()) << name;

@@ -7,6 +7,7 @@ const kMinBudget = 6000, kMaxBudget = 400000, kRestBudget = 110000;
 const kNearKeyframes = 130;  // where there are more, these are drawn with their edges, and all others as dots
 const kMostPathPoints = 1500;
 const kSlowMs = 46, kFastMs = 38;  // of a picture
+const kMinSharpness = 0.5;  // of the screen's resolution, in motion, where even the fewest landmarks are too slow
 
 const pointVertex = `
   attribute vec2 value;  // belief, first frame
@@ -102,6 +103,7 @@ export class SceneView {
     this.pose = null;
     this.budget = isSoftware() ? 20000 : 200000;
     this.adapted = 0;
+    this.sharpness = this.drawnSharpness = 1;
     this.pictures = {times: [], drawnPoints: 0, fps: 0, count: 0};
     this.needsPicture = true;
     this.lastDrawn = this.lastCall = 0;
@@ -174,7 +176,7 @@ export class SceneView {
 
   resize() {
     const box = this.canvas.parentElement.getBoundingClientRect();
-    const ratio = Math.min(window.devicePixelRatio, 2);
+    const ratio = Math.min(window.devicePixelRatio, 2) * this.drawnSharpness;
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(Math.max(1, box.width), Math.max(1, box.height), false);
     this.camera.aspect = Math.max(1, box.width) / Math.max(1, box.height);
@@ -497,8 +499,24 @@ export class SceneView {
     this.pictures.fps = 1000 * times.length / times.reduce((a, b) => a + b, 0);
     if (++this.adapted % 5 !== 0) return;
     const recent = times.slice(-5).reduce((a, b) => a + b, 0) / Math.min(5, times.length);
-    if (recent > kSlowMs) this.budget = Math.max(kMinBudget, this.budget * Math.max(0.7, 40 / recent));
-    if (recent < kFastMs && this.pictures.drawnPoints > 0.9 * this.budget) this.budget = Math.min(kMaxBudget, this.budget * 1.15);
+    if (recent > kSlowMs) this.drawLess(recent);
+    if (recent < kFastMs) this.drawMore(recent);
+  }
+
+  /// First fewer landmarks, then fewer pixels.
+  drawLess(recent) {
+    if (this.budget > kMinBudget) this.budget = Math.max(kMinBudget, this.budget * Math.max(0.7, 40 / recent));
+    else this.sharpness = Math.max(kMinSharpness, this.sharpness - 0.125);
+  }
+
+  /// First all pixels again, as soon as they will not be too many at once, then more landmarks.
+  drawMore(recent) {
+    const sharper = Math.min(1, this.sharpness + 0.125);
+    if (this.sharpness < 1) {
+      if (recent * (sharper / this.sharpness) ** 2 < kFastMs) this.sharpness = sharper;
+    } else if (this.pictures.drawnPoints > 0.9 * this.budget) {
+      this.budget = Math.min(kMaxBudget, this.budget * 1.15);
+    }
   }
 
   /// Once nothing moves any more, one picture with as much as can be told apart.
@@ -513,6 +531,12 @@ export class SceneView {
     this.pictures.count++;
     this.settled = budget !== undefined;
     this.lastDrawn = now;
+    const sharpness = this.settled ? 1 : this.sharpness;
+    if (sharpness !== this.drawnSharpness) {
+      this.drawnSharpness = sharpness;
+      this.resize();
+      this.needsPicture = false;
+    }
     this.root.updateMatrixWorld();
     this.camera.updateMatrixWorld();
     this.chooseDetail(budget || this.budget);

@@ -14,7 +14,7 @@ namespace dmslam {
 
 enum class PlaybackMode : uint8_t { kRealtime = 1, kLockstep = 2 };
 
-/// Which camera the frames come from, and what is being played. Repeated once a second.
+/// Which camera the frames come from, and what is being played. Repeated twice a second.
 struct CameraInfo {
   int64_t utime = 0;  ///< wall time at which it was sent [us]
   uint32_t session = 0;
