@@ -65,6 +65,7 @@ find_programs() {
   local programs=(dmslam-report) program missing=()
   ((run == 0 || render == 0)) || programs+=(dmslam-synth)
   [[ $run == 0 || $processes == 1 || -n $runner ]] || programs+=(dmslam-inprocess)
+  [[ $run == 0 || -n $runner ]] || programs+=(dmslam-static)
   for program in "${programs[@]}"; do
     [[ -x $bin/$program ]] || missing+=("$program")
   done
@@ -96,6 +97,44 @@ render_stand_ins() {
     render "synth_still_$motion" --path "$motion" --frames "$frames"
   done
   render synth_xyz --preset static_xyz --camera "$root/config/TUM1.yaml"
+}
+
+# draw_selection NAME SEQUENCE CAMERA: the paper's Figures 2 to 5, what plain RANSAC and DLRSAC take for static.
+draw_selection() {
+  local folder=$out/figures/$1 method picture
+  [[ ! -e $folder ]] || return 0
+  progress_text "figures of $1"
+  rm -rf -- "$folder.part"
+  for method in dlrsac ransac; do
+    start "$bin/dmslam-static" --sequence "$2" --camera "$3" --method "$method" --features 3000 --gap 5 --no-window \
+      --pairs 2 --out "$folder.part/$method" >"$out/figures.log" 2>&1 ||
+      { progress_end; say "no figures of $1: $(tail -n 1 "$out/figures.log")"; return 0; }
+    for picture in "$folder.part/$method"/*.png; do
+      mv -- "$picture" "$folder.part/${picture##*/}.$method"
+    done
+    rm -rf -- "${folder:?}.part/$method"
+  done
+  # Names that sort by pair, DLRSAC beside RANSAC.
+  for picture in "$folder.part"/*; do
+    method=${picture##*.}
+    picture=${picture%.png.*}
+    mv -- "$picture.png.$method" "${picture}_$method.png"
+  done
+  mv -- "$folder.part" "$folder"
+}
+
+# draw_selections LINES...: of every sequence in which somebody walks.
+draw_selections() {
+  local line folder sequence camera name rest
+  for line in "$@"; do
+    IFS=$'\t' read -r folder sequence _ camera rest <<<"$line"
+    name=${folder#runs/}
+    name=${name%%/*}
+    [[ $name == *walk* ]] || continue
+    [[ $camera == /* ]] || camera=$root/$camera
+    draw_selection "$name" "$sequence" "$camera"
+  done
+  progress_end
 }
 
 # Sets `command` to what runs a sequence.
@@ -144,6 +183,7 @@ progress() {
   ((frames_done == 0)) || left=", $(duration $(((SECONDS - began) * frames_left / frames_done))) left"
   printf '\r\033[K[%d/%d] %s%s' "$number" "$total" "$1" "$left" >&2
 }
+progress_text() { [[ ! -t 2 ]] || printf '\r\033[K%s' "$1" >&2; }
 progress_end() { [[ ! -t 2 ]] || printf '\r\033[K' >&2; }
 
 # one_run FOLDER SEQUENCE FRAMES CAMERA PROFILE SEED SET. The first seed leaves a few pictures.
@@ -211,6 +251,7 @@ main() {
     local lines=()
     [[ -z $plan ]] || mapfile -t lines <<<"$plan"
     ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
+    [[ -n $runner ]] || draw_selections ${lines[@]+"${lines[@]}"}
     run_all ${lines[@]+"${lines[@]}"}
   fi
   "$bin/dmslam-report" write --out "$out" ${publish:+--publish "$publish"}

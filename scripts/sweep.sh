@@ -111,36 +111,25 @@ render() {
   name=$(sequence_name "$1" "$2")
   folder=$out/sequences/$name
   [[ ! -e $folder/rgb.txt ]] || return 0
+  mkdir -p -- "$out/sequences"
   (($2 == 0)) || people=(--moving-share "$(printf '0.%02d' "$2")" --behaviour "$1")
   rm -rf -- "$folder.part"
   start "$bin/dmslam-synth" --quiet --gray --frames "$frames" --seed 1 "${people[@]}" --out "$folder.part" ||
     die "$name cannot be rendered"
   mv -- "$folder.part" "$folder"
 }
-render_all() {
-  local kind share number=0 total=$((${#SHARES[@]} * ${#KINDS[@]}))
-  mkdir -p -- "$out/sequences"
-  for share in "${SHARES[@]}"; do
-    for kind in "${KINDS[@]}"; do
-      progress "$number" "$total" "rendering $kind $share %"
-      render "$kind" "$share"
-      number=$((number + 1)) work_done=$((work_done + 1))
-    done
-  done
-  progress_end
-}
-
-# One line per run: folder under DIR/runs, sequence's folder, camera, options.
+# One line per run: folder under DIR/runs, sequence's folder, camera, options, and what is to be rendered for it. Seed by
+# seed: stopped early, all have equally many.
 plan_sweep() {
   local profile share kind seed name
-  for profile in dm baseline; do
-    for ((seed = 1; seed <= seeds; ++seed)); do
+  for ((seed = 1; seed <= seeds; ++seed)); do
+    for profile in dm baseline; do
       for share in "${SHARES[@]}"; do
         for kind in "${KINDS[@]}"; do
           [[ $share != 0 || $kind == walk ]] || continue
           name=$(sequence_name "$kind" "$share")
-          printf '%s\t%s\t%s\t%s\n' "$name/sweep/$profile/seed_$seed" "$out/sequences/$name" \
-            "$out/sequences/$name/camera.yaml" "--profile $profile --seed $seed"
+          printf '%s\t%s\t%s\t%s\t%s\n' "$name/sweep/$profile/seed_$seed" "$out/sequences/$name" \
+            "$out/sequences/$name/camera.yaml" "--profile $profile --seed $seed" "$kind $share"
         done
       done
     done
@@ -154,7 +143,7 @@ plan_ablation() {
       [[ $variant != baseline ]] || profile=baseline
       for name in kitchen_walk1 kitchen_walk2; do
         [[ -d $data/$name ]] || continue
-        printf '%s\t%s\t%s\t%s\n' "$name/$variant/$profile/seed_$seed" "$data/$name" "$root/config/kitchen.yaml" \
+        printf '%s\t%s\t%s\t%s\t\n' "$name/$variant/$profile/seed_$seed" "$data/$name" "$root/config/kitchen.yaml" \
           "${SWITCHES[$variant]} --seed $seed --save-map map.log"
       done
     done
@@ -179,13 +168,15 @@ one_run() {
   [[ -s $folder/summary.json ]]
 }
 run_all() { # PART
-  local lines=() line folder sequence camera options number=0 in_a_row=0
+  local lines=() line folder sequence camera options rendered number=0 in_a_row=0
   mapfile -t lines < <("plan_$1")
   work_done=0 began=$SECONDS
   for line in ${lines[@]+"${lines[@]}"}; do
-    IFS=$'\t' read -r folder sequence camera options <<<"$line"
+    IFS=$'\t' read -r folder sequence camera options rendered <<<"$line"
     if [[ ! -s $out/runs/$folder/summary.json ]]; then
       progress "$number" "${#lines[@]}" "$folder"
+      # shellcheck disable=SC2086 # two words
+      [[ -z $rendered ]] || render $rendered
       if one_run "$folder" "$sequence" "$camera" "$options"; then
         in_a_row=0
       else
@@ -212,9 +203,7 @@ main() {
   if ((run)); then
     local part
     for part in "${parts[@]}"; do
-      if [[ $part == sweep ]]; then
-        render_all
-      elif [[ ! -d $data/kitchen_walk1 ]]; then
+      if [[ $part == ablation && ! -d $data/kitchen_walk1 ]]; then
         say "$data/kitchen_walk1 is not there: no ablation; set --data or DMSLAM_DATA"
       fi
       run_all "$part"

@@ -70,8 +70,8 @@ check "nothing is run twice" test ! -s "$CALLS"
 expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 3
 check "only the new seed is run" test "$(grep -c -- '--seed 3' "$CALLS")" -eq "$(wc -l <"$CALLS")"
 expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
-check "the page has no picture of real images" test ! -e "$work/docs/pictures/fr1_xyz_defaults.png"
-check "it has that of all runs" test -s "$work/docs/pictures/all_defaults.png"
+check "the page has no picture of real images" test ! -e "$work/docs/images/results/fr1_xyz_defaults.png"
+check "it has that of all runs" test -s "$work/docs/images/results/all_defaults.png"
 
 # Stopped in the middle: exit 130, the runner is gone, and the same command goes on where it was.
 : >"$CALLS"

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
@@ -87,20 +89,47 @@ bool IsRendered(const std::string& sequence) {
   return group == SequenceGroup::kStandIn || group == SequenceGroup::kStandInStill;
 }
 
+bool IsFrame(const ReportPicture& picture) {
+  return picture.section == FigureSection::kSelection || picture.section == FigureSection::kFeatures;
+}
+
+// A frame's picture as JPEG: a fifth of the size of its PNG.
+void CopyAsJpeg(const fs::path& from, const fs::path& to) {
+  const cv::Mat picture = cv::imread(from.string());
+  if (picture.empty() || !cv::imwrite(to.string(), picture, {cv::IMWRITE_JPEG_QUALITY, 85}))
+    throw InputError(to.string() + ": cannot be made of " + from.string());
+}
+
+// What a page may show: pictures of rendered sequences, and of frames two per sequence with people.
+bool IsPublished(const ReportPicture& picture, std::map<std::pair<FigureSection, std::string>, int>* frames) {
+  if (picture.sequence.empty()) return true;
+  if (!IsRendered(picture.sequence)) return false;
+  if (!IsFrame(picture)) return true;
+  return FindSequence(picture.sequence).group == SequenceGroup::kStandIn &&
+         ++(*frames)[{picture.section, picture.sequence}] <= 2;
+}
+
 // The report for docs/: all numbers, but pictures of rendered sequences only, copied beside it.
 void Publish(const fs::path& page, const fs::path& out, const Results& results,
              const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
-  const fs::path folder = page.parent_path() / "pictures";
+  const fs::path folder = page.parent_path() / "images" / page.stem();
   std::error_code error;
+  fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   std::vector<ReportPicture> copied;
+  std::map<std::pair<FigureSection, std::string>, int> frames;
   for (ReportPicture picture : pictures) {
-    if (!picture.sequence.empty() && !IsRendered(picture.sequence)) continue;
-    const std::string name = fs::path(picture.file).filename().string();
-    const bool named = picture.sequence.empty() || name.starts_with(picture.sequence);
-    const std::string target = named ? name : picture.sequence + "_" + name;
-    fs::copy_file(out / picture.file, folder / target, fs::copy_options::overwrite_existing);
-    picture.file = "pictures/" + target;
+    if (!IsPublished(picture, &frames)) continue;
+    fs::path name = fs::path(picture.file).filename();
+    const bool named = picture.sequence.empty() || name.string().starts_with(picture.sequence);
+    if (!named) name = picture.sequence + "_" + name.string();
+    if (IsFrame(picture)) {
+      name.replace_extension(".jpg");
+      CopyAsJpeg(out / picture.file, folder / name);
+    } else {
+      fs::copy_file(out / picture.file, folder / name, fs::copy_options::overwrite_existing);
+    }
+    picture.file = (fs::path("images") / page.stem() / name).string();
     copied.push_back(picture);
   }
   WriteText(page, ReportMarkdown(results, times, copied));
