@@ -13,6 +13,7 @@ namespace {
 
 constexpr int64_t kNsPerSecond = 1'000'000'000;
 constexpr double kPredictionValid_s = 0.5;  // how long after the last pose the motion model is still tried
+constexpr uint32_t kPriorValidFrames = 5;   // after so many the motion model says too little
 constexpr int kLostAfterFrames = 10;
 constexpr uint32_t kNearFrames = 10;        // a placed frame so near bounds where a frame may be
 constexpr double kMaxShiftPerFrame = 0.05;  // share of the scene's depth
@@ -155,6 +156,7 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   last_ = FrameOfKeyframe(*second);
   last_placed_ = {second->id, Rigid3d(), second->scale};
   velocity_.reset();
+  coasting_.reset();
   last_tracked_ns_ = second->stamp_ns;
   trial_until_ns_ = second->stamp_ns + ToNs(options_.trial_s);
   state_ = TrackingState::kTrial;
@@ -179,14 +181,19 @@ TrackedFrame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {
 // ---- Tracking
 // ------------------------------------------------------------------------------------------------------
 
-std::optional<Rigid3d> FrontendCore::PredictPose() const {
-  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(last_placed_.reference);
+std::optional<Rigid3d> FrontendCore::PoseOf(const Placed& placed) const {
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(placed.reference);
   if (!reference) return std::nullopt;
-  const Rigid3d T_last_world = reference->Compose(last_placed_.T_cam_reference, last_placed_.scale);
-  if (!velocity_) return T_last_world;
+  return reference->Compose(placed.T_cam_reference, placed.scale);
+}
+
+std::optional<Rigid3d> FrontendCore::PredictPose() const {
+  const Placed& newest = NewestPlaced();
+  const std::optional<Rigid3d> T_last_world = PoseOf(newest);
+  if (!T_last_world || !velocity_) return T_last_world;
   // The map may have been scaled since the velocity was measured.
-  const double growth = reference->scale / last_placed_.scale;
-  return Rigid3d(velocity_->rotation, velocity_->translation * growth) * T_last_world;
+  const double growth = map_.ResolvePose(newest.reference)->scale / newest.scale;
+  return Rigid3d(velocity_->rotation, velocity_->translation * growth) * *T_last_world;
 }
 
 bool FrontendCore::FindPose() {
@@ -195,22 +202,28 @@ bool FrontendCore::FindPose() {
   relocalized_ = false;
   const Keyframe* reference = map_.FindKeyframe(last_placed_.reference);
   const std::optional<double> depth = reference != nullptr ? map_.MedianDepth(*reference) : std::nullopt;
-  const bool trusted = velocity_ && predicted && frame_.index - last_.index == 1;
-  tracker_.SetMotionPrior(trusted ? predicted : std::nullopt, depth.value_or(1.0));
-  if (predicted && recent) {
-    if (tracker_.TrackFromFrame(map_, last_, *predicted, &frame_)) return true;
-    const uint64_t seed = DeriveSeed(seed_, frame_.index, "track_keyframe");
-    if (tracker_.TrackFromKeyframe(map_, last_placed_.reference, seed, &frame_)) return true;
+  const uint32_t gap = frame_.index - NewestIndex();
+  const bool trusted = velocity_ && predicted && gap <= kPriorValidFrames;
+  tracker_.SetMotionPrior(trusted ? predicted : std::nullopt, depth.value_or(1.0), gap);
+  if (!predicted || !recent) return false;
+  if (tracker_.TrackFromFrame(map_, last_, *predicted, &frame_)) return true;
+  if (trusted) {
+    const int inliers = tracker_.TrackFromPrediction(map_, *predicted, &frame_);
+    if (inliers >= options_.tracking.min_local_inliers) return true;
+    if (inliers >= options_.tracking.min_coasting_inliers) weak_pose_ = frame_.T_cam_world;
   }
-  return false;
+  const uint64_t seed = DeriveSeed(seed_, frame_.index, "track_keyframe");
+  return tracker_.TrackFromKeyframe(map_, last_placed_.reference, seed, &frame_);
 }
 
 void FrontendCore::Track(std::vector<FrontendEvent>* events) {
   TrackingReport report;
   report.reason = "too few features match the last frame";
+  weak_pose_.reset();
   if (FindPose()) {
     const bool careful = frame_.stamp_ns - relocalized_ns_ < kNsPerSecond && relocalized_ns_ != 0;
     report = tracker_.TrackLocalMap(map_, careful, &frame_);
+    if (report.num_static >= options_.tracking.min_coasting_inliers) weak_pose_ = frame_.T_cam_world;
   }
   if (!report.ok && state_ != TrackingState::kTrial) {
     tracker_.SetMotionPrior(std::nullopt, 1.0);
@@ -243,21 +256,18 @@ std::optional<FrontendCore::Placed> FrontendCore::Place(const Rigid3d& T_cam_wor
 }
 
 void FrontendCore::OnTracked(const TrackingReport& report, std::vector<FrontendEvent>* events) {
-  const std::optional<Rigid3d> last_pose = [&]() -> std::optional<Rigid3d> {
-    const auto reference = map_.ResolvePose(last_placed_.reference);
-    if (!reference) return std::nullopt;
-    return reference->Compose(last_placed_.T_cam_reference, last_placed_.scale);
-  }();
+  const std::optional<Rigid3d> last_pose = PoseOf(NewestPlaced());
   const std::optional<Placed> placed = Place(frame_.T_cam_world, tracker_.reference());
   if (!placed) {
     OnNotTracked(report, events);
     return;
   }
   ++counters_.tracked;
-  const bool successive = frame_.index - last_.index <= 2 && !relocalized_;
+  const bool successive = frame_.index - NewestIndex() <= 2 && !relocalized_;
   velocity_.reset();
   if (successive && last_pose) velocity_ = frame_.T_cam_world * last_pose->Inverse();
   last_placed_ = *placed;
+  coasting_.reset();
   last_tracked_ns_ = frame_.stamp_ns;
   if (state_ != TrackingState::kTrial || frame_.stamp_ns >= trial_until_ns_)
     state_ = TrackingState::kTracking;
@@ -270,8 +280,17 @@ void FrontendCore::OnTracked(const TrackingReport& report, std::vector<FrontendE
   last_ = frame_;
 }
 
+void FrontendCore::Coast() {
+  const std::optional<Rigid3d> last_pose = PoseOf(NewestPlaced());
+  const std::optional<Placed> placed = Place(*weak_pose_, last_placed_.reference);
+  if (!placed || !last_pose || frame_.index - NewestIndex() > kPriorValidFrames) return;
+  if (frame_.index - NewestIndex() == 1) velocity_ = *weak_pose_ * last_pose->Inverse();
+  coasting_ = Coasting{*placed, frame_.index};
+}
+
 void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<FrontendEvent>* events) {
   KeepUnplaced();
+  if (weak_pose_) Coast();
   if (state_ == TrackingState::kTrial) {
     GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason, events);
     events->push_back(MakePose(state_, report));
@@ -293,6 +312,7 @@ void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<F
   NextMapId();
   tracker_.Reset();
   velocity_.reset();
+  coasting_.reset();
   initializer_ = MakeInitializer();
   state_ = TrackingState::kNotInitialized;
   awaited_ = {};

@@ -118,6 +118,10 @@ class FrontendCore {
   bool LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near);
   void KeepUnplaced();
   void NextMapId();
+  void Coast();
+  const Placed& NewestPlaced() const { return coasting_ ? coasting_->placed : last_placed_; }
+  uint32_t NewestIndex() const { return coasting_ ? coasting_->index : last_.index; }
+  std::optional<Rigid3d> PoseOf(const Placed& placed) const;
 
   FrontendOptions options_;
   Camera camera_;
@@ -140,7 +144,15 @@ class FrontendCore {
   TrackedFrame proposing_frame_;  ///< the frame with which the first map was proposed
   TrackedFrame last_;             ///< the frame tracked last
   Placed last_placed_;
-  std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the frame tracked last
+  /// A pose after the frame tracked last that too few landmarks support to be told: it only leads the search
+  /// in the frames that follow.
+  struct Coasting {
+    Placed placed;
+    uint32_t index = 0;
+  };
+  std::optional<Coasting> coasting_;
+  std::optional<Rigid3d> weak_pose_;  ///< of this frame: may be coasted with
+  std::optional<Rigid3d> velocity_;   ///< T_cam_lastcam of the newest pose, coasted ones included
   int64_t last_tracked_ns_ = 0;
   int64_t trial_until_ns_ = 0;
   int frames_since_evidence_ = 0;

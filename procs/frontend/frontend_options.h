@@ -19,6 +19,7 @@ struct TrackingOptions {
   double hidden_distance = 40;       ///< so few bits are asked of a match where nothing else of the map is found...
   double hidden_distance_slope = 200;  ///< ...and so many more are allowed, times the share that is found around it
   int min_local_inliers = 20;        ///< fewer: the frame is not tracked
+  int min_coasting_inliers = 8;      ///< so many still lead the search in the next frames, for half a second
   int min_inliers_after_relocalization = 50;
   double chi2 = 5.991;
   double moved_chi2 = 4.0 * 5.991;   ///< a strong match farther off than this speaks for motion

@@ -20,6 +20,8 @@ constexpr int kStreakWithoutVote = 3;  // frames in a row seen elsewhere: no vot
 constexpr int kMaxKeyframeDistance = 50;
 constexpr double kFrontalCos = 0.998;
 constexpr int kNeighboursOfLocal = 10;
+constexpr double kWiderAfterRelocalization = 2.0;  // times the radius of the search
+constexpr double kWiderAroundPrediction = 4.0;
 
 size_t CellOf(const Eigen::Vector2d& uv_px, const Camera& camera) {
   const int column = std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
@@ -40,13 +42,13 @@ void PoseTracker::Reset() {
   evidence_.clear();
 }
 
-void PoseTracker::SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth) {
+void PoseTracker::SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth, double frames) {
   prior_.reset();
   if (!T_cam_world) return;
   PosePrior prior;
   prior.T_cam_world = *T_cam_world;
-  const double rotation = 1.0 / options_.prior_rotation_rad;
-  const double translation = 1.0 / (options_.prior_translation * depth);
+  const double rotation = 1.0 / (options_.prior_rotation_rad * frames);
+  const double translation = 1.0 / (options_.prior_translation * depth * frames);
   prior.information.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
       Eigen::Vector3d::Constant(translation * translation);
   prior_ = prior;
@@ -279,7 +281,7 @@ void PoseTracker::CollectLocalMap(const Map& map, const TrackedFrame& frame) {
   local_landmarks_.erase(std::unique(local_landmarks_.begin(), local_landmarks_.end()), local_landmarks_.end());
 }
 
-void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame) {
+void PoseTracker::SearchLocalLandmarks(const Map& map, double wider, TrackedFrame* frame) {
   std::vector<LandmarkId> matched;
   taken_.assign(frame->features->size(), 0);
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
@@ -295,8 +297,8 @@ void PoseTracker::SearchLocalLandmarks(const Map& map, bool relocalized, Tracked
     if (!view) continue;
     visible_.emplace_back(id, *view);
     if (!HasVote(landmark) || std::binary_search(matched.begin(), matched.end(), id)) continue;
-    double radius = view->view_cos > kFrontalCos ? options_.local_radius_frontal : options_.local_radius;
-    if (relocalized) radius *= 2;
+    const double radius =
+        wider * (view->view_cos > kFrontalCos ? options_.local_radius_frontal : options_.local_radius);
     const FeatureHit hit = FindFeature(*frame->features, view->uv_px, radius * pyramid_.Scale(view->octave),
                                        view->octave - 1, view->octave, landmark.descriptor, taken_);
     if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
@@ -511,9 +513,18 @@ TrackingReport PoseTracker::Summarize(const TrackedFrame& frame, int inliers, bo
   return report;
 }
 
+int PoseTracker::TrackFromPrediction(const Map& map, const Rigid3d& T_predicted, TrackedFrame* frame) {
+  std::erase_if(local_landmarks_, [&](LandmarkId id) { return map.FindLandmark(id) == nullptr; });
+  frame->ClearMatches();
+  frame->T_cam_world = T_predicted;
+  SearchLocalLandmarks(map, kWiderAroundPrediction, frame);
+  if (options_.motion_belief) DropMatchesOfHiddenPlaces(map, frame);
+  return OptimizeMatches(map, frame);
+}
+
 TrackingReport PoseTracker::TrackLocalMap(const Map& map, bool relocalized, TrackedFrame* frame) {
   CollectLocalMap(map, *frame);
-  SearchLocalLandmarks(map, relocalized, frame);
+  SearchLocalLandmarks(map, relocalized ? kWiderAfterRelocalization : 1.0, frame);
   if (options_.motion_belief) DropMatchesOfHiddenPlaces(map, frame);
   const int inliers = OptimizeMatches(map, frame);
   FindMoved(map, frame);

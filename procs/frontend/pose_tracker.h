@@ -32,10 +32,13 @@ class PoseTracker {
   PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid);
 
   /// Where the motion model expects the camera, for the frame that follows; none after a loss. `depth`: of the scene, in
-  /// map units.
-  void SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth);
+  /// map units; `frames`: since the last one that was tracked.
+  void SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth, double frames = 1.0);
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
   bool TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, TrackedFrame* frame);
+  /// Matches the landmarks around the frame tracked last, many more than it saw itself, near their projections at
+  /// `T_predicted`, and optimises the pose. Returns the number of inliers.
+  int TrackFromPrediction(const Map& map, const Rigid3d& T_predicted, TrackedFrame* frame);
   /// Matches a keyframe's landmarks by descriptor alone, and finds the pose from nothing.
   bool TrackFromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, TrackedFrame* frame);
   /// Refines the pose against the landmarks around: what its matches' keyframes and their neighbours see.
@@ -70,7 +73,7 @@ class PoseTracker {
   void KeepWhatAgrees(const Rigid3d& T_cam_world, double elder_age_s, int elders);
   int OptimizeMatches(const Map& map, TrackedFrame* frame);
   void CollectLocalMap(const Map& map, const TrackedFrame& frame);
-  void SearchLocalLandmarks(const Map& map, bool relocalized, TrackedFrame* frame);
+  void SearchLocalLandmarks(const Map& map, double wider, TrackedFrame* frame);
   void DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame);
   void FindMoved(const Map& map, TrackedFrame* frame);
   void JudgeMissing(const Map& map, const TrackedFrame& frame);
