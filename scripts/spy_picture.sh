@@ -7,7 +7,7 @@ usage() {
 Usage: scripts/spy_picture.sh --out FILE.png [--sequence DIR] [--camera FILE] [--build-dir DIR]
 
 Starts lcm-spy on a virtual display (Xvfb), runs the system beside it at a tenth of the recorded rate, opens
-DMSLAM_FRONTEND_POSE and a chart of its moving_share, and takes the picture. Fails where one of our channels cannot be
+DMSLAM_FRONTEND_POSE and a chart of its moving_share, and takes the picture once people walk. Fails where one of our channels cannot be
 decoded or a window does not open. --sequence: default a rendered room with people who walk.
 EOT
 }
@@ -38,7 +38,7 @@ cleanup() {
 trap cleanup EXIT
 if [[ -z $sequence ]]; then
   sequence=$work/sequence camera=$top/config/synthetic.yaml
-  "$build/bin/dmslam-synth" --quiet --out "$sequence" --path xyz --frames 200 --moving-share 0.3 --seed 2
+  "$build/bin/dmslam-synth" --quiet --out "$sequence" --path xyz --frames 180 --samples 1 --moving-share 0.55 --actors 5 --behaviour stop-and-go --stand-first 2 --seed 5
 fi
 
 exec 5<>"$work/display"

@@ -45,8 +45,7 @@ void ProcessBoard::OnStatus(const std::string& name, const StatusHead& head, con
   } else if (silent) {
     Note(BoardEvent::Level::kGood, name + " is back", wall_us);
   } else if (first) {
-    Note(BoardEvent::Level::kInfo, name + " is there (process " + std::to_string(head.health.pid) + ")",
-         wall_us);
+    Note(BoardEvent::Level::kInfo, name + ": process " + std::to_string(head.health.pid), wall_us);
   }
   process->state = state;
   process->reason = head.reason;

@@ -159,7 +159,8 @@ bool ViewerNode::TakeFrontendRecord() {
   if (record->channel == channels::kFramePose) {
     if (const auto pose = Read<FramePose>(*record->bytes)) core_->OnFramePose(*pose);
   } else if (record->channel == channels::kMapReset) {
-    if (const auto reset = Read<MapReset>(*record->bytes)) {
+    const auto reset = Read<MapReset>(*record->bytes);
+    if (reset && reset->map_id != 0) {  // 0: the wish that all maps be adjusted
       Note(BoardEvent::Level::kBad, "map " + std::to_string(reset->map_id) + " is left: " + reset->reason);
     }
   }

@@ -3,8 +3,10 @@
 const byId = (id) => document.getElementById(id);
 const kWindowSeconds = 60;
 const kBuckets = 240;
+const kAxisRem = 3.6;  // width of the axes: the charts and the strip above them lie over one another
 const kStates = {0: 'none', 1: 'none', 2: 'warn', 3: 'good', 4: 'warn', 5: 'bad', 6: 'good'};
 const thousands = (n) => Number(n).toLocaleString('en').replace(/,/g, '\u202f');
+const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const text = (id, value) => { if (byId(id).textContent !== value) byId(id).textContent = value; };
 
@@ -136,8 +138,8 @@ export class SeriesPanel {
         animation: false, responsive: true, maintainAspectRatio: false, parsing: false, normalized: true, events: [],
         plugins: {legend: {display: false}, tooltip: {enabled: false}},
         scales: {
-          x: {type: 'linear', grid: {display: false}, ticks: {maxTicksLimit: 5, includeBounds: false, maxRotation: 0, callback: (v) => Math.round(v) + ' s'}},
-          y: {beginAtZero: true, grid: {}, ticks: {maxTicksLimit: 4, callback: format}},
+          x: {type: 'linear', grid: {display: false}, ticks: {display: key === 'latency', maxTicksLimit: 5, includeBounds: false, maxRotation: 0, callback: (v) => Math.round(v) + ' s'}},
+          y: {beginAtZero: true, afterFit: (scale) => { scale.width = kAxisRem * rem(); }, grid: {}, ticks: {maxTicksLimit: 4, callback: format}},
         },
       },
     });
@@ -145,7 +147,7 @@ export class SeriesPanel {
   }
 
   applyTheme() {
-    const size = 0.78 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    const size = 0.78 * rem();
     for (const {chart, colourName} of this.charts) {
       const c = colour(colourName);
       chart.data.datasets[0].borderColor = c;

@@ -6,8 +6,8 @@ import {WideLines} from '/wide_lines.js';
 const kMinBudget = 6000, kMaxBudget = 400000, kRestBudget = 110000;
 const kNearKeyframes = 130;  // where there are more, these are drawn with their edges, and all others as dots
 const kMostPathPoints = 1500;
-const kSlowMs = 46, kFastMs = 38;  // of a picture
-const kMinSharpness = 0.5;  // of the screen's resolution, in motion, where even the fewest landmarks are too slow
+const kSlowMs = 46, kFastMs = 38, kTooSlowMs = 55;  // of a picture
+const kMinSharpness = 0.625;  // of the screen's resolution, in motion, where even the fewest landmarks are too slow
 
 const pointVertex = `
   attribute vec2 value;  // belief, first frame
@@ -128,7 +128,7 @@ export class SceneView {
       loops: new WideLines({width: 3, order: 4}),
       frusta: new WideLines({width: 1.4, opacity: 0.8, order: 2}),
       path: new WideLines({width: 2.8, order: 5}),
-      truth: new WideLines({width: 2, opacity: 0.9, order: 3}),
+      truth: new WideLines({width: 1.2, order: 5.5}),
       camera: new WideLines({width: 2.6, order: 6}),
     };
     this.truthGroup = new THREE.Group();
@@ -506,7 +506,7 @@ export class SceneView {
   /// First fewer landmarks, then fewer pixels.
   drawLess(recent) {
     if (this.budget > kMinBudget) this.budget = Math.max(kMinBudget, this.budget * Math.max(0.7, 40 / recent));
-    else this.sharpness = Math.max(kMinSharpness, this.sharpness - 0.125);
+    else if (recent > kTooSlowMs) this.sharpness = Math.max(kMinSharpness, this.sharpness - 0.125);
   }
 
   /// First all pixels again, as soon as they will not be too many at once, then more landmarks.
