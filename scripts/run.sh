@@ -13,6 +13,9 @@ Plays a sequence (TUM RGB-D folder, EuRoC folder, numbered images, video) throug
 closer, four processes on a private LCM port, and writes into the --out folder: trajectory.txt (final, TUM format),
 trajectory_online.txt, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs.
 
+  --video FILE        instead of --sequence: a video, a camera (/dev/videoN), or the address of a camera's stream
+  --fps X             rate of numbered images, of videos that state none, and asked of a camera (default: camera file)
+  --encoding NAME     how frames of videos and cameras travel: jpeg (default), png or raw, both without loss
   --log FILE          instead of --sequence: the frames of a log of lcm-logger, by our player (any mode)
   --replay FILE       instead of --sequence: the camera channels of such a log, by the real lcm-logplayer, in real time
                       (--start, --frames, --black-out, --jump, --camera and --prefix: of a copy of them)
@@ -51,7 +54,7 @@ player=() common=() changed=() prefix=""
 need() { [ $# -ge 2 ] || fail "$1 needs a value (see --help)"; }
 while [ $# -gt 0 ]; do
   case "$1" in
-    --sequence) need "$@"; sequence=$2; shift 2 ;;
+    --sequence | --video) need "$@"; sequence=$2; shift 2 ;;
     --log) need "$@"; log_file=$2; shift 2 ;;
     --replay) need "$@"; replay=$2; shift 2 ;;
     --map) need "$@"; map=$2; shift 2 ;;
@@ -63,6 +66,7 @@ while [ $# -gt 0 ]; do
     --speed) need "$@"; speed=$2; player+=(--speed "$2"); shift 2 ;;
     --seed) need "$@"; seed=$2; shift 2 ;;
     --start | --frames | --black-out | --jump) need "$@"; player+=("$1" "$2"); changed+=("$1" "$2"); shift 2 ;;
+    --fps | --encoding) need "$@"; player+=("$1" "$2"); shift 2 ;;
     --config) need "$@"; common+=(--config "$2"); shift 2 ;;
     --set) need "$@"; common+=(--set "$2"); shift 2 ;;
     --profile) need "$@"; profile=$2; shift 2 ;;
@@ -91,7 +95,7 @@ is_number() { [[ "$2" =~ ^[0-9]+$ ]] || fail "$1 $2: write a whole number"; }
 is_number --seed "$seed"
 is_number --pictures "$pictures"
 is_number --receive-buffer "$receive_buffer"
-[ -z "$sequence" ] || [ -e "$sequence" ] || fail "$sequence: no such folder or file; check --sequence"
+[ -z "$sequence" ] || [ -e "$sequence" ] || [[ $sequence == *://* ]] || fail "$sequence: no such folder or file; check --sequence"
 [ -z "$log_file" ] || [ -f "$log_file" ] || fail "$log_file: no such file; check --log"
 [ -z "$replay" ] || [ -f "$replay" ] || fail "$replay: no such file; check --replay"
 [ -z "$map" ] || [ -f "$map" ] || fail "$map: no such file; check --map"

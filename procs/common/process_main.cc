@@ -82,6 +82,7 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.now_ns = &EventLoop::now_ns;
   context.wall_us = &EventLoop::wall_us;
   context.pump = [&loop] { loop.PumpOnce(); };
+  context.watch = [&loop](int fd, std::function<void()> on_readable) { loop.Watch(fd, std::move(on_readable)); };
   context.random_id = RandomId();
   context.name = ProcessName(role_);
   context.fresh_system = fresh_system_;

@@ -5,7 +5,9 @@
 #include "common/process_main.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
+#include "player/live_node.h"
 #include "player/log_output.h"
+#include "player/open_sequence.h"
 #include "player/player_node.h"
 #include "player/records_node.h"
 
@@ -15,17 +17,11 @@ namespace {
 struct Arguments {
   dmslam::PlayerOptions options;
   std::string camera_file, encoding = "jpeg", channels = "camera", log, to_log;
+  double fps = 0;
   uint32_t log_session = 0;
   bool lockstep = false, remote_frontend = false;
   std::vector<std::string> black_outs, jumps;
 };
-
-dmslam::Camera ChooseCamera(const std::string& camera_file, const std::string& sequence) {
-  if (!camera_file.empty()) return dmslam::LoadCamera(camera_file);
-  const auto found = dmslam::FindCamera(sequence, dmslam::FindDataFolder("config"));
-  if (found) return *found;
-  throw dmslam::InputError(sequence + ": which camera took this is not known; name its file with --camera");
-}
 
 std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, dmslam::PlayerOptions* options) {
   auto log = std::make_shared<const dmslam::LogIndex>(a.log);
@@ -36,25 +32,38 @@ std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, dmslam::PlayerO
   return frames;
 }
 
-/// The recording, and in `options` how it is to be played.
-std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::NodeOptions& node,
-                                          dmslam::PlayerOptions* options) {
+/// How it is to be played, of all but the camera.
+void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::PlayerOptions* options) {
   *options = a.options;
   options->mode = a.lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
   options->session = node.session == 0 ? 1 : node.session;
   options->local_frames = node.link == dmslam::Link::kLan && !a.remote_frontend;
-  options->encoding = a.encoding == "png"   ? dmslam::FrameEncoding::kPng
-                      : a.encoding == "raw" ? dmslam::FrameEncoding::kGray8
-                                            : dmslam::FrameEncoding::kJpeg;
+  options->encoding.encoding = dmslam::ParseFrameEncoding(a.encoding);
   for (const std::string& text : a.black_outs) options->black_outs.push_back(dmslam::ParseBlackOut(text));
   for (const std::string& text : a.jumps) options->jumps.push_back(dmslam::ParseJump(text));
   if (options->sequence.empty() == a.log.empty()) {
     throw dmslam::InputError("give either --sequence or --log: what shall be played?");
   }
-  if (!a.log.empty()) return OpenLog(a, options);
-  auto source = dmslam::OpenFrameSource(options->sequence);
-  options->camera = ChooseCamera(a.camera_file, options->sequence);
-  return source;
+}
+
+/// The recording, and in `options` how it is to be played.
+std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::NodeOptions& node,
+                                          dmslam::PlayerOptions* options) {
+  SetOptions(a, node, options);
+  return a.log.empty() ? dmslam::OpenSequence(a.camera_file, a.fps, options) : OpenLog(a, options);
+}
+
+std::unique_ptr<dmslam::Node> WatchCamera(const Arguments& a, dmslam::NodeContext context,
+                                          const dmslam::NodeOptions& node) {
+  dmslam::PlayerOptions options;
+  SetOptions(a, node, &options);
+  if (a.lockstep) {
+    throw dmslam::InputError(options.sequence + ": a camera waits for nobody; leave --lockstep out");
+  }
+  options.camera = dmslam::ChooseCamera(a.camera_file, options.sequence);
+  if (a.fps > 0) options.camera.fps = a.fps;
+  auto source = dmslam::OpenLive(options.sequence, options.camera);
+  return std::make_unique<dmslam::LiveNode>(std::move(context), options, std::move(source));
 }
 
 /// Writes what the player would publish into a log, under the recording's own clock.
@@ -90,8 +99,13 @@ std::unique_ptr<dmslam::Node> EnterRecords(const Arguments& a, dmslam::NodeConte
 }
 
 void Declare(CLI::App& app, Arguments& a) {
-  app.add_option("--sequence", a.options.sequence,
-                 "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.add_option("--sequence,--video", a.options.sequence,
+                 "TUM RGB-D folder, EuRoC folder, numbered images, a video, or a camera: /dev/videoN or the "
+                 "address of a stream");
+  app.add_option("--fps", a.fps,
+                 "frames per second of numbered images and of videos that do not state it; asked of a "
+                 "camera; default: as the camera file says")
+      ->check(CLI::Range(0.01, 1000.0));
   app.add_option("--log", a.log,
                  "log of lcm-logger: its frames are played, with their indices, stamps and bytes");
   app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
@@ -110,8 +124,11 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--frames", a.options.frames, "at most so many frames");
   app.add_option("--encoding", a.encoding, "of re-encoded frames: jpeg, png, raw")
       ->check(CLI::IsMember({"jpeg", "png", "raw"}));
-  app.add_option("--jpeg-quality", a.options.jpeg_quality)->check(CLI::Range(1, 100))->capture_default_str();
-  app.add_flag("--reencode", a.options.reencode, "encode frames anew even where files hold JPEG or PNG");
+  app.add_option("--jpeg-quality", a.options.encoding.jpeg_quality)
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_flag("--reencode", a.options.encoding.reencode,
+               "encode frames anew even where files hold JPEG or PNG");
   app.add_flag("--remote-frontend", a.remote_frontend,
                "with --link lan: the frontend runs on another host, so frames leave this one");
   app.add_option("--lead", a.options.lead_s, "seconds before the first frame")->capture_default_str();
@@ -123,7 +140,7 @@ void Declare(CLI::App& app, Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("player", "Feeds the frames of a recording to the bus.");
+  dmslam::ProcessMain process("player", "Feeds the frames of a recording or of a camera to the bus.");
   Arguments arguments;
   Declare(process.app(), arguments);
   process.SetOffline([&](const dmslam::NodeOptions& node) {
@@ -134,6 +151,8 @@ int main(int argc, char** argv) {
       argc, argv,
       [&](dmslam::NodeContext context, dmslam::NodeOptions node) -> std::unique_ptr<dmslam::Node> {
         if (arguments.channels == "records") return EnterRecords(arguments, std::move(context), node);
+        if (dmslam::IsLive(arguments.options.sequence))
+          return WatchCamera(arguments, std::move(context), node);
         dmslam::PlayerOptions options;
         auto source = Open(arguments, node, &options);
         return std::make_unique<dmslam::PlayerNode>(std::move(context), options, std::move(source));

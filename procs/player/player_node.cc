@@ -28,16 +28,6 @@ std::string SequenceName(const std::string& path) {
   return p.filename().empty() ? p.parent_path().filename().string() : p.filename().string();
 }
 
-FrameEncoding ToFrameEncoding(ImageEncoding encoding) {
-  switch (encoding) {
-    case ImageEncoding::kPng: return FrameEncoding::kPng;
-    case ImageEncoding::kGray8: return FrameEncoding::kGray8;
-    case ImageEncoding::kRgb8: return FrameEncoding::kRgb8;
-    case ImageEncoding::kBgr8: return FrameEncoding::kBgr8;
-    default: return FrameEncoding::kJpeg;
-  }
-}
-
 /// Frames in the order of play: jumps taken out.
 std::vector<size_t> OrderOfPlay(const PlayerOptions& options, size_t available, size_t* jumped) {
   std::vector<size_t> order;
@@ -73,7 +63,8 @@ std::optional<std::pair<double, double>> ParsePair(const std::string& text) {
 PlayerOptions::BlackOut ParseBlackOut(const std::string& text) {
   const auto pair = ParsePair(text);
   if (!pair || pair->second <= 0) {
-    throw InputError("--black-out " + text + ": write FROM,SECONDS: a frame and a time above zero, as 300,1.5");
+    throw InputError("--black-out " + text +
+                     ": write FROM,SECONDS: a frame and a time above zero, as 300,1.5");
   }
   return {static_cast<size_t>(pair->first), pair->second};
 }
@@ -90,8 +81,8 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
     : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
   order_ = OrderOfPlay(options_, source_->size(), &jumped_);
   if (order_.empty()) {
-    throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) + " leaves no frame of " +
-                     std::to_string(source_->size()));
+    throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
+                     " leaves no frame of " + std::to_string(source_->size()));
   }
   ground_truth_ = source_->GroundTruth();
   context_.bus->Subscribe(channels::kFrameDone);
@@ -103,7 +94,8 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
 
 template <typename Message>
 void PlayerNode::Publish(const Message& message) {
-  context_.bus->Publish({wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
+  context_.bus->Publish(
+      {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
 }
 
 void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -165,35 +157,12 @@ bool PlayerNode::FrameIsDue() const {
 
 bool PlayerNode::IsBlack(size_t index) const {
   const double seconds = static_cast<double>(source_->StampNs(index)) * 1e-9;
-  return std::any_of(options_.black_outs.begin(), options_.black_outs.end(), [&](const PlayerOptions::BlackOut& b) {
-    const size_t from = std::min(b.from, source_->size() - 1);
-    const double begin = static_cast<double>(source_->StampNs(from)) * 1e-9;
-    return index >= from && seconds < begin + b.seconds;
-  });
-}
-
-void PlayerNode::Encode(const EncodedImage& image, size_t index) {
-  const bool compressed = image.encoding == ImageEncoding::kJpeg || image.encoding == ImageEncoding::kPng;
-  if ((compressed || source_->AsPublished()) && !options_.reencode) {
-    frame_.encoding = ToFrameEncoding(image.encoding);
-    frame_.data = image.bytes;
-    frame_.width_px = image.width;
-    frame_.height_px = image.height;
-    return;
-  }
-  const GrayImage gray = DecodeGray(image, source_->Name(index));
-  frame_.encoding = options_.encoding;
-  switch (options_.encoding) {
-    case FrameEncoding::kPng: frame_.data = EncodePng(gray); break;
-    case FrameEncoding::kGray8:
-      frame_.data = gray.data;
-      frame_.width_px = gray.width;
-      frame_.height_px = gray.height;
-      break;
-    default:
-      frame_.encoding = FrameEncoding::kJpeg;
-      frame_.data = EncodeJpeg(gray, options_.jpeg_quality);
-  }
+  return std::any_of(options_.black_outs.begin(), options_.black_outs.end(),
+                     [&](const PlayerOptions::BlackOut& b) {
+                       const size_t from = std::min(b.from, source_->size() - 1);
+                       const double begin = static_cast<double>(source_->StampNs(from)) * 1e-9;
+                       return index >= from && seconds < begin + b.seconds;
+                     });
 }
 
 bool PlayerNode::MakeFrame(size_t index) {
@@ -210,7 +179,7 @@ bool PlayerNode::MakeFrame(size_t index) {
     } else {
       EncodedImage image = source_->Read(index);
       if (image.encoding == ImageEncoding::kFile) image.encoding = DetectEncoding(image.bytes);
-      Encode(image, index);
+      EncodeFrame(image, source_->Name(index), options_.encoding, source_->AsPublished(), &frame_);
     }
   } catch (const InputError& error) {
     if (unreadable_++ == 0) {
@@ -242,8 +211,9 @@ void PlayerNode::PublishFrame() {
 
 void PlayerNode::PublishGroundTruth(size_t index) {
   const int64_t stamp_ns = source_->StampNs(index);
-  const auto at = std::lower_bound(ground_truth_.begin(), ground_truth_.end(), stamp_ns,
-                                   [](const StampedPose& pose, int64_t stamp) { return pose.stamp_ns < stamp; });
+  const auto at =
+      std::lower_bound(ground_truth_.begin(), ground_truth_.end(), stamp_ns,
+                       [](const StampedPose& pose, int64_t stamp) { return pose.stamp_ns < stamp; });
   if (at == ground_truth_.end() || at->stamp_ns - stamp_ns > 10'000'000) return;
   Publish(GroundTruthPose{options_.session, source_->FrameIndex(index), at->stamp_ns, at->T_world_cam});
 }

@@ -12,23 +12,22 @@
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/messaging/bus.h"
 #include "dmslam/wire/codec.h"
+#include "player/frame_encoding.h"
 
 namespace dmslam {
 
 /// What is played, and how.
 struct PlayerOptions {
-  std::string sequence;        ///< path of what is played; its last part names it
+  std::string sequence;  ///< path of what is played; its last part names it
   Camera camera;
   uint32_t session = 1;
   PlaybackMode mode = PlaybackMode::kRealtime;
-  double speed = 1.0;          ///< factor on the recorded rate; 0: as fast as possible
-  size_t start = 0;            ///< first frame
-  size_t frames = SIZE_MAX;    ///< at most so many
-  FrameEncoding encoding = FrameEncoding::kJpeg;
-  int jpeg_quality = 90;
-  bool reencode = false;       ///< files that are JPEG or PNG travel as they are, unless this is set
-  bool local_frames = false;   ///< frames stay on this host: the frontend runs here, and the bus leaves it
-  double lead_s = 0.5;         ///< between the first camera info and the first frame, so that others can get ready
+  double speed = 1.0;        ///< factor on the recorded rate; 0: as fast as possible
+  size_t start = 0;          ///< first frame
+  size_t frames = SIZE_MAX;  ///< at most so many
+  EncodingOptions encoding;
+  bool local_frames = false;  ///< frames stay on this host: the frontend runs here, and the bus leaves it
+  double lead_s = 0.5;  ///< between the first camera info and the first frame, so that others can get ready
   struct BlackOut {
     size_t from = 0;
     double seconds = 0;
@@ -68,7 +67,6 @@ class PlayerNode : public Node {
   bool FrameIsDue() const;
   void PublishFrame();
   bool MakeFrame(size_t index);
-  void Encode(const EncodedImage& image, size_t index);
   void PublishGroundTruth(size_t index);
   void PublishEnd();
   void PublishStatus(PlayerStatus::State state);
@@ -81,16 +79,16 @@ class PlayerNode : public Node {
   PlayerOptions options_;
   std::unique_ptr<FrameSource> source_;
   std::vector<StampedPose> ground_truth_;
-  std::vector<size_t> order_;   ///< indices into the source, in order of play
+  std::vector<size_t> order_;  ///< indices into the source, in order of play
   size_t jumped_ = 0, black_ = 0, unreadable_ = 0;
-  size_t position_ = 0;         ///< next of `order_`
-  Frame frame_;                 ///< the newest one published
+  size_t position_ = 0;  ///< next of `order_`
+  Frame frame_;          ///< the newest one published
   SharedBytes frame_bytes_;
   bool awaiting_done_ = false;  ///< lock-step
   bool end_heard_ = false;
   bool mapper_done_ = false;
   int64_t mapper_heard_ns_ = 0;
-  int64_t start_ns_ = 0;        ///< when the first frame is due
+  int64_t start_ns_ = 0;  ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0, next_end_ns_ = 0;
   int64_t end_since_ns_ = 0;
   int64_t published_ = 0, repeats_ = 0;

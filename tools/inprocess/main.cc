@@ -11,11 +11,13 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "in_process.h"
+#include "player/open_sequence.h"
 
 namespace {
 
 struct Arguments {
-  std::string sequence, log, records, record, out, camera, config, vocabulary, profile;
+  std::string sequence, log, records, record, out, camera, config, vocabulary, profile, encoding = "jpeg";
+  double fps = 0;
   uint32_t log_session = 0;
   std::vector<std::string> overrides, black_outs, jumps;
   size_t start = 0, frames = SIZE_MAX;
@@ -28,7 +30,13 @@ struct Arguments {
 
 void Declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", dmslam::kVersion);
-  app.add_option("--sequence", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.add_option("--sequence,--video", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.add_option("--fps", a.fps,
+                 "frames per second of numbered images and of videos that do not state it; default: as the "
+                 "camera file says")
+      ->check(CLI::Range(0.01, 1000.0));
+  app.add_option("--encoding", a.encoding, "of frames that are neither JPEG nor PNG: jpeg, png, raw")
+      ->check(CLI::IsMember({"jpeg", "png", "raw"}));
   app.add_option("--log", a.log, "log of lcm-logger: its frames are played");
   app.add_option("--records", a.records,
                  "such a log: its keyframes are entered, without images and without a frontend");
@@ -54,20 +62,13 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_flag("--no-loop", a.no_loop, "do not close loops");
 }
 
-dmslam::Camera ChooseCamera(const Arguments& a) {
-  if (!a.camera.empty()) return dmslam::LoadCamera(a.camera);
-  if (const auto found = dmslam::FindCamera(a.sequence, dmslam::FindDataFolder("config"))) return *found;
-  throw dmslam::InputError(a.sequence + ": which camera took this is not known; name its file with --camera");
-}
-
 std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOptions* player) {
   if (!a.records.empty()) return nullptr;
   if (a.sequence.empty() == a.log.empty())
     throw dmslam::InputError("give one of --sequence, --log and --records");
   if (a.log.empty()) {
     player->sequence = a.sequence;
-    player->camera = ChooseCamera(a);
-    return dmslam::OpenFrameSource(a.sequence);
+    return dmslam::OpenSequence(a.camera, a.fps, player);
   }
   auto log = std::make_shared<const dmslam::LogIndex>(a.log);
   if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
@@ -91,6 +92,7 @@ int Run(const Arguments& a) {
   options.record = a.record;
   options.map_files = a.map_files;
   options.player.session = a.session;
+  options.player.encoding.encoding = dmslam::ParseFrameEncoding(a.encoding);
   if (a.session == 0) {
     const bool continued = !a.map_files.load.empty();
     options.player.session = continued ? dmslam::NewestSession(dmslam::LoadMap(a.map_files.load).map) + 1 : 1;

@@ -2,8 +2,10 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <string>
 
 #include "dmslam/util/check.h"
@@ -21,7 +23,8 @@ Eigen::Vector2d DistortNormalized(const Camera& c, const Eigen::Vector2d& n) {
 }
 
 double ReadNumber(const YAML::Node& node, const std::string& path, const std::string& field) {
-  if (!node[field]) throw InputError(path + ": field '" + field + "' is missing; add it (see docs/camera.md)");
+  if (!node[field])
+    throw InputError(path + ": field '" + field + "' is missing; add it (see docs/camera.md)");
   try {
     return node[field].as<double>();
   } catch (const YAML::Exception&) {
@@ -49,7 +52,38 @@ void ReadDistortion(const YAML::Node& node, const std::string& path, Camera& cam
   camera.k3 = values[4];
 }
 
+constexpr const char* kConvert = "convert it with scripts/convert_camera.sh (dmslam-convert-camera)";
+
+/// Whether the file begins as OpenCV writes YAML, which no reader of YAML takes.
+bool IsOpenCvFile(const std::string& path) {
+  std::string line;
+  return std::getline(std::ifstream(path), line) && line.starts_with("%YAML:");
+}
+
+/// A slip in a field's name must not pass for a field that was left out.
+void RefuseUnknownFields(const YAML::Node& node, const std::string& path) {
+  static constexpr std::array kKnown = {"model", "width", "height",     "fx", "fy",
+                                        "cx",    "cy",    "distortion", "fps"};
+  for (const auto& entry : node) {
+    const std::string name = entry.first.as<std::string>("");
+    if (std::find(kKnown.begin(), kKnown.end(), name) != kKnown.end()) continue;
+    if (name.starts_with("Camera") || name == "camera_matrix" || name == "intrinsics") {
+      throw InputError(path + ": field '" + name + "' is that of another program's camera file; " + kConvert);
+    }
+    throw InputError(path + ": field '" + name + "' is not known; correct or remove it (see docs/camera.md)");
+  }
+}
+
+int ReadWhole(const YAML::Node& node, const std::string& path, const std::string& field) {
+  const double value = ReadNumber(node, path, field);
+  if (std::isfinite(value) && value == std::floor(value) && std::abs(value) < 1e6)
+    return static_cast<int>(value);
+  throw InputError(path + ": field '" + field +
+                   "' is not a whole number of pixels; write one (see docs/camera.md)");
+}
+
 YAML::Node LoadYaml(const std::string& path) {
+  if (IsOpenCvFile(path)) throw InputError(path + ": is another program's camera file; " + kConvert);
   try {
     YAML::Node node = YAML::LoadFile(path);
     if (!node.IsMap()) throw InputError(path + ": is not a map of fields; see docs/camera.md for an example");
@@ -109,16 +143,18 @@ Camera LoadCamera(const std::string& path) {
     throw InputError(path + ": field 'model' is '" + node["model"].as<std::string>("") +
                      "', which is not supported; undistort to a pinhole camera first (see docs/camera.md)");
   }
+  RefuseUnknownFields(node, path);
   Camera camera;
-  camera.width_px = static_cast<int>(ReadNumber(node, path, "width"));
-  camera.height_px = static_cast<int>(ReadNumber(node, path, "height"));
+  camera.width_px = ReadWhole(node, path, "width");
+  camera.height_px = ReadWhole(node, path, "height");
   camera.fx_px = ReadNumber(node, path, "fx");
   camera.fy_px = ReadNumber(node, path, "fy");
   camera.cx_px = ReadNumber(node, path, "cx");
   camera.cy_px = ReadNumber(node, path, "cy");
   if (node["fps"]) camera.fps = ReadNumber(node, path, "fps");
   ReadDistortion(node, path, camera);
-  if (const auto problem = camera.Problem()) throw InputError(path + ": " + *problem + "; correct it (see docs/camera.md)");
+  if (const auto problem = camera.Problem())
+    throw InputError(path + ": " + *problem + "; correct it (see docs/camera.md)");
   return camera;
 }
 

@@ -61,8 +61,22 @@ TEST(CameraFile, NamesTheFieldThatIsWrong) {
   EXPECT_NE(ErrorOf("width: 640\n").find("'height'"), std::string::npos);
   EXPECT_NE(ErrorOf(good + "model: fisheye\n").find("fisheye"), std::string::npos);
   EXPECT_NE(ErrorOf(good + "distortion: [1, 2]\n").find("'distortion'"), std::string::npos);
-  EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: abc\nfy: 500\ncx: 320\ncy: 240\n").find("'fx'"), std::string::npos);
-  EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 3200\ncy: 240\n").find("'cx'"), std::string::npos);
+  EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: abc\nfy: 500\ncx: 320\ncy: 240\n").find("'fx'"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 3200\ncy: 240\n").find("'cx'"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf("width: 640.5\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n").find("'width'"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf(good + "distorsion: [0, 0, 0, 0]\n").find("'distorsion' is not known"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf("Camera.fx: 500\n").find("convert_camera"), std::string::npos);
+  EXPECT_NE(ErrorOf("%YAML:1.0\nCamera.fx: 500\n").find("convert_camera"), std::string::npos);
+  for (const std::string field : {"width", "height", "fx", "fy", "cx", "cy"}) {
+    std::string lacking = good;
+    const size_t at = lacking.find(field + ":");
+    lacking.erase(at, lacking.find('\n', at) + 1 - at);
+    EXPECT_NE(ErrorOf(lacking).find("field '" + field + "' is missing"), std::string::npos);
+  }
   EXPECT_NE(ErrorOf("][").find("YAML"), std::string::npos);
   EXPECT_THROW(LoadCamera("/nonexistent.yaml"), InputError);
 }

@@ -127,6 +127,11 @@ TEST_F(DatasetTest, EurocFolderAndItsCamera) {
   EXPECT_DOUBLE_EQ(camera->fps, 20);
   Write("mav0/cam0/sensor.yaml", "resolution: [752, 480]\nintrinsics: [458.654]\n");
   EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("'intrinsics'"), std::string::npos);
+  Write("mav0/cam0/sensor.yaml", "camera_model: pinhole\ndistortion_model: equidistant\n");
+  EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("'distortion_model' is 'equidistant'"),
+            std::string::npos);
+  Write("mav0/cam0/sensor.yaml", "5\n");
+  EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("not a map"), std::string::npos);
   Write("mav0/cam0/data.csv", "5.5,a.png\n");
   EXPECT_NE(ErrorOf([&] { OpenFrameSource(root_.string()); }).find("data.csv:1: '5.5' is not a stamp"),
             std::string::npos);

@@ -84,6 +84,15 @@ std::vector<double> ReadList(const YAML::Node& node, const std::string& path, co
   return values;
 }
 
+/// A field that names a model must name this one, or be left out.
+void CheckModel(const YAML::Node& node, const std::string& path, const std::string& field,
+                const std::string& supported) {
+  const std::string model = node[field] ? node[field].as<std::string>("") : supported;
+  if (model == supported) return;
+  throw InputError(path + ": field '" + field + "' is '" + model +
+                   "', which is not supported; undistort to a pinhole camera first (see docs/camera.md)");
+}
+
 EncodedImage ReadEncoded(const std::string& path) {
   EncodedImage image;
   image.bytes = ReadFileBytes(path);
@@ -155,6 +164,9 @@ Camera EurocSequence::ReadCamera(const std::string& sensor_yaml) {
     throw InputError(sensor_yaml + ": is not valid YAML (" + error.what() +
                      "); give a camera file with --camera");
   }
+  if (!node.IsMap()) throw InputError(sensor_yaml + ": is not a map of fields; give a camera file with --camera");
+  CheckModel(node, sensor_yaml, "camera_model", "pinhole");
+  CheckModel(node, sensor_yaml, "distortion_model", "radial-tangential");
   const std::vector<double> resolution = ReadList(node, sensor_yaml, "resolution", 2);
   const std::vector<double> intrinsics = ReadList(node, sensor_yaml, "intrinsics", 4);
   const std::vector<double> distortion = ReadList(node, sensor_yaml, "distortion_coefficients", 4);

@@ -1,0 +1,66 @@
+// Takes the player's place: publishes images as a camera would, in some 40 lines. A driver of your own
+// does the same with its own images. Needs nothing of this project but message types and a camera file
+// (docs/camera.md):
+//
+//   lcm-gen --cpp --cpp-hpath=types lcmtypes/dmslam_{camera_info,frame,end_of_sequence,frame_done}_t.lcm
+//   c++ -std=c++17 -Itypes examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp -o frame_publisher
+//   ./frame_publisher 'udpm://239.255.76.67:7667?ttl=0' camera.yaml images/*.png
+#include <yaml-cpp/yaml.h>
+
+#include <chrono>
+#include <fstream>
+#include <lcm/lcm-cpp.hpp>
+#include <thread>
+
+#include "dmslam/camera_info_t.hpp"
+#include "dmslam/end_of_sequence_t.hpp"
+#include "dmslam/frame_done_t.hpp"
+#include "dmslam/frame_t.hpp"
+
+static void OnDone(const lcm::ReceiveBuffer*, const std::string&, const dmslam::frame_done_t* done,
+                   bool* heard) {
+  if (done->frame_index == -1) *heard = true;
+}
+
+int main(int argc, char** argv) {
+  if (argc < 4) return 2;
+  using Clock = std::chrono::system_clock;
+  lcm::LCM lcm(argv[1]);
+  const YAML::Node file = YAML::LoadFile(argv[2]);
+  dmslam::camera_info_t camera{};  // all that is not set is zero
+  camera.session = 1;              // the same for all messages of a run
+  camera.mode = dmslam::camera_info_t::MODE_REALTIME;
+  camera.width_px = file["width"].as<int>(), camera.height_px = file["height"].as<int>();
+  camera.fx_px = file["fx"].as<double>(), camera.fy_px = file["fy"].as<double>();
+  camera.cx_px = file["cx"].as<double>(), camera.cy_px = file["cy"].as<double>();
+  camera.fps = file["fps"].as<double>(30), camera.speed = 1, camera.sequence = "frame_publisher";
+  const auto lens = file["distortion"].as<std::vector<double>>(std::vector<double>(5));
+  camera.k1 = lens[0], camera.k2 = lens[1], camera.p1 = lens[2], camera.p2 = lens[3];
+  camera.k3 = lens.size() > 4 ? lens[4] : 0;
+  dmslam::frame_t frame{};
+  frame.session = camera.session;
+  auto due = Clock::now();
+  for (int i = 3; i < argc; ++i) {
+    std::this_thread::sleep_until(due += std::chrono::microseconds(int(1e6 / camera.fps)));
+    if (i % 10 == 3) lcm.publish("DMSLAM_PLAYER_CAMERA_INFO", &camera);  // several times a second
+    std::ifstream image(argv[i], std::ios::binary);
+    frame.data.assign(std::istreambuf_iterator<char>(image), {});
+    frame.num_bytes = int(frame.data.size());
+    frame.encoding = frame.data.at(0) == 0x89 ? int(frame.ENCODING_PNG) : int(frame.ENCODING_JPEG);
+    frame.frame_index = i - 3;
+    frame.stamp_ns = std::chrono::nanoseconds(due.time_since_epoch()).count();  // when it was taken
+    frame.utime = frame.capture_us = frame.publish_us = frame.stamp_ns / 1000;
+    lcm.publish("DMSLAM_PLAYER_FRAME", &frame);
+  }
+  dmslam::end_of_sequence_t end{};  // repeated until the frontend says that it has heard it
+  end.session = camera.session, end.frames_published = end.frames_listed = argc - 3;
+  end.last_frame_index = frame.frame_index, end.last_stamp_ns = frame.stamp_ns;
+  bool heard = false;
+  lcm.subscribeFunction("DMSLAM_FRONTEND_FRAME_DONE", OnDone, &heard);
+  for (int i = 0; !heard && i < 100; ++i) {
+    lcm.publish("DMSLAM_PLAYER_CAMERA_INFO", &camera);
+    lcm.publish("DMSLAM_PLAYER_END_OF_SEQUENCE", &end);
+    lcm.handleTimeout(200);
+  }
+  return heard ? 0 : 1;
+}

@@ -1,0 +1,170 @@
+#include "player/live_node.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "common/process_info.h"
+#include "dmslam/util/check.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kInfoEveryNs = 500'000'000;
+constexpr int64_t kStatusEveryNs = 1'000'000'000;
+constexpr int64_t kEndEveryNs = 200'000'000;
+constexpr int64_t kEndTimeoutNs = 60'000'000'000;
+constexpr int64_t kStopTimeoutNs = 2'000'000'000;
+constexpr int64_t kMapperSilentNs = 5'000'000'000;  // after the end: nobody to wait for
+constexpr uint32_t kEndIndex = std::numeric_limits<uint32_t>::max();
+
+/// What to call the camera in messages: its device, or the address without a password.
+std::string CameraName(const std::string& path) {
+  const size_t from = path.find_last_of('@');
+  return path.substr(from == std::string::npos ? 0 : from + 1);
+}
+
+}  // namespace
+
+LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<LiveSource> source)
+    : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
+  context_.bus->Subscribe(channels::kFrameDone);
+  context_.bus->Subscribe(channels::kMapperStatus);
+  context_.bus->SetHandler(
+      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
+  if (context_.watch) context_.watch(source_->fd(), [this] { TakeFrame(); });
+}
+
+template <typename Message>
+void LiveNode::Publish(const Message& message) {
+  context_.bus->Publish(
+      {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
+}
+
+void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (channel == channels::kMapperStatus) {
+    const auto status = wire::Decode<MapperStatus>(bytes);
+    if (!status || status->head.session != options_.session) return;
+    mapper_heard_ns_ = context_.now_ns();
+    mapper_done_ = status->state == MapperStatus::State::kDone;
+    return;
+  }
+  const auto done = wire::Decode<FrameDone>(bytes);
+  if (!done || done->session != options_.session) return;
+  if (done->frame_index == kEndIndex) {
+    end_heard_ = true;
+    ending_ = true;
+  } else if (done->frame_index > frame_.frame_index || published_ == 0) {
+    first_index_ = std::max(first_index_, done->frame_index + 1);  // a player before this one was further
+  }
+}
+
+/// Called when the camera has something to say. Late frames were dropped by the source, which keeps the
+/// newest.
+void LiveNode::TakeFrame() {
+  auto live = source_->Take();
+  if (!live) {
+    if (source_->ended() && !ending_) {
+      spdlog::warn("{}: the camera delivers no more frames", CameraName(options_.sequence));
+      ending_ = true;
+    }
+    return;
+  }
+  if (ending_) return;
+  frame_ = Frame();
+  frame_.session = options_.session;
+  frame_.frame_index = first_index_ + live->index;
+  frame_.stamp_ns = live->stamp_ns;
+  frame_.capture_us = live->stamp_ns / 1000;
+  EncodeFrame(live->image, CameraName(options_.sequence), options_.encoding, false, &frame_);
+  frame_.publish_us = context_.wall_us();
+  context_.bus->Publish(
+      {channels::kFrame, std::make_shared<const Bytes>(wire::Encode(frame_)), options_.local_frames});
+  ++published_;
+  ending_ = static_cast<size_t>(published_) >= options_.frames;
+}
+
+void LiveNode::PublishCameraInfo() {
+  CameraInfo info;
+  info.utime = context_.wall_us();
+  info.session = options_.session;
+  info.camera = options_.camera;
+  info.sequence = CameraName(options_.sequence);
+  info.num_frames = options_.frames == SIZE_MAX ? 0 : static_cast<int64_t>(options_.frames);
+  info.mode = PlaybackMode::kRealtime;
+  Publish(info);
+}
+
+void LiveNode::PublishStatus() {
+  PlayerStatus status;
+  status.head.utime = context_.wall_us();
+  status.head.session = options_.session;
+  status.head.health = MeasureProcess();
+  status.state = ending_ ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying;
+  status.frames_published = published_;
+  status.frames_missing = source_->dropped();
+  status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  status.late_ms = published_ > 0 ? static_cast<double>(frame_.publish_us - frame_.capture_us) * 1e-3 : 0;
+  Publish(status);
+}
+
+void LiveNode::PublishEnd() {
+  EndOfSequence end;
+  end.utime = context_.wall_us();
+  end.session = options_.session;
+  end.frames_published = published_;
+  end.frames_listed = published_ + source_->dropped();
+  end.frames_missing = source_->dropped();
+  end.last_frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  end.last_stamp_ns = frame_.stamp_ns;
+  Publish(end);
+}
+
+void LiveNode::Advance() {
+  const int64_t now = context_.now_ns();
+  if (exit_code_) return;
+  if (now >= next_info_ns_) {
+    next_info_ns_ = now + kInfoEveryNs;
+    PublishCameraInfo();
+  }
+  if (now >= next_status_ns_) {
+    next_status_ns_ = now + kStatusEveryNs;
+    PublishStatus();
+  }
+  if (!ending_) TakeFrame();
+  if (!ending_) return;
+  if (end_since_ns_ == 0) end_since_ns_ = now;
+  if (now >= next_end_ns_) {
+    next_end_ns_ = now + kEndEveryNs;
+    PublishEnd();
+  }
+  EndIfHeard(now);
+}
+
+/// Stays until the map is done, since a frontend that is started again at the end needs camera and end.
+void LiveNode::EndIfHeard(int64_t now) {
+  if (end_heard_) {
+    const bool mapper_silent = now - std::max(mapper_heard_ns_, end_since_ns_) > kMapperSilentNs;
+    if (mapper_done_ || mapper_silent) exit_code_ = 0;
+  } else if (stopped_ && now - end_since_ns_ > kStopTimeoutNs) {
+    exit_code_ = 0;
+  } else if (now - end_since_ns_ > kEndTimeoutNs) {
+    exit_code_ = 5;
+    problem_ = "no frontend answered the end of the sequence; is it running on the same bus?";
+  }
+}
+
+void LiveNode::Stop() {
+  ending_ = true;
+  stopped_ = true;
+}
+
+int64_t LiveNode::deadline_ns() const {
+  const int64_t deadline = std::min(next_info_ns_, next_status_ns_);
+  return ending_ ? std::min(deadline, next_end_ns_) : deadline;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/node.h"
+#include "dmslam/dataset/live_source.h"
+#include "player/player_node.h"
+
+namespace dmslam {
+
+/// Feeds a camera's frames to the bus as they come, until the camera ends, so many were published, or
+/// somebody asks to stop; then says that the sequence has ended, until the frontend has heard it.
+class LiveNode : public Node {
+ public:
+  /// Of the options those of a recording (start, speed, black-outs, jumps, mode) mean nothing here.
+  LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<LiveSource> source);
+
+  void Advance() override;
+  int64_t deadline_ns() const override;
+  /// Ends the sequence; the node is done when the frontend has heard it, or has said nothing for two seconds.
+  void Stop() override;
+  std::optional<int> exit_code() const override { return exit_code_; }
+  std::string problem() const override { return problem_; }
+
+  int64_t published() const { return published_; }
+
+ private:
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void TakeFrame();
+  void PublishCameraInfo();
+  void PublishStatus();
+  void PublishEnd();
+  void EndIfHeard(int64_t now);
+  template <typename Message>
+  void Publish(const Message& message);
+
+  NodeContext context_;
+  PlayerOptions options_;
+  std::unique_ptr<LiveSource> source_;
+  uint32_t first_index_ =
+      0;         ///< of the camera's first frame: above 0 where a player before this one has published
+  Frame frame_;  ///< the newest one published
+  int64_t published_ = 0;
+  bool ending_ = false, stopped_ = false;
+  bool end_heard_ = false, mapper_done_ = false;
+  int64_t mapper_heard_ns_ = 0, end_since_ns_ = 0;
+  int64_t next_info_ns_ = 0, next_status_ns_ = 0, next_end_ns_ = 0;
+  std::optional<int> exit_code_;
+  std::string problem_;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,152 @@
+#include "player/live_node.h"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <utility>
+
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+/// What a fake camera has in store.
+struct Store {
+  std::deque<LiveFrame> frames;
+  bool ended = false;
+};
+
+class FakeCamera : public LiveSource {
+ public:
+  explicit FakeCamera(Store* store) : store_(store) {}
+  int fd() const override { return -1; }
+  std::optional<LiveFrame> Take() override {
+    if (store_->frames.empty()) return std::nullopt;
+    LiveFrame frame = std::move(store_->frames.front());
+    store_->frames.pop_front();
+    return frame;
+  }
+  bool ended() const override { return store_->ended && store_->frames.empty(); }
+  int64_t dropped() const override { return 3; }
+
+ private:
+  Store* store_;
+};
+
+LiveFrame Picture(uint32_t index, int64_t stamp_ns) {
+  LiveFrame frame{index, stamp_ns, {ImageEncoding::kGray8, 8, 4, {}}};
+  frame.image.bytes.assign(32, static_cast<uint8_t>(index));
+  return frame;
+}
+
+/// A node with a camera, on a bus where somebody listens; time stands still unless it is moved.
+class LiveNodeTest : public testing::Test {
+ protected:
+  LiveNodeTest() : player_port_(bus_.AddPort()), ear_(bus_.AddPort()) {
+    for (const char* channel : {channels::kFrame, channels::kCameraInfo, channels::kEndOfSequence})
+      ear_.Subscribe(channel);
+    ear_.SetHandler([this](const std::string& channel, std::span<const uint8_t> bytes) {
+      if (channel == channels::kFrame) frames_.push_back(*wire::Decode<Frame>(bytes));
+      if (channel == channels::kCameraInfo) infos_.push_back(*wire::Decode<CameraInfo>(bytes));
+      if (channel == channels::kEndOfSequence) ends_.push_back(*wire::Decode<EndOfSequence>(bytes));
+    });
+  }
+  LiveNode Make(size_t frames = SIZE_MAX) {
+    NodeContext context;
+    context.bus = &player_port_;
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    PlayerOptions options;
+    options.sequence = "rtsp://user:secret@robot/stream";
+    options.session = 9;
+    options.camera = {.width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 32, .cy_px = 24};
+    options.frames = frames;
+    options.encoding.encoding = FrameEncoding::kGray8;
+    return LiveNode(std::move(context), options, std::make_unique<FakeCamera>(&store_));
+  }
+  void Advance(LiveNode& node, int64_t by_ns = 10'000'000) {
+    now_ns_ += by_ns;
+    node.Advance();
+    while (bus_.DeliverOne()) {
+    }
+  }
+  template <typename Message>
+  void Say(const Message& message) {
+    ear_.Publish(
+        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
+    while (bus_.DeliverOne()) {
+    }
+  }
+
+  MemoryBus bus_;
+  MemoryBus::Port& player_port_;
+  MemoryBus::Port& ear_;
+  int64_t now_ns_ = 1'000'000'000;
+  Store store_;
+  std::vector<Frame> frames_;
+  std::vector<CameraInfo> infos_;
+  std::vector<EndOfSequence> ends_;
+};
+
+TEST_F(LiveNodeTest, PublishesWhatComesUntilEnoughAndThenItsEnd) {
+  LiveNode node = Make(2);
+  Advance(node);
+  ASSERT_EQ(infos_.size(), 1u);
+  EXPECT_EQ(infos_[0].sequence, "robot/stream") << "no password travels";
+  EXPECT_EQ(infos_[0].mode, PlaybackMode::kRealtime);
+  EXPECT_TRUE(frames_.empty());
+  store_.frames = {Picture(0, 100), Picture(4, 200), Picture(5, 300)};
+  for (int i = 0; i < 4; ++i) Advance(node);
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_EQ(frames_[0].session, 9u);
+  EXPECT_EQ(frames_[0].frame_index, 0u);
+  EXPECT_EQ(frames_[1].frame_index, 4u) << "the index counts what the camera delivered";
+  EXPECT_EQ(frames_[1].stamp_ns, 200);
+  EXPECT_EQ(frames_[1].data, std::vector<uint8_t>(32, 4));
+  ASSERT_FALSE(ends_.empty());
+  EXPECT_EQ(ends_[0].frames_published, 2);
+  EXPECT_EQ(ends_[0].frames_missing, 3);
+  EXPECT_EQ(ends_[0].last_frame_index, 4);
+  EXPECT_FALSE(node.exit_code().has_value());
+  Say(FrameDone{9, 0xFFFFFFFF, 0});
+  Advance(node, 6'000'000'000);  // no mapper says anything
+  EXPECT_EQ(node.exit_code(), 0);
+}
+
+TEST_F(LiveNodeTest, EndsWithItsCamera) {
+  LiveNode node = Make();
+  store_.frames = {Picture(0, 100)};
+  store_.ended = true;
+  for (int i = 0; i < 3; ++i) Advance(node);
+  EXPECT_EQ(frames_.size(), 1u);
+  EXPECT_FALSE(ends_.empty());
+  Advance(node, 61'000'000'000);
+  EXPECT_EQ(node.exit_code(), 5) << "nobody has heard it";
+  EXPECT_NE(node.problem().find("no frontend"), std::string::npos);
+}
+
+TEST_F(LiveNodeTest, ToldToStopItSaysTheEndAndDoesNotWaitLong) {
+  LiveNode node = Make();
+  store_.frames = {Picture(0, 100)};
+  Advance(node);
+  node.Stop();
+  Advance(node);
+  EXPECT_FALSE(ends_.empty());
+  EXPECT_FALSE(node.exit_code().has_value());
+  Advance(node, 3'000'000'000);
+  EXPECT_EQ(node.exit_code(), 0);
+}
+
+TEST_F(LiveNodeTest, StartedAgainItGoesOnBehindTheFramesBefore) {
+  LiveNode node = Make();
+  Advance(node);
+  Say(FrameDone{8, 500, 0});  // another session
+  Say(FrameDone{9, 41, 0});
+  store_.frames = {Picture(0, 100)};
+  Advance(node);
+  ASSERT_EQ(frames_.size(), 1u);
+  EXPECT_EQ(frames_[0].frame_index, 42u);
+}
+
+}  // namespace
+}  // namespace dmslam

@@ -1,0 +1,24 @@
+#include "player/open_sequence.h"
+
+#include "common/process_main.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+
+Camera ChooseCamera(const std::string& camera_file, const std::string& sequence) {
+  if (!camera_file.empty()) return LoadCamera(camera_file);
+  if (const auto found = FindCamera(sequence, FindDataFolder("config"))) return *found;
+  throw InputError(sequence + ": which camera took this is not known; name its file with --camera");
+}
+
+std::unique_ptr<FrameSource> OpenSequence(const std::string& camera_file, double fps,
+                                          PlayerOptions* options) {
+  FrameSourceOptions source_options;
+  if (fps > 0) source_options.fps = fps;
+  if (fps <= 0 && !camera_file.empty()) source_options.fps = LoadCamera(camera_file).fps;
+  auto source = OpenFrameSource(options->sequence, source_options);
+  options->camera = ChooseCamera(camera_file, options->sequence);
+  return source;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,151 @@
+#include "dmslam/dataset/live_source.h"
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+
+bool IsLive(const std::string& path) {
+  return path.starts_with("/dev/") || path.find("://") != std::string::npos;
+}
+
+}  // namespace dmslam
+
+#ifdef DMSLAM_HAVE_VIDEOIO
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+#include <thread>
+
+namespace dmslam {
+namespace {
+
+int64_t WallNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+cv::VideoCapture OpenCapture(const std::string& path, const Camera& camera) {
+  cv::VideoCapture capture;
+  if (!capture.open(path, path.starts_with("/dev/") ? cv::CAP_V4L2 : cv::CAP_ANY)) {
+    throw InputError(path +
+                     ": cannot be opened as a camera; check that it is there, that no other program "
+                     "uses it and that you may read it (group video)");
+  }
+  capture.set(cv::CAP_PROP_FRAME_WIDTH, camera.width_px);
+  capture.set(cv::CAP_PROP_FRAME_HEIGHT, camera.height_px);
+  capture.set(cv::CAP_PROP_FPS, camera.fps);
+  capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
+  return capture;
+}
+
+/// Throws InputError unless the frame is as the camera file says.
+void CheckFrame(const cv::Mat& frame, const std::string& path, const Camera& camera) {
+  if (frame.empty()) throw InputError(path + ": delivers no image; is the camera working?");
+  if (frame.cols == camera.width_px && frame.rows == camera.height_px && frame.type() == CV_8UC3) return;
+  throw InputError(path + ": delivers images of " + std::to_string(frame.cols) + "x" +
+                   std::to_string(frame.rows) + " pixels, the camera file says " +
+                   std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px) +
+                   "; calibrate the camera at the size that it delivers");
+}
+
+EncodedImage ToEncoded(const cv::Mat& frame) {
+  EncodedImage image{ImageEncoding::kBgr8, frame.cols, frame.rows, {}};
+  const size_t row_bytes = static_cast<size_t>(frame.cols) * 3;
+  image.bytes.resize(row_bytes * static_cast<size_t>(frame.rows));
+  for (int y = 0; y < frame.rows; ++y) {
+    std::memcpy(image.bytes.data() + static_cast<size_t>(y) * row_bytes, frame.ptr(y), row_bytes);
+  }
+  return image;
+}
+
+/// A thread waits in the driver; the newest frame waits behind a lock, and an event says that it is there.
+class OpenCvCamera : public LiveSource {
+ public:
+  OpenCvCamera(const std::string& path, const Camera& camera)
+      : capture_(OpenCapture(path, camera)), event_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+    DMSLAM_CHECK(event_ >= 0, "eventfd is part of every Linux");
+    cv::Mat first;
+    capture_.read(first);
+    CheckFrame(first, path, camera);
+    thread_ = std::thread([this] { Read(); });
+  }
+  ~OpenCvCamera() override {
+    stop_ = true;
+    thread_.join();
+    close(event_);
+  }
+  OpenCvCamera(const OpenCvCamera&) = delete;
+  OpenCvCamera& operator=(const OpenCvCamera&) = delete;
+
+  int fd() const override { return event_; }
+  std::optional<LiveFrame> Take() override {
+    uint64_t events = 0;
+    if (read(event_, &events, sizeof(events)) < 0) events = 0;  // nothing was there
+    const std::lock_guard lock(mutex_);
+    return std::exchange(newest_, std::nullopt);
+  }
+  bool ended() const override {
+    const std::lock_guard lock(mutex_);
+    return ended_ && !newest_;
+  }
+  int64_t dropped() const override { return dropped_; }
+
+ private:
+  void Read() {
+    cv::Mat frame;
+    int64_t last_stamp_ns = 0;
+    for (uint32_t index = 0; !stop_; ++index) {
+      const bool good = capture_.read(frame) && frame.type() == CV_8UC3;
+      const int64_t stamp_ns = std::max(WallNs(), last_stamp_ns + 1);
+      last_stamp_ns = stamp_ns;
+      std::optional<LiveFrame> next;
+      if (good) next = LiveFrame{index, stamp_ns, ToEncoded(frame)};
+      {
+        const std::lock_guard lock(mutex_);
+        if (good && newest_) ++dropped_;
+        if (good) newest_ = std::move(next);
+        ended_ = !good;
+      }
+      const uint64_t one = 1;
+      if (write(event_, &one, sizeof(one)) < 0 || !good) return;
+    }
+  }
+
+  cv::VideoCapture capture_;
+  const int event_;
+  std::atomic<bool> stop_ = false;
+  std::atomic<int64_t> dropped_ = 0;
+  mutable std::mutex mutex_;
+  std::optional<LiveFrame> newest_;  ///< under mutex_
+  bool ended_ = false;               ///< under mutex_
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<LiveSource> OpenLive(const std::string& path, const Camera& camera) {
+  return std::make_unique<OpenCvCamera>(path, camera);
+}
+
+}  // namespace dmslam
+
+#else
+
+namespace dmslam {
+
+std::unique_ptr<LiveSource> OpenLive(const std::string& path, const Camera&) {
+  throw InputError(path + ": this build reads no camera; install libopencv-videoio-dev and build again");
+}
+
+}  // namespace dmslam
+
+#endif

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dmslam/camera/camera.h"
+#include "dmslam/dataset/image.h"
+
+namespace dmslam {
+
+/// One image as a camera delivered it.
+struct LiveFrame {
+  uint32_t index = 0;    ///< counts what the camera delivered, taken or not
+  int64_t stamp_ns = 0;  ///< wall time at which it was there, nanoseconds since 1970; rises strictly
+  EncodedImage image;
+};
+
+/// A camera that delivers frames at a rate of its own. Whoever is late gets the newest one.
+class LiveSource {
+ public:
+  virtual ~LiveSource() = default;
+  /// Can be read when Take has something new to say.
+  virtual int fd() const = 0;
+  /// The newest frame that was not taken yet.
+  virtual std::optional<LiveFrame> Take() = 0;
+  /// No more frames will come, and the last one was taken.
+  virtual bool ended() const = 0;
+  /// How many frames were replaced by a newer one before they were taken.
+  virtual int64_t dropped() const = 0;
+};
+
+/// Whether `path` names a camera rather than a recording: a device (/dev/video0) or the address of a stream
+/// (rtsp://..., http://...).
+bool IsLive(const std::string& path);
+
+/// Opens a camera with OpenCV's videoio and asks it for the size and rate that `camera` states. A thread
+/// reads it. Throws InputError where it cannot be opened, or where it delivers images of another size.
+std::unique_ptr<LiveSource> OpenLive(const std::string& path, const Camera& camera);
+
+}  // namespace dmslam

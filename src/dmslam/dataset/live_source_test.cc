@@ -1,0 +1,75 @@
+#include "dmslam/dataset/live_source.h"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+#include <string>
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+/// Five frames, each of one grey value that tells its number; none where OpenCV cannot write videos here.
+std::string WriteVideo() {
+  const std::string path = testing::TempDir() + "dmslam_live.avi";
+  cv::VideoWriter writer(path, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0,
+                         {64, 48});
+  for (int i = 0; i < 5 && writer.isOpened(); ++i)
+    writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20)));
+  return writer.isOpened() ? path : "";
+}
+
+Camera SmallCamera() {
+  return {.width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 32, .cy_px = 24};
+}
+
+TEST(LiveSource, TellsCamerasFromRecordings) {
+  EXPECT_TRUE(IsLive("/dev/video0"));
+  EXPECT_TRUE(IsLive("rtsp://robot/stream"));
+  EXPECT_FALSE(IsLive("video.avi"));
+  EXPECT_FALSE(IsLive("/data/kitchen"));
+}
+
+// A file stands for the camera: it delivers as fast as it can be read, and ends.
+TEST(LiveSource, GivesTheNewestFrameAndCountsTheOthers) {
+  const std::string path = WriteVideo();
+  if (path.empty()) GTEST_SKIP() << "OpenCV writes no videos here";
+  const auto source = OpenLive(path, SmallCamera());
+  int64_t taken = 0, last_stamp_ns = 0, last_index = -1;
+  while (!source->ended()) {
+    pollfd waiting{source->fd(), POLLIN, 0};
+    ASSERT_EQ(poll(&waiting, 1, 10'000), 1) << "the source says nothing more and has not ended";
+    if (const auto frame = source->Take()) {
+      ++taken;
+      EXPECT_GT(frame->stamp_ns, last_stamp_ns);
+      EXPECT_GT(frame->index, last_index);
+      last_stamp_ns = frame->stamp_ns;
+      last_index = frame->index;
+      // The first frame of the file was read to see its size.
+      EXPECT_NEAR(DecodeGray(frame->image, "frame").at(30, 20), 40.0 * (frame->index + 1) + 20, 4);
+    }
+  }
+  EXPECT_EQ(last_index, 3);
+  EXPECT_EQ(taken + source->dropped(), 4);
+  EXPECT_FALSE(source->Take().has_value());
+}
+
+TEST(LiveSource, RefusesWhatIsNoCameraOfThatSize) {
+  EXPECT_THROW(OpenLive("/dev/no_such_camera", SmallCamera()), InputError);
+  const std::string path = WriteVideo();
+  if (path.empty()) GTEST_SKIP() << "OpenCV writes no videos here";
+  Camera camera = SmallCamera();
+  camera.width_px = 128;
+  try {
+    OpenLive(path, camera);
+    FAIL() << "another size was taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("64x48 pixels, the camera file says 128x48"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace dmslam
