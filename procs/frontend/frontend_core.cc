@@ -44,6 +44,7 @@ FrontendCore::FrontendCore(Setup setup)
       extractor_(setup.extractor),
       first_map_extractor_(WithMoreFeatures(setup.extractor, setup.options.initializer_feature_factor)),
       initializer_options_(setup.initializer),
+      run_search_(std::move(setup.run_search)),
       initializer_(MakeInitializer()),
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
       relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {
@@ -52,7 +53,11 @@ FrontendCore::FrontendCore(Setup setup)
   map_id_ = 0;  // any, until it has found itself in one
 }
 
-FrontendCore::FirstMapSearch FrontendCore::MakeInitializer() const {
+FirstMapSearch FrontendCore::MakeInitializer() const {
+  return run_search_ ? run_search_(MakeSearch()) : MakeSearch();
+}
+
+FirstMapSearch FrontendCore::MakeSearch() const {
   if (options_.initializer_method == "ransac") {
     auto baseline = std::make_shared<BaselineInitializer>(BaselineInitializerOptions(), camera_, seed_);
     return [baseline](const InitializerFrame& frame) { return baseline->AddFrame(frame); };
@@ -128,6 +133,8 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
   status.reason = report.reason.c_str();
   if (report.result) {
     InitialMap proposal = MakeInitialMap(*report.result, session_, map_id_);
+    const InitializerFrame& found_with = report.result->frame1;
+    const bool found_now = found_with.index == frame_.index;
     initial_first_ = proposal.first.id;
     initial_second_ = proposal.second.id;
     last_keyframe_ = awaited_ = initial_second_;
@@ -136,7 +143,8 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
     status.reason = "a first map was proposed";
     events->push_back(std::move(proposal));
     ++counters_.keyframes_proposed;
-    proposing_frame_ = frame_;
+    proposing_frame_ =
+        found_now ? frame_ : TrackedFrame(found_with.index, found_with.stamp_ns, found_with.features);
   }
   events->push_back(MakePose(state_, status));
 }

@@ -22,6 +22,9 @@
 
 namespace dmslam {
 
+/// Takes a frame of the stream in which a first map is looked for, and says what is known by now.
+using FirstMapSearch = std::function<InitializerReport(const InitializerFrame&)>;
+
 /// A record of the frontend's stream.
 using FrontendEvent = std::variant<FramePose, InitialMap, KeyframeProposal, FrameEvidence, MapReset>;
 
@@ -51,6 +54,8 @@ class FrontendCore {
     uint64_t seed = 0;
     bool in_saved_map = false;   ///< begins lost in a map that is there already
     bool localize_only = false;  ///< ... and adds nothing to it
+    std::function<FirstMapSearch(FirstMapSearch)>
+        run_search;  ///< how the search for a first map is run, as in the background; empty: at once
     std::shared_ptr<const Vocabulary>
         vocabulary;  ///< for relocalisation; without one only the newest places are tried
   };
@@ -99,8 +104,8 @@ class FrontendCore {
     double scale = 1.0;
   };
 
-  using FirstMapSearch = std::function<InitializerReport(const InitializerFrame&)>;
   FirstMapSearch MakeInitializer() const;
+  FirstMapSearch MakeSearch() const;
   void Initialize(std::vector<FrontendEvent>* events);
   void AwaitMap(std::vector<FrontendEvent>* events);
   void Track(std::vector<FrontendEvent>* events);
@@ -134,6 +139,7 @@ class FrontendCore {
   OrbExtractor extractor_;
   OrbExtractor first_map_extractor_;  ///< more features while there is no map
   InitializerOptions initializer_options_;
+  std::function<FirstMapSearch(FirstMapSearch)> run_search_;
   FirstMapSearch initializer_;
   PoseTracker tracker_;
   Relocalizer relocalizer_;

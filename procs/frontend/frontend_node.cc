@@ -7,6 +7,7 @@
 
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
+#include "frontend/background_search.h"
 #include "frontend/pictures.h"
 
 namespace dmslam {
@@ -38,6 +39,7 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.in_saved_map = settings.start.saved_map;
   setup.localize_only = settings.start.localize_only;
   setup.vocabulary = extras_.vocabulary;
+  if (!lockstep_) setup.run_search = InBackground;
   core_ = std::make_unique<FrontendCore>(setup);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&core_->map(), [this] { return HandOverVersion(); });

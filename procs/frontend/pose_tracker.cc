@@ -4,7 +4,6 @@
 #include <array>
 #include <bitset>
 #include <cmath>
-#include <map>
 
 #include "dmslam/robust/pose_from_matches.h"
 #include "frontend/found_share.h"
@@ -13,7 +12,6 @@ namespace dmslam {
 namespace {
 
 constexpr int kCellColumns = 8, kCellRows = 6;
-constexpr int kSeenColumns = 20, kSeenRows = 15;
 constexpr int kTurnBins = 30;
 constexpr float kStrongBelief = 0.0F;  // log odds above which a landmark has no vote
 constexpr int kStreakWithoutVote = 3;  // frames in a row seen elsewhere: no vote, before the mapper says so
@@ -32,7 +30,7 @@ size_t CellOf(const Eigen::Vector2d& uv_px, const Camera& camera) {
 }  // namespace
 
 PoseTracker::PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid)
-    : options_(options), camera_(camera), pyramid_(pyramid) {}
+    : options_(options), camera_(camera), pyramid_(pyramid), witnesses_(camera) {}
 
 void PoseTracker::Reset() {
   reference_ = {};
@@ -161,7 +159,8 @@ bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint
 /// more. People who stood still while they were mapped are younger than the room around them, so they cannot carry the
 /// camera away when they walk on, however much of the image they fill.
 void PoseTracker::OptimizeElders(const TrackedFrame& frame, const PoseOptimizationOptions& options) {
-  std::vector<double> sorted = ages_s_;
+  std::vector<double>& sorted = sorted_ages_s_;
+  sorted = ages_s_;
   const size_t wanted = std::max(static_cast<size_t>(options_.min_elders),
                                  static_cast<size_t>(options_.elder_share * static_cast<double>(sorted.size())));
   if (sorted.size() <= wanted) return;
@@ -242,35 +241,53 @@ int PoseTracker::OptimizeMatches(const Map& map, TrackedFrame* frame) {
 
 // ---- Local map -----------------------------------------------------------------------------------------------------
 
-void PoseTracker::CollectLocalMap(const Map& map, const TrackedFrame& frame) {
-  std::map<KeyframeId, int> votes;
+/// The keyframes that see most of the frame's landmarks, most first.
+void PoseTracker::RankByVotes(const Map& map, const TrackedFrame& frame) {
+  votes_.clear();
   for (const LandmarkId id : frame.landmarks) {
     const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
     if (landmark == nullptr) continue;
-    for (const Observation& o : landmark->observations) ++votes[o.keyframe];
+    for (const Observation& o : landmark->observations) votes_.push_back(o.keyframe);
   }
-  std::vector<std::pair<int, KeyframeId>> ranked;
-  for (const auto& [id, count] : votes) ranked.emplace_back(-count, id);
-  std::sort(ranked.begin(), ranked.end());
-  std::vector<KeyframeId> keyframes;
+  std::sort(votes_.begin(), votes_.end());
+  ranked_.clear();
+  for (auto begin = votes_.begin(); begin != votes_.end();) {
+    const auto end = std::find_if(begin, votes_.end(), [begin](KeyframeId other) { return other != *begin; });
+    ranked_.emplace_back(-static_cast<int>(end - begin), *begin);
+    begin = end;
+  }
+  std::sort(ranked_.begin(), ranked_.end());
+}
+
+/// The best neighbour of a local keyframe that is not local yet; invalid: none.
+KeyframeId PoseTracker::NewNeighbour(const Map& map, KeyframeId of) {
+  ranked_.clear();
+  for (const auto& [other, shared] : map.FindKeyframe(of)->covisible) {
+    if (shared >= 1) ranked_.emplace_back(-shared, other);
+  }
+  const auto asked = ranked_.begin() + std::min<ptrdiff_t>(kNeighboursOfLocal, std::ssize(ranked_));
+  std::partial_sort(ranked_.begin(), asked, ranked_.end());
+  const auto found = std::find_if(ranked_.begin(), asked, [this](const auto& item) {
+    return !std::binary_search(listed_.begin(), listed_.end(), item.second);
+  });
+  return found == asked ? KeyframeId() : found->second;
+}
+
+void PoseTracker::CollectLocalMap(const Map& map, const TrackedFrame& frame) {
+  RankByVotes(map, frame);
   const size_t most = static_cast<size_t>(options_.max_local_keyframes);
-  for (const auto& [count, id] : ranked) {
-    if (keyframes.size() < most) keyframes.push_back(id);
+  const size_t direct = std::min(ranked_.size(), most);
+  local_keyframes_.clear();
+  for (size_t i = 0; i < direct; ++i) local_keyframes_.push_back(ranked_[i].second);
+  if (direct > 0) reference_ = local_keyframes_.front();
+  listed_ = local_keyframes_;
+  std::sort(listed_.begin(), listed_.end());
+  for (size_t i = 0; i < direct && local_keyframes_.size() < most; ++i) {
+    const KeyframeId neighbour = NewNeighbour(map, local_keyframes_[i]);
+    if (!neighbour.valid()) continue;
+    listed_.insert(std::lower_bound(listed_.begin(), listed_.end(), neighbour), neighbour);
+    local_keyframes_.push_back(neighbour);
   }
-  if (!keyframes.empty()) reference_ = keyframes.front();
-  std::vector<KeyframeId> listed = keyframes;
-  std::sort(listed.begin(), listed.end());
-  const size_t direct = keyframes.size();
-  for (size_t i = 0; i < direct && keyframes.size() < most; ++i) {
-    for (const KeyframeId neighbour : map.BestCovisible(keyframes[i], kNeighboursOfLocal, 1)) {
-      const auto at = std::lower_bound(listed.begin(), listed.end(), neighbour);
-      if (at != listed.end() && *at == neighbour) continue;
-      listed.insert(at, neighbour);
-      keyframes.push_back(neighbour);
-      break;
-    }
-  }
-  local_keyframes_ = std::move(keyframes);
   local_landmarks_.clear();
   for (const KeyframeId id : local_keyframes_) {
     for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
@@ -282,7 +299,8 @@ void PoseTracker::CollectLocalMap(const Map& map, const TrackedFrame& frame) {
 }
 
 void PoseTracker::SearchLocalLandmarks(const Map& map, double wider, TrackedFrame* frame) {
-  std::vector<LandmarkId> matched;
+  std::vector<LandmarkId>& matched = known_;
+  matched.clear();
   taken_.assign(frame->features->size(), 0);
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     if (!frame->landmarks[i].valid()) continue;
@@ -312,7 +330,8 @@ void PoseTracker::SearchLocalLandmarks(const Map& map, double wider, TrackedFram
 /// search radius, and so in agreement with any pose, right or wrong. It must look like its landmark more closely than a
 /// match among many others.
 void PoseTracker::DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame) {
-  std::vector<LandmarkId> matched;
+  std::vector<LandmarkId>& matched = known_;
+  matched.clear();
   for (const LandmarkId id : frame->landmarks) {
     if (id.valid()) matched.push_back(id);
   }
@@ -334,7 +353,8 @@ void PoseTracker::DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame)
 }
 
 void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
-  std::vector<LandmarkId> used;
+  std::vector<LandmarkId>& used = known_;
+  used.clear();
   taken_.assign(frame->features->size(), 0);
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     if (!frame->landmarks[i].valid()) continue;
@@ -370,60 +390,52 @@ void PoseTracker::FindMoved(const Map& map, TrackedFrame* frame) {
   }
 }
 
-namespace {
+PoseTracker::Witnesses::Witnesses(const Camera& camera)
+    : cell_width_(static_cast<double>(camera.width_px) / kSeenColumns),
+      cell_height_(static_cast<double>(camera.height_px) / kSeenRows) {}
 
-/// What this frame knows of a place in the image.
-struct Witness {
-  Eigen::Vector2d uv_px;
-  double depth;
-  bool moves;
-};
+void PoseTracker::Witnesses::Clear() {
+  for (auto& cell : cells_) cell.clear();
+}
 
-/// Witnesses by image cell.
-class Witnesses {
- public:
-  explicit Witnesses(const Camera& camera)
-      : cell_width_(static_cast<double>(camera.width_px) / kSeenColumns),
-        cell_height_(static_cast<double>(camera.height_px) / kSeenRows) {}
+void PoseTracker::Witnesses::Add(const Witness& witness) {
+  cells_[Index(Column(witness.uv_px.x()), Row(witness.uv_px.y()))].push_back(witness);
+}
 
-  void Add(const Witness& witness) { cells_[Index(Column(witness.uv_px.x()), Row(witness.uv_px.y()))].push_back(witness); }
-
-  template <typename Visit>
-  void ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const {
-    for (int row = Row(uv_px.y() - reach_px); row <= Row(uv_px.y() + reach_px); ++row) {
-      for (int column = Column(uv_px.x() - reach_px); column <= Column(uv_px.x() + reach_px); ++column) {
-        for (const Witness& witness : cells_[Index(column, row)]) {
-          if ((witness.uv_px - uv_px).squaredNorm() <= reach_px * reach_px) visit(witness);
-        }
+template <typename Visit>
+void PoseTracker::Witnesses::ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const {
+  for (int row = Row(uv_px.y() - reach_px); row <= Row(uv_px.y() + reach_px); ++row) {
+    for (int column = Column(uv_px.x() - reach_px); column <= Column(uv_px.x() + reach_px); ++column) {
+      for (const Witness& witness : cells_[Index(column, row)]) {
+        if ((witness.uv_px - uv_px).squaredNorm() <= reach_px * reach_px) visit(witness);
       }
     }
   }
+}
 
- private:
-  int Column(double x) const { return std::clamp(static_cast<int>(x / cell_width_), 0, kSeenColumns - 1); }
-  int Row(double y) const { return std::clamp(static_cast<int>(y / cell_height_), 0, kSeenRows - 1); }
-  static size_t Index(int column, int row) { return static_cast<size_t>(row * kSeenColumns + column); }
+int PoseTracker::Witnesses::Column(double x) const {
+  return std::clamp(static_cast<int>(x / cell_width_), 0, kSeenColumns - 1);
+}
 
-  double cell_width_, cell_height_;
-  std::array<std::vector<Witness>, kSeenColumns * kSeenRows> cells_;
-};
-
-}  // namespace
+int PoseTracker::Witnesses::Row(double y) const {
+  return std::clamp(static_cast<int>(y / cell_height_), 0, kSeenRows - 1);
+}
 
 /// Judges the landmarks that are missing by what is seen around them. What lies behind is seen: nothing hides them, they
 /// have gone. Their neighbours move: they go together. Something nearer is seen: they are hidden, and nothing is said.
 void PoseTracker::JudgeMissing(const Map& map, const TrackedFrame& frame) {
-  Witnesses witnesses(camera_);
-  std::vector<LandmarkId> known = moved_;
+  witnesses_.Clear();
+  std::vector<LandmarkId>& known = known_;
+  known = moved_;
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].valid()) continue;
     known.push_back(frame.landmarks[i]);
     const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
-    witnesses.Add({frame.features->uv_px[i], depth, false});
+    witnesses_.Add({frame.features->uv_px[i], depth, false});
   }
   for (const LandmarkId id : moved_) {
     const Eigen::Vector3d p_cam = frame.T_cam_world * map.FindLandmark(id)->p_world;
-    if (const auto uv = camera_.Project(p_cam)) witnesses.Add({*uv, p_cam.z(), true});
+    if (const auto uv = camera_.Project(p_cam)) witnesses_.Add({*uv, p_cam.z(), true});
   }
   std::sort(known.begin(), known.end());
   gone_.clear();
@@ -431,7 +443,7 @@ void PoseTracker::JudgeMissing(const Map& map, const TrackedFrame& frame) {
   for (const auto& [id, view] : visible_) {
     if (std::binary_search(known.begin(), known.end(), id)) continue;
     int behind = 0, beside = 0, before = 0, moving_beside = 0;
-    witnesses.ForEachNear(view.uv_px, options_.seen_through_px, [&, depth = view.depth](const Witness& witness) {
+    witnesses_.ForEachNear(view.uv_px, options_.seen_through_px, [&, depth = view.depth](const Witness& witness) {
       const bool farther = witness.depth > options_.seen_through_depth * depth;
       const bool nearer = witness.depth * options_.seen_through_depth < depth;
       if (witness.moves) {

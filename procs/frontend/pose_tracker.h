@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+#include <memory_resource>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "dmslam/map/map.h"
@@ -64,6 +67,32 @@ class PoseTracker {
     int streak = 0;  ///< frames in a row that saw it elsewhere
   };
 
+  /// What a frame knows of a place in the image.
+  struct Witness {
+    Eigen::Vector2d uv_px;
+    double depth;
+    bool moves;
+  };
+  /// Witnesses by image cell.
+  class Witnesses {
+   public:
+    explicit Witnesses(const Camera& camera);
+    void Clear();
+    void Add(const Witness& witness);
+    template <typename Visit>
+    void ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const;
+
+   private:
+    static constexpr int kSeenColumns = 20, kSeenRows = 15;
+
+    int Column(double x) const;
+    int Row(double y) const;
+    static size_t Index(int column, int row) { return static_cast<size_t>(row * kSeenColumns + column); }
+
+    double cell_width_, cell_height_;
+    std::array<std::vector<Witness>, kSeenColumns * kSeenRows> cells_;
+  };
+
   bool HasVote(const Landmark& landmark) const;
   double Trust(const Landmark& landmark, int64_t stamp_ns) const;
   void MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double radius_px,
@@ -72,6 +101,8 @@ class PoseTracker {
   void OptimizeElders(const TrackedFrame& frame, const PoseOptimizationOptions& options);
   void KeepWhatAgrees(const Rigid3d& T_cam_world, double elder_age_s, int elders);
   int OptimizeMatches(const Map& map, TrackedFrame* frame);
+  void RankByVotes(const Map& map, const TrackedFrame& frame);
+  KeyframeId NewNeighbour(const Map& map, KeyframeId of);
   void CollectLocalMap(const Map& map, const TrackedFrame& frame);
   void SearchLocalLandmarks(const Map& map, double wider, TrackedFrame* frame);
   void DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame);
@@ -87,6 +118,7 @@ class PoseTracker {
   KeyframeId reference_;
   std::optional<PosePrior> prior_;
 
+  // A frame is tracked without asking the heap for memory: what it needs is kept from frame to frame.
   std::vector<Match> matches_;
   std::vector<float> match_turns_;
   std::vector<PoseObservation> observations_;
@@ -101,8 +133,15 @@ class PoseTracker {
   std::vector<LandmarkId> moved_;         ///< seen elsewhere by this frame
   std::vector<LandmarkId> hidden_;        ///< missing, with something nearer seen in their place; sorted
   std::vector<LandmarkId> gone_;          ///< missing: what lies behind them is seen, or their neighbours move
-  std::unordered_map<LandmarkId, RecentMotion> recent_motion_;
-  std::unordered_map<LandmarkId, FrameEvidence::Item> evidence_;
+  std::vector<double> sorted_ages_s_;
+  std::vector<KeyframeId> votes_;   ///< one for each observation of the frame's landmarks
+  std::vector<std::pair<int, KeyframeId>> ranked_;
+  std::vector<KeyframeId> listed_;  ///< local_keyframes_, sorted
+  std::vector<LandmarkId> known_;
+  Witnesses witnesses_;
+  std::pmr::unsynchronized_pool_resource pool_;
+  std::pmr::unordered_map<LandmarkId, RecentMotion> recent_motion_{&pool_};
+  std::pmr::unordered_map<LandmarkId, FrameEvidence::Item> evidence_{&pool_};
 };
 
 }  // namespace dmslam

@@ -82,6 +82,17 @@ struct PairGeometry {
   const LandmarkCreationOptions& options;
 };
 
+/// Whether the two planes differ by no more than `sigmas` of both tolerances together. What is clear by
+/// squares is not asked of the much slower hypot.
+bool SamePlane(const PlaneEntry& a, const PlaneEntry& b, double sigmas) {
+  const double apart = std::abs(a.angle - b.angle);
+  const double apart_squared = apart * apart;
+  const double bound_squared = sigmas * sigmas * (a.tolerance * a.tolerance + b.tolerance * b.tolerance);
+  if (apart_squared < bound_squared * (1 - 1e-9)) return true;
+  if (apart_squared > bound_squared * (1 + 1e-9)) return false;
+  return apart <= sigmas * std::hypot(a.tolerance, b.tolerance);
+}
+
 /// The best partner of one feature of a among b's entries in its window; -1: none.
 int BestPartner(const PlaneEntry& entry, const std::vector<PlaneEntry>& sorted_b, const PairGeometry& pair) {
   const Descriptor& descriptor = pair.a.features->set.descriptors[entry.feature];
@@ -93,7 +104,7 @@ int BestPartner(const PlaneEntry& entry, const std::vector<PlaneEntry>& sorted_b
   int best = 257, second = 257, best_feature = -1;
   for (; it != sorted_b.end() && it->angle <= entry.angle + reach; ++it) {
     // The error lies in the other image as in ORB-SLAM2, with this feature's own error added.
-    if (std::abs(it->angle - entry.angle) > sigmas * std::hypot(it->tolerance, entry.tolerance)) continue;
+    if (!SamePlane(*it, entry, sigmas)) continue;
     if (it->along <= entry.along) continue;  // rays from a to b must converge in front of both
     const auto& keypoint = pair.b.features->set.keypoints[it->feature];
     if (std::abs(keypoint.octave - octave) > 3) continue;

@@ -59,6 +59,7 @@ void MapperNode::Begin(const CameraInfo& info) {
   if (!lockstep_) {
     core_->SetInterrupt([this] {
       PumpWithinWork();
+      NoteArrivals();
       return KeyframeWaits();
     });
   }
@@ -135,15 +136,25 @@ void MapperNode::OnWriterOpen() {
 void MapperNode::PublishDelta(const MapDelta& delta) {
   PublishRecord(delta);
   PumpWithinWork();
-  const double elapsed_ms = static_cast<double>(context_.now_ns() - keyframe_begin_ns_) * 1e-6;
+  const int64_t now_ns = context_.now_ns();
+  const double elapsed_ms = static_cast<double>(now_ns - keyframe_arrived_ns_) * 1e-6;
+  if (delta.event == MapEvent::kFused) fused_ns_ = now_ns;
+  if (delta.event == MapEvent::kAdjusted) adjustment_.Add(static_cast<double>(now_ns - fused_ns_) * 1e-6);
   if (delta.event == MapEvent::kLandmarksCreated) to_landmarks_.Add(elapsed_ms);
   if (delta.event == MapEvent::kAdjusted) to_adjusted_.Add(elapsed_ms);
 }
 
 bool MapperNode::KeyframeWaits() const {
   return std::any_of(taken_.begin(), taken_.end(),
-                     [](const Record& record) { return record.channel == channels::kKeyframe; }) ||
-         frontend_reader_->backlog() > 60;
+                     [](const Arrived& arrived) { return arrived.record.channel == channels::kKeyframe; }) ||
+         arrived_.size() + frontend_reader_->backlog() > 60;
+}
+
+/// Latencies count from when a record came, not from when there was time for it.
+void MapperNode::NoteArrivals() {
+  const int64_t now_ns = context_.now_ns();
+  while (std::optional<Record> record = frontend_reader_->Take())
+    arrived_.push_back({std::move(*record), now_ns});
 }
 
 void MapperNode::TakeLoopAnswers() {
@@ -187,7 +198,11 @@ bool MapperNode::WorkOnce() {
   }
   if (!saved_parts_.empty()) return PublishSavedMap();
   TakeLoopAnswers();
-  while (std::optional<Record> record = frontend_reader_->Take()) taken_.push_back(std::move(*record));
+  NoteArrivals();
+  while (!arrived_.empty()) {
+    taken_.push_back(std::move(arrived_.front()));
+    arrived_.pop_front();
+  }
   AcceptWhatIsSafe();
   if (awaited_.valid()) {
     SettleAwaited();
@@ -198,7 +213,8 @@ bool MapperNode::WorkOnce() {
     return true;
   }
   if (taken_.empty()) return EndIfDone();
-  const Record record = std::move(taken_.front());
+  const Record record = std::move(taken_.front().record);
+  keyframe_arrived_ns_ = taken_.front().at_ns;
   taken_.pop_front();
   current_ = record.version();
   Handle(record);
@@ -238,13 +254,11 @@ void MapperNode::Handle(const Record& record) {
 }
 
 void MapperNode::HandleInitialMap(const InitialMap& proposal) {
-  keyframe_begin_ns_ = context_.now_ns();
   const bool started = core_->OnInitialMap(proposal);
   AfterKeyframe(proposal.second.id, proposal.map_id, started);
 }
 
 void MapperNode::HandleKeyframe(const KeyframeProposal& proposal) {
-  keyframe_begin_ns_ = context_.now_ns();
   const bool inserted = core_->OnKeyframe(proposal);
   AfterKeyframe(proposal.id, proposal.map_id, inserted);
 }
@@ -327,13 +341,14 @@ void MapperNode::PublishStatus() {
       MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
   status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
   if (completing_) status.state = MapperStatus::State::kDone;
-  status.keyframe_queue = static_cast<int32_t>(taken_.size());
+  status.keyframe_queue = static_cast<int32_t>(arrived_.size() + taken_.size());
   status.keyframes_unaccepted = static_cast<int32_t>(pending_.size()) + (awaited_.valid() ? 1 : 0);
   status.last_settled = last_settled_;
   status.landmarks_p50_ms = to_landmarks_.Quantile(0.5);
   status.landmarks_p95_ms = to_landmarks_.Quantile(0.95);
   status.adjusted_p50_ms = to_adjusted_.Quantile(0.5);
   status.adjusted_p95_ms = to_adjusted_.Quantile(0.95);
+  status.adjustment_ms = adjustment_.Quantile(0.5);
   if (core_) FillCoreStatus(&status);
   PublishLoose(status);
 }

@@ -37,6 +37,10 @@ class MapperNode : public StreamNode {
   void PublishStatus() override;
 
  private:
+  struct Arrived {
+    Record record;
+    int64_t at_ns = 0;
+  };
   /// A record whose effect is in the map, and the map record that must be safe before it is accepted.
   struct Pending {
     Version version;
@@ -64,6 +68,7 @@ class MapperNode : public StreamNode {
   void MarkFrontend(const Version& version);
   void AcceptWhatIsSafe();
   bool KeyframeWaits() const;
+  void NoteArrivals();
   void PublishDelta(const MapDelta& delta);
   bool EndIfDone();
   void FillCoreStatus(MapperStatus* status) const;
@@ -82,7 +87,8 @@ class MapperNode : public StreamNode {
   bool frontend_ended_ = false;
   bool end_announced_ = false;
   bool completing_ = false;              ///< nothing follows; the readers are waited for
-  std::deque<Record> taken_;             ///< records of the frontend, taken and not yet handled
+  std::deque<Arrived> arrived_;          ///< records of the frontend that came while it worked
+  std::deque<Arrived> taken_;            ///< the same, to be handled next
   std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
@@ -91,8 +97,9 @@ class MapperNode : public StreamNode {
   MapId awaited_map_ = 0;
   Version awaited_version_;  ///< of the record that brought it
   KeyframeId last_settled_;
-  int64_t keyframe_begin_ns_ = 0;
-  LatencyWindow to_landmarks_, to_adjusted_;
+  int64_t keyframe_arrived_ns_ = 0;  ///< the one that is handled
+  int64_t fused_ns_ = 0;             ///< since then it adjusts
+  LatencyWindow to_landmarks_, to_adjusted_, adjustment_;
 };
 
 }  // namespace dmslam

@@ -126,12 +126,46 @@ double CondemnedAround(const Map& map, LandmarkId id, const Suspects& suspects,
   return all > 0 ? static_cast<double>(condemned) / all : 0.0;
 }
 
+/// Where the condemned are seen. Most suspects are near none of them, and need no closer look.
+class CondemnedPlaces {
+ public:
+  CondemnedPlaces(const Map& map, const Suspects& suspects) : map_(map) {
+    for (const auto& [id, suspect] : suspects) {
+      if (!suspect.condemned) continue;
+      for (const Observation& o : map.FindLandmark(id)->observations)
+        uv_px_[o.keyframe].push_back(PixelOf(o));
+    }
+  }
+
+  bool AnyNear(const Landmark& landmark, double radius_px) const {
+    return std::any_of(landmark.observations.begin(), landmark.observations.end(), [&](const Observation& o) {
+      const auto there = uv_px_.find(o.keyframe);
+      if (there == uv_px_.end()) return false;
+      const Eigen::Vector2d uv_px = PixelOf(o);
+      return std::any_of(there->second.begin(), there->second.end(), [&](const Eigen::Vector2d& other) {
+        return (other - uv_px).squaredNorm() <= radius_px * radius_px;
+      });
+    });
+  }
+
+ private:
+  const Eigen::Vector2d& PixelOf(const Observation& o) const {
+    return map_.FindKeyframe(o.keyframe)->features->uv_px[o.feature];
+  }
+
+  const Map& map_;
+  std::map<KeyframeId, std::vector<Eigen::Vector2d>> uv_px_;
+};
+
 /// Suspects among the condemned share their fate. Returns how many.
 int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
   std::vector<LandmarkId> found;
+  const CondemnedPlaces condemned(map, *suspects);
   for (const auto& [id, suspect] : *suspects) {
-    if (!suspect.condemned && CondemnedAround(map, id, *suspects, options) >= options.together_share)
-      found.push_back(id);
+    if (suspect.condemned) continue;
+    const bool near = condemned.AnyNear(*map.FindLandmark(id), options.together_px + 1e-6);
+    const double share = near ? CondemnedAround(map, id, *suspects, options) : 0.0;
+    if (share >= options.together_share) found.push_back(id);
   }
   for (const LandmarkId id : found) suspects->at(id).condemned = true;
   return static_cast<int>(found.size());

@@ -14,7 +14,8 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
       uv->x() >= camera.width_px + limits.border_px || uv->y() >= camera.height_px + limits.border_px) {
     return std::nullopt;
   }
-  const Landmark::ViewingRange& viewing = map.Viewing(landmark.id);
+  const Landmark::ViewingRange& viewing =
+      landmark.viewing_stale ? map.Viewing(landmark.id) : landmark.viewing;
   const Eigen::Vector3d ray = landmark.p_world - T_cam_world.Center();
   const double distance = ray.norm();
   if (distance < viewing.min_distance / limits.distance_slack ||
@@ -25,11 +26,13 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
   if (view_cos < limits.min_view_cos) return std::nullopt;
   const Pyramid& pyramid = map.pyramid();
   const double octave = std::ceil(std::log(viewing.max_distance / distance) / std::log(pyramid.scale_factor));
-  return LandmarkView{*uv, p_cam.z(), view_cos, static_cast<int>(std::clamp(octave, 0.0, pyramid.levels - 1.0))};
+  return LandmarkView{*uv, p_cam.z(), view_cos,
+                      static_cast<int>(std::clamp(octave, 0.0, pyramid.levels - 1.0))};
 }
 
-FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px, int min_octave,
-                       int max_octave, const Descriptor& descriptor, const std::vector<uint8_t>& taken) {
+FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px,
+                       int min_octave, int max_octave, const Descriptor& descriptor,
+                       const std::vector<uint8_t>& taken) {
   FeatureHit hit;
   features.grid.ForEachInRadius(uv_px, radius_px, min_octave, max_octave, [&](uint32_t i) {
     if (!taken.empty() && taken[i] != 0) return;

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "frontend/frontend_core.h"
+
+namespace dmslam {
+
+/// Runs a search for the first map on a thread of its own: a search may take longer than frames are apart,
+/// and nothing else waits for it. What it finds is told with the next frame; its frames are then earlier
+/// ones. Where it is too slow for all frames the oldest that wait are left out, as the frontend does with
+/// images. For real time only: which frames it sees depends on the machine.
+class BackgroundSearch {
+ public:
+  explicit BackgroundSearch(FirstMapSearch search);
+  ~BackgroundSearch();
+  BackgroundSearch(const BackgroundSearch&) = delete;
+  BackgroundSearch& operator=(const BackgroundSearch&) = delete;
+
+  /// Hands a frame over and returns at once: the map if one was found, else why there is none yet. Throws
+  /// what the search threw.
+  InitializerReport AddFrame(const InitializerFrame& frame);
+
+ private:
+  void Work(const std::stop_token& stop);
+
+  FirstMapSearch search_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::deque<InitializerFrame> waiting_;
+  InitializerReport last_;  ///< of the frame searched last
+  std::exception_ptr problem_;
+  std::jthread worker_;  ///< last: it ends before what it works on
+};
+
+/// A search that runs in the background.
+FirstMapSearch InBackground(FirstMapSearch search);
+
+}  // namespace dmslam

@@ -1,0 +1,95 @@
+#include "core_loop.h"
+
+#include <utility>
+#include <variant>
+
+namespace dmslam::bench {
+namespace {
+
+FrontendCore::Setup SetupOf(const Settings& settings, const Camera& camera,
+                            const std::shared_ptr<const Vocabulary>& vocabulary) {
+  FrontendCore::Setup setup;
+  setup.options = settings.frontend;
+  setup.extractor = settings.extractor;
+  setup.initializer = settings.initializer;
+  setup.camera = camera;
+  setup.pyramid = settings.pyramid();
+  setup.seed = settings.seed;
+  setup.vocabulary = vocabulary;
+  return setup;
+}
+
+}  // namespace
+
+CoreLoop::CoreLoop(const Settings& settings, const Camera& camera,
+                   std::shared_ptr<const Vocabulary> vocabulary)
+    : frontend_(SetupOf(settings, camera, vocabulary)),
+      mapper_(settings.mapper, camera, settings.pyramid(), 1,
+              [this](const MapDelta& delta) { OnDelta(delta); }),
+      loopcloser_(settings.loop, camera, settings.pyramid(), settings.seed, vocabulary) {}
+
+StepTimes CoreLoop::StepImage(uint32_t index, int64_t stamp_ns, const GrayView& image) {
+  events_.clear();
+  const Stopwatch watch;
+  frontend_.ProcessImage(index, stamp_ns, image, &events_);
+  return AfterFrame(watch.ms());
+}
+
+StepTimes CoreLoop::StepFeatures(uint32_t index, int64_t stamp_ns, FeatureSet features) {
+  events_.clear();
+  const Stopwatch watch;
+  frontend_.ProcessFeatures(index, stamp_ns, std::move(features), &events_);
+  return AfterFrame(watch.ms());
+}
+
+void CoreLoop::OnDelta(const MapDelta& delta) {
+  if (times_ != nullptr && delta.event == MapEvent::kLandmarksCreated)
+    times_->to_landmarks = keyframe_watch_.ms();
+  if (times_ != nullptr && delta.event == MapEvent::kAdjusted) times_->to_adjusted = keyframe_watch_.ms();
+  deltas_.push_back(delta);
+}
+
+void CoreLoop::Settle(KeyframeId id, MapId map_id, StepTimes* times) {
+  TellLoopCloser();
+  const Stopwatch watch;
+  const LoopAnswer answer = loopcloser_.Check(id);
+  times->check = watch.ms();
+  mapper_.OnLoopAnswer(answer);
+  mapper_.Settle(id, map_id);
+}
+
+void CoreLoop::TellLoopCloser() {
+  for (; told_ < deltas_.size(); ++told_) loopcloser_.ApplyMapDelta(deltas_[told_]);
+}
+
+StepTimes CoreLoop::AfterFrame(double frontend_ms) {
+  StepTimes times;
+  times.frontend = frontend_ms;
+  deltas_.clear();
+  told_ = 0;
+  for (const FrontendEvent& event : events_) {
+    if (const auto* initial = std::get_if<InitialMap>(&event)) {
+      mapper_.OnInitialMap(*initial);
+      Settle(initial->second.id, initial->map_id, &times);
+    } else if (const auto* keyframe = std::get_if<KeyframeProposal>(&event)) {
+      times.keyframe = true;
+      times_ = &times;
+      keyframe_watch_ = Stopwatch();
+      mapper_.OnKeyframe(*keyframe);
+      times.mapper = keyframe_watch_.ms();
+      times_ = nullptr;
+      Settle(keyframe->id, keyframe->map_id, &times);
+    } else if (const auto* evidence = std::get_if<FrameEvidence>(&event)) {
+      mapper_.OnEvidence(*evidence);
+    } else if (const auto* reset = std::get_if<MapReset>(&event)) {
+      mapper_.OnReset(*reset);
+    }
+  }
+  TellLoopCloser();
+  const Stopwatch watch;
+  for (const MapDelta& delta : deltas_) frontend_.ApplyMapDelta(delta);
+  times.replica_update = watch.ms();
+  return times;
+}
+
+}  // namespace dmslam::bench

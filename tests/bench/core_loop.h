@@ -1,0 +1,65 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "common/settings.h"
+#include "frontend/frontend_core.h"
+#include "loopcloser/loopcloser_core.h"
+#include "mapper/mapper_core.h"
+
+namespace dmslam::bench {
+
+/// Milliseconds since it was made.
+class Stopwatch {
+ public:
+  double ms() const {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// What a frame cost each core [ms].
+struct StepTimes {
+  double frontend = 0;
+  bool keyframe = false;      ///< the rest is of a keyframe
+  double to_landmarks = 0;    ///< mapper: from the keyframe to its landmarks
+  double to_adjusted = 0;     ///< mapper: to its local bundle adjustment
+  double mapper = 0;          ///< mapper: all of it
+  double check = 0;           ///< loop closer
+  double replica_update = 0;  ///< frontend: the records that the keyframe caused
+};
+
+/// The cores of frontend, mapper and loop closer in lock-step, without processes, messages or a clock.
+class CoreLoop {
+ public:
+  CoreLoop(const Settings& settings, const Camera& camera, std::shared_ptr<const Vocabulary> vocabulary);
+
+  StepTimes StepImage(uint32_t index, int64_t stamp_ns, const GrayView& image);
+  StepTimes StepFeatures(uint32_t index, int64_t stamp_ns, FeatureSet features);
+
+  const FrontendCore& frontend() const { return frontend_; }
+  const Map& map() const { return mapper_.map(); }
+
+ private:
+  StepTimes AfterFrame(double frontend_ms);
+  void OnDelta(const MapDelta& delta);
+  void TellLoopCloser();
+  void Settle(KeyframeId id, MapId map_id, StepTimes* times);
+
+  FrontendCore frontend_;
+  MapperCore mapper_;
+  LoopcloserCore loopcloser_;
+  std::vector<FrontendEvent> events_;
+  std::vector<MapDelta> deltas_;  ///< that this frame caused
+  size_t told_ = 0;               ///< of them, to the loop closer
+  Stopwatch keyframe_watch_;
+  StepTimes* times_ = nullptr;  ///< of the keyframe in work
+};
+
+}  // namespace dmslam::bench
