@@ -29,7 +29,7 @@ struct Arguments {
 
 void Declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", dmslam::kVersion);
-  app.add_option("--log", a.log, "log of a run, or a saved map")->required();
+  app.add_option("--log,--map", a.log, "log of a run, or a saved map")->required();
   app.add_option("--log-session", a.session, "which of the log's sessions, where it holds several");
   app.add_option("--at", a.at_s, "seconds after the log's beginning: the map as it was then")
       ->check(CLI::NonNegativeNumber);
