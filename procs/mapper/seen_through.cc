@@ -15,6 +15,7 @@ struct Suspect {
   int64_t first_ns = 0, last_ns = 0;  ///< seen from then to then
   int through = 0;                    ///< keyframes of another time that see through it
   int support = 0;                    ///< that see something at its place
+  int proven_support = 0;             ///< that see something proven there
   bool condemned = false;
 };
 
@@ -54,6 +55,7 @@ bool InImage(const Camera& camera, const Eigen::Vector2d& uv_px) {
 struct Depths {
   int behind = 0;
   int same = 0;
+  int proven_same = 0;
 };
 
 /// Depths of the landmarks that `witness` sees around the pixel of `p_world`, relative to its own.
@@ -74,6 +76,7 @@ Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3
           ++depths.behind;
         } else if (ratio > 1 - options.depth_tolerance) {
           ++depths.same;
+          if (suspect == suspects.end()) ++depths.proven_same;
         }
       });
   return depths;
@@ -85,7 +88,7 @@ int CondemnSeenThrough(const Map& map, const std::vector<KeyframeId>& witnesses,
   std::vector<LandmarkId> found;
   for (auto& [id, suspect] : *suspects) {
     if (suspect.condemned) continue;
-    suspect.through = suspect.support = 0;
+    suspect.through = suspect.support = suspect.proven_support = 0;
     const Eigen::Vector3d p_world = map.FindLandmark(id)->p_world;
     for (const KeyframeId witness_id : witnesses) {
       const Keyframe& witness = *map.FindKeyframe(witness_id);
@@ -96,6 +99,7 @@ int CondemnSeenThrough(const Map& map, const std::vector<KeyframeId>& witnesses,
       const Depths depths = LookThrough(map, witness, p_world, *suspects, options);
       if (depths.behind > 0 && depths.same == 0) ++suspect.through;
       if (depths.same > 0) ++suspect.support;
+      if (depths.proven_same > 0) ++suspect.proven_support;
     }
     if (suspect.through > options.through_per_support * suspect.support) found.push_back(id);
   }
@@ -171,6 +175,14 @@ int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects*
   return static_cast<int>(found.size());
 }
 
+/// Where somebody stood, an unproven landmark needs proven ones at its place, and its neighbours share its fate.
+void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
+  for (auto& [id, suspect] : *suspects) {
+    if (suspect.proven_support < options.min_proven_support) suspect.condemned = true;
+  }
+  for (int round = 0; round < options.rounds_unsupported; ++round) CondemnTogether(map, options, suspects);
+}
+
 int RemoveCondemned(Map& map, const Suspects& suspects) {
   int removed = 0;
   for (const auto& [id, suspect] : suspects) {
@@ -236,9 +248,7 @@ int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenTh
     const int together = CondemnTogether(map, options, &suspects);
     if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
   }
-  for (auto& [id, suspect] : suspects) {
-    if (somebody_stood && suspect.support == 0) suspect.condemned = true;
-  }
+  if (somebody_stood) CondemnUnsupported(map, options, &suspects);
   return RemoveCondemned(map, suspects);
 }
 
