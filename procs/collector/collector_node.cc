@@ -18,8 +18,9 @@ constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processe
 
 CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
     : StreamNode(std::move(context), std::move(options), "collector"), collector_(std::move(collector)) {
-  Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace, channels::kPlayerStatus, channels::kFrontendStatus,
-          channels::kMapperStatus, channels::kLoopcloserStatus});
+  Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
+          channels::kPlayerStatus, channels::kFrontendStatus, channels::kMapperStatus,
+          channels::kLoopcloserStatus});
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
@@ -37,11 +38,13 @@ void CollectorNode::Begin(const CameraInfo& info) {
 
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrameTrace) {
-    if (const auto trace = Read<FrameTrace>(bytes); trace && !IsForeign(trace->session)) run_.traces.push_back(*trace);
+    if (const auto trace = Read<FrameTrace>(bytes); trace && !IsForeign(trace->session))
+      run_.traces.push_back(*trace);
   } else if (channel == channels::kEndOfSequence) {
     if (auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session)) end_ = std::move(end);
   } else if (channel == channels::kGroundTruthPose) {
-    if (const auto pose = Read<GroundTruthPose>(bytes); pose && !IsForeignFrame(pose->session)) OnGroundTruth(*pose);
+    if (const auto pose = Read<GroundTruthPose>(bytes); pose && !IsForeignFrame(pose->session))
+      OnGroundTruth(*pose);
   } else if (channel == channels::kPlayerStatus) {
     if (const auto status = Read<PlayerStatus>(bytes)) OnHealth("player", status->head);
   } else if (channel == channels::kFrontendStatus) {
@@ -61,10 +64,11 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
 
-/// Counters begin at zero in a process that was started again: those of the ones before it are added. False for a
-/// process of another session.
+/// Counters begin at zero in a process that was started again: those of the ones before it are added. False
+/// for a process of another session.
 bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
-  const bool ours = head.session == 0 || (process == "player" ? !IsForeignFrame(head.session) : !IsForeign(head.session));
+  const bool ours =
+      head.session == 0 || (process == "player" ? !IsForeignFrame(head.session) : !IsForeign(head.session));
   if (!ours) return false;
   ProcessHealth& health = run_.health[process];
   if (process_ids_[process].insert(head.health.pid).second && process_ids_[process].size() > 1) {
@@ -208,19 +212,23 @@ void CollectorNode::Stop() {
   Exit(0);
 }
 
+/// A camera has no end that is known.
+std::string CollectorNode::OfTotal() const {
+  return frames_total_ > 0 ? " of " + std::to_string(frames_total_) : "";
+}
+
 /// Into the log: where a first map stands, and every so many frames.
 void CollectorNode::SayProgress() {
   constexpr int64_t kEveryFrames = 20;
   if (frames_seen_ < next_progress_ || builder_->map().keyframes().empty()) return;
   next_progress_ = frames_seen_ + kEveryFrames;
-  spdlog::info("frame {} of {}, {} keyframes", frames_seen_, frames_total_,
-               builder_->map().keyframes().size());
+  spdlog::info("frame {}{}, {} keyframes", frames_seen_, OfTotal(), builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {
   if (!collector_.progress || !builder_ || written_) return;
-  std::fprintf(stderr, "\r%s: frame %lld of %lld, %s, %d static, %zu keyframes, %zu landmarks   ", run_.sequence.c_str(),
-               static_cast<long long>(frames_seen_), static_cast<long long>(frames_total_),
+  std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",
+               run_.sequence.c_str(), static_cast<long long>(frames_seen_), OfTotal().c_str(),
                run_.frontend.inliers > 0 ? "tracking" : "waiting", run_.frontend.inliers,
                builder_->map().keyframes().size(), builder_->map().num_landmarks());
   std::fflush(stderr);

@@ -45,6 +45,7 @@ class CollectorNode : public StreamNode {
   void OnFramePose(const Record& record);
   void CountMissingKeyframes();
   void OpenJournal();
+  std::string OfTotal() const;
   void SayProgress();
   bool EndIfDone();
   void Write();
