@@ -7,7 +7,7 @@ usage() {
 Usage: scripts/spy_picture.sh --out FILE.png [--sequence DIR] [--camera FILE] [--build-dir DIR]
 
 Starts lcm-spy on a virtual display (Xvfb), runs the system beside it at a tenth of the recorded rate, opens
-DMSLAM_FRONTEND_POSE and a chart of its moving_share, and takes the picture once people walk. Fails where one of our channels cannot be
+DMSLAM_FRONTEND_POSE and a chart of its moving_share, waits for people to walk, and takes the picture. Fails where one of our channels cannot be
 decoded or a window does not open. --sequence: default a rendered room with people who walk.
 EOT
 }
@@ -97,7 +97,7 @@ done
 [[ -n $chart ]] || fail "the chart of moving_share did not open"
 xdotool windowmove "$chart" 0 445 windowsize "$chart" 900 510
 xdotool mousemove 1300 700
-sleep 12
+sleep 19
 mkdir -p "$(dirname "$out")"
 import -window root "$out"
 grep -qi "exception" "$work/spy.log" && fail "lcm-spy reported: $(grep -i exception "$work/spy.log" | head -n 1)"

@@ -51,9 +51,9 @@ void StreamNode::OnMessage(const std::string&, std::span<const uint8_t>) {}
 
 void StreamNode::Listen(const std::vector<std::string>& channels) {
   other_channels_.insert(other_channels_.end(), channels.begin(), channels.end());
-  endpoint_.SetOtherHandler(other_channels_, [this](const std::string& channel, std::span<const uint8_t> bytes) {
-    Receive(channel, bytes);
-  });
+  endpoint_.SetOtherHandler(
+      other_channels_,
+      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
 }
 
 void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -72,7 +72,8 @@ void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
   if (session_ == 0) session_ = info->session;
   if (options_.accept_recorded && !recorded_session_ && info->session != session_) {
     recorded_session_ = info->session;
-    spdlog::info("{}: takes the frames of recorded session {} for its own {}", role_, info->session, session_);
+    spdlog::info("{}: takes the frames of recorded session {} for its own {}", role_, info->session,
+                 session_);
   }
   if (IsForeignFrame(info->session)) return;
   camera_due_ns_ = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
@@ -96,7 +97,8 @@ bool StreamNode::IsForeignFrame(uint32_t session) {
 
 bool StreamNode::IsForeign(uint32_t session) {
   if (session == session_) return false;
-  if (dropped_foreign_++ == 0) spdlog::warn("{}: dropped a message of session {}; ours is {}", role_, session, session_);
+  if (dropped_foreign_++ == 0)
+    spdlog::warn("{}: dropped a message of session {}; ours is {}", role_, session, session_);
   return true;
 }
 
@@ -108,7 +110,8 @@ void StreamNode::CountMalformed(const std::string& channel, const std::string& r
 }
 
 std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
-                                                     const std::vector<std::string>& record_channels, Version start) {
+                                                     const std::vector<std::string>& record_channels,
+                                                     Version start) {
   StreamReader::Options options;
   options.session = session_;
   options.stream = stream;
@@ -191,7 +194,8 @@ void StreamNode::OpenWriter() {
 
 void StreamNode::WatchWriter() {
   if (!writer_) return;
-  if (writer_->superseded_by()) Exit(4, "another writer has taken over the stream: " + *writer_->superseded_by());
+  if (writer_->superseded_by())
+    Exit(4, "another writer has taken over the stream: " + *writer_->superseded_by());
   if (const std::optional<Version>& newer = writer_->newer_replica()) {
     Exit(8, "another process holds version " + std::to_string(newer->epoch) + ":" +
                 std::to_string(newer->seq) +
@@ -224,14 +228,20 @@ void StreamNode::Advance() {
   WatchReaders();
   if (exit_code_) return;
   if (begun_ && (!plan_ || writer_)) {
-    while (!exit_code_ && !stopping_ && WorkOnce()) PumpWithinWork();
+    while (!exit_code_ && !stopping_ && WorkOnce()) {
+      PumpWithinWork();
+      PublishStatusIfDue();  // who has much to do says so too
+    }
   }
-  if (context_.now_ns() >= next_status_ns_) {
-    next_status_ns_ = context_.now_ns() + kStatusEveryNs;
-    KeepCameraKnown();
-    PublishStatus();
-  }
+  PublishStatusIfDue();
   endpoint_.Advance();
+}
+
+void StreamNode::PublishStatusIfDue() {
+  if (context_.now_ns() < next_status_ns_) return;
+  next_status_ns_ = context_.now_ns() + kStatusEveryNs;
+  KeepCameraKnown();
+  PublishStatus();
 }
 
 void StreamNode::PumpWithinWork() {
@@ -259,7 +269,8 @@ void StreamNode::Exit(int code, std::string problem) {
   problem_ = std::move(problem);
 }
 
-StatusHead StreamNode::MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const {
+StatusHead StreamNode::MakeStatusHead(const std::string& reason,
+                                      const std::vector<const StreamReader*>& readers) const {
   StatusHead head;
   head.utime = context_.wall_us();
   head.session = session_;

@@ -18,12 +18,14 @@ namespace dmslam {
 
 /// What every process of the system is told at its start.
 struct NodeOptions {
-  uint32_t session = 0;             ///< 0: that of the first camera heard
-  std::vector<std::string> peers;   ///< processes that take part: they are waited for, and hold their streams' writers back
+  uint32_t session = 0;  ///< 0: that of the first camera heard
+  std::vector<std::string>
+      peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
   Link link = Link::kHost;
-  bool accept_recorded = false;     ///< camera and frames of a recorded session (a log that is replayed) are ours
-  bool take_over = false;           ///< asks a present writer of its stream to close
-  bool fresh = false;               ///< a mapper begins with an empty map, whatever replicas there are
+  bool accept_recorded =
+      false;               ///< camera and frames of a recorded session (a log that is replayed) are ours
+  bool take_over = false;  ///< asks a present writer of its stream to close
+  bool fresh = false;      ///< a mapper begins with an empty map, whatever replicas there are
   Settings settings;
 
   bool HasPeer(std::string_view name) const;
@@ -32,8 +34,8 @@ struct NodeOptions {
 /// Hash over the fingerprints of all message types: processes with another one are refused by name.
 int64_t SchemaHash();
 
-/// What the processes have in common: they learn camera and session from the player, decide by election who writes (those
-/// that write a stream), keep their streams going, and say how they fare once a second.
+/// What the processes have in common: they learn camera and session from the player, decide by election who
+/// writes (those that write a stream), keep their streams going, and say how they fare once a second.
 class StreamNode : public Node {
  public:
   void Advance() final;
@@ -63,13 +65,15 @@ class StreamNode : public Node {
 
   void Listen(const std::vector<std::string>& channels);
   std::unique_ptr<StreamReader> MakeReader(StreamId stream, const std::string& owner,
-                                           const std::vector<std::string>& record_channels, Version start = {});
+                                           const std::vector<std::string>& record_channels,
+                                           Version start = {});
   struct WriterPlan {
     StreamId stream = StreamId::kTest;
     std::vector<std::string> readers;  ///< roles of the lossless readers
     Version parent;
     SnapshotSource* snapshots = nullptr;
-    std::vector<std::string> watchers = {"viewer"};  ///< roles whose wishes are heard, but who hold nothing back
+    std::vector<std::string> watchers = {
+        "viewer"};  ///< roles whose wishes are heard, but who hold nothing back
   };
   /// Offers the replica of the map that this process holds to a mapper that starts. `held`: its version,
   /// empty while it is not whole. `map` must stay where it is.
@@ -122,6 +126,7 @@ class StreamNode : public Node {
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(std::span<const uint8_t> bytes);
+  void PublishStatusIfDue();
   void KeepCameraKnown();
   void RunElection();
   void StartElection();

@@ -35,9 +35,14 @@ def measure(page, options):
     """Pictures per second while the view turns, once it has settled how much it draws."""
     page.eval("dmslam.scene.turning = true")
     time.sleep(options.settle)
+    used = page.cpu_seconds()
     page.eval("dmslam.scene.pictures.count = 0; window.begun = performance.now()")
     time.sleep(options.seconds)
-    return page.eval("({fps: 1000 * dmslam.scene.pictures.count / (performance.now() - begun), landmarks: dmslam.scene.pictures.drawnPoints})")
+    result = page.eval("({pictures: dmslam.scene.pictures.count, landmarks: dmslam.scene.pictures.drawnPoints,"
+                       " fps: 1000 * dmslam.scene.pictures.count / (performance.now() - begun),"
+                       " sharpness: dmslam.scene.drawnSharpness})")
+    result["cpu_ms"] = 1000 * (page.cpu_seconds() - used) / max(1, result["pictures"])
+    return result
 
 
 def main():
@@ -70,7 +75,8 @@ def main():
                 for view in ("orbit", "follow"):
                     page.eval(f"dmslam.setMode('{view}')")
                     result = measure(page, options)
-                    print(f"{view}: {result['fps']:.1f} pictures a second with {result['landmarks']} landmarks each")
+                    print(f"{view}: {result['fps']:.1f} pictures a second with {result['landmarks']} landmarks each, at"
+                          f" {100 * result['sharpness']:.0f} % of the resolution; {result['cpu_ms']:.0f} ms of CPU a picture")
                     if result["fps"] < 20:
                         problems.append(f"{view}: {result['fps']:.1f} pictures a second, wanted 20")
                 if options.picture:

@@ -119,7 +119,7 @@ export class SeriesPanel {
     this.charts = [
       this.makeChart('chart-inliers', 'inliers', 'inliers', '--good', (v) => String(Math.round(v))),
       this.makeChart('chart-share', 'share', 'moving share', '--bad', (v) => (100 * v).toFixed(0) + ' %'),
-      this.makeChart('chart-latency', 'latency', 'latency', '--accent', (v) => v.toFixed(0) + ' ms'),
+      this.makeChart('chart-latency', 'latency', 'latency', '--accent', (v) => (v < 1000 ? v.toFixed(0) + ' ms' : v / 1000 + ' s')),
     ];
     this.applyTheme();
   }
@@ -192,7 +192,7 @@ export class SeriesPanel {
       chart.options.scales.x.max = Math.max(newest, 4);
       chart.update('none');
     }
-    this.drawStrip(begin);
+    this.drawStrip(begin, this.charts[0].chart.options.scales.x);
     const tracked = state.filter((s) => s === 3 || s === 2).length;
     text('value-tracked', (100 * tracked / state.length).toFixed(1) + ' %');
     text('count-tracked', (100 * tracked / state.length).toFixed(0) + ' %');
@@ -216,18 +216,19 @@ export class SeriesPanel {
     return points;
   }
 
-  drawStrip(begin) {
+  /// Over the same time as the charts, {min, max}.
+  drawStrip(begin, time) {
     const canvas = byId('strip'), {t, state} = this.data;
     const ratio = window.devicePixelRatio;
     canvas.width = canvas.clientWidth * ratio;
     canvas.height = canvas.clientHeight * ratio;
     const context = canvas.getContext('2d');
     const colours = {good: colour('--good'), warn: colour('--warn'), bad: colour('--bad'), none: colour('--line')};
-    const n = t.length - begin;
+    const at = (seconds) => Math.round((seconds - time.min) / (time.max - time.min) * canvas.width);
     for (let i = begin; i < t.length; ++i) {
       context.fillStyle = colours[kStates[state[i]]];
-      const x = Math.floor((i - begin) / n * canvas.width);
-      context.fillRect(x, 0, Math.ceil(canvas.width / n) + 1, canvas.height);
+      const from = at(i > 0 ? t[i - 1] : time.min);
+      context.fillRect(from, 0, Math.max(1, at(t[i]) - from), canvas.height);
     }
   }
 }
