@@ -159,7 +159,7 @@ PlotSeries SeriesOf(const Sweep& sweep, const SweepKind& kind, Cell SweepPoint::
     }
     const std::optional<Spread> spread = SpreadOf(std::move(values));
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    series.x.push_back(point.share_percent);
+    series.x.push_back(point.coverage_percent);
     series.y.push_back(spread ? spread->median : kNone);
     series.y_low.push_back(spread ? spread->min : kNone);
     series.y_high.push_back(spread ? spread->max : kNone);
@@ -169,8 +169,8 @@ PlotSeries SeriesOf(const Sweep& sweep, const SweepKind& kind, Cell SweepPoint::
 
 PlotPanel PanelOf(const Sweep& sweep, const SweepKind& kind, const NumberOfRun& number) {
   PlotPanel panel;
-  panel.x_label = "image covered by people [%]";
-  panel.x_range = PlotRange{-2, 72};
+  panel.x_label = "image covered by people, mean [%]";
+  panel.x_range = PlotRange{-2, 75};
   panel.series.push_back(SeriesOf(sweep, kind, &SweepPoint::dm, number));
   panel.series.back().label = "dm";
   panel.series.push_back(SeriesOf(sweep, kind, &SweepPoint::baseline, number));
