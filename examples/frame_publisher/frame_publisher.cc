@@ -4,7 +4,7 @@
 //
 //   lcm-gen --cpp --cpp-hpath=types lcmtypes/dmslam_{camera_info,frame,end_of_sequence,frame_done}_t.lcm
 //   c++ -std=c++17 -Itypes examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp -o frame_publisher
-//   ./frame_publisher 'udpm://239.255.76.67:7667?ttl=0' camera.yaml images/*.png
+//   ./frame_publisher 'udpm://239.255.76.67:7670?ttl=0' camera.yaml images/*.png
 #include <yaml-cpp/yaml.h>
 
 #include <chrono>

@@ -2,7 +2,7 @@
 """Prints where the camera is, frame by frame. Needs nothing of this project but the message types:
 
   lcm-gen -p --ppath=types lcmtypes/dmslam_pose_t.lcm
-  PYTHONPATH=types:examples/python python3 examples/python/pose_printer.py 'udpm://239.255.76.67:7667?ttl=0'
+  PYTHONPATH=types:examples/python python3 examples/python/pose_printer.py 'udpm://239.255.76.67:7670?ttl=0'
 
 The bus may also be a log, played as fast as possible: 'file://run.lcmlog?speed=0'. "examples/python" is left out of the path
 where LCM's own bindings are installed.
@@ -28,7 +28,7 @@ def on_pose(channel, data):
 
 
 def main():
-    bus = lcm.LCM(sys.argv[1] if len(sys.argv) > 1 else "udpm://239.255.76.67:7667?ttl=0")
+    bus = lcm.LCM(sys.argv[1] if len(sys.argv) > 1 else "udpm://239.255.76.67:7670?ttl=0")
     bus.subscribe("DMSLAM_FRONTEND_POSE", on_pose)
     try:
         while True:

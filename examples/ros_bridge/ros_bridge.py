@@ -19,7 +19,7 @@ from dmslam import camera_info_t, end_of_sequence_t, frame_t, pose_t
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import CameraInfo, Image
 
-BUS = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
+BUS = "udpm://239.255.76.67:7670?ttl=0&recv_buf_size=4194304"
 ENCODINGS = {"mono8": (frame_t.ENCODING_GRAY8, 1), "rgb8": (frame_t.ENCODING_RGB8, 3), "bgr8": (frame_t.ENCODING_BGR8, 3)}
 
 
