@@ -14,7 +14,7 @@ Extraction, matching and the tracking of whole frames use the kitchen sequence i
 
   --out DIR       default: out/bench in the project
   --counts        also count instructions of the hot paths with callgrind: they are the same on a busy machine
-  --tour          also let a map grow to 5,000 keyframes (some ten minutes)
+  --tour          also let a map grow to 5,000 keyframes (some ten minutes), and let a process join one of that size
   --min-time S    seconds per benchmark (default 0.5)
   --build-dir DIR where the programs are (default: build/release, built first)
 EOF
@@ -39,7 +39,7 @@ benches=(features_bench tracking_bench optimization_bench motion_segmentation_be
 if [[ -z $build ]]; then
   build=$top/build/release
   cmake -S "$top" --preset release -DDMSLAM_BUILD_BENCH=ON >/dev/null
-  ninja -C "$build" "${benches[@]}" extractor_quality hot_paths tour_bench >&2
+  ninja -C "$build" "${benches[@]}" extractor_quality hot_paths tour_bench late_comer dmslam-map-tour >&2
 fi
 mkdir -p "$out"
 for bench in "${benches[@]}"; do
@@ -65,5 +65,25 @@ if ((counts)); then
   command -v valgrind >/dev/null || die "valgrind is missing; install it, or leave --counts out"
   for path in extract match pose bundle; do count "$path" 1 4; done >"$out/counts.txt"
 fi
-if ((tour)); then "$build/bin/tour_bench" | tee "$out/tour.txt" >&2 || true; fi
-exec python3 "$top/scripts/bench_table.py" "$out"
+# A writer of a large map, and a reader that joins when it is whole.
+join_late() {
+  local url="udpm://239.255.76.67:$((20000 + RANDOM % 30000))?ttl=0&recv_buf_size=4194304" status=0
+  "$build/bin/dmslam-map-tour" --lcm-url "$url" --fresh-system --rate 1000 </dev/null >"$out/map_tour.log" 2>&1 &
+  local writer=$!
+  trap 'kill $writer 2>/dev/null' EXIT
+  for ((i = 0; i < 1200; ++i)); do
+    if grep -q "the map is whole" "$out/map_tour.log" || ! kill -0 $writer 2>/dev/null; then break; fi
+    sleep 0.1
+  done
+  timeout 60 "$build/bin/late_comer" --lcm-url "$url" || status=$?
+  kill $writer
+  trap - EXIT
+  return $status
+}
+status=0
+if ((tour)); then
+  "$build/bin/tour_bench" | tee "$out/tour.txt" >&2 || status=1
+  join_late | tee -a "$out/tour.txt" >&2 || status=1
+fi
+python3 "$top/scripts/bench_table.py" "$out" || status=1
+exit $status

@@ -9,7 +9,7 @@ SCALE = {"ns": 1e-6, "us": 1e-3, "ms": 1.0, "s": 1e3}
 
 
 class Bench:
-    """One program's results: medians where it tells them, else means [ms]."""
+    """One program's results: medians where it tells them, else means of CPU time [ms]."""
 
     def __init__(self, path):
         self.name = path.stem
@@ -18,7 +18,7 @@ class Bench:
             if b.get("run_type") == "aggregate" or b.get("error_occurred"):
                 continue
             name = b["name"].split("/iterations:")[0].removesuffix("/manual_time")
-            self.ms[name] = b.get("p50_ms", b["real_time"] * SCALE[b["time_unit"]])
+            self.ms[name] = b.get("p50_ms", b["cpu_time"] * SCALE[b["time_unit"]])
             self.counters[name] = b
 
 
@@ -63,7 +63,7 @@ def bars(benches):
 def main():
     folder = pathlib.Path(sys.argv[1])
     benches = {path.stem: Bench(path) for path in sorted(folder.glob("*_bench.json"))}
-    table = ["# Benchmarks", "", "Medians or means [ms], one thread; cv::ORB with 1000 features on the same frames in the same run.", ""]
+    table = ["# Benchmarks", "", "CPU times [ms] of one thread, medians where there are quantiles, else means; cv::ORB with 1000 features on the same frames in the same run.", ""]
     table += ["| bar | reached | required | aimed at |", "|---|---|---|---|"]
     missed = []
     for what, value, required, aimed in bars(benches):

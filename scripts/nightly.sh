@@ -11,7 +11,8 @@ Usage: scripts/nightly.sh [--out DIR] [--data DIR] [--only PATTERN] [--fuzz-seco
 
 Runs what takes too long for every commit, each step once, and writes DIR/table.md with what was reached and what is asked:
 all tests; kitchen seeds 1..$SEEDS in lock-step, the same seed twice, kitchen in real time; kitchen_walk1 and kitchen_walk2;
-localisation in a saved map; recording and replay; $SCHEDULES seeded schedules of the stream protocol; 5,000 keyframes and 300,000 landmarks in the viewer; a run under
+localisation in a saved map; recording and replay; $SCHEDULES seeded schedules of the stream protocol; 5,000 keyframes and 300,000 landmarks in the viewer; benchmarks, their
+ratios to cv::ORB and a map that grows to 5,000 keyframes; a run under
 AddressSanitizer and UBSan; fuzzing of every reader of bytes.
 A step that is done (DIR/<step>/done) is not done again; remove DIR to begin anew.
 
@@ -74,6 +75,7 @@ step_sanitizers() {
 step_viewer() { # a large map in a browser without a graphics processor
   /usr/bin/python3 "$top/tests/system/viewer_load.py" --bin "$top/build/release/bin" --picture "$1/viewer.png"
 }
+step_bench() { "$top/scripts/bench.sh" --counts --tour --out "$1"; }
 step_localize() { "$top/scripts/localize.sh" --out "$1" --data "$data"; }
 step_replay() { "$top/scripts/replay.sh" --out "$1" --data "$data"; }
 step_kills() { # FOLDER SEQUENCE: processes die, and the run goes on
@@ -111,12 +113,12 @@ for name in walk1 walk2; do
 done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
 steps+=("lost" "loops")
-steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "noise" "localize" "replay" "viewer" "sanitizers" "fuzz" "mutations")
+steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "noise" "localize" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
 ((EUID != 0)) || steps+=("twohosts") # it makes network namespaces
 ((soak == 0)) || steps+=("soak")
 if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi
 
-needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|localize|replay|kills|noise|twohosts|soak|lost) ]]; }
+needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|bench|localize|replay|kills|noise|twohosts|soak|lost) ]]; }
 run_step() { # NAME [ARGUMENT]
   local folder=$out/$1 status=0
   [[ ! -e $folder/done ]] || return 0

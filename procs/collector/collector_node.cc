@@ -78,6 +78,7 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
   }
   const ProcessHealth& former = former_[process];
   const double largest = std::max(health.rss_mb, head.health.rss_mb);
+  run_.memory[process].push_back({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
   health = head.health;
   health.rss_mb = largest;
   for (int64_t ProcessHealth::*counter :
@@ -101,7 +102,19 @@ void CollectorNode::OnFrontendStatus(FrontendStatus status) {
   run_.frontend = std::move(status);
 }
 
-void CollectorNode::OnProposal(KeyframeId id, MapId map_id) { proposed_[id] = map_id; }
+void CollectorNode::OnProposal(KeyframeId id, MapId map_id) {
+  proposed_[id] = map_id;
+  heard_ns_.emplace(id, context_.now_ns());
+}
+
+/// As all who listen see it: the streams' own time is in it, and whatever the mapper did before.
+void CollectorNode::TimeKeyframe(const MapDelta& delta) {
+  const auto heard = heard_ns_.find(delta.about);
+  if (heard == heard_ns_.end()) return;
+  const double elapsed_ms = static_cast<double>(context_.now_ns() - heard->second) * 1e-6;
+  if (delta.event == MapEvent::kLandmarksCreated) run_.keyframe_to_landmarks_ms.push_back(elapsed_ms);
+  if (delta.event == MapEvent::kAdjusted) run_.keyframe_to_adjusted_ms.push_back(elapsed_ms);
+}
 
 void CollectorNode::OnFramePose(const Record& record) {
   const auto pose = Read<FramePose>(*record.bytes);
@@ -163,6 +176,7 @@ bool CollectorNode::TakeMapRecord() {
   if (record->begins_anew()) builder_->ForgetMap();
   if (const auto delta = Read<MapDelta>(*record->bytes)) {
     builder_->OnMapDelta(*delta);
+    if (!record->in_snapshot()) TimeKeyframe(*delta);
     if (delta->correction_id != 0) run_.corrections.push_back({delta->event, delta->about, delta->note});
     dropped_maps_.insert(delta->dropped_maps.begin(), delta->dropped_maps.end());
   }

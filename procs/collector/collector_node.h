@@ -42,6 +42,7 @@ class CollectorNode : public StreamNode {
   bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);
   void OnProposal(KeyframeId id, MapId map_id);
+  void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
   void CountMissingKeyframes();
   void OpenJournal();
@@ -59,6 +60,7 @@ class CollectorNode : public StreamNode {
       former_;  ///< counters of processes that another has followed, together
   FrontendStatus former_frontend_;
   std::map<KeyframeId, MapId> proposed_;  ///< keyframes that the frontend said should be
+  std::map<KeyframeId, int64_t> heard_ns_;  ///< when each was said to be one
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica
   int64_t next_progress_ = 0;

@@ -126,6 +126,22 @@ Json HealthJson(const RunRecord& run, double ProcessHealth::*field) {
   return json;
 }
 
+/// What a process's memory grew by from keyframe to keyframe, between the tenth and the last [MB]; null where the run was
+/// too short to tell.
+Json MemoryGrowthJson(const RunRecord& run) {
+  Json json = Json::object();
+  for (const auto& [process, samples] : run.memory) {
+    const auto first = std::find_if(samples.begin(), samples.end(), [](const auto& s) { return s.keyframes >= 10; });
+    if (first == samples.end() || samples.back().keyframes <= first->keyframes) {
+      json[process] = nullptr;
+      continue;
+    }
+    const double keyframes = static_cast<double>(samples.back().keyframes - first->keyframes);
+    json[process] = (samples.back().rss_mb - first->rss_mb) / keyframes;
+  }
+  return json;
+}
+
 Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder, const TrajectoryBuilder::Trajectories& t) {
   Json json;
   size_t after_first = 0;
@@ -160,8 +176,8 @@ Json TimingJson(const RunRecord& run) {
   json["decode_ms"] = Quantiles(Durations(run.traces, &FrameTrace::begin_us, &FrameTrace::decoded_us));
   json["extract_ms"] = Quantiles(Durations(run.traces, &FrameTrace::decoded_us, &FrameTrace::extracted_us));
   json["image_to_pose_ms"] = Quantiles(Durations(run.traces, &FrameTrace::publish_us, &FrameTrace::published_us));
-  json["keyframe_to_landmarks_ms"] = {{"p50", run.mapper.landmarks_p50_ms}, {"p95", run.mapper.landmarks_p95_ms}};
-  json["keyframe_to_adjusted_ms"] = {{"p50", run.mapper.adjusted_p50_ms}, {"p95", run.mapper.adjusted_p95_ms}};
+  json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframe_to_landmarks_ms);
+  json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframe_to_adjusted_ms);
   return json;
 }
 
@@ -215,6 +231,7 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder, const T
   json["payload_bytes"] = payload;
   json["resent_bytes"] = resent;
   json["max_rss_mb"] = HealthJson(run, &ProcessHealth::rss_mb);
+  json["rss_growth_mb_per_keyframe"] = MemoryGrowthJson(run);
   return json;
 }
 

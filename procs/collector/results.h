@@ -33,11 +33,20 @@ struct RunRecord {
   uint64_t resets = 0;
   int restarts = 0;
   size_t keyframes_proposed = 0;
+  /// From when a keyframe was heard to when its landmarks and its adjustment were, one for each keyframe
+  /// [ms].
+  std::vector<double> keyframe_to_landmarks_ms, keyframe_to_adjusted_ms;
+  struct MemorySample {
+    size_t keyframes = 0;
+    double rss_mb = 0;
+  };
+  std::map<std::string, std::vector<MemorySample>> memory;  ///< of each process, about once a second
   size_t keyframes_missing = 0;  ///< proposed for a map that stands, and neither in it nor culled from it
 };
 
-/// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, graph.txt, trajectory.png and summary.json into `dir`, and
-/// returns the summary as a table for people. Throws InputError naming what cannot be written.
+/// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, graph.txt, trajectory.png and
+/// summary.json into `dir`, and returns the summary as a table for people. Throws InputError naming what
+/// cannot be written.
 std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder);
 
 }  // namespace dmslam
