@@ -8,8 +8,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int kMaxFuseDistance = 50;  // bits, ORB-SLAM2's lower threshold
-
 bool Sees(const Landmark& landmark, KeyframeId keyframe) {
   const auto at = std::lower_bound(landmark.observations.begin(), landmark.observations.end(), keyframe,
                                    [](const Observation& o, KeyframeId id) { return o.keyframe < id; });
@@ -91,7 +89,7 @@ int FuseInto(Map& map, KeyframeId id, const Rigid3d& T_cam_world, const std::vec
     const double radius = radius_px * map.pyramid().Scale(view->octave);
     const FeatureHit hit = FindFeature(*keyframe.features, view->uv_px, radius, std::max(0, view->octave - 1),
                                        view->octave, landmark->descriptor, none_taken);
-    if (hit.feature < 0 || hit.distance > kMaxFuseDistance) continue;
+    if (hit.feature < 0 || hit.distance > options.max_fuse_distance) continue;
     if (NormalizedErrorSquared(*keyframe.features, hit.feature, view->uv_px, map.pyramid()) >
         options.creation.reprojection_sigmas_squared) {
       continue;

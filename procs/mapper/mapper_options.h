@@ -76,6 +76,7 @@ struct MapperOptions {
   double nearby_distance = 0.5;   ///< how far they may be, as a share of the scene's depth
   double nearby_angle_rad = 0.6;  ///< how far they may be turned
   double fuse_radius_px = 3.0;    ///< times the scale of the predicted octave
+  int max_fuse_distance = 80;     ///< bits, of a landmark and a feature at its place
 };
 
 }  // namespace dmslam
