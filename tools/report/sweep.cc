@@ -200,8 +200,11 @@ PlotFigure SweepFigure(const Sweep& sweep) {
     figure.panels.back().y_label = "ATE RMSE [m]";
     figure.panels.back().y_log = true;
   }
+  // One legend serves all panels; in the others it would hide a band.
+  for (PlotSeries& series : figure.panels.front().series) series.label.clear();
   for (const SweepKind& kind : Kinds()) {
     figure.panels.push_back(PanelOf(sweep, kind, [](const RunResult& run) { return run.tracked_percent; }));
+    for (PlotSeries& series : figure.panels.back().series) series.label.clear();
     figure.panels.back().title = "Coverage: " + kind.title;
     figure.panels.back().y_label = "tracked [%]";
     figure.panels.back().y_range = PlotRange{0, 105};
