@@ -6,7 +6,7 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kMostWaiting = 4;
+constexpr size_t kMostWaiting = 12;
 
 }  // namespace
 

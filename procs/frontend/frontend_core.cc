@@ -133,8 +133,6 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
   status.reason = report.reason.c_str();
   if (report.result) {
     InitialMap proposal = MakeInitialMap(*report.result, session_, map_id_);
-    const InitializerFrame& found_with = report.result->frame1;
-    const bool found_now = found_with.index == frame_.index;
     initial_first_ = proposal.first.id;
     initial_second_ = proposal.second.id;
     last_keyframe_ = awaited_ = initial_second_;
@@ -143,8 +141,6 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
     status.reason = "a first map was proposed";
     events->push_back(std::move(proposal));
     ++counters_.keyframes_proposed;
-    proposing_frame_ =
-        found_now ? frame_ : TrackedFrame(found_with.index, found_with.stamp_ns, found_with.features);
   }
   events->push_back(MakePose(state_, status));
 }
@@ -168,14 +164,30 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   last_tracked_ns_ = second->stamp_ns;
   trial_until_ns_ = second->stamp_ns + ToNs(options_.trial_s);
   state_ = TrackingState::kTrial;
-  // The frame that made the map is the first one to be placed in it; then this one.
-  TrackedFrame present = std::exchange(frame_, std::exchange(proposing_frame_, TrackedFrame()));
-  Track(events);
+  TrackedFrame present = std::move(frame_);
+  CatchUp(second->id.frame_index(), events);
   frame_ = std::move(present);
   if (state_ == TrackingState::kNotInitialized) {
     Initialize(events);
   } else {
     Track(events);
+  }
+}
+
+/// The frames since the one that made the map, in their order: in real time some came while it was searched for
+/// and adjusted.
+void FrontendCore::CatchUp(uint32_t since, std::vector<FrontendEvent>* events) {
+  const auto first = std::find_if(unplaced_.begin(), unplaced_.end(),
+                                  [since](const TrackedFrame& frame) { return frame.index >= since; });
+  std::vector<TrackedFrame> waited(std::make_move_iterator(first), std::make_move_iterator(unplaced_.end()));
+  unplaced_.erase(first, unplaced_.end());
+  for (TrackedFrame& frame : waited) {
+    frame_ = std::move(frame);
+    if (state_ == TrackingState::kNotInitialized) {
+      KeepUnplaced();
+    } else {
+      Track(events);
+    }
   }
 }
 

@@ -124,6 +124,7 @@ class FrontendCore {
   void KeepUnplaced();
   void NextMapId();
   void Coast();
+  void CatchUp(uint32_t since, std::vector<FrontendEvent>* events);
   const Placed& NewestPlaced() const { return coasting_ ? coasting_->placed : last_placed_; }
   uint32_t NewestIndex() const { return coasting_ ? coasting_->index : last_.index; }
   std::optional<Rigid3d> PoseOf(const Placed& placed) const;
@@ -147,7 +148,6 @@ class FrontendCore {
   TrackingState state_ = TrackingState::kNotInitialized;
   MapId map_id_ = 1;
   TrackedFrame frame_;
-  TrackedFrame proposing_frame_;  ///< the frame with which the first map was proposed
   TrackedFrame last_;             ///< the frame tracked last
   Placed last_placed_;
   /// A pose after the frame tracked last that too few landmarks support to be told: it only leads the search
