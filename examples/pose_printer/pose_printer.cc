@@ -1,5 +1,5 @@
-// Prints where the camera is, frame by frame, as the frontend says it. Needs nothing of this project but the message
-// types that lcm-gen makes of lcmtypes/dmslam_pose_t.lcm:
+// Prints where the camera is, frame by frame, as the frontend says it. Needs nothing of this project but the
+// message types that lcm-gen makes of lcmtypes/dmslam_pose_t.lcm:
 //
 //   lcm-gen --cpp --cpp-hpath=types lcmtypes/dmslam_pose_t.lcm
 //   c++ -std=c++17 -Itypes examples/pose_printer/pose_printer.cc -llcm -o pose_printer
@@ -17,19 +17,27 @@ namespace {
 
 const char* StateName(int state) {
   switch (state) {
-    case 0: return "no map yet";
-    case 1: return "waiting for a map";
-    case 2: return "trying a map";
-    case 3: return "tracking";
-    case 4: return "uncertain";
-    case 5: return "lost";
-    default: return "unknown state";
+    case 0:
+      return "no map yet";
+    case 1:
+      return "waiting for a map";
+    case 2:
+      return "trying a map";
+    case 3:
+      return "tracking";
+    case 4:
+      return "uncertain";
+    case 5:
+      return "lost";
+    default:
+      return "unknown state";
   }
 }
 
 class PosePrinter {
  public:
-  // Called by LCM for each message whose type is pose_t; others never get here. An exception must not leave a handler.
+  // Called by LCM for each message whose type is pose_t; others never get here. An exception must not leave a
+  // handler.
   void OnPose(const lcm::ReceiveBuffer*, const std::string&, const dmslam::pose_t* pose) {
     if (session_ != pose->session) {
       session_ = pose->session;
@@ -41,8 +49,9 @@ class PosePrinter {
       std::printf("%s\n", StateName(pose->state));
       return;
     }
-    std::printf("at (%.4f, %.4f, %.4f) of map %d, %s by %d features, %.0f %% of the image moves\n", pose->x, pose->y,
-                pose->z, pose->map_id, StateName(pose->state), pose->inliers, 100 * pose->moving_share);
+    std::printf("at (%.4f, %.4f, %.4f) of map %d, %s by %d features, %.0f %% of the image moves\n", pose->x,
+                pose->y, pose->z, pose->map_id, StateName(pose->state), pose->inliers,
+                100 * pose->moving_share);
     std::fflush(stdout);
   }
 

@@ -20,8 +20,8 @@ struct CollectorOptions {
   bool progress = false;     ///< show progress on the terminal
 };
 
-/// Reads the frontend's and the mapper's streams and everybody's statuses, and writes the run's results when the sequence
-/// has drained through all streams. A reader like any other.
+/// Reads the frontend's and the mapper's streams and everybody's statuses, and writes the run's results when
+/// the sequence has drained through all streams. A reader like any other.
 class CollectorNode : public StreamNode {
  public:
   CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector);
@@ -59,7 +59,7 @@ class CollectorNode : public StreamNode {
   std::map<std::string, ProcessHealth>
       former_;  ///< counters of processes that another has followed, together
   FrontendStatus former_frontend_;
-  std::map<KeyframeId, MapId> proposed_;  ///< keyframes that the frontend said should be
+  std::map<KeyframeId, MapId> proposed_;    ///< keyframes that the frontend said should be
   std::map<KeyframeId, int64_t> heard_ns_;  ///< when each was said to be one
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica

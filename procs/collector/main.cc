@@ -4,7 +4,8 @@
 #include "common/process_main.h"
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("collector", "Collects a run's trajectory, map and statuses and writes its results.");
+  dmslam::ProcessMain process("collector",
+                              "Collects a run's trajectory, map and statuses and writes its results.");
   dmslam::CollectorOptions collector;
   process.app().add_option("--out", collector.out_dir, "folder for the results")->required();
   process.app().add_option("--ground-truth", collector.ground_truth, "trajectory in TUM format");

@@ -21,13 +21,15 @@ void WriteMapPly(const std::string& path, const Map& map, MapId map_id) {
   }
   file << "ply\nformat ascii 1.0\ncomment map units; cameras are blue\nelement vertex "
        << landmarks.size() + keyframes.size()
-       << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n"
+       << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar "
+          "green\n"
           "property uchar blue\nend_header\n";
   char line[160];
   for (const Landmark* landmark : landmarks) {
     const bool moving = landmark->evidence.motion_belief > 0;
-    std::snprintf(line, sizeof(line), "%.17g %.17g %.17g %d %d %d\n", landmark->p_world.x(), landmark->p_world.y(),
-                  landmark->p_world.z(), moving ? 230 : 120, moving ? 40 : 120, moving ? 40 : 120);
+    std::snprintf(line, sizeof(line), "%.17g %.17g %.17g %d %d %d\n", landmark->p_world.x(),
+                  landmark->p_world.y(), landmark->p_world.z(), moving ? 230 : 120, moving ? 40 : 120,
+                  moving ? 40 : 120);
     file << line;
   }
   for (const Keyframe* keyframe : keyframes) {

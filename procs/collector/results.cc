@@ -34,7 +34,8 @@ Json Quantiles(const std::vector<double>& values) {
 }
 
 /// Differences of two of the trace's times over all frames [ms].
-std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t FrameTrace::*from, int64_t FrameTrace::*to) {
+std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t FrameTrace::*from,
+                              int64_t FrameTrace::*to) {
   std::vector<double> durations;
   for (const FrameTrace& trace : traces) {
     if (trace.*to > 0) durations.push_back(static_cast<double>(trace.*to - trace.*from) * 1e-3);
@@ -42,8 +43,8 @@ std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t Fra
   return durations;
 }
 
-/// The covisibility graph: a line "frame frame landmarks" for each two keyframes that share landmarks; "loop" behind it
-/// where a loop was closed between them.
+/// The covisibility graph: a line "frame frame landmarks" for each two keyframes that share landmarks; "loop"
+/// behind it where a loop was closed between them.
 void WriteGraph(const std::string& path, const Map& map) {
   std::ofstream file(path);
   file << "# frame frame shared_landmarks [loop]\n";
@@ -85,7 +86,8 @@ struct Errors {
 Errors Evaluate(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories) {
   Errors errors;
   if (run.ground_truth.empty() && run.heard_ground_truth.empty()) return errors;
-  errors.ground_truth = run.ground_truth.empty() ? run.heard_ground_truth : ReadGroundTruth(run.ground_truth).poses;
+  errors.ground_truth =
+      run.ground_truth.empty() ? run.heard_ground_truth : ReadGroundTruth(run.ground_truth).poses;
   AteReport final = EvaluateAte(errors.ground_truth, trajectories.final);
   AteReport online = EvaluateAte(errors.ground_truth, trajectories.online);
   if (final.usable()) errors.final = std::move(final);
@@ -93,12 +95,14 @@ Errors Evaluate(const RunRecord& run, const TrajectoryBuilder::Trajectories& tra
   return errors;
 }
 
-PlotFigure FigureOf(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories, const Errors& errors) {
+PlotFigure FigureOf(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories,
+                    const Errors& errors) {
   const std::string title = run.sequence + ", " + run.mode + ", seed " + std::to_string(run.seed);
   if (errors.final) {
     char subtitle[120];
-    std::snprintf(subtitle, sizeof(subtitle), "ATE RMSE %.4f m, %.1f %% of %lld frames placed", errors.final->rmse(),
-                  Percent(trajectories.final.size(), run.frames_published), static_cast<long long>(run.frames_published));
+    std::snprintf(subtitle, sizeof(subtitle), "ATE RMSE %.4f m, %.1f %% of %lld frames placed",
+                  errors.final->rmse(), Percent(trajectories.final.size(), run.frames_published),
+                  static_cast<long long>(run.frames_published));
     return TrajectoryFigure(errors.ground_truth, trajectories.final, *errors.final, title, subtitle);
   }
   PlotFigure figure;
@@ -126,12 +130,13 @@ Json HealthJson(const RunRecord& run, double ProcessHealth::*field) {
   return json;
 }
 
-/// What a process's memory grew by from keyframe to keyframe, between the tenth and the last [MB]; null where the run was
-/// too short to tell.
+/// What a process's memory grew by from keyframe to keyframe, between the tenth and the last [MB]; null where
+/// the run was too short to tell.
 Json MemoryGrowthJson(const RunRecord& run) {
   Json json = Json::object();
   for (const auto& [process, samples] : run.memory) {
-    const auto first = std::find_if(samples.begin(), samples.end(), [](const auto& s) { return s.keyframes >= 10; });
+    const auto first =
+        std::find_if(samples.begin(), samples.end(), [](const auto& s) { return s.keyframes >= 10; });
     if (first == samples.end() || samples.back().keyframes <= first->keyframes) {
       json[process] = nullptr;
       continue;
@@ -142,7 +147,8 @@ Json MemoryGrowthJson(const RunRecord& run) {
   return json;
 }
 
-Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder, const TrajectoryBuilder::Trajectories& t) {
+Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
+                  const TrajectoryBuilder::Trajectories& t) {
   Json json;
   size_t after_first = 0;
   const auto& poses = builder.frame_poses();
@@ -152,10 +158,12 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder, const 
     }));
   }
   json["tracked_online_percent"] = Percent(t.online.size(), run.frames_published);
-  json["tracked_online_after_first_map_percent"] = Percent(t.online.size(), static_cast<int64_t>(after_first));
+  json["tracked_online_after_first_map_percent"] =
+      Percent(t.online.size(), static_cast<int64_t>(after_first));
   json["tracked_percent"] = Percent(t.final.size(), run.frames_published);
   if (!t.online.empty() && !poses.empty()) {
-    json["first_init_s"] = static_cast<double>(t.online.front().stamp_ns - poses.begin()->second.stamp_ns) * 1e-9;
+    json["first_init_s"] =
+        static_cast<double>(t.online.front().stamp_ns - poses.begin()->second.stamp_ns) * 1e-9;
   } else {
     json["first_init_s"] = nullptr;
   }
@@ -175,14 +183,15 @@ Json TimingJson(const RunRecord& run) {
   json["frontend_without_decoding_ms"] = Quantiles(apart);
   json["decode_ms"] = Quantiles(Durations(run.traces, &FrameTrace::begin_us, &FrameTrace::decoded_us));
   json["extract_ms"] = Quantiles(Durations(run.traces, &FrameTrace::decoded_us, &FrameTrace::extracted_us));
-  json["image_to_pose_ms"] = Quantiles(Durations(run.traces, &FrameTrace::publish_us, &FrameTrace::published_us));
+  json["image_to_pose_ms"] =
+      Quantiles(Durations(run.traces, &FrameTrace::publish_us, &FrameTrace::published_us));
   json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframe_to_landmarks_ms);
   json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframe_to_adjusted_ms);
   return json;
 }
 
-Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder, const TrajectoryBuilder::Trajectories& t,
-                 const Errors& errors) {
+Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
+                 const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
   Json json;
   json["version"] = kVersion;
   json["sequence"] = run.sequence;
@@ -250,13 +259,16 @@ std::string Table(const Json& summary) {
   };
   row("sequence", summary["sequence"].get<std::string>());
   row("frames published / skipped", number("frames", "%.0f") + " / " + number("frames_skipped", "%.0f"));
-  row("tracked online / in the end [%]", number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
+  row("tracked online / in the end [%]",
+      number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
   row("first map after [s]", number("first_init_s", "%.2f"));
-  row("ATE RMSE final / online [m]", number("ate_rmse_final", "%.4f") + " / " + number("ate_rmse_online", "%.4f"));
+  row("ATE RMSE final / online [m]",
+      number("ate_rmse_final", "%.4f") + " / " + number("ate_rmse_online", "%.4f"));
   row("keyframes / landmarks / loops",
       number("keyframes", "%.0f") + " / " + number("landmarks", "%.0f") + " / " + number("loops", "%.0f"));
   row("resets / relocalisations", number("resets", "%.0f") + " / " + number("relocalisations", "%.0f"));
-  row("frontend median / p95 [ms]", number("frontend_ms_median", "%.1f") + " / " + number("frontend_ms_p95", "%.1f"));
+  row("frontend median / p95 [ms]",
+      number("frontend_ms_median", "%.1f") + " / " + number("frontend_ms_p95", "%.1f"));
   row("records lost / repaired", number("records_lost", "%.0f") + " / " + number("records_repaired", "%.0f"));
   return table;
 }
@@ -276,7 +288,8 @@ std::string WriteResults(const std::string& dir, const RunRecord& run, const Tra
   const Json summary = SummaryJson(run, builder, trajectories, errors);
   std::ofstream file(dir + "/summary.json");
   file << summary.dump(2) << "\n";
-  if (!file.flush()) throw InputError(dir + "/summary.json: cannot be written; check the folder given with --out");
+  if (!file.flush())
+    throw InputError(dir + "/summary.json: cannot be written; check the folder given with --out");
   return Table(summary);
 }
 

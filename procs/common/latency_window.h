@@ -23,7 +23,8 @@ class LatencyWindow {
   double Quantile(double q) const {
     if (values_.empty()) return 0.0;
     std::vector<double> sorted = values_;
-    const size_t index = std::min(sorted.size() - 1, static_cast<size_t>(q * static_cast<double>(sorted.size())));
+    const size_t index =
+        std::min(sorted.size() - 1, static_cast<size_t>(q * static_cast<double>(sorted.size())));
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<ptrdiff_t>(index), sorted.end());
     return sorted[index];
   }

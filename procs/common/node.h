@@ -15,14 +15,15 @@ struct NodeContext {
   std::function<int64_t()> now_ns;   ///< monotonic; virtual in one process
   std::function<int64_t()> wall_us;  ///< for utime and terms of office; reaches no result
   std::function<void()> pump;        ///< delivers what has arrived, from within long work; may do nothing
-  std::function<void(int fd, std::function<void()> on_readable)> watch;  ///< of descriptors of its own; may be none
-  int64_t random_id = 1;             ///< of this process: reader and writer id
-  std::string name;                  ///< "mapper on host (pid 17)"
-  bool fresh_system = false;         ///< nobody else can be writing: no listening before a stream begins
+  std::function<void(int fd, std::function<void()> on_readable)>
+      watch;                  ///< of descriptors of its own; may be none
+  int64_t random_id = 1;      ///< of this process: reader and writer id
+  std::string name;           ///< "mapper on host (pid 17)"
+  bool fresh_system = false;  ///< nobody else can be writing: no listening before a stream begins
 };
 
-/// A process without its main: connects a core to the bus. Message handlers only store what comes; all work is done in
-/// Advance, one thread.
+/// A process without its main: connects a core to the bus. Message handlers only store what comes; all work
+/// is done in Advance, one thread.
 class Node {
  public:
   virtual ~Node() = default;

@@ -38,13 +38,16 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
       ->check(CLI::IsMember({"host", "lan"}))
       ->capture_default_str();
   app_.add_option("--session", options_.session, "session id; 0: that of the first camera heard");
-  app_.add_option("--peers", options_.peers, "processes that take part (frontend, mapper, loopcloser, collector)")
+  app_.add_option("--peers", options_.peers,
+                  "processes that take part (frontend, mapper, loopcloser, collector)")
       ->delimiter(',');
   app_.add_option("--config", config_, "settings (YAML)");
   app_.add_option("--set", overrides_, "one setting: key=value; may be repeated");
-  app_.add_flag("--accept-recorded", options_.accept_recorded,
-                "take camera and frames of a recorded session, as lcm-logplayer plays them, for this session's");
-  app_.add_flag("--take-over", options_.take_over, "ask a present writer of the same stream to close, and follow it");
+  app_.add_flag(
+      "--accept-recorded", options_.accept_recorded,
+      "take camera and frames of a recorded session, as lcm-logplayer plays them, for this session's");
+  app_.add_flag("--take-over", options_.take_over,
+                "ask a present writer of the same stream to close, and follow it");
   app_.add_flag("--fresh", options_.fresh, "a mapper begins with an empty map, whatever the others hold");
   app_.add_flag("--fresh-system", fresh_system_, "nobody else can be writing: begin without listening first");
   app_.add_flag("--quiet", quiet_, "log warnings only");
@@ -82,7 +85,9 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.now_ns = &EventLoop::now_ns;
   context.wall_us = &EventLoop::wall_us;
   context.pump = [&loop] { loop.PumpOnce(); };
-  context.watch = [&loop](int fd, std::function<void()> on_readable) { loop.Watch(fd, std::move(on_readable)); };
+  context.watch = [&loop](int fd, std::function<void()> on_readable) {
+    loop.Watch(fd, std::move(on_readable));
+  };
   context.random_id = RandomId();
   context.name = ProcessName(role_);
   context.fresh_system = fresh_system_;
@@ -105,8 +110,8 @@ std::string FindDataFolder(const std::string& name) {
       if (fs::is_directory(candidate) && !fs::is_empty(candidate)) return candidate.string();
     }
   }
-  throw InputError("the folder '" + name + "' that ships with the programs was not found near " + program.string() +
-                   "; install the project again");
+  throw InputError("the folder '" + name + "' that ships with the programs was not found near " +
+                   program.string() + "; install the project again");
 }
 
 std::shared_ptr<const Vocabulary> LoadVocabulary(const std::string& path) {

@@ -60,7 +60,8 @@ std::string FormatValue(const T& value) {
 
 /// `at`: Settings& -> reference to the field. Numbers must lie in [low, high].
 template <typename Access>
-Entry Make(std::string key, std::string help, Access at, double low = -std::numeric_limits<double>::infinity(),
+Entry Make(std::string key, std::string help, Access at,
+           double low = -std::numeric_limits<double>::infinity(),
            double high = std::numeric_limits<double>::infinity()) {
   using T = std::remove_cvref_t<decltype(at(std::declval<Settings&>()))>;
   Entry entry;
@@ -97,122 +98,175 @@ Entry MakeChoice(std::string key, std::string help, Access at, std::vector<std::
 
 std::vector<Entry> GeneralEntries() {
   return {
-      Make("seed", "seed of everything random", [](Settings& s) -> auto& { return s.seed; }),
-      Make("features.count", "features per frame",
-           [](Settings& s) -> auto& { return s.extractor.num_features; }, 50, 10000),
-      Make("features.levels", "levels of the image pyramid",
-           [](Settings& s) -> auto& { return s.extractor.pyramid.levels; }, 1, 16),
-      Make("features.scale_factor", "between two levels",
-           [](Settings& s) -> auto& { return s.extractor.pyramid.scale_factor; }, 1.05, 2),
-      Make("features.fast_threshold", "least contrast of a corner [grey values]",
-           [](Settings& s) -> auto& { return s.extractor.fast_threshold; }, 1, 254),
-      Make("features.min_fast_threshold", "the same where there is no such corner",
-           [](Settings& s) -> auto& { return s.extractor.min_fast_threshold; }, 1, 254),
-      Make("loop.enabled", "close loops", [](Settings& s) -> auto& { return s.loop.enabled; }),
-      Make("map.saved", "the run begins in the map that the mapper loads (--map)",
-           [](Settings& s) -> auto& { return s.start.saved_map; }),
-      Make("map.localize_only", "nothing changes that map",
-           [](Settings& s) -> auto& { return s.start.localize_only; }),
+      Make(
+          "seed", "seed of everything random", [](Settings & s) -> auto& { return s.seed; }),
+      Make(
+          "features.count", "features per frame",
+          [](Settings & s) -> auto& { return s.extractor.num_features; }, 50, 10000),
+      Make(
+          "features.levels", "levels of the image pyramid",
+          [](Settings & s) -> auto& { return s.extractor.pyramid.levels; }, 1, 16),
+      Make(
+          "features.scale_factor", "between two levels",
+          [](Settings & s) -> auto& { return s.extractor.pyramid.scale_factor; }, 1.05, 2),
+      Make(
+          "features.fast_threshold", "least contrast of a corner [grey values]",
+          [](Settings & s) -> auto& { return s.extractor.fast_threshold; }, 1, 254),
+      Make(
+          "features.min_fast_threshold", "the same where there is no such corner",
+          [](Settings & s) -> auto& { return s.extractor.min_fast_threshold; }, 1, 254),
+      Make(
+          "loop.enabled", "close loops", [](Settings & s) -> auto& { return s.loop.enabled; }),
+      Make(
+          "map.saved", "the run begins in the map that the mapper loads (--map)",
+          [](Settings & s) -> auto& { return s.start.saved_map; }),
+      Make(
+          "map.localize_only", "nothing changes that map",
+          [](Settings & s) -> auto& { return s.start.localize_only; }),
   };
 }
 
 std::vector<Entry> LoopEntries() {
   return {
-      Make("loop.consistency", "keyframes in a row that must name places that belong together",
-           [](Settings& s) -> auto& { return s.loop.consistency; }, 1, 100),
-      Make("loop.min_matches", "landmarks of a place that must be found in the keyframe",
-           [](Settings& s) -> auto& { return s.loop.min_matches; }, 10, 10000),
-      Make("loop.min_share", "of what should be seen of a place: enough to be followed",
-           [](Settings& s) -> auto& { return s.loop.min_share; }, 0, 1),
-      Make("loop.min_confirmed_share", "of what should be seen of a place: enough to close the loop",
-           [](Settings& s) -> auto& { return s.loop.min_confirmed_share; }, 0, 1),
-      Make("loop.plausible_drift", "a loop that moves more than this share of its path needs more",
-           [](Settings& s) -> auto& { return s.loop.plausible_drift; }, 0, 10),
-      Make("loop.global_adjustment", "adjust the whole map after a loop",
-           [](Settings& s) -> auto& { return s.loop.global_adjustment; }),
+      Make(
+          "loop.consistency", "keyframes in a row that must name places that belong together",
+          [](Settings & s) -> auto& { return s.loop.consistency; }, 1, 100),
+      Make(
+          "loop.min_matches", "landmarks of a place that must be found in the keyframe",
+          [](Settings & s) -> auto& { return s.loop.min_matches; }, 10, 10000),
+      Make(
+          "loop.min_share", "of what should be seen of a place: enough to be followed",
+          [](Settings & s) -> auto& { return s.loop.min_share; }, 0, 1),
+      Make(
+          "loop.min_confirmed_share", "of what should be seen of a place: enough to close the loop",
+          [](Settings & s) -> auto& { return s.loop.min_confirmed_share; }, 0, 1),
+      Make(
+          "loop.plausible_drift", "a loop that moves more than this share of its path needs more",
+          [](Settings & s) -> auto& { return s.loop.plausible_drift; }, 0, 10),
+      Make(
+          "loop.global_adjustment", "adjust the whole map after a loop",
+          [](Settings & s) -> auto& { return s.loop.global_adjustment; }),
   };
 }
 
 std::vector<Entry> InitializerEntries() {
   return {
-      MakeChoice("initializer.method", "dlrsac; arsac behind the same gates; or ransac: two frames and plain RANSAC",
-                 [](Settings& s) -> auto& { return s.frontend.initializer_method; }, {"dlrsac", "arsac", "ransac"}),
-      Make("initializer.feature_factor", "features of a frame while there is no map, times features.count",
-           [](Settings& s) -> auto& { return s.frontend.initializer_feature_factor; }, 0.5, 5),
-      Make("initializer.min_matches", "matches a frame must have with the reference frame",
-           [](Settings& s) -> auto& { return s.initializer.min_matches; }, 8, 10000),
-      Make("initializer.num_pairs", "pairs of frames that must agree",
-           [](Settings& s) -> auto& { return s.initializer.num_pairs; }, 1, 20),
-      Make("initializer.min_agreement", "smallest Jaccard index of the pairs' static sets",
-           [](Settings& s) -> auto& { return s.initializer.agreement.min_agreement; }, 0, 1),
-      Make("initializer.min_parallax_rad", "median parallax of the first map's points",
-           [](Settings& s) -> auto& { return s.initializer.min_parallax_rad; }, 0, 1),
-      Make("initializer.min_distribution_px", "root of the static matches' distribution D",
-           [](Settings& s) -> auto& { return s.initializer.agreement.min_distribution_px; }, 0, 10000),
-      Make("initializer.cell_px", "side of DLRSAC's cells",
-           [](Settings& s) -> auto& { return s.initializer.selector.cell_px; }, 16, 4096),
-      Make("initializer.min_cell_matches", "matches that a cell needs",
-           [](Settings& s) -> auto& { return s.initializer.selector.min_cell_matches; }, 8, 10000),
-      Make("initializer.couple_threshold", "share of a cell's inliers that couples it",
-           [](Settings& s) -> auto& { return s.initializer.selector.couple_threshold; }, 0, 1),
+      MakeChoice(
+          "initializer.method", "dlrsac; arsac behind the same gates; or ransac: two frames and plain RANSAC",
+          [](Settings & s) -> auto& { return s.frontend.initializer_method; }, {"dlrsac", "arsac", "ransac"}),
+      Make(
+          "initializer.feature_factor", "features of a frame while there is no map, times features.count",
+          [](Settings & s) -> auto& { return s.frontend.initializer_feature_factor; }, 0.5, 5),
+      Make(
+          "initializer.min_matches", "matches a frame must have with the reference frame",
+          [](Settings & s) -> auto& { return s.initializer.min_matches; }, 8, 10000),
+      Make(
+          "initializer.num_pairs", "pairs of frames that must agree",
+          [](Settings & s) -> auto& { return s.initializer.num_pairs; }, 1, 20),
+      Make(
+          "initializer.min_agreement", "smallest Jaccard index of the pairs' static sets",
+          [](Settings & s) -> auto& { return s.initializer.agreement.min_agreement; }, 0, 1),
+      Make(
+          "initializer.min_parallax_rad", "median parallax of the first map's points",
+          [](Settings & s) -> auto& { return s.initializer.min_parallax_rad; }, 0, 1),
+      Make(
+          "initializer.min_distribution_px", "root of the static matches' distribution D",
+          [](Settings & s) -> auto& { return s.initializer.agreement.min_distribution_px; }, 0, 10000),
+      Make(
+          "initializer.cell_px", "side of DLRSAC's cells",
+          [](Settings & s) -> auto& { return s.initializer.selector.cell_px; }, 16, 4096),
+      Make(
+          "initializer.min_cell_matches", "matches that a cell needs",
+          [](Settings & s) -> auto& { return s.initializer.selector.min_cell_matches; }, 8, 10000),
+      Make(
+          "initializer.couple_threshold", "share of a cell's inliers that couples it",
+          [](Settings & s) -> auto& { return s.initializer.selector.couple_threshold; }, 0, 1),
   };
 }
 
 std::vector<Entry> TrackingEntries() {
   return {
-      Make("tracking.motion_belief", "landmarks that are believed to move have no vote",
-           [](Settings& s) -> auto& { return s.frontend.tracking.motion_belief; }),
-      Make("tracking.motion_radius_px", "search around the motion model's prediction",
-           [](Settings& s) -> auto& { return s.frontend.tracking.motion_radius_px; }, 1, 200),
-      Make("tracking.min_inliers", "fewer static inliers: the frame is not tracked",
-           [](Settings& s) -> auto& { return s.frontend.tracking.min_local_inliers; }, 6, 10000),
-      Make("tracking.hidden_distance", "descriptor distance allowed where nothing of the map is found around [bits]",
-           [](Settings& s) -> auto& { return s.frontend.tracking.hidden_distance; }, 0, 256),
-      Make("tracking.hidden_distance_slope", "more of it, times the share of the map that is found around [bits]",
-           [](Settings& s) -> auto& { return s.frontend.tracking.hidden_distance_slope; }, 0, 10000),
-      Make("tracking.young_trust", "weight of a landmark that was just made",
-           [](Settings& s) -> auto& { return s.frontend.tracking.young_trust; }, 0, 1),
-      Make("tracking.trusted_age_s", "age at which a landmark has full weight",
-           [](Settings& s) -> auto& { return s.frontend.tracking.trusted_age_s; }, 0, 1000),
-      Make("tracking.max_local_keyframes", "keyframes whose landmarks are searched for",
-           [](Settings& s) -> auto& { return s.frontend.tracking.max_local_keyframes; }, 1, 1000),
-      Make("tracking.trial_s", "time for which a first map must predict the frames",
-           [](Settings& s) -> auto& { return s.frontend.trial_s; }, 0, 60),
-      Make("tracking.new_map_after_s", "lost for so long: a new map is started",
-           [](Settings& s) -> auto& { return s.frontend.new_map_after_s; }, 0.1, 3600),
-      Make("keyframe.max_interval_s", "at least one keyframe in this time, where it helps",
-           [](Settings& s) -> auto& { return s.frontend.keyframe.max_interval_s; }, 0, 60),
-      Make("keyframe.min_interval_s", "no two keyframes within this time, unless tracking is weak",
-           [](Settings& s) -> auto& { return s.frontend.keyframe.min_interval_s; }, 0, 60),
-      Make("keyframe.tracked_ratio", "of the reference's landmarks; fewer tracked asks for a keyframe",
-           [](Settings& s) -> auto& { return s.frontend.keyframe.tracked_ratio; }, 0, 1),
+      Make(
+          "tracking.motion_belief", "landmarks that are believed to move have no vote",
+          [](Settings & s) -> auto& { return s.frontend.tracking.motion_belief; }),
+      Make(
+          "tracking.motion_radius_px", "search around the motion model's prediction",
+          [](Settings & s) -> auto& { return s.frontend.tracking.motion_radius_px; }, 1, 200),
+      Make(
+          "tracking.min_inliers", "fewer static inliers: the frame is not tracked",
+          [](Settings & s) -> auto& { return s.frontend.tracking.min_local_inliers; }, 6, 10000),
+      Make(
+          "tracking.hidden_distance",
+          "descriptor distance allowed where nothing of the map is found around [bits]",
+          [](Settings & s) -> auto& { return s.frontend.tracking.hidden_distance; }, 0, 256),
+      Make(
+          "tracking.hidden_distance_slope",
+          "more of it, times the share of the map that is found around [bits]",
+          [](Settings & s) -> auto& { return s.frontend.tracking.hidden_distance_slope; }, 0, 10000),
+      Make(
+          "tracking.young_trust", "weight of a landmark that was just made",
+          [](Settings & s) -> auto& { return s.frontend.tracking.young_trust; }, 0, 1),
+      Make(
+          "tracking.trusted_age_s", "age at which a landmark has full weight",
+          [](Settings & s) -> auto& { return s.frontend.tracking.trusted_age_s; }, 0, 1000),
+      Make(
+          "tracking.max_local_keyframes", "keyframes whose landmarks are searched for",
+          [](Settings & s) -> auto& { return s.frontend.tracking.max_local_keyframes; }, 1, 1000),
+      Make(
+          "tracking.trial_s", "time for which a first map must predict the frames",
+          [](Settings & s) -> auto& { return s.frontend.trial_s; }, 0, 60),
+      Make(
+          "tracking.new_map_after_s", "lost for so long: a new map is started",
+          [](Settings & s) -> auto& { return s.frontend.new_map_after_s; }, 0.1, 3600),
+      Make(
+          "keyframe.max_interval_s", "at least one keyframe in this time, where it helps",
+          [](Settings & s) -> auto& { return s.frontend.keyframe.max_interval_s; }, 0, 60),
+      Make(
+          "keyframe.min_interval_s", "no two keyframes within this time, unless tracking is weak",
+          [](Settings & s) -> auto& { return s.frontend.keyframe.min_interval_s; }, 0, 60),
+      Make(
+          "keyframe.tracked_ratio", "of the reference's landmarks; fewer tracked asks for a keyframe",
+          [](Settings & s) -> auto& { return s.frontend.keyframe.tracked_ratio; }, 0, 1),
   };
 }
 
 std::vector<Entry> MappingEntries() {
   return {
-      Make("mapping.mutual_exclusion", "Algorithm 1: one new landmark per neighbourhood, and a bound on their number",
-           [](Settings& s) -> auto& { return s.mapper.creation.mutual_exclusion; }),
-      Make("mapping.neighbourhood_px", "half the side of the neighbourhood",
-           [](Settings& s) -> auto& { return s.mapper.creation.neighbourhood_px; }, 0, 1000),
-      Make("mapping.alpha", "bound on the candidates, as a share of the tracked landmarks",
-           [](Settings& s) -> auto& { return s.mapper.creation.alpha; }, 0, 100),
-      Make("mapping.min_candidates", "candidates that are always allowed",
-           [](Settings& s) -> auto& { return s.mapper.creation.min_candidates; }, 0, 10000),
-      Make("mapping.confirmed_views", "points seen in so many views for a second are free of the bound and the neighbourhood; 0: none",
-           [](Settings& s) -> auto& { return s.mapper.creation.confirmed_views; }, 0, 100),
-      Make("mapping.seen_through", "landmarks go that other keyframes see through (people who stood)",
-           [](Settings& s) -> auto& { return s.mapper.seen_through.enabled; }),
-      Make("mapping.local_keyframes", "keyframes adjusted at a time",
-           [](Settings& s) -> auto& { return s.mapper.local_keyframes; }, 2, 1000),
-      Make("mapping.redundant_share", "a keyframe goes when so much of it is seen by three others",
-           [](Settings& s) -> auto& { return s.mapper.redundant_share; }, 0, 1),
-      Make("mapping.belief_found_step", "log odds taken by a frame that finds a landmark in its place",
-           [](Settings& s) -> auto& { return s.mapper.belief.found_step; }, 0, 10),
-      Make("mapping.belief_moved_step", "log odds added by a frame that finds it elsewhere",
-           [](Settings& s) -> auto& { return s.mapper.belief.moved_step; }, 0, 10),
-      Make("mapping.belief_remove_above", "log odds at which a landmark leaves the map",
-           [](Settings& s) -> auto& { return s.mapper.belief.remove_above; }, 0, 100),
+      Make(
+          "mapping.mutual_exclusion",
+          "Algorithm 1: one new landmark per neighbourhood, and a bound on their number",
+          [](Settings & s) -> auto& { return s.mapper.creation.mutual_exclusion; }),
+      Make(
+          "mapping.neighbourhood_px", "half the side of the neighbourhood",
+          [](Settings & s) -> auto& { return s.mapper.creation.neighbourhood_px; }, 0, 1000),
+      Make(
+          "mapping.alpha", "bound on the candidates, as a share of the tracked landmarks",
+          [](Settings & s) -> auto& { return s.mapper.creation.alpha; }, 0, 100),
+      Make(
+          "mapping.min_candidates", "candidates that are always allowed",
+          [](Settings & s) -> auto& { return s.mapper.creation.min_candidates; }, 0, 10000),
+      Make(
+          "mapping.confirmed_views",
+          "points seen in so many views for a second are free of the bound and the neighbourhood; 0: none",
+          [](Settings & s) -> auto& { return s.mapper.creation.confirmed_views; }, 0, 100),
+      Make(
+          "mapping.seen_through", "landmarks go that other keyframes see through (people who stood)",
+          [](Settings & s) -> auto& { return s.mapper.seen_through.enabled; }),
+      Make(
+          "mapping.local_keyframes", "keyframes adjusted at a time",
+          [](Settings & s) -> auto& { return s.mapper.local_keyframes; }, 2, 1000),
+      Make(
+          "mapping.redundant_share", "a keyframe goes when so much of it is seen by three others",
+          [](Settings & s) -> auto& { return s.mapper.redundant_share; }, 0, 1),
+      Make(
+          "mapping.belief_found_step", "log odds taken by a frame that finds a landmark in its place",
+          [](Settings & s) -> auto& { return s.mapper.belief.found_step; }, 0, 10),
+      Make(
+          "mapping.belief_moved_step", "log odds added by a frame that finds it elsewhere",
+          [](Settings & s) -> auto& { return s.mapper.belief.moved_step; }, 0, 10),
+      Make(
+          "mapping.belief_remove_above", "log odds at which a landmark leaves the map",
+          [](Settings & s) -> auto& { return s.mapper.belief.remove_above; }, 0, 100),
   };
 }
 
@@ -257,7 +311,8 @@ std::string NearestKey(const std::vector<Entry>& entries, std::string_view key) 
   return nearest->key;
 }
 
-void ApplyYaml(const YAML::Node& node, const std::string& prefix, const std::string& path, Settings* settings) {
+void ApplyYaml(const YAML::Node& node, const std::string& prefix, const std::string& path,
+               Settings* settings) {
   for (const auto& item : node) {
     const std::string key = prefix + item.first.as<std::string>();
     if (item.second.IsMap()) {
@@ -285,8 +340,8 @@ void ApplySetting(std::string_view key, std::string_view value, Settings* settin
     settings->mapper.belief.enabled = settings->frontend.tracking.motion_belief;
     return;
   }
-  throw InputError("setting '" + std::string(key) + "' does not exist; did you mean '" + NearestKey(entries, key) +
-                   "'? (docs/configuration.md lists all)");
+  throw InputError("setting '" + std::string(key) + "' does not exist; did you mean '" +
+                   NearestKey(entries, key) + "'? (docs/configuration.md lists all)");
 }
 
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& overrides) {
@@ -294,7 +349,8 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& o
   if (!path.empty()) {
     try {
       const YAML::Node node = YAML::LoadFile(path);
-      if (!node.IsMap() && !node.IsNull()) throw InputError(path + ": is not a map of settings; write 'key: value' lines");
+      if (!node.IsMap() && !node.IsNull())
+        throw InputError(path + ": is not a map of settings; write 'key: value' lines");
       if (node["profile"]) ApplySetting("profile", node["profile"].as<std::string>(""), &settings);
       ApplyYaml(node, "", path, &settings);
     } catch (const YAML::BadFile&) {
@@ -320,7 +376,8 @@ std::vector<SettingInfo> ListSettings(const Settings& settings) {
 
 uint64_t SettingsHash(const Settings& settings) {
   uint64_t hash = 0;
-  for (const SettingInfo& info : ListSettings(settings)) hash = DeriveSeed(hash, 0, info.key + "=" + info.value);
+  for (const SettingInfo& info : ListSettings(settings))
+    hash = DeriveSeed(hash, 0, info.key + "=" + info.value);
   return hash;
 }
 

@@ -16,11 +16,12 @@ namespace dmslam {
 
 /// With which map a run begins.
 struct StartOptions {
-  bool saved_map = false;      ///< the mapper has loaded one: the frontend waits for it and finds itself in it
+  bool saved_map = false;  ///< the mapper has loaded one: the frontend waits for it and finds itself in it
   bool localize_only = false;  ///< ... and nothing changes it
 };
 
-/// Everything that can be set and that changes results: the same file and the same `--set`s go to every process.
+/// Everything that can be set and that changes results: the same file and the same `--set`s go to every
+/// process.
 struct Settings {
   Settings() { extractor.num_features = 2000; }
 
@@ -43,12 +44,13 @@ struct SettingInfo {
   std::string help;
 };
 
-/// Sets one value. Throws InputError that names the key (and the nearest one that exists) or what the value should be.
-/// "profile=baseline" sets several at once: plain RANSAC initialisation, no mutual exclusion, no motion belief.
+/// Sets one value. Throws InputError that names the key (and the nearest one that exists) or what the value
+/// should be. "profile=baseline" sets several at once: plain RANSAC initialisation, no mutual exclusion, no
+/// motion belief.
 void ApplySetting(std::string_view key, std::string_view value, Settings* settings);
 
-/// Reads a configuration file (YAML: sections of keys) and then the overrides "key=value". Throws InputError that names
-/// file, key and cure.
+/// Reads a configuration file (YAML: sections of keys) and then the overrides "key=value". Throws InputError
+/// that names file, key and cure.
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& overrides);
 
 /// All settings with their values.

@@ -5,7 +5,8 @@
 
 namespace dmslam {
 
-InitializerReport BaselineInitializer::BeginWith(const InitializerFrame& frame, WaitReason wait, const char* reason) {
+InitializerReport BaselineInitializer::BeginWith(const InitializerFrame& frame, WaitReason wait,
+                                                 const char* reason) {
   reference_.reset();
   if (static_cast<int>(frame.features->size()) >= options_.min_features) reference_ = frame;
   InitializerReport report;
@@ -19,7 +20,8 @@ InitializerReport BaselineInitializer::AddFrame(const InitializerFrame& frame) {
   if (static_cast<int>(frame.features->size()) < options_.min_features) {
     return BeginWith(frame, WaitReason::kTooFewFeatures, "too few features");
   }
-  const std::vector<Match> matches = MatchFrames(*reference_->features, *frame.features, options_.matching, &matcher_);
+  const std::vector<Match> matches =
+      MatchFrames(*reference_->features, *frame.features, options_.matching, &matcher_);
   if (static_cast<int>(matches.size()) < options_.min_matches) {
     return BeginWith(frame, WaitReason::kTooFewMatches, "too few matches with the reference frame");
   }

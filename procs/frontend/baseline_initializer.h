@@ -10,12 +10,13 @@ namespace dmslam {
 struct BaselineInitializerOptions {
   MatchingOptions matching;
   HomographyOrFundamentalOptions model;
-  int min_features = 100;   ///< per frame
-  int min_matches = 100;    ///< with the reference frame; fewer: this frame becomes the reference
+  int min_features = 100;  ///< per frame
+  int min_matches = 100;   ///< with the reference frame; fewer: this frame becomes the reference
 };
 
-/// The initialiser that `profile=baseline` stands for: two frames, plain RANSAC, homography or fundamental matrix by
-/// score (Mur-Artal, Montiel, Tardos, "ORB-SLAM", TRO 2015, Sec. IV). Knows nothing of motion in the scene.
+/// The initialiser that `profile=baseline` stands for: two frames, plain RANSAC, homography or fundamental
+/// matrix by score (Mur-Artal, Montiel, Tardos, "ORB-SLAM", TRO 2015, Sec. IV). Knows nothing of motion in
+/// the scene.
 class BaselineInitializer {
  public:
   BaselineInitializer(const BaselineInitializerOptions& options, const Camera& camera, uint64_t seed)

@@ -174,8 +174,8 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   }
 }
 
-/// The frames since the one that made the map, in their order: in real time some came while it was searched for
-/// and adjusted.
+/// The frames since the one that made the map, in their order: in real time some came while it was searched
+/// for and adjusted.
 void FrontendCore::CatchUp(uint32_t since, std::vector<FrontendEvent>* events) {
   const auto first = std::find_if(unplaced_.begin(), unplaced_.end(),
                                   [since](const TrackedFrame& frame) { return frame.index >= since; });

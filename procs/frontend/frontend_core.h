@@ -148,7 +148,7 @@ class FrontendCore {
   TrackingState state_ = TrackingState::kNotInitialized;
   MapId map_id_ = 1;
   TrackedFrame frame_;
-  TrackedFrame last_;             ///< the frame tracked last
+  TrackedFrame last_;  ///< the frame tracked last
   Placed last_placed_;
   /// A pose after the frame tracked last that too few landmarks support to be told: it only leads the search
   /// in the frames that follow.

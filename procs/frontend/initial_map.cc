@@ -46,8 +46,8 @@ InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, MapId map
   proposal.second.reference = proposal.first.id;
   proposal.second.T_cam_reference = first_map.T_1_0;
   for (const FirstMap::Point& point : first_map.points) {
-    proposal.points.push_back({static_cast<uint16_t>(point.feature0), static_cast<uint16_t>(point.feature1),
-                               point.p_world});
+    proposal.points.push_back(
+        {static_cast<uint16_t>(point.feature0), static_cast<uint16_t>(point.feature1), point.p_world});
   }
   return proposal;
 }

@@ -5,7 +5,8 @@ int main(int argc, char** argv) {
   dmslam::ProcessMain process("frontend", "Tracks the camera and proposes keyframes.");
   dmslam::FrontendNode::Extras extras;
   std::string vocabulary;
-  process.app().add_option("--vocabulary", vocabulary, "bag-of-words vocabulary; default: the one that ships");
+  process.app().add_option("--vocabulary", vocabulary,
+                           "bag-of-words vocabulary; default: the one that ships");
   process.app().add_option("--picture-dir", extras.picture_dir, "folder for pictures of the features");
   process.app().add_option("--picture-every", extras.picture_every, "draw every so manieth frame");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {

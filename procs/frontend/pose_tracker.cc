@@ -22,7 +22,8 @@ constexpr double kWiderAfterRelocalization = 2.0;  // times the radius of the se
 constexpr double kWiderAroundPrediction = 4.0;
 
 size_t CellOf(const Eigen::Vector2d& uv_px, const Camera& camera) {
-  const int column = std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
+  const int column =
+      std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
   const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
   return static_cast<size_t>(row * kCellColumns + column);
 }
@@ -66,10 +67,11 @@ double PoseTracker::Trust(const Landmark& landmark, int64_t stamp_ns) const {
   return options_.young_trust + (1.0 - options_.young_trust) * grown;
 }
 
-// ---- First guess ---------------------------------------------------------------------------------------------------
+// ---- First guess
+// ---------------------------------------------------------------------------------------------------
 
-void PoseTracker::MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double radius_px,
-                                    const TrackedFrame& frame) {
+void PoseTracker::MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world,
+                                    double radius_px, const TrackedFrame& frame) {
   matches_.clear();
   match_turns_.clear();
   taken_.assign(frame.features->size(), 0);
@@ -82,14 +84,15 @@ void PoseTracker::MatchByProjection(const Map& map, const TrackedFrame& last, co
     const std::optional<Eigen::Vector2d> uv = camera_.Project(T_cam_world * landmark.p_world);
     if (!uv) continue;
     const Keypoint& seen = last.features->set.keypoints[i];
-    const FeatureHit hit = FindFeature(*frame.features, *uv, radius_px * pyramid_.Scale(seen.octave), seen.octave - 1,
-                                       seen.octave + 1, last.features->set.descriptors[i], taken_);
+    const FeatureHit hit =
+        FindFeature(*frame.features, *uv, radius_px * pyramid_.Scale(seen.octave), seen.octave - 1,
+                    seen.octave + 1, last.features->set.descriptors[i], taken_);
     if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
     const size_t feature = static_cast<size_t>(hit.feature);
     taken_[feature] = 1;
     matches_.push_back({*id, static_cast<uint16_t>(feature)});
-    match_turns_.push_back(static_cast<float>(
-        static_cast<uint8_t>(frame.features->set.keypoints[feature].angle - seen.angle)));
+    match_turns_.push_back(
+        static_cast<float>(static_cast<uint8_t>(frame.features->set.keypoints[feature].angle - seen.angle)));
   }
 }
 
@@ -108,7 +111,8 @@ void PoseTracker::KeepConsistentTurns(const TrackedFrame&, const TrackedFrame&) 
   matches_.resize(kept);
 }
 
-bool PoseTracker::TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, TrackedFrame* frame) {
+bool PoseTracker::TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
+                                 TrackedFrame* frame) {
   double radius_px = options_.motion_radius_px;
   for (int attempt = 0; attempt < 2; ++attempt, radius_px *= 2) {
     MatchByProjection(map, last, T_predicted, radius_px, *frame);
@@ -122,7 +126,8 @@ bool PoseTracker::TrackFromFrame(const Map& map, const TrackedFrame& last, const
   return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
 }
 
-bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed, TrackedFrame* frame) {
+bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed,
+                                    TrackedFrame* frame) {
   const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
   if (keyframe == nullptr) return false;
   std::vector<Eigen::Vector3d> points;
@@ -131,12 +136,14 @@ bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint
   matches_.clear();
   taken_.assign(frame->features->size(), 0);
   for (size_t i = 0; i < keyframe->landmarks.size(); ++i) {
-    const Landmark* landmark = keyframe->landmarks[i].valid() ? map.FindLandmark(keyframe->landmarks[i]) : nullptr;
+    const Landmark* landmark =
+        keyframe->landmarks[i].valid() ? map.FindLandmark(keyframe->landmarks[i]) : nullptr;
     if (landmark == nullptr || !HasVote(*landmark)) continue;
-    const FeatureHit hit =
-        FindFeature(*frame->features, {camera_.width_px / 2.0, camera_.height_px / 2.0}, 2.0 * camera_.width_px, 0,
-                    pyramid_.levels, keyframe->features->set.descriptors[i], taken_);
-    if (hit.feature < 0 || hit.distance > kMaxKeyframeDistance || hit.distance > 0.75 * hit.second_distance) continue;
+    const FeatureHit hit = FindFeature(*frame->features, {camera_.width_px / 2.0, camera_.height_px / 2.0},
+                                       2.0 * camera_.width_px, 0, pyramid_.levels,
+                                       keyframe->features->set.descriptors[i], taken_);
+    if (hit.feature < 0 || hit.distance > kMaxKeyframeDistance || hit.distance > 0.75 * hit.second_distance)
+      continue;
     const size_t feature = static_cast<size_t>(hit.feature);
     taken_[feature] = 1;
     matches_.push_back({landmark->id, static_cast<uint16_t>(feature)});
@@ -155,16 +162,18 @@ bool PoseTracker::TrackFromKeyframe(const Map& map, KeyframeId keyframe_id, uint
   return OptimizeMatches(map, frame) >= options_.min_motion_inliers;
 }
 
-/// The landmarks that stood still for longest decide first; the others only refine what agrees with them, and never weigh
-/// more. People who stood still while they were mapped are younger than the room around them, so they cannot carry the
-/// camera away when they walk on, however much of the image they fill.
+/// The landmarks that stood still for longest decide first; the others only refine what agrees with them, and
+/// never weigh more. People who stood still while they were mapped are younger than the room around them, so
+/// they cannot carry the camera away when they walk on, however much of the image they fill.
 void PoseTracker::OptimizeElders(const TrackedFrame& frame, const PoseOptimizationOptions& options) {
   std::vector<double>& sorted = sorted_ages_s_;
   sorted = ages_s_;
-  const size_t wanted = std::max(static_cast<size_t>(options_.min_elders),
-                                 static_cast<size_t>(options_.elder_share * static_cast<double>(sorted.size())));
+  const size_t wanted =
+      std::max(static_cast<size_t>(options_.min_elders),
+               static_cast<size_t>(options_.elder_share * static_cast<double>(sorted.size())));
   if (sorted.size() <= wanted) return;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<ptrdiff_t>(wanted), sorted.end(), std::greater<>());
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<ptrdiff_t>(wanted), sorted.end(),
+                   std::greater<>());
   const double elder_age_s = std::min(sorted[wanted], options_.trusted_age_s);
   elders_.clear();
   for (size_t i = 0; i < matches_.size(); ++i) {
@@ -182,7 +191,8 @@ void PoseTracker::KeepWhatAgrees(const Rigid3d& T_cam_world, double elder_age_s,
   int young = 0;
   for (size_t i = 0; i < matches_.size(); ++i) {
     const PoseObservation& o = observations_[i];
-    const double chi2 = ReprojectionErrorSquared(camera_.Ideal(), T_cam_world, o.p_world, o.uv_px) * o.inv_sigma_squared;
+    const double chi2 =
+        ReprojectionErrorSquared(camera_.Ideal(), T_cam_world, o.p_world, o.uv_px) * o.inv_sigma_squared;
     if (ages_s_[i] < elder_age_s) {
       if (chi2 > options_.elder_chi2) {
         rejected_.push_back({matches_[i], chi2});
@@ -239,7 +249,8 @@ int PoseTracker::OptimizeMatches(const Map& map, TrackedFrame* frame) {
   return optimized_.num_inliers;
 }
 
-// ---- Local map -----------------------------------------------------------------------------------------------------
+// ---- Local map
+// -----------------------------------------------------------------------------------------------------
 
 /// The keyframes that see most of the frame's landmarks, most first.
 void PoseTracker::RankByVotes(const Map& map, const TrackedFrame& frame) {
@@ -295,7 +306,8 @@ void PoseTracker::CollectLocalMap(const Map& map, const TrackedFrame& frame) {
     }
   }
   std::sort(local_landmarks_.begin(), local_landmarks_.end());
-  local_landmarks_.erase(std::unique(local_landmarks_.begin(), local_landmarks_.end()), local_landmarks_.end());
+  local_landmarks_.erase(std::unique(local_landmarks_.begin(), local_landmarks_.end()),
+                         local_landmarks_.end());
 }
 
 void PoseTracker::SearchLocalLandmarks(const Map& map, double wider, TrackedFrame* frame) {
@@ -320,15 +332,16 @@ void PoseTracker::SearchLocalLandmarks(const Map& map, double wider, TrackedFram
     const FeatureHit hit = FindFeature(*frame->features, view->uv_px, radius * pyramid_.Scale(view->octave),
                                        view->octave - 1, view->octave, landmark.descriptor, taken_);
     if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
-    if (hit.octave == hit.second_octave && hit.distance > options_.local_ratio * hit.second_distance) continue;
+    if (hit.octave == hit.second_octave && hit.distance > options_.local_ratio * hit.second_distance)
+      continue;
     frame->landmarks[static_cast<size_t>(hit.feature)] = id;
     taken_[static_cast<size_t>(hit.feature)] = 1;
   }
 }
 
-/// What is found where little else of the map is found is mostly found by chance, on whoever hides the map: within the
-/// search radius, and so in agreement with any pose, right or wrong. It must look like its landmark more closely than a
-/// match among many others.
+/// What is found where little else of the map is found is mostly found by chance, on whoever hides the map:
+/// within the search radius, and so in agreement with any pose, right or wrong. It must look like its
+/// landmark more closely than a match among many others.
 void PoseTracker::DropMatchesOfHiddenPlaces(const Map& map, TrackedFrame* frame) {
   std::vector<LandmarkId>& matched = known_;
   matched.clear();
@@ -403,7 +416,8 @@ void PoseTracker::Witnesses::Add(const Witness& witness) {
 }
 
 template <typename Visit>
-void PoseTracker::Witnesses::ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const {
+void PoseTracker::Witnesses::ForEachNear(const Eigen::Vector2d& uv_px, double reach_px,
+                                         const Visit& visit) const {
   for (int row = Row(uv_px.y() - reach_px); row <= Row(uv_px.y() + reach_px); ++row) {
     for (int column = Column(uv_px.x() - reach_px); column <= Column(uv_px.x() + reach_px); ++column) {
       for (const Witness& witness : cells_[Index(column, row)]) {
@@ -421,8 +435,9 @@ int PoseTracker::Witnesses::Row(double y) const {
   return std::clamp(static_cast<int>(y / cell_height_), 0, kSeenRows - 1);
 }
 
-/// Judges the landmarks that are missing by what is seen around them. What lies behind is seen: nothing hides them, they
-/// have gone. Their neighbours move: they go together. Something nearer is seen: they are hidden, and nothing is said.
+/// Judges the landmarks that are missing by what is seen around them. What lies behind is seen: nothing hides
+/// them, they have gone. Their neighbours move: they go together. Something nearer is seen: they are hidden,
+/// and nothing is said.
 void PoseTracker::JudgeMissing(const Map& map, const TrackedFrame& frame) {
   witnesses_.Clear();
   std::vector<LandmarkId>& known = known_;
@@ -443,16 +458,17 @@ void PoseTracker::JudgeMissing(const Map& map, const TrackedFrame& frame) {
   for (const auto& [id, view] : visible_) {
     if (std::binary_search(known.begin(), known.end(), id)) continue;
     int behind = 0, beside = 0, before = 0, moving_beside = 0;
-    witnesses_.ForEachNear(view.uv_px, options_.seen_through_px, [&, depth = view.depth](const Witness& witness) {
-      const bool farther = witness.depth > options_.seen_through_depth * depth;
-      const bool nearer = witness.depth * options_.seen_through_depth < depth;
-      if (witness.moves) {
-        if (!farther && !nearer) ++moving_beside;
-        if (nearer) ++before;
-        return;
-      }
-      ++(farther ? behind : nearer ? before : beside);
-    });
+    witnesses_.ForEachNear(view.uv_px, options_.seen_through_px,
+                           [&, depth = view.depth](const Witness& witness) {
+                             const bool farther = witness.depth > options_.seen_through_depth * depth;
+                             const bool nearer = witness.depth * options_.seen_through_depth < depth;
+                             if (witness.moves) {
+                               if (!farther && !nearer) ++moving_beside;
+                               if (nearer) ++before;
+                               return;
+                             }
+                             ++(farther ? behind : nearer ? before : beside);
+                           });
     const bool seen_through = behind >= options_.seen_through_min && beside == 0;
     const bool goes_with_others = moving_beside >= options_.moving_together_min && moving_beside > 2 * beside;
     if (seen_through || goes_with_others) {

@@ -10,37 +10,38 @@
 #include "dmslam/map/projection.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/optimization/pose_optimization.h"
-#include "frontend/tracked_frame.h"
 #include "frontend/frontend_options.h"
+#include "frontend/tracked_frame.h"
 
 namespace dmslam {
 
 /// What tracking one frame against the map came to.
 struct TrackingReport {
   bool ok = false;
-  const char* reason = "";   ///< why not
-  int num_static = 0;        ///< inliers
+  const char* reason = "";  ///< why not
+  int num_static = 0;       ///< inliers
   int num_moving = 0;
-  int num_unknown = 0;       ///< matched, neither inlier nor moving
-  int cells = 0;             ///< of an 8 x 6 grid that hold inliers
-  double moving_share = 0;   ///< of the cells that hold matches, those with more moving than static ones
+  int num_unknown = 0;      ///< matched, neither inlier nor moving
+  int cells = 0;            ///< of an 8 x 6 grid that hold inliers
+  double moving_share = 0;  ///< of the cells that hold matches, those with more moving than static ones
   double mean_chi2 = 0;
 };
 
-/// Finds a frame's pose in a map: by the motion model, by likeness to a keyframe, and then against the local map. Owns
-/// the buffers that this needs, the cached local map, and the frontend's own short memory of what moves. The map is
-/// given with each call and only read.
+/// Finds a frame's pose in a map: by the motion model, by likeness to a keyframe, and then against the local
+/// map. Owns the buffers that this needs, the cached local map, and the frontend's own short memory of what
+/// moves. The map is given with each call and only read.
 class PoseTracker {
  public:
   PoseTracker(const TrackingOptions& options, const Camera& camera, const Pyramid& pyramid);
 
-  /// Where the motion model expects the camera, for the frame that follows; none after a loss. `depth`: of the scene, in
-  /// map units; `frames`: since the last one that was tracked.
+  /// Where the motion model expects the camera, for the frame that follows; none after a loss. `depth`: of
+  /// the scene, in map units; `frames`: since the last one that was tracked.
   void SetMotionPrior(const std::optional<Rigid3d>& T_cam_world, double depth, double frames = 1.0);
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
-  bool TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, TrackedFrame* frame);
-  /// Matches the landmarks around the frame tracked last, many more than it saw itself, near their projections at
-  /// `T_predicted`, and optimises the pose. Returns the number of inliers.
+  bool TrackFromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
+                      TrackedFrame* frame);
+  /// Matches the landmarks around the frame tracked last, many more than it saw itself, near their
+  /// projections at `T_predicted`, and optimises the pose. Returns the number of inliers.
   int TrackFromPrediction(const Map& map, const Rigid3d& T_predicted, TrackedFrame* frame);
   /// Matches a keyframe's landmarks by descriptor alone, and finds the pose from nothing.
   bool TrackFromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, TrackedFrame* frame);
@@ -95,8 +96,8 @@ class PoseTracker {
 
   bool HasVote(const Landmark& landmark) const;
   double Trust(const Landmark& landmark, int64_t stamp_ns) const;
-  void MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double radius_px,
-                         const TrackedFrame& frame);
+  void MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world,
+                         double radius_px, const TrackedFrame& frame);
   void KeepConsistentTurns(const TrackedFrame& last, const TrackedFrame& frame);
   void OptimizeElders(const TrackedFrame& frame, const PoseOptimizationOptions& options);
   void KeepWhatAgrees(const Rigid3d& T_cam_world, double elder_age_s, int elders);
@@ -123,18 +124,18 @@ class PoseTracker {
   std::vector<float> match_turns_;
   std::vector<PoseObservation> observations_;
   std::vector<PoseObservation> elders_;
-  std::vector<double> ages_s_;              ///< of the matched landmarks
-  std::vector<Rejected> rejected_;          ///< by the optimisation done last
+  std::vector<double> ages_s_;      ///< of the matched landmarks
+  std::vector<Rejected> rejected_;  ///< by the optimisation done last
   PoseOptimizationReport optimized_;
   std::vector<uint8_t> taken_;
   std::vector<KeyframeId> local_keyframes_;
   std::vector<LandmarkId> local_landmarks_;
   std::vector<std::pair<LandmarkId, LandmarkView>> visible_;  ///< local landmarks that this frame should see
-  std::vector<LandmarkId> moved_;         ///< seen elsewhere by this frame
-  std::vector<LandmarkId> hidden_;        ///< missing, with something nearer seen in their place; sorted
-  std::vector<LandmarkId> gone_;          ///< missing: what lies behind them is seen, or their neighbours move
+  std::vector<LandmarkId> moved_;                             ///< seen elsewhere by this frame
+  std::vector<LandmarkId> hidden_;  ///< missing, with something nearer seen in their place; sorted
+  std::vector<LandmarkId> gone_;    ///< missing: what lies behind them is seen, or their neighbours move
   std::vector<double> sorted_ages_s_;
-  std::vector<KeyframeId> votes_;   ///< one for each observation of the frame's landmarks
+  std::vector<KeyframeId> votes_;  ///< one for each observation of the frame's landmarks
   std::vector<std::pair<int, KeyframeId>> ranked_;
   std::vector<KeyframeId> listed_;  ///< local_keyframes_, sorted
   std::vector<LandmarkId> known_;

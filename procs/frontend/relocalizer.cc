@@ -17,7 +17,8 @@ constexpr int kNeighboursOfLast = 4;
 
 }  // namespace
 
-Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera, const Pyramid& pyramid)
+Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera,
+                         const Pyramid& pyramid)
     : camera_(camera), pyramid_(pyramid), places_(std::move(vocabulary)) {}
 
 void Relocalizer::Clear() { places_.Clear(); }
@@ -26,9 +27,12 @@ void Relocalizer::Update(const Map& map) { places_.Update(map); }
 
 std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
                                                 const BowImage& image) const {
-  const auto of_another_map = [&](const Keyframe& keyframe) { return map_id != 0 && keyframe.map_id != map_id; };
+  const auto of_another_map = [&](const Keyframe& keyframe) {
+    return map_id != 0 && keyframe.map_id != map_id;
+  };
   std::vector<KeyframeId> ids;
-  for (const PlaceCandidate& candidate : places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
+  for (const PlaceCandidate& candidate :
+       places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
     if (ids.size() < kMaxCandidates) ids.push_back(candidate.keyframe);
   }
   const auto add = [&](KeyframeId id) {
@@ -44,8 +48,9 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, Ke
 bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                               TrackedFrame* frame) const {
   const std::vector<uint8_t> usable = StaticFeatures(map, keyframe);
-  const std::vector<BowMatch> matches = MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
-                                                     {&frame->features->set, &image.nodes, {}});
+  const std::vector<BowMatch> matches =
+      MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
+                   {&frame->features->set, &image.nodes, {}});
   if (matches.size() < kMinWordMatches) return false;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Vector2d> pixels;
@@ -68,8 +73,8 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
   return true;
 }
 
-bool Relocalizer::Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed, PoseTracker* tracker,
-                             TrackedFrame* frame) const {
+bool Relocalizer::Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed,
+                             PoseTracker* tracker, TrackedFrame* frame) const {
   if (!places_.usable()) return false;
   const BowImage image = places_.Transform(frame->features->set);
   for (const KeyframeId id : Candidates(map, map_id, last_seen, image)) {

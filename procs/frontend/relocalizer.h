@@ -5,13 +5,14 @@
 
 #include "dmslam/map/map.h"
 #include "dmslam/place_recognition/map_places.h"
-#include "frontend/tracked_frame.h"
 #include "frontend/pose_tracker.h"
+#include "frontend/tracked_frame.h"
 
 namespace dmslam {
 
-/// Finds a lost camera in the replica of the map: keyframes that look alike, matches by words, pose by RANSAC, guided
-/// search and refinement. Needs nothing but the replica, so it works when the loop closer is down.
+/// Finds a lost camera in the replica of the map: keyframes that look alike, matches by words, pose by
+/// RANSAC, guided search and refinement. Needs nothing but the replica, so it works when the loop closer is
+/// down.
 class Relocalizer {
  public:
   Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera, const Pyramid& pyramid);
@@ -25,8 +26,10 @@ class Relocalizer {
                   TrackedFrame* frame) const;
 
  private:
-  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen, const BowImage& image) const;
-  bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed, TrackedFrame* frame) const;
+  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
+                                     const BowImage& image) const;
+  bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
+                   TrackedFrame* frame) const;
 
   Camera camera_;
   Pyramid pyramid_;

@@ -22,8 +22,8 @@ struct TrackedFrame {
   int64_t stamp_ns = 0;
   std::shared_ptr<const FrameFeatures> features;
   Rigid3d T_cam_world;
-  std::vector<LandmarkId> landmarks;   ///< parallel to the features
-  std::vector<FeatureClass> classes;   ///< parallel to the features
+  std::vector<LandmarkId> landmarks;  ///< parallel to the features
+  std::vector<FeatureClass> classes;  ///< parallel to the features
 
   TrackedFrame() = default;
   TrackedFrame(uint32_t frame_index, int64_t stamp, std::shared_ptr<const FrameFeatures> seen)

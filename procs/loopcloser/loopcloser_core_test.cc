@@ -60,7 +60,8 @@ struct WorldOptions {
 /// A camera that goes around a room; landmarks of the second round are not known to be those of the first.
 class Room {
  public:
-  explicit Room(const WorldOptions& options) : options_(options), map_(TestCamera(525, 319.5, 239.5), Pyramid()) {
+  explicit Room(const WorldOptions& options)
+      : options_(options), map_(TestCamera(525, 319.5, 239.5), Pyramid()) {
     Random random(7);
     for (int i = 0; i < kPoints; ++i) {
       const double angle = random.Uniform(0, 2 * std::numbers::pi);

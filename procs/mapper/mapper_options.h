@@ -50,9 +50,10 @@ struct SeenThroughOptions {
   double together_share = 0.3;  ///< ...when so many of them are condemned
   int rounds = 4;               ///< of both tests at the end
   double stood_share = 0.5;     ///< of the unproven seen through: from here on somebody must have stood there
-  int min_proven_support = 2;  ///< then unproven ones go that fewer keyframes see beside proven ones of the same depth
-  int rounds_unsupported = 2;  ///< and after them so many times their neighbours
-  int max_witnesses = 60;       ///< while mapping
+  int min_proven_support =
+      2;  ///< then unproven ones go that fewer keyframes see beside proven ones of the same depth
+  int rounds_unsupported = 2;      ///< and after them so many times their neighbours
+  int max_witnesses = 60;          ///< while mapping
   double witness_angle_rad = 1.0;  ///< between the viewing directions of keyframe and witness
 };
 

@@ -175,7 +175,8 @@ int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects*
   return static_cast<int>(found.size());
 }
 
-/// Where somebody stood, an unproven landmark needs proven ones at its place, and its neighbours share its fate.
+/// Where somebody stood, an unproven landmark needs proven ones at its place, and its neighbours share its
+/// fate.
 void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
   for (auto& [id, suspect] : *suspects) {
     if (suspect.proven_support < options.min_proven_support) suspect.condemned = true;

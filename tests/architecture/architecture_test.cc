@@ -1,4 +1,5 @@
-// The direction between rooms, read from the includes: who may use whom, and where third-party libraries may appear.
+// The direction between rooms, read from the includes: who may use whom, and where third-party libraries may
+// appear.
 
 #include <gtest/gtest.h>
 
@@ -26,8 +27,8 @@ const std::map<std::string, Names>& AllowedRooms() {
     a["camera"] = a["robust"] = {"util", "geometry"};
     a["features"] = {"util", "geometry", "camera", "robust"};
     a["motion_segmentation"] = a["map"] = {"util", "geometry", "camera", "robust", "features"};
-    a["optimization"] = a["place_recognition"] = {"util",     "geometry",           "camera", "robust",
-                                                  "features", "motion_segmentation", "map"};
+    a["optimization"] = a["place_recognition"] = {
+        "util", "geometry", "camera", "robust", "features", "motion_segmentation", "map"};
     a["dataset"] = {"util", "geometry", "camera"};
     a["synthetic"] = a["evaluation"] = {"util", "geometry", "camera", "dataset"};
     a["messaging"] = {"util"};
@@ -50,7 +51,8 @@ fs::path SourceDir() {
 }
 
 bool IsSource(const fs::path& path) {
-  return path.extension() == ".h" || path.extension() == ".cc" || path.extension() == ".cpp" || path.extension() == ".hpp";
+  return path.extension() == ".h" || path.extension() == ".cc" || path.extension() == ".cpp" ||
+         path.extension() == ".hpp";
 }
 
 std::vector<Include> ReadIncludes(const std::string& text, const std::string& file) {
@@ -112,7 +114,8 @@ std::string Misplaced(const Include& include) {
     return "Ceres belongs to optimization";
   }
   if (StartsWith(target, "lcm/") || EndsWith(target, "_t.hpp")) {
-    return room == "messaging" || room == "wire" ? "" : "LCM and its generated types belong to messaging and wire";
+    return room == "messaging" || room == "wire" ? ""
+                                                 : "LCM and its generated types belong to messaging and wire";
   }
   if (StartsWith(target, "opencv2/")) {
     const bool drawing = FileName(include.file).find("plot") != std::string::npos ||
@@ -139,7 +142,8 @@ std::string Neighbour(const Include& include) {
   static const std::regex place(R"(^procs/([a-z_]+)/)");
   static const std::regex used(R"(^([a-z_]+)/[a-z_0-9]+\.h$)");
   std::smatch from, to;
-  if (!std::regex_search(include.file, from, place) || !std::regex_search(include.target, to, used)) return "";
+  if (!std::regex_search(include.file, from, place) || !std::regex_search(include.target, to, used))
+    return "";
   static const Names processes = {"player", "frontend", "mapper", "loopcloser", "collector", "viewer"};
   if (processes.count(to[1]) == 0 || to[1] == from[1]) return "";
   if (from[1] == "common") return "";  // the settings hold the options of all

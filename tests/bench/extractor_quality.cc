@@ -27,7 +27,8 @@ double Median(std::vector<double> values) {
 }
 
 /// Both extractors in turn on every frame, so that whatever else the machine does meets both.
-void MeasureTime(const std::vector<testing::TrueFrame>& frames, const OrbExtractorOptions& options, int rounds) {
+void MeasureTime(const std::vector<testing::TrueFrame>& frames, const OrbExtractorOptions& options,
+                 int rounds) {
   OrbExtractor extractor(options);
   const auto orb = cv::ORB::create(options.num_features);
   FeatureSet set;
@@ -50,17 +51,18 @@ void MeasureTime(const std::vector<testing::TrueFrame>& frames, const OrbExtract
     }
   }
   const double count = static_cast<double>(ours.size());
-  std::printf("time   ours %.3f ms (%.0f features)  cv::ORB %.3f ms (%.0f features)  ratio of medians %.3f\n", Median(ours),
-              static_cast<double>(our_count) / count, Median(theirs), static_cast<double>(their_count) / count,
-              Median(ours) / Median(theirs));
+  std::printf("time   ours %.3f ms (%.0f features)  cv::ORB %.3f ms (%.0f features)  ratio of medians %.3f\n",
+              Median(ours), static_cast<double>(our_count) / count, Median(theirs),
+              static_cast<double>(their_count) / count, Median(ours) / Median(theirs));
 }
 
 void Print(const char* name, int gap, const testing::Quality& q) {
-  std::printf("gap %2d %-8s features %6.1f  repeatability %.3f  matches %6.1f  inliers %6.1f (%.3f)  median epipolar "
-              "error %.3f px  coverage %.3f\n",
-              gap, name, static_cast<double>(q.features) / q.pairs, q.Repeatability(),
-              static_cast<double>(q.matches) / q.pairs, q.MeanInliers(), q.Precision(), q.MedianErrorPx(),
-              q.MeanCoverage());
+  std::printf(
+      "gap %2d %-8s features %6.1f  repeatability %.3f  matches %6.1f  inliers %6.1f (%.3f)  median epipolar "
+      "error %.3f px  coverage %.3f\n",
+      gap, name, static_cast<double>(q.features) / q.pairs, q.Repeatability(),
+      static_cast<double>(q.matches) / q.pairs, q.MeanInliers(), q.Precision(), q.MedianErrorPx(),
+      q.MeanCoverage());
 }
 
 void MeasureQuality(const std::string& folder, const OrbExtractorOptions& options, int gap, int step) {
@@ -73,7 +75,8 @@ void MeasureQuality(const std::string& folder, const OrbExtractorOptions& option
     FeatureSet set0, set1;
     extractor.Extract(ViewOf(frames[0].grey), &set0);
     extractor.Extract(ViewOf(frames[1].grey), &set1);
-    testing::AddPair(testing::FromSet(set0, options.pyramid), testing::FromSet(set1, options.pyramid), geometry, &ours);
+    testing::AddPair(testing::FromSet(set0, options.pyramid), testing::FromSet(set1, options.pyramid),
+                     geometry, &ours);
     testing::AddPair(testing::FromCvOrb(frames[0].grey, options.num_features),
                      testing::FromCvOrb(frames[1].grey, options.num_features), geometry, &theirs);
   }
@@ -101,7 +104,8 @@ int Main(int argc, char** argv) {
   if (portable) options.simd_path = SimdPath::kPortable;
   cv::setNumThreads(1);
   const auto folder = testing::SequenceFolder(sequence);
-  if (!folder) throw InputError("sequence " + sequence + " not found; set DMSLAM_DATA to the folder that holds it");
+  if (!folder)
+    throw InputError("sequence " + sequence + " not found; set DMSLAM_DATA to the folder that holds it");
   if (rounds > 0) MeasureTime(testing::LoadFrames(*folder, 0, 25, 40), options, rounds);
   for (const int gap : {5, 10, 20}) {
     if (pair_step > 0) MeasureQuality(*folder, options, gap, pair_step);

@@ -1,5 +1,5 @@
-// The extractor and its parts beside cv::ORB, and the matcher, on real frames where they are at hand, else on a made-up
-// picture. Every benchmark works through the same frames, one per iteration.
+// The extractor and its parts beside cv::ORB, and the matcher, on real frames where they are at hand, else on
+// a made-up picture. Every benchmark works through the same frames, one per iteration.
 #include <benchmark/benchmark.h>
 
 #include <opencv2/core.hpp>
@@ -23,7 +23,8 @@ const std::vector<cv::Mat>& Frames() {
     std::vector<cv::Mat> images;
     if (const auto folder = testing::SequenceFolder("kitchen")) {
       for (int first = 0; first < 1000; first += 50) {
-        for (const auto& frame : testing::LoadFrames(*folder, first, kFrameGap, 2)) images.push_back(frame.grey);
+        for (const auto& frame : testing::LoadFrames(*folder, first, kFrameGap, 2))
+          images.push_back(frame.grey);
       }
     }
     if (images.empty()) images.assign(2, MatOf(testing::RandomRectangles(640, 480, 600, 1).View()));
@@ -98,8 +99,8 @@ void BM_PartCorners(benchmark::State& state) {
   for (auto _ : state) {
     const ImagePyramid& pyramid = pyramids[iteration++ % pyramids.size()];
     for (size_t i = 0; i < pyramid.size(); ++i) {
-      detector.Detect(pyramid.level(i).image, static_cast<int>(state.range(0)), 16, KernelsOn(SimdPath::kBest),
-                      &corners);
+      detector.Detect(pyramid.level(i).image, static_cast<int>(state.range(0)), 16,
+                      KernelsOn(SimdPath::kBest), &corners);
     }
   }
 }

@@ -1,5 +1,5 @@
-// Runs one hot path a fixed number of times on made-up data, for counting instructions: scripts/bench.sh does that with
-// callgrind. The same build counts the same, whatever else the machine does.
+// Runs one hot path a fixed number of times on made-up data, for counting instructions: scripts/bench.sh does
+// that with callgrind. The same build counts the same, whatever else the machine does.
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -41,8 +41,8 @@ void Match(int times) {
   FeatureMatcher matcher;
   std::vector<FeatureMatch> matches;
   for (int i = 0; i < times; ++i) {
-    matcher.MatchWindow({sets[0].keypoints, sets[0].descriptors, uv_px[0]}, {sets[1].keypoints, sets[1].descriptors, uv_px[1]},
-                        grid, {}, &matches);
+    matcher.MatchWindow({sets[0].keypoints, sets[0].descriptors, uv_px[0]},
+                        {sets[1].keypoints, sets[1].descriptors, uv_px[1]}, grid, {}, &matches);
   }
 }
 

@@ -1,6 +1,6 @@
 // The three selectors at 2000 iterations in total on the same matches (the paper's Table 1), beside OpenCV's
-// findFundamentalMat with RANSAC. `iterations` is what each really made. The matches are of two frames of kitchen_walk2
-// below $DMSLAM_DATA, or made up where that is not there (the label says which).
+// findFundamentalMat with RANSAC. `iterations` is what each really made. The matches are of two frames of
+// kitchen_walk2 below $DMSLAM_DATA, or made up where that is not there (the label says which).
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -43,8 +43,8 @@ BenchPair MadeUp() {
   return {std::move(pair.matches), pair.camera, "made up"};
 }
 
-/// 1000 matches of two real frames, an even choice; nothing where the data is not there. Matched without window, ratio and
-/// orientation: the more are wrong, the later findFundamentalMat stops.
+/// 1000 matches of two real frames, an even choice; nothing where the data is not there. Matched without
+/// window, ratio and orientation: the more are wrong, the later findFundamentalMat stops.
 std::optional<BenchPair> FromRecording() {
   const char* const data = std::getenv("DMSLAM_DATA");
   const std::string folder = std::string(data ? data : "../shared/data") + "/kitchen_walk2";
@@ -133,8 +133,8 @@ void BM_Dlrsac(benchmark::State& state, ModelKind kind) {
 /// As the system runs it: stop by Eq. 4.
 void BM_DlrsacDefault(benchmark::State& state) { Run(state, Dlrsac(DlrsacOptions())); }
 
-/// How many samples of seven findFundamentalMat draws at this confidence, going by the inliers it found: it stops by the
-/// same formula (paper Eq. 4), whatever confidence is asked for.
+/// How many samples of seven findFundamentalMat draws at this confidence, going by the inliers it found: it
+/// stops by the same formula (paper Eq. 4), whatever confidence is asked for.
 int IterationsOfOpenCv(const cv::Mat& mask, double confidence) {
   const double share = cv::countNonZero(mask) / static_cast<double>(mask.total());
   const double needed = std::log(1.0 - confidence) / std::log(1.0 - std::pow(share, 7));

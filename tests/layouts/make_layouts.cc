@@ -1,5 +1,6 @@
-// The same frames in all layouts that are read: make_layouts SEQUENCE OUT FRAMES writes the first frames of a TUM folder,
-// in grey and without loss, as OUT/tum, OUT/euroc, OUT/numbered and OUT/video.avi, 30 a second from time zero.
+// The same frames in all layouts that are read: make_layouts SEQUENCE OUT FRAMES writes the first frames of a
+// TUM folder, in grey and without loss, as OUT/tum, OUT/euroc, OUT/numbered and OUT/video.avi, 30 a second
+// from time zero.
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
@@ -33,7 +34,8 @@ cv::Mat ToBgr(const dmslam::GrayImage& gray) {
 }
 
 void MakeLayouts(const std::string& sequence, const fs::path& out, int frames) {
-  for (const char* folder : {"tum/rgb", "euroc/mav0/cam0/data", "numbered"}) fs::create_directories(out / folder);
+  for (const char* folder : {"tum/rgb", "euroc/mav0/cam0/data", "numbered"})
+    fs::create_directories(out / folder);
   std::ofstream tum(out / "tum/rgb.txt"), euroc(out / "euroc/mav0/cam0/data.csv");
   euroc << "#timestamp [ns],filename\n";
   dmslam::TumSequence source(sequence);
@@ -51,8 +53,8 @@ void MakeLayouts(const std::string& sequence, const fs::path& out, int frames) {
     dmslam::WriteFileBytes((out / "euroc/mav0/cam0/data" / (stamp + ".png")).string(), png);
     dmslam::WriteFileBytes((out / "numbered" / ("frame" + std::to_string(i) + ".png")).string(), png);
     if (i == 0) {
-      video.open((out / "video.avi").string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('F', 'F', 'V', '1'), kFps,
-                 {gray.width, gray.height});
+      video.open((out / "video.avi").string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('F', 'F', 'V', '1'),
+                 kFps, {gray.width, gray.height});
       if (!video.isOpened()) throw std::runtime_error("OpenCV writes no FFV1 video here");
     }
     video.write(ToBgr(gray));

@@ -30,7 +30,8 @@ struct Arguments {
 
 void Declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", dmslam::kVersion);
-  app.add_option("--sequence,--video", a.sequence, "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.add_option("--sequence,--video", a.sequence,
+                 "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
   app.add_option("--fps", a.fps,
                  "frames per second of numbered images and of videos that do not state it; default: as the "
                  "camera file says")
@@ -50,7 +51,8 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--seed", a.seed)->capture_default_str();
   app.add_option("--start", a.start, "first frame");
   app.add_option("--frames", a.frames, "at most so many frames");
-  app.add_option("--black-out", a.black_outs, "FROM,SECONDS: black frames from frame FROM on; may be repeated");
+  app.add_option("--black-out", a.black_outs,
+                 "FROM,SECONDS: black frames from frame FROM on; may be repeated");
   app.add_option("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
   app.add_option("--pictures", a.pictures, "draw every so manieth frame");
   app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
@@ -99,7 +101,8 @@ int Run(const Arguments& a) {
   }
   options.player.start = a.start;
   options.player.frames = a.frames;
-  for (const std::string& text : a.black_outs) options.player.black_outs.push_back(dmslam::ParseBlackOut(text));
+  for (const std::string& text : a.black_outs)
+    options.player.black_outs.push_back(dmslam::ParseBlackOut(text));
   for (const std::string& text : a.jumps) options.player.jumps.push_back(dmslam::ParseJump(text));
   options.collector.out_dir = a.out;
   options.collector.ground_truth = source ? source->GroundTruthPath().value_or("") : "";

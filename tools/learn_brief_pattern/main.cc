@@ -1,4 +1,5 @@
-// Learns the comparisons of the descriptor from photographs and prints them as the table that the extractor includes.
+// Learns the comparisons of the descriptor from photographs and prints them as the table that the extractor
+// includes.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -21,9 +22,11 @@ namespace dmslam {
 namespace {
 
 std::vector<std::string> ImagesIn(const std::string& folder) {
-  if (!std::filesystem::is_directory(folder)) throw InputError(folder + ": no such folder; give one with photographs");
+  if (!std::filesystem::is_directory(folder))
+    throw InputError(folder + ": no such folder; give one with photographs");
   std::vector<std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path().string());
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    files.push_back(entry.path().string());
   std::sort(files.begin(), files.end());
   return files;
 }
@@ -80,7 +83,8 @@ void AddPairs(const cv::Mat& image, Random* random, OrbExtractor* extractor, std
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app{"Learns the extractor's comparisons from photographs; prints the table that brief_pattern.cc includes"};
+  CLI::App app{
+      "Learns the extractor's comparisons from photographs; prints the table that brief_pattern.cc includes"};
   app.set_version_flag("--version", kVersion);
   std::string folder;
   int num_images = 80;
@@ -89,8 +93,10 @@ int Main(int argc, char** argv) {
   extractor_options.num_features = 400;
   extractor_options.pyramid.levels = 5;
   app.add_option("folder", folder, "folder of photographs")->required();
-  app.add_option("--images", num_images, "how many of them, evenly spread over the folder")->check(CLI::PositiveNumber);
-  app.add_option("--candidates", options.num_candidates, "random tests to choose from")->check(CLI::Range(512, 100000));
+  app.add_option("--images", num_images, "how many of them, evenly spread over the folder")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--candidates", options.num_candidates, "random tests to choose from")
+      ->check(CLI::Range(512, 100000));
   app.add_option("--sigma", options.sigma_px, "spread of their points [px]")->check(CLI::Range(1.0, 50.0));
   app.add_option("--seed", options.seed, "seed");
   CLI11_PARSE(app, argc, argv);

@@ -46,7 +46,8 @@ BriefTest RandomTest(double sigma_px, Random* random) {
 }
 
 Candidate Evaluate(const BriefTest& test, const std::vector<PatchPair>& pairs) {
-  // Pairs stand in the order of their images, so a pair a few places on is another corner of the same photograph mostly.
+  // Pairs stand in the order of their images, so a pair a few places on is another corner of the same
+  // photograph mostly.
   constexpr size_t kOther = 29;
   const SteeredPattern steered(std::span(&test, 1));
   const auto bit_of = [&](const KeypointPatch& patch) {
@@ -95,7 +96,9 @@ struct Moments {
   double sum, sum_of_squares, count;
 
   Moments(const std::vector<uint16_t>& distances)
-      : sum(Sum(distances)), sum_of_squares(SumOfSquares(distances)), count(static_cast<double>(distances.size())) {}
+      : sum(Sum(distances)),
+        sum_of_squares(SumOfSquares(distances)),
+        count(static_cast<double>(distances.size())) {}
   double MeanWith(double test_mean) const { return sum / count + test_mean; }
   double VarianceWith(double test_mean, double overlap) const {
     const double mean = MeanWith(test_mean);
@@ -103,8 +106,8 @@ struct Moments {
   }
 };
 
-/// The candidate that tells same from other corners best together with those chosen before: the largest difference of the
-/// mean distances in units of their spread.
+/// The candidate that tells same from other corners best together with those chosen before: the largest
+/// difference of the mean distances in units of their spread.
 size_t BestAddition(const std::vector<Candidate>& candidates, const Distances& distances) {
   const Moments same(distances.same_corner), other(distances.other_corners);
   size_t best = 0;
@@ -127,12 +130,14 @@ size_t BestAddition(const std::vector<Candidate>& candidates, const Distances& d
 }
 
 void Add(const std::vector<uint16_t>& differ, std::vector<uint16_t>* distances) {
-  for (size_t i = 0; i < differ.size(); ++i) (*distances)[i] = static_cast<uint16_t>((*distances)[i] + differ[i]);
+  for (size_t i = 0; i < differ.size(); ++i)
+    (*distances)[i] = static_cast<uint16_t>((*distances)[i] + differ[i]);
 }
 
 }  // namespace
 
-std::vector<KeypointPatch> CutPatches(const GrayView& image, const FeatureSet& features, const Pyramid& pyramid) {
+std::vector<KeypointPatch> CutPatches(const GrayView& image, const FeatureSet& features,
+                                      const Pyramid& pyramid) {
   const ImageKernels& kernels = KernelsOn(SimdPath::kBest);
   ImagePyramid levels;
   levels.SetUp(image.width, image.height, pyramid, 32);
@@ -150,14 +155,16 @@ std::vector<KeypointPatch> CutPatches(const GrayView& image, const FeatureSet& f
     const long x = std::lround((keypoint.x_px() + 0.5) / level.scale_x - 0.5);
     const long y = std::lround((keypoint.y_px() + 0.5) / level.scale_y - 0.5);
     for (long row = 0; row < 31; ++row) {
-      std::memcpy(patches[i].pixels + 32 * row, smooth[keypoint.octave].row(static_cast<int>(y + row - 15)) + x - 15, 32);
+      std::memcpy(patches[i].pixels + 32 * row,
+                  smooth[keypoint.octave].row(static_cast<int>(y + row - 15)) + x - 15, 32);
     }
     patches[i].angle = keypoint.angle;
   }
   return patches;
 }
 
-std::vector<BriefTest> LearnPattern(const std::vector<PatchPair>& pairs, const PatternLearnerOptions& options) {
+std::vector<BriefTest> LearnPattern(const std::vector<PatchPair>& pairs,
+                                    const PatternLearnerOptions& options) {
   if (pairs.size() < 1000) throw InputError("too few corners to learn from: give more or larger images");
   Random random(DeriveSeed(options.seed, 0, "brief pattern"));
   std::vector<Candidate> candidates;

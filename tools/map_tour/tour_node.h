@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "common/stream_node.h"
 #include "common/map_snapshots.h"
+#include "common/stream_node.h"
 #include "tour_map.h"
 
 namespace dmslam {

@@ -18,7 +18,8 @@ int main(int argc, char** argv) {
   if (out.empty()) {
     std::fputs(page.c_str(), stdout);
   } else if (!(std::ofstream(out) << page).flush()) {
-    std::fprintf(stderr, "dmslam-settings: %s cannot be written; is its folder there, and writable?\n", out.c_str());
+    std::fprintf(stderr, "dmslam-settings: %s cannot be written; is its folder there, and writable?\n",
+                 out.c_str());
     return 1;
   }
   return 0;

@@ -8,12 +8,16 @@ namespace {
 constexpr const char* kHead =
     "# Configuration\n"
     "\n"
-    "Written by `dmslam-settings --out docs/configuration.md`; change `procs/common/settings.cc` instead of this page.\n"
+    "Written by `dmslam-settings --out docs/configuration.md`; change `procs/common/settings.cc` instead of "
+    "this page.\n"
     "\n"
-    "A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with `motion_belief: off`\n"
-    "below it) or from the command line (`--set tracking.motion_belief=off`, which goes before the file). The same\n"
+    "A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with "
+    "`motion_belief: off`\n"
+    "below it) or from the command line (`--set tracking.motion_belief=off`, which goes before the file). "
+    "The same\n"
     "settings go to every process; a process whose settings differ from the session's is told so by name.\n"
-    "`profile=baseline` is the same system with a plain RANSAC two-view start, without mutual exclusion of new\n"
+    "`profile=baseline` is the same system with a plain RANSAC two-view start, without mutual exclusion of "
+    "new\n"
     "landmarks and without motion belief.\n";
 
 std::string SectionOf(const std::string& key) {

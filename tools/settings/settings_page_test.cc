@@ -18,7 +18,8 @@ TEST(SettingsPageTest, PageIsNotStale) {
   std::ifstream file(path);
   ASSERT_TRUE(file.good()) << path;
   const std::string page(std::istreambuf_iterator<char>(file), {});
-  EXPECT_TRUE(page == SettingsPage()) << "write it anew: build/release/bin/dmslam-settings --out docs/configuration.md";
+  EXPECT_TRUE(page == SettingsPage())
+      << "write it anew: build/release/bin/dmslam-settings --out docs/configuration.md";
 }
 
 TEST(SettingsPageTest, EverySettingIsExplainedAndCanBeSetToItsDefault) {

@@ -7,7 +7,8 @@
 namespace dmslam {
 namespace {
 
-const cv::Scalar kGreen(0, 210, 0), kYellow(255, 220, 0), kGrey(120, 120, 120), kWhite(255, 255, 255), kBlack(0, 0, 0);
+const cv::Scalar kGreen(0, 210, 0), kYellow(255, 220, 0), kGrey(120, 120, 120), kWhite(255, 255, 255),
+    kBlack(0, 0, 0);
 constexpr int kMatrixPx = 480;
 constexpr int kTitlePx = 24;
 
@@ -17,12 +18,14 @@ cv::Mat AsMat(const ColorImage& image) {
 
 cv::Point Pixel(const Eigen::Vector2d& uv) { return {cvRound(uv.x()), cvRound(uv.y())}; }
 
-void Text(cv::Mat& canvas, const std::string& text, cv::Point at, const cv::Scalar& color, double size = 0.4) {
+void Text(cv::Mat& canvas, const std::string& text, cv::Point at, const cv::Scalar& color,
+          double size = 0.4) {
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, kBlack, 3, cv::LINE_AA);
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, color, 1, cv::LINE_AA);
 }
 
-void DrawFeatures(cv::Mat& canvas, std::span<const Match> matches, const StaticSelection& selection, bool second) {
+void DrawFeatures(cv::Mat& canvas, std::span<const Match> matches, const StaticSelection& selection,
+                  bool second) {
   for (size_t i = 0; i < matches.size(); ++i) {
     const bool is_static = selection.is_static[i] != 0;
     const cv::Point from = Pixel(matches[i].uv0_px), to = Pixel(matches[i].uv1_px);
@@ -36,13 +39,15 @@ void DrawCells(cv::Mat& canvas, const StaticSelection& selection) {
     for (size_t k = 0; k < selection.cells.size(); ++k) {
       const CellReport& cell = selection.cells[k];
       if (cell.chosen != chosen) continue;
-      const cv::Point low(cell.column * canvas.cols / selection.columns, cell.row * canvas.rows / selection.rows);
+      const cv::Point low(cell.column * canvas.cols / selection.columns,
+                          cell.row * canvas.rows / selection.rows);
       const cv::Point high((cell.column + 1) * canvas.cols / selection.columns - 1,
                            (cell.row + 1) * canvas.rows / selection.rows - 1);
       cv::rectangle(canvas, low, high, chosen ? kGreen : kGrey, chosen ? 2 : 1);
       const std::string label = std::to_string(k) + ": " + std::to_string(cell.num_inliers) + "/" +
                                 std::to_string(cell.num_matches) + " " + std::string(ToString(cell.state));
-      Text(canvas, label, low + cv::Point(4, 13), static_cast<int>(k) == selection.leading_cell ? kGreen : kWhite);
+      Text(canvas, label, low + cv::Point(4, 13),
+           static_cast<int>(k) == selection.leading_cell ? kGreen : kWhite);
     }
   }
 }
@@ -86,8 +91,10 @@ ColorImage DrawSelection(const ColorImage& frame0, const ColorImage& frame1, std
   const int width = first.cols + second.cols + (has_matrix ? kMatrixPx : 0);
   const int height = std::max({first.rows, second.rows, has_matrix ? kMatrixPx : 0}) + kTitlePx;
   cv::Mat canvas(height, width, CV_8UC3, kBlack);
-  const std::string count = std::to_string(selection.num_static) + " static of " + std::to_string(matches.size());
-  Paste(first, {0, 0}, has_cells ? "first frame: cells, their own inliers, state; the chosen set framed" : "first frame",
+  const std::string count =
+      std::to_string(selection.num_static) + " static of " + std::to_string(matches.size());
+  Paste(first, {0, 0},
+        has_cells ? "first frame: cells, their own inliers, state; the chosen set framed" : "first frame",
         canvas);
   Paste(second, {first.cols, 0},
         selection.IsUsable() ? "second frame: " + count : "refused: " + selection.explanation, canvas);

@@ -55,8 +55,9 @@ struct Tally {
             {"median_recall", Quantile(recall, 0.5)}};
   }
   std::string Cells() const {
-    return Number(accepted(), 3) + " | " + Number(bad_share(), 3) + " | " + Number(Quantile(precision, 0.5), 3) +
-           " | " + Number(Quantile(precision, 0.1), 3) + " | " + Number(Quantile(recall, 0.5), 3);
+    return Number(accepted(), 3) + " | " + Number(bad_share(), 3) + " | " +
+           Number(Quantile(precision, 0.5), 3) + " | " + Number(Quantile(precision, 0.1), 3) + " | " +
+           Number(Quantile(recall, 0.5), 3);
   }
 };
 
@@ -145,7 +146,8 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
     const size_t frame = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
                                  static_cast<size_t>(gap) + 1);
     const size_t other = frame + static_cast<size_t>(gap);
-    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, &matcher);
+    const auto matches =
+        MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, &matcher);
     const auto truth = sequence.Judge(frame, other, matches);
     for (size_t s = 0; s < selectors.size(); ++s) {
       const StaticSelection selection = selectors[s].selector->Select(matches, sequence.camera(), frame);
@@ -156,10 +158,12 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
     }
     sequence.ForgetBefore(frame);
   }
-  out << "Gap " << gap << (window_and_orientation ? ", search window and orientation check" : ", neither window nor orientation check")
+  out << "Gap " << gap
+      << (window_and_orientation ? ", search window and orientation check"
+                                 : ", neither window nor orientation check")
       << "; " << count << " pairs; moving share of the matches: median " << Number(Quantile(moving, 0.5), 2)
-      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead << " |\n|---|"
-      << kTallyRule << "|\n";
+      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead
+      << " |\n|---|" << kTallyRule << "|\n";
   for (size_t s = 0; s < selectors.size(); ++s) {
     out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
   }
@@ -179,7 +183,8 @@ struct Window {
 
 /// One selector's answer for one window, over matches made before.
 Window RunWindow(const std::vector<std::vector<Match>>& matches, std::span<const MatchTruth> truth,
-                 const StaticSelector& selector, const Camera& camera, const AgreementOptions& options, size_t frame) {
+                 const StaticSelector& selector, const Camera& camera, const AgreementOptions& options,
+                 size_t frame) {
   std::vector<PairView> pairs(matches.size());
   std::vector<const PairView*> pointers;
   for (size_t p = 0; p < matches.size(); ++p) {
@@ -213,8 +218,9 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
                                  static_cast<size_t>(options.gaps.back()) + 1);
     std::vector<std::vector<Match>> matches;
     for (const int gap : options.gaps) {
-      matches.push_back(MatchFrames(*sequence.Features(frame), *sequence.Features(frame + static_cast<size_t>(gap)),
-                                    options.matching, &matcher));
+      matches.push_back(MatchFrames(*sequence.Features(frame),
+                                    *sequence.Features(frame + static_cast<size_t>(gap)), options.matching,
+                                    &matcher));
     }
     const size_t last = frame + static_cast<size_t>(options.gaps.back());
     const auto truth = sequence.Judge(frame, last, matches.back());
@@ -234,11 +240,12 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
     sequence.ForgetBefore(frame);
   }
   PrintWindowTable(selectors, all, "All windows.", out);
-  PrintWindowTable(selectors, parallax, "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m.",
-                   out);
+  PrintWindowTable(selectors, parallax,
+                   "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m.", out);
   if (hard[0].asked > 0) {
-    PrintWindowTable(selectors, hard, "Hard windows: more than " + Number(options.hard_moving_share, 2) +
-                                          " of the matches moving.", out);
+    PrintWindowTable(
+        selectors, hard,
+        "Hard windows: more than " + Number(options.hard_moving_share, 2) + " of the matches moving.", out);
   }
   out << "Why windows were refused:\n\n";
   for (size_t s = 0; s < selectors.size(); ++s) {
@@ -247,7 +254,9 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
     out << '\n';
   }
   out << '\n';
-  return {{"all", ToJson(selectors, all)}, {"with_parallax", ToJson(selectors, parallax)}, {"hard", ToJson(selectors, hard)}};
+  return {{"all", ToJson(selectors, all)},
+          {"with_parallax", ToJson(selectors, parallax)},
+          {"hard", ToJson(selectors, hard)}};
 }
 
 AdjustFunction MakeAdjustment(const Camera& camera) {
@@ -314,8 +323,8 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
 
 }  // namespace
 
-nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
-                           std::ostream& out) {
+nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count,
+                           uint64_t seed, std::ostream& out) {
   std::vector<Start> starts;
   std::map<std::string, int> reasons;
   for (int k = 0; k < count; ++k) {
@@ -333,7 +342,8 @@ nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& o
     rotation.push_back(start.rotation_deg);
     direction.push_back(start.direction_deg);
   }
-  out << "| starts | first map | right | of all starts | median wait [s] | 75th | 90th | median rotation error "
+  out << "| starts | first map | right | of all starts | median wait [s] | 75th | 90th | median rotation "
+         "error "
          "[deg] | median direction error [deg] | 90th |\n|---|---|---|---|---|---|---|---|---|---|\n| "
       << count << " | " << found << " | " << good << " | " << Number(good / static_cast<double>(count), 2);
   for (const double q : {0.5, 0.75, 0.9}) {
@@ -344,7 +354,8 @@ nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& o
       << Number(Quantile(direction, 0.9), 1) << " |\n\nWhat was waited for [frames]:";
   for (const auto& [reason, number] : reasons) out << ' ' << reason << ' ' << number << ';';
   out << "\n\n";
-  nlohmann::json json{{"starts", count}, {"first_map", found}, {"right", good}, {"waited_for_frames", reasons}};
+  nlohmann::json json{
+      {"starts", count}, {"first_map", found}, {"right", good}, {"waited_for_frames", reasons}};
   for (const Start& start : starts) json["each"].push_back(start.ToJson());
   return json;
 }

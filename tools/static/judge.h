@@ -18,8 +18,8 @@ struct NamedSelector {
   std::string name;
   std::unique_ptr<StaticSelector> selector;
 };
-/// RANSAC, ARSAC (each with F and with E), DLRSAC as the paper writes it, DLRSAC; DLRSAC's own gate on the distribution
-/// is off if `gated` is not set.
+/// RANSAC, ARSAC (each with F and with E), DLRSAC as the paper writes it, DLRSAC; DLRSAC's own gate on the
+/// distribution is off if `gated` is not set.
 std::vector<NamedSelector> AllSelectors(bool gated);
 /// DLRSAC with one of its parts taken away or exchanged, each.
 std::vector<NamedSelector> DlrsacAblations();
@@ -29,17 +29,17 @@ struct WindowOptions {
   std::vector<int> gaps{4, 8, 12};
   AgreementOptions agreement = InitializerOptions().agreement;  ///< the gates of the system
   MatchingOptions matching;
-  double min_baseline_m = 0.05;  ///< of the last pair, for a window to count as one with parallax
+  double min_baseline_m = 0.05;    ///< of the last pair, for a window to count as one with parallax
   double hard_moving_share = 0.3;  ///< of the last pair's matches, for a window to count as hard
 };
 
 /// Each prints Markdown tables and returns the same numbers.
 nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
-                                    const std::vector<NamedSelector>& selectors, std::ostream& out);
+                          const std::vector<NamedSelector>& selectors, std::ostream& out);
 nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
-                                      const std::vector<NamedSelector>& selectors, std::ostream& out);
-nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count, uint64_t seed,
-                           std::ostream& out);
+                            const std::vector<NamedSelector>& selectors, std::ostream& out);
+nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count,
+                           uint64_t seed, std::ostream& out);
 
 /// The bundle adjustment that the initialiser is given.
 AdjustFunction MakeAdjustment(const Camera& camera);

@@ -36,7 +36,9 @@ JudgedSequence::JudgedSequence(const std::string& folder, const Camera& camera, 
   if (const auto path = source_.GroundTruthPath()) poses_ = ReadGroundTruth(*path).poses;
 }
 
-ColorImage JudgedSequence::Color(size_t frame) { return DecodeColor(source_.Read(frame), source_.Name(frame)); }
+ColorImage JudgedSequence::Color(size_t frame) {
+  return DecodeColor(source_.Read(frame), source_.Name(frame));
+}
 
 std::shared_ptr<const FrameFeatures> JudgedSequence::Features(size_t frame) {
   auto& cached = features_[frame];

@@ -26,8 +26,8 @@ enum class MatchTruth : uint8_t {
   kNeither,   ///< on an actor who stands still in both frames: neither right nor wrong
 };
 
-/// A recording with features, and with masks and true poses where it has them; these only judge. Features and masks are
-/// kept once they were asked for.
+/// A recording with features, and with masks and true poses where it has them; these only judge. Features and
+/// masks are kept once they were asked for.
 class JudgedSequence {
  public:
   /// Throws InputError where the folder is no sequence.
@@ -62,16 +62,18 @@ class JudgedSequence {
 
 /// Precision and recall of one answer.
 struct SelectionScore {
-  int num_static = 0;       ///< called static and judged (kNeither is not)
-  int num_right = 0;        ///< of these, not moving
-  int num_true = 0;         ///< static matches there are
-  int num_true_found = 0;   ///< of these, called static
-  int num_moving = 0;       ///< moving matches there are
+  int num_static = 0;      ///< called static and judged (kNeither is not)
+  int num_right = 0;       ///< of these, not moving
+  int num_true = 0;        ///< static matches there are
+  int num_true_found = 0;  ///< of these, called static
+  int num_moving = 0;      ///< moving matches there are
   int num_matches = 0;
 
   double precision() const { return num_static == 0 ? 1.0 : num_right / static_cast<double>(num_static); }
   double recall() const { return num_true == 0 ? 1.0 : num_true_found / static_cast<double>(num_true); }
-  double moving_share() const { return num_matches == 0 ? 0.0 : num_moving / static_cast<double>(num_matches); }
+  double moving_share() const {
+    return num_matches == 0 ? 0.0 : num_moving / static_cast<double>(num_matches);
+  }
 };
 SelectionScore ScoreSelection(std::span<const MatchTruth> truth, std::span<const uint8_t> is_static);
 

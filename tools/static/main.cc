@@ -70,10 +70,10 @@ double MedianDisplacement(const std::vector<Match>& matches) {
   return lengths.empty() ? 0.0 : lengths[lengths.size() / 2];
 }
 
-/// The frame that goes with `frame`: so many later, or with "auto" the first whose picture has moved by 20 px while 150
-/// matches remain (at most 24 frames later).
-size_t Partner(JudgedSequence& sequence, size_t frame, const std::string& gap, const MatchingOptions& matching,
-               FeatureMatcher* matcher) {
+/// The frame that goes with `frame`: so many later, or with "auto" the first whose picture has moved by 20 px
+/// while 150 matches remain (at most 24 frames later).
+size_t Partner(JudgedSequence& sequence, size_t frame, const std::string& gap,
+               const MatchingOptions& matching, FeatureMatcher* matcher) {
   if (gap != "auto") return frame + static_cast<size_t>(std::stoi(gap));
   size_t best = frame + 1;
   for (size_t other = frame + 2; other < std::min(sequence.size(), frame + 25); other += 2) {
@@ -128,11 +128,13 @@ class Run {
     const Camera camera = ChooseCamera(settings_.camera, settings_.sequence);
     JudgedSequence sequence(settings_.sequence, camera, settings_.features);
     const size_t reach = settings_.gap == "auto" ? 3 : static_cast<size_t>(std::stoi(settings_.gap)) + 1;
-    if (sequence.size() < reach) throw InputError(settings_.sequence + ": fewer frames than the gap asks for");
+    if (sequence.size() < reach)
+      throw InputError(settings_.sequence + ": fewer frames than the gap asks for");
     SelectionScore total;
     int accepted = 0;
     for (int k = 0; k < settings_.pairs; ++k) {
-      const size_t frame = (sequence.size() - reach) * static_cast<size_t>(k) / static_cast<size_t>(settings_.pairs);
+      const size_t frame =
+          (sequence.size() - reach) * static_cast<size_t>(k) / static_cast<size_t>(settings_.pairs);
       accepted += OnPair(sequence, frame, &total) ? 1 : 0;
       sequence.ForgetBefore(frame);
     }
@@ -147,7 +149,8 @@ class Run {
  private:
   bool OnPair(JudgedSequence& sequence, size_t frame, SelectionScore* total) {
     const size_t other = Partner(sequence, frame, settings_.gap, matching_, &matcher_);
-    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching_, &matcher_);
+    const auto matches =
+        MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching_, &matcher_);
     const StaticSelection selection = selector_->Select(matches, sequence.camera(), settings_.seed + frame);
     const std::string name = "pair_" + std::to_string(frame) + "_" + std::to_string(other);
     Write(name, DrawSelection(sequence.Color(frame), sequence.Color(other), matches, selection));
@@ -188,7 +191,8 @@ class Run {
 };
 
 void RunJudge(const JudgeSettings& settings) {
-  JudgedSequence sequence(settings.sequence, ChooseCamera(settings.camera, settings.sequence), settings.features);
+  JudgedSequence sequence(settings.sequence, ChooseCamera(settings.camera, settings.sequence),
+                          settings.features);
   std::ofstream file;
   if (!settings.out.empty()) {
     file.open(settings.out, std::ios::app);
@@ -199,7 +203,8 @@ void RunJudge(const JudgeSettings& settings) {
                       {"table", settings.table},
                       {"count", settings.count},
                       {"features", settings.features}};
-  out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table << "\n\n";
+  out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table
+      << "\n\n";
   if (settings.table == "pairs" || settings.table == "ablation") {
     const auto selectors = settings.table == "pairs" ? AllSelectors(false) : DlrsacAblations();
     for (const int gap : settings.gaps) {
@@ -224,9 +229,12 @@ void AddOptions(CLI::App& app, Settings& s) {
   app.add_option("images", s.images, "Two images of the same camera")->expected(0, 2);
   app.add_option("--sequence", s.sequence, "TUM RGB-D folder, instead of two images");
   app.add_option("--gap", s.gap, "Frames between the two of a pair, or auto")->capture_default_str();
-  app.add_option("--pairs", s.pairs, "Pairs spread over the sequence")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--pairs", s.pairs, "Pairs spread over the sequence")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   app.add_option("--method", s.method, "dlrsac, dlrsac-paper, arsac or ransac")->capture_default_str();
-  app.add_option("--model", s.model, "e (essential matrix, five points) or f (fundamental matrix, eight points)")
+  app.add_option("--model", s.model,
+                 "e (essential matrix, five points) or f (fundamental matrix, eight points)")
       ->check(CLI::IsMember({"e", "f"}))
       ->capture_default_str();
   app.add_option("--camera", s.camera, "Camera file (YAML)");
@@ -237,8 +245,11 @@ void AddOptions(CLI::App& app, Settings& s) {
 }
 
 void AddJudge(CLI::App& app, JudgeSettings& s) {
-  CLI::App* judge = app.add_subcommand("judge", "Measure against masks and true poses; prints Markdown tables");
-  judge->add_option("--sequence", s.sequence, "TUM RGB-D folder with groundtruth.txt, and mask.txt where there are movers")
+  CLI::App* judge =
+      app.add_subcommand("judge", "Measure against masks and true poses; prints Markdown tables");
+  judge
+      ->add_option("--sequence", s.sequence,
+                   "TUM RGB-D folder with groundtruth.txt, and mask.txt where there are movers")
       ->required();
   judge->add_option("--table", s.table, "pairs, ablation, windows or starts")->capture_default_str();
   judge->add_option("--count", s.count, "Pairs, windows or starts, spread over the sequence")

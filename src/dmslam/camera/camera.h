@@ -8,9 +8,9 @@
 
 namespace dmslam {
 
-/// Pinhole camera with Brown distortion (k1, k2, k3 radial; p1, p2 tangential; OpenCV's order and meaning). Pixels are
-/// in the coordinate frame whose origin is the centre of the top left pixel, x right, y down; the camera frame has x
-/// right, y down, z forward.
+/// Pinhole camera with Brown distortion (k1, k2, k3 radial; p1, p2 tangential; OpenCV's order and meaning).
+/// Pixels are in the coordinate frame whose origin is the centre of the top left pixel, x right, y down; the
+/// camera frame has x right, y down, z forward.
 struct Camera {
   int width_px = 0;
   int height_px = 0;
@@ -32,8 +32,8 @@ struct Camera {
   Eigen::Vector3d Ray(const Eigen::Vector2d& uv_px) const {
     return {(uv_px.x() - cx_px) / fx_px, (uv_px.y() - cy_px) / fy_px, 1.0};
   }
-  /// Ideal pixel to the pixel that the lens makes of it, and back (fixed point, to 1e-9 in normalised coordinates; none
-  /// where the distortion cannot be inverted).
+  /// Ideal pixel to the pixel that the lens makes of it, and back (fixed point, to 1e-9 in normalised
+  /// coordinates; none where the distortion cannot be inverted).
   Eigen::Vector2d Distort(const Eigen::Vector2d& ideal_px) const;
   std::optional<Eigen::Vector2d> Undistort(const Eigen::Vector2d& raw_px) const;
 
@@ -41,8 +41,9 @@ struct Camera {
   std::optional<std::string> Problem() const;
 };
 
-/// Reads a camera file (YAML: width, height, fx, fy, cx, cy, optional distortion [k1, k2, p1, p2, k3], fps and model).
-/// Throws InputError that names file, field and cure; a model other than "pinhole" is refused by name.
+/// Reads a camera file (YAML: width, height, fx, fy, cx, cy, optional distortion [k1, k2, p1, p2, k3], fps
+/// and model). Throws InputError that names file, field and cure; a model other than "pinhole" is refused by
+/// name.
 Camera LoadCamera(const std::string& path);
 
 }  // namespace dmslam

@@ -164,7 +164,8 @@ Camera EurocSequence::ReadCamera(const std::string& sensor_yaml) {
     throw InputError(sensor_yaml + ": is not valid YAML (" + error.what() +
                      "); give a camera file with --camera");
   }
-  if (!node.IsMap()) throw InputError(sensor_yaml + ": is not a map of fields; give a camera file with --camera");
+  if (!node.IsMap())
+    throw InputError(sensor_yaml + ": is not a map of fields; give a camera file with --camera");
   CheckModel(node, sensor_yaml, "camera_model", "pinhole");
   CheckModel(node, sensor_yaml, "distortion_model", "radial-tangential");
   const std::vector<double> resolution = ReadList(node, sensor_yaml, "resolution", 2);

@@ -11,11 +11,14 @@
 namespace dmslam {
 namespace {
 
-/// Five frames at 10 Hz, each of one grey value that tells its number; none where OpenCV cannot write videos here.
+/// Five frames at 10 Hz, each of one grey value that tells its number; none where OpenCV cannot write videos
+/// here.
 std::string WriteVideo() {
   const std::string path = testing::TempDir() + "dmslam_video.avi";
-  cv::VideoWriter writer(path, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0, {64, 48});
-  for (int i = 0; i < 5 && writer.isOpened(); ++i) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20)));
+  cv::VideoWriter writer(path, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0,
+                         {64, 48});
+  for (int i = 0; i < 5 && writer.isOpened(); ++i)
+    writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20)));
   return writer.isOpened() ? path : "";
 }
 
@@ -29,7 +32,8 @@ TEST(VideoSource, ReadsForwardAndBack) {
     const EncodedImage frame = video->Read(index);
     EXPECT_EQ(frame.encoding, ImageEncoding::kBgr8);
     EXPECT_EQ(frame.width, 64);
-    EXPECT_NEAR(DecodeGray(frame, video->Name(index)).at(30, 20), 40.0 * static_cast<double>(index) + 20, 4) << index;
+    EXPECT_NEAR(DecodeGray(frame, video->Name(index)).at(30, 20), 40.0 * static_cast<double>(index) + 20, 4)
+        << index;
   }
   EXPECT_THROW(video->Read(5), InputError);
 }

@@ -7,8 +7,8 @@
 
 namespace dmslam {
 
-/// One comparison of a descriptor: is the pixel at (x0, y0) darker than the one at (x1, y1)? Offsets from the keypoint in
-/// an upright patch [px of its level], within the disc of radius 15.
+/// One comparison of a descriptor: is the pixel at (x0, y0) darker than the one at (x1, y1)? Offsets from the
+/// keypoint in an upright patch [px of its level], within the disc of radius 15.
 struct BriefTest {
   int8_t x0, y0, x1, y1;
 };
@@ -16,8 +16,8 @@ struct BriefTest {
 /// The 256 comparisons, in the order of the descriptor's bits. Learned by tools/learn_brief_pattern.
 const std::array<BriefTest, 256>& BriefPattern();
 
-/// A set of comparisons turned to every orientation of a keypoint (256 steps per turn), as places in a patch of 32 bytes
-/// per row (see ImageKernels::compare_pairs).
+/// A set of comparisons turned to every orientation of a keypoint (256 steps per turn), as places in a patch
+/// of 32 bytes per row (see ImageKernels::compare_pairs).
 class SteeredPattern {
  public:
   explicit SteeredPattern(std::span<const BriefTest> tests);

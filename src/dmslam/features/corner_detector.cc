@@ -7,8 +7,8 @@
 
 namespace dmslam {
 
-void CornerDetector::Detect(const PaddedImage& image, int threshold, int border_px, const ImageKernels& kernels,
-                            std::vector<Corner>* corners) {
+void CornerDetector::Detect(const PaddedImage& image, int threshold, int border_px,
+                            const ImageKernels& kernels, std::vector<Corner>* corners) {
   DMSLAM_CHECK(border_px >= 4, "the circle and its neighbours must lie in the image");
   corners->clear();
   const int x_begin = border_px, x_end = image.width() - border_px;
@@ -27,7 +27,8 @@ void CornerDetector::Detect(const PaddedImage& image, int threshold, int border_
       std::memset(rows[2], 0, row_size);
     }
     if (any_here) {
-      const int count = kernels.local_maxima({rows[0], rows[1], rows[2]}, x_begin, x_end, y - 1, row_corners_.data());
+      const int count =
+          kernels.local_maxima({rows[0], rows[1], rows[2]}, x_begin, x_end, y - 1, row_corners_.data());
       corners->insert(corners->end(), row_corners_.begin(), row_corners_.begin() + count);
     }
     any_here = any_below;
@@ -76,10 +77,12 @@ void CornerSelector::SortIntoCells(std::span<const Corner> corners, int width, i
     start = end;
   }
   by_cell_.resize(corners.size());
-  for (size_t i = corners.size(); i-- > 0;) by_cell_[--cell_starts_[cell_of(corners[i])]] = static_cast<uint32_t>(i);
+  for (size_t i = corners.size(); i-- > 0;)
+    by_cell_[--cell_starts_[cell_of(corners[i])]] = static_cast<uint32_t>(i);
 }
 
-void CornerSelector::RankCell(std::span<const Corner> corners, std::span<uint32_t> cell, const Options& options) {
+void CornerSelector::RankCell(std::span<const Corner> corners, std::span<uint32_t> cell,
+                              const Options& options) {
   std::sort(cell.begin(), cell.end(), [&](uint32_t a, uint32_t b) {
     return corners[a].score != corners[b].score ? corners[a].score > corners[b].score : a < b;
   });

@@ -9,12 +9,12 @@
 
 namespace dmslam {
 
-/// Finds the FAST-9 corners of an image, each a maximum of the score among its eight neighbours (Rosten, Drummond, ECCV
-/// 2006).
+/// Finds the FAST-9 corners of an image, each a maximum of the score among its eight neighbours (Rosten,
+/// Drummond, ECCV 2006).
 class CornerDetector {
  public:
-  /// Corners whose score exceeds `threshold`, at least `border_px` >= 4 away from the image's edges, in reading order,
-  /// into `corners` (cleared first). Reuses memory.
+  /// Corners whose score exceeds `threshold`, at least `border_px` >= 4 away from the image's edges, in
+  /// reading order, into `corners` (cleared first). Reuses memory.
   void Detect(const PaddedImage& image, int threshold, int border_px, const ImageKernels& kernels,
               std::vector<Corner>* corners);
 
@@ -25,9 +25,10 @@ class CornerDetector {
 
 /// Chooses corners that are strong and spread over the image.
 ///
-/// The image is divided into square cells. In each cell corners are ranked by score, and one of rank r (0 = best) competes
-/// with score * decay^r: decay 1 takes the strongest wherever they are, decay 0 one of each cell after the other. In a
-/// cell that has a corner above the strong threshold, those below it do not compete at all.
+/// The image is divided into square cells. In each cell corners are ranked by score, and one of rank r (0 =
+/// best) competes with score * decay^r: decay 1 takes the strongest wherever they are, decay 0 one of each
+/// cell after the other. In a cell that has a corner above the strong threshold, those below it do not
+/// compete at all.
 class CornerSelector {
  public:
   struct Options {
@@ -36,8 +37,8 @@ class CornerSelector {
     double rank_decay = 0.8;
   };
 
-  /// At most `count` of `corners` (in reading order), into `chosen` in reading order. Ties go to the earlier corner.
-  /// Reuses memory.
+  /// At most `count` of `corners` (in reading order), into `chosen` in reading order. Ties go to the earlier
+  /// corner. Reuses memory.
   void Select(std::span<const Corner> corners, int count, int width, int height, const Options& options,
               std::vector<Corner>* chosen);
 

@@ -16,8 +16,8 @@ int ClampedCell(double coordinate_px, double cell_size_px, int count) {
 
 }  // namespace
 
-void FeatureGrid::Build(std::span<const Eigen::Vector2d> uv_px, std::span<const Keypoint> keypoints, int width_px,
-                        int height_px) {
+void FeatureGrid::Build(std::span<const Eigen::Vector2d> uv_px, std::span<const Keypoint> keypoints,
+                        int width_px, int height_px) {
   DMSLAM_CHECK(uv_px.size() == keypoints.size(), "every keypoint needs its pixel");
   DMSLAM_CHECK(width_px > 0 && height_px > 0, "the image must have pixels");
   columns_ = static_cast<int>(std::ceil(width_px / kCellSizePx));
@@ -37,23 +37,25 @@ void FeatureGrid::Build(std::span<const Eigen::Vector2d> uv_px, std::span<const 
   }
 }
 
-void FeatureGrid::FindInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
-                               std::vector<uint32_t>* features) const {
+void FeatureGrid::FindInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave,
+                               int max_octave, std::vector<uint32_t>* features) const {
   features->clear();
   ForEachInRadius(center_px, radius_px, min_octave, max_octave,
                   [features](uint32_t feature) { features->push_back(feature); });
 }
 
-size_t FeatureGrid::CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
-                                    uint32_t* features) const {
+size_t FeatureGrid::CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave,
+                                    int max_octave, uint32_t* features) const {
   const CellRange range = CellsOf(center_px, radius_px);
   const double radius_squared = radius_px * radius_px, center_x = center_px.x(), center_y = center_px.y();
   size_t count = 0;
   for (int row = range.row_begin; row < range.row_end; ++row) {
     const Entry* end = entries_.data() + starts_[CellIndex(range.column_end - 1, row) + 1];
-    for (const Entry* entry = entries_.data() + starts_[CellIndex(range.column_begin, row)]; entry < end; ++entry) {
+    for (const Entry* entry = entries_.data() + starts_[CellIndex(range.column_begin, row)]; entry < end;
+         ++entry) {
       const double dx = entry->x_px - center_x, dy = entry->y_px - center_y;
-      const bool wanted = static_cast<int>(entry->octave >= min_octave) & static_cast<int>(entry->octave <= max_octave) &
+      const bool wanted = static_cast<int>(entry->octave >= min_octave) &
+                          static_cast<int>(entry->octave <= max_octave) &
                           static_cast<int>(dx * dx + dy * dy <= radius_squared);
       features[count] = entry->feature;
       count += static_cast<size_t>(wanted);

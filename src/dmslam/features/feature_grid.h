@@ -10,18 +10,19 @@
 
 namespace dmslam {
 
-/// Finds the features near an undistorted pixel. A bucket index: the features are sorted by square cells of the image;
-/// those outside the image (undistortion may push them there) are kept in the nearest cell and found all the same.
+/// Finds the features near an undistorted pixel. A bucket index: the features are sorted by square cells of
+/// the image; those outside the image (undistortion may push them there) are kept in the nearest cell and
+/// found all the same.
 class FeatureGrid {
  public:
-  /// Indexes features at `uv_px` (undistorted pixels, finite) with the octaves of `keypoints`, same order and length.
-  /// Throws InvariantError when the lengths differ or the image has no pixels. Reuses its memory.
+  /// Indexes features at `uv_px` (undistorted pixels, finite) with the octaves of `keypoints`, same order and
+  /// length. Throws InvariantError when the lengths differ or the image has no pixels. Reuses its memory.
   void Build(std::span<const Eigen::Vector2d> uv_px, std::span<const Keypoint> keypoints, int width_px,
              int height_px);
 
-  /// Calls visit(uint32_t feature) for each feature within `radius_px` (Euclidean, inclusive) of `center_px` whose octave
-  /// is in [min_octave, max_octave]. Order: by cell (rows of cells from the top), then by feature index; it depends on
-  /// nothing else.
+  /// Calls visit(uint32_t feature) for each feature within `radius_px` (Euclidean, inclusive) of `center_px`
+  /// whose octave is in [min_octave, max_octave]. Order: by cell (rows of cells from the top), then by
+  /// feature index; it depends on nothing else.
   template <typename Visit>
   void ForEachInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                        Visit&& visit) const {
@@ -44,8 +45,8 @@ class FeatureGrid {
   void FindInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                     std::vector<uint32_t>* features) const;
 
-  /// The same into `features`, which has room for size() of them; returns how many there are. Faster where most features
-  /// of the cells are wanted or refused without pattern, as it takes no branches.
+  /// The same into `features`, which has room for size() of them; returns how many there are. Faster where
+  /// most features of the cells are wanted or refused without pattern, as it takes no branches.
   size_t CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                          uint32_t* features) const;
 

@@ -8,8 +8,8 @@
 
 namespace dmslam {
 
-/// What a camera saw in one frame, and where on the ideal image plane. Made once, never changed, shared by all who hold
-/// the frame or the keyframe made of it.
+/// What a camera saw in one frame, and where on the ideal image plane. Made once, never changed, shared by
+/// all who hold the frame or the keyframe made of it.
 struct FrameFeatures {
   FeatureSet set;
   std::vector<Eigen::Vector2d> uv_px;  ///< undistorted pixel of each keypoint

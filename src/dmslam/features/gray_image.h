@@ -8,7 +8,8 @@
 
 namespace dmslam {
 
-/// An 8-bit grey image that owns its pixels. Row-major without padding: pixel (x, y) is pixels[y * width + x].
+/// An 8-bit grey image that owns its pixels. Row-major without padding: pixel (x, y) is pixels[y * width +
+/// x].
 struct GrayImage {
   std::vector<uint8_t> pixels;
   int width = 0;
@@ -20,7 +21,9 @@ struct GrayImage {
         width(width_px),
         height(height_px) {}
 
-  uint8_t& at(int x, int y) { return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)]; }
+  uint8_t& at(int x, int y) {
+    return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+  }
   uint8_t at(int x, int y) const {
     return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
   }

@@ -7,8 +7,8 @@
 namespace dmslam {
 
 /// Distances [bits] between `query` and the descriptors that `indices` name, into `distances`, same order.
-using HammingToIndexed = void (*)(const Descriptor& query, const Descriptor* descriptors, const uint32_t* indices,
-                                  int count, uint16_t* distances);
+using HammingToIndexed = void (*)(const Descriptor& query, const Descriptor* descriptors,
+                                  const uint32_t* indices, int count, uint16_t* distances);
 /// The same for `count` consecutive descriptors.
 using HammingToRange = void (*)(const Descriptor& query, const Descriptor* descriptors, int count,
                                 uint16_t* distances);

@@ -14,7 +14,8 @@ bool HasSimdPath(SimdPath path) {
     case SimdPath::kSse2:
       return true;
     case SimdPath::kAvx2:
-      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("bmi");
+      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("popcnt") &&
+             __builtin_cpu_supports("bmi");
 #else
     case SimdPath::kSse2:
     case SimdPath::kAvx2:
@@ -27,7 +28,8 @@ bool HasSimdPath(SimdPath path) {
 const ImageKernels& KernelsOn(SimdPath path) {
   DMSLAM_CHECK(HasSimdPath(path), "the CPU lacks the instructions of this path");
 #if defined(__x86_64__)
-  if (path == SimdPath::kAvx2 || (path == SimdPath::kBest && HasSimdPath(SimdPath::kAvx2))) return Avx2Kernels();
+  if (path == SimdPath::kAvx2 || (path == SimdPath::kBest && HasSimdPath(SimdPath::kAvx2)))
+    return Avx2Kernels();
   if (path != SimdPath::kPortable) return Sse2Kernels();
 #endif
   return PortableKernels();

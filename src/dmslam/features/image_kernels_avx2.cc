@@ -38,7 +38,8 @@ inline uint32_t NonZeroMask(Bytes a) {
 #include "dmslam/features/image_kernels_plain.inc"
 
 /// Two rows, interleaved byte by byte, times their weights in 64ths.
-inline void ResizeBlend(const uint8_t* upper, const uint8_t* lower, int lower_weight, int width, uint8_t* out) {
+inline void ResizeBlend(const uint8_t* upper, const uint8_t* lower, int lower_weight, int width,
+                        uint8_t* out) {
   const __m256i weights = _mm256_set1_epi16(static_cast<int16_t>((lower_weight << 8) | (64 - lower_weight)));
   const __m256i half = _mm256_set1_epi16(32);
   for (int x = 0; x < width; x += kLanes) {

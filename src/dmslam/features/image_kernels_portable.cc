@@ -9,7 +9,8 @@ namespace {
 
 inline constexpr int kLanes = 16;
 
-// A vector type of the compiler (GCC, Clang): one instruction per operation wherever the CPU has vectors of 16 bytes.
+// A vector type of the compiler (GCC, Clang): one instruction per operation wherever the CPU has vectors of
+// 16 bytes.
 using Bytes = uint8_t __attribute__((vector_size(kLanes)));
 
 Bytes Load(const uint8_t* from) {

@@ -30,7 +30,8 @@ inline uint32_t NonZeroMask(Bytes a) {
 
 #include "dmslam/features/image_kernels_plain.inc"
 
-inline void ResizeBlend(const uint8_t* upper, const uint8_t* lower, int lower_weight, int width, uint8_t* out) {
+inline void ResizeBlend(const uint8_t* upper, const uint8_t* lower, int lower_weight, int width,
+                        uint8_t* out) {
   PlainResizeBlend(upper, lower, lower_weight, width, out);
 }
 inline void ResizeAlong(const uint8_t* source, const ResizeBlock* blocks, int num_blocks, uint8_t* out) {

@@ -21,7 +21,8 @@ PaddedImage Noise(int width, int height, uint64_t seed) {
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       // Flat stretches between wild ones, so that both corners and none occur.
-      image.row(y)[x] = static_cast<uint8_t>((x / 9 + y / 7) % 2 == 0 ? random.Below(256) : 90 + random.Below(12));
+      image.row(y)[x] =
+          static_cast<uint8_t>((x / 9 + y / 7) % 2 == 0 ? random.Below(256) : 90 + random.Below(12));
     }
   }
   return image;
@@ -81,13 +82,14 @@ TEST_P(KernelPath, ScoresAroundFollowTheDefinition) {
 
 TEST_P(KernelPath, OfEqualNeighboursTheFirstIsTheMaximum) {
   std::vector<uint8_t> above(128, 0), here(128, 0), below(128, 0);
-  here[20] = here[21] = 9;   // a pair: 20 stays
+  here[20] = here[21] = 9;      // a pair: 20 stays
   here[40] = 7, below[39] = 7;  // 39 comes later: 40 stays
   here[60] = 7, above[61] = 7;  // 61 came before: 60 goes
   here[70] = 7, below[71] = 8;
   here[90] = 1;
   std::array<Corner, 64> corners;
-  const int count = kernels().local_maxima({above.data(), here.data(), below.data()}, 16, 96, 5, corners.data());
+  const int count =
+      kernels().local_maxima({above.data(), here.data(), below.data()}, 16, 96, 5, corners.data());
   ASSERT_EQ(count, 3);
   EXPECT_EQ(corners[0].x, 20);
   EXPECT_EQ(corners[0].y, 5);
@@ -136,13 +138,16 @@ TEST_P(KernelPath, ShrinkingAndSmoothingAreThePortableOnesBitForBit) {
       smoother.Smooth(image, *sets[i], &smooth[i]);
     }
     for (int y = 0; y < 34; ++y) {
-      ASSERT_TRUE(std::equal(shrunken[0].row(y), shrunken[0].row(y) + shrunken[0].width(), shrunken[1].row(y)));
+      ASSERT_TRUE(
+          std::equal(shrunken[0].row(y), shrunken[0].row(y) + shrunken[0].width(), shrunken[1].row(y)));
     }
-    for (int y = 0; y < 40; ++y) ASSERT_TRUE(std::equal(smooth[0].row(y), smooth[0].row(y) + width, smooth[1].row(y)));
+    for (int y = 0; y < 40; ++y)
+      ASSERT_TRUE(std::equal(smooth[0].row(y), smooth[0].row(y) + width, smooth[1].row(y)));
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Paths, KernelPath, testing::Values(SimdPath::kPortable, SimdPath::kSse2, SimdPath::kAvx2));
+INSTANTIATE_TEST_SUITE_P(Paths, KernelPath,
+                         testing::Values(SimdPath::kPortable, SimdPath::kSse2, SimdPath::kAvx2));
 
 TEST(ImageShrinker, MapsPixelCentresToPixelCentres) {
   PaddedImage ramp, shrunken;

@@ -26,7 +26,8 @@ ImageShrinker::ImageShrinker(int from_width, int from_height, int width, int hei
     : from_width_(from_width), from_height_(from_height), width_(width), height_(height) {
   DMSLAM_CHECK(width > 0 && height > 0, "the shrunken image must have pixels");
   DMSLAM_CHECK(width <= from_width && from_width <= 2 * width, "shrinks to between half and the whole width");
-  DMSLAM_CHECK(height <= from_height && from_height <= 2 * height, "shrinks to between half and the whole height");
+  DMSLAM_CHECK(height <= from_height && from_height <= 2 * height,
+               "shrinks to between half and the whole height");
   blended_.resize(static_cast<size_t>(from_width + kRowPadding));
   blocks_.resize(static_cast<size_t>(width + 7) / 8);
   for (size_t b = 0; b < blocks_.size(); ++b) {
@@ -45,14 +46,15 @@ ImageShrinker::ImageShrinker(int from_width, int from_height, int width, int hei
 }
 
 void ImageShrinker::Shrink(const PaddedImage& from, const ImageKernels& kernels, PaddedImage* to) {
-  DMSLAM_CHECK(from.width() == from_width_ && from.height() == from_height_, "image has another size than agreed");
+  DMSLAM_CHECK(from.width() == from_width_ && from.height() == from_height_,
+               "image has another size than agreed");
   to->Resize(width_, height_);
   for (int y = 0; y < height_; ++y) {
     const Source source = SourceOf(y, from_height_, height_);
     const uint8_t* upper = from.row(source.before);
     const uint8_t* lower = source.weight == 0 ? upper : from.row(source.before + 1);
-    kernels.resize_row(upper, lower, source.weight, from_width_, blocks_.data(), static_cast<int>(blocks_.size()),
-                       blended_.data(), to->row(y));
+    kernels.resize_row(upper, lower, source.weight, from_width_, blocks_.data(),
+                       static_cast<int>(blocks_.size()), blended_.data(), to->row(y));
   }
 }
 

@@ -8,7 +8,8 @@
 
 namespace dmslam {
 
-/// A grey image in memory of its own whose rows may be read kRowPadding bytes before their begin and beyond their end.
+/// A grey image in memory of its own whose rows may be read kRowPadding bytes before their begin and beyond
+/// their end.
 class PaddedImage {
  public:
   /// Sets the size; pixels are undefined. Reuses memory where it suffices.
@@ -28,8 +29,9 @@ class PaddedImage {
   ptrdiff_t stride_ = 0;
 };
 
-/// Shrinks images of one size to another, not smaller than half: linear interpolation between the four neighbours,
-/// positions and weights in 64ths. Pixel centres map to pixel centres: x_from = (x + 0.5) * from_width / width - 0.5.
+/// Shrinks images of one size to another, not smaller than half: linear interpolation between the four
+/// neighbours, positions and weights in 64ths. Pixel centres map to pixel centres: x_from = (x + 0.5) *
+/// from_width / width - 0.5.
 class ImageShrinker {
  public:
   ImageShrinker(int from_width, int from_height, int width, int height);
@@ -58,7 +60,8 @@ class ImagePyramid {
     double scale_x = 1.0, scale_y = 1.0;  ///< size of a pixel in pixels of level 0
   };
 
-  /// Sets sizes and memory for images of one size. Levels are left out whose smaller side is not above `min_size_px`.
+  /// Sets sizes and memory for images of one size. Levels are left out whose smaller side is not above
+  /// `min_size_px`.
   void SetUp(int width, int height, const Pyramid& pyramid, int min_size_px);
 
   /// Copies `image` into level 0; its size must be the one set up.
@@ -78,8 +81,8 @@ class ImagePyramid {
   std::vector<ImageShrinker> shrinkers_;  ///< entry i makes level i + 1
 };
 
-/// Smooths images with the triangle filter of seven taps, (1 2 3 4 3 2 1) / 16 in both directions, sigma 1.58 px; beyond
-/// the edges the outermost pixels go on. Averages of pairs round up.
+/// Smooths images with the triangle filter of seven taps, (1 2 3 4 3 2 1) / 16 in both directions, sigma 1.58
+/// px; beyond the edges the outermost pixels go on. Averages of pairs round up.
 class ImageSmoother {
  public:
   /// Reuses memory.

@@ -44,7 +44,8 @@ std::array<bool, kOrientationBins> FullestBins(const std::array<int, kOrientatio
 
 void CheckSide(const MatchSide& side) {
   DMSLAM_CHECK(side.keypoints.size() == side.size(), "every descriptor needs its keypoint");
-  DMSLAM_CHECK(side.usable.empty() || side.usable.size() == side.size(), "one usable flag per feature, or none");
+  DMSLAM_CHECK(side.usable.empty() || side.usable.size() == side.size(),
+               "one usable flag per feature, or none");
 }
 
 /// End of the run of entries of the same group that begins at `begin`.
@@ -88,9 +89,9 @@ void FeatureMatcher::MatchAll(const MatchSide& a, const MatchSide& b, const Matc
   Finish(a, b, options, matches);
 }
 
-void FeatureMatcher::MatchGroups(const MatchSide& a, std::span<const GroupedFeature> groups_a, const MatchSide& b,
-                                 std::span<const GroupedFeature> groups_b, const MatchOptions& options,
-                                 std::vector<FeatureMatch>* matches) {
+void FeatureMatcher::MatchGroups(const MatchSide& a, std::span<const GroupedFeature> groups_a,
+                                 const MatchSide& b, std::span<const GroupedFeature> groups_b,
+                                 const MatchOptions& options, std::vector<FeatureMatch>* matches) {
   Start(a, b, matches);
   for (size_t begin_a = 0, begin_b = 0; begin_a < groups_a.size() && begin_b < groups_b.size();) {
     const uint32_t group_a = groups_a[begin_a].group, group_b = groups_b[begin_b].group;
@@ -113,8 +114,9 @@ void FeatureMatcher::MatchGroups(const MatchSide& a, std::span<const GroupedFeat
   Finish(a, b, options, matches);
 }
 
-std::optional<NearestFeatures> FeatureMatcher::FindNearest(const Descriptor& descriptor, const SearchArea& area,
-                                                           const MatchSide& side, const FeatureGrid& grid) {
+std::optional<NearestFeatures> FeatureMatcher::FindNearest(const Descriptor& descriptor,
+                                                           const SearchArea& area, const MatchSide& side,
+                                                           const FeatureGrid& grid) {
   CompareInArea(descriptor, area, side, grid);
   if (candidates_.empty()) return std::nullopt;
   const BestTwo two = BestTwoOfCandidates();
@@ -123,7 +125,8 @@ std::optional<NearestFeatures> FeatureMatcher::FindNearest(const Descriptor& des
   nearest.distance = DistanceOf(two.best);
   nearest.octave = side.keypoints[nearest.index].octave;
   nearest.second_distance = DistanceOf(two.second);
-  if (nearest.second_distance < kNoDistance) nearest.second_octave = side.keypoints[IndexOf(two.second)].octave;
+  if (nearest.second_distance < kNoDistance)
+    nearest.second_octave = side.keypoints[IndexOf(two.second)].octave;
   return nearest;
 }
 
@@ -133,7 +136,8 @@ std::optional<FeatureMatch> FeatureMatcher::FindMatch(const Descriptor& descript
   const std::optional<NearestFeatures> nearest = FindNearest(descriptor, area, side, grid);
   if (!nearest || nearest->distance > max_distance) return std::nullopt;
   const bool comparable = nearest->second_distance < kNoDistance && nearest->second_octave == nearest->octave;
-  if (comparable && !ClearlyBetter(nearest->distance, nearest->second_distance, max_ratio)) return std::nullopt;
+  if (comparable && !ClearlyBetter(nearest->distance, nearest->second_distance, max_ratio))
+    return std::nullopt;
   return FeatureMatch{0, nearest->index, nearest->distance};
 }
 
@@ -144,7 +148,8 @@ void FeatureMatcher::Start(const MatchSide& a, const MatchSide& b, std::vector<F
   nearest0_.assign(b.size(), KeyOf(kNoDistance, 0));
 }
 
-void FeatureMatcher::Propose(uint32_t index0, const MatchOptions& options, std::vector<FeatureMatch>* matches) {
+void FeatureMatcher::Propose(uint32_t index0, const MatchOptions& options,
+                             std::vector<FeatureMatch>* matches) {
   const auto [best, second] = BestTwoOfCandidates();
   if (options.mutual) {
     for (size_t i = 0; i < candidates_.size(); ++i) NoteForSecondImage(candidates_[i], distances_[i], index0);
@@ -177,21 +182,22 @@ void FeatureMatcher::Finish(const MatchSide& a, const MatchSide& b, const MatchO
   std::sort(matches->begin(), matches->end());
 }
 
-void FeatureMatcher::CompareInArea(const Descriptor& descriptor, const SearchArea& area, const MatchSide& side,
-                                   const FeatureGrid& grid) {
+void FeatureMatcher::CompareInArea(const Descriptor& descriptor, const SearchArea& area,
+                                   const MatchSide& side, const FeatureGrid& grid) {
   DMSLAM_CHECK(grid.size() == side.size(), "the grid must index the features of the side");
   if (in_area_.size() < side.size()) in_area_.resize(side.size());
   const size_t count =
       grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave, area.max_octave, in_area_.data());
   candidates_.assign(in_area_.data(), in_area_.data() + count);
-  if (!side.usable.empty()) std::erase_if(candidates_, [&](uint32_t feature) { return !side.Usable(feature); });
+  if (!side.usable.empty())
+    std::erase_if(candidates_, [&](uint32_t feature) { return !side.Usable(feature); });
   CompareWithCandidates(descriptor, side);
 }
 
 void FeatureMatcher::CompareWithCandidates(const Descriptor& descriptor, const MatchSide& side) {
   distances_.resize(candidates_.size());
-  kernels_.to_indexed(descriptor, side.descriptors.data(), candidates_.data(), static_cast<int>(candidates_.size()),
-                      distances_.data());
+  kernels_.to_indexed(descriptor, side.descriptors.data(), candidates_.data(),
+                      static_cast<int>(candidates_.size()), distances_.data());
 }
 
 void KeepConsistentTurns(std::span<const Keypoint> keypoints0, std::span<const Keypoint> keypoints1,

@@ -34,8 +34,8 @@ struct FeatureMatch {
 
 /// What makes two features a match.
 struct MatchOptions {
-  int max_distance = 50;          ///< largest Hamming distance [bits]
-  double max_ratio = 0.9;         ///< the distance must be below this share of the second best's; 1 turns it off
+  int max_distance = 50;   ///< largest Hamming distance [bits]
+  double max_ratio = 0.9;  ///< the distance must be below this share of the second best's; 1 turns it off
   bool check_orientation = true;  ///< keep only matches whose turn of the keypoint agrees with most others
   bool mutual = true;             ///< also the best one seen from the second image (ratio not asked there)
 };
@@ -67,7 +67,7 @@ struct SearchArea {
 /// The two best features of a search area. The second one's distance is 257 where there is none.
 struct NearestFeatures {
   uint32_t index = 0;
-  int distance = 257;         ///< [bits]
+  int distance = 257;  ///< [bits]
   int octave = 0;
   int second_distance = 257;  ///< [bits]
   int second_octave = 0;
@@ -77,16 +77,16 @@ struct NearestFeatures {
 inline constexpr int kOrientationBins = 30;
 inline constexpr int kOrientationBinsKept = 3;
 
-/// Matches features of two images. Holds scratch memory, so that it allocates only while this and the caller's results
-/// grow; one matcher serves one thread. Ties go to the smaller index, so results do not depend on the order of a search.
-/// Every feature takes part in at most one match (two that want the same one: the smaller distance wins, then the smaller
-/// index0), and matches are sorted by index0.
+/// Matches features of two images. Holds scratch memory, so that it allocates only while this and the
+/// caller's results grow; one matcher serves one thread. Ties go to the smaller index, so results do not
+/// depend on the order of a search. Every feature takes part in at most one match (two that want the same
+/// one: the smaller distance wins, then the smaller index0), and matches are sorted by index0.
 class FeatureMatcher {
  public:
   explicit FeatureMatcher(const HammingKernels& kernels = BestHammingKernels()) : kernels_(kernels) {}
 
-  /// Features of b within the window around `predicted_px[i]` for each feature i of a; with an empty prediction around
-  /// a.uv_px[i]. `grid_b` indexes b.
+  /// Features of b within the window around `predicted_px[i]` for each feature i of a; with an empty
+  /// prediction around a.uv_px[i]. `grid_b` indexes b.
   void MatchWindow(const MatchSide& a, const MatchSide& b, const FeatureGrid& grid_b,
                    const WindowMatchOptions& options, std::vector<FeatureMatch>* matches,
                    std::span<const Eigen::Vector2d> predicted_px = {});
@@ -100,14 +100,16 @@ class FeatureMatcher {
                    std::span<const GroupedFeature> groups_b, const MatchOptions& options,
                    std::vector<FeatureMatch>* matches);
 
-  /// The features of `side` nearest to `descriptor` within an area; none when the area holds no usable feature.
+  /// The features of `side` nearest to `descriptor` within an area; none when the area holds no usable
+  /// feature.
   std::optional<NearestFeatures> FindNearest(const Descriptor& descriptor, const SearchArea& area,
                                              const MatchSide& side, const FeatureGrid& grid);
 
-  /// FindNearest with the decision made: within `max_distance`, and clearly better than a second one of the same octave
-  /// (one of another octave shows the same corner). `max_ratio` >= 1 turns the second test off.
-  std::optional<FeatureMatch> FindMatch(const Descriptor& descriptor, const SearchArea& area, const MatchSide& side,
-                                        const FeatureGrid& grid, int max_distance, double max_ratio);
+  /// FindNearest with the decision made: within `max_distance`, and clearly better than a second one of the
+  /// same octave (one of another octave shows the same corner). `max_ratio` >= 1 turns the second test off.
+  std::optional<FeatureMatch> FindMatch(const Descriptor& descriptor, const SearchArea& area,
+                                        const MatchSide& side, const FeatureGrid& grid, int max_distance,
+                                        double max_ratio);
 
  private:
   /// Distance (high 32 bits) and index of the two nearest candidates; distance 257 where there are fewer.
@@ -133,11 +135,13 @@ class FeatureMatcher {
   std::vector<uint32_t> in_area_;
   std::vector<uint32_t> candidates_;
   std::vector<uint16_t> distances_;
-  std::vector<uint64_t> nearest0_;  ///< per feature of b: distance (high 32 bits) and index of the nearest of a
+  std::vector<uint64_t>
+      nearest0_;  ///< per feature of b: distance (high 32 bits) and index of the nearest of a
 };
 
-/// Removes matches whose turn (difference of the keypoints' angles) is not among the most common: a histogram of 30 bins,
-/// of which the fullest three are kept, the second and third only with a tenth of the first's. Keeps the order.
+/// Removes matches whose turn (difference of the keypoints' angles) is not among the most common: a histogram
+/// of 30 bins, of which the fullest three are kept, the second and third only with a tenth of the first's.
+/// Keeps the order.
 void KeepConsistentTurns(std::span<const Keypoint> keypoints0, std::span<const Keypoint> keypoints1,
                          std::vector<FeatureMatch>* matches);
 

@@ -30,8 +30,8 @@ struct Image {
   FeatureGrid grid;
 
   void Add(double x, double y, int octave, int angle, const Descriptor& descriptor) {
-    keypoints.push_back({static_cast<uint16_t>(x * 16), static_cast<uint16_t>(y * 16), static_cast<uint8_t>(octave),
-                         static_cast<uint8_t>(angle)});
+    keypoints.push_back({static_cast<uint16_t>(x * 16), static_cast<uint16_t>(y * 16),
+                         static_cast<uint8_t>(octave), static_cast<uint8_t>(angle)});
     descriptors.push_back(descriptor);
     uv_px.emplace_back(x, y);
   }
@@ -109,10 +109,12 @@ TEST(Hamming, PathsAgree) {
     indices.push_back(random.Below(i + 1));
   }
   std::vector<uint16_t> portable(100), best(100);
-  PortableHammingKernels().to_indexed(descriptors[7], descriptors.data(), indices.data(), 100, portable.data());
+  PortableHammingKernels().to_indexed(descriptors[7], descriptors.data(), indices.data(), 100,
+                                      portable.data());
   BestHammingKernels().to_indexed(descriptors[7], descriptors.data(), indices.data(), 100, best.data());
   EXPECT_EQ(portable, best);
-  for (size_t i = 0; i < 100; ++i) EXPECT_EQ(best[i], HammingDistance(descriptors[7], descriptors[indices[i]]));
+  for (size_t i = 0; i < 100; ++i)
+    EXPECT_EQ(best[i], HammingDistance(descriptors[7], descriptors[indices[i]]));
   PortableHammingKernels().to_range(descriptors[7], descriptors.data(), 100, portable.data());
   BestHammingKernels().to_range(descriptors[7], descriptors.data(), 100, best.data());
   EXPECT_EQ(portable, best);

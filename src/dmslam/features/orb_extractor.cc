@@ -41,7 +41,9 @@ void OrbExtractorOptions::Check() const {
 }
 
 OrbExtractor::OrbExtractor(const OrbExtractorOptions& options)
-    : options_((options.Check(), options)), kernels_(KernelsOn(options.simd_path)), pattern_(BriefPattern()) {}
+    : options_((options.Check(), options)),
+      kernels_(KernelsOn(options.simd_path)),
+      pattern_(BriefPattern()) {}
 
 void OrbExtractor::Extract(const GrayView& image, FeatureSet* features) {
   DMSLAM_CHECK(image.width <= 4095 && image.height <= 4095, "keypoints cannot name pixels beyond 4095");
@@ -84,7 +86,8 @@ void OrbExtractor::SetQuotas() {
   for (size_t i = 0; i < quotas_.size(); ++i) {
     const bool last = i + 1 == quotas_.size();
     const double share = 1.0 / pyramid_.level(i).scale_x / sum;
-    quotas_[i] = last ? options_.num_features - given : static_cast<int>(std::lround(share * options_.num_features));
+    quotas_[i] =
+        last ? options_.num_features - given : static_cast<int>(std::lround(share * options_.num_features));
     given += quotas_[i];
   }
 }
@@ -105,7 +108,8 @@ void OrbExtractor::Describe(size_t octave, FeatureSet* features) {
     keypoint.octave = static_cast<uint8_t>(octave);
     keypoint.angle = Orientation(moment_x, moment_y);
     features->keypoints.push_back(keypoint);
-    kernels_.compare_pairs(smooth_.row(corner.y) + corner.x, smooth_.stride(), pattern_.Places(keypoint.angle),
+    kernels_.compare_pairs(smooth_.row(corner.y) + corner.x, smooth_.stride(),
+                           pattern_.Places(keypoint.angle),
                            features->descriptors.emplace_back().words.data());
   }
 }

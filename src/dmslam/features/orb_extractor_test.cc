@@ -41,7 +41,8 @@ TEST(OrbExtractor, FindsTheCornersOfASquare) {
   }
   for (const Keypoint& k : features.keypoints) {
     double nearest = 1e9;
-    for (const auto& corner : corners) nearest = std::min(nearest, std::hypot(k.x_px() - corner[0], k.y_px() - corner[1]));
+    for (const auto& corner : corners)
+      nearest = std::min(nearest, std::hypot(k.x_px() - corner[0], k.y_px() - corner[1]));
     EXPECT_LT(nearest, 4.0 * std::pow(1.2, k.octave)) << "a keypoint away from every corner";
   }
 }
@@ -67,7 +68,8 @@ TEST(OrbExtractor, GivesTheNumberAskedAndUniqueKeypoints) {
   std::array<int, 8> per_octave{};
   for (const Keypoint& k : features.keypoints) ++per_octave[k.octave];
   for (size_t i = 0; i < 8; ++i) {
-    const double share = std::pow(1 / 1.2, static_cast<double>(i)) * (1 - 1 / 1.2) / (1 - std::pow(1 / 1.2, 8));
+    const double share =
+        std::pow(1 / 1.2, static_cast<double>(i)) * (1 - 1 / 1.2) / (1 - std::pow(1 / 1.2, 8));
     EXPECT_NEAR(per_octave[i], 1000 * share, 0.25 * 1000 * share) << "octave " << i;
   }
 }
@@ -89,7 +91,8 @@ TEST(OrbExtractor, DescriptorsTurnWithTheImage) {
         if (k.octave != upright.keypoints[i].octave || std::hypot(k.x_px() - x, k.y_px() - y) > 1.0) continue;
         ++repeated;
         if (HammingDistance(upright.descriptors[i], turned.descriptors[j]) <= 50) ++alike;
-        const int turn = (k.angle - upright.keypoints[i].angle - static_cast<int>(std::lround(degrees / 360 * 256))) & 255;
+        const int turn =
+            (k.angle - upright.keypoints[i].angle - static_cast<int>(std::lround(degrees / 360 * 256))) & 255;
         turn_error += std::min(turn, 256 - turn);
         break;
       }
@@ -206,7 +209,8 @@ TEST(OrbExtractor, AllocatesNothingOnceItKnowsTheSize) {
 TEST(OrbExtractor, SmallAndBlankImagesGiveNothing) {
   FeatureSet features;
   OrbExtractor extractor;
-  for (const auto& [width, height] : {std::pair(0, 0), std::pair(1, 1), std::pair(32, 32), std::pair(500, 7)}) {
+  for (const auto& [width, height] :
+       {std::pair(0, 0), std::pair(1, 1), std::pair(32, 32), std::pair(500, 7)}) {
     const GrayImage image(width, height, 7);
     extractor.Extract(image.View(), &features);
     EXPECT_EQ(features.size(), 0U) << width << "x" << height;
@@ -245,8 +249,10 @@ TEST(OrbExtractorOptions, NamesTheFieldThatIsWrong) {
     return "";
   };
   EXPECT_EQ(message_of([](OrbExtractorOptions&) {}), "");
-  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.num_features = 0; }).find("num_features"), std::string::npos);
-  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.border_px = 15; }).find("border_px"), std::string::npos);
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.num_features = 0; }).find("num_features"),
+            std::string::npos);
+  EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.border_px = 15; }).find("border_px"),
+            std::string::npos);
   EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.pyramid.scale_factor = 2.5; }).find("scale_factor"),
             std::string::npos);
   EXPECT_NE(message_of([](OrbExtractorOptions& o) { o.min_fast_threshold = 21; }).find("min_fast_threshold"),

@@ -5,7 +5,8 @@
 namespace dmslam {
 
 SubpixelOffset RefineMaximum(const uint8_t* scores) {
-  // Six times the gradient, six times the second derivatives along the axes, four times the mixed one; in integers.
+  // Six times the gradient, six times the second derivatives along the axes, four times the mixed one; in
+  // integers.
   int gradient_x = 0, gradient_y = 0, curvature_x = 0, curvature_y = 0, mixed = 0;
   for (int y = -1; y <= 1; ++y) {
     for (int x = -1; x <= 1; ++x) {

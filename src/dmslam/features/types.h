@@ -19,13 +19,13 @@ struct GrayView {
   const uint8_t* row(int y) const { return data + y * stride; }
 };
 
-/// A keypoint as it travels: position in the raw (distorted) image at full resolution, in sixteenths of a pixel, so that
-/// every process computes with the same numbers.
+/// A keypoint as it travels: position in the raw (distorted) image at full resolution, in sixteenths of a
+/// pixel, so that every process computes with the same numbers.
 struct Keypoint {
-  uint16_t x_q4 = 0;  ///< x [px] * 16
-  uint16_t y_q4 = 0;  ///< y [px] * 16
-  uint8_t octave = 0; ///< pyramid level, 0 = full resolution
-  uint8_t angle = 0;  ///< orientation, 256 steps per turn
+  uint16_t x_q4 = 0;   ///< x [px] * 16
+  uint16_t y_q4 = 0;   ///< y [px] * 16
+  uint8_t octave = 0;  ///< pyramid level, 0 = full resolution
+  uint8_t angle = 0;   ///< orientation, 256 steps per turn
 
   double x_px() const { return x_q4 / 16.0; }
   double y_px() const { return y_q4 / 16.0; }
@@ -57,7 +57,8 @@ struct Pyramid {
   int levels = 8;
   double scale_factor = 1.2;
 
-  /// Size of one pixel of a level in pixels of level 0; also the standard deviation of a keypoint's position [px].
+  /// Size of one pixel of a level in pixels of level 0; also the standard deviation of a keypoint's position
+  /// [px].
   double Scale(int octave) const { return std::pow(scale_factor, octave); }
   double SigmaSquared(int octave) const { return std::pow(scale_factor, 2 * octave); }
 };

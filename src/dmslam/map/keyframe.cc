@@ -5,7 +5,8 @@
 
 namespace dmslam {
 
-std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera, const Pyramid& pyramid) {
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera,
+                                                       const Pyramid& pyramid) {
   auto features = std::make_shared<FrameFeatures>();
   FeatureSet kept;
   kept.keypoints.reserve(set.size());

@@ -14,8 +14,10 @@
 
 namespace dmslam {
 
-/// Undistorts the keypoints of `set` and indexes them. Keypoints whose distortion cannot be inverted are dropped.
-std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera, const Pyramid& pyramid);
+/// Undistorts the keypoints of `set` and indexes them. Keypoints whose distortion cannot be inverted are
+/// dropped.
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera,
+                                                       const Pyramid& pyramid);
 
 /// A keyframe of the map. `landmarks[i]` is the landmark that feature i observes (invalid: none).
 struct Keyframe {

@@ -16,13 +16,15 @@ struct Observation {
   auto operator<=>(const Observation&) const = default;
 };
 
-/// What frames said of a landmark since it was made. All of it is the mapper's state and travels with the map.
+/// What frames said of a landmark since it was made. All of it is the mapper's state and travels with the
+/// map.
 struct LandmarkEvidence {
   uint32_t visible = 0;  ///< frames in which it should have been seen
   uint32_t found = 0;    ///< frames in which it was seen where the map says
   uint32_t moved = 0;    ///< frames in which something like it was seen elsewhere
-  float motion_belief = 0.0F;  ///< log odds that it moves; above zero it has no vote (see docs/motion_belief.md)
-  int64_t last_moved_ns = 0;   ///< stamp of the newest frame that saw it elsewhere; 0 = never
+  float motion_belief =
+      0.0F;  ///< log odds that it moves; above zero it has no vote (see docs/motion_belief.md)
+  int64_t last_moved_ns = 0;  ///< stamp of the newest frame that saw it elsewhere; 0 = never
   auto operator<=>(const LandmarkEvidence&) const = default;
 };
 
@@ -31,11 +33,11 @@ struct Landmark {
   LandmarkId id;
   MapId map_id = 0;
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
-  Descriptor descriptor;          ///< the observation nearest to all others
-  KeyframeId reference;           ///< the keyframe whose corrections it follows
-  KeyframeId first_keyframe;      ///< the newest keyframe when it was made: its age is counted from here
-  int64_t first_ns = 0;           ///< stamp of the oldest frame that sees it
-  int64_t last_ns = 0;            ///< stamp of the newest keyframe that sees it
+  Descriptor descriptor;      ///< the observation nearest to all others
+  KeyframeId reference;       ///< the keyframe whose corrections it follows
+  KeyframeId first_keyframe;  ///< the newest keyframe when it was made: its age is counted from here
+  int64_t first_ns = 0;       ///< stamp of the oldest frame that sees it
+  int64_t last_ns = 0;        ///< stamp of the newest keyframe that sees it
   LandmarkEvidence evidence;
   std::vector<Observation> observations;  ///< sorted by keyframe
 

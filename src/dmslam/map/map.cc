@@ -29,7 +29,8 @@ auto FindObservation(std::vector<Observation>& observations, KeyframeId keyframe
 
 Map::Map(const Camera& camera, const Pyramid& pyramid) : camera_(camera), pyramid_(pyramid) {}
 
-// ---- Reading -------------------------------------------------------------------------------------------------------
+// ---- Reading
+// -------------------------------------------------------------------------------------------------------
 
 const Keyframe* Map::FindKeyframe(KeyframeId id) const {
   const auto it = keyframes_.find(id);
@@ -168,12 +169,14 @@ void Map::RefreshViewing(Landmark& landmark) const {
   const Keyframe& keyframe = keyframes_.at(scale_from->keyframe);
   const double distance = (landmark.p_world - keyframe.T_cam_world.Center()).norm();
   Landmark::ViewingRange& viewing = landmark.viewing;
-  viewing.max_distance = distance * pyramid_.Scale(keyframe.features->set.keypoints[scale_from->feature].octave);
+  viewing.max_distance =
+      distance * pyramid_.Scale(keyframe.features->set.keypoints[scale_from->feature].octave);
   viewing.min_distance = viewing.max_distance / pyramid_.Scale(pyramid_.levels - 1);
   viewing.mean_direction = sum.normalized();
 }
 
-// ---- Editing -------------------------------------------------------------------------------------------------------
+// ---- Editing
+// -------------------------------------------------------------------------------------------------------
 
 Keyframe& Map::MutableKeyframe(KeyframeId id) {
   const auto it = keyframes_.find(id);
@@ -236,7 +239,8 @@ void Map::SetObservation(KeyframeId keyframe_id, uint16_t feature, LandmarkId la
   Landmark& landmark = MutableLandmark(landmark_id);
   ClearObservation(keyframe_id, feature);
   const auto at = FindObservation(landmark.observations, keyframe_id);
-  if (at != landmark.observations.end() && at->keyframe == keyframe_id) ClearObservation(keyframe_id, at->feature);
+  if (at != landmark.observations.end() && at->keyframe == keyframe_id)
+    ClearObservation(keyframe_id, at->feature);
   keyframe.landmarks[feature] = landmark_id;
   landmark.observations.insert(FindObservation(landmark.observations, keyframe_id), {keyframe_id, feature});
   landmark.viewing_stale = true;
@@ -339,7 +343,8 @@ void Map::Fuse(LandmarkId from, LandmarkId into) {
     ClearObservation(o.keyframe, o.feature);
     Landmark& target = MutableLandmark(into);
     const auto at = FindObservation(target.observations, o.keyframe);
-    if (at == target.observations.end() || at->keyframe != o.keyframe) SetObservation(o.keyframe, o.feature, into);
+    if (at == target.observations.end() || at->keyframe != o.keyframe)
+      SetObservation(o.keyframe, o.feature, into);
   }
   const Landmark& gone = MutableLandmark(from);
   Landmark& target = MutableLandmark(into);
@@ -395,7 +400,8 @@ void Map::ReparentChildren(const Keyframe& removed) {
 
 void Map::RemoveKeyframe(KeyframeId id) {
   const Keyframe& keyframe = MutableKeyframe(id);
-  DMSLAM_CHECK(keyframe.parent.valid() && keyframes_.contains(keyframe.parent), "a map's first keyframe stays");
+  DMSLAM_CHECK(keyframe.parent.valid() && keyframes_.contains(keyframe.parent),
+               "a map's first keyframe stays");
   for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
     const LandmarkId landmark_id = keyframe.landmarks[i];
     if (!landmark_id.valid()) continue;
@@ -428,7 +434,8 @@ void Map::EraseKeyframe(KeyframeId id) {
   Detach(id, it->second.parent);
   keyframes_.erase(it);
   dirty_keyframes_.erase(id);
-  dirty_observations_.erase(dirty_observations_.lower_bound({id, 0}), dirty_observations_.upper_bound({id, 0xffff}));
+  dirty_observations_.erase(dirty_observations_.lower_bound({id, 0}),
+                            dirty_observations_.upper_bound({id, 0xffff}));
 }
 
 void Map::ForgetMap(MapId map_id) {
@@ -447,11 +454,13 @@ void Map::DropMap(MapId map_id) {
   dropped_maps_.push_back(map_id);
 }
 
-// ---- Deltas --------------------------------------------------------------------------------------------------------
+// ---- Deltas
+// --------------------------------------------------------------------------------------------------------
 
 KeyframeState Map::StateOf(const Keyframe& keyframe, bool with_features) const {
-  KeyframeState state{keyframe.id,    keyframe.map_id,     keyframe.stamp_ns, keyframe.T_cam_world, keyframe.scale,
-                      keyframe.parent, keyframe.loop_edges, with_features,     {}};
+  KeyframeState state{keyframe.id,          keyframe.map_id, keyframe.stamp_ns,
+                      keyframe.T_cam_world, keyframe.scale,  keyframe.parent,
+                      keyframe.loop_edges,  with_features,   {}};
   if (with_features) state.features = keyframe.features->set;
   return state;
 }
@@ -477,7 +486,8 @@ MapDelta Map::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
       delta.keyframe_poses.push_back({id, keyframe.T_cam_world, keyframe.scale});
     }
   }
-  std::vector<std::pair<LandmarkId, uint8_t>> dirty_landmarks(dirty_landmarks_.begin(), dirty_landmarks_.end());
+  std::vector<std::pair<LandmarkId, uint8_t>> dirty_landmarks(dirty_landmarks_.begin(),
+                                                              dirty_landmarks_.end());
   std::sort(dirty_landmarks.begin(), dirty_landmarks.end());
   for (const auto& [id, dirty] : dirty_landmarks) {
     const Landmark& landmark = landmarks_.at(id);
@@ -491,7 +501,8 @@ MapDelta Map::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
   for (const auto& [keyframe, feature] : dirty_observations_) {
     delta.observations.push_back({keyframe, feature, keyframes_.at(keyframe).landmarks[feature]});
   }
-  for (const KeyframeId id : new_keyframe_tombstones_) delta.keyframe_tombstones.push_back(keyframe_tombstones_.at(id));
+  for (const KeyframeId id : new_keyframe_tombstones_)
+    delta.keyframe_tombstones.push_back(keyframe_tombstones_.at(id));
   for (const LandmarkId id : new_landmark_tombstones_) {
     delta.landmark_tombstones.push_back({id, landmark_tombstones_.at(id)});
   }
@@ -610,7 +621,8 @@ void Map::ApplyTombstones(const MapDelta& delta) {
     keyframe_tombstones_[tombstone.id] = tombstone;
     const auto it = keyframes_.find(tombstone.id);
     if (it == keyframes_.end()) continue;
-    for (size_t i = 0; i < it->second.landmarks.size(); ++i) ClearObservation(tombstone.id, static_cast<uint16_t>(i));
+    for (size_t i = 0; i < it->second.landmarks.size(); ++i)
+      ClearObservation(tombstone.id, static_cast<uint16_t>(i));
     EraseKeyframe(tombstone.id);
     applied_removed_keyframes_.push_back(tombstone.id);
   }
@@ -654,7 +666,8 @@ std::vector<MapDelta> Map::Snapshot(KeyframeId center, size_t max_bytes_hint) co
   std::set<LandmarkId> sent;
   for (const KeyframeId id : order) {
     const Keyframe& keyframe = keyframes_.at(id);
-    room_for(kFeatureBytes * keyframe.features->size() + kSmallBytes).keyframes.push_back(StateOf(keyframe, true));
+    room_for(kFeatureBytes * keyframe.features->size() + kSmallBytes)
+        .keyframes.push_back(StateOf(keyframe, true));
     for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
       const LandmarkId landmark_id = keyframe.landmarks[i];
       if (!landmark_id.valid()) continue;
@@ -664,7 +677,8 @@ std::vector<MapDelta> Map::Snapshot(KeyframeId center, size_t max_bytes_hint) co
       room_for(kObservationBytes).observations.push_back({id, static_cast<uint16_t>(i), landmark_id});
     }
   }
-  for (const auto& [id, tombstone] : keyframe_tombstones_) room_for(kSmallBytes).keyframe_tombstones.push_back(tombstone);
+  for (const auto& [id, tombstone] : keyframe_tombstones_)
+    room_for(kSmallBytes).keyframe_tombstones.push_back(tombstone);
   for (const auto& [id, by] : landmark_tombstones_) room_for(16).landmark_tombstones.push_back({id, by});
   for (MapDelta& part : parts) {
     part.event = MapEvent::kSnapshot;

@@ -15,12 +15,12 @@
 
 namespace dmslam {
 
-/// Keyframes, landmarks, who sees what, the covisibility graph and the spanning tree: the same class in the mapper, who
-/// edits it, and in every replica, which only applies deltas. Every edit is remembered, and `TakeDelta` turns what was
-/// edited since the last one into absolute values.
+/// Keyframes, landmarks, who sees what, the covisibility graph and the spanning tree: the same class in the
+/// mapper, who edits it, and in every replica, which only applies deltas. Every edit is remembered, and
+/// `TakeDelta` turns what was edited since the last one into absolute values.
 ///
-/// Order: keyframes iterate by id. Landmarks are stored by hash and are never iterated in that order; go through
-/// keyframes' features or `LandmarkIdsSorted`.
+/// Order: keyframes iterate by id. Landmarks are stored by hash and are never iterated in that order; go
+/// through keyframes' features or `LandmarkIdsSorted`.
 class Map {
  public:
   Map(const Camera& camera, const Pyramid& pyramid);
@@ -51,7 +51,8 @@ class Map {
   const std::vector<KeyframeId>& Children(KeyframeId id) const;
   const std::map<KeyframeId, KeyframeTombstone>& keyframe_tombstones() const { return keyframe_tombstones_; }
   const std::map<LandmarkId, LandmarkId>& landmark_tombstones() const { return landmark_tombstones_; }
-  /// Keyframes that share at least `min_shared` landmarks with `id`, most first (ties: older first), at most `most`.
+  /// Keyframes that share at least `min_shared` landmarks with `id`, most first (ties: older first), at most
+  /// `most`.
   std::vector<KeyframeId> BestCovisible(KeyframeId id, int most, int min_shared = 15) const;
   /// How many landmarks of a keyframe have at least `min_observations` observers.
   int CountTracked(const Keyframe& keyframe, int min_observations) const;
@@ -63,8 +64,8 @@ class Map {
   // Editing (the mapper, and Apply). Ids must exist unless said otherwise.
   void AddKeyframe(Keyframe keyframe);  ///< without landmarks; observations are added one by one
   void AddLandmark(Landmark landmark);  ///< without observations
-  /// Feature `feature` of `keyframe` sees `landmark`. Replaces what the feature saw; a landmark has at most one feature
-  /// per keyframe (an older one is released).
+  /// Feature `feature` of `keyframe` sees `landmark`. Replaces what the feature saw; a landmark has at most
+  /// one feature per keyframe (an older one is released).
   void SetObservation(KeyframeId keyframe, uint16_t feature, LandmarkId landmark);
   void ClearObservation(KeyframeId keyframe, uint16_t feature);
   void SetPose(KeyframeId id, const Rigid3d& T_cam_world);
@@ -78,17 +79,18 @@ class Map {
   void SetMapId(LandmarkId id, MapId map_id);
   /// Chooses the descriptor nearest to all observations (least median distance).
   void UpdateDescriptor(LandmarkId id);
-  /// Moves all observations of `from` to `into` (unless the keyframe sees `into` already) and leaves a tombstone.
+  /// Moves all observations of `from` to `into` (unless the keyframe sees `into` already) and leaves a
+  /// tombstone.
   void Fuse(LandmarkId from, LandmarkId into);
   void RemoveLandmark(LandmarkId id);
-  /// Removes a keyframe: its children get new parents, a tombstone keeps its place relative to its parent, landmarks
-  /// that nobody sees any more go with it.
+  /// Removes a keyframe: its children get new parents, a tombstone keeps its place relative to its parent,
+  /// landmarks that nobody sees any more go with it.
   void RemoveKeyframe(KeyframeId id);
   /// Forgets a whole map: keyframes, landmarks, and their tombstones.
   void DropMap(MapId map_id);
 
-  /// What changed since the last call, as absolute values, with the next version number. `event`, `about` and the rest
-  /// of the header are the caller's.
+  /// What changed since the last call, as absolute values, with the next version number. `event`, `about` and
+  /// the rest of the header are the caller's.
   MapDelta TakeDelta(MapEvent event, KeyframeId about, MapId map_id);
   /// Applies a delta of a writer's map to this replica. What refers to unknown ids is skipped and counted.
   void Apply(const MapDelta& delta);
@@ -98,11 +100,12 @@ class Map {
   /// Highest ordinal of an epoch of which the map knows a landmark, living or dead; 0: of none.
   uint16_t HighestOrdinal() const;
   uint64_t skipped_references() const { return skipped_references_; }
-  /// The whole map as deltas with at most `max_bytes_hint` of payload each, keyframes near `center` first. Applying all
-  /// of them to an empty map gives this one.
+  /// The whole map as deltas with at most `max_bytes_hint` of payload each, keyframes near `center` first.
+  /// Applying all of them to an empty map gives this one.
   std::vector<MapDelta> Snapshot(KeyframeId center, size_t max_bytes_hint) const;
 
-  /// Landmarks touched by the last Apply (new, moved, or with changed observations), sorted; for readers with indices.
+  /// Landmarks touched by the last Apply (new, moved, or with changed observations), sorted; for readers with
+  /// indices.
   const std::vector<KeyframeId>& applied_new_keyframes() const { return applied_new_keyframes_; }
   const std::vector<KeyframeId>& applied_removed_keyframes() const { return applied_removed_keyframes_; }
 
@@ -134,7 +137,8 @@ class Map {
   uint64_t skipped_references_ = 0;
   std::map<KeyframeId, Keyframe> keyframes_;
   mutable std::unordered_map<LandmarkId, Landmark> landmarks_;
-  std::map<KeyframeId, std::vector<KeyframeId>> children_;  ///< by parent, whether the parent is known yet or not
+  std::map<KeyframeId, std::vector<KeyframeId>>
+      children_;  ///< by parent, whether the parent is known yet or not
   std::map<KeyframeId, KeyframeTombstone> keyframe_tombstones_;
   std::map<LandmarkId, LandmarkId> landmark_tombstones_;
 

@@ -17,18 +17,18 @@ enum class MapEvent : uint8_t {
   kKeyframeInserted = 1,
   kLandmarksCreated = 2,
   kFused = 3,
-  kAdjusted = 4,       ///< local bundle adjustment
-  kMapped = 5,         ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
+  kAdjusted = 4,  ///< local bundle adjustment
+  kMapped = 5,    ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
   kEvidence = 6,
-  kCorrected = 7,      ///< a loop correction was applied
+  kCorrected = 7,  ///< a loop correction was applied
   kGloballyAdjusted = 8,
   kMapStarted = 9,
   kMapDropped = 10,
-  kSettled = 11,       ///< all work that keyframe `about` caused is done
-  kSnapshot = 12,      ///< part of a snapshot
+  kSettled = 11,   ///< all work that keyframe `about` caused is done
+  kSnapshot = 12,  ///< part of a snapshot
 
-  kRefused = 13,       ///< a correction that was not applied; `note` says why
-  kEnded = 14,         ///< the sequence has ended, nothing follows
+  kRefused = 13,  ///< a correction that was not applied; `note` says why
+  kEnded = 14,    ///< the sequence has ended, nothing follows
 };
 
 /// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.
@@ -111,14 +111,15 @@ struct MapProgress {
   bool operator==(const MapProgress&) const = default;
 };
 
-/// A change of the map as absolute values: applying it twice is applying it once. One delta becomes one map record.
+/// A change of the map as absolute values: applying it twice is applying it once. One delta becomes one map
+/// record.
 struct MapDelta {
   MapEvent event = MapEvent::kSettled;
-  KeyframeId about;        ///< the keyframe whose arrival caused it
+  KeyframeId about;  ///< the keyframe whose arrival caused it
   MapId map_id = 0;
-  uint64_t version = 0;    ///< the map's version after it; counts deltas
+  uint64_t version = 0;  ///< the map's version after it; counts deltas
   uint64_t correction_id = 0;
-  int64_t stamp_ns = 0;    ///< capture time of `about`; 0: not known
+  int64_t stamp_ns = 0;  ///< capture time of `about`; 0: not known
   std::string note;
   MapProgress progress;
   std::vector<KeyframeState> keyframes;

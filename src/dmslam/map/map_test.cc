@@ -14,7 +14,8 @@ namespace {
 std::shared_ptr<const FrameFeatures> RandomFeatures(Random& random, size_t count) {
   FeatureSet set;
   for (size_t i = 0; i < count; ++i) {
-    set.keypoints.push_back({static_cast<uint16_t>(random.Below(640 * 16)), static_cast<uint16_t>(random.Below(480 * 16)),
+    set.keypoints.push_back({static_cast<uint16_t>(random.Below(640 * 16)),
+                             static_cast<uint16_t>(random.Below(480 * 16)),
                              static_cast<uint8_t>(random.Below(8)), static_cast<uint8_t>(random.Below(256))});
     Descriptor descriptor;
     for (uint64_t& word : descriptor.words) word = random.Next();
@@ -32,14 +33,24 @@ class RandomEditor {
 
   void Step() {
     switch (random_.Below(10)) {
-      case 0: AddKeyframe(); break;
+      case 0:
+        AddKeyframe();
+        break;
       case 1:
-      case 2: AddLandmark(); break;
+      case 2:
+        AddLandmark();
+        break;
       case 3:
       case 4:
-      case 5: Observe(); break;
-      case 6: MoveSomething(); break;
-      case 7: FuseSomething(); break;
+      case 5:
+        Observe();
+        break;
+      case 6:
+        MoveSomething();
+        break;
+      case 7:
+        FuseSomething();
+        break;
       case 8:
         if (random_.Below(4) == 0) RemoveSomeKeyframe();
         break;
@@ -64,7 +75,8 @@ class RandomEditor {
     keyframe.id = KeyframeId::Make(1, next_frame_++);
     keyframe.map_id = 1;
     keyframe.parent = AnyKeyframe();
-    keyframe.T_cam_world.translation = Eigen::Vector3d(random_.Uniform(), random_.Uniform(), random_.Uniform());
+    keyframe.T_cam_world.translation =
+        Eigen::Vector3d(random_.Uniform(), random_.Uniform(), random_.Uniform());
     keyframe.features = RandomFeatures(random_, 30);
     map_.AddKeyframe(keyframe);
   }

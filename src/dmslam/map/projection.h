@@ -17,12 +17,13 @@ struct LandmarkView {
 };
 
 struct ViewLimits {
-  double min_view_cos = 0.5;      ///< views from the side are refused (ORB-SLAM2: 60 degrees)
-  double distance_slack = 1.2;    ///< how far outside its range of distances a landmark may be
-  double border_px = 0;           ///< how far outside the image a projection may lie
+  double min_view_cos = 0.5;    ///< views from the side are refused (ORB-SLAM2: 60 degrees)
+  double distance_slack = 1.2;  ///< how far outside its range of distances a landmark may be
+  double border_px = 0;         ///< how far outside the image a projection may lie
 };
 
-/// Predicts the view of a landmark; none when it is behind, outside the image, or seen from too different a place.
+/// Predicts the view of a landmark; none when it is behind, outside the image, or seen from too different a
+/// place.
 std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark, const Rigid3d& T_cam_world,
                                         const ViewLimits& limits = {});
 
@@ -35,10 +36,12 @@ struct FeatureHit {
   int second_octave = -1;
 };
 
-/// Looks within `radius_px` of `uv_px`, at octaves min..max, for the feature nearest to `descriptor`. Features whose
-/// entry in `taken` is non-zero are passed over (`taken` may be empty). Ties go to the lower index.
-FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px, int min_octave,
-                       int max_octave, const Descriptor& descriptor, const std::vector<uint8_t>& taken);
+/// Looks within `radius_px` of `uv_px`, at octaves min..max, for the feature nearest to `descriptor`.
+/// Features whose entry in `taken` is non-zero are passed over (`taken` may be empty). Ties go to the lower
+/// index.
+FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px,
+                       int min_octave, int max_octave, const Descriptor& descriptor,
+                       const std::vector<uint8_t>& taken);
 
 /// Squared reprojection error over the feature's variance (sigma of a pixel at its octave).
 inline double NormalizedErrorSquared(const FrameFeatures& features, int feature, const Eigen::Vector2d& uv_px,

@@ -18,7 +18,7 @@ struct KeyframeProposal {
   KeyframeId id;
   MapId map_id = 0;
   int64_t stamp_ns = 0;
-  KeyframeId reference;   ///< the keyframe its pose is told from; may have been culled meanwhile
+  KeyframeId reference;  ///< the keyframe its pose is told from; may have been culled meanwhile
   Rigid3d T_cam_reference;
   double reference_scale = 1.0;  ///< the reference's scale (Keyframe::scale) when the pose was told
   FeatureSet features;
@@ -26,8 +26,8 @@ struct KeyframeProposal {
     uint16_t feature = 0;
     LandmarkId landmark;
   };
-  std::vector<Match> matches;          ///< landmarks seen as static
-  std::vector<uint16_t> moving;        ///< features seen to move: no landmark is made of them; sorted
+  std::vector<Match> matches;    ///< landmarks seen as static
+  std::vector<uint16_t> moving;  ///< features seen to move: no landmark is made of them; sorted
 };
 
 /// A first map, as the frontend sees it: two frames and the points seen by both.
@@ -62,9 +62,9 @@ enum class TrackingState : uint8_t {
   kWaitingForMap = 1,  ///< a first map was proposed and has not come back yet
   kTrial = 2,          ///< a young map must still prove that it predicts
   kTracking = 3,
-  kUncertain = 4,      ///< too few static inliers: the pose is a prediction
+  kUncertain = 4,  ///< too few static inliers: the pose is a prediction
   kLost = 5,
-  kLocalizedLater = 6, ///< a frame placed in the map after the fact
+  kLocalizedLater = 6,  ///< a frame placed in the map after the fact
 };
 
 /// Where the camera was.
@@ -73,22 +73,22 @@ struct FramePose {
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::kNotInitialized;
   MapId map_id = 0;
-  KeyframeId reference;      ///< invalid: no pose
+  KeyframeId reference;  ///< invalid: no pose
   Rigid3d T_cam_reference;
   double reference_scale = 1.0;  ///< the reference's scale (Keyframe::scale) when the pose was told
-  Rigid3d T_cam_world;       ///< in the map as the frontend knew it then
+  Rigid3d T_cam_world;           ///< in the map as the frontend knew it then
   uint16_t num_features = 0;
-  uint16_t num_static = 0;   ///< inliers
+  uint16_t num_static = 0;  ///< inliers
   uint16_t num_moving = 0;
-  uint16_t num_unknown = 0;  ///< matched, but without a vote
+  uint16_t num_unknown = 0;         ///< matched, but without a vote
   float moving_image_share = 0.0F;  ///< share of occupied image cells whose features move
-  std::string reason;        ///< why there is no pose, or why the state is what it is
+  std::string reason;               ///< why there is no pose, or why the state is what it is
   bool HasPose() const { return reference.valid(); }
 };
 
 /// The frontend gives a map up.
-/// With map 0 it gives up none: the sequence has ended, and the mapper is asked to adjust its maps as a whole. It answers
-/// with a settled record about no keyframe.
+/// With map 0 it gives up none: the sequence has ended, and the mapper is asked to adjust its maps as a
+/// whole. It answers with a settled record about no keyframe.
 struct MapReset {
   MapId map_id = 0;
   bool drop = false;  ///< true: it was wrong from the beginning; false: keep it, a new one follows
@@ -99,10 +99,10 @@ struct MapReset {
 /// The loop closer's answer to keyframe `keyframe`.
 struct LoopAnswer {
   KeyframeId keyframe;
-  uint64_t base_version = 0;  ///< map version it was computed on
-  uint64_t correction_id = 0; ///< 0: no loop
+  uint64_t base_version = 0;   ///< map version it was computed on
+  uint64_t correction_id = 0;  ///< 0: no loop
   enum class Kind : uint8_t { kNone = 0, kLoop = 1, kGlobalAdjustment = 2 } kind = Kind::kNone;
-  KeyframeId matched;         ///< the other end of the loop
+  KeyframeId matched;  ///< the other end of the loop
   struct KeyframeCorrection {
     KeyframeId keyframe;
     Sim3d corrected_from_base;  ///< world (corrected) from world (base), for what hangs on this keyframe

@@ -16,7 +16,8 @@ constexpr int kLevel = 1;  // fast; more gains little on coordinates and descrip
 std::optional<Bytes> Pack(std::span<const uint8_t> plain) {
   uLongf size = compressBound(static_cast<uLong>(plain.size()));
   Bytes packed(kHeadBytes + size);
-  if (compress2(packed.data() + kHeadBytes, &size, plain.data(), static_cast<uLong>(plain.size()), kLevel) != Z_OK) {
+  if (compress2(packed.data() + kHeadBytes, &size, plain.data(), static_cast<uLong>(plain.size()), kLevel) !=
+      Z_OK) {
     return std::nullopt;
   }
   packed.resize(kHeadBytes + size);
@@ -51,7 +52,8 @@ Bytes ContentOf(std::string_view channel, std::span<const uint8_t> record, bool 
   return packed ? std::move(*packed) : plain;
 }
 
-std::optional<std::pair<std::string, Bytes>> ParseContent(std::span<const uint8_t> content, size_t max_bytes) {
+std::optional<std::pair<std::string, Bytes>> ParseContent(std::span<const uint8_t> content,
+                                                          size_t max_bytes) {
   if (content.empty()) return std::nullopt;
   Bytes plain;
   if (content[0] == 0) {

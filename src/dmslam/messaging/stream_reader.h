@@ -16,15 +16,15 @@
 namespace dmslam {
 
 struct ReaderStatistics {
-  int64_t records = 0;          ///< handed out
-  int64_t payload_bytes = 0;    ///< of them
-  int64_t parts = 0;            ///< that arrived
-  int64_t duplicates = 0;       ///< records and parts that were here already
-  int64_t requested = 0;        ///< ranges of bytes or records named as missing
-  int64_t repaired = 0;         ///< records that came late or in pieces, after they had been named as missing
-  int64_t lost = 0;  ///< records given up: no longer kept, and the writer offers no snapshot; those that
-                     ///< were gone when this reader came are not counted
-  int64_t snapshots = 0;        ///< received whole
+  int64_t records = 0;        ///< handed out
+  int64_t payload_bytes = 0;  ///< of them
+  int64_t parts = 0;          ///< that arrived
+  int64_t duplicates = 0;     ///< records and parts that were here already
+  int64_t requested = 0;      ///< ranges of bytes or records named as missing
+  int64_t repaired = 0;       ///< records that came late or in pieces, after they had been named as missing
+  int64_t lost = 0;       ///< records given up: no longer kept, and the writer offers no snapshot; those that
+                          ///< were gone when this reader came are not counted
+  int64_t snapshots = 0;  ///< received whole
   int64_t dropped_bad = 0;      ///< messages with wrong bytes
   int64_t dropped_foreign = 0;  ///< of other sessions
   int64_t dropped_stale = 0;    ///< of other terms, or before any beacon was heard
@@ -32,9 +32,9 @@ struct ReaderStatistics {
   double recovery_p50_ms =
       0;  ///< from a record's being named as missing to its being here, of the newest ones
   double recovery_p99_ms = 0;
-  int64_t acks = 0;             ///< sent
-  int64_t backlog = 0;          ///< records known to exist and not yet taken
-  size_t kept_bytes = 0;        ///< waiting to be taken, whole or in pieces
+  int64_t acks = 0;       ///< sent
+  int64_t backlog = 0;    ///< records known to exist and not yet taken
+  size_t kept_bytes = 0;  ///< waiting to be taken, whole or in pieces
 };
 
 /// The receiving end of a stream: hands out its records once each, strictly in order, whatever is lost,

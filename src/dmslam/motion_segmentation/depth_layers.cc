@@ -44,7 +44,8 @@ double Disparity(const TwoViewModel& model, const MatchArrays& arrays, size_t i)
 }
 
 int KeepWidestLayer(const LayerOptions& options, const TwoViewModel& model, const MatchArrays& arrays,
-                    std::span<const Eigen::Vector2d> positions_px, double focal_px, std::span<uint8_t> flags) {
+                    std::span<const Eigen::Vector2d> positions_px, double focal_px,
+                    std::span<uint8_t> flags) {
   std::vector<double> disparity_px;
   std::vector<size_t> index;
   for (size_t i = 0; i < flags.size(); ++i) {
@@ -59,7 +60,8 @@ int KeepWidestLayer(const LayerOptions& options, const TwoViewModel& model, cons
   for (const Layer& layer : FindLayers(options, disparity_px)) {
     points.clear();
     for (size_t k = 0; k < index.size(); ++k) {
-      if (disparity_px[k] >= layer.low && disparity_px[k] <= layer.high) points.push_back(positions_px[index[k]]);
+      if (disparity_px[k] >= layer.low && disparity_px[k] <= layer.high)
+        points.push_back(positions_px[index[k]]);
     }
     const double spread = Spread(points);
     const double score = spread * spread * static_cast<double>(points.size());

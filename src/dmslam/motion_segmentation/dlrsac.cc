@@ -47,7 +47,8 @@ class Segmentation {
     if (Refused(NumModels(), "a model")) return std::move(out_);
     FillCoupleMatrix();
     const std::optional<CoupledSet> set = ChooseSet();
-    if (!set) return Refuse(Refusal::kNoModel, "no cell determines a motion: all are degenerate", matches_.size());
+    if (!set)
+      return Refuse(Refusal::kNoModel, "no cell determines a motion: all are degenerate", matches_.size());
     Select(*set);
     return std::move(out_);
   }
@@ -77,13 +78,14 @@ class Segmentation {
   void VoteWithNeighbors(std::vector<uint8_t>* flags) const;
 
   int NumModels() const {
-    return static_cast<int>(std::count_if(kept_.begin(), kept_.end(), [](const Cell& c) { return c.num_own > 0; }));
+    return static_cast<int>(
+        std::count_if(kept_.begin(), kept_.end(), [](const Cell& c) { return c.num_own > 0; }));
   }
   bool Refused(int cells, const char* what) {
     if (cells >= options_.min_cells) return false;
     out_.refusal = Refusal::kTooFewCells;
-    out_.explanation = std::to_string(cells) + " cells with " + what + ", " +
-                       std::to_string(options_.min_cells) + " needed";
+    out_.explanation =
+        std::to_string(cells) + " cells with " + what + ", " + std::to_string(options_.min_cells) + " needed";
     out_.is_static.assign(matches_.size(), 0);
     return true;
   }
@@ -101,8 +103,10 @@ class Segmentation {
 
 /// Steps 2: cells, kept ones and their centroids.
 void Segmentation::SortIntoCells() {
-  out_.columns = std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.width_px) / options_.cell_px)));
-  out_.rows = std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.height_px) / options_.cell_px)));
+  out_.columns =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.width_px) / options_.cell_px)));
+  out_.rows =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.height_px) / options_.cell_px)));
   out_.cells.resize(static_cast<size_t>(out_.columns) * static_cast<size_t>(out_.rows));
   const auto cell_of = [&](const Match& match) {
     const int c = static_cast<int>(match.uv0_px.x() * out_.columns / camera_.width_px);
@@ -153,9 +157,9 @@ void Segmentation::FitCell(int iterations, Random& random, Cell* cell) {
   const auto count = [&](const Eigen::Matrix3d& M) {
     return static_cast<double>(CountInliers(M, arrays_, cell->range));
   };
-  const BestSample best =
-      DrawModels(options_.sampling, arrays_, cell->range, iterations, random, count,
-                 [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(cell->range.size()); });
+  const BestSample best = DrawModels(
+      options_.sampling, arrays_, cell->range, iterations, random, count,
+      [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(cell->range.size()); });
   out_.iterations += best.iterations;
   if (!best.found()) return;
   std::vector<uint8_t> flags(arrays_.size(), 0);
@@ -197,7 +201,8 @@ bool Segmentation::ExplainedByRotation(Cell* cell) const {
   std::vector<uint8_t> use(arrays_.size(), 0);
   std::copy(cell->own.begin(), cell->own.end(), use.begin() + static_cast<ptrdiff_t>(cell->range.begin));
   if (!RefineRotation(arrays_, use, 5, &cell->rotation)) return false;
-  return CountRotationInliers(cell->rotation, arrays_, cell->range) >= options_.degenerate_share * cell->num_own;
+  return CountRotationInliers(cell->rotation, arrays_, cell->range) >=
+         options_.degenerate_share * cell->num_own;
 }
 
 bool Segmentation::ExplainedByPlane(std::span<const int> own) const {
@@ -238,7 +243,8 @@ void Segmentation::FillCoupleMatrix() {
   }
 }
 
-/// A cell without visible parallax knows its rotation only: which share of the other cell's own inliers it explains.
+/// A cell without visible parallax knows its rotation only: which share of the other cell's own inliers it
+/// explains.
 double Segmentation::CoupleByRotation(const Eigen::Matrix3d& R, const Cell& cell) const {
   if (cell.num_own == 0) return 0;
   int shared = 0;
@@ -253,7 +259,8 @@ double Segmentation::CoupleByRotation(const Eigen::Matrix3d& R, const Cell& cell
 bool Segmentation::SearchSetModel(CoupledSet* set) const {
   std::vector<uint8_t> use(arrays_.size(), 0);
   for (const size_t j : set->members) {
-    std::copy(kept_[j].own.begin(), kept_[j].own.end(), use.begin() + static_cast<ptrdiff_t>(kept_[j].range.begin));
+    std::copy(kept_[j].own.begin(), kept_[j].own.end(),
+              use.begin() + static_cast<ptrdiff_t>(kept_[j].range.begin));
   }
   MinimaOptions options = options_.minima;
   options.samples /= 3;  // as there may be many sets
@@ -273,8 +280,8 @@ CoupledSet Segmentation::MakeSet(size_t leader) {
   for (int round = 0;; ++round) {
     std::vector<size_t> members;
     for (size_t j = 0; j < kept_.size(); ++j) {
-      const double degree = round == 0 ? out_.couple(kept_[leader].index, kept_[j].index)
-                                       : Couple(set.model.M, kept_[j]);
+      const double degree =
+          round == 0 ? out_.couple(kept_[leader].index, kept_[j].index) : Couple(set.model.M, kept_[j]);
       if (j == leader || degree > options_.couple_threshold) members.push_back(j);
     }
     const bool settled = round > 0 && members == set.members;
@@ -297,7 +304,9 @@ void Segmentation::Measure(CoupledSet* set) const {
   double total = 0, sum = 0;
   set->support = 0;
   const auto weight = [&](const Cell& cell) {
-    return options_.distribution_weight == DistributionWeight::kCells ? 1.0 : static_cast<double>(cell.range.size());
+    return options_.distribution_weight == DistributionWeight::kCells
+               ? 1.0
+               : static_cast<double>(cell.range.size());
   };
   for (const size_t j : set->members) {
     mean += weight(kept_[j]) * kept_[j].centroid_px;
@@ -338,8 +347,8 @@ void Segmentation::Select(const CoupledSet& set) {
   const double asked_px = options_.min_distribution_share * std::hypot(camera_.width_px, camera_.height_px);
   if (set.distribution_px < asked_px) {
     out_.refusal = Refusal::kDistributionTooSmall;
-    out_.explanation = "the widest coupled set spreads over " + std::to_string(set.distribution_px) + " px, " +
-                       std::to_string(asked_px) + " asked for";
+    out_.explanation = "the widest coupled set spreads over " + std::to_string(set.distribution_px) +
+                       " px, " + std::to_string(asked_px) + " asked for";
     out_.is_static.assign(matches_.size(), 0);
     return;
   }
@@ -366,7 +375,8 @@ void Segmentation::Select(const CoupledSet& set) {
 
 void Segmentation::KeepLayer(const TwoViewModel& model, std::vector<uint8_t>* flags) const {
   if (kind() != ModelKind::kEssential || !options_.layers.enabled) return;
-  KeepWidestLayer(options_.layers, model, arrays_, positions_px_, 0.5 * (camera_.fx_px + camera_.fy_px), *flags);
+  KeepWidestLayer(options_.layers, model, arrays_, positions_px_, 0.5 * (camera_.fx_px + camera_.fy_px),
+                  *flags);
 }
 
 /// Selects over the whole image, within the widest layer, and refits to what was selected.
@@ -378,7 +388,8 @@ void Segmentation::RefitOnAll(TwoViewModel* model, std::vector<uint8_t>* flags) 
     KeepLayer(*model, &selected);
     const bool settled = round > 0 && selected == *flags;
     *flags = std::move(selected);
-    if (settled || round >= options_.sampling.refit_rounds || !Refine(kind(), arrays_, *flags, 5, model)) break;
+    if (settled || round >= options_.sampling.refit_rounds || !Refine(kind(), arrays_, *flags, 5, model))
+      break;
   }
 }
 
@@ -416,7 +427,8 @@ void Segmentation::SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags
 void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
   std::vector<Match> sorted(matches_.size());
   for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
-  const std::vector<float> shares = NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_px);
+  const std::vector<float> shares =
+      NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_px);
   for (size_t k = 0; k < flags->size(); ++k) {
     if (shares[k] < options_.neighbor_share) (*flags)[k] = 0;
   }

@@ -15,18 +15,19 @@ enum class DistributionWeight : uint8_t {
 
 /// Which matches may be called static once the motion is chosen.
 enum class StaticScope : uint8_t {
-  kCoupledCells,  ///< all features in the cells of the chosen set (the paper)
+  kCoupledCells,    ///< all features in the cells of the chosen set (the paper)
   kCoupledInliers,  ///< those of them that agree with the model
-  kImage,         ///< every match of the image that agrees with the model
+  kImage,           ///< every match of the image that agrees with the model
 };
 
-/// DLRSAC (Lu et al., Appl. Sci. 2020, 10(12), 4252, Sec. 2.1): the static world is the motion whose support is spread
-/// widest over the image. What the paper leaves open is a field here; `Paper()` is the paper as written, the defaults
-/// are what selects better (docs/dlrsac.md has the numbers).
+/// DLRSAC (Lu et al., Appl. Sci. 2020, 10(12), 4252, Sec. 2.1): the static world is the motion whose support
+/// is spread widest over the image. What the paper leaves open is a field here; `Paper()` is the paper as
+/// written, the defaults are what selects better (docs/dlrsac.md has the numbers).
 struct DlrsacOptions {
   DlrsacOptions();
 
-  /// max_iterations is shared by the cells kept; stop_confidence works per cell and is 0.999 unless set otherwise.
+  /// max_iterations is shared by the cells kept; stop_confidence works per cell and is 0.999 unless set
+  /// otherwise.
   SamplingOptions sampling;
   InputOptions input;
   InlierOptions inlier;
@@ -39,39 +40,41 @@ struct DlrsacOptions {
   /// The tested share is of the cell's own inliers (the paper); off: of all its matches.
   bool couple_over_own_inliers = true;
   DistributionWeight distribution_weight = DistributionWeight::kCells;
-  /// Each coupled set's model is refitted to the set's matches that it explains, and its row of C taken anew, so often.
+  /// Each coupled set's model is refitted to the set's matches that it explains, and its row of C taken anew,
+  /// so often.
   int set_refit_rounds = 2;
   StaticScope scope = StaticScope::kImage;
 
-  /// Cells that do not determine the motion do not vote for one: collinear ones never lead a set; planes lead only with
-  /// essential matrices, which five points of a plane determine; cells without visible parallax vote for their rotation,
-  /// which they do determine, and the motion is searched in the whole set that shares it. Off: told apart nowhere (the
-  /// paper).
+  /// Cells that do not determine the motion do not vote for one: collinear ones never lead a set; planes lead
+  /// only with essential matrices, which five points of a plane determine; cells without visible parallax
+  /// vote for their rotation, which they do determine, and the motion is searched in the whole set that
+  /// shares it. Off: told apart nowhere (the paper).
   bool tell_degenerate = true;
   double degenerate_share = 0.95;  ///< share of a cell's inliers that a plane or a rotation must explain
   double collinear_px = 4.0;       ///< spread across the main direction below this: collinear
 
-  /// Keeps the widest layer of disparities only (essential matrices); off: all that agree with the model (the paper).
+  /// Keeps the widest layer of disparities only (essential matrices); off: all that agree with the model (the
+  /// paper).
   LayerOptions layers;
 
-  /// After the choice the motion is searched again among all minima of the epipolar cost of what nearly agrees with it
-  /// (essential matrices): a model from one cell's sample is often a wrong local one. That with the largest D times
-  /// number of static matches is taken.
+  /// After the choice the motion is searched again among all minima of the epipolar cost of what nearly
+  /// agrees with it (essential matrices): a model from one cell's sample is often a wrong local one. That
+  /// with the largest D times number of static matches is taken.
   bool search_minima = true;
   MinimaOptions minima;
-  double loose_bound = 9.0;  ///< nearly agrees: squared Sampson distance up to so many times its bound
+  double loose_bound = 9.0;   ///< nearly agrees: squared Sampson distance up to so many times its bound
   double minima_slack = 3.0;  ///< minima with up to so many times the lowest cost are tried
 
-  /// A match is called static only if this share of its neighbours in the image agrees with the model too. What moves
-  /// agrees by accident, and not all of it together. 0: not asked.
+  /// A match is called static only if this share of its neighbours in the image agrees with the model too.
+  /// What moves agrees by accident, and not all of it together. 0: not asked.
   double neighbor_share = 0.0;
-  int neighbors = 10;              ///< how many nearest matches are asked at most
-  double neighbor_reach_px = 40;   ///< and how far they may be, about
+  int neighbors = 10;             ///< how many nearest matches are asked at most
+  double neighbor_reach_px = 40;  ///< and how far they may be, about
 
-  /// Root of D of the chosen set below this share of the image's diagonal: refused, the motion is too complex (paper
-  /// 2.3.1). Two neighbouring cells stay below it.
+  /// Root of D of the chosen set below this share of the image's diagonal: refused, the motion is too complex
+  /// (paper 2.3.1). Two neighbouring cells stay below it.
   double min_distribution_share = 0.12;
-  int min_static = 12;               ///< fewer static matches: refused
+  int min_static = 12;  ///< fewer static matches: refused
 
   /// The paper as written: fundamental matrices, no octaves, no degeneracy, all features of the chosen cells.
   static DlrsacOptions Paper();

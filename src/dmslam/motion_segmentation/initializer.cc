@@ -31,12 +31,18 @@ double Median(std::vector<double> values) {
 
 WaitReason FromAgreement(AgreementRefusal refusal) {
   switch (refusal) {
-    case AgreementRefusal::kNone: return WaitReason::kNone;
-    case AgreementRefusal::kSelectionRefused: return WaitReason::kSelectionRefused;
-    case AgreementRefusal::kTooFewCommon: return WaitReason::kTooFewMatches;
-    case AgreementRefusal::kDisagreement: return WaitReason::kDisagreement;
-    case AgreementRefusal::kTooFewStatic: return WaitReason::kTooFewStatic;
-    case AgreementRefusal::kDistributionTooSmall: return WaitReason::kDistributionTooSmall;
+    case AgreementRefusal::kNone:
+      return WaitReason::kNone;
+    case AgreementRefusal::kSelectionRefused:
+      return WaitReason::kSelectionRefused;
+    case AgreementRefusal::kTooFewCommon:
+      return WaitReason::kTooFewMatches;
+    case AgreementRefusal::kDisagreement:
+      return WaitReason::kDisagreement;
+    case AgreementRefusal::kTooFewStatic:
+      return WaitReason::kTooFewStatic;
+    case AgreementRefusal::kDistributionTooSmall:
+      return WaitReason::kDistributionTooSmall;
   }
   return WaitReason::kNone;
 }
@@ -47,18 +53,30 @@ std::string Degrees(double rad) { return std::to_string(rad * 180.0 / M_PI) + " 
 
 std::string_view ToString(WaitReason reason) {
   switch (reason) {
-    case WaitReason::kNone: return "none";
-    case WaitReason::kTooFewFeatures: return "too few features";
-    case WaitReason::kTooFewFrames: return "too few frames";
-    case WaitReason::kTooFewMatches: return "too few matches";
-    case WaitReason::kTooLittleMotion: return "too little motion";
-    case WaitReason::kSelectionRefused: return "selection refused";
-    case WaitReason::kDistributionTooSmall: return "distribution too small";
-    case WaitReason::kDisagreement: return "disagreement between pairs";
-    case WaitReason::kTooFewStatic: return "too few static matches";
-    case WaitReason::kParallaxTooSmall: return "parallax too small";
-    case WaitReason::kNoReconstruction: return "no reconstruction";
-    case WaitReason::kInconsistent: return "views inconsistent";
+    case WaitReason::kNone:
+      return "none";
+    case WaitReason::kTooFewFeatures:
+      return "too few features";
+    case WaitReason::kTooFewFrames:
+      return "too few frames";
+    case WaitReason::kTooFewMatches:
+      return "too few matches";
+    case WaitReason::kTooLittleMotion:
+      return "too little motion";
+    case WaitReason::kSelectionRefused:
+      return "selection refused";
+    case WaitReason::kDistributionTooSmall:
+      return "distribution too small";
+    case WaitReason::kDisagreement:
+      return "disagreement between pairs";
+    case WaitReason::kTooFewStatic:
+      return "too few static matches";
+    case WaitReason::kParallaxTooSmall:
+      return "parallax too small";
+    case WaitReason::kNoReconstruction:
+      return "no reconstruction";
+    case WaitReason::kInconsistent:
+      return "views inconsistent";
   }
   return "unknown";
 }
@@ -90,7 +108,11 @@ std::unique_ptr<StaticSelector> MakeInitializerSelector(const InitializerOptions
 class Initializer::Impl {
  public:
   Impl(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust)
-      : options_(options), camera_(camera), seed_(seed), adjust_(std::move(adjust)), selector_(MakeInitializerSelector(options)) {}
+      : options_(options),
+        camera_(camera),
+        seed_(seed),
+        adjust_(std::move(adjust)),
+        selector_(MakeInitializerSelector(options)) {}
 
   InitializerReport AddFrame(const InitializerFrame& frame) {
     InitializerReport report = Consider(frame);
@@ -152,9 +174,10 @@ class Initializer::Impl {
   std::vector<const View*> ChooseViews() const;
   std::vector<const View*> ViewsBetween(const View& last) const;
   InitializerReport TryMap();
-  std::optional<Candidate> Reconstruct(const View& last, const Agreement& agreement, InitializerReport* report) const;
-  std::optional<Candidate> BuildCandidate(const View& last, const Agreement& agreement, const TwoViewModel& model,
-                                          InitializerReport* report) const;
+  std::optional<Candidate> Reconstruct(const View& last, const Agreement& agreement,
+                                       InitializerReport* report) const;
+  std::optional<Candidate> BuildCandidate(const View& last, const Agreement& agreement,
+                                          const TwoViewModel& model, InitializerReport* report) const;
   bool SameMotion(const Candidate& a, const Candidate& b) const;
   bool Passes(const Candidate& candidate, InitializerReport* report) const;
   double CandidateCost(const Candidate& candidate, std::span<const uint8_t> is_static) const;
@@ -175,8 +198,9 @@ class Initializer::Impl {
   std::unique_ptr<StaticSelector> selector_;
   FeatureMatcher matcher_;
   std::optional<InitializerFrame> reference_;
-  std::deque<View> views_;              ///< in order of index
-  std::deque<InitializerFrame> pending_;  ///< frames older than the newest, not matched with the reference yet
+  std::deque<View> views_;  ///< in order of index
+  std::deque<InitializerFrame>
+      pending_;             ///< frames older than the newest, not matched with the reference yet
   bool promising_ = false;  ///< the pairs agreed the last time; only their parallax did not suffice
   uint32_t last_looked_ = 0;
   InitializerReport last_wait_;
@@ -184,8 +208,8 @@ class Initializer::Impl {
 
 InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   if (static_cast<int>(frame.features->size()) < options_.min_features) {
-    return Wait(WaitReason::kTooFewFeatures, std::to_string(frame.features->size()) + " of " +
-                                                 std::to_string(options_.min_features));
+    return Wait(WaitReason::kTooFewFeatures,
+                std::to_string(frame.features->size()) + " of " + std::to_string(options_.min_features));
   }
   if (!reference_) {
     reference_ = frame;
@@ -300,25 +324,27 @@ InitializerReport Initializer::Impl::TryMap() {
 
 bool Initializer::Impl::Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, const Match& match) const {
   const double variance = options_.selector.inlier.pyramid.SigmaSquared(match.octave1);
-  return ReprojectionErrorSquared(camera_.Ideal(), T_k_0, point, match.uv1_px) <= options_.max_view_chi2 * variance;
+  return ReprojectionErrorSquared(camera_.Ideal(), T_k_0, point, match.uv1_px) <=
+         options_.max_view_chi2 * variance;
 }
 
-/// Every minimum of the pair's epipolar cost that is about as low as the lowest is carried through all views; what they
-/// say decides. Two different motions that explain them about equally well: wait.
+/// Every minimum of the pair's epipolar cost that is about as low as the lowest is carried through all views;
+/// what they say decides. Two different motions that explain them about equally well: wait.
 std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(const View& last,
                                                                            const Agreement& agreement,
                                                                            InitializerReport* report) const {
   std::vector<uint32_t> order(last.pair.matches.size());
   std::iota(order.begin(), order.end(), 0U);
   const MatchArrays arrays = MakeArrays(last.pair.matches, order, camera_, options_.selector.inlier);
-  const std::vector<EssentialMinimum> minima =
-      FindEssentialMinima(arrays, agreement.is_static, options_.minima, DeriveSeed(seed_, last.frame.index, "minima"));
+  const std::vector<EssentialMinimum> minima = FindEssentialMinima(
+      arrays, agreement.is_static, options_.minima, DeriveSeed(seed_, last.frame.index, "minima"));
   std::optional<Candidate> best;
   double runner_up = 1e9;
   *report = Wait(WaitReason::kNoReconstruction, "the static matches determine no motion");
   for (const EssentialMinimum& minimum : minima) {
     if (minimum.cost > options_.minima_slack * minima.front().cost) break;
-    std::optional<Candidate> candidate = BuildCandidate(last, agreement, minimum.model, best ? nullptr : report);
+    std::optional<Candidate> candidate =
+        BuildCandidate(last, agreement, minimum.model, best ? nullptr : report);
     if (!candidate) continue;
     if (best && SameMotion(*best, *candidate)) {
       if (candidate->cost < best->cost) best = std::move(candidate);
@@ -349,10 +375,9 @@ bool Initializer::Impl::SameMotion(const Candidate& a, const Candidate& b) const
 }
 
 /// The map under one motion of the pair: points, poses of the views between, adjusted.
-std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(const View& last,
-                                                                              const Agreement& agreement,
-                                                                              const TwoViewModel& model,
-                                                                              InitializerReport* report) const {
+std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(
+    const View& last, const Agreement& agreement, const TwoViewModel& model,
+    InitializerReport* report) const {
   StaticSelection selection = last.pair.selection;
   selection.is_static = agreement.is_static;
   selection.kind = ModelKind::kEssential;
@@ -361,11 +386,13 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(co
     if (report) *report = Wait(reason, text);
     return std::nullopt;
   };
-  // Little parallax refuses the winner only (Passes): the right motion may have less of it than its wrong rivals.
+  // Little parallax refuses the winner only (Passes): the right motion may have less of it than its wrong
+  // rivals.
   ReconstructionOptions reconstruction = options_.reconstruction;
   reconstruction.min_parallax_rad = 0;
   reconstruction.max_runner_up = 1;
-  const TwoViewReconstruction pair = ReconstructFromStatic(last.pair.matches, selection, camera_, reconstruction);
+  const TwoViewReconstruction pair =
+      ReconstructFromStatic(last.pair.matches, selection, camera_, reconstruction);
   if (!pair.IsUsable()) return refuse(WaitReason::kNoReconstruction, pair.explanation);
   Candidate candidate;
   candidate.points = pair.points_cam0;
@@ -382,7 +409,8 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(co
                                                  " of the points where they should be");
   }
   KeepConsistent(&candidate);
-  // Twice: what had no point under the first poses has a say, too. A motion half way to its minimum would lose unfairly.
+  // Twice: what had no point under the first poses has a say, too. A motion half way to its minimum would
+  // lose unfairly.
   for (int round = 0; round < 2; ++round) {
     KeepEvery(options_.max_adjusted, &candidate);
     if (adjust_ && !AdjustAll(&candidate)) return refuse(WaitReason::kInconsistent, "the adjustment failed");
@@ -407,9 +435,10 @@ bool Initializer::Impl::Passes(const Candidate& candidate, InitializerReport* re
   return true;
 }
 
-/// Mean over the static matches of the squared errors in all views that see them, truncated at the bound and in units
-/// of it; a match without a point counts as the bound.
-double Initializer::Impl::CandidateCost(const Candidate& candidate, std::span<const uint8_t> is_static) const {
+/// Mean over the static matches of the squared errors in all views that see them, truncated at the bound and
+/// in units of it; a match without a point counts as the bound.
+double Initializer::Impl::CandidateCost(const Candidate& candidate,
+                                        std::span<const uint8_t> is_static) const {
   const auto& matches = candidate.placed.front().view->pair.matches;
   std::vector<double> sum(matches.size(), 0.0), count(matches.size(), 0.0);
   for (const Placed& placed : candidate.placed) {
@@ -464,7 +493,8 @@ void Initializer::Impl::PlaceView(const View& view, double fraction, Candidate* 
     if (inliers.size() < 10) break;
     if (round < 2) T = RefinePose(camera_.Ideal(), T, points, uv, information, inliers, 5);
   }
-  candidate->placed.push_back({&view, T, static_cast<double>(inliers.size()) / static_cast<double>(all.size())});
+  candidate->placed.push_back(
+      {&view, T, static_cast<double>(inliers.size()) / static_cast<double>(all.size())});
 }
 
 /// Drops points that some view does not see where they should be.
@@ -520,7 +550,8 @@ bool Initializer::Impl::AdjustAll(Candidate* candidate) const {
     if (!candidate->use[k]) continue;
     point_of[k] = static_cast<int>(points.size());
     points.push_back(candidate->points[k]);
-    observations.push_back({0, point_of[k], matches[k].uv0_px, 1.0 / pyramid.SigmaSquared(matches[k].octave0)});
+    observations.push_back(
+        {0, point_of[k], matches[k].uv0_px, 1.0 / pyramid.SigmaSquared(matches[k].octave0)});
   }
   for (const Placed& placed : candidate->placed) {
     const int pose = static_cast<int>(poses.size());
@@ -542,7 +573,8 @@ double Initializer::Impl::CandidateParallax(const Candidate& candidate) const {
   const Eigen::Vector3d center = candidate.placed.front().T_k_0.Center();
   std::vector<double> parallax;
   for (size_t k = 0; k < candidate.use.size(); ++k) {
-    if (candidate.use[k]) parallax.push_back(ParallaxAngle(Eigen::Vector3d::Zero(), center, candidate.points[k]));
+    if (candidate.use[k])
+      parallax.push_back(ParallaxAngle(Eigen::Vector3d::Zero(), center, candidate.points[k]));
   }
   return Median(std::move(parallax));
 }
@@ -582,7 +614,8 @@ FirstMap Initializer::Impl::MakeMap(const Candidate& candidate, const Agreement&
   return map;
 }
 
-Initializer::Initializer(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust)
+Initializer::Initializer(const InitializerOptions& options, const Camera& camera, uint64_t seed,
+                         AdjustFunction adjust)
     : impl_(std::make_unique<Impl>(options, camera, seed, std::move(adjust))) {}
 Initializer::~Initializer() = default;
 

@@ -37,7 +37,8 @@ class SyntheticRoom {
     for (const Point& point : points_) {
       const double turn = 0.15 * index;
       const Eigen::Vector3d walk(0.02 * index, 0.05 * std::sin(turn), 0.0);
-      const auto uv = camera_.Project(TruePose(index) * (point.p_world + (point.moves ? walk : Eigen::Vector3d::Zero())));
+      const auto uv =
+          camera_.Project(TruePose(index) * (point.p_world + (point.moves ? walk : Eigen::Vector3d::Zero())));
       const double dx = 0.4 * random.Gaussian(), dy = 0.4 * random.Gaussian();
       if (!uv) continue;
       const Eigen::Vector2d seen = *uv + Eigen::Vector2d(dx, dy);
@@ -136,8 +137,7 @@ TEST(Initializer, AbsurdFramesGiveReasonsAndNoMap) {
 
 TEST(Initializer, WaitsForFramesWithoutFeatures) {
   Initializer initializer({}, SyntheticCamera(), 1);
-  const InitializerReport report =
-      initializer.AddFrame({0, 0, std::make_shared<const FrameFeatures>()});
+  const InitializerReport report = initializer.AddFrame({0, 0, std::make_shared<const FrameFeatures>()});
   EXPECT_EQ(report.wait, WaitReason::kTooFewFeatures);
 }
 
@@ -157,7 +157,8 @@ TEST(Initializer, IsDeterministic) {
   EXPECT_EQ(maps[0].frame1.index, maps[1].frame1.index);
   EXPECT_EQ(maps[0].T_1_0.translation, maps[1].T_1_0.translation);
   ASSERT_EQ(maps[0].points.size(), maps[1].points.size());
-  for (size_t k = 0; k < maps[0].points.size(); ++k) EXPECT_EQ(maps[0].points[k].p_world, maps[1].points[k].p_world);
+  for (size_t k = 0; k < maps[0].points.size(); ++k)
+    EXPECT_EQ(maps[0].points[k].p_world, maps[1].points[k].p_world);
 }
 
 TEST(ReconstructBaseline, FindsThePoseOfARoom) {

@@ -31,7 +31,9 @@ class Buckets {
 
  private:
   int Column(double px) const { return std::clamp(static_cast<int>(px / side_px_), 0, 1023); }
-  std::vector<uint32_t>& At(int column, int row) { return items_[static_cast<size_t>(row * columns_ + column)]; }
+  std::vector<uint32_t>& At(int column, int row) {
+    return items_[static_cast<size_t>(row * columns_ + column)];
+  }
 
   double side_px_;
   int columns_ = 0, rows_ = 0;
@@ -40,8 +42,8 @@ class Buckets {
 
 }  // namespace
 
-std::vector<float> NeighborShares(std::span<const Match> matches, std::span<const uint8_t> flags, int neighbors,
-                                  double reach_px) {
+std::vector<float> NeighborShares(std::span<const Match> matches, std::span<const uint8_t> flags,
+                                  int neighbors, double reach_px) {
   const Buckets buckets(matches, reach_px);
   std::vector<float> shares(matches.size(), 1.0F);
   std::vector<std::pair<double, uint32_t>> near;

@@ -45,13 +45,15 @@ void SetRefusal(AgreementRefusal refusal, std::string explanation, Agreement* ag
   agreement->explanation = std::move(explanation);
 }
 
-void CompareAll(std::span<const PairView* const> pairs, const AgreementOptions& options, Agreement* agreement) {
+void CompareAll(std::span<const PairView* const> pairs, const AgreementOptions& options,
+                Agreement* agreement) {
   for (size_t a = 0; a < pairs.size(); ++a) {
     for (size_t b = a + 1; b < pairs.size(); ++b) {
       const Overlap overlap = Compare(*pairs[a], *pairs[b]);
       if (overlap.common < options.min_common) {
         SetRefusal(AgreementRefusal::kTooFewCommon,
-                   "two pairs have only " + std::to_string(overlap.common) + " features in common", agreement);
+                   "two pairs have only " + std::to_string(overlap.common) + " features in common",
+                   agreement);
       }
       const double jaccard = overlap.either == 0 ? 0.0 : overlap.both / static_cast<double>(overlap.either);
       agreement->agreement = std::min(agreement->agreement, jaccard);
@@ -67,12 +69,18 @@ void CompareAll(std::span<const PairView* const> pairs, const AgreementOptions& 
 
 std::string_view ToString(AgreementRefusal refusal) {
   switch (refusal) {
-    case AgreementRefusal::kNone: return "none";
-    case AgreementRefusal::kSelectionRefused: return "selection refused";
-    case AgreementRefusal::kTooFewCommon: return "too few common features";
-    case AgreementRefusal::kDisagreement: return "disagreement";
-    case AgreementRefusal::kTooFewStatic: return "too few static matches";
-    case AgreementRefusal::kDistributionTooSmall: return "distribution too small";
+    case AgreementRefusal::kNone:
+      return "none";
+    case AgreementRefusal::kSelectionRefused:
+      return "selection refused";
+    case AgreementRefusal::kTooFewCommon:
+      return "too few common features";
+    case AgreementRefusal::kDisagreement:
+      return "disagreement";
+    case AgreementRefusal::kTooFewStatic:
+      return "too few static matches";
+    case AgreementRefusal::kDistributionTooSmall:
+      return "distribution too small";
   }
   return "unknown";
 }
@@ -105,7 +113,8 @@ Agreement Agree(std::span<const PairView* const> pairs, const AgreementOptions& 
   }
   if (agreement.distribution_px < options.min_distribution_px) {
     SetRefusal(AgreementRefusal::kDistributionTooSmall,
-               "the static matches spread over " + std::to_string(agreement.distribution_px) + " px", &agreement);
+               "the static matches spread over " + std::to_string(agreement.distribution_px) + " px",
+               &agreement);
   }
   return agreement;
 }

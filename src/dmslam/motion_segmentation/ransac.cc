@@ -114,7 +114,8 @@ void Finish(std::span<const Match> matches, std::span<const uint32_t> order, std
   StoreModel(model, kind, camera, selection);
 }
 
-StaticSelection RansacSelector::Select(std::span<const Match> matches, const Camera& camera, uint64_t seed) const {
+StaticSelection RansacSelector::Select(std::span<const Match> matches, const Camera& camera,
+                                       uint64_t seed) const {
   if (const auto problem = CheckMatches(matches, camera, options_.input)) {
     return Refuse(problem->refusal, problem->explanation, matches.size());
   }
@@ -122,10 +123,12 @@ StaticSelection RansacSelector::Select(std::span<const Match> matches, const Cam
   const MatchArrays arrays = MakeArrays(matches, order, camera, options_.inlier);
   const Range all{0, arrays.size()};
   Random random(DeriveSeed(seed, 0, "ransac"));
-  const auto count = [&](const Eigen::Matrix3d& M) { return static_cast<double>(CountInliers(M, arrays, all)); };
-  BestSample best = DrawModels(
-      options_.sampling, arrays, all, options_.sampling.max_iterations, random, count,
-      [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(arrays.size()); });
+  const auto count = [&](const Eigen::Matrix3d& M) {
+    return static_cast<double>(CountInliers(M, arrays, all));
+  };
+  BestSample best =
+      DrawModels(options_.sampling, arrays, all, options_.sampling.max_iterations, random, count,
+                 [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(arrays.size()); });
   if (!best.found()) return Refuse(Refusal::kNoModel, "no sample gave a model", matches.size());
   StaticSelection selection;
   selection.iterations = best.iterations;

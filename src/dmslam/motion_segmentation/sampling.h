@@ -18,8 +18,8 @@ struct BestSample {
   bool found() const { return score >= 0; }
 };
 
-/// Draws samples from `range` and keeps the model of the highest `score(M)`. `inlier_share(M)` is asked for only when
-/// a better model is found and the options stop early.
+/// Draws samples from `range` and keeps the model of the highest `score(M)`. `inlier_share(M)` is asked for
+/// only when a better model is found and the options stop early.
 template <typename Score, typename InlierShare>
 BestSample DrawModels(const SamplingOptions& options, const MatchArrays& arrays, Range range, int iterations,
                       Random& random, Score score, InlierShare inlier_share) {
@@ -43,13 +43,13 @@ BestSample DrawModels(const SamplingOptions& options, const MatchArrays& arrays,
   return best;
 }
 
-/// Refits to the inliers of the whole and selects again, as often as `rounds` says. `flags` are of `model` afterwards;
-/// returns their number.
+/// Refits to the inliers of the whole and selects again, as often as `rounds` says. `flags` are of `model`
+/// afterwards; returns their number.
 int RefitOnAll(ModelKind kind, const MatchArrays& arrays, int rounds, TwoViewModel* model,
                std::vector<uint8_t>* flags);
 
-/// Fills what every selector reports: model, flags (`flags[k]` belongs to match `order[k]`), counts, distribution; or the
-/// refusal for too few static ones.
+/// Fills what every selector reports: model, flags (`flags[k]` belongs to match `order[k]`), counts,
+/// distribution; or the refusal for too few static ones.
 void Finish(std::span<const Match> matches, std::span<const uint32_t> order, std::span<const uint8_t> flags,
             const TwoViewModel& model, ModelKind kind, const Camera& camera, int min_static,
             StaticSelection* selection);

@@ -121,7 +121,8 @@ TEST(Dlrsac, PrefersTheWideMotionToTheOneWithMostMatches) {
     const StaticSelection dlrsac = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, seed);
     ASSERT_TRUE(dlrsac.IsUsable()) << dlrsac.explanation;
     EXPECT_GT(ScoreOf(pair, dlrsac).precision, 0.95) << seed;
-    const StaticSelection ransac = RansacSelector(RansacSelectorOptions()).Select(pair.matches, pair.camera, seed);
+    const StaticSelection ransac =
+        RansacSelector(RansacSelectorOptions()).Select(pair.matches, pair.camera, seed);
     ransac_fooled += ScoreOf(pair, ransac).precision < 0.5 ? 1 : 0;
   }
   EXPECT_GE(ransac_fooled, 4) << "the scene does not tell the methods apart";
@@ -133,8 +134,9 @@ TEST(Dlrsac, FindsTheMotion) {
   ASSERT_TRUE(selection.IsUsable());
   double nearest = 1e9;
   for (const Rigid3d& pose : DecomposeEssential(selection.E)) {
-    nearest = std::min(nearest, AngleBetween(pose.rotation, pair.T_1_0.rotation) +
-                                    (pose.translation.normalized() - pair.T_1_0.translation.normalized()).norm());
+    nearest =
+        std::min(nearest, AngleBetween(pose.rotation, pair.T_1_0.rotation) +
+                              (pose.translation.normalized() - pair.T_1_0.translation.normalized()).norm());
   }
   EXPECT_LT(nearest, 0.05);
 }
@@ -209,7 +211,8 @@ TEST(Dlrsac, CollinearCellsDoNotVote) {
   options.num_static = 2000;
   SyntheticPair pair = MakeSyntheticPair(options, 13);
   std::erase_if(pair.matches, [](const Match& m) {
-    return std::abs(m.uv0_px.y() - 80) > 2 && std::abs(m.uv0_px.y() - 240) > 2 && std::abs(m.uv0_px.y() - 400) > 2;
+    return std::abs(m.uv0_px.y() - 80) > 2 && std::abs(m.uv0_px.y() - 240) > 2 &&
+           std::abs(m.uv0_px.y() - 400) > 2;
   });
   DlrsacOptions dlrsac;
   dlrsac.min_cell_matches = 5;

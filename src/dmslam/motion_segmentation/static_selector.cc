@@ -11,26 +11,40 @@ namespace dmslam {
 
 std::string_view ToString(Refusal refusal) {
   switch (refusal) {
-    case Refusal::kNone: return "none";
-    case Refusal::kTooFewMatches: return "too few matches";
-    case Refusal::kBadInput: return "bad input";
-    case Refusal::kNoMotion: return "no motion";
-    case Refusal::kTooFewCells: return "too few cells";
-    case Refusal::kNoModel: return "no model";
-    case Refusal::kTooFewStatic: return "too few static matches";
-    case Refusal::kDistributionTooSmall: return "distribution too small";
+    case Refusal::kNone:
+      return "none";
+    case Refusal::kTooFewMatches:
+      return "too few matches";
+    case Refusal::kBadInput:
+      return "bad input";
+    case Refusal::kNoMotion:
+      return "no motion";
+    case Refusal::kTooFewCells:
+      return "too few cells";
+    case Refusal::kNoModel:
+      return "no model";
+    case Refusal::kTooFewStatic:
+      return "too few static matches";
+    case Refusal::kDistributionTooSmall:
+      return "distribution too small";
   }
   return "unknown";
 }
 
 std::string_view ToString(CellState state) {
   switch (state) {
-    case CellState::kTooFew: return "too few";
-    case CellState::kNoModel: return "no model";
-    case CellState::kCollinear: return "collinear";
-    case CellState::kPlane: return "plane";
-    case CellState::kPureRotation: return "pure rotation";
-    case CellState::kGeneral: return "general";
+    case CellState::kTooFew:
+      return "too few";
+    case CellState::kNoModel:
+      return "no model";
+    case CellState::kCollinear:
+      return "collinear";
+    case CellState::kPlane:
+      return "plane";
+    case CellState::kPureRotation:
+      return "pure rotation";
+    case CellState::kGeneral:
+      return "general";
   }
   return "unknown";
 }
@@ -59,7 +73,8 @@ std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const C
   const auto middle = displacement.begin() + static_cast<ptrdiff_t>(displacement.size() / 2);
   std::nth_element(displacement.begin(), middle, displacement.end());
   if (std::sqrt(*middle) < options.min_displacement_px) {
-    return InputProblem{Refusal::kNoMotion, "the median displacement is " + std::to_string(std::sqrt(*middle)) +
+    return InputProblem{Refusal::kNoMotion, "the median displacement is " +
+                                                std::to_string(std::sqrt(*middle)) +
                                                 " px: the frames show the same picture"};
   }
   return std::nullopt;

@@ -34,15 +34,15 @@ enum class Refusal : uint8_t {
 };
 std::string_view ToString(Refusal refusal);
 
-/// What a cell's matches look like. What does not determine a motion does not vote for one (DlrsacOptions), but can be
-/// voted for.
+/// What a cell's matches look like. What does not determine a motion does not vote for one (DlrsacOptions),
+/// but can be voted for.
 enum class CellState : uint8_t {
-  kTooFew = 0,     ///< fewer matches than a model needs
-  kNoModel,        ///< RANSAC found nothing that enough matches agree with
-  kCollinear,      ///< all on a line
-  kPlane,          ///< a homography explains them all: the epipolar geometry is not determined
-  kPureRotation,   ///< a rotation alone explains them all: no translation is visible
-  kGeneral,        ///< has a model of its own
+  kTooFew = 0,    ///< fewer matches than a model needs
+  kNoModel,       ///< RANSAC found nothing that enough matches agree with
+  kCollinear,     ///< all on a line
+  kPlane,         ///< a homography explains them all: the epipolar geometry is not determined
+  kPureRotation,  ///< a rotation alone explains them all: no translation is visible
+  kGeneral,       ///< has a model of its own
 };
 std::string_view ToString(CellState state);
 
@@ -52,9 +52,9 @@ struct CellReport {
   int row = 0;
   CellState state = CellState::kTooFew;
   int num_matches = 0;
-  int num_inliers = 0;     ///< of the cell's own model; those of the couple degree's denominator
-  int num_static = 0;      ///< of the final answer
-  bool chosen = false;     ///< belongs to the coupled set that was chosen
+  int num_inliers = 0;  ///< of the cell's own model; those of the couple degree's denominator
+  int num_static = 0;   ///< of the final answer
+  bool chosen = false;  ///< belongs to the coupled set that was chosen
   Eigen::Vector2d centroid_px = Eigen::Vector2d::Zero();  ///< mean of its matches' uv0
   double coupled_distribution_px = 0;  ///< square root of D over the coupled set that this cell leads
 };
@@ -76,7 +76,8 @@ struct StaticSelection {
 
   int columns = 0, rows = 0;
   std::vector<CellReport> cells;
-  /// C(i, j): share of cell j's own inliers that cell i's model explains (paper 2.1). Empty for RANSAC and ARSAC.
+  /// C(i, j): share of cell j's own inliers that cell i's model explains (paper 2.1). Empty for RANSAC and
+  /// ARSAC.
   Eigen::MatrixXd couple;
   int leading_cell = -1;  ///< whose coupled set was chosen; -1 for RANSAC and ARSAC
   int iterations = 0;     ///< samples drawn in all
@@ -86,10 +87,10 @@ struct StaticSelection {
 
 /// Limits that every selector checks before it works.
 struct InputOptions {
-  int min_matches = 16;            ///< fewer is refused; never below 8
+  int min_matches = 16;               ///< fewer is refused; never below 8
   double min_displacement_px = 0.35;  ///< median displacement below this: the same picture twice
-  /// How far outside the image an ideal pixel may lie, as a share of the image's width. Only used for cameras with
-  /// distortion, where ideal pixels leave the image; 0 is used for others.
+  /// How far outside the image an ideal pixel may lie, as a share of the image's width. Only used for cameras
+  /// with distortion, where ideal pixels leave the image; 0 is used for others.
   double outside_share = 0.5;
 };
 
@@ -97,18 +98,20 @@ struct InputOptions {
 struct InlierOptions {
   double chi2 = 3.84;     ///< bound on the squared Sampson distance in units of its variance
   double sigma_px = 1.0;  ///< standard deviation of a keypoint of octave 0
-  /// Standard deviation grows with the octave's scale (Pyramid). Off: every keypoint counts as octave 0 (the paper).
+  /// Standard deviation grows with the octave's scale (Pyramid). Off: every keypoint counts as octave 0 (the
+  /// paper).
   bool scale_by_octave = true;
   Pyramid pyramid;
 };
 
-/// Finds which matches belong to the static world. Implementations keep no state between calls and never throw for what
-/// is in the matches: they refuse. The same (matches, seed) gives the same answer.
+/// Finds which matches belong to the static world. Implementations keep no state between calls and never
+/// throw for what is in the matches: they refuse. The same (matches, seed) gives the same answer.
 class StaticSelector {
  public:
   virtual ~StaticSelector() = default;
   virtual std::string_view name() const = 0;
-  virtual StaticSelection Select(std::span<const Match> matches, const Camera& camera, uint64_t seed) const = 0;
+  virtual StaticSelection Select(std::span<const Match> matches, const Camera& camera,
+                                 uint64_t seed) const = 0;
 };
 
 /// Refusals that need no model: too few, not finite, outside, identical frames. None: go on.
@@ -119,8 +122,8 @@ struct InputProblem {
 std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const Camera& camera,
                                          const InputOptions& options);
 
-/// "dlrsac", "dlrsac-paper", "arsac" or "ransac" with default options and the given kind of model; throws InputError
-/// for another name.
+/// "dlrsac", "dlrsac-paper", "arsac" or "ransac" with default options and the given kind of model; throws
+/// InputError for another name.
 std::unique_ptr<StaticSelector> MakeSelector(const std::string& name, ModelKind kind);
 
 }  // namespace dmslam

@@ -14,14 +14,14 @@ namespace dmslam {
 
 struct SyntheticPairOptions {
   int num_static = 500;
-  int num_moving = 0;                     ///< on one rigid mover in the middle of the picture
-  int num_mismatches = 0;                 ///< anywhere to anywhere
+  int num_moving = 0;      ///< on one rigid mover in the middle of the picture
+  int num_mismatches = 0;  ///< anywhere to anywhere
   double noise_px = 0.5;
   Eigen::Vector3d rotation = {0.01, 0.03, -0.01};
   Eigen::Vector3d translation = {0.15, 0.02, 0.05};   ///< of the camera: T_1_0
   Eigen::Vector3d mover_motion = {-0.10, 0.25, 0.1};  ///< in the world, between the frames
-  bool flat = false;                      ///< the whole room is one slanted plane
-  double mover_half_width = 0.5;          ///< of the mover, at depth 2
+  bool flat = false;                                  ///< the whole room is one slanted plane
+  double mover_half_width = 0.5;                      ///< of the mover, at depth 2
 };
 
 struct SyntheticPair {
@@ -48,8 +48,8 @@ inline bool Inside(const Camera& camera, const Eigen::Vector2d& uv) {
 }
 
 /// Adds the match of a point that moves by `motion` between the frames, if both frames see it.
-inline bool Add(const SyntheticPairOptions& options, const Eigen::Vector3d& point, const Eigen::Vector3d& motion,
-                bool is_static, Random* random, SyntheticPair* pair) {
+inline bool Add(const SyntheticPairOptions& options, const Eigen::Vector3d& point,
+                const Eigen::Vector3d& motion, bool is_static, Random* random, SyntheticPair* pair) {
   const auto uv0 = pair->camera.Project(point), uv1 = pair->camera.Project(pair->T_1_0 * (point + motion));
   if (!uv0 || !uv1) return false;
   const auto noisy = [&](const Eigen::Vector2d& uv) -> Eigen::Vector2d {
@@ -78,13 +78,16 @@ inline SyntheticPair MakeSyntheticPair(const SyntheticPairOptions& options, uint
     const Eigen::Vector3d ray = camera.Ray({random.Uniform(0, 639), random.Uniform(0, 479)});
     const bool behind_mover = options.num_moving > 0 && std::abs(ray.x()) < options.mover_half_width / 2 &&
                               std::abs(ray.y()) < options.mover_half_width / 2;
-    const double depth = options.flat ? 3.0 / (1.0 + 0.2 * ray.x() + 0.3 * ray.y()) : random.Uniform(2.0, 5.0);
+    const double depth =
+        options.flat ? 3.0 / (1.0 + 0.2 * ray.x() + 0.3 * ray.y()) : random.Uniform(2.0, 5.0);
     if (behind_mover) continue;
-    k += synthetic_pair_detail::Add(options, depth * ray, Eigen::Vector3d::Zero(), true, &random, &pair) ? 1 : 0;
+    k += synthetic_pair_detail::Add(options, depth * ray, Eigen::Vector3d::Zero(), true, &random, &pair) ? 1
+                                                                                                         : 0;
   }
   for (int k = 0; k < options.num_moving;) {
     const double half = options.mover_half_width;
-    const Eigen::Vector3d point(random.Uniform(-half, half), random.Uniform(-half, half), random.Uniform(1.8, 2.2));
+    const Eigen::Vector3d point(random.Uniform(-half, half), random.Uniform(-half, half),
+                                random.Uniform(1.8, 2.2));
     k += synthetic_pair_detail::Add(options, point, options.mover_motion, false, &random, &pair) ? 1 : 0;
   }
   for (int k = 0; k < options.num_mismatches; ++k) {

@@ -19,16 +19,15 @@ using Vector5d = Eigen::Matrix<double, 5, 1>;
 
 /// Two directions that span the plane across `t`.
 Eigen::Matrix<double, 3, 2> Tangent(const Eigen::Vector3d& t) {
-  const Eigen::Vector3d helper =
-      std::abs(t.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d helper = std::abs(t.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
   Eigen::Matrix<double, 3, 2> B;
   B.col(0) = t.cross(helper).normalized();
   B.col(1) = t.cross(B.col(0));
   return B;
 }
 
-/// Algebraic epipolar residual t . (R ray0 x ray1) and its derivative with respect to a left rotation and to t in its
-/// tangent plane.
+/// Algebraic epipolar residual t . (R ray0 x ray1) and its derivative with respect to a left rotation and to
+/// t in its tangent plane.
 struct EssentialRow {
   double residual = 0;
   Vector5d jacobian;
@@ -201,7 +200,8 @@ bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, 
   for (size_t i = 0; i < use.size(); ++i) {
     if (!use[i]) continue;
     indices.push_back(static_cast<int>(i));
-    weights[i] = arrays.bound0[0] / (static_cast<double>(arrays.bound0[i]) + static_cast<double>(arrays.bound1[i]));
+    weights[i] =
+        arrays.bound0[0] / (static_cast<double>(arrays.bound0[i]) + static_cast<double>(arrays.bound1[i]));
   }
   const auto F = FundamentalEightPoint(arrays.p0, arrays.p1, indices, weights);
   if (!F) return false;
@@ -209,8 +209,8 @@ bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, 
   return model->M.allFinite();
 }
 
-bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, TwoViewModel* model,
-                     double bound_scale) {
+bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
+                     TwoViewModel* model, double bound_scale) {
   double damping = 1e-6;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
@@ -222,8 +222,7 @@ bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, in
       if (!use[i]) continue;
       const double bound = bound_scale * SampsonBound(M, arrays, i);
       if (!(bound > 0)) continue;
-      const EssentialRow row =
-          MakeEssentialRow(model->R * arrays.ray0[i], arrays.ray1[i], model->t, B);
+      const EssentialRow row = MakeEssentialRow(model->R * arrays.ray0[i], arrays.ray1[i], model->t, B);
       const double squared = row.residual * row.residual / bound;
       const double weight = 1.0 / (bound * (1.0 + squared) * (1.0 + squared));  // Geman-McClure
       normal.noalias() += row.jacobian * (weight * row.jacobian.transpose());
@@ -247,7 +246,8 @@ namespace {
 
 /// Of the flags set keeps every k-th, so that at most about `most` remain.
 std::vector<uint8_t> Thin(std::span<const uint8_t> use, size_t most) {
-  const auto total = static_cast<size_t>(std::count_if(use.begin(), use.end(), [](uint8_t u) { return u != 0; }));
+  const auto total =
+      static_cast<size_t>(std::count_if(use.begin(), use.end(), [](uint8_t u) { return u != 0; }));
   const size_t stride = std::max<size_t>(1, (total + most - 1) / std::max<size_t>(1, most));
   std::vector<uint8_t> thin(use.size(), 0);
   size_t seen = 0;
@@ -278,7 +278,8 @@ bool SameMotion(const TwoViewModel& a, const TwoViewModel& b) {
 
 namespace {
 
-/// Starts spread over the half sphere of directions (Fibonacci's spiral), with the rotation that fits best alone.
+/// Starts spread over the half sphere of directions (Fibonacci's spiral), with the rotation that fits best
+/// alone.
 void StartFromSphere(const MatchArrays& arrays, std::span<const uint8_t> use, int starts,
                      std::vector<TwoViewModel>* models) {
   TwoViewModel model;
@@ -295,8 +296,8 @@ void StartFromSphere(const MatchArrays& arrays, std::span<const uint8_t> use, in
 }
 
 /// Starts from the best of many samples of five.
-void StartFromSamples(const MatchArrays& arrays, std::span<const uint8_t> use, int samples, size_t kept, Random& random,
-                      std::vector<TwoViewModel>* models) {
+void StartFromSamples(const MatchArrays& arrays, std::span<const uint8_t> use, int samples, size_t kept,
+                      Random& random, std::vector<TwoViewModel>* models) {
   std::vector<int> indices;
   for (size_t i = 0; i < use.size(); ++i) {
     if (use[i]) indices.push_back(static_cast<int>(i));
@@ -314,7 +315,8 @@ void StartFromSamples(const MatchArrays& arrays, std::span<const uint8_t> use, i
       ranked.emplace_back(EpipolarCost(arrays, use, M), M);
     }
   }
-  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
   for (size_t k = 0; k < std::min(kept, ranked.size()); ++k) {
     TwoViewModel model;
     model.M = ranked[k].second;
@@ -373,7 +375,8 @@ double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, d
   return weakest > 0.1 ? std::min(M_PI, 1.0 / std::sqrt(weakest)) : M_PI;
 }
 
-bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations, Eigen::Matrix3d* R) {
+bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
+                    Eigen::Matrix3d* R) {
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
     Eigen::Vector3d rhs = Eigen::Vector3d::Zero();

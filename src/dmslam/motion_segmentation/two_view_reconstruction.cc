@@ -38,8 +38,8 @@ TwoViewReconstruction Reconstruct(std::span<const Rigid3d> candidates, const Mat
                                   const ReconstructionOptions& options) {
   PoseChoiceOptions choice_options;
   choice_options.max_reprojection_error_squared_px = options.max_reprojection_squared_px;
-  const auto choice = ChoosePose(candidates, camera.Ideal(), columns.x0, columns.x1, mask, columns.sigma_squared,
-                                 choice_options);
+  const auto choice = ChoosePose(candidates, camera.Ideal(), columns.x0, columns.x1, mask,
+                                 columns.sigma_squared, choice_options);
   const size_t n = columns.x0.size();
   if (!choice) return RefuseReconstruction(ReconstructionRefusal::kNoModel, "the model has no pose", n);
   TwoViewReconstruction result;
@@ -52,7 +52,8 @@ TwoViewReconstruction Reconstruct(std::span<const Rigid3d> candidates, const Mat
   result.num_points = choice->num_good;
   result.parallax_rad = choice->parallax_rad;
   result.median_parallax_rad = choice->median_parallax_rad;
-  const auto asked = static_cast<double>(std::count_if(mask.begin(), mask.end(), [](char c) { return c != 0; }));
+  const auto asked =
+      static_cast<double>(std::count_if(mask.begin(), mask.end(), [](char c) { return c != 0; }));
   if (choice->num_good < options.min_points || choice->num_good < options.min_good_share * asked) {
     result.refusal = ReconstructionRefusal::kTooFewPoints;
     result.explanation = std::to_string(choice->num_good) + " points triangulate well";
@@ -67,7 +68,8 @@ TwoViewReconstruction Reconstruct(std::span<const Rigid3d> candidates, const Mat
   return result;
 }
 
-/// A model of the baseline and its score: sum over matches and both directions of (bound - error) where below the bound.
+/// A model of the baseline and its score: sum over matches and both directions of (bound - error) where below
+/// the bound.
 struct Scored {
   Eigen::Matrix3d model = Eigen::Matrix3d::Zero();
   double score = -1;
@@ -84,7 +86,8 @@ double ScoreHomography(const Eigen::Matrix3d& H, const MatchColumns& columns,
   for (size_t i = 0; i < columns.x0.size(); ++i) {
     const double forward = TransferErrorSquared(H, columns.x0[i], columns.x1[i]) * inv;
     const double backward = TransferErrorSquared(H_inverse, columns.x1[i], columns.x0[i]) * inv;
-    const bool in_forward = forward <= options.chi2_homography, in_backward = backward <= options.chi2_homography;
+    const bool in_forward = forward <= options.chi2_homography,
+               in_backward = backward <= options.chi2_homography;
     score += (in_forward ? kScoreBound - forward : 0.0) + (in_backward ? kScoreBound - backward : 0.0);
     if (inliers) (*inliers)[i] = in_forward && in_backward ? 1 : 0;
   }
@@ -99,7 +102,8 @@ double ScoreFundamental(const Eigen::Matrix3d& F, const MatchColumns& columns,
   for (size_t i = 0; i < columns.x0.size(); ++i) {
     const double forward = EpipolarDistanceSquared(F, columns.x0[i], columns.x1[i]) * inv;
     const double backward = EpipolarDistanceSquared(F_transposed, columns.x1[i], columns.x0[i]) * inv;
-    const bool in_forward = forward <= options.chi2_fundamental, in_backward = backward <= options.chi2_fundamental;
+    const bool in_forward = forward <= options.chi2_fundamental,
+               in_backward = backward <= options.chi2_fundamental;
     score += (in_forward ? kScoreBound - forward : 0.0) + (in_backward ? kScoreBound - backward : 0.0);
     if (inliers) (*inliers)[i] = in_forward && in_backward ? 1 : 0;
   }
@@ -110,11 +114,16 @@ double ScoreFundamental(const Eigen::Matrix3d& F, const MatchColumns& columns,
 
 std::string_view ToString(ReconstructionRefusal refusal) {
   switch (refusal) {
-    case ReconstructionRefusal::kNone: return "none";
-    case ReconstructionRefusal::kNoModel: return "no model";
-    case ReconstructionRefusal::kAmbiguous: return "ambiguous";
-    case ReconstructionRefusal::kTooFewPoints: return "too few points";
-    case ReconstructionRefusal::kParallaxTooSmall: return "parallax too small";
+    case ReconstructionRefusal::kNone:
+      return "none";
+    case ReconstructionRefusal::kNoModel:
+      return "no model";
+    case ReconstructionRefusal::kAmbiguous:
+      return "ambiguous";
+    case ReconstructionRefusal::kTooFewPoints:
+      return "too few points";
+    case ReconstructionRefusal::kParallaxTooSmall:
+      return "parallax too small";
   }
   return "unknown";
 }
@@ -129,7 +138,8 @@ TwoViewReconstruction ReconstructFromStatic(std::span<const Match> matches, cons
                                 : EssentialFromFundamental(selection.F, camera.Ideal(), camera.Ideal());
   const std::array<Rigid3d, 4> candidates = DecomposeEssential(E);
   const std::vector<char> mask(selection.is_static.begin(), selection.is_static.end());
-  return Reconstruct(candidates, MatchColumns(matches, options.pyramid), mask, camera, options.max_runner_up, options);
+  return Reconstruct(candidates, MatchColumns(matches, options.pyramid), mask, camera, options.max_runner_up,
+                     options);
 }
 
 TwoViewReconstruction ReconstructBaseline(std::span<const Match> matches, const Camera& camera,

@@ -94,9 +94,9 @@ std::vector<uint16_t> KeyframeDatabase::CountCommon(const BowVector& words) cons
 
 std::vector<PlaceCandidate> KeyframeDatabase::Score(const BowVector& words, const PlaceQuery& query) const {
   const std::vector<uint16_t> common = CountCommon(words);
-  // Keyframes with most words in common first (ties: the newer one, whatever its slot), as if none had more words
-  // than the query: who has twice the words has twice as many in common by chance. Exclusion is asked only of
-  // those that could matter.
+  // Keyframes with most words in common first (ties: the newer one, whatever its slot), as if none had more
+  // words than the query: who has twice the words has twice as many in common by chance. Exclusion is asked
+  // only of those that could matter.
   std::vector<std::tuple<double, KeyframeId, Slot>> sharing;
   for (Slot slot = 0; slot < common.size(); ++slot) {
     if (common[slot] == 0) continue;

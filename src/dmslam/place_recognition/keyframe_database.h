@@ -13,8 +13,8 @@ namespace dmslam {
 
 /// How a KeyframeDatabase looks for places.
 struct KeyframeDatabaseOptions {
-  double min_common_share = 0.8;  ///< a candidate shares at least this part of the most words that any shares (counted
-                                  ///< as if none had more words than the query)
+  double min_common_share = 0.8;  ///< a candidate shares at least this part of the most words that any shares
+                                  ///< (counted as if none had more words than the query)
   double min_group_share = 0.75;  ///< and its group scores at least this part of the best group
   size_t group_size = 10;         ///< most neighbours whose scores join a candidate's
   size_t max_scored =

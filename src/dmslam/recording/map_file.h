@@ -20,7 +20,8 @@ struct RebuiltMap {
   bool ended = false;    ///< the mapper had done all it wanted to do
 };
 
-/// What the frontend said of itself when it began, or where that was not recorded what the player said of its camera.
+/// What the frontend said of itself when it began, or where that was not recorded what the player said of its
+/// camera.
 std::optional<SessionStart> FindSessionStart(const LogIndex& log, const RecordedSession& session);
 
 /// Builds the map of a session from its recorded map records, up to `until_us` of wall time. With all records

@@ -3,7 +3,8 @@
 namespace dmslam {
 
 void FailInvariant(const char* condition, const char* file, int line, const char* message) {
-  throw InvariantError(std::string(file) + ":" + std::to_string(line) + ": " + message + " (" + condition + ")");
+  throw InvariantError(std::string(file) + ":" + std::to_string(line) + ": " + message + " (" + condition +
+                       ")");
 }
 
 }  // namespace dmslam

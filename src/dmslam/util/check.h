@@ -5,7 +5,8 @@
 
 namespace dmslam {
 
-/// Input that a user can mend: names the file, the field and the cure. `main` prints it in one line and exits non-zero.
+/// Input that a user can mend: names the file, the field and the cure. `main` prints it in one line and exits
+/// non-zero.
 class InputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -22,7 +23,7 @@ class InvariantError : public std::logic_error {
 }  // namespace dmslam
 
 /// Checks an invariant in every build; throws InvariantError that names it.
-#define DMSLAM_CHECK(condition, message)                                              \
-  do {                                                                                \
+#define DMSLAM_CHECK(condition, message)                                                \
+  do {                                                                                  \
     if (!(condition)) ::dmslam::FailInvariant(#condition, __FILE__, __LINE__, message); \
   } while (false)

@@ -6,8 +6,9 @@
 
 namespace dmslam {
 
-/// Which keyframe, for ever: the session in the high 32 bits, the index of its frame in the low ones. A keyframe that
-/// is proposed twice therefore carries the same id twice. Zero is no keyframe (sessions start at 1).
+/// Which keyframe, for ever: the session in the high 32 bits, the index of its frame in the low ones. A
+/// keyframe that is proposed twice therefore carries the same id twice. Zero is no keyframe (sessions start
+/// at 1).
 struct KeyframeId {
   uint64_t value = 0;
 
@@ -20,8 +21,8 @@ struct KeyframeId {
   auto operator<=>(const KeyframeId&) const = default;
 };
 
-/// Which landmark, for ever: the ordinal of the mapper's epoch in the high 16 bits (1 for a first mapper, 2 for the one
-/// that took over from it), a running number in the low 48. Zero is no landmark.
+/// Which landmark, for ever: the ordinal of the mapper's epoch in the high 16 bits (1 for a first mapper, 2
+/// for the one that took over from it), a running number in the low 48. Zero is no landmark.
 struct LandmarkId {
   uint64_t value = 0;
 

@@ -5,7 +5,8 @@
 
 namespace dmslam {
 
-/// Mixes 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood, "Fast splittable pseudorandom number generators").
+/// Mixes 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood, "Fast splittable pseudorandom number
+/// generators").
 constexpr uint64_t Mix64(uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -13,8 +14,8 @@ constexpr uint64_t Mix64(uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// The seed of one randomised call, from the configured seed, the frame it works on and what it is for. Two calls never
-/// share a stream, and the order of calls does not matter.
+/// The seed of one randomised call, from the configured seed, the frame it works on and what it is for. Two
+/// calls never share a stream, and the order of calls does not matter.
 constexpr uint64_t DeriveSeed(uint64_t seed, uint64_t frame, std::string_view purpose) {
   uint64_t hash = 0xcbf29ce484222325ULL;
   for (const char c : purpose) hash = (hash ^ static_cast<uint8_t>(c)) * 0x100000001b3ULL;

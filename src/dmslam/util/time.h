@@ -7,8 +7,9 @@
 
 namespace dmslam {
 
-/// Parses decimal seconds ("1305031102.175304") into nanoseconds exactly, never through floating point. Up to nine
-/// decimals; more are refused unless they are zeros. No sign but a leading '-', no exponent, no white space.
+/// Parses decimal seconds ("1305031102.175304") into nanoseconds exactly, never through floating point. Up to
+/// nine decimals; more are refused unless they are zeros. No sign but a leading '-', no exponent, no white
+/// space.
 std::optional<int64_t> ParseStampNs(std::string_view text);
 
 /// Writes nanoseconds as decimal seconds: six decimals where that is exact, nine otherwise.

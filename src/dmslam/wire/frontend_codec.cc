@@ -204,9 +204,7 @@ struct Codec<MapReset> {
     s(m.drop, w.drop);
     s(m.reason, w.reason);
   }
-  static void Validate(const MapReset& m, Checker& check) {
-    check.Stamp(m.stamp_ns);
-  }
+  static void Validate(const MapReset& m, Checker& check) { check.Stamp(m.stamp_ns); }
 };
 
 template <>

@@ -29,8 +29,8 @@ struct ProcessHealth {
   int64_t records_lost = 0;       ///< as reader: given up, that is bridged by a snapshot
   double recovery_p50_ms = 0;     ///< as reader: from a record's being named as missing to its being here
   double recovery_p99_ms = 0;
-  int64_t epoch = 0;              ///< as writer; 0: not yet, or no writer
-  int64_t written = 0;            ///< as writer: records
+  int64_t epoch = 0;    ///< as writer; 0: not yet, or no writer
+  int64_t written = 0;  ///< as writer: records
   int64_t written_bytes = 0;
   int64_t resent = 0;  ///< as writer: pieces sent again
   int64_t resent_bytes = 0;

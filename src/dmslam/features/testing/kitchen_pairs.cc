@@ -40,7 +40,8 @@ std::vector<FeatureMatch> MutualMatches(const Features& a, const Features& b, do
   const std::vector<Keypoint> keypoints_a(a.descriptors.size()), keypoints_b(b.descriptors.size());
   std::vector<FeatureMatch> matches;
   FeatureMatcher().MatchAll({keypoints_a, a.descriptors}, {keypoints_b, b.descriptors},
-                            {.max_distance = 64, .max_ratio = max_ratio, .check_orientation = false}, &matches);
+                            {.max_distance = 64, .max_ratio = max_ratio, .check_orientation = false},
+                            &matches);
   return matches;
 }
 
@@ -161,7 +162,8 @@ std::optional<Eigen::Vector2d> PairGeometry::Transfer(const Eigen::Vector2d& uv0
   constexpr double kReachPx = 12.0, kAgreementPx = 2.0, kMarginPx = 20.0;
   std::vector<double> inverse_depths;
   for (const DepthPoint& point : points_) {
-    if ((point.uv0_px - uv0_px).squaredNorm() < kReachPx * kReachPx) inverse_depths.push_back(point.inverse_depth);
+    if ((point.uv0_px - uv0_px).squaredNorm() < kReachPx * kReachPx)
+      inverse_depths.push_back(point.inverse_depth);
   }
   if (inverse_depths.size() < 3) return std::nullopt;
   std::sort(inverse_depths.begin(), inverse_depths.end());
@@ -188,7 +190,8 @@ double Quality::MeanCoverage() const {
   return coverages.empty() ? 0.0 : sum / static_cast<double>(coverages.size());
 }
 
-void AddPair(const Features& features0, const Features& features1, const PairGeometry& geometry, Quality* quality) {
+void AddPair(const Features& features0, const Features& features1, const PairGeometry& geometry,
+             Quality* quality) {
   constexpr double kCellPx = 40.0, kCells = 16 * 12;
   ++quality->pairs;
   quality->features += features0.uv_px.size();
@@ -199,7 +202,8 @@ void AddPair(const Features& features0, const Features& features1, const PairGeo
     bool repeated = false;
     for (size_t j = 0; j < features1.uv_px.size() && !repeated; ++j) {
       const double size_ratio = features0.size[i] / features1.size[j];
-      repeated = (features1.uv_px[j] - *place).squaredNorm() < 2.5 * 2.5 && size_ratio < 1.3 && size_ratio > 0.75;
+      repeated =
+          (features1.uv_px[j] - *place).squaredNorm() < 2.5 * 2.5 && size_ratio < 1.3 && size_ratio > 0.75;
     }
     quality->repeated += repeated ? 1 : 0;
   }

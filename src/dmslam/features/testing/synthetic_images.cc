@@ -21,7 +21,8 @@ GrayImage RandomRectangles(int width, int height, int count, uint64_t seed) {
     }
   }
   for (uint8_t& pixel : image.pixels) {
-    pixel = static_cast<uint8_t>(std::clamp(static_cast<int>(pixel) + static_cast<int>(random.Below(5)) - 2, 0, 255));
+    pixel = static_cast<uint8_t>(
+        std::clamp(static_cast<int>(pixel) + static_cast<int>(random.Below(5)) - 2, 0, 255));
   }
   return image;
 }
