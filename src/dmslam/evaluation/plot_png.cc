@@ -32,6 +32,7 @@ class PngCanvas : public PlotCanvas {
     });
   }
   void Polygon(std::span<const PlotPoint> points, const PlotColor& fill) override {
+    if (points.size() < 3) return;  // encloses nothing
     const std::vector<std::vector<cv::Point>> polygon = Pieces(points);
     Blend(fill,
           [&](cv::Mat* image) { cv::fillPoly(*image, polygon, Bgr(fill), cv::LINE_AA, kFractionBits); });
