@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <utility>
 
 #include "dmslam/camera/camera.h"
 

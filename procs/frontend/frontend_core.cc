@@ -118,8 +118,7 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
   }
 }
 
-// ---- Initialisation
-// ------------------------------------------------------------------------------------------------
+// ---- Initialisation ----
 
 void FrontendCore::KeepUnplaced() {
   unplaced_.push_back(frame_);
@@ -198,8 +197,7 @@ TrackedFrame FrontendCore::FrameOfKeyframe(const Keyframe& keyframe) const {
   return frame;
 }
 
-// ---- Tracking
-// ------------------------------------------------------------------------------------------------------
+// ---- Tracking ----
 
 std::optional<Rigid3d> FrontendCore::PoseOf(const Placed& placed) const {
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(placed.reference);
@@ -364,8 +362,7 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
   return pose;
 }
 
-// ---- Keyframes
-// -----------------------------------------------------------------------------------------------------
+// ---- Keyframes ----
 
 bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
   const KeyframeOptions& o = options_.keyframe;
@@ -414,8 +411,7 @@ void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
   if (!evidence.items.empty() && !localize_only_) events->push_back(std::move(evidence));
 }
 
-// ---- After the end
-// -------------------------------------------------------------------------------------------------
+// ---- After the end ----
 
 bool FrontendCore::LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near) {
   const Keyframe* reference = map_.FindKeyframe(tracker_.reference());

@@ -67,8 +67,7 @@ double PoseTracker::Trust(const Landmark& landmark, int64_t stamp_ns) const {
   return options_.young_trust + (1.0 - options_.young_trust) * grown;
 }
 
-// ---- First guess
-// ---------------------------------------------------------------------------------------------------
+// ---- First guess ----
 
 void PoseTracker::MatchByProjection(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world,
                                     double radius_px, const TrackedFrame& frame) {
@@ -249,8 +248,7 @@ int PoseTracker::OptimizeMatches(const Map& map, TrackedFrame* frame) {
   return optimized_.num_inliers;
 }
 
-// ---- Local map
-// -----------------------------------------------------------------------------------------------------
+// ---- Local map ----
 
 /// The keyframes that see most of the frame's landmarks, most first.
 void PoseTracker::RankByVotes(const Map& map, const TrackedFrame& frame) {

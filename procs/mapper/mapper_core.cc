@@ -70,8 +70,7 @@ LandmarkId MapperCore::AddLandmark(MapId map_id, KeyframeId reference, KeyframeI
   return id;
 }
 
-// ---- A first map
-// ---------------------------------------------------------------------------------------------------
+// ---- A first map ----
 
 bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   if (map_.FindKeyframe(proposal.second.id) != nullptr) {
@@ -127,8 +126,7 @@ void MapperCore::ScaleToUnitDepth(MapId map_id, KeyframeId first) {
   }
 }
 
-// ---- A keyframe
-// ----------------------------------------------------------------------------------------------------
+// ---- A keyframe ----
 
 bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   adjusted_ = false;
@@ -287,8 +285,7 @@ void MapperCore::End(bool as_it_is) {
   Publish(MapEvent::kEnded, {}, 0);
 }
 
-// ---- Corrections
-// ---------------------------------------------------------------------------------------------------
+// ---- Corrections ----
 
 void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   if (answer.kind == LoopAnswer::Kind::kNone) return;

@@ -67,8 +67,7 @@ void MapperNode::Begin(const CameraInfo& info) {
   WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
 }
 
-// ---- Continuing what another mapper began
-// -------------------------------------------------------------------------
+// ---- Continuing what another mapper began ----
 
 void MapperNode::BeginFetch() {
   ReplicaFetch::Options options;
@@ -130,8 +129,7 @@ void MapperNode::OnWriterOpen() {
   }
 }
 
-// ---- The frontend's and the loop closer's records
-// -----------------------------------------------------------------
+// ---- The frontend's and the loop closer's records ----
 
 void MapperNode::PublishDelta(const MapDelta& delta) {
   PublishRecord(delta);
@@ -300,8 +298,7 @@ void MapperNode::AcceptWhatIsSafe() {
   }
 }
 
-// ---- The end
-// -------------------------------------------------------------------------------------------------------
+// ---- The end ----
 
 bool MapperNode::EndIfDone() {
   frontend_ended_ = frontend_ended_ || frontend_reader_->AtEnd();

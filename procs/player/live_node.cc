@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "common/process_info.h"
@@ -15,11 +14,6 @@ namespace {
 
 constexpr int64_t kInfoEveryNs = 500'000'000;
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
-constexpr int64_t kEndEveryNs = 200'000'000;
-constexpr int64_t kEndTimeoutNs = 60'000'000'000;
-constexpr int64_t kStopTimeoutNs = 2'000'000'000;
-constexpr int64_t kMapperSilentNs = 5'000'000'000;  // after the end: nobody to wait for
-constexpr uint32_t kEndIndex = std::numeric_limits<uint32_t>::max();
 
 /// What to call the camera in messages: its device, or the address without a password.
 std::string CameraName(const std::string& path) {
@@ -48,14 +42,13 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
   if (channel == channels::kMapperStatus) {
     const auto status = wire::Decode<MapperStatus>(bytes);
     if (!status || status->head.session != options_.session) return;
-    mapper_heard_ns_ = context_.now_ns();
-    mapper_done_ = status->state == MapperStatus::State::kDone;
+    end_.OnMapperStatus(*status, context_.now_ns());
     return;
   }
   const auto done = wire::Decode<FrameDone>(bytes);
   if (!done || done->session != options_.session) return;
-  if (done->frame_index == kEndIndex) {
-    end_heard_ = true;
+  if (done->frame_index == EndOfPlay::kFrameIndex) {
+    end_.OnFrontendHeard();
     ending_ = true;
   } else if (done->frame_index > frame_.frame_index || published_ == 0) {
     first_index_ = std::max(first_index_, done->frame_index + 1);  // a player before this one was further
@@ -136,25 +129,9 @@ void LiveNode::Advance() {
   }
   if (!ending_) TakeFrame();
   if (!ending_) return;
-  if (end_since_ns_ == 0) end_since_ns_ = now;
-  if (now >= next_end_ns_) {
-    next_end_ns_ = now + kEndEveryNs;
-    PublishEnd();
-  }
-  EndIfHeard(now);
-}
-
-/// Stays until the map is done, since a frontend that is started again at the end needs camera and end.
-void LiveNode::EndIfHeard(int64_t now) {
-  if (end_heard_) {
-    const bool mapper_silent = now - std::max(mapper_heard_ns_, end_since_ns_) > kMapperSilentNs;
-    if (mapper_done_ || mapper_silent) exit_code_ = 0;
-  } else if (stopped_ && now - end_since_ns_ > kStopTimeoutNs) {
-    exit_code_ = 0;
-  } else if (now - end_since_ns_ > kEndTimeoutNs) {
-    exit_code_ = 5;
-    problem_ = "no frontend answered the end of the sequence; is it running on the same bus?";
-  }
+  if (end_.IsDue(now)) PublishEnd();
+  if (const std::optional<int> code = end_.ExitCode(now, stopped_)) exit_code_ = code;
+  if (exit_code_ == 5) problem_ = EndOfPlay::NobodyAnswered();
 }
 
 void LiveNode::Stop() {
@@ -164,7 +141,7 @@ void LiveNode::Stop() {
 
 int64_t LiveNode::deadline_ns() const {
   const int64_t deadline = std::min(next_info_ns_, next_status_ns_);
-  return ending_ ? std::min(deadline, next_end_ns_) : deadline;
+  return ending_ ? std::min(deadline, end_.due_ns()) : deadline;
 }
 
 }  // namespace dmslam

@@ -7,6 +7,7 @@
 
 #include "common/node.h"
 #include "dmslam/dataset/live_source.h"
+#include "player/end_of_play.h"
 #include "player/player_node.h"
 
 namespace dmslam {
@@ -33,7 +34,6 @@ class LiveNode : public Node {
   void PublishCameraInfo();
   void PublishStatus();
   void PublishEnd();
-  void EndIfHeard(int64_t now);
   template <typename Message>
   void Publish(const Message& message);
 
@@ -45,9 +45,8 @@ class LiveNode : public Node {
   Frame frame_;  ///< the newest one published
   int64_t published_ = 0;
   bool ending_ = false, stopped_ = false;
-  bool end_heard_ = false, mapper_done_ = false;
-  int64_t mapper_heard_ns_ = 0, end_since_ns_ = 0;
-  int64_t next_info_ns_ = 0, next_status_ns_ = 0, next_end_ns_ = 0;
+  EndOfPlay end_;
+  int64_t next_info_ns_ = 0, next_status_ns_ = 0;
   std::optional<int> exit_code_;
   std::string problem_;
 };

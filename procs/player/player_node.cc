@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -18,10 +17,6 @@ namespace {
 constexpr int64_t kInfoEveryNs = 500'000'000;
 constexpr int64_t kRepeatEveryNs = 300'000'000;
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
-constexpr int64_t kEndEveryNs = 200'000'000;
-constexpr int64_t kEndTimeoutNs = 60'000'000'000;
-constexpr int64_t kMapperSilentNs = 5'000'000'000;  // after the end: nobody to wait for
-constexpr uint32_t kEndIndex = std::numeric_limits<uint32_t>::max();
 
 std::string SequenceName(const std::string& path) {
   const std::filesystem::path p = std::filesystem::path(path).lexically_normal();
@@ -104,15 +99,14 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
   } else if (channel == channels::kMapperStatus) {
     const auto status = wire::Decode<MapperStatus>(bytes);
     if (!status || status->head.session != options_.session) return;
-    mapper_heard_ns_ = context_.now_ns();
-    mapper_done_ = status->state == MapperStatus::State::kDone;
+    end_.OnMapperStatus(*status, context_.now_ns());
   }
 }
 
 void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session) return;
-  if (done.frame_index == kEndIndex) {
-    end_heard_ = true;
+  if (done.frame_index == EndOfPlay::kFrameIndex) {
+    end_.OnFrontendHeard();
     position_ = order_.size();
     awaiting_done_ = false;
   } else if (published_ > 0 && done.frame_index > frame_.frame_index) {
@@ -266,31 +260,16 @@ void PlayerNode::Advance() {
     context_.bus->Publish({channels::kFrame, frame_bytes_, options_.local_frames});
   }
   if (position_ < order_.size() || awaiting_done_) return;
-  if (end_since_ns_ == 0) end_since_ns_ = now;
-  if (now >= next_end_ns_) {
-    next_end_ns_ = now + kEndEveryNs;
-    PublishEnd();
-  }
-  EndIfHeard(now);
-}
-
-/// Stays until the map is done, since a frontend that is started again at the end needs camera and end of the
-/// sequence.
-void PlayerNode::EndIfHeard(int64_t now) {
-  if (end_heard_) {
-    const bool mapper_silent = now - std::max(mapper_heard_ns_, end_since_ns_) > kMapperSilentNs;
-    if (mapper_done_ || mapper_silent) exit_code_ = 0;
-  } else if (now - end_since_ns_ > kEndTimeoutNs) {
-    exit_code_ = 5;
-    problem_ = "no frontend answered the end of the sequence; is it running on the same bus?";
-  }
+  if (end_.IsDue(now)) PublishEnd();
+  if (const std::optional<int> code = end_.ExitCode(now, false)) exit_code_ = code;
+  if (exit_code_ == 5) problem_ = EndOfPlay::NobodyAnswered();
 }
 
 int64_t PlayerNode::deadline_ns() const {
   int64_t deadline = std::min(next_info_ns_, next_status_ns_);
   if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
   if (position_ < order_.size()) return std::min(deadline, DueNs(position_));
-  return std::min(deadline, next_end_ns_);
+  return std::min(deadline, end_.due_ns());
 }
 
 }  // namespace dmslam

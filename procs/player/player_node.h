@@ -12,6 +12,7 @@
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/messaging/bus.h"
 #include "dmslam/wire/codec.h"
+#include "player/end_of_play.h"
 #include "player/frame_encoding.h"
 
 namespace dmslam {
@@ -62,7 +63,6 @@ class PlayerNode : public Node {
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnFrameDone(const FrameDone& done);
   void SkipBehind(uint32_t frame_index);
-  void EndIfHeard(int64_t now);
   void PublishCameraInfo();
   bool FrameIsDue() const;
   void PublishFrame();
@@ -85,12 +85,9 @@ class PlayerNode : public Node {
   Frame frame_;          ///< the newest one published
   SharedBytes frame_bytes_;
   bool awaiting_done_ = false;  ///< lock-step
-  bool end_heard_ = false;
-  bool mapper_done_ = false;
-  int64_t mapper_heard_ns_ = 0;
+  EndOfPlay end_;
   int64_t start_ns_ = 0;  ///< when the first frame is due
-  int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0, next_end_ns_ = 0;
-  int64_t end_since_ns_ = 0;
+  int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
   int64_t published_ = 0, repeats_ = 0;
   double late_ms_ = 0;
   std::optional<int> exit_code_;

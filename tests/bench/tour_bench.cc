@@ -11,6 +11,7 @@
 #include "common/process_info.h"
 #include "common/process_main.h"
 #include "core_loop.h"
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
 #include "dmslam/util/version.h"
@@ -26,15 +27,7 @@ constexpr double kNoisePx = 0.4;
 constexpr uint32_t kFlippedBits = 12;
 constexpr double kMostOverFirst = 1.3, kMostBytesPerFeature = 45;
 
-Camera ShelfCamera() {
-  Camera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 500;
-  camera.cx_px = 319.5;
-  camera.cy_px = 239.5;
-  return camera;
-}
+Camera ShelfCamera() { return TestCamera(500, 319.5, 239.5); }
 
 /// Things along a shelf. They are made from their number alone, so that nothing need be kept.
 class Shelf {

@@ -94,19 +94,23 @@ class System {
   std::unique_ptr<Recorder> recorder_;
 };
 
+/// The processes that need no images: collector, loop closer and mapper.
+void AddMapSide(InProcessOptions* options, System* system) {
+  NodeOptions& node = options->node;
+  node.session = options->player.session;
+  node.peers = {"frontend", "mapper", "loopcloser", "collector"};
+  if (!options->record.empty()) system->Record(options->record);
+  system->Add(std::make_unique<CollectorNode>(system->ContextFor("collector"), node, options->collector));
+  system->Add(std::make_unique<LoopcloserNode>(system->ContextFor("loopcloser"), node, options->vocabulary));
+  system->Add(std::make_unique<MapperNode>(system->ContextFor("mapper"), node, options->map_files));
+}
+
 }  // namespace
 
 int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex> log, uint32_t log_session,
                         std::string* problem) {
-  options.node.session = options.player.session;
-  options.node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   System system;
-  if (!options.record.empty()) system.Record(options.record);
-  system.Add(
-      std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
-  system.Add(
-      std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
-  system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node, options.map_files));
+  AddMapSide(&options, &system);
   system.Add(
       std::make_unique<RecordsNode>(system.ContextFor("player"), options.node, std::move(log), log_session));
   return system.Run(problem);
@@ -114,15 +118,8 @@ int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex
 
 int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem) {
   options.player.mode = PlaybackMode::kLockstep;
-  options.node.session = options.player.session;
-  options.node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   System system;
-  if (!options.record.empty()) system.Record(options.record);
-  system.Add(
-      std::make_unique<CollectorNode>(system.ContextFor("collector"), options.node, options.collector));
-  system.Add(
-      std::make_unique<LoopcloserNode>(system.ContextFor("loopcloser"), options.node, options.vocabulary));
-  system.Add(std::make_unique<MapperNode>(system.ContextFor("mapper"), options.node, options.map_files));
+  AddMapSide(&options, &system);
   system.Add(std::make_unique<FrontendNode>(
       system.ContextFor("frontend"), options.node,
       FrontendNode::Extras{options.vocabulary, options.picture_dir, options.picture_every}));

@@ -6,26 +6,13 @@
 #include <nlohmann/json.hpp>
 
 #include "dmslam/util/check.h"
-#include "dmslam/util/random.h"
 #include "figures.h"
+#include "testing/wavy_path.h"
 
 namespace dmslam {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::vector<StampedPose> Path(double noise, uint64_t seed) {
-  Random random(seed);
-  std::vector<StampedPose> path;
-  for (int i = 0; i < 150; ++i) {
-    const double t = i / 30.0;
-    const Eigen::Vector3d jitter(random.Gaussian(), random.Gaussian(), random.Gaussian());
-    path.push_back(
-        {i * 33'333'000LL, Rigid3d(ExpSo3({0.1 * t, 0, noise * random.Gaussian()}),
-                                   Eigen::Vector3d(std::sin(t), std::cos(t), 0.2 * t) + noise * jitter)});
-  }
-  return path;
-}
 
 /// A folder with two made-up sequences and, where asked for, results of runs on them.
 class Reproduction : public ::testing::Test {
@@ -37,9 +24,9 @@ class Reproduction : public ::testing::Test {
     for (const char* name :
          {"tum/rgbd_dataset_freiburg3_walking_xyz", "tum/more/synth_walking_xyz", "tum/synth_still_xyz"}) {
       fs::create_directories(root_ / name);
-      WriteTrajectory((root_ / name / "groundtruth.txt").string(), Path(0, 1));
+      WriteTrajectory((root_ / name / "groundtruth.txt").string(), WavyPath(150, 0, 1));
       std::ofstream list(root_ / name / "rgb.txt");
-      for (const StampedPose& pose : Path(0, 1)) list << FormatPose(pose).substr(0, 8) << " a.png\n";
+      for (const StampedPose& pose : WavyPath(150, 0, 1)) list << FormatPose(pose).substr(0, 8) << " a.png\n";
     }
     options_.roots = {root_ / "tum"};
     options_.seeds = 3;
@@ -51,7 +38,7 @@ class Reproduction : public ::testing::Test {
     fs::create_directories(folder);
     std::ofstream(folder / "summary.json") << summary;
     if (noise < 0) return;
-    const auto path = Path(noise, static_cast<uint64_t>(key.seed));
+    const auto path = WavyPath(150, noise, static_cast<uint64_t>(key.seed));
     WriteTrajectory((folder / "trajectory.txt").string(), path);
     WriteTrajectory((folder / "trajectory_online.txt").string(), std::span(path).subspan(50, 75));
   }

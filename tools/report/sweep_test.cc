@@ -8,25 +8,12 @@
 #include <sstream>
 
 #include "dmslam/util/check.h"
-#include "dmslam/util/random.h"
+#include "testing/wavy_path.h"
 
 namespace dmslam {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::vector<StampedPose> Path(double noise, uint64_t seed) {
-  Random random(seed);
-  std::vector<StampedPose> path;
-  for (int i = 0; i < 60; ++i) {
-    const double t = i / 30.0;
-    const Eigen::Vector3d jitter(random.Gaussian(), random.Gaussian(), random.Gaussian());
-    path.push_back(
-        {i * 33'333'000LL, Rigid3d(ExpSo3({0.1 * t, 0, 0}),
-                                   Eigen::Vector3d(std::sin(t), std::cos(t), 0.2 * t) + noise * jitter)});
-  }
-  return path;
-}
 
 /// A sweep's folder with two rendered sequences and one of the ablation's.
 class SweepFolder : public ::testing::Test {
@@ -37,9 +24,9 @@ class SweepFolder : public ::testing::Test {
     fs::remove_all(root_);
     for (const char* name : {"out/sequences/synth_0", "out/sequences/synth_walk_30", "data/kitchen_walk1"}) {
       fs::create_directories(root_ / name);
-      WriteTrajectory((root_ / name / "groundtruth.txt").string(), Path(0, 1));
+      WriteTrajectory((root_ / name / "groundtruth.txt").string(), WavyPath(60, 0, 1));
       std::ofstream list(root_ / name / "rgb.txt");
-      for (const StampedPose& pose : Path(0, 1)) list << FormatPose(pose).substr(0, 8) << " a.png\n";
+      for (const StampedPose& pose : WavyPath(60, 0, 1)) list << FormatPose(pose).substr(0, 8) << " a.png\n";
       std::ofstream(root_ / name / "synthetic.json")
           << R"({"mean_coverage": 0.301, "mean_moving_coverage": 0.25})";
     }
@@ -51,7 +38,8 @@ class SweepFolder : public ::testing::Test {
     fs::create_directories(folder);
     std::ofstream(folder / "summary.json") << "{\"tracked_percent\": " << tracked_percent << "}";
     if (noise > 0)
-      WriteTrajectory((folder / "trajectory.txt").string(), Path(noise, static_cast<uint64_t>(key.seed)));
+      WriteTrajectory((folder / "trajectory.txt").string(),
+                      WavyPath(60, noise, static_cast<uint64_t>(key.seed)));
     return folder;
   }
   Sweep Read() const { return ReadSweep(root_ / "out", root_ / "data", 3); }

@@ -1,5 +1,6 @@
 #include "dmslam/dataset/live_source.h"
 
+#include "dmslam/dataset/bgr_frame.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -18,7 +19,6 @@ bool IsLive(const std::string& path) {
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstring>
 #include <mutex>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
@@ -55,16 +55,6 @@ void CheckFrame(const cv::Mat& frame, const std::string& path, const Camera& cam
                    std::to_string(frame.rows) + " pixels, the camera file says " +
                    std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px) +
                    "; calibrate the camera at the size that it delivers");
-}
-
-EncodedImage ToEncoded(const cv::Mat& frame) {
-  EncodedImage image{ImageEncoding::kBgr8, frame.cols, frame.rows, {}};
-  const size_t row_bytes = static_cast<size_t>(frame.cols) * 3;
-  image.bytes.resize(row_bytes * static_cast<size_t>(frame.rows));
-  for (int y = 0; y < frame.rows; ++y) {
-    std::memcpy(image.bytes.data() + static_cast<size_t>(y) * row_bytes, frame.ptr(y), row_bytes);
-  }
-  return image;
 }
 
 /// A thread waits in the driver; the newest frame waits behind a lock, and an event says that it is there.

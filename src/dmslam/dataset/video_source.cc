@@ -1,11 +1,11 @@
 #include "dmslam/dataset/video_source.h"
 
+#include "dmslam/dataset/bgr_frame.h"
 #include "dmslam/util/check.h"
 
 #ifdef DMSLAM_HAVE_VIDEOIO
 
 #include <cmath>
-#include <cstring>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 
@@ -46,15 +46,6 @@ class VideoSource : public FrameSource {
     if (!capture_.open(path_, cv::CAP_FFMPEG))
       throw InputError(path_ + ": cannot be opened as a video; check the file and its codec");
     next_ = 0;
-  }
-  static EncodedImage ToEncoded(const cv::Mat& frame) {
-    EncodedImage image{ImageEncoding::kBgr8, frame.cols, frame.rows, {}};
-    const size_t row_bytes = static_cast<size_t>(frame.cols) * 3;
-    image.bytes.resize(row_bytes * static_cast<size_t>(frame.rows));
-    for (int y = 0; y < frame.rows; ++y) {
-      std::memcpy(image.bytes.data() + static_cast<size_t>(y) * row_bytes, frame.ptr(y), row_bytes);
-    }
-    return image;
   }
 
   std::string path_;

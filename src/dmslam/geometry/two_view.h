@@ -15,8 +15,7 @@ namespace dmslam {
 // x1 = 0 with rays, x2 ~ H x1, and poses T_cam2_cam1. Solvers for a sample take `indices` into the full
 // arrays, so that a RANSAC loop copies nothing; no solver for a sample allocates.
 
-// ---- Fundamental matrix
-// ------------------------------------------------------------------------------------------
+// ---- Fundamental matrix ----
 
 /// Hartley's normalised eight-point method (PAMI 1997) on exactly eight matches: null vector by elimination
 /// with full pivoting, then the rank-2 constraint. None for a degenerate sample.
@@ -35,8 +34,7 @@ std::optional<Eigen::Matrix3d> FundamentalEightPoint(std::span<const Eigen::Vect
 int FundamentalSevenPoint(std::span<const Eigen::Vector2d> x1_px, std::span<const Eigen::Vector2d> x2_px,
                           std::span<const int, 7> indices, std::array<Eigen::Matrix3d, 3>& models);
 
-// ---- Essential matrix
-// --------------------------------------------------------------------------------------------
+// ---- Essential matrix ----
 
 /// Five rays in each view (z = 1 or any length); up to ten solutions, written to `models`; returns how many.
 /// The method of Nister, "An Efficient Solution to the Five-Point Relative Pose Problem" (PAMI 2004):
@@ -63,8 +61,7 @@ Eigen::Matrix3d ProjectToEssential(const Eigen::Matrix3d& E);
 /// The four poses of an essential matrix, |t| = 1 (Hartley and Zisserman, 2nd ed., Result 9.19).
 std::array<Rigid3d, 4> DecomposeEssential(const Eigen::Matrix3d& E);
 
-// ---- Homography
-// --------------------------------------------------------------------------------------------------
+// ---- Homography ----
 
 /// Normalised DLT on four matches; none if three of them are collinear in either view.
 std::optional<Eigen::Matrix3d> HomographyFourPoint(std::span<const Eigen::Vector2d> x1_px,
@@ -88,8 +85,7 @@ struct PlaneMotion {
 std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& H, const Pinhole& camera1,
                                              const Pinhole& camera2);
 
-// ---- Which pose
-// ---------------------------------------------------------------------------------------------------
+// ---- Which pose ----
 
 struct PoseChoiceOptions {
   double max_reprojection_error_squared_px =
@@ -134,8 +130,7 @@ Rigid3d RefineRelativePose(const Pinhole& camera, const Rigid3d& T_cam2_cam1,
                            std::span<const int> indices, std::span<const double> weights = {},
                            double huber_px = 0.0, int iterations = 5);
 
-// ---- Residuals
-// ----------------------------------------------------------------------------------------------------
+// ---- Residuals ----
 
 /// Sampson's first-order approximation of the squared distance to the epipolar variety [px^2 if F is in
 /// pixels].

@@ -29,8 +29,7 @@ auto FindObservation(std::vector<Observation>& observations, KeyframeId keyframe
 
 Map::Map(const Camera& camera, const Pyramid& pyramid) : camera_(camera), pyramid_(pyramid) {}
 
-// ---- Reading
-// -------------------------------------------------------------------------------------------------------
+// ---- Reading ----
 
 const Keyframe* Map::FindKeyframe(KeyframeId id) const {
   const auto it = keyframes_.find(id);
@@ -175,8 +174,7 @@ void Map::RefreshViewing(Landmark& landmark) const {
   viewing.mean_direction = sum.normalized();
 }
 
-// ---- Editing
-// -------------------------------------------------------------------------------------------------------
+// ---- Editing ----
 
 Keyframe& Map::MutableKeyframe(KeyframeId id) {
   const auto it = keyframes_.find(id);
@@ -454,8 +452,7 @@ void Map::DropMap(MapId map_id) {
   dropped_maps_.push_back(map_id);
 }
 
-// ---- Deltas
-// --------------------------------------------------------------------------------------------------------
+// ---- Deltas ----
 
 KeyframeState Map::StateOf(const Keyframe& keyframe, bool with_features) const {
   KeyframeState state{keyframe.id,          keyframe.map_id, keyframe.stamp_ns,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dmslam/camera/camera.h"
+#include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/motion_segmentation/match.h"
 #include "dmslam/util/random.h"
@@ -31,15 +32,7 @@ struct SyntheticPair {
   std::vector<uint8_t> truth;  ///< 1 static, 0 moving or mismatch
 };
 
-inline Camera SyntheticCamera() {
-  Camera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 525;
-  camera.cx_px = 320;
-  camera.cy_px = 240;
-  return camera;
-}
+inline Camera SyntheticCamera() { return TestCamera(525); }
 
 namespace synthetic_pair_detail {
 

@@ -1,0 +1,32 @@
+#include "player/end_of_play.h"
+
+#include <algorithm>
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kTellEveryNs = 200'000'000;
+constexpr int64_t kNobodyNs = 60'000'000'000;
+constexpr int64_t kNobodyWhenStoppedNs = 2'000'000'000;
+constexpr int64_t kMapperSilentNs = 5'000'000'000;  // nobody to wait for
+
+}  // namespace
+
+bool EndOfPlay::IsDue(int64_t now_ns) {
+  if (since_ns_ == 0) since_ns_ = now_ns;
+  if (now_ns < due_ns_) return false;
+  due_ns_ = now_ns + kTellEveryNs;
+  return true;
+}
+
+std::optional<int> EndOfPlay::ExitCode(int64_t now_ns, bool stopped) const {
+  if (heard_) {
+    const bool mapper_silent = now_ns - std::max(mapper_heard_ns_, since_ns_) > kMapperSilentNs;
+    return mapper_done_ || mapper_silent ? std::optional(0) : std::nullopt;
+  }
+  if (stopped && now_ns - since_ns_ > kNobodyWhenStoppedNs) return 0;
+  if (now_ns - since_ns_ > kNobodyNs) return 5;
+  return std::nullopt;
+}
+
+}  // namespace dmslam

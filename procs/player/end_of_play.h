@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+
+/// The end of what a player plays: it is told again and again until the frontend has heard it. The player
+/// then stays until the map is done, since a frontend that is started again at the end needs camera and end.
+class EndOfPlay {
+ public:
+  /// What the frontend answers with, in place of a frame's index.
+  static constexpr uint32_t kFrameIndex = std::numeric_limits<uint32_t>::max();
+
+  void OnFrontendHeard() { heard_ = true; }
+  void OnMapperStatus(const MapperStatus& status, int64_t now_ns) {
+    mapper_heard_ns_ = now_ns;
+    mapper_done_ = status.state == MapperStatus::State::kDone;
+  }
+
+  /// Whether the end is to be told now. The first call begins it.
+  bool IsDue(int64_t now_ns);
+  /// Set when there is nobody left to wait for: the player's exit code. `stopped`: asked to stop, it does not
+  /// wait long for a frontend.
+  std::optional<int> ExitCode(int64_t now_ns, bool stopped) const;
+  /// What exit code 5 means.
+  static std::string NobodyAnswered() {
+    return "no frontend answered the end of the sequence; is it running on the same bus?";
+  }
+  /// When to ask again.
+  int64_t due_ns() const { return due_ns_; }
+
+ private:
+  bool heard_ = false, mapper_done_ = false;
+  int64_t mapper_heard_ns_ = 0, since_ns_ = 0, due_ns_ = 0;
+};
+
+}  // namespace dmslam
