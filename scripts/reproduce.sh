@@ -3,7 +3,9 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-readonly root
+readonly root me=reproduce
+# shellcheck source-path=SCRIPTDIR source=lib/resumable.sh
+source "$root/scripts/lib/resumable.sh"
 readonly MAX_FAILURES_IN_A_ROW=3
 
 tum='' out='' seeds=10 data=${DMSLAM_DATA:-$root/../shared/data} render=1 run=1 publish='' runner=''
@@ -33,9 +35,6 @@ there are listed in the report with the address to get them from (scripts/get_tu
 EOF
 }
 
-say() { printf 'reproduce: %s\n' "$*" >&2; }
-die() { say "$*"; exit 1; }
-
 parse() {
   while (($#)); do
     case $1 in
@@ -61,18 +60,11 @@ parse() {
 
 # Sets `bin` to the folder with the programs, built where they are not there.
 find_programs() {
-  bin=${DMSLAM_BIN:-$root/build/release/bin}
-  local programs=(dmslam-report) program missing=()
+  local programs=(dmslam-report)
   ((run == 0 || render == 0)) || programs+=(dmslam-synth)
   [[ $run == 0 || $processes == 1 || -n $runner ]] || programs+=(dmslam-inprocess)
   [[ $run == 0 || -n $runner ]] || programs+=(dmslam-static)
-  for program in "${programs[@]}"; do
-    [[ -x $bin/$program ]] || missing+=("$program")
-  done
-  ((${#missing[@]})) || return 0
-  [[ -z ${DMSLAM_BIN:-} ]] || die "$bin does not hold ${missing[*]}; build them or unset DMSLAM_BIN"
-  say "building ${missing[*]}"
-  (cd "$root" && cmake --preset release && cmake --build --preset release --target "${missing[@]}") >&2
+  need_programs "${programs[@]}"
 }
 
 wanted() { ((${#only[@]} == 0)) || [[ " ${only[*]} " == *" $1 "* ]]; }
@@ -103,7 +95,7 @@ render_stand_ins() {
 draw_selection() {
   local folder=$out/figures/$1 method picture
   [[ ! -e $folder ]] || return 0
-  progress_text "figures of $1"
+  progress_line "figures of $1"
   rm -rf -- "$folder.part"
   for method in dlrsac ransac; do
     start "$bin/dmslam-static" --sequence "$2" --camera "$3" --method "$method" --features 3000 --gap 5 --no-window \
@@ -144,31 +136,6 @@ choose_command() {
   else command=("$bin/dmslam-inprocess"); fi
 }
 
-# start COMMAND...: runs it in a process group of its own, so that an interrupt reaches it through us alone.
-child=''
-start() {
-  local status=0
-  set -m
-  "$@" </dev/null 8>&- 9>&- &
-  child=$!
-  set +m
-  wait "$child" || status=$?
-  child=''
-  return "$status"
-}
-
-interrupted() {
-  trap '' INT TERM
-  exec 2>&8  # a run's output may be redirected at this moment
-  if [[ -n $child ]]; then
-    kill -TERM "$child" 2>/dev/null || true
-    wait "$child" 2>/dev/null || true
-  fi
-  progress_end
-  say "stopped; the same command continues"
-  exit 130
-}
-
 duration() {
   local s=$1
   if ((s < 90)); then printf '%d s' "$s"
@@ -183,8 +150,6 @@ progress() {
   ((frames_done == 0)) || left=", $(duration $(((SECONDS - began) * frames_left / frames_done))) left"
   printf '\r\033[K[%d/%d] %s%s' "$number" "$total" "$1" "$left" >&2
 }
-progress_text() { [[ ! -t 2 ]] || printf '\r\033[K%s' "$1" >&2; }
-progress_end() { [[ ! -t 2 ]] || printf '\r\033[K' >&2; }
 
 # one_run FOLDER SEQUENCE FRAMES CAMERA PROFILE SEED SET. The first seed leaves a few pictures.
 one_run() {
@@ -197,12 +162,7 @@ one_run() {
   start "${command[@]}" "${arguments[@]}" >"$log" 2>&1 || status=$?
   mkdir -p -- "$part"
   mv -- "$log" "$part/log.txt"
-  if [[ ! -s $part/summary.json ]]; then
-    rm -f -- "$part/summary.json"
-    { printf 'exit status %d: ' "$status"; grep -v '^ *$' "$part/log.txt" | tail -n 1 || true; echo; } >"$part/failed.txt"
-  fi
-  mv -- "$part" "$folder"
-  [[ -s $folder/summary.json ]]
+  finish_run "$part" "$folder" "$status"
 }
 
 run_all() {
@@ -235,12 +195,8 @@ run_all() {
 
 main() {
   parse "$@"
-  mkdir -p -- "$out" || die "$out cannot be made"
-  out=$(cd "$out" && pwd)
   find_programs
-  exec 8>&2 9>"$out/.lock"
-  flock -n 9 || die "another reproduce.sh is working in $out"
-  trap interrupted INT TERM
+  work_in "$out"
   choose_command
   if ((run)); then
     ((render == 0)) || render_stand_ins

@@ -3,7 +3,9 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-readonly root
+readonly root me=sweep
+# shellcheck source-path=SCRIPTDIR source=lib/resumable.sh
+source "$root/scripts/lib/resumable.sh"
 readonly SHARES=(0 10 20 30 40 50 60 70) KINDS=(walk stop-and-go) MAX_FAILURES_IN_A_ROW=5
 # The ablation's variants, and what each gives dmslam-inprocess.
 readonly VARIANTS=(dm no_exclusion no_belief no_seen_through arsac ransac baseline)
@@ -33,9 +35,6 @@ DIR/dynamic-scenes.md and the sweep's picture. Stopped at any time, the same com
 END
 }
 
-say() { printf 'sweep: %s\n' "$*" >&2; }
-die() { say "$*"; exit 1; }
-
 parse() {
   while (($#)); do
     case $1 in
@@ -58,39 +57,9 @@ parse() {
 
 # Sets `bin` to the folder with the programs, built where they are not there.
 find_programs() {
-  bin=${DMSLAM_BIN:-$root/build/release/bin}
-  local programs=(dmslam-report) program missing=()
+  local programs=(dmslam-report)
   ((run == 0)) || programs+=(dmslam-synth dmslam-inprocess dmslam-map)
-  for program in "${programs[@]}"; do
-    [[ -x $bin/$program ]] || missing+=("$program")
-  done
-  ((${#missing[@]})) || return 0
-  [[ -z ${DMSLAM_BIN:-} ]] || die "$bin does not hold ${missing[*]}; build them or unset DMSLAM_BIN"
-  "$root/scripts/build.sh" release "${missing[@]}" >&2
-}
-
-# start COMMAND...: runs it in a process group of its own, so that an interrupt reaches it through us alone.
-child=''
-start() {
-  local status=0
-  set -m
-  "$@" </dev/null 8>&- 9>&- &
-  child=$!
-  set +m
-  wait "$child" || status=$?
-  child=''
-  return "$status"
-}
-interrupted() {
-  trap '' INT TERM
-  exec 2>&8 # a run's output may be redirected at this moment
-  if [[ -n $child ]]; then
-    kill -TERM "$child" 2>/dev/null || true
-    wait "$child" 2>/dev/null || true
-  fi
-  progress_end
-  say "stopped; the same command continues"
-  exit 130
+  need_programs "${programs[@]}"
 }
 
 # On a terminal only: what is in work, and how long the rest takes, by the work done since we began.
@@ -101,7 +70,6 @@ progress() { # DONE TOTAL WHAT
   ((work_done == 0)) || left=", $(((SECONDS - began) * ($2 - $1) / work_done / 60 + 1)) min left"
   printf '\r\033[K[%d/%d] %s%s' "$(($1 + 1))" "$2" "$3" "$left" >&2
 }
-progress_end() { [[ ! -t 2 ]] || printf '\r\033[K' >&2; }
 
 sequence_name() { ((10#$2 == 0)) && echo synth_0 || echo "synth_$1_$2"; } # nobody there: the same for both kinds
 
@@ -161,11 +129,7 @@ one_run() {
     start "$bin/dmslam-map" --log "$part/map.log" --masks "$2" --json "$part/map.json" >>"$part/log.txt" 2>&1 || true
     rm -f -- "$part/map.log"
   fi
-  if [[ ! -s $part/summary.json ]]; then
-    { printf 'exit status %d: ' "$status"; grep -v '^ *$' "$part/log.txt" | tail -n 1 || true; echo; } >"$part/failed.txt"
-  fi
-  mv -- "$part" "$folder"
-  [[ -s $folder/summary.json ]]
+  finish_run "$part" "$folder" "$status"
 }
 run_all() { # PART
   local lines=() line folder sequence camera options rendered number=0 in_a_row=0
@@ -194,12 +158,8 @@ run_all() { # PART
 
 main() {
   parse "$@"
-  mkdir -p -- "$out" || die "$out cannot be made"
-  out=$(cd "$out" && pwd)
   find_programs
-  exec 8>&2 9>"$out/.lock"
-  flock -n 9 || die "another sweep.sh is working in $out"
-  trap interrupted INT TERM
+  work_in "$out"
   if ((run)); then
     local part
     for part in "${parts[@]}"; do
