@@ -52,9 +52,10 @@ struct SeenThroughOptions {
   double stood_share = 0.5;     ///< of the unproven seen through: from here on somebody must have stood there
   int min_proven_support =
       2;  ///< then unproven ones go that fewer keyframes see beside proven ones of the same depth
-  int rounds_unsupported = 2;      ///< and after them so many times their neighbours
-  int max_witnesses = 60;          ///< while mapping
-  double witness_angle_rad = 1.0;  ///< between the viewing directions of keyframe and witness
+  double support_per_observation = 1.0;  ///< or not more keyframes than this, times its own observers
+  int rounds_unsupported = 2;            ///< and after them so many times their neighbours
+  int max_witnesses = 60;                ///< while mapping
+  double witness_angle_rad = 1.0;        ///< between the viewing directions of keyframe and witness
 };
 
 struct MapperOptions {

@@ -175,11 +175,16 @@ int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects*
   return static_cast<int>(found.size());
 }
 
-/// Where somebody stood, an unproven landmark needs proven ones at its place, and its neighbours share its
-/// fate.
+/// Where somebody stood, an unproven landmark needs proven ones at its place, seen at other times by more
+/// keyframes than see the landmark itself: whoever stood there was seen often, and what stands at his depth
+/// by chance seldom. Its neighbours share its fate.
 void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
   for (auto& [id, suspect] : *suspects) {
-    if (suspect.proven_support < options.min_proven_support) suspect.condemned = true;
+    const double asked =
+        options.support_per_observation * static_cast<double>(map.FindLandmark(id)->observations.size());
+    const bool supported =
+        suspect.proven_support >= options.min_proven_support && suspect.proven_support > asked;
+    if (!supported) suspect.condemned = true;
   }
   for (int round = 0; round < options.rounds_unsupported; ++round) CondemnTogether(map, options, suspects);
 }

@@ -135,5 +135,27 @@ TEST_F(StandingPerson, FurnitureIsProvenByTime) {
   EXPECT_EQ(CountLeft(map_, cupboard), 9);
 }
 
+/// Somebody stands where a cupboard of the same depth is seen at other times: nothing looks through him.
+TEST_F(StandingPerson, InFrontOfFurnitureStaysOnlyWhileMoreKeyframesSeeTheFurniture) {
+  const auto left = [this](const std::vector<double>& others_s) {
+    map_ = Map(TestCamera(), Pyramid());
+    std::vector<KeyframeId> others, with;
+    uint32_t index = 0;
+    for (const double seconds : others_s) others.push_back(AddKeyframe(index++, seconds));
+    for (const double seconds : {20.0, 20.5, 21.0, 21.5}) with.push_back(AddKeyframe(index++, seconds));
+    const auto wall = AddLandmarks(kWallDepth, with.back(), false);
+    const auto cupboard = AddLandmarks(kPersonDepth, with.back(), true);
+    const auto person = AddLandmarks(kPersonDepth, with.back(), true);
+    for (const KeyframeId id : others) See(id, wall, cupboard);
+    for (const KeyframeId id : with) See(id, wall, person);
+    constexpr uint64_t kManyBefore = 1000;  // so somebody must have stood
+    RemoveUnproven(map_, 1, kManyBefore, SeenThroughOptions());
+    EXPECT_EQ(CountLeft(map_, cupboard), 9);
+    return CountLeft(map_, person);
+  };
+  EXPECT_EQ(left({0, 0.4, 10, 10.4}), 0);
+  EXPECT_EQ(left({0, 0.4, 10, 10.4, 11}), 9);
+}
+
 }  // namespace
 }  // namespace dmslam
