@@ -95,7 +95,7 @@ is_number() { [[ "$2" =~ ^[0-9]+$ ]] || fail "$1 $2: write a whole number"; }
 is_number --seed "$seed"
 is_number --pictures "$pictures"
 is_number --receive-buffer "$receive_buffer"
-[ -z "$sequence" ] || [ -e "$sequence" ] || [[ $sequence == *://* ]] || fail "$sequence: no such folder or file; check --sequence"
+[ -z "$sequence" ] || [ -e "$sequence" ] || [[ $sequence == *://* || $sequence == /dev/* ]] || fail "$sequence: no such folder or file; check --sequence"
 [ -z "$log_file" ] || [ -f "$log_file" ] || fail "$log_file: no such file; check --log"
 [ -z "$replay" ] || [ -f "$replay" ] || fail "$replay: no such file; check --replay"
 [ -z "$map" ] || [ -f "$map" ] || fail "$map: no such file; check --map"

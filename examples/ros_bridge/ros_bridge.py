@@ -43,6 +43,8 @@ def camera_from_ros(info, session):
 
 
 def frame_from_ros(image, session, index):
+    if image.encoding not in ENCODINGS:
+        raise ValueError(f"image encoding {image.encoding} is not supported; convert to one of {', '.join(ENCODINGS)}")
     encoding, channels = ENCODINGS[image.encoding]
     row = image.width * channels
     data = bytes(image.data)
@@ -96,7 +98,8 @@ class Bridge:
         self.send(message)
 
     def close(self):
-        """Tells that no more frames follow, so that results are written."""
+        """Tells that no more frames follow, so that results are written. ROS may be gone already."""
+        self.send = lambda message: None
         end = end_of_sequence_t()
         end.session, end.frames_published, end.frames_listed = self.session, self.index, self.index
         end.last_frame_index = self.index - 1
@@ -116,6 +119,7 @@ def main_ros1(rospy, image_topic, info_topic, bus):
 
 
 def main_ros2(rclpy, image_topic, info_topic, bus):
+    from rclpy.executors import ExternalShutdownException
     from rclpy.qos import qos_profile_sensor_data
     from rclpy.time import Time
     rclpy.init()
@@ -126,8 +130,11 @@ def main_ros2(rclpy, image_topic, info_topic, bus):
     node.create_subscription(Image, image_topic, bridge.on_image, qos_profile_sensor_data)
     try:
         rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
     finally:
         bridge.close()
+        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ refused "waits for nobody" run --video "$address" --camera "$camera" --lockstep 
 sed 's/^width:.*/width: 320/; s/^cx:.*/cx: 160/' "$camera" >"$work/small.yaml"
 refused "640x480 pixels, the camera file says 320x480" run --video "$address" --camera "$work/small.yaml" --out "$work/refused"
 refused "cannot be opened as a camera" run --video http://127.0.0.1:1/none --camera "$camera" --out "$work/refused"
-refused "no such folder|cannot be opened" run --video /dev/video99 --camera "$camera" --out "$work/refused"
+refused "/dev/video99: cannot be opened as a camera" run --video /dev/video99 --camera "$camera" --out "$work/refused"
 
 run --video "$address" --camera "$camera" --out "$work/live" >"$work/said" 2>&1 &
 running=$!

@@ -1,5 +1,9 @@
 #include "settings_page.h"
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "common/settings.h"
 
 namespace dmslam {
@@ -37,14 +41,16 @@ std::string Escaped(const std::string& text) {
 }  // namespace
 
 std::string SettingsPage() {
-  std::string page = kHead, section;
+  std::vector<std::pair<std::string, std::string>> sections;  // name and rows, in the order of first mention
   for (const SettingInfo& info : ListSettings(Settings{})) {
-    if (SectionOf(info.key) != section) {
-      section = SectionOf(info.key);
-      page += "\n## " + section + "\n\n| setting | default | what it does |\n|---|---|---|\n";
-    }
-    page += "| `" + info.key + "` | " + Escaped(info.value) + " | " + Escaped(info.help) + " |\n";
+    const std::string name = SectionOf(info.key);
+    auto section = std::ranges::find(sections, name, &std::pair<std::string, std::string>::first);
+    if (section == sections.end()) section = sections.insert(section, {name, ""});
+    section->second += "| `" + info.key + "` | " + Escaped(info.value) + " | " + Escaped(info.help) + " |\n";
   }
+  std::string page = kHead;
+  for (const auto& [name, rows] : sections)
+    page += "\n## " + name + "\n\n| setting | default | what it does |\n|---|---|---|\n" + rows;
   return page;
 }
 

@@ -15,7 +15,7 @@ constexpr double kTitleHeight = 30;
 constexpr double kSubtitleHeight = 22;
 constexpr double kPanelTitleHeight = 28;
 constexpr double kBelowAxis = 48;   // tick labels and the axis' label
-constexpr double kLeftOfAxis = 74;  // the same beside the y axis
+constexpr double kLeftOfAxis = 82;  // the same beside the y axis
 constexpr double kRightOfAxis = 18;
 constexpr double kColorBarWidth = 14;
 constexpr double kColorBarSpace = 92;  // the bar, its ticks and its label
@@ -137,7 +137,7 @@ void DrawFrameAndTicks(const PlotPanel& panel, const Axes& axes, PlotCanvas* can
   canvas->Polyline(frame, kAxisColor, 1, false);
   canvas->Text({box.x, box.y - 10}, panel.title, {14, TextAnchor::kStart, true});
   canvas->Text({box.x + 0.5 * box.width, box.bottom() + 38}, panel.x_label, {13, TextAnchor::kMiddle});
-  canvas->Text({box.x - 54, box.y + 0.5 * box.height}, panel.y_label, {13, TextAnchor::kMiddle, false, true});
+  canvas->Text({box.x - 64, box.y + 0.5 * box.height}, panel.y_label, {13, TextAnchor::kMiddle, false, true});
 }
 
 void DrawBand(const PlotSeries& series, const Axes& axes, PlotCanvas* canvas) {
