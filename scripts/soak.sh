@@ -36,26 +36,22 @@ done
 mkdir -p "$out/sequence"
 ln -sfn "$(cd "$sequence" && pwd)/rgb" "$out/sequence/rgb"
 # To and fro at the mean rate of the recording, as one list with ascending stamps.
-awk -v seconds="$seconds" -v speed="$speed" '!/^#/ && NF >= 2 { stamp[n] = $1; file[n++] = $2 }
+awk -v seconds="$seconds" -v speed="$speed" 'BEGIN { n = 0 } !/^#/ && NF >= 2 { stamp[n] = $1; file[n++] = $2 }
   END { period = (stamp[n - 1] - stamp[0]) / (n - 1); at = 0; step = 1
     for (i = 0; i * period < seconds * speed; ++i) {
       printf "%.6f %s\n", 1 + i * period, file[at]
       if (at + step < 0 || at + step >= n) step = -step
       at += step } }' "$sequence/rgb.txt" >"$out/sequence/rgb.txt"
 
-port=$((20000 + RANDOM % 30000))
-"$top/scripts/run.sh" --build-dir "$build" --port "$port" --sequence "$out/sequence" "${camera[@]}" --speed "$speed" \
+"$top/scripts/run.sh" --build-dir "$build" --sequence "$out/sequence" "${camera[@]}" --speed "$speed" \
   --out "$out/run" >"$out/said.txt" 2>&1 &
 runner=$!
 trap 'kill -TERM "$runner" 2>/dev/null; wait; exit 130' INT TERM
 echo "seconds,player,frontend,mapper,loopcloser,collector" >"$out/memory.csv"
 resident() { # PROCESS: KiB; 0 when it is not there
-  local dir line kib=0
-  for dir in /proc/[0-9]*; do
-    line=$({ tr '\0' ' ' <"$dir/cmdline"; } 2>/dev/null) || continue
-    [[ $line == *bin/dmslam-$1\ * && $line == *:$port\?* ]] || continue
-    kib=$(sed -nE 's/^VmRSS:[^0-9]*([0-9]+).*/\1/p' "$dir/status" 2>/dev/null)
-  done
+  local pid=0 kib=0
+  read -r pid 2>/dev/null <"$out/run/log/$1.pid" || true
+  kib=$(sed -nE 's/^VmRSS:[^0-9]*([0-9]+).*/\1/p' "/proc/$pid/status" 2>/dev/null || true)
   echo "${kib:-0}"
 }
 began=$SECONDS
@@ -66,15 +62,18 @@ while kill -0 "$runner" 2>/dev/null; do
 done
 status=0
 wait "$runner" || status=$?
-awk -F, 'NR > 1 && $2 * $3 * $4 * $5 * $6 > 0 { for (c = 2; c <= 6; ++c) kib[n, c] = $c; ++n }
+awk -F, 'BEGIN { n = 0 } NR > 1 && $2 * $3 * $4 * $5 * $6 > 0 { at[n] = $1; for (c = 2; c <= 6; ++c) mb[n, c] = $c / 1024; ++n }
   NR == 1 { for (c = 2; c <= 6; ++c) name[c] = $c }
-  END { print "| process | third quarter [MB] | last quarter [MB] | verdict |\n|---|---|---|---|"
-    for (c = 2; c <= 6; ++c) { a = b = na = nb = 0
-      for (i = 0; i < n; ++i) { if (i >= n * 3 / 4) { b += kib[i, c]; ++nb } else if (i >= n / 2) { a += kib[i, c]; ++na } }
+  END { print "| process | third quarter [MB] | last quarter [MB] | slope of the last half [MB/h] | verdict |\n|---|---|---|---|---|"
+    for (c = 2; c <= 6; ++c) { a = b = na = nb = t = tt = tm = 0
+      for (i = 0; i < n; ++i) {
+        if (i >= n * 3 / 4) { b += mb[i, c]; ++nb } else if (i >= n / 2) { a += mb[i, c]; ++na }
+        if (i >= n / 2) { h = at[i] / 3600; t += h; tt += h * h; tm += h * mb[i, c] } }
       if (na == 0 || nb == 0) { print "too short"; exit 1 }
-      a /= na * 1024; b /= nb * 1024; bad = b > a * 1.03 && b > a + 8
+      slope = ((na + nb) * tm - t * (a + b)) / ((na + nb) * tt - t * t)
+      a /= na; b /= nb; bad = b > a * 1.03 && b > a + 8
       if (bad) worst = 1
-      printf "| %s | %.1f | %.1f | %s |\n", name[c], a, b, bad ? "grows" : "flat" }
+      printf "| %s | %.1f | %.1f | %.1f | %s |\n", name[c], a, b, slope, bad ? "grows" : "flat" }
     exit worst }' "$out/memory.csv" >"$out/table.md" || status=1
 cat "$out/table.md"
 exit "$status"

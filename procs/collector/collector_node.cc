@@ -39,7 +39,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrameTrace) {
     if (const auto trace = Read<FrameTrace>(bytes); trace && !IsForeign(trace->session))
-      run_.traces.push_back(*trace);
+      run_.durations.Add(*trace);
   } else if (channel == channels::kEndOfSequence) {
     if (auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session)) end_ = std::move(end);
   } else if (channel == channels::kGroundTruthPose) {
@@ -59,6 +59,7 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
 }
 
 void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
+  if (!run_.ground_truth.empty()) return;
   std::vector<StampedPose>& heard = run_.heard_ground_truth;
   if (!heard.empty() && pose.stamp_ns <= heard.back().stamp_ns) return;
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
@@ -119,9 +120,15 @@ void CollectorNode::TimeKeyframe(const MapDelta& delta) {
 void CollectorNode::OnFramePose(const Record& record) {
   const auto pose = Read<FramePose>(*record.bytes);
   if (!pose) return;
-  builder_->OnFramePose(*pose);
-  frames_seen_ = static_cast<int64_t>(builder_->frame_poses().size());
+  CountFrame(*pose);
   journal_->Append(*record.bytes);
+}
+
+/// Those that were placed later have been seen before.
+void CollectorNode::CountFrame(const FramePose& pose) {
+  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frame_) return;
+  newest_frame_ = pose.frame_index;
+  ++frames_seen_;
 }
 
 bool CollectorNode::TakeFrontendRecord() {
@@ -154,13 +161,13 @@ void CollectorNode::CountMissingKeyframes() {
   }
 }
 
-/// The frame poses of a collector that was before this one.
+/// Behind the frame poses of a collector that was before this one.
 void CollectorNode::OpenJournal() {
   std::filesystem::create_directories(collector_.out_dir);
   journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
   Version newest;
   journal_->Resume(context_.fresh_system ? 0 : session_, [&](std::span<const uint8_t> record) {
-    if (const auto pose = Read<FramePose>(record)) builder_->OnFramePose(*pose);
+    if (const auto pose = Read<FramePose>(record)) CountFrame(*pose);
     const std::optional<RecordHeader> header = ParseHeader(record);
     newest = {header->epoch, header->seq};
   });
@@ -206,7 +213,10 @@ bool CollectorNode::EndIfDone() {
 void CollectorNode::Write() {
   if (written_ || !builder_) return;
   written_ = true;
-  run_.frames_published = frames_seen_;
+  journal_->ForEach([this](std::span<const uint8_t> record) {
+    if (const auto pose = Read<FramePose>(record)) builder_->OnFramePose(*pose);
+  });
+  run_.frames_published = static_cast<int64_t>(builder_->frame_poses().size());
   if (end_) {
     run_.frames_published = end_->frames_published;
     run_.frames_missing = end_->frames_missing;

@@ -44,6 +44,7 @@ class CollectorNode : public StreamNode {
   void OnProposal(KeyframeId id, MapId map_id);
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
+  void CountFrame(const FramePose& pose);
   void CountMissingKeyframes();
   void OpenJournal();
   std::string OfTotal() const;
@@ -62,11 +63,12 @@ class CollectorNode : public StreamNode {
   std::map<KeyframeId, MapId> proposed_;    ///< keyframes that the frontend said should be
   std::map<KeyframeId, int64_t> heard_ns_;  ///< when each was said to be one
   std::set<MapId> dropped_maps_;
-  std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica
+  std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
   int64_t next_progress_ = 0;
   std::optional<EndOfSequence> end_;
   int64_t frames_total_ = 0;
   int64_t frames_seen_ = 0;
+  int64_t newest_frame_ = -1;
   int64_t drained_ns_ = 0;
   bool frontend_ended_ = false;
   bool written_ = false;

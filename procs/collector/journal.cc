@@ -1,9 +1,9 @@
 #include "collector/journal.h"
 
+#include <unistd.h>
+
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <vector>
 
@@ -15,28 +15,40 @@ namespace {
 
 constexpr size_t kLengthBytes = 4;
 
-std::vector<uint8_t> ReadWhole(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
+constexpr uint32_t kMostBytes = 1u << 24;  // of a record: beyond it is damage
 
 }  // namespace
 
-void Journal::Resume(int64_t session, const std::function<void(std::span<const uint8_t> record)>& handle) {
-  const std::vector<uint8_t> all = ReadWhole(path_);
-  const std::span<const uint8_t> bytes(all);
-  size_t at = 0;
-  while (bytes.size() - at > kLengthBytes) {
-    const auto length = static_cast<size_t>(GetInt<uint32_t>(bytes, at));
-    if (length > bytes.size() - at - kLengthBytes) break;
-    const std::span<const uint8_t> record = bytes.subspan(at + kLengthBytes, length);
+/// False at the end, and where a record is not whole.
+bool Journal::ReadNext(std::vector<uint8_t>* record) {
+  std::vector<uint8_t> length_bytes(kLengthBytes);
+  if (std::fread(length_bytes.data(), 1, kLengthBytes, file_) != kLengthBytes) return false;
+  const auto length = GetInt<uint32_t>(length_bytes, 0);
+  if (length > kMostBytes) return false;
+  record->resize(length);
+  return std::fread(record->data(), 1, length, file_) == length;
+}
+
+void Journal::Resume(int64_t session, const Handler& handle) {
+  Open();
+  std::rewind(file_);
+  std::vector<uint8_t> record;
+  long whole = 0;
+  while (ReadNext(&record)) {
     const std::optional<RecordHeader> header = ParseHeader(record);
     if (!header || header->session != session) break;
     handle(record);
-    at += kLengthBytes + length;
+    whole = std::ftell(file_);
   }
-  if (at < all.size()) std::filesystem::resize_file(path_, at);
-  Open("ab");
+  if (ftruncate(fileno(file_), whole) != 0) throw InputError(path_ + ": cannot be written; check its rights");
+  std::fseek(file_, 0, SEEK_END);
+}
+
+void Journal::ForEach(const Handler& handle) {
+  std::rewind(file_);
+  std::vector<uint8_t> record;
+  while (ReadNext(&record)) handle(record);
+  std::fseek(file_, 0, SEEK_END);
 }
 
 void Journal::Append(std::span<const uint8_t> record) {
@@ -53,9 +65,9 @@ void Journal::Remove() {
   std::filesystem::remove(path_);
 }
 
-void Journal::Open(const char* mode) {
+void Journal::Open() {
   Close();
-  file_ = std::fopen(path_.c_str(), mode);
+  file_ = std::fopen(path_.c_str(), "a+b");
   if (file_ == nullptr) throw InputError(path_ + ": cannot be written; check the folder given with --out");
 }
 

@@ -29,18 +29,10 @@ double Quantile(std::vector<double> values, double q) {
   return values[std::min(values.size() - 1, static_cast<size_t>(q * static_cast<double>(values.size())))];
 }
 
+std::vector<double> Doubles(const std::deque<float>& values) { return {values.begin(), values.end()}; }
+
 Json Quantiles(const std::vector<double>& values) {
   return {{"p50", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"p99", Quantile(values, 0.99)}};
-}
-
-/// Differences of two of the trace's times over all frames [ms].
-std::vector<double> Durations(const std::vector<FrameTrace>& traces, int64_t FrameTrace::*from,
-                              int64_t FrameTrace::*to) {
-  std::vector<double> durations;
-  for (const FrameTrace& trace : traces) {
-    if (trace.*to > 0) durations.push_back(static_cast<double>(trace.*to - trace.*from) * 1e-3);
-  }
-  return durations;
 }
 
 /// The covisibility graph: a line "frame frame landmarks" for each two keyframes that share landmarks; "loop"
@@ -175,16 +167,14 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
 }
 
 Json TimingJson(const RunRecord& run) {
-  const std::vector<double> step = Durations(run.traces, &FrameTrace::begin_us, &FrameTrace::tracked_us);
-  const std::vector<double> apart = Durations(run.traces, &FrameTrace::decoded_us, &FrameTrace::tracked_us);
+  const FrameDurations& durations = run.durations;
   Json json;
-  json["frontend_ms_median"] = Quantile(step, 0.5);
-  json["frontend_ms_p95"] = Quantile(step, 0.95);
-  json["frontend_without_decoding_ms"] = Quantiles(apart);
-  json["decode_ms"] = Quantiles(Durations(run.traces, &FrameTrace::begin_us, &FrameTrace::decoded_us));
-  json["extract_ms"] = Quantiles(Durations(run.traces, &FrameTrace::decoded_us, &FrameTrace::extracted_us));
-  json["image_to_pose_ms"] =
-      Quantiles(Durations(run.traces, &FrameTrace::publish_us, &FrameTrace::published_us));
+  json["frontend_ms_median"] = Quantile(Doubles(durations.step), 0.5);
+  json["frontend_ms_p95"] = Quantile(Doubles(durations.step), 0.95);
+  json["frontend_without_decoding_ms"] = Quantiles(Doubles(durations.apart));
+  json["decode_ms"] = Quantiles(Doubles(durations.decode));
+  json["extract_ms"] = Quantiles(Doubles(durations.extract));
+  json["image_to_pose_ms"] = Quantiles(Doubles(durations.image_to_pose));
   json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframe_to_landmarks_ms);
   json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframe_to_adjusted_ms);
   return json;
@@ -274,6 +264,17 @@ std::string Table(const Json& summary) {
 }
 
 }  // namespace
+
+void FrameDurations::Add(const FrameTrace& trace) {
+  const auto add = [](int64_t from_us, int64_t to_us, std::deque<float>* durations) {
+    if (to_us > 0) durations->push_back(static_cast<float>(to_us - from_us) * 1e-3F);
+  };
+  add(trace.begin_us, trace.tracked_us, &step);
+  add(trace.decoded_us, trace.tracked_us, &apart);
+  add(trace.begin_us, trace.decoded_us, &decode);
+  add(trace.decoded_us, trace.extracted_us, &extract);
+  add(trace.publish_us, trace.published_us, &image_to_pose);
+}
 
 std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder) {
   std::filesystem::create_directories(dir);

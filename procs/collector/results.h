@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 #include <vector>
@@ -18,17 +19,27 @@ struct CorrectionRecord {
   std::string note;
 };
 
+/// What each frame took [ms]: five numbers a frame are kept, whatever the length of the run.
+struct FrameDurations {
+  std::deque<float> step;   ///< of the frontend
+  std::deque<float> apart;  ///< ... without decoding
+  std::deque<float> decode, extract;
+  std::deque<float> image_to_pose;  ///< from when the player published it
+
+  void Add(const FrameTrace& trace);
+};
+
 /// All that the summary of a run is made of.
 struct RunRecord {
   std::string sequence, mode, profile, ground_truth;
-  std::vector<StampedPose> heard_ground_truth;  ///< as the player told it: used where there is no file
+  std::vector<StampedPose> heard_ground_truth;  ///< as the player told it: kept where there is no file
   uint64_t seed = 0;
   int64_t frames_published = 0, frames_missing = 0, frames_blacked = 0, frames_jumped = 0;
   FrontendStatus frontend;
   MapperStatus mapper;
   LoopcloserStatus loopcloser;
   std::map<std::string, ProcessHealth> health;
-  std::vector<FrameTrace> traces;
+  FrameDurations durations;
   std::vector<CorrectionRecord> corrections;
   uint64_t resets = 0;
   int restarts = 0;

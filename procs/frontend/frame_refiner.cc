@@ -19,6 +19,7 @@ void FrameRefiner::Keep(const TrackedFrame& frame, const FramePose& pose) {
     kept.sights.push_back({frame.landmarks[i], frame.features->uv_px[i].cast<float>(),
                            static_cast<uint8_t>(frame.features->set.keypoints[i].octave)});
   }
+  kept.sights.shrink_to_fit();  // they stay for long
   frames_.push_back(std::move(kept));
   if (frames_.size() > max_frames_) frames_.pop_front();
 }

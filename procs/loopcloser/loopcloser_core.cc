@@ -21,6 +21,16 @@ LoopcloserCore::LoopcloserCore(const LoopcloserOptions& options, const Camera& c
 void LoopcloserCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   places_.Update(map_);
+  if (awaited_correction_ != 0 && delta.correction_id == awaited_correction_) HearOfCorrection(delta);
+}
+
+/// What the mapper made of the loop that was proposed.
+void LoopcloserCore::HearOfCorrection(const MapDelta& delta) {
+  awaited_correction_ = 0;
+  if (delta.event != MapEvent::kRefused) return;
+  --counters_.loops;
+  adjustment_due_ = false;
+  keyframes_since_loop_ = options_.min_keyframes_between;
 }
 
 void LoopcloserCore::ForgetMap() {
@@ -28,6 +38,7 @@ void LoopcloserCore::ForgetMap() {
   places_.Clear();
   detector_.Reset();
   proposals_.clear();
+  awaited_correction_ = 0;
 }
 
 std::function<bool()> LoopcloserCore::Interrupt() const {
@@ -47,7 +58,7 @@ LoopAnswer LoopcloserCore::Check(KeyframeId id) {
   if (options_.enabled && places_.usable() && keyframe != nullptr) {
     places_.Refresh(map_, id);
     ++keyframes_since_loop_;
-    answer = adjustment_due_ ? AdjustAfterLoop(id) : FindLoop(*keyframe);
+    if (awaited_correction_ == 0) answer = adjustment_due_ ? AdjustAfterLoop(id) : FindLoop(*keyframe);
   }
   answer.keyframe = id;
   answer.base_version = map_.version();
@@ -108,6 +119,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
   counters_.last_loop_keyframe = loop.keyframe;
   keyframes_since_loop_ = 0;
   adjustment_due_ = options_.global_adjustment;
+  awaited_correction_ = answer.correction_id;
   detector_.Reset();
   proposals_.clear();
   return answer;

@@ -40,8 +40,9 @@ class LoopcloserCore {
   void ApplyMapDelta(const MapDelta& delta);
   /// The replica is void: a fresh map stream, or a snapshot, begins.
   void ForgetMap();
-  /// The answer to a keyframe whose local mapping is done: a correction, or none. The keyframe after a loop
-  /// is answered with the global adjustment of the map that the loop has left.
+  /// The answer to a keyframe whose local mapping is done: a correction, or none. The first keyframe after a
+  /// loop is in the map is answered with the global adjustment of what the loop has left. A loop that the
+  /// mapper refused may be found again.
   LoopAnswer Check(KeyframeId keyframe);
 
   const Map& map() const { return map_; }
@@ -58,6 +59,7 @@ class LoopcloserCore {
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
 
  private:
+  void HearOfCorrection(const MapDelta& delta);
   LoopAnswer FindLoop(const Keyframe& keyframe);
   LoopAnswer Close(const VerifiedLoop& loop);
   /// Follows what earlier keyframes proposed.
@@ -84,6 +86,7 @@ class LoopcloserCore {
   std::vector<Proposal> proposals_;  ///< oldest first
   int keyframes_since_loop_;
   bool adjustment_due_ = false;
+  uint64_t awaited_correction_ = 0;  ///< proposed; the mapper's word on it has not been heard. 0: none
   std::vector<Verdict> verdicts_;
   LoopcloserCounters counters_;
 };

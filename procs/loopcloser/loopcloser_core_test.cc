@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -106,6 +107,13 @@ class Room {
     return map_.TakeDelta(MapEvent::kMapped, id, 1);
   }
 
+  /// The mapper's word on a correction. It stays where it is: these tests look at answers alone.
+  MapDelta SayOf(const LoopAnswer& answer, MapEvent event) {
+    MapDelta delta = map_.TakeDelta(event, answer.keyframe, 1);
+    delta.correction_id = answer.correction_id;
+    return delta;
+  }
+
   const Map& map() const { return map_; }
 
  private:
@@ -160,7 +168,7 @@ struct Answers {
   std::vector<LoopAnswer> loops, adjustments;
 };
 
-Answers Play(Room& room, LoopcloserCore& core) {
+Answers Play(Room& room, LoopcloserCore& core, MapEvent said = MapEvent::kCorrected) {
   Answers answers;
   for (int k = 0; k < kKeyframes; ++k) {
     const MapDelta delta = room.Next();
@@ -168,6 +176,7 @@ Answers Play(Room& room, LoopcloserCore& core) {
     LoopAnswer answer = core.Check(delta.about);
     EXPECT_EQ(answer.keyframe, delta.about);
     EXPECT_EQ(answer.base_version, core.map().version());
+    if (answer.kind != LoopAnswer::Kind::kNone) core.ApplyMapDelta(room.SayOf(answer, said));
     if (answer.kind == LoopAnswer::Kind::kLoop) answers.loops.push_back(std::move(answer));
     if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) answers.adjustments.push_back(std::move(answer));
   }
@@ -229,6 +238,35 @@ TEST(LoopcloserCoreTest, TheKeyframeAfterALoopIsAnsweredWithAGlobalAdjustment) {
             answers.loops.front().keyframe.frame_index() + 1);
   EXPECT_FALSE(answers.adjustments.front().landmark_offsets.empty());
   EXPECT_EQ(core.counters().loops, answers.loops.size());
+}
+
+TEST(LoopcloserCoreTest, ALoopThatWasRefusedIsFoundAgainAndNotAdjusted) {
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core, MapEvent::kRefused);
+  EXPECT_GE(answers.loops.size(), 2u);
+  EXPECT_TRUE(answers.adjustments.empty());
+  EXPECT_EQ(core.counters().loops, 0u);
+}
+
+TEST(LoopcloserCoreTest, UntilTheMapperHasSpokenNothingMoreIsProposed) {
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  std::optional<LoopAnswer> loop;
+  for (int k = 0; k < kKeyframes; ++k) {
+    const MapDelta delta = room.Next();
+    core.ApplyMapDelta(delta);
+    LoopAnswer answer = core.Check(delta.about);
+    if (loop) {
+      EXPECT_EQ(answer.kind, LoopAnswer::Kind::kNone);
+    }
+    if (!loop && answer.kind == LoopAnswer::Kind::kLoop) loop = std::move(answer);
+  }
+  ASSERT_TRUE(loop);
+  core.ApplyMapDelta(room.SayOf(*loop, MapEvent::kCorrected));
+  const MapDelta delta = room.Next();
+  core.ApplyMapDelta(delta);
+  EXPECT_EQ(core.Check(delta.about).kind, LoopAnswer::Kind::kGlobalAdjustment);
 }
 
 TEST(LoopcloserCoreTest, MovingLandmarksDoNotVote) {

@@ -289,19 +289,35 @@ void MapperCore::End(bool as_it_is) {
 
 void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   if (answer.kind == LoopAnswer::Kind::kNone) return;
-  const bool known = std::any_of(answer.corrections.begin(), answer.corrections.end(),
-                                 [&](const auto& c) { return map_.FindKeyframe(c.keyframe) != nullptr; });
-  if (!known) {
+  if (const std::string why = WhyRefused(answer); !why.empty()) {
     ++counters_.corrections_refused;
-    Publish(MapEvent::kRefused, answer.keyframe, 0, answer.correction_id, "its keyframes are gone");
+    Publish(MapEvent::kRefused, answer.keyframe, 0, answer.correction_id, why);
     return;
   }
   Correct(answer);
   ++counters_.corrections_applied;
+  MapProgress progress = map_.progress();
+  progress.corrected = map_.version() + 1;  // that of the record which says so
+  map_.SetProgress(progress);
   const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(answer.keyframe);
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe,
           anchor ? anchor->map_id : 0, answer.correction_id, answer.note);
+}
+
+/// Empty: it applies.
+std::string MapperCore::WhyRefused(const LoopAnswer& answer) const {
+  const bool known = std::any_of(answer.corrections.begin(), answer.corrections.end(),
+                                 [&](const auto& c) { return map_.FindKeyframe(c.keyframe) != nullptr; });
+  if (!known) return "its keyframes are gone";
+  const std::string computed = "computed on version " + std::to_string(answer.base_version);
+  if (answer.base_version < map_.progress().corrected) {
+    return computed + ", before the correction of version " + std::to_string(map_.progress().corrected);
+  }
+  if (answer.base_version > map_.version()) {
+    return computed + "; the map's is " + std::to_string(map_.version());
+  }
+  return "";
 }
 
 void MapperCore::Correct(const LoopAnswer& answer) {

@@ -60,8 +60,10 @@ class MapperCore {
   bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
-  /// A loop or a global adjustment, composed with the poses of now. Refused with a record where it no longer
-  /// applies.
+  /// A loop or a global adjustment, composed with the poses of now: local mapping since its base changes
+  /// nothing about it. Refused with a record where it no longer applies: its keyframes are gone, another
+  /// correction was applied since its base (two loop closers, one after the other, may have found the same
+  /// loop), or its base is not a version of this map.
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says that all work that keyframe `id` caused is done.
   void Settle(KeyframeId id, MapId map_id);
@@ -84,6 +86,7 @@ class MapperCore {
                          const Eigen::Vector3d& p_world);
   bool BuildInitialMap(const InitialMap& proposal);
   void ScaleToUnitDepth(MapId map_id, KeyframeId first);
+  std::string WhyRefused(const LoopAnswer& answer) const;
   void Correct(const LoopAnswer& answer);
   void Connect(const LoopAnswer& answer);
   void Reroot(KeyframeId id, KeyframeId parent);

@@ -353,7 +353,7 @@ void Map::Fuse(LandmarkId from, LandmarkId into) {
   target.first_keyframe = std::min(target.first_keyframe, gone.first_keyframe);
   dirty_landmarks_[into] |= kStateDirty;
   EraseLandmark(from);
-  landmark_tombstones_[from] = into;
+  Bury(from, into);
   new_landmark_tombstones_.push_back(from);
   UpdateDescriptor(into);
 }
@@ -362,8 +362,25 @@ void Map::RemoveLandmark(LandmarkId id) {
   const std::vector<Observation> observations = MutableLandmark(id).observations;
   for (const Observation& o : observations) ClearObservation(o.keyframe, o.feature);
   EraseLandmark(id);
-  landmark_tombstones_[id] = LandmarkId{};
+  Bury(id, LandmarkId{});
   new_landmark_tombstones_.push_back(id);
+}
+
+void Map::Bury(LandmarkId id, LandmarkId replaced_by) {
+  if (landmark_tombstones_.insert_or_assign(id, replaced_by).second) burials_.push_back(id);
+}
+
+/// Without that of the highest id: HighestOrdinal must not fall.
+void Map::ForgetOldTombstones() {
+  while (landmark_tombstones_.size() > kLandmarkTombstones) {
+    const LandmarkId oldest = burials_.front();
+    burials_.pop_front();
+    if (oldest == landmark_tombstones_.rbegin()->first) {
+      burials_.push_back(oldest);
+    } else {
+      landmark_tombstones_.erase(oldest);
+    }
+  }
 }
 
 void Map::EraseLandmark(LandmarkId id) {
@@ -505,6 +522,7 @@ MapDelta Map::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
   }
   delta.dropped_maps = dropped_maps_;
   ClearJournal();
+  ForgetOldTombstones();
   return delta;
 }
 
@@ -612,7 +630,7 @@ void Map::ApplyTombstones(const MapDelta& delta) {
       for (const Observation& o : observations) ClearObservation(o.keyframe, o.feature);
       EraseLandmark(tombstone.id);
     }
-    landmark_tombstones_[tombstone.id] = tombstone.replaced_by;
+    Bury(tombstone.id, tombstone.replaced_by);
   }
   for (const KeyframeTombstone& tombstone : delta.keyframe_tombstones) {
     keyframe_tombstones_[tombstone.id] = tombstone;
@@ -640,6 +658,7 @@ void Map::Apply(const MapDelta& delta) {
   version_ = std::max(version_, delta.version);
   progress_ = delta.progress;
   ClearJournal();
+  ForgetOldTombstones();
 }
 
 std::vector<MapDelta> Map::Snapshot(KeyframeId center, size_t max_bytes_hint) const {
@@ -676,7 +695,9 @@ std::vector<MapDelta> Map::Snapshot(KeyframeId center, size_t max_bytes_hint) co
   }
   for (const auto& [id, tombstone] : keyframe_tombstones_)
     room_for(kSmallBytes).keyframe_tombstones.push_back(tombstone);
-  for (const auto& [id, by] : landmark_tombstones_) room_for(16).landmark_tombstones.push_back({id, by});
+  for (const LandmarkId id : burials_) {
+    room_for(16).landmark_tombstones.push_back({id, landmark_tombstones_.at(id)});
+  }
   for (MapDelta& part : parts) {
     part.event = MapEvent::kSnapshot;
     part.version = version_;

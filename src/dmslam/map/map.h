@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -50,7 +51,11 @@ class Map {
   /// Spanning tree: who has `id` for its parent, sorted.
   const std::vector<KeyframeId>& Children(KeyframeId id) const;
   const std::map<KeyframeId, KeyframeTombstone>& keyframe_tombstones() const { return keyframe_tombstones_; }
+  /// What dead landmarks were fused into; 0: culled. Of those that died last (kLandmarkTombstones, some
+  /// minutes' worth): keyframes in flight, and what the frontend keeps of its newest frames, refer to no
+  /// older ones.
   const std::map<LandmarkId, LandmarkId>& landmark_tombstones() const { return landmark_tombstones_; }
+  static constexpr size_t kLandmarkTombstones = 32768;
   /// Keyframes that share at least `min_shared` landmarks with `id`, most first (ties: older first), at most
   /// `most`.
   std::vector<KeyframeId> BestCovisible(KeyframeId id, int most, int min_shared = 15) const;
@@ -128,6 +133,8 @@ class Map {
   void EraseLandmark(LandmarkId id);
   void RefreshViewing(Landmark& landmark) const;
   void ClearJournal();
+  void Bury(LandmarkId id, LandmarkId replaced_by);
+  void ForgetOldTombstones();
   void ForgetMap(MapId map_id);
 
   Camera camera_;
@@ -141,6 +148,7 @@ class Map {
       children_;  ///< by parent, whether the parent is known yet or not
   std::map<KeyframeId, KeyframeTombstone> keyframe_tombstones_;
   std::map<LandmarkId, LandmarkId> landmark_tombstones_;
+  std::deque<LandmarkId> burials_;  ///< their ids in the order of death
 
   std::map<KeyframeId, uint8_t> dirty_keyframes_;
   std::unordered_map<LandmarkId, uint8_t> dirty_landmarks_;

@@ -237,6 +237,41 @@ TEST(Map, CulledKeyframesAndFusedLandmarksResolve) {
   EXPECT_FALSE(map.ResolvePose(KeyframeId::Make(1, 9)).has_value());
 }
 
+TEST(Map, TombstonesOfLandmarksAreBounded) {
+  Map map(TestCamera(), Pyramid()), replica(TestCamera(), Pyramid());
+  Keyframe keyframe;
+  keyframe.id = KeyframeId::Make(1, 1);
+  keyframe.map_id = 1;
+  keyframe.features = MakeFrameFeatures({}, map.camera(), map.pyramid());
+  const KeyframeId first = keyframe.id;
+  map.AddKeyframe(std::move(keyframe));
+  const auto add_and_remove = [&](LandmarkId id) {
+    Landmark landmark;
+    landmark.id = id;
+    landmark.map_id = 1;
+    landmark.reference = landmark.first_keyframe = first;
+    map.AddLandmark(std::move(landmark));
+    map.RemoveLandmark(id);
+  };
+  add_and_remove(LandmarkId::Make(2, 1));  // of the highest epoch, and the first to die
+  constexpr uint64_t kMany = 3 * Map::kLandmarkTombstones;
+  for (uint64_t i = 1; i <= kMany; ++i) {
+    add_and_remove(LandmarkId::Make(1, i));
+    if (i % 1000 == 0) replica.Apply(map.TakeDelta(MapEvent::kSettled, {}, 1));
+  }
+  replica.Apply(map.TakeDelta(MapEvent::kSettled, {}, 1));
+  EXPECT_EQ(map.landmark_tombstones().size(), Map::kLandmarkTombstones);
+  EXPECT_FALSE(map.landmark_tombstones().contains(LandmarkId::Make(1, 1)));
+  EXPECT_TRUE(map.landmark_tombstones().contains(LandmarkId::Make(1, kMany)));
+  EXPECT_EQ(map.HighestOrdinal(), 2);
+  Map late(TestCamera(), Pyramid());
+  for (const MapDelta& part : map.Snapshot(first, 60000)) late.Apply(part);
+  for (const Map* other : {&replica, &late}) {
+    EXPECT_EQ(other->landmark_tombstones(), map.landmark_tombstones());
+    EXPECT_EQ(other->HighestOrdinal(), 2);
+  }
+}
+
 TEST(Map, FirstKeyframeCannotBeRemoved) {
   Random random(3);
   Map map(TestCamera(), Pyramid());

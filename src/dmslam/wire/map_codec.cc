@@ -347,6 +347,7 @@ struct Codec<MapDelta> {
     s(m.progress.loopcloser.epoch, w.loopcloser_epoch);
     s(m.progress.loopcloser.seq, w.loopcloser_seq);
     s(m.progress.settled, w.settled);
+    s(m.progress.corrected, w.corrected);
     s(m.progress.ended, w.ended);
     Flat flat;
     if constexpr (Copy::kToWire) flat = Flatten(m);
