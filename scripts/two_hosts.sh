@@ -70,16 +70,16 @@ make_link() {
   ip -n "$a" route add 224.0.0.0/4 dev "va$id"
   ip -n "$b" route add 224.0.0.0/4 dev "vb$id"
 }
-drop() { # PERCENT: of the packets that come in, on both sides
-  local host device
+drop() { # PERCENT: of the packets that come from the other side; multicast that a host hears of itself is on no link
+  local host device other
   for host in "$a" "$b"; do
-    device=va$id
-    [[ $host == "$a" ]] || device=vb$id
+    device=va$id other=10.77.0.2
+    [[ $host == "$a" ]] || device=vb$id other=10.77.0.1
     ip netns exec "$host" nft flush ruleset
     (($1 > 0)) || continue
     ip netns exec "$host" nft add table netdev loss
     ip netns exec "$host" nft "add chain netdev loss in { type filter hook ingress device $device priority 0; }"
-    ip netns exec "$host" nft add rule netdev loss in numgen random mod 100 '<' "$1" drop
+    ip netns exec "$host" nft add rule netdev loss in ip saddr "$other" numgen random mod 100 '<' "$1" counter drop
   done
 }
 counter() { # HOST DEVICE NAME
