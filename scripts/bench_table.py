@@ -17,7 +17,7 @@ class Bench:
         for b in json.loads(path.read_text(encoding="utf-8"))["benchmarks"]:
             if b.get("run_type") == "aggregate" or b.get("error_occurred"):
                 continue
-            name = b["name"].split("/iterations:")[0].removesuffix("/manual_time")
+            name = b["name"].split("/iterations:")[0].removesuffix("/manual_time").removesuffix("/process_time")
             self.ms[name] = b.get("p50_ms", b["cpu_time"] * SCALE[b["time_unit"]])
             self.counters[name] = b
 

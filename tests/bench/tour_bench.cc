@@ -25,6 +25,7 @@ constexpr double kNear = 2.5, kFar = 6.0,
 constexpr int64_t kFrameNs = 33'333'333;
 constexpr double kNoisePx = 0.4;
 constexpr uint32_t kFlippedBits = 12;
+constexpr size_t kWindowKeyframes = 100;
 constexpr double kMostOverFirst = 1.3, kMostBytesPerFeature = 45;
 
 Camera ShelfCamera() { return TestCamera(500, 319.5, 239.5); }
@@ -84,7 +85,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Medians over the last so many keyframes and the frames between them.
+/// Medians over the last `kWindowKeyframes` before it, and the frames between them.
 struct Station {
   size_t keyframes = 0, landmarks = 0;
   double frame_ms = 0, to_landmarks_ms = 0, mapper_ms = 0, check_ms = 0, replica_ms = 0, rss_mb = 0;
@@ -158,6 +159,7 @@ int Run(const Arguments& a) {
   double bytes = 0;
   std::printf("keyframes landmarks  frame_ms  landmarks_ms mapper_ms  check_ms replica_ms   rss_mb\n");
   size_t next = a.first_station;
+  bool near_station = false;
   for (uint32_t i = 0; loop.map().keyframes().size() < a.keyframes; ++i) {
     const double along = 20 + a.step_m * i;
     FeatureSet features = shelf.See(camera, PoseAt(along), along, &noise);
@@ -168,8 +170,11 @@ int Run(const Arguments& a) {
         throw InputError("no first map was found on the shelf");
       continue;
     }
-    window.Add(times);
-    if (loop.map().keyframes().size() < next) continue;
+    const size_t keyframes = loop.map().keyframes().size();
+    near_station = near_station || keyframes + kWindowKeyframes >= next;
+    if (near_station) window.Add(times);
+    if (keyframes < next) continue;
+    near_station = false;
     stations.push_back(window.Take(loop.map()));
     Print(stations.back());
     next += a.first_station;

@@ -59,9 +59,10 @@ struct BundleReport {
   std::string message;         ///< Why it is not usable.
 };
 
-/// Bundle adjustment over poses and points, one thread, deterministic (same input, same bytes). Uses Ceres
-/// with a Schur complement; dense for few poses, sparse for many. Throws InvariantError for indices out of
-/// range.
+/// Bundle adjustment over poses and points, deterministic (same input, same bytes). Uses Ceres with a Schur
+/// complement; dense for few poses, sparse for many. Runs on one thread, for whose end the caller waits (its
+/// memory is apart from the caller's, see there); `interrupt` is asked on it. Throws InvariantError for
+/// indices out of range.
 BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem);
 
 /// Options for the adjustment of a whole map or of the first two keyframes: one robust stage of so many
