@@ -2,10 +2,10 @@
 # Loop closing on rendered sequences, with and without. See --help.
 set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-out=$top/out/loops cache="" seeds=5 only="" build=$top/build/release
+out=$top/out/loops cache="" seeds=5 only="" baseline=1 build=$top/build/release
 usage() {
   cat <<EOF
-Usage: scripts/loops.sh [--out DIR] [--cache DIR] [--seeds N] [--only PATTERN] [--build-dir DIR]
+Usage: scripts/loops.sh [--out DIR] [--cache DIR] [--seeds N] [--only PATTERN] [--no-baseline] [--build-dir DIR]
 
 Renders a ring of corridors, a tour of a room, and a tour of two rooms with the same things (aliased), with and without
 walkers, seeds 1..N; plays each in lock-step with loop closing and with --no-loop, and writes DIR/table.md. What is done
@@ -15,6 +15,7 @@ is not done again: the same command continues.
   --cache DIR       rendered sequences (default: --out's folder 'sequences'); some 100 MB each
   --seeds N         default 5
   --only PATTERN    only runs whose name matches, as 'ring_*'
+  --no-baseline     leave the runs with --no-loop out
   --build-dir DIR   where the programs are (default: build/release)
 EOF
 }
@@ -23,6 +24,7 @@ while (($#)); do
   case $1 in
     -h | --help) usage; exit 0 ;;
     --out | --cache | --seeds | --only) (($# > 1)) || die "$1 needs a value; see --help"; printf -v "${1#--}" %s "$2"; shift 2 ;;
+    --no-baseline) baseline=0; shift ;;
     --build-dir) (($# > 1)) || die "$1 needs a value; see --help"; build=$2; shift 2 ;;
     *) die "unknown option $1; see --help" ;;
   esac
@@ -48,7 +50,7 @@ play() { # NAME VARIANT, options of dmslam-inprocess
   echo "loops.sh: $folder" >&2
   mkdir -p -- "$folder"
   "$bin/dmslam-inprocess" --sequence "$cache/$name" --camera "$cache/$name/camera.yaml" --out "$folder" "$@" \
-    >"$folder/log.txt" 2>&1 || echo "loops.sh: $folder failed; see its log.txt" >&2
+    >"$folder/log.txt" 2>&1 || { echo "loops.sh: $folder failed; see its log.txt" >&2; return 0; }
   touch "$folder/done"
 }
 
@@ -69,7 +71,7 @@ for ((seed = 1; seed <= seeds; ++seed)); do
     [[ $kind != ring ]] || profile=(--profile baseline)
     render "$name" "$seed" "${scene[@]}" "${walkers[@]}"
     play "$name" loop "${profile[@]}"
-    play "$name" no-loop "${profile[@]}" --no-loop
+    ((baseline == 0)) || play "$name" no-loop "${profile[@]}" --no-loop
   done
 done
 python3 "$top/scripts/loops_table.py" "$cache" "$out" >"$out/table.md"

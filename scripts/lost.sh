@@ -33,7 +33,7 @@ play() { # SEQUENCE VARIANT, options of dmslam-inprocess
   echo "lost.sh: $folder" >&2
   mkdir -p -- "$folder"
   "$build/bin/dmslam-inprocess" --sequence "$sequence" --camera "$top/config/kitchen.yaml" --out "$folder" "$@" \
-    >"$folder/log.txt" 2>&1 || echo "lost.sh: $folder failed; see its log.txt" >&2
+    >"$folder/log.txt" 2>&1 || { echo "lost.sh: $folder failed; see its log.txt" >&2; return 0; }
   touch "$folder/done"
 }
 trouble() { # SEQUENCE FIRST STEP

@@ -5,17 +5,10 @@ import pathlib
 import statistics
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "lib"))
+from trajectories import errors, frame_stamps, read  # noqa: E402
+
 PLACES, DARK, WITHIN, AFTER = 10, 30, 10, 30  # DARK: frames of a second; AFTER: frames whose error is looked at
-
-
-def read(file):
-    """Lines of numbers of a trajectory, by stamp in microseconds."""
-    rows = {}
-    for line in file.read_text().splitlines():
-        if line and not line.startswith("#"):
-            fields = line.split()
-            rows[round(float(fields[0]) * 1e6)] = [float(x) for x in fields[1:8]]
-    return rows
 
 
 def angle_deg(p, q):
@@ -24,45 +17,6 @@ def angle_deg(p, q):
 
 def is_near(p, q):
     return math.dist(p[:3], q[:3]) <= 0.3 and angle_deg(p, q) <= 20
-
-
-def matmul(a, b):
-    return [[sum(x * y for x, y in zip(row, column)) for column in zip(*b)] for row in a]
-
-
-def transpose(a):
-    return [list(row) for row in zip(*a)]
-
-
-def polar(a):
-    """The rotation nearest to a 3x3 matrix, by Higham's iteration."""
-    for _ in range(100):
-        (p, q, r), (s, t, u), (v, w, x) = a
-        cofactors = [[t * x - u * w, u * v - s * x, s * w - t * v],
-                     [r * w - q * x, p * x - r * v, q * v - p * w],
-                     [q * u - r * t, r * s - p * u, p * t - q * s]]
-        determinant = p * cofactors[0][0] + q * cofactors[0][1] + r * cofactors[0][2]
-        a = [[(m + c / determinant) / 2 for m, c in zip(row, other)] for row, other in zip(a, cofactors)]
-    return a
-
-
-def errors(truth, estimate):
-    """Distance of every estimated centre from the true one, after one similarity for all (Umeyama)."""
-    stamps = [s for s in estimate if s in truth]
-    a = [estimate[s][:3] for s in stamps]
-    b = [truth[s][:3] for s in stamps]
-    mean = lambda points: [statistics.fmean(c) for c in zip(*points)]
-    ma, mb = mean(a), mean(b)
-    da = [[x - m for x, m in zip(p, ma)] for p in a]
-    db = [[x - m for x, m in zip(p, mb)] for p in b]
-    covariance = matmul(transpose(db), da)
-    rotation = polar(covariance)
-    scale = sum(rotation[i][j] * covariance[i][j] for i in range(3) for j in range(3)) / sum(x * x for p in da for x in p)
-    result = {}
-    for s, p, q in zip(stamps, da, db):
-        turned = [sum(r * x for r, x in zip(row, p)) for row in rotation]
-        result[s] = math.dist([scale * x for x in turned], q)
-    return result
 
 
 def row(name, frames, truth, folder, plain_error, first, step):
@@ -91,8 +45,7 @@ def row(name, frames, truth, folder, plain_error, first, step):
 
 def main():
     sequence, prefix, first, step = pathlib.Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
-    frames = [round(float(l.split()[0]) * 1e6) for l in (sequence / "rgb.txt").read_text().splitlines()
-              if l and not l.startswith("#")]
+    frames = frame_stamps(sequence)
     truth = read(sequence / "groundtruth.txt")
     plain = errors(truth, read(pathlib.Path(prefix + "_plain") / "trajectory.txt"))
     plain_error = math.sqrt(statistics.fmean(e * e for e in plain.values()))

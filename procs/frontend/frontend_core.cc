@@ -421,7 +421,7 @@ bool FrontendCore::LocalizeLater(TrackedFrame* frame, const LaterNeighbours& nea
     tracker_.SetMotionPrior(predicted, depth);
     const Rigid3d guess = predicted.value_or(near.next->T_cam_world);
     if (tracker_.TrackFromFrame(map_, *near.next, guess, frame) &&
-        tracker_.TrackLocalMap(map_, false, frame).ok) {
+        tracker_.TrackLocalMap(map_, false, frame).ok && near.Plausible(*frame, depth)) {
       return true;
     }
   }

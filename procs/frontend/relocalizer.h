@@ -21,15 +21,26 @@ class Relocalizer {
   void Update(const Map& map);
   void Clear();
   /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
-  /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours.
+  /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours, then
+  /// all that these places show together.
   bool Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed, PoseTracker* tracker,
                   TrackedFrame* frame) const;
 
  private:
+  struct Match {
+    LandmarkId landmark;
+    uint32_t feature = 0;
+  };
+
   std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
                                      const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                    TrackedFrame* frame) const;
+  /// All that these places and their neighbours show, by descriptor alone.
+  bool TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
+                   TrackedFrame* frame) const;
+  bool FindPose(const Map& map, const std::vector<Match>& matches, uint64_t seed, TrackedFrame* frame) const;
+  static bool Refine(const Map& map, PoseTracker* tracker, TrackedFrame* frame);
 
   Camera camera_;
   Pyramid pyramid_;
