@@ -2,7 +2,7 @@
 # Loop closing on rendered sequences, with and without. See --help.
 set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-out=$top/out/loops cache="" seeds=5 only="" baseline=1 build=$top/build/release
+out=$top/out/loops cache="" seeds=5 only="" baseline=1 build=$top/build/release failed=0
 usage() {
   cat <<EOF
 Usage: scripts/loops.sh [--out DIR] [--cache DIR] [--seeds N] [--only PATTERN] [--no-baseline] [--build-dir DIR]
@@ -50,7 +50,7 @@ play() { # NAME VARIANT, options of dmslam-inprocess
   echo "loops.sh: $folder" >&2
   mkdir -p -- "$folder"
   "$bin/dmslam-inprocess" --sequence "$cache/$name" --camera "$cache/$name/camera.yaml" --out "$folder" "$@" \
-    >"$folder/log.txt" 2>&1 || { echo "loops.sh: $folder failed; see its log.txt" >&2; return 0; }
+    >"$folder/log.txt" 2>&1 || { echo "loops.sh: $folder failed; see its log.txt" >&2; failed=1; return 0; }
   touch "$folder/done"
 }
 
@@ -76,3 +76,4 @@ for ((seed = 1; seed <= seeds; ++seed)); do
 done
 python3 "$top/scripts/loops_table.py" "$cache" "$out" >"$out/table.md"
 cat "$out/table.md"
+exit "$failed"

@@ -79,8 +79,9 @@ def row(name, sequence, results):
     bar = max((before or 0) / 5, 0.003 * length)
     wrong = false_loops(runs["loop"], poses(truth), stamps)
     run, shown = runs["loop"], "not run" if before is None else f"{before:.4f}"
+    unseen = " missed" if found < len(revisits) else ""
     return (
-        f"| {name} | {length:.1f} | {run['tracked_percent']:.1f} | {found} of {len(revisits)} | "
+        f"| {name} | {length:.1f} | {run['tracked_percent']:.1f} | {found} of {len(revisits)}{unseen} | "
         f"{run['loops']} / {wrong} | {shown} | {after:.4f} | {bar:.4f}{'' if after <= bar else ' missed'} |"
     )
 

@@ -2,7 +2,7 @@
 # Loses the camera on purpose and measures how it is found again. See --help.
 set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-out=$top/out/lost data=${DMSLAM_DATA:-$top/../shared/data} build=$top/build/release
+out=$top/out/lost data=${DMSLAM_DATA:-$top/../shared/data} build=$top/build/release failed=0
 usage() {
   cat <<EOF
 Usage: scripts/lost.sh [--out DIR] [--data DIR] [--build-dir DIR]
@@ -33,7 +33,7 @@ play() { # SEQUENCE VARIANT, options of dmslam-inprocess
   echo "lost.sh: $folder" >&2
   mkdir -p -- "$folder"
   "$build/bin/dmslam-inprocess" --sequence "$sequence" --camera "$top/config/kitchen.yaml" --out "$folder" "$@" \
-    >"$folder/log.txt" 2>&1 || { echo "lost.sh: $folder failed; see its log.txt" >&2; return 0; }
+    >"$folder/log.txt" 2>&1 || { echo "lost.sh: $folder failed; see its log.txt" >&2; failed=1; return 0; }
   touch "$folder/done"
 }
 trouble() { # SEQUENCE FIRST STEP
@@ -56,3 +56,4 @@ trouble kitchen_walk1 110 58
   python3 "$top/scripts/lost_table.py" "$data/kitchen_walk1" "$out/kitchen_walk1" 110 58
 } >"$out/table.md"
 cat "$out/table.md"
+exit "$failed"

@@ -40,7 +40,9 @@ def row(name, frames, truth, folder, plain_error, first, step):
     rms = lambda v: math.sqrt(statistics.fmean(x * x for x in v)) if v else float("nan")
     ok = sum(w is not None and w <= WITHIN for w in waits)
     shown = " ".join("-" if w is None else str(w) for w in waits)
-    return (f"| {name} | {ok} of {counted} | {shown} | {rms(after):.4f} | {rms(otherwise):.4f} | {plain_error:.4f} |")
+    missed = " missed" if ok < 0.9 * counted else ""
+    return (f"| {name} | {ok} of {counted}{missed} | {shown} | {rms(after):.4f} | {rms(otherwise):.4f} | "
+            f"{plain_error:.4f} |")
 
 
 def main():

@@ -102,7 +102,10 @@ step_loops() { # keeps what was played beside the step's folder, so that it cont
   "$top/scripts/loops.sh" --out "$out/loops_played" --seeds "$SEEDS"
   ! grep -qE 'missed|not tracked|/ [1-9]' "$out/loops_played/table.md"
 }
-step_lost() { "$top/scripts/lost.sh" --out "$1" --data "$data"; }
+step_lost() {
+  "$top/scripts/lost.sh" --out "$1" --data "$data"
+  ! grep -q missed "$1/table.md"
+}
 step_fuzz() { "$top/scripts/fuzz.sh" --seconds "$fuzz_seconds"; }
 
 steps=("tests")
