@@ -33,8 +33,10 @@ struct EssentialRow {
   Vector5d jacobian;
 };
 
-EssentialRow MakeEssentialRow(const Eigen::Vector3d& y, const Eigen::Vector3d& ray1, const Eigen::Vector3d& t,
-                              const Eigen::Matrix<double, 3, 2>& B) {
+[[gnu::always_inline]] inline EssentialRow MakeEssentialRow(const Eigen::Vector3d& y,
+                                                            const Eigen::Vector3d& ray1,
+                                                            const Eigen::Vector3d& t,
+                                                            const Eigen::Matrix<double, 3, 2>& B) {
   EssentialRow row;
   const Eigen::Vector3d normal = y.cross(ray1);
   row.residual = t.dot(normal);
@@ -51,7 +53,7 @@ void UpdateEssential(const Vector5d& step, const Eigen::Matrix<double, 3, 2>& B,
 }
 
 /// Sampson's denominator with both points' bounds, for row vectors of M.
-double SampsonBound(const Eigen::Matrix3d& M, const MatchArrays& a, size_t i) {
+[[gnu::always_inline]] inline double SampsonBound(const Eigen::Matrix3d& M, const MatchArrays& a, size_t i) {
   const Eigen::Vector3d l1 = M * a.ray0[i];
   const Eigen::Vector3d l0 = M.transpose() * a.ray1[i];
   return a.bound1[i] * l1.head<2>().squaredNorm() + a.bound0[i] * l0.head<2>().squaredNorm();
@@ -211,15 +213,18 @@ bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, 
 
 bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
                      TwoViewModel* model, double bound_scale) {
-  double damping = 1e-6;
+  constexpr double kDamping = 1e-6;
+  std::vector<uint32_t> used;
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (use[i]) used.push_back(static_cast<uint32_t>(i));
+  }
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
     const Eigen::Matrix3d M = Hat(model->t) * model->R;
     Matrix5d normal = Matrix5d::Zero();
     Vector5d gradient = Vector5d::Zero();
-    int used = 0;
-    for (size_t i = 0; i < use.size(); ++i) {
-      if (!use[i]) continue;
+    int bounded = 0;
+    for (const uint32_t i : used) {
       const double bound = bound_scale * SampsonBound(M, arrays, i);
       if (!(bound > 0)) continue;
       const EssentialRow row = MakeEssentialRow(model->R * arrays.ray0[i], arrays.ray1[i], model->t, B);
@@ -227,10 +232,10 @@ bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, in
       const double weight = 1.0 / (bound * (1.0 + squared) * (1.0 + squared));  // Geman-McClure
       normal.noalias() += row.jacobian * (weight * row.jacobian.transpose());
       gradient += weight * row.residual * row.jacobian;
-      ++used;
+      ++bounded;
     }
-    if (used < 5) return false;
-    normal.diagonal() *= 1.0 + damping;
+    if (bounded < 5) return false;
+    normal.diagonal() *= 1.0 + kDamping;
     normal.diagonal().array() += 1e-12;
     const Vector5d step = -normal.ldlt().solve(gradient);
     if (!step.allFinite() || step.head<3>().norm() > 1.0) return false;
