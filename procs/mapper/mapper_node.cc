@@ -343,8 +343,10 @@ void MapperNode::PublishStatus() {
   status.last_settled = last_settled_;
   status.landmarks_p50_ms = to_landmarks_.Quantile(0.5);
   status.landmarks_p95_ms = to_landmarks_.Quantile(0.95);
+  status.landmarks_p99_ms = to_landmarks_.Quantile(0.99);
   status.adjusted_p50_ms = to_adjusted_.Quantile(0.5);
   status.adjusted_p95_ms = to_adjusted_.Quantile(0.95);
+  status.adjusted_p99_ms = to_adjusted_.Quantile(0.99);
   status.adjustment_ms = adjustment_.Quantile(0.5);
   if (core_) FillCoreStatus(&status);
   PublishLoose(status);

@@ -121,8 +121,10 @@ struct MapperStatus {
   KeyframeId last_settled;
   double landmarks_p50_ms = 0;  ///< keyframe received to its new landmarks published
   double landmarks_p95_ms = 0;
+  double landmarks_p99_ms = 0;
   double adjusted_p50_ms = 0;  ///< keyframe received to its local bundle adjustment published
   double adjusted_p95_ms = 0;
+  double adjusted_p99_ms = 0;
   double adjustment_ms = 0;  ///< median time of a local bundle adjustment
 };
 

@@ -177,8 +177,10 @@ struct Codec<MapperStatus> {
     s(m.last_settled, w.last_settled);
     s(m.landmarks_p50_ms, w.landmarks_p50_ms);
     s(m.landmarks_p95_ms, w.landmarks_p95_ms);
+    s(m.landmarks_p99_ms, w.landmarks_p99_ms);
     s(m.adjusted_p50_ms, w.adjusted_p50_ms);
     s(m.adjusted_p95_ms, w.adjusted_p95_ms);
+    s(m.adjusted_p99_ms, w.adjusted_p99_ms);
     s(m.adjustment_ms, w.adjustment_ms);
   }
   static void Validate(const MapperStatus& m, Checker& check) {
