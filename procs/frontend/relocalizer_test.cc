@@ -16,7 +16,9 @@ namespace dmslam {
 namespace {
 
 constexpr int kPoints = 3000, kKeyframes = 30;
-constexpr double kStep = 0.35;      // between two keyframes [map units]
+constexpr double kStep = 0.35;  // between two keyframes [map units]
+constexpr size_t kPoorEvery = 8;
+constexpr int kPoorFlips = 32;
 constexpr double kMoverStep = 0.4;  // how far the movers have gone when the camera is lost
 
 std::shared_ptr<const Vocabulary> ShippedVocabulary() {
@@ -78,6 +80,20 @@ class Wall {
   /// What a camera sees after the movers have gone by `moved`.
   TrackedFrame Frame(double x, double moved = 0.0) const {
     return TrackedFrame(1000, 1'000'000'000'000, See(PoseAt(x), moved, 1000, nullptr));
+  }
+  /// A few of the features at `x`, each with many bits wrong.
+  TrackedFrame Poor(double x) const {
+    const FeatureSet all = Frame(x).features->set;
+    FeatureSet few;
+    Random random(11);
+    for (size_t i = 0; i < all.size(); i += kPoorEvery) {
+      few.keypoints.push_back(all.keypoints[i]);
+      few.descriptors.push_back(all.descriptors[i]);
+      for (int flips = 0; flips < kPoorFlips; ++flips)
+        few.descriptors.back().words[random.Below(4)] ^= uint64_t{1} << random.Below(64);
+    }
+    return TrackedFrame(1000, 1'000'000'000'000,
+                        MakeFrameFeatures(std::move(few), map_.camera(), map_.pyramid()));
   }
   /// As many features as at `x`, that look like nothing in the map.
   TrackedFrame Elsewhere(double x) const {
@@ -157,12 +173,28 @@ TEST(RelocalizerTest, APlaceThatWasNeverSeenIsNotFound) {
   EXPECT_FALSE(lost.Find(&frame));
 }
 
+TEST(RelocalizerTest, WhatNoKeyframeShowsWellEnoughPlacesShowTogether) {
+  Wall wall;
+  Lost lost(wall);
+  for (const double x : {1.9, 4.4, 7.3}) {
+    TrackedFrame frame = wall.Poor(x);
+    ASSERT_TRUE(lost.Find(&frame)) << "at " << x;
+    EXPECT_LT((frame.T_cam_world.Center() - PoseAt(x).Center()).norm(), 0.03) << "at " << x;
+  }
+}
+
 TEST(RelocalizerTest, LandmarksThatAreBelievedToMoveDoNotVote) {
   Wall wall(0.65, 2.0F);  // most of what is seen has gone on together
   Lost lost(wall);
   TrackedFrame frame = wall.Frame(4.4, kMoverStep);
   ASSERT_TRUE(lost.Find(&frame));
   EXPECT_LT((frame.T_cam_world.Center() - PoseAt(4.4).Center()).norm(), 0.02);
+
+  Wall unknowing(0.65, -2.0F);  // were they believed to stand, they would decide
+  Lost misled(unknowing);
+  frame = unknowing.Frame(4.4, kMoverStep);
+  ASSERT_TRUE(misled.Find(&frame));
+  EXPECT_GT((frame.T_cam_world.Center() - PoseAt(4.4).Center()).norm(), kMoverStep / 2);
 
   Wall crowd(1.0, 2.0F);  // nothing else was ever mapped
   Lost among_them(crowd);
