@@ -53,10 +53,16 @@ std::optional<FramePose> FrameRefiner::RefineOne(const Map& map, const Kept& kep
   return pose;
 }
 
-std::vector<FramePose> FrameRefiner::Refine(const Map& map) {
+std::vector<FramePose> FrameRefiner::Refine(const Map& map, std::optional<MapId> map_id) {
   std::vector<FramePose> poses;
-  for (const Kept& kept : std::exchange(frames_, {})) {
-    if (std::optional<FramePose> pose = RefineOne(map, kept)) poses.push_back(std::move(*pose));
+  for (Kept& kept : std::exchange(frames_, {})) {
+    const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
+    if (!reference) continue;
+    if (map_id && reference->map_id != *map_id) {
+      frames_.push_back(std::move(kept));
+    } else if (std::optional<FramePose> pose = RefineOne(map, kept)) {
+      poses.push_back(std::move(*pose));
+    }
   }
   return poses;
 }

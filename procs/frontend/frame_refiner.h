@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dmslam/camera/camera.h"
@@ -22,9 +23,10 @@ class FrameRefiner {
   /// Keeps a tracked frame and the pose that was told of it; the oldest is dropped when there are too many.
   void Keep(const TrackedFrame& frame, const FramePose& pose);
 
-  /// The frames' poses in `map`, relative to their reference keyframes as these are now (state: localised
-  /// later). A frame whose observations do not agree with the map any more is left out. Forgets the frames.
-  std::vector<FramePose> Refine(const Map& map);
+  /// The poses of the frames of map `map_id` (none given: of all), relative to their reference keyframes as
+  /// these are now (state: localised later). A frame whose observations do not agree with the map any more is
+  /// left out. Forgets the frames.
+  std::vector<FramePose> Refine(const Map& map, std::optional<MapId> map_id = std::nullopt);
 
  private:
   struct Sight {

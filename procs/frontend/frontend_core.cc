@@ -73,6 +73,10 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   relocalizer_.Update(map_);
   if (delta.progress.settled >= awaited_) awaited_ = {};
+  const bool at_the_end = delta.event == MapEvent::kGloballyAdjusted && !delta.about.valid();
+  if (!at_the_end) return;
+  // Now, as the next record may take landmarks away that are no part of the world but were good to see.
+  for (FramePose& pose : refiner_.Refine(map_, delta.map_id)) refined_.push_back(std::move(pose));
 }
 
 void FrontendCore::Resume() {
@@ -471,6 +475,7 @@ void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
     events->push_back(pose);
   }
   unplaced_.clear();
+  for (FramePose& pose : std::exchange(refined_, {})) events->push_back(std::move(pose));
   for (FramePose& pose : refiner_.Refine(map_)) events->push_back(std::move(pose));
 }
 

@@ -137,6 +137,7 @@ class FrontendCore {
   bool localize_only_;
   Map map_;
   FrameRefiner refiner_;
+  std::vector<FramePose> refined_;  ///< told at the end
   OrbExtractor extractor_;
   OrbExtractor first_map_extractor_;  ///< more features while there is no map
   InitializerOptions initializer_options_;

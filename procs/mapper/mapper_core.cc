@@ -146,10 +146,6 @@ void MapperCore::MapAround(const KeyframeProposal& proposal) {
   const MapId map_id = proposal.map_id;
   counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, options_));
   CreateLandmarks(id, proposal.moving);
-  if (options_.seen_through.enabled) {
-    counters_.landmarks_seen_through +=
-        static_cast<uint64_t>(RemoveSeenThrough(map_, id, options_.seen_through));
-  }
   Publish(MapEvent::kLandmarksCreated, id, map_id);
   if (Interrupted()) {
     ++counters_.adjustments_interrupted;
@@ -268,11 +264,11 @@ void MapperCore::AdjustMaps() {
   for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
-    if (options_.seen_through.enabled) {
-      counters_.landmarks_seen_through += static_cast<uint64_t>(
-          RemoveUnproven(map_, map_id, counters_.landmarks_seen_through, options_.seen_through));
-    }
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);
+    if (!options_.seen_through.enabled) continue;
+    // With the next record: frames take their last poses from the map that still has those who stood.
+    counters_.landmarks_seen_through +=
+        static_cast<uint64_t>(RemoveSeenThrough(map_, map_id, options_.seen_through));
   }
   adjusted_ = true;
 }

@@ -55,7 +55,7 @@ bool InImage(const Camera& camera, const Eigen::Vector2d& uv_px) {
 struct Depths {
   int behind = 0;
   int same = 0;
-  int proven_same = 0;
+  int proven_same = 0;  ///< within the narrower tolerance
 };
 
 /// Depths of the landmarks that `witness` sees around the pixel of `p_world`, relative to its own.
@@ -76,7 +76,8 @@ Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3
           ++depths.behind;
         } else if (ratio > 1 - options.depth_tolerance) {
           ++depths.same;
-          if (suspect == suspects.end()) ++depths.proven_same;
+          if (suspect == suspects.end() && std::abs(ratio - 1) < options.support_tolerance)
+            ++depths.proven_same;
         }
       });
   return depths;
@@ -180,10 +181,8 @@ int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects*
 /// by chance seldom. Its neighbours share its fate.
 void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
   for (auto& [id, suspect] : *suspects) {
-    const double asked =
-        options.support_per_observation * static_cast<double>(map.FindLandmark(id)->observations.size());
-    const bool supported =
-        suspect.proven_support >= options.min_proven_support && suspect.proven_support > asked;
+    const auto observers = static_cast<double>(map.FindLandmark(id)->observations.size());
+    const bool supported = suspect.proven_support > options.support_per_observation * observers;
     if (!supported) suspect.condemned = true;
   }
   for (int round = 0; round < options.rounds_unsupported; ++round) CondemnTogether(map, options, suspects);
@@ -199,42 +198,9 @@ int RemoveCondemned(Map& map, const Suspects& suspects) {
   return removed;
 }
 
-/// Keyframes that look where keyframe `id` looks, nearest first.
-std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenThroughOptions& options) {
-  const Keyframe& keyframe = *map.FindKeyframe(id);
-  const double depth = map.MedianDepth(keyframe).value_or(0.0);
-  std::vector<std::pair<double, KeyframeId>> near;
-  for (const auto& [other_id, other] : map.keyframes()) {
-    if (other.map_id != keyframe.map_id || other_id == id) continue;
-    const double distance = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
-    const double angle = AngleBetween(other.T_cam_world.rotation, keyframe.T_cam_world.rotation);
-    if (distance < depth && angle < options.witness_angle_rad) near.emplace_back(distance, other_id);
-  }
-  std::sort(near.begin(), near.end());
-  if (near.size() > static_cast<size_t>(options.max_witnesses))
-    near.resize(static_cast<size_t>(options.max_witnesses));
-  std::vector<KeyframeId> witnesses;
-  for (const auto& [distance, other_id] : near) witnesses.push_back(other_id);
-  return witnesses;
-}
-
 }  // namespace
 
-int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options) {
-  Suspects suspects;
-  for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-    if (landmark.valid()) AddIfUnproven(map, landmark, options, &suspects);
-  }
-  const std::vector<KeyframeId> witnesses = WitnessesNear(map, id, options);
-  if (CondemnSeenThrough(map, witnesses, options, &suspects) == 0) return 0;
-  for (int round = 0; round < options.rounds; ++round) {
-    const int together = CondemnTogether(map, options, &suspects);
-    if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
-  }
-  return RemoveCondemned(map, suspects);
-}
-
-int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
+int RemoveSeenThrough(Map& map, MapId map_id, const SeenThroughOptions& options) {
   Suspects suspects;
   for (const LandmarkId id : map.LandmarkIdsSorted()) {
     if (map.FindLandmark(id)->map_id == map_id) AddIfUnproven(map, id, options, &suspects);
@@ -243,10 +209,8 @@ int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenTh
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (keyframe.map_id == map_id) witnesses.push_back(id);
   }
-  const double before = static_cast<double>(removed_before);
-  const double seen_through = before + CondemnSeenThrough(map, witnesses, options, &suspects);
-  const bool somebody_stood =
-      seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
+  const int seen_through = CondemnSeenThrough(map, witnesses, options, &suspects);
+  const bool somebody_stood = seen_through > options.stood_share * static_cast<double>(suspects.size());
   for (auto& [id, suspect] : suspects) {
     if (somebody_stood && map.FindLandmark(id)->evidence.moved > 0) suspect.condemned = true;
   }
