@@ -35,14 +35,12 @@ void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& opti
                         std::set<KeyframeId>* listed, std::vector<KeyframeId>* targets) {
   const Keyframe& keyframe = *map.FindKeyframe(id);
   const double depth = map.MedianDepth(keyframe).value_or(0.0);
-  std::vector<std::pair<double, KeyframeId>> near;
-  for (const auto& [other_id, other] : map.keyframes()) {
-    if (other.map_id != keyframe.map_id || listed->contains(other_id)) continue;
-    const double distance = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
-    const double angle = AngleBetween(other.T_cam_world.rotation, keyframe.T_cam_world.rotation);
-    if (distance < options.nearby_distance * depth && angle < options.nearby_angle_rad)
-      near.emplace_back(distance, other_id);
-  }
+  std::vector<std::pair<double, KeyframeId>> near = map.KeyframesWithin(id, options.nearby_distance * depth);
+  std::erase_if(near, [&](const std::pair<double, KeyframeId>& other) {
+    const Rigid3d& T_cam_world = map.FindKeyframe(other.second)->T_cam_world;
+    const double angle = AngleBetween(T_cam_world.rotation, keyframe.T_cam_world.rotation);
+    return listed->contains(other.second) || !(angle < options.nearby_angle_rad);
+  });
   std::sort(near.begin(), near.end());
   for (size_t i = 0; i < near.size() && i < static_cast<size_t>(options.nearby_keyframes); ++i) {
     listed->insert(near[i].second);

@@ -124,6 +124,19 @@ std::vector<KeyframeId> Map::BestCovisible(KeyframeId id, int most, int min_shar
   return best;
 }
 
+std::vector<std::pair<double, KeyframeId>> Map::KeyframesWithin(KeyframeId id, double distance) const {
+  std::vector<std::pair<double, KeyframeId>> within;
+  const Keyframe* keyframe = FindKeyframe(id);
+  if (keyframe == nullptr) return within;
+  const Eigen::Vector3d center = keyframe->T_cam_world.Center();
+  for (const Standpoint& other : standpoints_) {
+    if (other.map_id != keyframe->map_id || other.id == id) continue;
+    const double apart = (other.center - center).norm();
+    if (apart < distance) within.emplace_back(apart, other.id);
+  }
+  return within;
+}
+
 int Map::CountTracked(const Keyframe& keyframe, int min_observations) const {
   int count = 0;
   for (const LandmarkId id : keyframe.landmarks) {
@@ -188,6 +201,16 @@ Landmark& Map::MutableLandmark(LandmarkId id) {
   return it->second;
 }
 
+void Map::UpdateStandpoint(const Keyframe& keyframe) {
+  const Standpoint standpoint{keyframe.id, keyframe.map_id, keyframe.T_cam_world.Center()};
+  const auto at = std::ranges::lower_bound(standpoints_, keyframe.id, {}, &Standpoint::id);
+  if (at != standpoints_.end() && at->id == keyframe.id) {
+    *at = standpoint;
+  } else {
+    standpoints_.insert(at, standpoint);
+  }
+}
+
 void Map::Attach(KeyframeId child, KeyframeId parent) {
   if (parent.valid()) InsertSorted(children_[parent], child);
 }
@@ -206,7 +229,7 @@ void Map::AddKeyframe(Keyframe keyframe) {
   keyframe.landmarks.assign(keyframe.features->size(), LandmarkId{});
   keyframe.covisible.clear();
   Attach(id, keyframe.parent);
-  keyframes_.emplace(id, std::move(keyframe));
+  UpdateStandpoint(keyframes_.emplace(id, std::move(keyframe)).first->second);
   dirty_keyframes_[id] |= kKeyframeStateDirty | kFeaturesDirty;
 }
 
@@ -263,7 +286,9 @@ void Map::ClearObservation(KeyframeId keyframe_id, uint16_t feature) {
 }
 
 void Map::SetPose(KeyframeId id, const Rigid3d& T_cam_world) {
-  MutableKeyframe(id).T_cam_world = T_cam_world;
+  Keyframe& keyframe = MutableKeyframe(id);
+  keyframe.T_cam_world = T_cam_world;
+  UpdateStandpoint(keyframe);
   dirty_keyframes_[id] |= kPoseDirty;
 }
 
@@ -300,7 +325,9 @@ void Map::AddLoopEdge(KeyframeId a, KeyframeId b) {
 }
 
 void Map::SetMapId(KeyframeId id, MapId map_id) {
-  MutableKeyframe(id).map_id = map_id;
+  Keyframe& keyframe = MutableKeyframe(id);
+  keyframe.map_id = map_id;
+  UpdateStandpoint(keyframe);
   dirty_keyframes_[id] |= kKeyframeStateDirty;
 }
 
@@ -448,6 +475,7 @@ void Map::EraseKeyframe(KeyframeId id) {
   if (it == keyframes_.end()) return;
   Detach(id, it->second.parent);
   keyframes_.erase(it);
+  standpoints_.erase(std::ranges::lower_bound(standpoints_, id, {}, &Standpoint::id));
   dirty_keyframes_.erase(id);
   dirty_observations_.erase(dirty_observations_.lower_bound({id, 0}),
                             dirty_observations_.upper_bound({id, 0xffff}));
@@ -560,6 +588,7 @@ void Map::ApplyKeyframes(const MapDelta& delta) {
     Detach(state.id, keyframe.parent);
     keyframe.parent = state.parent;
     Attach(state.id, state.parent);
+    UpdateStandpoint(keyframe);
   }
   for (const KeyframePose& pose : delta.keyframe_poses) {
     const auto it = keyframes_.find(pose.id);
@@ -569,6 +598,7 @@ void Map::ApplyKeyframes(const MapDelta& delta) {
     }
     it->second.T_cam_world = pose.T_cam_world;
     it->second.scale = pose.scale;
+    UpdateStandpoint(it->second);
   }
 }
 

@@ -59,6 +59,9 @@ class Map {
   /// Keyframes that share at least `min_shared` landmarks with `id`, most first (ties: older first), at most
   /// `most`.
   std::vector<KeyframeId> BestCovisible(KeyframeId id, int most, int min_shared = 15) const;
+  /// The other keyframes of the same map whose cameras stand nearer to that of `id` than `distance`, by id,
+  /// with their distances.
+  std::vector<std::pair<double, KeyframeId>> KeyframesWithin(KeyframeId id, double distance) const;
   /// How many landmarks of a keyframe have at least `min_observations` observers.
   int CountTracked(const Keyframe& keyframe, int min_observations) const;
   /// Median depth of a keyframe's landmarks in its camera; none without landmarks.
@@ -118,7 +121,16 @@ class Map {
   enum LandmarkDirty : uint8_t { kPositionDirty = 1, kEvidenceDirty = 2, kStateDirty = 4 };
   enum KeyframeDirty : uint8_t { kPoseDirty = 1, kKeyframeStateDirty = 2, kFeaturesDirty = 4 };
 
+  /// Where a camera stands. Kept beside the keyframes, which lie all over the memory: thousands are compared
+  /// at a time.
+  struct Standpoint {
+    KeyframeId id;
+    MapId map_id = 0;
+    Eigen::Vector3d center;
+  };
+
   Keyframe& MutableKeyframe(KeyframeId id);
+  void UpdateStandpoint(const Keyframe& keyframe);
   Landmark& MutableLandmark(LandmarkId id);
   void Link(const Landmark& landmark, KeyframeId keyframe, int sign);
   void Attach(KeyframeId child, KeyframeId parent);
@@ -143,6 +155,7 @@ class Map {
   MapProgress progress_;
   uint64_t skipped_references_ = 0;
   std::map<KeyframeId, Keyframe> keyframes_;
+  std::vector<Standpoint> standpoints_;  ///< of all keyframes, by id
   mutable std::unordered_map<LandmarkId, Landmark> landmarks_;
   std::map<KeyframeId, std::vector<KeyframeId>>
       children_;  ///< by parent, whether the parent is known yet or not

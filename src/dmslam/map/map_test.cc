@@ -140,6 +140,20 @@ void ExpectSameLandmarks(const Map& a, const Map& b) {
   }
 }
 
+/// KeyframesWithin goes by a copy of what the keyframes say.
+void ExpectNeighboursInSpace(const Map& map) {
+  constexpr double kDistance = 0.5;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    std::vector<std::pair<double, KeyframeId>> expected;
+    for (const auto& [other_id, other] : map.keyframes()) {
+      const double apart = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
+      if (other_id != id && other.map_id == keyframe.map_id && apart < kDistance)
+        expected.emplace_back(apart, other_id);
+    }
+    EXPECT_EQ(map.KeyframesWithin(id, kDistance), expected);
+  }
+}
+
 void ExpectSameMaps(const Map& a, const Map& b) {
   ASSERT_EQ(a.keyframes().size(), b.keyframes().size());
   for (const auto& [id, x] : a.keyframes()) {
@@ -155,6 +169,8 @@ void ExpectSameMaps(const Map& a, const Map& b) {
   }
   EXPECT_EQ(a.landmark_tombstones(), b.landmark_tombstones());
   ExpectSameLandmarks(a, b);
+  ExpectNeighboursInSpace(a);
+  ExpectNeighboursInSpace(b);
 }
 
 TEST(Map, ReplicaEqualsOriginalAfterRandomEdits) {

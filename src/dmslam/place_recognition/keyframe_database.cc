@@ -52,7 +52,7 @@ bool KeyframeDatabase::Remove(KeyframeId id) {
   const Slot slot = found->second;
   for (const WordWeight& item : entries_[slot].words) {
     auto& list = postings_[item.word];
-    *std::find(list.begin(), list.end(), slot) = list.back();
+    *std::find(list.rbegin(), list.rend(), slot) = list.back();  // most that go came late
     list.pop_back();
   }
   entries_[slot] = {};
