@@ -145,7 +145,8 @@ bool CollectorNode::TakeFrontendRecord() {
       OnProposal(proposal->second.id, proposal->map_id);
     }
   } else if (record->channel == channels::kMapReset) {
-    ++run_.resets;
+    // Map 0 is all of them: that they be adjusted at the end.
+    if (const auto reset = Read<MapReset>(*record->bytes); reset && reset->map_id != 0) ++run_.resets;
   }
   frontend_reader_->AcceptTaken();
   return true;

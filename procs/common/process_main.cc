@@ -3,8 +3,11 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "common/process_info.h"
 #include "dmslam/messaging/event_loop.h"
@@ -38,9 +41,12 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
       ->check(CLI::IsMember({"host", "lan"}))
       ->capture_default_str();
   app_.add_option("--session", options_.session, "session id; 0: that of the first camera heard");
-  app_.add_option("--peers", options_.peers,
-                  "processes that take part (frontend, mapper, loopcloser, collector)")
-      ->delimiter(',');
+  // Those who take part in a run wait for one another; tools and viewers wait for nobody.
+  const std::vector<std::string> pipeline = {"frontend", "mapper", "loopcloser", "collector"};
+  if (role == "player" || std::ranges::find(pipeline, role) != pipeline.end()) options_.peers = pipeline;
+  app_.add_option("--peers", options_.peers, "processes that take part: they are waited for")
+      ->delimiter(',')
+      ->capture_default_str();
   app_.add_option("--config", config_, "settings (YAML)");
   app_.add_option("--set", overrides_, "one setting: key=value; may be repeated");
   app_.add_flag(

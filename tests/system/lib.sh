@@ -87,6 +87,10 @@ need_data() {
   echo "SKIPPED: $data/$1 is not there; set DMSLAM_DATA to the folder that holds $1"
   exit $SKIPPED
 }
+find_python() { # one with ctypes, for examples/python (python3-minimal has none)
+  for python in /usr/bin/python3 python3; do "$python" -c 'import ctypes, select' 2>/dev/null && return; done
+  python=""
+}
 need_synthetic() { # sequence rendered before, see CMakeLists.txt
   synthetic=$build/synthetic
   [[ -s $synthetic/rgb.txt ]] || { echo "FAILED: $synthetic was not rendered"; exit 1; }

@@ -10,10 +10,7 @@ check "the example is built" c++ -std=c++17 -Wall -Wextra -isystem "$work/types"
   examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp -o "$work/frame_publisher"
 sed 's/^fps: .*/fps: 6/' config/synthetic.yaml >"$work/camera.yaml"
 
-python=""
-for candidate in /usr/bin/python3 python3; do
-  "$candidate" -c 'import ctypes, select' 2>/dev/null && { python=$candidate; break; }
-done
+find_python
 if [[ -n $python ]]; then
   check "Python types" lcm-gen -p --ppath="$work/python" lcmtypes/dmslam_pose_t.lcm
   PYTHONPATH=$work/python:examples/python timeout 200 "$python" examples/python/pose_printer.py "$bus" >"$work/poses.txt" 2>"$work/poses.err" &

@@ -3,11 +3,8 @@ source "$(dirname "$0")/lib.sh"
 need_synthetic
 multicast
 [[ -x $build/bin/make_layouts ]] || { echo "SKIPPED: built without OpenCV's videoio"; exit $SKIPPED; }
-python=""
-for candidate in /usr/bin/python3 python3; do
-  "$candidate" -c 'import ctypes, select' 2>/dev/null && { python=$candidate; break; }
-done
-[[ -n $python ]] || { echo "SKIPPED: there is no Python 3"; exit $SKIPPED; }
+find_python
+[[ -n $python ]] || { echo "SKIPPED: there is no Python 3 with ctypes"; exit $SKIPPED; }
 
 bus='udpm://239.255.76.67:29754?ttl=0&recv_buf_size=4194304'
 cd "$root" || exit 1

@@ -7,13 +7,15 @@ if ldd "$build/bin/dmslam-player" | grep -qE 'lib[at]san'; then
   echo "SKIPPED: nothing can be loaded before a sanitizer's library"
   exit $SKIPPED
 fi
+find_python
+[[ -n $python ]] || { echo "SKIPPED: there is no Python 3 with ctypes"; exit $SKIPPED; }
 cd "$root" || exit 1
 check "the device is built" c++ -std=c++20 -Wall -Wextra -Werror -shared -fPIC tests/system/v4l2_stand_in.cc -o "$work/camera.so"
 check "a video is made" "$build/bin/make_layouts" "$synthetic" "$work/in" 100
 check "its frames are grey values" "$build/bin/dmslam-player" --quiet --video "$work/in/video.avi" --encoding raw \
   --camera config/synthetic.yaml --to-log "$work/raw.lcmlog"
 check "Python types" lcm-gen -p --ppath="$work/types" lcmtypes/dmslam_frame_t.lcm
-PYTHONPATH=$work/types:examples/python python3 - "$work/raw.lcmlog" "$work/grey.raw" <<'EOF' || failed "the frames are not written"
+PYTHONPATH=$work/types:examples/python "$python" - "$work/raw.lcmlog" "$work/grey.raw" <<'EOF' || failed "the frames are not written"
 import sys
 import lcm
 from dmslam import frame_t

@@ -61,8 +61,8 @@ inline SyntheticScene MakeSyntheticScene(const SyntheticSceneOptions& options) {
   Random random(options.seed);
   for (int c = 0; c < options.num_cameras; ++c) {
     const double along = options.step * (c - 0.5 * (options.num_cameras - 1));
-    const Eigen::Vector3d center(along, 0.3 * options.step * random.Gaussian(),
-                                 0.2 * options.step * random.Gaussian());
+    const double z = 0.2 * options.step * random.Gaussian(), y = 0.3 * options.step * random.Gaussian();
+    const Eigen::Vector3d center(along, y, z);
     // Turned towards the middle of the cloud, and a little beside it.
     const Eigen::Vector3d towards(0.0, -std::atan2(-along, options.depth), 0.0);
     const Eigen::Quaterniond rotation = ExpSo3(RandomVector(random, options.rotation_rad)) * ExpSo3(towards);

@@ -723,6 +723,11 @@ std::vector<MapDelta> Map::Snapshot(KeyframeId center, size_t max_bytes_hint) co
       room_for(kObservationBytes).observations.push_back({id, static_cast<uint16_t>(i), landmark_id});
     }
   }
+  if (sent.size() <
+      landmarks_.size()) {  // some that nobody observes: their last feature was given to another
+    for (const LandmarkId id : LandmarkIdsSorted())
+      if (!sent.contains(id)) room_for(kLandmarkBytes).landmarks.push_back(StateOf(landmarks_.at(id)));
+  }
   for (const auto& [id, tombstone] : keyframe_tombstones_)
     room_for(kSmallBytes).keyframe_tombstones.push_back(tombstone);
   for (const LandmarkId id : burials_) {

@@ -54,15 +54,19 @@ class Filler {
     text.clear();
     for (uint32_t i = random_.Below(8); i > 0; --i) text += kPieces[random_.Below(6)];
   }
-  void operator()(KeyframeId& id) { id = KeyframeId::Make(1 + random_.Below(3), random_.Below(100000)); }
+  // One draw a statement: in which order arguments are evaluated is the compiler's affair.
+  void operator()(KeyframeId& id) {
+    const uint32_t frame = random_.Below(100000);
+    id = KeyframeId::Make(1 + random_.Below(3), frame);
+  }
   void operator()(LandmarkId& id) {
-    id = LandmarkId::Make(static_cast<uint16_t>(1 + random_.Below(3)), random_.Next() & 0xffffffffffffULL);
+    const uint64_t number = random_.Next() & 0xffffffffffffULL;
+    id = LandmarkId::Make(static_cast<uint16_t>(1 + random_.Below(3)), number);
   }
   void operator()(Eigen::Vector3d& p) { p = {Real(), Real(), Real()}; }
   void operator()(Eigen::Quaterniond& q) {
     do {
-      q.coeffs() = Eigen::Vector4d(random_.Uniform(-1, 1), random_.Uniform(-1, 1), random_.Uniform(-1, 1),
-                                   random_.Uniform(-1, 1));
+      for (int i = 3; i >= 0; --i) q.coeffs()[i] = random_.Uniform(-1, 1);
     } while (q.coeffs().squaredNorm() < 0.01);
     q.normalize();
   }
