@@ -1,5 +1,6 @@
 #include "common/process_info.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -33,6 +34,12 @@ ProcessHealth MeasureProcess() {
 
 std::string ProcessName(const std::string& role) {
   return role + " on " + HostName() + " (pid " + std::to_string(getpid()) + ")";
+}
+
+void ReturnFreeMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 }  // namespace dmslam

@@ -37,7 +37,7 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
   app_.set_version_flag("--version", kVersion);
   app_.add_option("--lcm-url", lcm_url_, "LCM bus; separate systems by port")->capture_default_str();
   app_.add_option("--prefix", prefix_, "put before every channel: separates systems that share a port");
-  app_.add_option("--link", link_, "host: records travel whole; lan: in parts of at most 1200 bytes")
+  app_.add_option("--link", link_, "host: records travel whole; lan: in parts of at most 1380 bytes")
       ->check(CLI::IsMember({"host", "lan"}))
       ->capture_default_str();
   app_.add_option("--session", options_.session, "session id; 0: that of the first camera heard");

@@ -16,6 +16,7 @@ namespace {
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kCameraSilentNs = 1'500'000'000;
+constexpr int64_t kTidyEveryNs = 60'000'000'000;
 
 std::string UpperCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -242,6 +243,9 @@ void StreamNode::PublishStatusIfDue() {
   next_status_ns_ = context_.now_ns() + kStatusEveryNs;
   KeepCameraKnown();
   PublishStatus();
+  if (context_.now_ns() < next_tidy_ns_) return;
+  if (next_tidy_ns_ > 0) ReturnFreeMemory();
+  next_tidy_ns_ = context_.now_ns() + kTidyEveryNs;
 }
 
 void StreamNode::PumpWithinWork() {

@@ -144,6 +144,7 @@ class StreamNode : public Node {
   std::string problem_;
   std::vector<std::string> other_channels_;
   int64_t next_status_ns_ = 0;
+  int64_t next_tidy_ns_ = 0;
   int64_t started_ns_ = 0;
   int64_t received_ = 0, received_bytes_ = 0, dropped_foreign_ = 0, dropped_malformed_ = 0;
   std::vector<std::string> logged_;

@@ -54,6 +54,7 @@ bool KeyframeDatabase::Remove(KeyframeId id) {
     auto& list = postings_[item.word];
     *std::find(list.rbegin(), list.rend(), slot) = list.back();  // most that go came late
     list.pop_back();
+    if (list.capacity() > 2 * list.size() + 2) list.shrink_to_fit();  // most words are rare
   }
   entries_[slot] = {};
   free_slots_.push_back(slot);
