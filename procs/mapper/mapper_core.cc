@@ -146,6 +146,10 @@ void MapperCore::MapAround(const KeyframeProposal& proposal) {
   const MapId map_id = proposal.map_id;
   counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, options_));
   CreateLandmarks(id, proposal.moving);
+  if (options_.seen_through.enabled) {
+    counters_.landmarks_seen_through +=
+        static_cast<uint64_t>(RemoveSeenThrough(map_, id, options_.seen_through));
+  }
   Publish(MapEvent::kLandmarksCreated, id, map_id);
   if (Interrupted()) {
     ++counters_.adjustments_interrupted;
@@ -267,8 +271,8 @@ void MapperCore::AdjustMaps() {
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.
-    counters_.landmarks_seen_through +=
-        static_cast<uint64_t>(RemoveSeenThrough(map_, map_id, options_.seen_through));
+    counters_.landmarks_seen_through += static_cast<uint64_t>(
+        RemoveUnproven(map_, map_id, counters_.landmarks_seen_through, options_.seen_through));
   }
   adjusted_ = true;
 }

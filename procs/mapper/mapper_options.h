@@ -49,13 +49,15 @@ struct SeenThroughOptions {
   double together_px = 70;  ///< neighbours within this share its fate...
   double together_share = 0.3;  ///< ...when so many of them are condemned
   int rounds = 4;               ///< of both tests
-  double stood_share = 0.2;     ///< of the unproven seen through: from here on somebody must have stood there
+  double stood_share = 0.5;     ///< of the unproven seen through: from here on somebody must have stood there
   double support_per_observation =
       1.0;  ///< then unproven ones go beside which, at other times, no more keyframes than this, times their
             ///< own observers, see a proven one of the same depth
   double support_tolerance =
-      0.05;                    ///< relative difference of depth: people stand before furniture, not in it
-  int rounds_unsupported = 2;  ///< and after them so many times their neighbours
+      0.05;                        ///< relative difference of depth: people stand before furniture, not in it
+  int rounds_unsupported = 2;      ///< and after them so many times their neighbours
+  int max_witnesses = 60;          ///< while mapping
+  double witness_angle_rad = 1.0;  ///< between the viewing directions of keyframe and witness
 };
 
 struct MapperOptions {

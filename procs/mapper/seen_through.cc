@@ -198,9 +198,40 @@ int RemoveCondemned(Map& map, const Suspects& suspects) {
   return removed;
 }
 
+/// Keyframes that look where keyframe `id` looks, nearest first.
+std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenThroughOptions& options) {
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  const double depth = map.MedianDepth(keyframe).value_or(0.0);
+  std::vector<std::pair<double, KeyframeId>> near = map.KeyframesWithin(id, depth);
+  std::erase_if(near, [&](const std::pair<double, KeyframeId>& other) {
+    const Rigid3d& T_cam_world = map.FindKeyframe(other.second)->T_cam_world;
+    return !(AngleBetween(T_cam_world.rotation, keyframe.T_cam_world.rotation) < options.witness_angle_rad);
+  });
+  std::sort(near.begin(), near.end());
+  if (near.size() > static_cast<size_t>(options.max_witnesses))
+    near.resize(static_cast<size_t>(options.max_witnesses));
+  std::vector<KeyframeId> witnesses;
+  for (const auto& [distance, other_id] : near) witnesses.push_back(other_id);
+  return witnesses;
+}
+
 }  // namespace
 
-int RemoveSeenThrough(Map& map, MapId map_id, const SeenThroughOptions& options) {
+int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options) {
+  Suspects suspects;
+  for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+    if (landmark.valid()) AddIfUnproven(map, landmark, options, &suspects);
+  }
+  const std::vector<KeyframeId> witnesses = WitnessesNear(map, id, options);
+  if (CondemnSeenThrough(map, witnesses, options, &suspects) == 0) return 0;
+  for (int round = 0; round < options.rounds; ++round) {
+    const int together = CondemnTogether(map, options, &suspects);
+    if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
+  }
+  return RemoveCondemned(map, suspects);
+}
+
+int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
   Suspects suspects;
   for (const LandmarkId id : map.LandmarkIdsSorted()) {
     if (map.FindLandmark(id)->map_id == map_id) AddIfUnproven(map, id, options, &suspects);
@@ -209,8 +240,10 @@ int RemoveSeenThrough(Map& map, MapId map_id, const SeenThroughOptions& options)
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (keyframe.map_id == map_id) witnesses.push_back(id);
   }
-  const int seen_through = CondemnSeenThrough(map, witnesses, options, &suspects);
-  const bool somebody_stood = seen_through > options.stood_share * static_cast<double>(suspects.size());
+  const double before = static_cast<double>(removed_before);
+  const double seen_through = before + CondemnSeenThrough(map, witnesses, options, &suspects);
+  const bool somebody_stood =
+      seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
   for (auto& [id, suspect] : suspects) {
     if (somebody_stood && map.FindLandmark(id)->evidence.moved > 0) suspect.condemned = true;
   }

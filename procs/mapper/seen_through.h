@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "dmslam/map/map.h"
 #include "mapper/mapper_options.h"
 
@@ -11,10 +13,13 @@ namespace dmslam {
 /// pixel that lie behind it, and none at its depth: free-space carving with the map's own points. Its
 /// neighbours in the image and in depth go with it.
 
-/// Removes them from a map whose sequence has ended; until then they are good to see, as long as people
-/// stand. Witnesses are all keyframes. Where so many of the unproven are seen through that somebody must have
-/// stood there, unproven landmarks that were ever found elsewhere go too, and those that too little supports.
-/// Returns how many.
-int RemoveSeenThrough(Map& map, MapId map_id, const SeenThroughOptions& options);
+/// Removes those among the landmarks that keyframe `id` sees. Witnesses are the keyframes that look at the
+/// same place. Returns how many.
+int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options);
+
+/// The same over a whole map when its sequence has ended. Where so many of the unproven were seen through
+/// (now, or `removed_before` while mapping) that somebody must have stood there, unproven landmarks that were
+/// ever found elsewhere go too, and those that nothing supports. Returns how many.
+int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options);
 
 }  // namespace dmslam

@@ -94,7 +94,7 @@ TEST_F(StandingPerson, IsRemovedWhereTheWallWasSeenBefore) {
   const auto person = AddLandmarks(kPersonDepth, with_too, true);
   See(with, wall, person);
   See(with_too, wall, person);
-  EXPECT_EQ(RemoveSeenThrough(map_, 1, SeenThroughOptions()), 9);
+  EXPECT_EQ(RemoveSeenThrough(map_, with_too, SeenThroughOptions()), 9);
   EXPECT_EQ(CountLeft(map_, person), 0);
   EXPECT_EQ(CountLeft(map_, wall), 63);
 }
@@ -105,7 +105,7 @@ TEST_F(StandingPerson, StaysWhileNobodySawWhatIsBehind) {
   const auto person = AddLandmarks(kPersonDepth, with_too, true);
   See(with, wall, person);
   See(with_too, wall, person);
-  EXPECT_EQ(RemoveSeenThrough(map_, 1, SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveSeenThrough(map_, with_too, SeenThroughOptions()), 0);
   EXPECT_EQ(CountLeft(map_, person), 9);
 }
 
@@ -118,7 +118,7 @@ TEST_F(StandingPerson, GoesAtTheEndWhenTheWallWasSeenAfter) {
   See(with_too, wall, person);
   See(after, wall, {});
   See(after_too, wall, {});
-  EXPECT_GE(RemoveSeenThrough(map_, 1, SeenThroughOptions()), 9);
+  EXPECT_GE(RemoveUnproven(map_, 1, 0, SeenThroughOptions()), 9);
   EXPECT_EQ(CountLeft(map_, person), 0);
 }
 
@@ -131,7 +131,7 @@ TEST_F(StandingPerson, FurnitureIsProvenByTime) {
   const KeyframeId odd =
       AddKeyframe(400, 13);  // sees the wall where the cupboard stands, for whatever reason
   See(odd, wall, {});
-  EXPECT_EQ(RemoveSeenThrough(map_, 1, SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveSeenThrough(map_, late_too, SeenThroughOptions()), 0);
   EXPECT_EQ(CountLeft(map_, cupboard), 9);
 }
 
@@ -148,9 +148,8 @@ TEST_F(StandingPerson, InFrontOfFurnitureStaysOnlyWhileMoreKeyframesSeeTheFurnit
     const auto person = AddLandmarks(kPersonDepth, with.back(), true);
     for (const KeyframeId id : others) See(id, wall, cupboard);
     for (const KeyframeId id : with) See(id, wall, person);
-    SeenThroughOptions options;
-    options.stood_share = -1;  // somebody must have stood
-    RemoveSeenThrough(map_, 1, options);
+    constexpr uint64_t kManyBefore = 1000;  // so somebody must have stood
+    RemoveUnproven(map_, 1, kManyBefore, SeenThroughOptions());
     EXPECT_EQ(CountLeft(map_, cupboard), 9);
     return CountLeft(map_, person);
   };
