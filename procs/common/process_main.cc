@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <random>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "common/process_info.h"
@@ -110,7 +111,9 @@ int ProcessMain::RunNode(const Factory& factory) {
 
 std::string FindDataFolder(const std::string& name) {
   namespace fs = std::filesystem;
-  const fs::path program = fs::read_symlink("/proc/self/exe");
+  std::error_code unreadable;
+  const fs::path program = fs::read_symlink("/proc/self/exe", unreadable);
+  if (unreadable) throw InputError("/proc/self/exe: cannot be read; is /proc mounted?");
   for (fs::path at = program.parent_path(); !at.empty() && at != at.root_path(); at = at.parent_path()) {
     for (const fs::path& candidate : {at / "share" / "dmslam" / name, at / name}) {
       if (fs::is_directory(candidate) && !fs::is_empty(candidate)) return candidate.string();

@@ -2,7 +2,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include <limits>
 #include <utility>
 
 #include "dmslam/recording/recorded_frames.h"
@@ -114,7 +113,7 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
   if (!end || !camera_info_ || IsForeignFrame(end->session)) return;
-  if (finished_) PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
+  if (finished_) PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
   end_ = std::move(end);
 }
 
@@ -323,7 +322,7 @@ bool FrontendNode::Finish() {
   next_portion_ns_ = context_.now_ns() + kPortionEveryNs;
   if (end != last_events_->end()) return false;
   last_events_->clear();
-  PublishLoose(FrameDone{session_, std::numeric_limits<uint32_t>::max(), 0});
+  PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
   PublishStatus();
   writer_->Complete(context_.now_ns());
   finished_ = true;

@@ -33,18 +33,14 @@ std::vector<KeyframeId> NeighboursOfNeighbours(const Map& map, KeyframeId id, in
 /// small, a place that is seen again is joined with itself here, without a loop.
 void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& options,
                         std::set<KeyframeId>* listed, std::vector<KeyframeId>* targets) {
-  const Keyframe& keyframe = *map.FindKeyframe(id);
-  const double depth = map.MedianDepth(keyframe).value_or(0.0);
-  std::vector<std::pair<double, KeyframeId>> near = map.KeyframesWithin(id, options.nearby_distance * depth);
-  std::erase_if(near, [&](const std::pair<double, KeyframeId>& other) {
-    const Rigid3d& T_cam_world = map.FindKeyframe(other.second)->T_cam_world;
-    const double angle = AngleBetween(T_cam_world.rotation, keyframe.T_cam_world.rotation);
-    return listed->contains(other.second) || !(angle < options.nearby_angle_rad);
-  });
-  std::sort(near.begin(), near.end());
-  for (size_t i = 0; i < near.size() && i < static_cast<size_t>(options.nearby_keyframes); ++i) {
-    listed->insert(near[i].second);
-    targets->push_back(near[i].second);
+  const double depth = map.MedianDepth(*map.FindKeyframe(id)).value_or(0.0);
+  int added = 0;
+  for (const KeyframeId near :
+       map.KeyframesNear(id, options.nearby_distance * depth, options.nearby_angle_rad)) {
+    if (added == options.nearby_keyframes) return;
+    if (!listed->insert(near).second) continue;
+    targets->push_back(near);
+    ++added;
   }
 }
 

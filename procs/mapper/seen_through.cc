@@ -200,18 +200,10 @@ int RemoveCondemned(Map& map, const Suspects& suspects) {
 
 /// Keyframes that look where keyframe `id` looks, nearest first.
 std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenThroughOptions& options) {
-  const Keyframe& keyframe = *map.FindKeyframe(id);
-  const double depth = map.MedianDepth(keyframe).value_or(0.0);
-  std::vector<std::pair<double, KeyframeId>> near = map.KeyframesWithin(id, depth);
-  std::erase_if(near, [&](const std::pair<double, KeyframeId>& other) {
-    const Rigid3d& T_cam_world = map.FindKeyframe(other.second)->T_cam_world;
-    return !(AngleBetween(T_cam_world.rotation, keyframe.T_cam_world.rotation) < options.witness_angle_rad);
-  });
-  std::sort(near.begin(), near.end());
-  if (near.size() > static_cast<size_t>(options.max_witnesses))
-    near.resize(static_cast<size_t>(options.max_witnesses));
-  std::vector<KeyframeId> witnesses;
-  for (const auto& [distance, other_id] : near) witnesses.push_back(other_id);
+  const double depth = map.MedianDepth(*map.FindKeyframe(id)).value_or(0.0);
+  std::vector<KeyframeId> witnesses = map.KeyframesNear(id, depth, options.witness_angle_rad);
+  if (witnesses.size() > static_cast<size_t>(options.max_witnesses))
+    witnesses.resize(static_cast<size_t>(options.max_witnesses));
   return witnesses;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 
@@ -13,9 +12,6 @@ namespace dmslam {
 /// then stays until the map is done, since a frontend that is started again at the end needs camera and end.
 class EndOfPlay {
  public:
-  /// What the frontend answers with, in place of a frame's index.
-  static constexpr uint32_t kFrameIndex = std::numeric_limits<uint32_t>::max();
-
   void OnFrontendHeard() { heard_ = true; }
   void OnMapperStatus(const MapperStatus& status, int64_t now_ns) {
     mapper_heard_ns_ = now_ns;

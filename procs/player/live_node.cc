@@ -47,7 +47,7 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
   }
   const auto done = wire::Decode<FrameDone>(bytes);
   if (!done || done->session != options_.session) return;
-  if (done->frame_index == EndOfPlay::kFrameIndex) {
+  if (done->frame_index == FrameDone::kEndOfSequence) {
     end_.OnFrontendHeard();
     ending_ = true;
   } else if (done->frame_index > frame_.frame_index || published_ == 0) {

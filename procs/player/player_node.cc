@@ -105,7 +105,7 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
 
 void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session) return;
-  if (done.frame_index == EndOfPlay::kFrameIndex) {
+  if (done.frame_index == FrameDone::kEndOfSequence) {
     end_.OnFrontendHeard();
     position_ = order_.size();
     awaiting_done_ = false;

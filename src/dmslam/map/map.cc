@@ -124,17 +124,23 @@ std::vector<KeyframeId> Map::BestCovisible(KeyframeId id, int most, int min_shar
   return best;
 }
 
-std::vector<std::pair<double, KeyframeId>> Map::KeyframesWithin(KeyframeId id, double distance) const {
-  std::vector<std::pair<double, KeyframeId>> within;
+std::vector<KeyframeId> Map::KeyframesNear(KeyframeId id, double distance, double angle_rad) const {
+  std::vector<KeyframeId> ids;
   const Keyframe* keyframe = FindKeyframe(id);
-  if (keyframe == nullptr) return within;
+  if (keyframe == nullptr) return ids;
   const Eigen::Vector3d center = keyframe->T_cam_world.Center();
+  std::vector<std::pair<double, KeyframeId>> near;
   for (const Standpoint& other : standpoints_) {
     if (other.map_id != keyframe->map_id || other.id == id) continue;
     const double apart = (other.center - center).norm();
-    if (apart < distance) within.emplace_back(apart, other.id);
+    if (apart < distance) near.emplace_back(apart, other.id);
   }
-  return within;
+  std::sort(near.begin(), near.end());
+  for (const auto& [apart, other] : near) {
+    const Eigen::Quaterniond& rotation = keyframes_.at(other).T_cam_world.rotation;
+    if (AngleBetween(rotation, keyframe->T_cam_world.rotation) < angle_rad) ids.push_back(other);
+  }
+  return ids;
 }
 
 int Map::CountTracked(const Keyframe& keyframe, int min_observations) const {

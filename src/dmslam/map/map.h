@@ -59,9 +59,9 @@ class Map {
   /// Keyframes that share at least `min_shared` landmarks with `id`, most first (ties: older first), at most
   /// `most`.
   std::vector<KeyframeId> BestCovisible(KeyframeId id, int most, int min_shared = 15) const;
-  /// The other keyframes of the same map whose cameras stand nearer to that of `id` than `distance`, by id,
-  /// with their distances.
-  std::vector<std::pair<double, KeyframeId>> KeyframesWithin(KeyframeId id, double distance) const;
+  /// The other keyframes of the same map whose cameras stand nearer to that of `id` than `distance` and are
+  /// turned from it by less than `angle_rad`, nearest first.
+  std::vector<KeyframeId> KeyframesNear(KeyframeId id, double distance, double angle_rad) const;
   /// How many landmarks of a keyframe have at least `min_observations` observers.
   int CountTracked(const Keyframe& keyframe, int min_observations) const;
   /// Median depth of a keyframe's landmarks in its camera; none without landmarks.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "dmslam/camera/testing/test_camera.h"
@@ -75,6 +76,7 @@ class RandomEditor {
     keyframe.id = KeyframeId::Make(1, next_frame_++);
     keyframe.map_id = 1;
     keyframe.parent = AnyKeyframe();
+    keyframe.T_cam_world.rotation = ExpSo3({0, 0.1 * (next_frame_ % 7), 0});
     keyframe.T_cam_world.translation = {random_.Uniform(), random_.Uniform(), random_.Uniform()};
     keyframe.features = RandomFeatures(random_, 30);
     map_.AddKeyframe(keyframe);
@@ -140,17 +142,21 @@ void ExpectSameLandmarks(const Map& a, const Map& b) {
   }
 }
 
-/// KeyframesWithin goes by a copy of what the keyframes say.
+/// KeyframesNear goes by a copy of what the keyframes say.
 void ExpectNeighboursInSpace(const Map& map) {
-  constexpr double kDistance = 0.5;
+  constexpr double kDistance = 0.5, kAngleRad = 0.3;
   for (const auto& [id, keyframe] : map.keyframes()) {
-    std::vector<std::pair<double, KeyframeId>> expected;
+    std::vector<std::pair<double, KeyframeId>> near;
     for (const auto& [other_id, other] : map.keyframes()) {
       const double apart = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
-      if (other_id != id && other.map_id == keyframe.map_id && apart < kDistance)
-        expected.emplace_back(apart, other_id);
+      const double turned = AngleBetween(other.T_cam_world.rotation, keyframe.T_cam_world.rotation);
+      const bool is_near = apart < kDistance && turned < kAngleRad;
+      if (other_id != id && other.map_id == keyframe.map_id && is_near) near.emplace_back(apart, other_id);
     }
-    EXPECT_EQ(map.KeyframesWithin(id, kDistance), expected);
+    std::sort(near.begin(), near.end());
+    std::vector<KeyframeId> expected;
+    for (const auto& [apart, other_id] : near) expected.push_back(other_id);
+    EXPECT_EQ(map.KeyframesNear(id, kDistance, kAngleRad), expected);
   }
 }
 

@@ -28,6 +28,9 @@ struct SessionStart {
 
 /// The frontend is done with a frame and with all it has to wait for (lock-step).
 struct FrameDone {
+  /// In place of a frame's index: the end of the sequence was heard, and all is told.
+  static constexpr uint32_t kEndOfSequence = 0xffffffff;
+
   uint32_t session = 0;
   uint32_t frame_index = 0;
   int64_t stamp_ns = 0;
