@@ -36,6 +36,11 @@ def revisit_is_found(revisit, graph, reach=120):
     return False
 
 
+def was_mapped(revisit, graph, reach=120):
+    """Whether the map had begun when the earlier view was taken: else nobody can find it again."""
+    return any(abs(frame - revisit["earlier_frame"]) <= reach for a, b, _, _ in graph for frame in (a, b))
+
+
 def poses(file):
     """Camera centres of a trajectory by stamp."""
     return {
@@ -72,7 +77,8 @@ def row(name, sequence, results):
     length = path_length(truth)
     stamps = [l.split()[0] for l in (sequence / "rgb.txt").read_text().splitlines() if l and l[0] != "#"]
     graph = list(edges(results / name / "loop" / "graph.txt"))
-    revisits = json.loads((sequence / "loops.json").read_text())["revisits"]
+    stated = json.loads((sequence / "loops.json").read_text())["revisits"]
+    revisits = [r for r in stated if was_mapped(r, graph)]
     found = sum(revisit_is_found(r, graph) for r in revisits)
     after = runs["loop"]["ate_rmse_final"]
     before = runs["no-loop"]["ate_rmse_final"] if "no-loop" in runs else None
@@ -80,6 +86,8 @@ def row(name, sequence, results):
     wrong = false_loops(runs["loop"], poses(truth), stamps)
     run, shown = runs["loop"], "not run" if before is None else f"{before:.4f}"
     unseen = " missed" if found < len(revisits) else ""
+    if len(revisits) < len(stated):
+        unseen += f" ({len(stated) - len(revisits)} of a place before the map)"
     return (
         f"| {name} | {length:.1f} | {run['tracked_percent']:.1f} | {found} of {len(revisits)}{unseen} | "
         f"{run['loops']} / {wrong} | {shown} | {after:.4f} | {bar:.4f}{'' if after <= bar else ' missed'} |"

@@ -61,9 +61,15 @@ struct Tally {
   }
 };
 
-nlohmann::json ToJson(const std::vector<NamedSelector>& selectors, const std::vector<Tally>& tallies) {
+std::vector<std::string> NamesOf(const std::vector<NamedSelector>& selectors) {
+  std::vector<std::string> names;
+  for (const NamedSelector& each : selectors) names.push_back(each.name);
+  return names;
+}
+
+nlohmann::json ToJson(const std::vector<std::string>& names, const std::vector<Tally>& tallies) {
   nlohmann::json json = nlohmann::json::array();
-  for (size_t s = 0; s < selectors.size(); ++s) json.push_back(tallies[s].ToJson(selectors[s].name));
+  for (size_t s = 0; s < names.size(); ++s) json.push_back(tallies[s].ToJson(names[s]));
   return json;
 }
 
@@ -171,7 +177,7 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
   return {{"gap", gap},
           {"window_and_orientation", window_and_orientation},
           {"median_moving_share", Quantile(moving, 0.5)},
-          {"methods", ToJson(selectors, tallies)}};
+          {"methods", ToJson(NamesOf(selectors), tallies)}};
 }
 
 namespace {
@@ -197,11 +203,11 @@ Window RunWindow(const std::vector<std::vector<Match>>& matches, std::span<const
   return window;
 }
 
-void PrintWindowTable(const std::vector<NamedSelector>& selectors, const std::vector<Tally>& tallies,
+void PrintWindowTable(const std::vector<std::string>& names, const std::vector<Tally>& tallies,
                       const std::string& title, std::ostream& out) {
   out << title << "\n\n| method | windows | " << kTallyHead << " |\n|---|---|" << kTallyRule << "|\n";
-  for (size_t s = 0; s < selectors.size(); ++s) {
-    out << "| " << selectors[s].name << " | " << tallies[s].asked << " | " << tallies[s].Cells() << " |\n";
+  for (size_t s = 0; s < names.size(); ++s) {
+    out << "| " << names[s] << " | " << tallies[s].asked << " | " << tallies[s].Cells() << " |\n";
   }
   out << '\n';
 }
@@ -239,12 +245,12 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
     }
     sequence.ForgetBefore(frame);
   }
-  PrintWindowTable(selectors, all, "All windows.", out);
-  PrintWindowTable(selectors, parallax,
+  PrintWindowTable(NamesOf(selectors), all, "All windows.", out);
+  PrintWindowTable(NamesOf(selectors), parallax,
                    "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m.", out);
   if (hard[0].asked > 0) {
     PrintWindowTable(
-        selectors, hard,
+        NamesOf(selectors), hard,
         "Hard windows: more than " + Number(options.hard_moving_share, 2) + " of the matches moving.", out);
   }
   out << "Why windows were refused:\n\n";
@@ -254,9 +260,150 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
     out << '\n';
   }
   out << '\n';
-  return {{"all", ToJson(selectors, all)},
-          {"with_parallax", ToJson(selectors, parallax)},
-          {"hard", ToJson(selectors, hard)}};
+  return {{"all", ToJson(NamesOf(selectors), all)},
+          {"with_parallax", ToJson(NamesOf(selectors), parallax)},
+          {"hard", ToJson(NamesOf(selectors), hard)}};
+}
+
+namespace {
+
+struct NamedInitializer {
+  std::string name;
+  InitializerOptions options;
+};
+
+/// The initialiser with each of the selectors.
+std::vector<NamedInitializer> AllInitializers(const InitializerOptions& options) {
+  std::vector<NamedInitializer> initializers;
+  const auto add = [&](const std::string& name, const std::string& method, ModelKind kind) {
+    InitializerOptions own = options;
+    own.method = method;
+    own.selector.sampling.kind = kind;
+    initializers.push_back({name, own});
+  };
+  add("RANSAC, F", "ransac", ModelKind::kFundamental);
+  add("RANSAC, E", "ransac", ModelKind::kEssential);
+  add("ARSAC, F", "arsac", ModelKind::kFundamental);
+  add("ARSAC, E", "arsac", ModelKind::kEssential);
+  add("DLRSAC", "dlrsac", ModelKind::kEssential);
+  return initializers;
+}
+
+/// Frames given to an initialiser: from `past` on they testify, from `first` on they may be chosen.
+struct FrameSpan {
+  size_t past = 0, first = 0, end = 0;
+};
+
+/// A first map, and the frame that made it.
+struct FoundMap {
+  FirstMap map;
+  size_t frame = 0;
+};
+
+/// The first map of a span of frames; none if there is none.
+std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
+                                   const FrameSpan& span, uint64_t seed, std::map<std::string, int>* waited) {
+  options.past_first = static_cast<int>(span.first - span.past);
+  Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
+  for (size_t frame = span.past; frame < std::min(span.end, sequence.size()); ++frame) {
+    InitializerReport report = initializer.AddFrame(
+        {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
+    if (report.result) return FoundMap{std::move(*report.result), frame};
+    ++(*waited)[std::string(ToString(report.wait))];
+  }
+  return std::nullopt;
+}
+
+std::vector<uint8_t> MatchesWithPoint(const FirstMap& map) {
+  std::vector<uint8_t> has_point(map.matches.size(), 0);
+  for (size_t m = 0, p = 0; m < map.matches.size() && p < map.points.size(); ++m) {
+    if (map.matches[m].index0 != map.points[p].feature0) continue;
+    has_point[m] = 1;
+    ++p;
+  }
+  return has_point;
+}
+
+/// What the windows of one method add up to.
+struct SystemTally {
+  Tally all, parallax, hard;
+  std::map<std::string, int> waited;  ///< frames, by reason
+};
+
+/// What the first frame of a window shows against one a little later.
+struct WindowKind {
+  bool has_parallax = false;
+  bool is_hard = false;
+};
+
+WindowKind KindOfWindow(JudgedSequence& sequence, const SystemWindowOptions& options, size_t first,
+                        FeatureMatcher* matcher) {
+  const size_t other = first + static_cast<size_t>(options.hard_gap);
+  const auto matches = MatchFrames(*sequence.Features(first), *sequence.Features(other),
+                                   options.initializer.matching, matcher);
+  const std::vector<uint8_t> none(matches.size(), 0);
+  const SelectionScore score = ScoreSelection(sequence.Judge(first, other, matches), none);
+  const auto motion = sequence.TrueMotion(first, other);
+  return {motion && motion->translation.norm() >= options.min_baseline_m,
+          score.moving_share() > options.hard_moving_share};
+}
+
+void AddWindow(JudgedSequence& sequence, const std::optional<FoundMap>& found, const WindowKind& kind,
+               SystemTally* tally) {
+  for (Tally* each :
+       {&tally->all, kind.has_parallax ? &tally->parallax : nullptr, kind.is_hard ? &tally->hard : nullptr}) {
+    if (!each) continue;
+    ++each->asked;
+    if (!found) continue;
+    const FirstMap& map = found->map;
+    const auto truth = sequence.Judge(map.frame0.index, map.frame1.index, map.matches);
+    each->Add(ScoreSelection(truth, MatchesWithPoint(map)));
+  }
+}
+
+}  // namespace
+
+nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
+                           uint64_t seed, std::ostream& out) {
+  const std::vector<NamedInitializer> initializers = AllInitializers(options.initializer);
+  FeatureMatcher matcher;
+  std::vector<SystemTally> tallies(initializers.size());
+  const auto before = static_cast<size_t>(options.frames_before);
+  for (int k = 0; k < count; ++k) {
+    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
+                                 static_cast<size_t>(options.frames));
+    const WindowKind kind = KindOfWindow(sequence, options, first, &matcher);
+    for (size_t s = 0; s < initializers.size(); ++s) {
+      const size_t end = first + static_cast<size_t>(options.frames);
+      const auto found = FirstMapOf(sequence, initializers[s].options,
+                                    {first - std::min(before, first), first, end}, seed, &tallies[s].waited);
+      AddWindow(sequence, found, kind, &tallies[s]);
+    }
+    sequence.ForgetBefore(first - std::min(first, before));
+  }
+  std::vector<std::string> names;
+  std::vector<Tally> all, parallax, hard;
+  for (size_t s = 0; s < initializers.size(); ++s) {
+    names.push_back(initializers[s].name);
+    all.push_back(tallies[s].all);
+    parallax.push_back(tallies[s].parallax);
+    hard.push_back(tallies[s].hard);
+  }
+  PrintWindowTable(names, all, "All windows.", out);
+  const std::string over = " over " + std::to_string(options.hard_gap) + " frames";
+  PrintWindowTable(names, parallax,
+                   "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m" + over + ".",
+                   out);
+  if (hard[0].asked > 0) {
+    PrintWindowTable(names, hard,
+                     "Hard windows: more than " + Number(options.hard_moving_share, 2) + " of the matches" +
+                         over + " moving.",
+                     out);
+  }
+  nlohmann::json json{
+      {"all", ToJson(names, all)}, {"with_parallax", ToJson(names, parallax)}, {"hard", ToJson(names, hard)}};
+  for (size_t s = 0; s < names.size(); ++s) json["waited_for_frames"][names[s]] = tallies[s].waited;
+  return json;
 }
 
 AdjustFunction MakeAdjustment(const Camera& camera) {
@@ -296,27 +443,19 @@ struct Start {
 };
 
 Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size_t first, uint64_t seed,
-               std::map<std::string, int>* reasons) {
-  Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
+               std::map<std::string, int>* waited) {
   Start start;
   start.first = first;
-  for (size_t frame = first; frame < sequence.size(); ++frame) {
-    const InitializerReport report = initializer.AddFrame(
-        {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
-    if (!report.result) {
-      ++(*reasons)[std::string(ToString(report.wait))];
-      continue;
-    }
-    start.found = true;
-    start.wait_s = static_cast<double>(sequence.StampNs(frame) - sequence.StampNs(first)) * 1e-9;
-    const FirstMap& map = *report.result;
-    if (const auto truth = sequence.TrueMotion(map.frame0.index, map.frame1.index)) {
-      start.rotation_deg = kDegrees * AngleBetween(truth->rotation, map.T_1_0.rotation);
-      const double cosine = truth->translation.normalized().dot(map.T_1_0.translation.normalized());
-      const bool scored = truth->translation.norm() >= 0.05;
-      start.direction_deg = scored ? kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0)) : 0.0;
-    }
-    break;
+  const auto found = FirstMapOf(sequence, options, {first, first, sequence.size()}, seed, waited);
+  if (!found) return start;
+  const FirstMap& map = found->map;
+  start.found = true;
+  start.wait_s = static_cast<double>(sequence.StampNs(found->frame) - sequence.StampNs(first)) * 1e-9;
+  if (const auto truth = sequence.TrueMotion(map.frame0.index, map.frame1.index)) {
+    start.rotation_deg = kDegrees * AngleBetween(truth->rotation, map.T_1_0.rotation);
+    const double cosine = truth->translation.normalized().dot(map.T_1_0.translation.normalized());
+    const bool scored = truth->translation.norm() >= 0.05;
+    start.direction_deg = scored ? kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0)) : 0.0;
   }
   return start;
 }

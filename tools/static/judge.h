@@ -38,6 +38,19 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
                           const std::vector<NamedSelector>& selectors, std::ostream& out);
 nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
                             const std::vector<NamedSelector>& selectors, std::ostream& out);
+/// Windows of the whole initialiser: it is begun at frames spread over the sequence and given `frames` of
+/// them; a window is accepted where it makes a first map. Judged are the points of that map.
+struct SystemWindowOptions {
+  int frames = 60;                 ///< of a window
+  int frames_before = 12;          ///< given to the initialiser before the window begins: they testify only
+  int hard_gap = 12;               ///< a window is hard by its first frame's matches with that so much later
+  double hard_moving_share = 0.3;  ///< share of these matches that moves, for a window to count as hard
+  double min_baseline_m = 0.05;    ///< of these two frames, for a window to count as one with parallax
+  InitializerOptions initializer;
+};
+nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
+                           uint64_t seed, std::ostream& out);
+/// First maps of an initialiser begun at frames spread over the sequence, beside the true motion.
 nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count,
                            uint64_t seed, std::ostream& out);
 

@@ -214,10 +214,13 @@ void RunJudge(const JudgeSettings& settings) {
     WindowOptions options;
     options.matching.use_window = options.matching.check_orientation = !settings.no_window;
     json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
+  } else if (settings.table == "system") {
+    json["system"] = JudgeSystem(sequence, SystemWindowOptions(), settings.count, settings.seed, out);
   } else if (settings.table == "starts") {
     json["starts"] = JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
   } else {
-    throw InputError("unknown table '" + settings.table + "': use pairs, ablation, windows or starts");
+    throw InputError("unknown table '" + settings.table +
+                     "': use pairs, ablation, windows, system or starts");
   }
   if (settings.json.empty()) return;
   std::ofstream json_file(settings.json);
@@ -251,7 +254,7 @@ void AddJudge(CLI::App& app, JudgeSettings& s) {
       ->add_option("--sequence", s.sequence,
                    "TUM RGB-D folder with groundtruth.txt, and mask.txt where there are movers")
       ->required();
-  judge->add_option("--table", s.table, "pairs, ablation, windows or starts")->capture_default_str();
+  judge->add_option("--table", s.table, "pairs, ablation, windows, system or starts")->capture_default_str();
   judge->add_option("--count", s.count, "Pairs, windows or starts, spread over the sequence")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();

@@ -154,12 +154,8 @@ void Segmentation::FitCells(uint64_t seed) {
 }
 
 void Segmentation::FitCell(int iterations, Random& random, Cell* cell) {
-  const auto count = [&](const Eigen::Matrix3d& M) {
-    return static_cast<double>(CountInliers(M, arrays_, cell->range));
-  };
-  const BestSample best = DrawModels(
-      options_.sampling, arrays_, cell->range, iterations, random, count,
-      [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(cell->range.size()); });
+  const BestSample best = DrawModels(options_.sampling, arrays_, cell->range, iterations, random,
+                                     InlierCount{arrays_, cell->range}, InlierShare{arrays_, cell->range});
   out_.iterations += best.iterations;
   if (!best.found()) return;
   std::vector<uint8_t> flags(arrays_.size(), 0);

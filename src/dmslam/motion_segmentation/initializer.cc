@@ -160,6 +160,7 @@ class Initializer::Impl {
     promising_ = false;
     views_.clear();
     pending_.clear();
+    past_.clear();
   }
   InitializerReport Wait(WaitReason reason, std::string text) const {
     InitializerReport report;
@@ -170,12 +171,15 @@ class Initializer::Impl {
 
   InitializerReport Consider(const InitializerFrame& frame);
   void TakeNewerReference(const InitializerFrame& frame);
+  int64_t OldestPast() const { return reference_->stamp_ns - static_cast<int64_t>(options_.past_s * 1e9); }
+  std::vector<const InitializerFrame*> ChoosePast() const;
+  bool AgreesWithPast(Candidate* candidate, InitializerReport* report);
   View MakeView(const InitializerFrame& frame);
   std::vector<const View*> ChooseViews() const;
   std::vector<const View*> ViewsBetween(const View& last) const;
   InitializerReport TryMap();
   std::optional<Candidate> Reconstruct(const View& last, const Agreement& agreement,
-                                       InitializerReport* report) const;
+                                       InitializerReport* report);
   std::optional<Candidate> BuildCandidate(const View& last, const Agreement& agreement,
                                           const TwoViewModel& model, InitializerReport* report) const;
   bool SameMotion(const Candidate& a, const Candidate& b) const;
@@ -200,7 +204,8 @@ class Initializer::Impl {
   std::optional<InitializerFrame> reference_;
   std::deque<View> views_;  ///< in order of index
   std::deque<InitializerFrame>
-      pending_;             ///< frames older than the newest, not matched with the reference yet
+      pending_;                        ///< frames older than the newest, not matched with the reference yet
+  std::deque<InitializerFrame> past_;  ///< some of the frames before the reference frame
   bool promising_ = false;  ///< the pairs agreed the last time; only their parallax did not suffice
   uint32_t last_looked_ = 0;
   InitializerReport last_wait_;
@@ -210,6 +215,10 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   if (static_cast<int>(frame.features->size()) < options_.min_features) {
     return Wait(WaitReason::kTooFewFeatures,
                 std::to_string(frame.features->size()) + " of " + std::to_string(options_.min_features));
+  }
+  if (!reference_ && static_cast<int>(past_.size()) < options_.past_first) {
+    past_.push_back(frame);
+    return Wait(WaitReason::kTooFewFrames, "of the past");
   }
   if (!reference_) {
     reference_ = frame;
@@ -251,12 +260,11 @@ void Initializer::Impl::TakeNewerReference(const InitializerFrame& frame) {
   std::deque<View> old = std::exchange(views_, {});
   pending_.clear();
   promising_ = false;
-  if (old.empty()) {
-    reference_ = frame;
-    return;
-  }
+  past_.push_back(*reference_);
   const size_t middle = old.size() / 2;
-  reference_ = old[middle].frame;
+  for (size_t k = 0; k < middle; ++k) past_.push_back(old[k].frame);
+  reference_ = old.empty() ? frame : old[middle].frame;
+  while (!past_.empty() && past_.front().stamp_ns < OldestPast()) past_.pop_front();
   for (size_t k = middle + 1; k < old.size(); ++k) pending_.push_back(old[k].frame);
 }
 
@@ -284,6 +292,17 @@ std::vector<const Initializer::Impl::View*> Initializer::Impl::ChooseViews() con
   const uint32_t span = moved.back()->frame.index - moved.front()->frame.index;
   if (span < static_cast<uint32_t>(options_.min_pair_step) * (asked - 1)) return chosen;
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
+  return chosen;
+}
+
+/// An even choice of the frames before the reference frame, the oldest among them.
+std::vector<const InitializerFrame*> Initializer::Impl::ChoosePast() const {
+  std::vector<const InitializerFrame*> all, chosen;
+  for (const InitializerFrame& frame : past_) {
+    if (frame.stamp_ns >= OldestPast()) all.push_back(&frame);
+  }
+  const size_t asked = std::min(all.size(), static_cast<size_t>(std::max(0, options_.past_views)));
+  for (size_t k = 0; k < asked; ++k) chosen.push_back(all[k * all.size() / asked]);
   return chosen;
 }
 
@@ -332,7 +351,7 @@ bool Initializer::Impl::Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point,
 /// what they say decides. Two different motions that explain them about equally well: wait.
 std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(const View& last,
                                                                            const Agreement& agreement,
-                                                                           InitializerReport* report) const {
+                                                                           InitializerReport* report) {
   std::vector<uint32_t> order(last.pair.matches.size());
   std::iota(order.begin(), order.end(), 0U);
   const MatchArrays arrays = MakeArrays(last.pair.matches, order, camera_, options_.selector.inlier);
@@ -364,8 +383,35 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::Reconstruct(const
     return std::nullopt;
   }
   KeepConsistent(&*best);
-  if (!Passes(*best, report)) return std::nullopt;
+  if (!AgreesWithPast(&*best, report) || !Passes(*best, report)) return std::nullopt;
   return best;
+}
+
+/// Drops points that frames just before the reference frame see elsewhere. If there are many, somebody has
+/// just stopped, and what is his cannot be told from the rest: what these frames do not show is not dropped.
+bool Initializer::Impl::AgreesWithPast(Candidate* candidate, InitializerReport* report) {
+  const std::vector<const InitializerFrame*> frames = ChoosePast();
+  std::vector<View> past(frames.size());
+  Candidate longer = *candidate;
+  const double length = candidate->placed.front().view->frame.index - reference_->index;
+  for (size_t k = 0; k < frames.size(); ++k) {
+    past[k].frame = *frames[k];
+    past[k].pair.matches =
+        MatchFrames(*reference_->features, *frames[k]->features, options_.matching, &matcher_);
+    const double before = reference_->index - frames[k]->index;
+    PlaceView(past[k], -before / length, &longer);
+  }
+  KeepConsistent(&longer);
+  const auto points = std::accumulate(candidate->use.begin(), candidate->use.end(), 0);
+  const auto left = std::accumulate(longer.use.begin(), longer.use.end(), 0);
+  if (points - left > options_.max_past_conflict * points) {
+    *report =
+        Wait(WaitReason::kInconsistent, std::to_string(points - left) + " of " + std::to_string(points) +
+                                            " points were elsewhere just before");
+    return false;
+  }
+  candidate->use = longer.use;
+  return true;
 }
 
 bool Initializer::Impl::SameMotion(const Candidate& a, const Candidate& b) const {

@@ -116,6 +116,12 @@ struct InitializerOptions {
   double max_view_chi2 = 9.0;  ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
   int min_points = 80;                 ///< points that all views agree on
+
+  double past_s = 0.45;  ///< frames that are older than the reference frame by up to so much testify:
+                         ///< who has just stopped is in his place in all views, but not in them
+  int past_views = 6;    ///< so many of them at most; 0: none
+  double max_past_conflict = 0.08;  ///< of the points, that one of them sees elsewhere; more: wait
+  int past_first = 0;               ///< frames that come before the first reference frame may be chosen
 };
 
 /// Makes the first map out of a stream of frames: keeps a reference frame, asks DLRSAC for the static matches

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 #include "dmslam/util/check.h"
 
@@ -30,13 +33,21 @@ class SyntheticRoom {
     return Rigid3d(ExpSo3({0.0, 0.002 * frame, 0.0}), speed_ * frame * Eigen::Vector3d(1.0, 0.1, 0.2));
   }
   void SetSpeed(double speed) { speed_ = speed; }
+  /// The walker stands from this frame on.
+  void StopWalkerAt(uint32_t frame) { stop_ = frame; }
+  bool IsWalkers(const Descriptor& descriptor) const {
+    return std::any_of(points_.begin(), points_.end(), [&](const Point& point) {
+      return point.moves && point.descriptor.words == descriptor.words;
+    });
+  }
 
   InitializerFrame Frame(uint32_t index) const {
     auto features = std::make_shared<FrameFeatures>();
     Random random(DeriveSeed(3, index, "frame"));
     for (const Point& point : points_) {
-      const double turn = 0.15 * index;
-      const Eigen::Vector3d walk(0.02 * index, 0.05 * std::sin(turn), 0.0);
+      const uint32_t walked = std::min(index, stop_);
+      const double turn = 0.15 * walked;
+      const Eigen::Vector3d walk(0.02 * walked, 0.05 * std::sin(turn), 0.0);
       const auto uv =
           camera_.Project(TruePose(index) * (point.p_world + (point.moves ? walk : Eigen::Vector3d::Zero())));
       const double dx = 0.4 * random.Gaussian(), dy = 0.4 * random.Gaussian();
@@ -63,7 +74,27 @@ class SyntheticRoom {
   Camera camera_;
   std::vector<Point> points_;
   double speed_ = 0.012;
+  uint32_t stop_ = UINT32_MAX;
 };
+
+/// The first map of a room, asked for from `first` on.
+std::optional<FirstMap> MapFrom(const SyntheticRoom& room, const InitializerOptions& options,
+                                uint32_t first) {
+  Initializer initializer(options, room.camera(), 1);
+  std::optional<FirstMap> map;
+  for (uint32_t frame = first; frame < first + 60 && !map; ++frame) {
+    map = std::move(initializer.AddFrame(room.Frame(frame)).result);
+  }
+  return map;
+}
+
+double ShareOfWalker(const SyntheticRoom& room, const FirstMap& map) {
+  double walkers = 0;
+  for (const FirstMap::Point& point : map.points) {
+    if (room.IsWalkers(map.frame0.features->set.descriptors[point.feature0])) walkers += 1;
+  }
+  return walkers / static_cast<double>(map.points.size());
+}
 
 TEST(Initializer, MapsTheRoomAndNotTheWalker) {
   const SyntheticRoom room(600, 150);
@@ -87,6 +118,39 @@ TEST(Initializer, MapsTheRoomAndNotTheWalker) {
     ASSERT_TRUE(uv.has_value());
     EXPECT_LT((*uv - map->frame0.features->uv_px[point.feature0]).norm(), 4.0);
   }
+}
+
+TEST(Initializer, FramesBeforeTellWhoHasJustStopped) {
+  SyntheticRoom room(600, 150);
+  room.StopWalkerAt(12);
+  InitializerOptions blind;
+  blind.past_views = 0;
+  const auto taken_in = MapFrom(room, blind, 12);
+  ASSERT_TRUE(taken_in.has_value());
+  EXPECT_GT(ShareOfWalker(room, *taken_in), 0.1);
+  InitializerOptions options;
+  options.past_first = 12;
+  Initializer initializer(options, room.camera(), 1);
+  bool waited = false;
+  for (uint32_t frame = 0; frame < 45; ++frame) {
+    const InitializerReport report = initializer.AddFrame(room.Frame(frame));
+    waited |= report.reason.find("just before") != std::string::npos;
+    if (report.result && report.result->frame0.index == 12) {
+      EXPECT_LT(ShareOfWalker(room, *report.result), 0.01);
+    }
+  }
+  EXPECT_TRUE(waited);
+}
+
+TEST(Initializer, ThePastOfARoomDoesNotDelayItsMap) {
+  const SyntheticRoom room(600, 0);
+  InitializerOptions options;
+  const auto without = MapFrom(room, options, 12);
+  options.past_first = 12;
+  const auto with = MapFrom(room, options, 0);
+  ASSERT_TRUE(without.has_value() && with.has_value());
+  EXPECT_EQ(with->frame0.index, without->frame0.index);
+  EXPECT_EQ(with->frame1.index, without->frame1.index);
 }
 
 TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {

@@ -123,12 +123,8 @@ StaticSelection RansacSelector::Select(std::span<const Match> matches, const Cam
   const MatchArrays arrays = MakeArrays(matches, order, camera, options_.inlier);
   const Range all{0, arrays.size()};
   Random random(DeriveSeed(seed, 0, "ransac"));
-  const auto count = [&](const Eigen::Matrix3d& M) {
-    return static_cast<double>(CountInliers(M, arrays, all));
-  };
-  BestSample best =
-      DrawModels(options_.sampling, arrays, all, options_.sampling.max_iterations, random, count,
-                 [&](const Eigen::Matrix3d& M) { return count(M) / static_cast<double>(arrays.size()); });
+  BestSample best = DrawModels(options_.sampling, arrays, all, options_.sampling.max_iterations, random,
+                               InlierCount{arrays, all}, InlierShare{arrays, all});
   if (!best.found()) return Refuse(Refusal::kNoModel, "no sample gave a model", matches.size());
   StaticSelection selection;
   selection.iterations = best.iterations;
@@ -149,15 +145,12 @@ StaticSelection Arsac::Select(std::span<const Match> matches, const Camera& came
   Random random(DeriveSeed(seed, 0, "arsac"));
   std::vector<uint8_t> flags(arrays.size());
   std::vector<double> scratch;
-  const auto score = [&](const Eigen::Matrix3d& M) {
+  const auto score = [&](const Eigen::Matrix3d& M, double) {
     FlagInliers(M, arrays, all, flags);
     return grid.Score(flags, &scratch);
   };
-  const auto share = [&](const Eigen::Matrix3d& M) {
-    return static_cast<double>(CountInliers(M, arrays, all)) / static_cast<double>(arrays.size());
-  };
-  BestSample best =
-      DrawModels(options_.sampling, arrays, all, options_.sampling.max_iterations, random, score, share);
+  BestSample best = DrawModels(options_.sampling, arrays, all, options_.sampling.max_iterations, random,
+                               score, InlierShare{arrays, all});
   if (!best.found()) return Refuse(Refusal::kNoModel, "no sample gave a model", matches.size());
   StaticSelection selection;
   selection.iterations = best.iterations;

@@ -18,11 +18,30 @@ struct BestSample {
   bool found() const { return score >= 0; }
 };
 
-/// Draws samples from `range` and keeps the model of the highest `score(M)`. `inlier_share(M)` is asked for
-/// only when a better model is found and the options stop early.
-template <typename Score, typename InlierShare>
+/// How many of `range` agree with a model.
+struct InlierCount {
+  const MatchArrays& arrays;
+  Range range;
+  double operator()(const Eigen::Matrix3d& M, double more_than) const {
+    return CountInliers(M, arrays, range, static_cast<int>(more_than));
+  }
+};
+
+/// Which share of `range` agrees with a model.
+struct InlierShare {
+  const MatchArrays& arrays;
+  Range range;
+  double operator()(const Eigen::Matrix3d& M) const {
+    return CountInliers(M, arrays, range) / static_cast<double>(range.size());
+  }
+};
+
+/// Draws samples from `range` and keeps the model of the highest `score(M, best)`, which may be any number up
+/// to `best` where it does not exceed that. `inlier_share(M)` is asked for only when a better model is found
+/// and the options stop early.
+template <typename Score, typename Share>
 BestSample DrawModels(const SamplingOptions& options, const MatchArrays& arrays, Range range, int iterations,
-                      Random& random, Score score, InlierShare inlier_share) {
+                      Random& random, Score score, Share inlier_share) {
   BestSample best;
   std::array<Eigen::Matrix3d, kMaxModels> models;
   int limit = iterations;
@@ -30,7 +49,7 @@ BestSample DrawModels(const SamplingOptions& options, const MatchArrays& arrays,
     const int count = SolveSample(options.kind, arrays, range, random, models);
     for (int k = 0; k < count; ++k) {
       const Eigen::Matrix3d& M = models[static_cast<size_t>(k)];
-      const double value = score(M);
+      const double value = score(M, best.score);
       if (!(value > best.score)) continue;
       best.score = value;
       best.model.M = M;

@@ -28,6 +28,36 @@ Score ScoreOf(const SyntheticPair& pair, const StaticSelection& selection) {
   return {called == 0 ? 1.0 : right / static_cast<double>(called), right / static_cast<double>(all)};
 }
 
+TEST(CountInliers, IsTheSameOnEveryPathAndExactAboveItsBound) {
+  SyntheticPairOptions options;
+  options.num_moving = 200;
+  options.num_mismatches = 77;
+  const SyntheticPair pair = MakeSyntheticPair(options, 3);
+  std::vector<uint32_t> order(pair.matches.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const MatchArrays arrays = MakeArrays(pair.matches, order, pair.camera, {});
+  Random random(5);
+  std::array<Eigen::Matrix3d, kMaxModels> models;
+  for (int k = 0; k < 50; ++k) {
+    const Range range{static_cast<size_t>(k), arrays.size() - static_cast<size_t>(2 * k)};
+    const int solutions = SolveSample(ModelKind::kEssential, arrays, range, random, models);
+    for (int m = 0; m < solutions; ++m) {
+      const Eigen::Matrix3d& M = models[static_cast<size_t>(m)];
+      std::vector<uint8_t> flags(arrays.size(), 0);
+      const int count = FlagInliers(M, arrays, range, flags, VectorPath::kBaseline);
+      EXPECT_EQ(std::accumulate(flags.begin(), flags.end(), 0), count);
+      for (const VectorPath path : VectorPaths()) {
+        EXPECT_EQ(CountInliers(M, arrays, range, -1, path), count);
+        EXPECT_EQ(CountInliers(M, arrays, range, count - 1, path), count);
+        EXPECT_LE(CountInliers(M, arrays, range, count, path), count);
+        std::vector<uint8_t> others(arrays.size(), 0);
+        EXPECT_EQ(FlagInliers(M, arrays, range, others, path), count);
+        EXPECT_EQ(others, flags);
+      }
+    }
+  }
+}
+
 class EverySelector : public testing::TestWithParam<std::pair<const char*, ModelKind>> {
  protected:
   std::unique_ptr<StaticSelector> Make() const { return MakeSelector(GetParam().first, GetParam().second); }

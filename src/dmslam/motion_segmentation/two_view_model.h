@@ -49,10 +49,18 @@ struct TwoViewModel {
 /// View Geometry, 2nd ed., Eq. 11.9, with each image's error weighted by its variance).
 double NormalizedSampson(const Eigen::Matrix3d& M, const MatchArrays& arrays, size_t i);
 
-/// How many of `range` are inliers.
-int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range);
+/// Instructions that an inner loop may use; where a machine has not got them, the baseline is taken. The
+/// results are the same.
+enum class VectorPath : uint8_t { kBaseline, kAvx2 };
+/// Those that this machine has.
+std::vector<VectorPath> VectorPaths();
+
+/// How many of `range` are inliers, where these are more than `more_than`; else some number up to it.
+int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, int more_than = -1,
+                 VectorPath path = VectorPath::kAvx2);
 /// Flags of all of `range` into flags[range.begin .. range.end).
-int FlagInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, std::span<uint8_t> flags);
+int FlagInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, std::span<uint8_t> flags,
+                VectorPath path = VectorPath::kAvx2);
 /// The same for a rotation alone: transfer error of ray0 into image 1 against both points' variance.
 int CountRotationInliers(const Eigen::Matrix3d& R, const MatchArrays& arrays, Range range);
 
