@@ -8,8 +8,9 @@ usage() {
 Usage: scripts/judge_static.sh [--out DIR] [--data DIR] [--windows N] [--pairs N] [--starts N]
 
 Writes DIR/<sequence>_<table>.md and .json for kitchen_walk2, kitchen_walk1 and kitchen: windows behind the system's gates,
-single pairs with and without search window and orientation check, first maps of starts spread over the sequence; and the
-parts of DLRSAC one by one on kitchen_walk2. A table that is there is not made again; remove it to make it anew.
+windows of the whole initialiser, single pairs with and without search window and orientation check, first maps of starts
+spread over the sequence; and the parts of DLRSAC one by one on kitchen_walk2. A table that is there is not made again; remove
+it to make it anew.
 
   --out DIR     default: out/static in the project
   --data DIR    the sequences (default: \$DMSLAM_DATA, else ../shared/data)
@@ -45,6 +46,7 @@ table() { # SEQUENCE NAME ARGUMENTS...
 for sequence in kitchen_walk2 kitchen_walk1 kitchen; do
   [[ -d $data/$sequence ]] || continue
   table "$sequence" windows --table windows --count "$windows"
+  table "$sequence" system --table system --count "$windows" --features 4000
   table "$sequence" starts --table starts --count "$starts" --features 4000
   table "$sequence" pairs --table pairs --count "$pairs"
   table "$sequence" pairs_without_window --table pairs --count "$pairs" --no-window

@@ -265,6 +265,29 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
           {"hard", ToJson(NamesOf(selectors), hard)}};
 }
 
+std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
+                                   const FrameSpan& span, uint64_t seed, std::map<std::string, int>* waited) {
+  options.past_first = static_cast<int>(span.first - span.past);
+  Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
+  for (size_t frame = span.past; frame < std::min(span.end, sequence.size()); ++frame) {
+    InitializerReport report = initializer.AddFrame(
+        {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
+    if (report.result) return FoundMap{std::move(*report.result), frame};
+    if (waited) ++(*waited)[std::string(ToString(report.wait))];
+  }
+  return std::nullopt;
+}
+
+std::vector<uint8_t> MatchesWithPoint(const FirstMap& map) {
+  std::vector<uint8_t> has_point(map.matches.size(), 0);
+  for (size_t m = 0, p = 0; m < map.matches.size() && p < map.points.size(); ++m) {
+    if (map.matches[m].index0 != map.points[p].feature0) continue;
+    has_point[m] = 1;
+    ++p;
+  }
+  return has_point;
+}
+
 namespace {
 
 struct NamedInitializer {
@@ -287,41 +310,6 @@ std::vector<NamedInitializer> AllInitializers(const InitializerOptions& options)
   add("ARSAC, E", "arsac", ModelKind::kEssential);
   add("DLRSAC", "dlrsac", ModelKind::kEssential);
   return initializers;
-}
-
-/// Frames given to an initialiser: from `past` on they testify, from `first` on they may be chosen.
-struct FrameSpan {
-  size_t past = 0, first = 0, end = 0;
-};
-
-/// A first map, and the frame that made it.
-struct FoundMap {
-  FirstMap map;
-  size_t frame = 0;
-};
-
-/// The first map of a span of frames; none if there is none.
-std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
-                                   const FrameSpan& span, uint64_t seed, std::map<std::string, int>* waited) {
-  options.past_first = static_cast<int>(span.first - span.past);
-  Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
-  for (size_t frame = span.past; frame < std::min(span.end, sequence.size()); ++frame) {
-    InitializerReport report = initializer.AddFrame(
-        {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
-    if (report.result) return FoundMap{std::move(*report.result), frame};
-    ++(*waited)[std::string(ToString(report.wait))];
-  }
-  return std::nullopt;
-}
-
-std::vector<uint8_t> MatchesWithPoint(const FirstMap& map) {
-  std::vector<uint8_t> has_point(map.matches.size(), 0);
-  for (size_t m = 0, p = 0; m < map.matches.size() && p < map.points.size(); ++m) {
-    if (map.matches[m].index0 != map.points[p].feature0) continue;
-    has_point[m] = 1;
-    ++p;
-  }
-  return has_point;
 }
 
 /// What the windows of one method add up to.

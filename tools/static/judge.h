@@ -1,7 +1,9 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -38,6 +40,23 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
                           const std::vector<NamedSelector>& selectors, std::ostream& out);
 nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
                             const std::vector<NamedSelector>& selectors, std::ostream& out);
+/// Frames given to an initialiser: from `past` on they testify, from `first` on they may be chosen.
+struct FrameSpan {
+  size_t past = 0, first = 0, end = 0;
+};
+/// A first map, and the frame that made it.
+struct FoundMap {
+  FirstMap map;
+  size_t frame = 0;
+};
+/// The first map of a span of frames; none if there is none. Counts what the other frames waited for, if
+/// asked.
+std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
+                                   const FrameSpan& span, uint64_t seed,
+                                   std::map<std::string, int>* waited = nullptr);
+/// Flags of map.matches: those with a point.
+std::vector<uint8_t> MatchesWithPoint(const FirstMap& map);
+
 /// Windows of the whole initialiser: it is begun at frames spread over the sequence and given `frames` of
 /// them; a window is accepted where it makes a first map. Judged are the points of that map.
 struct SystemWindowOptions {

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct Settings {
   int features = 3000;
   uint64_t seed = 1;
   bool no_window = false;
+  bool first_maps = false;
+  bool gated = false;
 };
 
 struct JudgeSettings {
@@ -135,11 +138,12 @@ class Run {
     for (int k = 0; k < settings_.pairs; ++k) {
       const size_t frame =
           (sequence.size() - reach) * static_cast<size_t>(k) / static_cast<size_t>(settings_.pairs);
-      accepted += OnPair(sequence, frame, &total) ? 1 : 0;
+      const bool done = settings_.first_maps ? OnFirstMap(sequence, frame) : OnPair(sequence, frame, &total);
+      accepted += done ? 1 : 0;
       sequence.ForgetBefore(frame);
     }
     report_["accept_rate"] = accepted / static_cast<double>(settings_.pairs);
-    if (sequence.HasMasks()) {
+    if (sequence.HasMasks() && !settings_.first_maps) {
       report_["precision"] = total.precision();
       report_["recall"] = total.recall();
     }
@@ -151,7 +155,8 @@ class Run {
     const size_t other = Partner(sequence, frame, settings_.gap, matching_, &matcher_);
     const auto matches =
         MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching_, &matcher_);
-    const StaticSelection selection = selector_->Select(matches, sequence.camera(), settings_.seed + frame);
+    StaticSelection selection = selector_->Select(matches, sequence.camera(), settings_.seed + frame);
+    if (settings_.gated) AskPairsBetween(sequence, frame, other, matches, &selection);
     const std::string name = "pair_" + std::to_string(frame) + "_" + std::to_string(other);
     Write(name, DrawSelection(sequence.Color(frame), sequence.Color(other), matches, selection));
     nlohmann::json json = Describe(selection, matches.size());
@@ -170,6 +175,56 @@ class Run {
               << (selection.IsUsable() ? "" : ", refused: " + selection.explanation) << '\n';
     report_["pairs"].push_back(std::move(json));
     return selection.IsUsable();
+  }
+  /// The gates of the initialiser: two pairs of the same first frame with frames between must call the same
+  /// matches static. What not all of them call static is not.
+  void AskPairsBetween(JudgedSequence& sequence, size_t frame, size_t other,
+                       const std::vector<Match>& matches, StaticSelection* selection) {
+    std::vector<PairView> pairs;
+    for (const size_t part : {size_t{1}, size_t{2}}) {
+      const size_t between = frame + std::max<size_t>(1, (other - frame) * part / 3);
+      PairView pair;
+      pair.matches =
+          MatchFrames(*sequence.Features(frame), *sequence.Features(between), matching_, &matcher_);
+      pair.selection = selector_->Select(pair.matches, sequence.camera(), settings_.seed + frame + part);
+      pairs.push_back(std::move(pair));
+    }
+    pairs.push_back({matches, *selection});
+    std::vector<const PairView*> pointers;
+    for (const PairView& pair : pairs) pointers.push_back(&pair);
+    const Agreement agreement = Agree(pointers, InitializerOptions().agreement);
+    selection->is_static = agreement.is_static;
+    selection->num_static = agreement.num_static;
+    selection->explanation = agreement.explanation;
+    if (!agreement.IsUsable()) selection->refusal = Refusal::kNoModel;
+  }
+  /// The points of the first map of an initialiser that is begun at `frame`.
+  bool OnFirstMap(JudgedSequence& sequence, size_t frame) {
+    const auto found =
+        FirstMapOf(sequence, InitializerOptions(), {frame, frame, sequence.size()}, settings_.seed);
+    if (!found) {
+      std::cout << "from frame " << frame << ": no first map\n";
+      return false;
+    }
+    const FirstMap& map = found->map;
+    StaticSelection selection;
+    selection.is_static = MatchesWithPoint(map);
+    selection.num_static = static_cast<int>(map.points.size());
+    const std::string name = "map_" + std::to_string(frame) + "_" + std::to_string(map.frame0.index) + "_" +
+                             std::to_string(map.frame1.index);
+    Write(name, DrawSelection(sequence.Color(map.frame0.index), sequence.Color(map.frame1.index), map.matches,
+                              selection));
+    std::cout << name << ": " << selection.num_static << " points of " << map.matches.size() << " matches\n";
+    nlohmann::json json = Describe(selection, map.matches.size());
+    json["frames"] = {map.frame0.index, map.frame1.index};
+    if (sequence.HasMasks()) {
+      const auto truth = sequence.Judge(map.frame0.index, map.frame1.index, map.matches);
+      const SelectionScore score = ScoreSelection(truth, selection.is_static);
+      json["precision"] = score.precision();
+      json["recall"] = score.recall();
+    }
+    report_["pairs"].push_back(std::move(json));
+    return true;
   }
   void Write(const std::string& name, const ColorImage& picture) const {
     WriteFileBytes(settings_.out + "/" + name + ".png", EncodePng(picture));
@@ -191,6 +246,11 @@ class Run {
 };
 
 void RunJudge(const JudgeSettings& settings) {
+  static const std::set<std::string> kTables{"pairs", "ablation", "windows", "system", "starts"};
+  if (!kTables.contains(settings.table)) {
+    throw InputError("unknown table '" + settings.table +
+                     "': use pairs, ablation, windows, system or starts");
+  }
   JudgedSequence sequence(settings.sequence, ChooseCamera(settings.camera, settings.sequence),
                           settings.features);
   std::ofstream file;
@@ -216,11 +276,8 @@ void RunJudge(const JudgeSettings& settings) {
     json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
   } else if (settings.table == "system") {
     json["system"] = JudgeSystem(sequence, SystemWindowOptions(), settings.count, settings.seed, out);
-  } else if (settings.table == "starts") {
-    json["starts"] = JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
   } else {
-    throw InputError("unknown table '" + settings.table +
-                     "': use pairs, ablation, windows, system or starts");
+    json["starts"] = JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
   }
   if (settings.json.empty()) return;
   std::ofstream json_file(settings.json);
@@ -244,6 +301,9 @@ void AddOptions(CLI::App& app, Settings& s) {
   app.add_option("--features", s.features, "Most features per image")->capture_default_str();
   app.add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
   app.add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
+  app.add_flag("--first-maps", s.first_maps,
+               "Instead of pairs: the first maps of an initialiser begun at so many frames (DLRSAC)");
+  app.add_flag("--gated", s.gated, "Pairs with two frames between must agree, as the initialiser asks them");
   app.add_option("--out", s.out, "Folder for pictures and static.json")->capture_default_str();
 }
 
