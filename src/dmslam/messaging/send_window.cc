@@ -85,7 +85,7 @@ int SendWindow::SendNew(int budget, int64_t now_ns, std::vector<Outgoing>* out) 
       kept.sent_ns = now_ns;
       bytes_sent += static_cast<int64_t>(kept.record->size());
       const size_t datagrams = 1 + kept.plain_bytes() / static_cast<size_t>(options_.part_bytes);
-      budget -= static_cast<int>(std::min<size_t>(datagrams, static_cast<size_t>(budget)));
+      budget -= static_cast<int>(datagrams);
       ++next_seq_;
       continue;
     }

@@ -36,7 +36,7 @@ class SendWindow {
   void Repair(const ack_t& ack, int64_t now_ns);
 
   /// Sends up to `budget` datagrams: repairs first, then what was never sent. Returns what is left of the
-  /// budget.
+  /// budget: less than nothing after a record that travels whole.
   int Send(int budget, int64_t now_ns, std::vector<Outgoing>* out);
 
   bool idle() const { return repairs_.empty() && next_seq_ > last(); }

@@ -61,9 +61,12 @@ void StreamWriter::Advance(int64_t now_ns) {
 
 int64_t StreamWriter::deadline_ns() const {
   if (IsSilent()) return INT64_MAX;
-  const bool idle = window_.idle() && (!snapshot_ || snapshot_->window.idle());
   int64_t deadline = beacon_due_ ? INT64_MIN : next_beacon_ns_;
-  if (!idle) deadline = std::min(deadline, burst_left_ > 0 ? INT64_MIN : next_burst_ns_);
+  if (!window_.idle()) deadline = std::min(deadline, burst_left_ > 0 ? INT64_MIN : next_burst_ns_);
+  if (snapshot_ && !snapshot_->window.idle()) {
+    const bool now = burst_left_ > 0 && snapshot_left_ > 0;
+    deadline = std::min(deadline, now ? INT64_MIN : next_burst_ns_);
+  }
   if (state_ == State::kClosing) deadline = std::min(deadline, close_deadline_ns_);
   return deadline;
 }
@@ -273,11 +276,19 @@ void StreamWriter::MakePieces() {
 
 void StreamWriter::SendPaced(int64_t now_ns) {
   if (now_ns >= next_burst_ns_) {
+    const int64_t bursts = 1 + std::min<int64_t>(99, (now_ns - next_burst_ns_) / options_.burst_ns);
+    snapshot_left_ = std::min(options_.snapshot_per_burst,
+                              snapshot_left_ + static_cast<int>(bursts) * options_.snapshot_per_burst);
     burst_left_ = options_.parts_per_burst;
     next_burst_ns_ = now_ns + options_.burst_ns;
   }
-  burst_left_ = window_.Send(burst_left_, now_ns, &outgoing_);
-  if (snapshot_) burst_left_ = snapshot_->window.Send(burst_left_, now_ns, &outgoing_);
+  burst_left_ = std::max(0, window_.Send(burst_left_, now_ns, &outgoing_));
+  if (!snapshot_) return;
+  const int share = std::min(burst_left_, snapshot_left_);
+  if (share <= 0) return;
+  const int sent = share - snapshot_->window.Send(share, now_ns, &outgoing_);
+  burst_left_ = std::max(0, burst_left_ - sent);
+  snapshot_left_ -= sent;  // what a piece takes beyond its share is missing in the next bursts
 }
 
 void StreamWriter::Beacon(int64_t now_ns) {

@@ -70,16 +70,18 @@ class StreamWriter : public StateMachine {
     int64_t schema_hash = 0;  ///< over all message types; readers with another one are refused
     std::vector<Role> roles;  ///< the lossless readers
     Link link = Link::kHost;
-    size_t max_records = 65536;            ///< kept at most; beyond them the oldest are forgotten
-    size_t max_bytes = 64u << 20;          ///< ... and of bytes
-    size_t spare_records = 64;             ///< kept though accepted, for readers that are not lossless ...
-    size_t spare_bytes = 1u << 20;         ///< ... within so many bytes
-    int32_t part_bytes = 1380;             ///< of a record in one datagram: with all headers below 1500
-    bool pack = true;                      ///< parts are pieces of the deflated record
-    int parts_per_burst = 40;              ///< pace: at most so many datagrams ...
-    int64_t burst_ns = 2'000'000;          ///< ... in so much time
-    int64_t resend_after_ns = 20'000'000;  ///< a part sent this recently is not repaired again
-    int64_t beacon_ns = 100'000'000;       ///< between beacons
+    size_t max_records = 65536;     ///< kept at most; beyond them the oldest are forgotten
+    size_t max_bytes = 64u << 20;   ///< ... and of bytes
+    size_t spare_records = 64;      ///< kept though accepted, for readers that are not lossless ...
+    size_t spare_bytes = 1u << 20;  ///< ... within so many bytes
+    int32_t part_bytes = 1380;      ///< of a record in one datagram: with all headers below 1500
+    bool pack = true;               ///< parts are pieces of the deflated record
+    int parts_per_burst = 40;       ///< pace: at most so many datagrams ...
+    int64_t burst_ns = 2'000'000;   ///< ... in so much time
+    int snapshot_per_burst = 12;    ///< of them for a snapshot: about 8 MB/s, so that a late comer to a
+                                    ///< large map does not take the machine from those who track
+    int64_t resend_after_ns = 20'000'000;       ///< a part sent this recently is not repaired again
+    int64_t beacon_ns = 100'000'000;            ///< between beacons
     int64_t taker_timeout_ns = 2'000'000'000;   ///< who takes a snapshot must say so that often
     int64_t reader_timeout_ns = 5'000'000'000;  ///< a reader is known so long after its last word
     int64_t close_timeout_ns = 2'000'000'000;   ///< closing waits for the readers at most so long
@@ -191,11 +193,12 @@ class StreamWriter : public StateMachine {
   std::string refusal_;
   std::vector<Outgoing> outgoing_;
   int64_t next_beacon_ns_ = INT64_MIN;
-  int64_t next_burst_ns_ = INT64_MIN;
+  int64_t next_burst_ns_ = INT64_MIN / 2;
   int64_t close_deadline_ns_ = INT64_MAX;
   bool lingers_ = false;  // complete, and not yet told to close
   int farewells_ = 3;     // beacons that still say goodbye
   int burst_left_ = 0;
+  int snapshot_left_ = 0;  ///< of burst_left_, for a snapshot
   bool beacon_due_ = true;
   WriterStatistics statistics_;
 };
