@@ -10,6 +10,7 @@
 #include "dmslam/motion_segmentation/match_frames.h"
 #include "dmslam/motion_segmentation/ransac.h"
 #include "dmslam/optimization/bundle_adjustment.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -296,10 +297,11 @@ struct NamedInitializer {
 };
 
 /// The initialiser with each of the selectors.
-std::vector<NamedInitializer> AllInitializers(const InitializerOptions& options) {
+std::vector<NamedInitializer> AllInitializers(const SystemWindowOptions& options) {
   std::vector<NamedInitializer> initializers;
   const auto add = [&](const std::string& name, const std::string& method, ModelKind kind) {
-    InitializerOptions own = options;
+    if (name.find(options.only) == std::string::npos) return;
+    InitializerOptions own = options.initializer;
     own.method = method;
     own.selector.sampling.kind = kind;
     initializers.push_back({name, own});
@@ -353,7 +355,8 @@ void AddWindow(JudgedSequence& sequence, const std::optional<FoundMap>& found, c
 
 nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
                            uint64_t seed, std::ostream& out) {
-  const std::vector<NamedInitializer> initializers = AllInitializers(options.initializer);
+  const std::vector<NamedInitializer> initializers = AllInitializers(options);
+  if (initializers.empty()) throw InputError("--only " + options.only + ": no method has a name like that");
   FeatureMatcher matcher;
   std::vector<SystemTally> tallies(initializers.size());
   const auto before = static_cast<size_t>(options.frames_before);

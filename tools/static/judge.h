@@ -65,6 +65,7 @@ struct SystemWindowOptions {
   int hard_gap = 12;               ///< a window is hard by its first frame's matches with that so much later
   double hard_moving_share = 0.3;  ///< share of these matches that moves, for a window to count as hard
   double min_baseline_m = 0.05;    ///< of these two frames, for a window to count as one with parallax
+  std::string only;                ///< methods whose name contains this; empty: all
   InitializerOptions initializer;
 };
 nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,

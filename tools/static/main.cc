@@ -42,7 +42,9 @@ struct JudgeSettings {
   std::string out;
   std::string json;
   std::vector<int> gaps{3, 5, 8, 12};
+  std::string only;
   int count = 100;
+  int window = SystemWindowOptions().frames;
   int features = 3000;
   uint64_t seed = 1;
   bool no_window = false;
@@ -275,7 +277,10 @@ void RunJudge(const JudgeSettings& settings) {
     options.matching.use_window = options.matching.check_orientation = !settings.no_window;
     json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
   } else if (settings.table == "system") {
-    json["system"] = JudgeSystem(sequence, SystemWindowOptions(), settings.count, settings.seed, out);
+    SystemWindowOptions options;
+    options.frames = settings.window;
+    options.only = settings.only;
+    json["system"] = JudgeSystem(sequence, options, settings.count, settings.seed, out);
   } else {
     json["starts"] = JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
   }
@@ -318,6 +323,10 @@ void AddJudge(CLI::App& app, JudgeSettings& s) {
   judge->add_option("--count", s.count, "Pairs, windows or starts, spread over the sequence")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
+  judge->add_option("--window", s.window, "Frames of a window of table 'system'")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  judge->add_option("--only", s.only, "Of table 'system': only methods whose name contains this, as DLRSAC");
   judge->add_option("--gaps", s.gaps, "Gaps of the pairs [frames]")->capture_default_str();
   judge->add_option("--camera", s.camera, "Camera file (YAML)");
   judge->add_option("--features", s.features, "Most features per image")->capture_default_str();
