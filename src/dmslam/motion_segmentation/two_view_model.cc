@@ -182,7 +182,7 @@ std::vector<VectorPath> VectorPaths() {
 }
 
 int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, int more_than,
-                 VectorPath path) {
+                 [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
   if (path == VectorPath::kAvx2 && HasAvx2()) return CountAvx2(M, arrays, range, more_than);
 #endif
@@ -190,7 +190,7 @@ int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range rang
 }
 
 int FlagInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, std::span<uint8_t> flags,
-                VectorPath path) {
+                [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
   if (path == VectorPath::kAvx2 && HasAvx2()) return FlagAvx2(M, arrays, range, flags.data());
 #endif
