@@ -162,7 +162,7 @@ std::vector<Entry> InitializerEntries() {
           [](Settings & s) -> auto& { return s.initializer.min_matches; }, 8, 10000),
       Make(
           "initializer.num_pairs", "pairs of frames that must agree",
-          [](Settings & s) -> auto& { return s.initializer.num_pairs; }, 1, 20),
+          [](Settings & s) -> auto& { return s.initializer.num_pairs; }, 1, 5),
       Make(
           "initializer.min_agreement", "smallest Jaccard index of the pairs' static sets",
           [](Settings & s) -> auto& { return s.initializer.agreement.min_agreement; }, 0, 1),

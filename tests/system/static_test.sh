@@ -37,6 +37,7 @@ done
 refused "unknown.*magsac" "$static" --sequence "$synthetic" --camera "$camera" --method magsac --out "$work/no"
 refused "give two images" "$static" "$synthetic/rgb.txt" --camera "$camera" --out "$work/no"
 refused "gap.*none" "$static" --sequence "$synthetic" --camera "$camera" --gap none --out "$work/no"
+refused "give --sequence" "$static" "$synthetic/rgb.txt" "$synthetic/rgb.txt" --gated --camera "$camera" --out "$work/no"
 refused "unknown table" "$static" judge --sequence "$synthetic" --camera "$camera" --table legs
 refused "no_such" "$static" judge --sequence "$work/no_such" --camera "$camera"
 finish

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -202,10 +203,16 @@ class Run {
   }
   /// The points of the first map of an initialiser that is begun at `frame`.
   bool OnFirstMap(JudgedSequence& sequence, size_t frame) {
+    InitializerOptions options;
+    options.method = settings_.method;
+    options.selector.sampling.kind = settings_.model == "f" ? ModelKind::kFundamental : ModelKind::kEssential;
+    options.matching = matching_;
+    std::map<std::string, int> waited;
     const auto found =
-        FirstMapOf(sequence, InitializerOptions(), {frame, frame, sequence.size()}, settings_.seed);
+        FirstMapOf(sequence, options, {frame, frame, sequence.size()}, settings_.seed, &waited);
     if (!found) {
       std::cout << "from frame " << frame << ": no first map\n";
+      report_["pairs"].push_back({{"first", frame}, {"accepted", false}, {"waited_for_frames", waited}});
       return false;
     }
     const FirstMap& map = found->map;
@@ -217,8 +224,12 @@ class Run {
     Write(name, DrawSelection(sequence.Color(map.frame0.index), sequence.Color(map.frame1.index), map.matches,
                               selection));
     std::cout << name << ": " << selection.num_static << " points of " << map.matches.size() << " matches\n";
-    nlohmann::json json = Describe(selection, map.matches.size());
-    json["frames"] = {map.frame0.index, map.frame1.index};
+    nlohmann::json json{{"first", frame},
+                        {"accepted", true},
+                        {"frames", {map.frame0.index, map.frame1.index}},
+                        {"matches", map.matches.size()},
+                        {"points", map.points.size()},
+                        {"waited_for_frames", waited}};
     if (sequence.HasMasks()) {
       const auto truth = sequence.Judge(map.frame0.index, map.frame1.index, map.matches);
       const SelectionScore score = ScoreSelection(truth, selection.is_static);
@@ -307,7 +318,7 @@ void AddOptions(CLI::App& app, Settings& s) {
   app.add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
   app.add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
   app.add_flag("--first-maps", s.first_maps,
-               "Instead of pairs: the first maps of an initialiser begun at so many frames (DLRSAC)");
+               "Instead of pairs: the first maps of an initialiser begun at so many frames of --sequence");
   app.add_flag("--gated", s.gated, "Pairs with two frames between must agree, as the initialiser asks them");
   app.add_option("--out", s.out, "Folder for pictures and static.json")->capture_default_str();
 }
@@ -345,6 +356,8 @@ void RunSelection(const Settings& settings) {
   Run run(settings);
   if (!settings.sequence.empty()) {
     run.OnSequence();
+  } else if (settings.first_maps || settings.gated) {
+    throw InputError("--first-maps and --gated need more than two frames: give --sequence DIR");
   } else if (settings.images.size() == 2) {
     run.OnImages();
   } else {

@@ -315,12 +315,13 @@ TEST(Stream, ACompleteStreamStaysUntilItIsClosed) {
 // Values 1..n as pieces of three.
 struct CountingSource : SnapshotSource {
   int64_t cut = 0, next = 1;
+  size_t bytes = 3000;
   void BeginSnapshot(int64_t c) override {
     cut = c;
     next = 1;
   }
   Piece NextPiece() override {
-    Piece piece{"DMSLAM_TEST_X", MakeRecord(-next, 3000), false};
+    Piece piece{"DMSLAM_TEST_X", MakeRecord(-next, bytes), false};
     next += 3;
     piece.last = next > cut;
     return piece;
@@ -357,6 +358,30 @@ TEST(Stream, ALateReaderGetsASnapshotAndGoesOnBehindIt) {
     EXPECT_EQ(pair.writer.statistics().snapshots, 1);
     EXPECT_EQ(pair.reader.held(), (Version{1000, 110}));
   }
+}
+
+TEST(Stream, ASnapshotKeepsToItsShareOfTheBus) {
+  constexpr size_t kBytes = 30'000;
+  StreamWriter::Options options = WriterOptions();
+  options.max_records = 4;
+  CountingSource source;
+  source.bytes = kBytes;
+  Pair pair(options, &source);
+  for (int i = 1; i <= 1000; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  int pieces = 0;
+  pair.drop = [&](const Outgoing& out) {
+    pieces += out.bytes->size() >= kBytes ? 1 : 0;
+    return false;
+  };
+  while (pieces == 0 && pair.now_ns < 1000 * kMs) pair.Step(), pair.now_ns += kMs;
+  ASSERT_GT(pieces, 0);
+  pieces = 0;
+  pair.Run(200 * kMs);
+  const double parts = 1 + static_cast<double>(kBytes / static_cast<size_t>(options.part_bytes));
+  const double bursts = 200.0 * kMs / static_cast<double>(options.burst_ns);
+  const double share = bursts * options.snapshot_per_burst / parts;
+  EXPECT_LE(pieces, share + 2);
+  EXPECT_GE(pieces, 0.7 * share);
 }
 
 TEST(Stream, ASuccessorIsFollowedWhenItKnowsWhatIsHeld) {

@@ -132,6 +132,7 @@ void ReplicaServer::Open(int64_t now_ns) {
   options.name = options_.name;
   options.schema_hash = options_.schema_hash;
   options.link = options_.link;
+  options.snapshot_per_burst = options.parts_per_burst;  // everybody waits for it
   writer_ = std::make_unique<StreamWriter>(options, Term{epoch_, *served_}, offered_, source_);
 }
 

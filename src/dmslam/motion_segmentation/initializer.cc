@@ -288,9 +288,10 @@ std::vector<const Initializer::Impl::View*> Initializer::Impl::ChooseViews() con
   }
   const auto asked = static_cast<size_t>(options_.num_pairs);
   std::vector<const View*> chosen;
-  if (moved.size() < asked) return chosen;
+  if (asked < 1 || moved.size() < asked) return chosen;
   const uint32_t span = moved.back()->frame.index - moved.front()->frame.index;
   if (span < static_cast<uint32_t>(options_.min_pair_step) * (asked - 1)) return chosen;
+  if (asked == 1) return {moved.back()};
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
   return chosen;
 }
