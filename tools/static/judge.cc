@@ -351,27 +351,9 @@ void AddWindow(JudgedSequence& sequence, const std::optional<FoundMap>& found, c
   }
 }
 
-}  // namespace
-
-nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
-                           uint64_t seed, std::ostream& out) {
-  const std::vector<NamedInitializer> initializers = AllInitializers(options);
-  if (initializers.empty()) throw InputError("--only " + options.only + ": no method has a name like that");
-  FeatureMatcher matcher;
-  std::vector<SystemTally> tallies(initializers.size());
-  const auto before = static_cast<size_t>(options.frames_before);
-  for (int k = 0; k < count; ++k) {
-    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
-                                 static_cast<size_t>(options.frames));
-    const WindowKind kind = KindOfWindow(sequence, options, first, &matcher);
-    for (size_t s = 0; s < initializers.size(); ++s) {
-      const size_t end = first + static_cast<size_t>(options.frames);
-      const auto found = FirstMapOf(sequence, initializers[s].options,
-                                    {first - std::min(before, first), first, end}, seed, &tallies[s].waited);
-      AddWindow(sequence, found, kind, &tallies[s]);
-    }
-    sequence.ForgetBefore(first - std::min(first, before));
-  }
+nlohmann::json PrintSystem(const SystemWindowOptions& options,
+                           const std::vector<NamedInitializer>& initializers,
+                           const std::vector<SystemTally>& tallies, std::ostream& out) {
   std::vector<std::string> names;
   std::vector<Tally> all, parallax, hard;
   for (size_t s = 0; s < initializers.size(); ++s) {
@@ -395,6 +377,30 @@ nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& 
       {"all", ToJson(names, all)}, {"with_parallax", ToJson(names, parallax)}, {"hard", ToJson(names, hard)}};
   for (size_t s = 0; s < names.size(); ++s) json["waited_for_frames"][names[s]] = tallies[s].waited;
   return json;
+}
+
+}  // namespace
+
+nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
+                           uint64_t seed, std::ostream& out) {
+  const std::vector<NamedInitializer> initializers = AllInitializers(options);
+  if (initializers.empty()) throw InputError("--only " + options.only + ": no method has a name like that");
+  FeatureMatcher matcher;
+  std::vector<SystemTally> tallies(initializers.size());
+  const auto before = static_cast<size_t>(options.frames_before);
+  for (int k = 0; k < count; ++k) {
+    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
+                                 static_cast<size_t>(options.frames));
+    const WindowKind kind = KindOfWindow(sequence, options, first, &matcher);
+    for (size_t s = 0; s < initializers.size(); ++s) {
+      const size_t end = first + static_cast<size_t>(options.frames);
+      const auto found = FirstMapOf(sequence, initializers[s].options,
+                                    {first - std::min(before, first), first, end}, seed, &tallies[s].waited);
+      AddWindow(sequence, found, kind, &tallies[s]);
+    }
+    sequence.ForgetBefore(first - std::min(first, before));
+  }
+  return PrintSystem(options, initializers, tallies, out);
 }
 
 AdjustFunction MakeAdjustment(const Camera& camera) {

@@ -159,11 +159,13 @@ class Run {
     const auto matches =
         MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching_, &matcher_);
     StaticSelection selection = selector_->Select(matches, sequence.camera(), settings_.seed + frame);
-    if (settings_.gated) AskPairsBetween(sequence, frame, other, matches, &selection);
+    const Agreement agreement =
+        settings_.gated ? AskPairsBetween(sequence, frame, other, matches, &selection) : Agreement();
     const std::string name = "pair_" + std::to_string(frame) + "_" + std::to_string(other);
     Write(name, DrawSelection(sequence.Color(frame), sequence.Color(other), matches, selection));
     nlohmann::json json = Describe(selection, matches.size());
     json["frames"] = {frame, other};
+    if (!agreement.IsUsable()) json["refusal"] = ToString(agreement.refusal);
     if (sequence.HasMasks() && selection.IsUsable()) {
       const SelectionScore score = ScoreSelection(sequence.Judge(frame, other, matches), selection.is_static);
       json["precision"] = score.precision();
@@ -181,8 +183,8 @@ class Run {
   }
   /// The gates of the initialiser: two pairs of the same first frame with frames between must call the same
   /// matches static. What not all of them call static is not.
-  void AskPairsBetween(JudgedSequence& sequence, size_t frame, size_t other,
-                       const std::vector<Match>& matches, StaticSelection* selection) {
+  Agreement AskPairsBetween(JudgedSequence& sequence, size_t frame, size_t other,
+                            const std::vector<Match>& matches, StaticSelection* selection) {
     std::vector<PairView> pairs;
     for (const size_t part : {size_t{1}, size_t{2}}) {
       const size_t between = frame + std::max<size_t>(1, (other - frame) * part / 3);
@@ -199,7 +201,8 @@ class Run {
     selection->is_static = agreement.is_static;
     selection->num_static = agreement.num_static;
     selection->explanation = agreement.explanation;
-    if (!agreement.IsUsable()) selection->refusal = Refusal::kNoModel;
+    if (!agreement.IsUsable()) selection->refusal = Refusal::kNoModel;  // the report has the true reason
+    return agreement;
   }
   /// The points of the first map of an initialiser that is begun at `frame`.
   bool OnFirstMap(JudgedSequence& sequence, size_t frame) {

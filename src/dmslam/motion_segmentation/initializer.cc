@@ -218,7 +218,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   }
   if (!reference_ && static_cast<int>(past_.size()) < options_.past_first) {
     past_.push_back(frame);
-    return Wait(WaitReason::kTooFewFrames, "of the past");
+    return Wait(WaitReason::kTooFewFrames, "this one only testifies");
   }
   if (!reference_) {
     reference_ = frame;

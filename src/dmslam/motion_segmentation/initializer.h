@@ -121,7 +121,7 @@ struct InitializerOptions {
                          ///< who has just stopped is in his place in all views, but not in them
   int past_views = 6;    ///< so many of them at most; 0: none
   double max_past_conflict = 0.08;  ///< of the points, that one of them sees elsewhere; more: wait
-  int past_first = 0;               ///< frames that come before the first reference frame may be chosen
+  int past_first = 0;  ///< so many frames come before the first reference frame: they testify only
 };
 
 /// Makes the first map out of a stream of frames: keeps a reference frame, asks DLRSAC for the static matches
