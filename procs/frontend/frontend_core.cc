@@ -39,6 +39,7 @@ FrontendCore::FrontendCore(Setup setup)
       session_(setup.session),
       seed_(setup.seed),
       localize_only_(setup.localize_only),
+      catch_up_in_portions_(setup.catch_up_in_portions),
       map_(setup.camera, setup.pyramid),
       refiner_(setup.camera, setup.pyramid, static_cast<size_t>(setup.options.max_refined_frames)),
       extractor_(setup.extractor),
@@ -108,6 +109,10 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
   ++counters_.frames;
   frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
   if (counters_.frames == 1) last_tracked_ns_ = stamp_ns;  // in a saved map it is lost from now on
+  if (IsBehind()) {
+    AwaitTurn(events);
+    return;
+  }
   const bool tracks = state_ != TrackingState::kNotInitialized && state_ != TrackingState::kWaitingForMap;
   if (tracks && map_.keyframes().empty()) GiveUpMap(true, "the mapper began with an empty map", events);
   switch (state_) {
@@ -160,37 +165,48 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
     events->push_back(MakePose(state_, status));
     return;
   }
-  last_ = FrameOfKeyframe(*second);
-  last_placed_ = {second->id, Rigid3d(), second->scale};
-  velocity_.reset();
-  coasting_.reset();
-  last_tracked_ns_ = second->stamp_ns;
-  trial_until_ns_ = second->stamp_ns + ToNs(options_.trial_s);
-  state_ = TrackingState::kTrial;
-  TrackedFrame present = std::move(frame_);
-  CatchUp(second->id.frame_index(), events);
-  frame_ = std::move(present);
-  if (state_ == TrackingState::kNotInitialized) {
-    Initialize(events);
+  BeginTrial(*second);
+  if (!catch_up_in_portions_) {
+    TrackedFrame present = std::move(frame_);
+    while (IsBehind()) CatchUp(events);
+    frame_ = std::move(present);
+    state_ == TrackingState::kNotInitialized ? Initialize(events) : Track(events);
   } else {
-    Track(events);
+    AwaitTurn(events);
   }
 }
 
-/// The frames since the one that made the map, in their order: in real time some came while it was searched
-/// for and adjusted.
-void FrontendCore::CatchUp(uint32_t since, std::vector<FrontendEvent>* events) {
+/// The frames since the one that made the map are tracked in their order: in real time some came while it was
+/// searched for and adjusted.
+void FrontendCore::BeginTrial(const Keyframe& second) {
+  last_ = FrameOfKeyframe(second);
+  last_placed_ = {second.id, Rigid3d(), second.scale};
+  velocity_.reset();
+  coasting_.reset();
+  last_tracked_ns_ = second.stamp_ns;
+  trial_until_ns_ = second.stamp_ns + ToNs(options_.trial_s);
+  state_ = TrackingState::kTrial;
+  const uint32_t since = second.id.frame_index();
   const auto first = std::find_if(unplaced_.begin(), unplaced_.end(),
                                   [since](const TrackedFrame& frame) { return frame.index >= since; });
-  std::vector<TrackedFrame> waited(std::make_move_iterator(first), std::make_move_iterator(unplaced_.end()));
+  behind_.assign(std::make_move_iterator(first), std::make_move_iterator(unplaced_.end()));
   unplaced_.erase(first, unplaced_.end());
-  for (TrackedFrame& frame : waited) {
-    frame_ = std::move(frame);
-    if (state_ == TrackingState::kNotInitialized) {
-      KeepUnplaced();
-    } else {
-      Track(events);
-    }
+}
+
+void FrontendCore::AwaitTurn(std::vector<FrontendEvent>* events) {
+  behind_.push_back(frame_);
+  TrackingReport status;
+  status.reason = "frames that waited for the first map come first";
+  events->push_back(MakePose(TrackingState::kWaitingForMap, status));
+}
+
+void FrontendCore::CatchUp(std::vector<FrontendEvent>* events) {
+  frame_ = std::move(behind_.front());
+  behind_.pop_front();
+  if (state_ == TrackingState::kNotInitialized) {
+    KeepUnplaced();
+  } else {
+    Track(events);
   }
 }
 
@@ -448,6 +464,7 @@ bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double 
 }
 
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
+  while (IsBehind()) CatchUp(events);
   LaterNeighbours near;
   for (auto it = unplaced_.rbegin(); it != unplaced_.rend();
        ++it) {  // from the newest back: the map lies after them

@@ -54,6 +54,9 @@ class FrontendCore {
     uint64_t seed = 0;
     bool in_saved_map = false;   ///< begins lost in a map that is there already
     bool localize_only = false;  ///< ... and adds nothing to it
+    /// Frames that came while the first map was made are tracked one by one with CatchUp(), and those that
+    /// come meanwhile wait their turn; else all at once when the map is there.
+    bool catch_up_in_portions = false;
     std::function<FirstMapSearch(FirstMapSearch)>
         run_search;  ///< how the search for a first map is run, as in the background; empty: at once
     std::shared_ptr<const Vocabulary>
@@ -80,6 +83,9 @@ class FrontendCore {
                        std::vector<FrontendEvent>* events);
   /// At the end of the sequence: places frames that had no pose when they came.
   void Finish(std::vector<FrontendEvent>* events);
+  /// Whether frames wait to be tracked, and tracks the oldest of them (there must be one).
+  bool IsBehind() const { return !behind_.empty(); }
+  void CatchUp(std::vector<FrontendEvent>* events);
 
   TrackingState state() const { return state_; }
   const TrackedFrame& frame() const { return frame_; }
@@ -124,7 +130,8 @@ class FrontendCore {
   void KeepUnplaced();
   void NextMapId();
   void Coast();
-  void CatchUp(uint32_t since, std::vector<FrontendEvent>* events);
+  void BeginTrial(const Keyframe& second);
+  void AwaitTurn(std::vector<FrontendEvent>* events);
   const Placed& NewestPlaced() const { return coasting_ ? coasting_->placed : last_placed_; }
   uint32_t NewestIndex() const { return coasting_ ? coasting_->index : last_.index; }
   std::optional<Rigid3d> PoseOf(const Placed& placed) const;
@@ -135,6 +142,7 @@ class FrontendCore {
   uint32_t session_;
   uint64_t seed_;
   bool localize_only_;
+  bool catch_up_in_portions_;
   Map map_;
   FrameRefiner refiner_;
   std::vector<FramePose> refined_;  ///< told at the end
@@ -172,6 +180,7 @@ class FrontendCore {
   int64_t last_keyframe_ns_ = 0;
   KeyframeId awaited_;
   std::deque<TrackedFrame> unplaced_;
+  std::deque<TrackedFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
   double extract_ms_ = 0;
   FrontendCounters counters_;
 };

@@ -39,6 +39,7 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.localize_only = settings.start.localize_only;
   setup.vocabulary = extras_.vocabulary;
   if (!lockstep_) setup.run_search = InBackground;
+  setup.catch_up_in_portions = !lockstep_;
   core_ = std::make_unique<FrontendCore>(setup);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&core_->map(), [this] { return HandOverVersion(); });
@@ -176,8 +177,18 @@ bool FrontendNode::WorkOnce() {
   if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
   if (waiting_) return ProcessWaiting();
+  if (core_->IsBehind()) return CatchUp();
   if (!end_) return false;
   return MapsAreAdjusted() ? Finish() : false;
+}
+
+/// In the time between two images.
+bool FrontendNode::CatchUp() {
+  std::vector<FrontendEvent> events;
+  core_->CatchUp(&events);
+  PublishEvents(events);
+  endpoint_.Advance();
+  return true;
 }
 
 /// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.

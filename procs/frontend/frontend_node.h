@@ -58,6 +58,7 @@ class FrontendNode : public StreamNode {
   bool HoldsBack() const;
   bool AwaitsSavedMap() const;
   bool ProcessWaiting();
+  bool CatchUp();
   bool DecodeImage(const Frame& frame);
   void PublishEvents(const std::vector<FrontendEvent>& events);
   void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);

@@ -12,8 +12,10 @@ struct LoopcloserOptions {
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
 
   // What makes a place the same.
-  int min_word_matches = 20;         ///< of landmarks, between the two keyframes
-  int min_sim3_inliers = 20;         ///< of them, that agree with one similarity
+  int min_word_matches = 20;  ///< of landmarks, between the two keyframes
+  int min_sim3_inliers = 20;  ///< of them, that agree with one similarity
+  int min_pose_inliers =
+      30;  ///< without such pairs: landmarks of the place that agree with one pose of the keyframe
   double search_radius_px = 7.5;     ///< of the guided search, times the scale of the predicted octave
   int max_descriptor_distance = 60;  ///< of the guided search [bits]
   int min_matches = 40;              ///< landmarks of the place found in the keyframe

@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <map>
 
+#include "dmslam/features/matcher.h"
 #include "dmslam/map/projection.h"
 #include "dmslam/optimization/sim3_optimization.h"
+#include "dmslam/robust/pose_from_matches.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -14,6 +16,10 @@ namespace {
 
 constexpr int kCellColumns = 8, kCellRows = 6;
 constexpr int kPlaceNeighbours = 15;
+constexpr int kPlaceNeighboursMatched = 5;
+constexpr MatchOptions kMatchLandmarks = {.max_ratio = 0.8, .check_orientation = false};
+constexpr int kMaxPoseIterations = 1000;
+constexpr size_t kMinDepthRatios = 5;
 constexpr ViewLimits kSurelySeen{.min_view_cos = 0.7, .distance_slack = 1.0, .border_px = 0};
 
 size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
@@ -77,6 +83,23 @@ Sim3d WithScaleOfDepths(const std::vector<Sim3Match>& matches, const Sim3Report&
   return Sim3d(S.rotation, S.translation * (*middle / S.scale), *middle);
 }
 
+/// How much larger the keyframe's own map is than the place's: from landmarks of both on the same features.
+std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                                   const std::vector<PlaceMatch>& matches) {
+  std::vector<double> ratios;
+  for (const PlaceMatch& match : matches) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
+    const double depth_mine = (keyframe.T_cam_world * map.FindLandmark(mine)->p_world).z();
+    const double depth_theirs = (T_cam_world * map.FindLandmark(match.landmark)->p_world).z();
+    if (depth_mine > 0 && depth_theirs > 0) ratios.push_back(depth_mine / depth_theirs);
+  }
+  if (ratios.size() < kMinDepthRatios) return std::nullopt;
+  const auto middle = ratios.begin() + static_cast<ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
 template <typename... Values>
 std::string Text(const char* format, Values... values) {
   char text[160];
@@ -103,6 +126,77 @@ std::vector<LandmarkId> LandmarksAround(const Map& map, KeyframeId id, int neigh
 std::optional<Sim3d> LoopVerifier::FirstSimilarity(const Map& map, const MapPlaces& places,
                                                    const Keyframe& keyframe, const Keyframe& place,
                                                    std::string* why) const {
+  if (const auto similarity = SimilarityFromWords(map, places, keyframe, place, why)) return similarity;
+  std::string why_not;
+  const auto similarity = SimilarityFromFeatures(map, keyframe, place, &why_not);
+  *why += "; " + why_not;
+  return similarity;
+}
+
+/// Where the keyframe has few landmarks of its own yet, as behind people: its features against the landmarks
+/// of the place and its neighbours, without words.
+std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const Keyframe& keyframe,
+                                                          const Keyframe& place, std::string* why) const {
+  const std::vector<LandmarkId> ids =
+      LandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
+  std::vector<Descriptor> descriptors;
+  for (const LandmarkId id : ids) descriptors.push_back(map.FindLandmark(id)->descriptor);
+  const std::vector<Keypoint> anywhere(ids.size());
+  std::vector<FeatureMatch> found;
+  const FeatureSet& features = keyframe.features->set;
+  FeatureMatcher().MatchAll({anywhere, descriptors}, {features.keypoints, features.descriptors},
+                            kMatchLandmarks, &found);
+  std::vector<PlaceMatch> matches;
+  for (const FeatureMatch& match : found) {
+    const LandmarkId mine = keyframe.landmarks[match.index1];
+    if (mine.valid() && !IsStatic(map.FindLandmark(mine))) continue;
+    matches.push_back({static_cast<uint16_t>(match.index1), ids[match.index0]});
+  }
+  const bool one_map = keyframe.map_id == place.map_id;
+  return SimilarityFromPose(map, keyframe, place, matches, one_map ? std::optional(1.0) : std::nullopt, why);
+}
+
+/// Landmarks of the place on features of the keyframe give its pose; features that show landmarks of both
+/// tell the scale, and where they are too few, `scale` is taken, if it is known: within one map the drift is
+/// small, and what the loop joins corrects it in the adjustment that follows.
+std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyframe& keyframe,
+                                                      const Keyframe& place,
+                                                      const std::vector<PlaceMatch>& matches,
+                                                      std::optional<double> scale, std::string* why) const {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<double> weights;
+  for (const PlaceMatch& match : matches) {
+    points.push_back(map.FindLandmark(match.landmark)->p_world);
+    pixels.push_back(keyframe.features->uv_px[match.feature]);
+    weights.push_back(1.0 /
+                      map.pyramid().SigmaSquared(keyframe.features->set.keypoints[match.feature].octave));
+  }
+  PoseRansacOptions options;
+  options.min_inliers = options_.min_pose_inliers;
+  options.max_iterations = kMaxPoseIterations;
+  options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop_pose");
+  const auto pose = PoseFromMatches(map.camera().Ideal(), points, pixels, weights, options);
+  if (!pose.success) {
+    *why = Text("%d of %zu landmarks agree on a pose", pose.num_inliers, matches.size());
+    return std::nullopt;
+  }
+  std::vector<PlaceMatch> agreeing;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (pose.inliers[i]) agreeing.push_back(matches[i]);
+  }
+  if (const auto measured = ScaleOfPairs(map, keyframe, pose.model, agreeing)) scale = measured;
+  if (!scale) {
+    *why = Text("too few of %zu landmarks tell the scale of the two maps", agreeing.size());
+    return std::nullopt;
+  }
+  const double s = *scale;
+  return Sim3d(pose.model.rotation, pose.model.translation * s, s) * Sim3d(place.T_cam_world).Inverse();
+}
+
+std::optional<Sim3d> LoopVerifier::SimilarityFromWords(const Map& map, const MapPlaces& places,
+                                                       const Keyframe& keyframe, const Keyframe& place,
+                                                       std::string* why) const {
   const std::vector<uint8_t> usable1 = StaticFeatures(map, keyframe), usable2 = StaticFeatures(map, place);
   const std::vector<BowMatch> pairs =
       MatchByNodes({&keyframe.features->set, places.Nodes(keyframe.id), usable1},
@@ -153,11 +247,13 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
     options.fix_scale = true;
     report = OptimizeSim3(camera, camera, matches, WithScaleOfDepths(matches, report), options);
   }
-  if (!report.success) {
-    *why = Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
-    return std::nullopt;
-  }
-  return report.S_cam1_cam2;
+  if (report.success) return report.S_cam1_cam2;
+  const std::string pairs =
+      Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
+  const auto similarity =
+      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
+  if (!similarity) *why = pairs + "; " + *why;
+  return similarity;
 }
 
 PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
@@ -236,7 +332,10 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
                                                   const VerifiedLoop& earlier, std::string* why) const {
   const Keyframe* before = map.FindKeyframe(earlier.keyframe);
   const Keyframe* place_before = map.FindKeyframe(earlier.place);
-  if (before == nullptr || place_before == nullptr || before->map_id != keyframe.map_id) return std::nullopt;
+  if (before == nullptr || place_before == nullptr || before->map_id != keyframe.map_id) {
+    *why = "the keyframes of the proposal are gone";
+    return std::nullopt;
+  }
   const Sim3d S_before_world = earlier.S_keyframe_place * Sim3d(place_before->T_cam_world);
   const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
   const std::vector<LandmarkId> landmarks =

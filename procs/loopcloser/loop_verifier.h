@@ -65,6 +65,13 @@ class LoopVerifier {
  private:
   std::optional<Sim3d> FirstSimilarity(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
                                        const Keyframe& place, std::string* why) const;
+  std::optional<Sim3d> SimilarityFromWords(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
+                                           const Keyframe& place, std::string* why) const;
+  std::optional<Sim3d> SimilarityFromFeatures(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                              std::string* why) const;
+  std::optional<Sim3d> SimilarityFromPose(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                          const std::vector<PlaceMatch>& matches, std::optional<double> scale,
+                                          std::string* why) const;
   std::optional<Sim3d> RefinedSimilarity(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                          const Sim3d& S_keyframe_place, std::string* why) const;
   VerifiedLoop Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,

@@ -14,6 +14,8 @@ namespace {
 
 constexpr int kInitialAdjustmentIterations = 20;
 constexpr int kMinInitialLandmarks = 40;
+constexpr int kMaxLoopSide = 1000;    // keyframes on a loop's side that are joined with the place
+constexpr int kPlaceNeighbours = 15;  // keyframes around the place
 
 /// The correction of a keyframe: its own, or that of its nearest ancestor that has one.
 const Sim3d* CorrectionOf(const Map& map, KeyframeId id, const std::map<KeyframeId, Sim3d>& corrections) {
@@ -29,6 +31,19 @@ const Sim3d* CorrectionOf(const Map& map, KeyframeId id, const std::map<Keyframe
     }
   }
   return nullptr;
+}
+
+/// Landmarks of a keyframe and its best neighbours, sorted.
+std::vector<LandmarkId> LandmarksOfPlace(const Map& map, KeyframeId id, int min_covisibility) {
+  std::vector<KeyframeId> keyframes = map.BestCovisible(id, kPlaceNeighbours, min_covisibility);
+  keyframes.push_back(id);
+  std::set<LandmarkId> landmarks;
+  for (const KeyframeId keyframe : keyframes) {
+    for (const LandmarkId landmark : map.FindKeyframe(keyframe)->landmarks) {
+      if (landmark.valid()) landmarks.insert(landmark);
+    }
+  }
+  return {landmarks.begin(), landmarks.end()};
 }
 
 }  // namespace
@@ -325,6 +340,7 @@ void MapperCore::Correct(const LoopAnswer& answer) {
   for (const auto& c : answer.corrections) corrections[c.keyframe] = c.corrected_from_base;
   std::map<LandmarkId, Eigen::Vector3d> offsets;
   for (const auto& o : answer.landmark_offsets) offsets[o.landmark] = o.offset_world;
+  const LoopSide side = answer.kind == LoopAnswer::Kind::kLoop ? SideOf(answer.keyframe) : LoopSide();
 
   for (const LandmarkId id : map_.LandmarkIdsSorted()) {
     const Landmark& landmark = *map_.FindLandmark(id);
@@ -343,11 +359,26 @@ void MapperCore::Correct(const LoopAnswer& answer) {
     const Sim3d corrected = Sim3d(map_.FindKeyframe(id)->T_cam_world) * correction.Inverse();
     map_.SetPoseAndScale(id, corrected.ToRigid(), correction.scale);
   }
-  if (answer.kind == LoopAnswer::Kind::kLoop) Connect(answer);
+  if (answer.kind == LoopAnswer::Kind::kLoop) Connect(answer, side);
+}
+
+/// The keyframe of a loop and its neighbours, where they stand to it: of what lies between them the loop says
+/// nothing new, while the corrected poses also share in what the graph has spread.
+MapperCore::LoopSide MapperCore::SideOf(KeyframeId keyframe) const {
+  const std::optional<KeyframeId> here = map_.ResolveKeyframe(keyframe);
+  if (!here) return {};
+  std::vector<KeyframeId> ids = map_.BestCovisible(*here, kMaxLoopSide, options_.min_covisibility);
+  ids.push_back(*here);
+  const Keyframe& middle = *map_.FindKeyframe(*here);
+  LoopSide side;
+  for (const KeyframeId id : ids) {
+    side[id] = {map_.FindKeyframe(id)->T_cam_world * middle.T_cam_world.Inverse(), middle.scale};
+  }
+  return side;
 }
 
 /// What the two ends of a loop have in common becomes one.
-void MapperCore::Connect(const LoopAnswer& answer) {
+void MapperCore::Connect(const LoopAnswer& answer, const LoopSide& side) {
   const std::optional<KeyframeId> here = map_.ResolveKeyframe(answer.keyframe);
   const std::optional<KeyframeId> there = map_.ResolveKeyframe(answer.matched);
   if (!here || !there || *here == *there) return;
@@ -357,9 +388,18 @@ void MapperCore::Connect(const LoopAnswer& answer) {
     Reroot(*here, *there);
   }
   map_.AddLoopEdge(*here, *there);
+  const std::vector<LandmarkId> place = LandmarksOfPlace(map_, *there, options_.min_covisibility);
   for (const auto& fusion : answer.fusions) {
     const auto gone = map_.Resolve(fusion.from), kept = map_.Resolve(fusion.into);
     if (gone && kept && *gone != *kept) map_.Fuse(*gone, *kept);
+  }
+  // Every keyframe of this side is tied to all that it sees of the place: a few landmarks in a corner of its
+  // image would leave it free to turn about them.
+  const Keyframe& middle = *map_.FindKeyframe(*here);
+  for (const auto& [id, to] : side) {
+    const Rigid3d T_cam_here(to.T_cam_here.rotation, to.T_cam_here.translation * (middle.scale / to.scale));
+    counters_.fusions += static_cast<uint64_t>(
+        FuseInto(map_, id, T_cam_here * middle.T_cam_world, place, options_.fuse_radius_px, options_));
   }
   counters_.fusions += static_cast<uint64_t>(FuseWithNeighbours(map_, *here, options_));
 }

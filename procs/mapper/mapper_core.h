@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 
 #include "dmslam/map/map.h"
@@ -75,6 +76,13 @@ class MapperCore {
   const MapperCounters& counters() const { return counters_; }
 
  private:
+  /// Where a keyframe stands to that of the loop.
+  struct BesideLoop {
+    Rigid3d T_cam_here;
+    double scale = 1.0;  ///< of the loop's keyframe when it was measured
+  };
+  using LoopSide = std::map<KeyframeId, BesideLoop>;
+
   void MapAround(const KeyframeProposal& proposal);
   void Refine(KeyframeId id, MapId map_id);
   bool Insert(const KeyframeProposal& proposal);
@@ -88,7 +96,8 @@ class MapperCore {
   void ScaleToUnitDepth(MapId map_id, KeyframeId first);
   std::string WhyRefused(const LoopAnswer& answer) const;
   void Correct(const LoopAnswer& answer);
-  void Connect(const LoopAnswer& answer);
+  LoopSide SideOf(KeyframeId keyframe) const;
+  void Connect(const LoopAnswer& answer, const LoopSide& side);
   void Reroot(KeyframeId id, KeyframeId parent);
   void JoinMaps(MapId from, MapId into);
   void AdjustMaps();

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
@@ -109,6 +111,78 @@ TEST_F(Corrections, OneWhoseKeyframesAreGoneIsRefused) {
   core_.OnLoopAnswer(OneUp(base));
   EXPECT_EQ(core_.counters().corrections_refused, 1u);
   EXPECT_EQ(said_.back().note, "its keyframes are gone");
+}
+
+/// Two keyframes that see the wall of a third one again. They share landmarks of their own on its first half;
+/// of its second half they have none.
+class SecondVisit : public Corrections {
+ protected:
+  static constexpr uint16_t kHalf = 20;
+
+  SecondVisit() {
+    Map map(TestCamera(), Pyramid());
+    for (const uint32_t frame : {1u, 2u, 3u}) AddKeyframe(frame, 0.05 * frame, map);
+    for (const uint16_t feature : Features(0, 2 * kHalf)) AddLandmark(100u + feature, {1}, feature, map);
+    for (const uint16_t feature : Features(0, kHalf)) AddLandmark(200u + feature, {2, 3}, feature, map);
+    map.TakeDelta(MapEvent::kMapStarted, Id(3), 1);
+    core_.Continue(std::move(map));
+  }
+
+  static std::vector<uint16_t> Features(uint16_t from, uint16_t to) {
+    std::vector<uint16_t> features;
+    for (uint16_t i = from; i < to; ++i) features.push_back(i);
+    return features;
+  }
+  static Eigen::Vector3d Point(uint16_t i) { return {0.3 * (i % 8) - 1.0, 0.3 * (i / 8) - 0.6, 4.0}; }
+  static Descriptor DescriptorOf(uint16_t i) {
+    Random random(DeriveSeed(1, i, "descriptor"));
+    return {{random.Next(), random.Next(), random.Next(), random.Next()}};
+  }
+  static void AddKeyframe(uint32_t frame, double x, Map& map) {
+    Keyframe keyframe;
+    keyframe.id = Id(frame);
+    keyframe.map_id = 1;
+    keyframe.T_cam_world = Rigid3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-x, 0, 0));
+    if (frame > 1) keyframe.parent = Id(frame - 1);
+    FeatureSet features;
+    for (uint16_t i = 0; i < 2 * kHalf; ++i) {
+      const Eigen::Vector2d uv = *map.camera().Project(keyframe.T_cam_world * Point(i));
+      features.keypoints.push_back({static_cast<uint16_t>(std::lround(uv.x() * 16)),
+                                    static_cast<uint16_t>(std::lround(uv.y() * 16)), 1, 0});
+      features.descriptors.push_back(DescriptorOf(i));
+    }
+    keyframe.features = MakeFrameFeatures(std::move(features), map.camera(), map.pyramid());
+    map.AddKeyframe(std::move(keyframe));
+  }
+  static void AddLandmark(uint64_t number, const std::vector<uint32_t>& frames, uint16_t feature, Map& map) {
+    Landmark landmark;
+    landmark.id = LandmarkId::Make(1, number);
+    landmark.map_id = 1;
+    landmark.p_world = Point(feature);
+    landmark.reference = landmark.first_keyframe = Id(frames.front());
+    const LandmarkId id = landmark.id;
+    map.AddLandmark(std::move(landmark));
+    for (const uint32_t frame : frames) map.SetObservation(Id(frame), feature, id);
+    map.UpdateDescriptor(id);
+  }
+};
+
+TEST_F(SecondVisit, TiesEveryKeyframeOfItsSideToThePlace) {
+  LoopAnswer answer;
+  answer.keyframe = Id(3);
+  answer.matched = Id(1);
+  answer.base_version = core_.map().version();
+  answer.correction_id = 7;
+  answer.kind = LoopAnswer::Kind::kLoop;
+  // The graph has moved the neighbour out of its place: what it sees is looked for beside the loop's
+  // keyframe.
+  const Sim3d aside(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2, 0, 0), 1.0);
+  answer.corrections = {{Id(1), Sim3d()}, {Id(2), aside}, {Id(3), Sim3d()}};
+  core_.OnLoopAnswer(answer);
+  const Keyframe& neighbour = *core_.map().FindKeyframe(Id(2));
+  for (const uint16_t feature : Features(kHalf, 2 * kHalf)) {
+    EXPECT_EQ(neighbour.landmarks[feature], LandmarkId::Make(1, 100u + feature)) << feature;
+  }
 }
 
 }  // namespace
