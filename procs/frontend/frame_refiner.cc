@@ -1,8 +1,7 @@
 #include "frontend/frame_refiner.h"
 
+#include <algorithm>
 #include <utility>
-
-#include "dmslam/optimization/pose_optimization.h"
 
 namespace dmslam {
 namespace {
@@ -13,33 +12,94 @@ constexpr double kMinInlierShare = 0.7;
 }  // namespace
 
 void FrameRefiner::Keep(const TrackedFrame& frame, const FramePose& pose) {
-  Kept kept{pose, {}};
+  Kept kept{pose, {}, frame.features->set};
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].valid() || frame.classes[i] != FeatureClass::kUsed) continue;
     kept.sights.push_back({frame.landmarks[i], frame.features->uv_px[i].cast<float>(),
+                           static_cast<uint16_t>(i),
                            static_cast<uint8_t>(frame.features->set.keypoints[i].octave)});
   }
   kept.sights.shrink_to_fit();  // they stay for long
+  num_features_ += kept.features.keypoints.size();
   frames_.push_back(std::move(kept));
-  if (frames_.size() > max_frames_) frames_.pop_front();
+  Bound();
 }
 
-std::optional<FramePose> FrameRefiner::RefineOne(const Map& map, const Kept& kept) const {
-  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
-  const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(kept.pose.reference);
-  if (!reference || !keyframe_id) return std::nullopt;
+void FrameRefiner::Bound() {
+  if (frames_.size() > options_.max_frames) {
+    num_features_ -= frames_.front().features.keypoints.size();
+    num_without_features_ -= num_without_features_ > 0 ? 1 : 0;
+    frames_.pop_front();
+  }
+  while (num_features_ > options_.max_features && num_without_features_ < frames_.size()) {
+    FeatureSet& oldest = frames_[num_without_features_++].features;
+    num_features_ -= oldest.keypoints.size();
+    oldest = FeatureSet();
+  }
+}
+
+void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
+  std::deque<Kept> others;
+  for (Kept& kept : std::exchange(frames_, {})) {
+    const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
+    if (!reference) continue;
+    (map_id && reference->map_id != *map_id ? others : due_).push_back(std::move(kept));
+  }
+  frames_ = std::move(others);
+  num_features_ = 0;
+  for (const Kept& kept : frames_) num_features_ += kept.features.keypoints.size();
+  num_without_features_ = static_cast<size_t>(std::count_if(
+      frames_.begin(), frames_.end(), [](const Kept& kept) { return kept.features.keypoints.empty(); }));
+}
+
+std::vector<PoseObservation> FrameRefiner::Observations(const Map& map, MapId map_id,
+                                                        const Kept& kept) const {
   std::vector<PoseObservation> observations;
   for (const Sight& sight : kept.sights) {
     const std::optional<LandmarkId> id = map.Resolve(sight.landmark);
     const Landmark* landmark = id ? map.FindLandmark(*id) : nullptr;
-    if (landmark == nullptr || landmark->map_id != reference->map_id) continue;
+    if (landmark == nullptr || landmark->map_id != map_id) continue;
     observations.push_back(
         {landmark->p_world, sight.uv_px.cast<double>(), 1.0 / pyramid_.SigmaSquared(sight.octave), 1.0});
   }
-  if (static_cast<int>(observations.size()) < kMinSights) return std::nullopt;
+  return observations;
+}
+
+/// With what the map has become since: a frame from behind a walker saw little of the map of its time.
+std::optional<std::vector<PoseObservation>> FrameRefiner::SearchAgain(const Map& map, MapId map_id,
+                                                                      const Kept& kept, const Rigid3d& told,
+                                                                      const Search& search) const {
+  if (kept.features.keypoints.empty() || !search) return std::nullopt;
+  TrackedFrame frame(kept.pose.frame_index, kept.pose.stamp_ns,
+                     MakeFrameFeatures(kept.features, camera_, pyramid_));
+  frame.T_cam_world = told;
+  for (const Sight& sight : kept.sights) {
+    const std::optional<LandmarkId> id = map.Resolve(sight.landmark);
+    const Landmark* landmark = id ? map.FindLandmark(*id) : nullptr;
+    if (landmark != nullptr && landmark->map_id == map_id) frame.landmarks[sight.feature] = *id;
+  }
+  if (!search(&frame)) return std::nullopt;
+  std::vector<PoseObservation> observations;
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].valid() || frame.classes[i] != FeatureClass::kUsed) continue;
+    observations.push_back({map.FindLandmark(frame.landmarks[i])->p_world, frame.features->uv_px[i],
+                            1.0 / pyramid_.SigmaSquared(frame.features->set.keypoints[i].octave), 1.0});
+  }
+  return observations;
+}
+
+std::optional<FramePose> FrameRefiner::RefineNext(const Map& map, const Search& search) {
+  const Kept kept = std::move(due_.front());
+  due_.pop_front();
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
+  const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(kept.pose.reference);
+  if (!reference || !keyframe_id) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
-  const PoseOptimizationReport report = OptimizePose(camera_.Ideal(), told, observations);
-  if (!report.usable || report.num_inliers < kMinInlierShare * static_cast<double>(observations.size())) {
+  auto observations = SearchAgain(map, reference->map_id, kept, told, search);
+  if (!observations) observations = Observations(map, reference->map_id, kept);
+  if (static_cast<int>(observations->size()) < kMinSights) return std::nullopt;
+  const PoseOptimizationReport report = OptimizePose(camera_.Ideal(), told, *observations);
+  if (!report.usable || report.num_inliers < kMinInlierShare * static_cast<double>(observations->size())) {
     return std::nullopt;
   }
   const Keyframe& keyframe = *map.FindKeyframe(*keyframe_id);
@@ -51,20 +111,6 @@ std::optional<FramePose> FrameRefiner::RefineOne(const Map& map, const Kept& kep
   pose.reference_scale = keyframe.scale;
   pose.T_cam_world = report.T_cam_world;
   return pose;
-}
-
-std::vector<FramePose> FrameRefiner::Refine(const Map& map, std::optional<MapId> map_id) {
-  std::vector<FramePose> poses;
-  for (Kept& kept : std::exchange(frames_, {})) {
-    const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
-    if (!reference) continue;
-    if (map_id && reference->map_id != *map_id) {
-      frames_.push_back(std::move(kept));
-    } else if (std::optional<FramePose> pose = RefineOne(map, kept)) {
-      poses.push_back(std::move(*pose));
-    }
-  }
-  return poses;
 }
 
 }  // namespace dmslam

@@ -1,7 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <deque>
-#include <memory>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -9,41 +10,62 @@
 #include "dmslam/features/types.h"
 #include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/optimization/pose_optimization.h"
 #include "frontend/tracked_frame.h"
 
 namespace dmslam {
 
-/// What tracked frames saw of the map, kept so that their poses can be optimised once more when the map has
-/// become better than it was at their time. Only used features are kept, some kilobytes a frame.
+struct FrameRefinerOptions {
+  size_t max_frames = 3600;  ///< the oldest is forgotten beyond
+  /// The features of the oldest are forgotten beyond (38 bytes each): these frames are only optimised with
+  /// the landmarks that they saw.
+  size_t max_features = 3'000'000;
+};
+
+/// What tracked frames saw, kept so that their poses can be found once more when the map has become better
+/// and larger than it was at their time.
 class FrameRefiner {
  public:
-  FrameRefiner(const Camera& camera, const Pyramid& pyramid, size_t max_frames)
-      : camera_(camera), pyramid_(pyramid), max_frames_(max_frames) {}
+  /// Looks for more of the map from the frame's pose and with its landmarks; whether that went well.
+  using Search = std::function<bool(TrackedFrame*)>;
 
-  /// Keeps a tracked frame and the pose that was told of it; the oldest is dropped when there are too many.
+  FrameRefiner(const Camera& camera, const Pyramid& pyramid, const FrameRefinerOptions& options = {})
+      : camera_(camera), pyramid_(pyramid), options_(options) {}
+
+  /// Keeps a tracked frame and the pose that was told of it.
   void Keep(const TrackedFrame& frame, const FramePose& pose);
 
-  /// The poses of the frames of map `map_id` (none given: of all), relative to their reference keyframes as
-  /// these are now (state: localised later). A frame whose observations do not agree with the map any more is
-  /// left out. Forgets the frames.
-  std::vector<FramePose> Refine(const Map& map, std::optional<MapId> map_id = std::nullopt);
+  /// Takes the frames of map `map_id` (none given: of all) for RefineNext(); they are told once.
+  void Begin(const Map& map, std::optional<MapId> map_id = std::nullopt);
+  bool IsBusy() const { return !due_.empty(); }
+  /// The pose of the oldest frame that is due, relative to its reference keyframe as that is now (state:
+  /// localised later). None where its observations do not agree with the map any more.
+  std::optional<FramePose> RefineNext(const Map& map, const Search& search);
 
  private:
   struct Sight {
     LandmarkId landmark;
     Eigen::Vector2f uv_px;  ///< undistorted
+    uint16_t feature = 0;
     uint8_t octave = 0;
   };
   struct Kept {
     FramePose pose;
     std::vector<Sight> sights;
+    FeatureSet features;  ///< empty: forgotten
   };
-  std::optional<FramePose> RefineOne(const Map& map, const Kept& kept) const;
+  void Bound();
+  std::vector<PoseObservation> Observations(const Map& map, MapId map_id, const Kept& kept) const;
+  std::optional<std::vector<PoseObservation>> SearchAgain(const Map& map, MapId map_id, const Kept& kept,
+                                                          const Rigid3d& told, const Search& search) const;
 
   Camera camera_;
   Pyramid pyramid_;
-  size_t max_frames_;
+  FrameRefinerOptions options_;
   std::deque<Kept> frames_;
+  std::deque<Kept> due_;
+  size_t num_features_ = 0;          ///< of all frames kept
+  size_t num_without_features_ = 0;  ///< oldest frames whose features are forgotten
 };
 
 }  // namespace dmslam

@@ -51,6 +51,15 @@ class Refining : public testing::Test {
     told_.T_cam_reference.translation += Eigen::Vector3d(0.03, -0.02, 0.02);  // as an immature map had it
   }
 
+  std::vector<FramePose> Refine(FrameRefiner& refiner, const FrameRefiner::Search& search = {}) const {
+    std::vector<FramePose> poses;
+    refiner.Begin(map_);
+    while (refiner.IsBusy()) {
+      if (auto pose = refiner.RefineNext(map_, search)) poses.push_back(*pose);
+    }
+    return poses;
+  }
+
   Map map_;
   Rigid3d truth_;
   TrackedFrame frame_;
@@ -58,34 +67,82 @@ class Refining : public testing::Test {
 };
 
 TEST_F(Refining, PoseComesFromTheMapAsItIsNow) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid(), 10);
+  FrameRefiner refiner(map_.camera(), map_.pyramid());
   refiner.Keep(frame_, told_);
-  const std::vector<FramePose> refined = refiner.Refine(map_);
+  const std::vector<FramePose> refined = Refine(refiner);
   ASSERT_EQ(refined.size(), 1U);
   EXPECT_EQ(refined[0].frame_index, 5U);
   EXPECT_EQ(refined[0].state, TrackingState::kLocalizedLater);
   EXPECT_LT((refined[0].T_cam_reference.translation - truth_.translation).norm(), 1e-3);
-  EXPECT_TRUE(refiner.Refine(map_).empty()) << "frames are told once";
+  EXPECT_TRUE(Refine(refiner).empty()) << "frames are told once";
 }
 
 TEST_F(Refining, FrameThatTheMapContradictsIsLeftOut) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid(), 10);
+  FrameRefiner refiner(map_.camera(), map_.pyramid());
   refiner.Keep(frame_, told_);
   Random random(3);
   for (const LandmarkId id : map_.LandmarkIdsSorted()) {
     const Eigen::Vector3d shift(random.Uniform(-1, 1), random.Uniform(-1, 1), 0);
     map_.SetPosition(id, map_.FindLandmark(id)->p_world + shift);
   }
-  EXPECT_TRUE(refiner.Refine(map_).empty());
+  EXPECT_TRUE(Refine(refiner).empty());
 }
 
-TEST_F(Refining, OldestIsDroppedBeyondTheBound) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid(), 2);
+/// Tells of every landmark where it is.
+bool FindAll(const std::vector<LandmarkId>& ids, TrackedFrame* frame) {
+  frame->landmarks = ids;
+  frame->classes.assign(ids.size(), FeatureClass::kUsed);
+  return true;
+}
+
+TEST_F(Refining, WhatTheMapHasWonSinceCounts) {
+  const std::vector<LandmarkId> ids = frame_.landmarks;
+  for (size_t i = 20; i < ids.size(); ++i) frame_.landmarks[i] = {};  // too few to be refined with
+  FrameRefiner refiner(map_.camera(), map_.pyramid());
+  refiner.Keep(frame_, told_);
+  int known = 0;
+  const auto refined = Refine(refiner, [&](TrackedFrame* frame) {
+    for (const LandmarkId id : frame->landmarks) known += id.valid();
+    return FindAll(ids, frame);
+  });
+  EXPECT_EQ(known, 20);
+  ASSERT_EQ(refined.size(), 1U);
+  EXPECT_LT((refined[0].T_cam_reference.translation - truth_.translation).norm(), 1e-3);
+}
+
+TEST_F(Refining, AFailedSearchLeavesWhatTheFrameSaw) {
+  FrameRefiner refiner(map_.camera(), map_.pyramid());
+  refiner.Keep(frame_, told_);
+  const auto refined = Refine(refiner, [](TrackedFrame* frame) {
+    frame->ClearMatches();
+    return false;
+  });
+  ASSERT_EQ(refined.size(), 1U);
+  EXPECT_LT((refined[0].T_cam_reference.translation - truth_.translation).norm(), 1e-3);
+}
+
+TEST_F(Refining, FeaturesOfTheOldestAreForgottenBeyondTheBound) {
+  FrameRefiner refiner(map_.camera(), map_.pyramid(), {.max_features = 2 * kLandmarks});
   for (uint32_t i = 0; i < 4; ++i) {
     told_.frame_index = i;
     refiner.Keep(frame_, told_);
   }
-  const std::vector<FramePose> refined = refiner.Refine(map_);
+  std::vector<uint32_t> searched;
+  const auto refined = Refine(refiner, [&](TrackedFrame* frame) {
+    searched.push_back(frame->index);
+    return false;
+  });
+  EXPECT_EQ(searched, (std::vector<uint32_t>{2, 3}));
+  EXPECT_EQ(refined.size(), 4U);
+}
+
+TEST_F(Refining, OldestIsDroppedBeyondTheBound) {
+  FrameRefiner refiner(map_.camera(), map_.pyramid(), {.max_frames = 2});
+  for (uint32_t i = 0; i < 4; ++i) {
+    told_.frame_index = i;
+    refiner.Keep(frame_, told_);
+  }
+  const std::vector<FramePose> refined = Refine(refiner);
   ASSERT_EQ(refined.size(), 2U);
   EXPECT_EQ(refined[0].frame_index, 2U);
   EXPECT_EQ(refined[1].frame_index, 3U);

@@ -41,7 +41,7 @@ FrontendCore::FrontendCore(Setup setup)
       localize_only_(setup.localize_only),
       catch_up_in_portions_(setup.catch_up_in_portions),
       map_(setup.camera, setup.pyramid),
-      refiner_(setup.camera, setup.pyramid, static_cast<size_t>(setup.options.max_refined_frames)),
+      refiner_(setup.camera, setup.pyramid, setup.options.refiner),
       extractor_(setup.extractor),
       first_map_extractor_(WithMoreFeatures(setup.extractor, setup.options.initializer_feature_factor)),
       initializer_options_(setup.initializer),
@@ -71,13 +71,22 @@ FirstMapSearch FrontendCore::MakeSearch() const {
 }
 
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
+  while (IsRefining()) RefineNext();
   map_.Apply(delta);
   relocalizer_.Update(map_);
   if (delta.progress.settled >= awaited_) awaited_ = {};
   const bool at_the_end = delta.event == MapEvent::kGloballyAdjusted && !delta.about.valid();
   if (!at_the_end) return;
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
-  for (FramePose& pose : refiner_.Refine(map_, delta.map_id)) refined_.push_back(std::move(pose));
+  refiner_.Begin(map_, delta.map_id);
+}
+
+void FrontendCore::RefineNext() {
+  const auto search = [this](TrackedFrame* frame) {
+    tracker_.SetMotionPrior(std::nullopt, 1.0);
+    return tracker_.TrackLocalMap(map_, false, frame).ok;
+  };
+  if (std::optional<FramePose> pose = refiner_.RefineNext(map_, search)) refined_.push_back(std::move(*pose));
 }
 
 void FrontendCore::Resume() {
@@ -169,6 +178,7 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   if (!catch_up_in_portions_) {
     TrackedFrame present = std::move(frame_);
     while (IsBehind()) CatchUp(events);
+    while (IsRefining()) RefineNext();
     frame_ = std::move(present);
     state_ == TrackingState::kNotInitialized ? Initialize(events) : Track(events);
   } else {
@@ -465,6 +475,7 @@ bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double 
 
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
   while (IsBehind()) CatchUp(events);
+  while (IsRefining()) RefineNext();
   LaterNeighbours near;
   for (auto it = unplaced_.rbegin(); it != unplaced_.rend();
        ++it) {  // from the newest back: the map lies after them
@@ -492,8 +503,9 @@ void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
     events->push_back(pose);
   }
   unplaced_.clear();
+  refiner_.Begin(map_);  // of maps that nobody adjusted
+  while (IsRefining()) RefineNext();
   for (FramePose& pose : std::exchange(refined_, {})) events->push_back(std::move(pose));
-  for (FramePose& pose : refiner_.Refine(map_)) events->push_back(std::move(pose));
 }
 
 }  // namespace dmslam

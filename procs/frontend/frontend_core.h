@@ -66,6 +66,11 @@ class FrontendCore {
 
   /// A record of the map stream; call between frames.
   void ApplyMapDelta(const MapDelta& delta);
+  /// After the record that tells of maps adjusted at the end, and before the next one: whether frames wait
+  /// for their last poses, and finds that of one (applying a record or finishing does it for all that are
+  /// left).
+  bool IsRefining() const { return refiner_.IsBusy(); }
+  void RefineNext();
   /// The replica is void: a fresh map stream, or a snapshot, begins.
   void ForgetMap();
   /// Joins a system that has been running: it is lost in the newest map that it was given.

@@ -143,7 +143,7 @@ size_t FrontendNode::NumReadyRecords(bool all) const {
 
 /// Only what is applied is accepted: what is held back could not be handed over.
 void FrontendNode::ApplyHeldRecords(size_t count) {
-  for (; count > 0; --count) {
+  for (; count > 0 && !core_->IsRefining(); --count) {
     const HeldRecord& held = held_.front();
     if (held.begins_anew) core_->ForgetMap();
     core_->ApplyMapDelta(held.delta);
@@ -169,6 +169,10 @@ bool FrontendNode::AwaitsSavedMap() const {
 }
 
 bool FrontendNode::WorkOnce() {
+  if (core_->IsRefining()) {
+    core_->RefineNext();
+    return true;
+  }
   TakeMapRecords(finished_ || asked_to_adjust_);
   if (finished_) {
     if (!options_.HasPeer("mapper") || MapIsOver(core_->map(), *map_reader_)) Stop();

@@ -3,6 +3,8 @@
 #include <optional>
 #include <string>
 
+#include "frontend/frame_refiner.h"
+
 namespace dmslam {
 
 /// Tracking (paper 2.3; ORB-SLAM2's constants where nothing better was found).
@@ -67,9 +69,8 @@ struct FrontendOptions {
   double trial_s = 0.5;          ///< a first map must predict the frames of this time, else it is dropped
   double new_map_after_s = 5.0;  ///< lost for so long: a new map is started, the old one is kept
   int evidence_every_frames = 10;
-  int max_kept_frames = 300;  ///< unplaced frames kept for localisation at the end
-  int max_refined_frames =
-      3600;  ///< tracked frames whose observations are kept to refine their poses at the end
+  int max_kept_frames = 300;    ///< unplaced frames kept for localisation at the end
+  FrameRefinerOptions refiner;  ///< of the poses told at the end
 };
 
 }  // namespace dmslam
