@@ -129,6 +129,22 @@ draw_selections() {
   progress_end
 }
 
+# time_methods LINES...: the paper's Table 1, on the first sequence in which somebody walks.
+time_methods() {
+  local line folder sequence camera rest
+  [[ ! -s $out/table1.json ]] || return 0
+  for line in "$@"; do
+    IFS=$'\t' read -r folder sequence _ camera rest <<<"$line"
+    [[ $folder == *walk* ]] || continue
+    [[ $camera == /* ]] || camera=$root/$camera
+    progress_line "times of the methods"
+    start "$bin/dmslam-static" time --sequence "$sequence" --camera "$camera" --json "$out/table1.json" \
+      >"$out/table1.log" 2>&1 || { progress_end; say "no Table 1: $(tail -n 1 "$out/table1.log")"; }
+    break
+  done
+  progress_end
+}
+
 # Sets `command` to what runs a sequence.
 choose_command() {
   if [[ -n $runner ]]; then command=("$runner" --lockstep)
@@ -207,7 +223,7 @@ main() {
     local lines=()
     [[ -z $plan ]] || mapfile -t lines <<<"$plan"
     ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
-    [[ -n $runner ]] || draw_selections ${lines[@]+"${lines[@]}"}
+    [[ -n $runner ]] || { draw_selections ${lines[@]+"${lines[@]}"}; time_methods ${lines[@]+"${lines[@]}"}; }
     run_all ${lines[@]+"${lines[@]}"}
   fi
   "$bin/dmslam-report" write --out "$out" ${publish:+--publish "$publish"}

@@ -34,10 +34,19 @@ for table in pairs windows system starts; do
   check "judge: $table as JSON" python3 -c 'import json, sys; json.load(open(sys.argv[1]))' "$work/$table.json"
 done
 
+check "time: measures" "$static" time --sequence "$synthetic" --camera "$camera" --rounds 3 --json "$work/time.json"
+check "time: all made their iterations" python3 -c '
+import json, sys
+t = json.load(open(sys.argv[1]))
+assert t["iterations"]["ransac"] == 2000 and t["iterations"]["arsac"] <= 2000 and 0 < t["iterations"]["dlrsac"] <= 2000, t
+assert min(t["ransac_ms"], t["arsac_ms"], t["dlrsac_ms"]) > 0 and t["machine"], t
+' "$work/time.json"
+
 refused "unknown.*magsac" "$static" --sequence "$synthetic" --camera "$camera" --method magsac --out "$work/no"
 refused "give two images" "$static" "$synthetic/rgb.txt" --camera "$camera" --out "$work/no"
 refused "gap.*none" "$static" --sequence "$synthetic" --camera "$camera" --gap none --out "$work/no"
 refused "give --sequence" "$static" "$synthetic/rgb.txt" "$synthetic/rgb.txt" --gated --camera "$camera" --out "$work/no"
 refused "unknown table" "$static" judge --sequence "$synthetic" --camera "$camera" --table legs
+refused "fewer frames" "$static" time --sequence "$synthetic" --camera "$camera" --gap 5000
 refused "no_such" "$static" judge --sequence "$work/no_such" --camera "$camera"
 finish

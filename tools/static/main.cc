@@ -16,6 +16,7 @@
 #include "dmslam/util/version.h"
 #include "draw.h"
 #include "judge.h"
+#include "timing.h"
 
 namespace dmslam {
 namespace {
@@ -49,6 +50,16 @@ struct JudgeSettings {
   int features = 3000;
   uint64_t seed = 1;
   bool no_window = false;
+};
+
+struct TimeSettings {
+  std::string sequence;
+  std::string camera;
+  std::string json;
+  int gap = 5;
+  int features = 3000;
+  int matches = 1000;
+  TimingOptions timing;
 };
 
 Camera ChooseCamera(const std::string& file, const std::string& sequence) {
@@ -304,6 +315,66 @@ void RunJudge(const JudgeSettings& settings) {
   if (!json_file) throw InputError(settings.json + ": cannot be written");
 }
 
+/// Matches of the pair in the middle of the sequence, spread evenly over them where there are more.
+std::vector<Match> MatchesToTime(const TimeSettings& settings, const Camera& camera) {
+  JudgedSequence sequence(settings.sequence, camera, settings.features);
+  const size_t gap = static_cast<size_t>(settings.gap);
+  if (sequence.size() <= gap) throw InputError(settings.sequence + ": fewer frames than --gap asks for");
+  const size_t frame = (sequence.size() - gap) / 2;
+  MatchingOptions matching;
+  matching.use_window = matching.check_orientation = false;
+  matching.max_ratio = 1.0;
+  FeatureMatcher matcher;
+  const auto all =
+      MatchFrames(*sequence.Features(frame), *sequence.Features(frame + gap), matching, &matcher);
+  const size_t most = static_cast<size_t>(settings.matches);
+  if (all.size() <= most) return all;
+  std::vector<Match> matches;
+  for (size_t k = 0; k < most; ++k) matches.push_back(all[k * all.size() / most]);
+  return matches;
+}
+
+void RunTime(const TimeSettings& settings) {
+  const Camera camera = ChooseCamera(settings.camera, settings.sequence);
+  const std::vector<Match> matches = MatchesToTime(settings, camera);
+  const MethodTimes times = TimeMethods(matches, camera, settings.timing);
+  const std::string machine =
+      ProcessorName() + ", " + std::to_string(matches.size()) + " matches, one thread";
+  std::cout << "| | RANSAC | ARSAC | DLRSAC |\n|---|---:|---:|---:|\n| " << machine << " [ms] | "
+            << times.ransac_ms << " | " << times.arsac_ms << " | " << times.dlrsac_ms << " |\n";
+  if (settings.json.empty()) return;
+  const nlohmann::json json{{"ransac_ms", times.ransac_ms},   {"arsac_ms", times.arsac_ms},
+                            {"dlrsac_ms", times.dlrsac_ms},   {"machine", machine},
+                            {"iterations", times.iterations}, {"matches", matches.size()}};
+  std::ofstream file(settings.json);
+  file << json.dump(2) << '\n';
+  if (!file) throw InputError(settings.json + ": cannot be written");
+}
+
+void AddTime(CLI::App& app, TimeSettings& s) {
+  CLI::App* time = app.add_subcommand(
+      "time",
+      "Time the methods as the paper's Table 1 does: fundamental matrices, so many iterations in total");
+  time->add_option("--sequence", s.sequence, "TUM RGB-D folder; the pair in its middle is matched")
+      ->required();
+  time->add_option("--camera", s.camera, "Camera file (YAML)");
+  time->add_option("--gap", s.gap, "Frames between the two of the pair")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  time->add_option("--features", s.features, "Most features per image")->capture_default_str();
+  time->add_option("--matches", s.matches, "Most matches")
+      ->check(CLI::Range(8, 100000))
+      ->capture_default_str();
+  time->add_option("--iterations", s.timing.iterations, "In total; DLRSAC shares them among its cells")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  time->add_option("--rounds", s.timing.rounds, "Measurements of each method, of which the median is told")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  time->add_option("--json", s.json, "File for the same numbers, as the report reads them");
+  time->callback([&s] { RunTime(s); });
+}
+
 void AddOptions(CLI::App& app, Settings& s) {
   app.add_option("images", s.images, "Two images of the same camera")->expected(0, 2);
   app.add_option("--sequence", s.sequence, "TUM RGB-D folder, instead of two images");
@@ -378,6 +449,8 @@ int main(int argc, char** argv) {
   dmslam::JudgeSettings judge;
   dmslam::AddOptions(app, settings);
   dmslam::AddJudge(app, judge);
+  dmslam::TimeSettings time;
+  dmslam::AddTime(app, time);
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty()) dmslam::RunSelection(settings);
