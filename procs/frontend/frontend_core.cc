@@ -81,6 +81,8 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   refiner_.Begin(map_, delta.map_id);
 }
 
+void FrontendCore::RefineRest() { refiner_.Begin(map_); }
+
 void FrontendCore::RefineNext() {
   const auto search = [this](TrackedFrame* frame) {
     tracker_.SetMotionPrior(std::nullopt, 1.0);
@@ -138,13 +140,13 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
 
 // ---- Initialisation ----
 
-void FrontendCore::KeepUnplaced() {
-  unplaced_.push_back(frame_);
+void FrontendCore::KeepUnplaced(TrackedFrame frame) {
+  unplaced_.push_back(std::move(frame));
   if (static_cast<int>(unplaced_.size()) > options_.max_kept_frames) unplaced_.pop_front();
 }
 
 void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
-  KeepUnplaced();
+  KeepUnplaced(frame_);
   const InitializerReport report = initializer_({frame_.index, frame_.stamp_ns, frame_.features});
   TrackingReport status;
   status.reason = report.reason.c_str();
@@ -165,7 +167,7 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
 void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   const Keyframe* second = map_.FindKeyframe(initial_second_);
   if (second == nullptr) {
-    KeepUnplaced();
+    KeepUnplaced(frame_);
     if (!awaited_.valid()) {  // settled without it: the mapper refused the proposal
       GiveUpMap(true, "the mapper refused the first map", events);
     }
@@ -178,7 +180,6 @@ void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   if (!catch_up_in_portions_) {
     TrackedFrame present = std::move(frame_);
     while (IsBehind()) CatchUp(events);
-    while (IsRefining()) RefineNext();
     frame_ = std::move(present);
     state_ == TrackingState::kNotInitialized ? Initialize(events) : Track(events);
   } else {
@@ -213,8 +214,9 @@ void FrontendCore::AwaitTurn(std::vector<FrontendEvent>* events) {
 void FrontendCore::CatchUp(std::vector<FrontendEvent>* events) {
   frame_ = std::move(behind_.front());
   behind_.pop_front();
-  if (state_ == TrackingState::kNotInitialized) {
-    KeepUnplaced();
+  if (map_.keyframes().empty()) {
+    KeepUnplaced(frame_);
+    GiveUpMap(true, "the mapper began with an empty map", events);
   } else {
     Track(events);
   }
@@ -337,7 +339,7 @@ void FrontendCore::Coast() {
 }
 
 void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<FrontendEvent>* events) {
-  KeepUnplaced();
+  KeepUnplaced(frame_);
   if (weak_pose_) Coast();
   if (state_ == TrackingState::kTrial) {
     GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason, events);
@@ -358,6 +360,7 @@ void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<F
   ++counters_.resets;
   if (map_id_ != 0) events->push_back(MapReset{map_id_, drop, reason});
   NextMapId();
+  for (TrackedFrame& frame : std::exchange(behind_, {})) KeepUnplaced(std::move(frame));
   tracker_.Reset();
   velocity_.reset();
   coasting_.reset();
@@ -503,7 +506,7 @@ void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
     events->push_back(pose);
   }
   unplaced_.clear();
-  refiner_.Begin(map_);  // of maps that nobody adjusted
+  RefineRest();
   while (IsRefining()) RefineNext();
   for (FramePose& pose : std::exchange(refined_, {})) events->push_back(std::move(pose));
 }

@@ -71,6 +71,8 @@ class FrontendCore {
   /// left).
   bool IsRefining() const { return refiner_.IsBusy(); }
   void RefineNext();
+  /// Makes those wait too that no record told of: their maps were not adjusted.
+  void RefineRest();
   /// The replica is void: a fresh map stream, or a snapshot, begins.
   void ForgetMap();
   /// Joins a system that has been running: it is lost in the newest map that it was given.
@@ -90,6 +92,7 @@ class FrontendCore {
   void Finish(std::vector<FrontendEvent>* events);
   /// Whether frames wait to be tracked, and tracks the oldest of them (there must be one).
   bool IsBehind() const { return !behind_.empty(); }
+  size_t num_behind() const { return behind_.size(); }
   void CatchUp(std::vector<FrontendEvent>* events);
 
   TrackingState state() const { return state_; }
@@ -132,7 +135,7 @@ class FrontendCore {
   FramePose MakePose(TrackingState state, const TrackingReport& report) const;
   TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
   bool LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near);
-  void KeepUnplaced();
+  void KeepUnplaced(TrackedFrame frame);
   void NextMapId();
   void Coast();
   void BeginTrial(const Keyframe& second);

@@ -13,6 +13,7 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
+constexpr size_t kMaxBehind = 15;       // frames: half a second
 constexpr std::ptrdiff_t kPortion = 8;  // records told at once at the end
 constexpr int64_t kPortionEveryNs = 8'000'000;
 constexpr int64_t kAskAgainNs = 10'000'000'000;
@@ -68,6 +69,10 @@ bool FrontendNode::ReadyToWrite() {
 
 Version FrontendNode::HandOverVersion() {
   TakeMapRecords(true);
+  while (core_->IsRefining()) {  // what is taken must be applied
+    core_->RefineNext();
+    ApplyHeldRecords(NumReadyRecords(true));
+  }
   return applied_;
 }
 
@@ -171,7 +176,7 @@ bool FrontendNode::AwaitsSavedMap() const {
 bool FrontendNode::WorkOnce() {
   if (core_->IsRefining()) {
     core_->RefineNext();
-    return true;
+    return false;  // one in a turn: it takes a while, and signals and elections are for between
   }
   TakeMapRecords(finished_ || asked_to_adjust_);
   if (finished_) {
@@ -180,13 +185,21 @@ bool FrontendNode::WorkOnce() {
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
-  if (waiting_) return ProcessWaiting();
+  if (waiting_ && !FallsBehind()) return ProcessWaiting();
   if (core_->IsBehind()) return CatchUp();
   if (!end_) return false;
-  return MapsAreAdjusted() ? Finish() : false;
+  if (!MapsAreAdjusted()) return false;
+  if (!std::exchange(rest_begun_, true)) core_->RefineRest();
+  return core_->IsRefining() ? true : Finish();
 }
 
-/// In the time between two images.
+/// Catching up has the time between two images. Where that is not enough it comes first until all is done,
+/// and images are skipped.
+bool FrontendNode::FallsBehind() {
+  hurries_ = core_->IsBehind() && (hurries_ || core_->num_behind() > kMaxBehind);
+  return hurries_;
+}
+
 bool FrontendNode::CatchUp() {
   std::vector<FrontendEvent> events;
   core_->CatchUp(&events);

@@ -30,7 +30,10 @@ class FrontendNode : public StreamNode {
   bool ReadyToWrite() override;
   void OnWriterOpen() override;
   bool WorkOnce() override;
-  int64_t WorkDeadline() const override { return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX; }
+  int64_t WorkDeadline() const override {
+    if (core_ && core_->IsRefining()) return 0;
+    return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX;
+  }
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
 
@@ -59,6 +62,7 @@ class FrontendNode : public StreamNode {
   bool AwaitsSavedMap() const;
   bool ProcessWaiting();
   bool CatchUp();
+  bool FallsBehind();
   bool DecodeImage(const Frame& frame);
   void PublishEvents(const std::vector<FrontendEvent>& events);
   void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);
@@ -86,7 +90,9 @@ class FrontendNode : public StreamNode {
   std::optional<std::vector<FrontendEvent>> last_events_;  ///< what is told at the end, in portions
   size_t last_told_ = 0;                                   ///< of them, already
   int64_t next_portion_ns_ = 0;
-  bool finished_ = false;  ///< everything is said; stays until the mapper has ended
+  bool hurries_ = false;     ///< catches up before it takes another image
+  bool rest_begun_ = false;  ///< the last frames wait for their last poses
+  bool finished_ = false;    ///< everything is said; stays until the mapper has ended
   bool frame_open_ =
       false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
   int64_t last_index_ = -1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -20,6 +21,7 @@ constexpr int kPlaceNeighboursMatched = 5;
 constexpr MatchOptions kMatchLandmarks = {.max_ratio = 0.8, .check_orientation = false};
 constexpr int kMaxPoseIterations = 1000;
 constexpr size_t kMinDepthRatios = 5;
+constexpr double kMaxScaleError = 0.03;  // standard error of a scale to be taken, as a share of it
 constexpr ViewLimits kSurelySeen{.min_view_cos = 0.7, .distance_slack = 1.0, .border_px = 0};
 
 size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
@@ -84,6 +86,7 @@ Sim3d WithScaleOfDepths(const std::vector<Sim3Match>& matches, const Sim3Report&
 }
 
 /// How much larger the keyframe's own map is than the place's: from landmarks of both on the same features.
+/// None where these are too few or do not agree.
 std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
                                    const std::vector<PlaceMatch>& matches) {
   std::vector<double> ratios;
@@ -95,9 +98,12 @@ std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, con
     if (depth_mine > 0 && depth_theirs > 0) ratios.push_back(depth_mine / depth_theirs);
   }
   if (ratios.size() < kMinDepthRatios) return std::nullopt;
-  const auto middle = ratios.begin() + static_cast<ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  std::sort(ratios.begin(), ratios.end());
+  const double median = ratios[ratios.size() / 2];
+  const double quartiles = ratios[ratios.size() * 3 / 4] - ratios[ratios.size() / 4];
+  const double error =
+      0.93 * quartiles / std::sqrt(static_cast<double>(ratios.size()));  // of a normal median
+  return error <= kMaxScaleError * median ? std::optional(median) : std::nullopt;
 }
 
 template <typename... Values>
@@ -250,8 +256,16 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   if (report.success) return report.S_cam1_cam2;
   const std::string pairs =
       Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
-  const auto similarity =
-      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
+  if (static_cast<int>(matches.size()) >= options_.min_sim3_inliers) {
+    *why = pairs;
+    return std::nullopt;
+  }
+  std::vector<PlaceMatch> seen_matches;
+  for (const PlaceMatch& match : support.matches) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    if (!mine.valid() || IsStatic(map.FindLandmark(mine))) seen_matches.push_back(match);
+  }
+  const auto similarity = SimilarityFromPose(map, keyframe, place, seen_matches, S_keyframe_place.scale, why);
   if (!similarity) *why = pairs + "; " + *why;
   return similarity;
 }

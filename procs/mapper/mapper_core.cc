@@ -340,7 +340,8 @@ void MapperCore::Correct(const LoopAnswer& answer) {
   for (const auto& c : answer.corrections) corrections[c.keyframe] = c.corrected_from_base;
   std::map<LandmarkId, Eigen::Vector3d> offsets;
   for (const auto& o : answer.landmark_offsets) offsets[o.landmark] = o.offset_world;
-  const LoopSide side = answer.kind == LoopAnswer::Kind::kLoop ? SideOf(answer.keyframe) : LoopSide();
+  const LoopSide side =
+      answer.kind == LoopAnswer::Kind::kLoop ? SideOf(answer.keyframe, answer.matched) : LoopSide();
 
   for (const LandmarkId id : map_.LandmarkIdsSorted()) {
     const Landmark& landmark = *map_.FindLandmark(id);
@@ -364,11 +365,18 @@ void MapperCore::Correct(const LoopAnswer& answer) {
 
 /// The keyframe of a loop and its neighbours, where they stand to it: of what lies between them the loop says
 /// nothing new, while the corrected poses also share in what the graph has spread.
-MapperCore::LoopSide MapperCore::SideOf(KeyframeId keyframe) const {
+MapperCore::LoopSide MapperCore::SideOf(KeyframeId keyframe, KeyframeId place) const {
   const std::optional<KeyframeId> here = map_.ResolveKeyframe(keyframe);
   if (!here) return {};
   std::vector<KeyframeId> ids = map_.BestCovisible(*here, kMaxLoopSide, options_.min_covisibility);
   ids.push_back(*here);
+  // Who sees the place already is of that side.
+  const std::optional<KeyframeId> there = map_.ResolveKeyframe(place);
+  if (there) {
+    std::erase_if(ids, [&](KeyframeId id) {
+      return id == *there || (id != *here && map_.FindKeyframe(*there)->covisible.contains(id));
+    });
+  }
   const Keyframe& middle = *map_.FindKeyframe(*here);
   LoopSide side;
   for (const KeyframeId id : ids) {
@@ -388,7 +396,7 @@ void MapperCore::Connect(const LoopAnswer& answer, const LoopSide& side) {
     Reroot(*here, *there);
   }
   map_.AddLoopEdge(*here, *there);
-  const std::vector<LandmarkId> place = LandmarksOfPlace(map_, *there, options_.min_covisibility);
+  std::vector<LandmarkId> place = LandmarksOfPlace(map_, *there, options_.min_covisibility);
   for (const auto& fusion : answer.fusions) {
     const auto gone = map_.Resolve(fusion.from), kept = map_.Resolve(fusion.into);
     if (gone && kept && *gone != *kept) map_.Fuse(*gone, *kept);
@@ -397,6 +405,9 @@ void MapperCore::Connect(const LoopAnswer& answer, const LoopSide& side) {
   // image would leave it free to turn about them.
   const Keyframe& middle = *map_.FindKeyframe(*here);
   for (const auto& [id, to] : side) {
+    for (LandmarkId& landmark : place) landmark = map_.Resolve(landmark).value_or(landmark);
+    std::sort(place.begin(), place.end());
+    place.erase(std::unique(place.begin(), place.end()), place.end());
     const Rigid3d T_cam_here(to.T_cam_here.rotation, to.T_cam_here.translation * (middle.scale / to.scale));
     counters_.fusions += static_cast<uint64_t>(
         FuseInto(map_, id, T_cam_here * middle.T_cam_world, place, options_.fuse_radius_px, options_));

@@ -96,7 +96,7 @@ class MapperCore {
   void ScaleToUnitDepth(MapId map_id, KeyframeId first);
   std::string WhyRefused(const LoopAnswer& answer) const;
   void Correct(const LoopAnswer& answer);
-  LoopSide SideOf(KeyframeId keyframe) const;
+  LoopSide SideOf(KeyframeId keyframe, KeyframeId place) const;
   void Connect(const LoopAnswer& answer, const LoopSide& side);
   void Reroot(KeyframeId id, KeyframeId parent);
   void JoinMaps(MapId from, MapId into);

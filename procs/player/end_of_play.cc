@@ -25,7 +25,7 @@ std::optional<int> EndOfPlay::ExitCode(int64_t now_ns, bool stopped) const {
     return mapper_done_ || mapper_silent ? std::optional(0) : std::nullopt;
   }
   if (stopped && now_ns - since_ns_ > kNobodyWhenStoppedNs) return 0;
-  if (now_ns - since_ns_ > kNobodyNs) return 5;
+  if (now_ns - std::max(frontend_heard_ns_, since_ns_) > kNobodyNs) return 5;
   return std::nullopt;
 }
 

@@ -13,6 +13,8 @@ namespace dmslam {
 class EndOfPlay {
  public:
   void OnFrontendHeard() { heard_ = true; }
+  /// A frontend of this session is alive: it may still be tracking, adjusting or telling its last poses.
+  void OnFrontendStatus(int64_t now_ns) { frontend_heard_ns_ = now_ns; }
   void OnMapperStatus(const MapperStatus& status, int64_t now_ns) {
     mapper_heard_ns_ = now_ns;
     mapper_done_ = status.state == MapperStatus::State::kDone;
@@ -32,7 +34,7 @@ class EndOfPlay {
 
  private:
   bool heard_ = false, mapper_done_ = false;
-  int64_t mapper_heard_ns_ = 0, since_ns_ = 0, due_ns_ = 0;
+  int64_t frontend_heard_ns_ = 0, mapper_heard_ns_ = 0, since_ns_ = 0, due_ns_ = 0;
 };
 
 }  // namespace dmslam

@@ -27,6 +27,7 @@ LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<L
     : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
   context_.bus->Subscribe(channels::kFrameDone);
   context_.bus->Subscribe(channels::kMapperStatus);
+  context_.bus->Subscribe(channels::kFrontendStatus);
   context_.bus->SetHandler(
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
   if (context_.watch) context_.watch(source_->fd(), [this] { TakeFrame(); });
@@ -43,6 +44,11 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
     const auto status = wire::Decode<MapperStatus>(bytes);
     if (!status || status->head.session != options_.session) return;
     end_.OnMapperStatus(*status, context_.now_ns());
+    return;
+  }
+  if (channel == channels::kFrontendStatus) {
+    const auto status = wire::Decode<FrontendStatus>(bytes);
+    if (status && status->head.session == options_.session) end_.OnFrontendStatus(context_.now_ns());
     return;
   }
   const auto done = wire::Decode<FrameDone>(bytes);

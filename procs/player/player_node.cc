@@ -82,6 +82,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
   ground_truth_ = source_->GroundTruth();
   context_.bus->Subscribe(channels::kFrameDone);
   context_.bus->Subscribe(channels::kMapperStatus);
+  context_.bus->Subscribe(channels::kFrontendStatus);
   context_.bus->SetHandler(
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
   start_ns_ = context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
@@ -100,6 +101,9 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
     const auto status = wire::Decode<MapperStatus>(bytes);
     if (!status || status->head.session != options_.session) return;
     end_.OnMapperStatus(*status, context_.now_ns());
+  } else if (channel == channels::kFrontendStatus) {
+    const auto status = wire::Decode<FrontendStatus>(bytes);
+    if (status && status->head.session == options_.session) end_.OnFrontendStatus(context_.now_ns());
   }
 }
 

@@ -338,6 +338,12 @@ void RunTime(const TimeSettings& settings) {
   const Camera camera = ChooseCamera(settings.camera, settings.sequence);
   const std::vector<Match> matches = MatchesToTime(settings, camera);
   const MethodTimes times = TimeMethods(matches, camera, settings.timing);
+  for (const auto& [method, iterations] : times.iterations) {
+    if (iterations > 0) continue;
+    throw InputError(settings.sequence + ": " + method + " made no iterations with the " +
+                     std::to_string(matches.size()) +
+                     " matches of the pair in the middle; give another --gap, or a sequence that moves");
+  }
   const std::string machine =
       ProcessorName() + ", " + std::to_string(matches.size()) + " matches, one thread";
   std::cout << "| | RANSAC | ARSAC | DLRSAC |\n|---|---:|---:|---:|\n| " << machine << " [ms] | "

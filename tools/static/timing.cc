@@ -17,6 +17,7 @@ SamplingOptions Sampling(int iterations) {
   sampling.kind = ModelKind::kFundamental;
   sampling.max_iterations = iterations;
   sampling.stop_confidence = 0;
+  sampling.refit_rounds = 0;  // sampling alone
   return sampling;
 }
 

@@ -15,8 +15,8 @@ struct TimingOptions {
   int rounds = 15;        ///< the methods take turns
 };
 
-/// Times of the paper's Table 1 [ms]: fundamental matrices from eight points, no early stop, DLRSAC as the
-/// paper writes it; one thread, medians.
+/// Times of the paper's Table 1 [ms]: fundamental matrices from eight points, no early stop, no refits,
+/// DLRSAC as the paper writes it; one thread, medians.
 struct MethodTimes {
   double ransac_ms = 0;
   double arsac_ms = 0;
