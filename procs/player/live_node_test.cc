@@ -125,6 +125,25 @@ TEST_F(LiveNodeTest, EndsWithItsCamera) {
   EXPECT_NE(node.problem().find("no frontend"), std::string::npos);
 }
 
+TEST_F(LiveNodeTest, WaitsAsLongAsItsFrontendIsAlive) {
+  LiveNode node = Make();
+  store_.frames = {Picture(0, 100)};
+  store_.ended = true;
+  FrontendStatus status;
+  status.head.session = 9;
+  for (int i = 0; i < 200; ++i) {
+    Advance(node, 1'000'000'000);
+    Say(status);
+  }
+  EXPECT_FALSE(node.exit_code().has_value()) << "it finds the last poses of a long sequence";
+  status.head.session = 8;
+  for (int i = 0; i < 70; ++i) {
+    Advance(node, 1'000'000'000);
+    Say(status);
+  }
+  EXPECT_EQ(node.exit_code(), 5) << "another session's is nobody";
+}
+
 TEST_F(LiveNodeTest, ToldToStopItSaysTheEndAndDoesNotWaitLong) {
   LiveNode node = Make();
   store_.frames = {Picture(0, 100)};
