@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
@@ -100,6 +101,15 @@ void CopyAsJpeg(const fs::path& from, const fs::path& to) {
     throw InputError(to.string() + ": cannot be made of " + from.string());
 }
 
+// A plot at half its size: it is drawn for paper, and the page's repository is to stay small.
+void CopyAtHalfSize(const fs::path& from, const fs::path& to) {
+  const cv::Mat picture = cv::imread(from.string());
+  cv::Mat half;
+  if (!picture.empty()) cv::resize(picture, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  if (half.empty() || !cv::imwrite(to.string(), half, {cv::IMWRITE_PNG_COMPRESSION, 9}))
+    throw InputError(to.string() + ": cannot be made of " + from.string());
+}
+
 // What a page may show: pictures of rendered sequences, and of frames two per sequence with people.
 bool IsPublished(const ReportPicture& picture, std::map<std::pair<FigureSection, std::string>, int>* frames) {
   if (picture.sequence.empty()) return true;
@@ -127,7 +137,7 @@ void Publish(const fs::path& page, const fs::path& out, const Results& results,
       name.replace_extension(".jpg");
       CopyAsJpeg(out / picture.file, folder / name);
     } else {
-      fs::copy_file(out / picture.file, folder / name, fs::copy_options::overwrite_existing);
+      CopyAtHalfSize(out / picture.file, folder / name);
     }
     picture.file = (fs::path("images") / page.stem() / name).string();
     copied.push_back(picture);
