@@ -9,6 +9,13 @@ namespace {
 constexpr int kMinSights = 30;
 constexpr double kMinInlierShare = 0.7;
 
+/// What became of a landmark of map `map_id`; null where it is gone.
+const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
+  const std::optional<LandmarkId> now = map.Resolve(id);
+  const Landmark* landmark = now ? map.FindLandmark(*now) : nullptr;
+  return landmark != nullptr && landmark->map_id == map_id ? landmark : nullptr;
+}
+
 }  // namespace
 
 void FrameRefiner::Keep(const TrackedFrame& frame, const FramePose& pose) {
@@ -56,9 +63,8 @@ std::vector<PoseObservation> FrameRefiner::Observations(const Map& map, MapId ma
                                                         const Kept& kept) const {
   std::vector<PoseObservation> observations;
   for (const Sight& sight : kept.sights) {
-    const std::optional<LandmarkId> id = map.Resolve(sight.landmark);
-    const Landmark* landmark = id ? map.FindLandmark(*id) : nullptr;
-    if (landmark == nullptr || landmark->map_id != map_id) continue;
+    const Landmark* landmark = LandmarkNow(map, map_id, sight.landmark);
+    if (landmark == nullptr) continue;
     observations.push_back(
         {landmark->p_world, sight.uv_px.cast<double>(), 1.0 / pyramid_.SigmaSquared(sight.octave), 1.0});
   }
@@ -74,9 +80,8 @@ std::optional<std::vector<PoseObservation>> FrameRefiner::SearchAgain(const Map&
                      MakeFrameFeatures(kept.features, camera_, pyramid_));
   frame.T_cam_world = told;
   for (const Sight& sight : kept.sights) {
-    const std::optional<LandmarkId> id = map.Resolve(sight.landmark);
-    const Landmark* landmark = id ? map.FindLandmark(*id) : nullptr;
-    if (landmark != nullptr && landmark->map_id == map_id) frame.landmarks[sight.feature] = *id;
+    const Landmark* landmark = LandmarkNow(map, map_id, sight.landmark);
+    if (landmark != nullptr) frame.landmarks[sight.feature] = landmark->id;
   }
   if (!search(&frame)) return std::nullopt;
   std::vector<PoseObservation> observations;

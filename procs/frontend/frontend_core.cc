@@ -48,7 +48,7 @@ FrontendCore::FrontendCore(Setup setup)
       run_search_(std::move(setup.run_search)),
       initializer_(MakeInitializer()),
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
-      relocalizer_(setup.vocabulary, setup.camera, setup.pyramid) {
+      relocalizer_(setup.vocabulary) {
   if (!setup.in_saved_map) return;
   state_ = TrackingState::kLost;
   map_id_ = 0;  // any, until it has found itself in one
@@ -478,6 +478,7 @@ bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double 
 
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
   while (IsBehind()) CatchUp(events);
+  RefineRest();
   while (IsRefining()) RefineNext();
   LaterNeighbours near;
   for (auto it = unplaced_.rbegin(); it != unplaced_.rend();
@@ -506,8 +507,6 @@ void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
     events->push_back(pose);
   }
   unplaced_.clear();
-  RefineRest();
-  while (IsRefining()) RefineNext();
   for (FramePose& pose : std::exchange(refined_, {})) events->push_back(std::move(pose));
 }
 

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "dmslam/features/matcher.h"
-#include "dmslam/robust/pose_from_matches.h"
+#include "dmslam/map/neighbourhood.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -21,13 +20,10 @@ constexpr int kMaxRounds = 4;  // of the search in the local map
 // keyframe seen last show together with their neighbours.
 constexpr ptrdiff_t kPlacesTogether = 3;
 constexpr int kNeighboursTogether = 5;
-constexpr MatchOptions kMatchTogether = {.max_ratio = 0.8, .check_orientation = false};
 
 }  // namespace
 
-Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera,
-                         const Pyramid& pyramid)
-    : camera_(camera), pyramid_(pyramid), places_(std::move(vocabulary)) {}
+Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary) : places_(std::move(vocabulary)) {}
 
 void Relocalizer::Clear() { places_.Clear(); }
 
@@ -59,55 +55,35 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
   const std::vector<BowMatch> matches =
       MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
                    {&frame->features->set, &image.nodes, {}});
-  std::vector<Match> seen;
-  for (const BowMatch& match : matches) seen.push_back({keyframe.landmarks[match.a], match.b});
+  std::vector<LandmarkMatch> seen;
+  for (const BowMatch& match : matches)
+    seen.push_back({static_cast<uint16_t>(match.b), keyframe.landmarks[match.a]});
   return FindPose(map, seen, DeriveSeed(seed, keyframe.id.frame_index(), "relocalize"), frame);
 }
 
 bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
                               TrackedFrame* frame) const {
-  std::vector<LandmarkId> ids;
+  std::vector<KeyframeId> keyframes;
   for (const KeyframeId place : places) {
-    std::vector<KeyframeId> around = map.BestCovisible(place, kNeighboursTogether, kMinCovisibility);
-    around.push_back(place);
-    for (const KeyframeId id : around) {
-      for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-        if (landmark.valid() && IsStatic(map.FindLandmark(landmark))) ids.push_back(landmark);
-      }
-    }
+    keyframes.push_back(place);
+    for (const KeyframeId id : map.BestCovisible(place, kNeighboursTogether, kMinCovisibility))
+      keyframes.push_back(id);
   }
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  std::vector<Descriptor> descriptors;
-  for (const LandmarkId id : ids) descriptors.push_back(map.FindLandmark(id)->descriptor);
-  std::vector<FeatureMatch> matches;
-  const std::vector<Keypoint> anywhere(ids.size());
-  FeatureMatcher().MatchAll({anywhere, descriptors},
-                            {frame->features->set.keypoints, frame->features->set.descriptors},
-                            kMatchTogether, &matches);
-  std::vector<Match> seen;
-  for (const FeatureMatch& match : matches) seen.push_back({ids[match.index0], match.index1});
+  std::vector<LandmarkId> ids = LandmarksSeenBy(map, keyframes);
+  KeepStatic(map, &ids);
+  const std::vector<LandmarkMatch> seen = MatchLandmarks(map, ids, frame->features->set);
   return FindPose(map, seen, DeriveSeed(seed, frame->index, "relocalize_together"), frame);
 }
 
 /// The pose on which most of the matches agree, with those that do.
-bool Relocalizer::FindPose(const Map& map, const std::vector<Match>& matches, uint64_t seed,
+bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
                            TrackedFrame* frame) const {
   if (matches.size() < kMinMatches) return false;
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> pixels;
-  std::vector<double> inv_sigma_squared;
-  for (const Match& match : matches) {
-    points.push_back(map.FindLandmark(match.landmark)->p_world);
-    pixels.push_back(frame->features->uv_px[match.feature]);
-    inv_sigma_squared.push_back(1.0 /
-                                pyramid_.SigmaSquared(frame->features->set.keypoints[match.feature].octave));
-  }
   PoseRansacOptions options;
   options.seed = seed;
   options.min_inliers = kMinInliers;
   options.max_iterations = kMaxIterations;
-  const auto report = PoseFromMatches(camera_.Ideal(), points, pixels, inv_sigma_squared, options);
+  const auto report = PoseFromLandmarks(map, *frame->features, matches, options);
   if (!report.success) return false;
   frame->ClearMatches();
   frame->T_cam_world = report.model;

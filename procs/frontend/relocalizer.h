@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dmslam/map/map.h"
+#include "dmslam/place_recognition/landmark_matches.h"
 #include "dmslam/place_recognition/map_places.h"
 #include "frontend/pose_tracker.h"
 #include "frontend/tracked_frame.h"
@@ -15,7 +16,7 @@ namespace dmslam {
 /// down.
 class Relocalizer {
  public:
-  Relocalizer(std::shared_ptr<const Vocabulary> vocabulary, const Camera& camera, const Pyramid& pyramid);
+  explicit Relocalizer(std::shared_ptr<const Vocabulary> vocabulary);
 
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Map& map);
@@ -27,11 +28,6 @@ class Relocalizer {
                   TrackedFrame* frame) const;
 
  private:
-  struct Match {
-    LandmarkId landmark;
-    uint32_t feature = 0;
-  };
-
   std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
                                      const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
@@ -39,11 +35,10 @@ class Relocalizer {
   /// All that these places and their neighbours show, by descriptor alone.
   bool TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
                    TrackedFrame* frame) const;
-  bool FindPose(const Map& map, const std::vector<Match>& matches, uint64_t seed, TrackedFrame* frame) const;
+  bool FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
+                TrackedFrame* frame) const;
   static bool Refine(const Map& map, PoseTracker* tracker, TrackedFrame* frame);
 
-  Camera camera_;
-  Pyramid pyramid_;
   MapPlaces places_;
 };
 

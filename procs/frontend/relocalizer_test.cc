@@ -138,7 +138,7 @@ class Lost {
  public:
   explicit Lost(Wall& wall)
       : replica_(TestCamera(525, 319.5, 239.5), Pyramid()),
-        relocalizer_(ShippedVocabulary(), replica_.camera(), Pyramid()),
+        relocalizer_(ShippedVocabulary()),
         tracker_({}, replica_.camera(), Pyramid()) {
     for (int k = 0; k < kKeyframes; ++k) {
       replica_.Apply(wall.Next());

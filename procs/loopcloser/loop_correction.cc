@@ -55,7 +55,7 @@ Fusions FindFusions(const Map& map, const VerifiedLoop& loop, const LoopVerifier
                     const GroupPoses& group) {
   Fusions fusions;
   const auto add_all = [&](const Keyframe& keyframe, const PlaceSupport& support) {
-    for (const PlaceMatch& match : support.matches) {
+    for (const LandmarkMatch& match : support.matches) {
       const LandmarkId mine = keyframe.landmarks[match.feature];
       const bool both = mine.valid() && IsStatic(map.FindLandmark(mine)) &&
                         !std::binary_search(loop.landmarks.begin(), loop.landmarks.end(), mine);

@@ -6,10 +6,9 @@
 #include <cstdio>
 #include <map>
 
-#include "dmslam/features/matcher.h"
+#include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 #include "dmslam/optimization/sim3_optimization.h"
-#include "dmslam/robust/pose_from_matches.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -18,7 +17,6 @@ namespace {
 constexpr int kCellColumns = 8, kCellRows = 6;
 constexpr int kPlaceNeighbours = 15;
 constexpr int kPlaceNeighboursMatched = 5;
-constexpr MatchOptions kMatchLandmarks = {.max_ratio = 0.8, .check_orientation = false};
 constexpr int kMaxPoseIterations = 1000;
 constexpr size_t kMinDepthRatios = 5;
 constexpr double kMaxScaleError = 0.03;  // standard error of a scale to be taken, as a share of it
@@ -60,7 +58,7 @@ double PathLength(const Map& map, const Keyframe& from, const Keyframe& to) {
 /// The keyframe that sees most of what was found and is no neighbour of `keyframe`; null where there is none.
 const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const PlaceSupport& support) {
   std::map<KeyframeId, int> votes;
-  for (const PlaceMatch& match : support.matches) {
+  for (const LandmarkMatch& match : support.matches) {
     for (const Observation& o : map.FindLandmark(match.landmark)->observations) {
       if (o.keyframe != keyframe.id && !keyframe.covisible.contains(o.keyframe)) ++votes[o.keyframe];
     }
@@ -88,9 +86,9 @@ Sim3d WithScaleOfDepths(const std::vector<Sim3Match>& matches, const Sim3Report&
 /// How much larger the keyframe's own map is than the place's: from landmarks of both on the same features.
 /// None where these are too few or do not agree.
 std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
-                                   const std::vector<PlaceMatch>& matches) {
+                                   const std::vector<LandmarkMatch>& matches) {
   std::vector<double> ratios;
-  for (const PlaceMatch& match : matches) {
+  for (const LandmarkMatch& match : matches) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
     if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
     const double depth_mine = (keyframe.T_cam_world * map.FindLandmark(mine)->p_world).z();
@@ -115,17 +113,9 @@ std::string Text(const char* format, Values... values) {
 
 }  // namespace
 
-std::vector<LandmarkId> LandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared) {
-  std::vector<KeyframeId> keyframes = map.BestCovisible(id, neighbours, min_shared);
-  keyframes.push_back(id);
-  std::vector<LandmarkId> landmarks;
-  for (const KeyframeId keyframe : keyframes) {
-    for (const LandmarkId landmark : map.FindKeyframe(keyframe)->landmarks) {
-      if (landmark.valid() && IsStatic(map.FindLandmark(landmark))) landmarks.push_back(landmark);
-    }
-  }
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+std::vector<LandmarkId> StaticLandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared) {
+  std::vector<LandmarkId> landmarks = LandmarksAround(map, id, neighbours, min_shared);
+  KeepStatic(map, &landmarks);
   return landmarks;
 }
 
@@ -144,20 +134,8 @@ std::optional<Sim3d> LoopVerifier::FirstSimilarity(const Map& map, const MapPlac
 std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const Keyframe& keyframe,
                                                           const Keyframe& place, std::string* why) const {
   const std::vector<LandmarkId> ids =
-      LandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
-  std::vector<Descriptor> descriptors;
-  for (const LandmarkId id : ids) descriptors.push_back(map.FindLandmark(id)->descriptor);
-  const std::vector<Keypoint> anywhere(ids.size());
-  std::vector<FeatureMatch> found;
-  const FeatureSet& features = keyframe.features->set;
-  FeatureMatcher().MatchAll({anywhere, descriptors}, {features.keypoints, features.descriptors},
-                            kMatchLandmarks, &found);
-  std::vector<PlaceMatch> matches;
-  for (const FeatureMatch& match : found) {
-    const LandmarkId mine = keyframe.landmarks[match.index1];
-    if (mine.valid() && !IsStatic(map.FindLandmark(mine))) continue;
-    matches.push_back({static_cast<uint16_t>(match.index1), ids[match.index0]});
-  }
+      StaticLandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
+  const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
   const bool one_map = keyframe.map_id == place.map_id;
   return SimilarityFromPose(map, keyframe, place, matches, one_map ? std::optional(1.0) : std::nullopt, why);
 }
@@ -167,27 +145,22 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
 /// small, and what the loop joins corrects it in the adjustment that follows.
 std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyframe& keyframe,
                                                       const Keyframe& place,
-                                                      const std::vector<PlaceMatch>& matches,
+                                                      std::vector<LandmarkMatch> matches,
                                                       std::optional<double> scale, std::string* why) const {
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> pixels;
-  std::vector<double> weights;
-  for (const PlaceMatch& match : matches) {
-    points.push_back(map.FindLandmark(match.landmark)->p_world);
-    pixels.push_back(keyframe.features->uv_px[match.feature]);
-    weights.push_back(1.0 /
-                      map.pyramid().SigmaSquared(keyframe.features->set.keypoints[match.feature].octave));
-  }
+  std::erase_if(matches, [&](const LandmarkMatch& match) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    return mine.valid() && !IsStatic(map.FindLandmark(mine));
+  });
   PoseRansacOptions options;
   options.min_inliers = options_.min_pose_inliers;
   options.max_iterations = kMaxPoseIterations;
   options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop_pose");
-  const auto pose = PoseFromMatches(map.camera().Ideal(), points, pixels, weights, options);
+  const auto pose = PoseFromLandmarks(map, *keyframe.features, matches, options);
   if (!pose.success) {
     *why = Text("%d of %zu landmarks agree on a pose", pose.num_inliers, matches.size());
     return std::nullopt;
   }
-  std::vector<PlaceMatch> agreeing;
+  std::vector<LandmarkMatch> agreeing;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (pose.inliers[i]) agreeing.push_back(matches[i]);
   }
@@ -230,15 +203,12 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromWords(const Map& map, const Map
 std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyframe& keyframe,
                                                      const Keyframe& place, const Sim3d& S_keyframe_place,
                                                      std::string* why) const {
-  std::vector<LandmarkId> seen;
-  for (const LandmarkId id : place.landmarks) {
-    if (id.valid() && IsStatic(map.FindLandmark(id))) seen.push_back(id);
-  }
-  std::sort(seen.begin(), seen.end());
+  std::vector<LandmarkId> seen = LandmarksSeenBy(map, {place.id});
+  KeepStatic(map, &seen);
   const Rigid3d T_cam_world = (S_keyframe_place * Sim3d(place.T_cam_world)).ToRigid();
   const PlaceSupport support = Look(map, keyframe, T_cam_world, seen, options_.search_radius_px);
   std::vector<Sim3Match> matches;
-  for (const PlaceMatch& match : support.matches) {
+  for (const LandmarkMatch& match : support.matches) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
     if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
     const auto at = std::find(place.landmarks.begin(), place.landmarks.end(), match.landmark);
@@ -260,12 +230,8 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
     *why = pairs;
     return std::nullopt;
   }
-  std::vector<PlaceMatch> seen_matches;
-  for (const PlaceMatch& match : support.matches) {
-    const LandmarkId mine = keyframe.landmarks[match.feature];
-    if (!mine.valid() || IsStatic(map.FindLandmark(mine))) seen_matches.push_back(match);
-  }
-  const auto similarity = SimilarityFromPose(map, keyframe, place, seen_matches, S_keyframe_place.scale, why);
+  const auto similarity =
+      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
   if (!similarity) *why = pairs + "; " + *why;
   return similarity;
 }
@@ -290,7 +256,7 @@ PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const 
     cells.set(CellOf(map.camera(), keyframe.features->uv_px[feature]));
   }
   std::sort(support.matches.begin(), support.matches.end(),
-            [](const PlaceMatch& a, const PlaceMatch& b) { return a.feature < b.feature; });
+            [](const LandmarkMatch& a, const LandmarkMatch& b) { return a.feature < b.feature; });
   support.found = static_cast<int>(support.matches.size());
   support.cells = static_cast<int>(cells.count());
   return support;
@@ -303,12 +269,12 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
   loop.place = place.id;
   loop.S_keyframe_place = S_keyframe_place;
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
-  loop.landmarks = LandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
+  loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
   const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
   loop.support = Look(map, keyframe, T_cam_world, loop.landmarks, options_.search_radius_px);
   const PlaceSupport own =
       Look(map, keyframe, keyframe.T_cam_world,
-           LandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
+           StaticLandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
            options_.search_radius_px);
   if (own.found > 0) loop.share = loop.support.Share() / own.Share();
   const double path = PathLength(map, place, keyframe);
@@ -353,7 +319,7 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   const Sim3d S_before_world = earlier.S_keyframe_place * Sim3d(place_before->T_cam_world);
   const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
   const std::vector<LandmarkId> landmarks =
-      LandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
+      StaticLandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
   const PlaceSupport seen =
       Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks, 2 * options_.search_radius_px);
   const Keyframe* place = BestObserver(map, keyframe, seen);

@@ -6,23 +6,18 @@
 #include <vector>
 
 #include "dmslam/map/map.h"
+#include "dmslam/place_recognition/landmark_matches.h"
 #include "dmslam/place_recognition/map_places.h"
 #include "loopcloser/loop_options.h"
 
 namespace dmslam {
 
-/// A feature of the keyframe shows a landmark of the place.
-struct PlaceMatch {
-  uint16_t feature = 0;
-  LandmarkId landmark;
-};
-
 /// How well a camera at some pose sees a place.
 struct PlaceSupport {
-  int expected = 0;                 ///< landmarks of the place that it should see
-  int found = 0;                    ///< and does
-  int cells = 0;                    ///< cells of the image (8 x 6) in which it finds some
-  std::vector<PlaceMatch> matches;  ///< sorted by feature
+  int expected = 0;                    ///< landmarks of the place that it should see
+  int found = 0;                       ///< and does
+  int cells = 0;                       ///< cells of the image (8 x 6) in which it finds some
+  std::vector<LandmarkMatch> matches;  ///< sorted by feature
   double Share() const { return expected == 0 ? 0.0 : static_cast<double>(found) / expected; }
 };
 
@@ -70,7 +65,7 @@ class LoopVerifier {
   std::optional<Sim3d> SimilarityFromFeatures(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                               std::string* why) const;
   std::optional<Sim3d> SimilarityFromPose(const Map& map, const Keyframe& keyframe, const Keyframe& place,
-                                          const std::vector<PlaceMatch>& matches, std::optional<double> scale,
+                                          std::vector<LandmarkMatch> matches, std::optional<double> scale,
                                           std::string* why) const;
   std::optional<Sim3d> RefinedSimilarity(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                          const Sim3d& S_keyframe_place, std::string* why) const;
@@ -83,6 +78,6 @@ class LoopVerifier {
 };
 
 /// Static landmarks of a keyframe and of its best neighbours, sorted.
-std::vector<LandmarkId> LandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared);
+std::vector<LandmarkId> StaticLandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared);
 
 }  // namespace dmslam

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "dmslam/map/neighbourhood.h"
 #include "mapper/landmark_fusion.h"
 #include "mapper/map_maintenance.h"
 #include "mapper/seen_through.h"
@@ -31,19 +32,6 @@ const Sim3d* CorrectionOf(const Map& map, KeyframeId id, const std::map<Keyframe
     }
   }
   return nullptr;
-}
-
-/// Landmarks of a keyframe and its best neighbours, sorted.
-std::vector<LandmarkId> LandmarksOfPlace(const Map& map, KeyframeId id, int min_covisibility) {
-  std::vector<KeyframeId> keyframes = map.BestCovisible(id, kPlaceNeighbours, min_covisibility);
-  keyframes.push_back(id);
-  std::set<LandmarkId> landmarks;
-  for (const KeyframeId keyframe : keyframes) {
-    for (const LandmarkId landmark : map.FindKeyframe(keyframe)->landmarks) {
-      if (landmark.valid()) landmarks.insert(landmark);
-    }
-  }
-  return {landmarks.begin(), landmarks.end()};
 }
 
 }  // namespace
@@ -396,7 +384,7 @@ void MapperCore::Connect(const LoopAnswer& answer, const LoopSide& side) {
     Reroot(*here, *there);
   }
   map_.AddLoopEdge(*here, *there);
-  std::vector<LandmarkId> place = LandmarksOfPlace(map_, *there, options_.min_covisibility);
+  std::vector<LandmarkId> place = LandmarksAround(map_, *there, kPlaceNeighbours, options_.min_covisibility);
   for (const auto& fusion : answer.fusions) {
     const auto gone = map_.Resolve(fusion.from), kept = map_.Resolve(fusion.into);
     if (gone && kept && *gone != *kept) map_.Fuse(*gone, *kept);

@@ -66,11 +66,7 @@ std::optional<BenchPair> FromRecording() {
   MatchingOptions matching;
   matching.use_window = matching.check_orientation = false;
   matching.max_ratio = 1.0;
-  const auto all = MatchFrames(*features[0], *features[1], matching, &matcher);
-  constexpr size_t kMatches = 1000;
-  for (size_t k = 0; k < std::min(kMatches, all.size()); ++k) {
-    pair.matches.push_back(all[all.size() <= kMatches ? k : k * all.size() / kMatches]);
-  }
+  pair.matches = EvenChoice(MatchFrames(*features[0], *features[1], matching, &matcher), 1000);
   return pair;
 }
 

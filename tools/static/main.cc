@@ -325,13 +325,9 @@ std::vector<Match> MatchesToTime(const TimeSettings& settings, const Camera& cam
   matching.use_window = matching.check_orientation = false;
   matching.max_ratio = 1.0;
   FeatureMatcher matcher;
-  const auto all =
-      MatchFrames(*sequence.Features(frame), *sequence.Features(frame + gap), matching, &matcher);
-  const size_t most = static_cast<size_t>(settings.matches);
-  if (all.size() <= most) return all;
-  std::vector<Match> matches;
-  for (size_t k = 0; k < most; ++k) matches.push_back(all[k * all.size() / most]);
-  return matches;
+  return EvenChoice(
+      MatchFrames(*sequence.Features(frame), *sequence.Features(frame + gap), matching, &matcher),
+      static_cast<size_t>(settings.matches));
 }
 
 void RunTime(const TimeSettings& settings) {

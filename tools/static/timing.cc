@@ -6,6 +6,7 @@
 #include <fstream>
 #include <memory>
 
+#include "dmslam/evaluation/statistics.h"
 #include "dmslam/motion_segmentation/dlrsac.h"
 #include "dmslam/motion_segmentation/ransac.h"
 
@@ -32,12 +33,6 @@ std::array<std::unique_ptr<StaticSelector>, 3> Methods(int iterations) {
   dlrsac.sampling.stop_confidence = 0;
   return {std::make_unique<RansacSelector>(ransac), std::make_unique<Arsac>(arsac),
           std::make_unique<Dlrsac>(dlrsac)};
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

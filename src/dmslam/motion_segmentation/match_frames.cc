@@ -35,4 +35,12 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
   return matches;
 }
 
+std::vector<Match> EvenChoice(const std::vector<Match>& matches, size_t most) {
+  if (matches.size() <= most) return matches;
+  std::vector<Match> chosen;
+  chosen.reserve(most);
+  for (size_t k = 0; k < most; ++k) chosen.push_back(matches[k * matches.size() / most]);
+  return chosen;
+}
+
 }  // namespace dmslam

@@ -22,4 +22,7 @@ struct MatchingOptions {
 std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1,
                                const MatchingOptions& options, FeatureMatcher* matcher);
 
+/// At most so many of the matches, spread evenly over them.
+std::vector<Match> EvenChoice(const std::vector<Match>& matches, size_t most);
+
 }  // namespace dmslam

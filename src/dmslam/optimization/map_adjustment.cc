@@ -4,6 +4,8 @@
 #include <map>
 #include <set>
 
+#include "dmslam/map/neighbourhood.h"
+
 namespace dmslam {
 namespace {
 
@@ -30,18 +32,6 @@ struct Window {
     return at;
   }
 };
-
-std::vector<LandmarkId> LandmarksSeenBy(const Map& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<LandmarkId> ids;
-  for (const KeyframeId id : keyframes) {
-    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-      if (landmark.valid()) ids.push_back(landmark);
-    }
-  }
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  return ids;
-}
 
 /// Observers outside the window, those that see most of its landmarks first.
 std::vector<KeyframeId> FixedObservers(const Map& map, const Window& window, int most) {

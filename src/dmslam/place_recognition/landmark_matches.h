@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dmslam/map/map.h"
+#include "dmslam/robust/pose_from_matches.h"
+
+namespace dmslam {
+
+/// A feature of an image shows a landmark.
+struct LandmarkMatch {
+  uint16_t feature = 0;
+  LandmarkId landmark;
+};
+
+/// Leaves those that may speak for a place: they are there, and are not believed to move.
+void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks);
+
+/// Landmarks with the features of an image by descriptor alone, wherever they are; in the landmarks' order.
+std::vector<LandmarkMatch> MatchLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks,
+                                          const FeatureSet& features);
+
+/// T_cam_world of the image on which most matches agree; `inliers` of the report is parallel to them.
+RansacReport<Rigid3d> PoseFromLandmarks(const Map& map, const FrameFeatures& features,
+                                        const std::vector<LandmarkMatch>& matches,
+                                        const PoseRansacOptions& options);
+
+}  // namespace dmslam
