@@ -117,6 +117,23 @@ TEST_P(EverySelector, RefusesWhatIsNotFiniteOrOutside) {
   }
 }
 
+TEST_P(EverySelector, RefusesMatchesInOneCell) {
+  const SyntheticPair whole = MakeSyntheticPair({}, 10);
+  for (const double left : {0.0, 250.0}) {  // a cell, and where four meet
+    SyntheticPair pair = whole;
+    std::erase_if(pair.matches, [left](const Match& m) {
+      return m.uv0_px.x() < left || m.uv0_px.y() < left || m.uv0_px.x() > left + 155 ||
+             m.uv0_px.y() > left + 155;
+    });
+    ASSERT_GE(pair.matches.size(), 16U);
+    const StaticSelection selection = Make()->Select(pair.matches, pair.camera, 1);
+    EXPECT_EQ(selection.refusal, Refusal::kTooFewCells);
+    EXPECT_FALSE(selection.explanation.empty());
+    EXPECT_EQ(selection.num_static, 0);
+    EXPECT_EQ(selection.F.norm(), 0.0);
+  }
+}
+
 TEST_P(EverySelector, RefusesIdenticalFrames) {
   SyntheticPair pair = MakeSyntheticPair({}, 5);
   for (Match& match : pair.matches) match.uv1_px = match.uv0_px;
@@ -191,15 +208,6 @@ TEST(Dlrsac, ReportsCellsAndCoupleMatrix) {
   EXPECT_EQ(matches, 800);
   ASSERT_GE(selection.leading_cell, 0);
   EXPECT_TRUE(selection.cells[static_cast<size_t>(selection.leading_cell)].chosen);
-}
-
-TEST(Dlrsac, RefusesMatchesInOneCell) {
-  SyntheticPair pair = MakeSyntheticPair({}, 10);
-  std::erase_if(pair.matches, [](const Match& m) { return m.uv0_px.x() > 155 || m.uv0_px.y() > 155; });
-  ASSERT_GE(pair.matches.size(), 16U);
-  const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1);
-  EXPECT_EQ(selection.refusal, Refusal::kTooFewCells);
-  EXPECT_FALSE(selection.explanation.empty());
 }
 
 TEST(Dlrsac, RefusesACompactSet) {

@@ -1,5 +1,6 @@
 #include "dmslam/motion_segmentation/static_selector.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -63,12 +64,14 @@ std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const C
   };
   std::vector<double> displacement;
   displacement.reserve(matches.size());
+  Eigen::AlignedBox2d extent;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (!inside(matches[i].uv0_px) || !inside(matches[i].uv1_px)) {
       return InputProblem{Refusal::kBadInput,
                           "match " + std::to_string(i) + " is not finite or lies outside the image"};
     }
     displacement.push_back((matches[i].uv1_px - matches[i].uv0_px).squaredNorm());
+    extent.extend(matches[i].uv0_px);
   }
   const auto middle = displacement.begin() + static_cast<ptrdiff_t>(displacement.size() / 2);
   std::nth_element(displacement.begin(), middle, displacement.end());
@@ -76,6 +79,12 @@ std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const C
     return InputProblem{Refusal::kNoMotion, "the median displacement is " +
                                                 std::to_string(std::sqrt(*middle)) +
                                                 " px: the frames show the same picture"};
+  }
+  if (extent.sizes().maxCoeff() < options.min_extent_px) {
+    return InputProblem{Refusal::kTooFewCells, "all " + std::to_string(matches.size()) +
+                                                   " matches lie within " +
+                                                   std::to_string(std::lround(extent.sizes().maxCoeff())) +
+                                                   " px: one cell determines no motion of the camera"};
   }
   return std::nullopt;
 }

@@ -89,6 +89,9 @@ struct StaticSelection {
 struct InputOptions {
   int min_matches = 16;               ///< fewer is refused; never below 8
   double min_displacement_px = 0.35;  ///< median displacement below this: the same picture twice
+  /// Matches that span less than this, across and down, fill no more than a cell of the usual size
+  /// (DlrsacOptions::cell_px): they do not determine a motion of the camera.
+  double min_extent_px = 160.0;
   /// How far outside the image an ideal pixel may lie, as a share of the image's width. Only used for cameras
   /// with distortion, where ideal pixels leave the image; 0 is used for others.
   double outside_share = 0.5;
@@ -114,7 +117,8 @@ class StaticSelector {
                                  uint64_t seed) const = 0;
 };
 
-/// Refusals that need no model: too few, not finite, outside, identical frames. None: go on.
+/// Refusals that need no model: too few, not finite, outside, identical frames, all in one place. None: go
+/// on.
 struct InputProblem {
   Refusal refusal = Refusal::kNone;
   std::string explanation;
