@@ -122,7 +122,10 @@ bool IsPublished(const ReportPicture& picture, std::map<std::pair<FigureSection,
 // The report for docs/: all numbers, but pictures of rendered sequences only, copied beside it.
 void Publish(const fs::path& page, const fs::path& out, const Results& results,
              const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
-  const fs::path folder = page.parent_path() / "images" / page.stem();
+  if (page.extension() != ".md") {
+    throw InputError("--publish " + page.string() + ": is not the name of a page; write FOLDER/NAME.md");
+  }
+  const fs::path folder = page.parent_path() / "images" / page.stem();  // of this page alone
   std::error_code error;
   fs::remove_all(folder, error);
   fs::create_directories(folder, error);
