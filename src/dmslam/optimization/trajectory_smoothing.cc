@@ -1,0 +1,310 @@
+#include "dmslam/optimization/trajectory_smoothing.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dmslam {
+namespace {
+
+constexpr int kPose = 6, kState = 3 * kPose;  // pose, its rate, and the rate's rate; each (rotation, centre)
+constexpr double kLeastInformation = 1e-12;   // keeps determined what nothing is known of
+constexpr double kMinInterval = 0.05;         // of two frames, in usual intervals
+constexpr double kMinLogVariance = -37.0, kMaxLogVariance = 14.0;  // of a standing camera; of any
+using StateMatrix = Eigen::Matrix<double, kState, kState>;
+using StateVector = Eigen::Matrix<double, kState, 1>;
+
+/// Of one frame; times are in usual frame intervals.
+struct State {
+  Eigen::Quaterniond R_world_cam;
+  Eigen::Vector3d center;
+  Vector6d rate = Vector6d::Zero(), acceleration = Vector6d::Zero();
+
+  void Step(const StateVector& step) {
+    R_world_cam = (R_world_cam * ExpSo3(step.head<3>())).normalized();
+    center += step.segment<3>(3);
+    rate += step.segment<kPose>(kPose);
+    acceleration += step.tail<kPose>();
+  }
+};
+
+/// Motion from `a` to `b`: (rotation in a's frame, shift in the world).
+Vector6d Difference(const State& a, const State& b) {
+  Vector6d difference;
+  difference << LogSo3(a.R_world_cam.conjugate() * b.R_world_cam), b.center - a.center;
+  return difference;
+}
+
+/// What is searched for besides the states, as logarithms.
+struct Variances {
+  double pose = 0.0, rotation = 0.0, translation = 0.0;
+  double& operator[](int i) { return i == 0 ? pose : i == 1 ? rotation : translation; }
+};
+
+using StateSteps = std::vector<StateVector>;
+
+/// The sum of squares around the present states: symmetric, block tridiagonal.
+struct NormalEquations {
+  std::vector<StateMatrix> diagonal, above;
+  StateSteps gradient;
+  double cost = 0.0;              ///< sum of the squared errors
+  double log_determinants = 0.0;  ///< of the information of all errors
+};
+
+/// Block Cholesky. The steps that solve the equations, and the logarithm of the matrix's determinant; none
+/// where it is not positive definite.
+std::optional<double> Solve(NormalEquations* equations, StateSteps* steps) {
+  const size_t count = equations->diagonal.size();
+  std::vector<Eigen::LLT<StateMatrix>> factors(count);
+  double log_determinant = 0.0;
+  for (size_t k = 0; k < count; ++k) {
+    factors[k].compute(equations->diagonal[k]);
+    if (factors[k].info() != Eigen::Success) return std::nullopt;
+    for (int i = 0; i < kState; ++i) log_determinant += 2.0 * std::log(factors[k].matrixLLT()(i, i));
+    if (k + 1 == count) break;
+    const StateMatrix gain = factors[k].solve(equations->above[k]);
+    equations->diagonal[k + 1].noalias() -= equations->above[k].transpose() * gain;
+    equations->gradient[k + 1].noalias() -= gain.transpose() * equations->gradient[k];
+  }
+  steps->resize(count);
+  for (size_t k = count; k-- > 0;) {
+    StateVector right = -equations->gradient[k];
+    if (k + 1 < count) right.noalias() -= equations->above[k] * (*steps)[k + 1];
+    (*steps)[k] = factors[k].solve(right);
+  }
+  if (!std::isfinite(log_determinant)) return std::nullopt;
+  const bool finite = std::all_of(steps->begin(), steps->end(), [](const auto& s) { return s.allFinite(); });
+  return finite ? std::optional(log_determinant) : std::nullopt;
+}
+
+class Smoother {
+ public:
+  Smoother(std::span<const PoseEstimate> estimates, const SmoothingOptions& options)
+      : estimates_(estimates), options_(options), weights_(estimates.size(), 1.0) {
+    interval_s_ = UsualInterval();
+    for (const PoseEstimate& estimate : estimates) {
+      State state;
+      state.R_world_cam = estimate.T_cam_world.rotation.conjugate();
+      state.center = estimate.T_cam_world.Center();
+      states_.push_back(state);
+      measured_.push_back(state);
+      // A step (w, v) on the left of T_cam_world turns the camera by -w in its own frame and shifts its
+      // centre by -R_world_cam v.
+      Matrix6d left = Matrix6d::Zero();
+      left.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
+      left.bottomRightCorner<3, 3>() = -estimate.T_cam_world.rotation.toRotationMatrix();
+      information_.push_back(left.transpose() * estimate.information * left);
+    }
+    FirstGuess();
+    if (options.noise) variances_ = ToVariances(*options.noise);
+  }
+
+  SmoothedTrajectory Run() {
+    for (int round = 0; round < options_.rounds; ++round) {
+      if (!options_.noise) FindVariances();
+      for (int k = 0; k < 2; ++k) Update();
+      Weigh();
+    }
+    Update();
+    return Result();
+  }
+
+ private:
+  /// The median of the times between frames.
+  double UsualInterval() const {
+    std::vector<double> intervals_s;
+    for (size_t k = 0; k + 1 < estimates_.size(); ++k) {
+      intervals_s.push_back(estimates_[k + 1].time_s - estimates_[k].time_s);
+    }
+    const auto middle = intervals_s.begin() + static_cast<std::ptrdiff_t>(intervals_s.size() / 2);
+    std::nth_element(intervals_s.begin(), middle, intervals_s.end());
+    return std::max(*middle, 1e-6);
+  }
+  /// From frame k to the next, in usual intervals.
+  double Interval(size_t k) const {
+    return std::max((estimates_[k + 1].time_s - estimates_[k].time_s) / interval_s_, kMinInterval);
+  }
+  bool Joined(size_t k) const {
+    return estimates_[k + 1].time_s - estimates_[k].time_s <= options_.max_gap_s;
+  }
+
+  void FirstGuess() {
+    for (size_t k = 0; k + 1 < states_.size(); ++k) {
+      if (!Joined(k)) continue;
+      states_[k].rate = Difference(states_[k], states_[k + 1]) / Interval(k);
+    }
+    // As if all that the motions change from frame to frame were their own doing.
+    double rotation = 0.0, translation = 0.0;
+    for (size_t k = 0; k + 1 < states_.size(); ++k) {
+      if (!Joined(k)) continue;
+      const Vector6d change = states_[k + 1].rate - states_[k].rate;
+      rotation += change.head<3>().squaredNorm();
+      translation += change.tail<3>().squaredNorm();
+    }
+    const double count = 3.0 * static_cast<double>(states_.size());
+    variances_.rotation = std::log(std::max(rotation / count, 1e-16));
+    variances_.translation = std::log(std::max(translation / count, 1e-16));
+    variances_.pose = std::min(variances_.pose, std::log(options_.max_variance));
+  }
+
+  void AddPoses(const Variances& variances, NormalEquations* equations) const {
+    for (size_t k = 0; k < states_.size(); ++k) {
+      const Matrix6d information = weights_[k] * std::exp(-variances.pose) * information_[k];
+      const Vector6d error = Difference(measured_[k], states_[k]);
+      equations->diagonal[k].topLeftCorner<kPose, kPose>() += information;
+      equations->gradient[k].head<kPose>() += information * error;
+      equations->cost += error.dot(information * error);
+      if (information_[k].isZero(0.0)) continue;
+      equations->log_determinants -= kPose * variances.pose;
+    }
+  }
+
+  /// White noise on the jerk between frames k and k + 1.
+  void AddMotion(size_t k, const Variances& variances, NormalEquations* equations) const {
+    const double dt = Interval(k), dt2 = dt * dt, dt3 = dt2 * dt;
+    Eigen::Matrix3d covariance;
+    covariance << dt2 * dt3 / 20.0, dt2 * dt2 / 8.0, dt3 / 6.0, dt2 * dt2 / 8.0, dt3 / 3.0, dt2 / 2.0,
+        dt3 / 6.0, dt2 / 2.0, dt;
+    const Eigen::Matrix3d inverse = covariance.inverse();
+    const State &a = states_[k], &b = states_[k + 1];
+    StateVector error;
+    error << Difference(a, b) - dt * a.rate - 0.5 * dt2 * a.acceleration,
+        b.rate - a.rate - dt * a.acceleration, b.acceleration - a.acceleration;
+    // d error / d a = -(turn, dt, dt^2 / 2; 0, 1, dt; 0, 0, 1), d error / d b = 1
+    StateMatrix J = StateMatrix::Identity();
+    J.topLeftCorner<3, 3>() = (b.R_world_cam.conjugate() * a.R_world_cam).toRotationMatrix();
+    J.block<kPose, kPose>(0, kPose).diagonal().setConstant(dt);
+    J.block<kPose, kPose>(0, 2 * kPose).diagonal().setConstant(0.5 * dt2);
+    J.block<kPose, kPose>(kPose, 2 * kPose).diagonal().setConstant(dt);
+    const double rotation = std::exp(-variances.rotation), translation = std::exp(-variances.translation);
+    StateMatrix W = StateMatrix::Zero();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        auto block = W.block<kPose, kPose>(kPose * i, kPose * j).diagonal();
+        block.head<3>().setConstant(rotation * inverse(i, j));
+        block.tail<3>().setConstant(translation * inverse(i, j));
+      }
+    }
+    const StateMatrix JW = J.transpose() * W;
+    equations->diagonal[k].noalias() += JW * J;
+    equations->diagonal[k + 1] += W;
+    equations->above[k] = -JW;
+    equations->gradient[k].noalias() -= JW * error;
+    equations->gradient[k + 1].noalias() += W * error;
+    equations->cost += error.dot(W * error);
+    equations->log_determinants -= 9.0 * (variances.rotation + variances.translation);
+  }
+
+  NormalEquations Linearize(const Variances& variances) const {
+    NormalEquations equations;
+    equations.diagonal.assign(states_.size(), kLeastInformation * StateMatrix::Identity());
+    equations.above.assign(states_.size() - 1, StateMatrix::Zero());
+    equations.gradient.assign(states_.size(), StateVector::Zero());
+    AddPoses(variances, &equations);
+    for (size_t k = 0; k + 1 < states_.size(); ++k) {
+      if (Joined(k)) AddMotion(k, variances, &equations);
+    }
+    return equations;
+  }
+
+  /// -2 log of the likelihood of the poses, the states integrated out.
+  double Unlikelihood(const Variances& variances) const {
+    if (options_.between) options_.between();
+    NormalEquations equations = Linearize(variances);
+    const StateSteps gradient = equations.gradient;
+    StateSteps steps;
+    const std::optional<double> log_determinant = Solve(&equations, &steps);
+    if (!log_determinant) return std::numeric_limits<double>::infinity();
+    double cost = equations.cost;  // at the minimum: less by what the steps gain
+    for (size_t k = 0; k < steps.size(); ++k) cost += gradient[k].dot(steps[k]);
+    return cost + *log_determinant - equations.log_determinants;
+  }
+
+  /// One logarithm after the other, by steps that become smaller.
+  void FindVariances() {
+    double best = Unlikelihood(variances_);
+    for (double step = 2.0; step > 0.1; step *= 0.5) {
+      for (int i = 0; i < 3; ++i) {
+        for (const double direction : {step, -step}) {
+          bool better = false;
+          while (TryStep(i, direction, &best)) better = true;
+          if (better) break;
+        }
+      }
+    }
+  }
+
+  bool TryStep(int i, double by, double* best) {
+    Variances tried = variances_;
+    tried[i] += by;
+    if (tried.pose < std::log(options_.min_variance) || tried.pose > std::log(options_.max_variance) ||
+        tried[i] < kMinLogVariance || tried[i] > kMaxLogVariance) {
+      return false;
+    }
+    const double now = Unlikelihood(tried);
+    if (!(now < *best)) return false;
+    *best = now;
+    variances_ = tried;
+    return true;
+  }
+
+  void Update() {
+    if (options_.between) options_.between();
+    NormalEquations equations = Linearize(variances_);
+    StateSteps steps;
+    if (!Solve(&equations, &steps)) return;
+    for (size_t k = 0; k < states_.size(); ++k) states_[k].Step(steps[k]);
+  }
+
+  void Weigh() {
+    for (size_t k = 0; k < states_.size(); ++k) {
+      const Vector6d error = Difference(measured_[k], states_[k]);
+      const double chi2 = error.dot(information_[k] * error) * std::exp(-variances_.pose);
+      weights_[k] = (options_.freedom + kPose) / (options_.freedom + chi2);
+    }
+  }
+
+  Variances ToVariances(const MotionNoise& noise) const {
+    const double s5 = std::pow(interval_s_, 5.0);
+    return {std::log(noise.variance), std::log(noise.jerk_rotation * s5),
+            std::log(noise.jerk_translation * s5)};
+  }
+
+  MotionNoise ToNoise(const Variances& variances) const {
+    const double s5 = std::pow(interval_s_, 5.0);
+    return {std::exp(variances.pose), std::exp(variances.rotation) / s5,
+            std::exp(variances.translation) / s5};
+  }
+
+  SmoothedTrajectory Result() const {
+    SmoothedTrajectory result;
+    result.noise = ToNoise(variances_);
+    for (const State& state : states_) {
+      result.T_cam_world.push_back(Rigid3d(state.R_world_cam, state.center).Inverse());
+    }
+    return result;
+  }
+
+  std::span<const PoseEstimate> estimates_;
+  const SmoothingOptions& options_;
+  double interval_s_ = 1.0;
+  std::vector<State> states_, measured_;
+  std::vector<Matrix6d> information_;  ///< of (rotation, centre)
+  std::vector<double> weights_;
+  Variances variances_;
+};
+
+}  // namespace
+
+SmoothedTrajectory SmoothTrajectory(std::span<const PoseEstimate> estimates,
+                                    const SmoothingOptions& options) {
+  const bool enough = static_cast<int>(estimates.size()) >= std::max(options.min_poses, 2) &&
+                      estimates.back().time_s > estimates.front().time_s;
+  if (enough) return Smoother(estimates, options).Run();
+  SmoothedTrajectory result;
+  for (const PoseEstimate& estimate : estimates) result.T_cam_world.push_back(estimate.T_cam_world);
+  return result;
+}
+
+}  // namespace dmslam
