@@ -210,6 +210,10 @@ std::vector<Entry> TrackingEntries() {
           "tracking.trusted_age_s", "age at which a landmark has full weight",
           [](Settings & s) -> auto& { return s.frontend.tracking.trusted_age_s; }, 0, 1000),
       Make(
+          "tracking.smooth_at_end",
+          "the poses told at the end: landmarks placed by all frames, and joined with the camera's motion",
+          [](Settings & s) -> auto& { return s.frontend.smooth_at_end; }),
+      Make(
           "tracking.max_local_keyframes", "keyframes whose landmarks are searched for",
           [](Settings & s) -> auto& { return s.frontend.tracking.max_local_keyframes; }, 1, 1000),
       Make(
@@ -287,6 +291,7 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   settings->mapper.creation.mutual_exclusion = dm;
   settings->mapper.seen_through.enabled = dm;
   settings->frontend.tracking.motion_belief = dm;
+  settings->frontend.smooth_at_end = dm;
   settings->frontend.initializer_method = dm ? "dlrsac" : "ransac";
 }
 

@@ -110,6 +110,7 @@ class StreamNode : public Node {
 
   /// Keeps the protocol alive from within long work.
   void PumpWithinWork();
+  void PublishStatusIfDue();
   void Exit(int code, std::string problem = {});
   StatusHead MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const;
 
@@ -126,7 +127,6 @@ class StreamNode : public Node {
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(std::span<const uint8_t> bytes);
-  void PublishStatusIfDue();
   void KeepCameraKnown();
   void RunElection();
   void StartElection();

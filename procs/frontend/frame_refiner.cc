@@ -7,7 +7,6 @@ namespace dmslam {
 namespace {
 
 constexpr int kMinSights = 30;
-constexpr double kMinInlierShare = 0.7;
 
 /// What became of a landmark of map `map_id`; null where it is gone.
 const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
@@ -19,13 +18,7 @@ const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
 }  // namespace
 
 void FrameRefiner::Keep(const TrackedFrame& frame, const FramePose& pose) {
-  Kept kept{pose, {}, frame.features->set};
-  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
-    if (!frame.landmarks[i].valid() || frame.classes[i] != FeatureClass::kUsed) continue;
-    kept.sights.push_back({frame.landmarks[i], frame.features->uv_px[i].cast<float>(),
-                           static_cast<uint16_t>(i),
-                           static_cast<uint8_t>(frame.features->set.keypoints[i].octave)});
-  }
+  Kept kept{pose, SightsOf(frame), frame.features->set};
   kept.sights.shrink_to_fit();  // they stay for long
   num_features_ += kept.features.keypoints.size();
   frames_.push_back(std::move(kept));
@@ -59,63 +52,46 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
       frames_.begin(), frames_.end(), [](const Kept& kept) { return kept.features.keypoints.empty(); }));
 }
 
-std::vector<PoseObservation> FrameRefiner::Observations(const Map& map, MapId map_id,
-                                                        const Kept& kept) const {
-  std::vector<PoseObservation> observations;
+std::vector<Sight> FrameRefiner::SightsNow(const Map& map, MapId map_id, const Kept& kept) {
+  std::vector<Sight> sights;
   for (const Sight& sight : kept.sights) {
     const Landmark* landmark = LandmarkNow(map, map_id, sight.landmark);
     if (landmark == nullptr) continue;
-    observations.push_back(
-        {landmark->p_world, sight.uv_px.cast<double>(), 1.0 / pyramid_.SigmaSquared(sight.octave), 1.0});
+    sights.push_back(sight);
+    sights.back().landmark = landmark->id;
   }
-  return observations;
+  return sights;
 }
 
 /// With what the map has become since: a frame from behind a walker saw little of the map of its time.
-std::optional<std::vector<PoseObservation>> FrameRefiner::SearchAgain(const Map& map, MapId map_id,
-                                                                      const Kept& kept, const Rigid3d& told,
-                                                                      const Search& search) const {
+std::optional<std::vector<Sight>> FrameRefiner::SearchAgain(const Map& map, MapId map_id, const Kept& kept,
+                                                            const Rigid3d& told, const Search& search) const {
   if (kept.features.keypoints.empty() || !search) return std::nullopt;
   TrackedFrame frame(kept.pose.frame_index, kept.pose.stamp_ns,
-                     MakeFrameFeatures(kept.features, camera_, pyramid_));
+                     MakeFrameFeatures(kept.features, map.camera(), map.pyramid()));
   frame.T_cam_world = told;
-  for (const Sight& sight : kept.sights) {
-    const Landmark* landmark = LandmarkNow(map, map_id, sight.landmark);
-    if (landmark != nullptr) frame.landmarks[sight.feature] = landmark->id;
-  }
+  for (const Sight& sight : SightsNow(map, map_id, kept)) frame.landmarks[sight.feature] = sight.landmark;
   if (!search(&frame)) return std::nullopt;
-  std::vector<PoseObservation> observations;
-  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
-    if (!frame.landmarks[i].valid() || frame.classes[i] != FeatureClass::kUsed) continue;
-    observations.push_back({map.FindLandmark(frame.landmarks[i])->p_world, frame.features->uv_px[i],
-                            1.0 / pyramid_.SigmaSquared(frame.features->set.keypoints[i].octave), 1.0});
-  }
-  return observations;
+  return SightsOf(frame);
 }
 
-std::optional<FramePose> FrameRefiner::RefineNext(const Map& map, const Search& search) {
+std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& search) {
   const Kept kept = std::move(due_.front());
   due_.pop_front();
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
   const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(kept.pose.reference);
   if (!reference || !keyframe_id) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
-  auto observations = SearchAgain(map, reference->map_id, kept, told, search);
-  if (!observations) observations = Observations(map, reference->map_id, kept);
-  if (static_cast<int>(observations->size()) < kMinSights) return std::nullopt;
-  const PoseOptimizationReport report = OptimizePose(camera_.Ideal(), told, *observations);
-  if (!report.usable || report.num_inliers < kMinInlierShare * static_cast<double>(observations->size())) {
-    return std::nullopt;
-  }
-  const Keyframe& keyframe = *map.FindKeyframe(*keyframe_id);
-  FramePose pose = kept.pose;
-  pose.state = TrackingState::kLocalizedLater;
-  pose.map_id = keyframe.map_id;
-  pose.reference = *keyframe_id;
-  pose.T_cam_reference = report.T_cam_world * keyframe.T_cam_world.Inverse();
-  pose.reference_scale = keyframe.scale;
-  pose.T_cam_world = report.T_cam_world;
-  return pose;
+  auto sights = SearchAgain(map, reference->map_id, kept, told, search);
+  if (!sights) sights = SightsNow(map, reference->map_id, kept);
+  if (static_cast<int>(sights->size()) < kMinSights) return std::nullopt;
+  FinalPose refined;
+  refined.pose = kept.pose;
+  const PoseOptimizationReport report = MeasurePose(map, told, *sights, &refined);
+  if (!Agrees(report, sights->size())) return std::nullopt;
+  refined.pose.state = TrackingState::kLocalizedLater;
+  refined.SetPose(*map.FindKeyframe(*keyframe_id), report.T_cam_world);
+  return refined;
 }
 
 }  // namespace dmslam

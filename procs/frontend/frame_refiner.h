@@ -6,11 +6,10 @@
 #include <optional>
 #include <vector>
 
-#include "dmslam/camera/camera.h"
 #include "dmslam/features/types.h"
 #include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
-#include "dmslam/optimization/pose_optimization.h"
+#include "frontend/final_poses.h"
 #include "frontend/tracked_frame.h"
 
 namespace dmslam {
@@ -29,8 +28,7 @@ class FrameRefiner {
   /// Looks for more of the map from the frame's pose and with its landmarks; whether that went well.
   using Search = std::function<bool(TrackedFrame*)>;
 
-  FrameRefiner(const Camera& camera, const Pyramid& pyramid, const FrameRefinerOptions& options = {})
-      : camera_(camera), pyramid_(pyramid), options_(options) {}
+  explicit FrameRefiner(const FrameRefinerOptions& options = {}) : options_(options) {}
 
   /// Keeps a tracked frame and the pose that was told of it.
   void Keep(const TrackedFrame& frame, const FramePose& pose);
@@ -40,27 +38,19 @@ class FrameRefiner {
   bool IsBusy() const { return !due_.empty(); }
   /// The pose of the oldest frame that is due, relative to its reference keyframe as that is now (state:
   /// localised later). None where its observations do not agree with the map any more.
-  std::optional<FramePose> RefineNext(const Map& map, const Search& search);
+  std::optional<FinalPose> RefineNext(const Map& map, const Search& search);
 
  private:
-  struct Sight {
-    LandmarkId landmark;
-    Eigen::Vector2f uv_px;  ///< undistorted
-    uint16_t feature = 0;
-    uint8_t octave = 0;
-  };
   struct Kept {
     FramePose pose;
     std::vector<Sight> sights;
     FeatureSet features;  ///< empty: forgotten
   };
   void Bound();
-  std::vector<PoseObservation> Observations(const Map& map, MapId map_id, const Kept& kept) const;
-  std::optional<std::vector<PoseObservation>> SearchAgain(const Map& map, MapId map_id, const Kept& kept,
-                                                          const Rigid3d& told, const Search& search) const;
+  static std::vector<Sight> SightsNow(const Map& map, MapId map_id, const Kept& kept);
+  std::optional<std::vector<Sight>> SearchAgain(const Map& map, MapId map_id, const Kept& kept,
+                                                const Rigid3d& told, const Search& search) const;
 
-  Camera camera_;
-  Pyramid pyramid_;
   FrameRefinerOptions options_;
   std::deque<Kept> frames_;
   std::deque<Kept> due_;

@@ -55,7 +55,7 @@ class Refining : public testing::Test {
     std::vector<FramePose> poses;
     refiner.Begin(map_);
     while (refiner.IsBusy()) {
-      if (auto pose = refiner.RefineNext(map_, search)) poses.push_back(*pose);
+      if (auto pose = refiner.RefineNext(map_, search)) poses.push_back(pose->pose);
     }
     return poses;
   }
@@ -67,7 +67,7 @@ class Refining : public testing::Test {
 };
 
 TEST_F(Refining, PoseComesFromTheMapAsItIsNow) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid());
+  FrameRefiner refiner;
   refiner.Keep(frame_, told_);
   const std::vector<FramePose> refined = Refine(refiner);
   ASSERT_EQ(refined.size(), 1U);
@@ -78,7 +78,7 @@ TEST_F(Refining, PoseComesFromTheMapAsItIsNow) {
 }
 
 TEST_F(Refining, FrameThatTheMapContradictsIsLeftOut) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid());
+  FrameRefiner refiner;
   refiner.Keep(frame_, told_);
   Random random(3);
   for (const LandmarkId id : map_.LandmarkIdsSorted()) {
@@ -98,7 +98,7 @@ bool FindAll(const std::vector<LandmarkId>& ids, TrackedFrame* frame) {
 TEST_F(Refining, WhatTheMapHasWonSinceCounts) {
   const std::vector<LandmarkId> ids = frame_.landmarks;
   for (size_t i = 20; i < ids.size(); ++i) frame_.landmarks[i] = {};  // too few to be refined with
-  FrameRefiner refiner(map_.camera(), map_.pyramid());
+  FrameRefiner refiner;
   refiner.Keep(frame_, told_);
   int known = 0;
   const auto refined = Refine(refiner, [&](TrackedFrame* frame) {
@@ -111,7 +111,7 @@ TEST_F(Refining, WhatTheMapHasWonSinceCounts) {
 }
 
 TEST_F(Refining, AFailedSearchLeavesWhatTheFrameSaw) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid());
+  FrameRefiner refiner;
   refiner.Keep(frame_, told_);
   const auto refined = Refine(refiner, [](TrackedFrame* frame) {
     frame->ClearMatches();
@@ -122,7 +122,7 @@ TEST_F(Refining, AFailedSearchLeavesWhatTheFrameSaw) {
 }
 
 TEST_F(Refining, FeaturesOfTheOldestAreForgottenBeyondTheBound) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid(), {.max_features = 2 * kLandmarks});
+  FrameRefiner refiner({.max_features = 2 * kLandmarks});
   for (uint32_t i = 0; i < 4; ++i) {
     told_.frame_index = i;
     refiner.Keep(frame_, told_);
@@ -137,7 +137,7 @@ TEST_F(Refining, FeaturesOfTheOldestAreForgottenBeyondTheBound) {
 }
 
 TEST_F(Refining, OldestIsDroppedBeyondTheBound) {
-  FrameRefiner refiner(map_.camera(), map_.pyramid(), {.max_frames = 2});
+  FrameRefiner refiner({.max_frames = 2});
   for (uint32_t i = 0; i < 4; ++i) {
     told_.frame_index = i;
     refiner.Keep(frame_, told_);

@@ -41,7 +41,7 @@ FrontendCore::FrontendCore(Setup setup)
       localize_only_(setup.localize_only),
       catch_up_in_portions_(setup.catch_up_in_portions),
       map_(setup.camera, setup.pyramid),
-      refiner_(setup.camera, setup.pyramid, setup.options.refiner),
+      refiner_(setup.options.refiner),
       extractor_(setup.extractor),
       first_map_extractor_(WithMoreFeatures(setup.extractor, setup.options.initializer_feature_factor)),
       initializer_options_(setup.initializer),
@@ -72,6 +72,7 @@ FirstMapSearch FrontendCore::MakeSearch() const {
 
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   while (IsRefining()) RefineNext();
+  near_ = {};  // may lie elsewhere now
   map_.Apply(delta);
   relocalizer_.Update(map_);
   if (delta.progress.settled >= awaited_) awaited_ = {};
@@ -88,7 +89,7 @@ void FrontendCore::RefineNext() {
     tracker_.SetMotionPrior(std::nullopt, 1.0);
     return tracker_.TrackLocalMap(map_, false, frame).ok;
   };
-  if (std::optional<FramePose> pose = refiner_.RefineNext(map_, search)) refined_.push_back(std::move(*pose));
+  if (auto pose = refiner_.RefineNext(map_, search)) final_poses_.Add(map_, std::move(*pose));
 }
 
 void FrontendCore::Resume() {
@@ -101,6 +102,7 @@ void FrontendCore::Resume() {
 }
 
 void FrontendCore::ForgetMap() {
+  near_ = {};
   map_ = Map(camera_, pyramid_);
   relocalizer_.Clear();
   tracker_.Reset();
@@ -476,38 +478,58 @@ bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double 
          AngleBetween(motion.rotation, Eigen::Quaterniond::Identity()) <= kMaxTurnPerFrame_rad * frames;
 }
 
+/// Of a frame that was placed in the map. To be smoothed: by what it sees alone, without what was expected of
+/// it; nothing is known where that does not agree.
+FinalPose FrontendCore::LaterPose(const TrackedFrame& frame) const {
+  FinalPose later;
+  later.pose.frame_index = frame.index;
+  later.pose.stamp_ns = frame.stamp_ns;
+  later.pose.state = TrackingState::kLocalizedLater;
+  const std::vector<Sight> sights = SightsOf(frame);
+  const PoseOptimizationReport report = MeasurePose(map_, frame.T_cam_world, sights, &later);
+  if (!Agrees(report, sights.size())) {
+    later.measured = frame.T_cam_world;
+    later.information.setZero();
+  }
+  later.SetPose(*map_.FindKeyframe(tracker_.reference()),
+                options_.smooth_at_end ? later.measured : frame.T_cam_world);
+  return later;
+}
+
+/// From the newest back: the map lies after them.
+void FrontendCore::LocalizeNextUnplaced() {
+  TrackedFrame frame = std::move(unplaced_.back());
+  unplaced_.pop_back();
+  if (!near_.next || near_.next->index - frame.index > kNearFrames) {
+    near_ = {};
+    const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, frame.index));
+    if (next != map_.keyframes().end()) near_.next = FrameOfKeyframe(next->second);
+  }
+  if (!LocalizeLater(&frame, near_) || map_.FindKeyframe(tracker_.reference()) == nullptr) return;
+  ++counters_.localized_later;
+  final_poses_.Add(map_, LaterPose(frame));
+  near_.after = std::move(near_.next);
+  near_.next = std::move(frame);
+}
+
+bool FrontendCore::WorkAtEnd() {
+  if (!unplaced_.empty()) {
+    LocalizeNextUnplaced();
+    return true;
+  }
+  if (!options_.smooth_at_end || final_poses_.IsSettled()) return false;
+  final_poses_.Improve(map_, pump_);
+  return true;
+}
+
 void FrontendCore::Finish(std::vector<FrontendEvent>* events) {
   while (IsBehind()) CatchUp(events);
   RefineRest();
   while (IsRefining()) RefineNext();
-  LaterNeighbours near;
-  for (auto it = unplaced_.rbegin(); it != unplaced_.rend();
-       ++it) {  // from the newest back: the map lies after them
-    TrackedFrame& frame = *it;
-    if (!near.next || near.next->index - frame.index > kNearFrames) {
-      near = {};
-      const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, frame.index));
-      if (next != map_.keyframes().end()) near.next = FrameOfKeyframe(next->second);
-    }
-    if (!LocalizeLater(&frame, near)) continue;
-    const std::optional<Placed> placed = Place(frame.T_cam_world, tracker_.reference());
-    if (!placed) continue;
-    near.after = std::move(near.next);
-    near.next = frame;
-    ++counters_.localized_later;
-    FramePose pose;
-    pose.frame_index = frame.index;
-    pose.stamp_ns = frame.stamp_ns;
-    pose.state = TrackingState::kLocalizedLater;
-    pose.map_id = map_.FindKeyframe(placed->reference)->map_id;
-    pose.reference = placed->reference;
-    pose.T_cam_reference = placed->T_cam_reference;
-    pose.reference_scale = placed->scale;
-    pose.T_cam_world = frame.T_cam_world;
-    events->push_back(pose);
+  while (WorkAtEnd()) {
   }
-  unplaced_.clear();
-  for (FramePose& pose : std::exchange(refined_, {})) events->push_back(std::move(pose));
+  for (FramePose& pose : final_poses_.Take()) events->push_back(std::move(pose));
+  near_ = {};
 }
 
 }  // namespace dmslam

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "dmslam/map/proposals.h"
 #include "dmslam/motion_segmentation/initializer.h"
 #include "frontend/baseline_initializer.h"
+#include "frontend/final_poses.h"
 #include "frontend/frame_refiner.h"
 #include "frontend/frontend_options.h"
 #include "frontend/pose_tracker.h"
@@ -88,7 +90,13 @@ class FrontendCore {
                     std::vector<FrontendEvent>* events);
   void ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features,
                        std::vector<FrontendEvent>* events);
-  /// At the end of the sequence: places frames that had no pose when they came.
+  /// At the end of the sequence, when no frame waits to be refined: does a part of what is left to do, which
+  /// is to place frames that had no pose when they came and to join the poses with the camera's motion.
+  /// False: all is done.
+  bool WorkAtEnd();
+  /// Called from within long work: delivers what has arrived; may do nothing, and does not change the core.
+  void SetPump(std::function<void()> pump) { pump_ = std::move(pump); }
+  /// Does all that is left and tells the last poses.
   void Finish(std::vector<FrontendEvent>* events);
   /// Whether frames wait to be tracked, and tracks the oldest of them (there must be one).
   bool IsBehind() const { return !behind_.empty(); }
@@ -135,6 +143,8 @@ class FrontendCore {
   FramePose MakePose(TrackingState state, const TrackingReport& report) const;
   TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
   bool LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near);
+  void LocalizeNextUnplaced();
+  FinalPose LaterPose(const TrackedFrame& frame) const;
   void KeepUnplaced(TrackedFrame frame);
   void NextMapId();
   void Coast();
@@ -153,7 +163,8 @@ class FrontendCore {
   bool catch_up_in_portions_;
   Map map_;
   FrameRefiner refiner_;
-  std::vector<FramePose> refined_;  ///< told at the end
+  FinalPoses final_poses_;
+  std::function<void()> pump_;
   OrbExtractor extractor_;
   OrbExtractor first_map_extractor_;  ///< more features while there is no map
   InitializerOptions initializer_options_;
@@ -188,6 +199,7 @@ class FrontendCore {
   int64_t last_keyframe_ns_ = 0;
   KeyframeId awaited_;
   std::deque<TrackedFrame> unplaced_;
+  LaterNeighbours near_;             ///< of the unplaced frame that was looked at last
   std::deque<TrackedFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
   double extract_ms_ = 0;
   FrontendCounters counters_;

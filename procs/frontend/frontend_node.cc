@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "common/process_info.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
 #include "frontend/background_search.h"
@@ -42,6 +43,10 @@ void FrontendNode::Begin(const CameraInfo& info) {
   if (!lockstep_) setup.run_search = InBackground;
   setup.catch_up_in_portions = !lockstep_;
   core_ = std::make_unique<FrontendCore>(setup);
+  core_->SetPump([this] {
+    PumpWithinWork();
+    PublishStatusIfDue();
+  });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&core_->map(), [this] { return HandOverVersion(); });
   WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
@@ -68,6 +73,7 @@ bool FrontendNode::ReadyToWrite() {
 }
 
 Version FrontendNode::HandOverVersion() {
+  if (within_work_) return applied_;  // the map is being read
   TakeMapRecords(true);
   while (core_->IsRefining()) {  // what is taken must be applied
     core_->RefineNext();
@@ -190,7 +196,17 @@ bool FrontendNode::WorkOnce() {
   if (!end_) return false;
   if (!MapsAreAdjusted()) return false;
   if (!std::exchange(rest_begun_, true)) core_->RefineRest();
-  return core_->IsRefining() ? true : Finish();
+  if (core_->IsRefining()) return true;
+  return !last_events_ && WorkAtEnd() ? false : Finish();
+}
+
+bool FrontendNode::WorkAtEnd() {
+  if (!std::exchange(work_begun_, true))
+    ReturnFreeMemory();  // the features that were kept are not needed now
+  within_work_ = true;
+  const bool more = core_->WorkAtEnd();
+  within_work_ = false;
+  return more;
 }
 
 /// Catching up has the time between two images. Where that is not enough it comes first until all is done,

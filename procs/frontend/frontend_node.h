@@ -32,6 +32,7 @@ class FrontendNode : public StreamNode {
   bool WorkOnce() override;
   int64_t WorkDeadline() const override {
     if (core_ && core_->IsRefining()) return 0;
+    if (rest_begun_ && !last_events_ && !stopping_ && !AwaitsSavedMap()) return 0;
     return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX;
   }
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
@@ -70,6 +71,7 @@ class FrontendNode : public StreamNode {
   void DrawPicture();
   bool MapsAreAdjusted();
   static bool IsAnswerToAll(const MapDelta& delta);
+  bool WorkAtEnd();
   bool Finish();
   int UnacceptedKeyframes();
   bool HoldsBackForStatus() const;
@@ -90,9 +92,11 @@ class FrontendNode : public StreamNode {
   std::optional<std::vector<FrontendEvent>> last_events_;  ///< what is told at the end, in portions
   size_t last_told_ = 0;                                   ///< of them, already
   int64_t next_portion_ns_ = 0;
-  bool hurries_ = false;     ///< catches up before it takes another image
-  bool rest_begun_ = false;  ///< the last frames wait for their last poses
-  bool finished_ = false;    ///< everything is said; stays until the mapper has ended
+  bool hurries_ = false;      ///< catches up before it takes another image
+  bool within_work_ = false;  ///< of the core, which pumps
+  bool work_begun_ = false;   ///< of the core at the end
+  bool rest_begun_ = false;   ///< the last frames wait for their last poses
+  bool finished_ = false;     ///< everything is said; stays until the mapper has ended
   bool frame_open_ =
       false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
   int64_t last_index_ = -1;

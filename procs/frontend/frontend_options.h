@@ -71,6 +71,7 @@ struct FrontendOptions {
   int evidence_every_frames = 10;
   int max_kept_frames = 300;    ///< unplaced frames kept for localisation at the end
   FrameRefinerOptions refiner;  ///< of the poses told at the end
+  bool smooth_at_end = true;    ///< these are joined with the motion of a carried camera
 };
 
 }  // namespace dmslam

@@ -1,0 +1,254 @@
+#include "frontend/final_poses.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include "dmslam/optimization/reprojection.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kRounds = 10;
+constexpr double kMinInlierShare = 0.7;
+constexpr int kMinFrames = 5;      // that see a landmark, to place it by them
+constexpr int kLandmarkSteps = 2;  // of Gauss and Newton
+constexpr double kHuber_chi2 = 5.991;
+// Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
+constexpr double kOverstep = 1.7;
+constexpr double kMaxMove = 0.3;  // of a landmark, as a share of its distance: more is a slip
+constexpr size_t kPortion = 64;   // frames or landmarks between two calls of who waits
+
+PoseObservation Observe(const Pyramid& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
+  return {p_world, sight.uv_px.cast<double>(), 1.0 / pyramid.SigmaSquared(sight.octave), 1.0};
+}
+
+/// Of a landmark's place.
+struct LandmarkEquations {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+
+  void Add(const Map& map, const Rigid3d& T_cam_world, const Eigen::Vector3d& p_world,
+           const Eigen::Vector2d& uv_px, int octave) {
+    const Pinhole camera = map.camera().Ideal();
+    const Eigen::Vector3d p_cam = T_cam_world * p_world;
+    if (p_cam.z() <= 0.0) return;
+    const Eigen::Vector2d error = camera.Project(p_cam) - uv_px;
+    const double inv_sigma_squared = 1.0 / map.pyramid().SigmaSquared(octave);
+    const double chi2 = error.squaredNorm() * inv_sigma_squared;
+    const double weight = inv_sigma_squared * (chi2 > kHuber_chi2 ? std::sqrt(kHuber_chi2 / chi2) : 1.0);
+    const Matrix23 J = ProjectionJacobian(camera, p_cam) * T_cam_world.rotation.toRotationMatrix();
+    information += weight * J.transpose() * J;
+    gradient += weight * J.transpose() * error;
+  }
+};
+
+/// How sure its keyframes are of a landmark's place.
+Eigen::Matrix3d InformationOf(const Map& map, const Landmark& landmark) {
+  LandmarkEquations equations;
+  for (const auto& [keyframe_id, feature] : landmark.observations) {
+    const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
+    if (keyframe == nullptr) continue;
+    equations.Add(map, keyframe->T_cam_world, landmark.p_world, keyframe->features->uv_px[feature],
+                  keyframe->features->set.keypoints[feature].octave);
+  }
+  return equations.information;
+}
+
+}  // namespace
+
+std::vector<Sight> SightsOf(const TrackedFrame& frame) {
+  std::vector<Sight> sights;
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].valid() || frame.classes[i] != FeatureClass::kUsed) continue;
+    sights.push_back({frame.landmarks[i], frame.features->uv_px[i].cast<float>(), static_cast<uint16_t>(i),
+                      static_cast<uint8_t>(frame.features->set.keypoints[i].octave)});
+  }
+  return sights;
+}
+
+void FinalPose::SetPose(const Rigid3d& T_cam_world) {
+  pose.T_cam_reference = T_cam_world * T_reference_world.Inverse();
+  pose.T_cam_world = T_cam_world;
+}
+
+void FinalPose::SetPose(const Keyframe& reference, const Rigid3d& T_cam_world) {
+  pose.map_id = reference.map_id;
+  pose.reference = reference.id;
+  pose.reference_scale = reference.scale;
+  T_reference_world = reference.T_cam_world;
+  SetPose(T_cam_world);
+}
+
+bool Agrees(const PoseOptimizationReport& report, size_t num_sights) {
+  return report.usable && report.num_inliers >= kMinInlierShare * static_cast<double>(num_sights);
+}
+
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
+                                   const std::vector<Sight>& sights, FinalPose* pose) {
+  std::vector<PoseObservation> observations;
+  observations.reserve(sights.size());
+  for (const Sight& sight : sights) {
+    observations.push_back(Observe(map.pyramid(), sight, map.FindLandmark(sight.landmark)->p_world));
+  }
+  PoseOptimizationReport report = OptimizePose(map.camera().Ideal(), T_cam_world, observations);
+  pose->measured = report.T_cam_world;
+  pose->information = report.information;
+  pose->sights.clear();
+  pose->sights.reserve(static_cast<size_t>(report.num_inliers));
+  for (size_t i = 0; i < sights.size(); ++i) {
+    if (report.inliers[i]) pose->sights.push_back(sights[i]);
+  }
+  return report;
+}
+
+void FinalPoses::Add(const Map& map, FinalPose pose) {
+  for (const Sight& sight : pose.sights) {
+    if (landmarks_.contains(sight.landmark)) continue;
+    const Landmark& landmark = *map.FindLandmark(sight.landmark);
+    landmarks_[sight.landmark] = {landmark.p_world, landmark.p_world, InformationOf(map, landmark)};
+  }
+  poses_.push_back(std::move(pose));
+  rounds_ = 0;
+}
+
+/// Whether keyframes of the poses are elsewhere than they were.
+bool FinalPoses::HasMoved(const Map& map) const {
+  return std::any_of(poses_.begin(), poses_.end(), [&map](const FinalPose& p) {
+    const Keyframe* reference = map.FindKeyframe(p.pose.reference);
+    return reference == nullptr || reference->map_id != p.pose.map_id ||
+           reference->T_cam_world.translation != p.T_reference_world.translation ||
+           reference->T_cam_world.rotation.coeffs() != p.T_reference_world.rotation.coeffs();
+  });
+}
+
+void FinalPoses::Improve(const Map& map, const std::function<void()>& between) {
+  map_has_moved_ = map_has_moved_ || HasMoved(map);
+  if (map_has_moved_) return;
+  between_ = between;
+  std::sort(poses_.begin(), poses_.end(), [](const FinalPose& a, const FinalPose& b) {
+    return std::tie(a.pose.map_id, a.pose.stamp_ns) < std::tie(b.pose.map_id, b.pose.stamp_ns);
+  });
+  if (rounds_++ > 0) {
+    PlaceLandmarks(map);
+    PlaceFrames(map);
+  }
+  Smooth();
+  between_ = {};
+}
+
+bool FinalPoses::IsSettled() const { return poses_.empty() || map_has_moved_ || rounds_ >= kRounds; }
+
+void FinalPoses::Between() const {
+  if (between_) between_();
+}
+
+std::vector<FramePose> FinalPoses::Take() {
+  std::vector<FramePose> told;
+  for (FinalPose& last : poses_) told.push_back(std::move(last.pose));
+  *this = FinalPoses();
+  return told;
+}
+
+void FinalPoses::Smooth() {
+  for (auto begin = poses_.begin(); begin != poses_.end();) {
+    const auto end = std::find_if(
+        begin, poses_.end(), [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
+    std::vector<PoseEstimate> estimates;
+    for (auto it = begin; it != end; ++it) {
+      const double time_s = 1e-9 * static_cast<double>(it->pose.stamp_ns - begin->pose.stamp_ns);
+      estimates.push_back({time_s, it->measured, it->information});
+    }
+    SmoothingOptions options;
+    options.between = between_;
+    const auto known = noise_.find(begin->pose.map_id);
+    if (known != noise_.end()) options.noise = known->second;
+    const SmoothedTrajectory smoothed = SmoothTrajectory(estimates, options);
+    if (smoothed.noise) noise_.emplace(begin->pose.map_id, *smoothed.noise);
+    for (auto it = begin; it != end; ++it) {
+      it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
+    }
+    begin = end;
+  }
+}
+
+bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const {
+  return std::all_of(views.begin(), views.end(), [&](const View& view) {
+    return (poses_[view.frame].pose.T_cam_world * p_world).z() > 0.0;
+  });
+}
+
+/// Least reprojection errors (Huber's loss) over the landmark's place, the poses as they are. What the
+/// keyframes say holds it too: else few frames, close to each other, would carry their landmarks along.
+/// (Those frames that became keyframes speak twice.)
+Eigen::Vector3d FinalPoses::FromViews(const Map& map, std::span<const View> views,
+                                      const Placed& landmark) const {
+  Eigen::Vector3d p_world = landmark.p_world;
+  for (int step = 0; step < kLandmarkSteps; ++step) {
+    LandmarkEquations equations{landmark.information, landmark.information * (p_world - landmark.p_map)};
+    for (const View& view : views) {
+      const FinalPose& from = poses_[view.frame];
+      const Sight& sight = from.sights[view.sight];
+      equations.Add(map, from.pose.T_cam_world, p_world, sight.uv_px.cast<double>(), sight.octave);
+    }
+    const Eigen::Vector3d move = -equations.information.ldlt().solve(equations.gradient);
+    if (!move.allFinite()) return p_world;
+    p_world += move;
+  }
+  return p_world;
+}
+
+void FinalPoses::PlaceLandmark(const Map& map, std::span<const View> views) {
+  Placed& landmark = landmarks_.at(views.front().landmark);
+  const Eigen::Vector3d wanted = FromViews(map, views, landmark);
+  const Eigen::Vector3d beyond = landmark.p_world + kOverstep * (wanted - landmark.p_world);
+  const double distance = (poses_[views.front().frame].pose.T_cam_world * landmark.p_map).norm();
+  for (const Eigen::Vector3d& p_world : {beyond, wanted}) {
+    if ((p_world - landmark.p_map).norm() > kMaxMove * distance || !IsInFront(views, p_world)) continue;
+    landmark.p_world = p_world;
+    return;
+  }
+}
+
+void FinalPoses::PlaceLandmarks(const Map& map) {
+  size_t num_placed = 0;
+  std::vector<View> views;
+  for (uint32_t frame = 0; frame < poses_.size(); ++frame) {
+    for (uint32_t sight = 0; sight < poses_[frame].sights.size(); ++sight) {
+      views.push_back({poses_[frame].sights[sight].landmark, frame, sight});
+    }
+  }
+  std::sort(views.begin(), views.end(), [](const View& a, const View& b) {
+    return std::tie(a.landmark, a.frame, a.sight) < std::tie(b.landmark, b.frame, b.sight);
+  });
+  for (auto begin = views.begin(); begin != views.end();) {
+    const auto end =
+        std::find_if(begin, views.end(), [begin](const View& v) { return v.landmark != begin->landmark; });
+    if (end - begin >= kMinFrames) PlaceLandmark(map, {begin, end});
+    if (++num_placed % kPortion == 0) Between();
+    begin = end;
+  }
+}
+
+void FinalPoses::PlaceFrames(const Map& map) {
+  std::vector<PoseObservation> observations;
+  PoseOptimizationReport report;
+  size_t num_placed = 0;
+  for (FinalPose& frame : poses_) {
+    observations.clear();
+    for (const Sight& sight : frame.sights) {
+      observations.push_back(Observe(map.pyramid(), sight, landmarks_.at(sight.landmark).p_world));
+    }
+    OptimizePose(map.camera().Ideal(), frame.pose.T_cam_world, observations, {}, report);
+    if (Agrees(report, observations.size())) {
+      frame.measured = report.T_cam_world;
+      frame.information = report.information;
+    }
+    if (++num_placed % kPortion == 0) Between();
+  }
+}
+
+}  // namespace dmslam
