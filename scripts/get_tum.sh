@@ -54,7 +54,8 @@ full_name() { printf 'rgbd_dataset_%s\n' "${1/#fr/freiburg}"; }
 
 # fetch URL FILE: continues where an earlier try stopped. Returns 2 where the server cannot be reached.
 fetch() {
-  local url=$1 file=$2 status=0
+  local url=$1 file=$2 status=0 begun=0
+  [[ -s $file ]] && begun=1  # of an earlier run: it may be whole already, which servers answer with an error
   if [[ $url == file://* ]]; then
     cp -- "${url#file://}" "$file" 2>/dev/null || return 1
   elif command -v curl >/dev/null; then
@@ -63,7 +64,9 @@ fetch() {
     curl --fail --location --retry 2 --connect-timeout 20 --continue-at - "${progress[@]}" -o "$file" "$url" || status=$?
     case $status in
       0) ;;
-      5 | 6 | 7 | 28 | 35 | 56) return 2 ;;
+      5 | 6 | 7 | 18 | 28 | 35 | 56 | 92) return 2 ;;
+      23) die "$file cannot be written (is the disk full?); what is there is kept" ;;
+      22 | 33) ((begun)) || return 1 ;;
       *) return 1 ;;
     esac
   elif command -v wget >/dev/null; then
@@ -71,6 +74,8 @@ fetch() {
     case $status in
       0) ;;
       4) return 2 ;;
+      3) die "$file cannot be written (is the disk full?); what is there is kept" ;;
+      8) ((begun)) || return 1 ;;
       *) return 1 ;;
     esac
   else

@@ -46,6 +46,21 @@ expect 1 'no network' env no_proxy='*' "$get_tum" --base-url http://127.0.0.1:9/
 check "no half of an archive is left" test -z "$(ls -A "$work/a")"
 expect 1 'cannot be downloaded' "$get_tum" --base-url "file://$mirror" --to "$work/a" fr1_xyz
 
+# An archive that is whole already: servers answer 416 to who asks for the rest, which curl calls 22. A connection that was
+# cut (18) and a full disk (23) keep what is there.
+mkdir -p "$work/fake" "$work/d"
+printf '#!/bin/sh\nexit "$CURL_SAYS"\n' >"$work/fake/curl"
+chmod +x "$work/fake/curl"
+with_curl() { CURL_SAYS=$1 PATH=$work/fake:$PATH "${@:2}"; }
+archive=$work/d/$name.tgz
+head -c 120 "$mirror/freiburg3/$name.tgz" >"$archive"
+expect 1 'no network' with_curl 18 "$get_tum" --base-url http://x --to "$work/d" fr3_walking_xyz
+expect 1 'disk full' with_curl 23 "$get_tum" --base-url http://x --to "$work/d" fr3_walking_xyz
+check "what was downloaded is kept" test -s "$archive"
+cp "$mirror/freiburg3/$name.tgz" "$archive"
+expect 0 '2 frames' with_curl 22 "$get_tum" --base-url http://x --to "$work/d" fr3_walking_xyz
+expect 1 'cannot be downloaded' with_curl 22 "$get_tum" --base-url http://x --to "$work/d" fr1_xyz
+
 # Broken archives are named and removed, and the other sequences still come.
 head -c 120 "$mirror/freiburg3/$name.tgz" >"$mirror/freiburg3/rgbd_dataset_freiburg3_walking_rpy.tgz"
 expect 1 'walking_rpy.tgz is broken \(it does not unpack\) and was removed' \

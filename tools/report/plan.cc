@@ -33,6 +33,13 @@ fs::path FindFolder(const std::vector<fs::path>& roots, const std::string& name)
   return {};
 }
 
+void RequireGroundTruth(const fs::path& folder) {
+  if (folder.empty() || fs::exists(folder / "groundtruth.txt")) return;
+  throw InputError(folder.string() +
+                   ": has no groundtruth.txt, so that no error can be told; unpack the sequence " +
+                   "again (scripts/get_tum.sh), or leave it out with --only");
+}
+
 std::vector<Setting> PaperSettings() {
   return {{"features3000", "3000 features per frame, as in the paper", "features.count=3000"},
           {"defaults", "default settings", ""}};
@@ -58,7 +65,9 @@ Plan MakePlan(const PlanOptions& options) {
   for (const SequenceInfo& info : KnownSequences()) {
     const bool wanted = options.only.empty() ||
                         std::find(options.only.begin(), options.only.end(), info.name) != options.only.end();
-    if (wanted) plan.sequences.push_back({info, FindFolder(options.roots, std::string(info.folder))});
+    if (!wanted) continue;
+    plan.sequences.push_back({info, FindFolder(options.roots, std::string(info.folder))});
+    RequireGroundTruth(plan.sequences.back().folder);
   }
   return plan;
 }

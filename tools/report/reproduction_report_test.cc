@@ -65,6 +65,19 @@ TEST_F(Reproduction, FindsSequencesInTheRootAndOneFolderDeeper) {
   EXPECT_EQ(MakePlan(options_).sequences.size(), 2u);
 }
 
+TEST_F(Reproduction, ASequenceWithoutGroundTruthIsNamedBeforeAnythingRuns) {
+  fs::remove(root_ / "tum/synth_still_xyz/groundtruth.txt");
+  try {
+    MakePlan(options_);
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("synth_still_xyz: has no groundtruth.txt"), std::string::npos)
+        << error.what();
+  }
+  options_.only = {"fr3_walking_xyz"};
+  EXPECT_EQ(MakePlan(options_).sequences.size(), 1u);
+}
+
 TEST_F(Reproduction, BadInputIsNamed) {
   options_.only = {"kitchin"};
   EXPECT_THROW(MakePlan(options_), InputError);
