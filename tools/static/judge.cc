@@ -87,7 +87,7 @@ size_t StartOf(size_t k, size_t count, size_t frames, size_t reach) {
 
 }  // namespace
 
-std::vector<NamedSelector> AllSelectors(bool gated) {
+std::vector<NamedSelector> AllSelectors(bool gated, const std::string& only) {
   std::vector<NamedSelector> selectors;
   selectors.push_back({"RANSAC, F", MakeSelector("ransac", ModelKind::kFundamental)});
   selectors.push_back({"RANSAC, E", MakeSelector("ransac", ModelKind::kEssential)});
@@ -97,6 +97,9 @@ std::vector<NamedSelector> AllSelectors(bool gated) {
   DlrsacOptions options;
   if (!gated) options.min_distribution_share = 0;
   selectors.push_back(MakeDlrsac("DLRSAC", options));
+  std::erase_if(selectors,
+                [&](const NamedSelector& each) { return each.name.find(only) == std::string::npos; });
+  if (selectors.empty()) throw InputError("--only " + only + ": no method has a name like that");
   return selectors;
 }
 
@@ -118,8 +121,11 @@ std::vector<NamedSelector> DlrsacAblations() {
   selectors.push_back(MakeDlrsac("+ disparity layers", essential));
   essential.search_minima = true;
   selectors.push_back(MakeDlrsac("+ search of all minima", essential));
-  selectors.push_back(MakeDlrsac("+ degenerate cells told apart, stop by Eq. 4 (the default)", ungated));
   DlrsacOptions other = ungated;
+  other.max_rival_share = 0;
+  selectors.push_back(MakeDlrsac("+ degenerate cells told apart, stop by Eq. 4", other));
+  selectors.push_back(MakeDlrsac("+ ambiguous motions refused (the default)", ungated));
+  other = ungated;
   other.layers.enabled = false;
   selectors.push_back(MakeDlrsac("default without disparity layers", other));
   other = ungated;

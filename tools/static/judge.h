@@ -21,8 +21,9 @@ struct NamedSelector {
   std::unique_ptr<StaticSelector> selector;
 };
 /// RANSAC, ARSAC (each with F and with E), DLRSAC as the paper writes it, DLRSAC; DLRSAC's own gate on the
-/// distribution is off if `gated` is not set.
-std::vector<NamedSelector> AllSelectors(bool gated);
+/// distribution is off if `gated` is not set. Only those whose name contains `only`; InputError where none
+/// does.
+std::vector<NamedSelector> AllSelectors(bool gated, const std::string& only);
 /// DLRSAC with one of its parts taken away or exchanged, each.
 std::vector<NamedSelector> DlrsacAblations();
 

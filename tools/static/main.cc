@@ -293,14 +293,14 @@ void RunJudge(const JudgeSettings& settings) {
   out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table
       << "\n\n";
   if (settings.table == "pairs" || settings.table == "ablation") {
-    const auto selectors = settings.table == "pairs" ? AllSelectors(false) : DlrsacAblations();
+    const auto selectors = settings.table == "pairs" ? AllSelectors(false, settings.only) : DlrsacAblations();
     for (const int gap : settings.gaps) {
       json["gaps"].push_back(JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out));
     }
   } else if (settings.table == "windows") {
     WindowOptions options;
     options.matching.use_window = options.matching.check_orientation = !settings.no_window;
-    json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true), out);
+    json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true, settings.only), out);
   } else if (settings.table == "system") {
     SystemWindowOptions options;
     options.frames = settings.window;
@@ -413,7 +413,8 @@ void AddJudge(CLI::App& app, JudgeSettings& s) {
   judge->add_option("--window", s.window, "Frames of a window of table 'system'")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
-  judge->add_option("--only", s.only, "Of table 'system': only methods whose name contains this, as DLRSAC");
+  judge->add_option("--only", s.only,
+                    "Of pairs, windows and system: only methods whose name contains this, as DLRSAC");
   judge->add_option("--gaps", s.gaps, "Gaps of the pairs [frames]")->capture_default_str();
   judge->add_option("--camera", s.camera, "Camera file (YAML)");
   judge->add_option("--features", s.features, "Most features per image")->capture_default_str();

@@ -9,6 +9,7 @@
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/neighbor_vote.h"
 #include "dmslam/motion_segmentation/sampling.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -32,6 +33,15 @@ struct CoupledSet {
   double distribution_px = 0;
   int support = 0;  ///< inliers of the model in the member cells
 };
+
+/// A search that may be made beside others.
+MinimaOptions Coarser(MinimaOptions options) {
+  options.samples /= 3;
+  options.samples_kept /= 2;
+  options.directions /= 2;
+  options.max_matches /= 2;
+  return options;
+}
 
 /// One call's work.
 class Segmentation {
@@ -75,6 +85,8 @@ class Segmentation {
   void RefitOnAll(TwoViewModel* model, std::vector<uint8_t>* flags) const;
   double SpreadScore(std::span<const uint8_t> flags) const;
   void SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags) const;
+  double RivalShare(std::span<const uint8_t> flags) const;
+  bool RefusedAsAmbiguous(std::span<const uint8_t> flags);
   void VoteWithNeighbors(std::vector<uint8_t>* flags) const;
 
   int NumModels() const {
@@ -258,12 +270,9 @@ bool Segmentation::SearchSetModel(CoupledSet* set) const {
     std::copy(kept_[j].own.begin(), kept_[j].own.end(),
               use.begin() + static_cast<ptrdiff_t>(kept_[j].range.begin));
   }
-  MinimaOptions options = options_.minima;
-  options.samples /= 3;  // as there may be many sets
-  options.samples_kept /= 2;
-  options.directions /= 2;
-  options.max_matches /= 2;
-  const std::vector<EssentialMinimum> minima = FindEssentialMinima(arrays_, use, options, seed_);
+  // Coarser, as there may be many sets.
+  const std::vector<EssentialMinimum> minima =
+      FindEssentialMinima(arrays_, use, Coarser(options_.minima), seed_);
   if (minima.empty()) return false;
   set->model = minima.front().model;
   return true;
@@ -353,6 +362,7 @@ void Segmentation::Select(const CoupledSet& set) {
   if (options_.scope == StaticScope::kImage) {
     RefitOnAll(&model, &flags);
     SearchMinima(&model, &flags);
+    if (RefusedAsAmbiguous(flags)) return;
     if (options_.neighbor_share > 0) VoteWithNeighbors(&flags);
   } else {
     for (const size_t j : set.members) FlagInliers(model.M, arrays_, kept_[j].range, flags);
@@ -420,6 +430,38 @@ void Segmentation::SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags
   }
 }
 
+/// D times number of the widest motion among the matches not flagged, as a share of that of the flagged.
+double Segmentation::RivalShare(std::span<const uint8_t> flags) const {
+  std::vector<uint8_t> rest(flags.size());
+  std::transform(flags.begin(), flags.end(), rest.begin(), [](uint8_t f) -> uint8_t { return f ? 0 : 1; });
+  const double chosen = SpreadScore(flags);
+  // D times number is a sum of squares and grows with each match: mostly all the rest is too little.
+  if (!(chosen > 0) || SpreadScore(rest) <= options_.max_rival_share * chosen) return 0;
+  double widest = 0;
+  for (const EssentialMinimum& minimum :
+       FindEssentialMinima(arrays_, rest, Coarser(options_.minima), seed_)) {
+    std::vector<uint8_t> rival(flags.size());
+    FlagInliers(minimum.model.M, arrays_, {0, arrays_.size()}, rival);
+    for (size_t k = 0; k < rival.size(); ++k) rival[k] &= rest[k];
+    KeepLayer(minimum.model, &rival);
+    if (std::accumulate(rival.begin(), rival.end(), 0) < options_.min_static) continue;
+    widest = std::max(widest, SpreadScore(rival));
+  }
+  return widest / chosen;
+}
+
+bool Segmentation::RefusedAsAmbiguous(std::span<const uint8_t> flags) {
+  if (kind() != ModelKind::kEssential || options_.max_rival_share <= 0) return false;
+  const double share = RivalShare(flags);
+  if (share <= options_.max_rival_share) return false;
+  out_.refusal = Refusal::kAmbiguous;
+  out_.explanation = "another motion has " + std::to_string(share) +
+                     " of the chosen one's D times number of matches, " +
+                     std::to_string(options_.max_rival_share) + " allowed";
+  out_.is_static.assign(matches_.size(), 0);
+  return true;
+}
+
 void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
   std::vector<Match> sorted(matches_.size());
   for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
@@ -447,7 +489,22 @@ DlrsacOptions DlrsacOptions::Paper() {
   options.search_minima = false;
   options.neighbor_share = 0.0;
   options.min_distribution_share = 0.0;
+  options.max_rival_share = 0.0;
   return options;
+}
+
+void DlrsacOptions::Check() const {
+  const auto require = [](bool holds, const char* field, const char* range) {
+    if (!holds) throw InputError(std::string("dlrsac: ") + field + " must be " + range);
+  };
+  const auto is_share = [](double value) { return value >= 0 && value <= 1; };
+  require(cell_px >= 1, "cell_px", "at least 1");
+  require(min_cells >= 1, "min_cells", "at least 1");
+  require(is_share(couple_threshold), "couple_threshold", "in 0..1");
+  require(is_share(degenerate_share), "degenerate_share", "in 0..1");
+  require(is_share(neighbor_share), "neighbor_share", "in 0..1");
+  require(is_share(min_distribution_share), "min_distribution_share", "in 0..1");
+  require(is_share(max_rival_share), "max_rival_share", "in 0..1");
 }
 
 StaticSelection Dlrsac::Select(std::span<const Match> matches, const Camera& camera, uint64_t seed) const {

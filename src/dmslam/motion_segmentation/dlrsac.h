@@ -76,13 +76,21 @@ struct DlrsacOptions {
   double min_distribution_share = 0.12;
   int min_static = 12;  ///< fewer static matches: refused
 
+  /// What is not static is searched for a motion of its own (essential matrices with StaticScope::kImage
+  /// only). Where the D times number of that rival's matches exceeds this share of the static ones':
+  /// refused, two views cannot tell which of the two motions is the camera's. 0: not asked (the paper).
+  double max_rival_share = 0.5;
+
+  /// Throws InputError for values outside their range.
+  void Check() const;
+
   /// The paper as written: fundamental matrices, no octaves, no degeneracy, all features of the chosen cells.
   static DlrsacOptions Paper();
 };
 
 class Dlrsac : public StaticSelector {
  public:
-  explicit Dlrsac(const DlrsacOptions& options) : options_(options) {}
+  explicit Dlrsac(const DlrsacOptions& options) : options_(options) { options.Check(); }
   std::string_view name() const override { return "dlrsac"; }
   StaticSelection Select(std::span<const Match> matches, const Camera& camera, uint64_t seed) const override;
   const DlrsacOptions& options() const { return options_; }

@@ -217,6 +217,46 @@ TEST(Dlrsac, RefusesACompactSet) {
   EXPECT_EQ(Dlrsac(options).Select(pair.matches, pair.camera, 1).refusal, Refusal::kDistributionTooSmall);
 }
 
+TEST(Dlrsac, RefusesTwoMotionsThatAreEquallyWideAndNumerous) {
+  const auto make = [](int num_others) {
+    SyntheticPairOptions options;
+    options.num_static = 300;
+    SyntheticPair pair = MakeSyntheticPair(options, 16);
+    options.num_static = num_others;  // as wide as the first, with another motion
+    options.rotation = {-0.02, -0.01, 0.02};
+    options.translation = {-0.05, 0.15, 0.02};
+    const SyntheticPair others = MakeSyntheticPair(options, 17);
+    pair.matches.insert(pair.matches.end(), others.matches.begin(), others.matches.end());
+    pair.truth.resize(pair.matches.size(), 0);
+    return pair;
+  };
+  const SyntheticPair even = make(300);
+  const StaticSelection refused = Dlrsac(DlrsacOptions()).Select(even.matches, even.camera, 1);
+  EXPECT_EQ(refused.refusal, Refusal::kAmbiguous) << ToString(refused.refusal);
+  EXPECT_FALSE(refused.explanation.empty());
+  EXPECT_EQ(refused.E.norm(), 0.0);
+  EXPECT_EQ(refused.num_static, 0);
+  EXPECT_EQ(refused.is_static, std::vector<uint8_t>(even.matches.size(), 0));
+
+  const SyntheticPair clear = make(100);
+  const StaticSelection accepted = Dlrsac(DlrsacOptions()).Select(clear.matches, clear.camera, 1);
+  ASSERT_TRUE(accepted.IsUsable()) << accepted.explanation;
+  EXPECT_GT(ScoreOf(clear, accepted).precision, 0.9);
+  EXPECT_GT(ScoreOf(clear, accepted).recall, 0.9);
+
+  DlrsacOptions unasked;
+  unasked.max_rival_share = 0;
+  EXPECT_TRUE(Dlrsac(unasked).Select(even.matches, even.camera, 1).IsUsable());
+}
+
+TEST(Dlrsac, RefusesOptionsOutOfRange) {
+  DlrsacOptions options;
+  options.max_rival_share = 1.5;
+  EXPECT_THROW(Dlrsac{options}, InputError);
+  EXPECT_NO_THROW(DlrsacOptions().Check());
+  EXPECT_NO_THROW(DlrsacOptions::Paper().Check());
+}
+
 TEST(Dlrsac, TellsDegenerateCells) {
   const auto share = [](const SyntheticPair& pair, CellState state) {
     const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1);

@@ -28,6 +28,8 @@ std::string_view ToString(Refusal refusal) {
       return "too few static matches";
     case Refusal::kDistributionTooSmall:
       return "distribution too small";
+    case Refusal::kAmbiguous:
+      return "ambiguous";
   }
   return "unknown";
 }

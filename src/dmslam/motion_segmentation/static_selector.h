@@ -31,6 +31,7 @@ enum class Refusal : uint8_t {
   kNoModel,               ///< no sample gave a model
   kTooFewStatic,          ///< too few matches fit the model chosen
   kDistributionTooSmall,  ///< the static set is too compact: the motion is too complex (paper 2.3.1)
+  kAmbiguous,             ///< another motion is nearly as wide and as numerous as the one chosen
 };
 std::string_view ToString(Refusal refusal);
 
