@@ -126,7 +126,7 @@ void BM_Dlrsac(benchmark::State& state, ModelKind kind) {
   Run(state, Dlrsac(options));
 }
 
-/// As the system runs it: stop by Eq. 4.
+/// The default: stop by Eq. 4. The initialiser does without the search for a rival motion.
 void BM_DlrsacDefault(benchmark::State& state) { Run(state, Dlrsac(DlrsacOptions())); }
 
 /// How many samples of seven findFundamentalMat draws at this confidence, going by the inliers it found: it
