@@ -31,6 +31,28 @@ std::vector<Layer> FindLayers(const LayerOptions& options, std::span<const doubl
   return layers;
 }
 
+/// That with the largest D times number of matches.
+Layer WidestLayer(std::span<const Layer> layers, std::span<const double> disparity_px,
+                  std::span<const size_t> index, std::span<const Eigen::Vector2d> positions_px) {
+  if (layers.size() == 1) return layers.front();
+  double best_score = -1;
+  Layer best;
+  std::vector<Eigen::Vector2d> points;
+  for (const Layer& layer : layers) {
+    points.clear();
+    for (size_t k = 0; k < index.size(); ++k) {
+      if (disparity_px[k] >= layer.low && disparity_px[k] <= layer.high)
+        points.push_back(positions_px[index[k]]);
+    }
+    const double spread = Spread(points);
+    const double score = spread * spread * static_cast<double>(points.size());
+    if (score <= best_score) continue;
+    best_score = score;
+    best = layer;
+  }
+  return best;
+}
+
 }  // namespace
 
 double Disparity(const TwoViewModel& model, const MatchArrays& arrays, size_t i) {
@@ -48,27 +70,15 @@ int KeepWidestLayer(const LayerOptions& options, const TwoViewModel& model, cons
                     std::span<uint8_t> flags) {
   std::vector<double> disparity_px;
   std::vector<size_t> index;
+  disparity_px.reserve(flags.size());
+  index.reserve(flags.size());
   for (size_t i = 0; i < flags.size(); ++i) {
     if (!flags[i]) continue;
     index.push_back(i);
     disparity_px.push_back(std::clamp(focal_px * Disparity(model, arrays, i), -1e4, 1e4));
   }
   if (index.empty()) return 0;
-  double best_score = -1;
-  Layer best;
-  std::vector<Eigen::Vector2d> points;
-  for (const Layer& layer : FindLayers(options, disparity_px)) {
-    points.clear();
-    for (size_t k = 0; k < index.size(); ++k) {
-      if (disparity_px[k] >= layer.low && disparity_px[k] <= layer.high)
-        points.push_back(positions_px[index[k]]);
-    }
-    const double spread = Spread(points);
-    const double score = spread * spread * static_cast<double>(points.size());
-    if (score <= best_score) continue;
-    best_score = score;
-    best = layer;
-  }
+  const Layer best = WidestLayer(FindLayers(options, disparity_px), disparity_px, index, positions_px);
   int kept = 0;
   for (size_t k = 0; k < index.size(); ++k) {
     const bool in_layer = disparity_px[k] >= best.low && disparity_px[k] <= best.high;

@@ -4,7 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <optional>
 
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/neighbor_vote.h"
@@ -72,7 +74,7 @@ class Segmentation {
   CellState Classify(Cell* cell) const;
   bool MayLead(const Cell& cell) const;
   double CoupleByRotation(const Eigen::Matrix3d& R, const Cell& cell) const;
-  bool SearchSetModel(CoupledSet* set) const;
+  bool SearchSetModel(CoupledSet* set);
   bool ExplainedByPlane(std::span<const int> own) const;
   bool ExplainedByRotation(Cell* cell) const;
   void FillCoupleMatrix();
@@ -109,6 +111,8 @@ class Segmentation {
   MatchArrays arrays_;
   std::vector<Eigen::Vector2d> positions_px_;  ///< uv0, parallel to arrays_
   std::vector<Cell> kept_;
+  /// What was found for sets whose leader knows none; several leaders may couple with the same cells.
+  std::map<std::vector<size_t>, std::optional<TwoViewModel>> searched_;
   StaticSelection out_;
   uint64_t seed_ = 0;
 };
@@ -125,10 +129,11 @@ void Segmentation::SortIntoCells() {
     const int r = static_cast<int>(match.uv0_px.y() * out_.rows / camera_.height_px);
     return std::clamp(r, 0, out_.rows - 1) * out_.columns + std::clamp(c, 0, out_.columns - 1);
   };
+  std::vector<int> cell(matches_.size());
+  std::transform(matches_.begin(), matches_.end(), cell.begin(), cell_of);
   order_.resize(matches_.size());
   std::iota(order_.begin(), order_.end(), 0U);
-  std::stable_sort(order_.begin(), order_.end(),
-                   [&](uint32_t a, uint32_t b) { return cell_of(matches_[a]) < cell_of(matches_[b]); });
+  std::stable_sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) { return cell[a] < cell[b]; });
   arrays_ = MakeArrays(matches_, order_, camera_, options_.inlier);
   for (const uint32_t i : order_) positions_px_.push_back(matches_[i].uv0_px);
   const int needed = std::max(options_.min_cell_matches, SampleSize(kind()));
@@ -138,18 +143,18 @@ void Segmentation::SortIntoCells() {
     report.column = index % out_.columns;
     report.row = index / out_.columns;
     Range range{next, next};
-    while (range.end < order_.size() && cell_of(matches_[order_[range.end]]) == index) {
+    while (range.end < order_.size() && cell[order_[range.end]] == index) {
       report.centroid_px += matches_[order_[range.end++]].uv0_px;
     }
     next = range.end;
     report.num_matches = static_cast<int>(range.size());
     if (range.size() > 0) report.centroid_px /= static_cast<double>(range.size());
     if (report.num_matches < needed) continue;
-    Cell cell;
-    cell.index = index;
-    cell.range = range;
-    cell.centroid_px = report.centroid_px;
-    kept_.push_back(std::move(cell));
+    Cell kept;
+    kept.index = index;
+    kept.range = range;
+    kept.centroid_px = report.centroid_px;
+    kept_.push_back(std::move(kept));
   }
 }
 
@@ -264,7 +269,12 @@ double Segmentation::CoupleByRotation(const Eigen::Matrix3d& R, const Cell& cell
 }
 
 /// The motion of a set whose leader knows none: the lowest minimum of the epipolar cost over the members.
-bool Segmentation::SearchSetModel(CoupledSet* set) const {
+bool Segmentation::SearchSetModel(CoupledSet* set) {
+  if (const auto known = searched_.find(set->members); known != searched_.end()) {
+    if (known->second) set->model = *known->second;
+    return known->second.has_value();
+  }
+  std::optional<TwoViewModel>& found = searched_[set->members];
   std::vector<uint8_t> use(arrays_.size(), 0);
   for (const size_t j : set->members) {
     std::copy(kept_[j].own.begin(), kept_[j].own.end(),
@@ -275,6 +285,7 @@ bool Segmentation::SearchSetModel(CoupledSet* set) const {
       FindEssentialMinima(arrays_, use, Coarser(options_.minima), seed_);
   if (minima.empty()) return false;
   set->model = minima.front().model;
+  found = set->model;
   return true;
 }
 

@@ -9,6 +9,7 @@
 
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/geometry/two_view.h"
+#include "dmslam/motion_segmentation/epipolar_sums.h"
 #include "dmslam/robust/ransac.h"
 
 namespace dmslam {
@@ -132,7 +133,7 @@ template <typename Sink>
 /// Counts until the rest cannot bring it above `more_than`.
 [[gnu::always_inline]] inline int Count(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range,
                                         int more_than) {
-  constexpr size_t kBlock = 128;
+  constexpr size_t kBlock = 32;
   int count = 0;
   for (Range block = range; block.begin < range.end; block.begin = block.end) {
     if (count + static_cast<int>(range.end - block.begin) <= more_than) break;
@@ -165,6 +166,8 @@ __attribute__((target("avx2"))) int FlagAvx2(const Eigen::Matrix3d& M, const Mat
 }
 #endif
 
+}  // namespace
+
 bool HasAvx2() {
 #if defined(__x86_64__)
   return __builtin_cpu_supports("avx2");
@@ -172,8 +175,6 @@ bool HasAvx2() {
   return false;
 #endif
 }
-
-}  // namespace
 
 std::vector<VectorPath> VectorPaths() {
   std::vector<VectorPath> paths{VectorPath::kBaseline};
@@ -243,6 +244,40 @@ void ChooseEssentialPose(const MatchArrays& arrays, std::span<const uint8_t> use
   model->t = pose.translation.normalized();
 }
 
+namespace {
+
+bool DescendEssential(const PackedMatches& matches, int iterations, double bound_scale, TwoViewModel* model) {
+  constexpr double kDamping = 1e-6;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
+    EssentialNormal normal = SumEssentialNormal(matches, *model, B, bound_scale);
+    if (normal.count < 5) return false;
+    normal.matrix.diagonal() *= 1.0 + kDamping;
+    normal.matrix.diagonal().array() += 1e-12;
+    const Vector5d step = -normal.matrix.ldlt().solve(normal.gradient);
+    if (!step.allFinite() || step.head<3>().norm() > 1.0) return false;
+    UpdateEssential(step, B, model);
+    if (step.squaredNorm() < 1e-14) break;
+  }
+  model->M = Hat(model->t) * model->R;
+  model->M /= model->M.norm();
+  return model->M.allFinite();
+}
+
+bool DescendRotation(const PackedMatches& matches, int iterations, Eigen::Matrix3d* R) {
+  const UnitRays rays1(matches);
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const RotationNormal normal = SumRotationNormal(matches, rays1, *R);
+    const Eigen::Vector3d step = normal.matrix.ldlt().solve(normal.gradient);
+    if (!step.allFinite()) return false;
+    *R = SmallRotation(step) * *R;
+    if (step.squaredNorm() < 1e-14) break;
+  }
+  return R->allFinite();
+}
+
+}  // namespace
+
 bool Refine(ModelKind kind, const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
             TwoViewModel* model) {
   return kind == ModelKind::kFundamental ? RefineFundamental(arrays, use, model)
@@ -266,38 +301,7 @@ bool RefineFundamental(const MatchArrays& arrays, std::span<const uint8_t> use, 
 
 bool RefineEssential(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
                      TwoViewModel* model, double bound_scale) {
-  constexpr double kDamping = 1e-6;
-  std::vector<uint32_t> used;
-  for (size_t i = 0; i < use.size(); ++i) {
-    if (use[i]) used.push_back(static_cast<uint32_t>(i));
-  }
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
-    const Eigen::Matrix3d M = Hat(model->t) * model->R;
-    Matrix5d normal = Matrix5d::Zero();
-    Vector5d gradient = Vector5d::Zero();
-    int bounded = 0;
-    for (const uint32_t i : used) {
-      const double bound = bound_scale * SampsonBound(M, arrays, i);
-      if (!(bound > 0)) continue;
-      const EssentialRow row = MakeEssentialRow(model->R * arrays.ray0[i], arrays.ray1[i], model->t, B);
-      const double squared = row.residual * row.residual / bound;
-      const double weight = 1.0 / (bound * (1.0 + squared) * (1.0 + squared));  // Geman-McClure
-      normal.noalias() += row.jacobian * (weight * row.jacobian.transpose());
-      gradient += weight * row.residual * row.jacobian;
-      ++bounded;
-    }
-    if (bounded < 5) return false;
-    normal.diagonal() *= 1.0 + kDamping;
-    normal.diagonal().array() += 1e-12;
-    const Vector5d step = -normal.ldlt().solve(gradient);
-    if (!step.allFinite() || step.head<3>().norm() > 1.0) return false;
-    UpdateEssential(step, B, model);
-    if (step.squaredNorm() < 1e-14) break;
-  }
-  model->M = Hat(model->t) * model->R;
-  model->M /= model->M.norm();
-  return model->M.allFinite();
+  return DescendEssential(PackedMatches(arrays, use), iterations, bound_scale, model);
 }
 
 namespace {
@@ -315,15 +319,8 @@ std::vector<uint8_t> Thin(std::span<const uint8_t> use, size_t most) {
   return thin;
 }
 
-double EpipolarCost(const MatchArrays& arrays, std::span<const uint8_t> use, const Eigen::Matrix3d& M) {
-  double sum = 0, count = 0;
-  for (size_t i = 0; i < use.size(); ++i) {
-    if (!use[i]) continue;
-    const double squared = NormalizedSampson(M, arrays, i);
-    sum += squared / (1.0 + squared);
-    count += 1;
-  }
-  return count > 0 ? sum / count : 1.0;
+double EpipolarCost(const PackedMatches& matches, const Eigen::Matrix3d& M) {
+  return matches.count > 0 ? SumEpipolarCost(matches, M) / static_cast<double>(matches.count) : 1.0;
 }
 
 /// Two models whose rotations and directions are about the same.
@@ -338,46 +335,69 @@ namespace {
 
 /// Starts spread over the half sphere of directions (Fibonacci's spiral), with the rotation that fits best
 /// alone.
-void StartFromSphere(const MatchArrays& arrays, std::span<const uint8_t> use, int starts,
-                     std::vector<TwoViewModel>* models) {
+void StartFromSphere(const PackedMatches& matches, int starts, std::vector<TwoViewModel>* models) {
   TwoViewModel model;
-  if (!RefineRotation(arrays, use, 10, &model.R)) return;
+  if (!DescendRotation(matches, 10, &model.R)) return;
   for (int k = 0; k < starts; ++k) {
     const double z = (k + 0.5) / starts, phi = 2.399963229728653 * k, r = std::sqrt(1.0 - z * z);
     model.t = Eigen::Vector3d(r * std::cos(phi), r * std::sin(phi), z);
     // From coarse to fine, so that far matches pull at first.
     TwoViewModel start = model;
-    if (RefineEssential(arrays, use, 6, &start, 100.0) && RefineEssential(arrays, use, 6, &start, 10.0)) {
+    if (DescendEssential(matches, 6, 100.0, &start) && DescendEssential(matches, 6, 10.0, &start)) {
       models->push_back(start);
     }
   }
 }
 
+/// The few models of lowest cost; of equal ones those that came first.
+class LowestModels {
+ public:
+  LowestModels(const PackedMatches& matches, size_t kept) : matches_(matches), kept_(kept) {}
+
+  void Offer(const Eigen::Matrix3d& M) {
+    const bool full = ranked_.size() >= kept_;
+    const double infinity = std::numeric_limits<double>::infinity();
+    const double sum = SumEpipolarCost(matches_, M, full ? ranked_.back().sum : infinity);
+    const double cost = sum / static_cast<double>(matches_.count);
+    if (!(cost < (full ? ranked_.back().cost : infinity))) return;
+    if (full) ranked_.pop_back();
+    const auto place = std::upper_bound(ranked_.begin(), ranked_.end(), cost,
+                                        [](double value, const Ranked& other) { return value < other.cost; });
+    ranked_.insert(place, {cost, sum, M});
+  }
+
+  struct Ranked {
+    double cost, sum;
+    Eigen::Matrix3d M;
+  };
+  const std::vector<Ranked>& ranked() const { return ranked_; }
+
+ private:
+  const PackedMatches& matches_;
+  size_t kept_;
+  std::vector<Ranked> ranked_;  // the lowest first
+};
+
 /// Starts from the best of many samples of five.
-void StartFromSamples(const MatchArrays& arrays, std::span<const uint8_t> use, int samples, size_t kept,
-                      Random& random, std::vector<TwoViewModel>* models) {
+void StartFromSamples(const MatchArrays& arrays, std::span<const uint8_t> use, const PackedMatches& packed,
+                      int samples, size_t kept, Random& random, std::vector<TwoViewModel>* models) {
   std::vector<int> indices;
   for (size_t i = 0; i < use.size(); ++i) {
     if (use[i]) indices.push_back(static_cast<int>(i));
   }
-  if (indices.size() < 8) return;
-  std::vector<std::pair<double, Eigen::Matrix3d>> ranked;
+  if (indices.size() < 8 || kept == 0) return;
+  LowestModels lowest(packed, kept);
   std::array<Eigen::Matrix3d, kMaxModels> solutions;
   for (int k = 0; k < samples; ++k) {
     std::array<int, 5> sample;
     DrawSample<5>(random, static_cast<int>(indices.size()), sample);
     for (int& index : sample) index = indices[static_cast<size_t>(index)];
     const int count = EssentialFivePoint(arrays.ray0, arrays.ray1, sample, solutions);
-    for (int s = 0; s < count; ++s) {
-      const Eigen::Matrix3d& M = solutions[static_cast<size_t>(s)];
-      ranked.emplace_back(EpipolarCost(arrays, use, M), M);
-    }
+    for (int s = 0; s < count; ++s) lowest.Offer(solutions[static_cast<size_t>(s)]);
   }
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (size_t k = 0; k < std::min(kept, ranked.size()); ++k) {
+  for (const LowestModels::Ranked& ranked : lowest.ranked()) {
     TwoViewModel model;
-    model.M = ranked[k].second;
+    model.M = ranked.M;
     ChooseEssentialPose(arrays, use, &model);
     models->push_back(model);
   }
@@ -389,14 +409,15 @@ std::vector<EssentialMinimum> FindEssentialMinima(const MatchArrays& arrays, std
                                                   const MinimaOptions& options, uint64_t seed) {
   const std::vector<uint8_t> thin = Thin(use, options.max_matches);
   std::vector<TwoViewModel> starts;
-  StartFromSphere(arrays, thin, options.directions, &starts);
+  const PackedMatches packed(arrays, thin);
+  StartFromSphere(packed, options.directions, &starts);
   Random random(DeriveSeed(seed, 0, "essential-minima"));
-  StartFromSamples(arrays, thin, options.samples, options.samples_kept, random, &starts);
+  StartFromSamples(arrays, thin, packed, options.samples, options.samples_kept, random, &starts);
   std::vector<EssentialMinimum> minima;
   for (const TwoViewModel& start : starts) {
     EssentialMinimum minimum{start, 0};
-    if (!RefineEssential(arrays, thin, 15, &minimum.model)) continue;
-    minimum.cost = EpipolarCost(arrays, thin, minimum.model.M);
+    if (!DescendEssential(packed, 15, 1.0, &minimum.model)) continue;
+    minimum.cost = EpipolarCost(packed, minimum.model.M);
     const auto same = std::find_if(minima.begin(), minima.end(), [&](const EssentialMinimum& other) {
       return SameMotion(other.model, minimum.model);
     });
@@ -435,25 +456,7 @@ double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, d
 
 bool RefineRotation(const MatchArrays& arrays, std::span<const uint8_t> use, int iterations,
                     Eigen::Matrix3d* R) {
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
-    Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
-    for (size_t i = 0; i < use.size(); ++i) {
-      if (!use[i]) continue;
-      const Eigen::Vector3d y = (*R * arrays.ray0[i]).normalized();
-      const Eigen::Vector3d x = arrays.ray1[i].normalized();
-      const double variance = static_cast<double>(arrays.bound0[i]) + static_cast<double>(arrays.bound1[i]);
-      const double squared = (x - y).squaredNorm() / variance;
-      const double weight = 1.0 / (variance * (1.0 + squared) * (1.0 + squared));
-      normal += weight * (Eigen::Matrix3d::Identity() - y * y.transpose());
-      rhs += weight * y.cross(x);
-    }
-    const Eigen::Vector3d step = normal.ldlt().solve(rhs);
-    if (!step.allFinite()) return false;
-    *R = SmallRotation(step) * *R;
-    if (step.squaredNorm() < 1e-14) break;
-  }
-  return R->allFinite();
+  return DescendRotation(PackedMatches(arrays, use), iterations, R);
 }
 
 void StoreModel(const TwoViewModel& model, ModelKind kind, const Camera& camera, StaticSelection* selection) {

@@ -52,6 +52,7 @@ double NormalizedSampson(const Eigen::Matrix3d& M, const MatchArrays& arrays, si
 /// Instructions that an inner loop may use; where a machine has not got them, the baseline is taken. The
 /// results are the same.
 enum class VectorPath : uint8_t { kBaseline, kAvx2 };
+bool HasAvx2();  ///< of this machine
 /// Those that this machine has.
 std::vector<VectorPath> VectorPaths();
 

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "dmslam/motion_segmentation/two_view_model.h"
+
+namespace dmslam {
+
+/// The matches that take part in a descent, packed: one array for each coordinate of their rays (z = 1) and
+/// each bound, padded with zeros to whole vectors.
+struct PackedMatches {
+  std::vector<double> x0, y0, x1, y1;
+  std::vector<double> bound0, bound1;
+  size_t count = 0;
+
+  PackedMatches(const MatchArrays& arrays, std::span<const uint8_t> use);
+};
+
+// Sums over matches are taken in vector code across a match's terms and, for the terms themselves, across
+// matches; each sum is added up match by match in their order. So every path gives the same bits.
+
+/// Normal equations of the algebraic epipolar residual t . (R ray0 x ray1), each match weighted by Sampson's
+/// denominator and Geman-McClure's factor: three parameters of a left rotation, then two of t along
+/// `tangent`.
+struct EssentialNormal {
+  Eigen::Matrix<double, 5, 5> matrix;  ///< lower half
+  Eigen::Matrix<double, 5, 1> gradient;
+  int count = 0;  ///< matches with a denominator above zero, which take part
+};
+/// `bound_scale` widens the robust cost's bounds (squared).
+EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewModel& model,
+                                   const Eigen::Matrix<double, 3, 2>& tangent, double bound_scale,
+                                   VectorPath path = VectorPath::kAvx2);
+
+/// Rays of frame 1, made unit vectors, and the sum of both bounds; parallel to PackedMatches.
+struct UnitRays {
+  std::vector<double> x, y, z, bound;
+  explicit UnitRays(const PackedMatches& matches);
+};
+
+/// Normal equations of a left rotation of `R` that takes unit rays of frame 0 into those of frame 1, each
+/// match weighted by its bound and Geman-McClure's factor.
+struct RotationNormal {
+  Eigen::Matrix3d matrix;  ///< lower half
+  Eigen::Vector3d gradient;
+};
+RotationNormal SumRotationNormal(const PackedMatches& matches, const UnitRays& rays1,
+                                 const Eigen::Matrix3d& R, VectorPath path = VectorPath::kAvx2);
+
+/// Sum of s / (1 + s), s the normalised Sampson distance, where it is below `enough`; else some number from
+/// `enough` up.
+double SumEpipolarCost(const PackedMatches& matches, const Eigen::Matrix3d& M,
+                       double enough = std::numeric_limits<double>::infinity(),
+                       VectorPath path = VectorPath::kAvx2);
+
+}  // namespace dmslam

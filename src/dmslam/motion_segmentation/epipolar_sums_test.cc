@@ -1,0 +1,128 @@
+#include "dmslam/motion_segmentation/epipolar_sums.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "dmslam/geometry/rigid3.h"
+#include "dmslam/motion_segmentation/synthetic_pair.h"
+
+namespace dmslam {
+namespace {
+
+/// Every third match of a pair is left out; the number that takes part is no multiple of a vector.
+struct Input {
+  MatchArrays arrays;
+  std::vector<uint8_t> use;
+  TwoViewModel model;
+  Eigen::Matrix<double, 3, 2> tangent;
+
+  Input() {
+    const SyntheticPair pair = MakeSyntheticPair({}, 3);
+    std::vector<uint32_t> order(pair.matches.size());
+    std::iota(order.begin(), order.end(), 0U);
+    arrays = MakeArrays(pair.matches, order, pair.camera, {});
+    for (size_t i = 0; i < arrays.size(); ++i) use.push_back(i % 3 == 1 ? 0 : 7);
+    while (std::count(use.begin(), use.end(), 7) % 4 != 3) *std::find(use.begin(), use.end(), 7) = 0;
+    model.R = ExpSo3({0.01, -0.02, 0.005}).toRotationMatrix();
+    model.t = Eigen::Vector3d(0.8, 0.1, 0.3).normalized();
+    model.M = Hat(model.t) * model.R;
+    tangent.col(0) = model.t.cross(Eigen::Vector3d::UnitY()).normalized();
+    tangent.col(1) = model.t.cross(tangent.col(0));
+  }
+};
+
+TEST(SumEssentialNormal, IsTheSumOfItsFormulaAndTheSameOnEveryPath) {
+  const Input in;
+  const PackedMatches matches(in.arrays, in.use);
+  Eigen::Matrix<double, 5, 5> matrix = Eigen::Matrix<double, 5, 5>::Zero();
+  Eigen::Matrix<double, 5, 1> gradient = Eigen::Matrix<double, 5, 1>::Zero();
+  for (size_t i = 0; i < in.arrays.size(); ++i) {
+    if (!in.use[i]) continue;
+    const Eigen::Vector3d y = in.model.R * in.arrays.ray0[i], normal = y.cross(in.arrays.ray1[i]);
+    const double residual = in.model.t.dot(normal);
+    const double squared = NormalizedSampson(in.model.M, in.arrays, i) / 10.0;
+    const double weight = squared / (residual * residual * (1.0 + squared) * (1.0 + squared));
+    Eigen::Matrix<double, 5, 1> row;
+    row << y.cross(in.arrays.ray1[i].cross(in.model.t)), in.tangent.transpose() * normal;
+    matrix += weight * row * row.transpose();
+    gradient += weight * residual * row;
+  }
+  const EssentialNormal plain =
+      SumEssentialNormal(matches, in.model, in.tangent, 10.0, VectorPath::kBaseline);
+  EXPECT_EQ(static_cast<size_t>(plain.count), matches.count);
+  const Eigen::Matrix<double, 5, 5> lower = matrix.triangularView<Eigen::Lower>();
+  EXPECT_LT((plain.matrix - lower).norm(), 1e-9 * lower.norm());
+  EXPECT_LT((plain.gradient - gradient).norm(), 1e-9 * gradient.norm());
+  for (const VectorPath path : VectorPaths()) {
+    const EssentialNormal other = SumEssentialNormal(matches, in.model, in.tangent, 10.0, path);
+    EXPECT_EQ(other.matrix, plain.matrix);
+    EXPECT_EQ(other.gradient, plain.gradient);
+    EXPECT_EQ(other.count, plain.count);
+  }
+}
+
+TEST(SumEssentialNormal, LeavesOutWhatHasNoDenominator) {
+  Input in;
+  std::fill(in.arrays.bound0.begin(), in.arrays.bound0.begin() + 30, 0.0F);
+  std::fill(in.arrays.bound1.begin(), in.arrays.bound1.begin() + 30, 0.0F);
+  std::vector<uint8_t> rest = in.use;
+  std::fill(rest.begin(), rest.begin() + 30, uint8_t{0});
+  const PackedMatches all(in.arrays, in.use), some(in.arrays, rest);
+  ASSERT_LT(some.count, all.count);
+  for (const VectorPath path : VectorPaths()) {
+    const EssentialNormal a = SumEssentialNormal(all, in.model, in.tangent, 1.0, path);
+    const EssentialNormal b = SumEssentialNormal(some, in.model, in.tangent, 1.0, path);
+    EXPECT_EQ(static_cast<size_t>(a.count), some.count);
+    EXPECT_EQ(a.matrix, b.matrix);
+    EXPECT_EQ(a.gradient, b.gradient);
+  }
+}
+
+TEST(SumRotationNormal, IsTheSumOfItsFormulaAndTheSameOnEveryPath) {
+  const Input in;
+  const PackedMatches matches(in.arrays, in.use);
+  const UnitRays rays1(matches);
+  Eigen::Matrix3d matrix = 1e-9 * Eigen::Matrix3d::Identity();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < in.arrays.size(); ++i) {
+    if (!in.use[i]) continue;
+    const Eigen::Vector3d y = (in.model.R * in.arrays.ray0[i]).normalized(),
+                          x = in.arrays.ray1[i].normalized();
+    const double bound = static_cast<double>(in.arrays.bound0[i]) + static_cast<double>(in.arrays.bound1[i]);
+    const double squared = (x - y).squaredNorm() / bound;
+    const double weight = 1.0 / (bound * (1.0 + squared) * (1.0 + squared));
+    matrix += weight * (Eigen::Matrix3d::Identity() - y * y.transpose());
+    gradient += weight * y.cross(x);
+  }
+  const RotationNormal plain = SumRotationNormal(matches, rays1, in.model.R, VectorPath::kBaseline);
+  const Eigen::Matrix3d lower = matrix.triangularView<Eigen::Lower>();
+  EXPECT_LT((plain.matrix - lower).norm(), 1e-9 * lower.norm());
+  EXPECT_LT((plain.gradient - gradient).norm(), 1e-9 * gradient.norm());
+  for (const VectorPath path : VectorPaths()) {
+    const RotationNormal other = SumRotationNormal(matches, rays1, in.model.R, path);
+    EXPECT_EQ(other.matrix, plain.matrix);
+    EXPECT_EQ(other.gradient, plain.gradient);
+  }
+}
+
+TEST(SumEpipolarCost, IsExactBelowEnoughAndTheSameOnEveryPath) {
+  const Input in;
+  const PackedMatches matches(in.arrays, in.use);
+  double expected = 0;
+  for (size_t i = 0; i < in.arrays.size(); ++i) {
+    const double squared = NormalizedSampson(in.model.M, in.arrays, i);
+    if (in.use[i]) expected += squared / (1.0 + squared);
+  }
+  const double plain = SumEpipolarCost(matches, in.model.M, 1e300, VectorPath::kBaseline);
+  EXPECT_NEAR(plain, expected, 1e-9 * expected);
+  for (const VectorPath path : VectorPaths()) {
+    EXPECT_EQ(SumEpipolarCost(matches, in.model.M, 1e300, path), plain);
+    EXPECT_EQ(SumEpipolarCost(matches, in.model.M, plain * 1.0001, path), plain);
+    EXPECT_GE(SumEpipolarCost(matches, in.model.M, plain / 2, path), plain / 2);
+  }
+}
+
+}  // namespace
+}  // namespace dmslam
