@@ -11,8 +11,8 @@
 
 #include "collector/map_ply.h"
 #include "dmslam/evaluation/trajectory_plot.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 
 namespace dmslam {
 namespace {
@@ -183,7 +183,7 @@ Json TimingJson(const RunRecord& run) {
 Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
                  const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
   Json json;
-  json["version"] = kVersion;
+  json["version"] = BuildVersion();
   json["sequence"] = run.sequence;
   json["seed"] = run.seed;
   json["mode"] = run.mode;
