@@ -18,6 +18,7 @@ expect "nothing is lost" "$work/first" records_lost "== 0"
 expect "nobody was restarted" "$work/first" restarts "== 0"
 check "the summary names the version" grep -qF "\"version\": \"$("$build/bin/dmslam-inprocess" --version)\"" \
   "$work/first/summary.json"
+check "and the machine" grep -q "\"cores\": [1-9]" "$work/first/summary.json"
 
 check "a run with a small buffer ends with 0" run "${sequence[@]}" --lockstep --out "$work/small" --receive-buffer 212992
 expect "nothing is lost with a small buffer" "$work/small" records_lost "== 0"
