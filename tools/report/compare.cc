@@ -29,6 +29,7 @@ std::vector<Origin> CountOrigins(const Results& results, const Setting* setting,
     }
   }
   std::vector<Origin> origins;
+  origins.reserve(counts.size());
   for (const auto& [name, runs] : counts) origins.push_back({name, runs});
   std::stable_sort(origins.begin(), origins.end(),
                    [](const Origin& a, const Origin& b) { return a.runs > b.runs; });
