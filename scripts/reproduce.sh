@@ -8,7 +8,7 @@ readonly root me=reproduce
 source "$root/scripts/lib/resumable.sh"
 readonly MAX_FAILURES_IN_A_ROW=3
 
-tum='' out='' seeds=10 data=${DMSLAM_DATA:-$root/../shared/data} render=1 run=1 publish='' runner=''
+tum='' out='' seeds='' data='' render=1 run=1 publish='' runner=''
 processes=0
 only=()
 
@@ -19,7 +19,8 @@ Usage: reproduce.sh --tum DIR --out DIR [--seeds 10] [options]
 Runs 'baseline' and 'dm' with 3000 features per frame (as the DM-SLAM paper did) and with the defaults on the paper's
 four TUM RGB-D sequences, on the kitchen sequences and on rendered stand-ins, each with as many seeds as said, and writes
 DIR/report.md, DIR/report.json and DIR/pictures. Stopped at any time, the same command continues. Sequences that are not
-there are listed in the report with the address to get them from (scripts/get_tum.sh paper does it).
+there are listed in the report with the address to get them from (scripts/get_tum.sh paper does it). The report shows all
+that was run in DIR so far, also with other sequences or seeds. DIR/progress.txt says how far it is.
 
   --tum DIR       folder that holds the TUM RGB-D sequences
   --out DIR       where runs and report go
@@ -27,7 +28,7 @@ there are listed in the report with the address to get them from (scripts/get_tu
   --only NAME     only this sequence (may be repeated), as fr3_walking_xyz, kitchen_walk2, synth_walking_rpy
   --data DIR      folder that holds the kitchen sequences (default: \$DMSLAM_DATA, else ../shared/data)
   --no-render     do not render the stand-ins (about ten minutes, once)
-  --report-only   write the report from the runs that are there
+  --report-only   write the report of all runs that are there; takes neither --seeds nor --only
   --publish FILE  also write the report to this page, with pictures of rendered sequences only
   --processes     run the real processes in lock-step (scripts/run.sh), not dmslam-inprocess; the bytes are the same
   --runner CMD    program to run instead (it gets the arguments of scripts/run.sh)
@@ -55,7 +56,19 @@ parse() {
   [[ -n $out ]] || die "--out DIR is missing; see --help"
   [[ -n $tum || $run == 0 ]] || die "--tum DIR is missing (an empty folder serves where there are none); see --help"
   [[ -z $tum || -d $tum ]] || die "--tum $tum: no such folder; scripts/get_tum.sh --to $tum paper fills it"
+  ((run)) || [[ -z $seeds && ${#only[@]} == 0 ]] ||
+    die "--report-only tells of all runs in $out: leave --seeds and --only out, or leave --report-only out to run them"
+  seeds=${seeds:-10}
   [[ $seeds =~ ^[1-9][0-9]{0,3}$ ]] || die "--seeds $seeds: write a number of at least 1"
+  find_data
+}
+
+# The kitchen sequences' folder: one that was named must be there, the usual ones need not.
+find_data() {
+  [[ -z $data || -d $data ]] || die "--data $data: no such folder; name the one that holds kitchen, or leave --data out"
+  [[ -z $data ]] || return 0
+  data=${DMSLAM_DATA:-$root/../shared/data}
+  [[ -z ${DMSLAM_DATA:-} || -d $data ]] || say "DMSLAM_DATA is $data, which is no folder: without the kitchen sequences"
 }
 
 # Sets `bin` to the folder with the programs, built where they are not there.
@@ -75,6 +88,7 @@ render() {
   shift
   wanted "$name" && [[ ! -e $out/synthetic/$name/rgb.txt ]] || return 0
   say "rendering $name"
+  note_progress "rendering $name"
   rm -rf -- "$out/synthetic/$name.part"
   start "$bin/dmslam-synth" --out "$out/synthetic/$name.part" --seed 1 "$@" || die "$name cannot be rendered"
   mv -- "$out/synthetic/$name.part" "$out/synthetic/$name"
@@ -96,6 +110,7 @@ draw_selection() {
   local folder=$out/figures/$1 method picture
   [[ ! -e $folder ]] || return 0
   progress_line "figures of $1"
+  note_progress "drawing figures of $1"
   rm -rf -- "$folder.part"
   for method in dlrsac ransac; do
     start "$bin/dmslam-static" --sequence "$2" --camera "$3" --method "$method" --features 3000 --gap 5 --no-window \
@@ -115,14 +130,16 @@ draw_selection() {
   mv -- "$folder.part" "$folder"
 }
 
-# draw_selections LINES...: of every sequence in which somebody walks.
+# draw_selections LINES...: of every sequence in which somebody walks, once however many runs it has.
 draw_selections() {
   local line folder sequence camera name rest
+  local -A seen=()
   for line in "$@"; do
     IFS=$'\t' read -r folder sequence _ camera rest <<<"$line"
     name=${folder#runs/}
     name=${name%%/*}
-    [[ $name == *walk* ]] || continue
+    [[ $name == *walk* && -z ${seen[$name]:-} ]] || continue
+    seen[$name]=1
     [[ $camera == /* ]] || camera=$root/$camera
     draw_selection "$name" "$sequence" "$camera"
   done
@@ -159,12 +176,31 @@ duration() {
   else printf '%d h %02d min' $((s / 3600)) $((s % 3600 / 60)); fi
 }
 
-# On a terminal only: which run this is and how long the rest takes, by the frames done so far.
+# How long the rest takes, by the frames done so far; nothing where none is done yet.
+time_left() { ((frames_done == 0)) || duration $(((SECONDS - began) * frames_left / frames_done)); }
+
+# On a terminal only: which run this is and how long the rest takes.
 progress() {
   [[ -t 2 ]] || return 0
-  local left=''
-  ((frames_done == 0)) || left=", $(duration $(((SECONDS - began) * frames_left / frames_done))) left"
-  printf '\r\033[K[%d/%d] %s%s' "$number" "$total" "$1" "$left" >&2
+  local left
+  left=$(time_left)
+  printf '\r\033[K[%d/%d] %s%s' "$number" "$total" "$1" "${left:+, $left left}" >&2
+}
+
+# note_progress WHAT: DIR/progress.txt, the same for who looks from elsewhere. It is never there in halves.
+runs_done=0 total='' runs_failed=0 last_run='' frames_done=0 frames_left=0 began=0 todo=()
+note_progress() {
+  local left
+  left=$(time_left)
+  {
+    printf 'at: %s\n' "$(date '+%F %T')"
+    printf 'now: %s\n' "$1"
+    printf 'runs done: %s\n' "$runs_done of ${total:-all (not counted yet)}"
+    printf 'failed this time: %d\n' "$runs_failed"
+    printf 'time left: %s\n' "${left:-not known yet}"
+    printf 'last run: %s\n' "${last_run:-none yet}"
+  } >"$out/progress.txt.part"
+  mv -- "$out/progress.txt.part" "$out/progress.txt"
 }
 
 # one_run FOLDER SEQUENCE FRAMES CAMERA PROFILE SEED SET. The first seed leaves a few pictures.
@@ -181,32 +217,74 @@ one_run() {
   finish_run "$part" "$folder" "$status"
 }
 
-run_all() {
-  local lines=("$@") line folder sequence frames camera profile seed set in_a_row=0
-  total=${#lines[@]} number=0 began=$SECONDS frames_done=0 frames_left=0
-  local todo=()
-  for line in "${lines[@]}"; do
-    IFS=$'\t' read -r folder sequence frames camera profile seed set <<<"$line"
-    [[ ! -s $out/$folder/summary.json ]] || { number=$((number + 1)); continue; }
-    todo+=("$line")
-    frames_left=$((frames_left + frames))
+# count_runs LINES...: sets `todo` to those that are not done yet, and the numbers of the progress.
+count_runs() {
+  local line folder sequence frames rest
+  total=$# todo=() began=$SECONDS
+  for line in "$@"; do
+    IFS=$'\t' read -r folder sequence frames rest <<<"$line"
+    if [[ -s $out/$folder/summary.json ]]; then
+      runs_done=$((runs_done + 1))
+    else
+      todo+=("$line")
+      frames_left=$((frames_left + frames))
+    fi
   done
+}
+
+# account_for NAME STATUS FOLDER: says what failed; three in a row end it.
+failed_in_a_row=0
+account_for() {
+  last_run="$1, done at $(date '+%F %T')"
+  if (($2 == 0)); then
+    runs_done=$((runs_done + 1)) failed_in_a_row=0
+    return
+  fi
+  progress_end
+  last_run="$1, failed at $(date '+%F %T'): $(head -n 1 "$3/failed.txt")"
+  say "runs/$1: $(head -n 1 "$3/failed.txt")"
+  runs_failed=$((runs_failed + 1)) failed_in_a_row=$((failed_in_a_row + 1))
+  ((failed_in_a_row < MAX_FAILURES_IN_A_ROW)) || die "$failed_in_a_row runs failed in a row; see $3/log.txt"
+}
+
+# What `todo` holds.
+run_all() {
+  local line folder sequence frames camera profile seed set status number=$runs_done
+  began=$SECONDS
   for line in ${todo[@]+"${todo[@]}"}; do
     IFS=$'\t' read -r folder sequence frames camera profile seed set <<<"$line"
-    number=$((number + 1))
+    number=$((number + 1)) status=0
     progress "${folder#runs/}"
+    note_progress "running ${folder#runs/}"
     [[ $camera == /* ]] || camera=$root/$camera
-    if one_run "$folder" "$sequence" "$frames" "$camera" "$profile" "$seed" "$set"; then
-      in_a_row=0
-    else
-      progress_end
-      say "$folder: $(head -n 1 "$out/$folder/failed.txt")"
-      in_a_row=$((in_a_row + 1))
-      ((in_a_row < MAX_FAILURES_IN_A_ROW)) || die "$in_a_row runs failed in a row; see $out/$folder/log.txt"
-    fi
+    one_run "$folder" "$sequence" "$frames" "$camera" "$profile" "$seed" "$set" || status=$?
     frames_done=$((frames_done + frames)) frames_left=$((frames_left - frames))
+    account_for "${folder#runs/}" "$status" "$out/$folder"
   done
   progress_end
+}
+
+# How it ended, for who reads DIR/progress.txt.
+note_end() {
+  case $1 in
+    0) note_progress "finished" ;;
+    130) note_progress "stopped; the same command continues" ;;
+    *) note_progress "ended with exit status $1; the same command continues" ;;
+  esac
+}
+
+run_everything() {
+  trap 'note_end $?' EXIT
+  ((render == 0)) || render_stand_ins
+  local roots=(--root "$tum") plan lines=()
+  [[ ! -d $data ]] || roots+=(--root "$data")
+  [[ ! -d $out/synthetic ]] || roots+=(--root "$out/synthetic")
+  plan=$("$bin/dmslam-report" plan "${roots[@]}" --out "$out" --seeds "$seeds" ${only[@]+--only "${only[@]}"})
+  [[ -z $plan ]] || mapfile -t lines <<<"$plan"
+  ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
+  count_runs ${lines[@]+"${lines[@]}"}
+  [[ -n $runner ]] || { draw_selections ${lines[@]+"${lines[@]}"}; time_methods ${lines[@]+"${lines[@]}"}; }
+  run_all
 }
 
 main() {
@@ -214,18 +292,7 @@ main() {
   find_programs
   work_in "$out"
   choose_command
-  if ((run)); then
-    ((render == 0)) || render_stand_ins
-    local roots=(--root "$tum") plan
-    [[ ! -d $data ]] || roots+=(--root "$data")
-    [[ ! -d $out/synthetic ]] || roots+=(--root "$out/synthetic")
-    plan=$("$bin/dmslam-report" plan "${roots[@]}" --out "$out" --seeds "$seeds" ${only[@]+--only "${only[@]}"})
-    local lines=()
-    [[ -z $plan ]] || mapfile -t lines <<<"$plan"
-    ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
-    [[ -n $runner ]] || { draw_selections ${lines[@]+"${lines[@]}"}; time_methods ${lines[@]+"${lines[@]}"}; }
-    run_all ${lines[@]+"${lines[@]}"}
-  fi
+  ((run == 0)) || run_everything
   "$bin/dmslam-report" write --out "$out" ${publish:+--publish "$publish"}
 }
 

@@ -11,8 +11,9 @@
 
 #include "collector/map_ply.h"
 #include "dmslam/evaluation/trajectory_plot.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
+#include "dmslam/util/machine.h"
 
 namespace dmslam {
 namespace {
@@ -180,10 +181,13 @@ Json TimingJson(const RunRecord& run) {
   return json;
 }
 
+Json MachineJson(const Machine& machine) { return {{"cpu", machine.processor}, {"cores", machine.cores}}; }
+
 Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
                  const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
   Json json;
-  json["version"] = kVersion;
+  json["version"] = BuildVersion();
+  json["machine"] = MachineJson(ThisMachine());
   json["sequence"] = run.sequence;
   json["seed"] = run.seed;
   json["mode"] = run.mode;

@@ -13,8 +13,8 @@
 #include "common/process_info.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/messaging/lcm_bus.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 
 namespace dmslam {
 namespace {
@@ -35,7 +35,7 @@ void SetUpLogging(const std::string& role, bool quiet) {
 
 ProcessMain::ProcessMain(const std::string& role, const std::string& description)
     : app_(description, "dmslam-" + role), role_(role) {
-  app_.set_version_flag("--version", kVersion);
+  app_.set_version_flag("--version", BuildVersion());
   app_.add_option("--lcm-url", lcm_url_, "LCM bus; separate systems by port")->capture_default_str();
   app_.add_option("--prefix", prefix_, "put before every channel: separates systems that share a port");
   app_.add_option("--link", link_, "host: records travel whole; lan: in parts of at most 1380 bytes")

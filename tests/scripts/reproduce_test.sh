@@ -36,9 +36,11 @@ error=0.04
 awk -v e=$error -v s="$seed" '{ $2 += e * s * sin(9 * NR); print }' "$sequence/groundtruth.txt" >"$out/trajectory.txt"
 tail -n +31 "$out/trajectory.txt" >"$out/trajectory_online.txt"
 echo '{"tracked_percent": 98.5, "tracked_online_percent": 75.0, "first_init_s": 1.0}' >"$out/summary.json"
+[[ ${FALL:-} != "$profile" ]] || { echo "it fell over in the end"; exit 9; }
 EOF
 chmod +x "$work/runner"
 export CALLS=$work/calls
+mkdir "$work/none"
 run=("$reproduce" --tum "$tum" --no-render --data "$work/none" --runner "$work/runner")
 
 expect 0 'Usage' "$reproduce" --help
@@ -49,6 +51,12 @@ expect 1 '--seeds none' "$reproduce" --tum "$tum" --out "$work/o" --seeds none
 expect 1 '--seeds needs a value' "$reproduce" --tum "$tum" --out "$work/o" --seeds
 expect 1 'unknown argument --frob' "$reproduce" --frob
 expect 1 "no sequence is called 'fr3'" "${run[@]}" --out "$work/o" --only fr3
+expect 1 '--data .*/nowhere: no such folder' "${run[@]}" --data "$work/nowhere" --out "$work/p"
+check "nothing was begun" test ! -e "$work/p"
+for option in '--seeds 1' '--only fr1_xyz'; do
+  # shellcheck disable=SC2086 # two words
+  expect 1 'report-only tells of all runs.*leave --seeds and --only out' "$reproduce" --out "$work/p" --report-only $option
+done
 
 # A whole run: 2 sequences x 2 profiles x 2 settings x 2 seeds. In a pipe, nothing is said but what is absent.
 expect 0 'report.json' "${run[@]}" --out "$work/a" --seeds 2
@@ -58,10 +66,13 @@ check "freiburg1 with its own camera" test "$(grep 'freiburg1_xyz' "$CALLS" | gr
 check "pictures of the first seed only" test "$(grep -c -- '--pictures 31' "$CALLS")" -eq 8
 check "no progress in a pipe" test -z "$(grep -F '[1/16]' <<<"$output")"
 for what in '\*0\.329\*' '\*0\.143\*' 'fr3_walking_rpy \| \*absent\*' 'cvg\.cit\.tum\.de' 'kitchen_walk2' '\| 98\.5 \| 1\.00 \| 2/2' \
-  'pictures/fr3_walking_xyz_defaults.png' '16 of 16 runs'; do
+  'pictures/fr3_walking_xyz_defaults.png' '16 of 16 runs' 'Version of the programs: not recorded'; do
   check "the report has $what" grep -qE -- "$what" "$work/a/report.md"
 done
 check "a picture" test -s "$work/a/pictures/fr1_xyz_features3000.png"
+for what in '^now: finished' '^runs done: 16 of 16' '^time left: 0 s' '^last run: fr1_xyz/defaults/dm/seed_2, done at '; do
+  check "progress.txt has $what" grep -qE -- "$what" "$work/a/progress.txt"
+done
 
 # Again: nothing is run twice. One more seed: only that one.
 : >"$CALLS"
@@ -69,6 +80,9 @@ expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 2
 check "nothing is run twice" test ! -s "$CALLS"
 expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 3
 check "only the new seed is run" test "$(grep -c -- '--seed 3' "$CALLS")" -eq "$(wc -l <"$CALLS")"
+expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 1 --only fr1_xyz
+check "one sequence and seed more leave the others in the report" grep -q '24 of 24 runs' "$work/a/report.md"
+check "with both sequences" grep -q '^| fr3_walking_xyz | dm | 3/3 ' "$work/a/report.md"
 expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
 check "the page has no picture of real images" test ! -e "$work/docs/images/results/fr1_xyz_defaults.png"
 check "it has that of all runs" test -s "$work/docs/images/results/all_defaults.png"
@@ -82,6 +96,7 @@ kill -TERM "$pid"
 wait "$pid"
 check "a stopped run exits with 130" test $? -eq 130
 check "it says how to go on" grep -q 'the same command continues' "$work/b.txt"
+check "so does progress.txt" grep -q '^now: stopped; the same command continues' "$work/b/progress.txt"
 check "its runner is gone" test ! -d "/proc/$(cat "$CALLS.pid")"
 before=$(wc -l <"$CALLS")
 expect 0 'report.md' "${run[@]}" --out "$work/b" --seeds 2 --only fr1_xyz
@@ -89,9 +104,14 @@ check "it goes on where it was" test $(($(wc -l <"$CALLS") - before)) -eq 4
 
 # Runs that fail are reported, tried again the next time, and three in a row end it.
 expect 0 'dm/seed_1: exit status 7: it fell over' env FAIL=dm "${run[@]}" --out "$work/c" --seeds 1
+check "the report counts them" grep -q '4 of 8 failed or gave no trajectory' "$work/c/report.md"
+check "as nothing tracked" grep -qE '^\| fr1_xyz \| dm \| 0/1 \| 1 of 1 \| – \| 0\.0 \| 0\.0 \| 0\.0 ' "$work/c/report.md"
+check "progress.txt counts them" grep -q '^failed this time: 4' "$work/c/progress.txt"
 check "the report lists them" grep -q 'the run failed: exit status 7: it fell over' "$work/c/report.md"
 expect 0 'report.md' "${run[@]}" --out "$work/c" --seeds 1
 check "the second time they are well" test -z "$(grep 'the run failed' "$work/c/report.md")"
+expect 0 'seed_1: exit status 9: it fell over in the end' env FALL=dm "${run[@]}" --out "$work/f" --seeds 1 --only fr1_xyz
+check "a summary does not make a run that failed a good one" grep -q '2 of 4 failed' "$work/f/report.md"
 printf '#!/bin/sh\necho it fell over\nexit 7\n' >"$work/broken"
 chmod +x "$work/broken"
 expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --runner "$work/broken"
@@ -99,6 +119,21 @@ expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --r
 # Nothing is there: a report that lists what is absent.
 mkdir "$work/empty"
 expect 0 'none of the sequences is there' "$reproduce" --tum "$work/empty" --no-render --runner "$work/runner" --data "$work/none" --out "$work/e"
+check "what can be downloaded has its address" grep -qE '^\| kitchen \|.*absent.*https://www.microsoft.com/.*7-scenes' "$work/e/report.md"
+check "what cannot says so" grep -qE '^\| kitchen_walk1 \|.*absent.*no public download page' "$work/e/report.md"
 check "all are listed as absent" test "$(grep -c '\*\*absent\*\*' "$work/e/report.md")" -eq 14
+
+# The pictures of what is taken for static: once per sequence, and what fails is named once.
+mkdir "$work/bin"
+ln -s "$1" "$work/bin/dmslam-report"
+ln -s "$work/runner" "$work/bin/dmslam-inprocess"
+# shellcheck disable=SC2016 # it is the program's
+printf '#!/bin/sh\necho "static $*" >>"$CALLS"\necho no matches\nexit 1\n' >"$work/bin/dmslam-static"
+chmod +x "$work/bin/dmslam-static"
+: >"$CALLS"
+expect 0 'no figures of fr3_walking_xyz: no matches' \
+  env DMSLAM_BIN="$work/bin" "$reproduce" --tum "$tum" --no-render --data "$work/none" --out "$work/g" --seeds 2
+check "named once" test "$(grep -c 'no figures of' <<<"$output")" -eq 1
+check "tried once" test "$(grep -c '^static --sequence' "$CALLS")" -eq 1
 
 finish

@@ -16,6 +16,9 @@ expect "the trajectory is right" "$work/first" ate_rmse_final "<= 0.05"
 expect "nothing is skipped" "$work/first" frames_skipped "== 0"
 expect "nothing is lost" "$work/first" records_lost "== 0"
 expect "nobody was restarted" "$work/first" restarts "== 0"
+check "the summary names the version" grep -qF "\"version\": \"$("$build/bin/dmslam-inprocess" --version)\"" \
+  "$work/first/summary.json"
+check "and the machine" grep -q "\"cores\": [1-9]" "$work/first/summary.json"
 
 check "a run with a small buffer ends with 0" run "${sequence[@]}" --lockstep --out "$work/small" --receive-buffer 212992
 expect "nothing is lost with a small buffer" "$work/small" records_lost "== 0"

@@ -8,8 +8,8 @@
 
 #include "common/process_main.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 #include "in_process.h"
 #include "player/open_sequence.h"
 
@@ -29,7 +29,7 @@ struct Arguments {
 };
 
 void Declare(CLI::App& app, Arguments& a) {
-  app.set_version_flag("--version", dmslam::kVersion);
+  app.set_version_flag("--version", dmslam::BuildVersion());
   app.add_option("--sequence,--video", a.sequence,
                  "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
   app.add_option("--fps", a.fps,

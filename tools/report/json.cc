@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "compare.h"
 #include "markdown.h"
 
 namespace dmslam {
@@ -41,6 +42,14 @@ const char* StateName(State state) {
   return "missing";
 }
 
+Json ToJson(const Machine& machine) { return {{"cpu", machine.processor}, {"cores", machine.cores}}; }
+
+Json ToJson(const std::vector<Origin>& origins, const char* what) {
+  Json json = Json::array();
+  for (const Origin& origin : origins) json.push_back({{what, origin.text}, {"runs", origin.runs}});
+  return json;
+}
+
 Json ToJson(const RunResult& run) {
   Json json = {{"seed", run.key.seed},
                {"state", StateName(run.state)},
@@ -49,6 +58,8 @@ Json ToJson(const RunResult& run) {
                {"tracked_online_after_first_map_percent", ToJson(run.tracked_online_after_first_map_percent)},
                {"first_map_s", ToJson(run.first_map_s)},
                {"frontend_ms_median", ToJson(run.frontend_ms_median)}};
+  if (run.version) json["version"] = *run.version;
+  if (run.machine) json["machine"] = ToJson(*run.machine);
   if (!run.reason.empty()) json["reason"] = run.reason;
   for (const auto& [metric, name] : kMetrics) {
     if (const auto statistics = MetricOf(run, metric)) json[name] = ToJson(*statistics);
@@ -60,6 +71,8 @@ Json ToJson(const Cell& cell) {
   Json json = {{"sequence", cell.sequence},
                {"settings", cell.setting},
                {"profile", cell.profile},
+               {"runs_made", cell.Made()},
+               {"runs_failed", cell.Failed()},
                {"tracked_percent", ToJson(cell.TrackedPercent())},
                {"tracked_online_percent", ToJson(cell.TrackedOnlinePercent())},
                {"tracked_online_after_first_map_percent", ToJson(cell.TrackedOnlineAfterFirstMapPercent())},
@@ -78,10 +91,71 @@ Json ToJson(const Cell& cell) {
 Json ToJson(const PlannedSequence& sequence) {
   Json json = {
       {"name", sequence.info.name}, {"present", sequence.present()}, {"source", sequence.info.source}};
+  if (!sequence.present() && sequence.has_runs) json["runs_not_shown"] = true;
   if (!sequence.info.like.empty()) json["stands_for"] = sequence.info.like;
   if (sequence.info.paper) {
     json["paper_ate_rmse_m"] = {{"orb_slam2", sequence.info.paper->orb_slam2_ate_rmse_m},
                                 {"dm_slam", sequence.info.paper->dm_slam_ate_rmse_m}};
+  }
+  return json;
+}
+
+// Of dm against baseline, by the medians over the seeds [%]; the shares tracked stand beside it.
+Json ImprovementJson(const PlannedSequence& sequence, const Cell& baseline, const Cell& dm) {
+  const std::optional<double> paper = PaperImprovementPercent(sequence.info);
+  Json json = {{"sequence", sequence.info.name},
+               {"settings", dm.setting},
+               {"baseline_tracked_percent", ToJson(baseline.TrackedPercent())},
+               {"dm_tracked_percent", ToJson(dm.TrackedPercent())}};
+  for (const auto& [metric, name] : kMetrics) {
+    json[name] = {{"rmse_percent", ToJson(ImprovementPercent(baseline.Rmse(metric), dm.Rmse(metric)))},
+                  {"mean_percent", ToJson(ImprovementPercent(baseline.Mean(metric), dm.Mean(metric)))},
+                  {"median_percent", ToJson(ImprovementPercent(baseline.Median(metric), dm.Median(metric)))},
+                  {"std_percent", ToJson(ImprovementPercent(baseline.Std(metric), dm.Std(metric)))}};
+  }
+  if (paper) {
+    const std::string_view like = sequence.info.like.empty() ? sequence.info.name : sequence.info.like;
+    json["paper"] = {{"sequence", like}, {"ate_rmse_percent", *paper}};
+  }
+  return json;
+}
+
+Json ImprovementsJson(const Results& results) {
+  Json json = Json::array();
+  for (const Setting& setting : results.plan.settings) {
+    for (const PlannedSequence& sequence : results.plan.sequences) {
+      const std::string name(sequence.info.name);
+      const Cell* baseline = results.Find(name, setting.name, "baseline");
+      const Cell* dm = results.Find(name, setting.name, "dm");
+      if (baseline != nullptr && dm != nullptr) json.push_back(ImprovementJson(sequence, *baseline, *dm));
+    }
+  }
+  return json;
+}
+
+Json ToJson(const StandIn& one) {
+  const Cell* still = one.dm_without_actors;
+  const auto with = one.dm->Rmse(Metric::kAte), baseline = one.baseline->Rmse(Metric::kAte);
+  return {
+      {"sequence", one.sequence->info.name},
+      {"stands_for", one.sequence->info.like},
+      {"settings", one.dm->setting},
+      {"without_actors", still == nullptr ? Json(nullptr) : Json(still->sequence)},
+      {"dm_ate_rmse_m", ToJson(with)},
+      {"dm_ate_rmse_without_actors_m", still == nullptr ? Json(nullptr) : ToJson(still->Rmse(Metric::kAte))},
+      {"ratio", ToJson(one.Ratio())},
+      {"dm_tracked_percent", ToJson(one.dm->TrackedPercent())},
+      {"dm_tracked_after_first_map_percent", ToJson(one.dm->TrackedOnlineAfterFirstMapPercent())},
+      {"baseline_ate_rmse_m", ToJson(baseline)},
+      {"baseline_tracked_percent", ToJson(one.baseline->TrackedPercent())},
+      {"better_by_percent", ToJson(ImprovementPercent(baseline, with))},
+      {"paper_better_by_percent", ToJson(PaperImprovementPercent(one.sequence->info))}};
+}
+
+Json StandInsJson(const Results& results) {
+  Json json = Json::array();
+  for (const Setting& setting : results.plan.settings) {
+    for (const StandIn& one : StandIns(results, setting)) json.push_back(ToJson(one));
   }
   return json;
 }
@@ -91,6 +165,9 @@ Json ToJson(const PlannedSequence& sequence) {
 std::string ReportJson(const Results& results, const std::optional<IterationTimes>& times) {
   Json json;
   json["seeds"] = results.plan.seeds;
+  json["versions"] = ToJson(Versions(results, nullptr), "version");
+  json["machines_of_runs"] = ToJson(Machines(results), "machine");
+  json["machine_of_report"] = ToJson(ThisMachine());
   json["sequences"] = Json::array();
   for (const PlannedSequence& sequence : results.plan.sequences)
     json["sequences"].push_back(ToJson(sequence));
@@ -102,6 +179,8 @@ std::string ReportJson(const Results& results, const std::optional<IterationTime
                                                   {"dlrsac", times->dlrsac_ms},
                                                   {"machine", times->machine}};
   }
+  json["improvements"] = ImprovementsJson(results);
+  json["stand_ins"] = StandInsJson(results);
   json["results"] = Json::array();
   for (const Cell& cell : results.cells) json["results"].push_back(ToJson(cell));
   return json.dump(1) + "\n";

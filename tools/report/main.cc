@@ -42,9 +42,8 @@ std::string CameraOf(const PlannedSequence& sequence) {
   return fs::exists(own) ? own.string() : "config/" + std::string(sequence.info.camera);
 }
 
-// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, and what
-// to
-// --set ("-": nothing).
+// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, and
+// what to --set ("-": nothing).
 void PrintRuns(const Plan& plan) {
   for (const RunKey& key : Runs(plan)) {
     const auto sequence = std::find_if(plan.sequences.begin(), plan.sequences.end(),
@@ -148,9 +147,19 @@ void Publish(const fs::path& page, const fs::path& out, const Results& results,
   WriteText(page, ReportMarkdown(results, times, copied));
 }
 
+void WarnOfRunsNotShown(const Plan& plan) {
+  for (const PlannedSequence& sequence : plan.sequences) {
+    if (sequence.present() || !sequence.has_runs) continue;
+    std::cerr
+        << "dmslam-report: runs/" << sequence.info.name
+        << " is not shown: the sequence is not where it was; run scripts/reproduce.sh with its folder\n";
+  }
+}
+
 void RunWrite(const Arguments& arguments) {
   const fs::path out = arguments.out;
-  const Results results = ReadResults(LoadPlan(out), out);
+  const Results results = ReadResults(PlanOfFolder(out), out);
+  WarnOfRunsNotShown(results.plan);
   const auto times = ReadTimes(out / "table1.json");
   const std::vector<ReportPicture> pictures = DrawPictures(results, out);
   WriteText(out / "report.md", ReportMarkdown(results, times, pictures));
@@ -189,7 +198,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", dmslam::kVersion);
   app.require_subcommand(1);
   dmslam::Arguments arguments;
-  CLI::App* plan = app.add_subcommand("plan", "find the sequences, write plan.json, print one line per run");
+  CLI::App* plan =
+      app.add_subcommand("plan", "find the sequences, add them to plan.json, print one line per run");
   plan->add_option("--root", arguments.roots, "folder that holds sequences; may be repeated")->required();
   plan->add_option("--out", arguments.out, "the reproduction's folder")->required();
   plan->add_option("--seeds", arguments.seeds, "runs of each sequence")->capture_default_str();

@@ -1,9 +1,8 @@
 #include "markdown.h"
 
 #include <algorithm>
-#include <functional>
-#include <map>
 
+#include "compare.h"
 #include "text.h"
 
 namespace dmslam {
@@ -18,10 +17,12 @@ std::string Number(const std::optional<Spread>& spread, int decimals) {
   return spread ? Number(spread->median, decimals) : kNone;
 }
 
-// By how many percent the second is smaller than the first.
+std::string Number(const std::optional<double>& value, int decimals) {
+  return value ? Number(*value, decimals) : kNone;
+}
+
 std::string Improvement(const std::optional<Spread>& before, const std::optional<Spread>& after) {
-  if (!before || !after || !(before->median > 0)) return kNone;
-  return Number(100 * (1 - after->median / before->median), 1);
+  return Number(ImprovementPercent(before, after), 1);
 }
 
 /// One of the paper's tables: a row per sequence with both systems and the improvement.
@@ -56,12 +57,12 @@ std::string SystemCells(const Cell& cell, const ErrorTable& table) {
                 Number(cell.FirstMapSeconds(), 2).c_str(), RunsText(cell).c_str());
 }
 
-std::string PaperRow(const PaperFigures& paper) {
-  const double better = 100 * (1 - paper.dm_slam_ate_rmse_m / paper.orb_slam2_ate_rmse_m);
+std::string PaperRow(const SequenceInfo& info) {
+  const PaperFigures& paper = *info.paper;
   return Format(
       "| *the paper: ORB-SLAM2, DM-SLAM* | *%.3f* | | | | *not given* | *not given* | *10* | *%.3f* | | | | "
       "*not given* | *not given* | *10* | *%.1f* | | | |\n",
-      paper.orb_slam2_ate_rmse_m, paper.dm_slam_ate_rmse_m, better);
+      paper.orb_slam2_ate_rmse_m, paper.dm_slam_ate_rmse_m, *PaperImprovementPercent(info));
 }
 
 std::string ErrorRow(const Cell& baseline, const Cell& dm, const ErrorTable& table) {
@@ -84,76 +85,59 @@ std::string RenderErrorTable(const Results& results, const Setting& setting, con
     } else {
       text += "| " + name + " | *absent* |" + std::string(17, '|') + "\n";
     }
-    if (sequence.info.paper && table.metric == Metric::kAte) text += PaperRow(*sequence.info.paper);
+    if (sequence.info.paper && table.metric == Metric::kAte) text += PaperRow(sequence.info);
   }
   return text + "\n";
+}
+
+std::string SpreadRow(const Cell& cell) {
+  const std::string failed = Format("%zu of %zu", cell.Failed(), cell.Made());
+  return Format("| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", cell.sequence.c_str(),
+                cell.profile.c_str(), RunsText(cell).c_str(), cell.Failed() == 0 ? "0" : failed.c_str(),
+                WithEnds(cell.Rmse(Metric::kAte), 4).c_str(), WithEnds(cell.TrackedPercent(), 1).c_str(),
+                WithEnds(cell.TrackedOnlinePercent(), 1).c_str(),
+                WithEnds(cell.TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
+                WithEnds(cell.FirstMapSeconds(), 2).c_str());
 }
 
 std::string SpreadTable(const Results& results, const Setting& setting) {
   std::string text =
-      "#### Over the seeds: median (least–most)\n\n| sequence | profile | runs with a trajectory | ATE RMSE "
-      "[m] | "
-      "tracked % | tracked as it came % | the same after the first map % | first map [s] |\n"
-      "|---|---|---:|---:|---:|---:|---:|---:|\n";
+      "#### Over the seeds: median (least–most)\n\n| sequence | profile | runs with a trajectory | failed | "
+      "ATE RMSE [m] | tracked % | tracked as it came % | the same after the first map % | first map [s] |\n"
+      "|---|---|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Cell& cell : results.cells) {
-    if (cell.setting != setting.name) continue;
-    text +=
-        Format("| %s | %s | %s | %s | %s | %s | %s | %s |\n", cell.sequence.c_str(), cell.profile.c_str(),
-               RunsText(cell).c_str(), WithEnds(cell.Rmse(Metric::kAte), 4).c_str(),
-               WithEnds(cell.TrackedPercent(), 1).c_str(), WithEnds(cell.TrackedOnlinePercent(), 1).c_str(),
-               WithEnds(cell.TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
-               WithEnds(cell.FirstMapSeconds(), 2).c_str());
+    if (cell.setting == setting.name) text += SpreadRow(cell);
   }
   return text + "\n";
 }
 
-const PlannedSequence* StillTwin(const Results& results, const SequenceInfo& info) {
-  for (const PlannedSequence& sequence : results.plan.sequences) {
-    if (sequence.info.group == SequenceGroup::kStandInStill && sequence.info.like == info.like)
-      return &sequence;
-  }
-  return nullptr;
-}
-
-std::string PaperImprovement(const SequenceInfo& info) {
-  const std::optional<PaperFigures>& paper = FindSequence(info.like).paper;
-  if (!paper) return kNone;
-  return Number(100 * (1 - paper->dm_slam_ate_rmse_m / paper->orb_slam2_ate_rmse_m), 0);
+std::string StandInRow(const StandIn& one) {
+  const auto with = one.dm->Rmse(Metric::kAte);
+  const auto without =
+      one.dm_without_actors == nullptr ? std::nullopt : one.dm_without_actors->Rmse(Metric::kAte);
+  const auto baseline = one.baseline->Rmse(Metric::kAte);
+  const SequenceInfo& info = one.sequence->info;
+  return Format("| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n",
+                std::string(info.name).c_str(), std::string(info.like).c_str(), Number(with, 5).c_str(),
+                Number(without, 5).c_str(), Number(one.Ratio(), 2).c_str(),
+                Number(one.dm->TrackedPercent(), 1).c_str(), Number(one.dm->FirstMapSeconds(), 2).c_str(),
+                Number(one.dm->TrackedOnlineAfterFirstMapPercent(), 1).c_str(), Number(baseline, 5).c_str(),
+                Number(one.baseline->TrackedPercent(), 1).c_str(), Improvement(baseline, with).c_str(),
+                Number(PaperImprovementPercent(info), 0).c_str());
 }
 
 // The rendered stand-ins: dm with actors against dm without, and its gain over the baseline beside the
 // paper's.
 std::string StandInTable(const Results& results, const Setting& setting) {
   std::string rows;
-  for (const PlannedSequence& sequence : results.plan.sequences) {
-    if (sequence.info.group != SequenceGroup::kStandIn || !sequence.present()) continue;
-    const std::string name(sequence.info.name);
-    const Cell* dm = results.Find(name, setting.name, "dm");
-    const Cell* baseline = results.Find(name, setting.name, "baseline");
-    const PlannedSequence* twin = StillTwin(results, sequence.info);
-    const Cell* still =
-        twin == nullptr ? nullptr : results.Find(std::string(twin->info.name), setting.name, "dm");
-    if (dm == nullptr || baseline == nullptr) continue;
-    const auto with = dm->Rmse(Metric::kAte);
-    const auto without = still == nullptr ? std::nullopt : still->Rmse(Metric::kAte);
-    const std::string ratio =
-        with && without && without->median > 0 ? Number(with->median / without->median, 2) : kNone;
-    rows += Format(
-        "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", name.c_str(),
-        std::string(sequence.info.like).c_str(), Number(with, 5).c_str(), Number(without, 5).c_str(),
-        ratio.c_str(), Number(dm->TrackedPercent(), 1).c_str(), Number(dm->FirstMapSeconds(), 2).c_str(),
-        Number(dm->TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
-        Number(baseline->Rmse(Metric::kAte), 5).c_str(), Number(baseline->TrackedPercent(), 1).c_str(),
-        Improvement(baseline->Rmse(Metric::kAte), with).c_str(), PaperImprovement(sequence.info).c_str());
-  }
+  for (const StandIn& one : StandIns(results, setting)) rows += StandInRow(one);
   if (rows.empty()) return {};
   return "#### Rendered stand-ins: dm with actors against dm without\n\n"
          "Wanted: a ratio of 1.5 at most, 95 % tracked after the first map, and better than the baseline.\n\n"
-         "| sequence | stands for | dm ATE [m] | dm ATE without actors [m] | ratio | dm tracked % | dm first "
-         "map "
-         "[s] | dm tracked after the first map % | baseline ATE [m] | baseline tracked % | dm better by % | "
-         "the "
-         "paper's gain on its sequence % |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n" +
+         "| sequence | stands for | dm ATE [m] | dm ATE without actors [m] | ratio | dm tracked % "
+         "| dm first map [s] | dm tracked after the first map % | baseline ATE [m] | baseline tracked % "
+         "| dm better by % | the paper's gain on its sequence % |\n"
+         "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n" +
          rows + "\n";
 }
 
@@ -180,12 +164,18 @@ const char* KindOf(const SequenceInfo& info) {
   return has_actors ? "rendered, two actors" : "rendered, nobody";
 }
 
+std::string WhetherHere(const PlannedSequence& sequence) {
+  if (sequence.present()) return "yes";
+  const std::string absent = "**absent**: " + std::string(sequence.info.source);
+  if (!sequence.has_runs) return absent;
+  return absent + ". **Its runs are not shown**: give `scripts/reproduce.sh` its folder again";
+}
+
 std::string SequenceList(const Results& results) {
   std::string text = "## Sequences\n\n| sequence | kind | here |\n|---|---|---|\n";
   for (const PlannedSequence& sequence : results.plan.sequences) {
-    const std::string source(sequence.info.source);
     text += Format("| %s | %s | %s |\n", std::string(sequence.info.name).c_str(), KindOf(sequence.info),
-                   sequence.present() ? "yes" : ("**absent**: " + source).c_str());
+                   WhetherHere(sequence).c_str());
   }
   return text + "\n";
 }
@@ -203,32 +193,60 @@ std::string TimesTable(const std::optional<IterationTimes>& times) {
                        kPaperArsacMs, kPaperDlrsacMs);
 }
 
-std::string Introduction(const Results& results) {
-  size_t planned = 0, done = 0;
+std::string HowManyRuns(const Results& results) {
+  size_t planned = 0, made = 0, failed = 0;
   for (const Cell& cell : results.cells) {
     planned += cell.runs.size();
-    done += cell.runs.size() - cell.Count(State::kMissing);
+    made += cell.Made();
+    failed += cell.Failed();
   }
+  std::string text = Format("%zu of %zu runs are done (%d seeds)", made, planned, results.plan.seeds);
+  if (failed == 0) return text + ".";
+  return text +
+         Format("; **%zu of %zu failed or gave no trajectory**: they count as 0 %% tracked.", failed, made);
+}
+
+// "" where it is one and the same: "A (30 runs), B (2 runs)".
+std::string Mixture(const std::vector<Origin>& origins) {
+  if (origins.size() < 2) return {};
+  std::string text;
+  for (const Origin& origin : origins) {
+    text += (text.empty() ? "" : "; ") + origin.text + Format(" (%zu runs)", origin.runs);
+  }
+  return text;
+}
+
+std::string WhereRunsComeFrom(const Results& results) {
+  std::string text;
+  const std::vector<Origin> versions = Versions(results, nullptr), machines = Machines(results);
+  if (versions.empty()) return text;
+  const std::string mixed_versions = Mixture(versions), mixed_machines = Mixture(machines);
+  if (mixed_versions.empty()) {
+    text = "Version of the programs: " + versions.front().text + ".";
+  } else {
+    text = "**The runs are of several versions**: " + mixed_versions +
+           ". Remove the folders of those of another version, and the same command runs them again.";
+  }
+  return text + " Machine: " + (mixed_machines.empty() ? machines.front().text : mixed_machines) + ".\n\n";
+}
+
+std::string Introduction(const Results& results) {
   return "# Results beside the DM-SLAM paper's\n\n"
          "Lu, Wang, Tang, Huang, Li: *DM-SLAM: Monocular SLAM in Dynamic Environments*, Appl. Sci. 2020, "
-         "10(12), 4252. " +
-         Format(
-             "`baseline` stands where the paper has ORB-SLAM2, `dm` where it has DM-SLAM; `dm` also joins "
-             "the "
-             "poses told at the end with the camera's motion (`tracking.smooth_at_end`). %zu of %zu runs "
-             "are done "
-             "(%d seeds). ",
-             done, planned, results.plan.seeds) +
-         "Each figure is the median over the seeds; trajectories are aligned by Sim3, as monocular ones must "
-         "be. "
-         "Lengths are metres, angles degrees. *Tracked* is the share of the sequence's frames that have a "
-         "pose in the "
-         "final trajectory (none for a run without one): an error without it is no result. *Runs* are those "
-         "with a "
-         "trajectory, of those that were run.\n\n"
+         "10(12), 4252. `baseline` stands where the paper has ORB-SLAM2, `dm` where it has DM-SLAM; `dm` "
+         "also "
+         "joins the poses told at the end with the camera's motion (`tracking.smooth_at_end`). " +
+         HowManyRuns(results) +
+         " Each figure is the median over the seeds; trajectories are aligned by Sim3, as monocular ones "
+         "must "
+         "be. Lengths are metres, angles degrees. *Tracked* is the share of the sequence's frames that have "
+         "a "
+         "pose in the final trajectory (none for a run without one): an error without it is no result. "
+         "*Runs* "
+         "are those with a trajectory, of those that were run.\n\n" +
+         WhereRunsComeFrom(results) +
          "Of the paper's figures only the RMSE of ATE and its Table 1 are recorded here; its other columns "
-         "are left "
-         "out rather than guessed, and it gives no coverage.\n\n";
+         "are left out rather than guessed, and it gives no coverage.\n\n";
 }
 
 std::string SettingSection(const Results& results, const Setting& setting) {
@@ -239,6 +257,8 @@ std::string SettingSection(const Results& results, const Setting& setting) {
       {"Table 3b. Translational RPE per second [m]", Metric::kRpeTranslationPerSecond, 4},
       {"Table 4. ATE [m]", Metric::kAte, 4}};
   std::string text = "## With " + setting.title + "\n\n";
+  if (const std::string mixed = Mixture(Versions(results, &setting)); !mixed.empty())
+    text += "**These tables mix versions**: " + mixed + ".\n\n";
   for (const ErrorTable& table : kTables) text += RenderErrorTable(results, setting, table);
   return text + SpreadTable(results, setting) + StandInTable(results, setting);
 }
@@ -286,10 +306,7 @@ std::string WithEnds(const std::optional<Spread>& spread, int decimals) {
   return Format("%.*f (%.*f–%.*f)", decimals, spread->median, decimals, spread->min, decimals, spread->max);
 }
 
-std::string RunsText(const Cell& cell) {
-  const size_t run = cell.runs.size() - cell.Count(State::kMissing);
-  return Format("%zu/%zu", cell.Count(State::kDone), run);
-}
+std::string RunsText(const Cell& cell) { return Format("%zu/%zu", cell.Count(State::kDone), cell.Made()); }
 
 std::string ReportMarkdown(const Results& results, const std::optional<IterationTimes>& times,
                            const std::vector<ReportPicture>& pictures) {

@@ -34,7 +34,7 @@ struct SequenceInfo {
   std::string_view camera;  // camera file under config/
   SequenceGroup group;
   std::string_view like;    // kStandIn and kStandInStill: the paper's sequence it stands for
-  std::string_view source;  // where it is to be had
+  std::string_view source;  // where it is to be had: its download page, or why there is none
   std::optional<PaperFigures> paper;
 };
 

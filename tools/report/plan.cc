@@ -1,6 +1,7 @@
 #include "plan.h"
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -38,6 +39,35 @@ void RequireGroundTruth(const fs::path& folder) {
   throw InputError(folder.string() +
                    ": has no groundtruth.txt, so that no error can be told; unpack the sequence " +
                    "again (scripts/get_tum.sh), or leave it out with --only");
+}
+
+PlannedSequence* Find(Plan* plan, std::string_view name) {
+  for (PlannedSequence& sequence : plan->sequences) {
+    if (sequence.info.name == name) return &sequence;
+  }
+  return nullptr;
+}
+
+void InOrderOfTheTables(Plan* plan) {
+  std::vector<PlannedSequence> ordered;
+  for (const SequenceInfo& info : KnownSequences()) {
+    if (const PlannedSequence* sequence = Find(plan, info.name)) ordered.push_back(*sequence);
+  }
+  plan->sequences = std::move(ordered);
+}
+
+// The largest N for which a folder of the sequence holds a finished seed_N; 0 where none does.
+int LargestSeedIn(const fs::path& runs_of_sequence) {
+  int largest = 0;
+  std::error_code error;
+  for (const auto& entry : fs::recursive_directory_iterator(runs_of_sequence, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!entry.is_directory() || !name.starts_with("seed_")) continue;
+    int seed = 0;
+    const auto [end, problem] = std::from_chars(name.data() + 5, name.data() + name.size(), seed);
+    if (problem == std::errc() && end == name.data() + name.size()) largest = std::max(largest, seed);
+  }
+  return largest;
 }
 
 std::vector<Setting> PaperSettings() {
@@ -87,7 +117,23 @@ std::vector<RunKey> Runs(const Plan& plan) {
   return runs;
 }
 
-void SavePlan(const Plan& plan, const fs::path& out) {
+Plan MergePlans(const Plan& before, const Plan& now) {
+  Plan merged = now;
+  merged.seeds = std::max(before.seeds, now.seeds);
+  for (const PlannedSequence& old : before.sequences) {
+    PlannedSequence* sequence = Find(&merged, old.info.name);
+    if (sequence == nullptr) {
+      merged.sequences.push_back(old);
+    } else if (!sequence->present()) {
+      sequence->folder = old.folder;
+    }
+  }
+  InOrderOfTheTables(&merged);
+  return merged;
+}
+
+void SavePlan(const Plan& now, const fs::path& out) {
+  const Plan plan = fs::exists(out / "plan.json") ? MergePlans(LoadPlan(out), now) : now;
   Json json;
   json["seeds"] = plan.seeds;
   json["profiles"] = plan.profiles;
@@ -130,6 +176,26 @@ Plan LoadPlan(const fs::path& out) {
   } catch (const nlohmann::json::exception& error) {
     throw InputError(path + ": is no plan of dmslam-report (" + error.what() + "); remove it");
   }
+  return plan;
+}
+
+Plan PlanOfFolder(const fs::path& out) {
+  Plan plan = LoadPlan(out);
+  for (const SequenceInfo& info : KnownSequences()) {
+    const std::string name(info.name);
+    const int largest_seed = LargestSeedIn(out / "runs" / name);
+    PlannedSequence* sequence = Find(&plan, name);
+    if (sequence == nullptr) {
+      if (largest_seed == 0) continue;
+      sequence = &plan.sequences.emplace_back(PlannedSequence{info, {}});
+    }
+    sequence->has_runs = largest_seed > 0;
+    plan.seeds = std::max(plan.seeds, largest_seed);
+    if (IsSequence(sequence->folder)) continue;
+    const fs::path rendered = out / "synthetic" / name;
+    sequence->folder = IsSequence(rendered) ? rendered : fs::path();
+  }
+  InOrderOfTheTables(&plan);
   return plan;
 }
 

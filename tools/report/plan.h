@@ -13,6 +13,8 @@ struct PlannedSequence {
   SequenceInfo info;
   // Its folder; empty where it is absent.
   std::filesystem::path folder;
+  // Runs of it lie in the output folder; where it is absent, they cannot be judged.
+  bool has_runs = false;
   bool present() const { return !folder.empty(); }
 };
 
@@ -56,8 +58,18 @@ Plan MakePlan(const PlanOptions& options);
 /// All runs of the sequences that are present, seed by seed: stopped early, all tables have equally many.
 std::vector<RunKey> Runs(const Plan& plan);
 
-/// Kept as plan.json in the output folder. LoadPlan throws InputError that names the file.
+/// Both together: the larger number of seeds and all sequences, in the order of the tables, each in the
+/// folder where `now` found it, else where `before` did.
+Plan MergePlans(const Plan& before, const Plan& now);
+
+/// Kept as plan.json in the output folder; SavePlan merges with the one that is there. LoadPlan throws
+/// InputError that names the file.
 void SavePlan(const Plan& plan, const std::filesystem::path& out);
 Plan LoadPlan(const std::filesystem::path& out);
+
+/// Everything that was planned or run in the output folder: its plan, and whatever lies in its folder `runs`
+/// beyond that. A sequence that is no longer where the plan says is taken from the folder `synthetic`, or is
+/// absent.
+Plan PlanOfFolder(const std::filesystem::path& out);
 
 }  // namespace dmslam

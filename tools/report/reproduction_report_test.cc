@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "compare.h"
 #include "dmslam/util/check.h"
 #include "figures.h"
 #include "testing/wavy_path.h"
@@ -142,6 +143,124 @@ TEST_F(Reproduction, RunsWithoutATrajectoryCountAndAreListed) {
   const std::string text = ReportMarkdown(results, std::nullopt, {});
   EXPECT_NE(text.find("it fell over"), std::string::npos);
   EXPECT_NE(text.find("| 1/3 |"), std::string::npos);
+}
+
+// A failed run is one of those over which the median goes: two of three, and nothing is tracked in the
+// middle.
+TEST_F(Reproduction, FailedRunsCountAsNothingTracked) {
+  const std::string all = R"({"tracked_percent": 100, "tracked_online_percent": 99,
+                              "tracked_online_after_first_map_percent": 98})";
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 1}, 0.01, all);
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 2}, -1, R"({"tracked_percent": 60})");
+  const RunKey failed{"fr3_walking_xyz", "defaults", "dm", 3};
+  fs::create_directories(root_ / "out" / failed.Folder());
+  std::ofstream(root_ / "out" / failed.Folder() / "failed.txt") << "it fell over\n";
+  const Results results = ReadResults(MakePlan(options_), root_ / "out");
+  const Cell& cell = *results.Find("fr3_walking_xyz", "defaults", "dm");
+  EXPECT_EQ(cell.TrackedPercent()->count, 3u);
+  EXPECT_EQ(cell.TrackedPercent()->median, 0);
+  EXPECT_EQ(cell.TrackedOnlinePercent()->median, 0);
+  EXPECT_EQ(cell.TrackedOnlineAfterFirstMapPercent()->median, 0);
+  const std::string text = ReportMarkdown(results, std::nullopt, {});
+  EXPECT_NE(text.find("2 of 3 failed or gave no trajectory"), std::string::npos) << text;
+  EXPECT_NE(text.find("| fr3_walking_xyz | dm | 1/3 | 2 of 3 |"), std::string::npos) << text;
+  const auto json = nlohmann::json::parse(ReportJson(results, std::nullopt));
+  size_t failed_runs = 0;
+  for (const auto& one : json["results"]) failed_runs += one["runs_failed"].get<size_t>();
+  EXPECT_EQ(failed_runs, 2u);
+}
+
+TEST_F(Reproduction, ASmallerPlanTakesNothingOutOfTheReport) {
+  const Plan all = MakePlan(options_);
+  SavePlan(all, root_ / "out");
+  WriteAllRuns(all);
+  options_.seeds = 1;
+  options_.only = {"synth_walking_xyz"};
+  SavePlan(MakePlan(options_), root_ / "out");
+  const Plan merged = PlanOfFolder(root_ / "out");
+  EXPECT_EQ(merged.seeds, 3);
+  EXPECT_EQ(merged.sequences.size(), KnownSequences().size());
+  EXPECT_EQ(Runs(merged).size(), Runs(all).size());
+  // A sequence that is found later takes its place; one that was found stays found.
+  options_.only = {"fr3_walking_xyz", "synth_xyz"};
+  options_.roots = {root_ / "out"};
+  EXPECT_TRUE(MergePlans(all, MakePlan(options_)).sequences.front().present());
+}
+
+// plan.json tells of one sequence and seed, the folder holds runs of three.
+TEST_F(Reproduction, WhatWasRunBeyondThePlanIsShown) {
+  WriteAllRuns(MakePlan(options_));
+  fs::create_directories(root_ / "out/runs/synth_still_xyz/defaults/dm/seed_9.part");
+  options_.seeds = 1;
+  options_.only = {"fr3_walking_xyz"};
+  SavePlan(MakePlan(options_), root_ / "out");
+  fs::create_directories(root_ / "out/synthetic");
+  fs::rename(root_ / "tum/synth_still_xyz", root_ / "out/synthetic/synth_still_xyz");
+  const Plan plan = PlanOfFolder(root_ / "out");
+  EXPECT_EQ(plan.seeds, 3);
+  ASSERT_EQ(plan.sequences.size(), 3u);
+  EXPECT_TRUE(plan.sequences[0].present());
+  EXPECT_EQ(plan.sequences[1].info.name, "synth_walking_xyz");
+  EXPECT_FALSE(plan.sequences[1].present());  // nobody says where it is
+  EXPECT_TRUE(plan.sequences[1].has_runs);
+  EXPECT_TRUE(plan.sequences[2].present());  // rendered, so it is where those are
+  const std::string text = ReportMarkdown(ReadResults(plan, root_ / "out"), std::nullopt, {});
+  EXPECT_NE(text.find("**Its runs are not shown**"), std::string::npos) << text;
+}
+
+TEST_F(Reproduction, VersionsAndMachinesOfTheRuns) {
+  const Plan plan = MakePlan(options_);
+  const std::string a = R"({"version": "0.1.0+aaaaaaaaaa", "machine": {"cpu": "Z80", "cores": 2}})";
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 1}, 0.01, a);
+  WriteRun({"fr3_walking_xyz", "features3000", "dm", 1}, 0.01, a);
+  const std::string one = ReportMarkdown(ReadResults(plan, root_ / "out"), std::nullopt, {});
+  EXPECT_NE(one.find("Version of the programs: 0.1.0+aaaaaaaaaa. Machine: Z80, 2 cores."), std::string::npos)
+      << one;
+  EXPECT_EQ(one.find("mix versions"), std::string::npos);
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 2}, 0.01, R"({"version": "0.1.0"})");
+  WriteRun({"fr3_walking_xyz", "defaults", "dm", 3}, 0.01, "{}");
+  const Results results = ReadResults(plan, root_ / "out");
+  const std::string text = ReportMarkdown(results, std::nullopt, {});
+  EXPECT_NE(text.find("**The runs are of several versions**: 0.1.0+aaaaaaaaaa (2 runs); "), std::string::npos)
+      << text;
+  const size_t mixed = text.find("**These tables mix versions**: ");
+  EXPECT_GT(mixed, text.find("## With default settings")) << text;  // not those with 3000 features
+  const auto json = nlohmann::json::parse(ReportJson(results, std::nullopt));
+  ASSERT_EQ(json["versions"].size(), 3u);
+  EXPECT_EQ(json["versions"][0]["runs"], 2);
+  EXPECT_EQ(json["versions"][1]["version"], "0.1.0, commit not recorded");
+  EXPECT_EQ(json["versions"][2]["version"], "not recorded");
+  EXPECT_EQ(json["machines_of_runs"][0]["machine"], "Z80, 2 cores");
+  EXPECT_GE(json["machine_of_report"]["cores"].get<int>(), 1);
+}
+
+TEST_F(Reproduction, JsonHoldsImprovementsAndRatios) {
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  const Results results = ReadResults(plan, root_ / "out");
+  const auto json = nlohmann::json::parse(ReportJson(results, std::nullopt));
+  ASSERT_EQ(json["improvements"].size(), 3u * 2);
+  const auto& first = json["improvements"][0];
+  EXPECT_EQ(first["sequence"], "fr3_walking_xyz");
+  EXPECT_NEAR(first["ate_m"]["rmse_percent"].get<double>(), 75, 5);  // 0.04 to 0.01
+  EXPECT_NEAR(first["paper"]["ate_rmse_percent"].get<double>(), 56.5, 0.05);
+  EXPECT_EQ(first["dm_tracked_percent"]["median"], 97.5);
+  EXPECT_FALSE(json["improvements"][2].contains("paper"));  // without actors
+  ASSERT_EQ(json["stand_ins"].size(), 2u);
+  const auto& stand_in = json["stand_ins"][0];
+  EXPECT_EQ(stand_in["without_actors"], "synth_still_xyz");
+  EXPECT_NEAR(stand_in["ratio"].get<double>(), 1, 1e-9);  // the same seeds, the same noise
+  EXPECT_EQ(stand_in["paper_better_by_percent"], first["paper"]["ate_rmse_percent"]);
+}
+
+// A sequence that is absent says where it is to be had, or why it cannot be.
+TEST(KnownSequences, EachHasItsSource) {
+  for (const SequenceInfo& info : KnownSequences()) {
+    const std::string source(info.source);
+    EXPECT_TRUE(source.starts_with("https://") || source.starts_with("no public download page") ||
+                source.starts_with("nothing to download"))
+        << info.name << ": " << source;
+  }
 }
 
 TEST_F(Reproduction, PicturesAreDrawn) {

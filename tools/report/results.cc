@@ -21,6 +21,28 @@ std::optional<double> NumberIn(const Json& json, const char* key) {
   return found->get<double>();
 }
 
+std::optional<std::string> TextIn(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_string()) return std::nullopt;
+  return found->get<std::string>();
+}
+
+std::optional<Machine> MachineIn(const Json& summary) {
+  const auto found = summary.find("machine");
+  if (found == summary.end() || !found->is_object()) return std::nullopt;
+  const auto cpu = TextIn(*found, "cpu");
+  const auto cores = NumberIn(*found, "cores");
+  if (!cpu || !cores) return std::nullopt;
+  return Machine{*cpu, static_cast<int>(*cores)};
+}
+
+// In the end nothing; as it came, what it says, or nothing.
+void TrackedNothing(RunResult* run) {
+  run->tracked_percent = 0;
+  run->tracked_online_percent = run->tracked_online_percent.value_or(0);
+  run->tracked_online_after_first_map_percent = run->tracked_online_after_first_map_percent.value_or(0);
+}
+
 // Of the frames since the first pose, how many have one.
 std::optional<double> OnlineAfterFirstMap(const fs::path& online, const fs::path& sequence) {
   if (!fs::exists(online)) return std::nullopt;
@@ -95,6 +117,7 @@ RunResult ReadRun(const RunKey& key, const fs::path& out, const fs::path& sequen
   if (fs::exists(folder / "failed.txt")) {
     run.state = State::kFailed;
     run.reason = FirstLine(folder / "failed.txt");
+    TrackedNothing(&run);
     return run;
   }
   const fs::path summary_path = folder / "summary.json";
@@ -108,14 +131,15 @@ RunResult ReadRun(const RunKey& key, const fs::path& out, const fs::path& sequen
     throw InputError(summary_path.string() +
                      ": is not JSON; remove the run's folder, so that it is run again");
   }
+  run.version = TextIn(summary, "version");
+  run.machine = MachineIn(summary);
   run.tracked_percent = NumberIn(summary, "tracked_percent");
   run.tracked_online_percent = NumberIn(summary, "tracked_online_percent");
   run.tracked_online_after_first_map_percent = NumberIn(summary, "tracked_online_after_first_map_percent");
   run.first_map_s = NumberIn(summary, "first_init_s");
   run.frontend_ms_median = NumberIn(summary, "frontend_ms_median");
   ReadTrajectoryOf(folder, sequence, &run);
-  // What gave no trajectory covered nothing: it counts among the shares.
-  if (run.state == State::kNoTrajectory) run.tracked_percent = run.tracked_percent.value_or(0);
+  if (run.state == State::kNoTrajectory) TrackedNothing(&run);
   return run;
 }
 
@@ -152,6 +176,9 @@ size_t Cell::Count(State state) const {
   return static_cast<size_t>(
       std::count_if(runs.begin(), runs.end(), [&](const RunResult& run) { return run.state == state; }));
 }
+
+size_t Cell::Failed() const { return Count(State::kFailed) + Count(State::kNoTrajectory); }
+size_t Cell::Made() const { return runs.size() - Count(State::kMissing); }
 
 std::optional<Spread> Cell::Rmse(Metric metric) const {
   return CollectStatistic(*this, metric, &Statistics::rmse);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dmslam/evaluation/report.h"
+#include "dmslam/util/machine.h"
 #include "plan.h"
 
 namespace dmslam {
@@ -16,6 +17,8 @@ struct RunResult {
   enum class State { kMissing, kFailed, kNoTrajectory, kDone } state = State::kMissing;
   std::string reason;  // where it is not kDone
   // From its summary.json; nothing where it does not say.
+  std::optional<std::string> version;  // of the programs that made it
+  std::optional<Machine> machine;      // on which it was made
   std::optional<double> tracked_percent;
   std::optional<double> tracked_online_percent;
   std::optional<double> first_map_s;
@@ -27,6 +30,7 @@ struct RunResult {
 };
 
 /// Reads the result of a run from its folder. `sequence` is the sequence's folder (ground truth, image list).
+/// What failed or gave no trajectory has tracked nothing: its shares are 0, so that no median passes over it.
 RunResult ReadRun(const RunKey& key, const std::filesystem::path& out, const std::filesystem::path& sequence);
 
 /// The errors that the tables show.
@@ -58,6 +62,9 @@ struct Cell {
   std::vector<RunResult> runs;
 
   size_t Count(RunResult::State state) const;
+  /// Runs that failed or gave no trajectory; and runs that were made, these among them.
+  size_t Failed() const;
+  size_t Made() const;
   /// Medians over the seeds of a metric's RMSE, mean, median, S.D.; and the spread of the RMSE.
   std::optional<Spread> Rmse(Metric metric) const;
   std::optional<Spread> Mean(Metric metric) const;

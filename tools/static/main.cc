@@ -13,6 +13,7 @@
 #include "dmslam/map/keyframe.h"
 #include "dmslam/motion_segmentation/match_frames.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/machine.h"
 #include "dmslam/util/version.h"
 #include "draw.h"
 #include "judge.h"
@@ -341,7 +342,7 @@ void RunTime(const TimeSettings& settings) {
                      " matches of the pair in the middle; give another --gap, or a sequence that moves");
   }
   const std::string machine =
-      ProcessorName() + ", " + std::to_string(matches.size()) + " matches, one thread";
+      ThisMachine().processor + ", " + std::to_string(matches.size()) + " matches, one thread";
   std::cout << "| | RANSAC | ARSAC | DLRSAC |\n|---|---:|---:|---:|\n| " << machine << " [ms] | "
             << times.ransac_ms << " | " << times.arsac_ms << " | " << times.dlrsac_ms << " |\n";
   if (settings.json.empty()) return;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <fstream>
 #include <memory>
 
 #include "dmslam/evaluation/statistics.h"
@@ -55,15 +54,6 @@ MethodTimes TimeMethods(const std::vector<Match>& matches, const Camera& camera,
   result.arsac_ms = Median(times_ms[1]);
   result.dlrsac_ms = Median(times_ms[2]);
   return result;
-}
-
-std::string ProcessorName() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    const size_t colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown processor";
 }
 
 }  // namespace dmslam

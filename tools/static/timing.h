@@ -27,7 +27,4 @@ struct MethodTimes {
 MethodTimes TimeMethods(const std::vector<Match>& matches, const Camera& camera,
                         const TimingOptions& options);
 
-/// What the processor calls itself; "unknown processor" where the system does not say.
-std::string ProcessorName();
-
 }  // namespace dmslam

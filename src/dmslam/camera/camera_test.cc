@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <string>
 
@@ -79,6 +80,33 @@ TEST(CameraFile, NamesTheFieldThatIsWrong) {
   }
   EXPECT_NE(ErrorOf("][").find("YAML"), std::string::npos);
   EXPECT_THROW(LoadCamera("/nonexistent.yaml"), InputError);
+}
+
+struct PublishedCamera {
+  const char* file;
+  Camera camera;
+};
+
+// As https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats gives them for the colour cameras.
+TEST(CameraFile, TumCamerasHoldThePublishedCalibrations) {
+  const char* source_dir = std::getenv("DMSLAM_SOURCE_DIR");
+  if (source_dir == nullptr) GTEST_SKIP() << "DMSLAM_SOURCE_DIR is not set";
+  const PublishedCamera published[] = {
+      {"TUM1.yaml", Freiburg1()},
+      {"TUM2.yaml",
+       {640, 480, 520.908620, 521.007327, 325.141442, 249.701764, 0.231222, -0.784899, -0.003257, -0.000105,
+        0.917205, 30.0}},
+      {"TUM3.yaml", {640, 480, 535.4, 539.2, 320.1, 247.6, 0, 0, 0, 0, 0, 30.0}}};
+  for (const auto& [file, want] : published) {
+    SCOPED_TRACE(file);
+    const Camera camera = LoadCamera(std::string(source_dir) + "/config/" + file);
+    EXPECT_EQ(camera.width_px, want.width_px);
+    EXPECT_EQ(camera.height_px, want.height_px);
+    EXPECT_EQ(camera.K(), want.K());
+    EXPECT_EQ(Eigen::Vector3d(camera.k1, camera.k2, camera.k3), Eigen::Vector3d(want.k1, want.k2, want.k3));
+    EXPECT_EQ(Eigen::Vector2d(camera.p1, camera.p2), Eigen::Vector2d(want.p1, want.p2));
+    EXPECT_EQ(camera.fps, want.fps);
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/crc32c.h"
 #include "dmslam/util/ids.h"
+#include "dmslam/util/machine.h"
 #include "dmslam/util/random.h"
 #include "dmslam/util/time.h"
 
@@ -62,6 +63,12 @@ TEST(Check, NamesTheInvariant) {
   } catch (const InvariantError& error) {
     EXPECT_NE(std::string_view(error.what()).find("1 == 2"), std::string_view::npos);
   }
+}
+
+TEST(Machine, HasAProcessorAndCores) {
+  EXPECT_FALSE(ThisMachine().processor.empty());
+  EXPECT_GE(ThisMachine().cores, 1);
+  EXPECT_EQ(ThisMachine(), ThisMachine());
 }
 
 }  // namespace
