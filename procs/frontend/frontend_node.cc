@@ -201,8 +201,8 @@ bool FrontendNode::WorkOnce() {
 }
 
 bool FrontendNode::WorkAtEnd() {
-  if (!std::exchange(work_begun_, true))
-    ReturnFreeMemory();  // the features that were kept are not needed now
+  // The features that were kept are not needed now.
+  if (!std::exchange(work_begun_, true)) ReturnFreeMemory();
   within_work_ = true;
   const bool more = core_->WorkAtEnd();
   within_work_ = false;

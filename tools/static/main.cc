@@ -326,7 +326,7 @@ std::vector<Match> MatchesToTime(const TimeSettings& settings, const Camera& cam
   matching.use_window = matching.check_orientation = false;
   matching.max_ratio = 1.0;
   FeatureMatcher matcher;
-  return EvenChoice(
+  return ChooseEvenly(
       MatchFrames(*sequence.Features(frame), *sequence.Features(frame + gap), matching, &matcher),
       static_cast<size_t>(settings.matches));
 }

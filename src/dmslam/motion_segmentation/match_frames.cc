@@ -35,7 +35,7 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
   return matches;
 }
 
-std::vector<Match> EvenChoice(const std::vector<Match>& matches, size_t most) {
+std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most) {
   if (matches.size() <= most) return matches;
   std::vector<Match> chosen;
   chosen.reserve(most);

@@ -23,6 +23,6 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
                                const MatchingOptions& options, FeatureMatcher* matcher);
 
 /// At most so many of the matches, spread evenly over them.
-std::vector<Match> EvenChoice(const std::vector<Match>& matches, size_t most);
+std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most);
 
 }  // namespace dmslam
