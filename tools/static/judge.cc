@@ -42,7 +42,9 @@ struct Tally {
     recall.push_back(score.recall());
     bad += score.precision() < kBadPrecision ? 1 : 0;
   }
-  double accepted() const { return asked == 0 ? 0.0 : static_cast<double>(precision.size()) / asked; }
+  double accepted() const {
+    return asked == 0 ? std::nan("") : static_cast<double>(precision.size()) / asked;
+  }
   double bad_share() const {
     return precision.empty() ? std::nan("") : bad / static_cast<double>(precision.size());
   }
@@ -152,6 +154,24 @@ std::vector<NamedSelector> DlrsacAblations() {
   return selectors;
 }
 
+namespace {
+
+void PrintPairs(int gap, bool window_and_orientation, int count, const std::vector<NamedSelector>& selectors,
+                const std::vector<Tally>& tallies, const std::vector<double>& moving, std::ostream& out) {
+  out << "Gap " << gap
+      << (window_and_orientation ? ", search window and orientation check"
+                                 : ", neither window nor orientation check")
+      << "; " << count << " pairs; moving share of the matches: median " << Number(Quantile(moving, 0.5), 2)
+      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead
+      << " |\n|---|" << kTallyRule << "|\n";
+  for (size_t s = 0; s < selectors.size(); ++s) {
+    out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
+  }
+  out << '\n';
+}
+
+}  // namespace
+
 nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
                           const std::vector<NamedSelector>& selectors, std::ostream& out) {
   MatchingOptions matching;
@@ -183,16 +203,7 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
     }
     sequence.ForgetBefore(frame);
   }
-  out << "Gap " << gap
-      << (window_and_orientation ? ", search window and orientation check"
-                                 : ", neither window nor orientation check")
-      << "; " << count << " pairs; moving share of the matches: median " << Number(Quantile(moving, 0.5), 2)
-      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead
-      << " |\n|---|" << kTallyRule << "|\n";
-  for (size_t s = 0; s < selectors.size(); ++s) {
-    out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
-  }
-  out << '\n';
+  PrintPairs(gap, window_and_orientation, count, selectors, tallies, moving, out);
   TellUnjudged(unjudged, count, "pairs", out);
   return {{"gap", gap},
           {"unjudged", unjudged},
@@ -458,8 +469,11 @@ nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& 
     const WindowKind kind = KindOfWindow(sequence, options, first, &matcher);
     for (size_t s = 0; s < initializers.size(); ++s) {
       const size_t end = first + static_cast<size_t>(options.frames);
-      const auto found = FirstMapOf(sequence, initializers[s].options,
-                                    {first - std::min(before, first), first, end}, seed, &tallies[s].waited);
+      std::optional<FoundMap> found;
+      if (kind.has_poses) {
+        found = FirstMapOf(sequence, initializers[s].options, {first - std::min(before, first), first, end},
+                           seed, &tallies[s].waited);
+      }
       AddWindow(sequence, found, kind, &tallies[s]);
     }
     sequence.ForgetBefore(first - std::min(first, before));
