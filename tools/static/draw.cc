@@ -11,6 +11,7 @@ const cv::Scalar kGreen(0, 210, 0), kYellow(255, 220, 0), kGrey(120, 120, 120), 
     kBlack(0, 0, 0);
 constexpr int kMatrixPx = 480;
 constexpr int kTitlePx = 24;
+constexpr double kSmallest = 0.33;  // size of text that can still be read
 
 cv::Mat AsMat(const ColorImage& image) {
   return cv::Mat(image.height, image.width, CV_8UC3, const_cast<uint8_t*>(image.data.data())).clone();
@@ -22,6 +23,23 @@ void Text(cv::Mat& canvas, const std::string& text, cv::Point at, const cv::Scal
           double size = 0.4) {
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, kBlack, 3, cv::LINE_AA);
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, color, 1, cv::LINE_AA);
+}
+
+int WidthOf(const std::string& text, double size) {
+  int below = 0;
+  return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 1, &below).width;
+}
+
+/// Text that ends after `width_px` at the latest: smaller where it is too long, and cut where that does not
+/// do.
+void TextWithin(cv::Mat& canvas, std::string text, cv::Point at, int width_px, const cv::Scalar& color,
+                double size) {
+  while (size > kSmallest && WidthOf(text, size) > width_px) size -= 0.01;
+  if (WidthOf(text, size) > width_px) {
+    while (!text.empty() && WidthOf(text + "...", size) > width_px) text.pop_back();
+    text += "...";
+  }
+  Text(canvas, text, at, color, size);
 }
 
 void DrawFeatures(cv::Mat& canvas, std::span<const Match> matches, const StaticSelection& selection,
@@ -44,10 +62,11 @@ void DrawCells(cv::Mat& canvas, const StaticSelection& selection) {
       const cv::Point high((cell.column + 1) * canvas.cols / selection.columns - 1,
                            (cell.row + 1) * canvas.rows / selection.rows - 1);
       cv::rectangle(canvas, low, high, chosen ? kGreen : kGrey, chosen ? 2 : 1);
+      const std::string state(cell.state == CellState::kPureRotation ? "rotation" : ToString(cell.state));
       const std::string label = std::to_string(k) + ": " + std::to_string(cell.num_inliers) + "/" +
-                                std::to_string(cell.num_matches) + " " + std::string(ToString(cell.state));
-      Text(canvas, label, low + cv::Point(4, 13),
-           static_cast<int>(k) == selection.leading_cell ? kGreen : kWhite);
+                                std::to_string(cell.num_matches) + " " + state;
+      TextWithin(canvas, label, low + cv::Point(4, 13), high.x - low.x - 8,
+                 static_cast<int>(k) == selection.leading_cell ? kGreen : kWhite, 0.4);
     }
   }
 }
@@ -75,7 +94,7 @@ cv::Mat DrawCoupleMatrix(const StaticSelection& selection) {
 
 void Paste(const cv::Mat& part, cv::Point at, const std::string& title, cv::Mat& canvas) {
   part.copyTo(canvas(cv::Rect(at.x, at.y + kTitlePx, part.cols, part.rows)));
-  Text(canvas, title, at + cv::Point(6, 16), kWhite, 0.45);
+  TextWithin(canvas, title, at + cv::Point(6, 16), part.cols - 12, kWhite, 0.45);
 }
 
 }  // namespace

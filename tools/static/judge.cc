@@ -42,7 +42,9 @@ struct Tally {
     recall.push_back(score.recall());
     bad += score.precision() < kBadPrecision ? 1 : 0;
   }
-  double accepted() const { return asked == 0 ? 0.0 : static_cast<double>(precision.size()) / asked; }
+  double accepted() const {
+    return asked == 0 ? std::nan("") : static_cast<double>(precision.size()) / asked;
+  }
   double bad_share() const {
     return precision.empty() ? std::nan("") : bad / static_cast<double>(precision.size());
   }
@@ -79,6 +81,13 @@ constexpr const char* kTallyRule = "---|---|---|---|---";
 
 NamedSelector MakeDlrsac(std::string name, const DlrsacOptions& options) {
   return {std::move(name), std::make_unique<Dlrsac>(options)};
+}
+
+/// Says how many of `count` could not be judged, where there are such.
+void TellUnjudged(int unjudged, int count, const char* what, std::ostream& out) {
+  if (unjudged == 0) return;
+  out << unjudged << " of " << count << ' ' << what
+      << " left out: groundtruth.txt has no pose within 20 ms of their frames.\n\n";
 }
 
 size_t StartOf(size_t k, size_t count, size_t frames, size_t reach) {
@@ -145,6 +154,24 @@ std::vector<NamedSelector> DlrsacAblations() {
   return selectors;
 }
 
+namespace {
+
+void PrintPairs(int gap, bool window_and_orientation, int count, const std::vector<NamedSelector>& selectors,
+                const std::vector<Tally>& tallies, const std::vector<double>& moving, std::ostream& out) {
+  out << "Gap " << gap
+      << (window_and_orientation ? ", search window and orientation check"
+                                 : ", neither window nor orientation check")
+      << "; " << count << " pairs; moving share of the matches: median " << Number(Quantile(moving, 0.5), 2)
+      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead
+      << " |\n|---|" << kTallyRule << "|\n";
+  for (size_t s = 0; s < selectors.size(); ++s) {
+    out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
+  }
+  out << '\n';
+}
+
+}  // namespace
+
 nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
                           const std::vector<NamedSelector>& selectors, std::ostream& out) {
   MatchingOptions matching;
@@ -155,10 +182,15 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
   FeatureMatcher matcher;
   std::vector<Tally> tallies(selectors.size());
   std::vector<double> moving;
+  int unjudged = 0;
   for (int k = 0; k < count; ++k) {
     const size_t frame = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
                                  static_cast<size_t>(gap) + 1);
     const size_t other = frame + static_cast<size_t>(gap);
+    if (!sequence.TrueMotion(frame, other)) {
+      ++unjudged;
+      continue;
+    }
     const auto matches =
         MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, &matcher);
     const auto truth = sequence.Judge(frame, other, matches);
@@ -171,17 +203,10 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
     }
     sequence.ForgetBefore(frame);
   }
-  out << "Gap " << gap
-      << (window_and_orientation ? ", search window and orientation check"
-                                 : ", neither window nor orientation check")
-      << "; " << count << " pairs; moving share of the matches: median " << Number(Quantile(moving, 0.5), 2)
-      << ", 90th percentile " << Number(Quantile(moving, 0.9), 2) << ".\n\n| method | " << kTallyHead
-      << " |\n|---|" << kTallyRule << "|\n";
-  for (size_t s = 0; s < selectors.size(); ++s) {
-    out << "| " << selectors[s].name << " | " << tallies[s].Cells() << " |\n";
-  }
-  out << '\n';
+  PrintPairs(gap, window_and_orientation, count, selectors, tallies, moving, out);
+  TellUnjudged(unjudged, count, "pairs", out);
   return {{"gap", gap},
+          {"unjudged", unjudged},
           {"window_and_orientation", window_and_orientation},
           {"median_moving_share", Quantile(moving, 0.5)},
           {"methods", ToJson(NamesOf(selectors), tallies)}};
@@ -219,57 +244,83 @@ void PrintWindowTable(const std::vector<std::string>& names, const std::vector<T
   out << '\n';
 }
 
+/// Answers of every selector over windows.
+struct WindowTallies {
+  explicit WindowTallies(size_t selectors)
+      : all(selectors), parallax(selectors), hard(selectors), refusals(selectors) {}
+  std::vector<Tally> all, parallax, hard;
+  std::vector<std::map<std::string, int>> refusals;
+};
+
+void PrintWindows(const std::vector<std::string>& names, const WindowOptions& options,
+                  const WindowTallies& tallies, std::ostream& out) {
+  PrintWindowTable(names, tallies.all, "All windows.", out);
+  PrintWindowTable(names, tallies.parallax,
+                   "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m.", out);
+  if (tallies.hard[0].asked > 0) {
+    PrintWindowTable(
+        names, tallies.hard,
+        "Hard windows: more than " + Number(options.hard_moving_share, 2) + " of the matches moving.", out);
+  }
+  out << "Why windows were refused:\n\n";
+  for (size_t s = 0; s < names.size(); ++s) {
+    out << "- " << names[s] << ":";
+    for (const auto& [reason, number] : tallies.refusals[s]) out << ' ' << reason << ' ' << number << ';';
+    out << '\n';
+  }
+  out << '\n';
+}
+
+/// One window of every selector; false where it has no true pose.
+bool AddSelectorWindow(JudgedSequence& sequence, const WindowOptions& options, size_t frame,
+                       const std::vector<NamedSelector>& selectors, FeatureMatcher* matcher,
+                       WindowTallies* tallies) {
+  const size_t last = frame + static_cast<size_t>(options.gaps.back());
+  const auto motion = sequence.TrueMotion(frame, last);
+  if (!motion) return false;
+  std::vector<std::vector<Match>> matches;
+  for (const int gap : options.gaps) {
+    matches.push_back(MatchFrames(*sequence.Features(frame),
+                                  *sequence.Features(frame + static_cast<size_t>(gap)), options.matching,
+                                  matcher));
+  }
+  const auto truth = sequence.Judge(frame, last, matches.back());
+  const bool has_parallax = motion->translation.norm() >= options.min_baseline_m;
+  for (size_t s = 0; s < selectors.size(); ++s) {
+    const Window window =
+        RunWindow(matches, truth, *selectors[s].selector, sequence.camera(), options.agreement, frame);
+    ++tallies->refusals[s][std::string(ToString(window.agreement.refusal))];
+    const bool is_hard = window.score.moving_share() > options.hard_moving_share;
+    for (Tally* tally : {&tallies->all[s], has_parallax ? &tallies->parallax[s] : nullptr,
+                         is_hard ? &tallies->hard[s] : nullptr}) {
+      if (!tally) continue;
+      ++tally->asked;
+      if (window.agreement.IsUsable()) tally->Add(window.score);
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
                             const std::vector<NamedSelector>& selectors, std::ostream& out) {
   FeatureMatcher matcher;
-  std::vector<Tally> all(selectors.size()), parallax(selectors.size()), hard(selectors.size());
-  std::vector<std::map<std::string, int>> refusals(selectors.size());
+  WindowTallies tallies(selectors.size());
+  int unjudged = 0;
   for (int k = 0; k < count; ++k) {
     const size_t frame = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
                                  static_cast<size_t>(options.gaps.back()) + 1);
-    std::vector<std::vector<Match>> matches;
-    for (const int gap : options.gaps) {
-      matches.push_back(MatchFrames(*sequence.Features(frame),
-                                    *sequence.Features(frame + static_cast<size_t>(gap)), options.matching,
-                                    &matcher));
-    }
-    const size_t last = frame + static_cast<size_t>(options.gaps.back());
-    const auto truth = sequence.Judge(frame, last, matches.back());
-    const auto motion = sequence.TrueMotion(frame, last);
-    const bool has_parallax = motion && motion->translation.norm() >= options.min_baseline_m;
-    for (size_t s = 0; s < selectors.size(); ++s) {
-      const Window window =
-          RunWindow(matches, truth, *selectors[s].selector, sequence.camera(), options.agreement, frame);
-      ++refusals[s][std::string(ToString(window.agreement.refusal))];
-      for (Tally* tally : {&all[s], has_parallax ? &parallax[s] : nullptr,
-                           window.score.moving_share() > options.hard_moving_share ? &hard[s] : nullptr}) {
-        if (!tally) continue;
-        ++tally->asked;
-        if (window.agreement.IsUsable()) tally->Add(window.score);
-      }
-    }
+    unjudged += AddSelectorWindow(sequence, options, frame, selectors, &matcher, &tallies) ? 0 : 1;
     sequence.ForgetBefore(frame);
   }
-  PrintWindowTable(NamesOf(selectors), all, "All windows.", out);
-  PrintWindowTable(NamesOf(selectors), parallax,
-                   "Windows with a true baseline of " + Number(options.min_baseline_m, 2) + " m.", out);
-  if (hard[0].asked > 0) {
-    PrintWindowTable(
-        NamesOf(selectors), hard,
-        "Hard windows: more than " + Number(options.hard_moving_share, 2) + " of the matches moving.", out);
-  }
-  out << "Why windows were refused:\n\n";
-  for (size_t s = 0; s < selectors.size(); ++s) {
-    out << "- " << selectors[s].name << ":";
-    for (const auto& [reason, number] : refusals[s]) out << ' ' << reason << ' ' << number << ';';
-    out << '\n';
-  }
-  out << '\n';
-  return {{"all", ToJson(NamesOf(selectors), all)},
-          {"with_parallax", ToJson(NamesOf(selectors), parallax)},
-          {"hard", ToJson(NamesOf(selectors), hard)}};
+  const std::vector<std::string> names = NamesOf(selectors);
+  PrintWindows(names, options, tallies, out);
+  TellUnjudged(unjudged, count, "windows", out);
+  return {{"all", ToJson(names, tallies.all)},
+          {"with_parallax", ToJson(names, tallies.parallax)},
+          {"hard", ToJson(names, tallies.hard)},
+          {"unjudged", unjudged}};
 }
 
 std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
@@ -323,11 +374,13 @@ std::vector<NamedInitializer> AllInitializers(const SystemWindowOptions& options
 /// What the windows of one method add up to.
 struct SystemTally {
   Tally all, parallax, hard;
+  int unjudged = 0;                   ///< windows that are in none of them, for want of true poses
   std::map<std::string, int> waited;  ///< frames, by reason
 };
 
 /// What the first frame of a window shows against one a little later.
 struct WindowKind {
+  bool has_poses = false;
   bool has_parallax = false;
   bool is_hard = false;
 };
@@ -335,17 +388,22 @@ struct WindowKind {
 WindowKind KindOfWindow(JudgedSequence& sequence, const SystemWindowOptions& options, size_t first,
                         FeatureMatcher* matcher) {
   const size_t other = first + static_cast<size_t>(options.hard_gap);
+  const auto motion = sequence.TrueMotion(first, other);
+  if (!motion) return {};
   const auto matches = MatchFrames(*sequence.Features(first), *sequence.Features(other),
                                    options.initializer.matching, matcher);
   const std::vector<uint8_t> none(matches.size(), 0);
   const SelectionScore score = ScoreSelection(sequence.Judge(first, other, matches), none);
-  const auto motion = sequence.TrueMotion(first, other);
-  return {motion && motion->translation.norm() >= options.min_baseline_m,
+  return {true, motion->translation.norm() >= options.min_baseline_m,
           score.moving_share() > options.hard_moving_share};
 }
 
 void AddWindow(JudgedSequence& sequence, const std::optional<FoundMap>& found, const WindowKind& kind,
                SystemTally* tally) {
+  if (!kind.has_poses || (found && !sequence.TrueMotion(found->map.frame0.index, found->map.frame1.index))) {
+    ++tally->unjudged;
+    return;
+  }
   for (Tally* each :
        {&tally->all, kind.has_parallax ? &tally->parallax : nullptr, kind.is_hard ? &tally->hard : nullptr}) {
     if (!each) continue;
@@ -381,27 +439,41 @@ nlohmann::json PrintSystem(const SystemWindowOptions& options,
   }
   nlohmann::json json{
       {"all", ToJson(names, all)}, {"with_parallax", ToJson(names, parallax)}, {"hard", ToJson(names, hard)}};
-  for (size_t s = 0; s < names.size(); ++s) json["waited_for_frames"][names[s]] = tallies[s].waited;
+  for (size_t s = 0; s < names.size(); ++s) {
+    json["waited_for_frames"][names[s]] = tallies[s].waited;
+    json["unjudged"][names[s]] = tallies[s].unjudged;
+    TellUnjudged(tallies[s].unjudged, tallies[s].unjudged + tallies[s].all.asked,
+                 ("windows of " + names[s]).c_str(), out);
+  }
   return json;
 }
 
 }  // namespace
 
+void RequireMethods(const SystemWindowOptions& options) {
+  if (AllInitializers(options).empty()) {
+    throw InputError("--only " + options.only + ": no method has a name like that");
+  }
+}
+
 nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
                            uint64_t seed, std::ostream& out) {
   const std::vector<NamedInitializer> initializers = AllInitializers(options);
-  if (initializers.empty()) throw InputError("--only " + options.only + ": no method has a name like that");
+  RequireMethods(options);
   FeatureMatcher matcher;
   std::vector<SystemTally> tallies(initializers.size());
   const auto before = static_cast<size_t>(options.frames_before);
+  const auto reach = static_cast<size_t>(std::max(options.frames, options.hard_gap + 1));
   for (int k = 0; k < count; ++k) {
-    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(),
-                                 static_cast<size_t>(options.frames));
+    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), reach);
     const WindowKind kind = KindOfWindow(sequence, options, first, &matcher);
     for (size_t s = 0; s < initializers.size(); ++s) {
       const size_t end = first + static_cast<size_t>(options.frames);
-      const auto found = FirstMapOf(sequence, initializers[s].options,
-                                    {first - std::min(before, first), first, end}, seed, &tallies[s].waited);
+      std::optional<FoundMap> found;
+      if (kind.has_poses) {
+        found = FirstMapOf(sequence, initializers[s].options, {first - std::min(before, first), first, end},
+                           seed, &tallies[s].waited);
+      }
       AddWindow(sequence, found, kind, &tallies[s]);
     }
     sequence.ForgetBefore(first - std::min(first, before));
@@ -433,11 +505,13 @@ namespace {
 struct Start {
   size_t first = 0;  ///< frame it began with
   bool found = false;
+  bool judged = true;  ///< the two frames of the first map have true poses
   double wait_s = 0, rotation_deg = 0, direction_deg = 0;
-  bool IsGood() const { return found && rotation_deg < 2.0 && direction_deg < 10.0; }
+  bool IsGood() const { return found && judged && rotation_deg < 2.0 && direction_deg < 10.0; }
   nlohmann::json ToJson() const {
     return {{"first", first},
             {"found", found},
+            {"judged", judged},
             {"wait_s", wait_s},
             {"rotation_deg", rotation_deg},
             {"direction_deg", direction_deg},
@@ -454,7 +528,9 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
   const FirstMap& map = found->map;
   start.found = true;
   start.wait_s = static_cast<double>(sequence.StampNs(found->frame) - sequence.StampNs(first)) * 1e-9;
-  if (const auto truth = sequence.TrueMotion(map.frame0.index, map.frame1.index)) {
+  const auto truth = sequence.TrueMotion(map.frame0.index, map.frame1.index);
+  start.judged = truth.has_value();
+  if (truth) {
     start.rotation_deg = kDegrees * AngleBetween(truth->rotation, map.T_1_0.rotation);
     const double cosine = truth->translation.normalized().dot(map.T_1_0.translation.normalized());
     const bool scored = truth->translation.norm() >= 0.05;
@@ -463,43 +539,60 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
   return start;
 }
 
-}  // namespace
-
-nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count,
-                           uint64_t seed, std::ostream& out) {
-  std::vector<Start> starts;
-  std::map<std::string, int> reasons;
-  for (int k = 0; k < count; ++k) {
-    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), 100);
-    starts.push_back(RunStart(sequence, options, first, seed, &reasons));
-    sequence.ForgetBefore(first);
-  }
-  int found = 0, good = 0;
+/// What starts add up to; those that cannot be judged are in none of the numbers but their own.
+struct StartTally {
+  int found = 0, good = 0, unjudged = 0;
   std::vector<double> wait, rotation, direction;
-  for (const Start& start : starts) {
+
+  void Add(const Start& start) {
+    if (!start.judged) {
+      ++unjudged;
+      return;
+    }
     good += start.IsGood() ? 1 : 0;
     wait.push_back(start.found ? start.wait_s : 1e9);
-    if (!start.found) continue;
+    if (!start.found) return;
     ++found;
     rotation.push_back(start.rotation_deg);
     direction.push_back(start.direction_deg);
   }
+};
+
+void PrintStarts(const StartTally& tally, const std::map<std::string, int>& reasons, std::ostream& out) {
   out << "| starts | first map | right | of all starts | median wait [s] | 75th | 90th | median rotation "
          "error "
          "[deg] | median direction error [deg] | 90th |\n|---|---|---|---|---|---|---|---|---|---|\n| "
-      << count << " | " << found << " | " << good << " | " << Number(good / static_cast<double>(count), 2);
+      << tally.wait.size() << " | " << tally.found << " | " << tally.good << " | "
+      << Number(tally.good / static_cast<double>(tally.wait.size()), 2);
   for (const double q : {0.5, 0.75, 0.9}) {
-    const double value = Quantile(wait, q);
+    const double value = Quantile(tally.wait, q);
     out << " | " << (value > 1e8 ? "none" : Number(value, 2));
   }
-  out << " | " << Number(Quantile(rotation, 0.5), 2) << " | " << Number(Quantile(direction, 0.5), 1) << " | "
-      << Number(Quantile(direction, 0.9), 1) << " |\n\nWhat was waited for [frames]:";
+  out << " | " << Number(Quantile(tally.rotation, 0.5), 2) << " | "
+      << Number(Quantile(tally.direction, 0.5), 1) << " | " << Number(Quantile(tally.direction, 0.9), 1)
+      << " |\n\nWhat was waited for [frames]:";
   for (const auto& [reason, number] : reasons) out << ' ' << reason << ' ' << number << ';';
   out << "\n\n";
-  nlohmann::json json{
-      {"starts", count}, {"first_map", found}, {"right", good}, {"waited_for_frames", reasons}};
-  for (const Start& start : starts) json["each"].push_back(start.ToJson());
-  return json;
+}
+
+}  // namespace
+
+nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& options, int count,
+                           uint64_t seed, std::ostream& out) {
+  StartTally tally;
+  nlohmann::json each = nlohmann::json::array();
+  std::map<std::string, int> reasons;
+  for (int k = 0; k < count; ++k) {
+    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), 100);
+    const Start start = RunStart(sequence, options, first, seed, &reasons);
+    tally.Add(start);
+    each.push_back(start.ToJson());
+    sequence.ForgetBefore(first);
+  }
+  PrintStarts(tally, reasons, out);
+  TellUnjudged(tally.unjudged, count, "starts", out);
+  return {{"starts", tally.wait.size()}, {"first_map", tally.found},     {"right", tally.good},
+          {"unjudged", tally.unjudged},  {"waited_for_frames", reasons}, {"each", each}};
 }
 
 }  // namespace dmslam

@@ -36,7 +36,8 @@ struct WindowOptions {
   double hard_moving_share = 0.3;  ///< of the last pair's matches, for a window to count as hard
 };
 
-/// Each prints Markdown tables and returns the same numbers.
+/// Each prints Markdown tables and returns the same numbers. What lies between frames of which one has no
+/// true pose is left out of them; it is told how much that is.
 nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_orientation, int count,
                           const std::vector<NamedSelector>& selectors, std::ostream& out);
 nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& options, int count,
@@ -69,6 +70,8 @@ struct SystemWindowOptions {
   std::string only;                ///< methods whose name contains this; empty: all
   InitializerOptions initializer;
 };
+/// Throws InputError where no method has a name that contains options.only.
+void RequireMethods(const SystemWindowOptions& options);
 nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& options, int count,
                            uint64_t seed, std::ostream& out);
 /// First maps of an initialiser begun at frames spread over the sequence, beside the true motion.

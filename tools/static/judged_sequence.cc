@@ -5,6 +5,7 @@
 
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/map/keyframe.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -31,6 +32,13 @@ double TrueError(const Rigid3d& T_1_0, const Eigen::Matrix3d& F, const Camera& c
 
 }  // namespace
 
+void CheckImageSize(const std::string& name, const GrayImage& image, const Camera& camera) {
+  if (image.width == camera.width_px && image.height == camera.height_px) return;
+  throw InputError(name + ": " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                   " pixels, but the camera has " + std::to_string(camera.width_px) + "x" +
+                   std::to_string(camera.height_px));
+}
+
 JudgedSequence::JudgedSequence(const std::string& folder, const Camera& camera, int num_features)
     : source_(folder), camera_(camera), extractor_(Extraction(num_features)) {
   if (const auto path = source_.GroundTruthPath()) poses_ = ReadGroundTruth(*path).poses;
@@ -44,6 +52,7 @@ std::shared_ptr<const FrameFeatures> JudgedSequence::Features(size_t frame) {
   auto& cached = features_[frame];
   if (!cached) {
     const GrayImage image = DecodeGray(source_.Read(frame), source_.Name(frame));
+    CheckImageSize(source_.Name(frame), image, camera_);
     FeatureSet set;
     extractor_.Extract({image.data.data(), image.width, image.height, image.width}, &set);
     cached = MakeFrameFeatures(std::move(set), camera_, Pyramid());

@@ -26,6 +26,9 @@ enum class MatchTruth : uint8_t {
   kNeither,   ///< on an actor who stands still in both frames: neither right nor wrong
 };
 
+/// Throws InputError, naming `name`, where an image has not the camera's size.
+void CheckImageSize(const std::string& name, const GrayImage& image, const Camera& camera);
+
 /// A recording with features, and with masks and true poses where it has them; these only judge. Features and
 /// masks are kept once they were asked for.
 class JudgedSequence {
@@ -37,6 +40,7 @@ class JudgedSequence {
   const Camera& camera() const { return camera_; }
   int64_t StampNs(size_t frame) const { return source_.StampNs(frame); }
   ColorImage Color(size_t frame);
+  /// Throws InputError where the image has not the camera's size.
   std::shared_ptr<const FrameFeatures> Features(size_t frame);
   bool HasMasks() const { return !source_.masks().empty(); }
   bool HasPoses() const { return !poses_.empty(); }

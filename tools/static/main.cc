@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -7,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/dataset/frame_source.h"
@@ -122,11 +124,7 @@ class Run {
     std::vector<ColorImage> pictures;
     for (const std::string& path : settings_.images) {
       const GrayImage gray = LoadGray(path);
-      if (gray.width != camera.width_px || gray.height != camera.height_px) {
-        throw InputError(path + ": " + std::to_string(gray.width) + "x" + std::to_string(gray.height) +
-                         " pixels, but the camera has " + std::to_string(camera.width_px) + "x" +
-                         std::to_string(camera.height_px));
-      }
+      CheckImageSize(path, gray, camera);
       FeatureSet set;
       extractor.Extract({gray.data.data(), gray.width, gray.height, gray.width}, &set);
       features.push_back(MakeFrameFeatures(std::move(set), camera, options.pyramid));
@@ -138,6 +136,7 @@ class Run {
     const auto matches = MatchFrames(*features[0], *features[1], matching_, &matcher_);
     const StaticSelection selection = selector_->Select(matches, camera, settings_.seed);
     Write("pair", DrawSelection(pictures[0], pictures[1], matches, selection));
+    Tell("pair", selection, matches.size());
     report_["pairs"].push_back(Describe(selection, matches.size()));
     Save();
   }
@@ -188,8 +187,7 @@ class Run {
       total->num_true += score.num_true;
       total->num_true_found += score.num_true_found;
     }
-    std::cout << name << ": " << selection.num_static << " static of " << matches.size()
-              << (selection.IsUsable() ? "" : ", refused: " + selection.explanation) << '\n';
+    Tell(name, selection, matches.size());
     report_["pairs"].push_back(std::move(json));
     return selection.IsUsable();
   }
@@ -213,7 +211,10 @@ class Run {
     selection->is_static = agreement.is_static;
     selection->num_static = agreement.num_static;
     selection->explanation = agreement.explanation;
-    if (!agreement.IsUsable()) selection->refusal = Refusal::kNoModel;  // the report has the true reason
+    if (agreement.IsUsable()) return agreement;
+    selection->refusal = Refusal::kNoModel;  // the report has the true reason
+    selection->is_static.assign(matches.size(), 0);
+    selection->num_static = 0;
     return agreement;
   }
   /// The points of the first map of an initialiser that is begun at `frame`.
@@ -254,6 +255,10 @@ class Run {
     report_["pairs"].push_back(std::move(json));
     return true;
   }
+  static void Tell(const std::string& name, const StaticSelection& selection, size_t num_matches) {
+    std::cout << name << ": " << selection.num_static << " static of " << num_matches
+              << (selection.IsUsable() ? "" : ", refused: " + selection.explanation) << '\n';
+  }
   void Write(const std::string& name, const ColorImage& picture) const {
     WriteFileBytes(settings_.out + "/" + name + ".png", EncodePng(picture));
   }
@@ -273,6 +278,63 @@ class Run {
   nlohmann::json report_;
 };
 
+/// Frames that the table's longest pair or window needs.
+size_t FramesNeeded(const JudgeSettings& settings) {
+  int last = 1;
+  if (settings.table == "pairs" || settings.table == "ablation") {
+    last = *std::max_element(settings.gaps.begin(), settings.gaps.end());
+  } else if (settings.table == "windows") {
+    last = WindowOptions().gaps.back();
+  } else if (settings.table == "system") {
+    last = SystemWindowOptions().hard_gap;
+  }
+  return static_cast<size_t>(last) + 1;
+}
+
+/// Throws InputError for what makes the table impossible, before anything is written.
+void CheckJudge(const JudgeSettings& settings, JudgedSequence& sequence) {
+  if (!sequence.HasPoses()) {
+    throw InputError(settings.sequence +
+                     "/groundtruth.txt: missing or empty; nothing can be judged without true poses: put them "
+                     "there, or look at what dmslam-static --sequence draws");
+  }
+  if (sequence.size() < FramesNeeded(settings)) {
+    throw InputError(settings.sequence + ": fewer frames than the gap asks for");
+  }
+  sequence.Features(0);  // of the camera's size
+  if (settings.table == "pairs" || settings.table == "windows") AllSelectors(false, settings.only);
+  if (settings.table != "system") return;
+  SystemWindowOptions options;
+  options.only = settings.only;
+  RequireMethods(options);
+}
+
+/// Prints the table and returns its key in the report, with the numbers.
+std::pair<std::string, nlohmann::json> JudgeTable(const JudgeSettings& settings, JudgedSequence& sequence,
+                                                  std::ostream& out) {
+  if (settings.table == "pairs" || settings.table == "ablation") {
+    const auto selectors = settings.table == "pairs" ? AllSelectors(false, settings.only) : DlrsacAblations();
+    nlohmann::json json;
+    for (const int gap : settings.gaps) {
+      json.push_back(JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out));
+    }
+    return {"gaps", json};
+  }
+  if (settings.table == "windows") {
+    WindowOptions options;
+    options.matching.use_window = options.matching.check_orientation = !settings.no_window;
+    return {"windows",
+            JudgeWindows(sequence, options, settings.count, AllSelectors(true, settings.only), out)};
+  }
+  if (settings.table == "system") {
+    SystemWindowOptions options;
+    options.frames = settings.window;
+    options.only = settings.only;
+    return {"system", JudgeSystem(sequence, options, settings.count, settings.seed, out)};
+  }
+  return {"starts", JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out)};
+}
+
 void RunJudge(const JudgeSettings& settings) {
   static const std::set<std::string> kTables{"pairs", "ablation", "windows", "system", "starts"};
   if (!kTables.contains(settings.table)) {
@@ -281,36 +343,22 @@ void RunJudge(const JudgeSettings& settings) {
   }
   JudgedSequence sequence(settings.sequence, ChooseCamera(settings.camera, settings.sequence),
                           settings.features);
+  CheckJudge(settings, sequence);
   std::ofstream file;
   if (!settings.out.empty()) {
     file.open(settings.out, std::ios::app);
     if (!file) throw InputError(settings.out + ": cannot be written");
   }
   std::ostream& out = settings.out.empty() ? std::cout : file;
-  nlohmann::json json{{"sequence", std::filesystem::path(settings.sequence).filename().string()},
-                      {"table", settings.table},
-                      {"count", settings.count},
-                      {"features", settings.features}};
-  out << "### " << std::filesystem::path(settings.sequence).filename().string() << ", " << settings.table
-      << "\n\n";
-  if (settings.table == "pairs" || settings.table == "ablation") {
-    const auto selectors = settings.table == "pairs" ? AllSelectors(false, settings.only) : DlrsacAblations();
-    for (const int gap : settings.gaps) {
-      json["gaps"].push_back(JudgePairs(sequence, gap, !settings.no_window, settings.count, selectors, out));
-    }
-  } else if (settings.table == "windows") {
-    WindowOptions options;
-    options.matching.use_window = options.matching.check_orientation = !settings.no_window;
-    json["windows"] = JudgeWindows(sequence, options, settings.count, AllSelectors(true, settings.only), out);
-  } else if (settings.table == "system") {
-    SystemWindowOptions options;
-    options.frames = settings.window;
-    options.only = settings.only;
-    json["system"] = JudgeSystem(sequence, options, settings.count, settings.seed, out);
-  } else {
-    json["starts"] = JudgeStarts(sequence, InitializerOptions(), settings.count, settings.seed, out);
-  }
+  const std::string name = std::filesystem::path(settings.sequence).filename().string();
+  out << "### " << name << ", " << settings.table << "\n\n";
+  const auto [key, numbers] = JudgeTable(settings, sequence, out);
   if (settings.json.empty()) return;
+  const nlohmann::json json{{"sequence", name},
+                            {"table", settings.table},
+                            {"count", settings.count},
+                            {"features", settings.features},
+                            {key, numbers}};
   std::ofstream json_file(settings.json);
   json_file << json.dump(2) << '\n';
   if (!json_file) throw InputError(settings.json + ": cannot be written");
@@ -416,7 +464,9 @@ void AddJudge(CLI::App& app, JudgeSettings& s) {
       ->capture_default_str();
   judge->add_option("--only", s.only,
                     "Of pairs, windows and system: only methods whose name contains this, as DLRSAC");
-  judge->add_option("--gaps", s.gaps, "Gaps of the pairs [frames]")->capture_default_str();
+  judge->add_option("--gaps", s.gaps, "Gaps of the pairs [frames]")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   judge->add_option("--camera", s.camera, "Camera file (YAML)");
   judge->add_option("--features", s.features, "Most features per image")->capture_default_str();
   judge->add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
@@ -430,6 +480,9 @@ void RunSelection(const Settings& settings) {
   if (settings.gap != "auto" && (settings.gap.find_first_not_of("0123456789") != std::string::npos ||
                                  settings.gap.empty() || settings.gap.size() > 6 || settings.gap == "0")) {
     throw InputError("--gap '" + settings.gap + "': give a number of frames, at least 1, or auto");
+  }
+  if (!settings.sequence.empty() && !settings.images.empty()) {
+    throw InputError("give two images or --sequence DIR, not both");
   }
   Run run(settings);
   if (!settings.sequence.empty()) {

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -441,7 +442,8 @@ void Segmentation::SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags
   }
 }
 
-/// D times number of the widest motion among the matches not flagged, as a share of that of the flagged.
+/// D times number of the widest motion among the matches not flagged, as a share of that of the flagged. It
+/// may be the chosen motion again, in a layer of disparity that KeepLayer left out.
 double Segmentation::RivalShare(std::span<const uint8_t> flags) const {
   std::vector<uint8_t> rest(flags.size());
   std::transform(flags.begin(), flags.end(), rest.begin(), [](uint8_t f) -> uint8_t { return f ? 0 : 1; });
@@ -466,9 +468,11 @@ bool Segmentation::RefusedAsAmbiguous(std::span<const uint8_t> flags) {
   const double share = RivalShare(flags);
   if (share <= options_.max_rival_share) return false;
   out_.refusal = Refusal::kAmbiguous;
-  out_.explanation = "another motion has " + std::to_string(share) +
-                     " of the chosen one's D times number of matches, " +
-                     std::to_string(options_.max_rival_share) + " allowed";
+  char text[128];
+  std::snprintf(text, sizeof(text),
+                "another motion or depth layer has %.2f of the chosen one's spread, %.2f allowed", share,
+                options_.max_rival_share);
+  out_.explanation = text;
   out_.is_static.assign(matches_.size(), 0);
   return true;
 }

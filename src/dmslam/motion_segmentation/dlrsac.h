@@ -78,7 +78,10 @@ struct DlrsacOptions {
 
   /// What is not static is searched for a motion of its own (essential matrices with StaticScope::kImage
   /// only). Where the D times number of that rival's matches exceeds this share of the static ones':
-  /// refused, two views cannot tell which of the two motions is the camera's. 0: not asked (the paper).
+  /// refused, two views cannot tell which of the two motions is the camera's. A layer of disparity that was
+  /// left out may be the rival, though it agrees with the chosen motion: it may be somebody who goes along
+  /// his epipolar lines. So a static scene in two layers of equal strength (a desk close before a far wall)
+  /// is refused, too. 0: not asked (the paper).
   double max_rival_share = 0.5;
 
   /// Throws InputError for values outside their range.

@@ -249,6 +249,41 @@ TEST(Dlrsac, RefusesTwoMotionsThatAreEquallyWideAndNumerous) {
   EXPECT_TRUE(Dlrsac(unasked).Select(even.matches, even.camera, 1).IsUsable());
 }
 
+/// A static scene in two layers of depth: a desk close to the camera, a wall far behind it.
+SyntheticPair DeskBeforeWall(int num_near, int num_far, uint64_t seed) {
+  const SyntheticPairOptions options;
+  SyntheticPair pair;
+  pair.camera = SyntheticCamera();
+  pair.T_1_0 = Rigid3d(ExpSo3(options.rotation), options.translation);
+  Random random(DeriveSeed(seed, 0, "desk-before-wall"));
+  const auto add = [&](int count, double low, double high) {
+    for (int k = 0; k < count;) {
+      const Eigen::Vector3d ray = pair.camera.Ray({random.Uniform(0, 639), random.Uniform(0, 479)});
+      const Eigen::Vector3d point = random.Uniform(low, high) * ray;
+      k += synthetic_pair_detail::Add(options, point, Eigen::Vector3d::Zero(), true, &random, &pair) ? 1 : 0;
+    }
+  };
+  add(num_near, 1.2, 2.0);
+  add(num_far, 6.0, 6.2);
+  return pair;
+}
+
+TEST(Dlrsac, RefusesOneMotionInTwoLayersOfEqualStrength) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticPair even = DeskBeforeWall(300, 300, seed);
+    const StaticSelection refused = Dlrsac(DlrsacOptions()).Select(even.matches, even.camera, seed);
+    EXPECT_EQ(refused.refusal, Refusal::kAmbiguous) << ToString(refused.refusal);
+    EXPECT_NE(refused.explanation.find("depth layer has 0."), std::string::npos) << refused.explanation;
+    EXPECT_NE(refused.explanation.find(" 0.50 allowed"), std::string::npos) << refused.explanation;
+
+    for (const bool near : {true, false}) {
+      const SyntheticPair clear = DeskBeforeWall(near ? 480 : 120, near ? 120 : 480, seed);
+      const StaticSelection accepted = Dlrsac(DlrsacOptions()).Select(clear.matches, clear.camera, seed);
+      EXPECT_TRUE(accepted.IsUsable()) << near << ' ' << accepted.explanation;
+    }
+  }
+}
+
 TEST(Dlrsac, RefusesOptionsOutOfRange) {
   DlrsacOptions options;
   options.max_rival_share = 1.5;
