@@ -7,6 +7,7 @@ readonly root me=reproduce
 # shellcheck source-path=SCRIPTDIR source=lib/resumable.sh
 source "$root/scripts/lib/resumable.sh"
 readonly MAX_FAILURES_IN_A_ROW=3
+readonly REPORT_HEADING="# Results beside the DM-SLAM paper's"
 
 tum='' out='' seeds='' data='' render=1 run=1 publish='' runner=''
 processes=0
@@ -60,7 +61,24 @@ parse() {
     die "--report-only tells of all runs in $out: leave --seeds and --only out, or leave --report-only out to run them"
   seeds=${seeds:-10}
   [[ $seeds =~ ^[1-9][0-9]{0,3}$ ]] || die "--seeds $seeds: write a number of at least 1"
+  [[ -z $publish ]] || check_page
   find_data
+}
+
+# dmslam-report refuses these pages too, but only after all runs.
+check_page() {
+  [[ $publish == *.md && ! -d $publish ]] || die "--publish $publish: is not the name of a page; write FOLDER/NAME.md"
+  local page=${publish##*/} folder
+  folder=$(dirname -- "$publish")
+  if [[ -e $publish ]]; then
+    [[ $(head -n 1 -- "$publish") == "$REPORT_HEADING" ]] || die "--publish $publish: is another page, and would be lost;" \
+      "name one that is not there yet, or a report (its first line is '$REPORT_HEADING')"
+  elif [[ -e $folder/images/${page%.md} ]]; then
+    die "--publish $publish: $folder/images/${page%.md} is there without its page, and would be lost;" \
+      "remove it or name another page"
+  fi
+  until [[ -e $folder ]]; do folder=$(dirname -- "$folder"); done
+  [[ -d $folder && -w $folder ]] || die "--publish $publish: $folder is no folder that can be written to; name another"
 }
 
 # The kitchen sequences' folder: one that was named must be there, the usual ones need not.

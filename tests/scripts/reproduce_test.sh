@@ -2,7 +2,8 @@
 # scripts/reproduce.sh with a runner that only pretends: arguments, continuing, failures, stopping, the report.
 # shellcheck source-path=SCRIPTDIR source=expect.sh
 source "$(dirname "$0")/expect.sh"
-DMSLAM_BIN=$(dirname "$1")
+report=$1
+DMSLAM_BIN=$(dirname "$report")
 export DMSLAM_BIN
 reproduce=$DMSLAM_SOURCE_DIR/scripts/reproduce.sh
 
@@ -53,6 +54,22 @@ expect 1 'unknown argument --frob' "$reproduce" --frob
 expect 1 "no sequence is called 'fr3'" "${run[@]}" --out "$work/o" --only fr3
 expect 1 '--data .*/nowhere: no such folder' "${run[@]}" --data "$work/nowhere" --out "$work/p"
 check "nothing was begun" test ! -e "$work/p"
+
+# --publish writes over no page but a report, and says so before anything runs.
+mkdir -p "$work/pages/images/viewer" "$work/pages/images/lone"
+printf '# Viewer\n' >"$work/pages/viewer.md"
+refused() { # PATTERN PAGE: by the script before anything runs, and by dmslam-report
+  expect 1 "--publish .*$1" "${run[@]}" --out "$work/p" --publish "$2"
+  check "nothing was begun" test ! -e "$work/p"
+  expect 1 "--publish .*$1" "$report" write --out "$work/p" --publish "$2"
+}
+refused 'not the name of a page; write FOLDER/NAME.md' "$work/pages/x.txt"
+refused 'not the name of a page' "$work/pages"
+refused 'another page, and would be lost; name one that is not there yet' "$work/pages/viewer.md"
+refused 'images/lone is there without its page' "$work/pages/lone.md"
+expect 1 '--publish .*viewer.md is no folder' "${run[@]}" --out "$work/p" --publish "$work/pages/viewer.md/x.md"
+check "the other page is as it was" grep -qx '# Viewer' "$work/pages/viewer.md"
+check "so are its pictures" test -d "$work/pages/images/viewer"
 for option in '--seeds 1' '--only fr1_xyz'; do
   # shellcheck disable=SC2086 # two words
   expect 1 'report-only tells of all runs.*leave --seeds and --only out' "$reproduce" --out "$work/p" --report-only $option
@@ -83,7 +100,10 @@ check "only the new seed is run" test "$(grep -c -- '--seed 3' "$CALLS")" -eq "$
 expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 1 --only fr1_xyz
 check "one sequence and seed more leave the others in the report" grep -q '24 of 24 runs' "$work/a/report.md"
 check "with both sequences" grep -q '^| fr3_walking_xyz | dm | 3/3 ' "$work/a/report.md"
-expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
+for again in no yes; do
+  expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
+  check "there is a page ($again)" test -s "$work/docs/results.md"
+done
 check "the page has no picture of real images" test ! -e "$work/docs/images/results/fr1_xyz_defaults.png"
 check "it has that of all runs" test -s "$work/docs/images/results/all_defaults.png"
 
@@ -125,7 +145,7 @@ check "all are listed as absent" test "$(grep -c '\*\*absent\*\*' "$work/e/repor
 
 # The pictures of what is taken for static: once per sequence, and what fails is named once.
 mkdir "$work/bin"
-ln -s "$1" "$work/bin/dmslam-report"
+ln -s "$report" "$work/bin/dmslam-report"
 ln -s "$work/runner" "$work/bin/dmslam-inprocess"
 # shellcheck disable=SC2016 # it is the program's
 printf '#!/bin/sh\necho "static $*" >>"$CALLS"\necho no matches\nexit 1\n' >"$work/bin/dmslam-static"

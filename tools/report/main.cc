@@ -118,13 +118,28 @@ bool IsPublished(const ReportPicture& picture, std::map<std::pair<FigureSection,
          ++(*frames)[{picture.section, picture.sequence}] <= 2;
 }
 
+// The folder of the pictures of this page alone.
+fs::path PicturesOf(const fs::path& page) { return page.parent_path() / "images" / page.stem(); }
+
+// Only what an earlier --publish wrote may be written over: the page begins with the report's heading.
+void RequirePage(const fs::path& page) {
+  const std::string option = "--publish " + page.string() + ": ";
+  if (page.extension() != ".md" || fs::is_directory(page))
+    throw InputError(option + "is not the name of a page; write FOLDER/NAME.md");
+  if (!fs::exists(page)) {
+    if (!fs::exists(PicturesOf(page))) return;
+    throw InputError(option + PicturesOf(page).string() +
+                     " is there without its page, and would be lost; remove it or name another page");
+  }
+  if (ReadTextFile(page.string()).starts_with(std::string(kReportHeading) + "\n")) return;
+  throw InputError(option + "is another page, and would be lost; name one that is not there yet, or a " +
+                   "report (its first line is '" + kReportHeading + "')");
+}
+
 // The report for docs/: all numbers, but pictures of rendered sequences only, copied beside it.
 void Publish(const fs::path& page, const fs::path& out, const Results& results,
              const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
-  if (page.extension() != ".md") {
-    throw InputError("--publish " + page.string() + ": is not the name of a page; write FOLDER/NAME.md");
-  }
-  const fs::path folder = page.parent_path() / "images" / page.stem();  // of this page alone
+  const fs::path folder = PicturesOf(page);
   std::error_code error;
   fs::remove_all(folder, error);
   fs::create_directories(folder, error);
@@ -157,6 +172,7 @@ void WarnOfRunsNotShown(const Plan& plan) {
 }
 
 void RunWrite(const Arguments& arguments) {
+  if (!arguments.publish.empty()) RequirePage(arguments.publish);
   const fs::path out = arguments.out;
   const Results results = ReadResults(PlanOfFolder(out), out);
   WarnOfRunsNotShown(results.plan);
