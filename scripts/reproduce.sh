@@ -237,11 +237,11 @@ one_run() {
 
 # count_runs LINES...: sets `todo` to those that are not done yet, and the numbers of the progress.
 count_runs() {
-  local line folder sequence frames rest
+  local line frames rest
   total=$# todo=() began=$SECONDS
   for line in "$@"; do
-    IFS=$'\t' read -r folder sequence frames rest <<<"$line"
-    if [[ -s $out/$folder/summary.json ]]; then
+    IFS=$'\t' read -r _ _ frames rest <<<"$line"
+    if [[ $rest == *$'\t'done ]]; then
       runs_done=$((runs_done + 1))
     else
       todo+=("$line")
@@ -270,7 +270,7 @@ run_all() {
   local line folder sequence frames camera profile seed set status number=$runs_done
   began=$SECONDS
   for line in ${todo[@]+"${todo[@]}"}; do
-    IFS=$'\t' read -r folder sequence frames camera profile seed set <<<"$line"
+    IFS=$'\t' read -r folder sequence frames camera profile seed set _ <<<"$line"
     number=$((number + 1)) status=0
     progress "${folder#runs/}"
     note_progress "running ${folder#runs/}"

@@ -136,6 +136,16 @@ printf '#!/bin/sh\necho it fell over\nexit 7\n' >"$work/broken"
 chmod +x "$work/broken"
 expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --runner "$work/broken"
 
+# A summary that was written in halves is a failed run in the report, and is run again.
+printf '{"tracked_percent": 98' >"$work/f/runs/fr1_xyz/defaults/dm/seed_1/summary.json"
+rm "$work/f/runs/fr1_xyz/defaults/dm/seed_1/failed.txt"
+expect 0 'report.md' "$reproduce" --out "$work/f" --report-only
+check "half a summary is a failed run" grep -q 'the run failed: .*summary.json: is not JSON; the same command' "$work/f/report.md"
+: >"$CALLS"
+expect 0 'report.md' "${run[@]}" --out "$work/f" --seeds 1 --only fr1_xyz
+check "it is run again" grep -q -- '--out [^ ]*/runs/fr1_xyz/defaults/dm/seed_1' "$CALLS"
+check "all four are well now" grep -q '4 of 4 runs' "$work/f/report.md"
+
 # Nothing is there: a report that lists what is absent.
 mkdir "$work/empty"
 expect 0 'none of the sequences is there' "$reproduce" --tum "$work/empty" --no-render --runner "$work/runner" --data "$work/none" --out "$work/e"

@@ -42,9 +42,9 @@ std::string CameraOf(const PlannedSequence& sequence) {
   return fs::exists(own) ? own.string() : "config/" + std::string(sequence.info.camera);
 }
 
-// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, and
-// what to --set ("-": nothing).
-void PrintRuns(const Plan& plan) {
+// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, what to
+// --set ("-": nothing), and whether it is done or still to do.
+void PrintRuns(const Plan& plan, const fs::path& out) {
   for (const RunKey& key : Runs(plan)) {
     const auto sequence = std::find_if(plan.sequences.begin(), plan.sequences.end(),
                                        [&](const PlannedSequence& s) { return s.info.name == key.sequence; });
@@ -53,7 +53,8 @@ void PrintRuns(const Plan& plan) {
     const size_t frames = ReadFrameStamps((sequence->folder / "rgb.txt").string()).size();
     std::cout << key.Folder().string() << '\t' << sequence->folder.string() << '\t' << frames << '\t'
               << CameraOf(*sequence) << '\t' << key.profile << '\t' << key.seed << '\t'
-              << (setting->argument.empty() ? "-" : setting->argument) << '\n';
+              << (setting->argument.empty() ? "-" : setting->argument) << '\t'
+              << (IsDone(key, out) ? "done" : "to do") << '\n';
   }
 }
 
@@ -69,7 +70,7 @@ void RunPlan(const Arguments& arguments) {
       std::cerr << "absent: " << sequence.info.name << " (" << sequence.info.source << ")\n";
     }
   }
-  PrintRuns(plan);
+  PrintRuns(plan, arguments.out);
 }
 
 std::optional<IterationTimes> ReadTimes(const fs::path& path) {
