@@ -29,7 +29,8 @@ that was run in DIR so far, also with other sequences or seeds. DIR/progress.txt
   --only NAME     only this sequence (may be repeated), as fr3_walking_xyz, kitchen_walk2, synth_walking_rpy
   --data DIR      folder that holds the kitchen sequences (default: \$DMSLAM_DATA, else ../shared/data)
   --no-render     do not render the stand-ins (about ten minutes, once)
-  --report-only   write the report of all runs that are there; takes neither --seeds nor --only
+  --report-only   write the report of all runs that are there; takes neither --seeds nor --only, but --tum and --data
+                  where sequences are no longer in the folders where they were
   --publish FILE  also write the report to this page, with pictures of rendered sequences only
   --processes     run the real processes in lock-step (scripts/run.sh), not dmslam-inprocess; the bytes are the same
   --runner CMD    program to run instead (it gets the arguments of scripts/run.sh)
@@ -59,6 +60,8 @@ parse() {
   [[ -z $tum || -d $tum ]] || die "--tum $tum: no such folder; scripts/get_tum.sh --to $tum paper fills it"
   ((run)) || [[ -z $seeds && ${#only[@]} == 0 ]] ||
     die "--report-only tells of all runs in $out: leave --seeds and --only out, or leave --report-only out to run them"
+  ((run)) || [[ -d $out/runs ]] ||
+    die "--out $out: holds no runs to report; name the folder of an earlier --out, or leave --report-only out to run them"
   seeds=${seeds:-10}
   [[ $seeds =~ ^[1-9][0-9]{0,3}$ ]] || die "--seeds $seeds: write a number of at least 1"
   [[ -z $publish ]] || check_page
@@ -84,7 +87,7 @@ check_page() {
 # The kitchen sequences' folder: one that was named must be there, the usual ones need not.
 find_data() {
   [[ -z $data || -d $data ]] || die "--data $data: no such folder; name the one that holds kitchen, or leave --data out"
-  [[ -z $data ]] || return 0
+  [[ -z $data && $run == 1 ]] || return 0
   data=${DMSLAM_DATA:-$root/../shared/data}
   [[ -z ${DMSLAM_DATA:-} || -d $data ]] || say "DMSLAM_DATA is $data, which is no folder: without the kitchen sequences"
 }
@@ -310,8 +313,9 @@ main() {
   find_programs
   work_in "$out"
   choose_command
-  ((run == 0)) || run_everything
-  "$bin/dmslam-report" write --out "$out" ${publish:+--publish "$publish"}
+  local roots=()
+  if ((run)); then run_everything; else roots=(${tum:+--root "$tum"} ${data:+--root "$data"}); fi
+  "$bin/dmslam-report" write --out "$out" ${roots[@]+"${roots[@]}"} ${publish:+--publish "$publish"}
 }
 
 main "$@"

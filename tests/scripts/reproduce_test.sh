@@ -107,6 +107,25 @@ done
 check "the page has no picture of real images" test ! -e "$work/docs/images/results/fr1_xyz_defaults.png"
 check "it has that of all runs" test -s "$work/docs/images/results/all_defaults.png"
 
+# --report-only: of a folder with runs; sequences that moved are where --tum says, from then on.
+mkdir "$work/bare"
+for folder in nope bare; do
+  expect 1 "--out .*/$folder: holds no runs to report; name the folder" "$reproduce" --out "$work/$folder" --report-only
+  expect 1 "--out .*/$folder: holds no runs of scripts/reproduce.sh" "$report" write --out "$work/$folder"
+done
+check "no folder is made of a mistyped name" test ! -e "$work/nope"
+cp -r "$work/a" "$work/h"
+cp -r "$tum" "$work/moved"
+rm "$work/h/plan.json"
+expect 0 'runs/fr1_xyz is not shown: the sequence is not where it was' "$reproduce" --out "$work/h" --report-only
+expect 0 'report.md' "$reproduce" --out "$work/h" --report-only --tum "$work/moved"
+check "the runs are shown" grep -q '24 of 24 runs' "$work/h/report.md"
+check "no run is said not to be" test -z "$(grep 'is not shown' <<<"$output")"
+expect 0 'report.md' "$reproduce" --out "$work/h" --report-only
+check "and are the next time" grep -q '24 of 24 runs' "$work/h/report.md"
+check "from there" grep -qF "$work/moved/" "$work/h/plan.json"
+check "the plan is never there in halves" test ! -e "$work/h/plan.json.part"
+
 # Stopped in the middle: exit 130, the runner is gone, and the same command goes on where it was.
 : >"$CALLS"
 SLOW=2 "${run[@]}" --out "$work/b" --seeds 2 --only fr1_xyz >"$work/b.txt" 2>&1 &

@@ -58,9 +58,11 @@ void PrintRuns(const Plan& plan, const fs::path& out) {
   }
 }
 
+std::vector<fs::path> Paths(const std::vector<std::string>& names) { return {names.begin(), names.end()}; }
+
 void RunPlan(const Arguments& arguments) {
   PlanOptions options;
-  for (const std::string& root : arguments.roots) options.roots.emplace_back(root);
+  options.roots = Paths(arguments.roots);
   options.seeds = arguments.seeds;
   options.only = arguments.only;
   const Plan plan = MakePlan(options);
@@ -175,7 +177,9 @@ void WarnOfRunsNotShown(const Plan& plan) {
 void RunWrite(const Arguments& arguments) {
   if (!arguments.publish.empty()) RequirePage(arguments.publish);
   const fs::path out = arguments.out;
-  const Results results = ReadResults(PlanOfFolder(out), out);
+  const Plan plan = PlanOfFolder(out, Paths(arguments.roots));
+  if (!arguments.roots.empty()) SavePlan(plan, out);  // the next report finds them without being told
+  const Results results = ReadResults(plan, out);
   WarnOfRunsNotShown(results.plan);
   const auto times = ReadTimes(out / "table1.json");
   const std::vector<ReportPicture> pictures = DrawPictures(results, out);
@@ -224,6 +228,8 @@ int main(int argc, char** argv) {
   CLI::App* write =
       app.add_subcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
   write->add_option("--out", arguments.out, "the reproduction's folder")->required();
+  write->add_option("--root", arguments.roots,
+                    "folder that holds sequences which are not where they were planned; may be repeated");
   write->add_option("--publish", arguments.publish,
                     "also write this page, with pictures of rendered sequences only");
   CLI::App* sweep = app.add_subcommand("sweep", "write the tables and the picture of scripts/sweep.sh");

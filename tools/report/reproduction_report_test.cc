@@ -245,6 +245,17 @@ TEST_F(Reproduction, WhatWasRunBeyondThePlanIsShown) {
   EXPECT_NE(text.find("**Its runs are not shown**"), std::string::npos) << text;
 }
 
+TEST_F(Reproduction, WithoutAPlanTheRunsTell) {
+  EXPECT_THROW(PlanOfFolder(root_ / "out"), InputError);
+  WriteAllRuns(MakePlan(options_));
+  const Plan plan = PlanOfFolder(root_ / "out");
+  EXPECT_EQ(plan.seeds, 3);
+  EXPECT_EQ(plan.sequences.size(), 3u);
+  EXPECT_TRUE(Runs(plan).empty());  // nobody says where they are
+  EXPECT_EQ(Runs(PlanOfFolder(root_ / "out", options_.roots)).size(), 3u * 2 * 2 * 3);
+  EXPECT_THROW(PlanOfFolder(root_ / "out", {root_ / "nowhere"}), InputError);
+}
+
 TEST_F(Reproduction, VersionsAndMachinesOfTheRuns) {
   const Plan plan = MakePlan(options_);
   const std::string a = R"({"version": "0.1.0+aaaaaaaaaa", "machine": {"cpu": "Z80", "cores": 2}})";
