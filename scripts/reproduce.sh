@@ -9,7 +9,7 @@ source "$root/scripts/lib/resumable.sh"
 readonly MAX_FAILURES_IN_A_ROW=3
 readonly REPORT_HEADING="# Results beside the DM-SLAM paper's"
 
-tum='' out='' seeds='' data='' render=1 run=1 publish='' runner=''
+tum='' out='' seeds='' data='' render=1 run=1 publish='' runner='' version=''
 processes=0
 only=()
 
@@ -126,13 +126,16 @@ render_stand_ins() {
   render synth_xyz --preset static_xyz --camera "$root/config/TUM1.yaml"
 }
 
+# is_current FILE: what stands beside it was made by programs of this version.
+is_current() { [[ -s $1 && $(<"$1") == "$version" ]]; }
+
 # draw_selection NAME SEQUENCE CAMERA: the paper's Figures 2 to 5, what plain RANSAC and DLRSAC take for static.
 draw_selection() {
   local folder=$out/figures/$1 method picture
-  [[ ! -e $folder ]] || return 0
+  ! is_current "$folder/version" || return 0
   progress_line "figures of $1"
   note_progress "drawing figures of $1"
-  rm -rf -- "$folder.part"
+  rm -rf -- "$folder" "$folder.part"
   for method in dlrsac ransac; do
     start "$bin/dmslam-static" --sequence "$2" --camera "$3" --method "$method" --features 3000 --gap 5 --no-window \
       --pairs 2 --out "$folder.part/$method" >"$out/figures.log" 2>&1 ||
@@ -148,6 +151,7 @@ draw_selection() {
     picture=${picture%.png.*}
     mv -- "$picture.png.$method" "${picture}_$method.png"
   done
+  printf '%s\n' "$version" >"$folder.part/version"
   mv -- "$folder.part" "$folder"
 }
 
@@ -170,17 +174,30 @@ draw_selections() {
 # time_methods LINES...: the paper's Table 1, on the first sequence in which somebody walks.
 time_methods() {
   local line folder sequence camera rest
-  [[ ! -s $out/table1.json ]] || return 0
+  [[ ! -s $out/table1.json ]] || ! is_current "$out/table1.version" || return 0
   for line in "$@"; do
     IFS=$'\t' read -r folder sequence _ camera rest <<<"$line"
     [[ $folder == *walk* ]] || continue
     [[ $camera == /* ]] || camera=$root/$camera
-    progress_line "times of the methods"
-    start "$bin/dmslam-static" time --sequence "$sequence" --camera "$camera" --json "$out/table1.json" \
-      >"$out/table1.log" 2>&1 || { progress_end; say "no Table 1: $(tail -n 1 "$out/table1.log")"; }
+    time_on "$sequence" "$camera"
     break
   done
   progress_end
+}
+
+# time_on SEQUENCE CAMERA
+time_on() {
+  local table=$out/table1.json
+  progress_line "times of the methods"
+  note_progress "timing the methods of Table 1"
+  rm -f -- "$table" "$table.part" "$out/table1.version"
+  if start "$bin/dmslam-static" time --sequence "$1" --camera "$2" --json "$table.part" >"$out/table1.log" 2>&1; then
+    printf '%s\n' "$version" >"$out/table1.version"
+    mv -- "$table.part" "$table"
+  else
+    progress_end
+    say "no Table 1: $(tail -n 1 "$out/table1.log")"
+  fi
 }
 
 # Sets `command` to what runs a sequence.
@@ -290,12 +307,16 @@ note_end() {
   case $1 in
     0) note_progress "finished" ;;
     130) note_progress "stopped; the same command continues" ;;
-    *) note_progress "ended with exit status $1; the same command continues" ;;
+    *)
+      if [[ -n $total ]]; then note_progress "ended with exit status $1; the same command continues"
+      else note_progress "ended with exit status $1 before the first run; the command has said why"; fi
+      ;;
   esac
 }
 
 run_everything() {
   trap 'note_end $?' EXIT
+  version=$("$bin/dmslam-report" --version)
   ((render == 0)) || render_stand_ins
   local roots=(--root "$tum") plan lines=()
   [[ ! -d $data ]] || roots+=(--root "$data")

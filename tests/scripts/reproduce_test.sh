@@ -52,6 +52,7 @@ expect 1 '--seeds none' "$reproduce" --tum "$tum" --out "$work/o" --seeds none
 expect 1 '--seeds needs a value' "$reproduce" --tum "$tum" --out "$work/o" --seeds
 expect 1 'unknown argument --frob' "$reproduce" --frob
 expect 1 "no sequence is called 'fr3'" "${run[@]}" --out "$work/o" --only fr3
+check "progress.txt does not tell to go on" grep -q '^now: ended with exit status 1 before the first run' "$work/o/progress.txt"
 expect 1 '--data .*/nowhere: no such folder' "${run[@]}" --data "$work/nowhere" --out "$work/p"
 check "nothing was begun" test ! -e "$work/p"
 
@@ -184,5 +185,34 @@ expect 0 'no figures of fr3_walking_xyz: no matches' \
   env DMSLAM_BIN="$work/bin" "$reproduce" --tum "$tum" --no-render --data "$work/none" --out "$work/g" --seeds 2
 check "named once" test "$(grep -c 'no figures of' <<<"$output")" -eq 1
 check "tried once" test "$(grep -c '^static --sequence' "$CALLS")" -eq 1
+check "Table 1 is not there in halves" test ! -e "$work/g/table1.json.part"
+
+# They are kept, with the version of the programs, and made again by another one.
+cat >"$work/bin/dmslam-static" <<'EOF'
+#!/usr/bin/env bash
+echo "static $*" >>"$CALLS"
+if [[ $1 == time ]]; then
+  cp -- "$OUT/progress.txt" "$CALLS.progress"
+  echo '{"ransac_ms": 1, "arsac_ms": 2, "dlrsac_ms": 3, "machine": "Z80"}' >"${@: -1}"
+else
+  mkdir -p "${@: -1}"
+  echo >"${@: -1}/pair_1.png"
+fi
+EOF
+again=(env DMSLAM_BIN="$work/bin" OUT="$work/g" "$reproduce" --tum "$tum" --no-render --data "$work/none" --out "$work/g" --seeds 2)
+made() { # COUNT: so many calls of dmslam-static, of which one is for Table 1 where there are any
+  : >"$CALLS"
+  expect 0 'report.md' "${again[@]}"
+  check "dmslam-static is called $1 times" test "$(grep -c '^static ' "$CALLS")" -eq "$1"
+}
+made 3
+check "progress.txt tells that Table 1 is timed" grep -q '^now: timing the methods of Table 1' "$CALLS.progress"
+check "figures have a version" test "$(cat "$work/g/figures/fr3_walking_xyz/version")" = "$("$report" --version)"
+check "Table 1 is in the report" grep -q 'Z80' "$work/g/report.md"
+made 0
+echo 0.0.9 >"$work/g/table1.version"
+made 1
+echo 0.0.9 >"$work/g/figures/fr3_walking_xyz/version"
+made 2
 
 finish

@@ -9,8 +9,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dmslam/dataset/text_table.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 #include "figures.h"
 #include "sweep.h"
 
@@ -216,7 +216,7 @@ void RunSweep(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("The reproduction of the DM-SLAM paper's tables: what to run, and the report of what was run.",
                "dmslam-report");
-  app.set_version_flag("--version", dmslam::kVersion);
+  app.set_version_flag("--version", dmslam::BuildVersion());
   app.require_subcommand(1);
   dmslam::Arguments arguments;
   CLI::App* plan =
