@@ -70,7 +70,7 @@ parse() {
 
 # dmslam-report refuses these pages too, but only after all runs.
 check_page() {
-  [[ $publish == *.md && ! -d $publish ]] || die "--publish $publish: is not the name of a page; write FOLDER/NAME.md"
+  [[ ${publish##*/} == ?*.md && ! -d $publish ]] || die "--publish $publish: is not the name of a page; write FOLDER/NAME.md"
   local page=${publish##*/} folder
   folder=$(dirname -- "$publish")
   if [[ -e $publish ]]; then

@@ -66,6 +66,7 @@ refused() { # PATTERN PAGE: by the script before anything runs, and by dmslam-re
 }
 refused 'not the name of a page; write FOLDER/NAME.md' "$work/pages/x.txt"
 refused 'not the name of a page' "$work/pages"
+refused 'not the name of a page' "$work/pages/.md"
 refused 'another page, and would be lost; name one that is not there yet' "$work/pages/viewer.md"
 refused 'images/lone is there without its page' "$work/pages/lone.md"
 expect 1 '--publish .*viewer.md is no folder' "${run[@]}" --out "$work/p" --publish "$work/pages/viewer.md/x.md"
