@@ -7,8 +7,9 @@ readonly root me=reproduce
 # shellcheck source-path=SCRIPTDIR source=lib/resumable.sh
 source "$root/scripts/lib/resumable.sh"
 readonly MAX_FAILURES_IN_A_ROW=3
+readonly REPORT_HEADING="# Results beside the DM-SLAM paper's"
 
-tum='' out='' seeds='' data='' render=1 run=1 publish='' runner=''
+tum='' out='' seeds='' data='' render=1 run=1 publish='' runner='' version=''
 processes=0
 only=()
 
@@ -28,7 +29,8 @@ that was run in DIR so far, also with other sequences or seeds. DIR/progress.txt
   --only NAME     only this sequence (may be repeated), as fr3_walking_xyz, kitchen_walk2, synth_walking_rpy
   --data DIR      folder that holds the kitchen sequences (default: \$DMSLAM_DATA, else ../shared/data)
   --no-render     do not render the stand-ins (about ten minutes, once)
-  --report-only   write the report of all runs that are there; takes neither --seeds nor --only
+  --report-only   write the report of all runs that are there; takes neither --seeds nor --only, but --tum and --data
+                  where sequences are no longer in the folders where they were
   --publish FILE  also write the report to this page, with pictures of rendered sequences only
   --processes     run the real processes in lock-step (scripts/run.sh), not dmslam-inprocess; the bytes are the same
   --runner CMD    program to run instead (it gets the arguments of scripts/run.sh)
@@ -58,15 +60,34 @@ parse() {
   [[ -z $tum || -d $tum ]] || die "--tum $tum: no such folder; scripts/get_tum.sh --to $tum paper fills it"
   ((run)) || [[ -z $seeds && ${#only[@]} == 0 ]] ||
     die "--report-only tells of all runs in $out: leave --seeds and --only out, or leave --report-only out to run them"
+  ((run)) || [[ -d $out/runs ]] ||
+    die "--out $out: holds no runs to report; name the folder of an earlier --out, or leave --report-only out to run them"
   seeds=${seeds:-10}
   [[ $seeds =~ ^[1-9][0-9]{0,3}$ ]] || die "--seeds $seeds: write a number of at least 1"
+  [[ -z $publish ]] || check_page
   find_data
+}
+
+# dmslam-report refuses these pages too, but only after all runs.
+check_page() {
+  [[ ${publish##*/} == ?*.md && ! -d $publish ]] || die "--publish $publish: is not the name of a page; write FOLDER/NAME.md"
+  local page=${publish##*/} folder
+  folder=$(dirname -- "$publish")
+  if [[ -e $publish ]]; then
+    [[ $(head -n 1 -- "$publish") == "$REPORT_HEADING" ]] || die "--publish $publish: is another page, and would be lost;" \
+      "name one that is not there yet, or a report (its first line is '$REPORT_HEADING')"
+  elif [[ -e $folder/images/${page%.md} ]]; then
+    die "--publish $publish: $folder/images/${page%.md} is there without its page, and would be lost;" \
+      "remove it or name another page"
+  fi
+  until [[ -e $folder ]]; do folder=$(dirname -- "$folder"); done
+  [[ -d $folder && -w $folder ]] || die "--publish $publish: $folder is no folder that can be written to; name another"
 }
 
 # The kitchen sequences' folder: one that was named must be there, the usual ones need not.
 find_data() {
   [[ -z $data || -d $data ]] || die "--data $data: no such folder; name the one that holds kitchen, or leave --data out"
-  [[ -z $data ]] || return 0
+  [[ -z $data && $run == 1 ]] || return 0
   data=${DMSLAM_DATA:-$root/../shared/data}
   [[ -z ${DMSLAM_DATA:-} || -d $data ]] || say "DMSLAM_DATA is $data, which is no folder: without the kitchen sequences"
 }
@@ -105,13 +126,16 @@ render_stand_ins() {
   render synth_xyz --preset static_xyz --camera "$root/config/TUM1.yaml"
 }
 
+# is_current FILE: what stands beside it was made by programs of this version.
+is_current() { [[ -s $1 && $(<"$1") == "$version" ]]; }
+
 # draw_selection NAME SEQUENCE CAMERA: the paper's Figures 2 to 5, what plain RANSAC and DLRSAC take for static.
 draw_selection() {
   local folder=$out/figures/$1 method picture
-  [[ ! -e $folder ]] || return 0
+  ! is_current "$folder/version" || return 0
   progress_line "figures of $1"
   note_progress "drawing figures of $1"
-  rm -rf -- "$folder.part"
+  rm -rf -- "$folder" "$folder.part"
   for method in dlrsac ransac; do
     start "$bin/dmslam-static" --sequence "$2" --camera "$3" --method "$method" --features 3000 --gap 5 --no-window \
       --pairs 2 --out "$folder.part/$method" >"$out/figures.log" 2>&1 ||
@@ -127,6 +151,7 @@ draw_selection() {
     picture=${picture%.png.*}
     mv -- "$picture.png.$method" "${picture}_$method.png"
   done
+  printf '%s\n' "$version" >"$folder.part/version"
   mv -- "$folder.part" "$folder"
 }
 
@@ -149,17 +174,30 @@ draw_selections() {
 # time_methods LINES...: the paper's Table 1, on the first sequence in which somebody walks.
 time_methods() {
   local line folder sequence camera rest
-  [[ ! -s $out/table1.json ]] || return 0
+  [[ ! -s $out/table1.json ]] || ! is_current "$out/table1.version" || return 0
   for line in "$@"; do
     IFS=$'\t' read -r folder sequence _ camera rest <<<"$line"
     [[ $folder == *walk* ]] || continue
     [[ $camera == /* ]] || camera=$root/$camera
-    progress_line "times of the methods"
-    start "$bin/dmslam-static" time --sequence "$sequence" --camera "$camera" --json "$out/table1.json" \
-      >"$out/table1.log" 2>&1 || { progress_end; say "no Table 1: $(tail -n 1 "$out/table1.log")"; }
+    time_on "$sequence" "$camera"
     break
   done
   progress_end
+}
+
+# time_on SEQUENCE CAMERA
+time_on() {
+  local table=$out/table1.json
+  progress_line "times of the methods"
+  note_progress "timing the methods of Table 1"
+  rm -f -- "$table" "$table.part" "$out/table1.version"
+  if start "$bin/dmslam-static" time --sequence "$1" --camera "$2" --json "$table.part" >"$out/table1.log" 2>&1; then
+    printf '%s\n' "$version" >"$out/table1.version"
+    mv -- "$table.part" "$table"
+  else
+    progress_end
+    say "no Table 1: $(tail -n 1 "$out/table1.log")"
+  fi
 }
 
 # Sets `command` to what runs a sequence.
@@ -219,11 +257,11 @@ one_run() {
 
 # count_runs LINES...: sets `todo` to those that are not done yet, and the numbers of the progress.
 count_runs() {
-  local line folder sequence frames rest
+  local line frames rest
   total=$# todo=() began=$SECONDS
   for line in "$@"; do
-    IFS=$'\t' read -r folder sequence frames rest <<<"$line"
-    if [[ -s $out/$folder/summary.json ]]; then
+    IFS=$'\t' read -r _ _ frames rest <<<"$line"
+    if [[ $rest == *$'\t'done ]]; then
       runs_done=$((runs_done + 1))
     else
       todo+=("$line")
@@ -252,7 +290,7 @@ run_all() {
   local line folder sequence frames camera profile seed set status number=$runs_done
   began=$SECONDS
   for line in ${todo[@]+"${todo[@]}"}; do
-    IFS=$'\t' read -r folder sequence frames camera profile seed set <<<"$line"
+    IFS=$'\t' read -r folder sequence frames camera profile seed set _ <<<"$line"
     number=$((number + 1)) status=0
     progress "${folder#runs/}"
     note_progress "running ${folder#runs/}"
@@ -269,12 +307,16 @@ note_end() {
   case $1 in
     0) note_progress "finished" ;;
     130) note_progress "stopped; the same command continues" ;;
-    *) note_progress "ended with exit status $1; the same command continues" ;;
+    *)
+      if [[ -n $total ]]; then note_progress "ended with exit status $1; the same command continues"
+      else note_progress "ended with exit status $1 before the first run; the command has said why"; fi
+      ;;
   esac
 }
 
 run_everything() {
   trap 'note_end $?' EXIT
+  version=$("$bin/dmslam-report" --version)
   ((render == 0)) || render_stand_ins
   local roots=(--root "$tum") plan lines=()
   [[ ! -d $data ]] || roots+=(--root "$data")
@@ -292,8 +334,9 @@ main() {
   find_programs
   work_in "$out"
   choose_command
-  ((run == 0)) || run_everything
-  "$bin/dmslam-report" write --out "$out" ${publish:+--publish "$publish"}
+  local roots=()
+  if ((run)); then run_everything; else roots=(${tum:+--root "$tum"} ${data:+--root "$data"}); fi
+  "$bin/dmslam-report" write --out "$out" ${roots[@]+"${roots[@]}"} ${publish:+--publish "$publish"}
 }
 
 main "$@"

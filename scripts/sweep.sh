@@ -137,7 +137,7 @@ run_all() { # PART
   work_done=0 began=$SECONDS
   for line in ${lines[@]+"${lines[@]}"}; do
     IFS=$'\t' read -r folder sequence camera options rendered <<<"$line"
-    if [[ ! -s $out/runs/$folder/summary.json ]]; then
+    if ! has_summary "$out/runs/$folder"; then
       progress "$number" "${#lines[@]}" "$folder"
       # shellcheck disable=SC2086 # two words
       [[ -z $rendered ]] || render $rendered

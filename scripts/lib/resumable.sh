@@ -57,10 +57,13 @@ interrupted() {
 progress_line() { [[ ! -t 2 ]] || printf '\r\033[K%s' "$*" >&2; }
 progress_end() { progress_line ""; }
 
+# has_summary FOLDER: whether the run in it left a result; one that was written in halves does not end with a brace.
+has_summary() { [[ -s $1/summary.json && $(tail -c 2 "$1/summary.json" | tr -d '\0') == *'}' ]]; }
+
 # finish_run PART FOLDER STATUS: the run's folder gets its name, and says why where there is no result, or where the run
 # did not end well whatever it left. Returns 1 then.
 finish_run() {
-  if [[ $3 != 0 || ! -s $1/summary.json ]]; then
+  if [[ $3 != 0 ]] || ! has_summary "$1"; then
     rm -f -- "$1/summary.json"
     { printf 'exit status %d: ' "$3"; grep -v '^ *$' "$1/log.txt" | tail -n 1 || true; echo; } >"$1/failed.txt"
   fi

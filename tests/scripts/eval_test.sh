@@ -22,6 +22,12 @@ expect 0 'alignment se3, scale 1,' "$eval" "$gt" "$est" --align se3
 expect 0 'RPE per 0.5 seconds' "$eval" "$gt" "$est" --rpe-delta 0.5s 10f
 head -n 150 "$est" | tail -n 100 >"$work/part.txt"
 expect 0 '50.0 % .*first pose after 1.67 s' "$eval" "$gt" "$work/part.txt" --frames "$work"
+expect 0 '80.0 %' "$eval" "$gt" "$est" --frame-count 250
+expect 0 '100.0 %' "$eval" "$gt" "$est" --frame-count 200
+for count in 0 5 199; do
+  expect 1 "--frame-count $count: .*est.txt has 200 poses; write the number of all frames" \
+    "$eval" "$gt" "$est" --frame-count $count
+done
 expect 0 '[0-9]+\.[0-9]+\.[0-9]+' "$eval" --version
 expect 0 'Usage' "$eval" --help
 

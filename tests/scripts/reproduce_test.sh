@@ -2,7 +2,8 @@
 # scripts/reproduce.sh with a runner that only pretends: arguments, continuing, failures, stopping, the report.
 # shellcheck source-path=SCRIPTDIR source=expect.sh
 source "$(dirname "$0")/expect.sh"
-DMSLAM_BIN=$(dirname "$1")
+report=$1
+DMSLAM_BIN=$(dirname "$report")
 export DMSLAM_BIN
 reproduce=$DMSLAM_SOURCE_DIR/scripts/reproduce.sh
 
@@ -51,8 +52,26 @@ expect 1 '--seeds none' "$reproduce" --tum "$tum" --out "$work/o" --seeds none
 expect 1 '--seeds needs a value' "$reproduce" --tum "$tum" --out "$work/o" --seeds
 expect 1 'unknown argument --frob' "$reproduce" --frob
 expect 1 "no sequence is called 'fr3'" "${run[@]}" --out "$work/o" --only fr3
+check "progress.txt does not tell to go on" grep -q '^now: ended with exit status 1 before the first run' "$work/o/progress.txt"
 expect 1 '--data .*/nowhere: no such folder' "${run[@]}" --data "$work/nowhere" --out "$work/p"
 check "nothing was begun" test ! -e "$work/p"
+
+# --publish writes over no page but a report, and says so before anything runs.
+mkdir -p "$work/pages/images/viewer" "$work/pages/images/lone"
+printf '# Viewer\n' >"$work/pages/viewer.md"
+refused() { # PATTERN PAGE: by the script before anything runs, and by dmslam-report
+  expect 1 "--publish .*$1" "${run[@]}" --out "$work/p" --publish "$2"
+  check "nothing was begun" test ! -e "$work/p"
+  expect 1 "--publish .*$1" "$report" write --out "$work/p" --publish "$2"
+}
+refused 'not the name of a page; write FOLDER/NAME.md' "$work/pages/x.txt"
+refused 'not the name of a page' "$work/pages"
+refused 'not the name of a page' "$work/pages/.md"
+refused 'another page, and would be lost; name one that is not there yet' "$work/pages/viewer.md"
+refused 'images/lone is there without its page' "$work/pages/lone.md"
+expect 1 '--publish .*viewer.md is no folder' "${run[@]}" --out "$work/p" --publish "$work/pages/viewer.md/x.md"
+check "the other page is as it was" grep -qx '# Viewer' "$work/pages/viewer.md"
+check "so are its pictures" test -d "$work/pages/images/viewer"
 for option in '--seeds 1' '--only fr1_xyz'; do
   # shellcheck disable=SC2086 # two words
   expect 1 'report-only tells of all runs.*leave --seeds and --only out' "$reproduce" --out "$work/p" --report-only $option
@@ -83,9 +102,31 @@ check "only the new seed is run" test "$(grep -c -- '--seed 3' "$CALLS")" -eq "$
 expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 1 --only fr1_xyz
 check "one sequence and seed more leave the others in the report" grep -q '24 of 24 runs' "$work/a/report.md"
 check "with both sequences" grep -q '^| fr3_walking_xyz | dm | 3/3 ' "$work/a/report.md"
-expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
+for again in no yes; do
+  expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
+  check "there is a page ($again)" test -s "$work/docs/results.md"
+done
 check "the page has no picture of real images" test ! -e "$work/docs/images/results/fr1_xyz_defaults.png"
 check "it has that of all runs" test -s "$work/docs/images/results/all_defaults.png"
+
+# --report-only: of a folder with runs; sequences that moved are where --tum says, from then on.
+mkdir "$work/bare"
+for folder in nope bare; do
+  expect 1 "--out .*/$folder: holds no runs to report; name the folder" "$reproduce" --out "$work/$folder" --report-only
+  expect 1 "--out .*/$folder: holds no runs of scripts/reproduce.sh" "$report" write --out "$work/$folder"
+done
+check "no folder is made of a mistyped name" test ! -e "$work/nope"
+cp -r "$work/a" "$work/h"
+cp -r "$tum" "$work/moved"
+rm "$work/h/plan.json"
+expect 0 'runs/fr1_xyz is not shown: the sequence is not where it was' "$reproduce" --out "$work/h" --report-only
+expect 0 'report.md' "$reproduce" --out "$work/h" --report-only --tum "$work/moved"
+check "the runs are shown" grep -q '24 of 24 runs' "$work/h/report.md"
+check "no run is said not to be" test -z "$(grep 'is not shown' <<<"$output")"
+expect 0 'report.md' "$reproduce" --out "$work/h" --report-only
+check "and are the next time" grep -q '24 of 24 runs' "$work/h/report.md"
+check "from there" grep -qF "$work/moved/" "$work/h/plan.json"
+check "the plan is never there in halves" test ! -e "$work/h/plan.json.part"
 
 # Stopped in the middle: exit 130, the runner is gone, and the same command goes on where it was.
 : >"$CALLS"
@@ -116,6 +157,16 @@ printf '#!/bin/sh\necho it fell over\nexit 7\n' >"$work/broken"
 chmod +x "$work/broken"
 expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --runner "$work/broken"
 
+# A summary that was written in halves is a failed run in the report, and is run again.
+printf '{"tracked_percent": 98' >"$work/f/runs/fr1_xyz/defaults/dm/seed_1/summary.json"
+rm "$work/f/runs/fr1_xyz/defaults/dm/seed_1/failed.txt"
+expect 0 'report.md' "$reproduce" --out "$work/f" --report-only
+check "half a summary is a failed run" grep -q 'the run failed: .*summary.json: is not JSON; the same command' "$work/f/report.md"
+: >"$CALLS"
+expect 0 'report.md' "${run[@]}" --out "$work/f" --seeds 1 --only fr1_xyz
+check "it is run again" grep -q -- '--out [^ ]*/runs/fr1_xyz/defaults/dm/seed_1' "$CALLS"
+check "all four are well now" grep -q '4 of 4 runs' "$work/f/report.md"
+
 # Nothing is there: a report that lists what is absent.
 mkdir "$work/empty"
 expect 0 'none of the sequences is there' "$reproduce" --tum "$work/empty" --no-render --runner "$work/runner" --data "$work/none" --out "$work/e"
@@ -125,7 +176,7 @@ check "all are listed as absent" test "$(grep -c '\*\*absent\*\*' "$work/e/repor
 
 # The pictures of what is taken for static: once per sequence, and what fails is named once.
 mkdir "$work/bin"
-ln -s "$1" "$work/bin/dmslam-report"
+ln -s "$report" "$work/bin/dmslam-report"
 ln -s "$work/runner" "$work/bin/dmslam-inprocess"
 # shellcheck disable=SC2016 # it is the program's
 printf '#!/bin/sh\necho "static $*" >>"$CALLS"\necho no matches\nexit 1\n' >"$work/bin/dmslam-static"
@@ -135,5 +186,34 @@ expect 0 'no figures of fr3_walking_xyz: no matches' \
   env DMSLAM_BIN="$work/bin" "$reproduce" --tum "$tum" --no-render --data "$work/none" --out "$work/g" --seeds 2
 check "named once" test "$(grep -c 'no figures of' <<<"$output")" -eq 1
 check "tried once" test "$(grep -c '^static --sequence' "$CALLS")" -eq 1
+check "Table 1 is not there in halves" test ! -e "$work/g/table1.json.part"
+
+# They are kept, with the version of the programs, and made again by another one.
+cat >"$work/bin/dmslam-static" <<'EOF'
+#!/usr/bin/env bash
+echo "static $*" >>"$CALLS"
+if [[ $1 == time ]]; then
+  cp -- "$OUT/progress.txt" "$CALLS.progress"
+  echo '{"ransac_ms": 1, "arsac_ms": 2, "dlrsac_ms": 3, "machine": "Z80"}' >"${@: -1}"
+else
+  mkdir -p "${@: -1}"
+  echo >"${@: -1}/pair_1.png"
+fi
+EOF
+again=(env DMSLAM_BIN="$work/bin" OUT="$work/g" "$reproduce" --tum "$tum" --no-render --data "$work/none" --out "$work/g" --seeds 2)
+made() { # COUNT: so many calls of dmslam-static, of which one is for Table 1 where there are any
+  : >"$CALLS"
+  expect 0 'report.md' "${again[@]}"
+  check "dmslam-static is called $1 times" test "$(grep -c '^static ' "$CALLS")" -eq "$1"
+}
+made 3
+check "progress.txt tells that Table 1 is timed" grep -q '^now: timing the methods of Table 1' "$CALLS.progress"
+check "figures have a version" test "$(cat "$work/g/figures/fr3_walking_xyz/version")" = "$("$report" --version)"
+check "Table 1 is in the report" grep -q 'Z80' "$work/g/report.md"
+made 0
+echo 0.0.9 >"$work/g/table1.version"
+made 1
+echo 0.0.9 >"$work/g/figures/fr3_walking_xyz/version"
+made 2
 
 finish

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <optional>
 
 #include "dmslam/evaluation/report.h"
 #include "dmslam/evaluation/trajectory_plot.h"
@@ -23,7 +24,7 @@ struct Arguments {
   std::vector<std::string> rpe_deltas = {"1f", "1s", "1m"};
   bool all_pairs = false;
   std::string frames;
-  size_t frame_count = 0;
+  std::optional<size_t> frame_count;
   std::string json;
   std::string plot;
   std::string title;
@@ -60,7 +61,15 @@ EvaluationOptions ParseOptions(const Arguments& arguments) {
 }
 
 Coverage FindCoverage(const Arguments& arguments, const std::vector<StampedPose>& estimate) {
-  if (arguments.frames.empty()) return ComputeCoverage(estimate, arguments.frame_count);
+  if (arguments.frames.empty()) {
+    if (arguments.frame_count && *arguments.frame_count < estimate.size()) {
+      throw InputError(
+          "--frame-count " + std::to_string(*arguments.frame_count) + ": " + arguments.estimate + " has " +
+          std::to_string(estimate.size()) +
+          " poses; write the number of all frames of the sequence, or give its list to --frames");
+    }
+    return ComputeCoverage(estimate, arguments.frame_count.value_or(0));
+  }
   std::filesystem::path list = arguments.frames;
   if (std::filesystem::is_directory(list)) list /= "rgb.txt";
   return ComputeCoverage(estimate, ReadFrameStamps(list.string()));

@@ -9,8 +9,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dmslam/dataset/text_table.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 #include "figures.h"
 #include "sweep.h"
 
@@ -42,9 +42,9 @@ std::string CameraOf(const PlannedSequence& sequence) {
   return fs::exists(own) ? own.string() : "config/" + std::string(sequence.info.camera);
 }
 
-// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, and
-// what to --set ("-": nothing).
-void PrintRuns(const Plan& plan) {
+// One line per run: its folder, the sequence's folder, number of frames, camera file, profile, seed, what to
+// --set ("-": nothing), and whether it is done or still to do.
+void PrintRuns(const Plan& plan, const fs::path& out) {
   for (const RunKey& key : Runs(plan)) {
     const auto sequence = std::find_if(plan.sequences.begin(), plan.sequences.end(),
                                        [&](const PlannedSequence& s) { return s.info.name == key.sequence; });
@@ -53,13 +53,16 @@ void PrintRuns(const Plan& plan) {
     const size_t frames = ReadFrameStamps((sequence->folder / "rgb.txt").string()).size();
     std::cout << key.Folder().string() << '\t' << sequence->folder.string() << '\t' << frames << '\t'
               << CameraOf(*sequence) << '\t' << key.profile << '\t' << key.seed << '\t'
-              << (setting->argument.empty() ? "-" : setting->argument) << '\n';
+              << (setting->argument.empty() ? "-" : setting->argument) << '\t'
+              << (IsDone(key, out) ? "done" : "to do") << '\n';
   }
 }
 
+std::vector<fs::path> Paths(const std::vector<std::string>& names) { return {names.begin(), names.end()}; }
+
 void RunPlan(const Arguments& arguments) {
   PlanOptions options;
-  for (const std::string& root : arguments.roots) options.roots.emplace_back(root);
+  options.roots = Paths(arguments.roots);
   options.seeds = arguments.seeds;
   options.only = arguments.only;
   const Plan plan = MakePlan(options);
@@ -69,7 +72,7 @@ void RunPlan(const Arguments& arguments) {
       std::cerr << "absent: " << sequence.info.name << " (" << sequence.info.source << ")\n";
     }
   }
-  PrintRuns(plan);
+  PrintRuns(plan, arguments.out);
 }
 
 std::optional<IterationTimes> ReadTimes(const fs::path& path) {
@@ -118,13 +121,28 @@ bool IsPublished(const ReportPicture& picture, std::map<std::pair<FigureSection,
          ++(*frames)[{picture.section, picture.sequence}] <= 2;
 }
 
+// The folder of the pictures of this page alone.
+fs::path PicturesOf(const fs::path& page) { return page.parent_path() / "images" / page.stem(); }
+
+// Only what an earlier --publish wrote may be written over: the page begins with the report's heading.
+void RequirePage(const fs::path& page) {
+  const std::string option = "--publish " + page.string() + ": ";
+  if (page.extension() != ".md" || fs::is_directory(page))
+    throw InputError(option + "is not the name of a page; write FOLDER/NAME.md");
+  if (!fs::exists(page)) {
+    if (!fs::exists(PicturesOf(page))) return;
+    throw InputError(option + PicturesOf(page).string() +
+                     " is there without its page, and would be lost; remove it or name another page");
+  }
+  if (ReadTextFile(page.string()).starts_with(std::string(kReportHeading) + "\n")) return;
+  throw InputError(option + "is another page, and would be lost; name one that is not there yet, or a " +
+                   "report (its first line is '" + kReportHeading + "')");
+}
+
 // The report for docs/: all numbers, but pictures of rendered sequences only, copied beside it.
 void Publish(const fs::path& page, const fs::path& out, const Results& results,
              const std::optional<IterationTimes>& times, const std::vector<ReportPicture>& pictures) {
-  if (page.extension() != ".md") {
-    throw InputError("--publish " + page.string() + ": is not the name of a page; write FOLDER/NAME.md");
-  }
-  const fs::path folder = page.parent_path() / "images" / page.stem();  // of this page alone
+  const fs::path folder = PicturesOf(page);
   std::error_code error;
   fs::remove_all(folder, error);
   fs::create_directories(folder, error);
@@ -157,8 +175,11 @@ void WarnOfRunsNotShown(const Plan& plan) {
 }
 
 void RunWrite(const Arguments& arguments) {
+  if (!arguments.publish.empty()) RequirePage(arguments.publish);
   const fs::path out = arguments.out;
-  const Results results = ReadResults(PlanOfFolder(out), out);
+  const Plan plan = PlanOfFolder(out, Paths(arguments.roots));
+  if (!arguments.roots.empty()) SavePlan(plan, out);  // the next report finds them without being told
+  const Results results = ReadResults(plan, out);
   WarnOfRunsNotShown(results.plan);
   const auto times = ReadTimes(out / "table1.json");
   const std::vector<ReportPicture> pictures = DrawPictures(results, out);
@@ -195,7 +216,7 @@ void RunSweep(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("The reproduction of the DM-SLAM paper's tables: what to run, and the report of what was run.",
                "dmslam-report");
-  app.set_version_flag("--version", dmslam::kVersion);
+  app.set_version_flag("--version", dmslam::BuildVersion());
   app.require_subcommand(1);
   dmslam::Arguments arguments;
   CLI::App* plan =
@@ -207,6 +228,8 @@ int main(int argc, char** argv) {
   CLI::App* write =
       app.add_subcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
   write->add_option("--out", arguments.out, "the reproduction's folder")->required();
+  write->add_option("--root", arguments.roots,
+                    "folder that holds sequences which are not where they were planned; may be repeated");
   write->add_option("--publish", arguments.publish,
                     "also write this page, with pictures of rendered sequences only");
   CLI::App* sweep = app.add_subcommand("sweep", "write the tables and the picture of scripts/sweep.sh");

@@ -231,7 +231,8 @@ std::string WhereRunsComeFrom(const Results& results) {
 }
 
 std::string Introduction(const Results& results) {
-  return "# Results beside the DM-SLAM paper's\n\n"
+  return std::string(kReportHeading) +
+         "\n\n"
          "Lu, Wang, Tang, Huang, Li: *DM-SLAM: Monocular SLAM in Dynamic Environments*, Appl. Sci. 2020, "
          "10(12), 4252. `baseline` stands where the paper has ORB-SLAM2, `dm` where it has DM-SLAM; `dm` "
          "also "

@@ -31,6 +31,9 @@ struct IterationTimes {
   std::string machine;
 };
 
+/// The first line of the report.
+inline constexpr const char* kReportHeading = "# Results beside the DM-SLAM paper's";
+
 /// The paper's Tables 1 to 4 with the paper's own figures beside ours, coverage beside every error, and what
 /// is absent.
 std::string ReportMarkdown(const Results& results, const std::optional<IterationTimes>& times,

@@ -34,6 +34,13 @@ fs::path FindFolder(const std::vector<fs::path>& roots, const std::string& name)
   return {};
 }
 
+void RequireFolders(const std::vector<fs::path>& roots) {
+  for (const fs::path& root : roots) {
+    if (!fs::is_directory(root))
+      throw InputError(root.string() + ": is no folder; name the one that holds the sequences");
+  }
+}
+
 void RequireGroundTruth(const fs::path& folder) {
   if (folder.empty() || fs::exists(folder / "groundtruth.txt")) return;
   throw InputError(folder.string() +
@@ -70,9 +77,24 @@ int LargestSeedIn(const fs::path& runs_of_sequence) {
   return largest;
 }
 
+std::vector<std::string> PaperProfiles() { return {"baseline", "dm"}; }
+
 std::vector<Setting> PaperSettings() {
   return {{"features3000", "3000 features per frame, as in the paper", "features.count=3000"},
           {"defaults", "default settings", ""}};
+}
+
+// Where nobody planned anything: the runs that lie there tell.
+Plan EmptyPlan(const fs::path& out) {
+  if (!fs::is_directory(out / "runs")) {
+    throw InputError("--out " + out.string() +
+                     ": holds no runs of scripts/reproduce.sh; name the folder that its --out named");
+  }
+  Plan plan;
+  plan.seeds = 1;
+  plan.settings = PaperSettings();
+  plan.profiles = PaperProfiles();
+  return plan;
 }
 
 }  // namespace
@@ -83,15 +105,12 @@ fs::path RunKey::Folder() const {
 
 Plan MakePlan(const PlanOptions& options) {
   if (options.seeds < 1) throw InputError("--seeds: write a number of at least 1");
-  for (const fs::path& root : options.roots) {
-    if (!fs::is_directory(root))
-      throw InputError(root.string() + ": is no folder; name the one that holds the sequences");
-  }
+  RequireFolders(options.roots);
   for (const std::string& name : options.only) FindSequence(name);
   Plan plan;
   plan.seeds = options.seeds;
   plan.settings = PaperSettings();
-  plan.profiles = {"baseline", "dm"};
+  plan.profiles = PaperProfiles();
   for (const SequenceInfo& info : KnownSequences()) {
     const bool wanted = options.only.empty() ||
                         std::find(options.only.begin(), options.only.end(), info.name) != options.only.end();
@@ -150,16 +169,18 @@ void SavePlan(const Plan& now, const fs::path& out) {
   }
   std::error_code error;
   fs::create_directories(out, error);
-  std::ofstream file(out / "plan.json", std::ios::binary);
+  const fs::path part = out / "plan.json.part";  // plan.json itself is never there in halves
+  std::ofstream file(part, std::ios::binary);
   file << json.dump(1) << "\n";
-  file.flush();
-  if (!file) throw InputError((out / "plan.json").string() + ": cannot be written; check --out");
+  file.close();
+  if (file) fs::rename(part, out / "plan.json", error);
+  if (!file || error) throw InputError((out / "plan.json").string() + ": cannot be written; check --out");
 }
 
 Plan LoadPlan(const fs::path& out) {
   const std::string path = (out / "plan.json").string();
   std::ifstream file(path);
-  if (!file) throw InputError(path + ": cannot be opened; run 'dmslam-report plan' first");
+  if (!file) throw InputError(path + ": cannot be opened; check --out");
   Plan plan;
   try {
     const Json json = Json::parse(file);
@@ -179,8 +200,9 @@ Plan LoadPlan(const fs::path& out) {
   return plan;
 }
 
-Plan PlanOfFolder(const fs::path& out) {
-  Plan plan = LoadPlan(out);
+Plan PlanOfFolder(const fs::path& out, const std::vector<fs::path>& roots) {
+  RequireFolders(roots);
+  Plan plan = fs::exists(out / "plan.json") ? LoadPlan(out) : EmptyPlan(out);
   for (const SequenceInfo& info : KnownSequences()) {
     const std::string name(info.name);
     const int largest_seed = LargestSeedIn(out / "runs" / name);
@@ -191,9 +213,13 @@ Plan PlanOfFolder(const fs::path& out) {
     }
     sequence->has_runs = largest_seed > 0;
     plan.seeds = std::max(plan.seeds, largest_seed);
+    if (const fs::path named = FindFolder(roots, std::string(info.folder)); !named.empty()) {
+      RequireGroundTruth(named);
+      sequence->folder = named;
+    }
     if (IsSequence(sequence->folder)) continue;
     const fs::path rendered = out / "synthetic" / name;
-    sequence->folder = IsSequence(rendered) ? rendered : fs::path();
+    sequence->folder = IsSequence(rendered) ? fs::canonical(rendered) : fs::path();
   }
   InOrderOfTheTables(&plan);
   return plan;

@@ -68,8 +68,9 @@ void SavePlan(const Plan& plan, const std::filesystem::path& out);
 Plan LoadPlan(const std::filesystem::path& out);
 
 /// Everything that was planned or run in the output folder: its plan, and whatever lies in its folder `runs`
-/// beyond that. A sequence that is no longer where the plan says is taken from the folder `synthetic`, or is
-/// absent.
-Plan PlanOfFolder(const std::filesystem::path& out);
+/// beyond that. Where there is no plan.json, that is all; throws InputError where there is no folder `runs`
+/// either. A sequence that is found under `roots` is taken from there; one that is no longer where the plan
+/// says is taken from the folder `synthetic`, or is absent.
+Plan PlanOfFolder(const std::filesystem::path& out, const std::vector<std::filesystem::path>& roots = {});
 
 }  // namespace dmslam

@@ -145,6 +145,43 @@ TEST_F(Reproduction, RunsWithoutATrajectoryCountAndAreListed) {
   EXPECT_NE(text.find("| 1/3 |"), std::string::npos);
 }
 
+TEST_F(Reproduction, ABrokenSummaryIsAFailedRun) {
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  const RunKey keys[] = {{"fr3_walking_xyz", "defaults", "dm", 1},
+                         {"fr3_walking_xyz", "defaults", "dm", 2},
+                         {"fr3_walking_xyz", "defaults", "dm", 3}};
+  const fs::path out = root_ / "out";
+  std::ofstream(out / keys[0].Folder() / "summary.json") << R"({"tracked_percent": 97.5, "first_)";
+  std::ofstream(out / keys[1].Folder() / "summary.json") << "";
+  EXPECT_FALSE(IsDone(keys[0], out));
+  EXPECT_FALSE(IsDone(keys[1], out));
+  EXPECT_TRUE(IsDone(keys[2], out));
+  const Results results = ReadResults(plan, out);
+  const Cell& cell = *results.Find("fr3_walking_xyz", "defaults", "dm");
+  EXPECT_EQ(cell.Count(RunResult::State::kFailed), 2u);
+  EXPECT_EQ(cell.Count(RunResult::State::kDone), 1u);
+  EXPECT_EQ(cell.TrackedPercent()->median, 0);
+  EXPECT_NE(ReportMarkdown(results, std::nullopt, {}).find("summary.json: is not JSON"), std::string::npos);
+}
+
+// What it was as it came is then not known; the final trajectory counts all the same.
+TEST_F(Reproduction, ABrokenOnlineTrajectoryLeavesTheRunDone) {
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  const RunKey empty{"fr3_walking_xyz", "defaults", "dm", 1}, broken{"fr3_walking_xyz", "defaults", "dm", 2};
+  const fs::path out = root_ / "out";
+  std::ofstream(out / empty.Folder() / "trajectory_online.txt") << "";
+  std::ofstream(out / broken.Folder() / "trajectory_online.txt") << "0.1 0 0";
+  for (const RunKey& key : {empty, broken}) {
+    const RunResult run = ReadRun(key, out, plan.sequences.front().folder);
+    EXPECT_EQ(run.state, RunResult::State::kDone);
+    EXPECT_EQ(run.tracked_percent, 97.5);
+    EXPECT_FALSE(run.tracked_online_after_first_map_percent);
+    EXPECT_NE(run.reason.find("trajectory_online.txt"), std::string::npos) << run.reason;
+  }
+}
+
 // A failed run is one of those over which the median goes: two of three, and nothing is tracked in the
 // middle.
 TEST_F(Reproduction, FailedRunsCountAsNothingTracked) {
@@ -206,6 +243,17 @@ TEST_F(Reproduction, WhatWasRunBeyondThePlanIsShown) {
   EXPECT_TRUE(plan.sequences[2].present());  // rendered, so it is where those are
   const std::string text = ReportMarkdown(ReadResults(plan, root_ / "out"), std::nullopt, {});
   EXPECT_NE(text.find("**Its runs are not shown**"), std::string::npos) << text;
+}
+
+TEST_F(Reproduction, WithoutAPlanTheRunsTell) {
+  EXPECT_THROW(PlanOfFolder(root_ / "out"), InputError);
+  WriteAllRuns(MakePlan(options_));
+  const Plan plan = PlanOfFolder(root_ / "out");
+  EXPECT_EQ(plan.seeds, 3);
+  EXPECT_EQ(plan.sequences.size(), 3u);
+  EXPECT_TRUE(Runs(plan).empty());  // nobody says where they are
+  EXPECT_EQ(Runs(PlanOfFolder(root_ / "out", options_.roots)).size(), 3u * 2 * 2 * 3);
+  EXPECT_THROW(PlanOfFolder(root_ / "out", {root_ / "nowhere"}), InputError);
 }
 
 TEST_F(Reproduction, VersionsAndMachinesOfTheRuns) {

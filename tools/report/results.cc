@@ -43,9 +43,22 @@ void TrackedNothing(RunResult* run) {
   run->tracked_online_after_first_map_percent = run->tracked_online_after_first_map_percent.value_or(0);
 }
 
-// Of the frames since the first pose, how many have one.
+RunResult Failed(RunResult run, const std::string& reason) {
+  run.state = State::kFailed;
+  run.reason = reason;
+  TrackedNothing(&run);
+  return run;
+}
+
+// Nothing where it is no JSON object, as where only half of it was written.
+std::optional<Json> ReadSummary(const fs::path& path) {
+  Json summary = Json::parse(ReadTextFile(path.string()), nullptr, false);
+  if (summary.is_discarded() || !summary.is_object()) return std::nullopt;
+  return summary;
+}
+
+// Of the frames since the first pose, how many have one. Throws InputError where the file is none.
 std::optional<double> OnlineAfterFirstMap(const fs::path& online, const fs::path& sequence) {
-  if (!fs::exists(online)) return std::nullopt;
   const std::vector<StampedPose> poses = ReadTrajectory(online.string());
   std::vector<int64_t> frames_ns = ReadFrameStamps((sequence / "rgb.txt").string());
   std::erase_if(frames_ns, [&](int64_t stamp_ns) { return stamp_ns < poses.front().stamp_ns; });
@@ -60,6 +73,17 @@ EvaluationOptions ReportOptions() {
   return options;
 }
 
+// A run whose final trajectory is good is done, whatever its trajectory as it came looks like.
+void ReadOnlineTrajectory(const fs::path& folder, const fs::path& sequence, RunResult* run) {
+  const fs::path online = folder / "trajectory_online.txt";
+  if (run->tracked_online_after_first_map_percent || !fs::exists(online)) return;
+  try {
+    run->tracked_online_after_first_map_percent = OnlineAfterFirstMap(online, sequence);
+  } catch (const InputError& error) {
+    run->reason = error.what();
+  }
+}
+
 void ReadTrajectoryOf(const fs::path& folder, const fs::path& sequence, RunResult* run) {
   const fs::path trajectory = folder / "trajectory.txt";
   try {
@@ -72,10 +96,7 @@ void ReadTrajectoryOf(const fs::path& folder, const fs::path& sequence, RunResul
       run->reason = evaluation.ate.reason;
       return;
     }
-    if (!run->tracked_online_after_first_map_percent) {
-      run->tracked_online_after_first_map_percent =
-          OnlineAfterFirstMap(folder / "trajectory_online.txt", sequence);
-    }
+    ReadOnlineTrajectory(folder, sequence, run);
     if (!run->tracked_percent) run->tracked_percent = evaluation.coverage.percent;
     run->evaluation = std::move(evaluation);
     run->state = State::kDone;
@@ -114,33 +135,31 @@ RunResult ReadRun(const RunKey& key, const fs::path& out, const fs::path& sequen
   RunResult run;
   run.key = key;
   const fs::path folder = out / key.Folder();
-  if (fs::exists(folder / "failed.txt")) {
-    run.state = State::kFailed;
-    run.reason = FirstLine(folder / "failed.txt");
-    TrackedNothing(&run);
-    return run;
-  }
+  if (fs::exists(folder / "failed.txt")) return Failed(run, FirstLine(folder / "failed.txt"));
   const fs::path summary_path = folder / "summary.json";
   if (!fs::exists(summary_path)) {
     run.reason = "not run yet";
     return run;
   }
+  const std::optional<Json> summary = ReadSummary(summary_path);
+  if (!summary) return Failed(run, summary_path.string() + ": is not JSON; the same command runs it again");
   run.state = State::kNoTrajectory;
-  const Json summary = Json::parse(ReadTextFile(summary_path.string()), nullptr, false);
-  if (summary.is_discarded() || !summary.is_object()) {
-    throw InputError(summary_path.string() +
-                     ": is not JSON; remove the run's folder, so that it is run again");
-  }
-  run.version = TextIn(summary, "version");
-  run.machine = MachineIn(summary);
-  run.tracked_percent = NumberIn(summary, "tracked_percent");
-  run.tracked_online_percent = NumberIn(summary, "tracked_online_percent");
-  run.tracked_online_after_first_map_percent = NumberIn(summary, "tracked_online_after_first_map_percent");
-  run.first_map_s = NumberIn(summary, "first_init_s");
-  run.frontend_ms_median = NumberIn(summary, "frontend_ms_median");
+  run.version = TextIn(*summary, "version");
+  run.machine = MachineIn(*summary);
+  run.tracked_percent = NumberIn(*summary, "tracked_percent");
+  run.tracked_online_percent = NumberIn(*summary, "tracked_online_percent");
+  run.tracked_online_after_first_map_percent = NumberIn(*summary, "tracked_online_after_first_map_percent");
+  run.first_map_s = NumberIn(*summary, "first_init_s");
+  run.frontend_ms_median = NumberIn(*summary, "frontend_ms_median");
   ReadTrajectoryOf(folder, sequence, &run);
   if (run.state == State::kNoTrajectory) TrackedNothing(&run);
   return run;
+}
+
+bool IsDone(const RunKey& key, const fs::path& out) {
+  const fs::path folder = out / key.Folder();
+  return !fs::exists(folder / "failed.txt") && fs::exists(folder / "summary.json") &&
+         ReadSummary(folder / "summary.json").has_value();
 }
 
 std::optional<Statistics> MetricOf(const RunResult& run, Metric metric) {

@@ -15,7 +15,7 @@ namespace dmslam {
 struct RunResult {
   RunKey key;
   enum class State { kMissing, kFailed, kNoTrajectory, kDone } state = State::kMissing;
-  std::string reason;  // where it is not kDone
+  std::string reason;  // where it is not kDone, or where not all of it could be read
   // From its summary.json; nothing where it does not say.
   std::optional<std::string> version;  // of the programs that made it
   std::optional<Machine> machine;      // on which it was made
@@ -32,6 +32,9 @@ struct RunResult {
 /// Reads the result of a run from its folder. `sequence` is the sequence's folder (ground truth, image list).
 /// What failed or gave no trajectory has tracked nothing: its shares are 0, so that no median passes over it.
 RunResult ReadRun(const RunKey& key, const std::filesystem::path& out, const std::filesystem::path& sequence);
+
+/// Whether it needs no run any more: it did not fail, and its summary.json is whole.
+bool IsDone(const RunKey& key, const std::filesystem::path& out);
 
 /// The errors that the tables show.
 enum class Metric {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <sstream>
 #include <string_view>
 
 #include "dmslam/util/check.h"
@@ -63,6 +64,15 @@ TEST(Check, NamesTheInvariant) {
   } catch (const InvariantError& error) {
     EXPECT_NE(std::string_view(error.what()).find("1 == 2"), std::string_view::npos);
   }
+}
+
+TEST(Machine, ProcessorIsTheModelNameOrTheArchitectureWithItsNumbers) {
+  std::istringstream intel("processor\t: 0\nmodel\t\t: 85\nmodel name\t: Z80 @ 4 MHz\nmodel name\t: other\n");
+  EXPECT_EQ(ProcessorName(intel, "x86_64"), "Z80 @ 4 MHz");
+  std::istringstream arm("processor\t: 0\nCPU implementer\t: 0x41\nCPU variant\t: 0x3\nCPU part\t: 0xd0c\n");
+  EXPECT_EQ(ProcessorName(arm, "aarch64"), "aarch64, implementer 0x41, part 0xd0c");
+  std::istringstream nothing;
+  EXPECT_EQ(ProcessorName(nothing, "riscv64"), "riscv64");
 }
 
 TEST(Machine, HasAProcessorAndCores) {
