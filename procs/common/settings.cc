@@ -223,6 +223,11 @@ std::vector<Entry> TrackingEntries() {
           "tracking.new_map_after_s", "lost for so long: a new map is started",
           [](Settings & s) -> auto& { return s.frontend.new_map_after_s; }, 0.1, 3600),
       Make(
+          "keyframe.at_end",
+          "frames placed when the sequence has ended become keyframes too, and the map grows to where they "
+          "see",
+          [](Settings & s) -> auto& { return s.frontend.keyframes_at_end; }),
+      Make(
           "keyframe.max_interval_s", "at least one keyframe in this time, where it helps",
           [](Settings & s) -> auto& { return s.frontend.keyframe.max_interval_s; }, 0, 60),
       Make(
@@ -240,6 +245,9 @@ std::vector<Entry> MappingEntries() {
           "mapping.mutual_exclusion",
           "Algorithm 1: one new landmark per neighbourhood, and a bound on their number",
           [](Settings & s) -> auto& { return s.mapper.creation.mutual_exclusion; }),
+      Make(
+          "mapping.min_depth", "no landmark nearer to a camera than this share of what it sees in the median",
+          [](Settings & s) -> auto& { return s.mapper.creation.min_depth; }, 0, 1),
       Make(
           "mapping.neighbourhood_px", "half the side of the neighbourhood",
           [](Settings & s) -> auto& { return s.mapper.creation.neighbourhood_px; }, 0, 1000),
@@ -289,9 +297,11 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   settings->profile = std::string(name);
   const bool dm = name == "dm";
   settings->mapper.creation.mutual_exclusion = dm;
+  settings->mapper.creation.min_depth = dm ? LandmarkCreationOptions().min_depth : 0.0;
   settings->mapper.seen_through.enabled = dm;
   settings->frontend.tracking.motion_belief = dm;
   settings->frontend.smooth_at_end = dm;
+  settings->frontend.keyframes_at_end = dm;
   settings->frontend.initializer_method = dm ? "dlrsac" : "ransac";
 }
 

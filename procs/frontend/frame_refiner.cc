@@ -75,6 +75,16 @@ std::optional<std::vector<Sight>> FrameRefiner::SearchAgain(const Map& map, MapI
   return SightsOf(frame);
 }
 
+std::optional<FinalPose> FrameRefiner::Measured(const Map& map, const Kept& kept, const Rigid3d& told,
+                                                const std::vector<Sight>& sights) {
+  if (static_cast<int>(sights.size()) < kMinSights) return std::nullopt;
+  FinalPose refined;
+  refined.pose = kept.pose;
+  const PoseOptimizationReport report = MeasurePose(map, told, sights, &refined);
+  if (!Agrees(report, sights.size())) return std::nullopt;
+  return refined;
+}
+
 std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& search) {
   const Kept kept = std::move(due_.front());
   due_.pop_front();
@@ -84,13 +94,15 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
   auto sights = SearchAgain(map, reference->map_id, kept, told, search);
   if (!sights) sights = SightsNow(map, reference->map_id, kept);
-  if (static_cast<int>(sights->size()) < kMinSights) return std::nullopt;
-  FinalPose refined;
-  refined.pose = kept.pose;
-  const PoseOptimizationReport report = MeasurePose(map, told, *sights, &refined);
-  if (!Agrees(report, sights->size())) return std::nullopt;
-  refined.pose.state = TrackingState::kLocalizedLater;
-  refined.SetPose(*map.FindKeyframe(*keyframe_id), report.T_cam_world);
+  std::optional<FinalPose> refined = Measured(map, kept, told, *sights);
+  if (!refined && kept.pose.state == TrackingState::kLocalizedLater) {
+    refined.emplace();
+    refined->pose = kept.pose;
+    refined->measured = told;
+  }
+  if (!refined) return std::nullopt;
+  refined->pose.state = TrackingState::kLocalizedLater;
+  refined->SetPose(*map.FindKeyframe(*keyframe_id), refined->measured);
   return refined;
 }
 

@@ -37,7 +37,8 @@ class FrameRefiner {
   void Begin(const Map& map, std::optional<MapId> map_id = std::nullopt);
   bool IsBusy() const { return !due_.empty(); }
   /// The pose of the oldest frame that is due, relative to its reference keyframe as that is now (state:
-  /// localised later). None where its observations do not agree with the map any more.
+  /// localised later). Where its observations do not agree with the map any more: none, as it was told
+  /// before; of a frame that was placed late, and never told, where it was, with nothing measured.
   std::optional<FinalPose> RefineNext(const Map& map, const Search& search);
 
  private:
@@ -48,6 +49,8 @@ class FrameRefiner {
   };
   void Bound();
   static std::vector<Sight> SightsNow(const Map& map, MapId map_id, const Kept& kept);
+  static std::optional<FinalPose> Measured(const Map& map, const Kept& kept, const Rigid3d& told,
+                                           const std::vector<Sight>& sights);
   std::optional<std::vector<Sight>> SearchAgain(const Map& map, MapId map_id, const Kept& kept,
                                                 const Rigid3d& told, const Search& search) const;
 

@@ -88,6 +88,20 @@ TEST_F(Refining, FrameThatTheMapContradictsIsLeftOut) {
   EXPECT_TRUE(Refine(refiner).empty());
 }
 
+TEST_F(Refining, FrameThatWasNeverToldKeepsItsPlaceWithNothingMeasured) {
+  FrameRefiner refiner;
+  told_.state = TrackingState::kLocalizedLater;
+  refiner.Keep(frame_, told_);
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) map_.RemoveLandmark(id);
+  refiner.Begin(map_);
+  const std::optional<FinalPose> kept = refiner.RefineNext(map_, {});
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->pose.frame_index, 5U);
+  EXPECT_LT((kept->pose.T_cam_reference.translation - told_.T_cam_reference.translation).norm(), 1e-12);
+  EXPECT_TRUE(kept->information.isZero());
+  EXPECT_TRUE(kept->sights.empty());
+}
+
 /// Tells of every landmark where it is.
 bool FindAll(const std::vector<LandmarkId>& ids, TrackedFrame* frame) {
   frame->landmarks = ids;

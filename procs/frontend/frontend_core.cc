@@ -72,10 +72,11 @@ FirstMapSearch FrontendCore::MakeSearch() const {
 
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   while (IsRefining()) RefineNext();
-  near_ = {};  // may lie elsewhere now
+  near_.next.reset();  // may lie elsewhere now
   map_.Apply(delta);
   relocalizer_.Update(map_);
-  if (delta.progress.settled >= awaited_) awaited_ = {};
+  const KeyframeId settled = delta.progress.settled;
+  if (grows_back_ ? settled == awaited_ : settled >= awaited_) awaited_ = {};
   const bool at_the_end = delta.event == MapEvent::kGloballyAdjusted && !delta.about.valid();
   if (!at_the_end) return;
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
@@ -142,8 +143,8 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
 
 // ---- Initialisation ----
 
-void FrontendCore::KeepUnplaced(TrackedFrame frame) {
-  unplaced_.push_back(std::move(frame));
+void FrontendCore::KeepUnplaced(const TrackedFrame& frame) {
+  unplaced_.emplace_back(frame);
   if (static_cast<int>(unplaced_.size()) > options_.max_kept_frames) unplaced_.pop_front();
 }
 
@@ -201,8 +202,11 @@ void FrontendCore::BeginTrial(const Keyframe& second) {
   state_ = TrackingState::kTrial;
   const uint32_t since = second.id.frame_index();
   const auto first = std::find_if(unplaced_.begin(), unplaced_.end(),
-                                  [since](const TrackedFrame& frame) { return frame.index >= since; });
-  behind_.assign(std::make_move_iterator(first), std::make_move_iterator(unplaced_.end()));
+                                  [since](const WaitingFrame& frame) { return frame.index >= since; });
+  behind_.clear();
+  for (auto it = first; it != unplaced_.end(); ++it) {
+    behind_.push_back(std::move(*it).ToTracked(camera_, pyramid_));
+  }
   unplaced_.erase(first, unplaced_.end());
 }
 
@@ -362,7 +366,7 @@ void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<F
   ++counters_.resets;
   if (map_id_ != 0) events->push_back(MapReset{map_id_, drop, reason});
   NextMapId();
-  for (TrackedFrame& frame : std::exchange(behind_, {})) KeepUnplaced(std::move(frame));
+  for (const TrackedFrame& frame : std::exchange(behind_, {})) KeepUnplaced(frame);
   tracker_.Reset();
   velocity_.reset();
   coasting_.reset();
@@ -405,7 +409,7 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
   if (localize_only_ || reference == nullptr || report.num_static <= o.min_inliers) return false;
   const int min_observations = map_.keyframes().size() <= 2 ? 2 : 3;
   const int expected = map_.CountTracked(*reference, min_observations);
-  const int64_t since_ns = frame_.stamp_ns - last_keyframe_ns_;
+  const int64_t since_ns = std::abs(frame_.stamp_ns - last_keyframe_ns_);
   const bool weak = report.num_static < 0.5 * expected || report.num_static < 60;
   const bool behind = report.num_static < o.tracked_ratio * expected;
   const bool due = since_ns >= ToNs(o.max_interval_s) || since_ns >= ToNs(o.min_interval_s) || weak;
@@ -448,27 +452,45 @@ void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
 
 // ---- After the end ----
 
-bool FrontendCore::LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near) {
+/// From the placed frame after it, and its motion.
+TrackingReport FrontendCore::TrackBackwards(TrackedFrame* frame) {
+  if (!near_.next) return {};
   const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
   const double depth = reference != nullptr ? map_.MedianDepth(*reference).value_or(1.0) : 1.0;
-  if (near.next) {
-    const std::optional<Rigid3d> predicted = near.Predict(frame->index);
-    tracker_.SetMotionPrior(predicted, depth);
-    const Rigid3d guess = predicted.value_or(near.next->T_cam_world);
-    if (tracker_.TrackFromFrame(map_, *near.next, guess, frame) &&
-        tracker_.TrackLocalMap(map_, false, frame).ok && near.Plausible(*frame, depth)) {
-      return true;
-    }
-  }
+  const std::optional<Rigid3d> predicted = near_.Predict(frame->index);
+  tracker_.SetMotionPrior(predicted, depth);
+  const Rigid3d guess = predicted.value_or(near_.next->T_cam_world);
+  if (!tracker_.TrackFromFrame(map_, *near_.next, guess, frame)) return {};
+  TrackingReport report = tracker_.TrackLocalMap(map_, false, frame);
+  report.ok = report.ok && near_.Plausible(*frame, depth);
+  return report;
+}
+
+TrackingReport FrontendCore::LocalizeLater(TrackedFrame* frame) {
+  TrackingReport report = TrackBackwards(frame);
+  if (report.ok) return report;
+  const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
+  const double depth = reference != nullptr ? map_.MedianDepth(*reference).value_or(1.0) : 1.0;
   frame->ClearMatches();
   tracker_.SetMotionPrior(std::nullopt, 1.0);
-  return relocalizer_.Relocalize(map_, 0, {}, DeriveSeed(seed_, frame->index, "later"), &tracker_, frame) &&
-         tracker_.TrackLocalMap(map_, true, frame).ok && (!near.next || near.Plausible(*frame, depth));
+  const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
+  if (!relocalizer_.Relocalize(map_, 0, {}, seed, &tracker_, frame)) return {};
+  report = tracker_.TrackLocalMap(map_, true, frame);
+  report.ok = report.ok && (!near_.next || near_.Plausible(*frame, depth));
+  return report;
 }
 
 std::optional<Rigid3d> FrontendCore::LaterNeighbours::Predict(uint32_t index) const {
-  if (!after || after->index - next->index != 1 || next->index - index != 1) return std::nullopt;
-  return next->T_cam_world * after->T_cam_world.Inverse() * next->T_cam_world;
+  if (!T_moving_after || next->index != moving || moving - index != 1) return std::nullopt;
+  return *T_moving_after * next->T_cam_world;
+}
+
+void FrontendCore::LaterNeighbours::MoveTo(TrackedFrame frame) {
+  T_moving_after.reset();
+  if (next && next->index - frame.index == 1)
+    T_moving_after = frame.T_cam_world * next->T_cam_world.Inverse();
+  moving = frame.index;
+  next = std::move(frame);
 }
 
 bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double depth) const {
@@ -476,6 +498,36 @@ bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double 
   const Rigid3d motion = frame.T_cam_world * next->T_cam_world.Inverse();
   return motion.translation.norm() <= kMaxShiftPerFrame * depth * frames &&
          AngleBetween(motion.rotation, Eigen::Quaterniond::Identity()) <= kMaxTurnPerFrame_rad * frames;
+}
+
+bool FrontendCore::GrowBack(std::vector<FrontendEvent>* events) {
+  if (!options_.keyframes_at_end || localize_only_) return false;
+  grows_back_ = true;
+  if (unplaced_.empty() || map_.keyframes().empty()) {
+    std::swap(unplaced_, not_placed_);  // they are tried again in the adjusted map
+    grows_back_ = false;
+    return false;
+  }
+  frame_ = TakeNewestUnplaced();
+  const TrackingReport report = LocalizeLater(&frame_);
+  if (report.ok && map_.FindKeyframe(tracker_.reference()) != nullptr) {
+    KeepPlacedLater(report, events);
+  } else {
+    not_placed_.emplace_front(frame_);
+  }
+  return true;
+}
+
+/// Its last pose comes with those of the frames that were tracked.
+void FrontendCore::KeepPlacedLater(const TrackingReport& report, std::vector<FrontendEvent>* events) {
+  ++counters_.localized_later;
+  last_placed_ = *Place(frame_.T_cam_world, tracker_.reference());
+  map_id_ = map_.FindKeyframe(last_placed_.reference)->map_id;
+  const bool keyframe = WantsKeyframe(report);
+  if (++frames_since_evidence_ >= options_.evidence_every_frames || keyframe) FlushEvidence(events);
+  if (keyframe) ProposeKeyframe(events);
+  refiner_.Keep(frame_, MakePose(TrackingState::kLocalizedLater, report));
+  near_.MoveTo(frame_);
 }
 
 /// Of a frame that was placed in the map. To be smoothed: by what it sees alone, without what was expected of
@@ -497,19 +549,23 @@ FinalPose FrontendCore::LaterPose(const TrackedFrame& frame) const {
 }
 
 /// From the newest back: the map lies after them.
-void FrontendCore::LocalizeNextUnplaced() {
-  TrackedFrame frame = std::move(unplaced_.back());
+TrackedFrame FrontendCore::TakeNewestUnplaced() {
+  TrackedFrame frame = std::move(unplaced_.back()).ToTracked(camera_, pyramid_);
   unplaced_.pop_back();
   if (!near_.next || near_.next->index - frame.index > kNearFrames) {
-    near_ = {};
+    near_.next.reset();
     const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, frame.index));
     if (next != map_.keyframes().end()) near_.next = FrameOfKeyframe(next->second);
   }
-  if (!LocalizeLater(&frame, near_) || map_.FindKeyframe(tracker_.reference()) == nullptr) return;
+  return frame;
+}
+
+void FrontendCore::LocalizeNextUnplaced() {
+  TrackedFrame frame = TakeNewestUnplaced();
+  if (!LocalizeLater(&frame).ok || map_.FindKeyframe(tracker_.reference()) == nullptr) return;
   ++counters_.localized_later;
   final_poses_.Add(map_, LaterPose(frame));
-  near_.after = std::move(near_.next);
-  near_.next = std::move(frame);
+  near_.MoveTo(std::move(frame));
 }
 
 bool FrontendCore::WorkAtEnd() {

@@ -90,6 +90,11 @@ class FrontendCore {
                     std::vector<FrontendEvent>* events);
   void ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features,
                        std::vector<FrontendEvent>* events);
+  /// When the sequence has ended, before the mapper adjusts its maps: places one of the frames that had no
+  /// pose when they came, the newest first, and proposes it as a keyframe where it shows more of the scene
+  /// than the map has. So the map grows back to before its first keyframe. Not while a keyframe is awaited.
+  /// False: nothing is left to do.
+  bool GrowBack(std::vector<FrontendEvent>* events);
   /// At the end of the sequence, when no frame waits to be refined: does a part of what is left to do, which
   /// is to place frames that had no pose when they came and to join the poses with the camera's motion.
   /// False: all is done.
@@ -110,15 +115,19 @@ class FrontendCore {
   double extract_ms() const { return extract_ms_; }
 
  private:
-  /// The placed frames that follow one to be placed: the next, and the one after it.
+  /// The placed frame that follows one to be placed, and the motion from there to the one after it.
   struct LaterNeighbours {
-    std::optional<TrackedFrame> next, after;
+    std::optional<TrackedFrame> next;
+    std::optional<Rigid3d> T_moving_after;  ///< camera of frame `moving` from that of its successor
+    uint32_t moving = 0;
 
     /// By constant velocity backwards, where the three frames are consecutive.
     std::optional<Rigid3d> Predict(uint32_t index) const;
     /// A hand-held camera can have come from the frame's pose to that of `next`; `depth` of the scene [map
     /// units].
     bool Plausible(const TrackedFrame& frame, double depth) const;
+    /// The frame was placed before `next` was forgotten or replaced: it is the next one now.
+    void MoveTo(TrackedFrame frame);
   };
   struct Placed {
     KeyframeId reference;
@@ -142,10 +151,13 @@ class FrontendCore {
   std::optional<Placed> Place(const Rigid3d& T_cam_world, KeyframeId reference) const;
   FramePose MakePose(TrackingState state, const TrackingReport& report) const;
   TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
-  bool LocalizeLater(TrackedFrame* frame, const LaterNeighbours& near);
+  TrackingReport LocalizeLater(TrackedFrame* frame);
+  TrackingReport TrackBackwards(TrackedFrame* frame);
+  void KeepPlacedLater(const TrackingReport& report, std::vector<FrontendEvent>* events);
+  TrackedFrame TakeNewestUnplaced();
   void LocalizeNextUnplaced();
   FinalPose LaterPose(const TrackedFrame& frame) const;
-  void KeepUnplaced(TrackedFrame frame);
+  void KeepUnplaced(const TrackedFrame& frame);
   void NextMapId();
   void Coast();
   void BeginTrial(const Keyframe& second);
@@ -198,7 +210,9 @@ class FrontendCore {
   KeyframeId last_keyframe_;
   int64_t last_keyframe_ns_ = 0;
   KeyframeId awaited_;
-  std::deque<TrackedFrame> unplaced_;
+  std::deque<WaitingFrame> unplaced_;
+  std::deque<WaitingFrame> not_placed_;  ///< of them, those that were looked at and not found
+  bool grows_back_ = false;
   LaterNeighbours near_;             ///< of the unplaced frame that was looked at last
   std::deque<TrackedFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
   double extract_ms_ = 0;

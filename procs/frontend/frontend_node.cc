@@ -194,6 +194,7 @@ bool FrontendNode::WorkOnce() {
   if (waiting_ && !FallsBehind()) return ProcessWaiting();
   if (core_->IsBehind()) return CatchUp();
   if (!end_) return false;
+  if (!asked_to_adjust_ && GrowBack()) return false;
   if (!MapsAreAdjusted()) return false;
   if (!std::exchange(rest_begun_, true)) core_->RefineRest();
   if (core_->IsRefining()) return true;
@@ -222,6 +223,17 @@ bool FrontendNode::CatchUp() {
   PublishEvents(events);
   endpoint_.Advance();
   return true;
+}
+
+/// One frame in a turn, and one keyframe at a time. True: there is more to do.
+bool FrontendNode::GrowBack() {
+  if (!options_.HasPeer("mapper")) return false;
+  if (grows_back_ && core_->awaited().valid()) return true;
+  std::vector<FrontendEvent> events;
+  grows_back_ = core_->GrowBack(&events);
+  PublishEvents(events);
+  endpoint_.Advance();
+  return grows_back_;
 }
 
 /// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.
@@ -397,7 +409,7 @@ void FrontendNode::PublishStatus() {
 }
 
 bool FrontendNode::HoldsBackForStatus() const {
-  return core_ != nullptr && (HoldsBack() || AwaitsSavedMap());
+  return core_ != nullptr && (HoldsBack() || AwaitsSavedMap() || (grows_back_ && core_->awaited().valid()));
 }
 
 void FrontendNode::FillCoreStatus(FrontendStatus* status) const {

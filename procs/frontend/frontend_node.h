@@ -32,6 +32,7 @@ class FrontendNode : public StreamNode {
   bool WorkOnce() override;
   int64_t WorkDeadline() const override {
     if (core_ && core_->IsRefining()) return 0;
+    if (grows_back_ && !core_->awaited().valid()) return 0;
     if (rest_begun_ && !last_events_ && !stopping_ && !AwaitsSavedMap()) return 0;
     return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX;
   }
@@ -69,6 +70,7 @@ class FrontendNode : public StreamNode {
   void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);
   void FinishFrame();
   void DrawPicture();
+  bool GrowBack();
   bool MapsAreAdjusted();
   static bool IsAnswerToAll(const MapDelta& delta);
   bool WorkAtEnd();
@@ -86,6 +88,7 @@ class FrontendNode : public StreamNode {
   std::optional<Waiting> waiting_;
   std::optional<EndOfSequence> end_;
   bool lockstep_ = false;
+  bool grows_back_ = false;  ///< the map, to before its first keyframe
   bool asked_to_adjust_ = false;
   int64_t asked_ns_ = 0;   ///< a mapper that died before it answered is asked again
   bool adjusted_ = false;  ///< all maps, after the last keyframe

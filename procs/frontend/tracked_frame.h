@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "dmslam/map/keyframe.h"
@@ -36,6 +37,19 @@ struct TrackedFrame {
   void ClearMatches() {
     landmarks.assign(features->size(), LandmarkId{});
     classes.assign(features->size(), FeatureClass::kNone);
+  }
+};
+
+/// A frame that waits for a pose: features alone, as many wait for long.
+struct WaitingFrame {
+  uint32_t index = 0;
+  int64_t stamp_ns = 0;
+  FeatureSet features;
+
+  explicit WaitingFrame(const TrackedFrame& frame)
+      : index(frame.index), stamp_ns(frame.stamp_ns), features(frame.features->set) {}
+  TrackedFrame ToTracked(const Camera& camera, const Pyramid& pyramid) && {
+    return {index, stamp_ns, MakeFrameFeatures(std::move(features), camera, pyramid)};
   }
 };
 

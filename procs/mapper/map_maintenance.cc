@@ -6,31 +6,11 @@ namespace dmslam {
 namespace {
 
 constexpr uint32_t kEvidenceWindow = 20;  // frames
+constexpr size_t kRememberedOrder = 64;   // keyframes
 
-/// How many keyframes were inserted after `id`, up to `most`; culled ones count.
-int KeyframesSince(const Map& map, KeyframeId id, int most) {
-  int count = 0;
-  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && it->first > id && count < most;
-       ++it)
-    ++count;
-  const auto& tombstones = map.keyframe_tombstones();
-  for (auto it = tombstones.rbegin(); it != tombstones.rend() && it->first > id && count < most; ++it)
-    ++count;
-  return count;
-}
-
-/// The keyframes inserted last, as far back as probation reaches.
-std::vector<KeyframeId> YoungestKeyframes(const Map& map, MapId map_id, int most) {
-  std::vector<KeyframeId> ids;
-  for (auto it = map.keyframes().rbegin();
-       it != map.keyframes().rend() && static_cast<int>(ids.size()) < most; ++it) {
-    if (it->second.map_id == map_id) ids.push_back(it->first);
-  }
-  return ids;
-}
-
-bool FailsProbation(const Map& map, const Landmark& landmark, const MapperOptions& options) {
-  const int age = KeyframesSince(map, landmark.first_keyframe, options.probation_keyframes);
+bool FailsProbation(const Map& map, const Landmark& landmark, const InsertionOrder& order,
+                    const MapperOptions& options) {
+  const int age = order.CountSince(map, landmark.first_keyframe, options.probation_keyframes);
   if (age >= options.probation_keyframes) return false;
   const LandmarkEvidence& evidence = landmark.evidence;
   if (evidence.visible > 0 && evidence.found < options.min_found_ratio * evidence.visible) return true;
@@ -80,10 +60,41 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
 
 }  // namespace
 
-int CullYoungLandmarks(Map& map, MapId map_id, const MapperOptions& options) {
+void InsertionOrder::Add(KeyframeId id) {
+  ids_.push_back(id);
+  if (ids_.size() > kRememberedOrder) ids_.pop_front();
+}
+
+void InsertionOrder::Assume(const Map& map) {
+  std::vector<KeyframeId> ids;
+  for (const auto& [id, keyframe] : map.keyframes()) ids.push_back(id);
+  for (const auto& [id, tombstone] : map.keyframe_tombstones()) ids.push_back(id);
+  std::sort(ids.begin(), ids.end());
+  ids_.assign(ids.end() - static_cast<std::ptrdiff_t>(std::min(ids.size(), kRememberedOrder)), ids.end());
+}
+
+int InsertionOrder::CountSince(const Map& map, KeyframeId id, int most) const {
+  int count = 0;
+  for (auto it = ids_.rbegin(); it != ids_.rend() && *it != id && count < most; ++it) {
+    const bool dropped = map.FindKeyframe(*it) == nullptr && !map.keyframe_tombstones().contains(*it);
+    if (!dropped) ++count;
+  }
+  return count;
+}
+
+std::vector<KeyframeId> InsertionOrder::Newest(const Map& map, MapId map_id, int most) const {
+  std::vector<KeyframeId> newest;
+  for (auto it = ids_.rbegin(); it != ids_.rend() && static_cast<int>(newest.size()) < most; ++it) {
+    const Keyframe* keyframe = map.FindKeyframe(*it);
+    if (keyframe != nullptr && keyframe->map_id == map_id) newest.push_back(*it);
+  }
+  return newest;
+}
+
+int CullYoungLandmarks(Map& map, MapId map_id, const InsertionOrder& order, const MapperOptions& options) {
   // A landmark on probation is seen by one of the keyframes around its making.
   std::vector<LandmarkId> candidates;
-  for (const KeyframeId id : YoungestKeyframes(map, map_id, 2 * options.probation_keyframes + 2)) {
+  for (const KeyframeId id : order.Newest(map, map_id, 2 * options.probation_keyframes + 2)) {
     for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
       if (landmark.valid()) candidates.push_back(landmark);
     }
@@ -92,7 +103,7 @@ int CullYoungLandmarks(Map& map, MapId map_id, const MapperOptions& options) {
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
   int culled = 0;
   for (const LandmarkId id : candidates) {
-    if (!FailsProbation(map, *map.FindLandmark(id), options)) continue;
+    if (!FailsProbation(map, *map.FindLandmark(id), order, options)) continue;
     map.RemoveLandmark(id);
     ++culled;
   }
@@ -114,6 +125,23 @@ int CullRedundantKeyframes(Map& map, KeyframeId id, KeyframeId keep, const Mappe
     }
   }
   return culled;
+}
+
+int RemoveTooNear(Map& map, MapId map_id, double share) {
+  std::vector<LandmarkId> near;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    const std::optional<double> depth = keyframe.map_id == map_id ? map.MedianDepth(keyframe) : std::nullopt;
+    if (!depth) continue;
+    for (const LandmarkId landmark : keyframe.landmarks) {
+      if (!landmark.valid()) continue;
+      const double z = (keyframe.T_cam_world * map.FindLandmark(landmark)->p_world).z();
+      if (z < share * *depth) near.push_back(landmark);
+    }
+  }
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  for (const LandmarkId id : near) map.RemoveLandmark(id);
+  return static_cast<int>(near.size());
 }
 
 EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const MotionBeliefOptions& options) {

@@ -44,7 +44,8 @@ void MapperCore::Continue(Map map) {
   map_ = std::move(map);
   epoch_ordinal_ = static_cast<uint16_t>(std::max<int>(map_.HighestOrdinal(), epoch_ordinal_) + 1);
   next_landmark_ = 1;
-  maybe_unfinished_ = map_.keyframes().empty() ? KeyframeId{} : map_.keyframes().rbegin()->first;
+  order_.Assume(map_);
+  maybe_unfinished_ = true;
 }
 
 void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id,
@@ -99,6 +100,8 @@ bool MapperCore::BuildInitialMap(const InitialMap& proposal) {
   Keyframe other = MakeKeyframe(proposal.second, proposal.second.T_cam_reference);
   other.parent = first;
   map_.AddKeyframe(std::move(other));
+  order_.Add(first);
+  order_.Add(second);
   for (const InitialMap::Point& point : proposal.points) {
     const bool known = point.feature_first < map_.FindKeyframe(first)->landmarks.size() &&
                        point.feature_second < map_.FindKeyframe(second)->landmarks.size();
@@ -133,8 +136,7 @@ void MapperCore::ScaleToUnitDepth(MapId map_id, KeyframeId first) {
 
 bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   adjusted_ = false;
-  const bool again =
-      proposal.id == std::exchange(maybe_unfinished_, {}) && map_.FindKeyframe(proposal.id) != nullptr;
+  const bool again = std::exchange(maybe_unfinished_, false) && map_.FindKeyframe(proposal.id) != nullptr;
   if (!again) {
     if (!Insert(proposal)) return false;
     Publish(MapEvent::kKeyframeInserted, proposal.id, proposal.map_id);
@@ -147,7 +149,7 @@ bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
 void MapperCore::MapAround(const KeyframeProposal& proposal) {
   const KeyframeId id = proposal.id;
   const MapId map_id = proposal.map_id;
-  counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, options_));
+  counters_.landmarks_culled += static_cast<uint64_t>(CullYoungLandmarks(map_, map_id, order_, options_));
   CreateLandmarks(id, proposal.moving);
   if (options_.seen_through.enabled) {
     counters_.landmarks_seen_through +=
@@ -198,6 +200,7 @@ bool MapperCore::Insert(const KeyframeProposal& proposal) {
   keyframe.scale = reference->scale;
   keyframe.parent = *parent;
   map_.AddKeyframe(std::move(keyframe));
+  order_.Add(proposal.id);
   ++counters_.keyframes_inserted;
   AddMatches(proposal);
   ChooseParent(proposal.id, *parent);
@@ -270,6 +273,8 @@ void MapperCore::AdjustMaps() {
   std::set<MapId> maps;
   for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
+    counters_.landmarks_culled +=
+        static_cast<uint64_t>(RemoveTooNear(map_, map_id, options_.creation.min_depth));
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;

@@ -9,6 +9,7 @@
 #include "dmslam/map/proposals.h"
 #include "mapper/landmark_creation.h"
 #include "mapper/local_adjustment.h"
+#include "mapper/map_maintenance.h"
 #include "mapper/mapper_options.h"
 
 namespace dmslam {
@@ -48,8 +49,8 @@ class MapperCore {
   void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
 
   /// Continues a map that others kept (after a restart) or that was saved: new landmarks get ids of an
-  /// ordinal that the map does not know, and the newest keyframe's local mapping is done again when it is
-  /// proposed again.
+  /// ordinal that the map does not know, and the local mapping of the keyframe that is proposed first is done
+  /// again where the map has it: what was done of it is not known.
   void Continue(Map map);
   /// What of the streams is worked into the map; travels with the next deltas.
   void SetProgress(const MapProgress& progress) { map_.SetProgress(progress); }
@@ -66,6 +67,8 @@ class MapperCore {
   /// correction was applied since its base (two loop closers, one after the other, may have found the same
   /// loop), or its base is not a version of this map.
   void OnLoopAnswer(const LoopAnswer& answer);
+  /// Says once more that keyframe `id` is mapped, for a loop closer that has not heard it.
+  void AskAgain(KeyframeId id, MapId map_id) { Publish(MapEvent::kMapped, id, map_id); }
   /// Says that all work that keyframe `id` caused is done.
   void Settle(KeyframeId id, MapId map_id);
   /// Says that the sequence has ended and that all it caused is done; first adjusts all maps, unless it
@@ -109,9 +112,10 @@ class MapperCore {
   Map map_;
   uint16_t epoch_ordinal_;
   uint64_t next_landmark_ = 1;
-  bool adjusted_ = false;        ///< as a whole, since the last keyframe
-  KeyframeId maybe_unfinished_;  ///< newest of a map that is continued: its mapper may have ended in the
-                                 ///< middle of it
+  bool adjusted_ = false;  ///< as a whole, since the last keyframe
+  InsertionOrder order_;
+  bool maybe_unfinished_ = false;  ///< the map is continued: its mapper may have ended in the middle of the
+                                   ///< keyframe that comes first
   Sink sink_;
   std::function<bool()> interrupt_;
   MapperCounters counters_;

@@ -267,6 +267,7 @@ void MapperNode::AfterKeyframe(KeyframeId id, MapId map_id, bool checked_by_loop
   awaited_ = id;
   awaited_map_ = map_id;
   awaited_version_ = current_;
+  asked_term_ = loop_reader_->term();
 }
 
 void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend) {
@@ -285,6 +286,11 @@ void MapperNode::SettleAwaited() {
     Settle(std::exchange(awaited_, {}), awaited_map_, awaited_version_);
     pending_.push_back({awaited_version_, writer_->last_seq()});
   }
+  // Another loop closer than the one that was asked does not know what is due.
+  const bool another = asked_term_.valid() && loop_reader_->term() != asked_term_;
+  if (!awaited_.valid() || !another) return;
+  asked_term_ = loop_reader_->term();
+  core_->AskAgain(awaited_, awaited_map_);
 }
 
 void MapperNode::AcceptWhatIsSafe() {

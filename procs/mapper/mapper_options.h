@@ -16,6 +16,7 @@ struct LandmarkCreationOptions {
   double confirmed_span_s = 1.0;  ///< ...over so much time is not subject to Algorithm 1; 0 views: all are
   int neighbours = 20;            ///< covisible keyframes that are matched with the new one
   double min_baseline_over_depth = 0.01;
+  double min_depth = 0.05;  ///< nearer to a camera than this share of what it sees in the median: a mismatch
   int max_descriptor_distance = 50;  ///< bits
   double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line; 1 = not asked
   double epipolar_sigmas_squared = 3.84;

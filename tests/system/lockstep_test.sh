@@ -28,6 +28,13 @@ for other in small one; do
     check "$file of '$other' has the same bytes" cmp "$work/first/$file" "$work/$other/$file"
   done
 done
+# What was seen before there was a map is mapped when the sequence has ended.
+check "without keyframes at the end it ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]}" \
+  --set keyframe.at_end=off --out "$work/without"
+first_keyframe() { grep -v '^#' "$work/$1/keyframes.txt" | head -n 1 | cut -d ' ' -f 1; }
+check "the map grows back to before its first keyframe" awk -v with="$(first_keyframe one)" \
+  -v without="$(first_keyframe without)" 'BEGIN { exit !(with > 0 && with < without) }'
+check "and what was tracked stays as it was" cmp "$work/one/trajectory_online.txt" "$work/without/trajectory_online.txt"
 check "another seed ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]:0:4}" --seed 4 --out "$work/other"
 expect "the summary names the seed" "$work/other" seed "== 4"
 finish

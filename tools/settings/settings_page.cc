@@ -22,7 +22,8 @@ constexpr const char* kHead =
     "settings go to every process; a process whose settings differ from the session's is told so by name.\n"
     "`profile=baseline` is the same system with a plain RANSAC two-view start, without mutual exclusion of "
     "new\n"
-    "landmarks, without motion belief and without `tracking.smooth_at_end`.\n";
+    "landmarks, without motion belief, with `mapping.min_depth=0`, and without `tracking.smooth_at_end` and\n"
+    "`keyframe.at_end`.\n";
 
 std::string SectionOf(const std::string& key) {
   const size_t dot = key.find('.');
