@@ -290,6 +290,8 @@ std::vector<Entry> AllEntries() {
   return entries;
 }
 
+constexpr int kKeptByBaseline = 300;  // frames without a pose
+
 void ApplyProfile(std::string_view name, Settings* settings) {
   if (name != "dm" && name != "baseline") {
     throw InputError("setting 'profile': '" + std::string(name) + "' is not 'dm' or 'baseline'");
@@ -302,6 +304,7 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   settings->frontend.tracking.motion_belief = dm;
   settings->frontend.smooth_at_end = dm;
   settings->frontend.keyframes_at_end = dm;
+  settings->frontend.max_kept_frames = dm ? FrontendOptions().max_kept_frames : kKeptByBaseline;
   settings->frontend.initializer_method = dm ? "dlrsac" : "ransac";
 }
 

@@ -18,6 +18,8 @@ constexpr int kLostAfterFrames = 10;
 constexpr uint32_t kNearFrames = 10;        // a placed frame so near bounds where a frame may be
 constexpr double kMaxShiftPerFrame = 0.05;  // share of the scene's depth
 constexpr double kMaxTurnPerFrame_rad = 0.1;
+constexpr int kWellSeen = 100;      // static features of a frame that becomes a keyframe at the end...
+constexpr int kWellSeenCells = 12;  // ...and the cells of an 8 x 6 grid that hold them
 
 int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * static_cast<double>(kNsPerSecond)); }
 
@@ -72,8 +74,8 @@ FirstMapSearch FrontendCore::MakeSearch() const {
 
 void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   while (IsRefining()) RefineNext();
-  near_.next.reset();  // may lie elsewhere now
   map_.Apply(delta);
+  PlaceNeighbourAgain();
   relocalizer_.Update(map_);
   const KeyframeId settled = delta.progress.settled;
   if (grows_back_ ? settled == awaited_ : settled >= awaited_) awaited_ = {};
@@ -81,6 +83,18 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   if (!at_the_end) return;
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
   refiner_.Begin(map_, delta.map_id);
+}
+
+/// The frame placed last, while the map grows back, may lie elsewhere now; where it became a keyframe that
+/// knows more. Any other is forgotten.
+void FrontendCore::PlaceNeighbourAgain() {
+  if (!near_.next) return;
+  const bool is_last = grows_back_ && near_.next->index == near_.moving;
+  const bool is_keyframe = map_.FindKeyframe(KeyframeId::Make(session_, near_.next->index)) != nullptr;
+  const std::optional<Rigid3d> T_cam_world =
+      is_last && !is_keyframe ? PoseOf(last_placed_) : std::optional<Rigid3d>();
+  if (T_cam_world) near_.next->T_cam_world = *T_cam_world;
+  if (!T_cam_world) near_.next.reset();
 }
 
 void FrontendCore::RefineRest() { refiner_.Begin(map_); }
@@ -143,13 +157,13 @@ void FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, Featu
 
 // ---- Initialisation ----
 
-void FrontendCore::KeepUnplaced(const TrackedFrame& frame) {
-  unplaced_.emplace_back(frame);
+void FrontendCore::KeepUnplaced(WaitingFrame frame) {
+  unplaced_.push_back(std::move(frame));
   if (static_cast<int>(unplaced_.size()) > options_.max_kept_frames) unplaced_.pop_front();
 }
 
 void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
-  KeepUnplaced(frame_);
+  KeepUnplaced(WaitingFrame(frame_));
   const InitializerReport report = initializer_({frame_.index, frame_.stamp_ns, frame_.features});
   TrackingReport status;
   status.reason = report.reason.c_str();
@@ -170,7 +184,7 @@ void FrontendCore::Initialize(std::vector<FrontendEvent>* events) {
 void FrontendCore::AwaitMap(std::vector<FrontendEvent>* events) {
   const Keyframe* second = map_.FindKeyframe(initial_second_);
   if (second == nullptr) {
-    KeepUnplaced(frame_);
+    KeepUnplaced(WaitingFrame(frame_));
     if (!awaited_.valid()) {  // settled without it: the mapper refused the proposal
       GiveUpMap(true, "the mapper refused the first map", events);
     }
@@ -203,25 +217,22 @@ void FrontendCore::BeginTrial(const Keyframe& second) {
   const uint32_t since = second.id.frame_index();
   const auto first = std::find_if(unplaced_.begin(), unplaced_.end(),
                                   [since](const WaitingFrame& frame) { return frame.index >= since; });
-  behind_.clear();
-  for (auto it = first; it != unplaced_.end(); ++it) {
-    behind_.push_back(std::move(*it).ToTracked(camera_, pyramid_));
-  }
+  behind_.assign(std::make_move_iterator(first), std::make_move_iterator(unplaced_.end()));
   unplaced_.erase(first, unplaced_.end());
 }
 
 void FrontendCore::AwaitTurn(std::vector<FrontendEvent>* events) {
-  behind_.push_back(frame_);
+  behind_.emplace_back(frame_);
   TrackingReport status;
   status.reason = "frames that waited for the first map come first";
   events->push_back(MakePose(TrackingState::kWaitingForMap, status));
 }
 
 void FrontendCore::CatchUp(std::vector<FrontendEvent>* events) {
-  frame_ = std::move(behind_.front());
+  frame_ = std::move(behind_.front()).ToTracked(camera_, pyramid_);
   behind_.pop_front();
   if (map_.keyframes().empty()) {
-    KeepUnplaced(frame_);
+    KeepUnplaced(WaitingFrame(frame_));
     GiveUpMap(true, "the mapper began with an empty map", events);
   } else {
     Track(events);
@@ -345,7 +356,7 @@ void FrontendCore::Coast() {
 }
 
 void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<FrontendEvent>* events) {
-  KeepUnplaced(frame_);
+  KeepUnplaced(WaitingFrame(frame_));
   if (weak_pose_) Coast();
   if (state_ == TrackingState::kTrial) {
     GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason, events);
@@ -366,7 +377,7 @@ void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<F
   ++counters_.resets;
   if (map_id_ != 0) events->push_back(MapReset{map_id_, drop, reason});
   NextMapId();
-  for (const TrackedFrame& frame : std::exchange(behind_, {})) KeepUnplaced(frame);
+  for (WaitingFrame& frame : std::exchange(behind_, {})) KeepUnplaced(std::move(frame));
   tracker_.Reset();
   velocity_.reset();
   coasting_.reset();
@@ -409,7 +420,8 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report) {
   if (localize_only_ || reference == nullptr || report.num_static <= o.min_inliers) return false;
   const int min_observations = map_.keyframes().size() <= 2 ? 2 : 3;
   const int expected = map_.CountTracked(*reference, min_observations);
-  const int64_t since_ns = std::abs(frame_.stamp_ns - last_keyframe_ns_);
+  const int64_t since_ns =
+      grows_back_ ? std::abs(frame_.stamp_ns - last_keyframe_ns_) : frame_.stamp_ns - last_keyframe_ns_;
   const bool weak = report.num_static < 0.5 * expected || report.num_static < 60;
   const bool behind = report.num_static < o.tracked_ratio * expected;
   const bool due = since_ns >= ToNs(o.max_interval_s) || since_ns >= ToNs(o.min_interval_s) || weak;
@@ -453,10 +465,8 @@ void FrontendCore::FlushEvidence(std::vector<FrontendEvent>* events) {
 // ---- After the end ----
 
 /// From the placed frame after it, and its motion.
-TrackingReport FrontendCore::TrackBackwards(TrackedFrame* frame) {
+TrackingReport FrontendCore::TrackBackwards(double depth, TrackedFrame* frame) {
   if (!near_.next) return {};
-  const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
-  const double depth = reference != nullptr ? map_.MedianDepth(*reference).value_or(1.0) : 1.0;
   const std::optional<Rigid3d> predicted = near_.Predict(frame->index);
   tracker_.SetMotionPrior(predicted, depth);
   const Rigid3d guess = predicted.value_or(near_.next->T_cam_world);
@@ -467,10 +477,11 @@ TrackingReport FrontendCore::TrackBackwards(TrackedFrame* frame) {
 }
 
 TrackingReport FrontendCore::LocalizeLater(TrackedFrame* frame) {
-  TrackingReport report = TrackBackwards(frame);
-  if (report.ok) return report;
   const Keyframe* reference = map_.FindKeyframe(tracker_.reference());
   const double depth = reference != nullptr ? map_.MedianDepth(*reference).value_or(1.0) : 1.0;
+  TrackingReport report = TrackBackwards(depth, frame);
+  if (report.ok) return report;
+  tracker_.DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   tracker_.SetMotionPrior(std::nullopt, 1.0);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
@@ -502,10 +513,10 @@ bool FrontendCore::LaterNeighbours::Plausible(const TrackedFrame& frame, double 
 
 bool FrontendCore::GrowBack(std::vector<FrontendEvent>* events) {
   if (!options_.keyframes_at_end || localize_only_) return false;
-  grows_back_ = true;
-  if (unplaced_.empty() || map_.keyframes().empty()) {
-    std::swap(unplaced_, not_placed_);  // they are tried again in the adjusted map
-    grows_back_ = false;
+  grows_back_ = !unplaced_.empty() && !map_.keyframes().empty();
+  if (!grows_back_) {
+    for (WaitingFrame& frame : not_placed_) unplaced_.push_back(std::move(frame));
+    not_placed_.clear();  // they are tried again in the adjusted map
     return false;
   }
   frame_ = TakeNewestUnplaced();
@@ -513,6 +524,7 @@ bool FrontendCore::GrowBack(std::vector<FrontendEvent>* events) {
   if (report.ok && map_.FindKeyframe(tracker_.reference()) != nullptr) {
     KeepPlacedLater(report, events);
   } else {
+    tracker_.DropEvidence();
     not_placed_.emplace_front(frame_);
   }
   return true;
@@ -523,7 +535,10 @@ void FrontendCore::KeepPlacedLater(const TrackingReport& report, std::vector<Fro
   ++counters_.localized_later;
   last_placed_ = *Place(frame_.T_cam_world, tracker_.reference());
   map_id_ = map_.FindKeyframe(last_placed_.reference)->map_id;
-  const bool keyframe = WantsKeyframe(report);
+  // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
+  const bool well_seen = report.num_static >= kWellSeen && report.cells >= kWellSeenCells;
+  const bool known = map_.ResolveKeyframe(KeyframeId::Make(session_, frame_.index)).has_value();
+  const bool keyframe = well_seen && !known && WantsKeyframe(report);
   if (++frames_since_evidence_ >= options_.evidence_every_frames || keyframe) FlushEvidence(events);
   if (keyframe) ProposeKeyframe(events);
   refiner_.Keep(frame_, MakePose(TrackingState::kLocalizedLater, report));
@@ -554,7 +569,8 @@ TrackedFrame FrontendCore::TakeNewestUnplaced() {
   unplaced_.pop_back();
   if (!near_.next || near_.next->index - frame.index > kNearFrames) {
     near_.next.reset();
-    const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, frame.index));
+    const uint32_t after = grows_back_ ? frame.index + 1 : frame.index;
+    const auto next = map_.keyframes().lower_bound(KeyframeId::Make(session_, after));
     if (next != map_.keyframes().end()) near_.next = FrameOfKeyframe(next->second);
   }
   return frame;

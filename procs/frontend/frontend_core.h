@@ -126,7 +126,8 @@ class FrontendCore {
     /// A hand-held camera can have come from the frame's pose to that of `next`; `depth` of the scene [map
     /// units].
     bool Plausible(const TrackedFrame& frame, double depth) const;
-    /// The frame was placed before `next` was forgotten or replaced: it is the next one now.
+    /// The frame was placed: it is the next one now, and the motion from it is kept where they are
+    /// consecutive.
     void MoveTo(TrackedFrame frame);
   };
   struct Placed {
@@ -152,12 +153,13 @@ class FrontendCore {
   FramePose MakePose(TrackingState state, const TrackingReport& report) const;
   TrackedFrame FrameOfKeyframe(const Keyframe& keyframe) const;
   TrackingReport LocalizeLater(TrackedFrame* frame);
-  TrackingReport TrackBackwards(TrackedFrame* frame);
+  TrackingReport TrackBackwards(double depth, TrackedFrame* frame);
   void KeepPlacedLater(const TrackingReport& report, std::vector<FrontendEvent>* events);
   TrackedFrame TakeNewestUnplaced();
   void LocalizeNextUnplaced();
   FinalPose LaterPose(const TrackedFrame& frame) const;
-  void KeepUnplaced(const TrackedFrame& frame);
+  void KeepUnplaced(WaitingFrame frame);
+  void PlaceNeighbourAgain();
   void NextMapId();
   void Coast();
   void BeginTrial(const Keyframe& second);
@@ -214,7 +216,7 @@ class FrontendCore {
   std::deque<WaitingFrame> not_placed_;  ///< of them, those that were looked at and not found
   bool grows_back_ = false;
   LaterNeighbours near_;             ///< of the unplaced frame that was looked at last
-  std::deque<TrackedFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
+  std::deque<WaitingFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
   double extract_ms_ = 0;
   FrontendCounters counters_;
 };

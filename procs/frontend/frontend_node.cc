@@ -228,7 +228,8 @@ bool FrontendNode::CatchUp() {
 /// One frame in a turn, and one keyframe at a time. True: there is more to do.
 bool FrontendNode::GrowBack() {
   if (!options_.HasPeer("mapper")) return false;
-  if (grows_back_ && core_->awaited().valid()) return true;
+  if (grows_back_ && core_->awaited().valid() && !core_->map().keyframes().empty()) return true;
+  core_->SetWithheld(false);  // one at a time, the mapper has time for it
   std::vector<FrontendEvent> events;
   grows_back_ = core_->GrowBack(&events);
   PublishEvents(events);

@@ -32,7 +32,7 @@ class FrontendNode : public StreamNode {
   bool WorkOnce() override;
   int64_t WorkDeadline() const override {
     if (core_ && core_->IsRefining()) return 0;
-    if (grows_back_ && !core_->awaited().valid()) return 0;
+    if (grows_back_ && !core_->awaited().valid() && !stopping_ && !AwaitsSavedMap()) return 0;
     if (rest_begun_ && !last_events_ && !stopping_ && !AwaitsSavedMap()) return 0;
     return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX;
   }

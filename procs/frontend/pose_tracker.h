@@ -52,6 +52,7 @@ class PoseTracker {
   KeyframeId reference() const { return reference_; }
   /// What frames said since the last call, and forgets it.
   FrameEvidence TakeEvidence(int64_t stamp_ns, MapId map_id);
+  void DropEvidence() { evidence_.clear(); }
   /// Forgets what belongs to a map that is gone.
   void Reset();
 

@@ -5,8 +5,8 @@
 namespace dmslam {
 namespace {
 
-constexpr uint32_t kEvidenceWindow = 20;  // frames
-constexpr size_t kRememberedOrder = 64;   // keyframes
+constexpr uint32_t kEvidenceWindow = 20;   // frames
+constexpr size_t kRememberedOrder = 1024;  // keyframes
 
 bool FailsProbation(const Map& map, const Landmark& landmark, const InsertionOrder& order,
                     const MapperOptions& options) {
@@ -49,7 +49,7 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
   state.visible += item.visible;
   state.found += item.found;
   state.moved += item.moved;
-  if (item.moved > 0) state.last_moved_ns = stamp_ns;
+  if (item.moved > 0) state.last_moved_ns = std::max(state.last_moved_ns, stamp_ns);
   if (options.enabled) {
     const float change = options.moved_step * static_cast<float>(item.moved) -
                          options.found_step * static_cast<float>(item.found);
@@ -70,6 +70,8 @@ void InsertionOrder::Assume(const Map& map) {
   for (const auto& [id, keyframe] : map.keyframes()) ids.push_back(id);
   for (const auto& [id, tombstone] : map.keyframe_tombstones()) ids.push_back(id);
   std::sort(ids.begin(), ids.end());
+  const auto settled = std::find(ids.begin(), ids.end(), map.progress().settled);
+  if (settled != ids.end()) std::rotate(settled, settled + 1, ids.end());
   ids_.assign(ids.end() - static_cast<std::ptrdiff_t>(std::min(ids.size(), kRememberedOrder)), ids.end());
 }
 
@@ -128,6 +130,7 @@ int CullRedundantKeyframes(Map& map, KeyframeId id, KeyframeId keep, const Mappe
 }
 
 int RemoveTooNear(Map& map, MapId map_id, double share) {
+  if (share <= 0) return 0;
   std::vector<LandmarkId> near;
   for (const auto& [id, keyframe] : map.keyframes()) {
     const std::optional<double> depth = keyframe.map_id == map_id ? map.MedianDepth(keyframe) : std::nullopt;

@@ -12,7 +12,7 @@ namespace dmslam {
 class InsertionOrder {
  public:
   void Add(KeyframeId id);
-  /// Of a map that others made: by stamp, as nothing better is known.
+  /// Of a map that others made: by stamp, as nothing better is known than which keyframe was settled last.
   void Assume(const Map& map);
   /// How many keyframes were inserted after `id`, up to `most`; culled ones count.
   int CountSince(const Map& map, KeyframeId id, int most) const;

@@ -9,7 +9,7 @@
 namespace dmslam {
 namespace {
 
-constexpr int kFeatures = 8;
+constexpr int kFeatures = 9;
 
 KeyframeId Id(uint32_t frame) { return KeyframeId::Make(1, frame); }
 LandmarkId Numbered(uint64_t number) { return LandmarkId::Make(1, number); }
@@ -90,6 +90,11 @@ TEST_F(Maintenance, OrderOfAMapOfOthersIsAssumedToBeThatOfItsStamps) {
   InsertionOrder assumed;
   assumed.Assume(map_);
   EXPECT_EQ(assumed.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(60), Id(50), Id(40)}));
+  MapProgress progress;
+  progress.settled = Id(40);
+  map_.SetProgress(progress);
+  assumed.Assume(map_);
+  EXPECT_EQ(assumed.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(40), Id(60), Id(50)}));
 }
 
 TEST_F(Maintenance, WhatLiesJustBeforeALensGoes) {
@@ -97,10 +102,12 @@ TEST_F(Maintenance, WhatLiesJustBeforeALensGoes) {
   for (uint64_t number = 1; number <= 5; ++number) See(number, 4.0, {1, 2}, 2);
   See(6, 0.1, {1, 2}, 2);
   See(7, 0.5, {1, 2}, 2);
+  See(8, -1.0, {1, 2}, 2);
   EXPECT_EQ(RemoveTooNear(map_, 1, 0.0), 0) << "switched off";
   EXPECT_EQ(RemoveTooNear(map_, 2, 0.05), 0) << "another map";
-  EXPECT_EQ(RemoveTooNear(map_, 1, 0.05), 1);
+  EXPECT_EQ(RemoveTooNear(map_, 1, 0.05), 2);
   EXPECT_FALSE(Has(6));
+  EXPECT_FALSE(Has(8));
   EXPECT_TRUE(Has(7));
 }
 

@@ -279,16 +279,21 @@ void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend)
 /// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
 /// due.
 void MapperNode::SettleAwaited() {
+  bool ask_again = false;
   while (!answers_.empty() && awaited_.valid()) {
     const KeyframeId answered = answers_.front().answer.keyframe;
     ApplyFirstAnswer();
-    if (answered != awaited_) continue;
+    if (answered != awaited_) {
+      ask_again = true;  // it has just come, and answers what is newest
+      continue;
+    }
     Settle(std::exchange(awaited_, {}), awaited_map_, awaited_version_);
     pending_.push_back({awaited_version_, writer_->last_seq()});
   }
   // Another loop closer than the one that was asked does not know what is due.
-  const bool another = asked_term_.valid() && loop_reader_->term() != asked_term_;
-  if (!awaited_.valid() || !another) return;
+  if (!awaited_.valid()) return;
+  if (!asked_term_.valid()) asked_term_ = loop_reader_->term();
+  if (!ask_again && loop_reader_->term() == asked_term_) return;
   asked_term_ = loop_reader_->term();
   core_->AskAgain(awaited_, awaited_map_);
 }

@@ -36,7 +36,7 @@ struct Landmark {
   Descriptor descriptor;      ///< the observation nearest to all others
   KeyframeId reference;       ///< the keyframe whose corrections it follows
   KeyframeId first_keyframe;  ///< the newest keyframe when it was made: its age is counted from here
-  int64_t first_ns = 0;       ///< stamp of the oldest frame that sees it
+  int64_t first_ns = 0;       ///< stamp of the keyframe with which it was made
   int64_t last_ns = 0;        ///< stamp of the newest keyframe that sees it
   LandmarkEvidence evidence;
   std::vector<Observation> observations;  ///< sorted by keyframe

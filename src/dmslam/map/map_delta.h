@@ -106,7 +106,7 @@ struct StreamPosition {
 struct MapProgress {
   StreamPosition frontend;    ///< records of the frontend's stream up to here are worked into it
   StreamPosition loopcloser;  ///< the loop closer's
-  KeyframeId settled;         ///< the newest keyframe all of whose work is done
+  KeyframeId settled;         ///< the keyframe all of whose work was done last
   uint64_t corrected = 0;     ///< the map's version when the newest correction was applied; 0: none was
   bool ended = false;         ///< the sequence has ended, nothing follows
   bool operator==(const MapProgress&) const = default;

@@ -366,7 +366,7 @@ struct Codec<MapDelta> {
   }
   static void Validate(const MapDelta& m, Checker& check) {
     check.OptionalId(m.about, "impossible id of the keyframe it is about");
-    check.OptionalId(m.progress.settled, "impossible id of the newest settled keyframe");
+    check.OptionalId(m.progress.settled, "impossible id of the keyframe settled last");
     check.Stamp(m.stamp_ns);
     ValidateKeyframes(m, check);
     ValidateLandmarks(m, check);
