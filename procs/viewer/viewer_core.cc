@@ -133,6 +133,10 @@ void ViewerCore::Draw(Scene* scene) {
   for (const LandmarkId id : dirty_points_) DrawPoint(id, scene);
   if (scene->points().size() > map_.num_landmarks()) SweepPoints(scene);
   for (const KeyframeId id : dirty_keyframes_) DrawKeyframe(id, scene);
+  for (const KeyframeId id : dirty_keyframes_) {  // once more where the parent has only now got its place
+    const Keyframe* keyframe = map_.FindKeyframe(id);
+    if (keyframe != nullptr && keyframe->parent > id) DrawKeyframe(id, scene);
+  }
   for (const uint32_t index : dirty_frames_) DrawFrame(index, scene);
   DrawTruth(scene);
   if (!dirty_points_.empty()) {

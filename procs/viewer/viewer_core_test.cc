@@ -89,6 +89,19 @@ TEST_F(ViewerCoreTest, DrawsWhatTheMapHolds) {
       1e-6);
 }
 
+TEST_F(ViewerCoreTest, AParentThatIsDrawnAfterItsChildIsLinked) {
+  AddKeyframe(1);
+  map_.SetParent(Kf(1), {});
+  AddKeyframe(0);  // the map grew back to it
+  map_.SetParent(Kf(0), Kf(1));
+  Say();
+  const int64_t slot = scene_.keyframes().Find(Kf(0));
+  ASSERT_GE(slot, 0);
+  const auto& links = scene_.keyframes().slots()[static_cast<size_t>(slot)].value.links;
+  ASSERT_EQ(links.size(), 1U);
+  EXPECT_EQ(links[0].slot, scene_.keyframes().Find(Kf(1)));
+}
+
 TEST_F(ViewerCoreTest, LandmarksGoWithTheirTombstonesOrTheirKeyframe) {
   for (int i = 0; i < 3; ++i) AddKeyframe(i);
   for (uint64_t i = 1; i <= 20; ++i) AddLandmark(i, static_cast<int>(i % 3), static_cast<uint16_t>(i));
