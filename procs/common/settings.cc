@@ -246,8 +246,9 @@ std::vector<Entry> MappingEntries() {
           "Algorithm 1: one new landmark per neighbourhood, and a bound on their number",
           [](Settings & s) -> auto& { return s.mapper.creation.mutual_exclusion; }),
       Make(
-          "mapping.min_depth", "no landmark nearer to a camera than this share of what it sees in the median",
-          [](Settings & s) -> auto& { return s.mapper.creation.min_depth; }, 0, 1),
+          "mapping.min_depth",
+          "nearer to a keyframe than this share of what it sees in the median, a landmark goes at the end",
+          [](Settings & s) -> auto& { return s.mapper.min_depth; }, 0, 1),
       Make(
           "mapping.neighbourhood_px", "half the side of the neighbourhood",
           [](Settings & s) -> auto& { return s.mapper.creation.neighbourhood_px; }, 0, 1000),
@@ -299,7 +300,7 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   settings->profile = std::string(name);
   const bool dm = name == "dm";
   settings->mapper.creation.mutual_exclusion = dm;
-  settings->mapper.creation.min_depth = dm ? LandmarkCreationOptions().min_depth : 0.0;
+  settings->mapper.min_depth = dm ? MapperOptions().min_depth : 0.0;
   settings->mapper.seen_through.enabled = dm;
   settings->frontend.tracking.motion_belief = dm;
   settings->frontend.smooth_at_end = dm;

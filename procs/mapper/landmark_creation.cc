@@ -78,7 +78,6 @@ std::vector<PlaneEntry> SortedWithWrap(std::vector<PlaneEntry> entries, double m
 struct PairGeometry {
   const Keyframe& a;
   const Keyframe& b;
-  double nearest;  ///< depth of a new point
   const Map& map;
   const LandmarkCreationOptions& options;
 };
@@ -141,10 +140,7 @@ std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t fe
       TriangulatePoint(pair.a.T_cam_world, pair.b.T_cam_world, ray_a, ray_b);
   const auto uv_a = point ? camera.Project(pair.a.T_cam_world * *point) : std::nullopt;
   const auto uv_b = point ? camera.Project(pair.b.T_cam_world * *point) : std::nullopt;
-  const auto too_near = [&](const Keyframe& keyframe) {
-    return (keyframe.T_cam_world * *point).z() < pair.nearest;
-  };
-  if (!uv_a || !uv_b || too_near(pair.a) || too_near(pair.b)) {
+  if (!uv_a || !uv_b) {
     ++diagnostics->refused_depth;
     return std::nullopt;
   }
@@ -228,7 +224,7 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
   const Pencil pencil = Pencil::Through(a.T_cam_world.Center(), b.T_cam_world.Center());
   std::vector<PlaneEntry> entries_a = PlaneEntries(a, use_a, pencil, map);
   const std::vector<PlaneEntry> sorted_b = SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5);
-  const PairGeometry pair{a, b, 0.0, map, options};
+  const PairGeometry pair{a, b, map, options};
   std::vector<int> partner_of_b(b.features->size(), -1);
   std::vector<int> distance_of_b(b.features->size(), 257);
   for (const PlaneEntry& entry : entries_a) {
@@ -278,7 +274,7 @@ std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, Keyframe
     const double baseline = (keyframe.T_cam_world.Center() - neighbour.T_cam_world.Center()).norm();
     const std::optional<double> depth = map.MedianDepth(neighbour);
     if (!depth || baseline < options.min_baseline_over_depth * *depth) continue;
-    const PairGeometry pair{keyframe, neighbour, options.min_depth * *depth, map, options};
+    const PairGeometry pair{keyframe, neighbour, map, options};
     for (const auto& [feature, other] :
          MatchAlongEpipolarPlanes(keyframe, use, neighbour, FreeFeatures(neighbour, {}), map, options)) {
       ++diagnostics->matched;

@@ -16,7 +16,6 @@ struct LandmarkCreationOptions {
   double confirmed_span_s = 1.0;  ///< ...over so much time is not subject to Algorithm 1; 0 views: all are
   int neighbours = 20;            ///< covisible keyframes that are matched with the new one
   double min_baseline_over_depth = 0.01;
-  double min_depth = 0.05;  ///< nearer to a camera than this share of what it sees in the median: a mismatch
   int max_descriptor_distance = 50;  ///< bits
   double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line; 1 = not asked
   double epipolar_sigmas_squared = 3.84;
@@ -75,7 +74,9 @@ struct MapperOptions {
   int local_keyframes = 40;  ///< at most this many keyframes are adjusted at a time (most covisible first)
   int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
   int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
-  int min_covisibility = 15;             ///< landmarks in common that make two keyframes neighbours
+  double min_depth = 0.05;  ///< a landmark goes before that where it is nearer to a keyframe than this share
+                            ///< of what the keyframe sees in the median; 0: none does
+  int min_covisibility = 15;  ///< landmarks in common that make two keyframes neighbours
   int nearby_keyframes =
       10;  ///< at most so many that look at the same place are fused with, covisible or not
   double nearby_distance = 0.5;   ///< how far they may be, as a share of the scene's depth
