@@ -28,15 +28,18 @@ for other in small one; do
     check "$file of '$other' has the same bytes" cmp "$work/first/$file" "$work/$other/$file"
   done
 done
-# What was seen before there was a map is mapped when the sequence has ended.
-check "without keyframes at the end it ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]}" \
+# What was seen before there was a map is mapped when the sequence has ended, in lock-step processes as in one.
+readonly EAGER=(--set keyframe.tracked_ratio=1)
+check "it ends with 0 with more keyframes" run "${sequence[@]}" "${EAGER[@]}" --lockstep --out "$work/eager"
+check "in one process too" "$build/bin/dmslam-inprocess" "${sequence[@]}" "${EAGER[@]}" --out "$work/with"
+check "and without keyframes at the end" "$build/bin/dmslam-inprocess" "${sequence[@]}" "${EAGER[@]}" \
   --set keyframe.at_end=off --out "$work/without"
-keyframes_before() { # those from before the first frame that was tracked
-  awk 'NR == FNR { if ($1 !~ /^#/ && !first) first = $1; next } $1 !~ /^#/ && $1 < first { ++n } END { print n + 0 }' \
-    "$work/$1/trajectory_online.txt" "$work/$1/keyframes.txt"
-}
-check "the map grows back to before the frames that were tracked" test "$(keyframes_before one)" -gt "$(keyframes_before without)"
-check "and what was tracked stays as it was" cmp "$work/one/trajectory_online.txt" "$work/without/trajectory_online.txt"
+proposed() { sed -n 's/.*"keyframes_proposed": \([0-9]*\).*/\1/p' "$work/$1/summary.json"; }
+check "frames from before the map become keyframes" test "$(proposed with)" -gt "$(proposed without)"
+check "what was tracked stays as it was" cmp "$work/with/trajectory_online.txt" "$work/without/trajectory_online.txt"
+for file in trajectory.txt keyframes.txt map.ply; do
+  check "$file of the processes has the same bytes" cmp "$work/eager/$file" "$work/with/$file"
+done
 check "another seed ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]:0:4}" --seed 4 --out "$work/other"
 expect "the summary names the seed" "$work/other" seed "== 4"
 finish
