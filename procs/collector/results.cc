@@ -198,6 +198,8 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["frames_jumped"] = run.frames_jumped;
   json["frames_processed"] = run.frontend.frames_processed;
   json["frames_skipped"] = run.frontend.frames_skipped;
+  json["frames_received"] = run.frontend.frames_received;
+  json["frames_lost"] = std::max<int64_t>(0, run.frames_published - run.frontend.frames_received);
   json.update(TrackingJson(run, builder, t));
   json["resets"] = run.resets;
   json["relocalisations"] = run.frontend.relocalisations;
@@ -252,7 +254,9 @@ std::string Table(const Json& summary) {
     return std::string(text);
   };
   row("sequence", summary["sequence"].get<std::string>());
-  row("frames published / skipped", number("frames", "%.0f") + " / " + number("frames_skipped", "%.0f"));
+  row("frames published / skipped / lost", number("frames", "%.0f") + " / " +
+                                               number("frames_skipped", "%.0f") + " / " +
+                                               number("frames_lost", "%.0f"));
   row("tracked online / in the end [%]",
       number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
   row("first map after [s]", number("first_init_s", "%.2f"));
