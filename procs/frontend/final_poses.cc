@@ -19,6 +19,8 @@ constexpr int kLandmarkSteps = 2;  // of Gauss and Newton
 constexpr double kHuber_chi2 = 5.991;
 // Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
 constexpr double kOverstep = 1.7;
+constexpr size_t kSharedFrames =
+    10;                           // since one saw a landmark: more, and the errors of the two are their own
 constexpr double kMaxMove = 0.3;  // of a landmark, as a share of its distance: more is a slip
 constexpr size_t kPortion = 64;   // frames or landmarks between two calls of who waits
 
@@ -136,7 +138,7 @@ void FinalPoses::Improve(const Map& map, const std::function<void()>& between) {
     PlaceLandmarks(map);
     PlaceFrames(map);
   }
-  Smooth();
+  Smooth(map);
   between_ = {};
 }
 
@@ -153,15 +155,32 @@ std::vector<FramePose> FinalPoses::Take() {
   return told;
 }
 
-void FinalPoses::Smooth() {
+std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const FinalPose> poses) const {
+  const Pinhole camera = map.camera().Ideal();
+  std::unordered_map<LandmarkId, size_t> seen;  // in which of them last
+  std::vector<PoseEstimate> estimates;
+  for (size_t k = 0; k < poses.size(); ++k) {
+    const FinalPose& frame = poses[k];
+    Matrix6d shared = Matrix6d::Zero();
+    for (const Sight& sight : frame.sights) {
+      const auto [last, is_new] = seen.try_emplace(sight.landmark, k);
+      const bool is_shared = !is_new && k - std::exchange(last->second, k) <= kSharedFrames;
+      const Eigen::Vector3d p_cam = frame.measured * landmarks_.at(sight.landmark).p_world;
+      if (!is_shared || p_cam.z() <= 0.0) continue;
+      const Matrix26 J = PoseJacobian(camera, p_cam);
+      shared += J.transpose() * J / map.pyramid().SigmaSquared(sight.octave);
+    }
+    const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses.front().pose.stamp_ns);
+    estimates.push_back({time_s, frame.measured, frame.information, shared});
+  }
+  return estimates;
+}
+
+void FinalPoses::Smooth(const Map& map) {
   for (auto begin = poses_.begin(); begin != poses_.end();) {
     const auto end = std::find_if(
         begin, poses_.end(), [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
-    std::vector<PoseEstimate> estimates;
-    for (auto it = begin; it != end; ++it) {
-      const double time_s = 1e-9 * static_cast<double>(it->pose.stamp_ns - begin->pose.stamp_ns);
-      estimates.push_back({time_s, it->measured, it->information});
-    }
+    const std::vector<PoseEstimate> estimates = Estimates(map, {begin, end});
     SmoothingOptions options;
     options.between = between_;
     const auto known = noise_.find(begin->pose.map_id);

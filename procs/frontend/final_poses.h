@@ -80,7 +80,8 @@ class FinalPoses {
   };
 
   bool HasMoved(const Map& map) const;
-  void Smooth();
+  std::vector<PoseEstimate> Estimates(const Map& map, std::span<const FinalPose> poses) const;
+  void Smooth(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
   void PlaceLandmark(const Map& map, std::span<const View> views);

@@ -93,8 +93,11 @@ void FrontendCore::PlaceNeighbourAgain() {
   const bool is_keyframe = map_.FindKeyframe(KeyframeId::Make(session_, near_.next->index)) != nullptr;
   const std::optional<Rigid3d> T_cam_world =
       is_last && !is_keyframe ? PoseOf(last_placed_) : std::optional<Rigid3d>();
-  if (T_cam_world) near_.next->T_cam_world = *T_cam_world;
-  if (!T_cam_world) near_.next.reset();
+  if (T_cam_world) {
+    near_.next->T_cam_world = *T_cam_world;
+  } else {
+    near_.next.reset();
+  }
 }
 
 void FrontendCore::RefineRest() { refiner_.Begin(map_); }

@@ -273,8 +273,7 @@ void MapperCore::AdjustMaps() {
   std::set<MapId> maps;
   for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
-    counters_.landmarks_culled +=
-        static_cast<uint64_t>(RemoveTooNear(map_, map_id, options_.min_depth));
+    counters_.landmarks_culled += static_cast<uint64_t>(RemoveTooNear(map_, map_id, options_.min_depth));
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
     Publish(MapEvent::kGloballyAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;

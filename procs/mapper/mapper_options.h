@@ -74,8 +74,8 @@ struct MapperOptions {
   int local_keyframes = 40;  ///< at most this many keyframes are adjusted at a time (most covisible first)
   int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
   int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
-  double min_depth = 0.05;  ///< a landmark goes before that where it is nearer to a keyframe than this share
-                            ///< of what the keyframe sees in the median; 0: none does
+  double min_depth = 0.1;  ///< a landmark goes before that where it is nearer to a keyframe than this share
+                           ///< of what the keyframe sees in the median; 0: none does
   int min_covisibility = 15;  ///< landmarks in common that make two keyframes neighbours
   int nearby_keyframes =
       10;  ///< at most so many that look at the same place are fused with, covisible or not

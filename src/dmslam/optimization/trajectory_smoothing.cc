@@ -1,6 +1,7 @@
 #include "dmslam/optimization/trajectory_smoothing.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,10 +9,16 @@
 namespace dmslam {
 namespace {
 
-constexpr int kPose = 6, kState = 3 * kPose;  // pose, its rate, and the rate's rate; each (rotation, centre)
-constexpr double kLeastInformation = 1e-12;   // keeps determined what nothing is known of
-constexpr double kMinInterval = 0.05;         // of two frames, in usual intervals
+// The motion: pose, its rate, and the rate's rate; each (rotation, centre). With it the error that the frame
+// has in common with the one before.
+constexpr int kPose = 6, kMotion = 3 * kPose, kState = kMotion + kPose;
+constexpr double kLeastInformation = 1e-12;  // keeps determined what nothing is known of
+constexpr double kMinInterval = 0.05;        // of two frames, in usual intervals
 constexpr double kMinLogVariance = -37.0, kMaxLogVariance = 14.0;  // of a standing camera; of any
+constexpr double kMaxCarried = 0.9999;                             // of a common error to the next frame
+constexpr double kMinSpread = 1e-9;  // of an information's eigenvalue to the largest: less says nothing
+using MotionMatrix = Eigen::Matrix<double, kMotion, kMotion>;
+using MotionVector = Eigen::Matrix<double, kMotion, 1>;
 using StateMatrix = Eigen::Matrix<double, kState, kState>;
 using StateVector = Eigen::Matrix<double, kState, 1>;
 
@@ -20,12 +27,14 @@ struct State {
   Eigen::Quaterniond R_world_cam;
   Eigen::Vector3d center;
   Vector6d rate = Vector6d::Zero(), acceleration = Vector6d::Zero();
+  Vector6d common = Vector6d::Zero();  ///< error, in standard deviations of the pose
 
   void Step(const StateVector& step) {
     R_world_cam = (R_world_cam * ExpSo3(step.head<3>())).normalized();
     center += step.segment<3>(3);
     rate += step.segment<kPose>(kPose);
-    acceleration += step.tail<kPose>();
+    acceleration += step.segment<kPose>(2 * kPose);
+    common += step.tail<kPose>();
   }
 };
 
@@ -34,6 +43,31 @@ Vector6d Difference(const State& a, const State& b) {
   Vector6d difference;
   difference << LogSo3(a.R_world_cam.conjugate() * b.R_world_cam), b.center - a.center;
   return difference;
+}
+
+/// What a frame's errors have in common with the frame before: common(k) = carried * common(k - 1) + new,
+/// such that the variance stays the same.
+struct Likeness {
+  Matrix6d carried = Matrix6d::Zero();
+  Matrix6d weight = Matrix6d::Identity();  ///< of what is new: (1 - carried carried^T)^-1
+  double log_determinant = 0.0;            ///< of the weight
+};
+
+/// Errors in standard deviations, I^(1/2) error: those of frames j and k that the same landmarks make have
+/// the covariance I_k^(-1/2) I_shared I_j^(-1/2).
+Likeness LikenessOf(const Matrix6d& shared, const Matrix6d& inverse_root,
+                    const Matrix6d& inverse_root_before) {
+  const Matrix6d covariance = inverse_root * shared * inverse_root_before;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(covariance * covariance.transpose());
+  const Matrix6d& U = eigen.eigenvectors();
+  const Vector6d singular = eigen.eigenvalues().cwiseMax(kMinSpread).cwiseSqrt();
+  const Vector6d carried = singular.cwiseMin(kMaxCarried);  // approximate Jacobians may say more
+  const Vector6d is_new = Vector6d::Ones() - carried.cwiseAbs2();
+  Likeness likeness;
+  likeness.carried = U * carried.cwiseQuotient(singular).asDiagonal() * U.transpose() * covariance;
+  likeness.weight = U * is_new.cwiseInverse().asDiagonal() * U.transpose();
+  likeness.log_determinant = -is_new.array().log().sum();
+  return likeness;
 }
 
 /// What is searched for besides the states, as logarithms.
@@ -83,19 +117,7 @@ class Smoother {
   Smoother(std::span<const PoseEstimate> estimates, const SmoothingOptions& options)
       : estimates_(estimates), options_(options), weights_(estimates.size(), 1.0) {
     interval_s_ = UsualInterval();
-    for (const PoseEstimate& estimate : estimates) {
-      State state;
-      state.R_world_cam = estimate.T_cam_world.rotation.conjugate();
-      state.center = estimate.T_cam_world.Center();
-      states_.push_back(state);
-      measured_.push_back(state);
-      // A step (w, v) on the left of T_cam_world turns the camera by -w in its own frame and shifts its
-      // centre by -R_world_cam v.
-      Matrix6d left = Matrix6d::Zero();
-      left.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-      left.bottomRightCorner<3, 3>() = -estimate.T_cam_world.rotation.toRotationMatrix();
-      information_.push_back(left.transpose() * estimate.information * left);
-    }
+    for (const PoseEstimate& estimate : estimates) AddEstimate(estimate);
     FirstGuess();
     if (options.noise) variances_ = ToVariances(*options.noise);
   }
@@ -111,6 +133,31 @@ class Smoother {
   }
 
  private:
+  void AddEstimate(const PoseEstimate& estimate) {
+    State state;
+    state.R_world_cam = estimate.T_cam_world.rotation.conjugate();
+    state.center = estimate.T_cam_world.Center();
+    states_.push_back(state);
+    measured_.push_back(state);
+    // A step (w, v) on the left of T_cam_world turns the camera by -w in its own frame and shifts its
+    // centre by -R_world_cam v.
+    Matrix6d left = Matrix6d::Zero();
+    left.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
+    left.bottomRightCorner<3, 3>() = -estimate.T_cam_world.rotation.toRotationMatrix();
+    const Matrix6d information = left.transpose() * estimate.information * left;
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
+    const Vector6d root = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+    const double least = std::sqrt(kMinSpread) * root.maxCoeff();
+    const Vector6d inverse = (root.array() > least).select(root.cwiseInverse(), 0.0);
+    const Matrix6d inverse_root =
+        eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+    likeness_.push_back(likeness_.empty() ? Likeness()
+                                          : LikenessOf(left.transpose() * estimate.shared * left,
+                                                       inverse_root, inverse_root_before_));
+    inverse_root_before_ = inverse_root;
+    roots_.push_back(eigen.eigenvectors() * root.asDiagonal() * eigen.eigenvectors().transpose());
+  }
+
   /// The median of the times between frames.
   double UsualInterval() const {
     std::vector<double> intervals_s;
@@ -148,15 +195,42 @@ class Smoother {
     variances_.pose = std::min(variances_.pose, std::log(options_.max_variance));
   }
 
+  /// What is wrong with the measured pose, in its standard deviations, besides what is common.
+  Vector6d OwnError(size_t k) const {
+    return roots_[k] * Difference(measured_[k], states_[k]) + states_[k].common;
+  }
+
   void AddPoses(const Variances& variances, NormalEquations* equations) const {
     for (size_t k = 0; k < states_.size(); ++k) {
-      const Matrix6d information = weights_[k] * std::exp(-variances.pose) * information_[k];
-      const Vector6d error = Difference(measured_[k], states_[k]);
-      equations->diagonal[k].topLeftCorner<kPose, kPose>() += information;
-      equations->gradient[k].head<kPose>() += information * error;
-      equations->cost += error.dot(information * error);
-      if (information_[k].isZero(0.0)) continue;
+      if (roots_[k].isZero(0.0)) continue;
+      const double weight = weights_[k] * std::exp(-variances.pose);
+      const Vector6d error = OwnError(k);
+      Eigen::Matrix<double, kPose, kState> J = Eigen::Matrix<double, kPose, kState>::Zero();
+      J.leftCols<kPose>() = roots_[k];
+      J.rightCols<kPose>().setIdentity();
+      equations->diagonal[k].noalias() += weight * J.transpose() * J;
+      equations->gradient[k].noalias() += weight * J.transpose() * error;
+      equations->cost += weight * error.squaredNorm();
       equations->log_determinants -= kPose * variances.pose;
+    }
+  }
+
+  void AddCommonErrors(NormalEquations* equations) const {
+    for (size_t k = 0; k < states_.size(); ++k) {
+      const Likeness& likeness = likeness_[k];
+      const Matrix6d weight = likeness.weight / options_.common_variance;
+      const bool first = k == 0;
+      const Vector6d error =
+          first ? states_[k].common : states_[k].common - likeness.carried * states_[k - 1].common;
+      equations->cost += error.dot(weight * error);
+      equations->log_determinants += likeness.log_determinant;
+      equations->gradient[k].tail<kPose>() += weight * error;
+      equations->diagonal[k].bottomRightCorner<kPose, kPose>() += weight;
+      if (first) continue;
+      const Matrix6d carried = likeness.carried.transpose() * weight;
+      equations->gradient[k - 1].tail<kPose>() -= carried * error;
+      equations->diagonal[k - 1].bottomRightCorner<kPose, kPose>() += carried * likeness.carried;
+      equations->above[k - 1].bottomRightCorner<kPose, kPose>() -= carried;
     }
   }
 
@@ -168,17 +242,17 @@ class Smoother {
         dt3 / 6.0, dt2 / 2.0, dt;
     const Eigen::Matrix3d inverse = covariance.inverse();
     const State &a = states_[k], &b = states_[k + 1];
-    StateVector error;
+    MotionVector error;
     error << Difference(a, b) - dt * a.rate - 0.5 * dt2 * a.acceleration,
         b.rate - a.rate - dt * a.acceleration, b.acceleration - a.acceleration;
     // d error / d a = -(turn, dt, dt^2 / 2; 0, 1, dt; 0, 0, 1), d error / d b = 1
-    StateMatrix J = StateMatrix::Identity();
+    MotionMatrix J = MotionMatrix::Identity();
     J.topLeftCorner<3, 3>() = (b.R_world_cam.conjugate() * a.R_world_cam).toRotationMatrix();
     J.block<kPose, kPose>(0, kPose).diagonal().setConstant(dt);
     J.block<kPose, kPose>(0, 2 * kPose).diagonal().setConstant(0.5 * dt2);
     J.block<kPose, kPose>(kPose, 2 * kPose).diagonal().setConstant(dt);
     const double rotation = std::exp(-variances.rotation), translation = std::exp(-variances.translation);
-    StateMatrix W = StateMatrix::Zero();
+    MotionMatrix W = MotionMatrix::Zero();
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         auto block = W.block<kPose, kPose>(kPose * i, kPose * j).diagonal();
@@ -186,12 +260,12 @@ class Smoother {
         block.tail<3>().setConstant(translation * inverse(i, j));
       }
     }
-    const StateMatrix JW = J.transpose() * W;
-    equations->diagonal[k].noalias() += JW * J;
-    equations->diagonal[k + 1] += W;
-    equations->above[k] = -JW;
-    equations->gradient[k].noalias() -= JW * error;
-    equations->gradient[k + 1].noalias() += W * error;
+    const MotionMatrix JW = J.transpose() * W;
+    equations->diagonal[k].topLeftCorner<kMotion, kMotion>().noalias() += JW * J;
+    equations->diagonal[k + 1].topLeftCorner<kMotion, kMotion>() += W;
+    equations->above[k].topLeftCorner<kMotion, kMotion>() -= JW;
+    equations->gradient[k].head<kMotion>().noalias() -= JW * error;
+    equations->gradient[k + 1].head<kMotion>().noalias() += W * error;
     equations->cost += error.dot(W * error);
     equations->log_determinants -= 9.0 * (variances.rotation + variances.translation);
   }
@@ -202,6 +276,7 @@ class Smoother {
     equations.above.assign(states_.size() - 1, StateMatrix::Zero());
     equations.gradient.assign(states_.size(), StateVector::Zero());
     AddPoses(variances, &equations);
+    AddCommonErrors(&equations);
     for (size_t k = 0; k + 1 < states_.size(); ++k) {
       if (Joined(k)) AddMotion(k, variances, &equations);
     }
@@ -259,8 +334,7 @@ class Smoother {
 
   void Weigh() {
     for (size_t k = 0; k < states_.size(); ++k) {
-      const Vector6d error = Difference(measured_[k], states_[k]);
-      const double chi2 = error.dot(information_[k] * error) * std::exp(-variances_.pose);
+      const double chi2 = OwnError(k).squaredNorm() * std::exp(-variances_.pose);
       weights_[k] = (options_.freedom + kPose) / (options_.freedom + chi2);
     }
   }
@@ -290,7 +364,9 @@ class Smoother {
   const SmoothingOptions& options_;
   double interval_s_ = 1.0;
   std::vector<State> states_, measured_;
-  std::vector<Matrix6d> information_;  ///< of (rotation, centre)
+  std::vector<Matrix6d> roots_;  ///< of the information of (rotation, centre)
+  std::vector<Likeness> likeness_;
+  Matrix6d inverse_root_before_;
   std::vector<double> weights_;
   Variances variances_;
 };

@@ -17,6 +17,8 @@ struct PoseEstimate {
   /// Of the pose, tangent (w, v) on its left as in PoseOptimizationReport; zero: nothing is known, and the
   /// pose given is where the search begins.
   Matrix6d information = Matrix6d::Zero();
+  /// The part of the information that comes from what the frames before saw too: their errors are alike.
+  Matrix6d shared = Matrix6d::Zero();
 };
 
 /// How sure poses and motion are.
@@ -33,6 +35,7 @@ struct SmoothingOptions {
   int min_poses = 10;                ///< fewer are left as they are
   double min_variance = 0.1;         ///< of the poses, relative to what their information says...
   double max_variance = 1.0;         ///< ...what is more must be motion
+  double common_variance = 0.1;      ///< of the errors that frames have in common, besides; relative likewise
   std::optional<MotionNoise> noise;  ///< as found before, in the same map; none: it is found from the data
   std::function<void()> between;     ///< called every few milliseconds of work, where given
 };
@@ -47,9 +50,11 @@ struct SmoothedTrajectory {
 /// Barfoot, State Estimation for Robotics, ch. 3.4 and 11, with jerk for acceleration). Poses that are well
 /// known hardly move; those of frames that saw a small part of the scene follow their neighbours. How strong
 /// the noise is, of the motion and of the poses, is what makes the poses most likely, so that a jerky camera
-/// is not smoothed. Poses that contradict their neighbours lose weight (Student's t). Estimates are in
-/// order of time, all in the coordinates of one map. What cannot be solved comes back as it was given.
-/// Deterministic.
+/// is not smoothed. Frames that see the same landmarks err alike: ten poses that are wrong by the same are no
+/// better known than one, so a part of each error is carried from frame to frame as far as the same landmarks
+/// determine both (PoseEstimate::shared). Poses that contradict their neighbours lose weight (Student's t).
+/// Estimates are in order of time, all in the coordinates of one map. What cannot be solved comes back as it
+/// was given. Deterministic.
 SmoothedTrajectory SmoothTrajectory(std::span<const PoseEstimate> estimates,
                                     const SmoothingOptions& options = {});
 

@@ -70,6 +70,34 @@ TEST(TrajectorySmoothing, WeakFramesFollowTheirNeighbours) {
   EXPECT_LT(after, 0.05 * before);
 }
 
+/// Frames that know their places ten times worse than others and are all wrong by the same 8 mm, as those are
+/// that see the same corner.
+std::vector<PoseEstimate> WrongTogether() {
+  auto estimates = Track(300, 0, 21);
+  for (size_t k = 140; k < 160; ++k) {
+    const Rigid3d wrong(Eigen::Quaterniond::Identity(), {0.008, 0.0, 0.0});
+    estimates[k].T_cam_world = wrong * TruthAt(estimates[k].time_s);
+    estimates[k].information *= 0.01;
+  }
+  return estimates;
+}
+
+TEST(TrajectorySmoothing, FramesThatAreWrongTogetherHaveTheSayOfOne) {
+  auto estimates = WrongTogether();
+  const double apart = RmsCenterError(estimates, SmoothTrajectory(estimates).T_cam_world, 140, 160);
+  for (size_t k = 141; k < 160; ++k) estimates[k].shared = estimates[k].information;
+  const double together = RmsCenterError(estimates, SmoothTrajectory(estimates).T_cam_world, 140, 160);
+  EXPECT_LT(together, 0.5 * apart);
+}
+
+TEST(TrajectorySmoothing, WhatAllFramesShareCostsLittleWhereTheirErrorsAreTheirOwn) {
+  auto estimates = Track(300, 0, 22);
+  const double apart = RmsCenterError(estimates, SmoothTrajectory(estimates).T_cam_world, 0, 300);
+  for (size_t k = 1; k < 300; ++k) estimates[k].shared = 0.9 * estimates[k].information;
+  const double together = RmsCenterError(estimates, SmoothTrajectory(estimates).T_cam_world, 0, 300);
+  EXPECT_LT(together, 1.1 * apart);
+}
+
 TEST(TrajectorySmoothing, EqualFramesGetBetterToo) {
   const auto estimates = Track(300, 0, 2);
   const SmoothedTrajectory smoothed = SmoothTrajectory(estimates);
