@@ -28,6 +28,7 @@ for count in 0 5 199; do
   expect 1 "--frame-count $count: .*est.txt has 200 poses; write the number of all frames" \
     "$eval" "$gt" "$est" --frame-count $count
 done
+expect 108 'frame-count' "$eval" "$gt" "$est" --frames "$work/rgb.txt" --frame-count 200
 expect 0 '[0-9]+\.[0-9]+\.[0-9]+' "$eval" --version
 expect 0 'Usage' "$eval" --help
 

@@ -120,8 +120,10 @@ void Declare(CLI::App* app, Arguments* arguments) {
       ->capture_default_str();
   app->add_flag("--rpe-all-pairs", arguments->all_pairs,
                 "in frames and metres, motions from every pose instead of end to end");
-  app->add_option("--frames", arguments->frames, "image list (rgb.txt) or its folder, for the share covered");
-  app->add_option("--frame-count", arguments->frame_count, "number of frames, where there is no list");
+  CLI::Option* const frames = app->add_option("--frames", arguments->frames,
+                                              "image list (rgb.txt) or its folder, for the share covered");
+  app->add_option("--frame-count", arguments->frame_count, "number of frames, where there is no list")
+      ->excludes(frames);
   app->add_option("--json", arguments->json, "write the figures to this file");
   app->add_option("--plot", arguments->plot,
                   "draw PREFIX.png and PREFIX.svg: top and side view, error over time");

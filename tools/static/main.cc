@@ -14,9 +14,9 @@
 #include "dmslam/dataset/frame_source.h"
 #include "dmslam/map/keyframe.h"
 #include "dmslam/motion_segmentation/match_frames.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/machine.h"
-#include "dmslam/util/version.h"
 #include "draw.h"
 #include "judge.h"
 #include "timing.h"
@@ -501,7 +501,7 @@ void RunSelection(const Settings& settings) {
 
 int main(int argc, char** argv) {
   CLI::App app("Finds which matches of two frames belong to the static world", "dmslam-static");
-  app.set_version_flag("--version", dmslam::kVersion);
+  app.set_version_flag("--version", dmslam::BuildVersion());
   dmslam::Settings settings;
   dmslam::JudgeSettings judge;
   dmslam::AddOptions(app, settings);
