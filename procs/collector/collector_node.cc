@@ -219,6 +219,7 @@ void CollectorNode::Write() {
   });
   run_.frames_published = static_cast<int64_t>(builder_->frame_poses().size());
   if (end_) {
+    run_.end_heard = true;
     run_.frames_published = end_->frames_published;
     run_.frames_missing = end_->frames_missing;
     run_.frames_blacked = end_->frames_blacked;

@@ -199,7 +199,9 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["frames_processed"] = run.frontend.frames_processed;
   json["frames_skipped"] = run.frontend.frames_skipped;
   json["frames_received"] = run.frontend.frames_received;
-  json["frames_lost"] = std::max<int64_t>(0, run.frames_published - run.frontend.frames_received);
+  const bool counted = run.end_heard && run.restarts == 0;  // counts since the last status die with a process
+  const int64_t lost = run.frames_published - run.frontend.frames_received;
+  json["frames_lost"] = counted ? Json(std::max<int64_t>(0, lost)) : Json(nullptr);
   json.update(TrackingJson(run, builder, t));
   json["resets"] = run.resets;
   json["relocalisations"] = run.frontend.relocalisations;
@@ -211,13 +213,13 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["ate_rmse_online"] = errors.online ? Json(errors.online->rmse()) : Json(nullptr);
   json["scale_final"] = errors.final ? Json(errors.final->scale()) : Json(nullptr);
   json.update(TimingJson(run));
-  int64_t lost = 0, repaired = 0, foreign = 0;
+  int64_t records_lost = 0, repaired = 0, foreign = 0;
   for (const auto& [process, health] : run.health) {
-    lost += health.records_lost;
+    records_lost += health.records_lost;
     repaired += health.records_repaired;
     foreign += health.dropped_foreign;
   }
-  json["records_lost"] = lost;
+  json["records_lost"] = records_lost;
   json["records_repaired"] = repaired;
   json["dropped_of_other_sessions"] = foreign;
   json["restarts"] = run.restarts;

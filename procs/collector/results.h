@@ -34,6 +34,7 @@ struct RunRecord {
   std::string sequence, mode, profile, ground_truth;
   std::vector<StampedPose> heard_ground_truth;  ///< as the player told it: kept where there is no file
   uint64_t seed = 0;
+  bool end_heard = false;  ///< of the sequence: how many frames there were is known
   int64_t frames_published = 0, frames_missing = 0, frames_blacked = 0, frames_jumped = 0;
   FrontendStatus frontend;
   MapperStatus mapper;

@@ -45,22 +45,30 @@ InitializerReport OfferUntilFound(BackgroundSearch* background, uint32_t first) 
 }
 
 TEST(BackgroundSearch, TellsLaterWhatItFound) {
-  BackgroundSearch background(
-      [](const InitializerFrame& frame) { return frame.index == 0 ? Found(frame) : InitializerReport(); });
+  Gate begun;
+  BackgroundSearch background([&begun](const InitializerFrame& frame) {
+    begun.Open();
+    return frame.index == 0 ? Found(frame) : InitializerReport();
+  });
   EXPECT_FALSE(background.AddFrame({0, 0, nullptr}).result);
+  begun.Pass();  // else those that are offered next push it out
   EXPECT_EQ(OfferUntilFound(&background, 1).result->frame1.index, 0u);
 }
 
 TEST(BackgroundSearch, BeginsAnewBehindAMap) {
   std::vector<uint32_t> seen;  // by one thread at a time: the search is asked under its lock's order
-  BackgroundSearch background([&seen](const InitializerFrame& frame) {
+  Gate first, second;
+  BackgroundSearch background([&](const InitializerFrame& frame) {
     seen.push_back(frame.index);
+    (seen.size() == 1 ? first : second).Open();
     return frame.index % 100 == 0 ? Found(frame) : InitializerReport();
   });
   background.AddFrame({0, 0, nullptr});
+  first.Pass();
   OfferUntilFound(&background, 1);
   EXPECT_EQ(seen, std::vector<uint32_t>{0});  // what waited meanwhile belongs to the map that was found
   background.AddFrame({100, 0, nullptr});
+  second.Pass();
   EXPECT_EQ(OfferUntilFound(&background, 101).result->frame1.index, 100u);
   EXPECT_EQ(seen, (std::vector<uint32_t>{0, 100}));
 }

@@ -164,11 +164,14 @@ std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const 
     Matrix6d shared = Matrix6d::Zero();
     for (const Sight& sight : frame.sights) {
       const auto [last, is_new] = seen.try_emplace(sight.landmark, k);
-      const bool is_shared = !is_new && k - std::exchange(last->second, k) <= kSharedFrames;
+      const size_t frames_ago = k - std::exchange(last->second, k);
       const Eigen::Vector3d p_cam = frame.measured * landmarks_.at(sight.landmark).p_world;
-      if (!is_shared || p_cam.z() <= 0.0) continue;
+      if (is_new || frames_ago == 0 || frames_ago > kSharedFrames || p_cam.z() <= 0.0) continue;
+      const double variance = map.pyramid().SigmaSquared(sight.octave);
+      const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
+      if (error.squaredNorm() > kHuber_chi2 * variance) continue;  // the pose was told without it
       const Matrix26 J = PoseJacobian(camera, p_cam);
-      shared += J.transpose() * J / map.pyramid().SigmaSquared(sight.octave);
+      shared += J.transpose() * J / variance;
     }
     const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses.front().pose.stamp_ns);
     estimates.push_back({time_s, frame.measured, frame.information, shared});

@@ -7,6 +7,8 @@ namespace dmslam {
 namespace {
 
 constexpr int kMinSights = 30;
+constexpr double kSeesLess = 0.8;  // of what the frame before saw
+constexpr double kSeesMore = 1.1;  // from its motion, than from where it was told to be
 
 /// What became of a landmark of map `map_id`; null where it is gone.
 const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
@@ -46,6 +48,10 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
     (map_id && reference->map_id != *map_id ? others : due_).push_back(std::move(kept));
   }
   frames_ = std::move(others);
+  if (options_.follow_motion) {  // those that were placed later came after
+    std::stable_sort(due_.begin(), due_.end(),
+                     [](const Kept& a, const Kept& b) { return a.pose.stamp_ns < b.pose.stamp_ns; });
+  }
   num_features_ = 0;
   for (const Kept& kept : frames_) num_features_ += kept.features.keypoints.size();
   num_without_features_ = static_cast<size_t>(std::count_if(
@@ -64,13 +70,15 @@ std::vector<Sight> FrameRefiner::SightsNow(const Map& map, MapId map_id, const K
 }
 
 /// With what the map has become since: a frame from behind a walker saw little of the map of its time.
-std::optional<std::vector<Sight>> FrameRefiner::SearchAgain(const Map& map, MapId map_id, const Kept& kept,
-                                                            const Rigid3d& told, const Search& search) const {
+std::optional<std::vector<Sight>> FrameRefiner::SearchAgain(const Map& map, const Kept& kept,
+                                                            const Rigid3d& told,
+                                                            const std::vector<Sight>& known,
+                                                            const Search& search) {
   if (kept.features.keypoints.empty() || !search) return std::nullopt;
   TrackedFrame frame(kept.pose.frame_index, kept.pose.stamp_ns,
                      MakeFrameFeatures(kept.features, map.camera(), map.pyramid()));
   frame.T_cam_world = told;
-  for (const Sight& sight : SightsNow(map, map_id, kept)) frame.landmarks[sight.feature] = sight.landmark;
+  for (const Sight& sight : known) frame.landmarks[sight.feature] = sight.landmark;
   if (!search(&frame)) return std::nullopt;
   return SightsOf(frame);
 }
@@ -85,6 +93,29 @@ std::optional<FinalPose> FrameRefiner::Measured(const Map& map, const Kept& kept
   return refined;
 }
 
+/// Where the last frame's motion goes on to; none where a frame is missing between.
+std::optional<Rigid3d> FrameRefiner::FromMotion(MapId map_id, int64_t stamp_ns) const {
+  if (!before_ || !last_ || before_->map_id != map_id || last_->map_id != map_id) return std::nullopt;
+  const int64_t earlier_ns = last_->stamp_ns - before_->stamp_ns, now_ns = stamp_ns - last_->stamp_ns;
+  const bool evenly = now_ns > 0 && earlier_ns > 0 && now_ns < 2 * earlier_ns && earlier_ns < 2 * now_ns;
+  if (!evenly) return std::nullopt;
+  return last_->T_cam_world * before_->T_cam_world.Inverse() * last_->T_cam_world;
+}
+
+void FrameRefiner::LookFromMotion(const Map& map, MapId map_id, const Kept& kept,
+                                  const std::vector<Sight>& known, const Search& search,
+                                  std::optional<FinalPose>* refined) const {
+  const std::optional<Rigid3d> predicted = FromMotion(map_id, kept.pose.stamp_ns);
+  const size_t found = *refined ? (*refined)->sights.size() : 0;
+  if (!predicted || static_cast<double>(found) >= kSeesLess * static_cast<double>(last_->num_sights)) return;
+  const auto sights = SearchAgain(map, kept, *predicted, known, search);
+  if (!sights) return;
+  std::optional<FinalPose> other = Measured(map, kept, *predicted, *sights);
+  const bool more =
+      other && static_cast<double>(other->sights.size()) > kSeesMore * static_cast<double>(found);
+  if (more) *refined = std::move(other);
+}
+
 std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& search) {
   const Kept kept = std::move(due_.front());
   due_.pop_front();
@@ -92,9 +123,12 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(kept.pose.reference);
   if (!reference || !keyframe_id) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
-  auto sights = SearchAgain(map, reference->map_id, kept, told, search);
-  if (!sights) sights = SightsNow(map, reference->map_id, kept);
-  std::optional<FinalPose> refined = Measured(map, kept, told, *sights);
+  const std::vector<Sight> known = SightsNow(map, reference->map_id, kept);
+  std::optional<FinalPose> refined =
+      Measured(map, kept, told, SearchAgain(map, kept, told, known, search).value_or(known));
+  if (options_.follow_motion) LookFromMotion(map, reference->map_id, kept, known, search, &refined);
+  before_ = std::exchange(last_, std::nullopt);
+  if (refined) last_ = {reference->map_id, kept.pose.stamp_ns, refined->measured, refined->sights.size()};
   if (!refined && kept.pose.state == TrackingState::kLocalizedLater) {
     refined.emplace();
     refined->pose = kept.pose;

@@ -19,6 +19,9 @@ struct FrameRefinerOptions {
   /// The features of the oldest are forgotten beyond (38 bytes each): these frames are only optimised with
   /// the landmarks that they saw.
   size_t max_features = 3'000'000;
+  /// Where a frame sees less of the map than the one before, it is looked for from that one's motion as well:
+  /// beside a wrong pose what is near is not found, and what is far agrees.
+  bool follow_motion = false;
 };
 
 /// What tracked frames saw, kept so that their poses can be found once more when the map has become better
@@ -47,18 +50,29 @@ class FrameRefiner {
     std::vector<Sight> sights;
     FeatureSet features;  ///< empty: forgotten
   };
+  /// A frame that was found in the map.
+  struct Found {
+    MapId map_id = 0;
+    int64_t stamp_ns = 0;
+    Rigid3d T_cam_world;
+    size_t num_sights = 0;
+  };
   void Bound();
   static std::vector<Sight> SightsNow(const Map& map, MapId map_id, const Kept& kept);
   static std::optional<FinalPose> Measured(const Map& map, const Kept& kept, const Rigid3d& told,
                                            const std::vector<Sight>& sights);
-  std::optional<std::vector<Sight>> SearchAgain(const Map& map, MapId map_id, const Kept& kept,
-                                                const Rigid3d& told, const Search& search) const;
+  static std::optional<std::vector<Sight>> SearchAgain(const Map& map, const Kept& kept, const Rigid3d& told,
+                                                       const std::vector<Sight>& known, const Search& search);
+  std::optional<Rigid3d> FromMotion(MapId map_id, int64_t stamp_ns) const;
+  void LookFromMotion(const Map& map, MapId map_id, const Kept& kept, const std::vector<Sight>& known,
+                      const Search& search, std::optional<FinalPose>* refined) const;
 
   FrameRefinerOptions options_;
   std::deque<Kept> frames_;
   std::deque<Kept> due_;
-  size_t num_features_ = 0;          ///< of all frames kept
-  size_t num_without_features_ = 0;  ///< oldest frames whose features are forgotten
+  std::optional<Found> before_, last_;  ///< the last but one, and the last
+  size_t num_features_ = 0;             ///< of all frames kept
+  size_t num_without_features_ = 0;     ///< oldest frames whose features are forgotten
 };
 
 }  // namespace dmslam

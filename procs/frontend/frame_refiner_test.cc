@@ -124,6 +124,34 @@ TEST_F(Refining, WhatTheMapHasWonSinceCounts) {
   EXPECT_LT((refined[0].T_cam_reference.translation - truth_.translation).norm(), 1e-3);
 }
 
+/// How many landmarks the last of three frames of a standing camera sees. From where the third was told to be
+/// only two thirds of them are found.
+size_t SeenByTheThird(const Map& map, const TrackedFrame& frame, FramePose told, const Rigid3d& truth,
+                      bool follow_motion) {
+  FrameRefiner refiner({.follow_motion = follow_motion});
+  for (const int64_t stamp_ns : {1000, 2000, 3000}) {
+    told.stamp_ns = stamp_ns;
+    refiner.Keep(frame, told);
+  }
+  refiner.Begin(map);
+  std::optional<FinalPose> refined;
+  int searches = 0;
+  while (refiner.IsBusy()) {
+    refined = refiner.RefineNext(map, [&](TrackedFrame* searched) {
+      FindAll(frame.landmarks, searched);
+      const bool astray = (searched->T_cam_world.translation - truth.translation).norm() > 0.01;
+      if (++searches > 2 && astray) std::fill_n(searched->landmarks.begin(), kLandmarks / 3, LandmarkId());
+      return true;
+    });
+  }
+  return refined ? refined->sights.size() : 0;
+}
+
+TEST_F(Refining, WhereAFrameSeesLessThanTheOneBeforeItIsLookedForFromTheMotion) {
+  EXPECT_EQ(SeenByTheThird(map_, frame_, told_, truth_, false), static_cast<size_t>(kLandmarks * 2 / 3));
+  EXPECT_EQ(SeenByTheThird(map_, frame_, told_, truth_, true), static_cast<size_t>(kLandmarks));
+}
+
 TEST_F(Refining, AFailedSearchLeavesWhatTheFrameSaw) {
   FrameRefiner refiner;
   refiner.Keep(frame_, told_);

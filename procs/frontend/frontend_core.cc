@@ -32,6 +32,12 @@ OrbExtractorOptions WithMoreFeatures(OrbExtractorOptions options, double factor)
   return options;
 }
 
+FrameRefinerOptions RefinerOptions(const FrontendOptions& frontend) {
+  FrameRefinerOptions options = frontend.refiner;
+  options.follow_motion = options.follow_motion || frontend.smooth_at_end;
+  return options;
+}
+
 }  // namespace
 
 FrontendCore::FrontendCore(Setup setup)
@@ -43,7 +49,7 @@ FrontendCore::FrontendCore(Setup setup)
       localize_only_(setup.localize_only),
       catch_up_in_portions_(setup.catch_up_in_portions),
       map_(setup.camera, setup.pyramid),
-      refiner_(setup.options.refiner),
+      refiner_(RefinerOptions(setup.options)),
       extractor_(setup.extractor),
       first_map_extractor_(WithMoreFeatures(setup.extractor, setup.options.initializer_feature_factor)),
       initializer_options_(setup.initializer),

@@ -21,5 +21,6 @@ check "the run ends with 0" play "$work/out" 212992
 no_orphans "the run"
 expect "no record is lost" "$work/out" records_lost "== 0"
 accounted "$work/out"
+expect "frames were worked on" "$work/out" frames_processed ">= 20"
 check "the recording is there" test -s "$work/out/run.lcmlog"
 finish

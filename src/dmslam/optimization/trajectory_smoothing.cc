@@ -53,20 +53,29 @@ struct Likeness {
   double log_determinant = 0.0;            ///< of the weight
 };
 
+/// For A = U diag(carried) U^T, or turned on its right.
+Likeness MakeLikeness(const Vector6d& carried, const Matrix6d& U) {
+  const Vector6d is_new = Vector6d::Ones() - carried.cwiseAbs2();
+  Likeness likeness;
+  likeness.carried = U * carried.asDiagonal() * U.transpose();
+  likeness.weight = U * is_new.cwiseInverse().asDiagonal() * U.transpose();
+  likeness.log_determinant = -is_new.array().log().sum();
+  return likeness;
+}
+
 /// Errors in standard deviations, I^(1/2) error: those of frames j and k that the same landmarks make have
-/// the covariance I_k^(-1/2) I_shared I_j^(-1/2).
+/// the covariance I_k^(-1/2) I_shared I_j^(-1/2). `shared` is told from frame k, as if j had seen all of it:
+/// a singular value s above 1 is a direction in which j knows less, and of j's error at most 1/s goes on
+/// there.
 Likeness LikenessOf(const Matrix6d& shared, const Matrix6d& inverse_root,
                     const Matrix6d& inverse_root_before) {
   const Matrix6d covariance = inverse_root * shared * inverse_root_before;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(covariance * covariance.transpose());
   const Matrix6d& U = eigen.eigenvectors();
   const Vector6d singular = eigen.eigenvalues().cwiseMax(kMinSpread).cwiseSqrt();
-  const Vector6d carried = singular.cwiseMin(kMaxCarried);  // approximate Jacobians may say more
-  const Vector6d is_new = Vector6d::Ones() - carried.cwiseAbs2();
-  Likeness likeness;
+  const Vector6d carried = singular.cwiseMin(singular.cwiseInverse()).cwiseMin(kMaxCarried);
+  Likeness likeness = MakeLikeness(carried, U);
   likeness.carried = U * carried.cwiseQuotient(singular).asDiagonal() * U.transpose() * covariance;
-  likeness.weight = U * is_new.cwiseInverse().asDiagonal() * U.transpose();
-  likeness.log_determinant = -is_new.array().log().sum();
   return likeness;
 }
 
@@ -151,10 +160,13 @@ class Smoother {
     const Vector6d inverse = (root.array() > least).select(root.cwiseInverse(), 0.0);
     const Matrix6d inverse_root =
         eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
-    likeness_.push_back(likeness_.empty() ? Likeness()
-                                          : LikenessOf(left.transpose() * estimate.shared * left,
-                                                       inverse_root, inverse_root_before_));
-    inverse_root_before_ = inverse_root;
+    if (!likeness_.empty() && root.isZero(0.0)) {
+      likeness_.push_back(MakeLikeness(kMaxCarried * Vector6d::Ones(), Matrix6d::Identity()));
+    } else {
+      likeness_.push_back(
+          LikenessOf(left.transpose() * estimate.shared * left, inverse_root, inverse_root_before_));
+      inverse_root_before_ = inverse_root;
+    }
     roots_.push_back(eigen.eigenvectors() * root.asDiagonal() * eigen.eigenvectors().transpose());
   }
 
@@ -366,7 +378,7 @@ class Smoother {
   std::vector<State> states_, measured_;
   std::vector<Matrix6d> roots_;  ///< of the information of (rotation, centre)
   std::vector<Likeness> likeness_;
-  Matrix6d inverse_root_before_;
+  Matrix6d inverse_root_before_ = Matrix6d::Zero();
   std::vector<double> weights_;
   Variances variances_;
 };
