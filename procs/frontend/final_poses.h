@@ -60,7 +60,7 @@ class FinalPoses {
   /// The frame's landmarks must be in the map now; they may leave it later.
   void Add(const Map& map, FinalPose pose);
   /// One round: landmarks and frames are placed (not in the first), poses smoothed. They are in order of map
-  /// and time then. `between` is called every few milliseconds.
+  /// and time then. `between` is called after each portion of work, 20 ms for 1000 frames.
   void Improve(const Map& map, const std::function<void()>& between = {});
   /// Whether all rounds are made, or none can be made any more.
   bool IsSettled() const;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kMinSights = 30;
 constexpr double kSeesLess = 0.8;  // of what the frame before saw
-constexpr double kSeesMore = 1.1;  // from its motion, than from where it was told to be
+constexpr double kSeesMore = 1.3;  // from its motion, than from where it was told to be
 
 /// What became of a landmark of map `map_id`; null where it is gone.
 const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
