@@ -19,10 +19,9 @@ constexpr int kLandmarkSteps = 2;  // of Gauss and Newton
 constexpr double kHuber_chi2 = 5.991;
 // Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
 constexpr double kOverstep = 1.7;
-constexpr size_t kSharedFrames =
-    10;                           // since one saw a landmark: more, and the errors of the two are their own
-constexpr double kMaxMove = 0.3;  // of a landmark, as a share of its distance: more is a slip
-constexpr size_t kPortion = 64;   // frames or landmarks between two calls of who waits
+constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and their errors are their own
+constexpr double kMaxMove = 0.3;      // of a landmark, as a share of its distance: more is a slip
+constexpr size_t kPortion = 64;       // frames or landmarks between two calls of who waits
 
 PoseObservation Observe(const Pyramid& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
   return {p_world, sight.uv_px.cast<double>(), 1.0 / pyramid.SigmaSquared(sight.octave), 1.0};

@@ -4,10 +4,6 @@ need_synthetic
 multicast
 
 overflows() { awk '$1 == "Udp:" && $2 ~ /^[0-9]+$/ { print $6 }' /proc/net/snmp; } # datagrams dropped at full receive buffers here
-
-play() { # FOLDER RECEIVE_BUFFER
-  run --sequence "$synthetic" --camera "$root/config/synthetic.yaml" --speed 0.5 --receive-buffer "$2" --record --out "$1"
-}
 accounted() { # FOLDER: each frame was worked on, was too late for that, or was dropped by the kernel on its way
   local processed skipped received lost frames
   processed=$(field "$1" frames_processed) skipped=$(field "$1" frames_skipped)
@@ -17,7 +13,8 @@ accounted() { # FOLDER: each frame was worked on, was too late for that, or was 
   (($(overflows) > 0)) || check "$lost frames were lost, but no receive buffer was full" test "$lost" = 0
 }
 
-check "the run ends with 0" play "$work/out" 212992
+check "the run ends with 0" run --sequence "$synthetic" --camera "$root/config/synthetic.yaml" --speed 0.5 \
+  --receive-buffer 212992 --record --out "$work/out"
 no_orphans "the run"
 expect "no record is lost" "$work/out" records_lost "== 0"
 accounted "$work/out"
