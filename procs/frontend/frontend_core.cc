@@ -56,6 +56,7 @@ FrontendCore::FrontendCore(Setup setup)
       run_search_(std::move(setup.run_search)),
       initializer_(MakeInitializer()),
       tracker_(setup.options.tracking, setup.camera, setup.pyramid),
+      searcher_(setup.options.tracking, setup.camera, setup.pyramid),
       relocalizer_(setup.vocabulary) {
   if (!setup.in_saved_map) return;
   state_ = TrackingState::kLost;
@@ -110,8 +111,8 @@ void FrontendCore::RefineRest() { refiner_.Begin(map_); }
 
 void FrontendCore::RefineNext() {
   const auto search = [this](TrackedFrame* frame) {
-    tracker_.SetMotionPrior(std::nullopt, 1.0);
-    return tracker_.TrackLocalMap(map_, false, frame).ok;
+    searcher_.Reset();  // what the frame before saw move may lie still in this one
+    return searcher_.TrackLocalMap(map_, false, frame).ok;
   };
   if (auto pose = refiner_.RefineNext(map_, search)) final_poses_.Add(map_, std::move(*pose));
 }

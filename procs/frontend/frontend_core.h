@@ -185,6 +185,7 @@ class FrontendCore {
   std::function<FirstMapSearch(FirstMapSearch)> run_search_;
   FirstMapSearch initializer_;
   PoseTracker tracker_;
+  PoseTracker searcher_;  ///< for the frames that are refined: what they see is not news of the map
   Relocalizer relocalizer_;
 
   TrackingState state_ = TrackingState::kNotInitialized;
