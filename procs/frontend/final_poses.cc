@@ -12,10 +12,11 @@
 namespace dmslam {
 namespace {
 
-constexpr int kRounds = 10;
+constexpr int kRounds = 20;
 constexpr double kMinInlierShare = 0.7;
-constexpr int kMinFrames = 5;      // that see a landmark, to place it by them
-constexpr int kLandmarkSteps = 2;  // of Gauss and Newton
+constexpr double kMaxLeverage = 1.0 / 3.0;  // of one sight: half of what all others say
+constexpr int kMinFrames = 5;               // that see a landmark, to place it by them
+constexpr int kLandmarkSteps = 2;           // of Gauss and Newton
 constexpr double kHuber_chi2 = 5.991;
 // Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
 constexpr double kOverstep = 1.7;
@@ -46,6 +47,38 @@ struct LandmarkEquations {
     gradient += weight * J.transpose() * error;
   }
 };
+
+/// The share of what is known of the pose that this observation alone says, along the direction where that is
+/// most: 0 to 1 (the greatest eigenvalue of its part of the hat matrix).
+double Leverage(const Pinhole& camera, const Rigid3d& T_cam_world, const Eigen::LDLT<Matrix6d>& information,
+                const PoseObservation& observation) {
+  const Matrix26 J = PoseJacobian(camera, T_cam_world * observation.p_world);
+  const Eigen::Matrix2d hat = observation.inv_sigma_squared * J * information.solve(J.transpose());
+  const double mean = 0.5 * hat.trace();
+  return mean + std::sqrt(std::max(0.0, mean * mean - hat.determinant()));
+}
+
+/// Drops what the pose rests on without others that would contradict it, were it wrong: as a rule a mismatch
+/// near the epipole, which makes a landmark just before the lens. Whether there were any; never half of all.
+bool DropUnchecked(const Pinhole& camera, const PoseOptimizationReport& report, std::vector<Sight>* sights,
+                   std::vector<PoseObservation>* observations) {
+  if (!report.usable) return false;
+  const Eigen::LDLT<Matrix6d> information(report.information);
+  std::vector<size_t> checked;
+  for (size_t i = 0; i < sights->size(); ++i) {
+    const bool alone = report.inliers[i] != 0 &&
+                       Leverage(camera, report.T_cam_world, information, (*observations)[i]) > kMaxLeverage;
+    if (!alone) checked.push_back(i);
+  }
+  if (checked.size() == sights->size() || 2 * checked.size() < sights->size()) return false;
+  for (size_t k = 0; k < checked.size(); ++k) {
+    (*sights)[k] = (*sights)[checked[k]];
+    (*observations)[k] = (*observations)[checked[k]];
+  }
+  sights->resize(checked.size());
+  observations->resize(checked.size());
+  return true;
+}
 
 /// How sure its keyframes are of a landmark's place.
 Eigen::Matrix3d InformationOf(const Map& map, const Landmark& landmark) {
@@ -84,18 +117,22 @@ void FinalPose::SetPose(const Keyframe& reference, const Rigid3d& T_cam_world) {
   SetPose(T_cam_world);
 }
 
-bool Agrees(const PoseOptimizationReport& report, size_t num_sights) {
-  return report.usable && report.num_inliers >= kMinInlierShare * static_cast<double>(num_sights);
+bool Agrees(const PoseOptimizationReport& report) {
+  return report.usable && report.num_inliers >= kMinInlierShare * static_cast<double>(report.inliers.size());
 }
 
-PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
-                                   const std::vector<Sight>& sights, FinalPose* pose) {
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world, std::vector<Sight> sights,
+                                   FinalPose* pose) {
+  const Pinhole camera = map.camera().Ideal();
   std::vector<PoseObservation> observations;
   observations.reserve(sights.size());
   for (const Sight& sight : sights) {
     observations.push_back(Observe(map.pyramid(), sight, map.FindLandmark(sight.landmark)->p_world));
   }
-  PoseOptimizationReport report = OptimizePose(map.camera().Ideal(), T_cam_world, observations);
+  PoseOptimizationReport report = OptimizePose(camera, T_cam_world, observations);
+  while (DropUnchecked(camera, report, &sights, &observations)) {
+    report = OptimizePose(camera, report.T_cam_world, observations);
+  }
   pose->measured = report.T_cam_world;
   pose->information = report.information;
   pose->sights.clear();
@@ -113,6 +150,7 @@ void FinalPoses::Add(const Map& map, FinalPose pose) {
     landmarks_[sight.landmark] = {landmark.p_world, landmark.p_world, InformationOf(map, landmark)};
   }
   poses_.push_back(std::move(pose));
+  views_.clear();
   rounds_ = 0;
 }
 
@@ -234,20 +272,23 @@ void FinalPoses::PlaceLandmark(const Map& map, std::span<const View> views) {
   }
 }
 
-void FinalPoses::PlaceLandmarks(const Map& map) {
-  size_t num_placed = 0;
-  std::vector<View> views;
+void FinalPoses::SortViews() {
   for (uint32_t frame = 0; frame < poses_.size(); ++frame) {
     for (uint32_t sight = 0; sight < poses_[frame].sights.size(); ++sight) {
-      views.push_back({poses_[frame].sights[sight].landmark, frame, sight});
+      views_.push_back({poses_[frame].sights[sight].landmark, frame, sight});
     }
   }
-  std::sort(views.begin(), views.end(), [](const View& a, const View& b) {
+  std::sort(views_.begin(), views_.end(), [](const View& a, const View& b) {
     return std::tie(a.landmark, a.frame, a.sight) < std::tie(b.landmark, b.frame, b.sight);
   });
-  for (auto begin = views.begin(); begin != views.end();) {
+}
+
+void FinalPoses::PlaceLandmarks(const Map& map) {
+  if (views_.empty()) SortViews();
+  size_t num_placed = 0;
+  for (auto begin = views_.cbegin(); begin != views_.cend();) {
     const auto end =
-        std::find_if(begin, views.end(), [begin](const View& v) { return v.landmark != begin->landmark; });
+        std::find_if(begin, views_.cend(), [begin](const View& v) { return v.landmark != begin->landmark; });
     if (end - begin >= kMinFrames) PlaceLandmark(map, {begin, end});
     if (++num_placed % kPortion == 0) Between();
     begin = end;
@@ -255,6 +296,10 @@ void FinalPoses::PlaceLandmarks(const Map& map) {
 }
 
 void FinalPoses::PlaceFrames(const Map& map) {
+  PoseOptimizationOptions a_few_steps;  // the landmarks move again before the next
+  a_few_steps.rounds = 2;
+  a_few_steps.robust_rounds = 1;
+  a_few_steps.iterations = 2;
   std::vector<PoseObservation> observations;
   PoseOptimizationReport report;
   size_t num_placed = 0;
@@ -263,8 +308,8 @@ void FinalPoses::PlaceFrames(const Map& map) {
     for (const Sight& sight : frame.sights) {
       observations.push_back(Observe(map.pyramid(), sight, landmarks_.at(sight.landmark).p_world));
     }
-    OptimizePose(map.camera().Ideal(), frame.pose.T_cam_world, observations, {}, report);
-    if (Agrees(report, observations.size())) {
+    OptimizePose(map.camera().Ideal(), frame.pose.T_cam_world, observations, a_few_steps, report);
+    if (Agrees(report)) {
       frame.measured = report.T_cam_world;
       frame.information = report.information;
     }

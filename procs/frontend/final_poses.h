@@ -38,13 +38,15 @@ struct FinalPose {
 /// The landmarks that a tracked frame uses.
 std::vector<Sight> SightsOf(const TrackedFrame& frame);
 
-/// Whether so many of the landmarks matched agree that the pose can be believed.
-bool Agrees(const PoseOptimizationReport& report, size_t num_sights);
+/// Whether so many of the landmarks observed agree that the pose can be believed.
+bool Agrees(const PoseOptimizationReport& report);
 
 /// The pose of least reprojection errors, from `T_cam_world`, by what was seen alone; fills in what was
-/// measured and the sights. The landmarks must be in the map.
-PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
-                                   const std::vector<Sight>& sights, FinalPose* pose);
+/// measured and the sights. The landmarks must be in the map. No pose rests on a single sight: where one says
+/// more than half of what all others say of some direction, it is left out, as no other could contradict it
+/// (Baarda's redundancy numbers, the same as leverage).
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world, std::vector<Sight> sights,
+                                   FinalPose* pose);
 
 /// The poses that are told at the end, and with them once more the landmarks that they see.
 ///
@@ -84,12 +86,14 @@ class FinalPoses {
   void Smooth(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
+  void SortViews();
   void PlaceLandmark(const Map& map, std::span<const View> views);
   void PlaceLandmarks(const Map& map);
   void PlaceFrames(const Map& map);
   void Between() const;
 
   std::vector<FinalPose> poses_;
+  std::vector<View> views_;  ///< all, by landmark; empty: to be listed
   int rounds_ = 0;
   bool map_has_moved_ = false;
   std::function<void()> between_;

@@ -89,7 +89,7 @@ std::optional<FinalPose> FrameRefiner::Measured(const Map& map, const Kept& kept
   FinalPose refined;
   refined.pose = kept.pose;
   const PoseOptimizationReport report = MeasurePose(map, told, sights, &refined);
-  if (!Agrees(report, sights.size())) return std::nullopt;
+  if (!Agrees(report)) return std::nullopt;
   return refined;
 }
 

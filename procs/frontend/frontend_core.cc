@@ -564,7 +564,7 @@ FinalPose FrontendCore::LaterPose(const TrackedFrame& frame) const {
   later.pose.state = TrackingState::kLocalizedLater;
   const std::vector<Sight> sights = SightsOf(frame);
   const PoseOptimizationReport report = MeasurePose(map_, frame.T_cam_world, sights, &later);
-  if (!Agrees(report, sights.size())) {
+  if (!Agrees(report)) {
     later.measured = frame.T_cam_world;
     later.information.setZero();
   }
