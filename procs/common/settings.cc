@@ -211,7 +211,8 @@ std::vector<Entry> TrackingEntries() {
           [](Settings & s) -> auto& { return s.frontend.tracking.trusted_age_s; }, 0, 1000),
       Make(
           "tracking.smooth_at_end",
-          "the poses told at the end: landmarks placed by all frames, and joined with the camera's motion",
+          "the poses told at the end: landmarks placed by all frames, weak frames looked for from the "
+          "motion, and joined with it",
           [](Settings & s) -> auto& { return s.frontend.smooth_at_end; }),
       Make(
           "tracking.max_local_keyframes", "keyframes whose landmarks are searched for",

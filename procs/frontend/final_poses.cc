@@ -80,6 +80,25 @@ bool DropUnchecked(const Pinhole& camera, const PoseOptimizationReport& report, 
   return true;
 }
 
+std::vector<PoseObservation> ObserveAll(const Map& map, const std::vector<Sight>& sights) {
+  std::vector<PoseObservation> observations;
+  observations.reserve(sights.size());
+  for (const Sight& sight : sights) {
+    observations.push_back(Observe(map.pyramid(), sight, map.FindLandmark(sight.landmark)->p_world));
+  }
+  return observations;
+}
+
+void SetMeasured(const PoseOptimizationReport& report, const std::vector<Sight>& sights, FinalPose* pose) {
+  pose->measured = report.T_cam_world;
+  pose->information = report.information;
+  pose->sights.clear();
+  pose->sights.reserve(static_cast<size_t>(report.num_inliers));
+  for (size_t i = 0; i < sights.size(); ++i) {
+    if (report.inliers[i] != 0) pose->sights.push_back(sights[i]);
+  }
+}
+
 /// How sure its keyframes are of a landmark's place.
 Eigen::Matrix3d InformationOf(const Map& map, const Landmark& landmark) {
   LandmarkEquations equations;
@@ -121,25 +140,24 @@ bool Agrees(const PoseOptimizationReport& report) {
   return report.usable && report.num_inliers >= kMinInlierShare * static_cast<double>(report.inliers.size());
 }
 
-PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world, std::vector<Sight> sights,
-                                   FinalPose* pose) {
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
+                                   const std::vector<Sight>& sights, FinalPose* pose) {
+  const PoseOptimizationReport report =
+      OptimizePose(map.camera().Ideal(), T_cam_world, ObserveAll(map, sights));
+  SetMeasured(report, sights, pose);
+  return report;
+}
+
+PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_world,
+                                          const std::vector<Sight>& sights, FinalPose* pose) {
   const Pinhole camera = map.camera().Ideal();
-  std::vector<PoseObservation> observations;
-  observations.reserve(sights.size());
-  for (const Sight& sight : sights) {
-    observations.push_back(Observe(map.pyramid(), sight, map.FindLandmark(sight.landmark)->p_world));
-  }
+  std::vector<Sight> checked = sights;
+  std::vector<PoseObservation> observations = ObserveAll(map, checked);
   PoseOptimizationReport report = OptimizePose(camera, T_cam_world, observations);
-  while (DropUnchecked(camera, report, &sights, &observations)) {
+  while (DropUnchecked(camera, report, &checked, &observations)) {
     report = OptimizePose(camera, report.T_cam_world, observations);
   }
-  pose->measured = report.T_cam_world;
-  pose->information = report.information;
-  pose->sights.clear();
-  pose->sights.reserve(static_cast<size_t>(report.num_inliers));
-  for (size_t i = 0; i < sights.size(); ++i) {
-    if (report.inliers[i]) pose->sights.push_back(sights[i]);
-  }
+  SetMeasured(report, checked, pose);
   return report;
 }
 

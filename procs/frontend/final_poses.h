@@ -42,11 +42,14 @@ std::vector<Sight> SightsOf(const TrackedFrame& frame);
 bool Agrees(const PoseOptimizationReport& report);
 
 /// The pose of least reprojection errors, from `T_cam_world`, by what was seen alone; fills in what was
-/// measured and the sights. The landmarks must be in the map. No pose rests on a single sight: where one says
-/// more than half of what all others say of some direction, it is left out, as no other could contradict it
-/// (Baarda's redundancy numbers, the same as leverage).
-PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world, std::vector<Sight> sights,
-                                   FinalPose* pose);
+/// measured and the sights. The landmarks must be in the map.
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
+                                   const std::vector<Sight>& sights, FinalPose* pose);
+
+/// The same, of a pose that rests on no single sight: where one says more than half of what all others say of
+/// some direction, it is left out, as no other could contradict it (leverage; Baarda's redundancy numbers).
+PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_world,
+                                          const std::vector<Sight>& sights, FinalPose* pose);
 
 /// The poses that are told at the end, and with them once more the landmarks that they see.
 ///

@@ -108,7 +108,7 @@ class PosesAtTheEnd : public testing::Test {
     FinalPose pose;
     pose.pose.frame_index = static_cast<uint32_t>(frame);
     pose.pose.stamp_ns = static_cast<int64_t>(1e9 * TimeOf(frame));
-    const PoseOptimizationReport report = MeasurePose(map_, TruthAt(TimeOf(frame)), sights, &pose);
+    const PoseOptimizationReport report = MeasureCheckedPose(map_, TruthAt(TimeOf(frame)), sights, &pose);
     EXPECT_TRUE(Agrees(report));
     pose.SetPose(*map_.FindKeyframe(KeyframeId::Make(1, 0)), report.T_cam_world);
     return pose;
@@ -148,7 +148,7 @@ TEST_F(PosesAtTheEnd, NoPoseRestsOnOneSight) {
   const Rigid3d truth = TruthAt(TimeOf(kFrame));
   std::vector<Sight> sights = SightsAt(kFrame);
   FinalPose without;
-  MeasurePose(map_, truth, sights, &without);
+  MeasureCheckedPose(map_, truth, sights, &without);
   // A mismatch just before the lens, two pixels from where it should be: it agrees with a wrong pose.
   const Eigen::Vector3d p_cam(0.01, 0.02, 0.1);
   Landmark false_one;
@@ -161,7 +161,7 @@ TEST_F(PosesAtTheEnd, NoPoseRestsOnOneSight) {
   sights.push_back({false_one.id, uv_px.cast<float>(), 0, 0});
 
   FinalPose pose;
-  const PoseOptimizationReport report = MeasurePose(map_, truth, sights, &pose);
+  const PoseOptimizationReport report = MeasureCheckedPose(map_, truth, sights, &pose);
   EXPECT_TRUE(Agrees(report));
   EXPECT_EQ(pose.sights.size(), without.sights.size());
   EXPECT_EQ(std::count_if(pose.sights.begin(), pose.sights.end(),

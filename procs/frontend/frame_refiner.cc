@@ -48,7 +48,7 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
     (map_id && reference->map_id != *map_id ? others : due_).push_back(std::move(kept));
   }
   frames_ = std::move(others);
-  if (options_.follow_motion) {  // those that were placed later came after
+  if (options_.for_smoothing) {  // those that were placed later came after
     std::stable_sort(due_.begin(), due_.end(),
                      [](const Kept& a, const Kept& b) { return a.pose.stamp_ns < b.pose.stamp_ns; });
   }
@@ -84,11 +84,12 @@ std::optional<std::vector<Sight>> FrameRefiner::SearchAgain(const Map& map, cons
 }
 
 std::optional<FinalPose> FrameRefiner::Measured(const Map& map, const Kept& kept, const Rigid3d& told,
-                                                const std::vector<Sight>& sights) {
+                                                const std::vector<Sight>& sights) const {
   if (static_cast<int>(sights.size()) < kMinSights) return std::nullopt;
   FinalPose refined;
   refined.pose = kept.pose;
-  const PoseOptimizationReport report = MeasurePose(map, told, sights, &refined);
+  const auto measure = options_.for_smoothing ? MeasureCheckedPose : MeasurePose;
+  const PoseOptimizationReport report = measure(map, told, sights, &refined);
   if (!Agrees(report)) return std::nullopt;
   return refined;
 }
@@ -126,7 +127,7 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   const std::vector<Sight> known = SightsNow(map, reference->map_id, kept);
   std::optional<FinalPose> refined =
       Measured(map, kept, told, SearchAgain(map, kept, told, known, search).value_or(known));
-  if (options_.follow_motion) LookFromMotion(map, reference->map_id, kept, known, search, &refined);
+  if (options_.for_smoothing) LookFromMotion(map, reference->map_id, kept, known, search, &refined);
   before_ = std::exchange(last_, std::nullopt);
   if (refined) last_ = {reference->map_id, kept.pose.stamp_ns, refined->measured, refined->sights.size()};
   if (!refined && kept.pose.state == TrackingState::kLocalizedLater) {

@@ -19,9 +19,11 @@ struct FrameRefinerOptions {
   /// The features of the oldest are forgotten beyond (38 bytes each): these frames are only optimised with
   /// the landmarks that they saw.
   size_t max_features = 3'000'000;
-  /// Where a frame sees less of the map than the one before, it is looked for from that one's motion as well:
-  /// beside a wrong pose what is near is not found, and what is far agrees.
-  bool follow_motion = false;
+  /// The poses are smoothed afterwards. Then it is the wrong ones that count, more than those that few sights
+  /// leave open: no pose rests on a single sight (MeasureCheckedPose()), and where a frame sees less of the
+  /// map than the one before, it is looked for from that one's motion as well, as beside a wrong pose what is
+  /// near is not found, and what is far agrees.
+  bool for_smoothing = false;
 };
 
 /// What tracked frames saw, kept so that their poses can be found once more when the map has become better
@@ -59,8 +61,8 @@ class FrameRefiner {
   };
   void Bound();
   static std::vector<Sight> SightsNow(const Map& map, MapId map_id, const Kept& kept);
-  static std::optional<FinalPose> Measured(const Map& map, const Kept& kept, const Rigid3d& told,
-                                           const std::vector<Sight>& sights);
+  std::optional<FinalPose> Measured(const Map& map, const Kept& kept, const Rigid3d& told,
+                                    const std::vector<Sight>& sights) const;
   static std::optional<std::vector<Sight>> SearchAgain(const Map& map, const Kept& kept, const Rigid3d& told,
                                                        const std::vector<Sight>& known, const Search& search);
   std::optional<Rigid3d> FromMotion(MapId map_id, int64_t stamp_ns) const;

@@ -128,7 +128,7 @@ TEST_F(Refining, WhatTheMapHasWonSinceCounts) {
 /// only two thirds of them are found.
 size_t SeenByTheThird(const Map& map, const TrackedFrame& frame, FramePose told, const Rigid3d& truth,
                       bool follow_motion) {
-  FrameRefiner refiner({.follow_motion = follow_motion});
+  FrameRefiner refiner({.for_smoothing = follow_motion});
   for (const int64_t stamp_ns : {1000, 2000, 3000}) {
     told.stamp_ns = stamp_ns;
     refiner.Keep(frame, told);

@@ -34,7 +34,7 @@ OrbExtractorOptions WithMoreFeatures(OrbExtractorOptions options, double factor)
 
 FrameRefinerOptions RefinerOptions(const FrontendOptions& frontend) {
   FrameRefinerOptions options = frontend.refiner;
-  options.follow_motion = options.follow_motion || frontend.smooth_at_end;
+  options.for_smoothing = options.for_smoothing || frontend.smooth_at_end;
   return options;
 }
 
@@ -563,7 +563,7 @@ FinalPose FrontendCore::LaterPose(const TrackedFrame& frame) const {
   later.pose.stamp_ns = frame.stamp_ns;
   later.pose.state = TrackingState::kLocalizedLater;
   const std::vector<Sight> sights = SightsOf(frame);
-  const PoseOptimizationReport report = MeasurePose(map_, frame.T_cam_world, sights, &later);
+  const PoseOptimizationReport report = MeasureCheckedPose(map_, frame.T_cam_world, sights, &later);
   if (!Agrees(report)) {
     later.measured = frame.T_cam_world;
     later.information.setZero();
