@@ -17,7 +17,7 @@ constexpr double kMinInlierShare = 0.7;
 constexpr double kMaxLeverage = 1.0 / 3.0;  // of one sight: half of what all others say
 constexpr int kMinFrames = 5;               // that see a landmark, to place it by them
 constexpr int kLandmarkSteps = 2;           // of Gauss and Newton
-constexpr double kHuber_chi2 = 5.991;
+constexpr double kHuberChi2 = 5.991;
 // Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
 constexpr double kOverstep = 1.7;
 constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and their errors are their own
@@ -41,7 +41,7 @@ struct LandmarkEquations {
     const Eigen::Vector2d error = camera.Project(p_cam) - uv_px;
     const double inv_sigma_squared = 1.0 / map.pyramid().SigmaSquared(octave);
     const double chi2 = error.squaredNorm() * inv_sigma_squared;
-    const double weight = inv_sigma_squared * (chi2 > kHuber_chi2 ? std::sqrt(kHuber_chi2 / chi2) : 1.0);
+    const double weight = inv_sigma_squared * (chi2 > kHuberChi2 ? std::sqrt(kHuberChi2 / chi2) : 1.0);
     const Matrix23 J = ProjectionJacobian(camera, p_cam) * T_cam_world.rotation.toRotationMatrix();
     information += weight * J.transpose() * J;
     gradient += weight * J.transpose() * error;
@@ -142,8 +142,7 @@ bool Agrees(const PoseOptimizationReport& report) {
 
 PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
                                    const std::vector<Sight>& sights, FinalPose* pose) {
-  const PoseOptimizationReport report =
-      OptimizePose(map.camera().Ideal(), T_cam_world, ObserveAll(map, sights));
+  PoseOptimizationReport report = OptimizePose(map.camera().Ideal(), T_cam_world, ObserveAll(map, sights));
   SetMeasured(report, sights, pose);
   return report;
 }
@@ -224,7 +223,7 @@ std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const 
       if (is_new || frames_ago == 0 || frames_ago > kSharedFrames || p_cam.z() <= 0.0) continue;
       const double variance = map.pyramid().SigmaSquared(sight.octave);
       const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
-      if (error.squaredNorm() > kHuber_chi2 * variance) continue;  // the pose was told without it
+      if (error.squaredNorm() > kHuberChi2 * variance) continue;  // the pose was told without it
       const Matrix26 J = PoseJacobian(camera, p_cam);
       shared += J.transpose() * J / variance;
     }
