@@ -214,6 +214,7 @@ bool CollectorNode::EndIfDone() {
 void CollectorNode::Write() {
   if (written_ || !builder_) return;
   written_ = true;
+  builder_->SetDroppedMaps(dropped_maps_);
   journal_->ForEach([this](std::span<const uint8_t> record) {
     if (const auto pose = Read<FramePose>(record)) builder_->OnFramePose(*pose);
   });

@@ -4,7 +4,9 @@
 
 namespace dmslam {
 
-void TrajectoryBuilder::OnFramePose(const FramePose& pose) {
+void TrajectoryBuilder::OnFramePose(const FramePose& told) {
+  FramePose pose = told;
+  if (dropped_maps_.contains(pose.map_id)) pose.reference = {};
   const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
   if (inserted) return;
   const bool later = pose.state == TrackingState::kLocalizedLater;

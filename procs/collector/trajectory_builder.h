@@ -17,6 +17,9 @@ class TrajectoryBuilder {
  public:
   TrajectoryBuilder(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
 
+  /// Maps that were wrong from the beginning: poses in them count for nothing. Their keyframes may have been
+  /// made again, of the same frames, in a later map.
+  void SetDroppedMaps(std::set<MapId> maps) { dropped_maps_ = std::move(maps); }
   void OnFramePose(const FramePose& pose);
   void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
 
@@ -42,6 +45,7 @@ class TrajectoryBuilder {
   MapId MapOfFrame(const FramePose& pose) const;
 
   Map map_;
+  std::set<MapId> dropped_maps_;
   std::map<uint32_t, FramePose>
       poses_;  ///< by frame index; a later placement does not replace an online one...
   std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory

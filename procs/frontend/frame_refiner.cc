@@ -52,6 +52,21 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
     std::stable_sort(due_.begin(), due_.end(),
                      [](const Kept& a, const Kept& b) { return a.pose.stamp_ns < b.pose.stamp_ns; });
   }
+  CountFeatures();
+}
+
+std::vector<WaitingFrame> FrameRefiner::TakeFramesOf(MapId map_id) {
+  std::vector<WaitingFrame> taken;
+  for (Kept& kept : frames_) {
+    if (kept.pose.map_id != map_id || kept.features.keypoints.empty()) continue;
+    taken.emplace_back(kept.pose.frame_index, kept.pose.stamp_ns, std::move(kept.features));
+  }
+  std::erase_if(frames_, [map_id](const Kept& kept) { return kept.pose.map_id == map_id; });
+  CountFeatures();
+  return taken;
+}
+
+void FrameRefiner::CountFeatures() {
   num_features_ = 0;
   for (const Kept& kept : frames_) num_features_ += kept.features.keypoints.size();
   num_without_features_ = static_cast<size_t>(std::count_if(

@@ -38,6 +38,10 @@ class FrameRefiner {
   /// Keeps a tracked frame and the pose that was told of it.
   void Keep(const TrackedFrame& frame, const FramePose& pose);
 
+  /// Gives back the frames that were tracked in map `map_id`, which was wrong, as far as their features are
+  /// kept.
+  std::vector<WaitingFrame> TakeFramesOf(MapId map_id);
+
   /// Takes the frames of map `map_id` (none given: of all) for RefineNext(); they are told once.
   void Begin(const Map& map, std::optional<MapId> map_id = std::nullopt);
   bool IsBusy() const { return !due_.empty(); }
@@ -60,6 +64,7 @@ class FrameRefiner {
     size_t num_sights = 0;
   };
   void Bound();
+  void CountFeatures();
   static std::vector<Sight> SightsNow(const Map& map, MapId map_id, const Kept& kept);
   std::optional<FinalPose> Measured(const Map& map, const Kept& kept, const Rigid3d& told,
                                     const std::vector<Sight>& sights) const;

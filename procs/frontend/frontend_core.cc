@@ -386,14 +386,23 @@ void FrontendCore::OnNotTracked(const TrackingReport& report, std::vector<Fronte
 void FrontendCore::GiveUpMap(bool drop, const std::string& reason, std::vector<FrontendEvent>* events) {
   ++counters_.resets;
   if (map_id_ != 0) events->push_back(MapReset{map_id_, drop, reason});
-  NextMapId();
   for (WaitingFrame& frame : std::exchange(behind_, {})) KeepUnplaced(std::move(frame));
+  if (drop && options_.keyframes_at_end) PutBackFramesOf(map_id_);
+  NextMapId();
   tracker_.Reset();
   velocity_.reset();
   coasting_.reset();
   initializer_ = MakeInitializer();
   state_ = TrackingState::kNotInitialized;
   awaited_ = {};
+}
+
+/// The poses of a map that was wrong are void: the next one may place its frames.
+void FrontendCore::PutBackFramesOf(MapId map_id) {
+  for (WaitingFrame& frame : refiner_.TakeFramesOf(map_id)) unplaced_.push_back(std::move(frame));
+  std::sort(unplaced_.begin(), unplaced_.end(),
+            [](const WaitingFrame& a, const WaitingFrame& b) { return a.index < b.index; });
+  while (static_cast<int>(unplaced_.size()) > options_.max_kept_frames) unplaced_.pop_front();
 }
 
 /// A number that no map has had: those of a saved one are taken.

@@ -146,6 +146,7 @@ class FrontendCore {
   void OnTracked(const TrackingReport& report, std::vector<FrontendEvent>* events);
   void OnNotTracked(const TrackingReport& report, std::vector<FrontendEvent>* events);
   void GiveUpMap(bool drop, const std::string& reason, std::vector<FrontendEvent>* events);
+  void PutBackFramesOf(MapId map_id);
   bool WantsKeyframe(const TrackingReport& report);
   void ProposeKeyframe(std::vector<FrontendEvent>* events);
   void FlushEvidence(std::vector<FrontendEvent>* events);

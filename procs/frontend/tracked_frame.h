@@ -47,7 +47,9 @@ struct WaitingFrame {
   FeatureSet features;
 
   explicit WaitingFrame(const TrackedFrame& frame)
-      : index(frame.index), stamp_ns(frame.stamp_ns), features(frame.features->set) {}
+      : WaitingFrame(frame.index, frame.stamp_ns, frame.features->set) {}
+  WaitingFrame(uint32_t frame_index, int64_t frame_stamp_ns, FeatureSet frame_features)
+      : index(frame_index), stamp_ns(frame_stamp_ns), features(std::move(frame_features)) {}
   TrackedFrame ToTracked(const Camera& camera, const Pyramid& pyramid) && {
     return {index, stamp_ns, MakeFrameFeatures(std::move(features), camera, pyramid)};
   }
