@@ -152,6 +152,23 @@ TEST_F(Refining, WhereAFrameSeesLessThanTheOneBeforeItIsLookedForFromTheMotion) 
   EXPECT_EQ(SeenByTheThird(map_, frame_, told_, truth_, true), static_cast<size_t>(kLandmarks));
 }
 
+TEST_F(Refining, FramesOfAMapThatWasWrongAreGivenBackWithTheirFeatures) {
+  FrameRefiner refiner;
+  refiner.Keep(frame_, told_);
+  FramePose of_another = told_;
+  of_another.map_id = 2;
+  of_another.frame_index = 6;
+  refiner.Keep(frame_, of_another);
+  const std::vector<WaitingFrame> back = refiner.TakeFramesOf(2);
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].index, 6U);
+  EXPECT_EQ(back[0].stamp_ns, 1000);
+  EXPECT_EQ(back[0].features.keypoints.size(), static_cast<size_t>(kLandmarks));
+  const std::vector<FramePose> refined = Refine(refiner);
+  ASSERT_EQ(refined.size(), 1U);
+  EXPECT_EQ(refined[0].frame_index, 5U);
+}
+
 TEST_F(Refining, AFailedSearchLeavesWhatTheFrameSaw) {
   FrameRefiner refiner;
   refiner.Keep(frame_, told_);
