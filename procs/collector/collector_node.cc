@@ -124,6 +124,14 @@ void CollectorNode::OnFramePose(const Record& record) {
   journal_->Append(*record.bytes);
 }
 
+/// Map 0 is all of them: that they be adjusted at the end.
+void CollectorNode::OnMapReset(const Record& record) {
+  const auto reset = Read<MapReset>(*record.bytes);
+  if (!reset || reset->map_id == 0) return;
+  ++run_.resets;
+  journal_->Append(*record.bytes);
+}
+
 /// Those that were placed later have been seen before.
 void CollectorNode::CountFrame(const FramePose& pose) {
   if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frame_) return;
@@ -145,8 +153,7 @@ bool CollectorNode::TakeFrontendRecord() {
       OnProposal(proposal->second.id, proposal->map_id);
     }
   } else if (record->channel == channels::kMapReset) {
-    // Map 0 is all of them: that they be adjusted at the end.
-    if (const auto reset = Read<MapReset>(*record->bytes); reset && reset->map_id != 0) ++run_.resets;
+    OnMapReset(*record);
   }
   frontend_reader_->AcceptTaken();
   return true;
@@ -162,13 +169,14 @@ void CollectorNode::CountMissingKeyframes() {
   }
 }
 
-/// Behind the frame poses of a collector that was before this one.
+/// Behind what a collector that was before this one had accepted.
 void CollectorNode::OpenJournal() {
   std::filesystem::create_directories(collector_.out_dir);
   journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
   Version newest;
   journal_->Resume(context_.fresh_system ? 0 : session_, [&](std::span<const uint8_t> record) {
-    if (const auto pose = Read<FramePose>(record)) CountFrame(*pose);
+    if (const auto pose = wire::Decode<FramePose>(record)) CountFrame(*pose);
+    if (wire::Decode<MapReset>(record)) ++run_.resets;
     const std::optional<RecordHeader> header = ParseHeader(record);
     newest = {header->epoch, header->seq};
   });
@@ -214,9 +222,9 @@ bool CollectorNode::EndIfDone() {
 void CollectorNode::Write() {
   if (written_ || !builder_) return;
   written_ = true;
-  builder_->SetDroppedMaps(dropped_maps_);
   journal_->ForEach([this](std::span<const uint8_t> record) {
-    if (const auto pose = Read<FramePose>(record)) builder_->OnFramePose(*pose);
+    if (const auto pose = wire::Decode<FramePose>(record)) builder_->OnFramePose(*pose);
+    if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
   });
   run_.frames_published = static_cast<int64_t>(builder_->frame_poses().size());
   if (end_) {

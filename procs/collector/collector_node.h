@@ -44,6 +44,7 @@ class CollectorNode : public StreamNode {
   void OnProposal(KeyframeId id, MapId map_id);
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
+  void OnMapReset(const Record& record);
   void CountFrame(const FramePose& pose);
   void CountMissingKeyframes();
   void OpenJournal();

@@ -4,14 +4,20 @@
 
 namespace dmslam {
 
-void TrajectoryBuilder::OnFramePose(const FramePose& told) {
-  FramePose pose = told;
-  if (dropped_maps_.contains(pose.map_id)) pose.reference = {};
+void TrajectoryBuilder::OnFramePose(const FramePose& pose) {
   const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
   if (inserted) return;
   const bool later = pose.state == TrackingState::kLocalizedLater;
   if (later && pose.HasPose() && it->second.HasPose()) refined_[pose.frame_index] = pose;
   if (!it->second.HasPose() || (pose.HasPose() && !later)) it->second = pose;
+}
+
+void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
+  if (!reset.drop) return;
+  for (auto& [index, pose] : poses_) {
+    if (pose.map_id == reset.map_id) pose.reference = {};
+  }
+  std::erase_if(refined_, [&reset](const auto& entry) { return entry.second.map_id == reset.map_id; });
 }
 
 MapId TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <map>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -17,10 +16,10 @@ class TrajectoryBuilder {
  public:
   TrajectoryBuilder(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
 
-  /// Maps that were wrong from the beginning: poses in them count for nothing. Their keyframes may have been
-  /// made again, of the same frames, in a later map.
-  void SetDroppedMaps(std::set<MapId> maps) { dropped_maps_ = std::move(maps); }
   void OnFramePose(const FramePose& pose);
+  /// Poses told in a map that was wrong from the beginning count for nothing: a later map may have its
+  /// keyframes again, of the same frames and so of the same names.
+  void OnMapReset(const MapReset& reset);
   void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
 
   /// The map as it is known from elsewhere.
@@ -45,7 +44,6 @@ class TrajectoryBuilder {
   MapId MapOfFrame(const FramePose& pose) const;
 
   Map map_;
-  std::set<MapId> dropped_maps_;
   std::map<uint32_t, FramePose>
       poses_;  ///< by frame index; a later placement does not replace an online one...
   std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory

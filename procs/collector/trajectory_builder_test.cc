@@ -37,8 +37,8 @@ class TrajectoryOfTwoMaps : public testing::Test {
 };
 
 TEST_F(TrajectoryOfTwoMaps, PosesOfADroppedMapDoNotComeBackWithAKeyframeOfTheSameNumber) {
-  builder_.SetDroppedMaps({1});
   builder_.OnFramePose(PoseIn(1, TrackingState::kTracking, 0.5));
+  builder_.OnMapReset({1, true, "", 0});
   const TrajectoryBuilder::Trajectories built = builder_.Build();
   EXPECT_TRUE(built.final.empty());
   EXPECT_TRUE(built.online.empty());
@@ -46,13 +46,20 @@ TEST_F(TrajectoryOfTwoMaps, PosesOfADroppedMapDoNotComeBackWithAKeyframeOfTheSam
 }
 
 TEST_F(TrajectoryOfTwoMaps, AFrameOfADroppedMapThatIsPlacedLaterHasThatPose) {
-  builder_.SetDroppedMaps({1});
   builder_.OnFramePose(PoseIn(1, TrackingState::kTracking, 0.5));
+  builder_.OnMapReset({1, true, "", 0});
   builder_.OnFramePose(PoseIn(2, TrackingState::kLocalizedLater, 1.0));
   const TrajectoryBuilder::Trajectories built = builder_.Build();
   ASSERT_EQ(built.final.size(), 1U);
   EXPECT_NEAR(built.final[0].T_world_cam.translation.x(), -8.0, 1e-12);
   EXPECT_TRUE(built.online.empty()) << "it was not there when the image came";
+}
+
+TEST_F(TrajectoryOfTwoMaps, PosesOfOtherMapsAndOfOneThatIsKeptStay) {
+  builder_.OnFramePose(PoseIn(2, TrackingState::kTracking, 0.5));
+  builder_.OnMapReset({1, true, "", 0});
+  builder_.OnMapReset({2, false, "", 0});
+  EXPECT_EQ(builder_.Build().final.size(), 1U);
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
-#include <set>
 #include <tuple>
 
 #include "collector/map_ply.h"
@@ -87,17 +86,14 @@ int ListChannels(const std::string& path) {
 int64_t AddFramePoses(const dmslam::LogIndex& log, const dmslam::RecordedSession& session, int64_t until_us,
                       dmslam::TrajectoryBuilder* builder) {
   const dmslam::Replay replay = dmslam::PlanReplay(session.Stream(dmslam::StreamId::kFrontend), until_us);
-  std::set<dmslam::MapId> dropped;
   for (const dmslam::ReplayStep& step : replay.steps) {
-    if (step.message->channel != dmslam::channels::kMapReset) continue;
-    const auto reset = dmslam::wire::Decode<dmslam::MapReset>(log.Read(*step.message));
-    if (reset && reset->drop) dropped.insert(reset->map_id);
-  }
-  builder->SetDroppedMaps(std::move(dropped));
-  for (const dmslam::ReplayStep& step : replay.steps) {
-    if (step.message->channel != dmslam::channels::kFramePose) continue;
-    if (const auto pose = dmslam::wire::Decode<dmslam::FramePose>(log.Read(*step.message)))
-      builder->OnFramePose(*pose);
+    if (step.message->channel == dmslam::channels::kFramePose) {
+      if (const auto pose = dmslam::wire::Decode<dmslam::FramePose>(log.Read(*step.message)))
+        builder->OnFramePose(*pose);
+    } else if (step.message->channel == dmslam::channels::kMapReset) {
+      if (const auto reset = dmslam::wire::Decode<dmslam::MapReset>(log.Read(*step.message)))
+        builder->OnMapReset(*reset);
+    }
   }
   return replay.missing;
 }
