@@ -46,7 +46,7 @@ die() { say "$*"; exit 1; }
 short_name() {
   local short=${1#rgbd_dataset_}
   short=${short/#freiburg/fr}
-  grep -qxF -- "$short" <(tr -s ' \n' '\n' <<<"$SEQUENCES") || return 1
+  [[ -n $short ]] && grep -qxF -- "$short" <(tr -s ' \n' '\n' <<<"$SEQUENCES") || return 1
   printf '%s\n' "$short"
 }
 
@@ -118,7 +118,7 @@ unpack() {
 }
 
 get() {
-  local short=$1 full archive url status=0
+  local short=$1 full archive url status=0 begun=0
   full=$(full_name "$short")
   archive=$TO/$full.tgz
   url=$BASE_URL/freiburg${short:2:1}/$full.tgz
@@ -129,11 +129,12 @@ get() {
     return 1
   fi
   say "$short: $url"
+  [[ ! -e $archive ]] || begun=1
   fetch "$url" "$archive" || status=$?
   if ((status == 2)); then
     die "no network: ${BASE_URL#*://} cannot be reached. Download $full.tgz with a browser from $PAGE and unpack it into $TO"
   elif ((status != 0)); then
-    rm -f -- "$archive"
+    ((begun)) || rm -f -- "$archive"
     say "$url cannot be downloaded; see $PAGE"
     return 1
   fi

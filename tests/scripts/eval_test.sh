@@ -24,7 +24,7 @@ head -n 150 "$est" | tail -n 100 >"$work/part.txt"
 expect 0 '50.0 % .*first pose after 1.67 s' "$eval" "$gt" "$work/part.txt" --frames "$work"
 expect 0 '80.0 %' "$eval" "$gt" "$est" --frame-count 250
 expect 0 '100.0 %' "$eval" "$gt" "$est" --frame-count 200
-for count in 0 5 199; do
+for count in -3 0 5 199; do
   expect 1 "--frame-count $count: .*est.txt has 200 poses; write the number of all frames" \
     "$eval" "$gt" "$est" --frame-count $count
 done
@@ -52,6 +52,21 @@ printf '100.0 0 0 0 0 0 0 1\n100.0 1 0 0 0 0 0 1\n100.1 0 1 0 0 0 0 1\n' >"$work
 expect 1 'bad.txt:2.*repeats' "$eval" "$work/bad.txt" "$est"
 expect 1 'nowhere.txt' "$eval" "$work/nowhere.txt" "$est"
 expect 1 'cannot be written' "$eval" "$gt" "$est" --json "$work/no/such/folder.json"
+cp "$est" "$work/est.svg"
+for option in "--json $gt" "--json $work/rgb.txt" "--plot $work/est"; do
+  # shellcheck disable=SC2086 # two words
+  expect 1 'is read too, and would be lost' "$eval" "$gt" "$work/est.svg" --frames "$work" $option
+done
+check "what is read is left alone" cmp "$est" "$work/est.svg"
+expect 1 'is the name of a folder' "$eval" "$gt" "$est" --plot "$work/"
+expect 1 'is the name of a folder' "$eval" "$gt" "$est" --json "$work"
+expect 0 'written: .*/q.png, .*/q.svg' "$eval" "$gt" "$est" --plot "$work/q.png"
+expect 1 'standard output cannot be written' bash -c "'$eval' '$gt' '$est' >/dev/full"
+printf '\xef\xbb\xbf' | cat - "$est" >"$work/bom.txt"
+expect 0 '200 pairs' "$eval" "$gt" "$work/bom.txt"
+sed '7s/ [^ ]*/ 1e300/' "$est" >"$work/far.txt"
+expect 1 'estimate: pose 7 .*more than 1e12' "$eval" "$gt" "$work/far.txt" --align none
+expect 1 '--rpe-delta 1e30f' "$eval" "$gt" "$est" --rpe-delta 1e30f
 expect 1 '--align best' "$eval" "$gt" "$est" --align best
 expect 1 '--rpe-delta 3x' "$eval" "$gt" "$est" --rpe-delta 3x
 expect 1 '--max-diff' "$eval" "$gt" "$est" --max-diff -1

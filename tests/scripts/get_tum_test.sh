@@ -26,6 +26,8 @@ check "--list repeats none" test "$("$get_tum" --list | sort -u | wc -l)" -eq 47
 expect 1 'name at least one sequence' "$get_tum"
 expect 1 "no sequence is called 'fr9_xyz'" "$get_tum" fr9_xyz
 expect 1 "no sequence is called 'xyz'" "$get_tum" xyz
+expect 1 "no sequence is called ''" "$get_tum" --to "$work/a" ''
+check "nothing was begun" test ! -e "$work/a"
 expect 1 'unknown option --frobnicate' "$get_tum" --frobnicate
 expect 1 '--to needs a folder' "$get_tum" --to
 
@@ -45,6 +47,9 @@ expect 1 'no network.*download' env no_proxy='*' "$get_tum" --base-url http://mi
 expect 1 'no network' env no_proxy='*' "$get_tum" --base-url http://127.0.0.1:9/x --to "$work/a" fr1_xyz
 check "no half of an archive is left" test -z "$(ls -A "$work/a")"
 expect 1 'cannot be downloaded' "$get_tum" --base-url "file://$mirror" --to "$work/a" fr1_xyz
+echo begun >"$work/a/rgbd_dataset_freiburg1_xyz.tgz"
+expect 1 'cannot be downloaded' "$get_tum" --base-url "file://$mirror" --to "$work/a" fr1_xyz
+check "what an earlier call brought is kept" grep -q begun "$work/a/rgbd_dataset_freiburg1_xyz.tgz"
 
 # An archive that is whole already: servers answer 416 to who asks for the rest, which curl calls 22. A connection that was
 # cut (18) and a full disk (23) keep what is there.

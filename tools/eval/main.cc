@@ -24,7 +24,7 @@ struct Arguments {
   std::vector<std::string> rpe_deltas = {"1f", "1s", "1m"};
   bool all_pairs = false;
   std::string frames;
-  std::optional<size_t> frame_count;
+  std::optional<int64_t> frame_count;
   std::string json;
   std::string plot;
   std::string title;
@@ -39,8 +39,9 @@ RpeOptions ParseDelta(const std::string& text, bool all_pairs) {
   if (unit == "m") options.unit = RpeUnit::kMetres;
   const bool known = unit == "f" || unit == "s" || unit == "m";
   if (error != std::errc() || !known || !(options.delta > 0) || !std::isfinite(options.delta) ||
-      (unit == "f" && options.delta != std::floor(options.delta))) {
-    throw InputError("--rpe-delta " + text + ": write a positive number and f, s or m, as 1f, 0.5s or 1m");
+      (unit == "f" && options.delta != std::floor(options.delta)) || options.delta > 1e9) {
+    throw InputError("--rpe-delta " + text +
+                     ": write a positive number, up to 1e9, and f, s or m, as 1f, 0.5s or 1m");
   }
   return options;
 }
@@ -60,19 +61,52 @@ EvaluationOptions ParseOptions(const Arguments& arguments) {
   return options;
 }
 
+// The image list that is named, or whose folder is; empty where none is.
+std::string FrameList(const Arguments& arguments) {
+  const std::filesystem::path list = arguments.frames;
+  return std::filesystem::is_directory(list) ? (list / "rgb.txt").string() : arguments.frames;
+}
+
 Coverage FindCoverage(const Arguments& arguments, const std::vector<StampedPose>& estimate) {
   if (arguments.frames.empty()) {
-    if (arguments.frame_count && *arguments.frame_count < estimate.size()) {
+    const int64_t frames = arguments.frame_count.value_or(0);
+    if (arguments.frame_count && frames < static_cast<int64_t>(estimate.size())) {
       throw InputError(
-          "--frame-count " + std::to_string(*arguments.frame_count) + ": " + arguments.estimate + " has " +
+          "--frame-count " + std::to_string(frames) + ": " + arguments.estimate + " has " +
           std::to_string(estimate.size()) +
           " poses; write the number of all frames of the sequence, or give its list to --frames");
     }
-    return ComputeCoverage(estimate, arguments.frame_count.value_or(0));
+    return ComputeCoverage(estimate, static_cast<size_t>(frames));
   }
-  std::filesystem::path list = arguments.frames;
-  if (std::filesystem::is_directory(list)) list /= "rgb.txt";
-  return ComputeCoverage(estimate, ReadFrameStamps(list.string()));
+  return ComputeCoverage(estimate, ReadFrameStamps(FrameList(arguments)));
+}
+
+std::string PlotPrefix(const std::string& named) {
+  const std::filesystem::path path(named);
+  const bool has_ending = path.extension() == ".png" || path.extension() == ".svg";
+  return has_ending ? std::filesystem::path(path).replace_extension().string() : named;
+}
+
+// What is written must be none of what is read, and no folder.
+void CheckOutput(const std::string& option, const std::string& output, const Arguments& arguments) {
+  namespace fs = std::filesystem;
+  const auto refuse = [&](const std::string& why) { throw InputError(option + " " + output + ": " + why); };
+  if (fs::path(output).filename().empty() || fs::is_directory(output))
+    refuse("is the name of a folder; write FOLDER/NAME");
+  for (const std::string& input : {arguments.ground_truth, arguments.estimate, FrameList(arguments)}) {
+    std::error_code error;
+    if (!input.empty() && fs::equivalent(output, input, error))
+      refuse("is read too, and would be lost; name another file");
+  }
+}
+
+void CheckOutputs(const Arguments& arguments) {
+  if (!arguments.json.empty()) CheckOutput("--json", arguments.json, arguments);
+  if (arguments.plot.empty()) return;
+  const std::string prefix = PlotPrefix(arguments.plot);
+  if (std::filesystem::path(prefix).filename().empty())
+    throw InputError("--plot " + prefix + ": is the name of a folder; write FOLDER/NAME");
+  for (const char* ending : {".png", ".svg"}) CheckOutput("--plot", prefix + ending, arguments);
 }
 
 void WriteText(const std::string& path, const std::string& text) {
@@ -84,6 +118,7 @@ void WriteText(const std::string& path, const std::string& text) {
 
 void Run(const Arguments& arguments) {
   const EvaluationOptions options = ParseOptions(arguments);
+  CheckOutputs(arguments);
   const GroundTruth truth = ReadGroundTruth(arguments.ground_truth);
   for (const std::string& where : truth.repeated) {
     std::cerr << "dmslam-eval: " << where << " repeats the stamp before it and is left out\n";
@@ -102,9 +137,10 @@ void Run(const Arguments& arguments) {
                                 : arguments.title;
   const PlotFigure figure =
       TrajectoryFigure(truth.poses, estimate, evaluation.ate, title, EvaluationSummary(evaluation));
-  WritePng(figure, arguments.plot + ".png");
-  WriteSvg(figure, arguments.plot + ".svg");
-  std::cout << "\nwritten: " << arguments.plot << ".png, " << arguments.plot << ".svg\n";
+  const std::string prefix = PlotPrefix(arguments.plot);
+  WritePng(figure, prefix + ".png");
+  WriteSvg(figure, prefix + ".svg");
+  std::cout << "\nwritten: " << prefix << ".png, " << prefix << ".svg\n";
 }
 
 void Declare(CLI::App* app, Arguments* arguments) {
@@ -143,6 +179,8 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     dmslam::Run(arguments);
+    std::cout.flush();
+    if (!std::cout) throw dmslam::InputError("the standard output cannot be written; is its disk full?");
   } catch (const std::exception& error) {
     std::cerr << "dmslam-eval: " << error.what() << "\n";
     return 1;

@@ -39,6 +39,8 @@ std::string ReadTextFile(const std::string& path) {
 void ForEachRow(
     std::string_view text, std::string_view separators,
     const std::function<void(size_t line_number, std::span<const std::string_view> fields)>& row) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // some editors put it before UTF-8
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::vector<std::string_view> fields;
   size_t line_number = 0;
   while (!text.empty()) {

@@ -10,6 +10,7 @@ namespace dmslam {
 namespace {
 
 constexpr size_t kMinPairs = 3;
+constexpr double kFarthest = 1e12;
 
 // The double nearest to a stamp in seconds, as reading its decimal text gives.
 double Seconds(int64_t stamp_ns) {
@@ -73,6 +74,8 @@ std::string WhyUnusable(std::span<const StampedPose> trajectory) {
     const std::string name =
         "pose " + std::to_string(i + 1) + " (stamp " + FormatStampNs(trajectory[i].stamp_ns) + ")";
     if (!trajectory[i].T_world_cam.AllFinite()) return name + " is not finite";
+    if (trajectory[i].T_world_cam.translation.cwiseAbs().maxCoeff() > kFarthest)
+      return name + " is more than 1e12 from the origin, where differences can no longer be told";
     if (i == 0 || trajectory[i].stamp_ns > trajectory[i - 1].stamp_ns) continue;
     return name + (trajectory[i].stamp_ns == trajectory[i - 1].stamp_ns
                        ? " repeats the stamp before it"

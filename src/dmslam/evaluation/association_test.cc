@@ -98,9 +98,22 @@ TEST(Coverage, CountsListedFramesOnly) {
   const Coverage coverage = ComputeCoverage(poses, frames_ns);
   EXPECT_EQ(coverage.poses_of_no_frame, 1u);
   EXPECT_DOUBLE_EQ(*coverage.percent, 50.0);
-  EXPECT_NEAR(*coverage.time_to_first_pose_s, 0.033333, 1e-9);
+  EXPECT_NEAR(*coverage.time_to_first_pose_s, 0.033333333, 1e-9);
   EXPECT_DOUBLE_EQ(*ComputeCoverage(poses, 6).percent, 50.0);
   EXPECT_FALSE(ComputeCoverage(poses, size_t{0}).percent);
+}
+
+TEST(Coverage, IsOfFramesHoweverManyPosesTheyHave) {
+  const std::vector<int64_t> frames_ns = {0, 33'333'333, 66'666'667, 100'000'000};
+  const std::vector<StampedPose> poses = {
+      {-5'000'000, {}}, {66'600'000, {}}, {66'666'667, {}}, {66'700'000, {}}};
+  const Coverage coverage = ComputeCoverage(poses, frames_ns);
+  EXPECT_EQ(coverage.poses_of_no_frame, 1u);
+  EXPECT_DOUBLE_EQ(*coverage.percent, 25.0);
+  EXPECT_NEAR(*coverage.time_to_first_pose_s, 0.066666667, 1e-9);
+  const std::vector<StampedPose> elsewhere = {{700'000'000, {}}};
+  EXPECT_DOUBLE_EQ(*ComputeCoverage(elsewhere, frames_ns).percent, 0.0);
+  EXPECT_FALSE(ComputeCoverage(elsewhere, frames_ns).time_to_first_pose_s);
 }
 
 class FrameList : public ::testing::Test {

@@ -12,10 +12,12 @@ namespace {
 // Stamps are copied from the image list; some programs round them to fewer decimals.
 constexpr int64_t kSameFrameNs = 500'000;
 
-bool HasFrame(std::span<const int64_t> frame_stamps_ns, int64_t stamp_ns) {
+// The index of the frame that a pose belongs to.
+std::optional<size_t> FrameOf(std::span<const int64_t> frame_stamps_ns, int64_t stamp_ns) {
   const auto frame =
       std::lower_bound(frame_stamps_ns.begin(), frame_stamps_ns.end(), stamp_ns - kSameFrameNs);
-  return frame != frame_stamps_ns.end() && *frame <= stamp_ns + kSameFrameNs;
+  if (frame == frame_stamps_ns.end() || *frame > stamp_ns + kSameFrameNs) return std::nullopt;
+  return static_cast<size_t>(frame - frame_stamps_ns.begin());
 }
 
 }  // namespace
@@ -23,14 +25,20 @@ bool HasFrame(std::span<const int64_t> frame_stamps_ns, int64_t stamp_ns) {
 Coverage ComputeCoverage(std::span<const StampedPose> estimate, std::span<const int64_t> frame_stamps_ns) {
   Coverage coverage = ComputeCoverage(estimate, frame_stamps_ns.size());
   if (frame_stamps_ns.empty()) return coverage;
-  size_t of_a_frame = 0;
-  for (const StampedPose& pose : estimate) of_a_frame += HasFrame(frame_stamps_ns, pose.stamp_ns) ? 1 : 0;
-  coverage.poses_of_no_frame = estimate.size() - of_a_frame;
-  coverage.percent = 100.0 * static_cast<double>(of_a_frame) / static_cast<double>(frame_stamps_ns.size());
-  if (!estimate.empty()) {
-    coverage.time_to_first_pose_s =
-        1e-9 * static_cast<double>(estimate.front().stamp_ns - frame_stamps_ns.front());
+  std::vector<bool> has_pose(frame_stamps_ns.size());
+  for (const StampedPose& pose : estimate) {
+    if (const auto frame = FrameOf(frame_stamps_ns, pose.stamp_ns)) {
+      has_pose[*frame] = true;
+    } else {
+      ++coverage.poses_of_no_frame;
+    }
   }
+  const auto covered = std::count(has_pose.begin(), has_pose.end(), true);
+  coverage.percent = 100.0 * static_cast<double>(covered) / static_cast<double>(frame_stamps_ns.size());
+  if (covered == 0) return coverage;
+  const auto first = std::find(has_pose.begin(), has_pose.end(), true) - has_pose.begin();
+  coverage.time_to_first_pose_s =
+      1e-9 * static_cast<double>(frame_stamps_ns[static_cast<size_t>(first)] - frame_stamps_ns.front());
   return coverage;
 }
 

@@ -16,9 +16,10 @@ struct Coverage {
   size_t poses = 0;
   // Frames of the sequence; nothing where they are not known.
   std::optional<size_t> frames;
-  // Poses that belong to a listed frame / frames, in percent.
+  // Listed frames that have a pose / frames, in percent.
   std::optional<double> percent;
-  // From the first frame to the first pose [s]; nothing where the frames' stamps are not known.
+  // From the first frame to the first that has a pose [s]; nothing where none has one, or where the frames'
+  // stamps are not known.
   std::optional<double> time_to_first_pose_s;
   // Poses whose stamp is within half a millisecond of no listed frame.
   size_t poses_of_no_frame = 0;

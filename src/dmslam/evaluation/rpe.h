@@ -26,7 +26,7 @@ struct RpeOptions {
   // motion may be from the wanted moment.
   int64_t max_difference_ns = 20'000'000;
   RpeUnit unit = RpeUnit::kFrames;
-  // Length of a relative motion, in `unit`; a whole number in kFrames.
+  // Length of a relative motion, in `unit`, up to 1e9; a whole number in kFrames.
   double delta = 1;
   // kFrames and kMetres: motions from every pose (true), or end to end (false), as `evo` does by default.
   // kSeconds always takes every pose.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 
 #include "dmslam/evaluation/evaluation_test_util.h"
@@ -55,6 +56,32 @@ TEST(Rpe, SecondsSkipGaps) {
   EXPECT_EQ(EvaluateRpe(path, with_gap, Options(RpeUnit::kSeconds, 0.5)).motions.size(), 30u);
 }
 
+TEST(Rpe, PosesThatShareAGroundTruthPoseHideNoMotion) {
+  // Ground truth at 100 Hz with a tenth of a second missing, beside which poses at 30 Hz share one.
+  const auto path = [](int poses, double rate_hz) {
+    std::vector<StampedPose> poses_at_rate;
+    for (int i = 0; i < poses; ++i) {
+      const double t = i / rate_hz;
+      poses_at_rate.push_back(
+          {std::llround(t * 1e9), Rigid3d(Eigen::Quaterniond::Identity(), {std::sin(t), std::cos(t), t})});
+    }
+    return poses_at_rate;
+  };
+  auto ground_truth = path(400, 100);
+  const auto estimate = path(120, 30);
+  ground_truth.erase(ground_truth.begin() + 101, ground_truth.begin() + 110);
+  auto options = Options(RpeUnit::kSeconds, 1);
+  options.max_difference_ns = 40'000'000;
+  const RpeReport report = EvaluateRpe(ground_truth, estimate, options);
+  ASSERT_EQ(report.pairs.size(), 120u);
+  EXPECT_EQ(report.pairs[30].ground_truth, report.pairs[31].ground_truth);
+  // The last 29 poses have no counterpart; all others do, those before the gap among them.
+  EXPECT_EQ(report.motions.size(), 91u);
+  for (const MotionPair& motion : report.motions) {
+    EXPECT_NEAR(static_cast<double>(motion.to - motion.from), 30.0, 1.0);
+  }
+}
+
 TEST(Rpe, MetresAreMeasuredAlongTheGroundTruth) {
   std::vector<StampedPose> path;
   for (int i = 0; i < 50; ++i) {
@@ -80,6 +107,7 @@ TEST(Rpe, BadOptionsAreNamed) {
   const auto path = CurvedPath(30);
   EXPECT_NE(EvaluateRpe(path, path, Options(RpeUnit::kFrames, 0)).reason.find("positive"), std::string::npos);
   EXPECT_NE(EvaluateRpe(path, path, Options(RpeUnit::kFrames, 1.5)).reason.find("whole"), std::string::npos);
+  EXPECT_NE(EvaluateRpe(path, path, Options(RpeUnit::kFrames, 1e30)).reason.find("1e9"), std::string::npos);
   EXPECT_NE(EvaluateRpe(path, path, Options(RpeUnit::kSeconds, 99)).reason.find("apart"), std::string::npos);
 }
 
