@@ -21,9 +21,11 @@ Runs 'baseline' and 'dm' with 3000 features per frame (as the DM-SLAM paper did)
 four TUM RGB-D sequences, on the kitchen sequences and on rendered stand-ins, each with as many seeds as said, and writes
 DIR/report.md, DIR/report.json and DIR/pictures. Stopped at any time, the same command continues. Sequences that are not
 there are listed in the report with the address to get them from (scripts/get_tum.sh paper does it). The report shows all
-that was run in DIR so far, also with other sequences or seeds. DIR/progress.txt says how far it is.
+that was run in DIR so far, also with other sequences or seeds. DIR/progress.txt says how far it is. Three runs that fail
+one after the other end it, with the report of what there is and exit status 1.
 
-  --tum DIR       folder that holds the TUM RGB-D sequences
+  --tum DIR       folder that holds the TUM RGB-D sequences, or folders of them, by the benchmark's names
+                  (rgbd_dataset_freiburg1_xyz) or the short ones (fr1_xyz)
   --out DIR       where runs and report go
   --seeds N       runs of each (default 10)
   --only NAME     only this sequence (may be repeated), as fr3_walking_xyz, kitchen_walk2, synth_walking_rpy
@@ -255,22 +257,24 @@ one_run() {
   finish_run "$part" "$folder" "$status"
 }
 
-# count_runs LINES...: sets `todo` to those that are not done yet, and the numbers of the progress.
+# count_runs LINES...: sets `todo` to those that are not done yet, and the numbers of the progress. What failed the last
+# time comes last, so that it keeps nothing else from being run.
 count_runs() {
-  local line frames rest
+  local line folder frames rest failed=()
   total=$# todo=() began=$SECONDS
   for line in "$@"; do
-    IFS=$'\t' read -r _ _ frames rest <<<"$line"
+    IFS=$'\t' read -r folder _ frames rest <<<"$line"
     if [[ $rest == *$'\t'done ]]; then
       runs_done=$((runs_done + 1))
-    else
-      todo+=("$line")
-      frames_left=$((frames_left + frames))
+      continue
     fi
+    if [[ -e $out/$folder/failed.txt ]]; then failed+=("$line"); else todo+=("$line"); fi
+    frames_left=$((frames_left + frames))
   done
+  todo+=(${failed[@]+"${failed[@]}"})
 }
 
-# account_for NAME STATUS FOLDER: says what failed; three in a row end it.
+# account_for NAME STATUS FOLDER: says what failed; returns 1 where three did in a row.
 failed_in_a_row=0
 account_for() {
   last_run="$1, done at $(date '+%F %T')"
@@ -282,10 +286,12 @@ account_for() {
   last_run="$1, failed at $(date '+%F %T'): $(head -n 1 "$3/failed.txt")"
   say "runs/$1: $(head -n 1 "$3/failed.txt")"
   runs_failed=$((runs_failed + 1)) failed_in_a_row=$((failed_in_a_row + 1))
-  ((failed_in_a_row < MAX_FAILURES_IN_A_ROW)) || die "$failed_in_a_row runs failed in a row; see $3/log.txt"
+  ((failed_in_a_row < MAX_FAILURES_IN_A_ROW)) && return
+  say "$failed_in_a_row runs failed in a row; see $3/log.txt. The others are left out; the same command begins with them"
+  return 1
 }
 
-# What `todo` holds.
+# What `todo` holds; returns 1 where too much of it fails.
 run_all() {
   local line folder sequence frames camera profile seed set status number=$runs_done
   began=$SECONDS
@@ -297,7 +303,7 @@ run_all() {
     [[ $camera == /* ]] || camera=$root/$camera
     one_run "$folder" "$sequence" "$frames" "$camera" "$profile" "$seed" "$set" || status=$?
     frames_done=$((frames_done + frames)) frames_left=$((frames_left - frames))
-    account_for "${folder#runs/}" "$status" "$out/$folder"
+    account_for "${folder#runs/}" "$status" "$out/$folder" || return 1
   done
   progress_end
 }
@@ -326,7 +332,7 @@ run_everything() {
   ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
   count_runs ${lines[@]+"${lines[@]}"}
   [[ -n $runner ]] || { draw_selections ${lines[@]+"${lines[@]}"}; time_methods ${lines[@]+"${lines[@]}"}; }
-  run_all
+  run_all || gave_up=1
 }
 
 main() {
@@ -334,9 +340,10 @@ main() {
   find_programs
   work_in "$out"
   choose_command
-  local roots=()
+  local roots=() gave_up=0
   if ((run)); then run_everything; else roots=(${tum:+--root "$tum"} ${data:+--root "$data"}); fi
   "$bin/dmslam-report" write --out "$out" ${roots[@]+"${roots[@]}"} ${publish:+--publish "$publish"}
+  return "$gave_up"
 }
 
 main "$@"

@@ -156,6 +156,19 @@ check "a summary does not make a run that failed a good one" grep -q '2 of 4 fai
 printf '#!/bin/sh\necho it fell over\nexit 7\n' >"$work/broken"
 chmod +x "$work/broken"
 expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --runner "$work/broken"
+check "the report is written all the same" grep -q '3 of 3 failed or gave no trajectory' "$work/d/report.md"
+check "progress.txt tells how it ended" grep -q '^now: ended with exit status 1; the same command continues' "$work/d/progress.txt"
+: >"$CALLS"
+expect 0 'report.md' "${run[@]}" --out "$work/d" --seeds 1
+check "what failed comes last" test "$(tail -n 3 "$CALLS" | grep -c 'features.count=3000.*\|--set')" -eq 3
+
+# The short names, and folders of sequences.
+mkdir -p "$work/short/deeper"
+cp -r "$tum/rgbd_dataset_freiburg1_xyz" "$work/short/fr1_xyz"
+cp -r "$tum/rgbd_dataset_freiburg3_walking_xyz" "$work/short/deeper/fr3_walking_xyz"
+: >"$CALLS"
+expect 0 'report.md' "$reproduce" --tum "$work/short" --no-render --data "$work/none" --runner "$work/runner" --out "$work/s" --seeds 1
+check "are found" test "$(wc -l <"$CALLS")" -eq 8
 
 # A summary that was written in halves is a failed run in the report, and is run again.
 printf '{"tracked_percent": 98' >"$work/f/runs/fr1_xyz/defaults/dm/seed_1/summary.json"

@@ -1,7 +1,10 @@
 #include "figures.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <limits>
 
@@ -124,7 +127,8 @@ void DrawSequence(const Results& results, const PlannedSequence& sequence, const
   PlotFigure figure;
   figure.title = name + ", " + setting.title;
   figure.subtitle =
-      "median runs, seen from the top, over the ground truth (grey); relative errors over one second";
+      "runs with the middle ATE, seen from the top, over the ground truth (grey); relative errors over one "
+      "second";
   figure.columns = 2;
   for (const Drawn& one : drawn) figure.panels.push_back(OverlayPanel(one));
   if (drawn.size() == 1) figure.panels[0].column_span = 2;
@@ -200,21 +204,46 @@ std::vector<fs::path> PicturesIn(const fs::path& folder) {
   return files;
 }
 
-// Frames with their features, that the first seed's run of `dm` with default settings left.
-void AddFramePictures(const Results& results, const std::string& sequence, const fs::path& out,
+// The number at the end of a name such as frame_000215; nothing where there is none.
+std::optional<size_t> NumberAtEnd(const std::string& name) {
+  const std::string digits = name.substr(name.find_last_not_of("0123456789") + 1);
+  return digits.empty() || digits.size() > 9 ? std::nullopt : std::optional<size_t>(std::stoul(digits));
+}
+
+// Frames with their features, that the first seed's run of `dm` with default settings left; before the first
+// map there is nothing to see on them.
+void AddFramePictures(const Results& results, const PlannedSequence& sequence, const fs::path& out,
                       std::vector<ReportPicture>* pictures) {
-  const Cell* cell = results.Find(sequence, "defaults", "dm");
+  const std::string name(sequence.info.name);
+  const Cell* cell = results.Find(name, "defaults", "dm");
   if (cell == nullptr || cell->runs.empty()) return;
-  for (const fs::path& file : PicturesIn(out / cell->runs.front().key.Folder() / "pictures")) {
-    pictures->push_back({FigureSection::kFeatures, sequence, sequence + ", " + file.stem().string(),
+  const RunResult& run = cell->runs.front();
+  const auto stamps_ns = ReadFrameStamps((sequence.folder / "rgb.txt").string());
+  for (const fs::path& file : PicturesIn(out / run.key.Folder() / "pictures")) {
+    const auto frame = NumberAtEnd(file.stem().string());
+    if (!frame || *frame >= stamps_ns.size()) continue;
+    const double seconds = 1e-9 * static_cast<double>(stamps_ns[*frame] - stamps_ns.front());
+    if (seconds <= run.first_map_s.value_or(0)) continue;
+    pictures->push_back({FigureSection::kFeatures, name, Format("%s, frame %zu", name.c_str(), *frame),
                          file.lexically_relative(out).string()});
   }
+}
+
+// "pair_0_5_dlrsac" as "frames 0 and 5, DLRSAC"; other names as they are.
+std::string PairTitle(const std::string& stem) {
+  size_t first = 0, second = 0;
+  std::array<char, 16> method{};
+  if (std::sscanf(stem.c_str(), "pair_%zu_%zu_%15s", &first, &second, method.data()) != 3) return stem;
+  std::string upper(method.data());
+  std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
+  return Format("frames %zu and %zu, %s", first, second, upper.c_str());
 }
 
 void AddSelectionPictures(const std::string& sequence, const fs::path& out,
                           std::vector<ReportPicture>* pictures) {
   for (const fs::path& file : PicturesIn(out / "figures" / sequence)) {
-    pictures->push_back({FigureSection::kSelection, sequence, sequence + ": " + file.stem().string(),
+    pictures->push_back({FigureSection::kSelection, sequence,
+                         sequence + ", " + PairTitle(file.stem().string()),
                          file.lexically_relative(out).string()});
   }
 }
@@ -229,7 +258,7 @@ std::vector<ReportPicture> DrawPictures(const Results& results, const fs::path& 
   for (const PlannedSequence& sequence : results.plan.sequences) {
     if (!sequence.present()) continue;
     AddSelectionPictures(std::string(sequence.info.name), out, &pictures);
-    AddFramePictures(results, std::string(sequence.info.name), out, &pictures);
+    AddFramePictures(results, sequence, out, &pictures);
   }
   for (const Setting& setting : results.plan.settings) {
     DrawSeeds(results, setting, out, &pictures);

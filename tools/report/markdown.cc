@@ -1,6 +1,7 @@
 #include "markdown.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "compare.h"
 #include "text.h"
@@ -10,6 +11,7 @@ namespace {
 
 using State = RunResult::State;
 constexpr const char* kNone = "–";
+constexpr double kSameCoveragePercent = 1;
 
 std::string Number(double value, int decimals) { return Format("%.*f", decimals, value); }
 
@@ -23,6 +25,13 @@ std::string Number(const std::optional<double>& value, int decimals) {
 
 std::string Improvement(const std::optional<Spread>& before, const std::optional<Spread>& after) {
   return Number(ImprovementPercent(before, after), 1);
+}
+
+// Beside a comparison of two that did not track the same share of the sequence.
+std::string CoverageMark(const Cell& baseline, const Cell& dm) {
+  const auto before = baseline.TrackedPercent(), after = dm.TrackedPercent();
+  const bool differ = before && after && std::abs(before->median - after->median) > kSameCoveragePercent;
+  return differ ? " †" : "";
 }
 
 /// One of the paper's tables: a row per sequence with both systems and the improvement.
@@ -60,22 +69,24 @@ std::string SystemCells(const Cell& cell, const ErrorTable& table) {
 std::string PaperRow(const SequenceInfo& info) {
   const PaperFigures& paper = *info.paper;
   return Format(
-      "| *the paper: ORB-SLAM2, DM-SLAM* | *%.3f* | | | | *not given* | *not given* | *10* | *%.3f* | | | | "
+      "| *the paper (its ORB-SLAM2; its DM-SLAM)* | *%.3f* | | | | *not given* | *not given* | *10* | *%.3f* "
+      "| | | | "
       "*not given* | *not given* | *10* | *%.1f* | | | |\n",
       paper.orb_slam2_ate_rmse_m, paper.dm_slam_ate_rmse_m, *PaperImprovementPercent(info));
 }
 
 std::string ErrorRow(const Cell& baseline, const Cell& dm, const ErrorTable& table) {
   const Metric metric = table.metric;
-  return "| " + baseline.sequence + " |" + SystemCells(baseline, table) + SystemCells(dm, table) +
-         Format(" %s | %s | %s | %s |\n", Improvement(baseline.Rmse(metric), dm.Rmse(metric)).c_str(),
-                Improvement(baseline.Mean(metric), dm.Mean(metric)).c_str(),
-                Improvement(baseline.Median(metric), dm.Median(metric)).c_str(),
-                Improvement(baseline.Std(metric), dm.Std(metric)).c_str());
+  const std::string mark = CoverageMark(baseline, dm);
+  return "| " + baseline.sequence + " |" + SystemCells(baseline, table) + SystemCells(dm, table) + " " +
+         Improvement(baseline.Rmse(metric), dm.Rmse(metric)) + mark + " | " +
+         Improvement(baseline.Mean(metric), dm.Mean(metric)) + mark + " | " +
+         Improvement(baseline.Median(metric), dm.Median(metric)) + mark + " | " +
+         Improvement(baseline.Std(metric), dm.Std(metric)) + mark + " |\n";
 }
 
 std::string RenderErrorTable(const Results& results, const Setting& setting, const ErrorTable& table) {
-  std::string text = "#### " + table.title + "\n\n" + ErrorTableHead();
+  std::string text = "### " + table.title + "\n\n" + ErrorTableHead();
   for (const PlannedSequence& sequence : results.plan.sequences) {
     const std::string name(sequence.info.name);
     const Cell* baseline = results.Find(name, setting.name, "baseline");
@@ -94,7 +105,7 @@ std::string SpreadRow(const Cell& cell) {
   const std::string failed = Format("%zu of %zu", cell.Failed(), cell.Made());
   return Format("| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", cell.sequence.c_str(),
                 cell.profile.c_str(), RunsText(cell).c_str(), cell.Failed() == 0 ? "0" : failed.c_str(),
-                WithEnds(cell.Rmse(Metric::kAte), 4).c_str(), WithEnds(cell.TrackedPercent(), 1).c_str(),
+                WithEnds(cell.Rmse(Metric::kAte), 5).c_str(), WithEnds(cell.TrackedPercent(), 1).c_str(),
                 WithEnds(cell.TrackedOnlinePercent(), 1).c_str(),
                 WithEnds(cell.TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
                 WithEnds(cell.FirstMapSeconds(), 2).c_str());
@@ -102,7 +113,7 @@ std::string SpreadRow(const Cell& cell) {
 
 std::string SpreadTable(const Results& results, const Setting& setting) {
   std::string text =
-      "#### Over the seeds: median (least–most)\n\n| sequence | profile | runs with a trajectory | failed | "
+      "### Over the seeds: median (least–most)\n\n| sequence | profile | runs with a trajectory | failed | "
       "ATE RMSE [m] | tracked % | tracked as it came % | the same after the first map % | first map [s] |\n"
       "|---|---|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Cell& cell : results.cells) {
@@ -122,7 +133,8 @@ std::string StandInRow(const StandIn& one) {
                 Number(without, 5).c_str(), Number(one.Ratio(), 2).c_str(),
                 Number(one.dm->TrackedPercent(), 1).c_str(), Number(one.dm->FirstMapSeconds(), 2).c_str(),
                 Number(one.dm->TrackedOnlineAfterFirstMapPercent(), 1).c_str(), Number(baseline, 5).c_str(),
-                Number(one.baseline->TrackedPercent(), 1).c_str(), Improvement(baseline, with).c_str(),
+                Number(one.baseline->TrackedPercent(), 1).c_str(),
+                (Improvement(baseline, with) + CoverageMark(*one.baseline, *one.dm)).c_str(),
                 Number(PaperImprovementPercent(info), 0).c_str());
 }
 
@@ -132,7 +144,7 @@ std::string StandInTable(const Results& results, const Setting& setting) {
   std::string rows;
   for (const StandIn& one : StandIns(results, setting)) rows += StandInRow(one);
   if (rows.empty()) return {};
-  return "#### Rendered stand-ins: dm with actors against dm without\n\n"
+  return "### Rendered stand-ins: dm with actors against dm without\n\n"
          "Wanted: a ratio of 1.5 at most, 95 % tracked after the first map, and better than the baseline.\n\n"
          "| sequence | stands for | dm ATE [m] | dm ATE without actors [m] | ratio | dm tracked % "
          "| dm first map [s] | dm tracked after the first map % | baseline ATE [m] | baseline tracked % "
@@ -238,13 +250,12 @@ std::string Introduction(const Results& results) {
          "also "
          "joins the poses told at the end with the camera's motion (`tracking.smooth_at_end`). " +
          HowManyRuns(results) +
-         " Each figure is the median over the seeds; trajectories are aligned by Sim3, as monocular ones "
-         "must "
-         "be. Lengths are metres, angles degrees. *Tracked* is the share of the sequence's frames that have "
-         "a "
-         "pose in the final trajectory (none for a run without one): an error without it is no result. "
-         "*Runs* "
-         "are those with a trajectory, of those that were run.\n\n" +
+         " Each figure is the median over the seeds, of each column by itself; trajectories are aligned by "
+         "Sim3, as monocular ones must be. Lengths are metres, angles degrees. *Tracked* is the share of the "
+         "sequence's frames that have a pose in the final trajectory (none for a run without one): an error "
+         "without it is no result. *Runs* are those with a trajectory, of those that were run. *Better by %* "
+         "compares the two medians; † marks those of which one tracked over 1 % more of the frames than the "
+         "other.\n\n" +
          WhereRunsComeFrom(results) +
          "Of the paper's figures only the RMSE of ATE and its Table 1 are recorded here; its other columns "
          "are left out rather than guessed, and it gives no coverage.\n\n";
@@ -253,10 +264,10 @@ std::string Introduction(const Results& results) {
 std::string SettingSection(const Results& results, const Setting& setting) {
   static const std::vector<ErrorTable> kTables = {
       {"Table 2a. Rotational RPE per frame [deg]", Metric::kRpeRotationPerFrame, 4},
-      {"Table 2b. Rotational RPE per second [deg]", Metric::kRpeRotationPerSecond, 3},
+      {"Table 2b. Rotational RPE per second [deg]", Metric::kRpeRotationPerSecond, 4},
       {"Table 3a. Translational RPE per frame [m]", Metric::kRpeTranslationPerFrame, 5},
-      {"Table 3b. Translational RPE per second [m]", Metric::kRpeTranslationPerSecond, 4},
-      {"Table 4. ATE [m]", Metric::kAte, 4}};
+      {"Table 3b. Translational RPE per second [m]", Metric::kRpeTranslationPerSecond, 5},
+      {"Table 4. ATE [m]", Metric::kAte, 5}};
   std::string text = "## With " + setting.title + "\n\n";
   if (const std::string mixed = Mixture(Versions(results, &setting)); !mixed.empty())
     text += "**These tables mix versions**: " + mixed + ".\n\n";
@@ -264,18 +275,36 @@ std::string SettingSection(const Results& results, const Setting& setting) {
   return text + SpreadTable(results, setting) + StandInTable(results, setting);
 }
 
-const char* SectionTitle(FigureSection section) {
+/// What a section shows, and how its pictures are to be read.
+struct SectionText {
+  const char* title;
+  const char* explanation;
+};
+
+SectionText TextOf(FigureSection section) {
   switch (section) {
     case FigureSection::kSelection:
-      return "Figures 2 to 5. Which matches are taken for static";
+      return {
+          "Figures 2 to 5. Which matches are taken for static",
+          "Left the cells, each with the matches that agree with its own motion and the kind of that motion; "
+          "those that DLRSAC chose to begin with are framed. In the middle how the matches move: taken for "
+          "static (green), left out (yellow). On the right how well the motion of one cell (row) explains "
+          "the matches of another (column), the brighter the better. RANSAC knows no cells: it takes all "
+          "matches at once."};
     case FigureSection::kFeatures:
-      return "Figure 6. Features as they are tracked: used (green), rejected (yellow), moving (red)";
+      return {"Figure 6. Features as they are tracked",
+              "Landmarks that the pose rests on (green), that disagree with it (yellow) or are taken for "
+              "moving (red); features without a landmark are small and blue. Those on people are blue: they "
+              "do not become landmarks. `dm`, default settings, seed 1."};
     case FigureSection::kTrajectories:
-      return "Figure 7. Trajectories over the ground truth, and relative errors";
+      return {
+          "Figure 7. Trajectories over the ground truth, and relative errors",
+          "Of each profile the run with the middle ATE (the lower of two); its coverage is its own, not the "
+          "median of the tables."};
     case FigureSection::kSeeds:
-      return "All runs";
+      return {"All runs", "One point per run."};
   }
-  return "";
+  return {"", ""};
 }
 
 std::string Image(const ReportPicture& picture) { return "![" + picture.title + "](" + picture.file + ")"; }
@@ -296,7 +325,22 @@ std::string Pictures(const std::vector<ReportPicture>& pictures, FigureSection s
     column = 1 - column;
   }
   if (column == 1) text += " |\n";
-  return text.empty() ? text : "## " + std::string(SectionTitle(section)) + "\n\n" + text + "\n";
+  if (text.empty()) return text;
+  const SectionText about = TextOf(section);
+  return Format("## %s\n\n%s\n\n", about.title, about.explanation) + text + "\n";
+}
+
+// Sequences with runs but without a picture, as where a page must not show real images.
+std::string WithoutPictures(const Results& results, const std::vector<ReportPicture>& pictures) {
+  std::string names;
+  for (const PlannedSequence& sequence : results.plan.sequences) {
+    const auto is_of_it = [&](const ReportPicture& picture) {
+      return picture.sequence == sequence.info.name;
+    };
+    if (!sequence.present() || pictures.empty() || std::ranges::any_of(pictures, is_of_it)) continue;
+    names += (names.empty() ? "" : ", ") + std::string(sequence.info.name);
+  }
+  return names.empty() ? names : "Pictures of " + names + " are in the folder of the runs only.\n";
 }
 
 }  // namespace
@@ -318,7 +362,7 @@ std::string ReportMarkdown(const Results& results, const std::optional<Iteration
                                       FigureSection::kTrajectories, FigureSection::kSeeds}) {
     text += Pictures(pictures, section);
   }
-  return text;
+  return text + WithoutPictures(results, pictures);
 }
 
 }  // namespace dmslam

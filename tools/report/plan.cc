@@ -27,9 +27,12 @@ fs::path FindFolder(const fs::path& root, const std::string& name) {
   return deeper.empty() ? fs::path() : fs::canonical(deeper.front());
 }
 
-fs::path FindFolder(const std::vector<fs::path>& roots, const std::string& name) {
+// By its folder's usual name, or by the sequence's short one.
+fs::path FindFolder(const std::vector<fs::path>& roots, const SequenceInfo& info) {
   for (const fs::path& root : roots) {
-    if (const fs::path folder = FindFolder(root, name); !folder.empty()) return folder;
+    for (const std::string_view name : {info.folder, info.name}) {
+      if (const fs::path folder = FindFolder(root, std::string(name)); !folder.empty()) return folder;
+    }
   }
   return {};
 }
@@ -115,7 +118,7 @@ Plan MakePlan(const PlanOptions& options) {
     const bool wanted = options.only.empty() ||
                         std::find(options.only.begin(), options.only.end(), info.name) != options.only.end();
     if (!wanted) continue;
-    plan.sequences.push_back({info, FindFolder(options.roots, std::string(info.folder))});
+    plan.sequences.push_back({info, FindFolder(options.roots, info)});
     RequireGroundTruth(plan.sequences.back().folder);
   }
   return plan;
@@ -213,7 +216,7 @@ Plan PlanOfFolder(const fs::path& out, const std::vector<fs::path>& roots) {
     }
     sequence->has_runs = largest_seed > 0;
     plan.seeds = std::max(plan.seeds, largest_seed);
-    if (const fs::path named = FindFolder(roots, std::string(info.folder)); !named.empty()) {
+    if (const fs::path named = FindFolder(roots, info); !named.empty()) {
       RequireGroundTruth(named);
       sequence->folder = named;
     }

@@ -311,6 +311,21 @@ TEST(KnownSequences, EachHasItsSource) {
   }
 }
 
+TEST_F(Reproduction, AComparisonOfUnequalSharesIsMarked) {
+  options_.only = {"fr3_walking_xyz"};
+  const Plan plan = MakePlan(options_);
+  WriteAllRuns(plan);
+  const auto rows = [&] {
+    const std::string text = ReportMarkdown(ReadResults(plan, root_ / "out"), std::nullopt, {});
+    return text.substr(text.find("## Sequences"));  // the introduction explains the mark
+  };
+  EXPECT_EQ(rows().find("†"), std::string::npos);
+  for (const RunKey& key : Runs(plan)) {
+    if (key.profile == "dm") WriteRun(key, 0.01, R"({"tracked_percent": 80.5, "first_init_s": 1.25})");
+  }
+  EXPECT_NE(rows().find(" † |"), std::string::npos);
+}
+
 TEST_F(Reproduction, PicturesAreDrawn) {
   options_.only = {"fr3_walking_xyz"};
   const Plan plan = MakePlan(options_);
@@ -318,13 +333,23 @@ TEST_F(Reproduction, PicturesAreDrawn) {
   const fs::path frames =
       root_ / "out" / RunKey{"fr3_walking_xyz", "defaults", "dm", 1}.Folder() / "pictures";
   fs::create_directories(frames);
-  for (const char* name : {"b.png", "a.png", "c.png"})
+  // Of these two are after the first map, which came after 1.25 s.
+  for (const char* name : {"frame_000120.png", "frame_000060.png", "frame_000000.png", "frame_000036.png"})
     std::ofstream(frames / name) << std::string(20000, 'x');
+  const fs::path pairs = root_ / "out/figures/fr3_walking_xyz";
+  fs::create_directories(pairs);
+  std::ofstream(pairs / "pair_0_5_dlrsac.png") << std::string(20000, 'x');
   const Results results = ReadResults(plan, root_ / "out");
   const auto pictures = DrawPictures(results, root_ / "out");
   ASSERT_EQ(pictures.size(), 7u);
-  EXPECT_TRUE(pictures[0].file.ends_with("a.png"));
+  EXPECT_EQ(pictures[0].title, "fr3_walking_xyz, frames 0 and 5, DLRSAC");
+  EXPECT_EQ(pictures[1].title, "fr3_walking_xyz, frame 60");
+  EXPECT_EQ(pictures[2].title, "fr3_walking_xyz, frame 120");
   const std::string text = ReportMarkdown(results, std::nullopt, pictures);
+  EXPECT_EQ(text.find("in the folder of the runs only"), std::string::npos);
+  const std::string without =
+      ReportMarkdown(results, std::nullopt, {{FigureSection::kSeeds, "", "All", "pictures/all.png"}});
+  EXPECT_NE(without.find("Pictures of fr3_walking_xyz are in the folder"), std::string::npos);
   EXPECT_LT(text.find("## Figure 6"), text.find("## Figure 7"));
   for (const ReportPicture& picture : pictures)
     EXPECT_NE(text.find("(" + picture.file + ")"), std::string::npos);
