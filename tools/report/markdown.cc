@@ -294,7 +294,8 @@ SectionText TextOf(FigureSection section) {
     case FigureSection::kFeatures:
       return {"Figure 6. Features as they are tracked",
               "Landmarks that the pose rests on (green), that disagree with it (yellow) or are taken for "
-              "moving (red); features without a landmark are small and blue. Those on people are blue: they "
+              "moving (red); features without a landmark are small and blue. Those on people are nearly all "
+              "blue: they "
               "do not become landmarks. `dm`, default settings, seed 1."};
     case FigureSection::kTrajectories:
       return {
