@@ -274,7 +274,7 @@ count_runs() {
   todo+=(${failed[@]+"${failed[@]}"})
 }
 
-# account_for NAME STATUS FOLDER: says what failed; returns 1 where three did in a row.
+# account_for NAME STATUS FOLDER: says what failed.
 failed_in_a_row=0
 account_for() {
   last_run="$1, done at $(date '+%F %T')"
@@ -286,12 +286,12 @@ account_for() {
   last_run="$1, failed at $(date '+%F %T'): $(head -n 1 "$3/failed.txt")"
   say "runs/$1: $(head -n 1 "$3/failed.txt")"
   runs_failed=$((runs_failed + 1)) failed_in_a_row=$((failed_in_a_row + 1))
-  ((failed_in_a_row < MAX_FAILURES_IN_A_ROW)) && return
+  too_many_failed || return 0
   say "$failed_in_a_row runs failed in a row; see $3/log.txt. The others are left out; the same command begins with them"
-  return 1
 }
+too_many_failed() { ((failed_in_a_row >= MAX_FAILURES_IN_A_ROW)); }
 
-# What `todo` holds; returns 1 where too much of it fails.
+# What `todo` holds, until too much of it fails.
 run_all() {
   local line folder sequence frames camera profile seed set status number=$runs_done
   began=$SECONDS
@@ -303,7 +303,8 @@ run_all() {
     [[ $camera == /* ]] || camera=$root/$camera
     one_run "$folder" "$sequence" "$frames" "$camera" "$profile" "$seed" "$set" || status=$?
     frames_done=$((frames_done + frames)) frames_left=$((frames_left - frames))
-    account_for "${folder#runs/}" "$status" "$out/$folder" || return 1
+    account_for "${folder#runs/}" "$status" "$out/$folder"
+    ! too_many_failed || break
   done
   progress_end
 }
@@ -332,7 +333,7 @@ run_everything() {
   ((${#lines[@]})) || say "none of the sequences is there: the report will only list them"
   count_runs ${lines[@]+"${lines[@]}"}
   [[ -n $runner ]] || { draw_selections ${lines[@]+"${lines[@]}"}; time_methods ${lines[@]+"${lines[@]}"}; }
-  run_all || gave_up=1
+  run_all
 }
 
 main() {
@@ -340,10 +341,10 @@ main() {
   find_programs
   work_in "$out"
   choose_command
-  local roots=() gave_up=0
+  local roots=()
   if ((run)); then run_everything; else roots=(${tum:+--root "$tum"} ${data:+--root "$data"}); fi
   "$bin/dmslam-report" write --out "$out" ${roots[@]+"${roots[@]}"} ${publish:+--publish "$publish"}
-  return "$gave_up"
+  ! too_many_failed
 }
 
 main "$@"

@@ -39,7 +39,7 @@ RpeOptions ParseDelta(const std::string& text, bool all_pairs) {
   if (unit == "m") options.unit = RpeUnit::kMetres;
   const bool known = unit == "f" || unit == "s" || unit == "m";
   if (error != std::errc() || !known || !(options.delta > 0) || !std::isfinite(options.delta) ||
-      (unit == "f" && options.delta != std::floor(options.delta)) || options.delta > 1e9) {
+      (unit == "f" && options.delta != std::floor(options.delta)) || options.delta > kMaxRpeDelta) {
     throw InputError("--rpe-delta " + text +
                      ": write a positive number, up to 1e9, and f, s or m, as 1f, 0.5s or 1m");
   }

@@ -70,8 +70,7 @@ std::string PaperRow(const SequenceInfo& info) {
   const PaperFigures& paper = *info.paper;
   return Format(
       "| *the paper (its ORB-SLAM2; its DM-SLAM)* | *%.3f* | | | | *not given* | *not given* | *10* | *%.3f* "
-      "| | | | "
-      "*not given* | *not given* | *10* | *%.1f* | | | |\n",
+      "| | | | *not given* | *not given* | *10* | *%.1f* | | | |\n",
       paper.orb_slam2_ate_rmse_m, paper.dm_slam_ate_rmse_m, *PaperImprovementPercent(info));
 }
 
@@ -295,8 +294,7 @@ SectionText TextOf(FigureSection section) {
       return {"Figure 6. Features as they are tracked",
               "Landmarks that the pose rests on (green), that disagree with it (yellow) or are taken for "
               "moving (red); features without a landmark are small and blue. Those on people are nearly all "
-              "blue: they "
-              "do not become landmarks. `dm`, default settings, seed 1."};
+              "blue: they do not become landmarks. `dm`, default settings, seed 1."};
     case FigureSection::kTrajectories:
       return {
           "Figure 7. Trajectories over the ground truth, and relative errors",

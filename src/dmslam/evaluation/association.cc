@@ -26,16 +26,6 @@ std::vector<double> Seconds(std::span<const StampedPose> trajectory) {
   return seconds;
 }
 
-// The first of those nearest to `moment` in a rising, not empty list.
-size_t Nearest(std::span<const double> rising, double moment) {
-  const auto not_before = std::lower_bound(rising.begin(), rising.end(), moment);
-  size_t nearest = static_cast<size_t>(not_before - rising.begin());
-  if (nearest == rising.size()) --nearest;
-  while (nearest > 0 && std::abs(rising[nearest - 1] - moment) <= std::abs(rising[nearest] - moment))
-    --nearest;
-  return nearest;
-}
-
 std::string TimeSpan(std::span<const StampedPose> trajectory) {
   return FormatStampNs(trajectory.front().stamp_ns) + " to " + FormatStampNs(trajectory.back().stamp_ns) +
          " s";
@@ -61,7 +51,7 @@ std::vector<PosePair> AssociateByTime(std::span<const StampedPose> ground_truth,
   const double max_difference = Seconds(max_difference_ns);
   std::vector<PosePair> pairs;
   for (size_t i = 0; i < shorter.size(); ++i) {
-    const size_t j = Nearest(longer, shorter[i]);
+    const size_t j = FirstOfNearest<double>(longer, shorter[i]);
     if (std::abs(longer[j] - shorter[i]) > max_difference) continue;
     pairs.push_back(estimate_longer ? PosePair{i, j} : PosePair{j, i});
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -9,6 +11,17 @@
 #include "dmslam/dataset/trajectory.h"
 
 namespace dmslam {
+
+/// The index of the first of those nearest to `moment` in a not empty list that does not fall.
+template <typename Time>
+size_t FirstOfNearest(std::span<const Time> rising, Time moment) {
+  const auto not_before = std::lower_bound(rising.begin(), rising.end(), moment);
+  size_t nearest = static_cast<size_t>(not_before - rising.begin());
+  if (nearest == rising.size()) --nearest;
+  while (nearest > 0 && std::abs(rising[nearest - 1] - moment) <= std::abs(rising[nearest] - moment))
+    --nearest;
+  return nearest;
+}
 
 /// Two poses of the same moment: indices into the ground truth and into the estimate.
 struct PosePair {

@@ -1,17 +1,12 @@
 #include "dmslam/evaluation/rpe.h"
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 
 #include "dmslam/evaluation/ate.h"
 
 namespace dmslam {
 namespace {
-
-constexpr double kMaxDelta =
-    1e9;  // more than any trajectory has, and indices and nanoseconds do not overflow
 
 std::vector<MotionPair> MotionsByFrames(size_t poses, size_t delta, bool all_pairs) {
   std::vector<MotionPair> motions;
@@ -20,29 +15,19 @@ std::vector<MotionPair> MotionsByFrames(size_t poses, size_t delta, bool all_pai
   return motions;
 }
 
-// The first of those nearest to `stamp_ns`; several poses may have the same stamp, where estimates share one
-// of the ground truth.
-size_t FirstOfNearest(std::span<const StampedPose> poses, int64_t stamp_ns) {
-  const auto from = [&](int64_t least_ns) {
-    return std::ranges::lower_bound(poses, least_ns, {}, &StampedPose::stamp_ns);
-  };
-  const auto after = from(stamp_ns);
-  if (after == poses.begin()) return 0;
-  const int64_t before_ns = std::prev(after)->stamp_ns;
-  const bool is_before = after == poses.end() || stamp_ns - before_ns <= after->stamp_ns - stamp_ns;
-  return static_cast<size_t>((is_before ? from(before_ns) : after) - poses.begin());
-}
-
-// From every pose to the one nearest to `delta_s` later.
+// From every pose to the one nearest to `delta_s` later. Several poses may have the same stamp, where
+// estimates share one of the ground truth.
 std::vector<MotionPair> MotionsBySeconds(std::span<const StampedPose> poses, double delta_s,
                                          int64_t tolerance_ns) {
   std::vector<MotionPair> motions;
   const int64_t delta_ns = std::llround(delta_s * 1e9);
-  for (size_t i = 0; i < poses.size(); ++i) {
-    const int64_t wanted_ns = poses[i].stamp_ns + delta_ns;
-    const size_t j = FirstOfNearest(poses, wanted_ns);
-    const bool is_later = poses[j].stamp_ns > poses[i].stamp_ns;
-    if (is_later && std::abs(poses[j].stamp_ns - wanted_ns) <= tolerance_ns) motions.push_back({i, j});
+  std::vector<int64_t> stamps_ns;
+  for (const StampedPose& pose : poses) stamps_ns.push_back(pose.stamp_ns);
+  for (size_t i = 0; i < stamps_ns.size(); ++i) {
+    const int64_t wanted_ns = stamps_ns[i] + delta_ns;
+    const size_t j = FirstOfNearest<int64_t>(stamps_ns, wanted_ns);
+    const bool is_later = stamps_ns[j] > stamps_ns[i];
+    if (is_later && std::abs(stamps_ns[j] - wanted_ns) <= tolerance_ns) motions.push_back({i, j});
   }
   return motions;
 }
@@ -98,7 +83,7 @@ std::vector<MotionPair> ChooseMotions(std::span<const StampedPose> poses, const 
 
 std::string WhyWrong(const RpeOptions& options) {
   if (!(options.delta > 0) || !std::isfinite(options.delta)) return "the delta of RPE must be positive";
-  if (options.delta > kMaxDelta) return "the delta of RPE must be at most 1e9";
+  if (options.delta > kMaxRpeDelta) return "the delta of RPE must be at most 1e9";
   if (options.unit == RpeUnit::kFrames && options.delta != std::floor(options.delta)) {
     return "the delta of RPE in frames must be a whole number";
   }

@@ -20,13 +20,17 @@ enum class RpeUnit {
   kMetres,   // path length along the ground truth
 };
 
+/// The largest length of a relative motion, in any unit: more than any trajectory has, and neither indices
+/// nor nanoseconds overflow.
+inline constexpr double kMaxRpeDelta = 1e9;
+
 struct RpeOptions {
   Alignment alignment = Alignment::kSim3;
   // Poses further apart in time than this are no pair [ns]; in kSeconds, also how far the second pose of a
   // motion may be from the wanted moment.
   int64_t max_difference_ns = 20'000'000;
   RpeUnit unit = RpeUnit::kFrames;
-  // Length of a relative motion, in `unit`, up to 1e9; a whole number in kFrames.
+  // Length of a relative motion, in `unit`, up to kMaxRpeDelta; a whole number in kFrames.
   double delta = 1;
   // kFrames and kMetres: motions from every pose (true), or end to end (false), as `evo` does by default.
   // kSeconds always takes every pose.
