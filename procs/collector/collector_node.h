@@ -10,7 +10,7 @@
 #include "collector/journal.h"
 #include "collector/results.h"
 #include "collector/trajectory_builder.h"
-#include "common/stream_node.h"
+#include "dmslam/runtime/stream_node.h"
 
 namespace dmslam {
 

@@ -1,7 +1,7 @@
 #include <unistd.h>
 
 #include "collector/collector_node.h"
-#include "common/process_main.h"
+#include "dmslam/runtime/process_main.h"
 
 int main(int argc, char** argv) {
   dmslam::ProcessMain process("collector",

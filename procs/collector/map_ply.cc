@@ -4,6 +4,7 @@
 #include <fstream>
 #include <vector>
 
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -26,7 +27,7 @@ void WriteMapPly(const std::string& path, const Map& map, MapId map_id) {
           "property uchar blue\nend_header\n";
   char line[160];
   for (const Landmark* landmark : landmarks) {
-    const bool moving = landmark->evidence.motion_belief > 0;
+    const bool moving = !IsStatic(landmark);
     std::snprintf(line, sizeof(line), "%.17g %.17g %.17g %d %d %d\n", landmark->p_world.x(),
                   landmark->p_world.y(), landmark->p_world.z(), moving ? 230 : 120, moving ? 40 : 120,
                   moving ? 40 : 120);

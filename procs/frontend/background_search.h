@@ -6,7 +6,7 @@
 #include <mutex>
 #include <thread>
 
-#include "frontend/frontend_core.h"
+#include "dmslam/slam/frontend_core.h"
 
 namespace dmslam {
 

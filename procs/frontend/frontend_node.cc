@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "common/process_info.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 #include "frontend/background_search.h"
 #include "frontend/pictures.h"

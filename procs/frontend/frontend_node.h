@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "common/latency_window.h"
-#include "common/stream_node.h"
 #include "dmslam/dataset/image.h"
-#include "frontend/frontend_core.h"
+#include "dmslam/runtime/latency_window.h"
+#include "dmslam/runtime/stream_node.h"
+#include "dmslam/slam/frontend_core.h"
 #include "frontend/online_error.h"
 
 namespace dmslam {

@@ -1,4 +1,4 @@
-#include "common/process_main.h"
+#include "dmslam/runtime/process_main.h"
 #include "frontend/frontend_node.h"
 
 int main(int argc, char** argv) {

@@ -2,9 +2,9 @@
 
 #include <memory>
 
-#include "common/latency_window.h"
-#include "common/stream_node.h"
-#include "loopcloser/loopcloser_core.h"
+#include "dmslam/loops/loopcloser_core.h"
+#include "dmslam/runtime/latency_window.h"
+#include "dmslam/runtime/stream_node.h"
 
 namespace dmslam {
 

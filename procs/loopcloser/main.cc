@@ -1,4 +1,4 @@
-#include "common/process_main.h"
+#include "dmslam/runtime/process_main.h"
 #include "loopcloser/loopcloser_node.h"
 
 int main(int argc, char** argv) {

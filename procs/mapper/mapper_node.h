@@ -6,11 +6,11 @@
 #include <optional>
 #include <vector>
 
-#include "common/latency_window.h"
-#include "common/map_snapshots.h"
-#include "common/stream_node.h"
+#include "dmslam/mapping/mapper_core.h"
 #include "dmslam/recording/map_file.h"
-#include "mapper/mapper_core.h"
+#include "dmslam/runtime/latency_window.h"
+#include "dmslam/runtime/map_snapshots.h"
+#include "dmslam/runtime/stream_node.h"
 
 namespace dmslam {
 

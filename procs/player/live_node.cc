@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/process_info.h"
+#include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "common/node.h"
 #include "dmslam/dataset/live_source.h"
+#include "dmslam/runtime/node.h"
 #include "player/end_of_play.h"
 #include "player/player_node.h"
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "common/process_main.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 #include "player/live_node.h"
 #include "player/log_output.h"

@@ -1,6 +1,6 @@
 #include "player/open_sequence.h"
 
-#include "common/process_main.h"
+#include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {

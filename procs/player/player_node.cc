@@ -8,7 +8,7 @@
 #include <sstream>
 #include <utility>
 
-#include "common/process_info.h"
+#include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "common/node.h"
 #include "dmslam/camera/camera.h"
 #include "dmslam/dataset/frame_source.h"
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/messaging/bus.h"
+#include "dmslam/runtime/node.h"
 #include "dmslam/wire/codec.h"
 #include "player/end_of_play.h"
 #include "player/frame_encoding.h"

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "common/stream_node.h"
 #include "dmslam/map/map.h"
 #include "dmslam/recording/log_index.h"
+#include "dmslam/runtime/stream_node.h"
 
 namespace dmslam {
 

@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "common/process_main.h"
 #include "dmslam/messaging/event_loop.h"
+#include "dmslam/runtime/process_main.h"
 #include "viewer/log_playback.h"
 #include "viewer/viewer_node.h"
 #include "viewer/web_server.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/process_info.h"
+#include "dmslam/runtime/process_info.h"
 #include "viewer/viewer_json.h"
 
 namespace dmslam {

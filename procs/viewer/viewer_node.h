@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/stream_node.h"
+#include "dmslam/runtime/stream_node.h"
 #include "viewer/exchange.h"
 #include "viewer/process_board.h"
 #include "viewer/viewer_core.h"

@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "common/settings.h"
-#include "frontend/frontend_core.h"
-#include "loopcloser/loopcloser_core.h"
-#include "mapper/mapper_core.h"
+#include "dmslam/loops/loopcloser_core.h"
+#include "dmslam/mapping/mapper_core.h"
+#include "dmslam/settings/settings.h"
+#include "dmslam/slam/frontend_core.h"
 
 namespace dmslam::bench {
 

@@ -6,9 +6,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "common/process_main.h"
-#include "common/stream_node.h"
 #include "dmslam/map/map.h"
+#include "dmslam/runtime/process_main.h"
+#include "dmslam/runtime/stream_node.h"
 
 namespace dmslam::bench {
 namespace {

@@ -8,10 +8,10 @@
 #include <cstdio>
 #include <vector>
 
-#include "common/process_info.h"
-#include "common/process_main.h"
 #include "core_loop.h"
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
 #include "dmslam/util/version.h"

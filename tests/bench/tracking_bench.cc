@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "common/process_main.h"
 #include "core_loop.h"
 #include "dmslam/camera/camera.h"
 #include "dmslam/features/opencv_convert.h"
 #include "dmslam/features/testing/kitchen_pairs.h"
+#include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam::bench {

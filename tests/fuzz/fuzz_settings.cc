@@ -1,5 +1,5 @@
 // Configuration files: read, or refused with an InputError.
-#include "common/settings.h"
+#include "dmslam/settings/settings.h"
 #include "fuzz_target.h"
 #include "memory_file.h"
 

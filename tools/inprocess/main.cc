@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "common/process_main.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/runtime/process_main.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "in_process.h"

@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "common/map_snapshots.h"
-#include "common/stream_node.h"
+#include "dmslam/runtime/map_snapshots.h"
+#include "dmslam/runtime/stream_node.h"
 #include "tour_map.h"
 
 namespace dmslam {

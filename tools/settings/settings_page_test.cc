@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string>
 
-#include "common/settings.h"
+#include "dmslam/settings/settings.h"
 
 namespace dmslam {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "dmslam/motion_segmentation/initializer.h"
-#include "dmslam/motion_segmentation/pair_agreement.h"
+#include "dmslam/initialization/initializer.h"
+#include "dmslam/initialization/pair_agreement.h"
 #include "dmslam/motion_segmentation/static_selector.h"
 #include "judged_sequence.h"
 

@@ -4,9 +4,9 @@
 #include <numeric>
 
 #include "dmslam/geometry/two_view.h"
+#include "dmslam/initialization/pair_agreement.h"
 #include "dmslam/motion_segmentation/depth_layers.h"
 #include "dmslam/motion_segmentation/dlrsac.h"
-#include "dmslam/motion_segmentation/pair_agreement.h"
 #include "dmslam/motion_segmentation/ransac.h"
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 #include "dmslam/util/check.h"

@@ -10,10 +10,6 @@ constexpr MatchOptions kByDescriptor = {.max_ratio = 0.8, .check_orientation = f
 
 }  // namespace
 
-void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks) {
-  std::erase_if(*landmarks, [&](LandmarkId id) { return !IsStatic(map.FindLandmark(id)); });
-}
-
 std::vector<LandmarkMatch> MatchLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks,
                                           const FeatureSet& features) {
   std::vector<Descriptor> descriptors;

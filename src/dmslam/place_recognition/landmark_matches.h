@@ -14,9 +14,6 @@ struct LandmarkMatch {
   LandmarkId landmark;
 };
 
-/// Leaves those that may speak for a place: they are there, and are not believed to move.
-void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks);
-
 /// Landmarks with the features of an image by descriptor alone, wherever they are; in the landmarks' order.
 std::vector<LandmarkMatch> MatchLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks,
                                           const FeatureSet& features);

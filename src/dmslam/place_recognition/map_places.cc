@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "dmslam/dynamics/motion_belief.h"
+
 namespace dmslam {
 namespace {
 
@@ -19,14 +21,6 @@ std::vector<uint8_t> CountedFeatures(const Map& map, const Keyframe& keyframe) {
 }
 
 }  // namespace
-
-std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe) {
-  std::vector<uint8_t> usable(keyframe.landmarks.size(), 0);
-  for (size_t i = 0; i < usable.size(); ++i) {
-    if (keyframe.landmarks[i].valid()) usable[i] = IsStatic(map.FindLandmark(keyframe.landmarks[i])) ? 1 : 0;
-  }
-  return usable;
-}
 
 MapPlaces::MapPlaces(std::shared_ptr<const Vocabulary> vocabulary, KeyframeDatabaseOptions options)
     : vocabulary_(std::move(vocabulary)), database_(options) {}

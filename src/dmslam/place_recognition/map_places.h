@@ -11,14 +11,6 @@
 
 namespace dmslam {
 
-/// Whether a landmark may speak for a place: it is there, and is not believed to move.
-inline bool IsStatic(const Landmark* landmark) {
-  return landmark != nullptr && landmark->evidence.motion_belief <= 0.0F;
-}
-
-/// One entry per feature of a keyframe: 1 where it sees a landmark that may speak for the place.
-std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe);
-
 /// The words of a map's keyframes, kept in step with a replica. Features on landmarks that are believed to
 /// move do not enter the words.
 class MapPlaces {

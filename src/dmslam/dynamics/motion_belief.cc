@@ -1,0 +1,61 @@
+#include "dmslam/dynamics/motion_belief.h"
+
+#include <algorithm>
+
+namespace dmslam {
+namespace {
+
+constexpr uint32_t kEvidenceWindow = 20;  // frames
+
+LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item, int64_t stamp_ns,
+                         const MotionBeliefOptions& options) {
+  state.visible += item.visible;
+  state.found += item.found;
+  state.moved += item.moved;
+  if (item.moved > 0) state.last_moved_ns = std::max(state.last_moved_ns, stamp_ns);
+  if (options.enabled) {
+    const float change = options.moved_step * static_cast<float>(item.moved) -
+                         options.found_step * static_cast<float>(item.found);
+    state.motion_belief = std::clamp(state.motion_belief + change, options.floor, options.ceiling);
+  }
+  return state;
+}
+
+}  // namespace
+
+void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks) {
+  std::erase_if(*landmarks, [&](LandmarkId id) { return !IsStatic(map.FindLandmark(id)); });
+}
+
+std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe) {
+  std::vector<uint8_t> usable(keyframe.landmarks.size(), 0);
+  for (size_t i = 0; i < usable.size(); ++i) {
+    if (keyframe.landmarks[i].valid()) usable[i] = IsStatic(map.FindLandmark(keyframe.landmarks[i])) ? 1 : 0;
+  }
+  return usable;
+}
+
+EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const MotionBeliefOptions& options) {
+  EvidenceReport report;
+  for (const FrameEvidence::Item& item : evidence.items) {
+    const std::optional<LandmarkId> id = map.Resolve(item.landmark);
+    if (!id) {
+      ++report.unknown;
+      continue;
+    }
+    const LandmarkEvidence updated =
+        Updated(map.FindLandmark(*id)->evidence, item, evidence.stamp_ns, options);
+    ++report.applied;
+    const bool gone = updated.visible >= kEvidenceWindow &&
+                      static_cast<double>(updated.found) < options.min_found_share * updated.visible;
+    if (options.enabled && (gone || updated.motion_belief > options.remove_above)) {
+      map.RemoveLandmark(*id);
+      ++report.removed;
+    } else {
+      map.SetEvidence(*id, updated);
+    }
+  }
+  return report;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+
+namespace dmslam {
+
+/// What each landmark's evidence does to the belief that it moves.
+struct MotionBeliefOptions {
+  bool enabled = true;
+  float found_step = 0.5F;  ///< taken from the log odds for each frame that found it in its place
+  float moved_step = 1.0F;  ///< added for each frame that found it elsewhere
+  float floor = -4.0F;      ///< however long it stood still, it may start to move
+  float ceiling = 4.0F;
+  float remove_above = 2.5F;  ///< beyond this it leaves the map
+  double min_found_share =
+      0.0;  ///< a landmark found in fewer of the recent frames that should see it leaves the map too
+};
+
+/// Log odds of motion above which a landmark is believed to move.
+constexpr float kBelievedToMove = 0.0F;
+
+/// Whether a landmark is in the map and is not believed to move. Only such a landmark speaks for a place.
+inline bool IsStatic(const Landmark* landmark) {
+  return landmark != nullptr && landmark->evidence.motion_belief <= kBelievedToMove;
+}
+
+/// Removes the ids of landmarks that are gone or are believed to move.
+void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks);
+
+/// One entry per feature of a keyframe: 1 where it sees a static landmark.
+std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe);
+
+struct EvidenceReport {
+  int applied = 0;
+  int unknown = 0;  ///< landmarks that are gone
+  int removed = 0;  ///< landmarks that were believed to move for too long
+};
+
+/// Adds what frames said to the landmarks' counters and motion belief; removes those that move.
+EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const MotionBeliefOptions& options);
+
+}  // namespace dmslam

@@ -1,0 +1,250 @@
+#include "dmslam/dynamics/seen_through.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+namespace dmslam {
+namespace {
+
+constexpr int kCoarsestOctave = std::numeric_limits<int>::max();
+
+struct Suspect {
+  int64_t first_ns = 0, last_ns = 0;  ///< seen from then to then
+  int through = 0;                    ///< keyframes of another time that see through it
+  int support = 0;                    ///< that see something at its place
+  int proven_support = 0;             ///< that see something proven there
+  bool condemned = false;
+};
+
+using Suspects = std::map<LandmarkId, Suspect>;
+
+double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+/// Stamps of the keyframes that see the landmark, in order.
+std::vector<int64_t> StampsOf(const Map& map, const Landmark& landmark) {
+  std::vector<int64_t> stamps;
+  for (const Observation& o : landmark.observations) stamps.push_back(map.FindKeyframe(o.keyframe)->stamp_ns);
+  std::sort(stamps.begin(), stamps.end());
+  return stamps;
+}
+
+/// Some observations lie outside any window as long as people stand.
+bool Proven(const std::vector<int64_t>& stamps, const SeenThroughOptions& options) {
+  size_t most = 0;
+  for (size_t begin = 0, end = 0; end < stamps.size(); ++end) {
+    while (Seconds(stamps[end] - stamps[begin]) > options.standing_s) ++begin;
+    most = std::max(most, end - begin + 1);
+  }
+  return stamps.size() - most >= static_cast<size_t>(options.outer_observations);
+}
+
+void AddIfUnproven(const Map& map, LandmarkId id, const SeenThroughOptions& options, Suspects* suspects) {
+  const Landmark& landmark = *map.FindLandmark(id);
+  const std::vector<int64_t> stamps = StampsOf(map, landmark);
+  if (stamps.empty() || Proven(stamps, options)) return;
+  (*suspects)[id] = {stamps.front(), stamps.back()};
+}
+
+bool InImage(const Camera& camera, const Eigen::Vector2d& uv_px) {
+  return uv_px.x() >= 0 && uv_px.y() >= 0 && uv_px.x() < camera.width_px && uv_px.y() < camera.height_px;
+}
+
+struct Depths {
+  int behind = 0;
+  int same = 0;
+  int proven_same = 0;  ///< within the narrower tolerance
+};
+
+/// Depths of the landmarks that `witness` sees around the pixel of `p_world`, relative to its own.
+Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3d& p_world,
+                   const Suspects& suspects, const SeenThroughOptions& options) {
+  Depths depths;
+  const Eigen::Vector3d p_cam = witness.T_cam_world * p_world;
+  const auto uv_px = p_cam.z() > 0 ? map.camera().Project(p_cam) : std::nullopt;
+  if (!uv_px || !InImage(map.camera(), *uv_px)) return depths;
+  witness.features->grid.ForEachInRadius(
+      *uv_px, options.radius_px, 0, kCoarsestOctave, [&](uint32_t feature) {
+        const LandmarkId other = witness.landmarks[feature];
+        if (!other.valid()) return;
+        const auto suspect = suspects.find(other);
+        if (suspect != suspects.end() && suspect->second.condemned) return;
+        const double ratio = (witness.T_cam_world * map.FindLandmark(other)->p_world).z() / p_cam.z();
+        if (ratio > 1 + options.depth_tolerance) {
+          ++depths.behind;
+        } else if (ratio > 1 - options.depth_tolerance) {
+          ++depths.same;
+          if (suspect == suspects.end() && std::abs(ratio - 1) < options.support_tolerance)
+            ++depths.proven_same;
+        }
+      });
+  return depths;
+}
+
+/// Asks every witness from another time, and condemns the suspects that are seen through. Returns how many.
+int CondemnSeenThrough(const Map& map, const std::vector<KeyframeId>& witnesses,
+                       const SeenThroughOptions& options, Suspects* suspects) {
+  std::vector<LandmarkId> found;
+  for (auto& [id, suspect] : *suspects) {
+    if (suspect.condemned) continue;
+    suspect.through = suspect.support = suspect.proven_support = 0;
+    const Eigen::Vector3d p_world = map.FindLandmark(id)->p_world;
+    for (const KeyframeId witness_id : witnesses) {
+      const Keyframe& witness = *map.FindKeyframe(witness_id);
+      if (Seconds(suspect.first_ns - witness.stamp_ns) < options.guard_s &&
+          Seconds(witness.stamp_ns - suspect.last_ns) < options.guard_s) {
+        continue;
+      }
+      const Depths depths = LookThrough(map, witness, p_world, *suspects, options);
+      if (depths.behind > 0 && depths.same == 0) ++suspect.through;
+      if (depths.same > 0) ++suspect.support;
+      if (depths.proven_same > 0) ++suspect.proven_support;
+    }
+    if (suspect.through > options.through_per_support * suspect.support) found.push_back(id);
+  }
+  for (const LandmarkId id : found) suspects->at(id).condemned = true;
+  return static_cast<int>(found.size());
+}
+
+/// Share of a landmark's neighbours, in the keyframes that see it and at its depth, that are condemned.
+double CondemnedAround(const Map& map, LandmarkId id, const Suspects& suspects,
+                       const SeenThroughOptions& options) {
+  const Landmark& landmark = *map.FindLandmark(id);
+  int all = 0, condemned = 0;
+  for (const Observation& o : landmark.observations) {
+    const Keyframe& keyframe = *map.FindKeyframe(o.keyframe);
+    const double depth = (keyframe.T_cam_world * landmark.p_world).z();
+    const auto visit = [&](uint32_t feature) {
+      const LandmarkId other = keyframe.landmarks[feature];
+      if (!other.valid() || other == id) return;
+      const double ratio = (keyframe.T_cam_world * map.FindLandmark(other)->p_world).z() / depth;
+      if (std::abs(ratio - 1) > options.depth_tolerance) return;
+      ++all;
+      const auto suspect = suspects.find(other);
+      if (suspect != suspects.end() && suspect->second.condemned) ++condemned;
+    };
+    keyframe.features->grid.ForEachInRadius(keyframe.features->uv_px[o.feature], options.together_px, 0,
+                                            kCoarsestOctave, visit);
+  }
+  return all > 0 ? static_cast<double>(condemned) / all : 0.0;
+}
+
+/// Where the condemned are seen. Most suspects are near none of them, and need no closer look.
+class CondemnedPlaces {
+ public:
+  CondemnedPlaces(const Map& map, const Suspects& suspects) : map_(map) {
+    for (const auto& [id, suspect] : suspects) {
+      if (!suspect.condemned) continue;
+      for (const Observation& o : map.FindLandmark(id)->observations)
+        uv_px_[o.keyframe].push_back(PixelOf(o));
+    }
+  }
+
+  bool AnyNear(const Landmark& landmark, double radius_px) const {
+    return std::any_of(landmark.observations.begin(), landmark.observations.end(), [&](const Observation& o) {
+      const auto there = uv_px_.find(o.keyframe);
+      if (there == uv_px_.end()) return false;
+      const Eigen::Vector2d uv_px = PixelOf(o);
+      return std::any_of(there->second.begin(), there->second.end(), [&](const Eigen::Vector2d& other) {
+        return (other - uv_px).squaredNorm() <= radius_px * radius_px;
+      });
+    });
+  }
+
+ private:
+  const Eigen::Vector2d& PixelOf(const Observation& o) const {
+    return map_.FindKeyframe(o.keyframe)->features->uv_px[o.feature];
+  }
+
+  const Map& map_;
+  std::map<KeyframeId, std::vector<Eigen::Vector2d>> uv_px_;
+};
+
+/// Suspects among the condemned share their fate. Returns how many.
+int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
+  std::vector<LandmarkId> found;
+  const CondemnedPlaces condemned(map, *suspects);
+  for (const auto& [id, suspect] : *suspects) {
+    if (suspect.condemned) continue;
+    const bool near = condemned.AnyNear(*map.FindLandmark(id), options.together_px + 1e-6);
+    const double share = near ? CondemnedAround(map, id, *suspects, options) : 0.0;
+    if (share >= options.together_share) found.push_back(id);
+  }
+  for (const LandmarkId id : found) suspects->at(id).condemned = true;
+  return static_cast<int>(found.size());
+}
+
+/// Where somebody stood, an unproven landmark needs proven ones at its place, seen at other times by more
+/// keyframes than see the landmark itself: whoever stood there was seen often, and what stands at his depth
+/// by chance seldom. Its neighbours share its fate.
+void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
+  for (auto& [id, suspect] : *suspects) {
+    const auto observers = static_cast<double>(map.FindLandmark(id)->observations.size());
+    const bool supported = suspect.proven_support > options.support_per_observation * observers;
+    if (!supported) suspect.condemned = true;
+  }
+  for (int round = 0; round < options.rounds_unsupported; ++round) CondemnTogether(map, options, suspects);
+}
+
+int RemoveCondemned(Map& map, const Suspects& suspects) {
+  int removed = 0;
+  for (const auto& [id, suspect] : suspects) {
+    if (!suspect.condemned) continue;
+    map.RemoveLandmark(id);
+    ++removed;
+  }
+  return removed;
+}
+
+/// Keyframes that look where keyframe `id` looks, nearest first.
+std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenThroughOptions& options) {
+  const double depth = map.MedianDepth(*map.FindKeyframe(id)).value_or(0.0);
+  std::vector<KeyframeId> witnesses = map.KeyframesNear(id, depth, options.witness_angle_rad);
+  if (witnesses.size() > static_cast<size_t>(options.max_witnesses))
+    witnesses.resize(static_cast<size_t>(options.max_witnesses));
+  return witnesses;
+}
+
+}  // namespace
+
+int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options) {
+  Suspects suspects;
+  for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+    if (landmark.valid()) AddIfUnproven(map, landmark, options, &suspects);
+  }
+  const std::vector<KeyframeId> witnesses = WitnessesNear(map, id, options);
+  if (CondemnSeenThrough(map, witnesses, options, &suspects) == 0) return 0;
+  for (int round = 0; round < options.rounds; ++round) {
+    const int together = CondemnTogether(map, options, &suspects);
+    if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
+  }
+  return RemoveCondemned(map, suspects);
+}
+
+int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
+  Suspects suspects;
+  for (const LandmarkId id : map.LandmarkIdsSorted()) {
+    if (map.FindLandmark(id)->map_id == map_id) AddIfUnproven(map, id, options, &suspects);
+  }
+  std::vector<KeyframeId> witnesses;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (keyframe.map_id == map_id) witnesses.push_back(id);
+  }
+  const double before = static_cast<double>(removed_before);
+  const double seen_through = before + CondemnSeenThrough(map, witnesses, options, &suspects);
+  const bool somebody_stood =
+      seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
+  for (auto& [id, suspect] : suspects) {
+    if (somebody_stood && map.FindLandmark(id)->evidence.moved > 0) suspect.condemned = true;
+  }
+  for (int round = 0; round < options.rounds; ++round) {
+    const int together = CondemnTogether(map, options, &suspects);
+    if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
+  }
+  if (somebody_stood) CondemnUnsupported(map, options, &suspects);
+  return RemoveCondemned(map, suspects);
+}
+
+}  // namespace dmslam

@@ -1,0 +1,275 @@
+#include "dmslam/initialization/initializer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "dmslam/motion_segmentation/synthetic_pair.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+/// A room of points with descriptors of their own, and a walker in it.
+class SyntheticRoom {
+ public:
+  SyntheticRoom(int num_static, int num_moving, uint64_t seed = 7) : camera_(SyntheticCamera()) {
+    Random random(seed);
+    for (int k = 0; k < num_static + num_moving; ++k) {
+      Point point;
+      point.moves = k >= num_static;
+      const double depth = point.moves ? random.Uniform(1.9, 2.1) : random.Uniform(2.0, 5.0);
+      const double x = point.moves ? random.Uniform(-0.25, 0.25) : random.Uniform(-0.65, 0.65);
+      const double y = point.moves ? random.Uniform(-0.25, 0.25) : random.Uniform(-0.5, 0.5);
+      point.p_world = depth * Eigen::Vector3d(x, y, 1.0);
+      for (uint64_t& word : point.descriptor.words) word = random.Next();
+      points_.push_back(point);
+    }
+  }
+
+  const Camera& camera() const { return camera_; }
+  Rigid3d TruePose(uint32_t frame) const {
+    return Rigid3d(ExpSo3({0.0, 0.002 * frame, 0.0}), speed_ * frame * Eigen::Vector3d(1.0, 0.1, 0.2));
+  }
+  void SetSpeed(double speed) { speed_ = speed; }
+  /// The walker stands from this frame on.
+  void StopWalkerAt(uint32_t frame) { stop_ = frame; }
+  bool IsWalkers(const Descriptor& descriptor) const {
+    return std::any_of(points_.begin(), points_.end(), [&](const Point& point) {
+      return point.moves && point.descriptor.words == descriptor.words;
+    });
+  }
+
+  InitializerFrame Frame(uint32_t index) const {
+    auto features = std::make_shared<FrameFeatures>();
+    Random random(DeriveSeed(3, index, "frame"));
+    for (const Point& point : points_) {
+      const uint32_t walked = std::min(index, stop_);
+      const double turn = 0.15 * walked;
+      const Eigen::Vector3d walk(0.02 * walked, 0.05 * std::sin(turn), 0.0);
+      const auto uv =
+          camera_.Project(TruePose(index) * (point.p_world + (point.moves ? walk : Eigen::Vector3d::Zero())));
+      const double dx = 0.4 * random.Gaussian(), dy = 0.4 * random.Gaussian();
+      if (!uv) continue;
+      const Eigen::Vector2d seen = *uv + Eigen::Vector2d(dx, dy);
+      if (!(seen.x() > 1 && seen.y() > 1 && seen.x() < 638 && seen.y() < 478)) continue;
+      Keypoint keypoint;
+      keypoint.x_q4 = static_cast<uint16_t>(seen.x() * 16);
+      keypoint.y_q4 = static_cast<uint16_t>(seen.y() * 16);
+      features->set.keypoints.push_back(keypoint);
+      features->set.descriptors.push_back(point.descriptor);
+      features->uv_px.push_back(seen);
+    }
+    features->grid.Build(features->uv_px, features->set.keypoints, camera_.width_px, camera_.height_px);
+    return {index, int64_t{index} * 33'333'333, features};
+  }
+
+ private:
+  struct Point {
+    Eigen::Vector3d p_world;
+    Descriptor descriptor;
+    bool moves = false;
+  };
+  Camera camera_;
+  std::vector<Point> points_;
+  double speed_ = 0.012;
+  uint32_t stop_ = UINT32_MAX;
+};
+
+/// The first map of a room, asked for from `first` on.
+std::optional<FirstMap> MapFrom(const SyntheticRoom& room, const InitializerOptions& options,
+                                uint32_t first) {
+  Initializer initializer(options, room.camera(), 1);
+  std::optional<FirstMap> map;
+  for (uint32_t frame = first; frame < first + 60 && !map; ++frame) {
+    map = std::move(initializer.AddFrame(room.Frame(frame)).result);
+  }
+  return map;
+}
+
+double ShareOfWalker(const SyntheticRoom& room, const FirstMap& map) {
+  double walkers = 0;
+  for (const FirstMap::Point& point : map.points) {
+    if (room.IsWalkers(map.frame0.features->set.descriptors[point.feature0])) walkers += 1;
+  }
+  return walkers / static_cast<double>(map.points.size());
+}
+
+TEST(Initializer, MapsTheRoomAndNotTheWalker) {
+  const SyntheticRoom room(600, 150);
+  Initializer initializer({}, room.camera(), 1);
+  std::optional<FirstMap> map;
+  for (uint32_t frame = 0; frame < 60 && !map; ++frame) {
+    InitializerReport report = initializer.AddFrame(room.Frame(frame));
+    EXPECT_EQ(report.wait == WaitReason::kNone, report.result.has_value());
+    EXPECT_FALSE(report.reason.empty());
+    map = std::move(report.result);
+  }
+  ASSERT_TRUE(map.has_value());
+  const Rigid3d truth = room.TruePose(map->frame1.index) * room.TruePose(map->frame0.index).Inverse();
+  EXPECT_LT(AngleBetween(truth.rotation, map->T_1_0.rotation), 0.02);
+  EXPECT_GT(truth.translation.normalized().dot(map->T_1_0.translation.normalized()), 0.985);
+  EXPECT_GE(map->points.size(), 80U);
+  EXPECT_EQ(map->matches.size(), map->is_static.size());
+  for (const FirstMap::Point& point : map->points) {
+    EXPECT_GT(point.p_world.z(), 0);
+    const auto uv = room.camera().Project(point.p_world);
+    ASSERT_TRUE(uv.has_value());
+    EXPECT_LT((*uv - map->frame0.features->uv_px[point.feature0]).norm(), 4.0);
+  }
+}
+
+TEST(Initializer, FramesBeforeTellWhoHasJustStopped) {
+  SyntheticRoom room(600, 150);
+  room.StopWalkerAt(12);
+  InitializerOptions blind;
+  blind.past_views = 0;
+  const auto taken_in = MapFrom(room, blind, 12);
+  ASSERT_TRUE(taken_in.has_value());
+  EXPECT_GT(ShareOfWalker(room, *taken_in), 0.1);
+  InitializerOptions options;
+  options.past_first = 12;
+  Initializer initializer(options, room.camera(), 1);
+  bool waited = false;
+  for (uint32_t frame = 0; frame < 45; ++frame) {
+    const InitializerReport report = initializer.AddFrame(room.Frame(frame));
+    waited |= report.reason.find("just before") != std::string::npos;
+    if (report.result && report.result->frame0.index == 12) {
+      EXPECT_LT(ShareOfWalker(room, *report.result), 0.01);
+    }
+  }
+  EXPECT_TRUE(waited);
+}
+
+TEST(Initializer, ThePastOfARoomDoesNotDelayItsMap) {
+  const SyntheticRoom room(600, 0);
+  InitializerOptions options;
+  const auto without = MapFrom(room, options, 12);
+  options.past_first = 12;
+  const auto with = MapFrom(room, options, 0);
+  ASSERT_TRUE(without.has_value() && with.has_value());
+  EXPECT_EQ(with->frame0.index, without->frame0.index);
+  EXPECT_EQ(with->frame1.index, without->frame1.index);
+}
+
+TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
+  SyntheticRoom room(600, 0);
+  room.SetSpeed(0.0);
+  Initializer initializer({}, room.camera(), 1);
+  for (uint32_t frame = 0; frame < 40; ++frame) {
+    EXPECT_FALSE(initializer.AddFrame(room.Frame(frame)).result.has_value()) << frame;
+  }
+}
+
+TEST(Initializer, TakesOtherSelectorsBehindTheSameGates) {
+  const SyntheticRoom room(600, 100);
+  for (const char* method : {"arsac", "ransac"}) {
+    InitializerOptions options;
+    options.method = method;
+    Initializer initializer(options, room.camera(), 1);
+    std::optional<FirstMap> map;
+    for (uint32_t frame = 0; frame < 60 && !map; ++frame) {
+      map = std::move(initializer.AddFrame(room.Frame(frame)).result);
+    }
+    ASSERT_TRUE(map.has_value()) << method;
+    const Rigid3d truth = room.TruePose(map->frame1.index) * room.TruePose(map->frame0.index).Inverse();
+    EXPECT_LT(AngleBetween(truth.rotation, map->T_1_0.rotation), 0.02) << method;
+  }
+  InitializerOptions unknown;
+  unknown.method = "magsac";
+  EXPECT_THROW(Initializer(unknown, room.camera(), 1), InputError);
+}
+
+TEST(Initializer, AbsurdFramesGiveReasonsAndNoMap) {
+  const SyntheticRoom room(600, 0);
+  Initializer same(InitializerOptions(), room.camera(), 1);  // the same picture again and again
+  for (uint32_t frame = 0; frame < 20; ++frame) {
+    InitializerFrame still = room.Frame(3);
+    still.index = frame;
+    still.stamp_ns = int64_t{frame} * 33'333'333;
+    const InitializerReport report = same.AddFrame(still);
+    EXPECT_FALSE(report.result.has_value());
+    EXPECT_FALSE(report.reason.empty());
+  }
+  Initializer unlike(InitializerOptions(), room.camera(), 1);  // no picture has anything of the one before
+  for (uint32_t frame = 0; frame < 20; ++frame) {
+    const SyntheticRoom other(600, 0, 100 + frame);
+    EXPECT_FALSE(unlike.AddFrame(other.Frame(frame)).result.has_value());
+  }
+}
+
+TEST(Initializer, WaitsForFramesWithoutFeatures) {
+  Initializer initializer({}, SyntheticCamera(), 1);
+  const InitializerReport report = initializer.AddFrame({0, 0, std::make_shared<const FrameFeatures>()});
+  EXPECT_EQ(report.wait, WaitReason::kTooFewFeatures);
+}
+
+TEST(Initializer, IsDeterministic) {
+  const SyntheticRoom room(400, 100);
+  std::vector<FirstMap> maps;
+  for (int run = 0; run < 2; ++run) {
+    Initializer initializer({}, room.camera(), 5);
+    for (uint32_t frame = 0; frame < 60; ++frame) {
+      InitializerReport report = initializer.AddFrame(room.Frame(frame));
+      if (!report.result) continue;
+      maps.push_back(std::move(*report.result));
+      break;
+    }
+  }
+  ASSERT_EQ(maps.size(), 2U);
+  EXPECT_EQ(maps[0].frame1.index, maps[1].frame1.index);
+  EXPECT_EQ(maps[0].T_1_0.translation, maps[1].T_1_0.translation);
+  ASSERT_EQ(maps[0].points.size(), maps[1].points.size());
+  for (size_t k = 0; k < maps[0].points.size(); ++k)
+    EXPECT_EQ(maps[0].points[k].p_world, maps[1].points[k].p_world);
+}
+
+TEST(ReconstructBaseline, FindsThePoseOfARoom) {
+  const SyntheticPair pair = MakeSyntheticPair({}, 21);
+  const TwoViewReconstruction map = ReconstructBaseline(pair.matches, pair.camera, {}, 1);
+  ASSERT_TRUE(map.IsUsable()) << map.explanation;
+  EXPECT_FALSE(map.from_homography);
+  EXPECT_GT(map.T_1_0.translation.dot(pair.T_1_0.translation.normalized()), 0.97);
+  EXPECT_LT(AngleBetween(map.T_1_0.rotation, pair.T_1_0.rotation), 0.02);
+}
+
+TEST(ReconstructBaseline, TakesAHomographyForAPlane) {
+  SyntheticPairOptions options;
+  options.flat = true;
+  options.translation = {0.4, 0.05, 0.02};
+  const SyntheticPair pair = MakeSyntheticPair(options, 22);
+  EXPECT_TRUE(ReconstructBaseline(pair.matches, pair.camera, {}, 1).from_homography);
+}
+
+TEST(ReconstructBaseline, RefusesARotation) {
+  SyntheticPairOptions options;
+  options.translation.setZero();
+  const SyntheticPair pair = MakeSyntheticPair(options, 23);
+  EXPECT_FALSE(ReconstructBaseline(pair.matches, pair.camera, {}, 1).IsUsable());
+  EXPECT_FALSE(ReconstructBaseline({}, pair.camera, {}, 1).IsUsable());
+}
+
+TEST(ReconstructFromStatic, TriangulatesWhatIsStatic) {
+  SyntheticPairOptions options;
+  options.num_moving = 100;
+  const SyntheticPair pair = MakeSyntheticPair(options, 24);
+  const StaticSelection selection = Dlrsac(DlrsacOptions()).Select(pair.matches, pair.camera, 1);
+  const TwoViewReconstruction map = ReconstructFromStatic(pair.matches, selection, pair.camera, {});
+  ASSERT_TRUE(map.IsUsable()) << map.explanation;
+  EXPECT_GT(map.num_points, 400);
+  for (size_t i = 0; i < pair.matches.size(); ++i) {
+    if (!map.has_point[i]) continue;
+    EXPECT_TRUE(selection.is_static[i]);
+    EXPECT_GT(map.points_cam0[i].z(), 0);
+  }
+}
+
+TEST(ReconstructFromStatic, PassesARefusalOn) {
+  StaticSelection refused;
+  refused.refusal = Refusal::kTooFewCells;
+  EXPECT_FALSE(ReconstructFromStatic({}, refused, SyntheticCamera(), {}).IsUsable());
+}
+
+}  // namespace
+}  // namespace dmslam

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dmslam/camera/camera.h"
+#include "dmslam/motion_segmentation/static_selector.h"
+
+namespace dmslam {
+
+/// Matches of the reference frame with another one, and what the selector made of them. index0 is the feature
+/// of the reference frame.
+struct PairView {
+  std::vector<Match> matches;  ///< sorted by index0
+  StaticSelection selection;
+};
+
+struct AgreementOptions {
+  double min_agreement = 0.8;  ///< Jaccard index of two pairs' static sets, over features matched in both
+  int min_common = 30;         ///< features matched in both pairs, for the index to mean anything
+  double min_distribution_share = 0.15;  ///< root of D over the static matches, by the image's diagonal
+  int min_static = 100;              ///< matches static in all pairs
+  double min_static_share = 0.0;     ///< share of the last pair's matches that must be static
+};
+
+enum class AgreementRefusal : uint8_t {
+  kNone = 0,
+  kSelectionRefused,      ///< the selector refused one of the pairs
+  kTooFewCommon,          ///< the pairs have too few features in common
+  kDisagreement,          ///< they call different features static
+  kTooFewStatic,          ///< too few are static in all of them
+  kDistributionTooSmall,  ///< what is static is too compact
+};
+std::string_view ToString(AgreementRefusal refusal);
+
+/// What several pairs with the same reference frame say together.
+struct Agreement {
+  AgreementRefusal refusal = AgreementRefusal::kNone;
+  std::string explanation;
+  std::vector<uint8_t> is_static;  ///< parallel to the last pair's matches; computed also when refused
+  int num_static = 0;
+  double agreement = 1;  ///< smallest Jaccard index
+  double distribution_px = 0;
+  bool IsUsable() const { return refusal == AgreementRefusal::kNone; }
+};
+
+/// The last pair's matches are static that it calls static and none of the other pairs calls moving. What
+/// moves along the epipolar lines of one pair seldom does so in all, and different samples do not fall for
+/// the same mover.
+Agreement Agree(std::span<const PairView* const> pairs, const Camera& camera, const AgreementOptions& options);
+
+}  // namespace dmslam

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <set>
+#include <vector>
+
+#include "dmslam/loops/loop_options.h"
+#include "dmslam/map/map.h"
+#include "dmslam/place_recognition/map_places.h"
+
+namespace dmslam {
+
+/// Names places that a keyframe may show again: by words, and only when several keyframes in a row name
+/// places that belong together (Mur-Artal, Montiel, Tardos, "ORB-SLAM", T-RO 2015, section VII.A).
+class LoopDetector {
+ public:
+  explicit LoopDetector(const LoopcloserOptions& options) : options_(options) {}
+
+  struct Found {
+    std::vector<KeyframeId> candidates;  ///< consistent, best first
+    int named = 0;                       ///< before consistency was asked
+  };
+  /// Keyframes in order, each once.
+  Found Detect(const Map& map, const MapPlaces& places, const Keyframe& keyframe);
+  /// A loop was closed, or the map is another one: begins anew.
+  void Reset() { groups_.clear(); }
+
+ private:
+  /// A place with its neighbours, and how many keyframes in a row have named it.
+  struct Group {
+    std::set<KeyframeId> members;
+    int seen = 0;
+  };
+
+  std::vector<PlaceCandidate> Candidates(const Map& map, const MapPlaces& places,
+                                         const Keyframe& keyframe) const;
+  Group GroupOf(const Map& map, KeyframeId id) const;
+
+  LoopcloserOptions options_;
+  std::vector<Group> groups_;  ///< what the keyframe before named
+};
+
+}  // namespace dmslam

@@ -1,0 +1,341 @@
+#include "dmslam/loops/loop_verifier.h"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "dmslam/dynamics/motion_belief.h"
+#include "dmslam/map/neighbourhood.h"
+#include "dmslam/map/projection.h"
+#include "dmslam/optimization/sim3_optimization.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kCellColumns = 8, kCellRows = 6;
+constexpr int kPlaceNeighbours = 15;
+constexpr int kPlaceNeighboursMatched = 5;
+constexpr int kMaxPoseIterations = 1000;
+constexpr size_t kMinDepthRatios = 5;
+constexpr double kMaxScaleError = 0.03;  // standard error of a scale to be taken, as a share of it
+constexpr ViewLimits kSurelySeen{.min_view_cos = 0.7, .distance_slack = 1.0, .border_px = 0};
+
+size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
+  const int column =
+      std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
+  const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
+  return static_cast<size_t>(row * kCellColumns + column);
+}
+
+/// A landmark of each keyframe that should be the same one.
+Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const Keyframe& b,
+                    size_t feature_b) {
+  Sim3Match match;
+  match.p_cam1 = a.T_cam_world * map.FindLandmark(a.landmarks[feature_a])->p_world;
+  match.p_cam2 = b.T_cam_world * map.FindLandmark(b.landmarks[feature_b])->p_world;
+  match.uv1_px = a.features->uv_px[feature_a];
+  match.uv2_px = b.features->uv_px[feature_b];
+  match.inv_sigma_squared1 = 1.0 / map.pyramid().SigmaSquared(a.features->set.keypoints[feature_a].octave);
+  match.inv_sigma_squared2 = 1.0 / map.pyramid().SigmaSquared(b.features->set.keypoints[feature_b].octave);
+  return match;
+}
+
+/// Along the keyframes from one to a later one [map units]; 0 where they belong to two maps.
+double PathLength(const Map& map, const Keyframe& from, const Keyframe& to) {
+  if (from.map_id != to.map_id) return 0.0;
+  double length = 0.0;
+  const Keyframe* last = &from;
+  for (auto at = map.keyframes().find(from.id); at != map.keyframes().end() && last->id < to.id; ++at) {
+    if (at->second.map_id != from.map_id) continue;
+    length += (at->second.T_cam_world.Center() - last->T_cam_world.Center()).norm();
+    last = &at->second;
+  }
+  return length;
+}
+
+/// The keyframe that sees most of what was found and is no neighbour of `keyframe`; null where there is none.
+const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const PlaceSupport& support) {
+  std::map<KeyframeId, int> votes;
+  for (const LandmarkMatch& match : support.matches) {
+    for (const Observation& o : map.FindLandmark(match.landmark)->observations) {
+      if (o.keyframe != keyframe.id && !keyframe.covisible.contains(o.keyframe)) ++votes[o.keyframe];
+    }
+  }
+  const auto best = std::max_element(votes.begin(), votes.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return best == votes.end() ? nullptr : map.FindKeyframe(best->first);
+}
+
+/// Where the camera has come back to nearly the same place, pixels do not tell the scale: the farther the
+/// points, the farther the image, and nothing moves. The landmarks' distances do: the median of their ratios.
+Sim3d WithScaleOfDepths(const std::vector<Sim3Match>& matches, const Sim3Report& report) {
+  const Sim3d& S = report.S_cam1_cam2;
+  std::vector<double> ratios;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (!report.inliers[i]) continue;
+    const Eigen::Vector3d ray = S.rotation * matches[i].p_cam2 + S.translation / S.scale;
+    ratios.push_back(matches[i].p_cam1.dot(ray) / ray.squaredNorm());
+  }
+  const auto middle = ratios.begin() + static_cast<ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return Sim3d(S.rotation, S.translation * (*middle / S.scale), *middle);
+}
+
+/// How much larger the keyframe's own map is than the place's: from landmarks of both on the same features.
+/// None where these are too few or do not agree.
+std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                                   const std::vector<LandmarkMatch>& matches) {
+  std::vector<double> ratios;
+  for (const LandmarkMatch& match : matches) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
+    const double depth_mine = (keyframe.T_cam_world * map.FindLandmark(mine)->p_world).z();
+    const double depth_theirs = (T_cam_world * map.FindLandmark(match.landmark)->p_world).z();
+    if (depth_mine > 0 && depth_theirs > 0) ratios.push_back(depth_mine / depth_theirs);
+  }
+  if (ratios.size() < kMinDepthRatios) return std::nullopt;
+  std::sort(ratios.begin(), ratios.end());
+  const double median = ratios[ratios.size() / 2];
+  const double quartiles = ratios[ratios.size() * 3 / 4] - ratios[ratios.size() / 4];
+  const double error =
+      0.93 * quartiles / std::sqrt(static_cast<double>(ratios.size()));  // of a normal median
+  return error <= kMaxScaleError * median ? std::optional(median) : std::nullopt;
+}
+
+template <typename... Values>
+std::string Text(const char* format, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof(text), format, values...);
+  return text;
+}
+
+}  // namespace
+
+std::vector<LandmarkId> StaticLandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared) {
+  std::vector<LandmarkId> landmarks = LandmarksAround(map, id, neighbours, min_shared);
+  KeepStatic(map, &landmarks);
+  return landmarks;
+}
+
+std::optional<Sim3d> LoopVerifier::FirstSimilarity(const Map& map, const MapPlaces& places,
+                                                   const Keyframe& keyframe, const Keyframe& place,
+                                                   std::string* why) const {
+  if (const auto similarity = SimilarityFromWords(map, places, keyframe, place, why)) return similarity;
+  std::string why_not;
+  const auto similarity = SimilarityFromFeatures(map, keyframe, place, &why_not);
+  *why += "; " + why_not;
+  return similarity;
+}
+
+/// Where the keyframe has few landmarks of its own yet, as behind people: its features against the landmarks
+/// of the place and its neighbours, without words.
+std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const Keyframe& keyframe,
+                                                          const Keyframe& place, std::string* why) const {
+  const std::vector<LandmarkId> ids =
+      StaticLandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
+  const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
+  const bool one_map = keyframe.map_id == place.map_id;
+  return SimilarityFromPose(map, keyframe, place, matches, one_map ? std::optional(1.0) : std::nullopt, why);
+}
+
+/// Landmarks of the place on features of the keyframe give its pose; features that show landmarks of both
+/// tell the scale, and where they are too few, `scale` is taken, if it is known: within one map the drift is
+/// small, and what the loop joins corrects it in the adjustment that follows.
+std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyframe& keyframe,
+                                                      const Keyframe& place,
+                                                      std::vector<LandmarkMatch> matches,
+                                                      std::optional<double> scale, std::string* why) const {
+  std::erase_if(matches, [&](const LandmarkMatch& match) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    return mine.valid() && !IsStatic(map.FindLandmark(mine));
+  });
+  PoseRansacOptions options;
+  options.min_inliers = options_.min_pose_inliers;
+  options.max_iterations = kMaxPoseIterations;
+  options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop_pose");
+  const auto pose = PoseFromLandmarks(map, *keyframe.features, matches, options);
+  if (!pose.success) {
+    *why = Text("%d of %zu landmarks agree on a pose", pose.num_inliers, matches.size());
+    return std::nullopt;
+  }
+  std::vector<LandmarkMatch> agreeing;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (pose.inliers[i]) agreeing.push_back(matches[i]);
+  }
+  if (const auto measured = ScaleOfPairs(map, keyframe, pose.model, agreeing)) scale = measured;
+  if (!scale) {
+    *why = Text("too few of %zu landmarks tell the scale of the two maps", agreeing.size());
+    return std::nullopt;
+  }
+  const double s = *scale;
+  return Sim3d(pose.model.rotation, pose.model.translation * s, s) * Sim3d(place.T_cam_world).Inverse();
+}
+
+std::optional<Sim3d> LoopVerifier::SimilarityFromWords(const Map& map, const MapPlaces& places,
+                                                       const Keyframe& keyframe, const Keyframe& place,
+                                                       std::string* why) const {
+  const std::vector<uint8_t> usable1 = StaticFeatures(map, keyframe), usable2 = StaticFeatures(map, place);
+  const std::vector<BowMatch> pairs =
+      MatchByNodes({&keyframe.features->set, places.Nodes(keyframe.id), usable1},
+                   {&place.features->set, places.Nodes(place.id), usable2});
+  if (static_cast<int>(pairs.size()) < options_.min_word_matches) {
+    *why = Text("%zu matches by words", pairs.size());
+    return std::nullopt;
+  }
+  std::vector<Sim3Match> matches;
+  for (const BowMatch& pair : pairs) matches.push_back(MakeMatch(map, keyframe, pair.a, place, pair.b));
+  Sim3RansacOptions options;
+  options.min_inliers = options_.min_sim3_inliers;
+  options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop");
+  const Pinhole camera = map.camera().Ideal();
+  const Sim3Report report = EstimateSim3Ransac(camera, camera, matches, options);
+  if (!report.success) {
+    *why = Text("%d of %zu matches agree on a similarity", report.num_inliers, matches.size());
+    return std::nullopt;
+  }
+  return report.S_cam1_cam2;
+}
+
+/// Landmarks of the place, looked for where the similarity says, with what the keyframe itself sees there:
+/// pairs of landmarks, of which both sides must agree.
+std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyframe& keyframe,
+                                                     const Keyframe& place, const Sim3d& S_keyframe_place,
+                                                     std::string* why) const {
+  std::vector<LandmarkId> seen = LandmarksSeenBy(map, {place.id});
+  KeepStatic(map, &seen);
+  const Rigid3d T_cam_world = (S_keyframe_place * Sim3d(place.T_cam_world)).ToRigid();
+  const PlaceSupport support = Look(map, keyframe, T_cam_world, seen, options_.search_radius_px);
+  std::vector<Sim3Match> matches;
+  for (const LandmarkMatch& match : support.matches) {
+    const LandmarkId mine = keyframe.landmarks[match.feature];
+    if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
+    const auto at = std::find(place.landmarks.begin(), place.landmarks.end(), match.landmark);
+    matches.push_back(
+        MakeMatch(map, keyframe, match.feature, place, static_cast<size_t>(at - place.landmarks.begin())));
+  }
+  const Pinhole camera = map.camera().Ideal();
+  Sim3OptimizationOptions options;
+  options.min_inliers = options_.min_sim3_inliers;
+  Sim3Report report = OptimizeSim3(camera, camera, matches, S_keyframe_place, options);
+  if (report.success) {
+    options.fix_scale = true;
+    report = OptimizeSim3(camera, camera, matches, WithScaleOfDepths(matches, report), options);
+  }
+  if (report.success) return report.S_cam1_cam2;
+  const std::string pairs =
+      Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
+  if (static_cast<int>(matches.size()) >= options_.min_sim3_inliers) {
+    *why = pairs;
+    return std::nullopt;
+  }
+  const auto similarity =
+      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
+  if (!similarity) *why = pairs + "; " + *why;
+  return similarity;
+}
+
+PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                                const std::vector<LandmarkId>& landmarks, double radius_px) const {
+  PlaceSupport support;
+  std::vector<uint8_t> taken(keyframe.features->size(), 0);
+  std::bitset<kCellColumns * kCellRows> cells;
+  for (const LandmarkId id : landmarks) {
+    const Landmark& landmark = *map.FindLandmark(id);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world, kSurelySeen);
+    if (!view) continue;
+    ++support.expected;
+    const FeatureHit hit =
+        FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
+                    std::max(0, view->octave - 1), view->octave + 1, landmark.descriptor, taken);
+    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
+    const size_t feature = static_cast<size_t>(hit.feature);
+    taken[feature] = 1;
+    support.matches.push_back({static_cast<uint16_t>(feature), id});
+    cells.set(CellOf(map.camera(), keyframe.features->uv_px[feature]));
+  }
+  std::sort(support.matches.begin(), support.matches.end(),
+            [](const LandmarkMatch& a, const LandmarkMatch& b) { return a.feature < b.feature; });
+  support.found = static_cast<int>(support.matches.size());
+  support.cells = static_cast<int>(cells.count());
+  return support;
+}
+
+VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                   const Sim3d& S_keyframe_place, std::string* why) const {
+  VerifiedLoop loop;
+  loop.keyframe = keyframe.id;
+  loop.place = place.id;
+  loop.S_keyframe_place = S_keyframe_place;
+  loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
+  loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
+  const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
+  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks, options_.search_radius_px);
+  const PlaceSupport own =
+      Look(map, keyframe, keyframe.T_cam_world,
+           StaticLandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
+           options_.search_radius_px);
+  if (own.found > 0) loop.share = loop.support.Share() / own.Share();
+  const double path = PathLength(map, place, keyframe);
+  const double moved = (T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
+  if (path > 0) loop.drift = moved / path;
+  *why = Text("%d of %d landmarks found in %d cells, share %.2f; drift %.3f, scale %.3f", loop.support.found,
+              loop.support.expected, loop.support.cells, loop.share, loop.drift,
+              1.0 / loop.S_keyframe_world.scale);
+  return loop;
+}
+
+bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
+  return loop.support.found >= options_.min_matches && loop.support.cells >= options_.min_cells &&
+         loop.share >= min_share;
+}
+
+bool LoopVerifier::IsCertain(const Map& map, const VerifiedLoop& loop) const {
+  const bool one_map = map.FindKeyframe(loop.keyframe)->map_id == map.FindKeyframe(loop.place)->map_id;
+  return one_map && loop.drift <= options_.certain_drift && Holds(loop, options_.min_confirmed_share);
+}
+
+std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,
+                                                  const Keyframe& keyframe, const Keyframe& place,
+                                                  std::string* why) const {
+  const std::optional<Sim3d> first = FirstSimilarity(map, places, keyframe, place, why);
+  if (!first) return std::nullopt;
+  const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, place, *first, why);
+  if (!refined) return std::nullopt;
+  VerifiedLoop loop = Measure(map, keyframe, place, *refined, why);
+  if (!Holds(loop, options_.min_share)) return std::nullopt;
+  return loop;
+}
+
+std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe& keyframe,
+                                                  const VerifiedLoop& earlier, std::string* why) const {
+  const Keyframe* before = map.FindKeyframe(earlier.keyframe);
+  const Keyframe* place_before = map.FindKeyframe(earlier.place);
+  if (before == nullptr || place_before == nullptr || before->map_id != keyframe.map_id) {
+    *why = "the keyframes of the proposal are gone";
+    return std::nullopt;
+  }
+  const Sim3d S_before_world = earlier.S_keyframe_place * Sim3d(place_before->T_cam_world);
+  const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
+  const std::vector<LandmarkId> landmarks =
+      StaticLandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
+  const PlaceSupport seen =
+      Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks, 2 * options_.search_radius_px);
+  const Keyframe* place = BestObserver(map, keyframe, seen);
+  if (place == nullptr) {
+    *why = "nothing of the place is seen";
+    return std::nullopt;
+  }
+  const Sim3d S_keyframe_place = S_keyframe_world * Sim3d(place->T_cam_world).Inverse();
+  const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, *place, S_keyframe_place, why);
+  if (!refined) return std::nullopt;
+  VerifiedLoop loop = Measure(map, keyframe, *place, *refined, why);
+  const bool plausible = place->map_id != keyframe.map_id || loop.drift <= options_.plausible_drift;
+  if (!Holds(loop, plausible ? options_.min_confirmed_share : options_.min_implausible_share))
+    return std::nullopt;
+  return loop;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dmslam/loops/loop_options.h"
+#include "dmslam/map/map.h"
+#include "dmslam/place_recognition/landmark_matches.h"
+#include "dmslam/place_recognition/map_places.h"
+
+namespace dmslam {
+
+/// How well a camera at some pose sees a place.
+struct PlaceSupport {
+  int expected = 0;                    ///< landmarks of the place that it should see
+  int found = 0;                       ///< and does
+  int cells = 0;                       ///< cells of the image (8 x 6) in which it finds some
+  std::vector<LandmarkMatch> matches;  ///< sorted by feature
+  double Share() const { return expected == 0 ? 0.0 : static_cast<double>(found) / expected; }
+};
+
+/// The keyframe sees the place again.
+struct VerifiedLoop {
+  KeyframeId keyframe;
+  KeyframeId place;
+  Sim3d S_keyframe_place;  ///< camera of the keyframe from camera of the place
+  Sim3d S_keyframe_world;  ///< where the place's landmarks say the keyframe is
+  PlaceSupport support;
+  double share =
+      0;  ///< of what the keyframe should see of the place, seen; over the same share of its own surroundings
+  double drift = 0;  ///< how far the loop moves the keyframe, as a share of the path since the place
+  std::vector<LandmarkId> landmarks;  ///< of the place and its neighbours, static, sorted
+};
+
+/// Asks geometry whether a keyframe shows a place: a similarity from matches of landmarks, refined, a guided
+/// search for everything else that the place should show, and the question what share of it is there. A
+/// picture that hangs in two rooms gives matches and a similarity as well; what tells the rooms apart is what
+/// should be around it and is not, and that the next keyframe sees no more of it. Landmarks that are believed
+/// to move neither match nor count.
+class LoopVerifier {
+ public:
+  LoopVerifier(const LoopcloserOptions& options, uint64_t seed) : options_(options), seed_(seed) {}
+
+  /// Whether the keyframe may show the place; `why` has the numbers.
+  std::optional<VerifiedLoop> Propose(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
+                                      const Keyframe& place, std::string* why) const;
+  /// Whether a later keyframe shows what an earlier one's loop says it should; `why` has the numbers.
+  std::optional<VerifiedLoop> Confirm(const Map& map, const Keyframe& keyframe, const VerifiedLoop& earlier,
+                                      std::string* why) const;
+
+  /// Whether a proposal needs no confirmation: it moves the keyframe by no more than drift does anyway.
+  bool IsCertain(const Map& map, const VerifiedLoop& loop) const;
+
+  /// Which of `landmarks` a camera at `T_cam_world` finds among the features of `keyframe`.
+  PlaceSupport Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                    const std::vector<LandmarkId>& landmarks, double radius_px) const;
+
+ private:
+  std::optional<Sim3d> FirstSimilarity(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
+                                       const Keyframe& place, std::string* why) const;
+  std::optional<Sim3d> SimilarityFromWords(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
+                                           const Keyframe& place, std::string* why) const;
+  std::optional<Sim3d> SimilarityFromFeatures(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                              std::string* why) const;
+  std::optional<Sim3d> SimilarityFromPose(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                          std::vector<LandmarkMatch> matches, std::optional<double> scale,
+                                          std::string* why) const;
+  std::optional<Sim3d> RefinedSimilarity(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                         const Sim3d& S_keyframe_place, std::string* why) const;
+  VerifiedLoop Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                       const Sim3d& S_keyframe_place, std::string* why) const;
+  bool Holds(const VerifiedLoop& loop, double min_share) const;
+
+  LoopcloserOptions options_;
+  uint64_t seed_;
+};
+
+/// Static landmarks of a keyframe and of its best neighbours, sorted.
+std::vector<LandmarkId> StaticLandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared);
+
+}  // namespace dmslam

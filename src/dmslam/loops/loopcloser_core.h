@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dmslam/loops/loop_detector.h"
+#include "dmslam/loops/loop_options.h"
+#include "dmslam/loops/loop_verifier.h"
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+#include "dmslam/place_recognition/map_places.h"
+
+namespace dmslam {
+
+struct LoopcloserCounters {
+  uint64_t checked = 0;
+  uint64_t candidates = 0;           ///< places named by words
+  uint64_t refused_consistency = 0;  ///< of them, not named by the keyframes before
+  uint64_t refused_geometry = 0;     ///< of the others
+  uint64_t loops = 0;
+  uint64_t global_adjustments = 0;
+  KeyframeId last_keyframe;
+  KeyframeId last_loop_keyframe;
+};
+
+/// Finds loops in a replica of the map and works out corrections (Mur-Artal, Montiel, Tardos, "ORB-SLAM: a
+/// versatile and accurate monocular SLAM system", T-RO 2015, section VII; DM-SLAM keeps it unchanged). Knows
+/// no bus, no clock and no thread.
+class LoopcloserCore {
+ public:
+  LoopcloserCore(const LoopcloserOptions& options, const Camera& camera, const Pyramid& pyramid,
+                 uint64_t seed, std::shared_ptr<const Vocabulary> vocabulary);
+
+  /// Called now and then during long work. May be empty.
+  void SetPump(std::function<void()> pump) { pump_ = std::move(pump); }
+  void ApplyMapDelta(const MapDelta& delta);
+  /// The replica is void: a fresh map stream, or a snapshot, begins.
+  void ForgetMap();
+  /// The answer to a keyframe whose local mapping is done: a correction, or none. The first keyframe after a
+  /// loop is in the map is answered with the global adjustment of what the loop has left. A loop that the
+  /// mapper refused may be found again.
+  LoopAnswer Check(KeyframeId keyframe);
+
+  const Map& map() const { return map_; }
+  const LoopcloserCounters& counters() const { return counters_; }
+  /// A place that words named consistently, or that an earlier keyframe proposed, and what geometry said of
+  /// it.
+  struct Verdict {
+    KeyframeId place;
+    bool confirms = false;  ///< an earlier proposal
+    bool accepted = false;  ///< as a proposal, or for good when it confirms one
+    std::string why;        ///< the numbers
+  };
+  /// Of the newest keyframe checked, in the order in which they were asked.
+  const std::vector<Verdict>& verdicts() const { return verdicts_; }
+
+ private:
+  void HearOfCorrection(const MapDelta& delta);
+  LoopAnswer FindLoop(const Keyframe& keyframe);
+  LoopAnswer Close(const VerifiedLoop& loop);
+  /// Follows what earlier keyframes proposed.
+  std::optional<VerifiedLoop> ConfirmProposed(const Keyframe& keyframe);
+  /// The first of the candidates that geometry bears out is kept as a proposal, or given back where it is
+  /// certain.
+  std::optional<VerifiedLoop> ProposePlace(const Keyframe& keyframe,
+                                           const std::vector<KeyframeId>& candidates);
+  LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
+  std::function<bool()> Interrupt() const;
+
+  LoopcloserOptions options_;
+  Camera camera_;
+  Pyramid pyramid_;
+  std::function<void()> pump_;
+  Map map_;
+  MapPlaces places_;
+  LoopDetector detector_;
+  LoopVerifier verifier_;
+  struct Proposal {
+    VerifiedLoop loop;
+    int age = 0;  ///< keyframes checked since
+  };
+  std::vector<Proposal> proposals_;  ///< oldest first
+  int keyframes_since_loop_;
+  bool adjustment_due_ = false;
+  uint64_t awaited_correction_ = 0;  ///< proposed; the mapper's word on it has not been heard. 0: none
+  std::vector<Verdict> verdicts_;
+  LoopcloserCounters counters_;
+};
+
+}  // namespace dmslam

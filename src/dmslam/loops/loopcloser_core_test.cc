@@ -1,0 +1,326 @@
+#include "dmslam/loops/loopcloser_core.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kKeyframes = 60;  // one and a quarter rounds
+constexpr int kPerRound = 48;
+constexpr int kPoints = 1600;  // on a cylinder around the path
+constexpr double kPathRadius = 2.0, kWallRadius = 5.0;
+constexpr double kDriftPerKeyframe = 0.004;  // of the scale, and of the position
+
+std::shared_ptr<const Vocabulary> ShippedVocabulary() {
+  const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+  return std::make_shared<const Vocabulary>(
+      LoadOrbVocabulary(std::string(source == nullptr ? "." : source) + "/data/vocabulary.dmv"));
+}
+
+Descriptor RandomDescriptor(Random& random) {
+  return {{random.Next(), random.Next(), random.Next(), random.Next()}};
+}
+
+/// Looks outwards from a circle, upright.
+Rigid3d TruePose(int k) {
+  const double angle = 2 * std::numbers::pi * k / kPerRound;
+  Eigen::Matrix3d R_world_cam;  // columns: right, down, forward
+  R_world_cam.col(2) = Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+  R_world_cam.col(1) = Eigen::Vector3d(0, 0, -1);
+  R_world_cam.col(0) = R_world_cam.col(1).cross(R_world_cam.col(2));
+  const Eigen::Vector3d center = kPathRadius * R_world_cam.col(2);
+  return Rigid3d(Eigen::Quaterniond(R_world_cam), center).Inverse();
+}
+
+/// What a keyframe and the landmarks made in it believe of the world: it grows and slides as the camera goes
+/// on.
+Sim3d Drift(int k) {
+  return Sim3d(Eigen::Quaterniond::Identity(), k * kDriftPerKeyframe * Eigen::Vector3d(1, 0.5, 0),
+               1.0 + k * kDriftPerKeyframe / 4);
+}
+
+struct WorldOptions {
+  bool second_visit_elsewhere = false;  ///< after one round the camera sees another wall...
+  double picture_rad = 0;               ///< a patch of the wall, so wide, hangs on the other side, too
+  bool first_wall_moves = false;        ///< its landmarks are believed to move
+  size_t landmark_every = 1;            ///< in the second round only every so many features get a landmark
+};
+
+/// A camera that goes around a room; landmarks of the second round are not known to be those of the first.
+class Room {
+ public:
+  explicit Room(const WorldOptions& options)
+      : options_(options), map_(TestCamera(525, 319.5, 239.5), Pyramid()) {
+    Random random(7);
+    for (int i = 0; i < kPoints; ++i) {
+      const double angle = random.Uniform(0, 2 * std::numbers::pi);
+      const double radius = kWallRadius + random.Uniform(-0.6, 0.6);
+      points_.push_back({radius * std::cos(angle), radius * std::sin(angle), random.Uniform(-2.0, 2.0)});
+      first_.push_back(RandomDescriptor(random));
+      second_.push_back(RandomDescriptor(random));
+      if (!options.second_visit_elsewhere) second_.back() = first_.back();
+      if (angle >= options.picture_rad) continue;
+      points_.push_back({-points_.back().x(), -points_.back().y(), points_.back().z()});
+      first_.push_back(first_.back());
+      second_.push_back(second_.back());
+    }
+  }
+
+  /// The next keyframe with what it sees, as a delta.
+  MapDelta Next() {
+    const int k = next_++;
+    const KeyframeId id = KeyframeId::Make(1, static_cast<uint32_t>(k + 1));
+    Random random(DeriveSeed(3, static_cast<uint64_t>(k), "keyframe"));
+    const Rigid3d T_cam_true = TruePose(k);
+    FeatureSet features;
+    std::vector<size_t> seen;
+    for (size_t i = 0; i < points_.size(); ++i) {
+      const auto uv = map_.camera().Project(T_cam_true * points_[i]);
+      if (!uv || uv->x() < 1 || uv->y() < 1 || uv->x() > 638 || uv->y() > 478) continue;
+      Descriptor descriptor = DescriptorOf(i, k);
+      for (int flips = 0; flips < 8; ++flips)
+        descriptor.words[random.Below(4)] ^= uint64_t{1} << random.Below(64);
+      const Eigen::Vector2d noisy = *uv + 0.3 * Eigen::Vector2d(random.Gaussian(), random.Gaussian());
+      features.keypoints.push_back({static_cast<uint16_t>(std::lround(noisy.x() * 16)),
+                                    static_cast<uint16_t>(std::lround(noisy.y() * 16)), 1, 0});
+      features.descriptors.push_back(descriptor);
+      seen.push_back(i);
+    }
+    AddKeyframe(k, id, std::move(features));
+    const size_t step = Round(k) == 0 ? 1 : options_.landmark_every;
+    for (size_t feature = 0; feature < seen.size(); feature += step) {
+      const LandmarkId landmark = LandmarkFor(seen[feature], k, id);
+      map_.SetObservation(id, static_cast<uint16_t>(feature), landmark);
+      map_.UpdateDescriptor(landmark);
+    }
+    return map_.TakeDelta(MapEvent::kMapped, id, 1);
+  }
+
+  /// The mapper's word on a correction. It stays where it is: these tests look at answers alone.
+  MapDelta SayOf(const LoopAnswer& answer, MapEvent event) {
+    MapDelta delta = map_.TakeDelta(event, answer.keyframe, 1);
+    delta.correction_id = answer.correction_id;
+    return delta;
+  }
+
+  const Map& map() const { return map_; }
+
+ private:
+  int Round(int k) const { return k / kPerRound; }
+  const Descriptor& DescriptorOf(size_t point, int k) const {
+    return Round(k) == 0 ? first_[point] : second_[point];
+  }
+
+  void AddKeyframe(int k, KeyframeId id, FeatureSet features) {
+    Keyframe keyframe;
+    keyframe.id = id;
+    keyframe.map_id = 1;
+    keyframe.stamp_ns = k * 300'000'000LL;
+    keyframe.T_cam_world = (Sim3d(TruePose(k)) * Drift(k).Inverse()).ToRigid();
+    if (k > 0) keyframe.parent = KeyframeId::Make(1, static_cast<uint32_t>(k));
+    keyframe.features = MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid());
+    map_.AddKeyframe(std::move(keyframe));
+  }
+
+  LandmarkId LandmarkFor(size_t point, int k, KeyframeId id) {
+    // Seen again in the second round it is another landmark; so are those that the first round's end sees of
+    // its start.
+    const auto [known, is_new] = landmarks_.try_emplace({point, Era(point, k)});
+    if (!is_new) return known->second;
+    Landmark landmark;
+    landmark.id = known->second = LandmarkId::Make(1, ++last_landmark_);
+    landmark.map_id = 1;
+    landmark.p_world = Drift(k) * points_[point];
+    landmark.reference = landmark.first_keyframe = id;
+    if (options_.first_wall_moves && Round(k) == 0) landmark.evidence.motion_belief = 2.0F;
+    map_.AddLandmark(landmark);
+    return landmark.id;
+  }
+  int Era(size_t point, int k) {
+    const auto last = last_seen_.find(point);
+    if (last != last_seen_.end() && k - last->second > kPerRound / 2) ++era_[point];
+    last_seen_[point] = k;
+    return era_[point];
+  }
+
+  WorldOptions options_;
+  Map map_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<Descriptor> first_, second_;
+  std::map<std::pair<size_t, int>, LandmarkId> landmarks_;
+  std::map<size_t, int> last_seen_, era_;
+  uint64_t last_landmark_ = 0;
+  int next_ = 0;
+};
+
+struct Answers {
+  std::vector<LoopAnswer> loops, adjustments;
+};
+
+Answers Play(Room& room, LoopcloserCore& core, MapEvent said = MapEvent::kCorrected) {
+  Answers answers;
+  for (int k = 0; k < kKeyframes; ++k) {
+    const MapDelta delta = room.Next();
+    core.ApplyMapDelta(delta);
+    LoopAnswer answer = core.Check(delta.about);
+    EXPECT_EQ(answer.keyframe, delta.about);
+    EXPECT_EQ(answer.base_version, core.map().version());
+    if (answer.kind != LoopAnswer::Kind::kNone) core.ApplyMapDelta(room.SayOf(answer, said));
+    if (answer.kind == LoopAnswer::Kind::kLoop) answers.loops.push_back(std::move(answer));
+    if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) answers.adjustments.push_back(std::move(answer));
+  }
+  return answers;
+}
+
+LoopcloserCore MakeCore(const LoopcloserOptions& options = {}) {
+  return LoopcloserCore(options, TestCamera(525, 319.5, 239.5), Pyramid(), 1, ShippedVocabulary());
+}
+
+/// The pose of a keyframe after a correction.
+Rigid3d Corrected(const Room& room, const LoopAnswer& answer, KeyframeId id) {
+  for (const auto& c : answer.corrections) {
+    if (c.keyframe == id) {
+      return (Sim3d(room.map().FindKeyframe(id)->T_cam_world) * c.corrected_from_base.Inverse()).ToRigid();
+    }
+  }
+  ADD_FAILURE() << "no correction for keyframe " << id.frame_index();
+  return {};
+}
+
+TEST(LoopcloserCoreTest, AReturnIsFoundAndTheDriftTakenOut) {
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  const LoopAnswer& loop = answers.loops.front();
+  const int here = static_cast<int>(loop.keyframe.frame_index()) - 1;
+  const int there = static_cast<int>(loop.matched.frame_index()) - 1;
+  EXPECT_GE(here, kPerRound - 6);
+  EXPECT_LE(here, kPerRound + 6);
+  EXPECT_LE(std::abs(here - kPerRound - there), 6) << here << " was matched with " << there;
+  EXPECT_GE(loop.fusions.size(), 20u);
+  // Where the two keyframes stand to one another, before and after, in truth's units.
+  const Eigen::Vector3d truth = TruePose(here).Center() - TruePose(there).Center();
+  const auto error = [&](const Rigid3d& a, const Rigid3d& b) {
+    return (a.Center() - b.Center() - truth).norm();
+  };
+  const double before = error(room.map().FindKeyframe(loop.keyframe)->T_cam_world,
+                              room.map().FindKeyframe(loop.matched)->T_cam_world);
+  const double after = error(Corrected(room, loop, loop.keyframe), Corrected(room, loop, loop.matched));
+  EXPECT_GT(before, 0.15);
+  EXPECT_LT(after, before / 5);
+  // The correction is spread: a keyframe in the middle moves, but less.
+  const KeyframeId middle = KeyframeId::Make(1, kPerRound / 2);
+  const double moved_middle =
+      (Corrected(room, loop, middle).Center() - room.map().FindKeyframe(middle)->T_cam_world.Center()).norm();
+  EXPECT_GT(moved_middle, 0.02);
+  EXPECT_LT(moved_middle, before);
+}
+
+TEST(LoopcloserCoreTest, AReturnIsFoundWithFewLandmarksOfItsOwn) {
+  Room room({.landmark_every = 25});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  const LoopAnswer& loop = answers.loops.front();
+  const auto relative = [](const Rigid3d& a, const Rigid3d& b) { return a * b.Inverse(); };
+  const Rigid3d truth = relative(TruePose(static_cast<int>(loop.keyframe.frame_index()) - 1),
+                                 TruePose(static_cast<int>(loop.matched.frame_index()) - 1));
+  const Rigid3d found = relative(Corrected(room, loop, loop.keyframe), Corrected(room, loop, loop.matched));
+  EXPECT_LT((found.Center() - truth.Center()).norm(), 0.05);
+  EXPECT_LT(AngleBetween(found.rotation, truth.rotation), 0.02);
+}
+
+TEST(LoopcloserCoreTest, TheKeyframeAfterALoopIsAnsweredWithAGlobalAdjustment) {
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  ASSERT_GE(answers.adjustments.size(), 1u);
+  EXPECT_EQ(answers.adjustments.front().keyframe.frame_index(),
+            answers.loops.front().keyframe.frame_index() + 1);
+  EXPECT_FALSE(answers.adjustments.front().landmark_offsets.empty());
+  EXPECT_EQ(core.counters().loops, answers.loops.size());
+}
+
+TEST(LoopcloserCoreTest, ALoopThatWasRefusedIsFoundAgainAndNotAdjusted) {
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core, MapEvent::kRefused);
+  EXPECT_GE(answers.loops.size(), 2u);
+  EXPECT_TRUE(answers.adjustments.empty());
+  EXPECT_EQ(core.counters().loops, 0u);
+}
+
+TEST(LoopcloserCoreTest, UntilTheMapperHasSpokenNothingMoreIsProposed) {
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  std::optional<LoopAnswer> loop;
+  for (int k = 0; k < kKeyframes; ++k) {
+    const MapDelta delta = room.Next();
+    core.ApplyMapDelta(delta);
+    LoopAnswer answer = core.Check(delta.about);
+    if (loop) {
+      EXPECT_EQ(answer.kind, LoopAnswer::Kind::kNone);
+    }
+    if (!loop && answer.kind == LoopAnswer::Kind::kLoop) loop = std::move(answer);
+  }
+  ASSERT_TRUE(loop);
+  core.ApplyMapDelta(room.SayOf(*loop, MapEvent::kCorrected));
+  const MapDelta delta = room.Next();
+  core.ApplyMapDelta(delta);
+  EXPECT_EQ(core.Check(delta.about).kind, LoopAnswer::Kind::kGlobalAdjustment);
+}
+
+TEST(LoopcloserCoreTest, MovingLandmarksDoNotVote) {
+  Room room({.first_wall_moves = true});
+  LoopcloserCore core = MakeCore();
+  EXPECT_TRUE(Play(room, core).loops.empty());
+}
+
+TEST(LoopcloserCoreTest, OnePictureThatHangsInTwoPlacesIsNoLoop) {
+  Room room({.second_visit_elsewhere = true, .picture_rad = 0.25});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  EXPECT_TRUE(answers.loops.empty());
+}
+
+TEST(LoopcloserCoreTest, SwitchedOffItAnswersNone) {
+  Room room({});
+  LoopcloserOptions options;
+  options.enabled = false;
+  LoopcloserCore core = MakeCore(options);
+  const Answers answers = Play(room, core);
+  EXPECT_TRUE(answers.loops.empty());
+  EXPECT_EQ(core.counters().checked, static_cast<uint64_t>(kKeyframes));
+}
+
+TEST(LoopcloserCoreTest, TheSameRecordsGiveTheSameAnswers) {
+  Room room_a({}), room_b({});
+  LoopcloserCore core_a = MakeCore(), core_b = MakeCore();
+  const Answers a = Play(room_a, core_a), b = Play(room_b, core_b);
+  ASSERT_EQ(a.loops.size(), b.loops.size());
+  for (size_t i = 0; i < a.loops.size(); ++i) {
+    ASSERT_EQ(a.loops[i].corrections.size(), b.loops[i].corrections.size());
+    for (size_t j = 0; j < a.loops[i].corrections.size(); ++j) {
+      EXPECT_EQ(a.loops[i].corrections[j].corrected_from_base.translation,
+                b.loops[i].corrections[j].corrected_from_base.translation);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dmslam

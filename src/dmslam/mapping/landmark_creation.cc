@@ -1,0 +1,341 @@
+#include "dmslam/mapping/landmark_creation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "dmslam/geometry/triangulation.h"
+#include "dmslam/map/projection.h"
+
+namespace dmslam {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Directions of features in the frame of the pencil of planes through both camera centres: the baseline is
+/// its axis.
+struct Pencil {
+  Eigen::Vector3d axis, u, v;
+
+  static Pencil Through(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    Pencil pencil;
+    pencil.axis = (to - from).normalized();
+    const Eigen::Vector3d helper =
+        std::abs(pencil.axis.y()) < 0.9 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX();
+    pencil.u = pencil.axis.cross(helper).normalized();
+    pencil.v = pencil.axis.cross(pencil.u);
+    return pencil;
+  }
+};
+
+struct PlaneEntry {
+  double angle;      ///< of the epipolar plane [rad]
+  double along;      ///< angle between ray and baseline [rad]
+  double tolerance;  ///< angle that one standard deviation of the feature spans [rad]
+  uint16_t feature;
+};
+
+std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector<uint8_t>& use,
+                                     const Pencil& pencil, const Map& map) {
+  const Camera& camera = map.camera();
+  const Eigen::Matrix3d R_world_cam = keyframe.T_cam_world.rotation.conjugate().toRotationMatrix();
+  std::vector<PlaneEntry> entries;
+  entries.reserve(keyframe.features->size());
+  for (size_t i = 0; i < keyframe.features->size(); ++i) {
+    if (use[i] == 0) continue;
+    const Eigen::Vector3d ray = (R_world_cam * camera.Ray(keyframe.features->uv_px[i])).normalized();
+    const double x = ray.dot(pencil.u), y = ray.dot(pencil.v);
+    const double across = std::hypot(x, y);
+    if (across < 0.02) continue;  // nearly along the baseline: any plane would do
+    const double sigma_px = map.pyramid().Scale(keyframe.features->set.keypoints[i].octave);
+    entries.push_back({std::atan2(y, x), std::atan2(across, ray.dot(pencil.axis)),
+                       sigma_px / (camera.fx_px * across), static_cast<uint16_t>(i)});
+  }
+  return entries;
+}
+
+bool ByAngle(const PlaneEntry& a, const PlaneEntry& b) {
+  return a.angle != b.angle ? a.angle < b.angle : a.feature < b.feature;
+}
+
+/// Sorted by angle, with copies beyond both ends so that a window never wraps around.
+std::vector<PlaneEntry> SortedWithWrap(std::vector<PlaneEntry> entries, double margin) {
+  const size_t count = entries.size();
+  for (size_t i = 0; i < count; ++i) {
+    PlaneEntry copy = entries[i];
+    if (copy.angle > kPi - margin) {
+      copy.angle -= 2 * kPi;
+      entries.push_back(copy);
+    } else if (copy.angle < -kPi + margin) {
+      copy.angle += 2 * kPi;
+      entries.push_back(copy);
+    }
+  }
+  std::sort(entries.begin(), entries.end(), ByAngle);
+  return entries;
+}
+
+struct PairGeometry {
+  const Keyframe& a;
+  const Keyframe& b;
+  const Map& map;
+  const LandmarkCreationOptions& options;
+};
+
+/// Whether the two planes differ by no more than `sigmas` of both tolerances together. What is clear by
+/// squares is not asked of the much slower hypot.
+bool SamePlane(const PlaneEntry& a, const PlaneEntry& b, double sigmas) {
+  const double apart = std::abs(a.angle - b.angle);
+  const double apart_squared = apart * apart;
+  const double bound_squared = sigmas * sigmas * (a.tolerance * a.tolerance + b.tolerance * b.tolerance);
+  if (apart_squared < bound_squared * (1 - 1e-9)) return true;
+  if (apart_squared > bound_squared * (1 + 1e-9)) return false;
+  return apart <= sigmas * std::hypot(a.tolerance, b.tolerance);
+}
+
+/// The best partner of one feature of a among b's entries in its window; -1: none.
+int BestPartner(const PlaneEntry& entry, const std::vector<PlaneEntry>& sorted_b, const PairGeometry& pair) {
+  const Descriptor& descriptor = pair.a.features->set.descriptors[entry.feature];
+  const int octave = pair.a.features->set.keypoints[entry.feature].octave;
+  const double sigmas = std::sqrt(pair.options.epipolar_sigmas_squared);
+  const double reach = 6.0 * entry.tolerance + 0.02;
+  auto it =
+      std::lower_bound(sorted_b.begin(), sorted_b.end(), PlaneEntry{entry.angle - reach, 0, 0, 0}, ByAngle);
+  int best = 257, second = 257, best_feature = -1;
+  for (; it != sorted_b.end() && it->angle <= entry.angle + reach; ++it) {
+    // The error lies in the other image as in ORB-SLAM2, with this feature's own error added.
+    if (!SamePlane(*it, entry, sigmas)) continue;
+    if (it->along <= entry.along) continue;  // rays from a to b must converge in front of both
+    const auto& keypoint = pair.b.features->set.keypoints[it->feature];
+    if (std::abs(keypoint.octave - octave) > 3) continue;
+    const int distance = HammingDistance(descriptor, pair.b.features->set.descriptors[it->feature]);
+    if (distance < best) {
+      second = best;
+      best = distance;
+      best_feature = it->feature;
+    } else if (distance < second) {
+      second = distance;
+    }
+  }
+  const bool unambiguous =
+      pair.options.descriptor_ratio >= 1.0 || best < pair.options.descriptor_ratio * second;
+  return best <= pair.options.max_descriptor_distance && unambiguous ? best_feature : -1;
+}
+
+/// Tests one candidate: parallax, depth, reprojection and scale (paper 2.2; ORB-SLAM2's constants).
+std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t feature_a, uint16_t feature_b,
+                                           CreationDiagnostics* diagnostics) {
+  const Camera& camera = pair.map.camera();
+  const Pyramid& pyramid = pair.map.pyramid();
+  const Eigen::Vector3d ray_a = camera.Ray(pair.a.features->uv_px[feature_a]);
+  const Eigen::Vector3d ray_b = camera.Ray(pair.b.features->uv_px[feature_b]);
+  const Eigen::Vector3d world_a = pair.a.T_cam_world.rotation.conjugate() * ray_a;
+  const Eigen::Vector3d world_b = pair.b.T_cam_world.rotation.conjugate() * ray_b;
+  const double parallax_cos = world_a.dot(world_b) / (world_a.norm() * world_b.norm());
+  if (!(parallax_cos > 0 && parallax_cos < pair.options.max_parallax_cos)) {
+    ++diagnostics->refused_parallax;
+    return std::nullopt;
+  }
+  const std::optional<Eigen::Vector3d> point =
+      TriangulatePoint(pair.a.T_cam_world, pair.b.T_cam_world, ray_a, ray_b);
+  const auto uv_a = point ? camera.Project(pair.a.T_cam_world * *point) : std::nullopt;
+  const auto uv_b = point ? camera.Project(pair.b.T_cam_world * *point) : std::nullopt;
+  if (!uv_a || !uv_b) {
+    ++diagnostics->refused_depth;
+    return std::nullopt;
+  }
+  if (NormalizedErrorSquared(*pair.a.features, feature_a, *uv_a, pyramid) >
+          pair.options.reprojection_sigmas_squared ||
+      NormalizedErrorSquared(*pair.b.features, feature_b, *uv_b, pyramid) >
+          pair.options.reprojection_sigmas_squared) {
+    ++diagnostics->refused_reprojection;
+    return std::nullopt;
+  }
+  const double distance_ratio =
+      (*point - pair.b.T_cam_world.Center()).norm() / (*point - pair.a.T_cam_world.Center()).norm();
+  const double octave_ratio = pyramid.Scale(pair.a.features->set.keypoints[feature_a].octave) /
+                              pyramid.Scale(pair.b.features->set.keypoints[feature_b].octave);
+  const double slack = pair.options.scale_ratio_slack * pyramid.scale_factor;
+  if (distance_ratio * slack < octave_ratio || distance_ratio > octave_ratio * slack) {
+    ++diagnostics->refused_scale;
+    return std::nullopt;
+  }
+  return point;
+}
+
+/// Features without a landmark, and not seen to move.
+std::vector<uint8_t> FreeFeatures(const Keyframe& keyframe, const std::vector<uint16_t>& moving) {
+  std::vector<uint8_t> use(keyframe.features->size(), 1);
+  for (size_t i = 0; i < use.size(); ++i) {
+    if (keyframe.landmarks[i].valid()) use[i] = 0;
+  }
+  for (const uint16_t feature : moving) {
+    if (feature < use.size()) use[feature] = 0;
+  }
+  return use;
+}
+
+/// The gate of Algorithm 1: one candidate per neighbourhood, at most alpha * Ln of them.
+class MutualExclusion {
+ public:
+  MutualExclusion(const LandmarkCreationOptions& options, int tracked_landmarks)
+      : options_(options),
+        limit_(std::max(options.min_candidates, static_cast<int>(options.alpha * tracked_landmarks))) {}
+
+  bool Admit(const Eigen::Vector2d& uv_px, CreationDiagnostics* diagnostics) {
+    if (!options_.mutual_exclusion) return true;
+    if (static_cast<int>(accepted_.size()) >= limit_) {
+      ++diagnostics->refused_count;
+      return false;
+    }
+    for (const Eigen::Vector2d& other : accepted_) {
+      if ((uv_px - other).cwiseAbs().maxCoeff() <= options_.neighbourhood_px) {
+        ++diagnostics->refused_neighbourhood;
+        return false;
+      }
+    }
+    accepted_.push_back(uv_px);
+    return true;
+  }
+
+ private:
+  const LandmarkCreationOptions& options_;
+  int limit_;
+  std::vector<Eigen::Vector2d> accepted_;
+};
+
+}  // namespace
+
+CreationDiagnostics& CreationDiagnostics::operator+=(const CreationDiagnostics& other) {
+  matched += other.matched;
+  refused_parallax += other.refused_parallax;
+  refused_depth += other.refused_depth;
+  refused_reprojection += other.refused_reprojection;
+  refused_scale += other.refused_scale;
+  refused_neighbourhood += other.refused_neighbourhood;
+  refused_count += other.refused_count;
+  created += other.created;
+  return *this;
+}
+
+std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
+    const Keyframe& a, const std::vector<uint8_t>& use_a, const Keyframe& b,
+    const std::vector<uint8_t>& use_b, const Map& map, const LandmarkCreationOptions& options) {
+  const Pencil pencil = Pencil::Through(a.T_cam_world.Center(), b.T_cam_world.Center());
+  std::vector<PlaneEntry> entries_a = PlaneEntries(a, use_a, pencil, map);
+  const std::vector<PlaneEntry> sorted_b = SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5);
+  const PairGeometry pair{a, b, map, options};
+  std::vector<int> partner_of_b(b.features->size(), -1);
+  std::vector<int> distance_of_b(b.features->size(), 257);
+  for (const PlaneEntry& entry : entries_a) {
+    const int partner = BestPartner(entry, sorted_b, pair);
+    if (partner < 0) continue;
+    const size_t index = static_cast<size_t>(partner);
+    const int distance =
+        HammingDistance(a.features->set.descriptors[entry.feature], b.features->set.descriptors[index]);
+    if (distance < distance_of_b[index]) {
+      distance_of_b[index] = distance;
+      partner_of_b[index] = entry.feature;
+    }
+  }
+  std::vector<std::pair<uint16_t, uint16_t>> matches;
+  for (size_t i = 0; i < partner_of_b.size(); ++i) {
+    if (partner_of_b[i] >= 0)
+      matches.emplace_back(static_cast<uint16_t>(partner_of_b[i]), static_cast<uint16_t>(i));
+  }
+  std::sort(matches.begin(), matches.end());
+  return matches;
+}
+
+namespace {
+
+/// A feature of the new keyframe matched with one of a neighbour, and the point they make.
+struct PairCandidate {
+  NeighbourFeature seen_by;
+  Eigen::Vector3d p_world;
+  double parallax_cos;
+};
+
+struct Candidate {
+  NewLandmark landmark;
+  bool confirmed = false;  ///< in enough views, over enough time
+};
+
+/// All pairs of every free feature of keyframe `id`, by feature.
+std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, KeyframeId id,
+                                                        const std::vector<uint16_t>& moving,
+                                                        const LandmarkCreationOptions& options,
+                                                        CreationDiagnostics* diagnostics) {
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  const std::vector<uint8_t> use = FreeFeatures(keyframe, moving);
+  std::vector<std::vector<PairCandidate>> pairs(keyframe.features->size());
+  for (const KeyframeId neighbour_id : map.BestCovisible(id, options.neighbours, 1)) {
+    const Keyframe& neighbour = *map.FindKeyframe(neighbour_id);
+    const double baseline = (keyframe.T_cam_world.Center() - neighbour.T_cam_world.Center()).norm();
+    const std::optional<double> depth = map.MedianDepth(neighbour);
+    if (!depth || baseline < options.min_baseline_over_depth * *depth) continue;
+    const PairGeometry pair{keyframe, neighbour, map, options};
+    for (const auto& [feature, other] :
+         MatchAlongEpipolarPlanes(keyframe, use, neighbour, FreeFeatures(neighbour, {}), map, options)) {
+      ++diagnostics->matched;
+      const std::optional<Eigen::Vector3d> point = Triangulate(pair, feature, other, diagnostics);
+      if (!point) continue;
+      const Eigen::Vector3d a = *point - keyframe.T_cam_world.Center(),
+                            b = *point - neighbour.T_cam_world.Center();
+      pairs[feature].push_back({{neighbour_id, other}, *point, a.dot(b) / (a.norm() * b.norm())});
+    }
+  }
+  return pairs;
+}
+
+/// The point of the pair with the widest parallax, with all pairs of the feature that see it where they
+/// should.
+Candidate CombinePairs(const Map& map, KeyframeId id, uint16_t feature,
+                       const std::vector<PairCandidate>& pairs, const LandmarkCreationOptions& options) {
+  const auto widest = std::min_element(
+      pairs.begin(), pairs.end(),
+      [](const PairCandidate& a, const PairCandidate& b) { return a.parallax_cos < b.parallax_cos; });
+  Candidate candidate{{feature, {widest->seen_by}, widest->p_world}, false};
+  int64_t first_ns = map.FindKeyframe(id)->stamp_ns, last_ns = first_ns;
+  for (auto pair = pairs.begin(); pair != pairs.end(); ++pair) {
+    const Keyframe& keyframe = *map.FindKeyframe(pair->seen_by.keyframe);
+    const auto uv_px = map.camera().Project(keyframe.T_cam_world * widest->p_world);
+    const bool agrees = uv_px && NormalizedErrorSquared(*keyframe.features, pair->seen_by.feature, *uv_px,
+                                                        map.pyramid()) <= options.reprojection_sigmas_squared;
+    if (pair != widest && !agrees) continue;
+    if (pair != widest) candidate.landmark.seen_by.push_back(pair->seen_by);
+    first_ns = std::min(first_ns, keyframe.stamp_ns);
+    last_ns = std::max(last_ns, keyframe.stamp_ns);
+  }
+  candidate.confirmed = options.confirmed_views > 0 &&
+                        static_cast<int>(candidate.landmark.seen_by.size()) + 1 >= options.confirmed_views &&
+                        static_cast<double>(last_ns - first_ns) * 1e-9 >= options.confirmed_span_s;
+  return candidate;
+}
+
+}  // namespace
+
+std::vector<NewLandmark> ProposeLandmarks(const Map& map, KeyframeId id, const std::vector<uint16_t>& moving,
+                                          const LandmarkCreationOptions& options,
+                                          CreationDiagnostics* diagnostics) {
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  std::vector<Candidate> candidates;
+  const auto pairs = MatchNeighbours(map, id, moving, options, diagnostics);
+  for (size_t feature = 0; feature < pairs.size(); ++feature) {
+    if (pairs[feature].empty()) continue;
+    candidates.push_back(CombinePairs(map, id, static_cast<uint16_t>(feature), pairs[feature], options));
+  }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.landmark.seen_by.size() > b.landmark.seen_by.size();
+  });
+  MutualExclusion gate(options, map.CountTracked(keyframe, 1));
+  std::vector<NewLandmark> created;
+  for (const Candidate& candidate : candidates) {
+    const Eigen::Vector2d& uv_px = keyframe.features->uv_px[candidate.landmark.feature];
+    if (candidate.confirmed || gate.Admit(uv_px, diagnostics)) created.push_back(candidate.landmark);
+  }
+  diagnostics->created += static_cast<uint32_t>(created.size());
+  return created;
+}
+
+}  // namespace dmslam

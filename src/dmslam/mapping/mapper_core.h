@@ -1,0 +1,124 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+#include "dmslam/mapping/landmark_creation.h"
+#include "dmslam/mapping/local_adjustment.h"
+#include "dmslam/mapping/map_maintenance.h"
+#include "dmslam/mapping/mapper_options.h"
+
+namespace dmslam {
+
+/// What the mapper did, for its status.
+struct MapperCounters {
+  uint64_t keyframes_inserted = 0;
+  uint64_t keyframes_repeated = 0;  ///< proposed again, and recognised
+  uint64_t keyframes_refused = 0;   ///< their reference is unknown
+  uint64_t keyframes_culled = 0;
+  uint64_t landmarks_culled = 0;
+  uint64_t landmarks_moving_removed = 0;
+  uint64_t landmarks_seen_through = 0;  ///< removed because other keyframes see what lies behind them
+  uint64_t observations_dropped = 0;    ///< of landmarks that are gone
+  uint64_t evidence_dropped = 0;
+  uint64_t fusions = 0;
+  uint64_t corrections_applied = 0;
+  uint64_t corrections_refused = 0;
+  uint64_t maps_started = 0;
+  uint64_t maps_refused = 0;
+  uint64_t maps_dropped = 0;
+  uint64_t adjustments_interrupted = 0;
+  CreationDiagnostics creation;
+};
+
+/// The map's only writer: takes the frontend's records in order, edits the map, and hands every change out as
+/// a delta. Knows no bus, no clock and no thread. Paper 2.3 (local mapping), with landmark creation after
+/// Algorithm 1.
+class MapperCore {
+ public:
+  using Sink = std::function<void(const MapDelta&)>;
+
+  MapperCore(const MapperOptions& options, const Camera& camera, const Pyramid& pyramid,
+             uint16_t epoch_ordinal, Sink sink);
+
+  /// Asked now and then during long work; true: finish early (a keyframe waits). May be empty (lock-step).
+  void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
+
+  /// Continues a map that others kept (after a restart) or that was saved: new landmarks get ids of an
+  /// ordinal that the map does not know, and the local mapping of the keyframe that is proposed first is done
+  /// again where the map has it: what was done of it is not known.
+  void Continue(Map map);
+  /// What of the streams is worked into the map; travels with the next deltas.
+  void SetProgress(const MapProgress& progress) { map_.SetProgress(progress); }
+
+  /// Builds a map of the proposal; false when it is known already or does not hold (a record says so).
+  bool OnInitialMap(const InitialMap& proposal);
+  /// Inserts a keyframe and does the local mapping that follows; false when it is known already, or its
+  /// reference is not.
+  bool OnKeyframe(const KeyframeProposal& proposal);
+  void OnEvidence(const FrameEvidence& evidence);
+  void OnReset(const MapReset& reset);
+  /// A loop or a global adjustment, composed with the poses of now: local mapping since its base changes
+  /// nothing about it. Refused with a record where it no longer applies: its keyframes are gone, another
+  /// correction was applied since its base (two loop closers, one after the other, may have found the same
+  /// loop), or its base is not a version of this map.
+  void OnLoopAnswer(const LoopAnswer& answer);
+  /// Says once more that keyframe `id` is mapped, for a loop closer that has not heard it.
+  void AskAgain(KeyframeId id, MapId map_id) { Publish(MapEvent::kMapped, id, map_id); }
+  /// Says that all work that keyframe `id` caused is done.
+  void Settle(KeyframeId id, MapId map_id);
+  /// Says that the sequence has ended and that all it caused is done; first adjusts all maps, unless it
+  /// is to leave them as they are.
+  void End(bool as_it_is = false);
+
+  const Map& map() const { return map_; }
+  const MapperCounters& counters() const { return counters_; }
+
+ private:
+  /// Where a keyframe stands to that of the loop.
+  struct BesideLoop {
+    Rigid3d T_cam_here;
+    double scale = 1.0;  ///< of the loop's keyframe when it was measured
+  };
+  using LoopSide = std::map<KeyframeId, BesideLoop>;
+
+  void MapAround(const KeyframeProposal& proposal);
+  void Refine(KeyframeId id, MapId map_id);
+  bool Insert(const KeyframeProposal& proposal);
+  Keyframe MakeKeyframe(const KeyframeProposal& proposal, const Rigid3d& T_cam_world) const;
+  void AddMatches(const KeyframeProposal& proposal);
+  void ChooseParent(KeyframeId id, KeyframeId fallback);
+  void CreateLandmarks(KeyframeId id, const std::vector<uint16_t>& moving);
+  LandmarkId AddLandmark(MapId map_id, KeyframeId reference, KeyframeId newest,
+                         const Eigen::Vector3d& p_world);
+  bool BuildInitialMap(const InitialMap& proposal);
+  void ScaleToUnitDepth(MapId map_id, KeyframeId first);
+  std::string WhyRefused(const LoopAnswer& answer) const;
+  void Correct(const LoopAnswer& answer);
+  LoopSide SideOf(KeyframeId keyframe, KeyframeId place) const;
+  void Connect(const LoopAnswer& answer, const LoopSide& side);
+  void Reroot(KeyframeId id, KeyframeId parent);
+  void JoinMaps(MapId from, MapId into);
+  void AdjustMaps();
+  void Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id = 0,
+               std::string note = {});
+  bool Interrupted() const { return interrupt_ && interrupt_(); }
+
+  MapperOptions options_;
+  Map map_;
+  uint16_t epoch_ordinal_;
+  uint64_t next_landmark_ = 1;
+  bool adjusted_ = false;  ///< as a whole, since the last keyframe
+  InsertionOrder order_;
+  bool maybe_unfinished_ = false;  ///< the map is continued: its mapper may have ended in the middle of the
+                                   ///< keyframe that comes first
+  Sink sink_;
+  std::function<bool()> interrupt_;
+  MapperCounters counters_;
+};
+
+}  // namespace dmslam

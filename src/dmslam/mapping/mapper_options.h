@@ -1,0 +1,52 @@
+#pragma once
+
+#include "dmslam/dynamics/motion_belief.h"
+#include "dmslam/dynamics/seen_through.h"
+
+namespace dmslam {
+
+/// Creation of landmarks: DM-SLAM's Algorithm 1 (paper 2.2) and the checks around it.
+struct LandmarkCreationOptions {
+  bool mutual_exclusion = true;  ///< Algorithm 1; off: every match that passes the checks becomes a landmark
+  double neighbourhood_px =
+      25;                    ///< half the side of the neighbourhood in which one candidate excludes others
+  double alpha = 1.0;        ///< candidates of a keyframe are at most alpha * Ln...
+  int min_candidates = 120;  ///< ...but never fewer than this
+  int confirmed_views = 4;   ///< a point seen in as many views or more...
+  double confirmed_span_s = 1.0;  ///< ...over so much time is not subject to Algorithm 1; 0 views: all are
+  int neighbours = 20;            ///< covisible keyframes that are matched with the new one
+  double min_baseline_over_depth = 0.01;
+  int max_descriptor_distance = 50;  ///< bits
+  double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line; 1 = not asked
+  double epipolar_sigmas_squared = 3.84;
+  double max_parallax_cos = 0.9998;
+  double reprojection_sigmas_squared = 5.991;
+  double scale_ratio_slack = 1.5;  ///< times the pyramid's factor
+};
+
+struct MapperOptions {
+  LandmarkCreationOptions creation;
+  MotionBeliefOptions belief;
+  SeenThroughOptions seen_through;
+  double min_found_ratio =
+      0.25;  ///< landmarks found less often than this, of the frames that should see them, go
+  int probation_keyframes = 3;  ///< a landmark is on probation until this many keyframes followed
+  int probation_min_observations =
+      3;  ///< from the second keyframe on, a landmark on probation needs as many observers
+  double redundant_share = 0.9;  ///< a keyframe goes when this share of its landmarks is seen by three others
+  double keypoint_sigma_px = 0.7;  ///< of octave 0, in bundle adjustment
+  int local_keyframes = 40;  ///< at most this many keyframes are adjusted at a time (most covisible first)
+  int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
+  int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
+  double min_depth = 0.1;  ///< a landmark goes before that where it is nearer to a keyframe than this share
+                           ///< of what the keyframe sees in the median; 0: none does
+  int min_covisibility = 15;  ///< landmarks in common that make two keyframes neighbours
+  int nearby_keyframes =
+      10;  ///< at most so many that look at the same place are fused with, covisible or not
+  double nearby_distance = 0.5;   ///< how far they may be, as a share of the scene's depth
+  double nearby_angle_rad = 0.6;  ///< how far they may be turned
+  double fuse_radius_px = 3.0;    ///< times the scale of the predicted octave
+  int max_fuse_distance = 80;     ///< bits, of a landmark and a feature at its place
+};
+
+}  // namespace dmslam

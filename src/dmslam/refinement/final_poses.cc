@@ -1,0 +1,337 @@
+#include "dmslam/refinement/final_poses.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include "dmslam/optimization/reprojection.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kRounds = 20;
+constexpr double kMinInlierShare = 0.7;
+constexpr double kMaxLeverage = 1.0 / 3.0;  // of one sight: half of what all others say
+constexpr int kMinFrames = 5;               // that see a landmark, to place it by them
+constexpr int kLandmarkSteps = 2;           // of Gauss and Newton
+constexpr double kHuberChi2 = 5.991;
+// Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
+constexpr double kOverstep = 1.7;
+constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and their errors are their own
+constexpr double kMaxMove = 0.3;      // of a landmark, as a share of its distance: more is a slip
+constexpr size_t kPortion = 64;       // frames or landmarks between two calls of who waits
+
+PoseObservation Observe(const Pyramid& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
+  return {p_world, sight.uv_px.cast<double>(), 1.0 / pyramid.SigmaSquared(sight.octave), 1.0};
+}
+
+/// Of a landmark's place.
+struct LandmarkEquations {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+
+  void Add(const Map& map, const Rigid3d& T_cam_world, const Eigen::Vector3d& p_world,
+           const Eigen::Vector2d& uv_px, int octave) {
+    const Pinhole camera = map.camera().Ideal();
+    const Eigen::Vector3d p_cam = T_cam_world * p_world;
+    if (p_cam.z() <= 0.0) return;
+    const Eigen::Vector2d error = camera.Project(p_cam) - uv_px;
+    const double inv_sigma_squared = 1.0 / map.pyramid().SigmaSquared(octave);
+    const double chi2 = error.squaredNorm() * inv_sigma_squared;
+    const double weight = inv_sigma_squared * (chi2 > kHuberChi2 ? std::sqrt(kHuberChi2 / chi2) : 1.0);
+    const Matrix23 J = ProjectionJacobian(camera, p_cam) * T_cam_world.rotation.toRotationMatrix();
+    information += weight * J.transpose() * J;
+    gradient += weight * J.transpose() * error;
+  }
+};
+
+/// The share of what is known of the pose that this observation alone says, along the direction where that is
+/// most: 0 to 1 (the greatest eigenvalue of its part of the hat matrix).
+double Leverage(const Pinhole& camera, const Rigid3d& T_cam_world, const Eigen::LDLT<Matrix6d>& information,
+                const PoseObservation& observation) {
+  const Matrix26 J = PoseJacobian(camera, T_cam_world * observation.p_world);
+  const Eigen::Matrix2d hat = observation.inv_sigma_squared * J * information.solve(J.transpose());
+  const double mean = 0.5 * hat.trace();
+  return mean + std::sqrt(std::max(0.0, mean * mean - hat.determinant()));
+}
+
+/// Drops what the pose rests on without others that would contradict it, were it wrong: as a rule a mismatch
+/// near the epipole, which makes a landmark just before the lens. Whether there were any; never half of all.
+bool DropUnchecked(const Pinhole& camera, const PoseOptimizationReport& report, std::vector<Sight>* sights,
+                   std::vector<PoseObservation>* observations) {
+  if (!report.usable) return false;
+  const Eigen::LDLT<Matrix6d> information(report.information);
+  std::vector<size_t> checked;
+  for (size_t i = 0; i < sights->size(); ++i) {
+    const bool alone = report.inliers[i] != 0 &&
+                       Leverage(camera, report.T_cam_world, information, (*observations)[i]) > kMaxLeverage;
+    if (!alone) checked.push_back(i);
+  }
+  if (checked.size() == sights->size() || 2 * checked.size() < sights->size()) return false;
+  for (size_t k = 0; k < checked.size(); ++k) {
+    (*sights)[k] = (*sights)[checked[k]];
+    (*observations)[k] = (*observations)[checked[k]];
+  }
+  sights->resize(checked.size());
+  observations->resize(checked.size());
+  return true;
+}
+
+std::vector<PoseObservation> ObserveAll(const Map& map, const std::vector<Sight>& sights) {
+  std::vector<PoseObservation> observations;
+  observations.reserve(sights.size());
+  for (const Sight& sight : sights) {
+    observations.push_back(Observe(map.pyramid(), sight, map.FindLandmark(sight.landmark)->p_world));
+  }
+  return observations;
+}
+
+void SetMeasured(const PoseOptimizationReport& report, const std::vector<Sight>& sights, FinalPose* pose) {
+  pose->measured = report.T_cam_world;
+  pose->information = report.information;
+  pose->sights.clear();
+  pose->sights.reserve(static_cast<size_t>(report.num_inliers));
+  for (size_t i = 0; i < sights.size(); ++i) {
+    if (report.inliers[i] != 0) pose->sights.push_back(sights[i]);
+  }
+}
+
+/// How sure its keyframes are of a landmark's place.
+Eigen::Matrix3d InformationOf(const Map& map, const Landmark& landmark) {
+  LandmarkEquations equations;
+  for (const auto& [keyframe_id, feature] : landmark.observations) {
+    const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
+    if (keyframe == nullptr) continue;
+    equations.Add(map, keyframe->T_cam_world, landmark.p_world, keyframe->features->uv_px[feature],
+                  keyframe->features->set.keypoints[feature].octave);
+  }
+  return equations.information;
+}
+
+}  // namespace
+
+std::vector<Sight> SightsOf(const TrackedFrame& frame) {
+  std::vector<Sight> sights;
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].valid() || frame.classes[i] != FeatureClass::kUsed) continue;
+    sights.push_back({frame.landmarks[i], frame.features->uv_px[i].cast<float>(), static_cast<uint16_t>(i),
+                      static_cast<uint8_t>(frame.features->set.keypoints[i].octave)});
+  }
+  return sights;
+}
+
+void FinalPose::SetPose(const Rigid3d& T_cam_world) {
+  pose.T_cam_reference = T_cam_world * T_reference_world.Inverse();
+  pose.T_cam_world = T_cam_world;
+}
+
+void FinalPose::SetPose(const Keyframe& reference, const Rigid3d& T_cam_world) {
+  pose.map_id = reference.map_id;
+  pose.reference = reference.id;
+  pose.reference_scale = reference.scale;
+  T_reference_world = reference.T_cam_world;
+  SetPose(T_cam_world);
+}
+
+bool Agrees(const PoseOptimizationReport& report) {
+  return report.usable && report.num_inliers >= kMinInlierShare * static_cast<double>(report.inliers.size());
+}
+
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
+                                   const std::vector<Sight>& sights, FinalPose* pose) {
+  PoseOptimizationReport report = OptimizePose(map.camera().Ideal(), T_cam_world, ObserveAll(map, sights));
+  SetMeasured(report, sights, pose);
+  return report;
+}
+
+PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_world,
+                                          const std::vector<Sight>& sights, FinalPose* pose) {
+  const Pinhole camera = map.camera().Ideal();
+  std::vector<Sight> checked = sights;
+  std::vector<PoseObservation> observations = ObserveAll(map, checked);
+  PoseOptimizationReport report = OptimizePose(camera, T_cam_world, observations);
+  while (DropUnchecked(camera, report, &checked, &observations)) {
+    report = OptimizePose(camera, report.T_cam_world, observations);
+  }
+  SetMeasured(report, checked, pose);
+  return report;
+}
+
+void FinalPoses::Add(const Map& map, FinalPose pose) {
+  for (const Sight& sight : pose.sights) {
+    if (landmarks_.contains(sight.landmark)) continue;
+    const Landmark& landmark = *map.FindLandmark(sight.landmark);
+    landmarks_[sight.landmark] = {landmark.p_world, landmark.p_world, InformationOf(map, landmark)};
+  }
+  poses_.push_back(std::move(pose));
+  views_.clear();
+  rounds_ = 0;
+}
+
+/// Whether keyframes of the poses are elsewhere than they were.
+bool FinalPoses::HasMoved(const Map& map) const {
+  return std::any_of(poses_.begin(), poses_.end(), [&map](const FinalPose& p) {
+    const Keyframe* reference = map.FindKeyframe(p.pose.reference);
+    return reference == nullptr || reference->map_id != p.pose.map_id ||
+           reference->T_cam_world.translation != p.T_reference_world.translation ||
+           reference->T_cam_world.rotation.coeffs() != p.T_reference_world.rotation.coeffs();
+  });
+}
+
+void FinalPoses::Improve(const Map& map, const std::function<void()>& between) {
+  map_has_moved_ = map_has_moved_ || HasMoved(map);
+  if (map_has_moved_) return;
+  between_ = between;
+  std::sort(poses_.begin(), poses_.end(), [](const FinalPose& a, const FinalPose& b) {
+    return std::tie(a.pose.map_id, a.pose.stamp_ns) < std::tie(b.pose.map_id, b.pose.stamp_ns);
+  });
+  if (rounds_++ > 0) {
+    PlaceLandmarks(map);
+    PlaceFrames(map);
+  }
+  Smooth(map);
+  between_ = {};
+}
+
+bool FinalPoses::IsSettled() const { return poses_.empty() || map_has_moved_ || rounds_ >= kRounds; }
+
+void FinalPoses::Between() const {
+  if (between_) between_();
+}
+
+std::vector<FramePose> FinalPoses::Take() {
+  std::vector<FramePose> told;
+  for (FinalPose& last : poses_) told.push_back(std::move(last.pose));
+  *this = FinalPoses();
+  return told;
+}
+
+std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const FinalPose> poses) const {
+  const Pinhole camera = map.camera().Ideal();
+  std::unordered_map<LandmarkId, size_t> seen;  // in which of them last
+  std::vector<PoseEstimate> estimates;
+  for (size_t k = 0; k < poses.size(); ++k) {
+    const FinalPose& frame = poses[k];
+    Matrix6d shared = Matrix6d::Zero();
+    for (const Sight& sight : frame.sights) {
+      const auto [last, is_new] = seen.try_emplace(sight.landmark, k);
+      const size_t frames_ago = k - std::exchange(last->second, k);
+      const Eigen::Vector3d p_cam = frame.measured * landmarks_.at(sight.landmark).p_world;
+      if (is_new || frames_ago == 0 || frames_ago > kSharedFrames || p_cam.z() <= 0.0) continue;
+      const double variance = map.pyramid().SigmaSquared(sight.octave);
+      const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
+      if (error.squaredNorm() > kHuberChi2 * variance) continue;  // the pose was told without it
+      const Matrix26 J = PoseJacobian(camera, p_cam);
+      shared += J.transpose() * J / variance;
+    }
+    const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses.front().pose.stamp_ns);
+    estimates.push_back({time_s, frame.measured, frame.information, shared});
+  }
+  return estimates;
+}
+
+void FinalPoses::Smooth(const Map& map) {
+  for (auto begin = poses_.begin(); begin != poses_.end();) {
+    const auto end = std::find_if(
+        begin, poses_.end(), [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
+    const std::vector<PoseEstimate> estimates = Estimates(map, {begin, end});
+    SmoothingOptions options;
+    options.between = between_;
+    const auto known = noise_.find(begin->pose.map_id);
+    if (known != noise_.end()) options.noise = known->second;
+    const SmoothedTrajectory smoothed = SmoothTrajectory(estimates, options);
+    if (smoothed.noise) noise_.emplace(begin->pose.map_id, *smoothed.noise);
+    for (auto it = begin; it != end; ++it) {
+      it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
+    }
+    begin = end;
+  }
+}
+
+bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const {
+  return std::all_of(views.begin(), views.end(), [&](const View& view) {
+    return (poses_[view.frame].pose.T_cam_world * p_world).z() > 0.0;
+  });
+}
+
+/// Least reprojection errors (Huber's loss) over the landmark's place, the poses as they are. What the
+/// keyframes say holds it too: else few frames, close to each other, would carry their landmarks along.
+/// (Those frames that became keyframes speak twice.)
+Eigen::Vector3d FinalPoses::FromViews(const Map& map, std::span<const View> views,
+                                      const Placed& landmark) const {
+  Eigen::Vector3d p_world = landmark.p_world;
+  for (int step = 0; step < kLandmarkSteps; ++step) {
+    LandmarkEquations equations{landmark.information, landmark.information * (p_world - landmark.p_map)};
+    for (const View& view : views) {
+      const FinalPose& from = poses_[view.frame];
+      const Sight& sight = from.sights[view.sight];
+      equations.Add(map, from.pose.T_cam_world, p_world, sight.uv_px.cast<double>(), sight.octave);
+    }
+    const Eigen::Vector3d move = -equations.information.ldlt().solve(equations.gradient);
+    if (!move.allFinite()) return p_world;
+    p_world += move;
+  }
+  return p_world;
+}
+
+void FinalPoses::PlaceLandmark(const Map& map, std::span<const View> views) {
+  Placed& landmark = landmarks_.at(views.front().landmark);
+  const Eigen::Vector3d wanted = FromViews(map, views, landmark);
+  const Eigen::Vector3d beyond = landmark.p_world + kOverstep * (wanted - landmark.p_world);
+  const double distance = (poses_[views.front().frame].pose.T_cam_world * landmark.p_map).norm();
+  for (const Eigen::Vector3d& p_world : {beyond, wanted}) {
+    if ((p_world - landmark.p_map).norm() > kMaxMove * distance || !IsInFront(views, p_world)) continue;
+    landmark.p_world = p_world;
+    return;
+  }
+}
+
+void FinalPoses::SortViews() {
+  for (uint32_t frame = 0; frame < poses_.size(); ++frame) {
+    for (uint32_t sight = 0; sight < poses_[frame].sights.size(); ++sight) {
+      views_.push_back({poses_[frame].sights[sight].landmark, frame, sight});
+    }
+  }
+  std::sort(views_.begin(), views_.end(), [](const View& a, const View& b) {
+    return std::tie(a.landmark, a.frame, a.sight) < std::tie(b.landmark, b.frame, b.sight);
+  });
+}
+
+void FinalPoses::PlaceLandmarks(const Map& map) {
+  if (views_.empty()) SortViews();
+  size_t num_placed = 0;
+  for (auto begin = views_.cbegin(); begin != views_.cend();) {
+    const auto end =
+        std::find_if(begin, views_.cend(), [begin](const View& v) { return v.landmark != begin->landmark; });
+    if (end - begin >= kMinFrames) PlaceLandmark(map, {begin, end});
+    if (++num_placed % kPortion == 0) Between();
+    begin = end;
+  }
+}
+
+void FinalPoses::PlaceFrames(const Map& map) {
+  PoseOptimizationOptions a_few_steps;  // the landmarks move again before the next
+  a_few_steps.rounds = 2;
+  a_few_steps.robust_rounds = 1;
+  a_few_steps.iterations = 2;
+  std::vector<PoseObservation> observations;
+  PoseOptimizationReport report;
+  size_t num_placed = 0;
+  for (FinalPose& frame : poses_) {
+    observations.clear();
+    for (const Sight& sight : frame.sights) {
+      observations.push_back(Observe(map.pyramid(), sight, landmarks_.at(sight.landmark).p_world));
+    }
+    OptimizePose(map.camera().Ideal(), frame.pose.T_cam_world, observations, a_few_steps, report);
+    if (Agrees(report)) {
+      frame.measured = report.T_cam_world;
+      frame.information = report.information;
+    }
+    if (++num_placed % kPortion == 0) Between();
+  }
+}
+
+}  // namespace dmslam

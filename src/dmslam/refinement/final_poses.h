@@ -1,0 +1,107 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+#include "dmslam/optimization/pose_optimization.h"
+#include "dmslam/optimization/trajectory_smoothing.h"
+#include "dmslam/tracking/tracked_frame.h"
+
+namespace dmslam {
+
+/// A landmark that a frame saw.
+struct Sight {
+  LandmarkId landmark;
+  Eigen::Vector2f uv_px;  ///< undistorted
+  uint16_t feature = 0;   ///< of the frame
+  uint8_t octave = 0;     ///< of the feature
+};
+
+/// A frame's pose as it is told at the end.
+struct FinalPose {
+  FramePose pose;
+  Rigid3d T_reference_world;  ///< of the keyframe that the pose is relative to, as it was then
+  Rigid3d measured;           ///< T_cam_world by what the frame saw, and how well that determines it:
+  Matrix6d information = Matrix6d::Zero();  ///< tangent (w, v) on its left
+  std::vector<Sight> sights;                ///< that agree with the pose
+
+  /// The pose in the map and relative to its keyframe.
+  void SetPose(const Rigid3d& T_cam_world);
+  void SetPose(const Keyframe& reference, const Rigid3d& T_cam_world);
+};
+
+/// The landmarks that a tracked frame uses.
+std::vector<Sight> SightsOf(const TrackedFrame& frame);
+
+/// Whether so many of the landmarks observed agree that the pose can be believed.
+bool Agrees(const PoseOptimizationReport& report);
+
+/// The pose of least reprojection errors, from `T_cam_world`, by what was seen alone; fills in what was
+/// measured and the sights. The landmarks must be in the map.
+PoseOptimizationReport MeasurePose(const Map& map, const Rigid3d& T_cam_world,
+                                   const std::vector<Sight>& sights, FinalPose* pose);
+
+/// The same, of a pose that rests on no single sight: where one says more than half of what all others say of
+/// some direction, it is left out, as no other could contradict it (leverage; Baarda's redundancy numbers).
+PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_world,
+                                          const std::vector<Sight>& sights, FinalPose* pose);
+
+/// The poses that are told at the end, and with them once more the landmarks that they see.
+///
+/// Two things are left when every frame has been matched with the finished map. In a frame of which walkers
+/// hide most, a few landmarks in a corner leave the pose open along some direction: poses are joined with the
+/// motion of a carried camera (SmoothTrajectory()). And the map knows a landmark from a few keyframes only,
+/// which is the more of an error the fewer landmarks a frame sees: each is placed again by all the frames
+/// that saw it, and the frames by the landmarks. The map itself stays as it is.
+/// Poses stay relative to their keyframes: where a keyframe moves meanwhile (a loop closed late), they go
+/// with it, and no more is improved.
+class FinalPoses {
+ public:
+  /// The frame's landmarks must be in the map now; they may leave it later.
+  void Add(const Map& map, FinalPose pose);
+  /// One round: landmarks and frames are placed (not in the first), poses smoothed. They are in order of map
+  /// and time then. `between` is called after each portion of work, 20 ms for 1000 frames.
+  void Improve(const Map& map, const std::function<void()>& between = {});
+  /// Whether all rounds are made, or none can be made any more.
+  bool IsSettled() const;
+  /// Gives the poses and forgets them.
+  std::vector<FramePose> Take();
+
+ private:
+  /// A sight of a landmark by one of the frames.
+  struct View {
+    LandmarkId landmark;
+    uint32_t frame = 0, sight = 0;
+  };
+  /// Where the map has it, how sure its keyframes are of that, and where it is now.
+  struct Placed {
+    Eigen::Vector3d p_map, p_world;
+    Eigen::Matrix3d information;
+  };
+
+  bool HasMoved(const Map& map) const;
+  std::vector<PoseEstimate> Estimates(const Map& map, std::span<const FinalPose> poses) const;
+  void Smooth(const Map& map);
+  bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
+  Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
+  void SortViews();
+  void PlaceLandmark(const Map& map, std::span<const View> views);
+  void PlaceLandmarks(const Map& map);
+  void PlaceFrames(const Map& map);
+  void Between() const;
+
+  std::vector<FinalPose> poses_;
+  std::vector<View> views_;  ///< all, by landmark; empty: to be listed
+  int rounds_ = 0;
+  bool map_has_moved_ = false;
+  std::function<void()> between_;
+  std::map<MapId, MotionNoise> noise_;  ///< as found when the poses of a map were smoothed first
+  std::unordered_map<LandmarkId, Placed> landmarks_;
+};
+
+}  // namespace dmslam

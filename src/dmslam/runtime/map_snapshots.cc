@@ -1,0 +1,27 @@
+#include "dmslam/runtime/map_snapshots.h"
+
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+constexpr size_t kPieceBytes = 56 * 1024;  // with headers below 64 KiB
+
+}  // namespace
+
+void MapSnapshots::BeginSnapshot(int64_t) {
+  const KeyframeId newest = map_->keyframes().empty() ? KeyframeId{} : map_->keyframes().rbegin()->first;
+  const std::vector<MapDelta> parts = map_->Snapshot(newest, kPieceBytes);
+  parts_.assign(parts.begin(), parts.end());
+}
+
+SnapshotSource::Piece MapSnapshots::NextPiece() {
+  Piece piece;
+  piece.channel = channels::kMap;
+  piece.message = wire::Encode(parts_.front());
+  parts_.pop_front();
+  piece.last = parts_.empty();
+  return piece;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,327 @@
+#include "dmslam/runtime/stream_node.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <tuple>
+
+#include "dmslam/runtime/process_info.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kStatusEveryNs = 1'000'000'000;
+constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
+constexpr int64_t kCameraSilentNs = 1'500'000'000;
+constexpr int64_t kTidyEveryNs = 60'000'000'000;
+
+std::string UpperCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
+  return text;
+}
+
+template <typename... Message>
+int64_t HashOf(const std::tuple<Message...>*) {
+  uint64_t hash = 0;
+  ((hash = Mix64(hash ^ static_cast<uint64_t>(wire::Info<Message>().fingerprint))), ...);
+  return static_cast<int64_t>(hash);
+}
+
+}  // namespace
+
+bool NodeOptions::HasPeer(std::string_view name) const {
+  return std::find(peers.begin(), peers.end(), name) != peers.end();
+}
+
+int64_t SchemaHash() { return HashOf(static_cast<const wire::Messages*>(nullptr)); }
+
+StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string role)
+    : context_(std::move(context)),
+      options_(std::move(options)),
+      role_(std::move(role)),
+      endpoint_(context_.bus, context_.now_ns),
+      session_(options_.session),
+      started_ns_(context_.now_ns()) {
+  Listen({channels::kCameraInfo});
+}
+
+void StreamNode::OnMessage(const std::string&, std::span<const uint8_t>) {}
+
+void StreamNode::Listen(const std::vector<std::string>& channels) {
+  other_channels_.insert(other_channels_.end(), channels.begin(), channels.end());
+  endpoint_.SetOtherHandler(
+      other_channels_,
+      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
+}
+
+void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  ++received_;
+  received_bytes_ += static_cast<int64_t>(bytes.size());
+  if (channel == channels::kCameraInfo) {
+    OnCameraInfo(bytes);
+  } else if (std::find(other_channels_.begin(), other_channels_.end(), channel) != other_channels_.end()) {
+    OnMessage(channel, bytes);
+  }
+}
+
+void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
+  std::optional<CameraInfo> info = Read<CameraInfo>(bytes);
+  if (!info) return;
+  if (session_ == 0) session_ = info->session;
+  if (options_.accept_recorded && !recorded_session_ && info->session != session_) {
+    recorded_session_ = info->session;
+    spdlog::info("{}: takes the frames of recorded session {} for its own {}", role_, info->session,
+                 session_);
+  }
+  if (IsForeignFrame(info->session)) return;
+  camera_due_ns_ = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
+  if (camera_info_) return;
+  if (!recorded_session_) camera_message_.emplace(bytes.begin(), bytes.end());
+  if (recorded_session_) info->mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
+  camera_info_ = std::move(info);
+}
+
+/// A process that starts after the player has left still learns the camera, from those who write: one of them
+/// repeats what the player said.
+void StreamNode::KeepCameraKnown() {
+  if (!camera_message_ || !plan_ || context_.now_ns() < camera_due_ns_) return;
+  camera_due_ns_ = context_.now_ns() + kCameraSilentNs;
+  context_.bus->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(*camera_message_), false});
+}
+
+bool StreamNode::IsForeignFrame(uint32_t session) {
+  return recorded_session_ ? session != *recorded_session_ && IsForeign(session) : IsForeign(session);
+}
+
+bool StreamNode::IsForeign(uint32_t session) {
+  if (session == session_) return false;
+  if (dropped_foreign_++ == 0)
+    spdlog::warn("{}: dropped a message of session {}; ours is {}", role_, session, session_);
+  return true;
+}
+
+void StreamNode::CountMalformed(const std::string& channel, const std::string& reason) {
+  ++dropped_malformed_;
+  if (std::find(logged_.begin(), logged_.end(), channel) != logged_.end()) return;
+  logged_.push_back(channel);
+  spdlog::warn("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
+}
+
+std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
+                                                     const std::vector<std::string>& record_channels,
+                                                     Version start) {
+  StreamReader::Options options;
+  options.session = session_;
+  options.stream = stream;
+  options.owner = owner;
+  options.reader = UpperCase(role_);
+  options.role = role_;
+  options.name = context_.name;
+  options.id = context_.random_id;
+  options.schema_hash = SchemaHash();
+  options.start = start;
+  auto reader = std::make_unique<StreamReader>(options);
+  endpoint_.AddReader(reader.get(), owner, record_channels);
+  readers_.push_back({reader.get(), {}});
+  return reader;
+}
+
+void StreamNode::ServeReplica(const Map* map, std::function<Version()> held) {
+  replica_snapshots_ = std::make_unique<MapSnapshots>(map);
+  ReplicaServer::Options options;
+  options.holder.session = session_;
+  options.holder.holder = UpperCase(role_);
+  options.holder.role = role_;
+  options.holder.id = context_.random_id;
+  options.name = context_.name;
+  options.schema_hash = SchemaHash();
+  options.link = options_.link;
+  replica_server_ = std::make_unique<ReplicaServer>(options, std::move(held), replica_snapshots_.get());
+  endpoint_.AddServer(replica_server_.get(), "MAPPER");
+}
+
+bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader) const {
+  if (!map.progress().ended) return false;
+  return map_reader.AtEnd() || map_reader.silent_ns(context_.now_ns()) > kSilentAfterEndNs;
+}
+
+void StreamNode::StartElection() {
+  WriterElection::Options options;
+  options.session = session_;
+  options.stream = plan_->stream;
+  options.owner = UpperCase(role_);
+  options.name = context_.name;
+  options.writer = context_.random_id;
+  options.schema_hash = SchemaHash();
+  options.take_over = options_.take_over;
+  if (context_.fresh_system) options.listen_ns = 0;
+  election_ = std::make_unique<WriterElection>(options, context_.now_ns());
+  endpoint_.AddElection(election_.get(), UpperCase(role_));
+  election_->Advance(context_.now_ns());
+}
+
+/// The election goes on until the writer is open: another one that is heard meanwhile turns the victory into
+/// a refusal.
+void StreamNode::RunElection() {
+  if (!plan_ || writer_) return;
+  if (!election_) StartElection();
+  if (election_->state() == WriterElection::State::kWon && ReadyToWrite() && !exit_code_) OpenWriter();
+  if (election_->state() == WriterElection::State::kRefused) Exit(3, election_->refusal());
+}
+
+void StreamNode::OpenWriter() {
+  StreamWriter::Options options;
+  options.session = session_;
+  options.stream = plan_->stream;
+  options.owner = UpperCase(role_);
+  options.name = context_.name;
+  options.schema_hash = SchemaHash();
+  options.link = options_.link;
+  std::vector<std::string> reader_names;
+  for (const std::string& reader : plan_->readers) {
+    options.roles.push_back({reader, options_.HasPeer(reader)});
+    reader_names.push_back(UpperCase(reader));
+  }
+  for (const std::string& watcher : plan_->watchers) reader_names.push_back(UpperCase(watcher));
+  const Term term = election_->Win(context_.wall_us());
+  endpoint_.Remove(election_.get());
+  writer_ = std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots);
+  endpoint_.AddWriter(writer_.get(), UpperCase(role_), reader_names);
+  OnWriterOpen();
+}
+
+void StreamNode::WatchWriter() {
+  if (!writer_) return;
+  if (writer_->superseded_by())
+    Exit(4, "another writer has taken over the stream: " + *writer_->superseded_by());
+  if (const std::optional<Version>& newer = writer_->newer_replica()) {
+    Exit(8, "another process holds version " + std::to_string(newer->epoch) + ":" +
+                std::to_string(newer->seq) +
+                ", which is newer than what this one began with; start it again");
+  }
+  if (writer_->close_requested_by() && !stopping_) {
+    spdlog::info("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
+    Stop();
+  }
+  if (stopping_ && writer_->closed() && !exit_code_) Exit(0);
+}
+
+void StreamNode::WatchReaders() {
+  for (Watched& watched : readers_) {
+    if (watched.reader->problem() == watched.problem) continue;
+    watched.problem = watched.reader->problem();
+    if (!watched.problem.empty()) spdlog::warn("{}: {}", role_, watched.problem);
+  }
+}
+
+void StreamNode::Advance() {
+  endpoint_.Advance();
+  if (exit_code_) return;
+  if (camera_info_ && !begun_) {
+    begun_ = true;
+    Begin(*camera_info_);
+  }
+  RunElection();
+  WatchWriter();
+  WatchReaders();
+  if (exit_code_) return;
+  if (begun_ && (!plan_ || writer_)) {
+    while (!exit_code_ && !stopping_ && WorkOnce()) {
+      PumpWithinWork();
+      PublishStatusIfDue();  // who has much to do says so too
+    }
+  }
+  PublishStatusIfDue();
+  endpoint_.Advance();
+}
+
+void StreamNode::PublishStatusIfDue() {
+  if (context_.now_ns() < next_status_ns_) return;
+  next_status_ns_ = context_.now_ns() + kStatusEveryNs;
+  KeepCameraKnown();
+  PublishStatus();
+  if (context_.now_ns() < next_tidy_ns_) return;
+  if (next_tidy_ns_ > 0) ReturnFreeMemory();
+  next_tidy_ns_ = context_.now_ns() + kTidyEveryNs;
+}
+
+void StreamNode::PumpWithinWork() {
+  if (context_.pump) context_.pump();
+  endpoint_.Advance();
+}
+
+int64_t StreamNode::deadline_ns() const {
+  return std::min({endpoint_.deadline_ns(), next_status_ns_, WorkDeadline()});
+}
+
+void StreamNode::Stop() {
+  if (stopping_) return;
+  stopping_ = true;
+  if (writer_) {
+    writer_->Close(context_.now_ns());
+  } else {
+    Exit(0);
+  }
+}
+
+void StreamNode::Exit(int code, std::string problem) {
+  if (exit_code_) return;
+  exit_code_ = code;
+  problem_ = std::move(problem);
+}
+
+StatusHead StreamNode::MakeStatusHead(const std::string& reason,
+                                      const std::vector<const StreamReader*>& readers) const {
+  StatusHead head;
+  head.utime = context_.wall_us();
+  head.session = session_;
+  head.reason = reason;
+  ProcessHealth& health = head.health;
+  health = MeasureProcess();
+  health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;
+  health.received = received_;
+  health.received_bytes = received_bytes_;
+  health.dropped_foreign = dropped_foreign_;
+  health.dropped_malformed = dropped_malformed_;
+  for (const StreamReader* reader : readers) {
+    if (reader == nullptr) continue;
+    const ReaderStatistics s = reader->statistics();
+    health.queue_depth += static_cast<int32_t>(s.backlog);
+    health.received += s.records;
+    health.received_bytes += s.payload_bytes;
+    health.dropped_foreign += s.dropped_foreign;
+    health.dropped_checksum += s.dropped_bad;
+    health.dropped_overflow += s.dropped_no_room;
+    health.dropped_duplicate += s.duplicates;
+    health.records_repaired += s.repaired;
+    health.recovery_p50_ms = std::max(health.recovery_p50_ms, s.recovery_p50_ms);
+    health.recovery_p99_ms = std::max(health.recovery_p99_ms, s.recovery_p99_ms);
+    health.repairs_requested += s.requested;
+    health.records_lost += s.lost;
+  }
+  if (!writer_) return head;
+  const WriterStatistics s = writer_->statistics();
+  health.epoch = writer_->term().epoch;
+  health.written = s.records;
+  health.written_bytes = s.payload_bytes;
+  health.dropped_checksum += s.dropped_bad;
+  health.dropped_foreign += s.dropped_foreign;
+  health.resent = s.parts_repaired;
+  health.resent_bytes = s.repaired_bytes;
+  health.kept_bytes = static_cast<int64_t>(s.kept_bytes);
+  health.readers = static_cast<int32_t>(writer_->num_readers());
+  health.snapshots = static_cast<int32_t>(s.snapshots);
+  health.refused_peers = s.refused;
+  for (const std::string& role : plan_->readers) {
+    health.unacknowledged = std::max(health.unacknowledged, static_cast<int32_t>(writer_->Backlog(role)));
+    if (options_.HasPeer(role) && !writer_->AcknowledgedBy(role)) {
+      health.waiting_for += (health.waiting_for.empty() ? "" : ", ") + role;
+    }
+  }
+  return head;
+}
+
+}  // namespace dmslam

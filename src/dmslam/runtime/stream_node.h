@@ -1,0 +1,160 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dmslam/messaging/endpoint.h"
+#include "dmslam/runtime/map_snapshots.h"
+#include "dmslam/runtime/node.h"
+#include "dmslam/settings/settings.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+
+/// What every process of the system is told at its start.
+struct NodeOptions {
+  uint32_t session = 0;  ///< 0: that of the first camera heard
+  std::vector<std::string>
+      peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
+  Link link = Link::kHost;
+  bool accept_recorded =
+      false;               ///< camera and frames of a recorded session (a log that is replayed) are ours
+  bool take_over = false;  ///< asks a present writer of its stream to close
+  bool fresh = false;      ///< a mapper begins with an empty map, whatever replicas there are
+  Settings settings;
+
+  bool HasPeer(std::string_view name) const;
+};
+
+/// Hash over the fingerprints of all message types: processes with another one are refused by name.
+int64_t SchemaHash();
+
+/// What the processes have in common: they learn camera and session from the player, decide by election who
+/// writes (those that write a stream), keep their streams going, and say how they fare once a second.
+class StreamNode : public Node {
+ public:
+  void Advance() final;
+  int64_t deadline_ns() const override;
+  void Stop() override;
+  std::optional<int> exit_code() const override { return exit_code_; }
+  std::string problem() const override { return problem_; }
+
+ protected:
+  /// `role` in lower case: "frontend". It names channels in upper case.
+  StreamNode(NodeContext context, NodeOptions options, std::string role);
+
+  /// The camera is known: makes readers, and asks for a writer with WantWriter.
+  virtual void Begin(const CameraInfo& info) = 0;
+  /// The election is won: whether the writer may be opened now. A mapper first fetches the newest replica, a
+  /// frontend the map. Asked again and again.
+  virtual bool ReadyToWrite() { return true; }
+  /// The writer is open: the node may work.
+  virtual void OnWriterOpen() {}
+  /// Some work, if there is any; called as long as it returns true.
+  virtual bool WorkOnce() = 0;
+  /// A message outside the streams.
+  virtual void OnMessage(const std::string& channel, std::span<const uint8_t> bytes);
+  virtual void PublishStatus() {}
+  /// When WorkOnce has something to do without a message.
+  virtual int64_t WorkDeadline() const { return INT64_MAX; }
+
+  void Listen(const std::vector<std::string>& channels);
+  std::unique_ptr<StreamReader> MakeReader(StreamId stream, const std::string& owner,
+                                           const std::vector<std::string>& record_channels,
+                                           Version start = {});
+  struct WriterPlan {
+    StreamId stream = StreamId::kTest;
+    std::vector<std::string> readers;  ///< roles of the lossless readers
+    Version parent;
+    SnapshotSource* snapshots = nullptr;
+    std::vector<std::string> watchers = {
+        "viewer"};  ///< roles whose wishes are heard, but who hold nothing back
+  };
+  /// Offers the replica of the map that this process holds to a mapper that starts. `held`: its version,
+  /// empty while it is not whole. `map` must stay where it is.
+  void ServeReplica(const Map* map, std::function<Version()> held);
+  /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence.
+  bool MapIsOver(const Map& map, const StreamReader& map_reader) const;
+
+  void WantWriter(WriterPlan plan) { plan_ = std::move(plan); }
+  WriterPlan& writer_plan() { return *plan_; }
+
+  /// Publishes a record of this node's stream; returns its sequence number.
+  template <typename Message>
+  int64_t PublishRecord(const Message& message) {
+    return writer_->Publish(wire::Info<Message>().channel, wire::Encode(message), context_.now_ns());
+  }
+  /// Publishes a message that may be lost. `local`: large, and of use on this host only.
+  template <typename Message>
+  void PublishLoose(const Message& message, bool local = false) {
+    context_.bus->Publish(
+        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), local});
+  }
+  /// Decodes one of ours; bad and foreign ones are counted, the first of each kind is logged.
+  template <typename Message>
+  std::optional<Message> Read(std::span<const uint8_t> bytes) {
+    std::string reason;
+    std::optional<Message> message = wire::Decode<Message>(bytes, &reason);
+    if (!message) CountMalformed(wire::Info<Message>().channel, reason);
+    return message;
+  }
+  /// Counts messages of other sessions; the first is logged.
+  bool IsForeign(uint32_t session);
+  /// The same for what the player says: a recorded session that was accepted is ours.
+  bool IsForeignFrame(uint32_t session);
+
+  /// Keeps the protocol alive from within long work.
+  void PumpWithinWork();
+  void PublishStatusIfDue();
+  void Exit(int code, std::string problem = {});
+  StatusHead MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const;
+
+  NodeContext context_;
+  NodeOptions options_;
+  std::string role_;
+  Endpoint endpoint_;
+  uint32_t session_ = 0;
+  std::optional<uint32_t> recorded_session_;  ///< whose camera and frames are played to us
+  std::optional<CameraInfo> camera_info_;
+  std::unique_ptr<StreamWriter> writer_;
+  bool stopping_ = false;
+
+ private:
+  void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnCameraInfo(std::span<const uint8_t> bytes);
+  void KeepCameraKnown();
+  void RunElection();
+  void StartElection();
+  void OpenWriter();
+  void WatchWriter();
+  void WatchReaders();
+  void CountMalformed(const std::string& channel, const std::string& reason);
+
+  bool begun_ = false;
+  std::optional<Bytes> camera_message_;  ///< as the player sent it
+  int64_t camera_due_ns_ = 0;            ///< when it is repeated, unless somebody else says it before
+  std::optional<WriterPlan> plan_;
+  std::unique_ptr<WriterElection> election_;
+  std::optional<int> exit_code_;
+  std::string problem_;
+  std::vector<std::string> other_channels_;
+  int64_t next_status_ns_ = 0;
+  int64_t next_tidy_ns_ = 0;
+  int64_t started_ns_ = 0;
+  int64_t received_ = 0, received_bytes_ = 0, dropped_foreign_ = 0, dropped_malformed_ = 0;
+  std::vector<std::string> logged_;
+  struct Watched {
+    const StreamReader* reader;
+    std::string problem;  ///< last one logged
+  };
+  std::vector<Watched> readers_;
+  std::unique_ptr<MapSnapshots> replica_snapshots_;
+  std::unique_ptr<ReplicaServer> replica_server_;
+};
+
+}  // namespace dmslam

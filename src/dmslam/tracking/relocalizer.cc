@@ -1,0 +1,126 @@
+#include "dmslam/tracking/relocalizer.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "dmslam/dynamics/motion_belief.h"
+#include "dmslam/map/neighbourhood.h"
+#include "dmslam/util/random.h"
+
+namespace dmslam {
+namespace {
+
+constexpr size_t kMaxCandidates = 8;
+constexpr size_t kMinMatches = 15;
+constexpr int kMinInliers = 12;
+constexpr int kMaxIterations = 1000;
+constexpr int kMinCovisibility = 15;
+constexpr int kNeighboursOfLast = 4;
+constexpr int kMaxRounds = 4;  // of the search in the local map
+// Where no single keyframe gives enough matches: what the first places and the
+// keyframe seen last show together with their neighbours.
+constexpr ptrdiff_t kPlacesTogether = 3;
+constexpr int kNeighboursTogether = 5;
+
+}  // namespace
+
+Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary) : places_(std::move(vocabulary)) {}
+
+void Relocalizer::Clear() { places_.Clear(); }
+
+void Relocalizer::Update(const Map& map) { places_.Update(map); }
+
+std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
+                                                const BowImage& image) const {
+  const auto of_another_map = [&](const Keyframe& keyframe) {
+    return map_id != 0 && keyframe.map_id != map_id;
+  };
+  std::vector<KeyframeId> ids;
+  for (const PlaceCandidate& candidate :
+       places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
+    if (ids.size() < kMaxCandidates) ids.push_back(candidate.keyframe);
+  }
+  const auto add = [&](KeyframeId id) {
+    if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  };
+  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) {
+    add(*last);
+    for (const KeyframeId id : map.BestCovisible(*last, kNeighboursOfLast, kMinCovisibility)) add(id);
+  }
+  return ids;
+}
+
+bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
+                              TrackedFrame* frame) const {
+  const std::vector<uint8_t> usable = StaticFeatures(map, keyframe);
+  const std::vector<BowMatch> matches =
+      MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
+                   {&frame->features->set, &image.nodes, {}});
+  std::vector<LandmarkMatch> seen;
+  for (const BowMatch& match : matches)
+    seen.push_back({static_cast<uint16_t>(match.b), keyframe.landmarks[match.a]});
+  return FindPose(map, seen, DeriveSeed(seed, keyframe.id.frame_index(), "relocalize"), frame);
+}
+
+bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
+                              TrackedFrame* frame) const {
+  std::vector<KeyframeId> keyframes;
+  for (const KeyframeId place : places) {
+    keyframes.push_back(place);
+    for (const KeyframeId id : map.BestCovisible(place, kNeighboursTogether, kMinCovisibility))
+      keyframes.push_back(id);
+  }
+  std::vector<LandmarkId> ids = LandmarksSeenBy(map, keyframes);
+  KeepStatic(map, &ids);
+  const std::vector<LandmarkMatch> seen = MatchLandmarks(map, ids, frame->features->set);
+  return FindPose(map, seen, DeriveSeed(seed, frame->index, "relocalize_together"), frame);
+}
+
+/// The pose on which most of the matches agree, with those that do.
+bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
+                           TrackedFrame* frame) const {
+  if (matches.size() < kMinMatches) return false;
+  PoseRansacOptions options;
+  options.seed = seed;
+  options.min_inliers = kMinInliers;
+  options.max_iterations = kMaxIterations;
+  const auto report = PoseFromLandmarks(map, *frame->features, matches, options);
+  if (!report.success) return false;
+  frame->ClearMatches();
+  frame->T_cam_world = report.model;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (report.inliers[i]) frame->landmarks[matches[i].feature] = matches[i].landmark;
+  }
+  return true;
+}
+
+/// Against the local map, and again from there as long as each round finds more
+/// of it: the matches with one keyframe alone may put the camera a little
+/// beside its place, where the first search misses much.
+bool Relocalizer::Refine(const Map& map, PoseTracker* tracker, TrackedFrame* frame) {
+  int found = 0;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const TrackingReport report = tracker->TrackLocalMap(map, true, frame);
+    if (report.ok) return true;
+    if (report.num_static <= found) return false;
+    found = report.num_static;
+  }
+  return false;
+}
+
+bool Relocalizer::Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed,
+                             PoseTracker* tracker, TrackedFrame* frame) const {
+  if (!places_.usable()) return false;
+  const BowImage image = places_.Transform(frame->features->set);
+  const std::vector<KeyframeId> candidates = Candidates(map, map_id, last_seen, image);
+  for (const KeyframeId id : candidates) {
+    if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
+    if (Refine(map, tracker, frame)) return true;
+  }
+  std::vector<KeyframeId> places(
+      candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
+  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) places.push_back(*last);
+  return TryTogether(map, places, seed, frame) && Refine(map, tracker, frame);
+}
+
+}  // namespace dmslam

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "dmslam/map/map.h"
+#include "dmslam/place_recognition/landmark_matches.h"
+#include "dmslam/place_recognition/map_places.h"
+#include "dmslam/tracking/pose_tracker.h"
+#include "dmslam/tracking/tracked_frame.h"
+
+namespace dmslam {
+
+/// Finds a lost camera in the replica of the map: keyframes that look alike, matches by words, pose by
+/// RANSAC, guided search and refinement. Needs nothing but the replica, so it works when the loop closer is
+/// down.
+class Relocalizer {
+ public:
+  explicit Relocalizer(std::shared_ptr<const Vocabulary> vocabulary);
+
+  /// Keeps the index in step with the replica: call after each applied delta.
+  void Update(const Map& map);
+  void Clear();
+  /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
+  /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours, then
+  /// all that these places show together.
+  bool Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed, PoseTracker* tracker,
+                  TrackedFrame* frame) const;
+
+ private:
+  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
+                                     const BowImage& image) const;
+  bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
+                   TrackedFrame* frame) const;
+  /// All that these places and their neighbours show, by descriptor alone.
+  bool TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
+                   TrackedFrame* frame) const;
+  bool FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
+                TrackedFrame* frame) const;
+  static bool Refine(const Map& map, PoseTracker* tracker, TrackedFrame* frame);
+
+  MapPlaces places_;
+};
+
+}  // namespace dmslam
