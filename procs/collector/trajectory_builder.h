@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "dmslam/dataset/trajectory.h"
-#include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/map/replica.h"
 
 namespace dmslam {
 
@@ -23,9 +23,9 @@ class TrajectoryBuilder {
   void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
 
   /// The map as it is known from elsewhere.
-  void SetMap(Map map) { map_ = std::move(map); }
+  void SetMap(Replica map) { map_ = std::move(map); }
   /// The map is void: a fresh stream, or a snapshot, begins.
-  void ForgetMap() { map_ = Map(map_.camera(), map_.pyramid()); }
+  void ForgetMap() { map_.Clear(); }
 
   struct Trajectories {
     MapId map_id = 0;                 ///< the map that holds most frames
@@ -43,7 +43,7 @@ class TrajectoryBuilder {
  private:
   MapId MapOfFrame(const FramePose& pose) const;
 
-  Map map_;
+  Replica map_;
   std::map<uint32_t, FramePose>
       poses_;  ///< by frame index; a later placement does not replace an online one...
   std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/replica.h"
 
 namespace dmslam {
 namespace {
@@ -12,14 +14,14 @@ namespace {
 class TrajectoryOfTwoMaps : public testing::Test {
  protected:
   TrajectoryOfTwoMaps() {
-    Map map(TestCamera(), Pyramid());
+    MapEditor map(TestCamera(), Pyramid());
     Keyframe keyframe;
     keyframe.id = KeyframeId::Make(1, 0);
     keyframe.map_id = 2;
     keyframe.T_cam_world.translation = Eigen::Vector3d(7.0, 0.0, 0.0);
     keyframe.features = MakeFrameFeatures(FeatureSet(), map.camera(), map.pyramid());
     map.AddKeyframe(std::move(keyframe));
-    builder_.SetMap(std::move(map));
+    builder_.SetMap(Replica(std::move(map)));
   }
 
   static FramePose PoseIn(MapId map_id, TrackingState state, double x) {

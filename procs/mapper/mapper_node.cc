@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/map/snapshot.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -32,7 +33,6 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
 /// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
 uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
   CheckFits(files_.load, *saved_, info.camera, options_.settings.pyramid());
-  saved_->map.SetProgress({});  // the streams it was made of are not today's
   const Map& map = saved_->map;
   if (session_ <= NewestSession(map)) {
     throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
@@ -43,8 +43,6 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
                  saved_->missing);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
-  const std::vector<MapDelta> parts = map.Snapshot(map.keyframes().rbegin()->first, 56 * 1024);
-  saved_parts_.assign(parts.begin(), parts.end());
   spdlog::info("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
                map.num_landmarks());
   return ordinal;
@@ -55,7 +53,12 @@ void MapperNode::Begin(const CameraInfo& info) {
   const uint16_t ordinal = saved_ ? ContinueSavedMap(info) : uint16_t{1};
   core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(),
                                        ordinal, [this](const MapDelta& delta) { PublishDelta(delta); });
-  if (saved_) core_->Continue(std::exchange(saved_, std::nullopt)->map);
+  if (saved_) {
+    core_->ContinueSaved(std::exchange(saved_, std::nullopt)->map);
+    const KeyframeId newest = core_->map().keyframes().rbegin()->first;
+    const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, 56 * 1024);
+    saved_parts_.assign(parts.begin(), parts.end());
+  }
   if (!lockstep_) {
     core_->SetInterrupt([this] {
       PumpWithinWork();

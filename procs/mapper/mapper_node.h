@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "dmslam/map/replica.h"
 #include "dmslam/mapping/mapper_core.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/runtime/latency_window.h"
@@ -82,7 +83,7 @@ class MapperNode : public StreamNode {
   std::unique_ptr<MapSnapshots> snapshots_;
   std::unique_ptr<StreamReader> frontend_reader_, loop_reader_;
   std::unique_ptr<ReplicaFetch> fetch_;  ///< while the newest replica is looked for
-  std::optional<Map> fetched_;
+  std::optional<Replica> fetched_;
   bool lockstep_ = false;
   bool frontend_ended_ = false;
   bool end_announced_ = false;

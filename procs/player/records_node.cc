@@ -31,7 +31,7 @@ RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_p
   if (records_.missing > 0) {
     spdlog::warn("{}: {} records of the frontend are missing in it", log_->path(), records_.missing);
   }
-  recorded_ = Map(start->camera, start->pyramid);
+  recorded_ = Replica(start->camera, start->pyramid);
   live_ = recorded_;
   if (session_ == 0) session_ = recorded.id + 1;
   CameraInfo info;
@@ -59,7 +59,7 @@ void RecordsNode::TakeMapRecords() {
   while (std::optional<Record> record = map_reader_->Take()) {
     if (record->begins_anew()) {
       held_.clear();
-      live_ = Map(live_.camera(), live_.pyramid());
+      live_.Clear();
     }
     if (auto delta = Read<MapDelta>(*record->bytes)) held_.push_back(std::move(*delta));
     const bool settled = !held_.empty() && (held_.back().event == MapEvent::kSettled || finished_);
@@ -91,7 +91,7 @@ void RecordsNode::AdvanceRecordedMap(int64_t until_order) {
   for (; next_map_record_ < map_records_.steps.size(); ++next_map_record_) {
     const ReplayStep& step = map_records_.steps[next_map_record_];
     if (step.message->order > until_order) return;
-    if (step.begins_anew) recorded_ = Map(recorded_.camera(), recorded_.pyramid());
+    if (step.begins_anew) recorded_.Clear();
     if (const auto delta = Read<MapDelta>(log_->Read(*step.message))) recorded_.Apply(*delta);
   }
 }

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/recording/log_index.h"
 #include "dmslam/runtime/stream_node.h"
 
@@ -41,8 +41,8 @@ class RecordsNode : public StreamNode {
   std::shared_ptr<const LogIndex> log_;
   Replay records_, map_records_;
   size_t next_record_ = 0, next_map_record_ = 0;
-  Map recorded_;               ///< the map as it was when the next record was made
-  Map live_;                   ///< the map that is being made
+  Replica recorded_;           ///< the map as it was when the next record was made
+  Replica live_;               ///< the map that is being made
   std::deque<MapDelta> held_;  ///< not yet followed by a settled record
   std::unique_ptr<StreamReader> map_reader_;
   KeyframeId awaited_;  ///< proposed, not yet settled

@@ -83,7 +83,7 @@ void ViewerCore::OnFramePose(const FramePose& pose) {
 }
 
 void ViewerCore::ForgetMap() {
-  map_ = Map(map_.camera(), map_.pyramid());
+  map_.Clear();
   MarkAll();
 }
 

@@ -9,8 +9,8 @@
 
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/geometry/rigid3.h"
-#include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/map/replica.h"
 #include "viewer/scene.h"
 
 namespace dmslam {
@@ -72,7 +72,7 @@ class ViewerCore {
     bool drawn = false;
   };
 
-  Map map_;
+  Replica map_;
   MapId shown_map_ = 0;
   std::map<uint32_t, FramePose> frames_;
   std::map<KeyframeId, std::vector<uint32_t>>

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/snapshot.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -67,7 +69,7 @@ class ViewerCoreTest : public testing::Test {
     return {p[0], p[1], p[2]};
   }
 
-  Map map_;
+  MapEditor map_;
   ViewerCore core_;
   Scene scene_;
 };
@@ -157,7 +159,7 @@ TEST_F(ViewerCoreTest, AVoidMapIsTakenOffAndASnapshotBringsTheFramesBack) {
   core_.Draw(&scene_);
   EXPECT_NE(scene_.generation(), generation);
   EXPECT_EQ(scene_.points().size() + scene_.keyframes().size() + scene_.path().size(), 0u);
-  for (const MapDelta& part : map_.Snapshot(Kf(2), 4000)) core_.OnMapDelta(part);
+  for (const MapDelta& part : CutSnapshot(map_, Kf(2), 4000)) core_.OnMapDelta(part);
   core_.Draw(&scene_);
   EXPECT_EQ(scene_.points().size(), 20u);
   EXPECT_EQ(scene_.keyframes().size(), 3u);

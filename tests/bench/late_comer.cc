@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/runtime/stream_node.h"
 
@@ -24,14 +24,14 @@ class LateComer : public StreamNode {
  protected:
   void Begin(const CameraInfo& info) override {
     camera_s_ = Elapsed();
-    map_ = std::make_unique<Map>(info.camera, Pyramid());
+    map_ = std::make_unique<Replica>(info.camera, Pyramid());
     reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   }
 
   bool WorkOnce() override {
     const std::optional<Record> record = reader_->Take();
     if (!record) return false;
-    if (record->begins_anew()) map_ = std::make_unique<Map>(map_->camera(), map_->pyramid());
+    if (record->begins_anew()) map_ = std::make_unique<Replica>(map_->camera(), map_->pyramid());
     bytes_ += record->bytes->size();
     if (const auto delta = Read<MapDelta>(*record->bytes)) map_->Apply(*delta);
     reader_->AcceptTaken();
@@ -57,7 +57,7 @@ class LateComer : public StreamNode {
   }
 
   int64_t begun_ns_;
-  std::unique_ptr<Map> map_;
+  std::unique_ptr<Replica> map_;
   std::unique_ptr<StreamReader> reader_;
   size_t bytes_ = 0;
   double camera_s_ = 0, local_s_ = -1;

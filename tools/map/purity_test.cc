@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -21,7 +22,8 @@ std::optional<GrayImage> LeftHalf(int64_t stamp_ns) {
   return mask;
 }
 
-KeyframeId AddKeyframe(Map* map, uint32_t second, const std::vector<uint16_t>& x_px, MapId map_id = kMap) {
+KeyframeId AddKeyframe(MapEditor* map, uint32_t second, const std::vector<uint16_t>& x_px,
+                       MapId map_id = kMap) {
   FeatureSet set;
   for (const uint16_t x : x_px) {
     set.keypoints.push_back({static_cast<uint16_t>(x * 16), 200 * 16, 0, 0});
@@ -37,7 +39,7 @@ KeyframeId AddKeyframe(Map* map, uint32_t second, const std::vector<uint16_t>& x
   return keyframe.id;
 }
 
-LandmarkId AddLandmark(Map* map, uint64_t number, MapId map_id = kMap) {
+LandmarkId AddLandmark(MapEditor* map, uint64_t number, MapId map_id = kMap) {
   Landmark landmark;
   landmark.id = LandmarkId::Make(1, number);
   landmark.map_id = map_id;
@@ -46,7 +48,7 @@ LandmarkId AddLandmark(Map* map, uint64_t number, MapId map_id = kMap) {
 }
 
 TEST(JudgeMap, CountsWhatIsSeenMostlyOnPeople) {
-  Map map(TestCamera(), Pyramid());
+  MapEditor map(TestCamera(), Pyramid());
   std::vector<KeyframeId> keyframes;
   for (uint32_t second = 1; second <= 3; ++second)
     keyframes.push_back(AddKeyframe(&map, second, {kPersonX, kWallX, kPersonX, kWallX}));
@@ -69,7 +71,7 @@ TEST(JudgeMap, CountsWhatIsSeenMostlyOnPeople) {
 }
 
 TEST(JudgeMap, LeavesOutKeyframesWithoutMaskAndOtherMaps) {
-  Map map(TestCamera(), Pyramid());
+  MapEditor map(TestCamera(), Pyramid());
   const KeyframeId masked = AddKeyframe(&map, 3, {kPersonX});
   const KeyframeId unmasked = AddKeyframe(&map, 4, {kWallX, kWallX});
   const KeyframeId other = AddKeyframe(&map, 5, {kPersonX}, 2);

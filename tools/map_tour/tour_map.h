@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -41,7 +41,7 @@ class TourMap {
   TourOptions options_;
   uint32_t session_;
   Random random_;
-  Map map_;
+  MapEditor map_;
   std::vector<Corner> way_;
   size_t next_ = 0;
   uint64_t landmarks_made_ = 0;

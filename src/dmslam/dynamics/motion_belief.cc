@@ -35,7 +35,8 @@ std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe) {
   return usable;
 }
 
-EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const MotionBeliefOptions& options) {
+EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
+                             const MotionBeliefOptions& options) {
   EvidenceReport report;
   for (const FrameEvidence::Item& item : evidence.items) {
     const std::optional<LandmarkId> id = map.Resolve(item.landmark);

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/map/proposals.h"
 
 namespace dmslam {
@@ -41,6 +41,7 @@ struct EvidenceReport {
 };
 
 /// Adds what frames said to the landmarks' counters and motion belief; removes those that move.
-EvidenceReport ApplyEvidence(Map& map, const FrameEvidence& evidence, const MotionBeliefOptions& options);
+EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
+                             const MotionBeliefOptions& options);
 
 }  // namespace dmslam

@@ -188,7 +188,7 @@ void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspe
   for (int round = 0; round < options.rounds_unsupported; ++round) CondemnTogether(map, options, suspects);
 }
 
-int RemoveCondemned(Map& map, const Suspects& suspects) {
+int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   int removed = 0;
   for (const auto& [id, suspect] : suspects) {
     if (!suspect.condemned) continue;
@@ -209,7 +209,7 @@ std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenT
 
 }  // namespace
 
-int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options) {
+int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& options) {
   Suspects suspects;
   for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
     if (landmark.valid()) AddIfUnproven(map, landmark, options, &suspects);
@@ -223,7 +223,7 @@ int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options
   return RemoveCondemned(map, suspects);
 }
 
-int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
+int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
   Suspects suspects;
   for (const LandmarkId id : map.LandmarkIdsSorted()) {
     if (map.FindLandmark(id)->map_id == map_id) AddIfUnproven(map, id, options, &suspects);

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
 
 namespace dmslam {
 
@@ -38,11 +38,11 @@ struct SeenThroughOptions {
 
 /// Removes those among the landmarks that keyframe `id` sees. Witnesses are the keyframes that look at the
 /// same place. Returns how many.
-int RemoveSeenThrough(Map& map, KeyframeId id, const SeenThroughOptions& options);
+int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& options);
 
 /// The same over a whole map when its sequence has ended. Where so many of the unproven were seen through
 /// (now, or `removed_before` while mapping) that somebody must have stood there, unproven landmarks that were
 /// ever found elsewhere go too, and those that nothing supports. Returns how many.
-int RemoveUnproven(Map& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options);
+int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options);
 
 }  // namespace dmslam

@@ -81,7 +81,7 @@ class StandingPerson : public testing::Test {
     }));
   }
 
-  Map map_;
+  MapEditor map_;
   uint32_t next_ = 1;
 };
 

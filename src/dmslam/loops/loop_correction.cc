@@ -210,7 +210,7 @@ LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerif
 LoopAnswer AdjustGlobally(const Map& map, KeyframeId keyframe, const LoopcloserOptions& options,
                           const std::function<bool()>& interrupt) {
   const MapId map_id = map.FindKeyframe(keyframe)->map_id;
-  Map adjusted = map;
+  MapEditor adjusted(map);
   const MapAdjustmentReport report =
       AdjustWholeMap(adjusted, map_id, options.global_iterations, options.keypoint_sigma_px, interrupt);
   LoopAnswer answer;

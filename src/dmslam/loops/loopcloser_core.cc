@@ -34,7 +34,7 @@ void LoopcloserCore::HearOfCorrection(const MapDelta& delta) {
 }
 
 void LoopcloserCore::ForgetMap() {
-  map_ = Map(camera_, pyramid_);
+  map_.Clear();
   places_.Clear();
   detector_.Reset();
   proposals_.clear();

@@ -10,8 +10,8 @@
 #include "dmslam/loops/loop_detector.h"
 #include "dmslam/loops/loop_options.h"
 #include "dmslam/loops/loop_verifier.h"
-#include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/place_recognition/map_places.h"
 
 namespace dmslam {
@@ -75,7 +75,7 @@ class LoopcloserCore {
   Camera camera_;
   Pyramid pyramid_;
   std::function<void()> pump_;
-  Map map_;
+  Replica map_;
   MapPlaces places_;
   LoopDetector detector_;
   LoopVerifier verifier_;

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -157,7 +157,7 @@ class Room {
   }
 
   WorldOptions options_;
-  Map map_;
+  MapEditor map_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> first_, second_;
   std::map<std::pair<size_t, int>, LandmarkId> landmarks_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -37,18 +38,27 @@ struct Landmark {
   KeyframeId reference;       ///< the keyframe whose corrections it follows
   KeyframeId first_keyframe;  ///< the newest keyframe when it was made: its age is counted from here
   int64_t first_ns = 0;       ///< stamp of the keyframe with which it was made
-  int64_t last_ns = 0;        ///< stamp of the newest keyframe that sees it
   LandmarkEvidence evidence;
   std::vector<Observation> observations;  ///< sorted by keyframe
 
-  /// Seen from where, and from how far; derived from position and observations.
+  /// How a keyframe sees it; null: it does not.
+  const Observation* SeenBy(KeyframeId keyframe) const {
+    const auto at = std::ranges::lower_bound(observations, keyframe, {}, &Observation::keyframe);
+    return at != observations.end() && at->keyframe == keyframe ? &*at : nullptr;
+  }
+
+  /// Seen from where, and from how far; follows from position and observations (`Map::Viewing`).
   struct ViewingRange {
     Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();  ///< unit, from the cameras to the point
     double min_distance = 0;  ///< nearer, it would be coarser than the pyramid's coarsest level
     double max_distance = 0;  ///< at this distance it is seen at octave 0
   };
-  ViewingRange viewing;
-  bool viewing_stale = true;
+
+ private:
+  friend class Map;
+  // The map computes the range when it is asked for, and marks it stale when it changes what it follows from.
+  mutable ViewingRange viewing_;
+  mutable bool viewing_stale_ = true;
 };
 
 }  // namespace dmslam

@@ -7,7 +7,7 @@ namespace dmslam {
 std::vector<LandmarkId> LandmarksSeenBy(const Map& map, const std::vector<KeyframeId>& keyframes) {
   std::vector<LandmarkId> ids;
   for (const KeyframeId id : keyframes) {
-    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+    for (const LandmarkId landmark : map.At(id).landmarks) {
       if (landmark.valid()) ids.push_back(landmark);
     }
   }

@@ -53,7 +53,7 @@ std::vector<LandmarkId> LandmarksOf(const Keyframe& keyframe) {
 }
 
 /// Joins a landmark with what the feature sees already.
-void JoinAt(Map& map, const Keyframe& keyframe, uint16_t feature, LandmarkId id) {
+void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, LandmarkId id) {
   const LandmarkId other = keyframe.landmarks[feature];
   if (!other.valid()) {
     map.SetObservation(keyframe.id, feature, id);
@@ -69,8 +69,8 @@ void JoinAt(Map& map, const Keyframe& keyframe, uint16_t feature, LandmarkId id)
 
 }  // namespace
 
-int FuseInto(Map& map, KeyframeId id, const Rigid3d& T_cam_world, const std::vector<LandmarkId>& landmarks,
-             double radius_px, const MapperOptions& options) {
+int FuseInto(MapEditor& map, KeyframeId id, const Rigid3d& T_cam_world,
+             const std::vector<LandmarkId>& landmarks, double radius_px, const MapperOptions& options) {
   const Keyframe& keyframe = *map.FindKeyframe(id);
   const std::vector<uint8_t> none_taken;
   int joined = 0;
@@ -94,7 +94,7 @@ int FuseInto(Map& map, KeyframeId id, const Rigid3d& T_cam_world, const std::vec
   return joined;
 }
 
-int FuseWithNeighbours(Map& map, KeyframeId id, const MapperOptions& options) {
+int FuseWithNeighbours(MapEditor& map, KeyframeId id, const MapperOptions& options) {
   std::set<KeyframeId> listed;
   std::vector<KeyframeId> targets = NeighboursOfNeighbours(map, id, options.min_covisibility, &listed);
   AddKeyframesNearby(map, id, options, &listed, &targets);

@@ -4,7 +4,7 @@
 
 namespace dmslam {
 
-MapAdjustmentReport AdjustLocally(Map& map, KeyframeId id, const MapperOptions& options,
+MapAdjustmentReport AdjustLocally(MapEditor& map, KeyframeId id, const MapperOptions& options,
                                   const std::function<bool()>& interrupt) {
   std::vector<KeyframeId> window =
       map.BestCovisible(id, options.local_keyframes - 1, options.min_covisibility);

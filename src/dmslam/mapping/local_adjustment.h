@@ -8,7 +8,7 @@
 namespace dmslam {
 
 /// The window around keyframe `id`: itself and its best covisible keyframes.
-MapAdjustmentReport AdjustLocally(Map& map, KeyframeId id, const MapperOptions& options,
+MapAdjustmentReport AdjustLocally(MapEditor& map, KeyframeId id, const MapperOptions& options,
                                   const std::function<bool()>& interrupt);
 
 }  // namespace dmslam

@@ -78,7 +78,8 @@ std::vector<KeyframeId> InsertionOrder::Newest(const Map& map, MapId map_id, int
   return newest;
 }
 
-int CullYoungLandmarks(Map& map, MapId map_id, const InsertionOrder& order, const MapperOptions& options) {
+int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order,
+                       const MapperOptions& options) {
   // A landmark on probation is seen by one of the keyframes around its making.
   std::vector<LandmarkId> candidates;
   for (const KeyframeId id : order.Newest(map, map_id, 2 * options.probation_keyframes + 2)) {
@@ -97,7 +98,7 @@ int CullYoungLandmarks(Map& map, MapId map_id, const InsertionOrder& order, cons
   return culled;
 }
 
-int CullRedundantKeyframes(Map& map, KeyframeId id, KeyframeId keep, const MapperOptions& options) {
+int CullRedundantKeyframes(MapEditor& map, KeyframeId id, KeyframeId keep, const MapperOptions& options) {
   int culled = 0;
   for (const KeyframeId neighbour : map.BestCovisible(id, 1000, options.min_covisibility)) {
     const Keyframe& keyframe = *map.FindKeyframe(neighbour);
@@ -114,7 +115,7 @@ int CullRedundantKeyframes(Map& map, KeyframeId id, KeyframeId keep, const Mappe
   return culled;
 }
 
-int RemoveTooNear(Map& map, MapId map_id, double share) {
+int RemoveTooNear(MapEditor& map, MapId map_id, double share) {
   if (share <= 0) return 0;
   std::vector<LandmarkId> near;
   for (const auto& [id, keyframe] : map.keyframes()) {

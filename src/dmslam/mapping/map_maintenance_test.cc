@@ -47,7 +47,7 @@ class Maintenance : public testing::Test {
   }
   bool Has(uint64_t number) const { return map_.FindLandmark(Numbered(number)) != nullptr; }
 
-  Map map_;
+  MapEditor map_;
   InsertionOrder order_;
   KeyframeId root_;
 };

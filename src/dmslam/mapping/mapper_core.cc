@@ -40,8 +40,14 @@ MapperCore::MapperCore(const MapperOptions& options, const Camera& camera, const
                        uint16_t epoch_ordinal, Sink sink)
     : options_(options), map_(camera, pyramid), epoch_ordinal_(epoch_ordinal), sink_(std::move(sink)) {}
 
+void MapperCore::ContinueSaved(Map map) {
+  MapEditor saved(std::move(map));
+  saved.SetProgress({});
+  Continue(std::move(saved));
+}
+
 void MapperCore::Continue(Map map) {
-  map_ = std::move(map);
+  map_ = MapEditor(std::move(map));
   epoch_ordinal_ = static_cast<uint16_t>(std::max<int>(map_.HighestOrdinal(), epoch_ordinal_) + 1);
   next_landmark_ = 1;
   order_.Assume(map_);

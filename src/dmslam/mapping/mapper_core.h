@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/mapping/landmark_creation.h"
 #include "dmslam/mapping/local_adjustment.h"
@@ -52,6 +52,8 @@ class MapperCore {
   /// ordinal that the map does not know, and the local mapping of the keyframe that is proposed first is done
   /// again where the map has it: what was done of it is not known.
   void Continue(Map map);
+  /// The same with a map that was saved: the streams it was made of are not today's.
+  void ContinueSaved(Map map);
   /// What of the streams is worked into the map; travels with the next deltas.
   void SetProgress(const MapProgress& progress) { map_.SetProgress(progress); }
 
@@ -109,7 +111,7 @@ class MapperCore {
   bool Interrupted() const { return interrupt_ && interrupt_(); }
 
   MapperOptions options_;
-  Map map_;
+  MapEditor map_;
   uint16_t epoch_ordinal_;
   uint64_t next_landmark_ = 1;
   bool adjusted_ = false;  ///< as a whole, since the last keyframe

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/replica.h"
+#include "dmslam/map/snapshot.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -15,8 +17,8 @@ namespace {
 KeyframeId Id(uint32_t frame) { return KeyframeId::Make(1, frame); }
 
 /// A map of three keyframes in a row, each hanging from the one before.
-Map SmallMap() {
-  Map map(TestCamera(), Pyramid());
+MapEditor SmallMap() {
+  MapEditor map(TestCamera(), Pyramid());
   for (uint32_t frame = 1; frame <= 3; ++frame) {
     Keyframe keyframe;
     keyframe.id = Id(frame);
@@ -87,8 +89,8 @@ TEST_F(Corrections, OneFromBeforeAnotherIsRefused) {
 TEST_F(Corrections, AMapperThatContinuesAReplicaRefusesThemToo) {
   const uint64_t base = core_.map().version();
   core_.OnLoopAnswer(OneUp(base));
-  Map replica(TestCamera(), Pyramid());
-  for (const MapDelta& part : core_.map().Snapshot(Id(1), 60000)) replica.Apply(part);
+  Replica replica(TestCamera(), Pyramid());
+  for (const MapDelta& part : CutSnapshot(core_.map(), Id(1), 60000)) replica.Apply(part);
   MapperCore next = MakeCore();
   next.Continue(std::move(replica));
   next.OnLoopAnswer(OneUp(base, 8));
@@ -120,7 +122,7 @@ class SecondVisit : public Corrections {
   static constexpr uint16_t kHalf = 20;
 
   SecondVisit() {
-    Map map(TestCamera(), Pyramid());
+    MapEditor map(TestCamera(), Pyramid());
     for (const uint32_t frame : {1u, 2u, 3u}) AddKeyframe(frame, 0.05 * frame, map);
     for (const uint16_t feature : Features(0, 2 * kHalf)) AddLandmark(100u + feature, {1}, feature, map);
     for (const uint16_t feature : Features(0, kHalf)) AddLandmark(200u + feature, {2, 3}, feature, map);
@@ -138,7 +140,7 @@ class SecondVisit : public Corrections {
     Random random(DeriveSeed(1, i, "descriptor"));
     return {{random.Next(), random.Next(), random.Next(), random.Next()}};
   }
-  static void AddKeyframe(uint32_t frame, double x, Map& map) {
+  static void AddKeyframe(uint32_t frame, double x, MapEditor& map) {
     Keyframe keyframe;
     keyframe.id = Id(frame);
     keyframe.map_id = 1;
@@ -154,7 +156,8 @@ class SecondVisit : public Corrections {
     keyframe.features = MakeFrameFeatures(std::move(features), map.camera(), map.pyramid());
     map.AddKeyframe(std::move(keyframe));
   }
-  static void AddLandmark(uint64_t number, const std::vector<uint32_t>& frames, uint16_t feature, Map& map) {
+  static void AddLandmark(uint64_t number, const std::vector<uint32_t>& frames, uint16_t feature,
+                          MapEditor& map) {
     Landmark landmark;
     landmark.id = LandmarkId::Make(1, number);
     landmark.map_id = 1;

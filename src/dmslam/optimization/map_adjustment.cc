@@ -69,7 +69,7 @@ void AddObservations(const Map& map, double sigma_px, Window& window) {
   }
 }
 
-void WriteBack(Map& map, const Window& window, const BundleReport& report) {
+void WriteBack(MapEditor& map, const Window& window, const BundleReport& report) {
   for (size_t i = 0; i < window.keyframes.size(); ++i) {
     if (!window.problem.pose_fixed[i]) map.SetPose(window.keyframes[i], window.problem.T_cam_world[i]);
   }
@@ -86,7 +86,7 @@ void WriteBack(Map& map, const Window& window, const BundleReport& report) {
 
 }  // namespace
 
-MapAdjustmentReport AdjustKeyframes(Map& map, const std::vector<KeyframeId>& keyframes, int max_fixed,
+MapAdjustmentReport AdjustKeyframes(MapEditor& map, const std::vector<KeyframeId>& keyframes, int max_fixed,
                                     double sigma_px, const BundleOptions& options) {
   Window window;
   window.problem.camera = map.camera().Ideal();
@@ -108,7 +108,7 @@ MapAdjustmentReport AdjustKeyframes(Map& map, const std::vector<KeyframeId>& key
   return report;
 }
 
-MapAdjustmentReport AdjustWholeMap(Map& map, MapId map_id, int iterations, double sigma_px,
+MapAdjustmentReport AdjustWholeMap(MapEditor& map, MapId map_id, int iterations, double sigma_px,
                                    const std::function<bool()>& interrupt) {
   std::vector<KeyframeId> all;
   for (const auto& [id, keyframe] : map.keyframes()) {

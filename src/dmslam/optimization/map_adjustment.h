@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/optimization/bundle_adjustment.h"
 
 namespace dmslam {
@@ -19,11 +19,11 @@ struct MapAdjustmentReport {
 /// observers of those landmarks (at most `max_fixed`). `sigma_px`: standard deviation of a keypoint of octave
 /// 0. Results are written into the map, observations that do not fit are cleared, and landmarks left with
 /// fewer than two observers are removed.
-MapAdjustmentReport AdjustKeyframes(Map& map, const std::vector<KeyframeId>& window, int max_fixed,
+MapAdjustmentReport AdjustKeyframes(MapEditor& map, const std::vector<KeyframeId>& window, int max_fixed,
                                     double sigma_px, const BundleOptions& options);
 
 /// All keyframes and landmarks of a map, the first keyframe held.
-MapAdjustmentReport AdjustWholeMap(Map& map, MapId map_id, int iterations, double sigma_px,
+MapAdjustmentReport AdjustWholeMap(MapEditor& map, MapId map_id, int iterations, double sigma_px,
                                    const std::function<bool()>& interrupt);
 
 }  // namespace dmslam

@@ -25,7 +25,7 @@ std::vector<uint8_t> CountedFeatures(const Map& map, const Keyframe& keyframe) {
 MapPlaces::MapPlaces(std::shared_ptr<const Vocabulary> vocabulary, KeyframeDatabaseOptions options)
     : vocabulary_(std::move(vocabulary)), database_(options) {}
 
-void MapPlaces::Update(const Map& map) {
+void MapPlaces::Update(const Replica& map) {
   if (!usable()) return;
   for (const KeyframeId id : map.applied_removed_keyframes()) {
     database_.Remove(id);

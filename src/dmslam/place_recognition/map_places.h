@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/place_recognition/keyframe_database.h"
 #include "dmslam/place_recognition/vocabulary.h"
 
@@ -18,7 +18,7 @@ class MapPlaces {
   explicit MapPlaces(std::shared_ptr<const Vocabulary> vocabulary, KeyframeDatabaseOptions options = {});
 
   /// Call after each delta that was applied to `map`.
-  void Update(const Map& map);
+  void Update(const Replica& map);
   /// Words of a keyframe anew, with what is known of it by now.
   void Refresh(const Map& map, KeyframeId id);
   void Clear();

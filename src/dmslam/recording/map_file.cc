@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "dmslam/map/snapshot.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
@@ -69,10 +70,10 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
                      (until_us == INT64_MAX ? "; was the mapper recorded too?" : " up to that time"));
   }
   if (!start) throw InputError(log.path() + ": does not say which camera the map was made with");
-  RebuiltMap rebuilt{Map(start->camera, start->pyramid), *start};
+  RebuiltMap rebuilt{Replica(start->camera, start->pyramid), *start};
   rebuilt.missing = replay.missing;
   for (const ReplayStep& step : replay.steps) {
-    if (step.begins_anew) rebuilt.map = Map(start->camera, start->pyramid);
+    if (step.begins_anew) rebuilt.map.Clear();
     const std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
     if (!delta) {
       ++rebuilt.missing;
@@ -94,7 +95,7 @@ void SaveMap(const std::string& path, const Map& map, const SessionStart& sessio
   EventLogWriter log(partial);
   WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), session);
   int64_t seq = 0;
-  for (const MapDelta& delta : map.Snapshot(newest.id, kPieceBytes)) {
+  for (const MapDelta& delta : CutSnapshot(map, newest.id, kPieceBytes)) {
     WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kMap, ++seq), delta);
   }
   log.Close();

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/recording/log_index.h"
 #include "dmslam/wire/frontend_messages.h"
 
@@ -12,7 +12,7 @@ namespace dmslam {
 
 /// A map with what it rests on.
 struct RebuiltMap {
-  Map map;
+  Replica map;
   SessionStart session;  ///< camera, pyramid, vocabulary ... of the run that made it
   int64_t records = 0;   ///< that were applied
   int64_t missing = 0;   ///< records of the map that the log lacks: the map is as good as it can be

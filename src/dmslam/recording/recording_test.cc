@@ -5,6 +5,8 @@
 #include <fstream>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/snapshot.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_index.h"
@@ -73,14 +75,14 @@ class TinyMapper {
   }
 
   Random random_{3};
-  Map map_;
+  MapEditor map_;
   uint32_t frame_ = 0;
   uint64_t landmarks_ = 0;
 };
 
 std::vector<Bytes> Content(const Map& map) {
   std::vector<Bytes> content;
-  for (const MapDelta& delta : map.Snapshot({}, SIZE_MAX)) content.push_back(wire::Encode(delta));
+  for (const MapDelta& delta : CutSnapshot(map, {}, SIZE_MAX)) content.push_back(wire::Encode(delta));
   return content;
 }
 
@@ -205,7 +207,7 @@ TEST_F(Recording, ATermCountsUpToWhereTheNextOneTookItOver) {
   // The second continues (100, 4): the fifth record of the first one is void.
   TinyMapper other;
   for (int i = 0; i < 4; ++i) other.Step();
-  Map expected = other.map();
+  MapEditor expected(other.map());
   expected.SetPosition(LandmarkId::Make(1, 1), {9, 9, 9});
   WriteRecord(log, 10, expected.TakeDelta(MapEvent::kAdjusted, {}, 1),
               Header(StreamId::kMap, 1, two, {100, 4}));
@@ -226,7 +228,7 @@ TEST_F(Recording, ASnapshotMakesUpForWhatIsMissing) {
     const MapDelta delta = mapper.Step();
     if (seq != 2) WriteRecord(log, seq, delta, Header(StreamId::kMap, seq));
     if (seq != 5) continue;
-    const std::vector<MapDelta> pieces = mapper.map().Snapshot({}, 3000);
+    const std::vector<MapDelta> pieces = CutSnapshot(mapper.map(), {}, 3000);
     ASSERT_GT(pieces.size(), 2u);
     for (size_t i = 0; i < pieces.size(); ++i) {
       RecordHeader header = Header(StreamId::kMap, static_cast<int64_t>(i) + 1);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/optimization/reprojection.h"
 #include "dmslam/util/random.h"
 
@@ -139,7 +140,7 @@ class PosesAtTheEnd : public testing::Test {
   }
 
   Random random_{3};
-  Map map_;
+  MapEditor map_;
   std::vector<Eigen::Vector3d> truth_;
 };
 
@@ -201,7 +202,7 @@ TEST_F(PosesAtTheEnd, PosesComeInOrderOfTimeAndRelativeToTheirKeyframe) {
 TEST_F(PosesAtTheEnd, LandmarksMayHaveLeftTheMap) {
   FinalPoses poses;
   for (int frame = 0; frame < 40; ++frame) poses.Add(map_, PoseOf(frame));
-  Map emptied(TestCamera(), Pyramid());
+  MapEditor emptied(TestCamera(), Pyramid());
   Keyframe keyframe;
   keyframe.id = KeyframeId::Make(1, 0);
   keyframe.map_id = 1;

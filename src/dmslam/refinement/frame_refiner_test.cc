@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -60,7 +61,7 @@ class Refining : public testing::Test {
     return poses;
   }
 
-  Map map_;
+  MapEditor map_;
   Rigid3d truth_;
   TrackedFrame frame_;
   FramePose told_;

@@ -1,5 +1,6 @@
 #include "dmslam/runtime/map_snapshots.h"
 
+#include "dmslam/map/snapshot.h"
 #include "dmslam/wire/codec.h"
 
 namespace dmslam {
@@ -11,7 +12,7 @@ constexpr size_t kPieceBytes = 56 * 1024;  // with headers below 64 KiB
 
 void MapSnapshots::BeginSnapshot(int64_t) {
   const KeyframeId newest = map_->keyframes().empty() ? KeyframeId{} : map_->keyframes().rbegin()->first;
-  const std::vector<MapDelta> parts = map_->Snapshot(newest, kPieceBytes);
+  const std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kPieceBytes);
   parts_.assign(parts.begin(), parts.end());
 }
 

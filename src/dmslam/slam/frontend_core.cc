@@ -128,7 +128,7 @@ void FrontendCore::Resume() {
 
 void FrontendCore::ForgetMap() {
   near_ = {};
-  map_ = Map(camera_, pyramid_);
+  map_.Clear();
   relocalizer_.Clear();
   tracker_.Reset();
 }

@@ -13,8 +13,8 @@
 #include "dmslam/features/orb_extractor.h"
 #include "dmslam/initialization/baseline_initializer.h"
 #include "dmslam/initialization/initializer.h"
-#include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/refinement/final_poses.h"
 #include "dmslam/refinement/frame_refiner.h"
 #include "dmslam/slam/frontend_options.h"
@@ -176,7 +176,7 @@ class FrontendCore {
   uint64_t seed_;
   bool localize_only_;
   bool catch_up_in_portions_;
-  Map map_;
+  Replica map_;
   FrameRefiner refiner_;
   FinalPoses final_poses_;
   std::function<void()> pump_;

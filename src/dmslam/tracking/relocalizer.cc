@@ -28,7 +28,7 @@ Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary) : places_
 
 void Relocalizer::Clear() { places_.Clear(); }
 
-void Relocalizer::Update(const Map& map) { places_.Update(map); }
+void Relocalizer::Update(const Replica& map) { places_.Update(map); }
 
 std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
                                                 const BowImage& image) const {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/place_recognition/landmark_matches.h"
 #include "dmslam/place_recognition/map_places.h"
 #include "dmslam/tracking/pose_tracker.h"
@@ -19,7 +19,7 @@ class Relocalizer {
   explicit Relocalizer(std::shared_ptr<const Vocabulary> vocabulary);
 
   /// Keeps the index in step with the replica: call after each applied delta.
-  void Update(const Map& map);
+  void Update(const Replica& map);
   void Clear();
   /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
   /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours, then

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/replica.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -126,7 +128,7 @@ class Wall {
     return MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid());
   }
 
-  Map map_;
+  MapEditor map_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> descriptors_;
   std::vector<bool> moves_;
@@ -151,7 +153,7 @@ class Lost {
   void Clear() { relocalizer_.Clear(); }
 
  private:
-  Map replica_;
+  Replica replica_;
   Relocalizer relocalizer_;
   PoseTracker tracker_;
 };

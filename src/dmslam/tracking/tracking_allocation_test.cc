@@ -3,6 +3,7 @@
 
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/features/testing/allocation_counter.h"
+#include "dmslam/map/map_editor.h"
 #include "dmslam/tracking/pose_tracker.h"
 #include "dmslam/util/random.h"
 
@@ -80,7 +81,7 @@ class Tracking : public ::testing::Test {
     return testing::NumAllocations() - before;
   }
 
-  Map map_;
+  MapEditor map_;
   PoseTracker tracker_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> descriptors_;
