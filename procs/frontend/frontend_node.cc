@@ -14,10 +14,7 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
-constexpr size_t kMaxBehind = 15;       // frames: half a second
-constexpr std::ptrdiff_t kPortion = 8;  // records told at once at the end
-constexpr int64_t kPortionEveryNs = 8'000'000;
-constexpr int64_t kAskAgainNs = 10'000'000'000;
+constexpr size_t kMaxBehind = 15;  // frames: half a second
 
 }  // namespace
 
@@ -43,10 +40,6 @@ void FrontendNode::Begin(const CameraInfo& info) {
   if (!lockstep_) setup.run_search = InBackground;
   setup.catch_up_in_portions = !lockstep_;
   core_ = std::make_unique<FrontendCore>(setup);
-  core_->SetPump([this] {
-    PumpWithinWork();
-    PublishStatusIfDue();
-  });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&core_->map(), [this] { return HandOverVersion(); });
   WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
@@ -73,7 +66,7 @@ bool FrontendNode::ReadyToWrite() {
 }
 
 Version FrontendNode::HandOverVersion() {
-  if (within_work_) return applied_;  // the map is being read
+  if (core_->NeedsMapUnchanged()) return applied_;
   TakeMapRecords(true);
   while (core_->IsRefining()) {  // what is taken must be applied
     core_->RefineNext();
@@ -123,10 +116,10 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
 }
 
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
-  std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
+  const std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
   if (!end || !camera_info_ || IsForeignFrame(end->session)) return;
-  if (finished_) PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
-  end_ = std::move(end);
+  if (end_.Is(SequenceEnd::Phase::kDone)) PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
+  end_.OnEndHeard();
 }
 
 /// In real time records are applied as they come. In lock-step they are applied up to a settled record, so
@@ -158,7 +151,7 @@ void FrontendNode::ApplyHeldRecords(size_t count) {
     const HeldRecord& held = held_.front();
     if (held.begins_anew) core_->ForgetMap();
     core_->ApplyMapDelta(held.delta);
-    adjusted_ = adjusted_ || (asked_to_adjust_ && IsAnswerToAll(held.delta));
+    if (IsAnswerToAll(held.delta)) end_.OnAnswer();
     applied_ = held.version;
     held_.pop_front();
   }
@@ -184,8 +177,8 @@ bool FrontendNode::WorkOnce() {
     core_->RefineNext();
     return false;  // one in a turn: it takes a while, and signals and elections are for between
   }
-  TakeMapRecords(finished_ || asked_to_adjust_);
-  if (finished_) {
+  if (!core_->NeedsMapUnchanged()) TakeMapRecords(end_.AppliesAllRecords());
+  if (end_.Is(SequenceEnd::Phase::kDone)) {
     if (!options_.HasPeer("mapper") || MapIsOver(core_->map(), *map_reader_)) Stop();
     return false;
   }
@@ -193,21 +186,42 @@ bool FrontendNode::WorkOnce() {
   if (frame_open_) FinishFrame();
   if (waiting_ && !FallsBehind()) return ProcessWaiting();
   if (core_->IsBehind()) return CatchUp();
-  if (!end_) return false;
-  if (!asked_to_adjust_ && GrowBack()) return false;
-  if (!MapsAreAdjusted()) return false;
-  if (!std::exchange(rest_begun_, true)) core_->RefineRest();
-  if (core_->IsRefining()) return true;
-  return !last_events_ && WorkAtEnd() ? false : Finish();
+  return WorkAtEnd();
 }
 
+int64_t FrontendNode::WorkDeadline() const {
+  using Phase = SequenceEnd::Phase;
+  if (!core_) return INT64_MAX;
+  if (core_->IsRefining()) return 0;
+  if (end_.Is(Phase::kTelling)) return end_.next_portion_ns();
+  if (stopping_ || AwaitsSavedMap()) return INT64_MAX;
+  const bool grows = end_.Is(Phase::kGrowingBack) && !core_->awaited().valid();
+  return grows || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
+}
+
+/// A portion in a turn: the node answers in between. True: the next step can begin at once.
 bool FrontendNode::WorkAtEnd() {
-  // The features that were kept are not needed now.
-  if (!std::exchange(work_begun_, true)) ReturnFreeMemory();
-  within_work_ = true;
-  const bool more = core_->WorkAtEnd();
-  within_work_ = false;
-  return more;
+  using Phase = SequenceEnd::Phase;
+  if (end_.Is(Phase::kPlaying)) return false;
+  if (end_.Is(Phase::kGrowingBack)) {
+    if (GrowBack()) return false;
+    end_.OnGrown();
+  }
+  if (end_.Is(Phase::kAwaitingAdjustedMap)) {
+    if (!MapsAreAdjusted()) return false;
+    core_->RefineRest();
+    end_.OnAdjusted();
+  }
+  if (core_->IsRefining()) return true;
+  if (end_.Is(Phase::kRefining)) {
+    ReturnFreeMemory();  // the features that were kept are not needed now
+    end_.OnRefined();
+  }
+  if (end_.Is(Phase::kJoining)) {
+    if (core_->WorkAtEnd()) return false;
+    end_.Tell(core_->Finish());
+  }
+  return TellLastPoses();
 }
 
 /// Catching up has the time between two images. Where that is not enough it comes first until all is done,
@@ -218,9 +232,7 @@ bool FrontendNode::FallsBehind() {
 }
 
 bool FrontendNode::CatchUp() {
-  std::vector<FrontendEvent> events;
-  core_->CatchUp(&events);
-  PublishEvents(events);
+  Publish(core_->CatchUp().events);
   endpoint_.Advance();
   return true;
 }
@@ -228,25 +240,20 @@ bool FrontendNode::CatchUp() {
 /// One frame in a turn, and one keyframe at a time. True: there is more to do.
 bool FrontendNode::GrowBack() {
   if (!options_.HasPeer("mapper")) return false;
-  if (grows_back_ && core_->awaited().valid() && !core_->map().keyframes().empty()) return true;
+  if (core_->awaited().valid() && !core_->map().keyframes().empty()) return true;
   core_->SetWithheld(false);  // one at a time, the mapper has time for it
-  std::vector<FrontendEvent> events;
-  grows_back_ = core_->GrowBack(&events);
-  PublishEvents(events);
+  const std::optional<FrontendOutput> output = core_->GrowBack();
+  if (output) Publish(output->events);
   endpoint_.Advance();
-  return grows_back_;
+  return output.has_value();
 }
 
 /// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.
 bool FrontendNode::MapsAreAdjusted() {
   if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
-  const bool again = asked_to_adjust_ && !adjusted_ && context_.now_ns() - asked_ns_ > kAskAgainNs;
-  if (!asked_to_adjust_ || again) {
-    asked_to_adjust_ = true;
-    asked_ns_ = context_.now_ns();
+  if (end_.Asks(context_.now_ns()))
     PublishRecord(MapReset{0, false, "the sequence has ended", last_stamp_ns_});
-  }
-  return adjusted_;
+  return end_.IsAnswered();
 }
 
 bool FrontendNode::DecodeImage(const Frame& frame) {
@@ -284,12 +291,12 @@ bool FrontendNode::ProcessWaiting() {
   if (!DecodeImage(waiting.frame)) return true;
   trace.decoded_us = context_.wall_us();
   core_->SetWithheld(UnacceptedKeyframes() >= kMaxUnacceptedKeyframes);
-  std::vector<FrontendEvent> events;
-  core_->ProcessImage(waiting.frame.frame_index, waiting.frame.stamp_ns,
-                      {image_.data.data(), image_.width, image_.height, image_.width}, &events);
+  const FrontendOutput output =
+      core_->ProcessImage(waiting.frame.frame_index, waiting.frame.stamp_ns,
+                          {image_.data.data(), image_.width, image_.height, image_.width});
   trace.tracked_us = context_.wall_us();
   trace.extracted_us = trace.decoded_us + static_cast<int64_t>(1000.0 * core_->extract_ms());
-  PublishEvents(events);
+  Publish(output.events);
   endpoint_.Advance();
   ++frames_processed_;
   PublishViews(waiting, last_pose_, trace);
@@ -298,7 +305,7 @@ bool FrontendNode::ProcessWaiting() {
   return true;
 }
 
-void FrontendNode::PublishEvents(const std::vector<FrontendEvent>& events) {
+void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
   for (const FrontendEvent& event : events) {
     const int64_t seq = std::visit([this](const auto& record) { return PublishRecord(record); }, event);
     if (std::holds_alternative<KeyframeProposal>(event) || std::holds_alternative<InitialMap>(event)) {
@@ -367,22 +374,12 @@ bool FrontendNode::IsAnswerToAll(const MapDelta& delta) {
   return delta.event == MapEvent::kSettled && !delta.about.valid();
 }
 
-/// What is told at the end comes in portions: lcm-logger, which nobody repairs, loses what comes faster than
-/// it empties its queue of 30 messages.
-bool FrontendNode::Finish() {
-  if (!last_events_) core_->Finish(&last_events_.emplace());
-  if (context_.now_ns() < next_portion_ns_) return false;
-  const auto begin = last_events_->begin() + static_cast<std::ptrdiff_t>(last_told_);
-  const auto end = begin + std::min(kPortion, last_events_->end() - begin);
-  PublishEvents({begin, end});
-  last_told_ += static_cast<size_t>(end - begin);
-  next_portion_ns_ = context_.now_ns() + kPortionEveryNs;
-  if (end != last_events_->end()) return false;
-  last_events_->clear();
+bool FrontendNode::TellLastPoses() {
+  Publish(end_.NextPortion(context_.now_ns()));
+  if (!end_.Is(SequenceEnd::Phase::kDone)) return false;
   PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
   PublishStatus();
   writer_->Complete(context_.now_ns());
-  finished_ = true;
   return true;
 }
 
@@ -410,7 +407,8 @@ void FrontendNode::PublishStatus() {
 }
 
 bool FrontendNode::HoldsBackForStatus() const {
-  return core_ != nullptr && (HoldsBack() || AwaitsSavedMap() || (grows_back_ && core_->awaited().valid()));
+  return core_ != nullptr && (HoldsBack() || AwaitsSavedMap() ||
+                              (end_.Is(SequenceEnd::Phase::kGrowingBack) && core_->awaited().valid()));
 }
 
 void FrontendNode::FillCoreStatus(FrontendStatus* status) const {

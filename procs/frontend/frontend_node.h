@@ -11,6 +11,7 @@
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/frontend_core.h"
 #include "frontend/online_error.h"
+#include "frontend/sequence_end.h"
 
 namespace dmslam {
 
@@ -30,12 +31,7 @@ class FrontendNode : public StreamNode {
   bool ReadyToWrite() override;
   void OnWriterOpen() override;
   bool WorkOnce() override;
-  int64_t WorkDeadline() const override {
-    if (core_ && core_->IsRefining()) return 0;
-    if (grows_back_ && !core_->awaited().valid() && !stopping_ && !AwaitsSavedMap()) return 0;
-    if (rest_begun_ && !last_events_ && !stopping_ && !AwaitsSavedMap()) return 0;
-    return last_events_ && !finished_ ? next_portion_ns_ : INT64_MAX;
-  }
+  int64_t WorkDeadline() const override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
 
@@ -66,15 +62,15 @@ class FrontendNode : public StreamNode {
   bool CatchUp();
   bool FallsBehind();
   bool DecodeImage(const Frame& frame);
-  void PublishEvents(const std::vector<FrontendEvent>& events);
+  void Publish(const std::vector<FrontendEvent>& events);
   void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);
   void FinishFrame();
   void DrawPicture();
+  bool WorkAtEnd();
   bool GrowBack();
   bool MapsAreAdjusted();
   static bool IsAnswerToAll(const MapDelta& delta);
-  bool WorkAtEnd();
-  bool Finish();
+  bool TellLastPoses();
   int UnacceptedKeyframes();
   bool HoldsBackForStatus() const;
   void FillCoreStatus(FrontendStatus* status) const;
@@ -86,20 +82,9 @@ class FrontendNode : public StreamNode {
       held_;         ///< lock-step: not yet followed by a settled record; or an unfinished snapshot
   Version applied_;  ///< of the replica
   std::optional<Waiting> waiting_;
-  std::optional<EndOfSequence> end_;
+  SequenceEnd end_;
   bool lockstep_ = false;
-  bool grows_back_ = false;  ///< the map, to before its first keyframe
-  bool asked_to_adjust_ = false;
-  int64_t asked_ns_ = 0;   ///< a mapper that died before it answered is asked again
-  bool adjusted_ = false;  ///< all maps, after the last keyframe
-  std::optional<std::vector<FrontendEvent>> last_events_;  ///< what is told at the end, in portions
-  size_t last_told_ = 0;                                   ///< of them, already
-  int64_t next_portion_ns_ = 0;
-  bool hurries_ = false;      ///< catches up before it takes another image
-  bool within_work_ = false;  ///< of the core, which pumps
-  bool work_begun_ = false;   ///< of the core at the end
-  bool rest_begun_ = false;   ///< the last frames wait for their last poses
-  bool finished_ = false;     ///< everything is said; stays until the mapper has ended
+  bool hurries_ = false;  ///< catches up before it takes another image
   bool frame_open_ =
       false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
   int64_t last_index_ = -1;

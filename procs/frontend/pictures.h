@@ -4,7 +4,7 @@
 
 #include "dmslam/dataset/image.h"
 #include "dmslam/map/proposals.h"
-#include "dmslam/tracking/tracked_frame.h"
+#include "dmslam/map/tracked_frame.h"
 
 namespace dmslam {
 

@@ -29,17 +29,15 @@ CoreLoop::CoreLoop(const Settings& settings, const Camera& camera,
       loopcloser_(settings.loop, camera, settings.pyramid(), settings.seed, vocabulary) {}
 
 StepTimes CoreLoop::StepImage(uint32_t index, int64_t stamp_ns, const GrayView& image) {
-  events_.clear();
   const Stopwatch watch;
-  frontend_.ProcessImage(index, stamp_ns, image, &events_);
-  return AfterFrame(watch.ms());
+  const FrontendOutput output = frontend_.ProcessImage(index, stamp_ns, image);
+  return AfterFrame(output, watch.ms());
 }
 
 StepTimes CoreLoop::StepFeatures(uint32_t index, int64_t stamp_ns, FeatureSet features) {
-  events_.clear();
   const Stopwatch watch;
-  frontend_.ProcessFeatures(index, stamp_ns, std::move(features), &events_);
-  return AfterFrame(watch.ms());
+  const FrontendOutput output = frontend_.ProcessFeatures(index, stamp_ns, std::move(features));
+  return AfterFrame(output, watch.ms());
 }
 
 void CoreLoop::OnDelta(const MapDelta& delta) {
@@ -62,12 +60,12 @@ void CoreLoop::TellLoopCloser() {
   for (; told_ < deltas_.size(); ++told_) loopcloser_.ApplyMapDelta(deltas_[told_]);
 }
 
-StepTimes CoreLoop::AfterFrame(double frontend_ms) {
+StepTimes CoreLoop::AfterFrame(const FrontendOutput& output, double frontend_ms) {
   StepTimes times;
   times.frontend = frontend_ms;
   deltas_.clear();
   told_ = 0;
-  for (const FrontendEvent& event : events_) {
+  for (const FrontendEvent& event : output.events) {
     if (const auto* initial = std::get_if<InitialMap>(&event)) {
       mapper_.OnInitialMap(*initial);
       Settle(initial->second.id, initial->map_id, &times);

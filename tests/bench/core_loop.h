@@ -51,7 +51,7 @@ class CoreLoop {
   const Map& map() const { return mapper_.map(); }
 
  private:
-  StepTimes AfterFrame(double frontend_ms);
+  StepTimes AfterFrame(const FrontendOutput& output, double frontend_ms);
   void OnDelta(const MapDelta& delta);
   void TellLoopCloser();
   void Settle(KeyframeId id, MapId map_id, StepTimes* times);
@@ -59,7 +59,6 @@ class CoreLoop {
   FrontendCore frontend_;
   MapperCore mapper_;
   LoopcloserCore loopcloser_;
-  std::vector<FrontendEvent> events_;
   std::vector<MapDelta> deltas_;  ///< that this frame caused
   size_t told_ = 0;               ///< of them, to the loop closer
   Stopwatch keyframe_watch_;

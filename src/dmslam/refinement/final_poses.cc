@@ -22,7 +22,7 @@ constexpr double kHuberChi2 = 5.991;
 constexpr double kOverstep = 1.7;
 constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and their errors are their own
 constexpr double kMaxMove = 0.3;      // of a landmark, as a share of its distance: more is a slip
-constexpr size_t kPortion = 64;       // frames or landmarks between two calls of who waits
+constexpr size_t kPortion = 64;       // frames or landmarks that are placed at once
 
 PoseObservation Observe(const Pyramid& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
   return {p_world, sight.uv_px.cast<double>(), 1.0 / pyramid.SigmaSquared(sight.octave), 1.0};
@@ -169,6 +169,7 @@ void FinalPoses::Add(const Map& map, FinalPose pose) {
   poses_.push_back(std::move(pose));
   views_.clear();
   rounds_ = 0;
+  GoTo(Step::kBetweenRounds);
 }
 
 /// Whether keyframes of the poses are elsewhere than they were.
@@ -181,25 +182,42 @@ bool FinalPoses::HasMoved(const Map& map) const {
   });
 }
 
-void FinalPoses::Improve(const Map& map, const std::function<void()>& between) {
+void FinalPoses::BeginRound(const Map& map) {
   map_has_moved_ = map_has_moved_ || HasMoved(map);
   if (map_has_moved_) return;
-  between_ = between;
   std::sort(poses_.begin(), poses_.end(), [](const FinalPose& a, const FinalPose& b) {
     return std::tie(a.pose.map_id, a.pose.stamp_ns) < std::tie(b.pose.map_id, b.pose.stamp_ns);
   });
-  if (rounds_++ > 0) {
-    PlaceLandmarks(map);
-    PlaceFrames(map);
-  }
-  Smooth(map);
-  between_ = {};
+  GoTo(rounds_++ > 0 ? Step::kLandmarks : Step::kSmoothing);
 }
 
-bool FinalPoses::IsSettled() const { return poses_.empty() || map_has_moved_ || rounds_ >= kRounds; }
+void FinalPoses::GoTo(Step step) {
+  step_ = step;
+  next_ = 0;
+  if (step == Step::kLandmarks && views_.empty()) SortViews();
+}
 
-void FinalPoses::Between() const {
-  if (between_) between_();
+void FinalPoses::Improve(const Map& map) {
+  switch (step_) {
+    case Step::kBetweenRounds:
+      BeginRound(map);
+      break;
+    case Step::kLandmarks:
+      PlaceSomeLandmarks(map);
+      if (next_ >= views_.size()) GoTo(Step::kFrames);
+      break;
+    case Step::kFrames:
+      PlaceSomeFrames(map);
+      if (next_ >= poses_.size()) GoTo(Step::kSmoothing);
+      break;
+    case Step::kSmoothing:
+      SmoothNextMap(map);
+      if (next_ >= poses_.size()) GoTo(Step::kBetweenRounds);
+  }
+}
+
+bool FinalPoses::IsSettled() const {
+  return !IsMidRound() && (poses_.empty() || map_has_moved_ || rounds_ >= kRounds);
 }
 
 std::vector<FramePose> FinalPoses::Take() {
@@ -233,22 +251,19 @@ std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const 
   return estimates;
 }
 
-void FinalPoses::Smooth(const Map& map) {
-  for (auto begin = poses_.begin(); begin != poses_.end();) {
-    const auto end = std::find_if(
-        begin, poses_.end(), [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
-    const std::vector<PoseEstimate> estimates = Estimates(map, {begin, end});
-    SmoothingOptions options;
-    options.between = between_;
-    const auto known = noise_.find(begin->pose.map_id);
-    if (known != noise_.end()) options.noise = known->second;
-    const SmoothedTrajectory smoothed = SmoothTrajectory(estimates, options);
-    if (smoothed.noise) noise_.emplace(begin->pose.map_id, *smoothed.noise);
-    for (auto it = begin; it != end; ++it) {
-      it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
-    }
-    begin = end;
+void FinalPoses::SmoothNextMap(const Map& map) {
+  const auto begin = poses_.begin() + static_cast<ptrdiff_t>(next_);
+  const auto end = std::find_if(begin, poses_.end(),
+                                [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
+  SmoothingOptions options;
+  const auto known = noise_.find(begin->pose.map_id);
+  if (known != noise_.end()) options.noise = known->second;
+  const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, {begin, end}), options);
+  if (smoothed.noise) noise_.emplace(begin->pose.map_id, *smoothed.noise);
+  for (auto it = begin; it != end; ++it) {
+    it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
   }
+  next_ = static_cast<size_t>(end - poses_.begin());
 }
 
 bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const {
@@ -300,38 +315,35 @@ void FinalPoses::SortViews() {
   });
 }
 
-void FinalPoses::PlaceLandmarks(const Map& map) {
-  if (views_.empty()) SortViews();
-  size_t num_placed = 0;
-  for (auto begin = views_.cbegin(); begin != views_.cend();) {
+void FinalPoses::PlaceSomeLandmarks(const Map& map) {
+  auto begin = views_.cbegin() + static_cast<ptrdiff_t>(next_);
+  for (size_t n = 0; n < kPortion && begin != views_.cend(); ++n) {
     const auto end =
         std::find_if(begin, views_.cend(), [begin](const View& v) { return v.landmark != begin->landmark; });
     if (end - begin >= kMinFrames) PlaceLandmark(map, {begin, end});
-    if (++num_placed % kPortion == 0) Between();
     begin = end;
   }
+  next_ = static_cast<size_t>(begin - views_.cbegin());
 }
 
-void FinalPoses::PlaceFrames(const Map& map) {
+void FinalPoses::PlaceFrame(const Map& map, FinalPose* frame) const {
   PoseOptimizationOptions a_few_steps;  // the landmarks move again before the next
   a_few_steps.rounds = 2;
   a_few_steps.robust_rounds = 1;
   a_few_steps.iterations = 2;
   std::vector<PoseObservation> observations;
-  PoseOptimizationReport report;
-  size_t num_placed = 0;
-  for (FinalPose& frame : poses_) {
-    observations.clear();
-    for (const Sight& sight : frame.sights) {
-      observations.push_back(Observe(map.pyramid(), sight, landmarks_.at(sight.landmark).p_world));
-    }
-    OptimizePose(map.camera().Ideal(), frame.pose.T_cam_world, observations, a_few_steps, report);
-    if (Agrees(report)) {
-      frame.measured = report.T_cam_world;
-      frame.information = report.information;
-    }
-    if (++num_placed % kPortion == 0) Between();
+  for (const Sight& sight : frame->sights) {
+    observations.push_back(Observe(map.pyramid(), sight, landmarks_.at(sight.landmark).p_world));
   }
+  const PoseOptimizationReport report =
+      OptimizePose(map.camera().Ideal(), frame->pose.T_cam_world, observations, a_few_steps);
+  if (!Agrees(report)) return;
+  frame->measured = report.T_cam_world;
+  frame->information = report.information;
+}
+
+void FinalPoses::PlaceSomeFrames(const Map& map) {
+  for (size_t n = 0; n < kPortion && next_ < poses_.size(); ++n) PlaceFrame(map, &poses_[next_++]);
 }
 
 }  // namespace dmslam

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <map>
 #include <span>
 #include <unordered_map>
@@ -8,9 +7,9 @@
 
 #include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/map/tracked_frame.h"
 #include "dmslam/optimization/pose_optimization.h"
 #include "dmslam/optimization/trajectory_smoothing.h"
-#include "dmslam/tracking/tracked_frame.h"
 
 namespace dmslam {
 
@@ -64,9 +63,10 @@ class FinalPoses {
  public:
   /// The frame's landmarks must be in the map now; they may leave it later.
   void Add(const Map& map, FinalPose pose);
-  /// One round: landmarks and frames are placed (not in the first), poses smoothed. They are in order of map
-  /// and time then. `between` is called after each portion of work, 20 ms for 1000 frames.
-  void Improve(const Map& map, const std::function<void()>& between = {});
+  /// One portion of a round: landmarks and frames are placed (not in the first), then the poses of each map
+  /// smoothed. After a round they are in order of map and time. The map must not change within one.
+  void Improve(const Map& map);
+  bool IsMidRound() const { return step_ != Step::kBetweenRounds; }
   /// Whether all rounds are made, or none can be made any more.
   bool IsSettled() const;
   /// Gives the poses and forgets them.
@@ -84,22 +84,27 @@ class FinalPoses {
     Eigen::Matrix3d information;
   };
 
+  enum class Step { kBetweenRounds, kLandmarks, kFrames, kSmoothing };
+
+  void BeginRound(const Map& map);
+  void GoTo(Step step);
   bool HasMoved(const Map& map) const;
   std::vector<PoseEstimate> Estimates(const Map& map, std::span<const FinalPose> poses) const;
-  void Smooth(const Map& map);
+  void SmoothNextMap(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
   void SortViews();
   void PlaceLandmark(const Map& map, std::span<const View> views);
-  void PlaceLandmarks(const Map& map);
-  void PlaceFrames(const Map& map);
-  void Between() const;
+  void PlaceSomeLandmarks(const Map& map);
+  void PlaceFrame(const Map& map, FinalPose* frame) const;
+  void PlaceSomeFrames(const Map& map);
 
   std::vector<FinalPose> poses_;
   std::vector<View> views_;  ///< all, by landmark; empty: to be listed
   int rounds_ = 0;
   bool map_has_moved_ = false;
-  std::function<void()> between_;
+  Step step_ = Step::kBetweenRounds;
+  size_t next_ = 0;                     ///< in this step: the first view, frame or pose to be worked on
   std::map<MapId, MotionNoise> noise_;  ///< as found when the poses of a map were smoothed first
   std::unordered_map<LandmarkId, Placed> landmarks_;
 };

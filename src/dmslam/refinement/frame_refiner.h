@@ -10,7 +10,7 @@
 #include "dmslam/map/map.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/refinement/final_poses.h"
-#include "dmslam/tracking/tracked_frame.h"
+#include "dmslam/refinement/unplaced_frames.h"
 
 namespace dmslam {
 

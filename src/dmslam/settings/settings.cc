@@ -188,7 +188,7 @@ std::vector<Entry> TrackingEntries() {
   return {
       Make(
           "tracking.motion_belief", "landmarks that are believed to move have no vote",
-          [](Settings & s) -> auto& { return s.frontend.tracking.motion_belief; }),
+          [](Settings & s) -> auto& { return s.frontend.tracking.dynamics.vote.motion_belief; }),
       Make(
           "tracking.motion_radius_px", "search around the motion model's prediction",
           [](Settings & s) -> auto& { return s.frontend.tracking.motion_radius_px; }, 1, 200),
@@ -198,17 +198,17 @@ std::vector<Entry> TrackingEntries() {
       Make(
           "tracking.hidden_distance",
           "descriptor distance allowed where nothing of the map is found around [bits]",
-          [](Settings & s) -> auto& { return s.frontend.tracking.hidden_distance; }, 0, 256),
+          [](Settings & s) -> auto& { return s.frontend.tracking.dynamics.hidden.distance; }, 0, 256),
       Make(
           "tracking.hidden_distance_slope",
           "more of it, times the share of the map that is found around [bits]",
-          [](Settings & s) -> auto& { return s.frontend.tracking.hidden_distance_slope; }, 0, 10000),
+          [](Settings & s) -> auto& { return s.frontend.tracking.dynamics.hidden.distance_slope; }, 0, 10000),
       Make(
           "tracking.young_trust", "weight of a landmark that was just made",
-          [](Settings & s) -> auto& { return s.frontend.tracking.young_trust; }, 0, 1),
+          [](Settings & s) -> auto& { return s.frontend.tracking.dynamics.vote.young_trust; }, 0, 1),
       Make(
           "tracking.trusted_age_s", "age at which a landmark has full weight",
-          [](Settings & s) -> auto& { return s.frontend.tracking.trusted_age_s; }, 0, 1000),
+          [](Settings & s) -> auto& { return s.frontend.tracking.dynamics.vote.trusted_age_s; }, 0, 1000),
       Make(
           "tracking.smooth_at_end",
           "the poses told at the end: landmarks placed by all frames, weak frames looked for from the "
@@ -303,7 +303,7 @@ void ApplyProfile(std::string_view name, Settings* settings) {
   settings->mapper.creation.mutual_exclusion = dm;
   settings->mapper.min_depth = dm ? MapperOptions().min_depth : 0.0;
   settings->mapper.seen_through.enabled = dm;
-  settings->frontend.tracking.motion_belief = dm;
+  settings->frontend.tracking.dynamics.vote.motion_belief = dm;
   settings->frontend.smooth_at_end = dm;
   settings->frontend.keyframes_at_end = dm;
   settings->frontend.max_kept_frames = dm ? FrontendOptions().max_kept_frames : kKeptByBaseline;
@@ -357,7 +357,7 @@ void ApplySetting(std::string_view key, std::string_view value, Settings* settin
   for (const Entry& entry : entries) {
     if (entry.key != key) continue;
     entry.set(value, settings);
-    settings->mapper.belief.enabled = settings->frontend.tracking.motion_belief;
+    settings->mapper.belief.enabled = settings->frontend.tracking.dynamics.vote.motion_belief;
     return;
   }
   throw InputError("setting '" + std::string(key) + "' does not exist; did you mean '" +
@@ -384,7 +384,7 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& o
     if (equals == std::string::npos) throw InputError("--set " + text + ": write key=value");
     ApplySetting(text.substr(0, equals), text.substr(equals + 1), &settings);
   }
-  settings.mapper.belief.enabled = settings.frontend.tracking.motion_belief;
+  settings.mapper.belief.enabled = settings.frontend.tracking.dynamics.vote.motion_belief;
   return settings;
 }
 

@@ -30,11 +30,9 @@ void Relocalizer::Clear() { places_.Clear(); }
 
 void Relocalizer::Update(const Replica& map) { places_.Update(map); }
 
-std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
-                                                const BowImage& image) const {
-  const auto of_another_map = [&](const Keyframe& keyframe) {
-    return map_id != 0 && keyframe.map_id != map_id;
-  };
+std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<MapId> map_id,
+                                                KeyframeId last_seen, const BowImage& image) const {
+  const auto of_another_map = [&](const Keyframe& keyframe) { return map_id && keyframe.map_id != *map_id; };
   std::vector<KeyframeId> ids;
   for (const PlaceCandidate& candidate :
        places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
@@ -97,10 +95,10 @@ bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& mat
 /// Against the local map, and again from there as long as each round finds more
 /// of it: the matches with one keyframe alone may put the camera a little
 /// beside its place, where the first search misses much.
-bool Relocalizer::Refine(const Map& map, PoseTracker* tracker, TrackedFrame* frame) {
+bool Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame) {
   int found = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const TrackingReport report = tracker->TrackLocalMap(map, true, frame);
+    const TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
     if (report.ok) return true;
     if (report.num_static <= found) return false;
     found = report.num_static;
@@ -108,19 +106,19 @@ bool Relocalizer::Refine(const Map& map, PoseTracker* tracker, TrackedFrame* fra
   return false;
 }
 
-bool Relocalizer::Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed,
-                             PoseTracker* tracker, TrackedFrame* frame) const {
+bool Relocalizer::Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
+                             PoseSearch* search, TrackedFrame* frame) const {
   if (!places_.usable()) return false;
   const BowImage image = places_.Transform(frame->features->set);
   const std::vector<KeyframeId> candidates = Candidates(map, map_id, last_seen, image);
   for (const KeyframeId id : candidates) {
     if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
-    if (Refine(map, tracker, frame)) return true;
+    if (Refine(map, search, frame)) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
   if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) places.push_back(*last);
-  return TryTogether(map, places, seed, frame) && Refine(map, tracker, frame);
+  return TryTogether(map, places, seed, frame) && Refine(map, search, frame);
 }
 
 }  // namespace dmslam

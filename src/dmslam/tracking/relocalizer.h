@@ -1,13 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dmslam/map/replica.h"
+#include "dmslam/map/tracked_frame.h"
 #include "dmslam/place_recognition/landmark_matches.h"
 #include "dmslam/place_recognition/map_places.h"
-#include "dmslam/tracking/pose_tracker.h"
-#include "dmslam/tracking/tracked_frame.h"
+#include "dmslam/tracking/pose_search.h"
 
 namespace dmslam {
 
@@ -21,14 +22,14 @@ class Relocalizer {
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Replica& map);
   void Clear();
-  /// A first pose of `frame` in map `map_id` (0: any), with matches; none when no keyframe fits.
+  /// A first pose of `frame` in map `map_id` (none given: in any), with matches; none when no keyframe fits.
   /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours, then
   /// all that these places show together.
-  bool Relocalize(const Map& map, MapId map_id, KeyframeId last_seen, uint64_t seed, PoseTracker* tracker,
-                  TrackedFrame* frame) const;
+  bool Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
+                  PoseSearch* search, TrackedFrame* frame) const;
 
  private:
-  std::vector<KeyframeId> Candidates(const Map& map, MapId map_id, KeyframeId last_seen,
+  std::vector<KeyframeId> Candidates(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen,
                                      const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                    TrackedFrame* frame) const;
@@ -37,7 +38,7 @@ class Relocalizer {
                    TrackedFrame* frame) const;
   bool FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
                 TrackedFrame* frame) const;
-  static bool Refine(const Map& map, PoseTracker* tracker, TrackedFrame* frame);
+  static bool Refine(const Map& map, PoseSearch* search, TrackedFrame* frame);
 
   MapPlaces places_;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -141,21 +142,21 @@ class Lost {
   explicit Lost(Wall& wall)
       : replica_(TestCamera(525, 319.5, 239.5), Pyramid()),
         relocalizer_(ShippedVocabulary()),
-        tracker_({}, replica_.camera(), Pyramid()) {
+        search_({}, replica_.camera()) {
     for (int k = 0; k < kKeyframes; ++k) {
       replica_.Apply(wall.Next());
       relocalizer_.Update(replica_);
     }
   }
-  bool Find(TrackedFrame* frame, MapId map_id = 1) {
-    return relocalizer_.Relocalize(replica_, map_id, {}, 1, &tracker_, frame);
+  bool Find(TrackedFrame* frame, std::optional<MapId> map_id = 1) {
+    return relocalizer_.Relocalize(replica_, map_id, {}, 1, &search_, frame);
   }
   void Clear() { relocalizer_.Clear(); }
 
  private:
   Replica replica_;
   Relocalizer relocalizer_;
-  PoseTracker tracker_;
+  PoseSearch search_;
 };
 
 TEST(RelocalizerTest, ACameraIsFoundWhereverItReappears) {
@@ -209,9 +210,9 @@ TEST(RelocalizerTest, OnlyTheMapThatIsAskedForIsSearched) {
   Lost lost(wall);
   TrackedFrame frame = wall.Frame(4.4);
   EXPECT_FALSE(lost.Find(&frame, 2));
-  EXPECT_TRUE(lost.Find(&frame, 0));
+  EXPECT_TRUE(lost.Find(&frame, std::nullopt));
   lost.Clear();
-  EXPECT_FALSE(lost.Find(&frame, 0));
+  EXPECT_FALSE(lost.Find(&frame, std::nullopt));
 }
 
 }  // namespace

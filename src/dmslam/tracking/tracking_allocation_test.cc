@@ -4,7 +4,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/features/testing/allocation_counter.h"
 #include "dmslam/map/map_editor.h"
-#include "dmslam/tracking/pose_tracker.h"
+#include "dmslam/tracking/pose_search.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -17,7 +17,7 @@ constexpr int64_t kStepNs = 100'000'000;
 /// sees has moved.
 class Tracking : public ::testing::Test {
  protected:
-  Tracking() : map_(TestCamera(), Pyramid()), tracker_({}, TestCamera(), Pyramid()) {
+  Tracking() : map_(TestCamera(), Pyramid()), search_({}, TestCamera()) {
     Random random(3);
     for (uint32_t i = 0; i < kLandmarks; ++i) {
       points_.emplace_back(random.Uniform(-1, 1), random.Uniform(-0.7, 0.7), random.Uniform(2, 4));
@@ -71,8 +71,8 @@ class Tracking : public ::testing::Test {
   size_t TrackBoth(TrackedFrame* a, TrackedFrame* b) {
     const size_t before = testing::NumAllocations();
     for (int round = 0; round < 4; ++round) {
-      EXPECT_TRUE(tracker_.TrackFromFrame(map_, *a, a->T_cam_world, b));
-      const TrackingReport report = tracker_.TrackLocalMap(map_, false, b);
+      EXPECT_TRUE(search_.FromFrame(map_, *a, a->T_cam_world, {}, b));
+      const TrackingReport report = search_.InLocalMap(map_, false, {}, b);
       EXPECT_TRUE(report.ok) << report.reason;
       EXPECT_GT(report.num_static, 250);
       EXPECT_GT(report.num_moving, 10);
@@ -82,7 +82,7 @@ class Tracking : public ::testing::Test {
   }
 
   MapEditor map_;
-  PoseTracker tracker_;
+  PoseSearch search_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> descriptors_;
 };
@@ -91,12 +91,12 @@ TEST_F(Tracking, SteadyStateDoesNotAllocate) {
   TrackedFrame first = Seen(1, 2.3, false), second = Seen(2, 2.5, true);
   first.T_cam_world = PoseAt(2.3);
   for (uint32_t i = 0; i < kLandmarks; ++i) first.landmarks[i] = LandmarkId::Make(1, i + 1);
-  EXPECT_TRUE(tracker_.TrackFromFrame(map_, first, first.T_cam_world, &second));
-  EXPECT_TRUE(tracker_.TrackLocalMap(map_, false, &second).ok);
+  EXPECT_TRUE(search_.FromFrame(map_, first, first.T_cam_world, {}, &second));
+  EXPECT_TRUE(search_.InLocalMap(map_, false, {}, &second).ok);
   TrackedFrame third = Seen(3, 2.7, true);
   EXPECT_GT(TrackBoth(&second, &third), 0u);  // The counter works.
   EXPECT_EQ(TrackBoth(&second, &third), 0u);
-  tracker_.TakeEvidence(0, 1);  // what was counted is handed over, and is counted anew
+  search_.judge().TakeEvidence(0, 1);  // what was counted is handed over, and is counted anew
   EXPECT_EQ(TrackBoth(&second, &third), 0u);
 }
 

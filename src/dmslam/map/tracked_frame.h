@@ -17,7 +17,7 @@ enum class FeatureClass : uint8_t {
   kMoving = 3,    ///< sees something that moves (red)
 };
 
-/// A frame in tracking.
+/// A frame and what of the map it sees.
 struct TrackedFrame {
   uint32_t index = 0;
   int64_t stamp_ns = 0;
@@ -34,24 +34,17 @@ struct TrackedFrame {
         landmarks(features->size()),
         classes(features->size(), FeatureClass::kNone) {}
 
+  /// The frame that became a keyframe, with what the map says of it.
+  static TrackedFrame Of(const Keyframe& keyframe) {
+    TrackedFrame frame(keyframe.id.frame_index(), keyframe.stamp_ns, keyframe.features);
+    frame.landmarks = keyframe.landmarks;
+    frame.T_cam_world = keyframe.T_cam_world;
+    return frame;
+  }
+
   void ClearMatches() {
     landmarks.assign(features->size(), LandmarkId{});
     classes.assign(features->size(), FeatureClass::kNone);
-  }
-};
-
-/// A frame that waits for a pose: features alone, as many wait for long.
-struct WaitingFrame {
-  uint32_t index = 0;
-  int64_t stamp_ns = 0;
-  FeatureSet features;
-
-  explicit WaitingFrame(const TrackedFrame& frame)
-      : WaitingFrame(frame.index, frame.stamp_ns, frame.features->set) {}
-  WaitingFrame(uint32_t frame_index, int64_t frame_stamp_ns, FeatureSet frame_features)
-      : index(frame_index), stamp_ns(frame_stamp_ns), features(std::move(frame_features)) {}
-  TrackedFrame ToTracked(const Camera& camera, const Pyramid& pyramid) && {
-    return {index, stamp_ns, MakeFrameFeatures(std::move(features), camera, pyramid)};
   }
 };
 

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace dmslam {
+
+struct ElderOptions {
+  int min_elders = 40;        ///< the oldest so many matched landmarks decide the pose first...
+  double share = 0.4;         ///< ...or this share of the matches, if that is more...
+  double agreement = 0.6;     ///< ...provided that this share of them agree
+  double max_chi2 = 7.8;      ///< younger ones farther from that pose have no say
+  double young_weight = 0.5;  ///< all younger ones together weigh at most this much of what the elders weigh
+};
+
+/// The landmarks that stood still for longest decide first; the others only refine what agrees with them, and
+/// never weigh more. People who stood still while they were mapped are younger than the room around them, so
+/// they cannot carry the camera away when they walk on, however much of the image they fill.
+class Elders {
+ public:
+  /// `trusted_age_s`: whoever is so old counts as an elder in any case.
+  Elders(const ElderOptions& options, double trusted_age_s)
+      : options_(options), trusted_age_s_(trusted_age_s) {}
+
+  /// Age [s] from which a matched landmark is an elder; none where there are too few matches to tell them
+  /// apart.
+  std::optional<double> FromAge(std::span<const double> ages_s);
+  /// Whether so many of the elders agree on a pose that it binds the others.
+  bool Decide(int agreeing, size_t elders) const {
+    return agreeing >= static_cast<int>(options_.agreement * static_cast<double>(elders));
+  }
+  /// Whether a younger landmark with this squared, normalised distance from the elders' pose has a say.
+  bool Admit(double chi2) const { return chi2 <= options_.max_chi2; }
+  /// The factor on the weights of `young` landmarks beside so many agreeing elders.
+  double YoungFactor(int agreeing, int young) const;
+
+ private:
+  ElderOptions options_;
+  double trusted_age_s_;
+  std::vector<double> sorted_ages_s_;  ///< workspace
+};
+
+}  // namespace dmslam

@@ -1,0 +1,23 @@
+#include "dmslam/dynamics/landmark_votes.h"
+
+#include <algorithm>
+
+#include "dmslam/dynamics/motion_belief.h"
+
+namespace dmslam {
+
+bool LandmarkVotes::HasVote(const Landmark& landmark) const {
+  if (!options_.motion_belief) return true;
+  if (!IsStatic(&landmark)) return false;
+  const auto streak = streaks_.find(landmark.id);
+  return streak == streaks_.end() || streak->second < options_.streak_without_vote;
+}
+
+double LandmarkVotes::Trust(const Landmark& landmark, int64_t stamp_ns) const {
+  if (!options_.motion_belief) return 1.0;
+  const double age_s = static_cast<double>(stamp_ns - landmark.first_ns) * 1e-9;
+  const double grown = std::clamp(age_s / options_.trusted_age_s, 0.0, 1.0);
+  return options_.young_trust + (1.0 - options_.young_trust) * grown;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory_resource>
+#include <span>
+#include <unordered_map>
+
+#include "dmslam/map/landmark.h"
+
+namespace dmslam {
+
+struct VoteOptions {
+  bool motion_belief = true;   ///< landmarks that are believed to move have no vote; off: all are equal
+  double young_trust = 0.3;    ///< weight of a landmark that was just made...
+  double trusted_age_s = 4.0;  ///< ...which grows to one when it stood still for so long
+  int streak_without_vote =
+      3;  ///< so many sightings elsewhere in a row cost the vote, before the mapper says so
+};
+
+/// Which landmarks have a say in a frame's pose, and how much: what the map believes of them, their age, and
+/// a short memory of those that were just seen elsewhere.
+class LandmarkVotes {
+ public:
+  explicit LandmarkVotes(const VoteOptions& options) : options_(options) {}
+
+  /// Whether the landmark may be matched at all.
+  bool HasVote(const Landmark& landmark) const;
+  /// Weight of the landmark in a pose at `stamp_ns`: young_trust to 1.
+  double Trust(const Landmark& landmark, int64_t stamp_ns) const;
+
+  void OnSeenElsewhere(LandmarkId id) { ++streaks_[id]; }
+  void OnFound(LandmarkId id) { streaks_.erase(id); }
+  void Reset() { streaks_.clear(); }
+
+  const VoteOptions& options() const { return options_; }
+
+ private:
+  VoteOptions options_;
+  std::pmr::unsynchronized_pool_resource pool_;
+  std::pmr::unordered_map<LandmarkId, int> streaks_{&pool_};  ///< sightings elsewhere in a row
+};
+
+}  // namespace dmslam

@@ -1,0 +1,75 @@
+#include "dmslam/dynamics/missing_landmarks.h"
+
+#include <algorithm>
+
+namespace dmslam {
+
+WitnessGrid::WitnessGrid(const Camera& camera)
+    : cell_width_px_(static_cast<double>(camera.width_px) / kColumns),
+      cell_height_px_(static_cast<double>(camera.height_px) / kRows) {}
+
+void WitnessGrid::Clear() {
+  for (auto& cell : cells_) cell.clear();
+}
+
+void WitnessGrid::Add(const Witness& witness) {
+  cells_[Index(Column(witness.uv_px.x()), Row(witness.uv_px.y()))].push_back(witness);
+}
+
+int WitnessGrid::Column(double x) const {
+  return std::clamp(static_cast<int>(x / cell_width_px_), 0, kColumns - 1);
+}
+
+int WitnessGrid::Row(double y) const {
+  return std::clamp(static_cast<int>(y / cell_height_px_), 0, kRows - 1);
+}
+
+void MissingLandmarks::CallWitnesses(const Map& map, const TrackedFrame& frame,
+                                     std::span<const LandmarkId> moved) {
+  witnesses_.Clear();
+  known_.assign(moved.begin(), moved.end());
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].valid()) continue;
+    known_.push_back(frame.landmarks[i]);
+    const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
+    witnesses_.Add({frame.features->uv_px[i], depth, false});
+  }
+  for (const LandmarkId id : moved) {
+    const Eigen::Vector3d p_cam = frame.T_cam_world * map.FindLandmark(id)->p_world;
+    if (const auto uv = map.camera().Project(p_cam)) witnesses_.Add({*uv, p_cam.z(), true});
+  }
+  std::sort(known_.begin(), known_.end());
+}
+
+MissingLandmarks::Verdict MissingLandmarks::AskAround(const LandmarkView& view) const {
+  int behind = 0, beside = 0, before = 0, moving_beside = 0;
+  witnesses_.ForEachNear(view.uv_px, options_.seen_through_px, [&](const Witness& witness) {
+    const bool farther = witness.depth > options_.seen_through_depth * view.depth;
+    const bool nearer = witness.depth * options_.seen_through_depth < view.depth;
+    if (witness.moves) {
+      if (!farther && !nearer) ++moving_beside;
+      if (nearer) ++before;
+      return;
+    }
+    ++(farther ? behind : nearer ? before : beside);
+  });
+  const bool seen_through = behind >= options_.seen_through_min && beside == 0;
+  const bool goes_with_others = moving_beside >= options_.moving_together_min && moving_beside > 2 * beside;
+  if (seen_through || goes_with_others) return Verdict::kGone;
+  return before > 0 && beside == 0 ? Verdict::kHidden : Verdict::kNone;
+}
+
+void MissingLandmarks::Judge(const Map& map, const TrackedFrame& frame,
+                             std::span<const ExpectedLandmark> expected, std::span<const LandmarkId> moved) {
+  CallWitnesses(map, frame, moved);
+  gone_.clear();
+  hidden_.clear();
+  for (const auto& [id, view] : expected) {
+    if (std::binary_search(known_.begin(), known_.end(), id)) continue;
+    const Verdict verdict = AskAround(view);
+    if (verdict == Verdict::kGone) gone_.push_back(id);
+    if (verdict == Verdict::kHidden) hidden_.push_back(id);
+  }
+}
+
+}  // namespace dmslam

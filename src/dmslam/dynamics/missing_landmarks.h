@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "dmslam/dynamics/frame_expectation.h"
+#include "dmslam/map/map.h"
+
+namespace dmslam {
+
+struct MissingOptions {
+  double seen_through_px = 40.0;    ///< what is seen this near to a missing landmark...
+  double seen_through_depth = 1.2;  ///< ...and this much farther away says that it has gone...
+  int seen_through_min = 2;     ///< ...where at least so many say it, and nothing of its own depth denies it
+  int moving_together_min = 3;  ///< a missing landmark goes with so many of its depth around it that move
+};
+
+/// What a frame knows of a place in the image: what it sees there, how far away, and whether that moves.
+struct Witness {
+  Eigen::Vector2d uv_px;
+  double depth = 0;
+  bool moves = false;
+};
+
+/// Witnesses by image cell.
+class WitnessGrid {
+ public:
+  explicit WitnessGrid(const Camera& camera);
+  void Clear();
+  void Add(const Witness& witness);
+  template <typename Visit>
+  void ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const {
+    for (int row = Row(uv_px.y() - reach_px); row <= Row(uv_px.y() + reach_px); ++row) {
+      for (int column = Column(uv_px.x() - reach_px); column <= Column(uv_px.x() + reach_px); ++column) {
+        for (const Witness& witness : cells_[Index(column, row)]) {
+          if ((witness.uv_px - uv_px).squaredNorm() <= reach_px * reach_px) visit(witness);
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr int kColumns = 20, kRows = 15;
+
+  int Column(double x) const;
+  int Row(double y) const;
+  static size_t Index(int column, int row) { return static_cast<size_t>(row * kColumns + column); }
+
+  double cell_width_px_, cell_height_px_;
+  std::array<std::vector<Witness>, kColumns * kRows> cells_;
+};
+
+/// Judges the landmarks that a frame should see and does not, by what it sees around them. What lies behind
+/// is seen: nothing hides them, they have gone. Their neighbours move: they go together. Something nearer is
+/// seen: they are hidden, and nothing is said.
+class MissingLandmarks {
+ public:
+  MissingLandmarks(const MissingOptions& options, const Camera& camera)
+      : options_(options), witnesses_(camera) {}
+
+  /// `moved`: seen elsewhere by the frame, and so not missing.
+  void Judge(const Map& map, const TrackedFrame& frame, std::span<const ExpectedLandmark> expected,
+             std::span<const LandmarkId> moved);
+
+  /// Missing: what lies behind them is seen, or their neighbours move.
+  const std::vector<LandmarkId>& gone() const { return gone_; }
+  /// Missing, with something nearer seen in their place; sorted.
+  const std::vector<LandmarkId>& hidden() const { return hidden_; }
+
+ private:
+  enum class Verdict { kNone, kGone, kHidden };
+
+  void CallWitnesses(const Map& map, const TrackedFrame& frame, std::span<const LandmarkId> moved);
+  Verdict AskAround(const LandmarkView& view) const;
+
+  MissingOptions options_;
+  WitnessGrid witnesses_;
+  std::vector<LandmarkId> gone_, hidden_;
+  std::vector<LandmarkId> known_;  ///< workspace: those that the frame sees, in their place or elsewhere
+};
+
+}  // namespace dmslam

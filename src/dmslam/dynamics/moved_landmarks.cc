@@ -1,0 +1,52 @@
+#include "dmslam/dynamics/moved_landmarks.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace dmslam {
+
+const std::vector<LandmarkId>& MovedLandmarks::Find(const Map& map,
+                                                    std::span<const ExpectedLandmark> expected,
+                                                    std::span<const RejectedMatch> rejected,
+                                                    TrackedFrame* frame) {
+  ListMatched(*frame, &used_);
+  MarkMatched(*frame, &taken_);
+  moved_.clear();
+  JudgeRejected(map, rejected, frame);
+  std::sort(used_.begin(), used_.end());
+  for (const ExpectedLandmark& landmark : expected) {
+    if (!std::binary_search(used_.begin(), used_.end(), landmark.id)) LookAround(map, landmark, frame);
+  }
+  return moved_;
+}
+
+/// A match that looks right and lies beside its place.
+void MovedLandmarks::JudgeRejected(const Map& map, std::span<const RejectedMatch> rejected,
+                                   TrackedFrame* frame) {
+  for (const RejectedMatch& match : rejected) {
+    const Landmark& landmark = *map.FindLandmark(match.landmark);
+    const int distance =
+        HammingDistance(landmark.descriptor, frame->features->set.descriptors[match.feature]);
+    if (match.chi2 < options_.near_chi2 || distance > options_.near_distance) continue;
+    moved_.push_back(match.landmark);
+    used_.push_back(match.landmark);
+    taken_[match.feature] = 1;
+    frame->classes[match.feature] = FeatureClass::kMoving;
+  }
+}
+
+/// One that is missed in its place and found in the neighbourhood, where nothing else looks like it.
+void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected, TrackedFrame* frame) {
+  const Landmark& landmark = *map.FindLandmark(expected.id);
+  const std::optional<Eigen::Vector2d> uv = map.camera().Project(frame->T_cam_world * landmark.p_world);
+  if (!uv) return;
+  const FeatureHit hit = FindFeature(*frame->features, *uv, options_.radius_px, expected.view.octave - 1,
+                                     expected.view.octave + 1, landmark.descriptor, taken_);
+  const bool alone = hit.distance <= options_.ratio * hit.second_distance;
+  if (hit.feature < 0 || hit.distance > options_.max_distance || !alone) return;
+  if (NormalizedErrorSquared(*frame->features, hit.feature, *uv, map.pyramid()) < options_.chi2) return;
+  moved_.push_back(expected.id);
+  frame->classes[static_cast<size_t>(hit.feature)] = FeatureClass::kMoving;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,49 @@
+#include "dmslam/refinement/last_poses.h"
+
+#include <utility>
+
+namespace dmslam {
+namespace {
+
+FrameRefinerOptions ForSmoothing(FrameRefinerOptions options, bool smooth) {
+  options.for_smoothing = options.for_smoothing || smooth;
+  return options;
+}
+
+}  // namespace
+
+LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
+                     const Camera& camera)
+    : refiner_(ForSmoothing(refiner, smooth)), search_(tracking, camera), smooth_(smooth) {}
+
+void LastPoses::RefineNext(const Map& map) {
+  const auto search = [&](TrackedFrame* frame) {
+    search_.Reset();  // what the frame before saw move may lie still in this one
+    return search_.InLocalMap(map, false, std::nullopt, frame).ok;
+  };
+  if (auto pose = refiner_.RefineNext(map, search)) final_.Add(map, std::move(*pose));
+}
+
+/// To be smoothed: by what it sees alone, without what was expected of it; nothing is known where that does
+/// not agree.
+void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Keyframe& reference) {
+  FinalPose later;
+  later.pose.frame_index = frame.index;
+  later.pose.stamp_ns = frame.stamp_ns;
+  later.pose.state = TrackingState::kLocalizedLater;
+  const PoseOptimizationReport report = MeasureCheckedPose(map, frame.T_cam_world, SightsOf(frame), &later);
+  if (!Agrees(report)) {
+    later.measured = frame.T_cam_world;
+    later.information.setZero();
+  }
+  later.SetPose(reference, smooth_ ? later.measured : frame.T_cam_world);
+  final_.Add(map, std::move(later));
+}
+
+bool LastPoses::Improve(const Map& map) {
+  if (!smooth_ || final_.IsSettled()) return false;
+  final_.Improve(map);
+  return true;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "dmslam/refinement/final_poses.h"
+#include "dmslam/refinement/frame_refiner.h"
+#include "dmslam/refinement/unplaced_frames.h"
+#include "dmslam/tracking/pose_search.h"
+
+namespace dmslam {
+
+/// The poses that are told when the sequence has ended: every tracked frame is looked for once more in the
+/// adjusted map, then all poses are joined with the camera's motion. Works in portions; what is called in
+/// what order does not depend on how they are cut.
+class LastPoses {
+ public:
+  /// `smooth`: joins the poses; else each stays as it was found.
+  LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
+            const Camera& camera);
+
+  /// Keeps a tracked frame and the pose that was told of it.
+  void Keep(const TrackedFrame& frame, const FramePose& pose) { refiner_.Keep(frame, pose); }
+  /// Gives back the frames of a map that was wrong.
+  std::vector<WaitingFrame> TakeFramesOf(MapId map_id) { return refiner_.TakeFramesOf(map_id); }
+
+  /// Takes the kept frames of one map (none given: of all) for RefineNext().
+  void Begin(const Map& map, std::optional<MapId> map_id = std::nullopt) { refiner_.Begin(map, map_id); }
+  bool IsRefining() const { return refiner_.IsBusy(); }
+  /// Finds the pose of the oldest frame that is due.
+  void RefineNext(const Map& map);
+  /// A frame that was placed just now, relative to keyframe `reference`.
+  void AddPlaced(const Map& map, const TrackedFrame& frame, const Keyframe& reference);
+
+  /// A portion of joining the poses. False: nothing is left to do.
+  bool Improve(const Map& map);
+  /// Whether a round of that is under way: the map that is handed in must stay as it is.
+  bool NeedsMapUnchanged() const { return final_.IsMidRound(); }
+  /// Gives the poses and forgets them.
+  std::vector<FramePose> Take() { return final_.Take(); }
+
+ private:
+  FrameRefiner refiner_;
+  FinalPoses final_;
+  PoseSearch search_;  ///< what refined frames see is not news of the map
+  bool smooth_;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,133 @@
+// Frames placed when the sequence has ended.
+#include "dmslam/refinement/late_placement.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/map/testing/map_scene.h"
+
+namespace dmslam {
+namespace {
+
+using testing::MapScene;
+
+WaitingFrame Waiting(uint32_t index) { return WaitingFrame(index, index * 33'333'333LL, FeatureSet()); }
+
+TEST(UnplacedFramesTest, TheOldestAreForgotten) {
+  UnplacedFrames frames(3);
+  for (uint32_t i = 0; i < 5; ++i) frames.Keep(Waiting(i));
+  EXPECT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames.TakeNewest().index, 4u);
+  frames.PutBack({});
+  std::vector<WaitingFrame> older;
+  older.push_back(Waiting(1));
+  frames.PutBack(std::move(older));
+  EXPECT_EQ(frames.TakeNewest().index, 3u);
+  EXPECT_EQ(frames.TakeNewest().index, 2u);
+  EXPECT_EQ(frames.TakeNewest().index, 1u);
+  EXPECT_TRUE(frames.empty());
+}
+
+TEST(UnplacedFramesTest, ThoseFromAFrameOnAreTakenInOrder) {
+  UnplacedFrames frames(10);
+  for (uint32_t i = 0; i < 6; ++i) frames.Keep(Waiting(i));
+  const std::deque<WaitingFrame> taken = frames.TakeFrom(4);
+  ASSERT_EQ(taken.size(), 2u);
+  EXPECT_EQ(taken.front().index, 4u);
+  EXPECT_EQ(frames.size(), 4u);
+}
+
+TEST(UnplacedFramesTest, WhatWasSetAsideIsTriedAgainInOrder) {
+  UnplacedFrames frames(10);
+  for (uint32_t i = 0; i < 3; ++i) frames.Keep(Waiting(i));
+  while (!frames.empty()) frames.SetAside(frames.TakeNewest());
+  frames.ReturnSetAside();
+  EXPECT_EQ(frames.TakeNewest().index, 2u);
+  EXPECT_EQ(frames.size(), 2u);
+}
+
+TEST(PlausibleMotion, IsBoundedInTimeAndDepth) {
+  const Rigid3d here = MapScene::PoseAt(0), there = MapScene::PoseAt(0.5);
+  EXPECT_TRUE(IsPlausibleMotion(here, there, 0.2, 2.0));
+  EXPECT_FALSE(IsPlausibleMotion(here, there, 0.1, 2.0)) << "too fast";
+  EXPECT_FALSE(IsPlausibleMotion(here, there, 0.2, 1.0)) << "too far in a small scene";
+  const Rigid3d turned(ExpSo3({0, 0.5, 0}), Eigen::Vector3d::Zero());
+  EXPECT_TRUE(IsPlausibleMotion(here, turned, 0.2, 1.0));
+  EXPECT_FALSE(IsPlausibleMotion(here, turned, 0.1, 1.0));
+}
+
+/// Frames before the map's first keyframe, which is frame 20.
+class GrowingBack : public ::testing::Test {
+ protected:
+  static constexpr uint32_t kFirst = 20;
+  static constexpr int64_t kFrameNs = 33'333'333;
+
+  GrowingBack() : relocalizer_(nullptr), search_({}, TestCamera()), placement_(MapScene::kSession, 0, {}) {
+    scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
+    scene_.MapAll(1);
+    Keyframe first = *scene_.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, 0));
+    first.id = KeyframeId::Make(MapScene::kSession, kFirst);
+    first.stamp_ns = kFirst * kFrameNs;
+    const std::vector<LandmarkId> seen = first.landmarks;
+    first.landmarks.clear();
+    scene_.map().AddKeyframe(first);
+    for (size_t i = 0; i < seen.size(); ++i)
+      scene_.map().SetObservation(first.id, static_cast<uint16_t>(i), seen[i]);
+    scene_.map().RemoveKeyframe(KeyframeId::Make(MapScene::kSession, 0));
+    placement_.SetGrowing(true);
+  }
+
+  TrackedFrame Frame(uint32_t index, double x) const {
+    TrackedFrame frame = scene_.See(index, index * kFrameNs, MapScene::PoseAt(x));
+    frame.T_cam_world = Rigid3d();
+    return frame;
+  }
+  TrackingReport Place(TrackedFrame* frame) {
+    return placement_.Place(scene_.map(), &search_, relocalizer_, frame);
+  }
+
+  MapScene scene_;
+  Relocalizer relocalizer_;
+  PoseSearch search_;
+  LatePlacement placement_;
+};
+
+TEST_F(GrowingBack, FramesArePlacedFromTheOneAfterThem) {
+  for (uint32_t index = kFirst - 1; index > 10; --index) {
+    const double x = -0.02 * (kFirst - index);
+    TrackedFrame frame = Frame(index, x);
+    const TrackingReport report = Place(&frame);
+    ASSERT_TRUE(report.ok) << index << ": " << report.reason;
+    EXPECT_LT((frame.T_cam_world.Center() - Eigen::Vector3d(x, 0, 0)).norm(), 2e-3);
+    placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
+  }
+}
+
+TEST_F(GrowingBack, AFrameTooFarFromItsNeighbourIsNotBelieved) {
+  TrackedFrame frame = Frame(kFirst - 1, -0.02);
+  ASSERT_TRUE(Place(&frame).ok);
+  placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
+  TrackedFrame leap = Frame(kFirst - 2, -0.02);
+  leap.stamp_ns = frame.stamp_ns - 1'000'000;  // the same place, but hardly any time between: as if it flew
+  TrackedFrame near = Frame(kFirst - 2, -0.08);
+  near.stamp_ns = leap.stamp_ns;
+  EXPECT_TRUE(Place(&leap).ok);
+  EXPECT_FALSE(Place(&near).ok) << "0.06 units in a thousandth of a second";
+}
+
+TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
+  TrackedFrame frame = Frame(kFirst - 1, -0.02);
+  ASSERT_TRUE(Place(&frame).ok);
+  placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
+  const Rigid3d shift(Eigen::Quaterniond::Identity(), {-3.0, 0, 0});
+  const KeyframeId id = KeyframeId::Make(MapScene::kSession, kFirst);
+  scene_.map().SetPose(id, scene_.map().FindKeyframe(id)->T_cam_world * shift);
+  for (size_t i = 0; i < scene_.size(); ++i)
+    scene_.map().SetPosition(MapScene::IdOf(i), scene_.point(i) + Eigen::Vector3d(3, 0, 0));
+  placement_.OnMapChanged(scene_.map());
+  TrackedFrame next = Frame(kFirst - 2, -0.04);
+  ASSERT_TRUE(Place(&next).ok);
+  EXPECT_LT((next.T_cam_world.Center() - Eigen::Vector3d(2.96, 0, 0)).norm(), 3e-3);
+}
+
+}  // namespace
+}  // namespace dmslam

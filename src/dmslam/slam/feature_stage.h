@@ -1,0 +1,21 @@
+#pragma once
+
+#include "dmslam/features/orb_extractor.h"
+
+namespace dmslam {
+
+/// From the image to its features: more of them while a first map is looked for.
+class FeatureStage {
+ public:
+  FeatureStage(const OrbExtractorOptions& options, double first_map_factor);
+
+  FeatureSet Extract(const GrayView& image, bool for_first_map);
+  double last_ms() const { return last_ms_; }
+
+ private:
+  OrbExtractor extractor_;
+  OrbExtractor first_map_extractor_;
+  double last_ms_ = 0;
+};
+
+}  // namespace dmslam

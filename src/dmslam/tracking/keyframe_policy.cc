@@ -1,0 +1,28 @@
+#include "dmslam/tracking/keyframe_policy.h"
+
+#include <algorithm>
+
+namespace dmslam {
+namespace {
+
+constexpr double kWeakShare = 0.5;  // of the expected landmarks
+constexpr int kWeak = 60;           // landmarks
+
+int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
+
+}  // namespace
+
+bool WantsKeyframe(const KeyframeOptions& options, const KeyframeInputs& inputs) {
+  if (inputs.num_static <= options.min_inliers) return false;
+  const bool weak = inputs.num_static < kWeakShare * inputs.expected || inputs.num_static < kWeak;
+  const int64_t due_ns = ToNs(std::min(options.min_interval_s, options.max_interval_s));
+  const bool due = inputs.since_ns >= due_ns || weak;
+  return due && inputs.num_static < options.tracked_ratio * inputs.expected;
+}
+
+/// A map of two keyframes has no landmark that three see.
+int ExpectedOf(const Map& map, const Keyframe& reference) {
+  return map.CountTracked(reference, map.keyframes().size() <= 2 ? 2 : 3);
+}
+
+}  // namespace dmslam

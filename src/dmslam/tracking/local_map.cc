@@ -1,0 +1,87 @@
+#include "dmslam/tracking/local_map.h"
+
+#include <algorithm>
+
+namespace dmslam {
+namespace {
+
+constexpr int kNeighboursAsked = 10;
+
+}  // namespace
+
+void LocalMap::Reset() {
+  reference_ = {};
+  keyframes_.clear();
+  landmarks_.clear();
+}
+
+/// The keyframes that see most of the frame's landmarks, most first.
+void LocalMap::RankByVotes(const Map& map, const TrackedFrame& frame) {
+  votes_.clear();
+  for (const LandmarkId id : frame.landmarks) {
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    if (landmark == nullptr) continue;
+    for (const Observation& o : landmark->observations) votes_.push_back(o.keyframe);
+  }
+  std::sort(votes_.begin(), votes_.end());
+  ranked_.clear();
+  for (auto begin = votes_.begin(); begin != votes_.end();) {
+    const auto end = std::find_if(begin, votes_.end(), [begin](KeyframeId other) { return other != *begin; });
+    ranked_.emplace_back(-static_cast<int>(end - begin), *begin);
+    begin = end;
+  }
+  std::sort(ranked_.begin(), ranked_.end());
+}
+
+/// The best neighbour of a local keyframe that is not local yet; invalid: none.
+KeyframeId LocalMap::NewNeighbour(const Map& map, KeyframeId of) {
+  ranked_.clear();
+  for (const auto& [other, shared] : map.FindKeyframe(of)->covisible) {
+    if (shared >= 1) ranked_.emplace_back(-shared, other);
+  }
+  const auto asked = ranked_.begin() + std::min<ptrdiff_t>(kNeighboursAsked, std::ssize(ranked_));
+  std::partial_sort(ranked_.begin(), asked, ranked_.end());
+  const auto found = std::find_if(ranked_.begin(), asked, [this](const auto& item) {
+    return !std::binary_search(listed_.begin(), listed_.end(), item.second);
+  });
+  return found == asked ? KeyframeId() : found->second;
+}
+
+void LocalMap::AddNeighbours(const Map& map) {
+  listed_ = keyframes_;
+  std::sort(listed_.begin(), listed_.end());
+  const size_t direct = keyframes_.size();
+  for (size_t i = 0; i < direct && keyframes_.size() < max_keyframes_; ++i) {
+    const KeyframeId neighbour = NewNeighbour(map, keyframes_[i]);
+    if (!neighbour.valid()) continue;
+    listed_.insert(std::lower_bound(listed_.begin(), listed_.end(), neighbour), neighbour);
+    keyframes_.push_back(neighbour);
+  }
+}
+
+void LocalMap::ListLandmarks(const Map& map) {
+  landmarks_.clear();
+  for (const KeyframeId id : keyframes_) {
+    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+      if (landmark.valid()) landmarks_.push_back(landmark);
+    }
+  }
+  std::sort(landmarks_.begin(), landmarks_.end());
+  landmarks_.erase(std::unique(landmarks_.begin(), landmarks_.end()), landmarks_.end());
+}
+
+void LocalMap::Collect(const Map& map, const TrackedFrame& frame) {
+  RankByVotes(map, frame);
+  keyframes_.clear();
+  for (size_t i = 0; i < std::min(ranked_.size(), max_keyframes_); ++i)
+    keyframes_.push_back(ranked_[i].second);
+  if (!keyframes_.empty()) reference_ = keyframes_.front();
+  AddNeighbours(map);
+  ListLandmarks(map);
+}
+
+void LocalMap::DropGone(const Map& map) {
+  std::erase_if(landmarks_, [&](LandmarkId id) { return map.FindLandmark(id) == nullptr; });
+}
+
+}  // namespace dmslam

@@ -1,0 +1,95 @@
+#include "dmslam/tracking/motion_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dmslam {
+namespace {
+
+// Times are compared half a step beside those at which frames come at 30 Hz. The frame that comes next is
+// near enough at any rate.
+constexpr int64_t kStepNs = 1'000'000'000 / 30;
+constexpr int64_t kRecentNs = 500'000'000;            // so long a tracked frame's pose leads anywhere
+constexpr int64_t kKnownNs = kStepNs * 11 / 2;        // so long the newest pose's motion says something
+constexpr int64_t kSuccessiveNs = kStepNs * 5 / 2;    // a step no longer than this is a motion...
+constexpr int64_t kCoastingStepNs = kStepNs * 3 / 2;  // ...and this, with a weak pose at its end
+
+}  // namespace
+
+PosePrior MotionPrior(const MotionModelOptions& options, const Rigid3d& T_cam_world, double depth,
+                      double steps) {
+  PosePrior prior;
+  prior.T_cam_world = T_cam_world;
+  const double rotation = 1.0 / (options.prior_rotation_rad * steps);
+  const double translation = 1.0 / (options.prior_translation * depth * steps);
+  prior.information.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
+      Eigen::Vector3d::Constant(translation * translation);
+  return prior;
+}
+
+std::optional<PlacedPose> PlacedPose::Of(const Map& map, const Rigid3d& T_cam_world, KeyframeId reference) {
+  const Keyframe* keyframe = map.FindKeyframe(reference);
+  if (keyframe == nullptr) return std::nullopt;
+  return PlacedPose{reference, T_cam_world * keyframe->T_cam_world.Inverse(), keyframe->scale};
+}
+
+std::optional<Rigid3d> PlacedPose::In(const Map& map) const {
+  const std::optional<Map::ResolvedPose> keyframe = map.ResolvePose(reference);
+  if (!keyframe) return std::nullopt;
+  return keyframe->Compose(T_cam_reference, scale);
+}
+
+void MotionModel::Begin(const PlacedPose& pose, const FrameTime& time) {
+  last_ = {pose, time};
+  Stop();
+}
+
+void MotionModel::Stop() {
+  velocity_.reset();
+  coasting_.reset();
+}
+
+bool MotionModel::IsWithin(const FrameTime& time, int64_t limit_ns) const {
+  const FrameTime& newest = Newest().time;
+  return time.index - newest.index == 1 || time.stamp_ns - newest.stamp_ns <= limit_ns;
+}
+
+/// The depth of the scene is that of the keyframe seen last.
+PosePrior MotionModel::MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const {
+  const Keyframe* reference = map.FindKeyframe(last_.pose.reference);
+  const double depth = reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
+  return MotionPrior(options_, T_cam_world, depth,
+                     std::max(1.0, std::round(static_cast<double>(since_ns) / kStepNs)));
+}
+
+MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time) const {
+  Prediction prediction;
+  prediction.recent = time.stamp_ns - last_.time.stamp_ns < kRecentNs;
+  prediction.T_cam_world = Newest().pose.In(map);
+  if (!prediction.T_cam_world || !velocity_) return prediction;
+  // The map may have been scaled since the velocity was measured.
+  const double growth = map.ResolvePose(Newest().pose.reference)->scale / Newest().pose.scale;
+  prediction.T_cam_world =
+      Rigid3d(velocity_->rotation, velocity_->translation * growth) * *prediction.T_cam_world;
+  if (!IsWithin(time, kKnownNs)) return prediction;
+  prediction.prior = MakePrior(map, *prediction.T_cam_world, time.stamp_ns - Newest().time.stamp_ns);
+  return prediction;
+}
+
+void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world,
+                            const FrameTime& time, bool jumped) {
+  const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
+  const bool successive = IsWithin(time, kSuccessiveNs) && !jumped;
+  Begin(pose, time);
+  if (successive && T_last_world) velocity_ = T_cam_world * T_last_world->Inverse();
+}
+
+void MotionModel::Coast(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) {
+  const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
+  const std::optional<PlacedPose> pose = PlacedPose::Of(map, T_cam_world, last_.pose.reference);
+  if (!pose || !T_last_world || !IsWithin(time, kKnownNs)) return;
+  if (IsWithin(time, kCoastingStepNs)) velocity_ = T_cam_world * T_last_world->Inverse();
+  coasting_ = Pose{*pose, time};
+}
+
+}  // namespace dmslam

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "dmslam/map/map.h"
+#include "dmslam/optimization/pose_optimization.h"
+
+namespace dmslam {
+
+/// A pose told relative to a keyframe, so that it goes with the map's corrections.
+struct PlacedPose {
+  KeyframeId reference;
+  Rigid3d T_cam_reference;
+  double scale = 1.0;  ///< of the reference when the pose was told
+
+  /// None where the keyframe is not in the map.
+  static std::optional<PlacedPose> Of(const Map& map, const Rigid3d& T_cam_world, KeyframeId reference);
+  /// T_cam_world in the map as it is now; none where nothing is known of the reference.
+  std::optional<Rigid3d> In(const Map& map) const;
+};
+
+/// Which frame of the stream, and when.
+struct FrameTime {
+  uint32_t index = 0;
+  int64_t stamp_ns = 0;
+};
+
+struct MotionModelOptions {
+  double prior_rotation_rad = 0.01;  ///< how well a step of 1/30 s is known beforehand...
+  double prior_translation = 0.01;   ///< ...and its translation, as a share of the scene's depth
+};
+
+/// What a motion model that predicts this pose `steps` of 1/30 s ahead knows; `depth` of the scene [map
+/// units].
+PosePrior MotionPrior(const MotionModelOptions& options, const Rigid3d& T_cam_world, double depth,
+                      double steps = 1.0);
+
+/// Where the camera is expected: the newest pose, and its motion carried on. A weak pose that too few
+/// landmarks support to be told may lead the search for a few frames (coasting).
+class MotionModel {
+ public:
+  struct Prediction {
+    std::optional<Rigid3d> T_cam_world;  ///< none: nothing is known
+    std::optional<PosePrior> prior;      ///< where the motion is known and recent
+    bool recent = false;  ///< the last frame was tracked so shortly ago that this leads anywhere
+  };
+
+  explicit MotionModel(const MotionModelOptions& options) : options_(options) {}
+
+  /// Stands at a known pose; its motion is not known.
+  void Begin(const PlacedPose& pose, const FrameTime& time);
+  Prediction Predict(const Map& map, const FrameTime& time) const;
+  /// A frame was tracked. `jumped`: not from the frame before (relocalised), so the step is no motion.
+  void OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world, const FrameTime& time,
+                 bool jumped);
+  /// A frame was not tracked, but has a weak pose.
+  void Coast(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time);
+  /// The motion is not known any more.
+  void Stop();
+
+  /// Of the frame tracked last.
+  const PlacedPose& last() const { return last_.pose; }
+  int64_t last_stamp_ns() const { return last_.time.stamp_ns; }
+  bool IsCoasting() const { return coasting_.has_value(); }
+
+ private:
+  struct Pose {
+    PlacedPose pose;
+    FrameTime time;
+  };
+  const Pose& Newest() const { return coasting_ ? *coasting_ : last_; }
+  bool IsWithin(const FrameTime& time, int64_t limit_ns) const;
+  PosePrior MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const;
+
+  MotionModelOptions options_;
+  Pose last_;
+  std::optional<Pose> coasting_;
+  std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the newest pose, coasted ones included
+};
+
+}  // namespace dmslam

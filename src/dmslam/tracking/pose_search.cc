@@ -1,0 +1,98 @@
+#include "dmslam/tracking/pose_search.h"
+
+namespace dmslam {
+namespace {
+
+constexpr double kWiderAfterRelocalization = 2.0;  // times the radius of the search
+constexpr double kWiderAroundPrediction = 4.0;
+constexpr size_t kMinKeyframeMatches = 15;
+
+void SetMatches(const std::vector<LandmarkMatch>& matches, const Rigid3d& T_cam_world, TrackedFrame* frame) {
+  frame->ClearMatches();
+  for (const LandmarkMatch& match : matches) frame->landmarks[match.feature] = match.landmark;
+  frame->T_cam_world = T_cam_world;
+}
+
+}  // namespace
+
+PoseSearch::PoseSearch(const TrackingOptions& options, const Camera& camera)
+    : options_(options),
+      camera_(camera),
+      local_map_(options.max_local_keyframes),
+      search_(options),
+      solver_(options.chi2),
+      judge_(options.dynamics, camera) {}
+
+void PoseSearch::Reset() {
+  local_map_.Reset();
+  judge_.Reset();
+}
+
+bool PoseSearch::FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
+                           const Prior& prior, TrackedFrame* frame) {
+  const size_t needed = static_cast<size_t>(options_.min_motion_matches);
+  const auto* matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, options_.motion_radius_px,
+                                            *frame->features);
+  if (matches->size() < needed) {
+    matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * options_.motion_radius_px,
+                                  *frame->features);
+  }
+  if (matches->size() < needed) return false;
+  SetMatches(*matches, T_predicted, frame);
+  return solver_.Solve(map, prior, &judge_, frame).inliers >= options_.min_motion_inliers;
+}
+
+int PoseSearch::FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior,
+                               TrackedFrame* frame) {
+  local_map_.DropGone(map);
+  SetMatches({}, T_predicted, frame);
+  MatchAround(map, kWiderAroundPrediction, frame);
+  return solver_.Solve(map, prior, &judge_, frame).inliers;
+}
+
+bool PoseSearch::FromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed, const Prior& prior,
+                              TrackedFrame* frame) {
+  const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
+  if (keyframe == nullptr) return false;
+  const std::vector<LandmarkMatch>& matches =
+      search_.MatchKeyframe(map, judge_.votes(), *keyframe, *frame->features);
+  if (matches.size() < kMinKeyframeMatches) return false;
+  PoseRansacOptions ransac;
+  ransac.seed = seed;
+  const auto report = PoseFromLandmarks(map, *frame->features, matches, ransac);
+  if (!report.success) return false;
+  SetMatches(matches, report.model, frame);
+  return solver_.Solve(map, prior, &judge_, frame).inliers >= options_.min_motion_inliers;
+}
+
+TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame) {
+  local_map_.Collect(map, *frame);
+  const auto expected = MatchAround(map, careful ? kWiderAfterRelocalization : 1.0, frame);
+  const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
+  judge_.Judge(map, expected, fit.rejected, frame);
+  TrackingReport report = CountClasses(camera_, *frame);
+  Decide(fit, careful, &report);
+  if (report.ok) judge_.Believe(map, expected, *frame);
+  return report;
+}
+
+std::span<const ExpectedLandmark> PoseSearch::MatchAround(const Map& map, double wider, TrackedFrame* frame) {
+  const auto expected = search_.MatchLandmarks(map, judge_.votes(), local_map_.landmarks(), wider, frame);
+  judge_.DropMatchesOfHiddenPlaces(map, expected, frame);
+  return expected;
+}
+
+void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report) const {
+  report->num_static = fit.inliers;
+  report->mean_chi2 = fit.mean_chi2;
+  const int needed = careful ? options_.min_inliers_after_relocalization : options_.min_local_inliers;
+  if (fit.inliers < needed) {
+    report->reason = "too few static features match the map";
+  } else if (report->cells < options_.min_cells) {
+    report->reason = "the static features lie in too small a part of the image";
+  } else {
+    report->ok = true;
+  }
+}
+
+}  // namespace dmslam

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "dmslam/dynamics/motion_judge.h"
+#include "dmslam/map/map.h"
+#include "dmslam/optimization/pose_optimization.h"
+#include "dmslam/tracking/local_map.h"
+#include "dmslam/tracking/pose_solver.h"
+#include "dmslam/tracking/projection_search.h"
+#include "dmslam/tracking/tracking_options.h"
+#include "dmslam/tracking/tracking_report.h"
+
+namespace dmslam {
+
+/// Finds a frame's pose in a map: first by another frame, by the motion model alone or by a keyframe, and
+/// then against the local map. Keeps what the next frame needs: the local map and the judgement of what
+/// moves. The map is given with each call and only read. `prior`: where the motion model expects the camera.
+class PoseSearch {
+ public:
+  using Prior = std::optional<PosePrior>;
+
+  PoseSearch(const TrackingOptions& options, const Camera& camera);
+
+  /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
+  bool FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, const Prior& prior,
+                 TrackedFrame* frame);
+  /// Matches the landmarks around the frame searched for last, many more than it saw itself, near their
+  /// projections at `T_predicted`, and optimises the pose. Returns the number of inliers.
+  int FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior, TrackedFrame* frame);
+  /// Matches a keyframe's landmarks by descriptor alone, and finds the pose from nothing.
+  bool FromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, const Prior& prior,
+                    TrackedFrame* frame);
+  /// Refines the pose against the landmarks around: what its matches' keyframes and their neighbours see.
+  /// `careful`: the camera was lost just before, so more is asked. Where the report is ok, what the frame
+  /// says of landmarks is added to the judge's evidence.
+  TrackingReport InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
+
+  /// The keyframe that shares most landmarks with the frame searched for last.
+  KeyframeId reference() const { return local_map_.reference(); }
+  MotionJudge& judge() { return judge_; }
+  /// Forgets what belongs to a map that is gone.
+  void Reset();
+
+ private:
+  std::span<const ExpectedLandmark> MatchAround(const Map& map, double wider, TrackedFrame* frame);
+  void Decide(const PoseFit& fit, bool careful, TrackingReport* report) const;
+
+  TrackingOptions options_;
+  Camera camera_;
+  LocalMap local_map_;
+  ProjectionSearch search_;
+  PoseSolver solver_;
+  MotionJudge judge_;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,110 @@
+#include "dmslam/tracking/projection_search.h"
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <optional>
+
+namespace dmslam {
+namespace {
+
+constexpr int kTurnBins = 30;
+constexpr int kMaxKeyframeDistance = 50;    // bits, without a position
+constexpr double kMaxKeyframeRatio = 0.75;  // best over second best descriptor distance
+constexpr double kFrontalCos = 0.998;
+
+}  // namespace
+
+const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, const LandmarkVotes& votes,
+                                                               const TrackedFrame& last,
+                                                               const Rigid3d& T_cam_world, double radius_px,
+                                                               const FrameFeatures& features) {
+  matches_.clear();
+  turns_.clear();
+  taken_.assign(features.size(), 0);
+  for (size_t i = 0; i < last.landmarks.size(); ++i) {
+    if (!last.landmarks[i].valid()) continue;
+    const std::optional<LandmarkId> id = map.Resolve(last.landmarks[i]);
+    if (!id) continue;
+    const Landmark& landmark = *map.FindLandmark(*id);
+    if (!votes.HasVote(landmark)) continue;
+    const std::optional<Eigen::Vector2d> uv = map.camera().Project(T_cam_world * landmark.p_world);
+    if (!uv) continue;
+    const Keypoint& seen = last.features->set.keypoints[i];
+    const FeatureHit hit =
+        FindFeature(features, *uv, radius_px * map.pyramid().Scale(seen.octave), seen.octave - 1,
+                    seen.octave + 1, last.features->set.descriptors[i], taken_);
+    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
+    const size_t feature = static_cast<size_t>(hit.feature);
+    taken_[feature] = 1;
+    matches_.push_back({static_cast<uint16_t>(feature), *id});
+    turns_.push_back(
+        static_cast<float>(static_cast<uint8_t>(features.set.keypoints[feature].angle - seen.angle)));
+  }
+  KeepConsistentTurns();
+  return matches_;
+}
+
+/// Keeps the matches whose keypoints turned as most others did (three best of thirty bins, as in ORB-SLAM2).
+void ProjectionSearch::KeepConsistentTurns() {
+  std::array<int, kTurnBins> counts{};
+  const auto bin_of = [](float turn) { return static_cast<size_t>(turn * kTurnBins / 256.0F) % kTurnBins; };
+  for (const float turn : turns_) ++counts[bin_of(turn)];
+  std::array<int, kTurnBins> sorted = counts;
+  std::sort(sorted.begin(), sorted.end(), std::greater<>());
+  const int least = std::max(sorted[2], sorted[0] / 10);
+  size_t kept = 0;
+  for (size_t i = 0; i < matches_.size(); ++i) {
+    if (counts[bin_of(turns_[i])] >= std::max(1, least)) matches_[kept++] = matches_[i];
+  }
+  matches_.resize(kept);
+}
+
+const std::vector<LandmarkMatch>& ProjectionSearch::MatchKeyframe(const Map& map, const LandmarkVotes& votes,
+                                                                  const Keyframe& keyframe,
+                                                                  const FrameFeatures& features) {
+  const Camera& camera = map.camera();
+  const Eigen::Vector2d middle_px(camera.width_px / 2.0, camera.height_px / 2.0);
+  matches_.clear();
+  taken_.assign(features.size(), 0);
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    const Landmark* landmark =
+        keyframe.landmarks[i].valid() ? map.FindLandmark(keyframe.landmarks[i]) : nullptr;
+    if (landmark == nullptr || !votes.HasVote(*landmark)) continue;
+    const FeatureHit hit = FindFeature(features, middle_px, 2.0 * camera.width_px, 0, map.pyramid().levels,
+                                       keyframe.features->set.descriptors[i], taken_);
+    const bool alone = hit.distance <= kMaxKeyframeRatio * hit.second_distance;
+    if (hit.feature < 0 || hit.distance > kMaxKeyframeDistance || !alone) continue;
+    taken_[static_cast<size_t>(hit.feature)] = 1;
+    matches_.push_back({static_cast<uint16_t>(hit.feature), landmark->id});
+  }
+  return matches_;
+}
+
+std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& map, const LandmarkVotes& votes,
+                                                                   std::span<const LandmarkId> landmarks,
+                                                                   double wider, TrackedFrame* frame) {
+  ListMatched(*frame, &matched_);
+  MarkMatched(*frame, &taken_);
+  expected_.clear();
+  for (const LandmarkId id : landmarks) {
+    const Landmark& landmark = *map.FindLandmark(id);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, frame->T_cam_world);
+    if (!view) continue;
+    expected_.push_back({id, *view});
+    if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), id)) continue;
+    const double radius =
+        wider * (view->view_cos > kFrontalCos ? options_.local_radius_frontal : options_.local_radius);
+    const FeatureHit hit =
+        FindFeature(*frame->features, view->uv_px, radius * map.pyramid().Scale(view->octave),
+                    view->octave - 1, view->octave, landmark.descriptor, taken_);
+    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
+    if (hit.octave == hit.second_octave && hit.distance > options_.local_ratio * hit.second_distance)
+      continue;
+    frame->landmarks[static_cast<size_t>(hit.feature)] = id;
+    taken_[static_cast<size_t>(hit.feature)] = 1;
+  }
+  return expected_;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "dmslam/map/replica.h"
+#include "dmslam/tracking/motion_model.h"
+#include "dmslam/tracking/pose_search.h"
+#include "dmslam/tracking/relocalizer.h"
+
+namespace dmslam {
+
+/// What tracking a frame came to.
+struct TrackingResult {
+  TrackedFrame frame{};                           ///< with its matches and classes
+  TrackingReport report{};                        ///< what it sees of the map
+  std::optional<PlacedPose> pose = std::nullopt;  ///< of the frame; none: the report says why
+  bool relocalized = false;                       ///< found without the motion model
+};
+
+/// Follows the camera through the frames of a stream, in a map that is given with each and only read.
+class Tracker {
+ public:
+  struct Setup {
+    TrackingOptions options;
+    Camera camera;
+    std::shared_ptr<const Vocabulary> vocabulary;  ///< to find a lost camera; none: only near where it was
+    uint64_t seed = 0;
+  };
+  explicit Tracker(const Setup& setup);
+
+  /// Begins at a keyframe; nothing is known of the motion.
+  void BeginAt(const Keyframe& keyframe);
+  /// Begins lost.
+  void BeginLost(const FrameTime& time) { motion_.Begin({}, time); }
+
+  struct Request {
+    std::optional<MapId> map_id;  ///< where a lost camera is looked for; none: in all maps
+    bool may_relocalize = true;
+  };
+  /// The next frame of the stream. The map may have changed since the last one.
+  TrackingResult Track(const Map& map, const Request& request, TrackedFrame frame);
+
+  /// After each change of the map, and when it is void.
+  void OnMapChanged(const Replica& map) { relocalizer_.Update(map); }
+  void OnMapForgotten();
+  /// The map that was tracked in is given up.
+  void OnMapGivenUp();
+
+  /// Stamp of the frame tracked last.
+  int64_t last_tracked_ns() const { return motion_.last_stamp_ns(); }
+  /// What frames said of landmarks since the last call.
+  FrameEvidence TakeEvidence(int64_t stamp_ns, MapId map_id) {
+    return search_.judge().TakeEvidence(stamp_ns, map_id);
+  }
+  /// For frames beside the stream, when it has ended.
+  PoseSearch& search() { return search_; }
+  const Relocalizer& relocalizer() const { return relocalizer_; }
+
+ private:
+  struct Attempt {
+    TrackingReport report;
+    std::optional<Rigid3d> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
+    bool relocalized = false;
+  };
+
+  bool FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
+                    Attempt* attempt);
+  Attempt FollowMotion(const Map& map, TrackedFrame* frame);
+  void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
+  bool IsCareful(int64_t stamp_ns) const;
+
+  TrackingOptions options_;
+  uint64_t seed_;
+  PoseSearch search_;
+  Relocalizer relocalizer_;
+  MotionModel motion_;
+  TrackedFrame last_;                      ///< the frame tracked last
+  std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
+};
+
+}  // namespace dmslam

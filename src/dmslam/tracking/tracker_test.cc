@@ -1,0 +1,247 @@
+// Tracking in a small map: each mechanism fails its test when it is taken out.
+#include "dmslam/tracking/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "dmslam/map/testing/map_scene.h"
+#include "dmslam/tracking/keyframe_policy.h"
+
+namespace dmslam {
+namespace {
+
+using testing::MapScene;
+
+constexpr int64_t kFrameNs = 33'333'333;
+constexpr int64_t kStartNs = 10'000'000'000;
+constexpr double kStep = 0.01;  // of the camera, per frame [map units]
+
+double ErrorAt(const Rigid3d& T_cam_world, double x) {
+  return (T_cam_world.Center() - Eigen::Vector3d(x, 0, 0)).norm();
+}
+
+// ---- Keyframe policy ----
+
+TEST(KeyframePolicy, AsksWhereTheMapShouldGrow) {
+  const KeyframeOptions options;
+  const int64_t long_ago = 2'000'000'000, just_now = 10'000'000;
+  EXPECT_FALSE(WantsKeyframe(options, {190, 200, long_ago})) << "the map suffices";
+  EXPECT_TRUE(WantsKeyframe(options, {170, 200, long_ago}));
+  EXPECT_FALSE(WantsKeyframe(options, {170, 200, just_now})) << "not yet";
+  EXPECT_TRUE(WantsKeyframe(options, {90, 200, just_now})) << "tracking becomes weak";
+  EXPECT_TRUE(WantsKeyframe(options, {55, 70, just_now})) << "... or hangs on few landmarks";
+  EXPECT_FALSE(WantsKeyframe(options, {15, 200, long_ago})) << "so few make no keyframe";
+}
+
+TEST(KeyframePolicy, TimeIsCountedInSecondsNotFrames) {
+  KeyframeOptions options;
+  options.min_interval_s = 0.1;
+  EXPECT_FALSE(WantsKeyframe(options, {170, 200, 99'999'999}));
+  EXPECT_TRUE(WantsKeyframe(options, {170, 200, 100'000'000}));
+}
+
+// ---- Motion model ----
+
+class Motion : public ::testing::Test {
+ protected:
+  Motion() {
+    scene_.AddCloud(100, {0, 0, 4}, {1, 1, 0.5});
+    scene_.MapAll();
+  }
+  static FrameTime Time(uint32_t frame) { return {frame, kStartNs + frame * kFrameNs}; }
+  void TrackTo(uint32_t frame, bool jumped = false) {
+    const Rigid3d T_cam_world = MapScene::PoseAt(kStep * frame);
+    motion_.OnTracked(scene_.map(), *PlacedPose::Of(scene_.map(), T_cam_world, Reference()), T_cam_world,
+                      Time(frame), jumped);
+  }
+  MotionModel::Prediction Predict(uint32_t frame) { return motion_.Predict(scene_.map(), Time(frame)); }
+  static KeyframeId Reference() { return KeyframeId::Make(MapScene::kSession, 0); }
+
+  MapScene scene_;
+  MotionModel motion_{{}};
+};
+
+TEST_F(Motion, NothingIsKnownBeforeTheFirstPose) {
+  EXPECT_FALSE(Predict(1).T_cam_world);
+  TrackTo(1);
+  const auto prediction = Predict(2);
+  ASSERT_TRUE(prediction.T_cam_world);
+  EXPECT_FALSE(prediction.prior) << "a pose alone is no motion";
+}
+
+TEST_F(Motion, GoesOnAsBefore) {
+  TrackTo(1);
+  TrackTo(2);
+  const auto prediction = Predict(3);
+  ASSERT_TRUE(prediction.prior);
+  EXPECT_LT(ErrorAt(*prediction.T_cam_world, 3 * kStep), 1e-9);
+}
+
+TEST_F(Motion, AJumpIsNoMotion) {
+  TrackTo(1);
+  TrackTo(2, true);
+  EXPECT_FALSE(Predict(3).prior);
+  EXPECT_LT(ErrorAt(*Predict(3).T_cam_world, 2 * kStep), 1e-9);
+}
+
+TEST_F(Motion, ThePriorFadesWithTheGap) {
+  TrackTo(1);
+  TrackTo(2);
+  const double near = Predict(3).prior->information(0, 0), far = Predict(6).prior->information(0, 0);
+  EXPECT_NEAR(near / far, 16.0, 1e-6);
+  EXPECT_FALSE(Predict(8).prior) << "after a fifth of a second the motion says too little";
+  EXPECT_TRUE(Predict(10).recent);
+  EXPECT_FALSE(Predict(20).recent);
+}
+
+TEST_F(Motion, FollowsACorrectionOfTheMap) {
+  TrackTo(1);
+  TrackTo(2);
+  const Rigid3d shift(Eigen::Quaterniond::Identity(), {-1.0, 0, 0});
+  scene_.map().SetPose(Reference(), scene_.map().FindKeyframe(Reference())->T_cam_world * shift);
+  EXPECT_LT(ErrorAt(*Predict(3).T_cam_world, 1.0 + 3 * kStep), 1e-9);
+}
+
+TEST_F(Motion, CoastsOnWeakPosesForAWhile) {
+  TrackTo(1);
+  TrackTo(2);
+  for (uint32_t frame = 3; frame <= 9; ++frame) {
+    motion_.Coast(scene_.map(), MapScene::PoseAt(kStep * frame), Time(frame));
+    EXPECT_TRUE(motion_.IsCoasting());
+    ASSERT_TRUE(Predict(frame + 1).prior);
+    EXPECT_LT(ErrorAt(*Predict(frame + 1).T_cam_world, kStep * (frame + 1)), 1e-9);
+  }
+  EXPECT_EQ(motion_.last_stamp_ns(), Time(2).stamp_ns) << "a weak pose is not told";
+  TrackTo(10);
+  EXPECT_FALSE(motion_.IsCoasting());
+}
+
+// ---- Tracker ----
+
+/// A wall and, before it, a group of people who were mapped half a second ago.
+class Tracking : public ::testing::Test {
+ protected:
+  static constexpr size_t kWall = 120, kPeople = 300;
+
+  explicit Tracking(bool motion_belief = true) {
+    scene_.AddCloud(kWall, {0, 0, 4}, {1.5, 1.1, 0.3}, 0);
+    scene_.AddCloud(kPeople, {0, 0, 3}, {0.9, 0.8, 0.1}, kStartNs - 500'000'000);
+    scene_.MapAll();
+    Tracker::Setup setup;
+    setup.camera = TestCamera();
+    setup.options.dynamics.vote.motion_belief = motion_belief;
+    tracker_.emplace(setup);
+    tracker_->BeginAt(*scene_.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, 0)));
+  }
+
+  static bool IsPerson(size_t i) { return i >= kWall; }
+  static double CameraAt(uint32_t frame) { return kStep * frame; }
+
+  /// The frame in which people have gone by `walked`; `hidden`: points that are not seen.
+  TrackedFrame Frame(uint32_t frame, double walked, const std::function<bool(size_t)>& hidden = {}) const {
+    return scene_.See(frame, static_cast<int64_t>(frame) * kFrameNs, MapScene::PoseAt(CameraAt(frame)),
+                      [&](size_t i) -> std::optional<Eigen::Vector3d> {
+                        if (hidden && hidden(i)) return std::nullopt;
+                        return scene_.point(i) + Eigen::Vector3d(IsPerson(i) ? walked : 0.0, 0, 0);
+                      });
+  }
+  TrackingResult Track(TrackedFrame frame) { return tracker_->Track(scene_.map(), {}, std::move(frame)); }
+
+  MapScene scene_;
+  std::optional<Tracker> tracker_;
+};
+
+TEST_F(Tracking, FollowsTheCamera) {
+  for (uint32_t frame = 1; frame < 20; ++frame) {
+    const TrackingResult result = Track(Frame(frame, 0.0));
+    ASSERT_TRUE(result.pose) << result.report.reason;
+    EXPECT_LT(ErrorAt(result.frame.T_cam_world, CameraAt(frame)), 2e-3);
+    EXPECT_GT(result.report.num_static, 350);
+  }
+}
+
+class WithoutBelief : public Tracking {
+ protected:
+  WithoutBelief() : Tracking(false) {}
+};
+
+double WalkAway(const std::function<TrackingResult(uint32_t, double)>& track) {
+  double worst = 0;
+  for (uint32_t frame = 1; frame < 25; ++frame) {
+    const double walked = frame < 5 ? 0.0 : 0.006 * (frame - 4);
+    const TrackingResult result = track(frame, walked);
+    if (!result.pose) return 1.0;
+    worst = std::max(worst, ErrorAt(result.frame.T_cam_world, kStep * frame));
+  }
+  return worst;
+}
+
+TEST_F(Tracking, AGroupOfYoungLandmarksDoesNotCarryTheCameraAway) {
+  EXPECT_LT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 5e-3);
+}
+
+TEST_F(WithoutBelief, TheyWouldWereAllLandmarksEqual) {
+  EXPECT_GT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.02);
+}
+
+TEST_F(Tracking, WhatWalksIsReportedAsMoved) {
+  WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); });
+  int moved = 0, wall_moved = 0;
+  for (const FrameEvidence::Item& item : tracker_->TakeEvidence(0, 1).items)
+    (IsPerson(item.landmark.number() - 1) ? moved : wall_moved) += item.moved;
+  EXPECT_GT(moved, 300);
+  EXPECT_LT(wall_moved, moved / 10);
+}
+
+TEST_F(Tracking, AWeakPoseIsNotToldButLeadsTheSearchOn) {
+  for (uint32_t frame = 1; frame < 6; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  const auto nearly_all = [](size_t i) { return IsPerson(i) || i >= 12; };  // 12 points of the wall are left
+  for (uint32_t frame = 6; frame < 12; ++frame) {
+    const TrackingResult result = Track(Frame(frame, 0.0, nearly_all));
+    EXPECT_FALSE(result.pose);
+    EXPECT_STRNE(result.report.reason, "");
+  }
+  const TrackingResult again = Track(Frame(12, 0.0));
+  ASSERT_TRUE(again.pose) << again.report.reason;
+  EXPECT_FALSE(again.relocalized);
+  EXPECT_LT(ErrorAt(again.frame.T_cam_world, CameraAt(12)), 2e-3);
+}
+
+TEST_F(Tracking, InlierThatLieInOneCornerAreNotBelieved) {
+  ASSERT_TRUE(Track(Frame(1, 0.0)).pose);
+  const auto in_corner = [&](size_t i) { return scene_.point(i).x() > -0.75 || scene_.point(i).y() > -0.1; };
+  const TrackingResult result = Track(Frame(2, 0.0, in_corner));
+  EXPECT_FALSE(result.pose);
+}
+
+TEST_F(Tracking, LostForLongItIsNotLedByAnOldPose) {
+  for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  const TrackingResult result = Track(Frame(40, 0.0));
+  EXPECT_FALSE(result.pose) << "without a vocabulary nothing else finds it";
+}
+
+// ---- Projection search ----
+
+TEST_F(Tracking, TheSearchLooksNearTheProjectionOnly) {
+  ProjectionSearch search({});
+  const LandmarkVotes votes({});
+  std::vector<LandmarkId> ids;
+  for (size_t i = 0; i < kWall; ++i) ids.push_back(MapScene::IdOf(i));
+  for (const double beside : {0.0, 0.01, 0.2}) {  // 0.2 at depth 4: 25 pixels
+    TrackedFrame frame = Frame(5, 0.0);
+    frame.T_cam_world = MapScene::PoseAt(CameraAt(5) + beside);
+    const auto expected = search.MatchLandmarks(scene_.map(), votes, ids, 1.0, &frame);
+    EXPECT_GT(expected.size(), kWall / 2);
+    const auto matched = std::count_if(frame.landmarks.begin(), frame.landmarks.end(),
+                                       [](LandmarkId id) { return id.valid(); });
+    if (beside < 0.1) {
+      EXPECT_EQ(static_cast<size_t>(matched), expected.size());
+    } else {
+      EXPECT_EQ(matched, 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dmslam

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "dmslam/camera/camera.h"
+#include "dmslam/map/tracked_frame.h"
+
+namespace dmslam {
+
+/// What tracking one frame against the map came to.
+struct TrackingReport {
+  bool ok = false;
+  const char* reason = "";  ///< why not
+  int num_static = 0;       ///< inliers
+  int num_moving = 0;
+  int num_unknown = 0;      ///< matched, neither inlier nor moving
+  int cells = 0;            ///< of an 8 x 6 grid that hold inliers
+  double moving_share = 0;  ///< of the cells that hold matches, those with more moving than static ones
+  double mean_chi2 = 0;
+};
+
+/// Counts the frame's features by class, in all and by image cell. Decides nothing.
+TrackingReport CountClasses(const Camera& camera, const TrackedFrame& frame);
+
+}  // namespace dmslam
