@@ -63,16 +63,7 @@ class GrowingBack : public ::testing::Test {
 
   GrowingBack() : relocalizer_(nullptr), search_({}, TestCamera()), placement_(MapScene::kSession, 0, {}) {
     scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
-    scene_.MapAll(1);
-    Keyframe first = *scene_.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, 0));
-    first.id = KeyframeId::Make(MapScene::kSession, kFirst);
-    first.stamp_ns = kFirst * kFrameNs;
-    const std::vector<LandmarkId> seen = first.landmarks;
-    first.landmarks.clear();
-    scene_.map().AddKeyframe(first);
-    for (size_t i = 0; i < seen.size(); ++i)
-      scene_.map().SetObservation(first.id, static_cast<uint16_t>(i), seen[i]);
-    scene_.map().RemoveKeyframe(KeyframeId::Make(MapScene::kSession, 0));
+    scene_.MapAll(1, 0.0, kFirst, kFirst * kFrameNs);
     placement_.SetGrowing(true);
   }
 

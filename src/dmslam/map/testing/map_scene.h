@@ -44,15 +44,15 @@ class MapScene {
       AddPoint(middle + half.cwiseProduct(Eigen::Vector3d(x, y, z)), first_ns);
     }
   }
-  /// Makes the map: all keyframes see all points.
-  void MapAll(uint32_t num_keyframes = 4, double step = 0.05) {
+  /// Makes the map: all keyframes see all points. The first one was frame `first`.
+  void MapAll(uint32_t num_keyframes = 4, double step = 0.05, uint32_t first = 0, int64_t first_ns = 0) {
     for (uint32_t k = 0; k < num_keyframes; ++k) {
       Keyframe keyframe;
-      keyframe.id = KeyframeId::Make(kSession, k);
+      keyframe.id = KeyframeId::Make(kSession, first + k);
       keyframe.map_id = kMap;
-      keyframe.stamp_ns = k * kKeyframeStepNs;
+      keyframe.stamp_ns = first_ns + k * kKeyframeStepNs;
       keyframe.T_cam_world = PoseAt(step * k);
-      if (k > 0) keyframe.parent = KeyframeId::Make(kSession, k - 1);
+      if (k > 0) keyframe.parent = KeyframeId::Make(kSession, first + k - 1);
       keyframe.features = See(k, 0, PoseAt(step * k)).features;
       map_.AddKeyframe(std::move(keyframe));
     }
@@ -62,11 +62,11 @@ class MapScene {
       landmark.map_id = kMap;
       landmark.p_world = points_[i];
       landmark.descriptor = descriptors_[i];
-      landmark.reference = landmark.first_keyframe = KeyframeId::Make(kSession, 0);
+      landmark.reference = landmark.first_keyframe = KeyframeId::Make(kSession, first);
       landmark.first_ns = first_ns_[i];
       map_.AddLandmark(landmark);
       for (uint32_t k = 0; k < num_keyframes; ++k)
-        map_.SetObservation(KeyframeId::Make(kSession, k), static_cast<uint16_t>(i), landmark.id);
+        map_.SetObservation(KeyframeId::Make(kSession, first + k), static_cast<uint16_t>(i), landmark.id);
     }
   }
 
