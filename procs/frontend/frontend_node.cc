@@ -218,7 +218,7 @@ bool FrontendNode::WorkAtEnd() {
     end_.OnRefined();
   }
   if (end_.Is(Phase::kJoining)) {
-    if (core_->WorkAtEnd()) return false;
+    if (core_->WorkAtEnd([this] { AnswerWithinWork(); })) return false;
     end_.Tell(core_->Finish());
   }
   return TellLastPoses();
@@ -372,6 +372,12 @@ void FrontendNode::DrawPicture() {
 /// The mapper's answer to the request to adjust its maps: settled, about no keyframe.
 bool FrontendNode::IsAnswerToAll(const MapDelta& delta) {
   return delta.event == MapEvent::kSettled && !delta.about.valid();
+}
+
+/// The smoothing of a long trajectory takes seconds.
+void FrontendNode::AnswerWithinWork() {
+  PumpWithinWork();
+  PublishStatusIfDue();
 }
 
 bool FrontendNode::TellLastPoses() {

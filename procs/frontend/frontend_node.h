@@ -70,6 +70,7 @@ class FrontendNode : public StreamNode {
   bool GrowBack();
   bool MapsAreAdjusted();
   static bool IsAnswerToAll(const MapDelta& delta);
+  void AnswerWithinWork();
   bool TellLastPoses();
   int UnacceptedKeyframes();
   bool HoldsBackForStatus() const;

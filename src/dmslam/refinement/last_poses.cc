@@ -40,9 +40,9 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Keyfr
   final_.Add(map, std::move(later));
 }
 
-bool LastPoses::Improve(const Map& map) {
+bool LastPoses::Improve(const Map& map, const std::function<void()>& between) {
   if (!smooth_ || final_.IsSettled()) return false;
-  final_.Improve(map);
+  final_.Improve(map, between);
   return true;
 }
 
