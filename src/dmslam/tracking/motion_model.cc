@@ -13,6 +13,7 @@ constexpr int64_t kRecentNs = 500'000'000;            // so long a tracked frame
 constexpr int64_t kKnownNs = kStepNs * 11 / 2;        // so long the newest pose's motion says something
 constexpr int64_t kSuccessiveNs = kStepNs * 5 / 2;    // a step no longer than this is a motion...
 constexpr int64_t kCoastingStepNs = kStepNs * 3 / 2;  // ...and this, with a weak pose at its end
+constexpr double kJitter = 0.1;                       // share of a step by which stamps may be uneven
 
 }  // namespace
 
@@ -45,8 +46,24 @@ void MotionModel::Begin(const PlacedPose& pose, const FrameTime& time) {
 }
 
 void MotionModel::Stop() {
-  velocity_.reset();
+  motion_.reset();
   coasting_.reset();
+}
+
+MotionModel::Motion MotionModel::MotionTo(const Rigid3d& T_cam_world, const Rigid3d& T_last_world,
+                                          const FrameTime& time) const {
+  return {T_cam_world * T_last_world.Inverse(), time.stamp_ns - Newest().time.stamp_ns};
+}
+
+/// The motion goes on evenly, for no longer than it says something. Stamps that jitter make no difference.
+Rigid3d MotionModel::StepUntil(const FrameTime& time) const {
+  const int64_t since_ns =
+      std::min(time.stamp_ns - Newest().time.stamp_ns, std::max(kKnownNs, motion_->duration_ns));
+  const double steps =
+      static_cast<double>(since_ns) / static_cast<double>(std::max<int64_t>(1, motion_->duration_ns));
+  const Rigid3d& motion = motion_->T_cam_lastcam;
+  if (std::abs(steps - 1.0) < kJitter) return motion;
+  return {ExpSo3(steps * LogSo3(motion.rotation)), steps * motion.translation};
 }
 
 bool MotionModel::IsWithin(const FrameTime& time, int64_t limit_ns) const {
@@ -66,11 +83,11 @@ MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& ti
   Prediction prediction;
   prediction.recent = time.stamp_ns - last_.time.stamp_ns < kRecentNs;
   prediction.T_cam_world = Newest().pose.In(map);
-  if (!prediction.T_cam_world || !velocity_) return prediction;
-  // The map may have been scaled since the velocity was measured.
+  if (!prediction.T_cam_world || !motion_) return prediction;
+  // The map may have been scaled since the motion was measured.
   const double growth = map.ResolvePose(Newest().pose.reference)->scale / Newest().pose.scale;
-  prediction.T_cam_world =
-      Rigid3d(velocity_->rotation, velocity_->translation * growth) * *prediction.T_cam_world;
+  const Rigid3d step = StepUntil(time);
+  prediction.T_cam_world = Rigid3d(step.rotation, step.translation * growth) * *prediction.T_cam_world;
   if (!IsWithin(time, kKnownNs)) return prediction;
   prediction.prior = MakePrior(map, *prediction.T_cam_world, time.stamp_ns - Newest().time.stamp_ns);
   return prediction;
@@ -80,15 +97,16 @@ void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const Rigid3
                             const FrameTime& time, bool jumped) {
   const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
   const bool successive = IsWithin(time, kSuccessiveNs) && !jumped;
+  const Motion motion = MotionTo(T_cam_world, T_last_world.value_or(T_cam_world), time);
   Begin(pose, time);
-  if (successive && T_last_world) velocity_ = T_cam_world * T_last_world->Inverse();
+  if (successive && T_last_world) motion_ = motion;
 }
 
 void MotionModel::Coast(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) {
   const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
   const std::optional<PlacedPose> pose = PlacedPose::Of(map, T_cam_world, last_.pose.reference);
   if (!pose || !T_last_world || !IsWithin(time, kKnownNs)) return;
-  if (IsWithin(time, kCoastingStepNs)) velocity_ = T_cam_world * T_last_world->Inverse();
+  if (IsWithin(time, kCoastingStepNs)) motion_ = MotionTo(T_cam_world, *T_last_world, time);
   coasting_ = Pose{*pose, time};
 }
 

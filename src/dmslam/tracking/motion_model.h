@@ -69,14 +69,20 @@ class MotionModel {
     PlacedPose pose;
     FrameTime time;
   };
+  struct Motion {
+    Rigid3d T_cam_lastcam;
+    int64_t duration_ns = 0;
+  };
   const Pose& Newest() const { return coasting_ ? *coasting_ : last_; }
+  Motion MotionTo(const Rigid3d& T_cam_world, const Rigid3d& T_last_world, const FrameTime& time) const;
+  Rigid3d StepUntil(const FrameTime& time) const;
   bool IsWithin(const FrameTime& time, int64_t limit_ns) const;
   PosePrior MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const;
 
   MotionModelOptions options_;
   Pose last_;
   std::optional<Pose> coasting_;
-  std::optional<Rigid3d> velocity_;  ///< T_cam_lastcam of the newest pose, coasted ones included
+  std::optional<Motion> motion_;  ///< to the newest pose, coasted ones included
 };
 
 }  // namespace dmslam

@@ -78,6 +78,19 @@ TEST_F(Motion, GoesOnAsBefore) {
   EXPECT_LT(ErrorAt(*prediction.T_cam_world, 3 * kStep), 1e-9);
 }
 
+TEST_F(Motion, AMotionOverAGapIsDividedByItsDuration) {
+  TrackTo(1);
+  TrackTo(3);  // a frame between was not tracked
+  EXPECT_LT(ErrorAt(*Predict(4).T_cam_world, 4 * kStep), 1e-9);
+}
+
+TEST_F(Motion, APredictionOverAGapGoesAsFarAsTheCamera) {
+  TrackTo(1);
+  TrackTo(2);
+  EXPECT_LT(ErrorAt(*Predict(5).T_cam_world, 5 * kStep), 1e-9);
+  EXPECT_LT(ErrorAt(*Predict(14).T_cam_world, 7.5 * kStep), 1e-3) << "but not on and on";
+}
+
 TEST_F(Motion, AJumpIsNoMotion) {
   TrackTo(1);
   TrackTo(2, true);
