@@ -6,8 +6,9 @@
 
 namespace dmslam {
 
-/// Landmarks that any of the keyframes sees, sorted.
+/// Landmarks that any of the keyframes sees, by id.
 std::vector<LandmarkId> LandmarksSeenBy(const Map& map, const std::vector<KeyframeId>& keyframes);
+std::vector<const Landmark*> LandmarksSeenBy(const Map& map, const std::vector<const Keyframe*>& keyframes);
 
 /// Landmarks of a keyframe and of those `neighbours` that share most landmarks with it (`min_shared` or
 /// more), sorted.

@@ -261,28 +261,26 @@ struct Candidate {
   bool confirmed = false;  ///< in enough views, over enough time
 };
 
-/// All pairs of every free feature of keyframe `id`, by feature.
-std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, KeyframeId id,
+/// All pairs of every free feature of a keyframe, by feature.
+std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, const Keyframe& keyframe,
                                                         const std::vector<uint16_t>& moving,
                                                         const LandmarkCreationOptions& options,
                                                         CreationDiagnostics* diagnostics) {
-  const Keyframe& keyframe = *map.FindKeyframe(id);
   const std::vector<uint8_t> use = FreeFeatures(keyframe, moving);
   std::vector<std::vector<PairCandidate>> pairs(keyframe.features->size());
-  for (const KeyframeId neighbour_id : map.BestCovisible(id, options.neighbours, 1)) {
-    const Keyframe& neighbour = *map.FindKeyframe(neighbour_id);
-    const double baseline = (keyframe.T_cam_world.Center() - neighbour.T_cam_world.Center()).norm();
-    const std::optional<double> depth = map.MedianDepth(neighbour);
+  for (const Keyframe* neighbour : map.BestCovisible(keyframe, options.neighbours, 1)) {
+    const double baseline = (keyframe.T_cam_world.Center() - neighbour->T_cam_world.Center()).norm();
+    const std::optional<double> depth = map.MedianDepth(*neighbour);
     if (!depth || baseline < options.min_baseline_over_depth * *depth) continue;
-    const PairGeometry pair{keyframe, neighbour, map, options};
+    const PairGeometry pair{keyframe, *neighbour, map, options};
     for (const auto& [feature, other] :
-         MatchAlongEpipolarPlanes(keyframe, use, neighbour, FreeFeatures(neighbour, {}), map, options)) {
+         MatchAlongEpipolarPlanes(keyframe, use, *neighbour, FreeFeatures(*neighbour, {}), map, options)) {
       ++diagnostics->matched;
       const std::optional<Eigen::Vector3d> point = Triangulate(pair, feature, other, diagnostics);
       if (!point) continue;
       const Eigen::Vector3d a = *point - keyframe.T_cam_world.Center(),
-                            b = *point - neighbour.T_cam_world.Center();
-      pairs[feature].push_back({{neighbour_id, other}, *point, a.dot(b) / (a.norm() * b.norm())});
+                            b = *point - neighbour->T_cam_world.Center();
+      pairs[feature].push_back({{neighbour, other}, *point, a.dot(b) / (a.norm() * b.norm())});
     }
   }
   return pairs;
@@ -290,22 +288,22 @@ std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, Keyframe
 
 /// The point of the pair with the widest parallax, with all pairs of the feature that see it where they
 /// should.
-Candidate CombinePairs(const Map& map, KeyframeId id, uint16_t feature,
+Candidate CombinePairs(const Map& map, const Keyframe& keyframe, uint16_t feature,
                        const std::vector<PairCandidate>& pairs, const LandmarkCreationOptions& options) {
   const auto widest = std::min_element(
       pairs.begin(), pairs.end(),
       [](const PairCandidate& a, const PairCandidate& b) { return a.parallax_cos < b.parallax_cos; });
   Candidate candidate{{feature, {widest->seen_by}, widest->p_world}, false};
-  int64_t first_ns = map.FindKeyframe(id)->stamp_ns, last_ns = first_ns;
+  int64_t first_ns = keyframe.stamp_ns, last_ns = first_ns;
   for (auto pair = pairs.begin(); pair != pairs.end(); ++pair) {
-    const Keyframe& keyframe = *map.FindKeyframe(pair->seen_by.keyframe);
-    const auto uv_px = map.camera().Project(keyframe.T_cam_world * widest->p_world);
-    const bool agrees = uv_px && NormalizedErrorSquared(*keyframe.features, pair->seen_by.feature, *uv_px,
+    const Keyframe& neighbour = *pair->seen_by.keyframe;
+    const auto uv_px = map.camera().Project(neighbour.T_cam_world * widest->p_world);
+    const bool agrees = uv_px && NormalizedErrorSquared(*neighbour.features, pair->seen_by.feature, *uv_px,
                                                         map.pyramid()) <= options.reprojection_sigmas_squared;
     if (pair != widest && !agrees) continue;
     if (pair != widest) candidate.landmark.seen_by.push_back(pair->seen_by);
-    first_ns = std::min(first_ns, keyframe.stamp_ns);
-    last_ns = std::max(last_ns, keyframe.stamp_ns);
+    first_ns = std::min(first_ns, neighbour.stamp_ns);
+    last_ns = std::max(last_ns, neighbour.stamp_ns);
   }
   candidate.confirmed = options.confirmed_views > 0 &&
                         static_cast<int>(candidate.landmark.seen_by.size()) + 1 >= options.confirmed_views &&
@@ -315,27 +313,45 @@ Candidate CombinePairs(const Map& map, KeyframeId id, uint16_t feature,
 
 }  // namespace
 
-std::vector<NewLandmark> ProposeLandmarks(const Map& map, KeyframeId id, const std::vector<uint16_t>& moving,
+std::vector<NewLandmark> ProposeLandmarks(const Map& map, const Keyframe& keyframe,
+                                          const std::vector<uint16_t>& moving,
                                           const LandmarkCreationOptions& options,
                                           CreationDiagnostics* diagnostics) {
-  const Keyframe& keyframe = *map.FindKeyframe(id);
   std::vector<Candidate> candidates;
-  const auto pairs = MatchNeighbours(map, id, moving, options, diagnostics);
+  const auto pairs = MatchNeighbours(map, keyframe, moving, options, diagnostics);
   for (size_t feature = 0; feature < pairs.size(); ++feature) {
     if (pairs[feature].empty()) continue;
-    candidates.push_back(CombinePairs(map, id, static_cast<uint16_t>(feature), pairs[feature], options));
+    candidates.push_back(
+        CombinePairs(map, keyframe, static_cast<uint16_t>(feature), pairs[feature], options));
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.landmark.seen_by.size() > b.landmark.seen_by.size();
   });
   MutualExclusion gate(options, map.CountTracked(keyframe, 1));
-  std::vector<NewLandmark> created;
+  std::vector<NewLandmark> proposed;
   for (const Candidate& candidate : candidates) {
     const Eigen::Vector2d& uv_px = keyframe.features->uv_px[candidate.landmark.feature];
-    if (candidate.confirmed || gate.Admit(uv_px, diagnostics)) created.push_back(candidate.landmark);
+    if (candidate.confirmed || gate.Admit(uv_px, diagnostics)) proposed.push_back(candidate.landmark);
   }
-  diagnostics->created += static_cast<uint32_t>(created.size());
-  return created;
+  diagnostics->created += static_cast<uint32_t>(proposed.size());
+  return proposed;
+}
+
+void CreateLandmarks(MapEditor& map, const Keyframe& keyframe, const std::vector<uint16_t>& moving,
+                     const LandmarkCreationOptions& options, LandmarkMaker& maker,
+                     CreationDiagnostics* diagnostics) {
+  const auto taken = [](const NeighbourFeature& seen_by) {
+    return seen_by.keyframe->landmarks[seen_by.feature].valid();
+  };
+  for (const NewLandmark& proposed : ProposeLandmarks(map, keyframe, moving, options, diagnostics)) {
+    if (taken(proposed.seen_by.front())) continue;
+    const LandmarkId id = maker.Add(map, keyframe, keyframe, proposed.p_world).id;
+    map.SetObservation(keyframe.id, proposed.feature, id);
+    for (const NeighbourFeature& seen_by : proposed.seen_by) {
+      if (!taken(seen_by)) map.SetObservation(seen_by.keyframe->id, seen_by.feature, id);
+    }
+    map.UpdateDescriptor(id);
+  }
 }
 
 }  // namespace dmslam

@@ -3,7 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/mapping/landmark_maker.h"
 #include "dmslam/mapping/mapper_options.h"
 
 namespace dmslam {
@@ -24,7 +25,7 @@ struct CreationDiagnostics {
 
 /// A feature of a keyframe that is there already.
 struct NeighbourFeature {
-  KeyframeId keyframe;
+  const Keyframe* keyframe = nullptr;
   uint16_t feature = 0;
 };
 
@@ -43,14 +44,21 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
     const Keyframe& a, const std::vector<uint8_t>& use_a, const Keyframe& b,
     const std::vector<uint8_t>& use_b, const Map& map, const LandmarkCreationOptions& options);
 
-/// DM-SLAM Algorithm 1: candidates for new landmarks of keyframe `id` from its best covisible keyframes.
+/// DM-SLAM Algorithm 1: candidates for new landmarks of a keyframe from its best covisible keyframes.
 /// `moving` lists features of the keyframe that were seen to move (sorted); none is made of them. A feature
 /// is matched with every neighbour; its point comes from the pair with the widest parallax, and all pairs
 /// that agree with it become its observations. Points seen in most views come first. Those confirmed by
 /// enough views over enough time did not move: they are not counted among the candidates that exclude each
 /// other (options; the paper has none such).
-std::vector<NewLandmark> ProposeLandmarks(const Map& map, KeyframeId id, const std::vector<uint16_t>& moving,
+std::vector<NewLandmark> ProposeLandmarks(const Map& map, const Keyframe& keyframe,
+                                          const std::vector<uint16_t>& moving,
                                           const LandmarkCreationOptions& options,
                                           CreationDiagnostics* diagnostics);
+
+/// Makes landmarks of these candidates. Where an earlier one of them has taken a candidate's feature in the
+/// neighbour it was made with, it makes none.
+void CreateLandmarks(MapEditor& map, const Keyframe& keyframe, const std::vector<uint16_t>& moving,
+                     const LandmarkCreationOptions& options, LandmarkMaker& maker,
+                     CreationDiagnostics* diagnostics);
 
 }  // namespace dmslam

@@ -1,50 +1,58 @@
 #include "dmslam/mapping/landmark_fusion.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
+#include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 
 namespace dmslam {
 namespace {
 
-bool Sees(const Landmark& landmark, KeyframeId keyframe) {
-  const auto at = std::lower_bound(landmark.observations.begin(), landmark.observations.end(), keyframe,
-                                   [](const Observation& o, KeyframeId id) { return o.keyframe < id; });
-  return at != landmark.observations.end() && at->keyframe == keyframe;
-}
+constexpr int kNeighbours = 20, kNeighboursOfEach = 5;
 
-std::vector<KeyframeId> NeighboursOfNeighbours(const Map& map, KeyframeId id, int min_covisibility,
-                                               std::set<KeyframeId>* out_listed) {
-  std::vector<KeyframeId> targets = map.BestCovisible(id, 20, min_covisibility);
-  std::set<KeyframeId> listed(targets.begin(), targets.end());
-  listed.insert(id);
-  const size_t first = targets.size();
-  for (size_t i = 0; i < first; ++i) {
-    for (const KeyframeId second : map.BestCovisible(targets[i], 5, min_covisibility)) {
-      if (listed.insert(second).second) targets.push_back(second);
-    }
+/// Whom a keyframe's landmarks are looked for in, each listed once.
+class Targets {
+ public:
+  explicit Targets(const Keyframe& keyframe) : listed_{keyframe.id} {}
+
+  bool Add(const Keyframe* keyframe) {
+    if (!listed_.insert(keyframe->id).second) return false;
+    keyframes_.push_back(keyframe);
+    return true;
   }
-  *out_listed = std::move(listed);
-  return targets;
+  const std::vector<const Keyframe*>& keyframes() const { return keyframes_; }
+
+ private:
+  std::vector<const Keyframe*> keyframes_;
+  std::set<KeyframeId> listed_;
+};
+
+void AddNeighboursOfNeighbours(const Map& map, const Keyframe& keyframe, int min_covisibility,
+                               Targets* targets) {
+  const std::vector<const Keyframe*> first = map.BestCovisible(keyframe, kNeighbours, min_covisibility);
+  for (const Keyframe* neighbour : first) targets->Add(neighbour);
+  for (const Keyframe* neighbour : first) {
+    for (const Keyframe* second : map.BestCovisible(*neighbour, kNeighboursOfEach, min_covisibility))
+      targets->Add(second);
+  }
 }
 
 /// Keyframes that look at the same place from nearby, whether they share landmarks or not: where drift is
 /// small, a place that is seen again is joined with itself here, without a loop.
-void AddKeyframesNearby(const Map& map, KeyframeId id, const MapperOptions& options,
-                        std::set<KeyframeId>* listed, std::vector<KeyframeId>* targets) {
-  const double depth = map.MedianDepth(*map.FindKeyframe(id)).value_or(0.0);
+void AddKeyframesNearby(const Map& map, const Keyframe& keyframe, const MapperOptions& options,
+                        Targets* targets) {
+  const double depth = map.MedianDepth(keyframe).value_or(0.0);
   int added = 0;
   for (const KeyframeId near :
-       map.KeyframesNear(id, options.nearby_distance * depth, options.nearby_angle_rad)) {
+       map.KeyframesNear(keyframe.id, options.nearby_distance * depth, options.nearby_angle_rad)) {
     if (added == options.nearby_keyframes) return;
-    if (!listed->insert(near).second) continue;
-    targets->push_back(near);
-    ++added;
+    if (targets->Add(&map.At(near))) ++added;
   }
 }
 
-std::vector<LandmarkId> LandmarksOf(const Keyframe& keyframe) {
+std::vector<LandmarkId> LandmarksInOrderOfFeatures(const Keyframe& keyframe) {
   std::vector<LandmarkId> ids;
   for (const LandmarkId id : keyframe.landmarks) {
     if (id.valid()) ids.push_back(id);
@@ -52,65 +60,63 @@ std::vector<LandmarkId> LandmarksOf(const Keyframe& keyframe) {
   return ids;
 }
 
+/// The feature that sees this landmark, as far as place and descriptor can say.
+std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                                  const Landmark& landmark, const MapperOptions& options) {
+  static const std::vector<uint8_t> kNoneTaken;
+  const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world);
+  if (!view) return std::nullopt;
+  const double radius_px = options.fuse_radius_px * map.pyramid().Scale(view->octave);
+  const FeatureHit hit =
+      FindFeature(*keyframe.features, view->uv_px, radius_px, std::max(0, view->octave - 1), view->octave,
+                  landmark.descriptor, kNoneTaken);
+  if (hit.feature < 0 || hit.distance > options.max_fuse_distance) return std::nullopt;
+  const double error = NormalizedErrorSquared(*keyframe.features, hit.feature, view->uv_px, map.pyramid());
+  if (error > options.creation.reprojection_sigmas_squared) return std::nullopt;
+  return static_cast<uint16_t>(hit.feature);
+}
+
 /// Joins a landmark with what the feature sees already.
-void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, LandmarkId id) {
-  const LandmarkId other = keyframe.landmarks[feature];
-  if (!other.valid()) {
-    map.SetObservation(keyframe.id, feature, id);
-    map.UpdateDescriptor(id);
+void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, const Landmark& landmark) {
+  const Landmark* other = map.LandmarkSeenBy(keyframe, feature);
+  if (other == nullptr) {
+    map.SetObservation(keyframe.id, feature, landmark.id);
+    map.UpdateDescriptor(landmark.id);
     return;
   }
-  if (other == id) return;
-  const size_t mine = map.FindLandmark(id)->observations.size();
-  const size_t theirs = map.FindLandmark(other)->observations.size();
-  const bool keep_other = theirs > mine || (theirs == mine && other < id);
-  map.Fuse(keep_other ? id : other, keep_other ? other : id);
+  const size_t mine = landmark.observations.size(), theirs = other->observations.size();
+  const bool keep_other = theirs > mine || (theirs == mine && other->id < landmark.id);
+  keep_other ? map.Fuse(landmark.id, other->id) : map.Fuse(other->id, landmark.id);
 }
 
 }  // namespace
 
-int FuseInto(MapEditor& map, KeyframeId id, const Rigid3d& T_cam_world,
-             const std::vector<LandmarkId>& landmarks, double radius_px, const MapperOptions& options) {
-  const Keyframe& keyframe = *map.FindKeyframe(id);
-  const std::vector<uint8_t> none_taken;
+int FuseInto(MapEditor& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+             const std::vector<LandmarkId>& landmarks, const MapperOptions& options) {
   int joined = 0;
-  for (const LandmarkId landmark_id : landmarks) {
-    const Landmark* landmark = map.FindLandmark(landmark_id);
-    if (landmark == nullptr || Sees(*landmark, id)) continue;
+  for (const LandmarkId id : landmarks) {
+    const Landmark* landmark = map.FindLandmark(id);
+    if (landmark == nullptr || landmark->SeenBy(keyframe.id) != nullptr) continue;
     if (options.belief.enabled && !IsStatic(landmark)) continue;
-    const auto view = PredictView(map, *landmark, T_cam_world);
-    if (!view) continue;
-    const double radius = radius_px * map.pyramid().Scale(view->octave);
-    const FeatureHit hit = FindFeature(*keyframe.features, view->uv_px, radius, std::max(0, view->octave - 1),
-                                       view->octave, landmark->descriptor, none_taken);
-    if (hit.feature < 0 || hit.distance > options.max_fuse_distance) continue;
-    if (NormalizedErrorSquared(*keyframe.features, hit.feature, view->uv_px, map.pyramid()) >
-        options.creation.reprojection_sigmas_squared) {
-      continue;
-    }
-    JoinAt(map, keyframe, static_cast<uint16_t>(hit.feature), landmark_id);
+    const std::optional<uint16_t> feature = FeatureAt(map, keyframe, T_cam_world, *landmark, options);
+    if (!feature) continue;
+    JoinAt(map, keyframe, *feature, *landmark);
     ++joined;
   }
   return joined;
 }
 
-int FuseWithNeighbours(MapEditor& map, KeyframeId id, const MapperOptions& options) {
-  std::set<KeyframeId> listed;
-  std::vector<KeyframeId> targets = NeighboursOfNeighbours(map, id, options.min_covisibility, &listed);
-  AddKeyframesNearby(map, id, options, &listed, &targets);
+int FuseWithNeighbours(MapEditor& map, const Keyframe& keyframe, const MapperOptions& options) {
+  Targets targets(keyframe);
+  AddNeighboursOfNeighbours(map, keyframe, options.min_covisibility, &targets);
+  AddKeyframesNearby(map, keyframe, options, &targets);
   int joined = 0;
-  for (const KeyframeId target : targets) {
-    const std::vector<LandmarkId> mine = LandmarksOf(*map.FindKeyframe(id));
-    joined +=
-        FuseInto(map, target, map.FindKeyframe(target)->T_cam_world, mine, options.fuse_radius_px, options);
+  std::vector<KeyframeId> ids;
+  for (const Keyframe* target : targets.keyframes()) {
+    joined += FuseInto(map, *target, target->T_cam_world, LandmarksInOrderOfFeatures(keyframe), options);
+    ids.push_back(target->id);
   }
-  std::set<LandmarkId> theirs;
-  for (const KeyframeId target : targets) {
-    for (const LandmarkId landmark : LandmarksOf(*map.FindKeyframe(target))) theirs.insert(landmark);
-  }
-  joined += FuseInto(map, id, map.FindKeyframe(id)->T_cam_world, {theirs.begin(), theirs.end()},
-                     options.fuse_radius_px, options);
-  return joined;
+  return joined + FuseInto(map, keyframe, keyframe.T_cam_world, LandmarksSeenBy(map, ids), options);
 }
 
 }  // namespace dmslam

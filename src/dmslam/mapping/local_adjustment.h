@@ -7,8 +7,8 @@
 
 namespace dmslam {
 
-/// The window around keyframe `id`: itself and its best covisible keyframes.
-MapAdjustmentReport AdjustLocally(MapEditor& map, KeyframeId id, const MapperOptions& options,
+/// Adjusts the window around a keyframe: itself and its best covisible keyframes.
+MapAdjustmentReport AdjustLocally(MapEditor& map, const Keyframe& keyframe, const MapperOptions& options,
                                   const std::function<bool()>& interrupt);
 
 }  // namespace dmslam

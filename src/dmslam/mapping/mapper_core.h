@@ -2,14 +2,13 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <string>
 
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/mapping/insertion_order.h"
 #include "dmslam/mapping/landmark_creation.h"
-#include "dmslam/mapping/local_adjustment.h"
-#include "dmslam/mapping/map_maintenance.h"
+#include "dmslam/mapping/landmark_maker.h"
 #include "dmslam/mapping/mapper_options.h"
 
 namespace dmslam {
@@ -65,9 +64,7 @@ class MapperCore {
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
   /// A loop or a global adjustment, composed with the poses of now: local mapping since its base changes
-  /// nothing about it. Refused with a record where it no longer applies: its keyframes are gone, another
-  /// correction was applied since its base (two loop closers, one after the other, may have found the same
-  /// loop), or its base is not a version of this map.
+  /// nothing about it. Refused with a record where it no longer applies (WhyRefused).
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says once more that keyframe `id` is mapped, for a loop closer that has not heard it.
   void AskAgain(KeyframeId id, MapId map_id) { Publish(MapEvent::kMapped, id, map_id); }
@@ -81,41 +78,20 @@ class MapperCore {
   const MapperCounters& counters() const { return counters_; }
 
  private:
-  /// Where a keyframe stands to that of the loop.
-  struct BesideLoop {
-    Rigid3d T_cam_here;
-    double scale = 1.0;  ///< of the loop's keyframe when it was measured
-  };
-  using LoopSide = std::map<KeyframeId, BesideLoop>;
-
-  void MapAround(const KeyframeProposal& proposal);
-  void Refine(KeyframeId id, MapId map_id);
-  bool Insert(const KeyframeProposal& proposal);
-  Keyframe MakeKeyframe(const KeyframeProposal& proposal, const Rigid3d& T_cam_world) const;
-  void AddMatches(const KeyframeProposal& proposal);
-  void ChooseParent(KeyframeId id, KeyframeId fallback);
-  void CreateLandmarks(KeyframeId id, const std::vector<uint16_t>& moving);
-  LandmarkId AddLandmark(MapId map_id, KeyframeId reference, KeyframeId newest,
-                         const Eigen::Vector3d& p_world);
-  bool BuildInitialMap(const InitialMap& proposal);
-  void ScaleToUnitDepth(MapId map_id, KeyframeId first);
-  std::string WhyRefused(const LoopAnswer& answer) const;
-  void Correct(const LoopAnswer& answer);
-  LoopSide SideOf(KeyframeId keyframe, KeyframeId place) const;
-  void Connect(const LoopAnswer& answer, const LoopSide& side);
-  void Reroot(KeyframeId id, KeyframeId parent);
-  void JoinMaps(MapId from, MapId into);
+  const Keyframe* FindOrInsert(const KeyframeProposal& proposal);
+  void CullYoung(MapId map_id);
+  void RemoveSeenThroughBy(const Keyframe& keyframe);
+  void Adjust(const Keyframe& keyframe);
   void AdjustMaps();
   void Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id = 0,
                std::string note = {});
-  bool Interrupted() const { return interrupt_ && interrupt_(); }
+  bool Interrupted();
 
   MapperOptions options_;
   MapEditor map_;
-  uint16_t epoch_ordinal_;
-  uint64_t next_landmark_ = 1;
-  bool adjusted_ = false;  ///< as a whole, since the last keyframe
+  LandmarkMaker maker_;
   InsertionOrder order_;
+  bool adjusted_ = false;          ///< as a whole, since the last keyframe
   bool maybe_unfinished_ = false;  ///< the map is continued: its mapper may have ended in the middle of the
                                    ///< keyframe that comes first
   Sink sink_;

@@ -9,6 +9,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/map/snapshot.h"
+#include "dmslam/mapping/testing/wall_scene.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -186,6 +187,207 @@ TEST_F(SecondVisit, TiesEveryKeyframeOfItsSideToThePlace) {
   for (const uint16_t feature : Features(kHalf, 2 * kHalf)) {
     EXPECT_EQ(neighbour.landmarks[feature], LandmarkId::Make(1, 100u + feature)) << feature;
   }
+}
+
+/// The frontend's records of a camera that moves along a wall, in steps of 0.3.
+class KeyframeStep : public testing::Test {
+ protected:
+  KeyframeStep() : core_(MakeCore(2.0)) {}
+
+  /// With a share above one no keyframe is redundant.
+  MapperCore MakeCore(double redundant_share) {
+    MapperOptions options;
+    options.redundant_share = redundant_share;
+    return MapperCore(options, TestCamera(), Pyramid(), 1,
+                      [this](const MapDelta& delta) { said_.push_back(delta); });
+  }
+
+  static constexpr uint16_t kKnown = 60;  // points of the first map
+  static double PlaceOf(uint32_t frame) { return 0.3 * frame; }
+  InitialMap FirstMap() const {
+    InitialMap proposal;
+    proposal.map_id = 1;
+    proposal.first = scene_.Propose(0, PlaceOf(0), 0, PlaceOf(0), 0);
+    proposal.second = scene_.Propose(1, PlaceOf(1), 0, PlaceOf(0), 1);
+    for (uint16_t i = 0; i < kKnown; ++i) proposal.points.push_back({i, i, scene_.point(i)});
+    return proposal;
+  }
+  /// What the frontend would say of a frame: it sees as many of the wall's points as have landmarks, and is
+  /// `off` away from where it takes itself to be.
+  KeyframeProposal Frame(uint32_t frame, double off = 0) const {
+    const uint32_t reference = core_.map().keyframes().rbegin()->first.frame_index();
+    KeyframeProposal proposal =
+        scene_.Propose(frame, PlaceOf(frame), reference, PlaceOf(reference), static_cast<double>(frame));
+    proposal.T_cam_reference.translation = Scale() * proposal.T_cam_reference.translation;
+    proposal.T_cam_reference.translation.y() += off;
+    const Keyframe& last = core_.map().keyframes().rbegin()->second;
+    for (uint16_t i = 0; i < last.landmarks.size(); ++i) {
+      if (last.landmarks[i].valid()) proposal.matches.push_back({i, last.landmarks[i]});
+    }
+    return proposal;
+  }
+  /// Of the map over that of the scene.
+  double Scale() const { return core_.map().ResolvePose(Id(1))->T_cam_world.Center().norm() / PlaceOf(1); }
+  std::vector<MapEvent> EventsSince(size_t first) const {
+    std::vector<MapEvent> events;
+    for (size_t i = first; i < said_.size(); ++i) events.push_back(said_[i].event);
+    return events;
+  }
+  bool Start() { return core_.OnInitialMap(FirstMap()); }
+
+  WallScene scene_;
+  std::vector<MapDelta> said_;
+  MapperCore core_;
+};
+
+TEST_F(KeyframeStep, PublishesEveryStepInOrder) {
+  ASSERT_TRUE(Start());
+  EXPECT_EQ(EventsSince(0), std::vector<MapEvent>{MapEvent::kMapStarted});
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
+  const std::vector<MapEvent> expected = {MapEvent::kKeyframeInserted, MapEvent::kLandmarksCreated,
+                                          MapEvent::kFused, MapEvent::kAdjusted, MapEvent::kMapped};
+  std::vector<MapEvent> events = EventsSince(1);
+  std::erase(events, MapEvent::kFused);  // said where something was fused
+  std::vector<MapEvent> without_fused = expected;
+  std::erase(without_fused, MapEvent::kFused);
+  std::vector<MapEvent> twice = without_fused;
+  twice.insert(twice.end(), without_fused.begin(), without_fused.end());
+  EXPECT_EQ(events, twice);
+  for (size_t i = 1; i < said_.size(); ++i) EXPECT_GT(said_[i].version, said_[i - 1].version);
+}
+
+TEST_F(KeyframeStep, MapsTheWholeWall) {
+  ASSERT_TRUE(Start());
+  for (const uint32_t frame : {2U, 3U}) ASSERT_TRUE(core_.OnKeyframe(Frame(frame)));
+  const Map& map = core_.map();
+  EXPECT_EQ(map.keyframes().size(), 4u);
+  EXPECT_GT(map.num_landmarks(), 120u) << "of 140; the first map had 60";
+  EXPECT_GT(core_.counters().creation.created, 60u);
+  for (const Landmark* landmark : map.LandmarksOf(1)) {
+    const uint16_t i = landmark->observations.front().feature;
+    EXPECT_LT((landmark->p_world / Scale() - scene_.point(i)).norm(), 0.05) << i;
+    for (const Observation& o : landmark->observations) EXPECT_EQ(o.feature, i) << "one point, one landmark";
+  }
+}
+
+TEST_F(KeyframeStep, AdjustsWhatTheFrontendGotWrong) {
+  ASSERT_TRUE(Start());
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2, 0.004)));
+  const Eigen::Vector3d center = core_.map().At(Id(2)).T_cam_world.Center() / Scale();
+  EXPECT_LT((center - Eigen::Vector3d(PlaceOf(2), 0, 0)).norm(), 0.005) << "it was 0.016 off";
+}
+
+TEST_F(KeyframeStep, MakesNothingOfWhatMoves) {
+  ASSERT_TRUE(Start());
+  KeyframeProposal proposal = Frame(2);
+  for (uint16_t i = kKnown; i < scene_.size(); ++i) proposal.moving.push_back(i);
+  ASSERT_TRUE(core_.OnKeyframe(proposal));
+  EXPECT_LE(core_.map().num_landmarks(), size_t{kKnown});
+}
+
+TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
+  ASSERT_TRUE(Start());
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  const KeyframeProposal next = Frame(3);
+  FrameEvidence evidence;
+  evidence.map_id = 1;
+  const LandmarkId lost = core_.map().At(Id(2)).landmarks[kKnown + 5];
+  ASSERT_TRUE(lost.valid());
+  evidence.items.push_back({lost, 20, 2, 0, 0});
+  core_.OnEvidence(evidence);
+  ASSERT_TRUE(core_.OnKeyframe(next));
+  EXPECT_EQ(core_.map().FindLandmark(lost), nullptr);
+  EXPECT_GE(core_.counters().landmarks_culled, 1u);
+}
+
+TEST_F(KeyframeStep, RemovesWhatIsSeenToMove) {
+  ASSERT_TRUE(Start());
+  FrameEvidence evidence;
+  evidence.map_id = 1;
+  const LandmarkId moving = core_.map().At(Id(1)).landmarks[5];
+  evidence.items.push_back({moving, 4, 0, 4, 0});
+  evidence.items.push_back({LandmarkId::Make(9, 9), 4, 0, 4, 0});
+  core_.OnEvidence(evidence);
+  EXPECT_EQ(core_.map().FindLandmark(moving), nullptr);
+  EXPECT_EQ(core_.counters().landmarks_moving_removed, 1u);
+  EXPECT_EQ(core_.counters().evidence_dropped, 1u);
+}
+
+TEST_F(KeyframeStep, CullsKeyframesThatSayNothingNew) {
+  core_ = MakeCore(0.9);
+  ASSERT_TRUE(Start());
+  for (uint32_t frame = 2; frame <= 7; ++frame) {
+    KeyframeProposal proposal = Frame(frame);  // hardly farther than the one before: all see the same
+    ASSERT_TRUE(core_.OnKeyframe(proposal));
+  }
+  EXPECT_GT(core_.counters().keyframes_culled, 0u);
+  EXPECT_NE(core_.map().FindKeyframe(Id(0)), nullptr);
+  EXPECT_TRUE(core_.map().HasKnown(Id(2)));
+}
+
+TEST_F(KeyframeStep, AnInterruptedStepStillInsertsAndCreates) {
+  ASSERT_TRUE(Start());
+  core_.SetInterrupt([] { return true; });
+  const size_t before = said_.size();
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kKeyframeInserted,
+                                                        MapEvent::kLandmarksCreated, MapEvent::kMapped}));
+  EXPECT_EQ(core_.counters().adjustments_interrupted, 1u);
+}
+
+TEST_F(KeyframeStep, OneThatComesTwiceIsDoneOnce) {
+  ASSERT_TRUE(Start());
+  const KeyframeProposal proposal = Frame(2);
+  ASSERT_TRUE(core_.OnKeyframe(proposal));
+  const size_t before = said_.size();
+  EXPECT_FALSE(core_.OnKeyframe(proposal));
+  EXPECT_EQ(said_.size(), before);
+  EXPECT_EQ(core_.counters().keyframes_repeated, 1u);
+}
+
+TEST_F(KeyframeStep, AMapperThatContinuesDoesTheFirstOneAgain) {
+  ASSERT_TRUE(Start());
+  const KeyframeProposal proposal = Frame(2);
+  ASSERT_TRUE(core_.OnKeyframe(proposal));
+  std::vector<MapDelta> said;
+  MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1,
+                  [&](const MapDelta& delta) { said.push_back(delta); });
+  next.Continue(Map(core_.map()));
+  EXPECT_TRUE(next.OnKeyframe(proposal)) << "its mapper may have ended in the middle of it";
+  EXPECT_EQ(said.back().event, MapEvent::kMapped);
+  EXPECT_FALSE(next.OnKeyframe(proposal)) << "and once is enough";
+}
+
+TEST_F(KeyframeStep, AMapperThatContinuesNumbersItsLandmarksAnew) {
+  ASSERT_TRUE(Start());
+  MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1, [](const MapDelta&) {});
+  next.Continue(Map(core_.map()));
+  ASSERT_TRUE(next.OnKeyframe(Frame(2)));
+  EXPECT_EQ(next.map().HighestOrdinal(), 2);
+  for (const LandmarkId id : core_.map().LandmarkIdsSorted()) EXPECT_EQ(id.epoch_ordinal(), 1);
+}
+
+TEST_F(KeyframeStep, AFirstMapThatDoesNotHoldIsDroppedWithARecord) {
+  InitialMap proposal = FirstMap();
+  proposal.points.resize(20);
+  EXPECT_FALSE(core_.OnInitialMap(proposal));
+  EXPECT_EQ(said_.back().event, MapEvent::kMapDropped);
+  EXPECT_EQ(said_.back().dropped_maps, std::vector<MapId>{1});
+  EXPECT_TRUE(core_.map().keyframes().empty());
+  EXPECT_EQ(core_.counters().maps_refused, 1u);
+}
+
+TEST_F(KeyframeStep, TheEndAdjustsOnce) {
+  ASSERT_TRUE(Start());
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  const size_t before = said_.size();
+  core_.OnReset({});
+  EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kGloballyAdjusted, MapEvent::kSettled}));
+  core_.End();
+  EXPECT_EQ(said_.back().event, MapEvent::kEnded);
+  EXPECT_TRUE(said_.back().progress.ended);
+  EXPECT_EQ(said_.size(), before + 3);
 }
 
 }  // namespace

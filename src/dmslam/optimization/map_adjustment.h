@@ -19,8 +19,8 @@ struct MapAdjustmentReport {
 /// observers of those landmarks (at most `max_fixed`). `sigma_px`: standard deviation of a keypoint of octave
 /// 0. Results are written into the map, observations that do not fit are cleared, and landmarks left with
 /// fewer than two observers are removed.
-MapAdjustmentReport AdjustKeyframes(MapEditor& map, const std::vector<KeyframeId>& window, int max_fixed,
-                                    double sigma_px, const BundleOptions& options);
+MapAdjustmentReport AdjustKeyframes(MapEditor& map, const std::vector<const Keyframe*>& keyframes,
+                                    int max_fixed, double sigma_px, const BundleOptions& options);
 
 /// All keyframes and landmarks of a map, the first keyframe held.
 MapAdjustmentReport AdjustWholeMap(MapEditor& map, MapId map_id, int iterations, double sigma_px,

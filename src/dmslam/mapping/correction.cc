@@ -1,0 +1,192 @@
+#include "dmslam/mapping/correction.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "dmslam/map/neighbourhood.h"
+#include "dmslam/mapping/landmark_fusion.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int kMaxLoopSide = 1000;    // keyframes on a loop's side that are joined with the place
+constexpr int kPlaceNeighbours = 15;  // keyframes around the place
+
+/// Who follows which correction.
+class Corrections {
+ public:
+  Corrections(const Map& map, const LoopAnswer& answer) : map_(map) {
+    for (const auto& c : answer.corrections) own_[c.keyframe] = c.corrected_from_base;
+  }
+
+  /// The correction of a keyframe, there or culled: its own, or that of its nearest ancestor that has one;
+  /// null: it stays.
+  const Sim3d* Of(KeyframeId id) const {
+    while (id.valid()) {
+      const auto own = own_.find(id);
+      if (own != own_.end()) return &own->second;
+      id = ParentOf(id);
+    }
+    return nullptr;
+  }
+
+ private:
+  KeyframeId ParentOf(KeyframeId id) const {
+    if (const Keyframe* keyframe = map_.FindKeyframe(id)) return keyframe->parent;
+    const auto tombstone = map_.keyframe_tombstones().find(id);
+    return tombstone == map_.keyframe_tombstones().end() ? KeyframeId{} : tombstone->second.parent;
+  }
+
+  const Map& map_;
+  std::map<KeyframeId, Sim3d> own_;
+};
+
+void MoveLandmarks(MapEditor& map, const LoopAnswer& answer, const Corrections& corrections) {
+  std::map<LandmarkId, Eigen::Vector3d> offsets;
+  for (const auto& o : answer.landmark_offsets) offsets[o.landmark] = o.offset_world;
+  for (const LandmarkId id : map.LandmarkIdsSorted()) {
+    const Landmark& landmark = map.At(id);
+    const Sim3d* correction = corrections.Of(landmark.reference);
+    if (correction == nullptr) continue;
+    const auto offset = offsets.find(id);
+    const Eigen::Vector3d beyond = offset == offsets.end() ? Eigen::Vector3d::Zero() : offset->second;
+    map.SetPosition(id, *correction * landmark.p_world + beyond);
+  }
+}
+
+void MoveKeyframes(MapEditor& map, const Corrections& corrections) {
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    const Sim3d* correction = corrections.Of(id);
+    if (correction == nullptr) continue;
+    const Sim3d corrected = Sim3d(keyframe.T_cam_world) * correction->Inverse();
+    map.SetPoseAndScale(id, corrected.ToRigid(), correction->scale);
+  }
+}
+
+/// The two ends of a loop as they stand in the map of now.
+struct LoopEnds {
+  const Keyframe& here;   ///< the keyframe that closed it
+  const Keyframe& there;  ///< the place
+};
+
+std::optional<LoopEnds> EndsOf(const Map& map, const LoopAnswer& answer) {
+  const std::optional<KeyframeId> here = map.ResolveKeyframe(answer.keyframe);
+  const std::optional<KeyframeId> there = map.ResolveKeyframe(answer.matched);
+  if (!here || !there || *here == *there) return std::nullopt;
+  return LoopEnds{map.At(*here), map.At(*there)};
+}
+
+/// Where a keyframe stands to the one that closed the loop.
+struct BesideLoop {
+  const Keyframe* keyframe = nullptr;
+  Rigid3d T_cam_here;
+};
+
+/// The keyframe of a loop and its neighbours, by id, where they stand to it: of what lies between them the
+/// loop says nothing new, while the corrected poses also share in what the graph has spread.
+struct LoopSide {
+  std::vector<BesideLoop> keyframes;
+  double scale = 1.0;  ///< of the loop's keyframe when this was measured
+};
+
+LoopSide SideOf(const Map& map, const LoopEnds& ends, int min_covisibility) {
+  std::vector<const Keyframe*> side = map.BestCovisible(ends.here, kMaxLoopSide, min_covisibility);
+  side.push_back(&ends.here);
+  // Who sees the place already is of that side.
+  std::erase_if(side, [&](const Keyframe* keyframe) {
+    const bool sees_place = ends.there.covisible.contains(keyframe->id);
+    return keyframe == &ends.there || (keyframe != &ends.here && sees_place);
+  });
+  std::ranges::sort(side, {}, &Keyframe::id);
+  LoopSide measured;
+  measured.scale = ends.here.scale;
+  const Rigid3d T_world_here = ends.here.T_cam_world.Inverse();
+  for (const Keyframe* keyframe : side)
+    measured.keyframes.push_back({keyframe, keyframe->T_cam_world * T_world_here});
+  return measured;
+}
+
+void FuseAsTold(MapEditor& map, const LoopAnswer& answer) {
+  for (const auto& fusion : answer.fusions) {
+    const std::optional<LandmarkId> gone = map.Resolve(fusion.from), kept = map.Resolve(fusion.into);
+    if (gone && kept && *gone != *kept) map.Fuse(*gone, *kept);
+  }
+}
+
+/// Every keyframe of this side is tied to all that it sees of the place: a few landmarks in a corner of its
+/// image would leave it free to turn about them.
+int TieToPlace(MapEditor& map, const LoopEnds& ends, const LoopSide& side, std::vector<LandmarkId> place,
+               const MapperOptions& options) {
+  int joined = 0;
+  for (const BesideLoop& beside : side.keyframes) {
+    for (LandmarkId& landmark : place) landmark = map.Resolve(landmark).value_or(landmark);
+    std::sort(place.begin(), place.end());
+    place.erase(std::unique(place.begin(), place.end()), place.end());
+    const Rigid3d T_cam_here(beside.T_cam_here.rotation,
+                             beside.T_cam_here.translation * (ends.here.scale / side.scale));
+    joined += FuseInto(map, *beside.keyframe, T_cam_here * ends.here.T_cam_world, place, options);
+  }
+  return joined;
+}
+
+/// What the two ends of a loop have in common becomes one.
+int Connect(MapEditor& map, const LoopAnswer& answer, const LoopEnds& ends, const LoopSide& side,
+            const MapperOptions& options) {
+  if (ends.here.map_id != ends.there.map_id) JoinMaps(map, ends.here, ends.there);
+  map.AddLoopEdge(ends.here.id, ends.there.id);
+  const std::vector<LandmarkId> place =
+      LandmarksAround(map, ends.there.id, kPlaceNeighbours, options.min_covisibility);
+  FuseAsTold(map, answer);
+  const int tied = TieToPlace(map, ends, side, place, options);
+  return tied + FuseWithNeighbours(map, ends.here, options);
+}
+
+/// Turns the spanning tree of a keyframe around, so that it hangs from `parent`.
+void Reroot(MapEditor& map, KeyframeId id, KeyframeId parent) {
+  while (id.valid()) {
+    const KeyframeId next = map.At(id).parent;
+    map.SetParent(id, parent);
+    parent = id;
+    id = next;
+  }
+}
+
+}  // namespace
+
+std::string WhyRefused(const Map& map, const LoopAnswer& answer) {
+  const bool known =
+      std::ranges::any_of(answer.corrections, [&](const LoopAnswer::KeyframeCorrection& correction) {
+        return map.FindKeyframe(correction.keyframe) != nullptr;
+      });
+  if (!known) return "its keyframes are gone";
+  const std::string computed = "computed on version " + std::to_string(answer.base_version);
+  if (answer.base_version < map.progress().corrected) {
+    return computed + ", before the correction of version " + std::to_string(map.progress().corrected);
+  }
+  if (answer.base_version > map.version()) {
+    return computed + "; the map's is " + std::to_string(map.version());
+  }
+  return "";
+}
+
+int ApplyCorrection(MapEditor& map, const LoopAnswer& answer, const MapperOptions& options) {
+  const bool is_loop = answer.kind == LoopAnswer::Kind::kLoop;
+  const std::optional<LoopEnds> ends = is_loop ? EndsOf(map, answer) : std::nullopt;
+  const LoopSide side = ends ? SideOf(map, *ends, options.min_covisibility) : LoopSide();
+  const Corrections corrections(map, answer);
+  MoveLandmarks(map, answer, corrections);
+  MoveKeyframes(map, corrections);
+  return ends ? Connect(map, answer, *ends, side, options) : 0;
+}
+
+void JoinMaps(MapEditor& map, const Keyframe& end, const Keyframe& place) {
+  const MapId from = end.map_id;
+  for (const Keyframe* keyframe : map.KeyframesOf(from)) map.SetMapId(keyframe->id, place.map_id);
+  for (const Landmark* landmark : map.LandmarksOf(from)) map.SetMapId(landmark->id, place.map_id);
+  Reroot(map, end.id, place.id);
+}
+
+}  // namespace dmslam

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "dmslam/map/map_editor.h"
+#include "dmslam/mapping/insertion_order.h"
+#include "dmslam/mapping/mapper_options.h"
+
+namespace dmslam {
+
+/// Removes landmarks that were made within the last keyframes and do not hold up (ORB-SLAM2's rule): found
+/// too rarely, or with too few observers after two keyframes. Returns how many.
+int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order,
+                       const MapperOptions& options);
+
+/// Removes neighbours of `keyframe` whose landmarks others see as well. `keep` is never removed (the frontend
+/// tracks against it). Returns how many.
+int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, KeyframeId keep,
+                           const MapperOptions& options);
+
+/// Removes landmarks that lie just before the lens of a keyframe that sees them: nearer than `share` of what
+/// the keyframe sees in the median. A mismatch beside the epipole makes them, and one pulls at the poses
+/// harder than all others together. Returns how many.
+int RemoveTooNear(MapEditor& map, MapId map_id, double share);
+
+}  // namespace dmslam

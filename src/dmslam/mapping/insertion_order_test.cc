@@ -1,0 +1,61 @@
+#include "dmslam/mapping/insertion_order.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/mapping/testing/wall_scene.h"
+
+namespace dmslam {
+namespace {
+
+constexpr auto Id = WallScene::Id;
+
+/// Keyframes are inserted in any order of their frames.
+class Order : public testing::Test {
+ protected:
+  void Insert(std::initializer_list<uint32_t> frames) {
+    for (const uint32_t frame : frames) {
+      scene_.AddKeyframe(map_, frame, 0);
+      order_.Add(Id(frame));
+    }
+  }
+
+  WallScene scene_{3, 3};
+  MapEditor map_{TestCamera(), Pyramid()};
+  InsertionOrder order_;
+};
+
+TEST_F(Order, CountsKeyframesAsTheyCameNotAsTheyWereSeen) {
+  Insert({50, 60, 70, 40});
+  EXPECT_EQ(order_.CountSince(map_, Id(40), 3), 0);
+  EXPECT_EQ(order_.CountSince(map_, Id(60), 3), 2);
+  EXPECT_EQ(order_.CountSince(map_, Id(50), 2), 2) << "no more than asked for";
+}
+
+TEST_F(Order, CulledKeyframesCount) {
+  Insert({50, 40, 30});
+  map_.RemoveKeyframe(Id(40));
+  EXPECT_EQ(order_.CountSince(map_, Id(50), 3), 2);
+  EXPECT_EQ(order_.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(30), Id(50)}));
+}
+
+TEST_F(Order, KeyframesOfADroppedMapDoNotCount) {
+  Insert({50, 40});
+  EXPECT_EQ(order_.CountSince(map_, Id(50), 3), 1);
+  map_.DropMap(1);
+  EXPECT_EQ(order_.CountSince(map_, Id(50), 3), 0);
+}
+
+TEST_F(Order, OfAMapOfOthersIsAssumedToBeThatOfItsStamps) {
+  Insert({50, 40, 60});
+  InsertionOrder assumed;
+  assumed.Assume(map_);
+  EXPECT_EQ(assumed.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(60), Id(50), Id(40)}));
+  MapProgress progress;
+  progress.settled = Id(40);
+  map_.SetProgress(progress);
+  assumed.Assume(map_);
+  EXPECT_EQ(assumed.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(40), Id(60), Id(50)}));
+}
+
+}  // namespace
+}  // namespace dmslam

@@ -1,0 +1,55 @@
+#include "dmslam/mapping/keyframe_insertion.h"
+
+#include <optional>
+#include <utility>
+
+namespace dmslam {
+namespace {
+
+/// Where the landmark of a match is now; null: it is gone, or is none of this map's.
+const Landmark* Usable(const Map& map, const Keyframe& keyframe, const KeyframeProposal::Match& match) {
+  const std::optional<LandmarkId> id = map.Resolve(match.landmark);
+  if (!id || match.feature >= keyframe.landmarks.size()) return nullptr;
+  const Landmark& landmark = map.At(*id);
+  return landmark.map_id == keyframe.map_id ? &landmark : nullptr;
+}
+
+}  // namespace
+
+Keyframe MakeKeyframe(const Map& map, const KeyframeProposal& proposal, const Rigid3d& T_cam_world) {
+  Keyframe keyframe;
+  keyframe.id = proposal.id;
+  keyframe.map_id = proposal.map_id;
+  keyframe.stamp_ns = proposal.stamp_ns;
+  keyframe.T_cam_world = T_cam_world;
+  keyframe.features = MakeFrameFeatures(proposal.features, map.camera(), map.pyramid());
+  return keyframe;
+}
+
+InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal) {
+  InsertionReport report;
+  report.repeated = map.HasKnown(proposal.id);
+  if (report.repeated) return report;
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(proposal.reference);
+  const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(proposal.reference);
+  if (!reference || !stands_for_it || reference->map_id != proposal.map_id) return report;
+  Keyframe made =
+      MakeKeyframe(map, proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
+  made.scale = reference->scale;
+  made.parent = *stands_for_it;
+  const Keyframe& keyframe = map.AddKeyframe(std::move(made));
+  for (const KeyframeProposal::Match& match : proposal.matches) {
+    if (const Landmark* landmark = Usable(map, keyframe, match)) {
+      map.SetObservation(keyframe.id, match.feature, landmark->id);
+      map.UpdateDescriptor(landmark->id);
+    } else {
+      ++report.observations_dropped;
+    }
+  }
+  const std::vector<const Keyframe*> nearest = map.BestCovisible(keyframe, 1, 1);
+  map.SetParent(keyframe.id, nearest.empty() ? *stands_for_it : nearest.front()->id);
+  report.keyframe = &keyframe;
+  return report;
+}
+
+}  // namespace dmslam

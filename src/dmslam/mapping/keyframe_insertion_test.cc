@@ -1,0 +1,100 @@
+#include "dmslam/mapping/keyframe_insertion.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/mapping/testing/wall_scene.h"
+
+namespace dmslam {
+namespace {
+
+constexpr auto Id = WallScene::Id;
+
+/// Keyframes 1 and 2 see the wall; 2 is half a unit to the right of 1.
+class Insertion : public testing::Test {
+ protected:
+  Insertion() {
+    scene_.AddKeyframe(map_, 1, 0.0);
+    scene_.AddKeyframe(map_, 2, 0.5);
+    for (uint16_t i = 0; i < 30; ++i) ids_.push_back(scene_.AddLandmark(map_, 100U + i, i, {1, 2}));
+  }
+  KeyframeProposal Seeing(uint16_t count, uint32_t reference = 2) const {
+    KeyframeProposal proposal = scene_.Propose(3, 0.8, reference, 0.5, 1.0);
+    for (uint16_t i = 0; i < count; ++i) proposal.matches.push_back({i, ids_[i]});
+    return proposal;
+  }
+  double PlaceOf(const InsertionReport& report) const { return report.keyframe->T_cam_world.Center().x(); }
+
+  WallScene scene_;
+  MapEditor map_{TestCamera(), Pyramid()};
+  std::vector<LandmarkId> ids_;
+};
+
+TEST_F(Insertion, PutsItWhereItsReferenceIsNow) {
+  map_.SetPoseAndScale(Id(2), WallScene::At(1.5), 2.0);  // corrected while the proposal was on its way
+  const InsertionReport report = InsertKeyframe(map_, Seeing(10));
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_NEAR(PlaceOf(report), 1.5 + 2.0 * 0.3, 1e-12) << "all lengths have doubled";
+  EXPECT_EQ(report.keyframe->scale, 2.0);
+  EXPECT_EQ(report.keyframe->stamp_ns, 1'000'000'000);
+}
+
+TEST_F(Insertion, ResolvesAReferenceThatWasCulled) {
+  const KeyframeProposal proposal = Seeing(10);
+  map_.RemoveKeyframe(Id(2));
+  const InsertionReport report = InsertKeyframe(map_, proposal);
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_NEAR(PlaceOf(report), 0.8, 1e-12);
+  EXPECT_EQ(report.keyframe->parent, Id(1));
+}
+
+TEST_F(Insertion, SeesWhatItsLandmarksHaveBecome) {
+  KeyframeProposal proposal = Seeing(10);
+  map_.Fuse(ids_[3], ids_[20]);
+  map_.RemoveLandmark(ids_[4]);
+  map_.SetMapId(ids_[5], 2);
+  proposal.matches.push_back({60000, ids_[6]});  // no such feature
+  const InsertionReport report = InsertKeyframe(map_, proposal);
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_EQ(report.observations_dropped, 3);
+  EXPECT_EQ(report.keyframe->landmarks[3], ids_[20]);
+  EXPECT_FALSE(report.keyframe->landmarks[4].valid());
+  EXPECT_FALSE(report.keyframe->landmarks[5].valid());
+  EXPECT_EQ(map_.CountTracked(*report.keyframe, 3), 8);
+}
+
+TEST_F(Insertion, HangsFromWhomItSharesMostWith) {
+  scene_.AddKeyframe(map_, 9, 0.7);
+  for (uint16_t i = 0; i < 6; ++i) map_.SetObservation(Id(9), i, ids_[i]);
+  map_.ClearObservation(Id(1), 0);
+  map_.ClearObservation(Id(2), 0);
+  const InsertionReport report = InsertKeyframe(map_, Seeing(6));
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_EQ(report.keyframe->parent, Id(9));
+}
+
+TEST_F(Insertion, HangsFromItsReferenceWhereItSharesNothing) {
+  const InsertionReport report = InsertKeyframe(map_, Seeing(0));
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_EQ(report.keyframe->parent, Id(2));
+}
+
+TEST_F(Insertion, OneProposedTwiceIsRecognisedAlsoWhenItWasCulled) {
+  EXPECT_NE(InsertKeyframe(map_, Seeing(10)).keyframe, nullptr);
+  EXPECT_TRUE(InsertKeyframe(map_, Seeing(10)).repeated);
+  map_.RemoveKeyframe(Id(3));
+  const InsertionReport again = InsertKeyframe(map_, Seeing(10));
+  EXPECT_TRUE(again.repeated);
+  EXPECT_EQ(again.keyframe, nullptr);
+}
+
+TEST_F(Insertion, RefusesAReferenceThatIsUnknownOrOfAnotherMap) {
+  const InsertionReport unknown = InsertKeyframe(map_, Seeing(10, 77));
+  EXPECT_EQ(unknown.keyframe, nullptr);
+  EXPECT_FALSE(unknown.repeated);
+  map_.SetMapId(Id(2), 2);
+  EXPECT_EQ(InsertKeyframe(map_, Seeing(10)).keyframe, nullptr);
+  EXPECT_EQ(map_.keyframes().size(), 2u);
+}
+
+}  // namespace
+}  // namespace dmslam

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "dmslam/map/map_editor.h"
+
+namespace dmslam {
+
+/// Makes landmarks with ids of one epoch's ordinal.
+class LandmarkMaker {
+ public:
+  explicit LandmarkMaker(uint16_t epoch_ordinal) : epoch_ordinal_(epoch_ordinal) {}
+
+  /// The same for a map that others began: ids of an ordinal above all that it knows.
+  void Continue(const Map& map) {
+    epoch_ordinal_ = static_cast<uint16_t>(std::max(map.HighestOrdinal(), epoch_ordinal_) + 1);
+    next_ = 1;
+  }
+
+  /// Adds a landmark that follows `reference`. `newest`: the newest keyframe; the landmark's age is counted
+  /// from there.
+  const Landmark& Add(MapEditor& map, const Keyframe& reference, const Keyframe& newest,
+                      const Eigen::Vector3d& p_world) {
+    Landmark landmark;
+    landmark.id = LandmarkId::Make(epoch_ordinal_, next_++);
+    landmark.map_id = reference.map_id;
+    landmark.p_world = p_world;
+    landmark.reference = reference.id;
+    landmark.first_keyframe = newest.id;
+    landmark.first_ns = newest.stamp_ns;
+    landmark.evidence.visible = 1;
+    landmark.evidence.found = 1;
+    return map.AddLandmark(std::move(landmark));
+  }
+
+ private:
+  uint16_t epoch_ordinal_;
+  uint64_t next_ = 1;
+};
+
+}  // namespace dmslam
