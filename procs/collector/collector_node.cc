@@ -186,14 +186,36 @@ void CollectorNode::OpenJournal() {
                                 newest);
 }
 
+std::vector<KeyframeId> CollectorNode::LoopsOf(KeyframeId id) const {
+  const Keyframe* keyframe = builder_->map().FindKeyframe(id);
+  return keyframe == nullptr ? std::vector<KeyframeId>() : keyframe->loop_edges;
+}
+
+/// A loop's other end is the keyframe to which there was no edge before; how they lie is known best now.
+void CollectorNode::OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before) {
+  CorrectionRecord correction{delta.event, delta.about, delta.note, {}, {}};
+  const std::vector<KeyframeId> loops = LoopsOf(delta.about);
+  const auto added = std::find_if(loops.begin(), loops.end(), [&](KeyframeId id) {
+    return !std::binary_search(loops_before.begin(), loops_before.end(), id);
+  });
+  if (delta.event == MapEvent::kCorrected && added != loops.end()) {
+    const Map& map = builder_->map();
+    correction.matched = *added;
+    correction.T_matched_keyframe =
+        map.FindKeyframe(*added)->T_cam_world * map.FindKeyframe(delta.about)->T_cam_world.Inverse();
+  }
+  run_.corrections.push_back(std::move(correction));
+}
+
 bool CollectorNode::TakeMapRecord() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return false;
   if (record->begins_anew()) builder_->ForgetMap();
   if (const auto delta = Read<MapDelta>(*record->bytes)) {
+    const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
     builder_->OnMapDelta(*delta);
     if (!record->in_snapshot()) TimeKeyframe(*delta);
-    if (delta->correction_id != 0) run_.corrections.push_back({delta->event, delta->about, delta->note});
+    if (delta->correction_id != 0) OnCorrection(*delta, loops_before);
     dropped_maps_.insert(delta->dropped_maps.begin(), delta->dropped_maps.end());
   }
   map_reader_->AcceptTaken();

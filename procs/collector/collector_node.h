@@ -38,6 +38,8 @@ class CollectorNode : public StreamNode {
  private:
   bool TakeFrontendRecord();
   bool TakeMapRecord();
+  std::vector<KeyframeId> LoopsOf(KeyframeId id) const;
+  void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
   bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);

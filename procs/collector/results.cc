@@ -66,6 +66,11 @@ Json LoopJson(const RunRecord& run) {
                                                                          : "refused";
     corrections.push_back(
         {{"frame", correction.keyframe.frame_index()}, {"kind", kind}, {"note", correction.note}});
+    if (!correction.matched.valid()) continue;
+    const Eigen::Vector3d& t = correction.T_matched_keyframe.translation;
+    const Eigen::Quaterniond& q = correction.T_matched_keyframe.rotation;
+    corrections.back()["matched_frame"] = correction.matched.frame_index();
+    corrections.back()["T_matched_keyframe"] = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
   }
   json["corrections"] = corrections;
   return json;

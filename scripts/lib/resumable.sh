@@ -41,6 +41,30 @@ start() {
   return "$status"
 }
 
+# start_beside COMMAND...: starts it in a process group of its own and goes on. A function may be given: on an interrupt
+# all that it has started ends with it.
+beside=()
+start_beside() {
+  set -m
+  "$@" </dev/null 8>&- 9>&- &
+  beside+=("$!")
+  set +m
+}
+
+# wait_beside LIMIT: waits until fewer than LIMIT of those run. Returns 1 where one that ended meanwhile failed.
+wait_beside() {
+  local pid running status=0
+  while ((${#beside[@]} >= $1 && ${#beside[@]})); do
+    wait -n "${beside[@]}" || status=1
+    running=()
+    for pid in "${beside[@]}"; do
+      ! kill -0 "$pid" 2>/dev/null || running+=("$pid")
+    done
+    beside=(${running[@]+"${running[@]}"})
+  done
+  return "$status"
+}
+
 interrupted() {
   trap '' INT TERM
   exec 2>&8 # a run's output may be redirected at this moment
@@ -48,6 +72,11 @@ interrupted() {
     kill -TERM "$child" 2>/dev/null || true
     wait "$child" 2>/dev/null || true
   fi
+  local pid
+  for pid in ${beside[@]+"${beside[@]}"}; do
+    kill -TERM -- "-$pid" 2>/dev/null || true
+    wait "$pid" 2>/dev/null || true
+  done
   progress_end
   say "stopped; the same command continues"
   exit 130

@@ -1,4 +1,5 @@
-// dmslam-report: what scripts/reproduce.sh has to run, and the report of what it has run.
+// dmslam-report: what scripts/reproduce.sh has to run, and the reports of what it, scripts/sweep.sh and
+// scripts/population.sh have run.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
@@ -12,6 +13,7 @@
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "figures.h"
+#include "population.h"
 #include "sweep.h"
 
 namespace dmslam {
@@ -26,6 +28,9 @@ struct Arguments {
   std::vector<std::string> only;
   std::string publish;
   std::string data;
+  std::string list;
+  std::vector<std::string> runs;
+  bool details = false;
 };
 
 void WriteText(const fs::path& path, const std::string& text) {
@@ -210,6 +215,22 @@ void RunSweep(const Arguments& arguments) {
   std::cout << (out / "dynamic-scenes.md").string() << "\n" << (out / "dynamic-scenes.png").string() << "\n";
 }
 
+void RunPopulation(const Arguments& arguments) {
+  std::vector<PopulationSystem> systems;
+  for (const std::string& text : arguments.runs) systems.push_back(ParsePopulationSystem(text));
+  const std::vector<PopulationSequence> sequences = ReadPopulation(arguments.list);
+  for (const PopulationSequence& sequence : sequences) {
+    if (!fs::exists(sequence.folder / "rgb.txt"))
+      std::cerr << "dmslam-report: " << sequence.name << " is not shown: " << sequence.folder.string()
+                << " holds no sequence\n";
+  }
+  const std::vector<PopulationRun> runs = ReadPopulationRuns(sequences, systems);
+  const std::string markdown = PopulationMarkdown(runs, arguments.details);
+  WriteText(arguments.out + ".md", markdown);
+  WriteText(arguments.out + ".json", PopulationJson(runs, arguments.details));
+  std::cout << markdown << "\nwritten: " << arguments.out << ".md, " << arguments.out << ".json\n";
+}
+
 }  // namespace
 }  // namespace dmslam
 
@@ -237,11 +258,22 @@ int main(int argc, char** argv) {
   sweep->add_option("--seeds", arguments.seeds, "runs of each sequence")->capture_default_str();
   sweep->add_option("--data", arguments.data, "folder that holds the kitchen sequences");
   sweep->add_option("--publish", arguments.publish, "also put them between this page's marks");
+  CLI::App* population =
+      app.add_subcommand("population", "write the tables of scripts/population.sh, and print them");
+  population->add_option("--list", arguments.list, "lines of half, name, kind, folder, separated by tabs")
+      ->required();
+  population
+      ->add_option("--runs", arguments.runs,
+                   "NAME=FOLDER: a system and the folder with its runs, one per sequence; may be repeated")
+      ->required();
+  population->add_option("--out", arguments.out, "writes OUT.md and OUT.json")->required();
+  population->add_flag("--details", arguments.details, "the report half's single sequences too");
   CLI11_PARSE(app, argc, argv);
   try {
     if (plan->parsed()) dmslam::RunPlan(arguments);
     if (write->parsed()) dmslam::RunWrite(arguments);
     if (sweep->parsed()) dmslam::RunSweep(arguments);
+    if (population->parsed()) dmslam::RunPopulation(arguments);
   } catch (const std::exception& error) {
     std::cerr << "dmslam-report: " << error.what() << "\n";
     return 1;

@@ -27,8 +27,10 @@ struct Arguments {
 
 void AddOptions(CLI::App& app, Arguments& args) {
   app.add_option("--out", args.out, "Folder to write into (it is made where it is not there)")->required();
-  app.add_option("--scene", args.scene, "room | corridor | aliased (default: what the path needs)");
-  app.add_option("--path", args.path, "static | xyz | rpy | halfsphere | tour | ring (default: xyz)");
+  app.add_option("--scene", args.scene,
+                 "room | office | hall | workshop | corridor | aliased (default: what the path needs)");
+  app.add_option("--path", args.path,
+                 "static | xyz | rpy | halfsphere | turn | tour | forward | ring (default: xyz)");
   app.add_option(
       "--preset", args.preset,
       "walking_xyz | walking_rpy | walking_halfsphere | static_xyz: as the sequences of the TUM benchmark: "
@@ -38,14 +40,20 @@ void AddOptions(CLI::App& app, Arguments& args) {
   app.add_option("--fps", args.fps, "Frames per second")->capture_default_str();
   app.add_option("--seed", args.seed, "Seed of everything: scene, path, people, noise")
       ->capture_default_str();
-  app.add_option("--moving-share", args.moving_share, "Mean share of the image covered by people, 0..0.7");
+  app.add_option("--moving-share", args.moving_share,
+                 "Mean share of the image covered by people and other things that move, 0..0.7");
   app.add_option("--actors", args.actors, "How many people (default: as many as the moving share takes)");
   app.add_option("--behaviour", args.behaviour, "walk | stop-and-go | sit")->capture_default_str();
+  app.add_flag("--carry", args.sequence.world.props.carried_box, "The first person carries a box");
+  app.add_flag("--cart", args.sequence.world.props.cart, "A cart rolls about by itself, and stops at times");
+  app.add_flag("--door", args.sequence.world.props.door, "A door opens and closes (not in --scene aliased)");
+  app.add_flag("--screen", args.sequence.world.props.screen, "A large screen plays videos");
   app.add_option("--stand-first", args.sequence.world.actor.stand_first_s,
                  "Seconds that people stand still at first");
   app.add_option("--static-start", args.sequence.world.path.static_start_s,
                  "Seconds that the camera stands still at first");
-  app.add_option("--speed", args.sequence.world.path.speed_mps, "Walking speed of tour and ring [m/s]");
+  app.add_option("--speed", args.sequence.world.path.speed_mps,
+                 "Walking speed of tour, forward and ring [m/s]");
   app.add_option("--ring-length", args.sequence.world.scene.ring_length_m,
                  "Length of the ring of corridors [m]")
       ->capture_default_str();
@@ -102,11 +110,12 @@ dmslam::SequenceOptions ToSequenceOptions(Arguments& args) {
   if (args.scene.empty()) args.scene = args.path == "ring" ? "corridor" : "room";
   options.world.path.kind = dmslam::ParsePathKind(args.path);
   options.world.scene.kind = dmslam::ParseSceneKind(args.scene);
+  options.world.scene.doorway = options.world.props.door;
   options.world.actor.behaviour = dmslam::ParseBehaviour(args.behaviour);
   options.world.actors = args.actors;
   options.world.moving_share = args.moving_share;
-  options.world.scene.seed = options.world.path.seed = options.world.actor.seed = options.render.seed =
-      args.seed;
+  options.world.scene.seed = options.world.path.seed = options.world.actor.seed = options.world.props.seed =
+      options.render.seed = args.seed;
   options.frames = args.frames;
   if (options.frames == 0) {
     const bool round = args.path == "tour" || args.path == "ring";

@@ -354,9 +354,9 @@ void AddLeg(const ActorLook& look, const Skeleton& s, float side, BodyBuilder& b
   body.AddTube(ankle, toes, 0.026f * s.h, 0.022f * s.h, s.up, 1.0f, look.shoes, 0);
 }
 
-void AddArm(const ActorLook& look, const Skeleton& s, float side, BodyBuilder& body) {
-  const float angle = -0.75f * s.Swing(side) * (1 - s.sit) + 0.35f * s.sit;
-  const float bend = 0.25f + 0.25f * s.stride + 0.9f * s.sit;
+void AddArm(const ActorLook& look, const Skeleton& s, float side, bool carrying, BodyBuilder& body) {
+  const float angle = carrying ? 0.3f : -0.75f * s.Swing(side) * (1 - s.sit) + 0.35f * s.sit;
+  const float bend = carrying ? 1.25f : 0.25f + 0.25f * s.stride + 0.9f * s.sit;
   const Vector3f shoulder = s.neck - 0.025f * s.h * s.lean + 0.108f * s.w * side * s.left;
   const Vector3f elbow = shoulder + 0.165f * s.h * (s.Down(angle) + 0.12f * side * s.left).normalized();
   const Vector3f forearm = (s.Down(angle + bend) - 0.05f * side * s.left).normalized();
@@ -417,13 +417,21 @@ ActorLook DressActor(uint64_t seed, int index, int texture_halvings, TextureList
   return look;
 }
 
+Eigen::Affine3f CarriedFrame(const ActorLook& look, const ActorState& state) {
+  const Skeleton s = Pose(look, state);
+  Eigen::Affine3f frame = Eigen::Affine3f::Identity();
+  frame.linear() << -s.left, s.ahead, s.up;
+  frame.translation() = s.hip + 0.14f * s.h * s.lean + 0.22f * s.h * s.ahead;
+  return frame;
+}
+
 Mesh BuildActorMesh(const ActorLook& look, const ActorState& state, int index) {
   const Skeleton skeleton = Pose(look, state);
   BodyBuilder body;
   AddTrunk(look, skeleton, body);
   for (const float side : {1.0f, -1.0f}) {
     AddLeg(look, skeleton, side, body);
-    AddArm(look, skeleton, side, body);
+    AddArm(look, skeleton, side, state.carrying, body);
   }
   return body.Take(index);
 }

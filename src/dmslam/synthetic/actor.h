@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -34,10 +35,11 @@ struct ActorOptions {
 struct ActorState {
   Eigen::Vector2d position{0, 0};
   double heading_rad = 0;
-  double gait_rad = 0;  ///< Phase of the steps.
-  double stride = 0;    ///< How far arms and legs swing, 0 standing .. 1 walking.
-  double sitting = 0;   ///< 0 upright .. 1 seated.
-  bool moving = false;  ///< Whether any part of the body moves.
+  double gait_rad = 0;    ///< Phase of the steps.
+  double stride = 0;      ///< How far arms and legs swing, 0 standing .. 1 walking.
+  double sitting = 0;     ///< 0 upright .. 1 seated.
+  bool moving = false;    ///< Whether any part of the body moves.
+  bool carrying = false;  ///< Both arms hold something before the chest.
 };
 
 /// A person's doings over a sequence, simulated once in small steps so that any instant can be asked for.
@@ -62,6 +64,9 @@ struct ActorLook {
 
 /// Dresses a person; adds its clothes to the scene's textures.
 ActorLook DressActor(uint64_t seed, int index, int texture_halvings, TextureList& textures);
+
+/// The place between the hands of somebody who carries: x to his right, y ahead of him, z up.
+Eigen::Affine3f CarriedFrame(const ActorLook& look, const ActorState& state);
 
 /// The body at one instant, as one mesh that belongs to actor `index`.
 Mesh BuildActorMesh(const ActorLook& look, const ActorState& state, int index);

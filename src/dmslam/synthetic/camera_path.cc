@@ -51,7 +51,10 @@ PathKind ParsePathKind(const std::string& name) {
   if (name == "halfsphere") return PathKind::kHalfsphere;
   if (name == "tour") return PathKind::kTour;
   if (name == "ring") return PathKind::kRing;
-  throw InputError("--path: '" + name + "' is not known; choose static, xyz, rpy, halfsphere, tour or ring");
+  if (name == "forward") return PathKind::kForward;
+  if (name == "turn") return PathKind::kTurn;
+  throw InputError("--path: '" + name +
+                   "' is not known; choose static, xyz, rpy, halfsphere, tour, ring, forward or turn");
 }
 
 SmoothNoise::SmoothNoise(uint64_t seed, double low_hz, double high_hz) {
@@ -89,9 +92,9 @@ double CameraPath::Loop::Heading(double s) const {
   return std::atan2(along.y(), along.x());
 }
 
-CameraPath::Loop CameraPath::MakeLoop(const Scene& scene, PathKind kind) {
+CameraPath::Loop CameraPath::MakeLoop(const Scene& scene) {
   Loop loop;
-  if (kind == PathKind::kRing) {
+  if (scene.kind == SceneKind::kCorridor) {
     AppendRoundedRectangle({0, 0}, scene.ring_size_m.cast<double>(), 1.0, loop.points);
   } else if (scene.kind == SceneKind::kAliased) {
     // Around the first room, through the door at x = 1.6, around the second, and back.
@@ -117,8 +120,8 @@ CameraPath::Loop CameraPath::MakeLoop(const Scene& scene, PathKind kind) {
   } else {
     const Eigen::Vector2d low = scene.rooms[0].min().cast<double>(),
                           high = scene.rooms[0].max().cast<double>();
-    AppendRoundedRectangle(low + Eigen::Vector2d(1.6, 1.15), high - Eigen::Vector2d(1.3, 1.15), 1.1,
-                           loop.points);
+    const Eigen::Vector2d first = low + Eigen::Vector2d(1.6, 1.15), last = high - Eigen::Vector2d(1.3, 1.15);
+    AppendRoundedRectangle(first, last, std::min(1.1, 0.45 * (last - first).minCoeff()), loop.points);
   }
   double arc = 0;
   for (size_t i = 0; i < loop.points.size(); ++i) {
@@ -129,16 +132,18 @@ CameraPath::Loop CameraPath::MakeLoop(const Scene& scene, PathKind kind) {
 }
 
 CameraPath::CameraPath(const Scene& scene, const CameraPathOptions& options) : options_(options) {
-  const bool ring = options.kind == PathKind::kRing;
-  if (ring != (scene.kind == SceneKind::kCorridor)) {
+  const bool corridor = scene.kind == SceneKind::kCorridor, forward = options.kind == PathKind::kForward;
+  if (!forward && corridor != (options.kind == PathKind::kRing)) {
     throw InputError(
-        "--path: the ring belongs to --scene corridor, all other paths to a room; change one of them");
+        "--path: the ring belongs to --scene corridor, forward to all scenes, all other paths to a room; "
+        "change one of them");
   }
-  const Eigen::Vector2f low = scene.rooms.front().min();
-  home_ = {low.x() + 2.0, low.y() + 3.0, kEyeHeight};
-  if (ring || options.kind == PathKind::kTour) {
-    loop_ = MakeLoop(scene, options.kind);
-    if (options_.speed_mps <= 0) options_.speed_mps = ring ? 0.9 : 0.55;
+  in_ring_ = corridor;
+  const Eigen::Vector2f home = scene.rooms.front().min() + scene.home;
+  home_ = {home.x(), home.y(), kEyeHeight};
+  if (corridor || forward || options.kind == PathKind::kTour) {
+    loop_ = MakeLoop(scene);
+    if (options_.speed_mps <= 0) options_.speed_mps = corridor ? 0.9 : 0.55;
     period_s_ = loop_.arc_m.back() / options_.speed_mps;
   }
   Random random(DeriveSeed(options.seed, 0, "path"));
@@ -157,7 +162,7 @@ double CameraPath::PathTime(double time_s) const {
 }
 
 CameraPath::View CameraPath::AlongLoop(double path_time_s) const {
-  const bool ring = options_.kind == PathKind::kRing;
+  const bool ring = in_ring_, forward = options_.kind == PathKind::kForward;
   const double start = ring ? 0.0 : phase_ * loop_.arc_m.back();
   const double s = start + options_.speed_mps * path_time_s;
   const Eigen::Vector2d position = loop_.At(s);
@@ -170,8 +175,8 @@ CameraPath::View CameraPath::AlongLoop(double path_time_s) const {
   const double heading = h1 + 0.3 * (WrapAngle(h0 - h1) + WrapAngle(h2 - h1));
   // Loops run against the clock: outwards is to the right. The sway does not fit the loop's length, so that
   // rounds differ a little in where one looks.
-  const double outwards = ring ? 28 : 42;
-  const double sway = (ring ? 9.0 : 12.0) * std::sin(0.31 * s + 6.28 * phase_);
+  const double outwards = forward ? 0 : ring ? 28 : 42;
+  const double sway = (forward ? 5.0 : ring ? 9.0 : 12.0) * std::sin(0.31 * s + 6.28 * phase_);
   view.yaw_rad = heading - (outwards + sway) * kDegree;
   view.pitch_rad = ((ring ? -5.0 : -9.0) + 4.0 * std::sin(0.23 * s)) * kDegree;
   view.roll_rad = 1.2 * kDegree * std::sin(steps_rad_s * path_time_s);
@@ -210,6 +215,15 @@ CameraPath::View CameraPath::ViewAt(double path_time_s) const {
                                     -std::sin(azimuth) * std::cos(elevation), std::sin(elevation) - 0.2);
       view.yaw_rad = 0.42 * azimuth;
       view.pitch_rad = -0.35 * elevation;
+      break;
+    }
+    case PathKind::kTurn: {
+      constexpr double kReach = 0.35;  // From the body's axis to the camera.
+      view.yaw_rad = 100.0 * kDegree * std::sin(2.0 * kPi * t / 20.0);
+      view.pitch_rad += 5.0 * kDegree * std::sin(0.8 * t);
+      view.position += Eigen::Vector3d(kReach * (std::cos(view.yaw_rad) - 1.0),
+                                       kReach * std::sin(view.yaw_rad) + 0.05 * std::sin(1.1 * t),
+                                       0.03 * std::sin(1.7 * t));
       break;
     }
     default:

@@ -17,17 +17,21 @@ enum class PathKind {
   kHalfsphere,  ///< On a half sphere of one metre diameter.
   kTour,  ///< Around the room (kAliased: around both, through the door), looking outwards, again and again.
   kRing,  ///< Along the ring of corridors, again and again.
+  kForward,  ///< As kTour, or in a corridor as kRing, but looks where it goes.
+  kTurn,  ///< Turns to and fro by 200 degrees where it stands, as a person does: the eye is before the body.
 };
 
-/// "static", "xyz", "rpy", "halfsphere", "tour" or "ring"; throws InputError for another name.
+/// "static", "xyz", "rpy", "halfsphere", "tour", "ring", "forward" or "turn"; throws InputError for another
+/// name.
 PathKind ParsePathKind(const std::string& name);
 
 struct CameraPathOptions {
   PathKind kind = PathKind::kXyz;
   uint64_t seed = 1;
   double static_start_s = 0;  ///< The camera stands on something for so long, then is taken up.
-  double speed_mps = 0;  ///< kTour and kRing: walking speed; 0 is 0.55 m/s for tours and 0.9 m/s for rings.
-  double tremor = 1.0;   ///< How much the hand shakes; 0 is a perfect rig, 1 an ordinary hand.
+  double speed_mps =
+      0;  ///< Walking speed of kTour, kRing, kForward; 0 is 0.55 m/s in rooms and 0.9 m/s in rings.
+  double tremor = 1.0;  ///< How much the hand shakes; 0 is a perfect rig, 1 an ordinary hand.
 };
 
 /// Sum of sinusoids of random phase between two frequencies, the slower the stronger: smooth, bounded, of
@@ -70,10 +74,11 @@ class CameraPath {
   View ViewAt(double path_time_s) const;
   View AlongLoop(double path_time_s) const;
   double PathTime(double time_s) const;
-  static Loop MakeLoop(const Scene& scene, PathKind kind);
+  static Loop MakeLoop(const Scene& scene);
   static Rigid3d ToPose(const View& view);
 
   CameraPathOptions options_;
+  bool in_ring_ = false;  ///< It goes along the ring of corridors.
   Eigen::Vector3d home_;
   Loop loop_;
   double period_s_ = 12;

@@ -34,6 +34,8 @@ struct Wall {
   uint32_t skin = 0;            ///< Index into Assets::walls.
   float max_depth = 0.45f;      ///< How far furniture may stand out.
   std::vector<float> openings;  ///< Middles of doorways, metres from `a`.
+  float height = kRoomHeight;
+  double bare = 0;  ///< Share of its places that stay empty.
   Vector2f along() const { return (b - a).normalized(); }
   Vector2f inward() const { return {-along().y(), along().x()}; }
   float length() const { return (b - a).norm(); }
@@ -59,12 +61,33 @@ void BuildWall(SceneBuilder& builder, const Assets& assets, const Wall& wall) {
   const Skin skin = assets.walls[wall.skin % assets.walls.size()];
   float from = 0;
   for (const float middle : wall.openings) {
-    AddWallPanel(builder, wall, skin, from, middle - 0.5f * kDoorwayWidth, 0, kRoomHeight);
+    AddWallPanel(builder, wall, skin, from, middle - 0.5f * kDoorwayWidth, 0, wall.height);
     AddWallPanel(builder, wall, skin, middle - 0.5f * kDoorwayWidth, middle + 0.5f * kDoorwayWidth,
-                 kDoorwayHeight, kRoomHeight);
+                 kDoorwayHeight, wall.height);
     from = middle + 0.5f * kDoorwayWidth;
   }
-  AddWallPanel(builder, wall, skin, from, wall.length(), 0, kRoomHeight);
+  AddWallPanel(builder, wall, skin, from, wall.length(), 0, wall.height);
+}
+
+/// The closet behind a wall's opening, with a picture in it, and the doorway itself.
+Doorway AddCloset(SceneBuilder& builder, const Assets& assets, const Wall& wall, float middle) {
+  constexpr float kDepth = 0.9f;
+  const Vector2f hinge = wall.a + (middle - 0.5f * kDoorwayWidth) * wall.along();
+  const Doorway doorway{hinge, wall.along(), wall.inward(), kDoorwayWidth, kDoorwayHeight};
+  const Vector3f across = On(kDoorwayWidth * wall.along(), 0), back = On(-kDepth * wall.inward(), 0),
+                 up(0, 0, kDoorwayHeight), foot = On(hinge, 0);
+  const Skin skin = assets.walls[(wall.skin + 2) % assets.walls.size()];
+  builder.AddQuad(foot + up + back, across, -up, skin);
+  builder.AddQuad(foot + up, back, -up, skin);
+  builder.AddQuad(foot + up + across + back, -back, -up, skin);
+  builder.AddQuad(foot + back, across, -back, assets.floor);
+  builder.AddQuad(foot + up, across, back, assets.ceiling);
+  builder.FinishMesh();
+  AddPoster(builder, builder.Pick(assets.posters),
+            FrameFacing(hinge + 0.5f * kDoorwayWidth * wall.along() - (kDepth - 0.02f) * wall.inward(),
+                        wall.inward()),
+            0.75f, 0.9f, 0.8f);
+  return doorway;
 }
 
 /// Takes posters in turn, so that none hangs twice before all hang once.
@@ -147,6 +170,7 @@ void FurnishWall(SceneBuilder& builder, const Assets& assets, PosterDeck& deck, 
       (left - from > to - right ? to : from) = left - from > to - right ? left : right;
     }
     const float width = to - from;
+    if (wall.bare > 0 && builder.Chance(wall.bare)) continue;
     if (width > slot - 0.01f)
       FurnishPlace(builder, assets, deck, wall, at, slot);
     else if (width > 0.4f)
@@ -155,7 +179,7 @@ void FurnishWall(SceneBuilder& builder, const Assets& assets, PosterDeck& deck, 
 }
 
 void AddFloorAndCeiling(SceneBuilder& builder, const Assets& assets, const Vector2f& low,
-                        const Vector2f& high) {
+                        const Vector2f& high, float height = kRoomHeight) {
   const Vector2f size = high - low;
   const int nx = std::max(1, static_cast<int>(std::ceil(size.x() / 3))),
             ny = std::max(1, static_cast<int>(std::ceil(size.y() / 3)));
@@ -164,15 +188,16 @@ void AddFloorAndCeiling(SceneBuilder& builder, const Assets& assets, const Vecto
     for (int i = 0; i < nx; ++i) {
       const float x = low.x() + static_cast<float>(i) * dx, y = low.y() + static_cast<float>(j) * dy;
       builder.AddQuad({x, y + dy, 0}, {dx, 0, 0}, {0, -dy, 0}, assets.floor);
-      builder.AddQuad({x, y, kRoomHeight}, {dx, 0, 0}, {0, dy, 0}, assets.ceiling);
+      builder.AddQuad({x, y, height}, {dx, 0, 0}, {0, dy, 0}, assets.ceiling);
       builder.FinishMesh();
     }
   }
 }
 
-void AddDeskGroup(SceneBuilder& builder, const Assets& assets, const Vector2f& center, Scene& scene) {
-  // Two desks side by side, fronts to -x and chairs on both sides.
-  for (const float side : {-1.0f, 1.0f}) {
+/// Desks side by side, fronts to -x and chairs on both sides: a pair, or one in the middle (`sides` {0}).
+void AddDeskGroup(SceneBuilder& builder, const Assets& assets, const Vector2f& center, Scene& scene,
+                  const std::vector<float>& sides = {-1.0f, 1.0f}) {
+  for (const float side : sides) {
     const Vector2f front = center + Vector2f(-0.38f + builder.Uniform(-0.04f, 0.04f), 0.82f * side);
     AddDesk(builder, assets, FrameFacing(front, {-1, 0}), 1.55f, 0.76f);
     scene.obstacles.push_back({center + Vector2f(0, 0.82f * side), 0.78f});
@@ -188,19 +213,28 @@ void AddDeskGroup(SceneBuilder& builder, const Assets& assets, const Vector2f& c
   }
 }
 
+/// Where along its wall a doorway is.
+constexpr float kDoorwayShare = 0.72f;
+
+void AddDoorway(SceneBuilder& builder, const Assets& assets, float middle, Wall& wall, Scene& scene) {
+  wall.openings.push_back(middle);
+  scene.doorways.push_back(AddCloset(builder, assets, wall, middle));
+}
+
 void BuildRoom(SceneBuilder& builder, const Assets& assets, const Vector2f& low,
-               const std::vector<float>& doors_at_end, const std::vector<float>& doors_at_start,
+               const std::vector<float>& doors_at_end, const std::vector<float>& doors_at_start, bool doorway,
                Scene& scene) {
   const Vector2f high = low + Vector2f(kRoomLength, kRoomWidth);
   const uint32_t skin = builder.random().Below(4);
   PosterDeck deck(assets.posters);
   deck.Shuffle(builder.random());
-  const std::vector<Wall> walls = {
+  std::vector<Wall> walls = {
       {low, {high.x(), low.y()}, skin, 0.45f, doors_at_start},
       {{high.x(), low.y()}, high, skin + 1, 0.45f, {}},
       {high, {low.x(), high.y()}, skin + 2, 0.45f, doors_at_end},
       {{low.x(), high.y()}, low, skin + 3, 0.45f, {}},
   };
+  if (doorway) AddDoorway(builder, assets, kDoorwayShare * walls[1].length(), walls[1], scene);
   for (const Wall& wall : walls) {
     BuildWall(builder, assets, wall);
     FurnishWall(builder, assets, deck, wall);
@@ -215,10 +249,59 @@ std::vector<Vector3f> RoomLamps(const Vector2f& low) {
           On(low + Vector2f(5.0f, 4.4f), 2.55f)};
 }
 
+/// What distinguishes the kinds of rooms beside BuildRoom's.
+struct RoomPlan {
+  Vector2f size;
+  float height = kRoomHeight;
+  double bare = 0;
+  std::vector<Vector2f> desks;      ///< Middles of desk groups.
+  std::vector<float> desks_beside;  ///< As AddDeskGroup's `sides`.
+  Vector2f home;
+};
+
+RoomPlan PlanOf(SceneKind kind) {
+  if (kind == SceneKind::kOffice) return {{5.0f, 4.4f}, 2.6f, 0, {{2.9f, 2.2f}}, {0.0f}, {1.0f, 2.2f}};
+  if (kind == SceneKind::kHall)
+    return {{11.0f, 8.5f}, 3.6f, 0.15, {{5.6f, 2.6f}, {7.6f, 5.9f}}, {-1.0f, 1.0f}, {2.6f, 4.2f}};
+  return {{kRoomLength, kRoomWidth}, kRoomHeight, 0.5, {{4.0f, 3.0f}}, {-1.0f, 1.0f}, {2.0f, 3.0f}};
+}
+
+void BuildPlannedRoom(const SceneOptions& options, Scene& scene) {
+  const RoomPlan plan = PlanOf(options.kind);
+  const Assets assets = PaintAssets(options.seed, 44, options.texture_halvings, scene.textures);
+  std::vector<Vector3f> lamps;
+  for (float x = 1.6f; x < plan.size.x(); x += 3.0f) {
+    for (float y = 1.5f; y < plan.size.y(); y += 2.8f) lamps.push_back({x, y, plan.height - 0.15f});
+  }
+  SceneBuilder builder(DeriveSeed(options.seed, static_cast<uint64_t>(options.kind), "layout"), lamps);
+  const uint32_t skin = builder.random().Below(4);
+  PosterDeck deck(assets.posters);
+  deck.Shuffle(builder.random());
+  const Vector2f o(0, 0), x(plan.size.x(), 0), y(0, plan.size.y());
+  std::vector<Wall> walls = {{o, x, skin, 0.45f, {}},
+                             {x, plan.size, skin + 1, 0.45f, {}},
+                             {plan.size, y, skin + 2, 0.45f, {}},
+                             {y, o, skin + 3, 0.45f, {}}};
+  for (Wall& wall : walls) {
+    wall.height = plan.height;
+    wall.bare = plan.bare;
+  }
+  if (options.doorway) AddDoorway(builder, assets, kDoorwayShare * walls[1].length(), walls[1], scene);
+  for (const Wall& wall : walls) {
+    BuildWall(builder, assets, wall);
+    FurnishWall(builder, assets, deck, wall);
+  }
+  AddFloorAndCeiling(builder, assets, o, plan.size, plan.height);
+  for (const Vector2f& desks : plan.desks) AddDeskGroup(builder, assets, desks, scene, plan.desks_beside);
+  scene.rooms.emplace_back(o, plan.size);
+  scene.home = plan.home;
+  scene.meshes = builder.TakeMeshes();
+}
+
 void BuildOneRoom(const SceneOptions& options, Scene& scene) {
   const Assets assets = PaintAssets(options.seed, 44, options.texture_halvings, scene.textures);
   SceneBuilder builder(DeriveSeed(options.seed, 0, "layout"), RoomLamps({0, 0}));
-  BuildRoom(builder, assets, {0, 0}, {}, {}, scene);
+  BuildRoom(builder, assets, {0, 0}, {}, {}, options.doorway, scene);
   scene.meshes = builder.TakeMeshes();
 }
 
@@ -230,9 +313,9 @@ void BuildTwoRooms(const SceneOptions& options, Scene& scene) {
   // Doorways meet: a wall runs against the direction of the one on its other side.
   const float door = 1.6f;
   SceneBuilder builder(DeriveSeed(options.seed, 0, "layout"), lamps);
-  BuildRoom(builder, assets, {0, 0}, {kRoomLength - door}, {}, scene);
+  BuildRoom(builder, assets, {0, 0}, {kRoomLength - door}, {}, false, scene);
   builder.random() = Random(DeriveSeed(options.seed, 1, "layout"));
-  BuildRoom(builder, assets, second, {}, {door}, scene);
+  BuildRoom(builder, assets, second, {}, {door}, false, scene);
   const float gap = second.y() - kRoomWidth, x0 = door - 0.5f * kDoorwayWidth,
               x1 = door + 0.5f * kDoorwayWidth;
   builder.AddQuad({x0, kRoomWidth, kDoorwayHeight}, {0, gap, 0}, {0, 0, -kDoorwayHeight}, assets.woods[0]);
@@ -262,9 +345,10 @@ void BuildCorridor(const SceneOptions& options, Scene& scene) {
   const float h = kCorridorHalfWidthM;
   const Vector2f o0(-h, -h), o1(size.x() + h, -h), o2(size.x() + h, size.y() + h), o3(-h, size.y() + h);
   const Vector2f i0(h, h), i1(size.x() - h, h), i2(size.x() - h, size.y() - h), i3(h, size.y() - h);
-  const std::vector<Wall> walls = {{o0, o1, 0, 0.36f, {}}, {o1, o2, 2, 0.36f, {}}, {o2, o3, 3, 0.36f, {}},
-                                   {o3, o0, 1, 0.36f, {}}, {i0, i3, 3, 0.36f, {}}, {i3, i2, 1, 0.36f, {}},
-                                   {i2, i1, 0, 0.36f, {}}, {i1, i0, 2, 0.36f, {}}};
+  std::vector<Wall> walls = {{o0, o1, 0, 0.36f, {}}, {o1, o2, 2, 0.36f, {}}, {o2, o3, 3, 0.36f, {}},
+                             {o3, o0, 1, 0.36f, {}}, {i0, i3, 3, 0.36f, {}}, {i3, i2, 1, 0.36f, {}},
+                             {i2, i1, 0, 0.36f, {}}, {i1, i0, 2, 0.36f, {}}};
+  if (options.doorway) AddDoorway(builder, assets, kDoorwayShare * walls[0].length(), walls[0], scene);
   for (const Wall& wall : walls) {
     BuildWall(builder, assets, wall);
     FurnishWall(builder, assets, deck, wall);
@@ -283,11 +367,17 @@ SceneKind ParseSceneKind(const std::string& name) {
   if (name == "room") return SceneKind::kRoom;
   if (name == "corridor") return SceneKind::kCorridor;
   if (name == "aliased") return SceneKind::kAliased;
-  throw InputError("--scene: '" + name + "' is not known; choose room, corridor or aliased");
+  if (name == "office") return SceneKind::kOffice;
+  if (name == "hall") return SceneKind::kHall;
+  if (name == "workshop") return SceneKind::kWorkshop;
+  throw InputError("--scene: '" + name +
+                   "' is not known; choose room, corridor, aliased, office, hall or workshop");
 }
 
 Scene BuildScene(const SceneOptions& options) {
   if (options.ring_length_m < 24) throw InputError("--ring-length: a ring needs at least 24 m");
+  if (options.doorway && options.kind == SceneKind::kAliased)
+    throw InputError("--door: --scene aliased has a doorway without a door; choose another scene");
   Scene scene;
   scene.kind = options.kind;
   switch (options.kind) {
@@ -299,6 +389,11 @@ Scene BuildScene(const SceneOptions& options) {
       break;
     case SceneKind::kAliased:
       BuildTwoRooms(options, scene);
+      break;
+    case SceneKind::kOffice:
+    case SceneKind::kHall:
+    case SceneKind::kWorkshop:
+      BuildPlannedRoom(options, scene);
       break;
   }
   return scene;

@@ -142,18 +142,19 @@ class FrameWriter {
 
 void WriteDescription(const SequenceOptions& options, const World& world, const SequenceReport& report,
                       const fs::path& path) {
-  const nlohmann::ordered_json root = {{"frames", report.frames},
-                                       {"fps", options.camera.fps},
-                                       {"scene_seed", options.world.scene.seed},
-                                       {"path_seed", options.world.path.seed},
-                                       {"actor_seed", options.world.actor.seed},
-                                       {"noise_seed", options.render.seed},
-                                       {"actors", world.actors()},
-                                       {"path_m", report.path_m},
-                                       {"round_s", world.path().period_s()},
-                                       {"mean_coverage", report.mean_coverage},
-                                       {"mean_moving_coverage", report.mean_moving_coverage},
-                                       {"revisits", report.revisits}};
+  nlohmann::ordered_json root = {{"frames", report.frames},
+                                 {"fps", options.camera.fps},
+                                 {"scene_seed", options.world.scene.seed},
+                                 {"path_seed", options.world.path.seed},
+                                 {"actor_seed", options.world.actor.seed},
+                                 {"noise_seed", options.render.seed},
+                                 {"actors", world.actors()},
+                                 {"path_m", report.path_m},
+                                 {"round_s", world.path().period_s()},
+                                 {"mean_coverage", report.mean_coverage},
+                                 {"mean_moving_coverage", report.mean_moving_coverage},
+                                 {"revisits", report.revisits}};
+  if (world.props() > 0) root["props"] = world.props();
   TextFile file(path);
   file.out() << root.dump(1) << "\n";
   file.Finish();
@@ -183,7 +184,7 @@ SequenceReport WriteSequence(const SequenceOptions& given, const std::string& fo
   options.render.depth = false;
   const World world(options.world, options.camera);
   const fs::path root(folder);
-  const bool masks = options.masks && world.actors() > 0;
+  const bool masks = options.masks && world.actors() + world.props() > 0;
   MakeFolders(root, masks);
   Renderer renderer(options.camera, options.render);
   FrameWriter writer(options, root, masks);

@@ -50,6 +50,10 @@ World::World(const WorldOptions& options, const Camera& camera)
   for (int i = 0; i < actors; ++i) {
     looks_.push_back(DressActor(options.actor.seed, i, options.scene.texture_halvings, scene_.textures));
   }
+  carries_ = options.props.carried_box;
+  if (carries_ && actors == 0) throw InputError("--carry: nobody is there to carry; give --actors");
+  props_ = MakeProps(options.props, scene_, path_, options.actor, options.duration_s,
+                     options.scene.texture_halvings, scene_.textures);
   if (options.moving_share > 0)
     FitMovingShare(options, camera, actors);
   else
@@ -99,9 +103,18 @@ double World::MeasureShare(const Camera& camera, double duration_s) const {
 Instant World::At(double time_s) const {
   Instant instant;
   instant.T_world_cam = path_.T_world_cam(time_s);
+  std::vector<Person> people;
   for (size_t i = 0; i < timelines_.size(); ++i) {
-    const ActorState state = timelines_[i].At(time_s);
+    ActorState state = timelines_[i].At(time_s);
+    state.carrying = carries_ && i == 0;
     instant.actors.push_back(BuildActorMesh(looks_[i], state, static_cast<int>(i)));
+    instant.moving.push_back(state.moving);
+    people.push_back({looks_[i], state});
+  }
+  for (const auto& prop : props_) {
+    PropState state = prop->At(time_s, people);
+    state.mesh.actor = static_cast<int>(instant.actors.size());
+    instant.actors.push_back(std::move(state.mesh));
     instant.moving.push_back(state.moving);
   }
   return instant;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "dmslam/camera/camera.h"
 #include "dmslam/synthetic/actor.h"
 #include "dmslam/synthetic/camera_path.h"
+#include "dmslam/synthetic/prop.h"
 #include "dmslam/synthetic/renderer.h"
 #include "dmslam/synthetic/scene.h"
 
@@ -17,9 +19,10 @@ struct WorldOptions {
   SceneOptions scene;
   CameraPathOptions path;
   ActorOptions actor;
-  int actors = 0;  ///< How many people. With a moving share and 0 here, as many as it takes.
+  PropOptions props;  ///< What moves beside people. `props.door` needs `scene.doorway`.
+  int actors = 0;     ///< How many people. With a moving share and 0 here, as many as it takes.
   double moving_share =
-      0;  ///< Mean share of the image that people cover, 0..0.7; 0 leaves ActorOptions' distances.
+      0;  ///< Mean share of the image that people and props cover, 0..0.7; 0 leaves ActorOptions' distances.
   double duration_s = 10;  ///< For so long the people's doings are simulated.
 };
 
@@ -37,6 +40,7 @@ class World {
   const Scene& scene() const { return scene_; }
   const CameraPath& path() const { return path_; }
   int actors() const { return static_cast<int>(timelines_.size()); }
+  int props() const { return static_cast<int>(props_.size()); }
   Instant At(double time_s) const;
 
  private:
@@ -48,6 +52,8 @@ class World {
   CameraPath path_;
   std::vector<ActorLook> looks_;
   std::vector<ActorTimeline> timelines_;
+  std::vector<std::unique_ptr<const Prop>> props_;
+  bool carries_ = false;  ///< The first person carries something.
 };
 
 /// One frame of a world, as the camera at `time_s` sees it. Makes a renderer for it: for many frames, keep

@@ -18,8 +18,9 @@ SceneOptions QuickScene(SceneKind kind, uint64_t seed = 1) {
   return options;
 }
 
-constexpr PathKind kRoomPaths[] = {PathKind::kStatic, PathKind::kXyz, PathKind::kRpy, PathKind::kHalfsphere,
-                                   PathKind::kTour};
+constexpr PathKind kRoomPaths[] = {PathKind::kStatic,     PathKind::kXyz,  PathKind::kRpy,
+                                   PathKind::kHalfsphere, PathKind::kTour, PathKind::kForward,
+                                   PathKind::kTurn};
 
 // A hand moves smoothly: neither place nor direction jumps, at any time, also where rounds begin again.
 TEST(CameraPath, MovesSmoothly) {
@@ -42,7 +43,54 @@ TEST(CameraPath, MovesSmoothly) {
     for (const PathKind kind : kRoomPaths) check(room, kind, seed);
     check(twins, PathKind::kTour, seed);
     check(ring, PathKind::kRing, seed);
+    check(ring, PathKind::kForward, seed);
+    for (const SceneKind kind : {SceneKind::kOffice, SceneKind::kHall, SceneKind::kWorkshop}) {
+      const Scene other = BuildScene(QuickScene(kind));
+      check(other, PathKind::kTour, seed);
+      check(other, PathKind::kTurn, seed);
+    }
   }
+}
+
+TEST(CameraPath, StaysWithinItsRoom) {
+  for (const SceneKind kind :
+       {SceneKind::kRoom, SceneKind::kOffice, SceneKind::kHall, SceneKind::kWorkshop}) {
+    const Scene scene = BuildScene(QuickScene(kind));
+    const Eigen::AlignedBox2f& room = scene.rooms.front();
+    const Eigen::AlignedBox2d inside(room.min().cast<double>() + Eigen::Vector2d::Constant(0.4),
+                                     room.max().cast<double>() - Eigen::Vector2d::Constant(0.4));
+    for (const PathKind path_kind : kRoomPaths) {
+      const CameraPath path(scene, {.kind = path_kind});
+      for (double t = 0; t < 40; t += 0.1) {
+        EXPECT_TRUE(inside.contains(path.T_world_cam(t).translation.head<2>().eval()))
+            << static_cast<int>(kind) << " " << static_cast<int>(path_kind) << " " << t;
+      }
+    }
+  }
+}
+
+TEST(CameraPath, ForwardLooksWhereItGoesAndTurnLooksAround) {
+  for (const SceneKind kind : {SceneKind::kRoom, SceneKind::kCorridor}) {
+    const Scene scene = BuildScene(QuickScene(kind));
+    const CameraPath path(scene, {.kind = PathKind::kForward, .tremor = 0});
+    double along = 0;
+    for (int i = 0; i < 300; ++i) {
+      const Rigid3d now = path.T_world_cam(0.1 * i), later = path.T_world_cam(0.1 * i + 0.01);
+      along +=
+          (later.translation - now.translation).normalized().dot(now.rotation * Eigen::Vector3d::UnitZ()) /
+          300;
+    }
+    EXPECT_GT(along, 0.9);
+  }
+  const Scene room = BuildScene(QuickScene(SceneKind::kRoom));
+  const CameraPath turn(room, {.kind = PathKind::kTurn, .tremor = 0});
+  double widest = 0, farthest = 0;
+  for (double t = 0; t < 20; t += 0.1) {
+    widest = std::max(widest, AngleBetween(turn.T_world_cam(t).rotation, turn.T_world_cam(0).rotation));
+    farthest = std::max(farthest, (turn.T_world_cam(t).translation - turn.T_world_cam(0).translation).norm());
+  }
+  EXPECT_GT(widest, 1.6);
+  EXPECT_LT(farthest, 0.7);
 }
 
 TEST(CameraPath, StaticStartStandsStill) {
