@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "dmslam/dynamics/motion_belief.h"
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/util/random.h"
 
@@ -21,8 +23,41 @@ constexpr int kMaxRounds = 4;  // of the search in the local map
 // keyframe seen last show together with their neighbours.
 constexpr ptrdiff_t kPlacesTogether = 3;
 constexpr int kNeighboursTogether = 5;
+// Of a keyframe, or of places together: so many landmarks that are proven to be no person speak alone.
+constexpr ptrdiff_t kEnoughProven = 50;
+constexpr ptrdiff_t kEnoughProvenTogether = 150;
+// What a hand does, and for how long nothing else is believed that is not proven.
+constexpr double kSuspicion_s = 1.0;
+constexpr double kMaxSpeed = 1.0, kSpeedSlack = 0.1;        // depths of the scene per second; depths
+constexpr double kMaxTurn_rad = 2.0, kTurnSlack_rad = 0.2;  // per second; once
+
+/// One entry per feature of a keyframe: 1 where it sees a landmark that may say where the camera is.
+std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) {
+  const std::vector<uint8_t> still = StaticFeatures(map, keyframe);
+  std::vector<uint8_t> proven = still;
+  for (size_t i = 0; i < proven.size(); ++i) {
+    if (proven[i] != 0) proven[i] = IsProven(map, *map.FindLandmark(keyframe.landmarks[i]), {}) ? 1 : 0;
+  }
+  return std::count(proven.begin(), proven.end(), 1) >= kEnoughProven ? proven : still;
+}
+
+/// Landmarks that the frame was found by, proven to be no person.
+ptrdiff_t CountProven(const Map& map, const TrackedFrame& frame) {
+  return std::count_if(frame.landmarks.begin(), frame.landmarks.end(), [&](LandmarkId id) {
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    return landmark != nullptr && IsProven(map, *landmark, {});
+  });
+}
 
 }  // namespace
+
+bool Relocalizer::CanReach(const LastKnown& last, const Rigid3d& T_cam_world) {
+  if (last.elapsed_s > kSuspicion_s) return true;
+  const double moved = (T_cam_world.Center() - last.T_cam_world.Center()).norm();
+  const double turned_rad = AngleBetween(T_cam_world.rotation, last.T_cam_world.rotation);
+  return moved <= (kSpeedSlack + kMaxSpeed * last.elapsed_s) * last.depth &&
+         turned_rad <= kTurnSlack_rad + kMaxTurn_rad * last.elapsed_s;
+}
 
 Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary) : places_(std::move(vocabulary)) {}
 
@@ -50,7 +85,7 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<Ma
 
 bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                               TrackedFrame* frame) const {
-  const std::vector<uint8_t> usable = StaticFeatures(map, keyframe);
+  const std::vector<uint8_t> usable = SpeakingFeatures(map, keyframe);
   const std::vector<BowMatch> matches =
       MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
                    {&frame->features->set, &image.nodes, {}});
@@ -70,6 +105,9 @@ bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& pla
   }
   std::vector<LandmarkId> ids = LandmarksSeenBy(map, keyframes);
   KeepStatic(map, &ids);
+  std::vector<LandmarkId> proven = ids;
+  std::erase_if(proven, [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), {}); });
+  if (std::ssize(proven) >= kEnoughProvenTogether) ids = std::move(proven);
   const std::vector<LandmarkMatch> seen = MatchLandmarks(map, ids, frame->features->set);
   return FindPose(map, seen, DeriveSeed(seed, frame->index, "relocalize_together"), frame);
 }
@@ -107,18 +145,23 @@ bool Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame
 }
 
 bool Relocalizer::Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
-                             PoseSearch* search, TrackedFrame* frame) const {
+                             PoseSearch* search, TrackedFrame* frame,
+                             const std::optional<LastKnown>& last) const {
   if (!places_.usable()) return false;
+  const auto refine = [&] {
+    if (!Refine(map, search, frame)) return false;
+    return !last || CanReach(*last, frame->T_cam_world) || CountProven(map, *frame) >= kEnoughProven;
+  };
   const BowImage image = places_.Transform(frame->features->set);
   const std::vector<KeyframeId> candidates = Candidates(map, map_id, last_seen, image);
   for (const KeyframeId id : candidates) {
     if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
-    if (Refine(map, search, frame)) return true;
+    if (refine()) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
-  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) places.push_back(*last);
-  return TryTogether(map, places, seed, frame) && Refine(map, search, frame);
+  if (const std::optional<KeyframeId> newest = map.ResolveKeyframe(last_seen)) places.push_back(*newest);
+  return TryTogether(map, places, seed, frame) && refine();
 }
 
 }  // namespace dmslam

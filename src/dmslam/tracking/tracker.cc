@@ -1,5 +1,6 @@
 #include "dmslam/tracking/tracker.h"
 
+#include <cmath>
 #include <utility>
 
 #include "dmslam/util/random.h"
@@ -78,11 +79,23 @@ bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& predic
 void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt) {
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
-  if (!relocalizer_.Relocalize(map, map_id, motion_.last().reference, seed, &search_, &found)) return;
+  const auto last = LastKnown(map, map_id, frame->stamp_ns);
+  if (!relocalizer_.Relocalize(map, map_id, motion_.last().reference, seed, &search_, &found, last)) return;
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
   attempt->relocalized = attempt->report.ok;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
+}
+
+/// Where the camera was when it was last tracked; none where that is not known in this map.
+std::optional<Relocalizer::LastKnown> Tracker::LastKnown(const Map& map, std::optional<MapId> map_id,
+                                                         int64_t stamp_ns) const {
+  const std::optional<Rigid3d> T_last_world = motion_.last().In(map);
+  const Keyframe* reference = map.FindKeyframe(motion_.last().reference);
+  const std::optional<double> depth = reference != nullptr ? map.MedianDepth(*reference) : std::nullopt;
+  if (!T_last_world || !depth || reference->map_id != map_id) return std::nullopt;
+  const double elapsed_s = static_cast<double>(stamp_ns - motion_.last_stamp_ns()) * 1e-9;
+  return Relocalizer::LastKnown{*T_last_world, std::abs(elapsed_s), *depth};
 }
 
 bool Tracker::IsCareful(int64_t stamp_ns) const {

@@ -69,6 +69,8 @@ class Tracker {
                     Attempt* attempt);
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
   void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
+  std::optional<Relocalizer::LastKnown> LastKnown(const Map& map, std::optional<MapId> map_id,
+                                                  int64_t stamp_ns) const;
   bool IsCareful(int64_t stamp_ns) const;
 
   TrackingOptions options_;
