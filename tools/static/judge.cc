@@ -146,10 +146,10 @@ std::vector<NamedSelector> DlrsacAblations() {
   other = ungated;
   other.couple_over_own_inliers = false;
   selectors.push_back(MakeDlrsac("default, couple degree over all matches", other));
-  for (const int cell : {120, 240}) {
+  for (const double share : {0.75, 1.5}) {
     other = ungated;
-    other.cell_px = cell;
-    selectors.push_back(MakeDlrsac("default, cells of " + std::to_string(cell) + " px", other));
+    other.cell_share *= share;
+    selectors.push_back(MakeDlrsac("default, cells " + Number(share, 2) + " times as wide and high", other));
   }
   return selectors;
 }
@@ -191,8 +191,8 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
       ++unjudged;
       continue;
     }
-    const auto matches =
-        MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, &matcher);
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), sequence.camera(),
+                                     matching, &matcher);
     const auto truth = sequence.Judge(frame, other, matches);
     for (size_t s = 0; s < selectors.size(); ++s) {
       const StaticSelection selection = selectors[s].selector->Select(matches, sequence.camera(), frame);
@@ -230,7 +230,7 @@ Window RunWindow(const std::vector<std::vector<Match>>& matches, std::span<const
     pointers.push_back(&pairs[p]);
   }
   Window window;
-  window.agreement = Agree(pointers, options);
+  window.agreement = Agree(pointers, camera, options);
   window.score = ScoreSelection(truth, window.agreement.is_static);
   return window;
 }
@@ -281,8 +281,8 @@ bool AddSelectorWindow(JudgedSequence& sequence, const WindowOptions& options, s
   std::vector<std::vector<Match>> matches;
   for (const int gap : options.gaps) {
     matches.push_back(MatchFrames(*sequence.Features(frame),
-                                  *sequence.Features(frame + static_cast<size_t>(gap)), options.matching,
-                                  matcher));
+                                  *sequence.Features(frame + static_cast<size_t>(gap)), sequence.camera(),
+                                  options.matching, matcher));
   }
   const auto truth = sequence.Judge(frame, last, matches.back());
   const bool has_parallax = motion->translation.norm() >= options.min_baseline_m;
@@ -390,7 +390,7 @@ WindowKind KindOfWindow(JudgedSequence& sequence, const SystemWindowOptions& opt
   const size_t other = first + static_cast<size_t>(options.hard_gap);
   const auto motion = sequence.TrueMotion(first, other);
   if (!motion) return {};
-  const auto matches = MatchFrames(*sequence.Features(first), *sequence.Features(other),
+  const auto matches = MatchFrames(*sequence.Features(first), *sequence.Features(other), sequence.camera(),
                                    options.initializer.matching, matcher);
   const std::vector<uint8_t> none(matches.size(), 0);
   const SelectionScore score = ScoreSelection(sequence.Judge(first, other, matches), none);

@@ -47,6 +47,8 @@ WaitReason FromAgreement(AgreementRefusal refusal) {
   return WaitReason::kNone;
 }
 
+double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
 std::string Degrees(double rad) { return std::to_string(rad * 180.0 / M_PI) + " degrees"; }
 
 }  // namespace
@@ -86,7 +88,7 @@ InitializerOptions::InitializerOptions() {
   // Agreement over pairs and the comparison of motions over all views decide what one pair leaves open.
   selector.max_rival_share = 0;
   agreement.min_agreement = 0.87;
-  agreement.min_distribution_px = 140;
+  agreement.min_distribution_share = 0.175;
 }
 
 namespace {
@@ -173,6 +175,10 @@ class Initializer::Impl {
 
   InitializerReport Consider(const InitializerFrame& frame);
   void TakeNewerReference(const InitializerFrame& frame);
+  /// Negative for frames before the reference frame.
+  double SinceReference(const InitializerFrame& frame) const {
+    return Seconds(frame.stamp_ns - reference_->stamp_ns);
+  }
   int64_t OldestPast() const { return reference_->stamp_ns - static_cast<int64_t>(options_.past_s * 1e9); }
   std::vector<const InitializerFrame*> ChoosePast() const;
   bool AgreesWithPast(Candidate* candidate, InitializerReport* report);
@@ -209,7 +215,7 @@ class Initializer::Impl {
       pending_;                        ///< frames older than the newest, not matched with the reference yet
   std::deque<InitializerFrame> past_;  ///< some of the frames before the reference frame
   bool promising_ = false;  ///< the pairs agreed the last time; only their parallax did not suffice
-  uint32_t last_looked_ = 0;
+  int64_t last_looked_ns_ = 0;
   InitializerReport last_wait_;
 };
 
@@ -224,10 +230,10 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   }
   if (!reference_) {
     reference_ = frame;
-    last_looked_ = frame.index;
+    last_looked_ns_ = frame.stamp_ns;
     return Wait(WaitReason::kTooFewFrames, "this is the first");
   }
-  if (frame.index - last_looked_ < static_cast<uint32_t>(options_.frame_step)) {
+  if (Seconds(frame.stamp_ns - last_looked_ns_) < options_.frame_step_s) {
     // A frame between: time for what was left over.
     if (!pending_.empty()) {
       View view = MakeView(pending_.back());
@@ -239,8 +245,8 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
     }
     return last_wait_;
   }
-  last_looked_ = frame.index;
-  const double age_s = static_cast<double>(frame.stamp_ns - reference_->stamp_ns) * 1e-9;
+  last_looked_ns_ = frame.stamp_ns;
+  const double age_s = SinceReference(frame);
   if (age_s > (promising_ ? options_.max_promising_age_s : options_.max_age_s)) TakeNewerReference(frame);
   if (reference_->index == frame.index) return Wait(WaitReason::kTooFewFrames, "a new reference frame");
   View view = MakeView(frame);
@@ -273,8 +279,9 @@ void Initializer::Impl::TakeNewerReference(const InitializerFrame& frame) {
 Initializer::Impl::View Initializer::Impl::MakeView(const InitializerFrame& frame) {
   View view;
   view.frame = frame;
-  view.pair.matches = MatchFrames(*reference_->features, *frame.features, options_.matching, &matcher_);
-  view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_px;
+  view.pair.matches =
+      MatchFrames(*reference_->features, *frame.features, camera_, options_.matching, &matcher_);
+  view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * camera_.FocalPx();
   if (view.moved) {
     const uint64_t seed = DeriveSeed(seed_, (uint64_t{reference_->index} << 32) | frame.index, "initializer");
     view.pair.selection = selector_->Select(view.pair.matches, camera_, seed);
@@ -291,8 +298,8 @@ std::vector<const Initializer::Impl::View*> Initializer::Impl::ChooseViews() con
   const auto asked = static_cast<size_t>(options_.num_pairs);
   std::vector<const View*> chosen;
   if (asked < 1 || moved.size() < asked) return chosen;
-  const uint32_t span = moved.back()->frame.index - moved.front()->frame.index;
-  if (span < static_cast<uint32_t>(options_.min_pair_step) * (asked - 1)) return chosen;
+  const double span_s = Seconds(moved.back()->frame.stamp_ns - moved.front()->frame.stamp_ns);
+  if (span_s < options_.min_pair_step_s * static_cast<double>(asked - 1)) return chosen;
   if (asked == 1) return {moved.back()};
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
   return chosen;
@@ -327,7 +334,7 @@ InitializerReport Initializer::Impl::TryMap() {
   if (views.empty()) return Wait(WaitReason::kTooFewFrames, "too few pairs yet");
   std::vector<const PairView*> pairs;
   for (const View* view : views) pairs.push_back(&view->pair);
-  const Agreement agreement = Agree(pairs, options_.agreement);
+  const Agreement agreement = Agree(pairs, camera_, options_.agreement);
   InitializerReport report;
   if (!agreement.IsUsable()) {
     report = Wait(FromAgreement(agreement.refusal), agreement.explanation);
@@ -396,13 +403,12 @@ bool Initializer::Impl::AgreesWithPast(Candidate* candidate, InitializerReport* 
   const std::vector<const InitializerFrame*> frames = ChoosePast();
   std::vector<View> past(frames.size());
   Candidate longer = *candidate;
-  const double length = candidate->placed.front().view->frame.index - reference_->index;
+  const double length = SinceReference(candidate->placed.front().view->frame);
   for (size_t k = 0; k < frames.size(); ++k) {
     past[k].frame = *frames[k];
     past[k].pair.matches =
-        MatchFrames(*reference_->features, *frames[k]->features, options_.matching, &matcher_);
-    const double before = reference_->index - frames[k]->index;
-    PlaceView(past[k], -before / length, &longer);
+        MatchFrames(*reference_->features, *frames[k]->features, camera_, options_.matching, &matcher_);
+    PlaceView(past[k], SinceReference(*frames[k]) / length, &longer);
   }
   KeepConsistent(&longer);
   const auto points = std::accumulate(candidate->use.begin(), candidate->use.end(), 0);
@@ -447,9 +453,9 @@ std::optional<Initializer::Impl::Candidate> Initializer::Impl::BuildCandidate(
   candidate.points = pair.points_cam0;
   candidate.use = pair.has_point;
   candidate.placed.push_back({&last, pair.T_1_0, 1.0});
-  const double length = static_cast<double>(last.frame.index - reference_->index);
+  const double length = SinceReference(last.frame);
   for (const View* view : ViewsBetween(last)) {
-    PlaceView(*view, static_cast<double>(view->frame.index - reference_->index) / length, &candidate);
+    PlaceView(*view, SinceReference(view->frame) / length, &candidate);
   }
   for (const Placed& placed : candidate.placed) {
     if (placed.consistent_share >= options_.min_consistent_share) continue;

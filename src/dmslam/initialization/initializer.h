@@ -96,16 +96,18 @@ struct InitializerOptions {
   ReconstructionOptions reconstruction;
   MatchingOptions matching;
 
-  int min_features = 100;  ///< a frame with fewer takes no part
-  int frame_step = 2;      ///< every so manieth frame is matched; between them only what was left over
-  int num_pairs = 3;       ///< pairs with the reference frame that must agree
-  int min_pair_step = 5;   ///< the frames of two such pairs are apart by so much at least [frames]
-  double max_age_s = 0.9;  ///< an older reference frame is given up for a newer one
+  int min_features = 100;       ///< a frame with fewer takes no part
+  double frame_step_s = 0.045;  ///< frames nearer to the last one looked at are left out; there is time then
+                                ///< for what was left over
+  int num_pairs = 3;            ///< pairs with the reference frame that must agree
+  double min_pair_step_s = 0.16;     ///< the frames of two such pairs are apart by so much at least
+  double max_age_s = 0.9;            ///< an older reference frame is given up for a newer one
   double max_promising_age_s = 2.0;  ///< the same where the pairs agree and only parallax is missing
   int max_views = 8;                 ///< frames after the reference frame that a map is made of, at most
   int max_adjusted = 300;            ///< points that rival motions are adjusted with; the winner takes all
   int min_matches = 120;             ///< of a frame with the reference frame; fewer: a newer reference frame
-  double min_displacement_px = 8.0;  ///< median displacement of the matches before a pair is worth its cost
+  double min_displacement_rad =
+      0.015;  ///< median displacement of the matches before a pair is worth its cost
 
   MinimaOptions minima;             ///< how the motion of the pair is searched
   double minima_slack = 1.5;        ///< a minimum with up to so many times the lowest cost is looked at, too

@@ -82,7 +82,7 @@ std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const C
                                                 std::to_string(std::sqrt(*middle)) +
                                                 " px: the frames show the same picture"};
   }
-  if (extent.sizes().maxCoeff() < options.min_extent_px) {
+  if (extent.sizes().maxCoeff() < options.min_extent_share * camera.DiagonalPx()) {
     return InputProblem{Refusal::kTooFewCells, "all " + std::to_string(matches.size()) +
                                                    " matches lie within " +
                                                    std::to_string(std::lround(extent.sizes().maxCoeff())) +
