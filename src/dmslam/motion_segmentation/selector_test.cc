@@ -377,14 +377,14 @@ TEST(Agree, KeepsWhatAllPairsCallStatic) {
     b.selection.is_static.push_back(i >= 5);
   }
   const PairView* pairs[] = {&a, &b};
-  const Agreement agreement = Agree(pairs, {});
+  const Agreement agreement = Agree(pairs, SyntheticCamera(), {});
   ASSERT_TRUE(agreement.IsUsable()) << agreement.explanation;
   EXPECT_EQ(agreement.num_static, 185);
   EXPECT_DOUBLE_EQ(agreement.agreement, 185.0 / 200.0);
   EXPECT_EQ(agreement.is_static[2], 0);
   EXPECT_EQ(agreement.is_static[195], 0);
   for (size_t i = 0; i < 60; ++i) b.selection.is_static[i] = 0;
-  EXPECT_EQ(Agree(pairs, {}).refusal, AgreementRefusal::kDisagreement);
+  EXPECT_EQ(Agree(pairs, SyntheticCamera(), {}).refusal, AgreementRefusal::kDisagreement);
 }
 
 }  // namespace
