@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <optional>
 #include <string>
 
@@ -21,9 +20,6 @@ struct Camera {
 
   bool HasDistortion() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
   Eigen::Matrix3d K() const;
-  /// One radian beside the optical axis is about so many pixels.
-  double FocalPx() const { return 0.5 * (fx_px + fy_px); }
-  double DiagonalPx() const { return std::hypot(width_px, height_px); }
   /// The camera without its lens, for undistorted pixels.
   Pinhole Ideal() const { return {fx_px, fy_px, cx_px, cy_px}; }
 

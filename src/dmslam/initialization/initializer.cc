@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/initialization/motion_contest.h"
 #include "dmslam/initialization/reference_window.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
@@ -128,9 +129,10 @@ InitializerReport Wait(WaitReason reason, const std::string& text) {
 }
 InitializerReport Wait(const Refused& refused) { return Wait(refused.wait, refused.text); }
 
-/// Of two reports that wait, that which came farther.
+/// That with a map, or of two that wait, that which came farther.
 InitializerReport Farther(InitializerReport a, InitializerReport b) {
-  return a.result || a.wait > b.wait ? std::move(a) : std::move(b);
+  const bool first = a.result || (!b.result && a.wait > b.wait);
+  return first ? std::move(a) : std::move(b);
 }
 
 }  // namespace
@@ -272,7 +274,7 @@ ReferenceView Initializer::Impl::MakeView(const InitializerFrame& reference, con
   view.since_reference_s = SecondsBetween(reference, frame);
   view.pair.matches =
       MatchFrames(*reference.features, *frame.features, camera_, options_.matching, &matcher_);
-  view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * camera_.FocalPx();
+  view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;
 }
 
@@ -338,7 +340,7 @@ InitializerReport Initializer::Impl::TryContest(ReferenceWindow* window) {
     std::vector<uint8_t> support = candidate->use;
     contenders.push_back({std::move(*candidate), std::move(support)});
   }
-  ContestResult result = DecideContest(std::move(contenders), options_.contest, camera_.DiagonalPx());
+  ContestResult result = DecideContest(std::move(contenders), options_.contest, DiagonalPx(camera_));
   if (!result.winner) {
     window->lead.reset();
     return Wait(result.refused);

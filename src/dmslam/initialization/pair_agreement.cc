@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
 
 namespace dmslam {
@@ -112,7 +113,7 @@ Agreement Agree(std::span<const PairView* const> pairs, const Camera& camera,
     SetRefusal(AgreementRefusal::kTooFewStatic,
                std::to_string(agreement.num_static) + " matches are static in all pairs", &agreement);
   }
-  if (agreement.distribution_px < options.min_distribution_share * camera.DiagonalPx()) {
+  if (agreement.distribution_px < options.min_distribution_share * DiagonalPx(camera)) {
     SetRefusal(AgreementRefusal::kDistributionTooSmall,
                "the static matches spread over " + std::to_string(agreement.distribution_px) + " px",
                &agreement);

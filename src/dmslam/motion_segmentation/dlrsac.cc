@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/neighbor_vote.h"
 #include "dmslam/motion_segmentation/sampling.h"
@@ -363,7 +364,7 @@ std::optional<CoupledSet> Segmentation::ChooseSet() {
 /// The answer: model and flags of the chosen set.
 void Segmentation::Select(const CoupledSet& set) {
   for (const size_t j : set.members) out_.cells[static_cast<size_t>(kept_[j].index)].chosen = true;
-  const double asked_px = options_.min_distribution_share * camera_.DiagonalPx();
+  const double asked_px = options_.min_distribution_share * DiagonalPx(camera_);
   if (set.distribution_px < asked_px) {
     out_.refusal = Refusal::kDistributionTooSmall;
     out_.explanation = "the widest coupled set spreads over " + std::to_string(set.distribution_px) +
@@ -482,7 +483,7 @@ void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
   std::vector<Match> sorted(matches_.size());
   for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
   const std::vector<float> shares =
-      NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_rad * camera_.FocalPx());
+      NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_rad * FocalPx(camera_));
   for (size_t k = 0; k < flags->size(); ++k) {
     if (shares[k] < options_.neighbor_share) (*flags)[k] = 0;
   }

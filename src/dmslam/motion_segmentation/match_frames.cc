@@ -1,5 +1,6 @@
 #include "dmslam/motion_segmentation/match_frames.h"
 
+#include "dmslam/camera/image_scale.h"
 namespace dmslam {
 
 std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
@@ -14,7 +15,7 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
   if (options.use_window) {
     WindowMatchOptions window;
     window.match = match;
-    window.window_px = options.window_rad * camera.FocalPx();
+    window.window_px = options.window_rad * FocalPx(camera);
     window.octave_slack = options.octave_slack;
     matcher->MatchWindow(side0, side1, frame1.grid, window, &found);
   } else {
