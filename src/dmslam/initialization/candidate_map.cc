@@ -52,10 +52,9 @@ bool CandidateBuilder::Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, 
          options_.max_view_chi2 * variance;
 }
 
-bool CandidateBuilder::SameMotion(const CandidateMap& a, const CandidateMap& b) {
-  const Rigid3d &T_a = a.T_last_0(), &T_b = b.T_last_0();
-  return AngleBetween(T_a.rotation, T_b.rotation) < 0.01 &&
-         T_a.translation.normalized().dot(T_b.translation.normalized()) > std::cos(0.1);
+bool CandidateBuilder::SameMotion(const Rigid3d& a, const Rigid3d& b) {
+  return AngleBetween(a.rotation, b.rotation) < 0.01 &&
+         a.translation.normalized().dot(b.translation.normalized()) > std::cos(0.1);
 }
 
 std::optional<CandidateMap> CandidateBuilder::PointsOfPair(const ReferenceView& last,

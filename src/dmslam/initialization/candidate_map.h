@@ -67,7 +67,7 @@ class CandidateBuilder {
   bool Adjust(CandidateMap* candidate) const;
 
   /// The two motions are the same to within 0.01 rad and 0.1 rad of direction.
-  static bool SameMotion(const CandidateMap& a, const CandidateMap& b);
+  static bool SameMotion(const Rigid3d& a, const Rigid3d& b);
   /// Median over the points, at the last view [rad].
   double Parallax(const CandidateMap& candidate) const;
   /// How well the direction of translation to the last view is known [rad].

@@ -175,6 +175,7 @@ class Initializer::Impl {
   bool Passes(const CandidateMap& candidate, Refused* refused) const;
   bool AgreesWithPast(ReferenceWindow* window, CandidateMap* candidate, Refused* refused);
   bool Finish(ReferenceWindow* window, CandidateMap* candidate, Refused* refused);
+  bool FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const;
   bool Leads(const InitializerFrame& now, const Contender& winner, ReferenceWindow* window) const;
 
   InitializerOptions options_;
@@ -317,8 +318,9 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   } else {
     report = Wait(refused);
   }
-  window->promising =
-      report.wait == WaitReason::kParallaxTooSmall || report.wait == WaitReason::kNoReconstruction;
+  if (report.wait == WaitReason::kNoReconstruction) window->found.reset();
+  window->promising = report.wait == WaitReason::kParallaxTooSmall ||
+                      report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kOnTrial;
   report.num_matches = static_cast<int>(pairs.back()->matches.size());
   report.num_static = agreement.num_static;
   report.distribution_px = agreement.distribution_px;
@@ -432,7 +434,7 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
     std::optional<CandidateMap> candidate =
         builder_.Build(last, between, is_static, minimum.model, best ? &own : refused);
     if (!candidate) continue;
-    if (best && CandidateBuilder::SameMotion(*best, *candidate)) {
+    if (best && CandidateBuilder::SameMotion(best->T_last_0(), candidate->T_last_0())) {
       if (candidate->cost < best->cost) best = std::move(candidate);
       continue;
     }
@@ -470,7 +472,22 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
     return false;
   }
   builder_.KeepConsistent(candidate);
-  return AgreesWithPast(window, candidate, refused) && Passes(*candidate, refused);
+  if (!AgreesWithPast(window, candidate, refused) || !Passes(*candidate, refused)) return false;
+  if (FoundAgain(*candidate, window)) return true;
+  *refused = {WaitReason::kOnTrial, "the same motion must be found with another view"};
+  return false;
+}
+
+/// Whether the map that was found before says the same of the camera's motion. What holds for one view by
+/// chance, where motions are hard to tell apart, seldom holds for the next.
+bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
+  const auto before = window->found;
+  window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};
+  if (!before) return false;
+  CandidateMap longer = candidate;
+  builder_.PlaceView(*before->view, &longer);
+  const CandidateMap::Placed& placed = longer.placed.back();
+  return placed.view == before->view && CandidateBuilder::SameMotion(placed.T_k_0, before->T_view_0);
 }
 
 /// Drops points that frames just before the reference frame see elsewhere. If there are many, somebody has

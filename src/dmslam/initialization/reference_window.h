@@ -40,6 +40,12 @@ class ReferenceWindow {
     std::vector<uint32_t> features;  ///< of the reference frame, sorted
   };
   std::optional<Lead> lead;
+  /// The motion of the map that was found last, to the view that it was found with.
+  struct Found {
+    const ReferenceView* view = nullptr;
+    Rigid3d T_view_0;
+  };
+  std::optional<Found> found;
   bool promising = false;  ///< the pairs agreed the last time; only their parallax did not suffice
 
  private:
