@@ -49,8 +49,8 @@ struct InitializerOptions {
       0.015;  ///< median displacement of the matches before a pair is worth its cost
 
   MinimaOptions minima;             ///< how the motion of the pair is searched
-  double minima_slack = 1.5;        ///< a minimum with up to so many times the lowest cost is looked at, too
-  double min_runner_up_cost = 1.5;  ///< another motion must cost all views this many times as much
+  double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
+  double min_runner_up_cost = 2.5;  ///< another motion must cost all views this many times as much
   double min_parallax_rad = 0.015;  ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad =
       0.035;                   ///< standard deviation of the direction of translation, from the residuals
