@@ -318,7 +318,10 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   } else {
     report = Wait(refused);
   }
-  if (report.wait == WaitReason::kNoReconstruction) window->found.reset();
+  if (report.wait == WaitReason::kNoReconstruction) {
+    window->found.reset();
+    window->doubtful = true;
+  }
   window->promising = report.wait == WaitReason::kParallaxTooSmall ||
                       report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kOnTrial;
   report.num_matches = static_cast<int>(pairs.back()->matches.size());
@@ -478,9 +481,10 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
   return false;
 }
 
-/// Whether the map that was found before says the same of the camera's motion. What holds for one view by
-/// chance, where motions are hard to tell apart, seldom holds for the next.
+/// Where motions were hard to tell apart before: whether the map found last says the same of the camera's.
+/// What holds for one view by chance seldom holds for the next.
 bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
+  if (!window->doubtful) return true;
   const auto before = window->found;
   window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};
   if (!before) return false;

@@ -46,6 +46,7 @@ class ReferenceWindow {
     Rigid3d T_view_0;
   };
   std::optional<Found> found;
+  bool doubtful = false;   ///< two motions explained the views about equally well, at some view
   bool promising = false;  ///< the pairs agreed the last time; only their parallax did not suffice
 
  private:
