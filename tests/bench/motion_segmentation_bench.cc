@@ -66,7 +66,7 @@ std::optional<BenchPair> FromRecording() {
   MatchingOptions matching;
   matching.use_window = matching.check_orientation = false;
   matching.max_ratio = 1.0;
-  pair.matches = ChooseEvenly(MatchFrames(*features[0], *features[1], matching, &matcher), 1000);
+  pair.matches = ChooseEvenly(MatchFrames(*features[0], *features[1], pair.camera, matching, &matcher), 1000);
   return pair;
 }
 

@@ -65,7 +65,7 @@ double MedianEpipolarError(const TwoFrames& frames, const Camera& camera) {
   const Eigen::Matrix3d F =
       FundamentalFromEssential(EssentialFromPose(frames.T_second_first), camera.Ideal(), camera.Ideal());
   std::vector<double> errors;
-  for (const Match& match : MatchFrames(*first, *second, matching, &matcher)) {
+  for (const Match& match : MatchFrames(*first, *second, camera, matching, &matcher)) {
     const double error =
         std::sqrt(std::max(EpipolarDistanceSquared(F, match.uv0_px, match.uv1_px),
                            EpipolarDistanceSquared(F.transpose(), match.uv1_px, match.uv0_px)));

@@ -146,10 +146,10 @@ std::vector<NamedSelector> DlrsacAblations() {
   other = ungated;
   other.couple_over_own_inliers = false;
   selectors.push_back(MakeDlrsac("default, couple degree over all matches", other));
-  for (const int cell : {120, 240}) {
+  for (const double share : {0.75, 1.5}) {
     other = ungated;
-    other.cell_px = cell;
-    selectors.push_back(MakeDlrsac("default, cells of " + std::to_string(cell) + " px", other));
+    other.cell_share *= share;
+    selectors.push_back(MakeDlrsac("default, cells " + Number(share, 2) + " times as wide and high", other));
   }
   return selectors;
 }
@@ -191,8 +191,8 @@ nlohmann::json JudgePairs(JudgedSequence& sequence, int gap, bool window_and_ori
       ++unjudged;
       continue;
     }
-    const auto matches =
-        MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, &matcher);
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), sequence.camera(),
+                                     matching, &matcher);
     const auto truth = sequence.Judge(frame, other, matches);
     for (size_t s = 0; s < selectors.size(); ++s) {
       const StaticSelection selection = selectors[s].selector->Select(matches, sequence.camera(), frame);
@@ -230,7 +230,7 @@ Window RunWindow(const std::vector<std::vector<Match>>& matches, std::span<const
     pointers.push_back(&pairs[p]);
   }
   Window window;
-  window.agreement = Agree(pointers, options);
+  window.agreement = Agree(pointers, camera, options);
   window.score = ScoreSelection(truth, window.agreement.is_static);
   return window;
 }
@@ -281,8 +281,8 @@ bool AddSelectorWindow(JudgedSequence& sequence, const WindowOptions& options, s
   std::vector<std::vector<Match>> matches;
   for (const int gap : options.gaps) {
     matches.push_back(MatchFrames(*sequence.Features(frame),
-                                  *sequence.Features(frame + static_cast<size_t>(gap)), options.matching,
-                                  matcher));
+                                  *sequence.Features(frame + static_cast<size_t>(gap)), sequence.camera(),
+                                  options.matching, matcher));
   }
   const auto truth = sequence.Judge(frame, last, matches.back());
   const bool has_parallax = motion->translation.norm() >= options.min_baseline_m;
@@ -390,7 +390,7 @@ WindowKind KindOfWindow(JudgedSequence& sequence, const SystemWindowOptions& opt
   const size_t other = first + static_cast<size_t>(options.hard_gap);
   const auto motion = sequence.TrueMotion(first, other);
   if (!motion) return {};
-  const auto matches = MatchFrames(*sequence.Features(first), *sequence.Features(other),
+  const auto matches = MatchFrames(*sequence.Features(first), *sequence.Features(other), sequence.camera(),
                                    options.initializer.matching, matcher);
   const std::vector<uint8_t> none(matches.size(), 0);
   const SelectionScore score = ScoreSelection(sequence.Judge(first, other, matches), none);
@@ -507,7 +507,10 @@ struct Start {
   bool found = false;
   bool judged = true;  ///< the two frames of the first map have true poses
   double wait_s = 0, rotation_deg = 0, direction_deg = 0;
-  bool IsGood() const { return found && judged && rotation_deg < 2.0 && direction_deg < 10.0; }
+  double precision = 1;  ///< share of the points that lie on nothing that moves
+  bool IsGood() const {
+    return found && judged && rotation_deg < 2.0 && direction_deg < 10.0 && precision >= kBadPrecision;
+  }
   nlohmann::json ToJson() const {
     return {{"first", first},
             {"found", found},
@@ -515,6 +518,7 @@ struct Start {
             {"wait_s", wait_s},
             {"rotation_deg", rotation_deg},
             {"direction_deg", direction_deg},
+            {"precision", precision},
             {"right", IsGood()}};
   }
 };
@@ -535,6 +539,8 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
     const double cosine = truth->translation.normalized().dot(map.T_1_0.translation.normalized());
     const bool scored = truth->translation.norm() >= 0.05;
     start.direction_deg = scored ? kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0)) : 0.0;
+    const auto on_what = sequence.Judge(map.frame0.index, map.frame1.index, map.matches);
+    start.precision = ScoreSelection(on_what, MatchesWithPoint(map)).precision();
   }
   return start;
 }
@@ -542,7 +548,7 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
 /// What starts add up to; those that cannot be judged are in none of the numbers but their own.
 struct StartTally {
   int found = 0, good = 0, unjudged = 0;
-  std::vector<double> wait, rotation, direction;
+  std::vector<double> wait, rotation, direction, precision;
 
   void Add(const Start& start) {
     if (!start.judged) {
@@ -555,13 +561,15 @@ struct StartTally {
     ++found;
     rotation.push_back(start.rotation_deg);
     direction.push_back(start.direction_deg);
+    precision.push_back(start.precision);
   }
 };
 
 void PrintStarts(const StartTally& tally, const std::map<std::string, int>& reasons, std::ostream& out) {
   out << "| starts | first map | right | of all starts | median wait [s] | 75th | 90th | median rotation "
          "error "
-         "[deg] | median direction error [deg] | 90th |\n|---|---|---|---|---|---|---|---|---|---|\n| "
+         "[deg] | median direction error [deg] | 90th | smallest precision |\n"
+         "|---|---|---|---|---|---|---|---|---|---|---|\n| "
       << tally.wait.size() << " | " << tally.found << " | " << tally.good << " | "
       << Number(tally.good / static_cast<double>(tally.wait.size()), 2);
   for (const double q : {0.5, 0.75, 0.9}) {
@@ -570,7 +578,7 @@ void PrintStarts(const StartTally& tally, const std::map<std::string, int>& reas
   }
   out << " | " << Number(Quantile(tally.rotation, 0.5), 2) << " | "
       << Number(Quantile(tally.direction, 0.5), 1) << " | " << Number(Quantile(tally.direction, 0.9), 1)
-      << " |\n\nWhat was waited for [frames]:";
+      << " | " << Number(Quantile(tally.precision, 0.0), 2) << " |\n\nWhat was waited for [frames]:";
   for (const auto& [reason, number] : reasons) out << ' ' << reason << ' ' << number << ';';
   out << "\n\n";
 }
@@ -583,7 +591,7 @@ nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& o
   nlohmann::json each = nlohmann::json::array();
   std::map<std::string, int> reasons;
   for (int k = 0; k < count; ++k) {
-    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), 100);
+    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), sequence.size() / 3);
     const Start start = RunStart(sequence, options, first, seed, &reasons);
     tally.Add(start);
     each.push_back(start.ToJson());

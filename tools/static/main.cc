@@ -97,7 +97,8 @@ size_t Partner(JudgedSequence& sequence, size_t frame, const std::string& gap,
   if (gap != "auto") return frame + static_cast<size_t>(std::stoi(gap));
   size_t best = frame + 1;
   for (size_t other = frame + 2; other < std::min(sequence.size(), frame + 25); other += 2) {
-    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching, matcher);
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), sequence.camera(),
+                                     matching, matcher);
     if (matches.size() < 150) break;
     best = other;
     if (MedianDisplacement(matches) >= 20.0) break;
@@ -133,7 +134,7 @@ class Run {
       encoded.encoding = DetectEncoding(encoded.bytes);
       pictures.push_back(DecodeColor(encoded, path));
     }
-    const auto matches = MatchFrames(*features[0], *features[1], matching_, &matcher_);
+    const auto matches = MatchFrames(*features[0], *features[1], camera, matching_, &matcher_);
     const StaticSelection selection = selector_->Select(matches, camera, settings_.seed);
     Write("pair", DrawSelection(pictures[0], pictures[1], matches, selection));
     Tell("pair", selection, matches.size());
@@ -167,8 +168,8 @@ class Run {
  private:
   bool OnPair(JudgedSequence& sequence, size_t frame, SelectionScore* total) {
     const size_t other = Partner(sequence, frame, settings_.gap, matching_, &matcher_);
-    const auto matches =
-        MatchFrames(*sequence.Features(frame), *sequence.Features(other), matching_, &matcher_);
+    const auto matches = MatchFrames(*sequence.Features(frame), *sequence.Features(other), sequence.camera(),
+                                     matching_, &matcher_);
     StaticSelection selection = selector_->Select(matches, sequence.camera(), settings_.seed + frame);
     const Agreement agreement =
         settings_.gated ? AskPairsBetween(sequence, frame, other, matches, &selection) : Agreement();
@@ -199,15 +200,15 @@ class Run {
     for (const size_t part : {size_t{1}, size_t{2}}) {
       const size_t between = frame + std::max<size_t>(1, (other - frame) * part / 3);
       PairView pair;
-      pair.matches =
-          MatchFrames(*sequence.Features(frame), *sequence.Features(between), matching_, &matcher_);
+      pair.matches = MatchFrames(*sequence.Features(frame), *sequence.Features(between), sequence.camera(),
+                                 matching_, &matcher_);
       pair.selection = selector_->Select(pair.matches, sequence.camera(), settings_.seed + frame + part);
       pairs.push_back(std::move(pair));
     }
     pairs.push_back({matches, *selection});
     std::vector<const PairView*> pointers;
     for (const PairView& pair : pairs) pointers.push_back(&pair);
-    const Agreement agreement = Agree(pointers, InitializerOptions().agreement);
+    const Agreement agreement = Agree(pointers, sequence.camera(), InitializerOptions().agreement);
     selection->is_static = agreement.is_static;
     selection->num_static = agreement.num_static;
     selection->explanation = agreement.explanation;
@@ -375,7 +376,7 @@ std::vector<Match> MatchesToTime(const TimeSettings& settings, const Camera& cam
   matching.max_ratio = 1.0;
   FeatureMatcher matcher;
   return ChooseEvenly(
-      MatchFrames(*sequence.Features(frame), *sequence.Features(frame + gap), matching, &matcher),
+      MatchFrames(*sequence.Features(frame), *sequence.Features(frame + gap), camera, matching, &matcher),
       static_cast<size_t>(settings.matches));
 }
 

@@ -21,7 +21,7 @@ InitializerReport BaselineInitializer::AddFrame(const InitializerFrame& frame) {
     return BeginWith(frame, WaitReason::kTooFewFeatures, "too few features");
   }
   const std::vector<Match> matches =
-      MatchFrames(*reference_->features, *frame.features, options_.matching, &matcher_);
+      MatchFrames(*reference_->features, *frame.features, camera_, options_.matching, &matcher_);
   if (static_cast<int>(matches.size()) < options_.min_matches) {
     return BeginWith(frame, WaitReason::kTooFewMatches, "too few matches with the reference frame");
   }

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 #include "dmslam/util/check.h"
@@ -14,7 +16,8 @@ namespace {
 /// A room of points with descriptors of their own, and a walker in it.
 class SyntheticRoom {
  public:
-  SyntheticRoom(int num_static, int num_moving, uint64_t seed = 7) : camera_(SyntheticCamera()) {
+  SyntheticRoom(int num_static, int num_moving, uint64_t seed = 7, const Camera& camera = SyntheticCamera())
+      : camera_(camera) {
     Random random(seed);
     for (int k = 0; k < num_static + num_moving; ++k) {
       Point point;
@@ -53,7 +56,10 @@ class SyntheticRoom {
       const double dx = 0.4 * random.Gaussian(), dy = 0.4 * random.Gaussian();
       if (!uv) continue;
       const Eigen::Vector2d seen = *uv + Eigen::Vector2d(dx, dy);
-      if (!(seen.x() > 1 && seen.y() > 1 && seen.x() < 638 && seen.y() < 478)) continue;
+      if (!(seen.x() > 1 && seen.y() > 1 && seen.x() < camera_.width_px - 2 &&
+            seen.y() < camera_.height_px - 2)) {
+        continue;
+      }
       Keypoint keypoint;
       keypoint.x_q4 = static_cast<uint16_t>(seen.x() * 16);
       keypoint.y_q4 = static_cast<uint16_t>(seen.y() * 16);
@@ -76,6 +82,37 @@ class SyntheticRoom {
   double speed_ = 0.012;
   uint32_t stop_ = UINT32_MAX;
 };
+
+/// The same camera with images of another size.
+Camera Scaled(Camera camera, double scale) {
+  camera.width_px = static_cast<int>(std::lround(camera.width_px * scale));
+  camera.height_px = static_cast<int>(std::lround(camera.height_px * scale));
+  camera.fx_px *= scale;
+  camera.fy_px *= scale;
+  camera.cx_px = (camera.cx_px + 0.5) * scale - 0.5;
+  camera.cy_px = (camera.cy_px + 0.5) * scale - 0.5;
+  return camera;
+}
+
+/// Asks for the first map of a room of which every `every`th frame is there; with its time since the first
+/// frame.
+std::optional<std::pair<FirstMap, double>> MapAtRate(const SyntheticRoom& room, uint32_t every) {
+  Initializer initializer({}, room.camera(), 1);
+  for (uint32_t k = 0; k * every < 90; ++k) {
+    InitializerFrame frame = room.Frame(k * every);
+    frame.index = k;
+    InitializerReport report = initializer.AddFrame(frame);
+    if (report.result)
+      return std::make_pair(std::move(*report.result), 1e-9 * static_cast<double>(frame.stamp_ns));
+  }
+  return std::nullopt;
+}
+
+double DirectionError(const SyntheticRoom& room, uint32_t every, const FirstMap& map) {
+  const Rigid3d truth =
+      room.TruePose(map.frame1.index * every) * room.TruePose(map.frame0.index * every).Inverse();
+  return std::acos(truth.translation.normalized().dot(map.T_1_0.translation.normalized()));
+}
 
 /// The first map of a room, asked for from `first` on.
 std::optional<FirstMap> MapFrom(const SyntheticRoom& room, const InitializerOptions& options,
@@ -151,6 +188,36 @@ TEST(Initializer, ThePastOfARoomDoesNotDelayItsMap) {
   ASSERT_TRUE(without.has_value() && with.has_value());
   EXPECT_EQ(with->frame0.index, without->frame0.index);
   EXPECT_EQ(with->frame1.index, without->frame1.index);
+}
+
+TEST(Initializer, StartsAtAnyRate) {
+  const SyntheticRoom room(600, 100);
+  for (const uint32_t every : {1U, 2U, 3U}) {  // 30, 15 and 10 Hz
+    const auto found = MapAtRate(room, every);
+    ASSERT_TRUE(found.has_value()) << every;
+    EXPECT_LT(found->second, 1.2) << every;
+    EXPECT_LT(DirectionError(room, every, found->first), 0.1) << every;
+    EXPECT_LT(ShareOfWalker(room, found->first), 0.02) << every;
+  }
+}
+
+TEST(Initializer, StartsAtAnySize) {
+  for (const double scale : {0.5, 2.0}) {
+    const SyntheticRoom room(600, 100, 7, Scaled(SyntheticCamera(), scale));
+    const auto found = MapAtRate(room, 1);
+    ASSERT_TRUE(found.has_value()) << scale;
+    EXPECT_LT(found->second, 1.2) << scale;
+    EXPECT_LT(DirectionError(room, 1, found->first), 0.15) << scale;
+    EXPECT_LT(ShareOfWalker(room, found->first), 0.02) << scale;
+  }
+}
+
+TEST(Initializer, TakesTheRoomWhereTwoGroupsMoveApart) {
+  const SyntheticRoom room(400, 300);  // the walker has nearly half of the matches
+  const auto found = MapAtRate(room, 1);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT(ShareOfWalker(room, found->first), 0.02);
+  EXPECT_LT(DirectionError(room, 1, found->first), 0.15);
 }
 
 TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {

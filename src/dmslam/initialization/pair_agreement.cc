@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
 
 namespace dmslam {
@@ -85,7 +86,8 @@ std::string_view ToString(AgreementRefusal refusal) {
   return "unknown";
 }
 
-Agreement Agree(std::span<const PairView* const> pairs, const AgreementOptions& options) {
+Agreement Agree(std::span<const PairView* const> pairs, const Camera& camera,
+                const AgreementOptions& options) {
   Agreement agreement;
   const PairView& last = *pairs.back();
   agreement.is_static = last.selection.is_static;
@@ -111,7 +113,7 @@ Agreement Agree(std::span<const PairView* const> pairs, const AgreementOptions& 
     SetRefusal(AgreementRefusal::kTooFewStatic,
                std::to_string(agreement.num_static) + " matches are static in all pairs", &agreement);
   }
-  if (agreement.distribution_px < options.min_distribution_px) {
+  if (agreement.distribution_px < options.min_distribution_share * DiagonalPx(camera)) {
     SetRefusal(AgreementRefusal::kDistributionTooSmall,
                "the static matches spread over " + std::to_string(agreement.distribution_px) + " px",
                &agreement);

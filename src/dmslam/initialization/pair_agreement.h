@@ -21,9 +21,9 @@ struct PairView {
 struct AgreementOptions {
   double min_agreement = 0.8;  ///< Jaccard index of two pairs' static sets, over features matched in both
   int min_common = 30;         ///< features matched in both pairs, for the index to mean anything
-  double min_distribution_px = 120;  ///< root of D over the static matches
-  int min_static = 100;              ///< matches static in all pairs
-  double min_static_share = 0.0;     ///< share of the last pair's matches that must be static
+  double min_distribution_share = 0.15;  ///< root of D over the static matches, by the image's diagonal
+  int min_static = 100;                  ///< matches static in all pairs
+  double min_static_share = 0.0;         ///< share of the last pair's matches that must be static
 };
 
 enum class AgreementRefusal : uint8_t {
@@ -50,6 +50,7 @@ struct Agreement {
 /// The last pair's matches are static that it calls static and none of the other pairs calls moving. What
 /// moves along the epipolar lines of one pair seldom does so in all, and different samples do not fall for
 /// the same mover.
-Agreement Agree(std::span<const PairView* const> pairs, const AgreementOptions& options);
+Agreement Agree(std::span<const PairView* const> pairs, const Camera& camera,
+                const AgreementOptions& options);
 
 }  // namespace dmslam

@@ -15,8 +15,8 @@ namespace dmslam {
 /// layer, a mover another.
 struct LayerOptions {
   bool enabled = true;
-  double bin_px = 2.0;        ///< bins of the histogram of disparities
-  double gap_px = 8.0;        ///< layers are apart by at least this much of (nearly) no disparity
+  double bin_rad = 0.0038;    ///< bins of the histogram of disparities
+  double gap_rad = 0.0152;    ///< layers are apart by at least this much of (nearly) no disparity
   double noise_share = 0.02;  ///< bins with less than this share of the fullest count as empty
 };
 
@@ -29,6 +29,6 @@ double Disparity(const TwoViewModel& model, const MatchArrays& arrays, size_t i)
 /// share of the matches); unsets the flags of others. `positions_px` is parallel to the arrays. Returns how
 /// many flags remain.
 int KeepWidestLayer(const LayerOptions& options, const TwoViewModel& model, const MatchArrays& arrays,
-                    std::span<const Eigen::Vector2d> positions_px, double focal_px, std::span<uint8_t> flags);
+                    std::span<const Eigen::Vector2d> positions_px, std::span<uint8_t> flags);
 
 }  // namespace dmslam

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/neighbor_vote.h"
 #include "dmslam/motion_segmentation/sampling.h"
@@ -68,6 +69,9 @@ class Segmentation {
 
  private:
   ModelKind kind() const { return options_.sampling.kind; }
+  double CellPx() const {
+    return options_.cell_share * std::sqrt(static_cast<double>(camera_.width_px) * camera_.height_px);
+  }
 
   void SortIntoCells();
   void FitCells(uint64_t seed);
@@ -120,10 +124,8 @@ class Segmentation {
 
 /// Steps 2: cells, kept ones and their centroids.
 void Segmentation::SortIntoCells() {
-  out_.columns =
-      std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.width_px) / options_.cell_px)));
-  out_.rows =
-      std::max(1, static_cast<int>(std::lround(static_cast<double>(camera_.height_px) / options_.cell_px)));
+  out_.columns = std::max(1, static_cast<int>(std::lround(camera_.width_px / CellPx())));
+  out_.rows = std::max(1, static_cast<int>(std::lround(camera_.height_px / CellPx())));
   out_.cells.resize(static_cast<size_t>(out_.columns) * static_cast<size_t>(out_.rows));
   const auto cell_of = [&](const Match& match) {
     const int c = static_cast<int>(match.uv0_px.x() * out_.columns / camera_.width_px);
@@ -205,7 +207,8 @@ CellState Segmentation::Classify(Cell* cell) const {
     scatter += offset * offset.transpose() / n;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(scatter);
-  if (eigen.eigenvalues()[0] < options_.collinear_px * options_.collinear_px) return CellState::kCollinear;
+  const double across_px = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]));
+  if (across_px < options_.collinear_share * CellPx()) return CellState::kCollinear;
   if (ExplainedByRotation(cell)) return CellState::kPureRotation;
   if (ExplainedByPlane(own)) return CellState::kPlane;
   return CellState::kGeneral;
@@ -361,7 +364,7 @@ std::optional<CoupledSet> Segmentation::ChooseSet() {
 /// The answer: model and flags of the chosen set.
 void Segmentation::Select(const CoupledSet& set) {
   for (const size_t j : set.members) out_.cells[static_cast<size_t>(kept_[j].index)].chosen = true;
-  const double asked_px = options_.min_distribution_share * std::hypot(camera_.width_px, camera_.height_px);
+  const double asked_px = options_.min_distribution_share * DiagonalPx(camera_);
   if (set.distribution_px < asked_px) {
     out_.refusal = Refusal::kDistributionTooSmall;
     out_.explanation = "the widest coupled set spreads over " + std::to_string(set.distribution_px) +
@@ -393,8 +396,7 @@ void Segmentation::Select(const CoupledSet& set) {
 
 void Segmentation::KeepLayer(const TwoViewModel& model, std::vector<uint8_t>* flags) const {
   if (kind() != ModelKind::kEssential || !options_.layers.enabled) return;
-  KeepWidestLayer(options_.layers, model, arrays_, positions_px_, 0.5 * (camera_.fx_px + camera_.fy_px),
-                  *flags);
+  KeepWidestLayer(options_.layers, model, arrays_, positions_px_, *flags);
 }
 
 /// Selects over the whole image, within the widest layer, and refits to what was selected.
@@ -481,7 +483,7 @@ void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
   std::vector<Match> sorted(matches_.size());
   for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
   const std::vector<float> shares =
-      NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_px);
+      NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_rad * FocalPx(camera_));
   for (size_t k = 0; k < flags->size(); ++k) {
     if (shares[k] < options_.neighbor_share) (*flags)[k] = 0;
   }
@@ -513,7 +515,7 @@ void DlrsacOptions::Check() const {
     if (!holds) throw InputError(std::string("dlrsac: ") + field + " must be " + range);
   };
   const auto is_share = [](double value) { return value >= 0 && value <= 1; };
-  require(cell_px >= 1, "cell_px", "at least 1");
+  require(cell_share > 0 && cell_share <= 4, "cell_share", "above 0 and at most 4");
   require(min_cells >= 1, "min_cells", "at least 1");
   require(is_share(couple_threshold), "couple_threshold", "in 0..1");
   require(is_share(degenerate_share), "degenerate_share", "in 0..1");

@@ -32,7 +32,9 @@ struct DlrsacOptions {
   InputOptions input;
   InlierOptions inlier;
 
-  int cell_px = 160;          ///< side of a cell; the paper shows 180 and 240
+  /// Side of a cell, as a share of the side of a square that has the image's area: 160 px of 640x480. The
+  /// paper shows 180 and 240 px.
+  double cell_share = 0.289;
   int min_cell_matches = 15;  ///< a cell with fewer is dropped; never below the solver's sample
   int min_cells = 3;          ///< fewer cells with a model: refused
   /// Cell i couples with cell j when at least this share of j's own inliers satisfies i's model.
@@ -51,7 +53,7 @@ struct DlrsacOptions {
   /// shares it. Off: told apart nowhere (the paper).
   bool tell_degenerate = true;
   double degenerate_share = 0.95;  ///< share of a cell's inliers that a plane or a rotation must explain
-  double collinear_px = 4.0;       ///< spread across the main direction below this: collinear
+  double collinear_share = 0.025;  ///< spread across the main direction below this share of a cell: collinear
 
   /// Keeps the widest layer of disparities only (essential matrices); off: all that agree with the model (the
   /// paper).
@@ -69,7 +71,7 @@ struct DlrsacOptions {
   /// What moves agrees by accident, and not all of it together. 0: not asked.
   double neighbor_share = 0.0;
   int neighbors = 10;             ///< how many nearest matches are asked at most
-  double neighbor_reach_px = 40;  ///< and how far they may be, about
+  double neighbor_reach_rad = 0.076;  ///< and how far they may be, about
 
   /// Root of D of the chosen set below this share of the image's diagonal: refused, the motion is too complex
   /// (paper 2.3.1). Two neighbouring cells stay below it.

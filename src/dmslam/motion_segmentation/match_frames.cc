@@ -1,8 +1,9 @@
 #include "dmslam/motion_segmentation/match_frames.h"
 
+#include "dmslam/camera/image_scale.h"
 namespace dmslam {
 
-std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1,
+std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
                                const MatchingOptions& options, FeatureMatcher* matcher) {
   const MatchSide side0{frame0.set.keypoints, frame0.set.descriptors, frame0.uv_px, {}};
   const MatchSide side1{frame1.set.keypoints, frame1.set.descriptors, frame1.uv_px, {}};
@@ -14,7 +15,7 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
   if (options.use_window) {
     WindowMatchOptions window;
     window.match = match;
-    window.window_px = options.window_px;
+    window.window_px = options.window_rad * FocalPx(camera);
     window.octave_slack = options.octave_slack;
     matcher->MatchWindow(side0, side1, frame1.grid, window, &found);
   } else {

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "dmslam/camera/camera.h"
 #include "dmslam/features/frame_features.h"
 #include "dmslam/features/matcher.h"
 #include "dmslam/motion_segmentation/match.h"
@@ -11,15 +12,15 @@ namespace dmslam {
 /// How features of two frames are matched.
 struct MatchingOptions {
   bool use_window = true;         ///< search only near where the feature was
-  double window_px = 100.0;       ///< radius
+  double window_rad = 0.19;       ///< radius
   int octave_slack = 1;           ///< largest difference of octaves in the window
   double max_ratio = 0.9;         ///< best distance to second best
   int max_distance = 50;          ///< [bits]
   bool check_orientation = true;  ///< keep the turns that most matches share
 };
 
-/// Matches of two frames by the options, sorted by index0.
-std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1,
+/// Matches of two frames of the camera by the options, sorted by index0.
+std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
                                const MatchingOptions& options, FeatureMatcher* matcher);
 
 /// At most so many of the matches, spread evenly over them.

@@ -4,7 +4,6 @@
 #include <numeric>
 
 #include "dmslam/geometry/two_view.h"
-#include "dmslam/initialization/pair_agreement.h"
 #include "dmslam/motion_segmentation/depth_layers.h"
 #include "dmslam/motion_segmentation/dlrsac.h"
 #include "dmslam/motion_segmentation/ransac.h"
@@ -363,28 +362,6 @@ TEST(Dlrsac, StopsEarlyByEquationFour) {
 
 TEST(MakeSelector, RefusesUnknownNames) {
   EXPECT_THROW(MakeSelector("magsac", ModelKind::kEssential), InputError);
-}
-
-TEST(Agree, KeepsWhatAllPairsCallStatic) {
-  PairView a, b;
-  for (uint32_t i = 0; i < 200; ++i) {
-    Match match;
-    match.index0 = i;
-    match.uv0_px = {3.0 * i, (i % 7) * 60.0};
-    a.matches.push_back(match);
-    b.matches.push_back(match);
-    a.selection.is_static.push_back(i < 190);
-    b.selection.is_static.push_back(i >= 5);
-  }
-  const PairView* pairs[] = {&a, &b};
-  const Agreement agreement = Agree(pairs, {});
-  ASSERT_TRUE(agreement.IsUsable()) << agreement.explanation;
-  EXPECT_EQ(agreement.num_static, 185);
-  EXPECT_DOUBLE_EQ(agreement.agreement, 185.0 / 200.0);
-  EXPECT_EQ(agreement.is_static[2], 0);
-  EXPECT_EQ(agreement.is_static[195], 0);
-  for (size_t i = 0; i < 60; ++i) b.selection.is_static[i] = 0;
-  EXPECT_EQ(Agree(pairs, {}).refusal, AgreementRefusal::kDisagreement);
 }
 
 }  // namespace

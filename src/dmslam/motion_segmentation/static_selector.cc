@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/motion_segmentation/dlrsac.h"
 #include "dmslam/motion_segmentation/ransac.h"
 #include "dmslam/util/check.h"
@@ -82,7 +83,7 @@ std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const C
                                                 std::to_string(std::sqrt(*middle)) +
                                                 " px: the frames show the same picture"};
   }
-  if (extent.sizes().maxCoeff() < options.min_extent_px) {
+  if (extent.sizes().maxCoeff() < options.min_extent_share * DiagonalPx(camera)) {
     return InputProblem{Refusal::kTooFewCells, "all " + std::to_string(matches.size()) +
                                                    " matches lie within " +
                                                    std::to_string(std::lround(extent.sizes().maxCoeff())) +

@@ -90,9 +90,9 @@ struct StaticSelection {
 struct InputOptions {
   int min_matches = 16;               ///< fewer is refused; never below 8
   double min_displacement_px = 0.35;  ///< median displacement below this: the same picture twice
-  /// Matches that span less than this, across and down, fill no more than a cell of the usual size
-  /// (DlrsacOptions::cell_px): they do not determine a motion of the camera.
-  double min_extent_px = 160.0;
+  /// Matches that span less than this share of the image's diagonal, across and down, fill no more than a
+  /// cell of the usual size (DlrsacOptions::cell_share): they do not determine a motion of the camera.
+  double min_extent_share = 0.2;
   /// How far outside the image an ideal pixel may lie, as a share of the image's width. Only used for cameras
   /// with distortion, where ideal pixels leave the image; 0 is used for others.
   double outside_share = 0.5;

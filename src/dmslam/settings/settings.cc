@@ -178,11 +178,13 @@ std::vector<Entry> InitializerEntries() {
           "initializer.min_parallax_rad", "median parallax of the first map's points",
           [](Settings & s) -> auto& { return s.initializer.min_parallax_rad; }, 0, 1),
       Make(
-          "initializer.min_distribution_px", "root of the static matches' distribution D",
-          [](Settings & s) -> auto& { return s.initializer.agreement.min_distribution_px; }, 0, 10000),
+          "initializer.min_distribution_share",
+          "root of the static matches' distribution D, as a share of the image's diagonal",
+          [](Settings & s) -> auto& { return s.initializer.agreement.min_distribution_share; }, 0, 1),
       Make(
-          "initializer.cell_px", "side of DLRSAC's cells",
-          [](Settings & s) -> auto& { return s.initializer.selector.cell_px; }, 16, 4096),
+          "initializer.cell_share",
+          "side of DLRSAC's cells, as a share of the side of a square of the image's area",
+          [](Settings & s) -> auto& { return s.initializer.selector.cell_share; }, 0.02, 4),
       Make(
           "initializer.min_cell_matches", "matches that a cell needs",
           [](Settings & s) -> auto& { return s.initializer.selector.min_cell_matches; }, 8, 10000),

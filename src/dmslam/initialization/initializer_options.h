@@ -1,0 +1,68 @@
+#pragma once
+
+#include <string>
+
+#include "dmslam/initialization/pair_agreement.h"
+#include "dmslam/initialization/two_view_reconstruction.h"
+#include "dmslam/motion_segmentation/dlrsac.h"
+#include "dmslam/motion_segmentation/match_frames.h"
+#include "dmslam/motion_segmentation/two_view_model.h"
+
+namespace dmslam {
+
+/// Several motions explain what several views show, and one of them shall be the camera's.
+struct ContestOptions {
+  bool enabled = true;                    ///< off: only pairs that agree make a map
+  int max_motions = 3;                    ///< that are looked for, each in what the ones before leave
+  int min_support = 40;                   ///< matches of one, in all views
+  double min_distribution_share = 0.175;  ///< root of D over the winner's support, by the image's diagonal
+  double max_rival_share = 0.3;  ///< D times number of what another motion explains besides, by the winner's
+  double step_s = 0.1;           ///< it is held so often at most: it is costly
+  double lead_s = 0.35;          ///< it must have won for so long...
+  double min_overlap = 0.6;      ///< ...with this share of the smaller support in common from view to view
+};
+
+/// Times are of the frames' stamps.
+struct InitializerOptions {
+  InitializerOptions();  ///< fewer samples than the selector's own default, stricter agreement
+
+  std::string method = "dlrsac";  ///< which matches are static, per pair of frames: dlrsac, arsac or ransac
+  DlrsacOptions selector;      ///< of DLRSAC; its sampling, input and inlier options hold for the others, too
+  AgreementOptions agreement;  ///< what several pairs must agree on
+  ContestOptions contest;      ///< where they do not
+  ReconstructionOptions reconstruction;
+  MatchingOptions matching;
+
+  int min_features = 100;         ///< a frame with fewer takes no part
+  double frame_step_s = 0.045;    ///< frames nearer to the last one looked at are left out
+  int max_references = 3;         ///< reference frames that are kept side by side
+  double reference_step_s = 0.3;  ///< a new one is taken so long after the last
+  int num_pairs = 3;              ///< pairs with the reference frame that must agree
+  double min_pair_step_s = 0.16;  ///< the frames of two such pairs are apart by so much at least
+  double max_age_s = 2.0;         ///< an older reference frame is given up...
+  double max_promising_age_s =
+      4.0;                 ///< ...or one as old as this, where the pairs agree and only parallax is missing
+  int max_views = 8;       ///< frames after the reference frame that a map is made of, at most
+  int max_adjusted = 300;  ///< points that rival motions are adjusted with; the winner takes all
+  int min_matches = 120;   ///< of a frame with the reference frame; fewer: it is given up
+  double min_displacement_rad =
+      0.015;  ///< median displacement of the matches before a pair is worth its cost
+
+  MinimaOptions minima;             ///< how the motion of the pair is searched
+  double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
+  double min_runner_up_cost = 2.5;  ///< another motion must cost all views this many times as much
+  double min_parallax_rad = 0.015;  ///< median over the points; below it the direction is chance
+  double max_direction_sigma_rad =
+      0.035;                   ///< standard deviation of the direction of translation, from the residuals
+  double max_view_chi2 = 9.0;  ///< a view agrees with a point: squared reprojection error / variance
+  double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
+  int min_points = 80;                 ///< points that all views agree on
+
+  double past_s = 0.45;  ///< frames that are older than the reference frame by up to so much testify:
+                         ///< who has just stopped is in his place in all views, but not in them
+  int past_views = 6;    ///< so many of them at most; 0: none
+  double max_past_conflict = 0.08;  ///< of the points, that one of them sees elsewhere; more: wait
+  int past_first = 0;  ///< so many frames come before the first reference frame: they testify only
+};
+
+}  // namespace dmslam

@@ -1,0 +1,33 @@
+#include "dmslam/initialization/reference_window.h"
+
+#include <algorithm>
+
+namespace dmslam {
+
+std::vector<const ReferenceView*> ReferenceWindow::PairsToAgree(const InitializerOptions& options) const {
+  std::vector<const ReferenceView*> moved, chosen;
+  for (const ReferenceView& view : views_) {
+    if (view.moved) moved.push_back(&view);
+  }
+  const auto asked = static_cast<size_t>(options.num_pairs);
+  if (asked < 1 || moved.size() < asked) return chosen;
+  const double span_s = SecondsBetween(moved.front()->frame, moved.back()->frame);
+  if (span_s < options.min_pair_step_s * static_cast<double>(asked - 1)) return chosen;
+  if (asked == 1) return {moved.back()};
+  for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
+  return chosen;
+}
+
+std::vector<const ReferenceView*> ReferenceWindow::ViewsBetween(const ReferenceView& last, int most) const {
+  std::vector<const ReferenceView*> all;
+  for (const ReferenceView& view : views_) {
+    if (&view != &last && !view.pair.matches.empty()) all.push_back(&view);
+  }
+  const auto kept = static_cast<size_t>(std::max(0, most));
+  if (all.size() <= kept) return all;
+  std::vector<const ReferenceView*> chosen;
+  for (size_t k = 0; k < kept; ++k) chosen.push_back(all[k * all.size() / kept]);
+  return chosen;
+}
+
+}  // namespace dmslam

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "dmslam/initialization/candidate_map.h"
+
+namespace dmslam {
+
+/// A reference frame with the views after it, and frames before it that testify.
+class ReferenceWindow {
+ public:
+  explicit ReferenceWindow(InitializerFrame reference, std::vector<InitializerFrame> past = {})
+      : reference_(std::move(reference)), past_frames_(std::move(past)) {}
+
+  const InitializerFrame& reference() const { return reference_; }
+  double AgeAt(const InitializerFrame& frame) const { return SecondsBetween(reference_, frame); }
+  /// Views stay where they are in memory while the window lives.
+  const ReferenceView& AddView(ReferenceView view) { return views_.emplace_back(std::move(view)); }
+  const std::deque<ReferenceView>& views() const { return views_; }
+
+  /// The newest view last, and as many before it as must agree, spread evenly over those that moved; empty
+  /// while there are too few, or all within too short a time.
+  std::vector<const ReferenceView*> PairsToAgree(const InitializerOptions& options) const;
+  /// The views that a map is made of besides `last`: of more than there may be an even choice.
+  std::vector<const ReferenceView*> ViewsBetween(const ReferenceView& last, int most) const;
+  /// Frames before the reference frame as views of it; they are matched with match(frame) the first time.
+  template <typename MatchFunction>
+  const std::deque<ReferenceView>& Past(MatchFunction match) {
+    for (const InitializerFrame& frame : past_frames_) past_.push_back(match(frame));
+    past_frames_.clear();
+    return past_;
+  }
+
+  /// What won the contest of motions at the newest view, since when without a break.
+  struct Lead {
+    int64_t since_ns = 0;
+    std::vector<uint32_t> features;  ///< of the reference frame, sorted
+  };
+  std::optional<Lead> lead;
+  /// The motion of the map that was found last, to the view that it was found with.
+  struct Found {
+    const ReferenceView* view = nullptr;
+    Rigid3d T_view_0;
+  };
+  std::optional<Found> found;
+  bool doubtful = false;   ///< two motions explained the views about equally well, at some view
+  bool promising = false;  ///< the pairs agreed the last time; only their parallax did not suffice
+
+ private:
+  InitializerFrame reference_;
+  std::deque<ReferenceView> views_;  ///< in order of time
+  std::vector<InitializerFrame> past_frames_;
+  std::deque<ReferenceView> past_;
+};
+
+}  // namespace dmslam
