@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "dmslam/dynamics/proven.h"
+
 namespace dmslam {
 namespace {
 
@@ -23,28 +25,10 @@ using Suspects = std::map<LandmarkId, Suspect>;
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-/// Stamps of the keyframes that see the landmark, in order.
-std::vector<int64_t> StampsOf(const Map& map, const Landmark& landmark) {
-  std::vector<int64_t> stamps;
-  for (const Observation& o : landmark.observations) stamps.push_back(map.FindKeyframe(o.keyframe)->stamp_ns);
-  std::sort(stamps.begin(), stamps.end());
-  return stamps;
-}
-
-/// Some observations lie outside any window as long as people stand.
-bool Proven(const std::vector<int64_t>& stamps, const SeenThroughOptions& options) {
-  size_t most = 0;
-  for (size_t begin = 0, end = 0; end < stamps.size(); ++end) {
-    while (Seconds(stamps[end] - stamps[begin]) > options.standing_s) ++begin;
-    most = std::max(most, end - begin + 1);
-  }
-  return stamps.size() - most >= static_cast<size_t>(options.outer_observations);
-}
-
 void AddIfUnproven(const Map& map, LandmarkId id, const SeenThroughOptions& options, Suspects* suspects) {
   const Landmark& landmark = *map.FindLandmark(id);
-  const std::vector<int64_t> stamps = StampsOf(map, landmark);
-  if (stamps.empty() || Proven(stamps, options)) return;
+  const std::vector<int64_t> stamps = ObservationStamps(map, landmark);
+  if (stamps.empty() || OutlastsStanding(stamps, {options.standing_s, options.outer_observations})) return;
   (*suspects)[id] = {stamps.front(), stamps.back()};
 }
 

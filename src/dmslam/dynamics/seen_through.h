@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/map/map_editor.h"
 
 namespace dmslam {
@@ -9,10 +10,10 @@ namespace dmslam {
 /// How landmarks of people who stood still are told from furniture.
 struct SeenThroughOptions {
   bool enabled = true;
-  double standing_s = 4.0;     ///< people stand no longer than this...
-  int outer_observations = 2;  ///< ...so a landmark with so many observations outside such a time is proven
-  double guard_s = 0.5;        ///< witnesses are at least so far in time from when the landmark was seen
-  double radius_px = 28;       ///< around its pixel a witness's landmarks are compared
+  double standing_s = ProvenOptions().standing_s;  ///< what was seen longer and outside it is proven
+  int outer_observations = ProvenOptions().outer_observations;
+  double guard_s = 0.5;           ///< witnesses are at least so far in time from when the landmark was seen
+  double radius_px = 28;          ///< around its pixel a witness's landmarks are compared
   double depth_tolerance = 0.11;  ///< relative difference of depth that is still the same place
   double through_per_support =
       0.2;                  ///< witnesses that see through it, per witness that sees something at its place

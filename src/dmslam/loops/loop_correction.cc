@@ -177,14 +177,14 @@ std::string NoteOf(const Map& map, const VerifiedLoop& loop) {
   const Keyframe& keyframe = *map.FindKeyframe(loop.keyframe);
   const Eigen::Vector3d moved =
       loop.S_keyframe_world.Inverse() * Eigen::Vector3d::Zero() - keyframe.T_cam_world.Center();
-  char text[240];
-  std::snprintf(text, sizeof(text),
-                "frame %u sees the place of frame %u again: %d of %d landmarks in %d cells, share %.2f; it "
-                "moves by %.3f "
-                "(%.3f of the path) and scales by %.4f",
-                loop.keyframe.frame_index(), loop.place.frame_index(), loop.support.found,
-                loop.support.expected, loop.support.cells, loop.share, moved.norm(), loop.drift,
-                1.0 / loop.S_keyframe_world.scale);
+  char text[320];
+  std::snprintf(
+      text, sizeof(text),
+      "frame %u sees the place of frame %u again: %d of %d landmarks in %d cells, share %.2f; %d of "
+      "them proven, share %.2f; it moves by %.3f (%.1f sigma) and scales by %.4f",
+      loop.keyframe.frame_index(), loop.place.frame_index(), loop.support.found, loop.support.expected,
+      loop.support.cells, loop.share, loop.proven.found, loop.proven_share, moved.norm(),
+      loop.drift_sigmas.value_or(0.0), 1.0 / loop.S_keyframe_world.scale);
   return text;
 }
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include "dmslam/dynamics/proven.h"
+#include "dmslam/loops/chain_drift.h"
+
 namespace dmslam {
 
 /// Loop closing. Where a number is not explained, it is ORB-SLAM2's.
@@ -25,12 +28,22 @@ struct LoopcloserOptions {
   // and grow as the camera goes on.
   double min_share = 0.22;            ///< enough to be believed if the next keyframes agree
   double min_confirmed_share = 0.35;  ///< of a keyframe that sees the place where an earlier one said it is
-  double min_implausible_share =
-      0.7;                       ///< the same where the loop moves the keyframe by more than drift would
-  double plausible_drift = 0.1;  ///< of the path since the place
-  double certain_drift =
-      0.03;  ///< a confirmed share needs no second keyframe where the loop moves it by less than this
-  int confirm_within = 4;  ///< keyframes
+  double min_joining_share = 0.7;     ///< the same between two maps, where no chain tells what drift can be
+  int min_told = 20;                  ///< landmarks that should be seen; of fewer the share seen says nothing
+
+  // Somebody who stood in two places is matched as well as a room is. What he cannot be is there for long.
+  ProvenOptions proven;
+  int min_proven = 20;       ///< landmarks of the place found that are proven to be no person...
+  int min_proven_cells = 6;  ///< ...and the cells of the image that hold them
+
+  // Drift: how far the chain of keyframes since the place can be off.
+  ChainDriftOptions drift;
+  double max_drift_sigmas = 3.0;
+
+  // A loop is closed when later keyframes have said so over some time.
+  int confirmations = 2;
+  double confirm_for_s = 1.0;     ///< from the proposal to the last of them, at least
+  double confirm_within_s = 4.0;  ///< a proposal not confirmed for so long is given up
 
   // What is done about it.
   int essential_covisibility = 100;  ///< landmarks in common that make an edge of the essential graph

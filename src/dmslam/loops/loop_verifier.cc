@@ -7,6 +7,8 @@
 #include <map>
 
 #include "dmslam/dynamics/motion_belief.h"
+#include "dmslam/dynamics/proven.h"
+#include "dmslam/loops/chain_drift.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 #include "dmslam/optimization/sim3_optimization.h"
@@ -41,19 +43,6 @@ Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const K
   match.inv_sigma_squared1 = 1.0 / map.pyramid().SigmaSquared(a.features->set.keypoints[feature_a].octave);
   match.inv_sigma_squared2 = 1.0 / map.pyramid().SigmaSquared(b.features->set.keypoints[feature_b].octave);
   return match;
-}
-
-/// Along the keyframes from one to a later one [map units]; 0 where they belong to two maps.
-double PathLength(const Map& map, const Keyframe& from, const Keyframe& to) {
-  if (from.map_id != to.map_id) return 0.0;
-  double length = 0.0;
-  const Keyframe* last = &from;
-  for (auto at = map.keyframes().find(from.id); at != map.keyframes().end() && last->id < to.id; ++at) {
-    if (at->second.map_id != from.map_id) continue;
-    length += (at->second.T_cam_world.Center() - last->T_cam_world.Center()).norm();
-    last = &at->second;
-  }
-  return length;
 }
 
 /// The keyframe that sees most of what was found and is no neighbour of `keyframe`; null where there is none.
@@ -109,6 +98,18 @@ template <typename... Values>
 std::string Text(const char* format, Values... values) {
   char text[160];
   std::snprintf(text, sizeof(text), format, values...);
+  return text;
+}
+
+/// The numbers, as a sentence.
+std::string Describe(const VerifiedLoop& loop) {
+  std::string text =
+      Text("%d of %d landmarks found in %d cells, share %.2f; proven %d of %d in %d, share %.2f",
+           loop.support.found, loop.support.expected, loop.support.cells, loop.share, loop.proven.found,
+           loop.proven.expected, loop.proven.cells, loop.proven_share);
+  if (loop.counter_share) text += Text("; seen from there %.2f", *loop.counter_share);
+  text += Text("; scale %.3f", 1.0 / loop.S_keyframe_world.scale);
+  if (loop.drift_sigmas) text += Text("; drift %.1f sigma", *loop.drift_sigmas);
   return text;
 }
 
@@ -277,24 +278,47 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
       Look(map, keyframe, keyframe.T_cam_world,
            StaticLandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
            options_.search_radius_px);
-  if (own.found > 0) loop.share = loop.support.Share() / own.Share();
-  const double path = PathLength(map, place, keyframe);
-  const double moved = (T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
-  if (path > 0) loop.drift = moved / path;
-  *why = Text("%d of %d landmarks found in %d cells, share %.2f; drift %.3f, scale %.3f", loop.support.found,
-              loop.support.expected, loop.support.cells, loop.share, loop.drift,
-              1.0 / loop.S_keyframe_world.scale);
+  loop.share = loop.support.ShareOver(own);
+  MeasureProven(map, keyframe, place, own, &loop);
+  const auto drift = DriftAlongChain(map, place.id, keyframe.id, options_.drift);
+  if (drift) loop.drift_sigmas = SigmasOf(*drift, keyframe.T_cam_world, loop.S_keyframe_world);
+  *why = Describe(loop);
+  if (drift) *why += Text(" (%d links, sigma %.3f)", drift->links, drift->position);
   return loop;
 }
 
-bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
-  return loop.support.found >= options_.min_matches && loop.support.cells >= options_.min_cells &&
-         loop.share >= min_share;
+/// What outlasts people, asked from both sides: of the place in the keyframe, and of the keyframe's
+/// surroundings in the place's keyframe.
+void LoopVerifier::MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+                                 const PlaceSupport& own, VerifiedLoop* loop) const {
+  const double radius = options_.search_radius_px;
+  std::vector<LandmarkId> here =
+      LandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility);
+  std::vector<LandmarkId> there = loop->landmarks;
+  KeepProven(map, &here);
+  KeepProven(map, &there);
+  const PlaceSupport own_here = Look(map, keyframe, keyframe.T_cam_world, here, radius);
+  const PlaceSupport own_there = Look(map, place, place.T_cam_world, there, radius);
+  loop->proven = Look(map, keyframe, loop->S_keyframe_world.ToRigid(), there, radius);
+  loop->proven_share = loop->proven.ShareOver(own_here.expected >= options_.min_told ? own_here : own);
+  const Sim3d S_place_world = loop->S_keyframe_place.Inverse() * Sim3d(keyframe.T_cam_world);
+  const PlaceSupport counter = Look(map, place, S_place_world.ToRigid(), here, radius);
+  if (counter.expected >= options_.min_told) loop->counter_share = counter.ShareOver(own_there);
 }
 
-bool LoopVerifier::IsCertain(const Map& map, const VerifiedLoop& loop) const {
-  const bool one_map = map.FindKeyframe(loop.keyframe)->map_id == map.FindKeyframe(loop.place)->map_id;
-  return one_map && loop.drift <= options_.certain_drift && Holds(loop, options_.min_confirmed_share);
+void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const {
+  std::erase_if(*landmarks,
+                [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), options_.proven); });
+}
+
+bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
+  const bool seen = loop.support.found >= options_.min_matches && loop.support.cells >= options_.min_cells &&
+                    loop.share >= min_share;
+  const bool no_person = loop.proven.found >= options_.min_proven &&
+                         loop.proven.cells >= options_.min_proven_cells && loop.proven_share >= min_share;
+  const bool agreed = loop.counter_share.value_or(1.0) >= min_share;
+  const bool plausible = loop.drift_sigmas.value_or(0.0) <= options_.max_drift_sigmas;
+  return seen && no_person && agreed && plausible;
 }
 
 std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,
@@ -332,9 +356,8 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, *place, S_keyframe_place, why);
   if (!refined) return std::nullopt;
   VerifiedLoop loop = Measure(map, keyframe, *place, *refined, why);
-  const bool plausible = place->map_id != keyframe.map_id || loop.drift <= options_.plausible_drift;
-  if (!Holds(loop, plausible ? options_.min_confirmed_share : options_.min_implausible_share))
-    return std::nullopt;
+  const bool one_map = place->map_id == keyframe.map_id;
+  if (!Holds(loop, one_map ? options_.min_confirmed_share : options_.min_joining_share)) return std::nullopt;
   return loop;
 }
 

@@ -19,6 +19,9 @@ struct PlaceSupport {
   int cells = 0;                       ///< cells of the image (8 x 6) in which it finds some
   std::vector<LandmarkMatch> matches;  ///< sorted by feature
   double Share() const { return expected == 0 ? 0.0 : static_cast<double>(found) / expected; }
+  /// How much of what this should show it does, over the same share of what stands there for certain: 1 where
+  /// a place is seen as well as the camera's own surroundings.
+  double ShareOver(const PlaceSupport& own) const { return own.found == 0 ? 0.0 : Share() / own.Share(); }
 };
 
 /// The keyframe sees the place again.
@@ -28,17 +31,24 @@ struct VerifiedLoop {
   Sim3d S_keyframe_place;  ///< camera of the keyframe from camera of the place
   Sim3d S_keyframe_world;  ///< where the place's landmarks say the keyframe is
   PlaceSupport support;
+  PlaceSupport proven;  ///< of it, landmarks that are proven to be no person
   double share =
       0;  ///< of what the keyframe should see of the place, seen; over the same share of its own surroundings
-  double drift = 0;  ///< how far the loop moves the keyframe, as a share of the path since the place
-  std::vector<LandmarkId> landmarks;  ///< of the place and its neighbours, static, sorted
+  double proven_share = 0;  ///< the same of the proven ones
+  /// Of what is proven around the keyframe, seen by the place's keyframe; over the same share of the place.
+  /// None where too little of it should be seen from there.
+  std::optional<double> counter_share;
+  std::optional<double> drift_sigmas;  ///< how far the loop moves the keyframe, over what the chain of
+                                       ///< keyframes can have drifted; none between two maps
+  std::vector<LandmarkId> landmarks;   ///< of the place and its neighbours, static, sorted
 };
 
 /// Asks geometry whether a keyframe shows a place: a similarity from matches of landmarks, refined, a guided
 /// search for everything else that the place should show, and the question what share of it is there. A
 /// picture that hangs in two rooms gives matches and a similarity as well; what tells the rooms apart is what
-/// should be around it and is not, and that the next keyframe sees no more of it. Landmarks that are believed
-/// to move neither match nor count.
+/// should be around it and is not, and that the next keyframe sees no more of it. So does somebody who stood
+/// in two places: he is told from a room by what outlasts him, seen from both sides, and by what the chain of
+/// keyframes between the two can have drifted. Landmarks that are believed to move neither match nor count.
 class LoopVerifier {
  public:
   LoopVerifier(const LoopcloserOptions& options, uint64_t seed) : options_(options), seed_(seed) {}
@@ -49,9 +59,6 @@ class LoopVerifier {
   /// Whether a later keyframe shows what an earlier one's loop says it should; `why` has the numbers.
   std::optional<VerifiedLoop> Confirm(const Map& map, const Keyframe& keyframe, const VerifiedLoop& earlier,
                                       std::string* why) const;
-
-  /// Whether a proposal needs no confirmation: it moves the keyframe by no more than drift does anyway.
-  bool IsCertain(const Map& map, const VerifiedLoop& loop) const;
 
   /// Which of `landmarks` a camera at `T_cam_world` finds among the features of `keyframe`.
   PlaceSupport Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
@@ -71,6 +78,9 @@ class LoopVerifier {
                                          const Sim3d& S_keyframe_place, std::string* why) const;
   VerifiedLoop Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                        const Sim3d& S_keyframe_place, std::string* why) const;
+  void MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place, const PlaceSupport& own,
+                     VerifiedLoop* loop) const;
+  void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
 
   LoopcloserOptions options_;

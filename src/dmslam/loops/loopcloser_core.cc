@@ -1,11 +1,20 @@
 #include "dmslam/loops/loopcloser_core.h"
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "dmslam/loops/loop_correction.h"
 
 namespace dmslam {
+namespace {
+
+/// Between two keyframes; time runs backwards where the map grows back.
+double SecondsBetween(int64_t a_ns, int64_t b_ns) {
+  return std::abs(static_cast<double>(a_ns - b_ns)) * 1e-9;
+}
+
+}  // namespace
 
 LoopcloserCore::LoopcloserCore(const LoopcloserOptions& options, const Camera& camera, const Pyramid& pyramid,
                                uint64_t seed, std::shared_ptr<const Vocabulary> vocabulary)
@@ -70,30 +79,36 @@ LoopAnswer LoopcloserCore::FindLoop(const Keyframe& keyframe) {
   const LoopDetector::Found found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
-  for (Proposal& proposal : proposals_) ++proposal.age;
-  std::erase_if(proposals_, [&](const Proposal& p) { return p.age > options_.confirm_within; });
+  std::erase_if(proposals_, [&](const Proposal& proposal) {
+    return SecondsBetween(keyframe.stamp_ns, proposal.last_ns) > options_.confirm_within_s;
+  });
   if (keyframes_since_loop_ <= options_.min_keyframes_between) return {};
-  std::optional<VerifiedLoop> loop = ConfirmProposed(keyframe);
-  if (!loop) loop = ProposePlace(keyframe, found.candidates);
-  return loop ? Close(*loop) : LoopAnswer();
+  const std::optional<VerifiedLoop> loop = ConfirmProposed(keyframe);
+  if (loop) return Close(*loop);
+  ProposePlace(keyframe, found.candidates);
+  return {};
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyframe) {
   std::optional<VerifiedLoop> best;
-  for (const Proposal& proposal : proposals_) {
+  for (Proposal& proposal : proposals_) {
     Verdict verdict;
     verdict.place = proposal.loop.place;
     verdict.confirms = true;
     std::optional<VerifiedLoop> loop = verifier_.Confirm(map_, keyframe, proposal.loop, &verdict.why);
     verdict.accepted = loop.has_value();
     verdicts_.push_back(std::move(verdict));
-    if (loop && (!best || loop->share > best->share)) best = std::move(loop);
+    if (!loop) continue;
+    proposal.loop = std::move(*loop);
+    proposal.last_ns = keyframe.stamp_ns;
+    const bool enough = ++proposal.confirmations >= options_.confirmations &&
+                        SecondsBetween(keyframe.stamp_ns, proposal.first_ns) >= options_.confirm_for_s;
+    if (enough && (!best || proposal.loop.share > best->share)) best = proposal.loop;
   }
   return best;
 }
 
-std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyframe,
-                                                         const std::vector<KeyframeId>& candidates) {
+void LoopcloserCore::ProposePlace(const Keyframe& keyframe, const std::vector<KeyframeId>& candidates) {
   for (const KeyframeId candidate : candidates) {
     Verdict verdict;
     verdict.place = candidate;
@@ -101,15 +116,12 @@ std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyfram
         verifier_.Propose(map_, places_, keyframe, *map_.FindKeyframe(candidate), &verdict.why);
     verdict.accepted = loop.has_value();
     verdicts_.push_back(std::move(verdict));
-    if (!loop) {
-      ++counters_.refused_geometry;
-      continue;
+    if (loop) {
+      proposals_.push_back({std::move(*loop), keyframe.stamp_ns, keyframe.stamp_ns, 0});
+      return;
     }
-    if (verifier_.IsCertain(map_, *loop)) return loop;
-    proposals_.push_back({std::move(*loop), 0});
-    break;
+    ++counters_.refused_geometry;
   }
-  return std::nullopt;
 }
 
 LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {

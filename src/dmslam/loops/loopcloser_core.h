@@ -62,12 +62,10 @@ class LoopcloserCore {
   void HearOfCorrection(const MapDelta& delta);
   LoopAnswer FindLoop(const Keyframe& keyframe);
   LoopAnswer Close(const VerifiedLoop& loop);
-  /// Follows what earlier keyframes proposed.
+  /// Follows what earlier keyframes proposed: a loop that enough of them have confirmed for long enough.
   std::optional<VerifiedLoop> ConfirmProposed(const Keyframe& keyframe);
-  /// The first of the candidates that geometry bears out is kept as a proposal, or given back where it is
-  /// certain.
-  std::optional<VerifiedLoop> ProposePlace(const Keyframe& keyframe,
-                                           const std::vector<KeyframeId>& candidates);
+  /// The first of the candidates that geometry bears out is kept as a proposal.
+  void ProposePlace(const Keyframe& keyframe, const std::vector<KeyframeId>& candidates);
   LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
   std::function<bool()> Interrupt() const;
 
@@ -79,9 +77,11 @@ class LoopcloserCore {
   MapPlaces places_;
   LoopDetector detector_;
   LoopVerifier verifier_;
+  /// A loop that waits for later keyframes to confirm it.
   struct Proposal {
-    VerifiedLoop loop;
-    int age = 0;  ///< keyframes checked since
+    VerifiedLoop loop;  ///< as the last of them measured it
+    int64_t first_ns = 0, last_ns = 0;
+    int confirmations = 0;
   };
   std::vector<Proposal> proposals_;  ///< oldest first
   int keyframes_since_loop_;

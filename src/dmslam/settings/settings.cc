@@ -141,8 +141,16 @@ std::vector<Entry> LoopEntries() {
           "loop.min_confirmed_share", "of what should be seen of a place: enough to close the loop",
           [](Settings & s) -> auto& { return s.loop.min_confirmed_share; }, 0, 1),
       Make(
-          "loop.plausible_drift", "a loop that moves more than this share of its path needs more",
-          [](Settings & s) -> auto& { return s.loop.plausible_drift; }, 0, 10),
+          "loop.min_proven",
+          "of the landmarks found, seen for longer than people stand: fewer may be somebody who stood in two "
+          "places",
+          [](Settings & s) -> auto& { return s.loop.min_proven; }, 0, 10000),
+      Make(
+          "loop.max_drift_sigmas", "a loop that moves more than the keyframes can have drifted is refused",
+          [](Settings & s) -> auto& { return s.loop.max_drift_sigmas; }, 0, 1e9),
+      Make(
+          "loop.confirmations", "later keyframes that must see the place again",
+          [](Settings & s) -> auto& { return s.loop.confirmations; }, 1, 100),
       Make(
           "loop.global_adjustment", "adjust the whole map after a loop",
           [](Settings & s) -> auto& { return s.loop.global_adjustment; }),

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "dmslam/dynamics/motion_belief.h"
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/util/random.h"
 
@@ -21,6 +22,19 @@ constexpr int kMaxRounds = 4;  // of the search in the local map
 // keyframe seen last show together with their neighbours.
 constexpr ptrdiff_t kPlacesTogether = 3;
 constexpr int kNeighboursTogether = 5;
+// Of a keyframe, or of places together: so many landmarks that are proven to be no person speak alone.
+constexpr ptrdiff_t kEnoughProven = 50;
+constexpr ptrdiff_t kEnoughProvenTogether = 150;
+
+/// One entry per feature of a keyframe: 1 where it sees a landmark that may say where the camera is.
+std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) {
+  const std::vector<uint8_t> still = StaticFeatures(map, keyframe);
+  std::vector<uint8_t> proven = still;
+  for (size_t i = 0; i < proven.size(); ++i) {
+    if (proven[i] != 0) proven[i] = IsProven(map, *map.FindLandmark(keyframe.landmarks[i]), {}) ? 1 : 0;
+  }
+  return std::count(proven.begin(), proven.end(), 1) >= kEnoughProven ? proven : still;
+}
 
 }  // namespace
 
@@ -50,7 +64,7 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<Ma
 
 bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                               TrackedFrame* frame) const {
-  const std::vector<uint8_t> usable = StaticFeatures(map, keyframe);
+  const std::vector<uint8_t> usable = SpeakingFeatures(map, keyframe);
   const std::vector<BowMatch> matches =
       MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
                    {&frame->features->set, &image.nodes, {}});
@@ -70,6 +84,9 @@ bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& pla
   }
   std::vector<LandmarkId> ids = LandmarksSeenBy(map, keyframes);
   KeepStatic(map, &ids);
+  std::vector<LandmarkId> proven = ids;
+  std::erase_if(proven, [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), {}); });
+  if (std::ssize(proven) >= kEnoughProvenTogether) ids = std::move(proven);
   const std::vector<LandmarkMatch> seen = MatchLandmarks(map, ids, frame->features->set);
   return FindPose(map, seen, DeriveSeed(seed, frame->index, "relocalize_together"), frame);
 }
@@ -106,19 +123,21 @@ bool Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame
   return false;
 }
 
-bool Relocalizer::Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
-                             PoseSearch* search, TrackedFrame* frame) const {
+bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch* search,
+                             TrackedFrame* frame) const {
   if (!places_.usable()) return false;
+  const auto fits = [&] {
+    return Refine(map, search, frame) && (!request.reachable || request.reachable(frame->T_cam_world));
+  };
   const BowImage image = places_.Transform(frame->features->set);
-  const std::vector<KeyframeId> candidates = Candidates(map, map_id, last_seen, image);
+  const std::vector<KeyframeId> candidates = Candidates(map, request.map_id, request.last_seen, image);
   for (const KeyframeId id : candidates) {
-    if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
-    if (Refine(map, search, frame)) return true;
+    if (TryKeyframe(map, *map.FindKeyframe(id), image, request.seed, frame) && fits()) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
-  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) places.push_back(*last);
-  return TryTogether(map, places, seed, frame) && Refine(map, search, frame);
+  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(request.last_seen)) places.push_back(*last);
+  return TryTogether(map, places, request.seed, frame) && fits();
 }
 
 }  // namespace dmslam

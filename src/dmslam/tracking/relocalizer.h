@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -22,11 +23,17 @@ class Relocalizer {
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Replica& map);
   void Clear();
-  /// A first pose of `frame` in map `map_id` (none given: in any), with matches; none when no keyframe fits.
-  /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours, then
-  /// all that these places show together.
-  bool Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
-                  PoseSearch* search, TrackedFrame* frame) const;
+  /// Where the camera is looked for.
+  struct Request {
+    std::optional<MapId> map_id = std::nullopt;  ///< none: in any map
+    KeyframeId last_seen{};                      ///< invalid: not known
+    std::function<bool(const Rigid3d& T_cam_world)> reachable{};  ///< empty: every pose is
+    uint64_t seed = 0;
+  };
+  /// A pose of `frame` with its matches; none when no keyframe fits. Keyframes that look alike are tried first,
+  /// then the one seen last and its neighbours, then all that these places show together. Where a place shows
+  /// enough landmarks that are proven to be no person, only these say where the camera is.
+  bool Relocalize(const Map& map, const Request& request, PoseSearch* search, TrackedFrame* frame) const;
 
  private:
   std::vector<KeyframeId> Candidates(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen,

@@ -5,9 +5,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
@@ -22,7 +24,9 @@ constexpr int kPoints = 3000, kKeyframes = 30;
 constexpr double kStep = 0.35;  // between two keyframes [map units]
 constexpr size_t kPoorEvery = 8;
 constexpr int kPoorFlips = 32;
-constexpr double kMoverStep = 0.4;  // how far the movers have gone when the camera is lost
+constexpr double kMoverStep = 0.4;                  // how far the movers have gone when the camera is lost
+constexpr int64_t kInterval_ns = 1'000'000'000;     // between two keyframes
+constexpr uint32_t kStoodFrom = 11, kStoodTo = 14;  // keyframes that see movers who stood for a while
 
 std::shared_ptr<const Vocabulary> ShippedVocabulary() {
   const char* source = std::getenv("DMSLAM_SOURCE_DIR");
@@ -36,8 +40,8 @@ Rigid3d PoseAt(double x) { return Rigid3d(Eigen::Quaterniond::Identity(), Eigen:
 /// map believes so with `belief` (log odds).
 class Wall {
  public:
-  explicit Wall(double moving_share = 0.0, float belief = 0.0F)
-      : map_(TestCamera(525, 319.5, 239.5), Pyramid()) {
+  explicit Wall(double moving_share = 0.0, float belief = 0.0F, bool they_stood = false)
+      : map_(TestCamera(525, 319.5, 239.5), Pyramid()), they_stood_(they_stood) {
     Random random(5);
     for (int i = 0; i < kPoints; ++i) {
       points_.emplace_back(random.Uniform(-2.0, kStep * kKeyframes + 2.0), random.Uniform(-1.2, 1.2),
@@ -62,13 +66,15 @@ class Wall {
     Keyframe keyframe;
     keyframe.id = KeyframeId::Make(1, k + 1);
     keyframe.map_id = 1;
-    keyframe.stamp_ns = k * 300'000'000LL;
+    keyframe.stamp_ns = k * kInterval_ns;
     keyframe.T_cam_world = PoseAt(k * kStep);
     if (k > 0) keyframe.parent = KeyframeId::Make(1, k);
     keyframe.features = See(keyframe.T_cam_world, 0.0, k, &seen);
     const KeyframeId id = keyframe.id;
     map_.AddKeyframe(std::move(keyframe));
+    const bool there = !they_stood_ || (k >= kStoodFrom && k <= kStoodTo);
     for (size_t feature = 0; feature < seen.size(); ++feature) {
+      if (moves_[seen[feature]] && !there) continue;
       Landmark& landmark = landmarks_[seen[feature]];
       if (map_.FindLandmark(landmark.id) == nullptr) {
         landmark.reference = landmark.first_keyframe = id;
@@ -130,6 +136,7 @@ class Wall {
   }
 
   MapEditor map_;
+  bool they_stood_;  ///< the movers, when they were mapped; else they were seen as long as the wall
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> descriptors_;
   std::vector<bool> moves_;
@@ -148,8 +155,9 @@ class Lost {
       relocalizer_.Update(replica_);
     }
   }
-  bool Find(TrackedFrame* frame, std::optional<MapId> map_id = 1) {
-    return relocalizer_.Relocalize(replica_, map_id, {}, 1, &search_, frame);
+  bool Find(TrackedFrame* frame, std::optional<MapId> map_id = 1,
+            std::function<bool(const Rigid3d&)> reachable = {}) {
+    return relocalizer_.Relocalize(replica_, {map_id, {}, std::move(reachable), 1}, &search_, frame);
   }
   void Clear() { relocalizer_.Clear(); }
 
@@ -203,6 +211,25 @@ TEST(RelocalizerTest, LandmarksThatAreBelievedToMoveDoNotVote) {
   Lost among_them(crowd);
   frame = crowd.Frame(4.4);
   EXPECT_FALSE(among_them.Find(&frame));
+}
+
+TEST(RelocalizerTest, PeopleWhoStoodForAWhileDoNotVoteWhereTheRoomIsProven) {
+  Wall wall(0.65, -2.0F, true);  // most of what these keyframes show has gone on together
+  Lost lost(wall);
+  TrackedFrame frame = wall.Frame(4.4, kMoverStep);
+  ASSERT_TRUE(lost.Find(&frame));
+  EXPECT_LT((frame.T_cam_world.Center() - PoseAt(4.4).Center()).norm(), 0.02);
+}
+
+TEST(RelocalizerTest, APlaceOutOfReachIsRefused) {
+  Wall wall;
+  Lost lost(wall);
+  TrackedFrame frame = wall.Frame(4.4);
+  const auto near = [](double x) {
+    return [x](const Rigid3d& T) { return (T.Center() - PoseAt(x).Center()).norm() < 0.6; };
+  };
+  EXPECT_FALSE(lost.Find(&frame, 1, near(0.5)));
+  EXPECT_TRUE(lost.Find(&frame, 1, near(4.2)));
 }
 
 TEST(RelocalizerTest, OnlyTheMapThatIsAskedForIsSearched) {

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -41,6 +42,7 @@ void Tracker::OnMapForgotten() {
 void Tracker::OnMapGivenUp() {
   search_.Reset();
   motion_.Stop();
+  recovery_.reset();
 }
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
@@ -77,10 +79,11 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
 /// At once where much of what is seen is proven to be no person; else where the place goes on to predict what
 /// is seen, and, in a map that is old enough to have them, proven landmarks are among it.
 bool Tracker::IsConfirmed(const Map& map, const TrackedFrame& frame) const {
-  const int proven = CountProven(map, frame);
+  const int proven = CountProven(map, frame.landmarks, {});
   if (proven >= kManyProven) return true;
   if (frame.stamp_ns - recovery_->since_ns < kConfirmNs) return false;
-  return proven >= kSomeProven || !HasProven(map, frame);
+  const Keyframe* reference = map.FindKeyframe(search_.reference());
+  return proven >= kSomeProven || reference == nullptr || !CanBeProven(map, reference->map_id, {});
 }
 
 /// What was recognised does not predict what is seen: the camera is as lost as it was.
@@ -130,10 +133,14 @@ bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& predic
 void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt) {
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
-  if (!relocalizer_.Relocalize(map, map_id, motion_.last().reference, seed, &search_, &found)) return;
+  const FrameTime time{frame->index, frame->stamp_ns};
+  const auto reachable = [&](const Rigid3d& pose) { return motion_.IsReachable(map, pose, time); };
+  Relocalizer::Request request{.map_id = map_id, .last_seen = motion_.last().reference, .seed = seed};
+  if (map_id) request.reachable = reachable;
+  if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
-  if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns}))
+  if (map_id && !reachable(frame->T_cam_world))
     Refuse("the place that was recognised is out of reach", &attempt->report);
   attempt->relocalized = attempt->report.ok;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
