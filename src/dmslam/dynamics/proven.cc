@@ -43,7 +43,7 @@ bool CanBeProven(const Map& map, MapId map_id, const ProvenOptions& options) {
     first_ns = std::min(first_ns, keyframe.stamp_ns);
     last_ns = std::max(last_ns, keyframe.stamp_ns);
   }
-  return first_ns < last_ns && static_cast<double>(last_ns - first_ns) * 1e-9 > 2 * options.standing_s;
+  return first_ns<last_ns&& static_cast<double>(last_ns - first_ns) * 1e-9> 2 * options.standing_s;
 }
 
 }  // namespace dmslam

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
 
 namespace dmslam {
 namespace {
@@ -19,8 +20,8 @@ std::vector<int64_t> Stamps(const std::vector<double>& seconds) {
 }
 
 /// A map in which one landmark is seen at these times.
-Map MapSeenAt(const std::vector<double>& seconds, float motion_belief = 0.0F) {
-  Map map(TestCamera(), Pyramid());
+MapEditor MapSeenAt(const std::vector<double>& seconds, float motion_belief = 0.0F) {
+  MapEditor map(TestCamera(), Pyramid());
   Landmark landmark;
   landmark.id = LandmarkId::Make(1, 1);
   landmark.map_id = 1;
@@ -64,6 +65,15 @@ TEST(ProvenTest, SeenLongIsProvenInWhateverOrderTheKeyframesCame) {
 }
 
 TEST(ProvenTest, WhatIsBelievedToMoveIsNot) { EXPECT_FALSE(Proven(MapSeenAt({0, 2, 4, 6, 8}, 1.0F))); }
+
+TEST(ProvenTest, AYoungMapCannotHaveProvenLandmarks) {
+  const MapEditor young = MapSeenAt({0, 1, 2, 3, 4, 5, 6}), old = MapSeenAt({0, 2, 4, 6, 8, 10});
+  EXPECT_FALSE(CanBeProven(young, 1, ProvenOptions()));
+  EXPECT_TRUE(CanBeProven(old, 1, ProvenOptions()));
+  EXPECT_FALSE(CanBeProven(old, 2, ProvenOptions())) << "there is no such map";
+  const LandmarkId id = LandmarkId::Make(1, 1);
+  EXPECT_EQ(CountProven(old, {id, LandmarkId(), LandmarkId::Make(1, 9)}, ProvenOptions()), 1);
+}
 
 }  // namespace
 }  // namespace dmslam

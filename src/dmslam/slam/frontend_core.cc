@@ -115,8 +115,8 @@ FrontendOutput FrontendCore::ProcessFrame() {
   return Track();
 }
 
-/// While a first map is looked for, every frame also asks the maps that there are where it is: who is recognised
-/// goes on there.
+/// While a first map is looked for, every frame also asks the maps that there are where it is: who is
+/// recognised goes on there.
 std::optional<FrontendOutput> FrontendCore::FindAgain() {
   if (map_.keyframes().empty()) return std::nullopt;
   TrackingResult result = tracker_.Track(map_, {std::nullopt, true}, std::move(frame_));

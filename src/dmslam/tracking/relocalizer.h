@@ -25,14 +25,14 @@ class Relocalizer {
   void Clear();
   /// Where the camera is looked for.
   struct Request {
-    std::optional<MapId> map_id = std::nullopt;  ///< none: in any map
-    KeyframeId last_seen{};                      ///< invalid: not known
+    std::optional<MapId> map_id = std::nullopt;                   ///< none: in any map
+    KeyframeId last_seen{};                                       ///< invalid: not known
     std::function<bool(const Rigid3d& T_cam_world)> reachable{};  ///< empty: every pose is
     uint64_t seed = 0;
   };
-  /// A pose of `frame` with its matches; none when no keyframe fits. Keyframes that look alike are tried first,
-  /// then the one seen last and its neighbours, then all that these places show together. Where a place shows
-  /// enough landmarks that are proven to be no person, only these say where the camera is.
+  /// A pose of `frame` with its matches; none when no keyframe fits. Keyframes that look alike are tried
+  /// first, then the one seen last and its neighbours, then all that these places show together. Where a
+  /// place shows enough landmarks that are proven to be no person, only these say where the camera is.
   bool Relocalize(const Map& map, const Request& request, PoseSearch* search, TrackedFrame* frame) const;
 
  private:
