@@ -29,4 +29,21 @@ bool IsProven(const Map& map, const Landmark& landmark, const ProvenOptions& opt
   return IsStatic(&landmark) && OutlastsStanding(ObservationStamps(map, landmark), options);
 }
 
+int CountProven(const Map& map, const std::vector<LandmarkId>& landmarks, const ProvenOptions& options) {
+  return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](LandmarkId id) {
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    return landmark != nullptr && IsProven(map, *landmark, options);
+  }));
+}
+
+bool CanBeProven(const Map& map, MapId map_id, const ProvenOptions& options) {
+  int64_t first_ns = INT64_MAX, last_ns = INT64_MIN;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (keyframe.map_id != map_id) continue;
+    first_ns = std::min(first_ns, keyframe.stamp_ns);
+    last_ns = std::max(last_ns, keyframe.stamp_ns);
+  }
+  return first_ns<last_ns&& static_cast<double>(last_ns - first_ns) * 1e-9> 2 * options.standing_s;
+}
+
 }  // namespace dmslam

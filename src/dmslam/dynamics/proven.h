@@ -24,4 +24,11 @@ std::vector<int64_t> ObservationStamps(const Map& map, const Landmark& landmark)
 /// however many sides it was seen.
 bool IsProven(const Map& map, const Landmark& landmark, const ProvenOptions& options);
 
+/// How many of these landmarks (invalid ids: none) are proven.
+int CountProven(const Map& map, const std::vector<LandmarkId>& landmarks, const ProvenOptions& options);
+
+/// Whether a map is old enough for the landmarks that are seen time and again to be proven: its keyframes
+/// span twice as long as people stand.
+bool CanBeProven(const Map& map, MapId map_id, const ProvenOptions& options);
+
 }  // namespace dmslam

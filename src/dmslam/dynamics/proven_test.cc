@@ -66,5 +66,14 @@ TEST(ProvenTest, SeenLongIsProvenInWhateverOrderTheKeyframesCame) {
 
 TEST(ProvenTest, WhatIsBelievedToMoveIsNot) { EXPECT_FALSE(Proven(MapSeenAt({0, 2, 4, 6, 8}, 1.0F))); }
 
+TEST(ProvenTest, AYoungMapCannotHaveProvenLandmarks) {
+  const MapEditor young = MapSeenAt({0, 1, 2, 3, 4, 5, 6}), old = MapSeenAt({0, 2, 4, 6, 8, 10});
+  EXPECT_FALSE(CanBeProven(young, 1, ProvenOptions()));
+  EXPECT_TRUE(CanBeProven(old, 1, ProvenOptions()));
+  EXPECT_FALSE(CanBeProven(old, 2, ProvenOptions())) << "there is no such map";
+  const LandmarkId id = LandmarkId::Make(1, 1);
+  EXPECT_EQ(CountProven(old, {id, LandmarkId(), LandmarkId::Make(1, 9)}, ProvenOptions()), 1);
+}
+
 }  // namespace
 }  // namespace dmslam

@@ -82,7 +82,7 @@ TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Re
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
-  if (!relocalizer.Relocalize(map, std::nullopt, {}, seed, search, frame)) return {};
+  if (!relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   report = search->InLocalMap(map, true, std::nullopt, frame);
   report.ok = report.ok && (!next_ || IsPlausible(*frame, depth));
   return report;

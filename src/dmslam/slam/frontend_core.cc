@@ -115,7 +115,22 @@ FrontendOutput FrontendCore::ProcessFrame() {
   return Track();
 }
 
+/// While a first map is looked for, every frame also asks the maps that there are where it is: who is
+/// recognised goes on there.
+std::optional<FrontendOutput> FrontendCore::FindAgain() {
+  if (map_.keyframes().empty()) return std::nullopt;
+  TrackingResult result = tracker_.Track(map_, {std::nullopt, true}, std::move(frame_));
+  frame_ = std::move(result.frame);
+  if (!result.pose) return std::nullopt;
+  ++counters_.relocalizations;
+  map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
+  first_map_.Restart();
+  phase_.BeginLost();
+  return OnTracked(result.report, *result.pose);
+}
+
 FrontendOutput FrontendCore::Initialize() {
+  if (std::optional<FrontendOutput> found = FindAgain()) return std::move(*found);
   FrontendOutput output;
   unplaced_.Keep(WaitingFrame(frame_));
   FirstMapPhase::Answer answer = first_map_.AddFrame(frame_, session_, *map_id_);

@@ -95,6 +95,7 @@ class FrontendCore {
 
  private:
   FrontendOutput ProcessFrame();
+  std::optional<FrontendOutput> FindAgain();
   FrontendOutput Initialize();
   FrontendOutput AwaitMap();
   void BeginTrial(const Keyframe& second);

@@ -71,11 +71,14 @@ bool MotionModel::IsWithin(const FrameTime& time, int64_t limit_ns) const {
   return time.index - newest.index == 1 || time.stamp_ns - newest.stamp_ns <= limit_ns;
 }
 
-/// The depth of the scene is that of the keyframe seen last.
-PosePrior MotionModel::MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const {
+/// Of the scene, as the keyframe seen last has it.
+double MotionModel::Depth(const Map& map) const {
   const Keyframe* reference = map.FindKeyframe(last_.pose.reference);
-  const double depth = reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
-  return MotionPrior(options_, T_cam_world, depth,
+  return reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
+}
+
+PosePrior MotionModel::MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const {
+  return MotionPrior(options_, T_cam_world, Depth(map),
                      std::max(1.0, std::round(static_cast<double>(since_ns) / kStepNs)));
 }
 
@@ -91,6 +94,24 @@ MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& ti
   if (!IsWithin(time, kKnownNs)) return prediction;
   prediction.prior = MakePrior(map, *prediction.T_cam_world, time.stamp_ns - Newest().time.stamp_ns);
   return prediction;
+}
+
+bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const {
+  if (time.stamp_ns - last_.time.stamp_ns > static_cast<int64_t>(options_.reach_known_s * 1e9)) return true;
+  const Prediction prediction = Predict(map, time);
+  if (!prediction.T_cam_world) return true;
+  const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *Newest().pose.In(map);
+  const double turned_rad = AngleBetween(T_cam_world.rotation, from.rotation);
+  const double moved = (T_cam_world.Center() - from.Center()).norm() / Depth(map);
+  const double since_s =
+      std::max(1.0 / 30, static_cast<double>(time.stamp_ns - Newest().time.stamp_ns) * 1e-9);
+  if (prediction.prior) {
+    const double steps = std::max(1.0, std::round(since_s * 30));
+    return turned_rad <= options_.max_surprise * options_.prior_rotation_rad * steps &&
+           moved <= options_.max_surprise * options_.prior_translation * steps;
+  }
+  return turned_rad <= options_.turn_slack_rad + options_.max_turn_rad_per_s * since_s &&
+         moved <= options_.speed_slack + options_.max_speed * since_s;
 }
 
 void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world,

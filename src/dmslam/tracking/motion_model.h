@@ -29,6 +29,12 @@ struct FrameTime {
 struct MotionModelOptions {
   double prior_rotation_rad = 0.01;  ///< how well a step of 1/30 s is known beforehand...
   double prior_translation = 0.01;   ///< ...and its translation, as a share of the scene's depth
+  double max_surprise = 4.0;  ///< a pose that lies more standard deviations of the prior off contradicts it
+  double max_speed = 1.0;     ///< of a camera whose motion is not known [depths of the scene / s]...
+  double speed_slack = 0.05;  ///< ...and how far it may be off besides [depths]
+  double max_turn_rad_per_s = 2.0;  ///< the same for its rotation...
+  double turn_slack_rad = 0.05;     ///< ...
+  double reach_known_s = 5.0;       ///< of where it was longer ago nothing follows
 };
 
 /// What a motion model that predicts this pose `steps` of 1/30 s ahead knows; `depth` of the scene [map
@@ -51,6 +57,9 @@ class MotionModel {
   /// Stands at a known pose; its motion is not known.
   void Begin(const PlacedPose& pose, const FrameTime& time);
   Prediction Predict(const Map& map, const FrameTime& time) const;
+  /// Whether a carried camera can have come to `T_cam_world` since its newest pose: near where its motion
+  /// leads, and where that is not known, no faster than hands and cars are.
+  bool IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
   /// A frame was tracked. `jumped`: not from the frame before (relocalised), so the step is no motion.
   void OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world, const FrameTime& time,
                  bool jumped);
@@ -77,6 +86,7 @@ class MotionModel {
   Motion MotionTo(const Rigid3d& T_cam_world, const Rigid3d& T_last_world, const FrameTime& time) const;
   Rigid3d StepUntil(const FrameTime& time) const;
   bool IsWithin(const FrameTime& time, int64_t limit_ns) const;
+  double Depth(const Map& map) const;
   PosePrior MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const;
 
   MotionModelOptions options_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <utility>
 
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/proven.h"
@@ -26,10 +25,6 @@ constexpr int kNeighboursTogether = 5;
 // Of a keyframe, or of places together: so many landmarks that are proven to be no person speak alone.
 constexpr ptrdiff_t kEnoughProven = 50;
 constexpr ptrdiff_t kEnoughProvenTogether = 150;
-// What a hand does, and for how long nothing else is believed that is not proven.
-constexpr double kSuspicion_s = 1.0;
-constexpr double kMaxSpeed = 1.0, kSpeedSlack = 0.1;        // depths of the scene per second; depths
-constexpr double kMaxTurn_rad = 2.0, kTurnSlack_rad = 0.2;  // per second; once
 
 /// One entry per feature of a keyframe: 1 where it sees a landmark that may say where the camera is.
 std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) {
@@ -41,23 +36,7 @@ std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) 
   return std::count(proven.begin(), proven.end(), 1) >= kEnoughProven ? proven : still;
 }
 
-/// Landmarks that the frame was found by, proven to be no person.
-ptrdiff_t CountProven(const Map& map, const TrackedFrame& frame) {
-  return std::count_if(frame.landmarks.begin(), frame.landmarks.end(), [&](LandmarkId id) {
-    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
-    return landmark != nullptr && IsProven(map, *landmark, {});
-  });
-}
-
 }  // namespace
-
-bool Relocalizer::CanReach(const LastKnown& last, const Rigid3d& T_cam_world) {
-  if (last.elapsed_s > kSuspicion_s) return true;
-  const double moved = (T_cam_world.Center() - last.T_cam_world.Center()).norm();
-  const double turned_rad = AngleBetween(T_cam_world.rotation, last.T_cam_world.rotation);
-  return moved <= (kSpeedSlack + kMaxSpeed * last.elapsed_s) * last.depth &&
-         turned_rad <= kTurnSlack_rad + kMaxTurn_rad * last.elapsed_s;
-}
 
 Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary) : places_(std::move(vocabulary)) {}
 
@@ -144,24 +123,21 @@ bool Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame
   return false;
 }
 
-bool Relocalizer::Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
-                             PoseSearch* search, TrackedFrame* frame,
-                             const std::optional<LastKnown>& last) const {
+bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch* search,
+                             TrackedFrame* frame) const {
   if (!places_.usable()) return false;
-  const auto refine = [&] {
-    if (!Refine(map, search, frame)) return false;
-    return !last || CanReach(*last, frame->T_cam_world) || CountProven(map, *frame) >= kEnoughProven;
+  const auto fits = [&] {
+    return Refine(map, search, frame) && (!request.credible || request.credible(*frame));
   };
   const BowImage image = places_.Transform(frame->features->set);
-  const std::vector<KeyframeId> candidates = Candidates(map, map_id, last_seen, image);
+  const std::vector<KeyframeId> candidates = Candidates(map, request.map_id, request.last_seen, image);
   for (const KeyframeId id : candidates) {
-    if (!TryKeyframe(map, *map.FindKeyframe(id), image, seed, frame)) continue;
-    if (refine()) return true;
+    if (TryKeyframe(map, *map.FindKeyframe(id), image, request.seed, frame) && fits()) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
-  if (const std::optional<KeyframeId> newest = map.ResolveKeyframe(last_seen)) places.push_back(*newest);
-  return TryTogether(map, places, seed, frame) && refine();
+  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(request.last_seen)) places.push_back(*last);
+  return TryTogether(map, places, request.seed, frame) && fits();
 }
 
 }  // namespace dmslam

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -17,28 +18,22 @@ namespace dmslam {
 /// down.
 class Relocalizer {
  public:
-  /// Where the camera was when it was last known: shortly after, it cannot be far away.
-  struct LastKnown {
-    Rigid3d T_cam_world;
-    double elapsed_s = 0;  ///< since then
-    double depth = 1;      ///< of the scene then [map units]
-  };
-  /// Whether a camera in a hand can have come to `T_cam_world`. Of what was long ago nothing follows.
-  static bool CanReach(const LastKnown& last, const Rigid3d& T_cam_world);
-
   explicit Relocalizer(std::shared_ptr<const Vocabulary> vocabulary);
 
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Replica& map);
   void Clear();
-  /// A first pose of `frame` in map `map_id` (none given: in any), with matches; none when no keyframe fits.
-  /// Keyframes that look alike are tried first, then `last_seen` (may be invalid) and its neighbours, then
-  /// all that these places show together. Where a place shows enough landmarks that are proven to be no
-  /// person, only these say where the camera is; and where `last` says that it cannot be, so many of them
-  /// must be found.
-  bool Relocalize(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen, uint64_t seed,
-                  PoseSearch* search, TrackedFrame* frame,
-                  const std::optional<LastKnown>& last = std::nullopt) const;
+  /// Where the camera is looked for.
+  struct Request {
+    std::optional<MapId> map_id = std::nullopt;           ///< none: in any map
+    KeyframeId last_seen{};                               ///< invalid: not known
+    std::function<bool(const TrackedFrame&)> credible{};  ///< asked of a frame with its pose; empty: all are
+    uint64_t seed = 0;
+  };
+  /// A pose of `frame` with its matches; none when no keyframe fits. Keyframes that look alike are tried
+  /// first, then the one seen last and its neighbours, then all that these places show together. Where a
+  /// place shows enough landmarks that are proven to be no person, only these say where the camera is.
+  bool Relocalize(const Map& map, const Request& request, PoseSearch* search, TrackedFrame* frame) const;
 
  private:
   std::vector<KeyframeId> Candidates(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen,

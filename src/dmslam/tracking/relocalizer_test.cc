@@ -5,9 +5,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
@@ -154,8 +156,8 @@ class Lost {
     }
   }
   bool Find(TrackedFrame* frame, std::optional<MapId> map_id = 1,
-            const std::optional<Relocalizer::LastKnown>& last = std::nullopt) {
-    return relocalizer_.Relocalize(replica_, map_id, {}, 1, &search_, frame, last);
+            std::function<bool(const TrackedFrame&)> credible = {}) {
+    return relocalizer_.Relocalize(replica_, {map_id, {}, std::move(credible), 1}, &search_, frame);
   }
   void Clear() { relocalizer_.Clear(); }
 
@@ -219,22 +221,17 @@ TEST(RelocalizerTest, PeopleWhoStoodForAWhileDoNotVoteWhereTheRoomIsProven) {
   EXPECT_LT((frame.T_cam_world.Center() - PoseAt(4.4).Center()).norm(), 0.02);
 }
 
-TEST(RelocalizerTest, ShortlyAfterALossTheCameraIsNotFarAwayWhereNothingIsProven) {
-  Wall wall(1.0, -2.0F, true);
+TEST(RelocalizerTest, APlaceThatIsNotCredibleIsRefused) {
+  Wall wall;
   Lost lost(wall);
-  const auto last = [](double x, double elapsed_s) {
-    return Relocalizer::LastKnown{PoseAt(x), elapsed_s, 3.0};
-  };
   TrackedFrame frame = wall.Frame(4.4);
-  EXPECT_FALSE(lost.Find(&frame, 1, last(0.5, 0.2)));
-  EXPECT_TRUE(lost.Find(&frame, 1, last(4.2, 0.2)));
-  EXPECT_TRUE(lost.Find(&frame, 1, last(0.5, 5.0)));
-  Wall proven;
-  Lost carried(proven);
-  EXPECT_TRUE(carried.Find(&frame, 1, last(0.5, 0.2)));
-  const Rigid3d turned(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitY())), {0, 0, 0});
-  EXPECT_FALSE(Relocalizer::CanReach({Rigid3d(), 0.2, 3.0}, turned));
-  EXPECT_TRUE(Relocalizer::CanReach({Rigid3d(), 0.6, 3.0}, turned));
+  const auto near = [](double x) {
+    return [x](const TrackedFrame& found) {
+      return (found.T_cam_world.Center() - PoseAt(x).Center()).norm() < 0.6;
+    };
+  };
+  EXPECT_FALSE(lost.Find(&frame, 1, near(0.5)));
+  EXPECT_TRUE(lost.Find(&frame, 1, near(4.2)));
 }
 
 TEST(RelocalizerTest, OnlyTheMapThatIsAskedForIsSearched) {

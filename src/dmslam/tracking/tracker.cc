@@ -1,14 +1,24 @@
 #include "dmslam/tracking/tracker.h"
 
-#include <cmath>
 #include <utility>
 
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
 
 constexpr int64_t kCarefulNs = 1'000'000'000;  // so long more is asked of a camera that was found
+constexpr int64_t kConfirmNs = 500'000'000;    // so long a place must predict what is seen to be believed
+constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
+constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
+constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
+constexpr int kSomeProven = 15;                // ...and that must be among them when it is confirmed by time
+
+void Refuse(const char* reason, TrackingReport* report) {
+  report->ok = false;
+  report->reason = reason;
+}
 
 }  // namespace
 
@@ -32,22 +42,62 @@ void Tracker::OnMapForgotten() {
 void Tracker::OnMapGivenUp() {
   search_.Reset();
   motion_.Stop();
+  recovery_.reset();
 }
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
-  const FrameTime time{frame.index, frame.stamp_ns};
   Attempt attempt = FollowMotion(map, &frame);
-  if (!attempt.report.ok && request.may_relocalize) Relocalize(map, request.map_id, &frame, &attempt);
+  if (!attempt.report.ok && recovery_) AbandonRecovery();
+  if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
+    Relocalize(map, request.map_id, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
   if (attempt.report.ok) result.pose = PlacedPose::Of(map, frame.T_cam_world, search_.reference());
   if (result.pose) {
-    motion_.OnTracked(map, *result.pose, frame.T_cam_world, time, attempt.relocalized);
-    last_ = frame;
+    Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
-    motion_.Coast(map, *attempt.weak_pose, time);
+    motion_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
+  }
+  if (recovery_) {
+    search_.judge().DropEvidence();
+    result.pose.reset();
+    result.report.ok = false;
+    result.report.reason = "a place was recognised that is not confirmed yet";
   }
   result.frame = std::move(frame);
   return result;
+}
+
+/// Goes on from a frame whose pose was found.
+void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame,
+                     const Attempt& attempt) {
+  if (attempt.relocalized) recovery_ = Recovery{frame.stamp_ns, motion_, last_};
+  motion_.OnTracked(map, pose, frame.T_cam_world, {frame.index, frame.stamp_ns}, attempt.relocalized);
+  last_ = frame;
+  if (recovery_ && IsConfirmed(map, frame)) recovery_.reset();
+}
+
+/// At once where much of what is seen is proven to be no person; else where the place goes on to predict what
+/// is seen, and, in a map that is old enough to have them, proven landmarks are among it.
+bool Tracker::IsConfirmed(const Map& map, const TrackedFrame& frame) const {
+  const int proven = CountProven(map, frame.landmarks, {});
+  if (proven >= kManyProven) return true;
+  if (frame.stamp_ns - recovery_->since_ns < kConfirmNs) return false;
+  const Keyframe* reference = map.FindKeyframe(search_.reference());
+  return proven >= kSomeProven || reference == nullptr || !CanBeProven(map, reference->map_id, {});
+}
+
+/// What was recognised does not predict what is seen: the camera is as lost as it was.
+void Tracker::AbandonRecovery() {
+  motion_ = recovery_->motion;
+  last_ = std::move(recovery_->last);
+  recovery_.reset();
+  relocalized_ns_.reset();
+}
+
+/// While the motion still leads, a place that looks alike is no better guess: people are such places.
+bool Tracker::MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const {
+  const int64_t missing_ns = stamp_ns - motion_.last_stamp_ns();
+  return missing_ns > (attempt.weak_pose ? kCoastNs : kNoPlacesNs);
 }
 
 /// From where the motion model expects the camera, to what the map around says.
@@ -58,7 +108,11 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   if (!prediction.T_cam_world || !prediction.recent) return attempt;
   if (!FindByMotion(map, prediction, frame, &attempt)) return attempt;
   attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns), prediction.prior, frame);
-  if (attempt.report.num_static >= options_.min_coasting_inliers) attempt.weak_pose = frame->T_cam_world;
+  if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
+    Refuse("the pose contradicts the camera's motion", &attempt.report);
+  } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
+    attempt.weak_pose = frame->T_cam_world;
+  }
   return attempt;
 }
 
@@ -79,23 +133,21 @@ bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& predic
 void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt) {
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
-  const auto last = LastKnown(map, map_id, frame->stamp_ns);
-  if (!relocalizer_.Relocalize(map, map_id, motion_.last().reference, seed, &search_, &found, last)) return;
+  const FrameTime time{frame->index, frame->stamp_ns};
+  // Far away only what is proven to be no person is believed.
+  const auto credible = [&](const TrackedFrame& at) {
+    return motion_.IsReachable(map, at.T_cam_world, time) ||
+           CountProven(map, at.landmarks, {}) >= kManyProven;
+  };
+  Relocalizer::Request request{.map_id = map_id, .last_seen = motion_.last().reference, .seed = seed};
+  if (map_id) request.credible = credible;
+  if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
+  if (request.credible && !credible(*frame))
+    Refuse("the place that was recognised is out of reach", &attempt->report);
   attempt->relocalized = attempt->report.ok;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
-}
-
-/// Where the camera was when it was last tracked; none where that is not known in this map.
-std::optional<Relocalizer::LastKnown> Tracker::LastKnown(const Map& map, std::optional<MapId> map_id,
-                                                         int64_t stamp_ns) const {
-  const std::optional<Rigid3d> T_last_world = motion_.last().In(map);
-  const Keyframe* reference = map.FindKeyframe(motion_.last().reference);
-  const std::optional<double> depth = reference != nullptr ? map.MedianDepth(*reference) : std::nullopt;
-  if (!T_last_world || !depth || reference->map_id != map_id) return std::nullopt;
-  const double elapsed_s = static_cast<double>(stamp_ns - motion_.last_stamp_ns()) * 1e-9;
-  return Relocalizer::LastKnown{*T_last_world, std::abs(elapsed_s), *depth};
 }
 
 bool Tracker::IsCareful(int64_t stamp_ns) const {

@@ -68,10 +68,14 @@ class Tracker {
   bool FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
                     Attempt* attempt);
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
+  bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
   void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
   std::optional<Relocalizer::LastKnown> LastKnown(const Map& map, std::optional<MapId> map_id,
                                                   int64_t stamp_ns) const;
   bool IsCareful(int64_t stamp_ns) const;
+  void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
+  bool IsConfirmed(const Map& map, const TrackedFrame& frame) const;
+  void AbandonRecovery();
 
   TrackingOptions options_;
   uint64_t seed_;
@@ -80,6 +84,13 @@ class Tracker {
   MotionModel motion_;
   TrackedFrame last_;                      ///< the frame tracked last
   std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
+  /// A lost camera that was found is followed, but not believed before it is confirmed.
+  struct Recovery {
+    int64_t since_ns = 0;
+    MotionModel motion;  ///< and the last frame, as they were when it was lost
+    TrackedFrame last;
+  };
+  std::optional<Recovery> recovery_;
 };
 
 }  // namespace dmslam

@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <string>
 
+#include "dmslam/map/replica.h"
 #include "dmslam/map/testing/map_scene.h"
 #include "dmslam/tracking/keyframe_policy.h"
 
@@ -130,6 +134,31 @@ TEST_F(Motion, CoastsOnWeakPosesForAWhile) {
   EXPECT_FALSE(motion_.IsCoasting());
 }
 
+TEST_F(Motion, AJoltThatNoHandMakesIsOutOfReach) {
+  TrackTo(1);
+  TrackTo(2);
+  const auto reachable = [&](double x) {
+    return motion_.IsReachable(scene_.map(), MapScene::PoseAt(x), Time(3));
+  };
+  EXPECT_TRUE(reachable(3 * kStep));
+  EXPECT_TRUE(reachable(3 * kStep + 0.1)) << "2.5 % of the depth beside where the motion leads";
+  EXPECT_FALSE(reachable(3 * kStep + 0.3));
+  const Rigid3d turned(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())),
+                       MapScene::PoseAt(3 * kStep).translation);
+  EXPECT_FALSE(motion_.IsReachable(scene_.map(), turned, Time(3)));
+}
+
+TEST_F(Motion, WhereItsMotionIsNotKnownACameraGoesNoFasterThanACarriedOne) {
+  TrackTo(1, true);
+  const auto reachable = [&](double x, uint32_t frame) {
+    return motion_.IsReachable(scene_.map(), MapScene::PoseAt(x), Time(frame));
+  };
+  EXPECT_FALSE(reachable(1.0, 4)) << "a quarter of the depth in a tenth of a second";
+  EXPECT_TRUE(reachable(1.0, 31));
+  EXPECT_FALSE(reachable(20.0, 31));
+  EXPECT_TRUE(reachable(20.0, 300)) << "where it was ten seconds ago says nothing";
+}
+
 // ---- Tracker ----
 
 /// A wall and, before it, a group of people who were mapped half a second ago.
@@ -232,6 +261,68 @@ TEST_F(Tracking, LostForLongItIsNotLedByAnOldPose) {
   for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
   const TrackingResult result = Track(Frame(40, 0.0));
   EXPECT_FALSE(result.pose) << "without a vocabulary nothing else finds it";
+}
+
+/// A camera that was lost for a second, in a map whose keyframes span `map_s`.
+class Recovering : public ::testing::Test {
+ protected:
+  static constexpr uint32_t kLost = 5, kFound = 35;
+
+  void Start(double map_s) {
+    scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
+    const auto keyframes = static_cast<uint32_t>(map_s * 1e9 / MapScene::kKeyframeStepNs) + 1;
+    scene_.MapAll(keyframes, 0.2 / keyframes);
+    replica_.Apply(scene_.map().TakeDelta(MapEvent::kMapStarted, KeyframeId::Make(MapScene::kSession, 1), 1));
+    const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+    Tracker::Setup setup;
+    setup.camera = TestCamera();
+    setup.vocabulary = std::make_shared<const Vocabulary>(
+        LoadOrbVocabulary((source != nullptr ? std::string(source) : ".") + "/data/vocabulary.dmv"));
+    tracker_.emplace(setup);
+    tracker_->OnMapChanged(replica_);
+    tracker_->BeginAt(*replica_.FindKeyframe(KeyframeId::Make(MapScene::kSession, 0)));
+    for (uint32_t frame = 1; frame < kFound; ++frame) Track(frame, frame >= kLost);
+  }
+  TrackingResult Track(uint32_t frame, bool blind = false) {
+    const auto nothing = [](size_t) { return std::optional<Eigen::Vector3d>(); };
+    const auto place = blind ? MapScene::Place(nothing) : MapScene::Place();
+    return tracker_->Track(replica_, {},
+                           scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(kStep * frame), place));
+  }
+  /// The first frame from `begin` on that has a pose.
+  uint32_t FirstFound(uint32_t begin) {
+    for (uint32_t frame = begin; frame < begin + 60; ++frame) {
+      if (Track(frame).pose) return frame;
+    }
+    return 0;
+  }
+
+  MapScene scene_;
+  Replica replica_{TestCamera(), Pyramid()};
+  std::optional<Tracker> tracker_;
+};
+
+TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
+  Start(1.0);
+  const TrackingResult first = Track(kFound);
+  EXPECT_TRUE(first.relocalized);
+  EXPECT_FALSE(first.pose) << "people who stood are places too";
+  EXPECT_TRUE(tracker_->TakeEvidence(0, 1).items.empty());
+  const uint32_t found = FirstFound(kFound + 1);
+  EXPECT_NEAR((found - kFound) / 30.0, 0.5, 0.05);
+}
+
+TEST_F(Recovering, ManyProvenLandmarksAreBelievedAtOnce) {
+  Start(10.0);
+  EXPECT_TRUE(Track(kFound).pose);
+}
+
+TEST_F(Recovering, APlaceThatDoesNotPredictIsDropped) {
+  Start(1.0);
+  EXPECT_TRUE(Track(kFound).relocalized);
+  for (uint32_t frame = kFound + 1; frame < kFound + 10; ++frame) Track(frame, true);
+  const uint32_t found = FirstFound(kFound + 10);
+  EXPECT_GE(found, kFound + 10 + 14) << "the half second begins anew";
 }
 
 // ---- Projection search ----
