@@ -70,8 +70,6 @@ class Tracker {
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
   void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
-  std::optional<Relocalizer::LastKnown> LastKnown(const Map& map, std::optional<MapId> map_id,
-                                                  int64_t stamp_ns) const;
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
   bool IsConfirmed(const Map& map, const TrackedFrame& frame) const;

@@ -95,6 +95,12 @@ TEST_F(Motion, APredictionOverAGapGoesAsFarAsTheCamera) {
   EXPECT_LT(ErrorAt(*Predict(14).T_cam_world, 7.5 * kStep), 1e-3) << "but not on and on";
 }
 
+TEST_F(Motion, AFrameThatIsTrackedTwiceIsNoGreatMotion) {
+  TrackTo(1);
+  TrackTo(1);
+  EXPECT_LT(ErrorAt(*Predict(2).T_cam_world, kStep), 1e-9);
+}
+
 TEST_F(Motion, AJumpIsNoMotion) {
   TrackTo(1);
   TrackTo(2, true);
