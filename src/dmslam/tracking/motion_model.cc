@@ -55,13 +55,14 @@ MotionModel::Motion MotionModel::MotionTo(const Rigid3d& T_cam_world, const Rigi
   return {T_cam_world * T_last_world.Inverse(), time.stamp_ns - Newest().time.stamp_ns};
 }
 
-/// The motion goes on evenly, for no longer than it says something. Stamps that jitter make no difference.
+/// The motion goes on evenly, for no longer than it says something. Stamps that jitter make no difference. A
+/// frame that was tracked twice, as the one that made the first map is, has corrected its pose and not moved.
 Rigid3d MotionModel::StepUntil(const FrameTime& time) const {
+  const Rigid3d& motion = motion_->T_cam_lastcam;
+  if (motion_->duration_ns <= 0) return motion;
   const int64_t since_ns =
       std::min(time.stamp_ns - Newest().time.stamp_ns, std::max(kKnownNs, motion_->duration_ns));
-  const double steps =
-      static_cast<double>(since_ns) / static_cast<double>(std::max<int64_t>(1, motion_->duration_ns));
-  const Rigid3d& motion = motion_->T_cam_lastcam;
+  const double steps = static_cast<double>(since_ns) / static_cast<double>(motion_->duration_ns);
   if (std::abs(steps - 1.0) < kJitter) return motion;
   return {ExpSo3(steps * LogSo3(motion.rotation)), steps * motion.translation};
 }
