@@ -176,7 +176,7 @@ TEST_F(Judgement, WhatIsMissingWhileTheWallBehindItIsSeenHasGone) {
 TEST_F(Judgement, WhatIsMissingBehindSomethingNearerIsHiddenAndNothingIsSaid) {
   // The wall around the poster is missing; the poster itself is seen.
   const auto near_poster = [&](size_t i) {
-    return !OfPoster(i) && std::abs(scene_.point(i).x()) < 0.3 && std::abs(scene_.point(i).y()) < 0.3;
+    return !OfPoster(i) && std::abs(scene_.point(i).x()) < 0.6 && std::abs(scene_.point(i).y()) < 0.6;
   };
   const auto place = [&](size_t i) { return near_poster(i) ? std::nullopt : std::optional(scene_.point(i)); };
   const FrameEvidence evidence = JudgedAndBelieved(Frame(place, [](size_t) { return true; }));

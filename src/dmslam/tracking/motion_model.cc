@@ -56,7 +56,7 @@ MotionModel::Motion MotionModel::MotionTo(const Rigid3d& T_cam_world, const Rigi
 }
 
 /// The motion goes on evenly, for no longer than it says something. Stamps that jitter make no difference. A
-/// frame that was tracked twice, as the one that made the map, took no time: what moved it is one step.
+/// frame that was tracked twice, as the one that made the first map is, has corrected its pose and not moved.
 Rigid3d MotionModel::StepUntil(const FrameTime& time) const {
   const Rigid3d& motion = motion_->T_cam_lastcam;
   if (motion_->duration_ns <= 0) return motion;

@@ -14,13 +14,13 @@
 
 namespace dmslam::testing {
 
-/// A map for tests: keyframes side by side, some centimetres and 0.1 s apart, that see the points given to
+/// A map for tests: keyframes side by side, some centimetres and 1/30 s apart, that see the points given to
 /// it, each with a descriptor of its own; and frames that see them, where they are or have gone.
 class MapScene {
  public:
   static constexpr MapId kMap = 1;
   static constexpr uint32_t kSession = 1;
-  static constexpr int64_t kKeyframeStepNs = 100'000'000;
+  static constexpr int64_t kStepNs = 33'333'333;                              ///< between keyframes
   using Place = std::function<std::optional<Eigen::Vector3d>(size_t point)>;  ///< none: hidden
 
   explicit MapScene(uint64_t seed = 3) : map_(TestCamera(), Pyramid()), random_(seed) {}
@@ -50,7 +50,7 @@ class MapScene {
       Keyframe keyframe;
       keyframe.id = KeyframeId::Make(kSession, first + k);
       keyframe.map_id = kMap;
-      keyframe.stamp_ns = first_ns + k * kKeyframeStepNs;
+      keyframe.stamp_ns = first_ns + k * kStepNs;
       keyframe.T_cam_world = PoseAt(step * k);
       if (k > 0) keyframe.parent = KeyframeId::Make(kSession, first + k - 1);
       keyframe.features = See(k, 0, PoseAt(step * k)).features;
