@@ -8,39 +8,63 @@ LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)
     : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {}
 
+LoopcloserNode::~LoopcloserNode() { stop_ = true; }
+
 void LoopcloserNode::Begin(const CameraInfo& info) {
   const Settings& settings = options_.settings;
+  work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<LoopcloserCore>(settings.loop, info.camera, settings.pyramid(), settings.seed,
                                            vocabulary_);
-  if (info.mode == PlaybackMode::kRealtime) core_->SetPump([this] { PumpWithinWork(); });
+  if (info.mode == PlaybackMode::kRealtime) core_->SetInterrupt([this] { return stop_.load(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  ServeReplica(&core_->map(), [this] { return map_reader_->held(); });
+  ServeReplica(
+      &core_->map(), [this] { return map_reader_->held(); }, [this] { return work_->Idle(); });
   WantWriter({StreamId::kLoopCloser, {"mapper"}, {}, nullptr});
 }
 
-void LoopcloserNode::Apply(const MapDelta& delta) {
-  core_->ApplyMapDelta(delta);
-  if (delta.event == MapEvent::kMapped || delta.event == MapEvent::kMapStarted) Answer(delta.about);
-}
-
+/// On the core.
 void LoopcloserNode::Answer(KeyframeId keyframe) {
   const int64_t begin_ns = context_.now_ns();
-  PublishRecord(core_->Check(keyframe));
-  check_.Add(static_cast<double>(context_.now_ns() - begin_ns) * 1e-6);
+  const LoopAnswer answer = core_->Check(keyframe);
+  const double ms = static_cast<double>(context_.now_ns() - begin_ns) * 1e-6;
+  work_->Report([this, answer, ms] {
+    PublishRecord(answer);
+    check_.Add(ms);
+  });
 }
 
 bool LoopcloserNode::WorkOnce() {
+  if (!work_->Idle()) return false;
+  LetSnapshotBegin();
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return EndIfDone();
-  if (record->begins_anew()) core_->ForgetMap();
-  if (const auto delta = Read<MapDelta>(*record->bytes)) Apply(*delta);
-  // The newest keyframe of a snapshot may be waiting for an answer that the one before this process did not
-  // give.
-  const Map& map = core_->map();
-  const bool may_wait = record->ends_snapshot() && !map.keyframes().empty() && !map.progress().ended;
-  if (may_wait) Answer(map.keyframes().rbegin()->first);
-  map_reader_->AcceptTaken();
-  return true;
+  WorkOn(*record);
+  return work_->Idle();
+}
+
+void LoopcloserNode::WorkOn(const Record& record) {
+  const std::optional<MapDelta> delta = Read<MapDelta>(*record.bytes);
+  work_->Post([this, delta, begins_anew = record.begins_anew(), ends_snapshot = record.ends_snapshot()] {
+    if (begins_anew) core_->ForgetMap();
+    if (delta) core_->ApplyMapDelta(*delta);
+    const bool asks = delta && (delta->event == MapEvent::kMapped || delta->event == MapEvent::kMapStarted);
+    if (asks) Answer(delta->about);
+    // The newest keyframe of a snapshot may be waiting for an answer that the one before this process did not
+    // give.
+    const Map& map = core_->map();
+    const bool may_wait = ends_snapshot && !map.keyframes().empty() && !map.progress().ended;
+    if (may_wait) Answer(map.keyframes().rbegin()->first);
+    work_->Report([this, status = CoreStatus()] {
+      core_status_ = status;
+      map_reader_->AcceptTaken();
+    });
+  });
+}
+
+void LoopcloserNode::Stop() {
+  stop_ = true;
+  if (work_ && !stopping_) work_->Finish();
+  StreamNode::Stop();
 }
 
 bool LoopcloserNode::EndIfDone() {
@@ -55,26 +79,31 @@ bool LoopcloserNode::EndIfDone() {
 }
 
 void LoopcloserNode::PublishStatus() {
-  LoopcloserStatus status;
+  if (core_ && work_->Idle()) core_status_ = CoreStatus();
+  LoopcloserStatus status = core_status_;
   status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {map_reader_.get()});
   status.state = core_ ? LoopcloserStatus::State::kWatching : LoopcloserStatus::State::kStarting;
   status.vocabulary_checksum = vocabulary_ ? vocabulary_->checksum() : 0;
   status.check_p50_ms = check_.Quantile(0.5);
   status.check_p95_ms = check_.Quantile(0.95);
-  if (core_) {
-    const LoopcloserCounters& counters = core_->counters();
-    status.replica_version = static_cast<int64_t>(core_->map().version());
-    status.indexed_keyframes = static_cast<int32_t>(core_->map().keyframes().size());
-    status.keyframes_checked = static_cast<int64_t>(counters.checked);
-    status.candidates = static_cast<int64_t>(counters.candidates);
-    status.refused_consistency = static_cast<int64_t>(counters.refused_consistency);
-    status.refused_geometry = static_cast<int64_t>(counters.refused_geometry);
-    status.loops_closed = static_cast<int64_t>(counters.loops);
-    status.global_adjustments = static_cast<int64_t>(counters.global_adjustments);
-    status.last_keyframe = counters.last_keyframe;
-    status.last_loop_keyframe = counters.last_loop_keyframe;
-  }
   PublishLoose(status);
+}
+
+/// On the core, or while it is idle.
+LoopcloserStatus LoopcloserNode::CoreStatus() const {
+  LoopcloserStatus status;
+  const LoopcloserCounters& counters = core_->counters();
+  status.replica_version = static_cast<int64_t>(core_->map().version());
+  status.indexed_keyframes = static_cast<int32_t>(core_->map().keyframes().size());
+  status.keyframes_checked = static_cast<int64_t>(counters.checked);
+  status.candidates = static_cast<int64_t>(counters.candidates);
+  status.refused_consistency = static_cast<int64_t>(counters.refused_consistency);
+  status.refused_geometry = static_cast<int64_t>(counters.refused_geometry);
+  status.loops_closed = static_cast<int64_t>(counters.loops);
+  status.global_adjustments = static_cast<int64_t>(counters.global_adjustments);
+  status.last_keyframe = counters.last_keyframe;
+  status.last_loop_keyframe = counters.last_loop_keyframe;
+  return status;
 }
 
 }  // namespace dmslam

@@ -1,18 +1,23 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 
 #include "dmslam/loops/loopcloser_core.h"
+#include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/stream_node.h"
 
 namespace dmslam {
 
 /// The loop closer on the bus: keeps a replica of the map, and answers every keyframe with a correction or
-/// none.
+/// none. The core works in jobs, one record at a time, and in real time on a thread of its own.
 class LoopcloserNode : public StreamNode {
  public:
   LoopcloserNode(NodeContext context, NodeOptions options, std::shared_ptr<const Vocabulary> vocabulary);
+  ~LoopcloserNode() override;
+
+  void Stop() override;
 
  protected:
   void Begin(const CameraInfo& info) override;
@@ -20,15 +25,19 @@ class LoopcloserNode : public StreamNode {
   void PublishStatus() override;
 
  private:
-  void Apply(const MapDelta& delta);
+  void WorkOn(const Record& record);
   void Answer(KeyframeId keyframe);
   bool EndIfDone();
+  LoopcloserStatus CoreStatus() const;
 
   std::shared_ptr<const Vocabulary> vocabulary_;
   std::unique_ptr<LoopcloserCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
   bool ended_ = false;
   LatencyWindow check_;
+  LoopcloserStatus core_status_;      ///< what the core had to say of itself last
+  std::atomic<bool> stop_{false};     ///< asked by the core: it finishes early
+  std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
 };
 
 }  // namespace dmslam

@@ -51,22 +51,20 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
   const uint16_t ordinal = saved_ ? ContinueSavedMap(info) : uint16_t{1};
+  work_ = MakeCoreThread(info.mode);
+  const auto publish = [this](const MapDelta& delta) {
+    work_->Report([this, delta] { PublishDelta(delta); });
+  };
   core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(),
-                                       ordinal, [this](const MapDelta& delta) { PublishDelta(delta); });
+                                       ordinal, publish);
   if (saved_) {
     core_->ContinueSaved(std::exchange(saved_, std::nullopt)->map);
     const KeyframeId newest = core_->map().keyframes().rbegin()->first;
     const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, 56 * 1024);
     saved_parts_.assign(parts.begin(), parts.end());
   }
-  if (!lockstep_) {
-    core_->SetInterrupt([this] {
-      PumpWithinWork();
-      NoteArrivals();
-      return KeyframeWaits();
-    });
-  }
-  snapshots_ = std::make_unique<MapSnapshots>(&core_->map());
+  if (!lockstep_) core_->SetInterrupt([this] { return keyframe_waits_.load(); });
+  snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
 }
 
@@ -128,7 +126,7 @@ void MapperNode::OnWriterOpen() {
     Stop();
   } else if (progress.settled.valid()) {  // somebody may not have heard it
     const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(progress.settled);
-    core_->Settle(progress.settled, settled ? settled->map_id : 0);
+    Run([this, id = progress.settled, map_id = settled ? settled->map_id : 0] { core_->Settle(id, map_id); });
   }
 }
 
@@ -136,7 +134,6 @@ void MapperNode::OnWriterOpen() {
 
 void MapperNode::PublishDelta(const MapDelta& delta) {
   PublishRecord(delta);
-  PumpWithinWork();
   const int64_t now_ns = context_.now_ns();
   const double elapsed_ms = static_cast<double>(now_ns - keyframe_arrived_ns_) * 1e-6;
   if (delta.event == MapEvent::kFused) fused_ns_ = now_ns;
@@ -174,18 +171,35 @@ bool MapperNode::PublishSavedMap() {
   PublishDelta(saved_parts_.front());
   saved_parts_.pop_front();
   const Keyframe& newest = core_->map().keyframes().rbegin()->second;
-  if (saved_parts_.empty()) core_->Settle(newest.id, newest.map_id);
+  if (saved_parts_.empty())
+    Run([this, id = newest.id, map_id = newest.map_id] { core_->Settle(id, map_id); });
   return true;
 }
 
 void MapperNode::ApplyFirstAnswer() {
   const PendingAnswer pending = std::move(answers_.front());
   answers_.pop_front();
-  MapProgress progress = core_->map().progress();
-  progress.loopcloser = {pending.version.epoch, pending.version.seq};
-  core_->SetProgress(progress);
-  core_->OnLoopAnswer(pending.answer);
-  pending_answers_.push_back({pending.version, writer_->last_seq()});
+  const auto apply = [this, pending] {
+    MapProgress progress = core_->map().progress();
+    progress.loopcloser = {pending.version.epoch, pending.version.seq};
+    core_->SetProgress(progress);
+    core_->OnLoopAnswer(pending.answer);
+  };
+  Run(apply, [this, version = pending.version] {
+    pending_answers_.push_back({version, writer_->last_seq()});
+  });
+}
+
+/// Has the core do something, and then this node. The core is idle.
+void MapperNode::Run(Job job, std::function<void()> when_done) {
+  keyframe_waits_ = KeyframeWaits();
+  work_->Post([this, job = std::move(job), when_done = std::move(when_done)] {
+    job();
+    work_->Report([this, when_done, status = CoreStatus()] {
+      core_status_ = status;
+      if (when_done) when_done();
+    });
+  });
 }
 
 int64_t MapperNode::WorkDeadline() const {
@@ -197,31 +211,28 @@ bool MapperNode::WorkOnce() {
     DrainAfterEnd();
     return false;
   }
+  NoteArrivals();
+  AcceptWhatIsSafe();
+  if (!work_->Idle()) {
+    if (KeyframeWaits()) keyframe_waits_ = true;
+    return false;
+  }
+  if (snapshots_->wanted()) endpoint_.Advance();  // now the map may be read
   if (!saved_parts_.empty()) return PublishSavedMap();
   TakeLoopAnswers();
-  NoteArrivals();
   while (!arrived_.empty()) {
     taken_.push_back(std::move(arrived_.front()));
     arrived_.pop_front();
   }
-  AcceptWhatIsSafe();
   if (awaited_.valid()) {
     SettleAwaited();
     return !awaited_.valid();
   }
   if (!lockstep_ && !answers_.empty()) {
     ApplyFirstAnswer();
-    return true;
+    return work_->Idle();
   }
-  if (taken_.empty()) return EndIfDone();
-  const Record record = std::move(taken_.front().record);
-  keyframe_arrived_ns_ = taken_.front().at_ns;
-  taken_.pop_front();
-  current_ = record.version();
-  Handle(record);
-  if (!awaited_.valid()) pending_.push_back({current_, writer_->last_seq()});
-  AcceptWhatIsSafe();
-  return true;
+  return taken_.empty() ? EndIfDone() : HandleFirstRecord();
 }
 
 /// The records up to here are worked into the map: the next map record says so.
@@ -231,52 +242,78 @@ void MapperNode::MarkFrontend(const Version& version) {
   core_->SetProgress(progress);
 }
 
-void MapperNode::Handle(const Record& record) {
-  // A keyframe makes several map records: only the last one says that it is done.
-  const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
-  if (!many) MarkFrontend(current_);
+/// True: there may be more to do.
+bool MapperNode::HandleFirstRecord() {
+  const Record record = std::move(taken_.front().record);
+  keyframe_arrived_ns_ = taken_.front().at_ns;
+  taken_.pop_front();
   if (record.channel == channels::kSession) {
     if (const auto start = Read<SessionStart>(*record.bytes)) session_start_ = *start;
   }
+  // A keyframe makes several map records: only the last one says that it is done.
+  const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
+  const Version version = record.version();
+  const auto work = [this, many, version, job = JobFor(record)] {
+    if (!many) MarkFrontend(version);
+    if (job) job();
+  };
+  Run(work, [this, version] {
+    if (!awaited_.valid()) pending_.push_back({version, writer_->last_seq()});
+    AcceptWhatIsSafe();
+  });
+  return work_->Idle();
+}
+
+/// What a record of the frontend asks of the core; empty: nothing.
+MapperNode::Job MapperNode::JobFor(const Record& record) {
+  const Version version = record.version();
   if (options_.settings.start.localize_only) {
     // The map stays as it is, but nobody is left waiting.
-    if (record.channel == channels::kMapReset) core_->Settle({}, 0);
-    return;
+    if (record.channel == channels::kMapReset) return [this] { core_->Settle({}, 0); };
+    return {};
   }
   if (record.channel == channels::kInitialMap) {
-    if (const auto proposal = Read<InitialMap>(*record.bytes)) HandleInitialMap(*proposal);
+    if (const auto proposal = Read<InitialMap>(*record.bytes)) {
+      return [this, version, proposal] {
+        const bool started = core_->OnInitialMap(*proposal);
+        AfterKeyframe(version, proposal->second.id, proposal->map_id, started);
+      };
+    }
   } else if (record.channel == channels::kKeyframe) {
-    if (const auto proposal = Read<KeyframeProposal>(*record.bytes)) HandleKeyframe(*proposal);
+    if (const auto proposal = Read<KeyframeProposal>(*record.bytes)) {
+      return [this, version, proposal] {
+        const bool inserted = core_->OnKeyframe(*proposal);
+        AfterKeyframe(version, proposal->id, proposal->map_id, inserted);
+      };
+    }
   } else if (record.channel == channels::kFrameEvidence) {
-    if (const auto evidence = Read<FrameEvidence>(*record.bytes)) core_->OnEvidence(*evidence);
+    if (const auto evidence = Read<FrameEvidence>(*record.bytes))
+      return [this, evidence] { core_->OnEvidence(*evidence); };
   } else if (record.channel == channels::kMapReset) {
-    if (const auto reset = Read<MapReset>(*record.bytes)) core_->OnReset(*reset);
+    if (const auto reset = Read<MapReset>(*record.bytes)) return [this, reset] { core_->OnReset(*reset); };
   }
+  return {};
 }
 
-void MapperNode::HandleInitialMap(const InitialMap& proposal) {
-  const bool started = core_->OnInitialMap(proposal);
-  AfterKeyframe(proposal.second.id, proposal.map_id, started);
-}
-
-void MapperNode::HandleKeyframe(const KeyframeProposal& proposal) {
-  const bool inserted = core_->OnKeyframe(proposal);
-  AfterKeyframe(proposal.id, proposal.map_id, inserted);
-}
-
-void MapperNode::AfterKeyframe(KeyframeId id, MapId map_id, bool checked_by_loopcloser) {
+/// On the core. In lock-step, where the node is told at once, a keyframe settles when the loop closer has
+/// answered it.
+void MapperNode::AfterKeyframe(const Version& version, KeyframeId id, MapId map_id,
+                               bool checked_by_loopcloser) {
   const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer("loopcloser");
-  if (!wait) return Settle(id, map_id, current_);
-  awaited_ = id;
-  awaited_map_ = map_id;
-  awaited_version_ = current_;
-  asked_term_ = loop_reader_->term();
+  if (!wait) return Settle(id, map_id, version);
+  work_->Report([this, version, id, map_id] {
+    awaited_ = id;
+    awaited_map_ = map_id;
+    awaited_version_ = version;
+    asked_term_ = loop_reader_->term();
+  });
 }
 
+/// On the core.
 void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend) {
   MarkFrontend(of_frontend);
   core_->Settle(id, map_id);
-  last_settled_ = id;
+  work_->Report([this, id] { last_settled_ = id; });
 }
 
 /// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
@@ -290,15 +327,18 @@ void MapperNode::SettleAwaited() {
       ask_again = true;  // it has just come, and answers what is newest
       continue;
     }
-    Settle(std::exchange(awaited_, {}), awaited_map_, awaited_version_);
-    pending_.push_back({awaited_version_, writer_->last_seq()});
+    const KeyframeId settled = std::exchange(awaited_, {});
+    Run([this, settled] { Settle(settled, awaited_map_, awaited_version_); },
+        [this] {
+          pending_.push_back({awaited_version_, writer_->last_seq()});
+        });
   }
   // Another loop closer than the one that was asked does not know what is due.
   if (!awaited_.valid()) return;
   if (!asked_term_.valid()) asked_term_ = loop_reader_->term();
   if (!ask_again && loop_reader_->term() == asked_term_) return;
   asked_term_ = loop_reader_->term();
-  core_->AskAgain(awaited_, awaited_map_);
+  Run([this] { core_->AskAgain(awaited_, awaited_map_); });
 }
 
 void MapperNode::AcceptWhatIsSafe() {
@@ -317,10 +357,14 @@ void MapperNode::AcceptWhatIsSafe() {
 bool MapperNode::EndIfDone() {
   frontend_ended_ = frontend_ended_ || frontend_reader_->AtEnd();
   if (!frontend_ended_) return false;
+  if (!answers_.empty() && !end_announced_) {
+    ApplyFirstAnswer();
+    return work_->Idle();
+  }
   if (!end_announced_) {
     end_announced_ = true;
-    while (!answers_.empty()) ApplyFirstAnswer();
-    core_->End(options_.settings.start.localize_only);
+    Run([this] { core_->End(options_.settings.start.localize_only); });
+    return work_->Idle();
   }
   writer_->Complete(context_.now_ns());
   completing_ = true;
@@ -341,13 +385,23 @@ void MapperNode::Save() {
   SaveMap(path, core_->map(), session_start_);
 }
 
+/// A step in work inserts and creates, and leaves out what takes long.
+void MapperNode::InterruptCore() {
+  keyframe_waits_ = true;
+  if (work_) work_->Finish();
+}
+
+MapperNode::~MapperNode() { keyframe_waits_ = true; }
+
 void MapperNode::Stop() {
+  if (!stopping_) InterruptCore();
   Save();
   StreamNode::Stop();
 }
 
 void MapperNode::PublishStatus() {
-  MapperStatus status;
+  if (core_ && work_->Idle()) core_status_ = CoreStatus();
+  MapperStatus status = core_status_;
   status.head =
       MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
   status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
@@ -362,29 +416,31 @@ void MapperNode::PublishStatus() {
   status.adjusted_p95_ms = to_adjusted_.Quantile(0.95);
   status.adjusted_p99_ms = to_adjusted_.Quantile(0.99);
   status.adjustment_ms = adjustment_.Quantile(0.5);
-  if (core_) FillCoreStatus(&status);
   PublishLoose(status);
 }
 
-void MapperNode::FillCoreStatus(MapperStatus* status) const {
+/// On the core, or while it is idle.
+MapperStatus MapperNode::CoreStatus() const {
+  MapperStatus status;
   const Map& map = core_->map();
   const MapperCounters& counters = core_->counters();
-  status->version = static_cast<int64_t>(map.version());
-  status->maps = static_cast<int32_t>(counters.maps_started - counters.maps_dropped);
-  status->keyframes = static_cast<int32_t>(map.keyframes().size());
-  status->landmarks = static_cast<int32_t>(map.num_landmarks());
-  status->keyframes_inserted = static_cast<int64_t>(counters.keyframes_inserted);
-  status->keyframes_culled = static_cast<int64_t>(counters.keyframes_culled);
-  status->landmarks_created = counters.creation.created;
-  status->landmarks_culled = static_cast<int64_t>(counters.landmarks_culled);
-  status->landmarks_fused = static_cast<int64_t>(counters.fusions);
-  status->observations_dropped = static_cast<int64_t>(counters.observations_dropped);
-  status->refused_neighbourhood = counters.creation.refused_neighbourhood + counters.creation.refused_count;
-  status->refused_motion = static_cast<int64_t>(counters.landmarks_moving_removed);
-  status->refused_geometry = counters.creation.refused_parallax + counters.creation.refused_depth +
-                             counters.creation.refused_reprojection + counters.creation.refused_scale;
-  status->corrections_applied = static_cast<int64_t>(counters.corrections_applied);
-  status->corrections_refused = static_cast<int64_t>(counters.corrections_refused);
+  status.version = static_cast<int64_t>(map.version());
+  status.maps = static_cast<int32_t>(counters.maps_started - counters.maps_dropped);
+  status.keyframes = static_cast<int32_t>(map.keyframes().size());
+  status.landmarks = static_cast<int32_t>(map.num_landmarks());
+  status.keyframes_inserted = static_cast<int64_t>(counters.keyframes_inserted);
+  status.keyframes_culled = static_cast<int64_t>(counters.keyframes_culled);
+  status.landmarks_created = counters.creation.created;
+  status.landmarks_culled = static_cast<int64_t>(counters.landmarks_culled);
+  status.landmarks_fused = static_cast<int64_t>(counters.fusions);
+  status.observations_dropped = static_cast<int64_t>(counters.observations_dropped);
+  status.refused_neighbourhood = counters.creation.refused_neighbourhood + counters.creation.refused_count;
+  status.refused_motion = static_cast<int64_t>(counters.landmarks_moving_removed);
+  status.refused_geometry = counters.creation.refused_parallax + counters.creation.refused_depth +
+                            counters.creation.refused_reprojection + counters.creation.refused_scale;
+  status.corrections_applied = static_cast<int64_t>(counters.corrections_applied);
+  status.corrections_refused = static_cast<int64_t>(counters.corrections_refused);
+  return status;
 }
 
 }  // namespace dmslam

@@ -1,7 +1,8 @@
 #pragma once
 
+#include <atomic>
 #include <deque>
-#include <map>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "dmslam/map/replica.h"
 #include "dmslam/mapping/mapper_core.h"
 #include "dmslam/recording/map_file.h"
+#include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
@@ -17,6 +19,8 @@ namespace dmslam {
 
 /// The mapper on the bus: the frontend's stream and the loop closer's in, the map stream out. A record of the
 /// frontend is accepted only when the map record that holds its effect was acknowledged by another process.
+/// The core works in jobs, one at a time, and in real time on a thread of its own: what touches the core is
+/// done in a job, or while there is none.
 class MapperNode : public StreamNode {
  public:
   /// Maps as files; empty: none.
@@ -25,6 +29,7 @@ class MapperNode : public StreamNode {
     std::string save;  ///< where the map is written at the end
   };
   MapperNode(NodeContext context, NodeOptions options, Files files = {});
+  ~MapperNode() override;
 
   /// Also saves the map where that is asked for.
   void Stop() override;
@@ -60,10 +65,11 @@ class MapperNode : public StreamNode {
   void TakeLoopAnswers();
   void ApplyFirstAnswer();
   void DrainAfterEnd();
-  void Handle(const Record& record);
-  void HandleKeyframe(const KeyframeProposal& proposal);
-  void HandleInitialMap(const InitialMap& proposal);
-  void AfterKeyframe(KeyframeId id, MapId map_id, bool checked_by_loopcloser);
+  bool HandleFirstRecord();
+  using Job = std::function<void()>;
+  void Run(Job job, std::function<void()> when_done = {});
+  Job JobFor(const Record& record);
+  void AfterKeyframe(const Version& version, KeyframeId id, MapId map_id, bool checked_by_loopcloser);
   void Settle(KeyframeId id, MapId map_id, const Version& of_frontend);
   void SettleAwaited();
   void MarkFrontend(const Version& version);
@@ -71,8 +77,9 @@ class MapperNode : public StreamNode {
   bool KeyframeWaits() const;
   void NoteArrivals();
   void PublishDelta(const MapDelta& delta);
+  void InterruptCore();
   bool EndIfDone();
-  void FillCoreStatus(MapperStatus* status) const;
+  MapperStatus CoreStatus() const;
 
   Files files_;
   std::optional<RebuiltMap> saved_;  ///< loaded, not yet taken over
@@ -93,7 +100,6 @@ class MapperNode : public StreamNode {
   std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
-  Version current_;     ///< the frontend's record that is handled
   KeyframeId awaited_;  ///< lock-step: the loop closer's answer to this keyframe is due
   MapId awaited_map_ = 0;
   Version awaited_version_;  ///< of the record that brought it
@@ -102,6 +108,9 @@ class MapperNode : public StreamNode {
   int64_t keyframe_arrived_ns_ = 0;  ///< the one that is handled
   int64_t fused_ns_ = 0;             ///< since then it adjusts
   LatencyWindow to_landmarks_, to_adjusted_, adjustment_;
+  MapperStatus core_status_;                 ///< what the core had to say of itself last
+  std::atomic<bool> keyframe_waits_{false};  ///< asked by the core: it finishes early
+  std::unique_ptr<CoreThread> work_;         ///< ends before everything that jobs touch
 };
 
 }  // namespace dmslam

@@ -50,14 +50,6 @@ void LoopcloserCore::ForgetMap() {
   awaited_correction_ = 0;
 }
 
-std::function<bool()> LoopcloserCore::Interrupt() const {
-  if (!pump_) return {};
-  return [pump = pump_] {
-    pump();
-    return false;
-  };
-}
-
 LoopAnswer LoopcloserCore::Check(KeyframeId id) {
   ++counters_.checked;
   counters_.last_keyframe = id;
@@ -125,7 +117,7 @@ void LoopcloserCore::ProposePlace(const Keyframe& keyframe, const std::vector<Ke
 }
 
 LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
-  LoopAnswer answer = CorrectLoop(map_, loop, verifier_, options_, Interrupt());
+  LoopAnswer answer = CorrectLoop(map_, loop, verifier_, options_, interrupt_);
   if (answer.kind != LoopAnswer::Kind::kLoop) return {};
   ++counters_.loops;
   counters_.last_loop_keyframe = loop.keyframe;
@@ -139,7 +131,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
 
 LoopAnswer LoopcloserCore::AdjustAfterLoop(KeyframeId keyframe) {
   adjustment_due_ = false;
-  LoopAnswer answer = AdjustGlobally(map_, keyframe, options_, Interrupt());
+  LoopAnswer answer = AdjustGlobally(map_, keyframe, options_, interrupt_);
   if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) ++counters_.global_adjustments;
   return answer;
 }

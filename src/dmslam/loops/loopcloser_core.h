@@ -35,8 +35,8 @@ class LoopcloserCore {
   LoopcloserCore(const LoopcloserOptions& options, const Camera& camera, const Pyramid& pyramid,
                  uint64_t seed, std::shared_ptr<const Vocabulary> vocabulary);
 
-  /// Called now and then during long work. May be empty.
-  void SetPump(std::function<void()> pump) { pump_ = std::move(pump); }
+  /// Asked now and then during long work; true: finish early. May be empty (lock-step).
+  void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
   void ApplyMapDelta(const MapDelta& delta);
   /// The replica is void: a fresh map stream, or a snapshot, begins.
   void ForgetMap();
@@ -67,12 +67,11 @@ class LoopcloserCore {
   /// The first of the candidates that geometry bears out is kept as a proposal.
   void ProposePlace(const Keyframe& keyframe, const std::vector<KeyframeId>& candidates);
   LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
-  std::function<bool()> Interrupt() const;
 
   LoopcloserOptions options_;
   Camera camera_;
   Pyramid pyramid_;
-  std::function<void()> pump_;
+  std::function<bool()> interrupt_;
   Replica map_;
   MapPlaces places_;
   LoopDetector detector_;

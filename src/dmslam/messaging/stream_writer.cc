@@ -214,7 +214,7 @@ void StreamWriter::AdvanceSnapshot(int64_t now_ns) {
   if (source_ == nullptr) return;
   const bool wanted = std::any_of(readers_.begin(), readers_.end(),
                                   [](const auto& entry) { return entry.second.wants_snapshot; });
-  if (!snapshot_ && wanted) BeginSnapshot();
+  if (!snapshot_ && wanted && source_->Ready()) BeginSnapshot();
   if (!snapshot_) return;
   for (auto& [id, reader] : readers_) {  // who comes before the first piece is forgotten may join
     if (!reader.wants_snapshot || snapshot_->window.first() != 1) continue;

@@ -25,6 +25,8 @@ class SnapshotSource {
     bool last = false;
   };
   virtual ~SnapshotSource() = default;
+  /// Whether a snapshot could begin now. A source that is at work says no, and is asked again.
+  virtual bool Ready() { return true; }
   /// A snapshot begins. It is cut at `cut`: readers go on with the next record of the stream. Later pieces
   /// may show later states as long as applying the records from `cut + 1` on ends in the right one (absolute
   /// values do).

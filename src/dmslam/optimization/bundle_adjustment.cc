@@ -283,7 +283,8 @@ BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem) 
   // Ceres makes some hundred thousand small allocations, all of which end with the adjustment. On the heap of
   // a long run they would lie in the gaps between landmarks all over it, and with a large map the adjustment
   // would spend two thirds of its time waiting for memory. A thread has a heap of its own (an arena of
-  // malloc), which is empty before and after. The caller waits for it; nothing runs beside it.
+  // malloc), which is empty before and after. The caller waits for it; nothing runs beside it, and
+  // `interrupt` only reads a flag.
   return std::async(std::launch::async, [&] { return Adjustment(options, problem).Run(); }).get();
 }
 

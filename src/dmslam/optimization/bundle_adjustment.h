@@ -43,7 +43,7 @@ struct BundleOptions {
   /// keeps its distance.
   bool keep_scale = true;
   /// Asked before every step; true ends the adjustment early, with the best state so far (`interrupted` in
-  /// the report).
+  /// the report). It reads a flag and does nothing else.
   std::function<bool()> interrupt;
 };
 

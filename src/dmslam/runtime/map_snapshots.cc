@@ -10,6 +10,11 @@ constexpr size_t kPieceBytes = 56 * 1024;  // with headers below 64 KiB
 
 }  // namespace
 
+bool MapSnapshots::Ready() {
+  wanted_ = may_read_ && !may_read_();
+  return !wanted_;
+}
+
 void MapSnapshots::BeginSnapshot(int64_t) {
   const KeyframeId newest = map_->keyframes().empty() ? KeyframeId{} : map_->keyframes().rbegin()->first;
   const std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kPieceBytes);

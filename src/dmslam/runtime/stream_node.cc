@@ -129,8 +129,15 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   return reader;
 }
 
-void StreamNode::ServeReplica(const Map* map, std::function<Version()> held) {
-  replica_snapshots_ = std::make_unique<MapSnapshots>(map);
+std::unique_ptr<CoreThread> StreamNode::MakeCoreThread(PlaybackMode mode) {
+  const bool own = mode == PlaybackMode::kRealtime && context_.watch;
+  auto thread = std::make_unique<CoreThread>(own ? CoreThread::Mode::kOwnThread : CoreThread::Mode::kAtOnce);
+  if (own) context_.watch(thread->fd(), [to = thread.get()] { to->Deliver(); });
+  return thread;
+}
+
+void StreamNode::ServeReplica(const Map* map, std::function<Version()> held, std::function<bool()> may_read) {
+  replica_snapshots_ = std::make_unique<MapSnapshots>(map, std::move(may_read));
   ReplicaServer::Options options;
   options.holder.session = session_;
   options.holder.holder = UpperCase(role_);
@@ -141,6 +148,10 @@ void StreamNode::ServeReplica(const Map* map, std::function<Version()> held) {
   options.link = options_.link;
   replica_server_ = std::make_unique<ReplicaServer>(options, std::move(held), replica_snapshots_.get());
   endpoint_.AddServer(replica_server_.get(), "MAPPER");
+}
+
+void StreamNode::LetSnapshotBegin() {
+  if (replica_snapshots_ && replica_snapshots_->wanted()) endpoint_.Advance();
 }
 
 bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader) const {

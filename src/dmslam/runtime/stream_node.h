@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dmslam/messaging/endpoint.h"
+#include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/settings/settings.h"
@@ -77,7 +78,13 @@ class StreamNode : public Node {
   };
   /// Offers the replica of the map that this process holds to a mapper that starts. `held`: its version,
   /// empty while it is not whole. `map` must stay where it is.
-  void ServeReplica(const Map* map, std::function<Version()> held);
+  /// `may_read`: whether it may be read now; empty: always.
+  void ServeReplica(const Map* map, std::function<Version()> held, std::function<bool()> may_read = {});
+  /// Begins the snapshot of the replica for which somebody waits, now that the map may be read.
+  void LetSnapshotBegin();
+  /// Where a core's jobs run: on a thread of its own in real time, at once in lock-step and wherever nothing
+  /// can wake this node.
+  std::unique_ptr<CoreThread> MakeCoreThread(PlaybackMode mode);
   /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence.
   bool MapIsOver(const Map& map, const StreamReader& map_reader) const;
 

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace dmslam {
+
+/// Runs the jobs of a core one after another, in the order in which they are posted, and hands back what they
+/// report. In real time on a thread of its own: the thread that posts them keeps the bus alive meanwhile. In
+/// lock-step, and in one process, at once on the caller's thread. Jobs and reports are the same in both cases
+/// and come in the same order, so that a core cannot tell the difference.
+///
+/// Everything a job touches belongs to it until its last report was delivered: between jobs (`Idle`) it is
+/// the poster's.
+class CoreThread {
+ public:
+  using Job = std::function<void()>;
+  enum class Mode { kAtOnce, kOwnThread };
+  struct Options {
+    size_t max_jobs = 1;      ///< posted, and not done
+    size_t max_reports = 64;  ///< made, and not delivered: beyond them a job waits
+  };
+
+  explicit CoreThread(Mode mode) : CoreThread(mode, Options()) {}
+  CoreThread(Mode mode, Options options);
+  /// Drops what has not begun and what was not delivered, and waits for the job in work.
+  ~CoreThread();
+  CoreThread(const CoreThread&) = delete;
+  CoreThread& operator=(const CoreThread&) = delete;
+
+  // ---- The thread that posts
+
+  bool HasRoom() const;
+  /// Needs room.
+  void Post(Job job);
+  /// Calls what was reported, in order. An exception that a job has left with is thrown here.
+  void Deliver();
+  /// Whether all jobs are done, and all their reports delivered.
+  bool Idle() const;
+  /// Delivers until it is idle.
+  void Finish();
+  /// Readable when there is something to deliver; -1 where jobs run at once.
+  int fd() const { return event_fd_; }
+
+  // ---- From within a job
+
+  /// To be called on the thread that posts.
+  void Report(Job report);
+
+ private:
+  void Work();
+  void RunNext(std::unique_lock<std::mutex>& lock);
+  void Wake() const;
+
+  const Options options_;
+  int event_fd_ = -1;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;  ///< the first one may be in work
+  std::deque<Job> reports_;
+  std::exception_ptr failure_;
+  bool stopping_ = false;
+  std::thread thread_;  ///< not joinable: jobs run at once
+};
+
+}  // namespace dmslam

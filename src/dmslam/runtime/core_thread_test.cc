@@ -1,0 +1,121 @@
+#include "dmslam/runtime/core_thread.h"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace dmslam {
+namespace {
+
+using Mode = CoreThread::Mode;
+
+/// Posts three jobs that report twice each, and gives back what was said in which order.
+std::string Conversation(Mode mode) {
+  CoreThread core(mode);
+  std::string said;
+  for (const char name : {'a', 'b', 'c'}) {
+    while (!core.HasRoom()) core.Deliver();
+    core.Post([&core, &said, name] {
+      for (const char number : {'1', '2'}) core.Report([&said, name, number] { said += {name, number}; });
+    });
+  }
+  core.Finish();
+  return said;
+}
+
+TEST(CoreThread, SaysTheSameInBothModes) {
+  EXPECT_EQ(Conversation(Mode::kAtOnce), "a1a2b1b2c1c2");
+  EXPECT_EQ(Conversation(Mode::kOwnThread), "a1a2b1b2c1c2");
+}
+
+TEST(CoreThread, AtOnceAJobIsDoneWhenItIsPosted) {
+  CoreThread core(Mode::kAtOnce);
+  const std::thread::id here = std::this_thread::get_id();
+  std::thread::id there;
+  core.Post([&] { core.Report([&] { there = std::this_thread::get_id(); }); });
+  EXPECT_EQ(there, here);
+  EXPECT_TRUE(core.Idle());
+  EXPECT_TRUE(core.HasRoom());
+  EXPECT_EQ(core.fd(), -1);
+}
+
+TEST(CoreThread, ThePosterGoesOnWhileAJobIsInWork) {
+  CoreThread core(Mode::kOwnThread);
+  std::atomic<bool> go_on = false;
+  std::thread::id worker, reporter;
+  core.Post([&] {
+    while (!go_on) std::this_thread::yield();  // an adjustment that looks at its flag
+    worker = std::this_thread::get_id();
+    core.Report([&] { reporter = std::this_thread::get_id(); });
+  });
+  EXPECT_FALSE(core.HasRoom());
+  EXPECT_FALSE(core.Idle());
+  core.Deliver();
+  go_on = true;
+  core.Finish();
+  EXPECT_NE(worker, std::this_thread::get_id());
+  EXPECT_EQ(reporter, std::this_thread::get_id());
+}
+
+TEST(CoreThread, ItsDescriptorWakesThePoster) {
+  CoreThread core(Mode::kOwnThread);
+  pollfd readable{core.fd(), POLLIN, 0};
+  EXPECT_EQ(poll(&readable, 1, 0), 0) << "nothing was said yet";
+  bool heard = false;
+  core.Post([&] { core.Report([&] { heard = true; }); });
+  while (!heard) {
+    ASSERT_EQ(poll(&readable, 1, 10000), 1);
+    core.Deliver();
+  }
+  core.Finish();
+  EXPECT_EQ(poll(&readable, 1, 0), 0);
+}
+
+TEST(CoreThread, AJobWaitsWhereTooMuchWasNotDelivered) {
+  CoreThread core(Mode::kOwnThread, {1, 4});
+  std::atomic<int> made = 0;
+  int heard = 0;
+  core.Post([&] {
+    for (int i = 0; i < 100; ++i) {
+      core.Report([&] { ++heard; });
+      ++made;
+    }
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_LE(made, 4);
+  core.Finish();
+  EXPECT_EQ(heard, 100);
+}
+
+TEST(CoreThread, AnExceptionIsThrownAfterWhatWasSaidBeforeIt) {
+  for (const Mode mode : {Mode::kAtOnce, Mode::kOwnThread}) {
+    CoreThread core(mode);
+    bool heard = false;
+    const auto run = [&] {
+      core.Post([&] {
+        core.Report([&] { heard = true; });
+        throw std::runtime_error("broken");
+      });
+      core.Finish();
+    };
+    EXPECT_THROW(run(), std::runtime_error);
+    EXPECT_TRUE(heard);
+    EXPECT_TRUE(core.Idle());
+  }
+}
+
+TEST(CoreThread, EndsWhileAJobWaitsForItsReportsToBeHeard) {
+  CoreThread core(Mode::kOwnThread, {1, 1});
+  core.Post([&] {
+    for (int i = 0; i < 10; ++i) core.Report([] { FAIL() << "nobody listens any more"; });
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+}  // namespace
+}  // namespace dmslam
