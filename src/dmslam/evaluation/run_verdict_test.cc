@@ -131,7 +131,7 @@ TEST_F(RunVerdictTest, AFirstMapIsJudgedAtItsOwnScale) {
   EXPECT_TRUE(IsWrongFirstMap(truth_, online_, {}));
   // An excursion is counted among the wrong poses; what is wrong later is no fault of the first map.
   online_ = final_;
-  Shift(&online_, 20, 40, 0.2);
+  Shift(&online_, 30, 36, 0.2);
   EXPECT_FALSE(IsWrongFirstMap(truth_, online_, {}));
   online_ = final_;
   Shift(&online_, 70, 80, 0.5);
