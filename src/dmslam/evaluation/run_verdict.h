@@ -77,8 +77,8 @@ struct RunVerdict {
 RunVerdict JudgeRun(const JudgedRun& run, const VerdictLimits& limits);
 
 /// Whether the poses published in the first `limits.first_map_s` contradict the ground truth: the motion from
-/// the first of them to any other, brought to the ground truth's scale over these poses alone, is off by more
-/// than a motion may be.
+/// the first of them to more than half of the others, brought to the ground truth's scale over these poses
+/// alone, is off by more than a motion may be. An excursion of a few frames makes no wrong map.
 bool IsWrongFirstMap(std::span<const StampedPose> ground_truth, std::span<const StampedPose> online,
                      const VerdictLimits& limits);
 

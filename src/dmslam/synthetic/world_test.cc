@@ -163,6 +163,41 @@ TEST(Scene, AliasedRoomsShareTheirThings) {
   EXPECT_GT(both, static_cast<long>(twins.textures.size() / 2));
 }
 
+Camera SmallCamera() {
+  return {.width_px = 64, .height_px = 48, .fx_px = 52.5, .fy_px = 52.5, .cx_px = 31.5, .cy_px = 23.5};
+}
+
+// Wherever one looks there is something: no gap between walls, nothing behind a doorway that is not built.
+TEST(Scene, RoomsAreClosed) {
+  for (const SceneKind kind :
+       {SceneKind::kRoom, SceneKind::kOffice, SceneKind::kHall, SceneKind::kWorkshop, SceneKind::kCorridor}) {
+    SceneOptions options = QuickScene(kind, 3);
+    options.doorway = true;
+    const Scene scene = BuildScene(options);
+    Renderer renderer(SmallCamera(), RenderOptions{});
+    const bool ring = kind == SceneKind::kCorridor;
+    const CameraPath path(scene, {.kind = ring ? PathKind::kRing : PathKind::kTurn, .tremor = 0});
+    for (int i = 0; i < 40; ++i) {
+      const auto depth = renderer.RenderDepth(scene.meshes, {path.T_world_cam(0.5 * i), {}, {}}, nullptr);
+      EXPECT_GT(*std::min_element(depth.begin(), depth.end()), 0)
+          << "scene " << static_cast<int>(kind) << " at " << 0.5 * i;
+    }
+  }
+}
+
+TEST(Scene, RoomsDifferInSizeAndInWhatIsInThem) {
+  const Scene room = BuildScene(QuickScene(SceneKind::kRoom)),
+              office = BuildScene(QuickScene(SceneKind::kOffice)),
+              hall = BuildScene(QuickScene(SceneKind::kHall)),
+              workshop = BuildScene(QuickScene(SceneKind::kWorkshop));
+  EXPECT_LT(office.rooms[0].volume(), 0.6f * room.rooms[0].volume());
+  EXPECT_GT(hall.rooms[0].volume(), 2 * room.rooms[0].volume());
+  EXPECT_EQ(hall.seats.size(), 8u);
+  EXPECT_EQ(office.seats.size(), 2u);
+  EXPECT_EQ(workshop.rooms[0].sizes(), room.rooms[0].sizes());
+  EXPECT_LT(workshop.meshes.size(), 4 * room.meshes.size() / 5);
+}
+
 class ActorTest : public testing::Test {
  protected:
   ActorTest() : scene_(BuildScene(QuickScene(SceneKind::kRoom))), path_(scene_, {.kind = PathKind::kXyz}) {}
