@@ -14,13 +14,13 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
                                            vocabulary_);
   if (info.mode == PlaybackMode::kRealtime) core_->SetPump([this] { PumpWithinWork(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  ServeReplica(&core_->map(), [this] { return map_reader_->held(); });
+  ServeReplica(&core_->map(), [this] { return MapHeld(*map_reader_); });
   WantWriter({StreamId::kLoopCloser, {"mapper"}, {}, nullptr});
 }
 
 void LoopcloserNode::Apply(const MapDelta& delta) {
   core_->ApplyMapDelta(delta);
-  if (delta.event == MapEvent::kMapped || delta.event == MapEvent::kMapStarted) Answer(delta.about);
+  if (delta.event == MapEvent::kMapped || delta.event == MapEvent::kMapStarted) Answer(*delta.about);
 }
 
 void LoopcloserNode::Answer(KeyframeId keyframe) {
@@ -33,7 +33,9 @@ bool LoopcloserNode::WorkOnce() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return EndIfDone();
   if (record->begins_anew()) core_->ForgetMap();
-  if (const auto delta = Read<MapDelta>(*record->bytes)) Apply(*delta);
+  const auto delta = ReadMapRecord(*record, map_reader_.get());
+  if (!delta) return true;
+  Apply(*delta);
   // The newest keyframe of a snapshot may be waiting for an answer that the one before this process did not
   // give.
   const Map& map = core_->map();
@@ -58,7 +60,7 @@ void LoopcloserNode::PublishStatus() {
   LoopcloserStatus status;
   status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {map_reader_.get()});
   status.state = core_ ? LoopcloserStatus::State::kWatching : LoopcloserStatus::State::kStarting;
-  status.vocabulary_checksum = vocabulary_ ? vocabulary_->checksum() : 0;
+  if (vocabulary_) status.vocabulary_checksum = vocabulary_->checksum();
   status.check_p50_ms = check_.Quantile(0.5);
   status.check_p95_ms = check_.Quantile(0.95);
   if (core_) {

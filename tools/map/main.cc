@@ -70,6 +70,7 @@ int ListChannels(const std::string& path) {
     Content& content = contents[event->channel];
     const auto name = names.find(dmslam::FingerprintOf(event->bytes).value_or(0));
     content.type = name == names.end() ? "?" : name->second;
+    if (const auto protocol = dmslam::OtherProtocol(*event)) content.type = dmslam::NameOfProtocol(*protocol);
     ++content.messages;
     content.bytes += static_cast<int64_t>(event->bytes.size());
   }
