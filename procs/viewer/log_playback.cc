@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "dmslam/recording/log_index.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/former_types.h"
 

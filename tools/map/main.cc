@@ -12,6 +12,7 @@
 #include "collector/trajectory_builder.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"

@@ -7,6 +7,7 @@
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/receive_window.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/former_types.h"
@@ -38,15 +39,6 @@ bool IsRecordChannel(const std::string& channel) { return RecordOf(channel).has_
 constexpr ReceiveWindow::Limits kNoLimits{INT64_MAX / 4, SIZE_MAX / 4, 64u << 20};
 
 }  // namespace
-
-std::optional<int32_t> OtherProtocol(const LogEvent& event) {
-  const std::optional<int64_t> fingerprint = FingerprintOf(event.bytes);
-  if (!fingerprint) return std::nullopt;
-  if (fingerprint != head_t::getHash()) return wire::FormerProtocol(*fingerprint);
-  const std::optional<head_t> head = DecodeHead(WithoutPrefix(event.channel), event.bytes);
-  const bool other = head && head->protocol_version != kProtocolVersion;
-  return other ? std::optional<int32_t>(head->protocol_version) : std::nullopt;
-}
 
 const RecordedStream& RecordedSession::Stream(StreamId stream) const {
   static const RecordedStream kNone;

@@ -90,10 +90,6 @@ class LogIndex {
   std::map<int32_t, int64_t> of_protocol_;  ///< messages of other versions, by their protocol
 };
 
-/// The protocol of a message that another version has written, as far as that can be told: a beacon says it
-/// (its layout never changes), and former types are known.
-std::optional<int32_t> OtherProtocol(const LogEvent& event);
-
 /// One step of a stream that is gone through again.
 struct ReplayStep {
   const RecordedMessage* message = nullptr;

@@ -6,8 +6,9 @@
 
 #include "dmslam/map/snapshot.h"
 #include "dmslam/messaging/codec.h"
-#include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
 
@@ -33,20 +34,6 @@ RecordHeader HeaderOf(uint32_t session, StreamId stream, int64_t seq) {
   header.writer = 1;
   header.seq = seq;
   return header;
-}
-
-/// The first message of a file: of all types, only this one keeps its layout for ever.
-void WriteBeacon(EventLogWriter* log, int64_t utime_us, uint32_t session) {
-  head_t head{};
-  head.utime = utime_us;
-  head.header = HeaderOf(session, StreamId::kMap, 0);
-  head.protocol_version = kProtocolVersion;
-  head.state = head_t::STATE_CLOSED;
-  head.first_seq = 1;
-  head.schema_hash = wire::SchemaHash();
-  head.name = std::string("dmslam ") + kVersion;
-  const Outgoing beacon = SealedMessage(HeadChannel("MAPPER"), head);
-  log->Write(utime_us, beacon.channel, *beacon.bytes);
 }
 
 bool SameLens(const Camera& a, const Camera& b) {
@@ -118,7 +105,7 @@ void SaveMap(const std::string& path, const Map& map, const SessionStart& sessio
   const int64_t utime_us = newest.stamp_ns / 1000;
   const std::string partial = path + ".part";
   EventLogWriter log(partial);
-  WriteBeacon(&log, utime_us, session.session);
+  WriteLogVersion(&log, "", utime_us);
   SessionStart start = session;  // of this program, whoever wrote the one it goes on from
   start.protocol_version = kProtocolVersion;
   start.software = kVersion;
