@@ -169,7 +169,8 @@ void MapperNode::NoteArrivals() {
 void MapperNode::TakeLoopAnswers() {
   while (std::optional<Record> record = loop_reader_->Take()) {
     auto answer = Read<LoopAnswer>(*record->bytes);
-    if (answer) answer = answer_groups_.Add(std::move(*answer));
+    if (!answer) continue;
+    answer = answer_groups_.Add(std::move(*answer));
     if (!answer_groups_.fault().empty()) CountMalformed(record->channel, answer_groups_.fault());
     if (answer) answers_.push_back({std::move(*answer), record->version()});
   }

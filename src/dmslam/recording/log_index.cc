@@ -153,6 +153,10 @@ void LogIndex::AddPart(const LogEvent& event, RecordedMessage message, Parts* pa
   message.offset = -1;
   message.bytes = std::make_shared<const Bytes>(std::move(result.whole->second));
   const SharedBytes bytes = message.bytes;
+  if (const std::optional<int32_t> protocol = wire::FormerProtocol(FingerprintOf(*bytes).value_or(0))) {
+    ++of_protocol_[*protocol];
+    return;
+  }
   AddRecord(std::move(message), *bytes);
 }
 
