@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/camera/testing/test_camera.h"
-#include "dmslam/map/map.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/replica.h"
 
 namespace dmslam {
 namespace {
@@ -26,7 +27,7 @@ class Holder : public StreamNode {
   bool WorkOnce() override {
     const std::optional<Record> record = reader_->Take();
     if (!record) return false;
-    if (record->begins_anew()) map_ = Map(TestCamera(), Pyramid());
+    if (record->begins_anew()) map_.Clear();
     const auto delta = ReadMapRecord(*record, reader_.get());
     if (!delta) return true;
     map_.Apply(*delta);
@@ -36,7 +37,7 @@ class Holder : public StreamNode {
   }
 
   std::unique_ptr<StreamReader> reader_;
-  Map map_;
+  Replica map_;
   int applied_ = 0;
 };
 
@@ -98,7 +99,7 @@ class MapStreamTest : public testing::Test {
 
   int64_t now_ns_ = kMs;
   MemoryBus bus_;
-  Map map_;
+  MapEditor map_;
   MapSnapshots snapshots_;
   Endpoint mapper_;
   std::unique_ptr<StreamWriter> writer_;
