@@ -294,7 +294,7 @@ TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
   evidence.map_id = 1;
   const LandmarkId lost = core_.map().At(Id(2)).landmarks[kKnown + 5];
   ASSERT_TRUE(lost.valid());
-  evidence.items.push_back({lost, 20, 2, 0, 0});
+  evidence.items.push_back({lost, 20, 2, 0});
   core_.OnEvidence(evidence);
   ASSERT_TRUE(core_.OnKeyframe(next));
   EXPECT_EQ(core_.map().FindLandmark(lost), nullptr);
@@ -306,7 +306,7 @@ TEST_F(KeyframeStep, RemovesWhatIsSeenToMove) {
   FrameEvidence evidence;
   evidence.map_id = 1;
   const LandmarkId moving = core_.map().At(Id(1)).landmarks[5];
-  evidence.items.push_back({moving, 4, 0, 4, 0});
+  evidence.items.push_back({moving, 4, 0, 4});
   evidence.items.push_back({LandmarkId::Make(9, 9), 4, 0, 4, 0});
   core_.OnEvidence(evidence);
   EXPECT_EQ(core_.map().FindLandmark(moving), nullptr);
