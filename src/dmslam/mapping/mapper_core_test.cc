@@ -307,7 +307,7 @@ TEST_F(KeyframeStep, RemovesWhatIsSeenToMove) {
   evidence.map_id = 1;
   const LandmarkId moving = core_.map().At(Id(1)).landmarks[5];
   evidence.items.push_back({moving, 4, 0, 4});
-  evidence.items.push_back({LandmarkId::Make(9, 9), 4, 0, 4, 0});
+  evidence.items.push_back({LandmarkId::Make(9, 9), 4, 0, 4});
   core_.OnEvidence(evidence);
   EXPECT_EQ(core_.map().FindLandmark(moving), nullptr);
   EXPECT_EQ(core_.counters().landmarks_moving_removed, 1u);
