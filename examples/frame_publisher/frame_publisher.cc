@@ -1,25 +1,38 @@
-// Takes the player's place: publishes images as a camera would, in some 40 lines. A driver of your own
+// Takes the player's place: publishes images as a camera would, in some 50 lines. A driver of your own
 // does the same with its own images. Needs nothing of this project but message types and a camera file
 // (docs/camera.md):
 //
-//   lcm-gen --cpp --cpp-hpath=types lcmtypes/dmslam_{camera_info,frame,end_of_sequence,frame_done}_t.lcm
-//   c++ -std=c++17 -Itypes examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp -o frame_publisher
+//   lcm-gen --cpp --cpp-hpath=types lcmtypes/dmslam_{camera_info,frame,end_of_sequence,sequence_done}_t.lcm
+//   c++ -std=c++17 -Itypes -o frame_publisher examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp
+//   -lz
 //   ./frame_publisher 'udpm://239.255.76.67:7670?ttl=0' camera.yaml images/*.png
 #include <yaml-cpp/yaml.h>
+#include <zlib.h>
 
 #include <chrono>
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
 #include <thread>
+#include <vector>
 
 #include "dmslam/camera_info_t.hpp"
 #include "dmslam/end_of_sequence_t.hpp"
-#include "dmslam/frame_done_t.hpp"
 #include "dmslam/frame_t.hpp"
+#include "dmslam/sequence_done_t.hpp"
 
-static void OnDone(const lcm::ReceiveBuffer*, const std::string&, const dmslam::frame_done_t* done,
+static void OnDone(const lcm::ReceiveBuffer*, const std::string&, const dmslam::sequence_done_t*,
                    bool* heard) {
-  if (done->frame_index == -1) *heard = true;
+  *heard = true;
+}
+
+// Every message carries the CRC-32 of its own bytes, taken while the field is zero.
+template <typename Message>
+static void Publish(lcm::LCM& lcm, const std::string& channel, Message& message) {
+  message.checksum = 0;
+  std::vector<unsigned char> bytes(size_t(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, int(bytes.size()));
+  message.checksum = int32_t(crc32_z(0, bytes.data(), bytes.size()));
+  lcm.publish(channel, &message);
 }
 
 int main(int argc, char** argv) {
@@ -42,7 +55,7 @@ int main(int argc, char** argv) {
   auto due = Clock::now();
   for (int i = 3; i < argc; ++i) {
     std::this_thread::sleep_until(due += std::chrono::microseconds(int(1e6 / camera.fps)));
-    if (i % 10 == 3) lcm.publish("DMSLAM_PLAYER_CAMERA_INFO", &camera);  // several times a second
+    if (i % 10 == 3) Publish(lcm, "DMSLAM_PLAYER_CAMERA_INFO", camera);  // several times a second
     std::ifstream image(argv[i], std::ios::binary);
     frame.data.assign(std::istreambuf_iterator<char>(image), {});
     frame.num_bytes = int(frame.data.size());
@@ -50,16 +63,16 @@ int main(int argc, char** argv) {
     frame.frame_index = i - 3;
     frame.stamp_ns = std::chrono::nanoseconds(due.time_since_epoch()).count();  // when it was taken
     frame.utime = frame.capture_us = frame.publish_us = frame.stamp_ns / 1000;
-    lcm.publish("DMSLAM_PLAYER_FRAME", &frame);
+    Publish(lcm, "DMSLAM_PLAYER_FRAME", frame);
   }
   dmslam::end_of_sequence_t end{};  // repeated until the frontend says that it has heard it
   end.session = camera.session, end.frames_published = end.frames_listed = argc - 3;
   end.last_frame_index = frame.frame_index, end.last_stamp_ns = frame.stamp_ns;
   bool heard = false;
-  lcm.subscribeFunction("DMSLAM_FRONTEND_FRAME_DONE", OnDone, &heard);
+  lcm.subscribeFunction("DMSLAM_FRONTEND_SEQUENCE_DONE", OnDone, &heard);
   for (int i = 0; !heard && i < 100; ++i) {
-    lcm.publish("DMSLAM_PLAYER_CAMERA_INFO", &camera);
-    lcm.publish("DMSLAM_PLAYER_END_OF_SEQUENCE", &end);
+    Publish(lcm, "DMSLAM_PLAYER_CAMERA_INFO", camera);
+    Publish(lcm, "DMSLAM_PLAYER_END_OF_SEQUENCE", end);
     lcm.handleTimeout(200);
   }
   return heard ? 0 : 1;

@@ -17,7 +17,8 @@ import lcm.logging.Log;
 
 public class PosePrinter implements LCMSubscriber {
   private static final String[] STATES = {
-    "no map yet", "waiting for a map", "trying a map", "tracking", "uncertain", "lost"
+    "no map yet", "waiting for a map", "trying a map", "tracking", "uncertain", "lost", "placed later",
+    "rotation only"
   };
   private long session = 0;
 

@@ -29,6 +29,10 @@ const char* StateName(int state) {
       return "uncertain";
     case 5:
       return "lost";
+    case 6:
+      return "placed later";
+    case 7:
+      return "rotation only";
     default:
       return "unknown state";
   }

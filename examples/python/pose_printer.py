@@ -13,13 +13,14 @@ import lcm
 
 from dmslam import pose_t
 
-STATES = ["no map yet", "waiting for a map", "trying a map", "tracking", "uncertain", "lost"]
+STATES = ["no map yet", "waiting for a map", "trying a map", "tracking", "uncertain", "lost",
+          "placed later", "rotation only"]
 
 
 def on_pose(channel, data):
     pose = pose_t.decode(data)
     stamp = f"{pose.stamp_ns // 1000000000}.{pose.stamp_ns % 1000000000:09}"
-    state = STATES[pose.state]
+    state = STATES[pose.state] if pose.state < len(STATES) else "unknown state"
     if not pose.has_pose:
         print(f"{stamp} frame {pose.frame_index}: {state}", flush=True)
         return

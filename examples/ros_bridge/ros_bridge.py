@@ -11,6 +11,7 @@ camera's axes being x right, y down, z forward (ROS calls that an optical frame)
 import sys
 import threading
 import time
+import zlib
 
 import lcm
 
@@ -21,6 +22,14 @@ from sensor_msgs.msg import CameraInfo, Image
 
 BUS = "udpm://239.255.76.67:7670?ttl=0&recv_buf_size=4194304"
 ENCODINGS = {"mono8": (frame_t.ENCODING_GRAY8, 1), "rgb8": (frame_t.ENCODING_RGB8, 3), "bgr8": (frame_t.ENCODING_BGR8, 3)}
+
+
+def sealed(message):
+    """The encoded message with the CRC-32 of its own bytes, taken while the field is zero."""
+    message.checksum = 0
+    checksum = zlib.crc32(message.encode())
+    message.checksum = checksum - (checksum >> 31 << 32)  # LCM's integers are signed
+    return message.encode()
 
 
 def stamp_ns(stamp):
@@ -81,8 +90,8 @@ class Bridge:
         if self.camera is None:
             return  # its CameraInfo has not come yet
         if self.index % 10 == 0:
-            self.lcm.publish("DMSLAM_PLAYER_CAMERA_INFO", self.camera.encode())
-        self.lcm.publish("DMSLAM_PLAYER_FRAME", frame_from_ros(image, self.session, self.index).encode())
+            self.lcm.publish("DMSLAM_PLAYER_CAMERA_INFO", sealed(self.camera))
+        self.lcm.publish("DMSLAM_PLAYER_FRAME", sealed(frame_from_ros(image, self.session, self.index)))
         self.index += 1
 
     def on_pose(self, channel, data):
@@ -104,7 +113,7 @@ class Bridge:
         end.session, end.frames_published, end.frames_listed = self.session, self.index, self.index
         end.last_frame_index = self.index - 1
         for _ in range(5):
-            self.lcm.publish("DMSLAM_PLAYER_END_OF_SEQUENCE", end.encode())
+            self.lcm.publish("DMSLAM_PLAYER_END_OF_SEQUENCE", sealed(end))
             time.sleep(0.2)
 
 

@@ -33,7 +33,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
   frames_total_ = info.num_frames;
   OpenJournal();
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  ServeReplica(&builder_->map(), [this] { return map_reader_->held(); });
+  ServeReplica(&builder_->map(), [this] { return MapHeld(*map_reader_); });
 }
 
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -110,7 +110,7 @@ void CollectorNode::OnProposal(KeyframeId id, MapId map_id) {
 
 /// As all who listen see it: the streams' own time is in it, and whatever the mapper did before.
 void CollectorNode::TimeKeyframe(const MapDelta& delta) {
-  const auto heard = heard_ns_.find(delta.about);
+  const auto heard = delta.about ? heard_ns_.find(*delta.about) : heard_ns_.end();
   if (heard == heard_ns_.end()) return;
   const double elapsed_ms = static_cast<double>(context_.now_ns() - heard->second) * 1e-6;
   if (delta.event == MapEvent::kLandmarksCreated) run_.keyframe_to_landmarks_ms.push_back(elapsed_ms);
@@ -124,10 +124,9 @@ void CollectorNode::OnFramePose(const Record& record) {
   journal_->Append(*record.bytes);
 }
 
-/// Map 0 is all of them: that they be adjusted at the end.
 void CollectorNode::OnMapReset(const Record& record) {
   const auto reset = Read<MapReset>(*record.bytes);
-  if (!reset || reset->map_id == 0) return;
+  if (!reset) return;
   ++run_.resets;
   journal_->Append(*record.bytes);
 }
@@ -180,20 +179,21 @@ void CollectorNode::OpenJournal() {
     const std::optional<RecordHeader> header = ParseHeader(record);
     newest = {header->epoch, header->seq};
   });
-  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
-                                {channels::kSession, channels::kInitialMap, channels::kKeyframe,
-                                 channels::kFramePose, channels::kFrameEvidence, channels::kMapReset},
-                                newest);
+  frontend_reader_ =
+      MakeReader(StreamId::kFrontend, "FRONTEND",
+                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+                  channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
+                 newest);
 }
 
-std::vector<KeyframeId> CollectorNode::LoopsOf(KeyframeId id) const {
-  const Keyframe* keyframe = builder_->map().FindKeyframe(id);
+std::vector<KeyframeId> CollectorNode::LoopsOf(std::optional<KeyframeId> id) const {
+  const Keyframe* keyframe = id ? builder_->map().FindKeyframe(*id) : nullptr;
   return keyframe == nullptr ? std::vector<KeyframeId>() : keyframe->loop_edges;
 }
 
 /// A loop's other end is the keyframe to which there was no edge before; how they lie is known best now.
 void CollectorNode::OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before) {
-  CorrectionRecord correction{delta.event, delta.about, delta.note, {}, {}};
+  CorrectionRecord correction{delta.event, delta.about.value_or(KeyframeId()), delta.note, {}, {}};
   const std::vector<KeyframeId> loops = LoopsOf(delta.about);
   const auto added = std::find_if(loops.begin(), loops.end(), [&](KeyframeId id) {
     return !std::binary_search(loops_before.begin(), loops_before.end(), id);
@@ -202,7 +202,7 @@ void CollectorNode::OnCorrection(const MapDelta& delta, const std::vector<Keyfra
     const Map& map = builder_->map();
     correction.matched = *added;
     correction.T_matched_keyframe =
-        map.FindKeyframe(*added)->T_cam_world * map.FindKeyframe(delta.about)->T_cam_world.Inverse();
+        map.FindKeyframe(*added)->T_cam_world * map.FindKeyframe(*delta.about)->T_cam_world.Inverse();
   }
   run_.corrections.push_back(std::move(correction));
 }
@@ -211,13 +211,13 @@ bool CollectorNode::TakeMapRecord() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return false;
   if (record->begins_anew()) builder_->ForgetMap();
-  if (const auto delta = Read<MapDelta>(*record->bytes)) {
-    const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
-    builder_->OnMapDelta(*delta);
-    if (!record->in_snapshot()) TimeKeyframe(*delta);
-    if (delta->correction_id != 0) OnCorrection(*delta, loops_before);
-    dropped_maps_.insert(delta->dropped_maps.begin(), delta->dropped_maps.end());
-  }
+  const auto delta = ReadMapRecord(*record, map_reader_.get());
+  if (!delta) return true;
+  const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
+  builder_->OnMapDelta(*delta);
+  if (!record->in_snapshot()) TimeKeyframe(*delta);
+  if (delta->correction_id) OnCorrection(*delta, loops_before);
+  dropped_maps_.insert(delta->dropped_maps.begin(), delta->dropped_maps.end());
   map_reader_->AcceptTaken();
   return true;
 }

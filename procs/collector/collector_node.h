@@ -38,7 +38,7 @@ class CollectorNode : public StreamNode {
  private:
   bool TakeFrontendRecord();
   bool TakeMapRecord();
-  std::vector<KeyframeId> LoopsOf(KeyframeId id) const;
+  std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
   bool OnHealth(const std::string& process, const StatusHead& head);

@@ -81,7 +81,7 @@ void FrontendNode::OnWriterOpen() {
   start.first_stamp_ns = 0;
   start.seed = options_.settings.seed;
   start.configuration_hash = SettingsHash(options_.settings);
-  start.vocabulary_checksum = extras_.vocabulary ? extras_.vocabulary->checksum() : 0;
+  if (extras_.vocabulary) start.vocabulary_checksum = extras_.vocabulary->checksum();
   start.mode = camera_info_->mode;
   start.camera = camera_info_->camera;
   start.pyramid = options_.settings.pyramid();
@@ -118,7 +118,7 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   const std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
   if (!end || !camera_info_ || IsForeignFrame(end->session)) return;
-  if (end_.Is(SequenceEnd::Phase::kDone)) PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
+  if (end_.Is(SequenceEnd::Phase::kDone)) PublishSequenceDone();
   end_.OnEndHeard();
 }
 
@@ -128,9 +128,10 @@ void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
 void FrontendNode::TakeMapRecords(bool all) {
   while (std::optional<Record> record = map_reader_->Take()) {
     if (record->begins_anew()) held_.clear();
-    auto delta = Read<MapDelta>(*record->bytes);
-    held_.push_back({delta ? std::move(*delta) : MapDelta(), record->version(), record->begins_anew(),
-                     record->in_snapshot(), record->ends_snapshot()});
+    auto delta = ReadMapRecord(*record, map_reader_.get());
+    if (!delta) continue;
+    held_.push_back({std::move(*delta), record->version(), record->begins_anew(), record->in_snapshot(),
+                     record->ends_snapshot()});
   }
   ApplyHeldRecords(NumReadyRecords(all));
 }
@@ -151,7 +152,7 @@ void FrontendNode::ApplyHeldRecords(size_t count) {
     const HeldRecord& held = held_.front();
     if (held.begins_anew) core_->ForgetMap();
     core_->ApplyMapDelta(held.delta);
-    if (IsAnswerToAll(held.delta)) end_.OnAnswer();
+    if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer();
     applied_ = held.version;
     held_.pop_front();
   }
@@ -252,7 +253,7 @@ bool FrontendNode::GrowBack() {
 bool FrontendNode::MapsAreAdjusted() {
   if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
   if (end_.Asks(context_.now_ns()))
-    PublishRecord(MapReset{0, false, "the sequence has ended", last_stamp_ns_});
+    PublishRecord(AdjustRequest{++requests_, "the sequence has ended", last_stamp_ns_});
   return end_.IsAnswered();
 }
 
@@ -369,9 +370,8 @@ void FrontendNode::DrawPicture() {
   WritePicture(extras_.picture_dir, image_, core_->frame(), last_pose_);
 }
 
-/// The mapper's answer to the request to adjust its maps: settled, about no keyframe.
-bool FrontendNode::IsAnswerToAll(const MapDelta& delta) {
-  return delta.event == MapEvent::kSettled && !delta.about.valid();
+void FrontendNode::PublishSequenceDone() {
+  PublishLoose(SequenceDone{context_.wall_us(), session_, 0, frames_processed_, frames_skipped_});
 }
 
 /// The smoothing of a long trajectory takes seconds.
@@ -383,7 +383,7 @@ void FrontendNode::AnswerWithinWork() {
 bool FrontendNode::TellLastPoses() {
   Publish(end_.NextPortion(context_.now_ns()));
   if (!end_.Is(SequenceEnd::Phase::kDone)) return false;
-  PublishLoose(FrameDone{session_, FrameDone::kEndOfSequence, 0});
+  PublishSequenceDone();
   PublishStatus();
   writer_->Complete(context_.now_ns());
   return true;

@@ -69,7 +69,7 @@ class FrontendNode : public StreamNode {
   bool WorkAtEnd();
   bool GrowBack();
   bool MapsAreAdjusted();
-  static bool IsAnswerToAll(const MapDelta& delta);
+  void PublishSequenceDone();
   void AnswerWithinWork();
   bool TellLastPoses();
   int UnacceptedKeyframes();
@@ -84,6 +84,7 @@ class FrontendNode : public StreamNode {
   Version applied_;  ///< of the replica
   std::optional<Waiting> waiting_;
   SequenceEnd end_;
+  uint32_t requests_ = 0;  ///< to adjust the maps, so far
   bool lockstep_ = false;
   bool hurries_ = false;  ///< catches up before it takes another image
   bool frame_open_ =

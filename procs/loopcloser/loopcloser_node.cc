@@ -18,7 +18,7 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
   if (info.mode == PlaybackMode::kRealtime) core_->SetInterrupt([this] { return stop_.load(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(
-      &core_->map(), [this] { return map_reader_->held(); }, [this] { return work_->Idle(); });
+      &core_->map(), [this] { return MapHeld(*map_reader_); }, [this] { return work_->Idle(); });
   WantWriter({StreamId::kLoopCloser, {"mapper"}, {}, nullptr});
 }
 
@@ -43,20 +43,20 @@ bool LoopcloserNode::WorkOnce() {
 }
 
 void LoopcloserNode::WorkOn(const Record& record) {
-  const std::optional<MapDelta> delta = Read<MapDelta>(*record.bytes);
+  const std::optional<MapDelta> delta = ReadMapRecord(record, map_reader_.get());
   work_->Post([this, delta, begins_anew = record.begins_anew(), ends_snapshot = record.ends_snapshot()] {
     if (begins_anew) core_->ForgetMap();
     if (delta) core_->ApplyMapDelta(*delta);
     const bool asks = delta && (delta->event == MapEvent::kMapped || delta->event == MapEvent::kMapStarted);
-    if (asks) Answer(delta->about);
+    if (asks) Answer(*delta->about);
     // The newest keyframe of a snapshot may be waiting for an answer that the one before this process did not
     // give.
     const Map& map = core_->map();
     const bool may_wait = ends_snapshot && !map.keyframes().empty() && !map.progress().ended;
     if (may_wait) Answer(map.keyframes().rbegin()->first);
-    work_->Report([this, status = CoreStatus()] {
+    work_->Report([this, status = CoreStatus(), whole = delta.has_value()] {
       core_status_ = status;
-      map_reader_->AcceptTaken();
+      if (whole) map_reader_->AcceptTaken();
     });
   });
 }
@@ -83,7 +83,7 @@ void LoopcloserNode::PublishStatus() {
   LoopcloserStatus status = core_status_;
   status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {map_reader_.get()});
   status.state = core_ ? LoopcloserStatus::State::kWatching : LoopcloserStatus::State::kStarting;
-  status.vocabulary_checksum = vocabulary_ ? vocabulary_->checksum() : 0;
+  if (vocabulary_) status.vocabulary_checksum = vocabulary_->checksum();
   status.check_p50_ms = check_.Quantile(0.5);
   status.check_p95_ms = check_.Quantile(0.95);
   PublishLoose(status);

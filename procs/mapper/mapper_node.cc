@@ -90,7 +90,14 @@ void MapperNode::BeginFetch() {
 bool MapperNode::FetchReplica() {
   while (std::optional<Record> record = fetch_->Take()) {
     if (record->begins_anew()) fetched_.emplace(core_->map().camera(), core_->map().pyramid());
-    if (const auto delta = Read<MapDelta>(*record->bytes)) fetched_->Apply(*delta);
+    const auto delta = Read<MapDelta>(*record->bytes);
+    if (!delta) {  // half a map is none: all of it is asked for again
+      endpoint_.Remove(fetch_.get());
+      fetched_.reset();
+      BeginFetch();
+      return false;
+    }
+    fetched_->Apply(*delta);
   }
   if (fetch_->state() == ReplicaFetch::State::kNone) return true;
   if (fetch_->state() != ReplicaFetch::State::kDone) return false;
@@ -115,18 +122,21 @@ void MapperNode::OnWriterOpen() {
   fetch_.reset();
   fetched_.reset();
   const MapProgress progress = core_->map().progress();
-  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
-                                {channels::kSession, channels::kInitialMap, channels::kKeyframe,
-                                 channels::kFramePose, channels::kFrameEvidence, channels::kMapReset},
-                                {progress.frontend.epoch, progress.frontend.seq});
+  frontend_reader_ =
+      MakeReader(StreamId::kFrontend, "FRONTEND",
+                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+                  channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
+                 {progress.frontend.epoch, progress.frontend.seq});
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
                             {progress.loopcloser.epoch, progress.loopcloser.seq});
   if (progress.ended) {  // the one before could not say goodbye
     end_announced_ = completing_ = true;
     Stop();
-  } else if (progress.settled.valid()) {  // somebody may not have heard it
-    const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(progress.settled);
-    Run([this, id = progress.settled, map_id = settled ? settled->map_id : 0] { core_->Settle(id, map_id); });
+  } else if (progress.settled) {  // somebody may not have heard it
+    const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(*progress.settled);
+    Run([this, id = *progress.settled, map_id = settled ? std::optional(settled->map_id) : std::nullopt] {
+      core_->Settle(id, map_id);
+    });
   }
 }
 
@@ -157,8 +167,11 @@ void MapperNode::NoteArrivals() {
 
 void MapperNode::TakeLoopAnswers() {
   while (std::optional<Record> record = loop_reader_->Take()) {
-    if (auto answer = Read<LoopAnswer>(*record->bytes))
-      answers_.push_back({std::move(*answer), record->version()});
+    auto answer = Read<LoopAnswer>(*record->bytes);
+    if (!answer) continue;
+    answer = answer_groups_.Add(std::move(*answer));
+    if (!answer_groups_.fault().empty()) CountMalformed(record->channel, answer_groups_.fault());
+    if (answer) answers_.push_back({std::move(*answer), record->version()});
   }
 }
 
@@ -269,7 +282,9 @@ MapperNode::Job MapperNode::JobFor(const Record& record) {
   const Version version = record.version();
   if (options_.settings.start.localize_only) {
     // The map stays as it is, but nobody is left waiting.
-    if (record.channel == channels::kMapReset) return [this] { core_->Settle({}, 0); };
+    if (record.channel != channels::kAdjustRequest) return {};
+    if (const auto request = Read<AdjustRequest>(*record.bytes))
+      return [this, request] { core_->AnswerRequest(request->request); };
     return {};
   }
   if (record.channel == channels::kInitialMap) {
@@ -291,6 +306,9 @@ MapperNode::Job MapperNode::JobFor(const Record& record) {
       return [this, evidence] { core_->OnEvidence(*evidence); };
   } else if (record.channel == channels::kMapReset) {
     if (const auto reset = Read<MapReset>(*record.bytes)) return [this, reset] { core_->OnReset(*reset); };
+  } else if (record.channel == channels::kAdjustRequest) {
+    if (const auto request = Read<AdjustRequest>(*record.bytes))
+      return [this, request] { core_->OnAdjustRequest(*request); };
   }
   return {};
 }

@@ -100,11 +100,12 @@ class MapperNode : public StreamNode {
   std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
+  wire::RecordGroups<LoopAnswer> answer_groups_;
   KeyframeId awaited_;  ///< lock-step: the loop closer's answer to this keyframe is due
   MapId awaited_map_ = 0;
   Version awaited_version_;  ///< of the record that brought it
   Term asked_term_;          ///< of the loop closer that was asked
-  KeyframeId last_settled_;
+  std::optional<KeyframeId> last_settled_;
   int64_t keyframe_arrived_ns_ = 0;  ///< the one that is handled
   int64_t fused_ns_ = 0;             ///< since then it adjusts
   LatencyWindow to_landmarks_, to_adjusted_, adjustment_;

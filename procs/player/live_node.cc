@@ -26,6 +26,7 @@ std::string CameraName(const std::string& path) {
 LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<LiveSource> source)
     : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
   context_.bus->Subscribe(channels::kFrameDone);
+  context_.bus->Subscribe(channels::kSequenceDone);
   context_.bus->Subscribe(channels::kMapperStatus);
   context_.bus->Subscribe(channels::kFrontendStatus);
   context_.bus->SetHandler(
@@ -51,12 +52,16 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
     if (status && status->head.session == options_.session) end_.OnFrontendStatus(context_.now_ns());
     return;
   }
-  const auto done = wire::Decode<FrameDone>(bytes);
-  if (!done || done->session != options_.session) return;
-  if (done->frame_index == FrameDone::kEndOfSequence) {
+  if (channel == channels::kSequenceDone) {
+    const auto done = wire::Decode<SequenceDone>(bytes);
+    if (!done || done->session != options_.session) return;
     end_.OnFrontendHeard();
     ending_ = true;
-  } else if (done->frame_index > frame_.frame_index || published_ == 0) {
+    return;
+  }
+  const auto done = wire::Decode<FrameDone>(bytes);
+  if (!done || done->session != options_.session) return;
+  if (done->frame_index > frame_.frame_index || published_ == 0) {
     first_index_ = std::max(first_index_, done->frame_index + 1);  // a player before this one was further
   }
 }

@@ -108,7 +108,7 @@ TEST_F(LiveNodeTest, PublishesWhatComesUntilEnoughAndThenItsEnd) {
   EXPECT_EQ(ends_[0].frames_missing, 3);
   EXPECT_EQ(ends_[0].last_frame_index, 4);
   EXPECT_FALSE(node.exit_code().has_value());
-  Say(FrameDone{9, 0xFFFFFFFF, 0});
+  Say(SequenceDone{0, 9});
   Advance(node, 6'000'000'000);  // no mapper says anything
   EXPECT_EQ(node.exit_code(), 0);
 }

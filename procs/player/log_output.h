@@ -5,6 +5,7 @@
 
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/event_log.h"
+#include "dmslam/recording/log_version.h"
 
 namespace dmslam {
 
@@ -14,7 +15,9 @@ class LogOutput : public Bus {
  public:
   /// The clock starts at `start_ns`, capture time. `prefix` comes before every channel.
   LogOutput(const std::string& path, std::string prefix, int64_t start_ns)
-      : log_(path), prefix_(std::move(prefix)), now_ns_(start_ns) {}
+      : log_(path), prefix_(std::move(prefix)), now_ns_(start_ns) {
+    WriteLogVersion(&log_, prefix_, now_ns_ / 1000);
+  }
 
   void Subscribe(const std::string&) override {}
   void SetHandler(Handler) override {}

@@ -81,6 +81,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
   }
   ground_truth_ = source_->GroundTruth();
   context_.bus->Subscribe(channels::kFrameDone);
+  context_.bus->Subscribe(channels::kSequenceDone);
   context_.bus->Subscribe(channels::kMapperStatus);
   context_.bus->Subscribe(channels::kFrontendStatus);
   context_.bus->SetHandler(
@@ -97,6 +98,8 @@ void PlayerNode::Publish(const Message& message) {
 void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrameDone) {
     if (const auto done = wire::Decode<FrameDone>(bytes)) OnFrameDone(*done);
+  } else if (channel == channels::kSequenceDone) {
+    if (const auto done = wire::Decode<SequenceDone>(bytes)) OnSequenceDone(*done);
   } else if (channel == channels::kMapperStatus) {
     const auto status = wire::Decode<MapperStatus>(bytes);
     if (!status || status->head.session != options_.session) return;
@@ -107,13 +110,16 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
   }
 }
 
+void PlayerNode::OnSequenceDone(const SequenceDone& done) {
+  if (done.session != options_.session) return;
+  end_.OnFrontendHeard();
+  position_ = order_.size();
+  awaiting_done_ = false;
+}
+
 void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session) return;
-  if (done.frame_index == FrameDone::kEndOfSequence) {
-    end_.OnFrontendHeard();
-    position_ = order_.size();
-    awaiting_done_ = false;
-  } else if (published_ > 0 && done.frame_index > frame_.frame_index) {
+  if (published_ > 0 && done.frame_index > frame_.frame_index) {
     SkipBehind(done.frame_index);
   } else if (awaiting_done_ && done.frame_index == frame_.frame_index) {
     awaiting_done_ = false;

@@ -62,6 +62,7 @@ class PlayerNode : public Node {
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnFrameDone(const FrameDone& done);
+  void OnSequenceDone(const SequenceDone& done);
   void SkipBehind(uint32_t frame_index);
   void PublishCameraInfo();
   bool FrameIsDue() const;

@@ -61,8 +61,11 @@ void RecordsNode::TakeMapRecords() {
       held_.clear();
       live_.Clear();
     }
-    if (auto delta = Read<MapDelta>(*record->bytes)) held_.push_back(std::move(*delta));
-    const bool settled = !held_.empty() && (held_.back().event == MapEvent::kSettled || finished_);
+    auto delta = ReadMapRecord(*record, map_reader_.get());
+    if (!delta) continue;
+    held_.push_back(std::move(*delta));
+    const MapEvent event = held_.back().event;
+    const bool settled = event == MapEvent::kSettled || event == MapEvent::kRequestDone || finished_;
     while (settled && !held_.empty()) {
       live_.Apply(held_.front());
       if (held_.front().event == MapEvent::kSettled && held_.front().about == awaited_) awaited_ = {};
@@ -102,6 +105,7 @@ void RecordsNode::Enter(const RecordedMessage& message) {
     if (auto start = Read<SessionStart>(bytes)) {
       start->session = session_;
       start->mode = PlaybackMode::kLockstep;
+      start->software = kVersion;
       PublishRecord(*start);
     }
   } else if (message.channel == channels::kInitialMap) {
@@ -124,6 +128,8 @@ void RecordsNode::Enter(const RecordedMessage& message) {
     }
   } else if (message.channel == channels::kMapReset) {
     if (const auto reset = Read<MapReset>(bytes)) PublishRecord(*reset);
+  } else if (message.channel == channels::kAdjustRequest) {
+    if (const auto request = Read<AdjustRequest>(bytes)) PublishRecord(*request);
   } else if (message.channel == channels::kFramePose) {
     if (const auto pose = Read<FramePose>(bytes)) PublishRecord(*pose);
   }
@@ -173,7 +179,6 @@ void RecordsNode::Translate(FrameEvidence* evidence) {
     sum.visible = static_cast<uint16_t>(std::min(0xffff, sum.visible + item.visible));
     sum.found = static_cast<uint16_t>(std::min(0xffff, sum.found + item.found));
     sum.moved = static_cast<uint16_t>(std::min(0xffff, sum.moved + item.moved));
-    sum.chi2_sum += item.chi2_sum;
   }
   evidence->items.clear();
   for (const auto& [id, item] : items) evidence->items.push_back(item);

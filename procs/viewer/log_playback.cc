@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/wire/former_types.h"
 
 namespace dmslam {
 namespace {
@@ -28,6 +30,8 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
   int64_t events = 0;
   while (const std::optional<LogEvent> event = reader.Next()) {
     if (WithoutPrefix(event->channel).empty()) continue;
+    if (const auto protocol = OtherProtocol(*event))
+      throw InputError(path + ": " + wire::ToldOfFormer(*protocol));
     if (events++ == 0) begin_us_ = end_us_ = event->utime_us;
     end_us_ = std::max(end_us_, event->utime_us);
   }

@@ -104,7 +104,7 @@ void ViewerCore::ChooseMap() {
   std::map<MapId, size_t> keyframes_in;
   for (const auto& [id, keyframe] : map_.keyframes()) ++keyframes_in[keyframe.map_id];
   MapId chosen = 0;
-  if (!frames_.empty()) chosen = frames_.rbegin()->second.map_id;
+  if (!frames_.empty()) chosen = frames_.rbegin()->second.map_id.value_or(0);
   if (!keyframes_in.contains(chosen)) {
     chosen = 0;
     for (const auto& [map_id, count] : keyframes_in) {

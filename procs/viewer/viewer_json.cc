@@ -101,6 +101,8 @@ std::string StateWord(TrackingState state) {
       return "lost";
     case TrackingState::kLocalizedLater:
       return "placed later";
+    case TrackingState::kRotationOnly:
+      return "rotation only";
   }
   return "";
 }
@@ -183,7 +185,7 @@ std::string PoseJson(const PoseView& view) {
             {"t", static_cast<double>(view.stamp_ns) * 1e-9},
             {"state", static_cast<int>(view.state)},
             {"word", StateWord(view.state)},
-            {"map", view.map_id},
+            {"map", view.map_id.value_or(0)},
             {"inliers", view.inliers},
             {"moving", view.moving},
             {"unknown", view.unknown},

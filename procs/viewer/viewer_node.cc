@@ -38,9 +38,10 @@ void ViewerNode::Begin(const CameraInfo& info) {
     series->Clear();
   });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  frontend_reader_ = MakeReader(StreamId::kFrontend, "FRONTEND",
-                                {channels::kSession, channels::kInitialMap, channels::kKeyframe,
-                                 channels::kFramePose, channels::kFrameEvidence, channels::kMapReset});
+  frontend_reader_ =
+      MakeReader(StreamId::kFrontend, "FRONTEND",
+                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+                  channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest});
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked});
 }
 
@@ -116,22 +117,24 @@ bool ViewerNode::TakeMapRecord() {
            record->in_snapshot() ? "a snapshot of the map begins" : "a fresh map begins");
   }
   ++map_records_;
-  if (const auto delta = Read<MapDelta>(*record->bytes)) {
-    core_->OnMapDelta(*delta);
-    NoteMapEvent(*delta);
-  }
+  const auto delta = ReadMapRecord(*record, map_reader_.get());
+  if (!delta) return true;
+  core_->OnMapDelta(*delta);
+  NoteMapEvent(*delta);
   map_reader_->AcceptTaken();
   return true;
 }
 
 void ViewerNode::NoteMapEvent(const MapDelta& delta) {
-  const std::string about = std::to_string(delta.about.frame_index());
+  const std::string about = std::to_string(delta.about.value_or(KeyframeId()).frame_index());
+  const std::string map = "map " + std::to_string(delta.map_id.value_or(0));
   switch (delta.event) {
     case MapEvent::kMapStarted:
-      Note(BoardEvent::Level::kGood, "map " + std::to_string(delta.map_id) + " begins");
+      Note(BoardEvent::Level::kGood, map + " begins");
       break;
     case MapEvent::kMapDropped:
-      Note(BoardEvent::Level::kBad, "map " + std::to_string(delta.map_id) + " is given up");
+    case MapEvent::kFirstMapRefused:
+      Note(BoardEvent::Level::kBad, map + " is given up");
       break;
     case MapEvent::kCorrected:
       ++loops_;
@@ -139,6 +142,7 @@ void ViewerNode::NoteMapEvent(const MapDelta& delta) {
            "loop closed at keyframe " + about + (delta.note.empty() ? "" : ": " + delta.note));
       break;
     case MapEvent::kGloballyAdjusted:
+    case MapEvent::kMapAdjusted:
       Note(BoardEvent::Level::kInfo, "the whole map was adjusted");
       break;
     case MapEvent::kRefused:
@@ -160,7 +164,7 @@ bool ViewerNode::TakeFrontendRecord() {
     if (const auto pose = Read<FramePose>(*record->bytes)) core_->OnFramePose(*pose);
   } else if (record->channel == channels::kMapReset) {
     const auto reset = Read<MapReset>(*record->bytes);
-    if (reset && reset->map_id != 0) {  // 0: the wish that all maps be adjusted
+    if (reset) {
       Note(BoardEvent::Level::kBad, "map " + std::to_string(reset->map_id) + " is left: " + reset->reason);
     }
   }

@@ -5,9 +5,9 @@ multicast
 
 bus='udpm://239.255.76.67:29753?ttl=0&recv_buf_size=4194304'
 cd "$root" || exit 1
-check "types are made" lcm-gen --cpp --cpp-hpath="$work/types" lcmtypes/dmslam_{camera_info,frame,end_of_sequence,frame_done}_t.lcm
+check "types are made" lcm-gen --cpp --cpp-hpath="$work/types" lcmtypes/dmslam_{camera_info,frame,end_of_sequence,sequence_done}_t.lcm
 check "the example is built" c++ -std=c++17 -Wall -Wextra -isystem "$work/types" \
-  examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp -o "$work/frame_publisher"
+  examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp -lz -o "$work/frame_publisher"
 sed 's/^fps: .*/fps: 6/' config/synthetic.yaml >"$work/camera.yaml"
 
 find_python

@@ -12,6 +12,7 @@
 #include "collector/trajectory_builder.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
@@ -70,6 +71,7 @@ int ListChannels(const std::string& path) {
     Content& content = contents[event->channel];
     const auto name = names.find(dmslam::FingerprintOf(event->bytes).value_or(0));
     content.type = name == names.end() ? "?" : name->second;
+    if (const auto protocol = dmslam::OtherProtocol(*event)) content.type = dmslam::NameOfProtocol(*protocol);
     ++content.messages;
     content.bytes += static_cast<int64_t>(event->bytes.size());
   }

@@ -51,8 +51,10 @@ std::vector<ChannelRow> FrontendRows() {
       Row<KeyframeProposal>("frontend", "mapper", "per keyframe"),
       Row<FramePose>("frontend", "mapper, collector", "per frame; once more where refined at the end"),
       Row<FrameEvidence>("frontend", "mapper", "with keyframes, and between"),
-      Row<MapReset>("frontend", "mapper, collector", "at the end; else rare"),
+      Row<MapReset>("frontend", "mapper, collector", "rare"),
+      Row<AdjustRequest>("frontend", "mapper", "at the end"),
       Row<FrameDone>("frontend", "player", "per frame"),
+      Row<SequenceDone>("frontend", "player", "at the end, once for each end_of_sequence_t"),
       Row<PoseView>("frontend", "eyes and plots, viewer", "per frame"),
       Row<FeatureView>("frontend", "viewer, pictures", "per frame"),
       Row<FrameTrace>("frontend", "latency reports", "per frame"),
@@ -183,7 +185,15 @@ Made by `dmslam-message-docs` from `lcmtypes/*.lcm` and the table in `tools/mess
   `src/dmslam/messaging/README.md`), and a program that only watches can ignore it.
 - Poses are named by what they do: `cam_world` takes points of the world into the camera (x right, y down, z forward).
   Lengths are map units. Quaternions are unit, in the order x, y, z, w.
-- Keyframe ids are `session << 32 | frame index`; landmark ids `ordinal of the mapper's epoch << 48 | number`; 0 is none.
+- Keyframe ids are `session << 32 | frame index`; landmark ids `ordinal of the mapper's epoch << 48 | number`. Ids and what else
+  counts from 1 is 0 where there is none; stamps and indices are -1. What is measured only sometimes is an array that is empty.
+- One meaning, one message: a request to adjust the maps (`adjust_request_t`) is not a reset (`map_reset_t`), the end of a
+  sequence is answered by `sequence_done_t`. What the mapper says travels in one type, `map_record_t`, since an answer and the
+  change that it concludes must not come apart: `event` says which answer it is, and nothing else has to be looked at.
+- Reserved, and not written yet: `camera_id` other than 0; covariances; depths and sigmas of keypoints; positions of landmarks in
+  their reference keyframe (`landmark_frame`; the world's coordinates are what the mapper computes with, and a change of frame
+  there and back changes their last bits); groups of records, which readers apply already.
+- `checksum` is CRC-32 as zlib, Python's `zlib.crc32` and Java's `CRC32` compute it. A message without it is dropped.
 - LCM has no unsigned integers: what is called unsigned keeps its bits.
 - Counts stand before the arrays that they count. Whoever receives checks the length, the counts and the values before
   use: LCM's generated decoders trust them. `wire::Decode` does all of that.

@@ -23,6 +23,7 @@ std::vector<std::string> AllChannels() {
                                   channels::kInitialMap,    channels::kKeyframe,
                                   channels::kFramePose,     channels::kFrameEvidence,
                                   channels::kMapReset,      channels::kFrameDone,
+                                  channels::kAdjustRequest, channels::kSequenceDone,
                                   channels::kPoseView,      channels::kFeatureView,
                                   channels::kFrameTrace,    channels::kFrontendStatus,
                                   channels::kMap,           channels::kMapperStatus,

@@ -17,7 +17,7 @@ void EvidenceCounter::OnFound(LandmarkId id) {
   ++item.found;
 }
 
-FrameEvidence EvidenceCounter::Take(int64_t stamp_ns, MapId map_id) {
+FrameEvidence EvidenceCounter::Take(int64_t stamp_ns, std::optional<MapId> map_id) {
   FrameEvidence evidence;
   evidence.stamp_ns = stamp_ns;
   evidence.map_id = map_id;

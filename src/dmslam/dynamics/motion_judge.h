@@ -30,7 +30,7 @@ class EvidenceCounter {
   void OnMoved(LandmarkId id) { ++At(id).moved; }
   void OnFound(LandmarkId id);
   /// In the landmarks' order; forgets it.
-  FrameEvidence Take(int64_t stamp_ns, MapId map_id);
+  FrameEvidence Take(int64_t stamp_ns, std::optional<MapId> map_id);
   void Clear() { items_.clear(); }
 
  private:
@@ -61,7 +61,9 @@ class MotionJudge {
   void Believe(const Map& map, std::span<const ExpectedLandmark> expected, const TrackedFrame& frame);
 
   /// What was believed since the last call.
-  FrameEvidence TakeEvidence(int64_t stamp_ns, MapId map_id) { return evidence_.Take(stamp_ns, map_id); }
+  FrameEvidence TakeEvidence(int64_t stamp_ns, std::optional<MapId> map_id) {
+    return evidence_.Take(stamp_ns, map_id);
+  }
   void DropEvidence() { evidence_.Clear(); }
   /// Forgets what belongs to a map that is gone.
   void Reset();

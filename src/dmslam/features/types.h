@@ -44,10 +44,14 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
          std::popcount(a.words[2] ^ b.words[2]) + std::popcount(a.words[3] ^ b.words[3]);
 }
 
-/// Keypoints of one image and their descriptors, same order and length.
+/// Keypoints of one image and their descriptors, same order and length. The other lists are as long, or empty
+/// where nothing of the kind was measured.
 struct FeatureSet {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
+  std::vector<float> depths_m;        ///< along the optical axis [m]; -1: not measured
+  std::vector<float> depth_sigmas_m;  ///< standard deviations of the depths [m]; -1: not measured
+  std::vector<float> sigmas_px;       ///< of the positions; empty: Pyramid::Scale says it
 
   size_t size() const { return keypoints.size(); }
 };

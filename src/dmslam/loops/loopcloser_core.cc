@@ -30,12 +30,12 @@ LoopcloserCore::LoopcloserCore(const LoopcloserOptions& options, const Camera& c
 void LoopcloserCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   places_.Update(map_);
-  if (awaited_correction_ != 0 && delta.correction_id == awaited_correction_) HearOfCorrection(delta);
+  if (awaited_correction_ && delta.correction_id == awaited_correction_) HearOfCorrection(delta);
 }
 
 /// What the mapper made of the loop that was proposed.
 void LoopcloserCore::HearOfCorrection(const MapDelta& delta) {
-  awaited_correction_ = 0;
+  awaited_correction_.reset();
   if (delta.event != MapEvent::kRefused) return;
   --counters_.loops;
   adjustment_due_ = false;
@@ -47,7 +47,7 @@ void LoopcloserCore::ForgetMap() {
   places_.Clear();
   detector_.Reset();
   proposals_.clear();
-  awaited_correction_ = 0;
+  awaited_correction_.reset();
 }
 
 LoopAnswer LoopcloserCore::Check(KeyframeId id) {
@@ -59,11 +59,11 @@ LoopAnswer LoopcloserCore::Check(KeyframeId id) {
   if (options_.enabled && places_.usable() && keyframe != nullptr) {
     places_.Refresh(map_, id);
     ++keyframes_since_loop_;
-    if (awaited_correction_ == 0) answer = adjustment_due_ ? AdjustAfterLoop(id) : FindLoop(*keyframe);
+    if (!awaited_correction_) answer = adjustment_due_ ? AdjustAfterLoop(id) : FindLoop(*keyframe);
   }
   answer.keyframe = id;
   answer.base_version = map_.version();
-  answer.stamp_ns = keyframe != nullptr ? keyframe->stamp_ns : 0;
+  if (keyframe != nullptr) answer.stamp_ns = keyframe->stamp_ns;
   return answer;
 }
 

@@ -23,8 +23,8 @@ struct LoopcloserCounters {
   uint64_t refused_geometry = 0;     ///< of the others
   uint64_t loops = 0;
   uint64_t global_adjustments = 0;
-  KeyframeId last_keyframe;
-  KeyframeId last_loop_keyframe;
+  std::optional<KeyframeId> last_keyframe;
+  std::optional<KeyframeId> last_loop_keyframe;
 };
 
 /// Finds loops in a replica of the map and works out corrections (Mur-Artal, Montiel, Tardos, "ORB-SLAM: a
@@ -85,7 +85,8 @@ class LoopcloserCore {
   std::vector<Proposal> proposals_;  ///< oldest first
   int keyframes_since_loop_;
   bool adjustment_due_ = false;
-  uint64_t awaited_correction_ = 0;  ///< proposed; the mapper's word on it has not been heard. 0: none
+  std::optional<uint64_t>
+      awaited_correction_;  ///< proposed; the mapper's word on it has not been heard. 0: none
   std::vector<Verdict> verdicts_;
   LoopcloserCounters counters_;
 };

@@ -217,7 +217,7 @@ Answers Play(Room& room, LoopcloserCore& core, MapEvent said = MapEvent::kCorrec
   for (int k = 0; k < kKeyframes; ++k) {
     const MapDelta delta = room.Next();
     core.ApplyMapDelta(delta);
-    LoopAnswer answer = core.Check(delta.about);
+    LoopAnswer answer = core.Check(*delta.about);
     EXPECT_EQ(answer.keyframe, delta.about);
     EXPECT_EQ(answer.base_version, core.map().version());
     if (answer.kind != LoopAnswer::Kind::kNone) core.ApplyMapDelta(room.SayOf(answer, said));
@@ -249,7 +249,7 @@ TEST(LoopcloserCoreTest, AReturnIsFoundAndTheDriftTakenOut) {
   ASSERT_GE(answers.loops.size(), 1u);
   const LoopAnswer& loop = answers.loops.front();
   const int here = static_cast<int>(loop.keyframe.frame_index()) - 1;
-  const int there = static_cast<int>(loop.matched.frame_index()) - 1;
+  const int there = static_cast<int>(loop.matched->frame_index()) - 1;
   EXPECT_GE(here, kPerRound - 12);
   EXPECT_LE(here, kPerRound + 12);
   EXPECT_LE(std::abs(here - kPerRound - there), 12) << here << " was matched with " << there;
@@ -260,8 +260,8 @@ TEST(LoopcloserCoreTest, AReturnIsFoundAndTheDriftTakenOut) {
     return (a.Center() - b.Center() - truth).norm();
   };
   const double before = error(room.map().FindKeyframe(loop.keyframe)->T_cam_world,
-                              room.map().FindKeyframe(loop.matched)->T_cam_world);
-  const double after = error(Corrected(room, loop, loop.keyframe), Corrected(room, loop, loop.matched));
+                              room.map().FindKeyframe(*loop.matched)->T_cam_world);
+  const double after = error(Corrected(room, loop, loop.keyframe), Corrected(room, loop, *loop.matched));
   EXPECT_GT(before, 0.15);
   EXPECT_LT(after, before / 5);
   // The correction is spread: a keyframe in the middle moves, but less.
@@ -280,8 +280,8 @@ TEST(LoopcloserCoreTest, AReturnIsFoundWithFewLandmarksOfItsOwn) {
   const LoopAnswer& loop = answers.loops.front();
   const auto relative = [](const Rigid3d& a, const Rigid3d& b) { return a * b.Inverse(); };
   const Rigid3d truth = relative(TruePose(static_cast<int>(loop.keyframe.frame_index()) - 1),
-                                 TruePose(static_cast<int>(loop.matched.frame_index()) - 1));
-  const Rigid3d found = relative(Corrected(room, loop, loop.keyframe), Corrected(room, loop, loop.matched));
+                                 TruePose(static_cast<int>(loop.matched->frame_index()) - 1));
+  const Rigid3d found = relative(Corrected(room, loop, loop.keyframe), Corrected(room, loop, *loop.matched));
   EXPECT_LT((found.Center() - truth.Center()).norm(), 0.05);
   EXPECT_LT(AngleBetween(found.rotation, truth.rotation), 0.02);
 }
@@ -314,7 +314,7 @@ TEST(LoopcloserCoreTest, UntilTheMapperHasSpokenNothingMoreIsProposed) {
   for (int k = 0; k < kKeyframes; ++k) {
     const MapDelta delta = room.Next();
     core.ApplyMapDelta(delta);
-    LoopAnswer answer = core.Check(delta.about);
+    LoopAnswer answer = core.Check(*delta.about);
     if (loop) {
       EXPECT_EQ(answer.kind, LoopAnswer::Kind::kNone);
     }
@@ -324,7 +324,7 @@ TEST(LoopcloserCoreTest, UntilTheMapperHasSpokenNothingMoreIsProposed) {
   core.ApplyMapDelta(room.SayOf(*loop, MapEvent::kCorrected));
   const MapDelta delta = room.Next();
   core.ApplyMapDelta(delta);
-  EXPECT_EQ(core.Check(delta.about).kind, LoopAnswer::Kind::kGlobalAdjustment);
+  EXPECT_EQ(core.Check(*delta.about).kind, LoopAnswer::Kind::kGlobalAdjustment);
 }
 
 TEST(LoopcloserCoreTest, MovingLandmarksDoNotVote) {

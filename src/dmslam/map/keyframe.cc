@@ -11,6 +11,9 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Cam
   FeatureSet kept;
   kept.keypoints.reserve(set.size());
   kept.descriptors.reserve(set.size());
+  const auto keep = [](const std::vector<float>& from, size_t i, std::vector<float>& to) {
+    if (!from.empty()) to.push_back(from[i]);
+  };
   features->uv_px.reserve(set.size());
   for (size_t i = 0; i < set.size(); ++i) {
     const Keypoint& keypoint = set.keypoints[i];
@@ -19,6 +22,9 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Cam
     if (!uv) continue;
     kept.keypoints.push_back(keypoint);
     kept.descriptors.push_back(set.descriptors[i]);
+    keep(set.depths_m, i, kept.depths_m);
+    keep(set.depth_sigmas_m, i, kept.depth_sigmas_m);
+    keep(set.sigmas_px, i, kept.sigmas_px);
     features->uv_px.push_back(*uv);
   }
   features->set = std::move(kept);

@@ -30,6 +30,7 @@ struct Keyframe {
   std::vector<KeyframeId> loop_edges;  ///< sorted
   std::shared_ptr<const FrameFeatures> features;
   std::vector<LandmarkId> landmarks;
+  CameraId camera_id = 0;
 
   // Derived from the above, the same in every replica.
   std::map<KeyframeId, int> covisible;  ///< landmarks seen in common (at least one)

@@ -2,33 +2,38 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "dmslam/features/types.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/map/landmark.h"
+#include "dmslam/map/record_group.h"
 #include "dmslam/util/ids.h"
 
 namespace dmslam {
 
-/// Why a map record was written.
+/// What a map record says, and why it was written. Each has one meaning, and says which of the delta's
+/// `about`, `map_id`, `correction_id` and `request` there are.
 enum class MapEvent : uint8_t {
-  kKeyframeInserted = 1,
-  kLandmarksCreated = 2,
-  kFused = 3,
-  kAdjusted = 4,  ///< local bundle adjustment
-  kMapped = 5,    ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
-  kEvidence = 6,
-  kCorrected = 7,  ///< a loop correction was applied
-  kGloballyAdjusted = 8,
-  kMapStarted = 9,
-  kMapDropped = 10,
-  kSettled = 11,   ///< all work that keyframe `about` caused is done
-  kSnapshot = 12,  ///< part of a snapshot
-
-  kRefused = 13,  ///< a correction that was not applied; `note` says why
-  kEnded = 14,    ///< the sequence has ended, nothing follows
+  kKeyframeInserted = 1,  ///< keyframe `about`
+  kLandmarksCreated = 2,  ///< by keyframe `about`
+  kFused = 3,             ///< landmarks of keyframe `about` with those of its neighbours
+  kAdjusted = 4,          ///< local bundle adjustment around keyframe `about`
+  kMapped = 5,            ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
+  kEvidence = 6,          ///< what frames said of landmarks
+  kCorrected = 7,         ///< `correction_id`, a loop of keyframe `about`, was applied
+  kGloballyAdjusted = 8,  ///< `correction_id`, a global adjustment after a loop, was applied
+  kMapStarted = 9,        ///< `map_id`, of a first map; `about` is its second keyframe
+  kMapDropped = 10,       ///< `map_id`, as the frontend said
+  kSettled = 11,          ///< the answer to a keyframe: all work that `about` caused is done
+  kSnapshot = 12,         ///< part of a snapshot
+  kRefused = 13,          ///< `correction_id` was not applied; `note` says why
+  kEnded = 14,            ///< the end of the session: nothing follows
+  kMapAdjusted = 15,      ///< `map_id` as a whole, after the last frame
+  kRequestDone = 16,      ///< the answer to an AdjustRequest, `request`: all maps are adjusted
+  kFirstMapRefused = 17,  ///< of `map_id`, with second keyframe `about`; `note` says why
 };
 
 /// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.
@@ -42,6 +47,7 @@ struct KeyframeState {
   std::vector<KeyframeId> loop_edges;
   bool has_features = false;
   FeatureSet features;
+  CameraId camera_id = 0;
 };
 
 /// A keyframe's pose alone.
@@ -104,23 +110,25 @@ struct StreamPosition {
 
 /// What a map contains of the streams it is made of: whoever continues it goes on from here.
 struct MapProgress {
-  StreamPosition frontend;    ///< records of the frontend's stream up to here are worked into it
-  StreamPosition loopcloser;  ///< the loop closer's
-  KeyframeId settled;         ///< the keyframe all of whose work was done last
-  uint64_t corrected = 0;     ///< the map's version when the newest correction was applied; 0: none was
-  bool ended = false;         ///< the sequence has ended, nothing follows
+  StreamPosition frontend;            ///< records of the frontend's stream up to here are worked into it
+  StreamPosition loopcloser;          ///< the loop closer's
+  std::optional<KeyframeId> settled;  ///< the keyframe all of whose work was done last
+  std::optional<uint64_t> corrected;  ///< the map's version when the newest correction was applied
+  bool ended = false;                 ///< the session has ended, nothing follows
   bool operator==(const MapProgress&) const = default;
 };
 
 /// A change of the map as absolute values: applying it twice is applying it once. One delta becomes one map
 /// record.
 struct MapDelta {
-  MapEvent event = MapEvent::kSettled;
-  KeyframeId about;  ///< the keyframe whose arrival caused it
-  MapId map_id = 0;
-  uint64_t version = 0;  ///< the map's version after it; counts deltas
-  uint64_t correction_id = 0;
-  int64_t stamp_ns = 0;  ///< capture time of `about`; 0: not known
+  MapEvent event = MapEvent::kSnapshot;
+  std::optional<KeyframeId> about;  ///< the keyframe whose arrival caused it
+  std::optional<MapId> map_id;
+  uint64_t version = 0;                   ///< the map's version after it; counts deltas
+  std::optional<uint64_t> correction_id;  ///< the correction that was applied or refused
+  std::optional<uint32_t> request;        ///< the AdjustRequest that is answered
+  std::optional<int64_t> stamp_ns;        ///< capture time of `about`, where that is known
+  RecordGroup group;
   std::string note;
   MapProgress progress;
   std::vector<KeyframeState> keyframes;

@@ -221,7 +221,7 @@ void MapEditor::DropMap(MapId map_id) {
   journal_.NoteDroppedMap(map_id);
 }
 
-MapDelta MapEditor::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
+MapDelta MapEditor::TakeDelta(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id) {
   SetVersion(version() + 1);
   MapDelta delta;
   delta.event = event;
@@ -229,7 +229,7 @@ MapDelta MapEditor::TakeDelta(MapEvent event, KeyframeId about, MapId map_id) {
   delta.map_id = map_id;
   delta.version = version();
   delta.progress = progress();
-  if (const Keyframe* keyframe = FindKeyframe(about)) delta.stamp_ns = keyframe->stamp_ns;
+  if (const Keyframe* keyframe = about ? FindKeyframe(*about) : nullptr) delta.stamp_ns = keyframe->stamp_ns;
   journal_.Write(*this, &delta);
   journal_ = {};
   ForgetOldTombstones();

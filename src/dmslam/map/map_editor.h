@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "dmslam/map/map.h"
@@ -50,7 +51,7 @@ class MapEditor : public Map {
 
   /// What changed since the last call, as absolute values, with the next version number. What else the header
   /// holds is the caller's.
-  MapDelta TakeDelta(MapEvent event, KeyframeId about, MapId map_id);
+  MapDelta TakeDelta(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id);
 
  private:
   void ReparentChildren(const Keyframe& removed);

@@ -2,11 +2,13 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "dmslam/features/types.h"
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/map/record_group.h"
 #include "dmslam/util/ids.h"
 
 namespace dmslam {
@@ -28,6 +30,7 @@ struct KeyframeProposal {
   };
   std::vector<Match> matches;    ///< landmarks seen as static
   std::vector<uint16_t> moving;  ///< features seen to move: no landmark is made of them; sorted
+  CameraId camera_id = 0;
 };
 
 /// A first map, as the frontend sees it: two frames and the points seen by both.
@@ -46,33 +49,41 @@ struct InitialMap {
 /// What frames said about landmarks since the last record.
 struct FrameEvidence {
   int64_t stamp_ns = 0;  ///< newest frame in it
-  MapId map_id = 0;
+  std::optional<MapId> map_id;
   struct Item {
     LandmarkId landmark;
     uint16_t visible = 0;
     uint16_t found = 0;
     uint16_t moved = 0;
-    float chi2_sum = 0.0F;  ///< sum of squared normalised residuals over `found`
   };
   std::vector<Item> items;  ///< sorted by landmark
+  CameraId camera_id = 0;
 };
 
+/// How well is known where the camera is. lcmtypes/dmslam_frame_pose_t.lcm says which of them come with a
+/// pose.
 enum class TrackingState : uint8_t {
-  kNotInitialized = 0,
-  kWaitingForMap = 1,  ///< a first map was proposed and has not come back yet
-  kTrial = 2,          ///< a young map must still prove that it predicts
-  kTracking = 3,
-  kUncertain = 4,  ///< too few static inliers: the pose is a prediction
+  kNotInitialized = 0,  ///< a first map is looked for
+  kWaitingForMap = 1,   ///< a first map was proposed and has not come back yet
+  kTrial = 2,           ///< a young map must still prove that it predicts
+  kTracking = 3,        ///< enough static landmarks fix position and rotation
+  kUncertain = 4,       ///< too few static inliers: the pose is a prediction
   kLost = 5,
-  kLocalizedLater = 6,  ///< a frame placed in the map after the fact
+  kLocalizedLater = 6,  ///< a frame placed in the map, or placed better, after the fact
+  kRotationOnly = 7,    ///< the rotation is measured, the position is a prediction
 };
+
+/// How many numbers the covariance of a pose takes: position x, y, z [map units], then the rotation vector
+/// x, y, z [rad], both along the axes of the frame that the pose is told in; 6 x 6, symmetric: the upper
+/// triangle, row by row.
+inline constexpr size_t kPoseCovarianceSize = 21;
 
 /// Where the camera was.
 struct FramePose {
   uint32_t frame_index = 0;
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::kNotInitialized;
-  MapId map_id = 0;
+  std::optional<MapId> map_id;
   KeyframeId reference;  ///< invalid: no pose
   Rigid3d T_cam_reference;
   double reference_scale = 1.0;  ///< the reference's scale (Keyframe::scale) when the pose was told
@@ -83,26 +94,40 @@ struct FramePose {
   uint16_t num_unknown = 0;         ///< matched, but without a vote
   float moving_image_share = 0.0F;  ///< share of occupied image cells whose features move
   std::string reason;               ///< why there is no pose, or why the state is what it is
+  CameraId camera_id = 0;
+  /// Of this camera's pose in its reference keyframe's frame, kPoseCovarianceSize numbers; empty: not known.
+  std::vector<double> covariance;
+  /// The same of this camera's pose in the camera of frame `step_from`.
+  std::vector<double> step_covariance;
+  std::optional<uint32_t> step_from;
   bool HasPose() const { return reference.valid(); }
 };
 
 /// The frontend gives a map up.
-/// With map 0 it gives up none: the sequence has ended, and the mapper is asked to adjust its maps as a
-/// whole. It answers with a settled record about no keyframe.
 struct MapReset {
   MapId map_id = 0;
   bool drop = false;  ///< true: it was wrong from the beginning; false: keep it, a new one follows
   std::string reason;
-  int64_t stamp_ns = 0;  ///< capture time of the frame at which it did so; 0: not known
+  std::optional<int64_t> stamp_ns;  ///< capture time of the frame at which it did so, where that is known
+  CameraId camera_id = 0;
+};
+
+/// No frame follows: the frontend asks the mapper to adjust each of its maps as a whole. The mapper answers
+/// with MapEvent::kMapAdjusted for each and then MapEvent::kRequestDone.
+struct AdjustRequest {
+  uint32_t request = 1;  ///< counts the requests of a frontend from 1: the answer names it
+  std::string reason;
+  std::optional<int64_t> newest_stamp_ns;  ///< capture time of the newest frame, where there is one
+  CameraId camera_id = 0;
 };
 
 /// The loop closer's answer to keyframe `keyframe`.
 struct LoopAnswer {
   KeyframeId keyframe;
-  uint64_t base_version = 0;   ///< map version it was computed on
-  uint64_t correction_id = 0;  ///< 0: no loop
+  uint64_t base_version = 0;              ///< map version it was computed on
+  std::optional<uint64_t> correction_id;  ///< of a loop or a global adjustment
   enum class Kind : uint8_t { kNone = 0, kLoop = 1, kGlobalAdjustment = 2 } kind = Kind::kNone;
-  KeyframeId matched;  ///< the other end of the loop
+  std::optional<KeyframeId> matched;  ///< the other end of a loop
   struct KeyframeCorrection {
     KeyframeId keyframe;
     Sim3d corrected_from_base;  ///< world (corrected) from world (base), for what hangs on this keyframe
@@ -120,7 +145,8 @@ struct LoopAnswer {
   };
   std::vector<LandmarkOffset> landmark_offsets;
   std::string note;
-  int64_t stamp_ns = 0;  ///< capture time of `keyframe`; 0: not known
+  std::optional<int64_t> stamp_ns;  ///< capture time of `keyframe`, where that is known
+  RecordGroup group;
 };
 
 }  // namespace dmslam

@@ -40,6 +40,7 @@ void Replica::ApplyKeyframes(const MapDelta& delta) {
       continue;
     }
     keyframe->stamp_ns = state.stamp_ns;
+    keyframe->camera_id = state.camera_id;
     keyframe->loop_edges = state.loop_edges;
     Place(*keyframe, state.T_cam_world, state.scale, state.map_id);
     Hang(*keyframe, state.parent);

@@ -85,7 +85,7 @@ std::vector<MapDelta> CutSnapshot(const Map& map, KeyframeId center, size_t max_
     part.event = MapEvent::kSnapshot;
     part.version = map.version();
     part.progress = map.progress();
-    part.about = center;
+    if (center.valid()) part.about = center;
   }
   return parts;
 }

@@ -74,7 +74,8 @@ struct LoopEnds {
 
 std::optional<LoopEnds> EndsOf(const Map& map, const LoopAnswer& answer) {
   const std::optional<KeyframeId> here = map.ResolveKeyframe(answer.keyframe);
-  const std::optional<KeyframeId> there = map.ResolveKeyframe(answer.matched);
+  const std::optional<KeyframeId> there =
+      answer.matched ? map.ResolveKeyframe(*answer.matched) : std::nullopt;
   if (!here || !there || *here == *there) return std::nullopt;
   return LoopEnds{map.At(*here), map.At(*there)};
 }
@@ -163,8 +164,9 @@ std::string WhyRefused(const Map& map, const LoopAnswer& answer) {
       });
   if (!known) return "its keyframes are gone";
   const std::string computed = "computed on version " + std::to_string(answer.base_version);
-  if (answer.base_version < map.progress().corrected) {
-    return computed + ", before the correction of version " + std::to_string(map.progress().corrected);
+  const std::optional<uint64_t> corrected = map.progress().corrected;
+  if (corrected && answer.base_version < *corrected) {
+    return computed + ", before the correction of version " + std::to_string(*corrected);
   }
   if (answer.base_version > map.version()) {
     return computed + "; the map's is " + std::to_string(map.version());

@@ -20,6 +20,7 @@ Keyframe MakeKeyframe(const Map& map, const KeyframeProposal& proposal, const Ri
   Keyframe keyframe;
   keyframe.id = proposal.id;
   keyframe.map_id = proposal.map_id;
+  keyframe.camera_id = proposal.camera_id;
   keyframe.stamp_ns = proposal.stamp_ns;
   keyframe.T_cam_world = T_cam_world;
   keyframe.features = MakeFrameFeatures(proposal.features, map.camera(), map.pyramid());

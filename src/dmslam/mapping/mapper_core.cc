@@ -36,14 +36,20 @@ void MapperCore::Continue(Map map) {
   maybe_unfinished_ = true;
 }
 
-void MapperCore::Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id,
-                         std::string note) {
+void MapperCore::Publish(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id,
+                         std::optional<uint64_t> correction_id, std::string note) {
   MapDelta delta = map_.TakeDelta(event, about, map_id);
   delta.correction_id = correction_id;
   delta.note = std::move(note);
-  const bool says_something = event == MapEvent::kSettled || event == MapEvent::kRefused ||
-                              event == MapEvent::kMapped || event == MapEvent::kEnded;
-  if (!delta.Empty() || says_something) sink_(delta);
+  Emit(std::move(delta));
+}
+
+/// What changes nothing is told where it is an answer.
+void MapperCore::Emit(MapDelta delta) {
+  const bool answers = delta.event == MapEvent::kSettled || delta.event == MapEvent::kRefused ||
+                       delta.event == MapEvent::kMapped || delta.event == MapEvent::kRequestDone ||
+                       delta.event == MapEvent::kEnded;
+  if (answers || !delta.Empty()) sink_(delta);
 }
 
 bool MapperCore::Interrupted() {
@@ -72,7 +78,7 @@ bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   }
   ++counters_.maps_refused;
   map_.DropMap(proposal.map_id);
-  Publish(MapEvent::kMapDropped, proposal.second.id, proposal.map_id, 0,
+  Publish(MapEvent::kFirstMapRefused, proposal.second.id, proposal.map_id, {},
           "too few landmarks after bundle adjustment");
   return false;
 }
@@ -140,20 +146,26 @@ void MapperCore::OnEvidence(const FrameEvidence& evidence) {
 }
 
 void MapperCore::OnReset(const MapReset& reset) {
-  if (reset.map_id == 0) {
-    if (!adjusted_) AdjustMaps();
-    Settle({}, 0);
-    return;
-  }
   if (!reset.drop) return;
   ++counters_.maps_dropped;
   map_.DropMap(reset.map_id);
-  Publish(MapEvent::kMapDropped, {}, reset.map_id, 0, reset.reason);
+  Publish(MapEvent::kMapDropped, {}, reset.map_id, {}, reset.reason);
 }
 
-void MapperCore::Settle(KeyframeId id, MapId map_id) {
+void MapperCore::OnAdjustRequest(const AdjustRequest& request) {
+  if (!adjusted_) AdjustMaps();
+  AnswerRequest(request.request);
+}
+
+void MapperCore::AnswerRequest(uint32_t request) {
+  MapDelta delta = map_.TakeDelta(MapEvent::kRequestDone, {}, {});
+  delta.request = request;
+  Emit(std::move(delta));
+}
+
+void MapperCore::Settle(KeyframeId id, std::optional<MapId> map_id) {
   MapProgress progress = map_.progress();
-  if (id.valid()) progress.settled = id;  // "the sequence has ended" is about no keyframe
+  progress.settled = id;
   map_.SetProgress(progress);
   Publish(MapEvent::kSettled, id, map_id);
 }
@@ -164,7 +176,7 @@ void MapperCore::AdjustMaps() {
   for (const MapId map_id : maps) {
     Count(RemoveTooNear(map_, map_id, options_.min_depth), &counters_.landmarks_culled);
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
-    Publish(MapEvent::kGloballyAdjusted, {}, map_id);
+    Publish(MapEvent::kMapAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.
     Count(RemoveUnproven(map_, map_id, counters_.landmarks_seen_through, options_.seen_through),
@@ -178,7 +190,7 @@ void MapperCore::End(bool as_it_is) {
   MapProgress progress = map_.progress();
   progress.ended = true;
   map_.SetProgress(progress);
-  Publish(MapEvent::kEnded, {}, 0);
+  Publish(MapEvent::kEnded, {}, {});
 }
 
 // ---- Corrections ----
@@ -187,7 +199,7 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   if (answer.kind == LoopAnswer::Kind::kNone) return;
   if (const std::string why = WhyRefused(map_, answer); !why.empty()) {
     ++counters_.corrections_refused;
-    Publish(MapEvent::kRefused, answer.keyframe, 0, answer.correction_id, why);
+    Publish(MapEvent::kRefused, answer.keyframe, {}, answer.correction_id, why);
     return;
   }
   Count(ApplyCorrection(map_, answer, options_), &counters_.fusions);
@@ -198,7 +210,7 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(answer.keyframe);
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe,
-          anchor ? anchor->map_id : 0, answer.correction_id, answer.note);
+          anchor ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id, answer.note);
 }
 
 }  // namespace dmslam

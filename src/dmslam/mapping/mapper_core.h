@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "dmslam/map/map_editor.h"
@@ -63,13 +64,17 @@ class MapperCore {
   bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
+  /// Adjusts every map as a whole, once, and answers the request.
+  void OnAdjustRequest(const AdjustRequest& request);
+  /// Says that all maps are adjusted, as far as they are to be.
+  void AnswerRequest(uint32_t request);
   /// A loop or a global adjustment, composed with the poses of now: local mapping since its base changes
   /// nothing about it. Refused with a record where it no longer applies (WhyRefused).
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says once more that keyframe `id` is mapped, for a loop closer that has not heard it.
   void AskAgain(KeyframeId id, MapId map_id) { Publish(MapEvent::kMapped, id, map_id); }
   /// Says that all work that keyframe `id` caused is done.
-  void Settle(KeyframeId id, MapId map_id);
+  void Settle(KeyframeId id, std::optional<MapId> map_id);
   /// Says that the sequence has ended and that all it caused is done; first adjusts all maps, unless it
   /// is to leave them as they are.
   void End(bool as_it_is = false);
@@ -83,8 +88,9 @@ class MapperCore {
   void RemoveSeenThroughBy(const Keyframe& keyframe);
   void Adjust(const Keyframe& keyframe);
   void AdjustMaps();
-  void Publish(MapEvent event, KeyframeId about, MapId map_id, uint64_t correction_id = 0,
-               std::string note = {});
+  void Publish(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id,
+               std::optional<uint64_t> correction_id = {}, std::string note = {});
+  void Emit(MapDelta delta);
   bool Interrupted();
 
   MapperOptions options_;

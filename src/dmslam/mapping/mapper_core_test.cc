@@ -294,7 +294,7 @@ TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
   evidence.map_id = 1;
   const LandmarkId lost = core_.map().At(Id(2)).landmarks[kKnown + 5];
   ASSERT_TRUE(lost.valid());
-  evidence.items.push_back({lost, 20, 2, 0, 0});
+  evidence.items.push_back({lost, 20, 2, 0});
   core_.OnEvidence(evidence);
   ASSERT_TRUE(core_.OnKeyframe(next));
   EXPECT_EQ(core_.map().FindLandmark(lost), nullptr);
@@ -306,8 +306,8 @@ TEST_F(KeyframeStep, RemovesWhatIsSeenToMove) {
   FrameEvidence evidence;
   evidence.map_id = 1;
   const LandmarkId moving = core_.map().At(Id(1)).landmarks[5];
-  evidence.items.push_back({moving, 4, 0, 4, 0});
-  evidence.items.push_back({LandmarkId::Make(9, 9), 4, 0, 4, 0});
+  evidence.items.push_back({moving, 4, 0, 4});
+  evidence.items.push_back({LandmarkId::Make(9, 9), 4, 0, 4});
   core_.OnEvidence(evidence);
   EXPECT_EQ(core_.map().FindLandmark(moving), nullptr);
   EXPECT_EQ(core_.counters().landmarks_moving_removed, 1u);
@@ -372,7 +372,8 @@ TEST_F(KeyframeStep, AFirstMapThatDoesNotHoldIsDroppedWithARecord) {
   InitialMap proposal = FirstMap();
   proposal.points.resize(20);
   EXPECT_FALSE(core_.OnInitialMap(proposal));
-  EXPECT_EQ(said_.back().event, MapEvent::kMapDropped);
+  EXPECT_EQ(said_.back().event, MapEvent::kFirstMapRefused);
+  EXPECT_EQ(said_.back().about, proposal.second.id);
   EXPECT_EQ(said_.back().dropped_maps, std::vector<MapId>{1});
   EXPECT_TRUE(core_.map().keyframes().empty());
   EXPECT_EQ(core_.counters().maps_refused, 1u);
@@ -382,12 +383,18 @@ TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   ASSERT_TRUE(Start());
   ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
   const size_t before = said_.size();
-  core_.OnReset({});
-  EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kGloballyAdjusted, MapEvent::kSettled}));
+  core_.OnAdjustRequest({.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
+  EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kMapAdjusted, MapEvent::kRequestDone}));
+  EXPECT_EQ(said_[before].map_id, 1U) << "which map it was is told, and not inferred";
+  EXPECT_EQ(said_.back().request, 3U);
+  EXPECT_FALSE(said_.back().about.has_value());
+  core_.OnAdjustRequest({.request = 4, .reason = "nobody answered", .newest_stamp_ns = {}, .camera_id = 0});
+  EXPECT_EQ(said_.back().request, 4U);
+  EXPECT_EQ(said_.size(), before + 3) << "they are adjusted already";
   core_.End();
   EXPECT_EQ(said_.back().event, MapEvent::kEnded);
   EXPECT_TRUE(said_.back().progress.ended);
-  EXPECT_EQ(said_.size(), before + 3);
+  EXPECT_EQ(said_.size(), before + 4);
 }
 
 }  // namespace

@@ -35,7 +35,8 @@ void WriterElection::Receive(const std::string& channel, std::span<const uint8_t
   if (head->protocol_version != kProtocolVersion || head->schema_hash != options_.schema_hash) {
     state_ = State::kRefused;
     refusal_ = head->name + " writes this stream with protocol " + std::to_string(head->protocol_version) +
-               " or other message types: stop it, and run the same build everywhere";
+               " (" + NameOfProtocol(head->protocol_version) +
+               ") or other message types: stop it, and run the same build everywhere";
   } else if (!options_.take_over) {
     state_ = State::kRefused;
     refusal_ = head->name + " writes this stream already: stop it, or start with --take-over";

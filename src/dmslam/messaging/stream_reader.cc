@@ -75,9 +75,12 @@ bool StreamReader::SpeaksOurLanguage(const head_t& head) {
   if (state_ != State::kRefusedVersion) ack_due_ = true;
   state_ = State::kRefusedVersion;
   term_ = {head.header.epoch, head.header.writer};
-  problem_ = "writer " + head.name + " speaks protocol " + std::to_string(head.protocol_version) +
-             (head.protocol_version == kProtocolVersion ? " with other message types" : "") +
-             ", this reader protocol " + std::to_string(kProtocolVersion) + ": run the same build everywhere";
+  problem_ =
+      "writer " + head.name + " speaks protocol " + std::to_string(head.protocol_version) +
+      (head.protocol_version == kProtocolVersion ? " with other message types"
+                                                 : " (" + NameOfProtocol(head.protocol_version) + ")") +
+      ", this reader protocol " + std::to_string(kProtocolVersion) + " (" + NameOfProtocol(kProtocolVersion) +
+      "): run the same build everywhere";
   return false;
 }
 

@@ -152,10 +152,12 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
   }
   if (ack->protocol_version != kProtocolVersion || ack->schema_hash != options_.schema_hash) {
     ++statistics_.refused;
-    refusal_ = "reader " + ack->name + " speaks protocol " + std::to_string(ack->protocol_version) +
-               (ack->protocol_version == kProtocolVersion ? " with other message types" : "") +
-               ", this writer protocol " + std::to_string(kProtocolVersion) +
-               ": run the same build everywhere";
+    refusal_ =
+        "reader " + ack->name + " speaks protocol " + std::to_string(ack->protocol_version) +
+        (ack->protocol_version == kProtocolVersion ? " with other message types"
+                                                   : " (" + NameOfProtocol(ack->protocol_version) + ")") +
+        ", this writer protocol " + std::to_string(kProtocolVersion) + " (" +
+        NameOfProtocol(kProtocolVersion) + "): run the same build everywhere";
     return;
   }
   ++statistics_.acks;

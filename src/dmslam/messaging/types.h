@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dmslam/record_header_t.hpp"
+#include "dmslam/util/version.h"
 
 namespace dmslam {
 
@@ -82,8 +83,5 @@ inline std::string AckChannel(const std::string& reader) { return "DMSLAM_" + re
 inline std::string TakeOverChannel(const std::string& owner) { return "DMSLAM_" + owner + "_TAKE_OVER"; }
 inline std::string HandOverChannel(const std::string& owner) { return "DMSLAM_" + owner + "_HAND_OVER"; }
 inline std::string ReplicaChannel(const std::string& holder) { return "DMSLAM_" + holder + "_REPLICA"; }
-
-/// Version of the protocol: beacons and acknowledgements of another one are refused by name.
-inline constexpr int32_t kProtocolVersion = 1;
 
 }  // namespace dmslam

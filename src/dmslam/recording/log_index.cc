@@ -7,8 +7,10 @@
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/receive_window.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
+#include "dmslam/wire/former_types.h"
 
 namespace dmslam {
 namespace {
@@ -17,14 +19,22 @@ bool EndsWith(const std::string& text, std::string_view end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+/// The type of the records that travel on a channel; none when no records do.
 template <typename... Message>
-bool IsRecordChannel(const std::string& channel, const std::tuple<Message...>*) {
-  return ((wire::Info<Message>().is_record && channel == wire::Info<Message>().channel) || ...);
+std::optional<wire::MessageInfo> RecordOf(const std::string& channel, const std::tuple<Message...>*) {
+  std::optional<wire::MessageInfo> record;
+  const auto look = [&](const wire::MessageInfo& info) {
+    if (info.is_record && channel == info.channel) record = info;
+  };
+  (look(wire::Info<Message>()), ...);
+  return record;
 }
 
-bool IsRecordChannel(const std::string& channel) {
-  return IsRecordChannel(channel, static_cast<const wire::Messages*>(nullptr));
+std::optional<wire::MessageInfo> RecordOf(const std::string& channel) {
+  return RecordOf(channel, static_cast<const wire::Messages*>(nullptr));
 }
+
+bool IsRecordChannel(const std::string& channel) { return RecordOf(channel).has_value(); }
 
 constexpr ReceiveWindow::Limits kNoLimits{INT64_MAX / 4, SIZE_MAX / 4, 64u << 20};
 
@@ -48,6 +58,9 @@ LogIndex::LogIndex(const std::string& path) : reader_(path) {
     end_us_ = std::max(end_us_, event->utime_us);
     Add(*event, &parts);
   }
+  if (sessions_.empty() && !of_protocol_.empty()) {
+    throw InputError(path + ": " + wire::ToldOfFormer(of_protocol_.rbegin()->first));
+  }
   if (sessions_.empty()) {
     throw InputError(path + ": holds no message of this system; record a run with `scripts/run.sh --record`");
   }
@@ -65,6 +78,10 @@ std::optional<Message> LogIndex::Decode(std::span<const uint8_t> bytes) {
 }
 
 void LogIndex::Add(const LogEvent& event, Parts* parts) {
+  if (const std::optional<int32_t> protocol = OtherProtocol(event)) {
+    ++of_protocol_[*protocol];
+    return;
+  }
   RecordedMessage message;
   message.utime_us = event.utime_us;
   message.order = num_messages_;
@@ -99,7 +116,9 @@ void LogIndex::AddFrame(const LogEvent& event, RecordedMessage message) {
 void LogIndex::AddRecord(RecordedMessage message, std::span<const uint8_t> bytes) {
   const std::optional<RecordHeader> header = ParseHeader(bytes);
   const bool sound = header && header->session > 0 && header->session <= UINT32_MAX && header->seq > 0 &&
-                     header->seq < kMaxSeq && header->epoch > 0 && IsIntact(message.channel, bytes);
+                     header->seq < kMaxSeq && header->epoch > 0 &&
+                     FingerprintOf(bytes) == RecordOf(message.channel)->fingerprint &&
+                     IsIntact(message.channel, bytes);
   if (!sound) {
     ++bad_messages_;
     return;
@@ -134,6 +153,10 @@ void LogIndex::AddPart(const LogEvent& event, RecordedMessage message, Parts* pa
   message.offset = -1;
   message.bytes = std::make_shared<const Bytes>(std::move(result.whole->second));
   const SharedBytes bytes = message.bytes;
+  if (const std::optional<int32_t> protocol = wire::FormerProtocol(FingerprintOf(*bytes).value_or(0))) {
+    ++of_protocol_[*protocol];
+    return;
+  }
   AddRecord(std::move(message), *bytes);
 }
 
@@ -158,9 +181,12 @@ Bytes LogIndex::Read(const RecordedMessage& message) const {
 
 std::string LogIndex::DescribeDamage() const {
   std::string text = reader_.DescribeGaps();
-  if (bad_messages_ == 0) return text;
-  text += text.empty() ? path() + ": " : "; ";
-  return text + std::to_string(bad_messages_) + " messages hold wrong bytes and were left out";
+  const auto add = [&](const std::string& more) { text += (text.empty() ? path() + ": " : "; ") + more; };
+  if (bad_messages_ > 0) add(std::to_string(bad_messages_) + " messages hold wrong bytes and were left out");
+  for (const auto& [protocol, count] : of_protocol_) {
+    add(std::to_string(count) + " messages are of " + NameOfProtocol(protocol) + " and were left out");
+  }
+  return text;
 }
 
 namespace {

@@ -56,7 +56,8 @@ struct RecordedSession {
 /// or in parts. Bad messages are left out and counted.
 class LogIndex {
  public:
-  /// Throws InputError for what is no log, or a log without any message of ours.
+  /// Throws InputError for what is no log, or a log without any message of ours; one that another version has
+  /// recorded is called that.
   explicit LogIndex(const std::string& path);
 
   /// The session `id`; 0: the only one there is. Throws InputError that names the sessions there are.
@@ -86,6 +87,7 @@ class LogIndex {
   std::map<uint32_t, RecordedSession> sessions_;
   int64_t begin_us_ = 0, end_us_ = 0;
   int64_t num_messages_ = 0, bad_messages_ = 0;
+  std::map<int32_t, int64_t> of_protocol_;  ///< messages of other versions, by their protocol
 };
 
 /// One step of a stream that is gone through again.

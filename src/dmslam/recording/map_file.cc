@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "dmslam/map/snapshot.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
+#include "dmslam/wire/record_groups.h"
 
 namespace dmslam {
 namespace {
@@ -72,17 +76,25 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
   if (!start) throw InputError(log.path() + ": does not say which camera the map was made with");
   RebuiltMap rebuilt{Replica(start->camera, start->pyramid), *start};
   rebuilt.missing = replay.missing;
+  wire::RecordGroups<MapDelta> groups;
   for (const ReplayStep& step : replay.steps) {
-    if (step.begins_anew) rebuilt.map.Clear();
-    const std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
-    if (!delta) {
-      ++rebuilt.missing;
-      continue;
+    if (step.begins_anew) {
+      rebuilt.map.Clear();
+      groups.Clear();
     }
+    std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
+    if (delta) {
+      ++rebuilt.records;
+      delta = groups.Add(std::move(*delta));
+      if (!groups.fault().empty()) ++rebuilt.missing;
+    } else {
+      ++rebuilt.missing;
+    }
+    if (!delta) continue;
     rebuilt.map.Apply(*delta);
     rebuilt.ended = delta->event == MapEvent::kEnded;
-    ++rebuilt.records;
   }
+  if (groups.open()) ++rebuilt.missing;
   rebuilt.skipped = rebuilt.map.skipped_references();
   return rebuilt;
 }
@@ -93,7 +105,11 @@ void SaveMap(const std::string& path, const Map& map, const SessionStart& sessio
   const int64_t utime_us = newest.stamp_ns / 1000;
   const std::string partial = path + ".part";
   EventLogWriter log(partial);
-  WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), session);
+  WriteLogVersion(&log, "", utime_us);
+  SessionStart start = session;  // of this program, whoever wrote the one it goes on from
+  start.protocol_version = kProtocolVersion;
+  start.software = kVersion;
+  WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), start);
   int64_t seq = 0;
   for (const MapDelta& delta : CutSnapshot(map, newest.id, kPieceBytes)) {
     WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kMap, ++seq), delta);

@@ -29,8 +29,8 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
 /// session.
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us = INT64_MAX);
 
-/// Writes a map as a log: its session, then the whole map as records. The same map gives the same bytes.
-/// Throws InputError when that cannot be written.
+/// Writes a map as a log: a beacon, which says the version to every later one, its session, then the whole
+/// map as records. The same map gives the same bytes. Throws InputError when that cannot be written.
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session);
 
 /// Reads what SaveMap has written, or rebuilds the map of any other log of a run. Throws InputError.

@@ -10,10 +10,12 @@
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_index.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
+#include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
 
 namespace dmslam {
@@ -331,6 +333,99 @@ TEST_F(Recording, OtherLogsAreRefused) {
   log.Write(1, "SOMETHING", Bytes(5));
   log.Close();
   EXPECT_THROW(LogIndex{path_}, InputError);
+}
+
+/// What LogIndex says of a log that it refuses.
+std::string Refusal(const std::string& path) {
+  try {
+    const LogIndex index(path);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "not refused";
+}
+
+TEST_F(Recording, ALogOfTheFormerVersionIsNamedAndNotCalledDamaged) {
+  Bytes record = {0x60, 0x59, 0x4f, 0x88, 0xdd, 0x67, 0xaf, 0x37};  // map_record_t of version 0.1
+  record.resize(200);
+  Bytes camera = {0xb0, 0xcb, 0x92, 0xb2, 0x85, 0x4c, 0x49, 0x0f};
+  camera.resize(100);
+  EventLogWriter log(path_);
+  log.Write(1, channels::kCameraInfo, camera);
+  log.Write(2, channels::kMap, record);
+  log.Close();
+  EXPECT_EQ(Refusal(path_), path_ + ": recorded by version 0.1; this is version " + kVersion +
+                                ", which cannot read it; use version 0.1, or record it again");
+  // Beside messages of now they are counted apart from what is damaged.
+  TinyMapper mapper;
+  EventLogWriter both(path_);
+  WriteSession(both);
+  both.Write(2, channels::kMap, record);
+  WriteRecord(both, 3, mapper.Step(), Header(StreamId::kMap, 1));
+  both.Close();
+  const LogIndex index(path_);
+  EXPECT_EQ(index.DescribeDamage(), path_ + ": 1 messages are of version 0.1 and were left out");
+  EXPECT_EQ(RebuildMap(index, index.Session()).records, 1);
+}
+
+TEST_F(Recording, TheBeaconNamesAVersionThatIsNotKnownYet) {
+  head_t head{};
+  head.header = Header(StreamId::kMap, 0);
+  head.first_seq = 1;
+  head.protocol_version = kProtocolVersion + 1;
+  const Outgoing beacon = SealedMessage(HeadChannel("MAPPER"), head);
+  Bytes record = wire::Encode(TinyMapper().Step());
+  record[0] ^= 1;  // a type that this version does not know
+  Seal(Header(StreamId::kMap, 1), channels::kMap, record);
+  EventLogWriter log(path_);
+  log.Write(1, "robot2/" + beacon.channel, *beacon.bytes);
+  log.Write(2, "robot2/" + std::string(channels::kMap), record);
+  log.Close();
+  EXPECT_NE(
+      Refusal(path_).find("recorded by a version with protocol " + std::to_string(kProtocolVersion + 1)),
+      std::string::npos)
+      << Refusal(path_);
+}
+
+TEST_F(Recording, ASavedMapBeginsWithABeacon) {
+  TinyMapper mapper;
+  mapper.Step();
+  SessionStart start;
+  start.session = kSession;
+  start.camera = TestCamera();
+  start.software = "0.0.1";
+  SaveMap(path_, mapper.map(), start);
+  EventLogReader log(path_);
+  const std::optional<LogEvent> first = log.Next();
+  ASSERT_TRUE(first.has_value());
+  const std::optional<head_t> head = DecodeHead(first->channel, first->bytes);
+  ASSERT_TRUE(head.has_value());
+  EXPECT_EQ(head->protocol_version, kProtocolVersion);
+  EXPECT_EQ(LoadMap(path_).session.software, kVersion) << "who saves it has written it";
+}
+
+TEST_F(Recording, AGroupOfRecordsIsAppliedAsOneOrNotAtAll) {
+  TinyMapper mapper;
+  MapDelta whole = mapper.Step();
+  MapDelta keyframes = whole, landmarks = whole;
+  keyframes.group = {9, 0, 2};
+  keyframes.landmarks.clear(), keyframes.observations.clear();
+  landmarks.group = {9, 1, 2};
+  landmarks.keyframes.clear();
+  for (const bool is_whole : {true, false}) {
+    EventLogWriter log(path_);
+    WriteSession(log);
+    WriteRecord(log, 1, keyframes, Header(StreamId::kMap, 1));
+    if (is_whole) WriteRecord(log, 2, landmarks, Header(StreamId::kMap, 2));
+    log.Close();
+    const LogIndex index(path_);
+    const RebuiltMap rebuilt = RebuildMap(index, index.Session());
+    EXPECT_EQ(rebuilt.missing, is_whole ? 0 : 1);
+    EXPECT_EQ(rebuilt.map.keyframes().size(), is_whole ? 1U : 0U);
+    if (is_whole) {
+      EXPECT_EQ(Content(rebuilt.map), Content(mapper.map()));
+    }
+  }
 }
 
 }  // namespace

@@ -257,10 +257,11 @@ void FinalPoses::SmoothNextMap(const Map& map, const std::function<void()>& betw
                                 [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
   SmoothingOptions options;
   options.between = between;
-  const auto known = noise_.find(begin->pose.map_id);
+  const MapId map_id = begin->pose.map_id.value_or(0);  // a final pose lies in a map
+  const auto known = noise_.find(map_id);
   if (known != noise_.end()) options.noise = known->second;
   const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, {begin, end}), options);
-  if (smoothed.noise) noise_.emplace(begin->pose.map_id, *smoothed.noise);
+  if (smoothed.noise) noise_.emplace(map_id, *smoothed.noise);
   for (auto it = begin; it != end; ++it) {
     it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
   }

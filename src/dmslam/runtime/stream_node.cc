@@ -110,6 +110,21 @@ void StreamNode::CountMalformed(const std::string& channel, const std::string& r
   spdlog::warn("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
 }
 
+std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamReader* reader) {
+  if (record.begins_anew()) map_groups_.Clear();
+  std::string reason;
+  std::optional<MapDelta> delta = wire::Decode<MapDelta>(*record.bytes, &reason);
+  if (delta) {
+    delta = map_groups_.Add(std::move(*delta));
+    reason = map_groups_.fault();
+  }
+  if (reason.empty()) return delta;
+  CountMalformed(record.channel, reason + "; asks for a snapshot of the map");
+  map_groups_.Clear();
+  reader->Forget();
+  return std::nullopt;
+}
+
 std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
                                                      const std::vector<std::string>& record_channels,
                                                      Version start) {

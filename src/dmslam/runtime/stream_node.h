@@ -14,6 +14,7 @@
 #include "dmslam/runtime/node.h"
 #include "dmslam/settings/settings.h"
 #include "dmslam/wire/codec.h"
+#include "dmslam/wire/record_groups.h"
 
 namespace dmslam {
 
@@ -110,6 +111,13 @@ class StreamNode : public Node {
     if (!message) CountMalformed(wire::Info<Message>().channel, reason);
     return message;
   }
+  /// The change that is complete with a record of the map stream; none while its group is not whole. None,
+  /// too, where the record cannot be read or breaks its group: that is counted and named, and the reader asks
+  /// for a snapshot, so that nothing is applied to a replica that lacks it, and nothing acknowledged.
+  std::optional<MapDelta> ReadMapRecord(const Record& record, StreamReader* reader);
+  /// The version that a replica made of what ReadMapRecord returned holds.
+  Version MapHeld(const StreamReader& reader) const { return map_groups_.open() ? Version() : reader.held(); }
+  void CountMalformed(const std::string& channel, const std::string& reason);
   /// Counts messages of other sessions; the first is logged.
   bool IsForeign(uint32_t session);
   /// The same for what the player says: a recorded session that was accepted is ours.
@@ -140,7 +148,6 @@ class StreamNode : public Node {
   void OpenWriter();
   void WatchWriter();
   void WatchReaders();
-  void CountMalformed(const std::string& channel, const std::string& reason);
 
   bool begun_ = false;
   std::optional<Bytes> camera_message_;  ///< as the player sent it
@@ -155,6 +162,7 @@ class StreamNode : public Node {
   int64_t started_ns_ = 0;
   int64_t received_ = 0, received_bytes_ = 0, dropped_foreign_ = 0, dropped_malformed_ = 0;
   std::vector<std::string> logged_;
+  wire::RecordGroups<MapDelta> map_groups_;
   struct Watched {
     const StreamReader* reader;
     std::string problem;  ///< last one logged

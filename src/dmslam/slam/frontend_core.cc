@@ -49,10 +49,9 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   late_.OnMapChanged(map_);
   tracker_.OnMapChanged(map_);
-  gate_.OnSettled(delta.progress.settled, !late_.IsGrowing());
-  const bool at_the_end = delta.event == MapEvent::kGloballyAdjusted && !delta.about.valid();
+  if (delta.progress.settled) gate_.OnSettled(*delta.progress.settled, !late_.IsGrowing());
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
-  if (at_the_end) last_poses_.Begin(map_, delta.map_id);
+  if (delta.event == MapEvent::kMapAdjusted) last_poses_.Begin(map_, delta.map_id);
 }
 
 void FrontendCore::Resume() {
@@ -72,7 +71,7 @@ void FrontendCore::ForgetMap() {
 FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
-  if (map_id_) output.Add(MapReset{*map_id_, drop, reason});
+  if (map_id_) output.Add(MapReset{*map_id_, drop, reason, frame_.stamp_ns});
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
   if (drop && options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(map_id_.value_or(0)));
@@ -237,7 +236,7 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
   told.frame_index = frame_.index;
   told.stamp_ns = frame_.stamp_ns;
   told.state = state;
-  told.map_id = map_id_.value_or(0);
+  told.map_id = map_id_;
   told.num_features = static_cast<uint16_t>(frame_.features->size());
   told.num_static = static_cast<uint16_t>(report.num_static);
   told.num_moving = static_cast<uint16_t>(report.num_moving);
@@ -268,7 +267,7 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId refere
 void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output) {
   if (++frames_since_evidence_ >= options_.evidence_every_frames || keyframe) {
     frames_since_evidence_ = 0;
-    FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_.value_or(0));
+    FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
     if (!evidence.items.empty() && !localize_only_) output->Add(std::move(evidence));
   }
   if (keyframe) output->Add(ProposeKeyframe(pose));

@@ -51,7 +51,7 @@ class Tracker {
   /// Stamp of the frame tracked last.
   int64_t last_tracked_ns() const { return motion_.last_stamp_ns(); }
   /// What frames said of landmarks since the last call.
-  FrameEvidence TakeEvidence(int64_t stamp_ns, MapId map_id) {
+  FrameEvidence TakeEvidence(int64_t stamp_ns, std::optional<MapId> map_id) {
     return search_.judge().TakeEvidence(stamp_ns, map_id);
   }
   /// For frames beside the stream, when it has ended.

@@ -35,8 +35,11 @@ struct LandmarkId {
   auto operator<=>(const LandmarkId&) const = default;
 };
 
-/// Which map: after a reset there may be several. Zero is no map.
+/// Which map, from 1: after a reset there may be several. Where there may be none it is a std::optional.
 using MapId = uint32_t;
+
+/// Which camera of a session, from 0.
+using CameraId = uint32_t;
 
 }  // namespace dmslam
 

@@ -19,8 +19,10 @@ inline constexpr char kKeyframe[] = "DMSLAM_FRONTEND_KEYFRAME";
 inline constexpr char kFramePose[] = "DMSLAM_FRONTEND_FRAME_POSE";
 inline constexpr char kFrameEvidence[] = "DMSLAM_FRONTEND_EVIDENCE";
 inline constexpr char kMapReset[] = "DMSLAM_FRONTEND_RESET";
+inline constexpr char kAdjustRequest[] = "DMSLAM_FRONTEND_ADJUST_REQUEST";
 // Not records: what may be lost.
 inline constexpr char kFrameDone[] = "DMSLAM_FRONTEND_FRAME_DONE";
+inline constexpr char kSequenceDone[] = "DMSLAM_FRONTEND_SEQUENCE_DONE";
 inline constexpr char kPoseView[] = "DMSLAM_FRONTEND_POSE";
 inline constexpr char kFeatureView[] = "DMSLAM_FRONTEND_FEATURES";
 inline constexpr char kFrameTrace[] = "DMSLAM_FRONTEND_TRACE";

@@ -1,5 +1,6 @@
 #include "dmslam/wire/check.h"
 
+#include "dmslam/map/proposals.h"
 #include "dmslam/wire/codec.h"
 
 namespace dmslam::wire {
@@ -37,6 +38,30 @@ void Checker::Features(const FeatureSet& features) {
   Require(features.size() <= kMaxFeatures, "more features than an index can name");
   for (const Keypoint& keypoint : features.keypoints)
     Require(keypoint.octave < kMaxPyramidLevels, "octave out of range");
+  const auto none_or_all = [&](const auto& list) { return list.empty() || list.size() == features.size(); };
+  Require(none_or_all(features.depths_m) && features.depths_m.size() == features.depth_sigmas_m.size(),
+          "as many depths and sigmas of depths as keypoints are needed, or none");
+  Require(none_or_all(features.sigmas_px), "as many sigmas as keypoints are needed, or none");
+  for (const std::vector<float>* list : {&features.depths_m, &features.depth_sigmas_m}) {
+    for (const float value : *list)
+      Require(std::isfinite(value) && (value >= 0 || value == -1), "depth of a keypoint below zero");
+  }
+  for (const float sigma : features.sigmas_px)
+    Require(std::isfinite(sigma) && sigma > 0, "sigma of a keypoint not above zero");
+}
+
+void Checker::Group(const RecordGroup& group) {
+  Require(group.count >= 1 && group.count <= kMaxGroup && group.index < group.count,
+          "place in a group of records out of range");
+  Require(group.alone() == (group.id == 0), "a group of records without an id, or an id without a group");
+}
+
+void Checker::Covariance(const std::vector<double>& covariance) {
+  Require(covariance.empty() || covariance.size() == kPoseCovarianceSize, "a covariance that is not 6 by 6");
+  for (const double value : covariance) Finite(value, "a covariance is not finite");
+  size_t diagonal = 0;
+  for (size_t row = 6; row > 0 && diagonal < covariance.size(); diagonal += row--)
+    Require(covariance[diagonal] >= 0, "a variance below zero");
 }
 
 namespace {

@@ -2,15 +2,22 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "dmslam/camera/camera.h"
 #include "dmslam/features/types.h"
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/map/record_group.h"
 #include "dmslam/util/ids.h"
 
 namespace dmslam::wire {
+
+inline constexpr CameraId kMaxCameraId = 255;
+/// Most records of a group.
+inline constexpr uint32_t kMaxGroup = 1 << 16;
 
 /// Collects what is wrong with a message; the first complaint stays.
 class Checker {
@@ -27,8 +34,14 @@ class Checker {
   void UnitQuaternion(const Eigen::Quaterniond& q, const char* what);
   void Pose(const Rigid3d& T, const char* what);
   void Scale(double scale, const char* what);
-  void Stamp(int64_t stamp_ns) { Require(stamp_ns >= 0, "negative stamp"); }
+  void Stamp(std::optional<int64_t> stamp_ns) { Require(!stamp_ns || *stamp_ns >= 0, "negative stamp"); }
   void Session(uint32_t session) { Require(session >= 1, "no session"); }
+  void CameraNumber(CameraId camera_id) {
+    Require(camera_id <= kMaxCameraId, "number of the camera out of range");
+  }
+  void Group(const RecordGroup& group);
+  /// The upper triangle of a covariance, or nothing.
+  void Covariance(const std::vector<double>& covariance);
   void Share(double share) { Require(share >= 0 && share <= 1, "a share outside 0..1"); }
   /// An id that some session, or some mapper, can have made; `Optional`: or none.
   void Id(KeyframeId id, const char* what) { Require(id.session() >= 1, what); }
@@ -36,6 +49,10 @@ class Checker {
   template <typename AnyId>
   void OptionalId(AnyId id, const char* what) {
     if (id.valid()) Id(id, what);
+  }
+  template <typename AnyId>
+  void OptionalId(const std::optional<AnyId>& id, const char* what) {
+    if (id) Id(*id, what);
   }
   void CameraModel(const Camera& camera);
   void Features(const FeatureSet& features);

@@ -1,6 +1,7 @@
+#include <zlib.h>
+
 #include <array>
 
-#include "dmslam/util/crc32c.h"
 #include "dmslam/wire/codec_impl.h"
 
 namespace dmslam::wire {
@@ -13,7 +14,10 @@ constexpr size_t kBytes = 4;
 
 uint32_t ChecksumOf(std::span<const uint8_t> bytes) {
   constexpr std::array<uint8_t, kBytes> kZero{};
-  return Crc32c(bytes.subspan(kOffset + kBytes), Crc32c(kZero, Crc32c(bytes.first(kOffset))));
+  uLong checksum = crc32_z(0, bytes.data(), kOffset);
+  checksum = crc32_z(checksum, kZero.data(), kBytes);
+  const std::span<const uint8_t> rest = bytes.subspan(kOffset + kBytes);
+  return static_cast<uint32_t>(crc32_z(checksum, rest.data(), rest.size()));
 }
 
 void PutChecksum(std::span<uint8_t> bytes) {
@@ -25,7 +29,7 @@ void PutChecksum(std::span<uint8_t> bytes) {
 bool ChecksumFits(std::span<const uint8_t> bytes) {
   uint32_t said = 0;
   for (size_t i = 0; i < kBytes; ++i) said = (said << 8) | bytes[kOffset + i];
-  return said == 0 || said == ChecksumOf(bytes);
+  return said == ChecksumOf(bytes);
 }
 
 }  // namespace dmslam::wire

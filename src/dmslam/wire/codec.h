@@ -18,9 +18,9 @@ namespace dmslam::wire {
 
 /// All that travels between processes, except the protocol's own messages.
 using Messages =
-    std::tuple<CameraInfo, Frame, EndOfSequence, GroundTruthPose, PlayerStatus,                 //
-               SessionStart, InitialMap, KeyframeProposal, FramePose, FrameEvidence, MapReset,  //
-               FrameDone, PoseView, FeatureView, FrameTrace, FrontendStatus,                    //
+    std::tuple<CameraInfo, Frame, EndOfSequence, GroundTruthPose, PlayerStatus,                            //
+               SessionStart, InitialMap, KeyframeProposal, FramePose, FrameEvidence, MapReset,             //
+               AdjustRequest, FrameDone, SequenceDone, PoseView, FeatureView, FrameTrace, FrontendStatus,  //
                MapDelta, MapperStatus, LoopAnswer, LoopcloserStatus>;
 
 /// Where a message travels and what it is there.
@@ -45,10 +45,10 @@ template <typename Message>
 std::vector<uint8_t> Encode(const Message& message);
 
 /// Decodes one of `Messages`, for bytes from anywhere. Length, counts and strings are checked before the
-/// generated decoder runs, then it must consume exactly the bytes there are, then every value must make
-/// sense: finite numbers, unit quaternions, ids that can be, indices in range, order where it is promised.
-/// None otherwise; `reason`, if not null, says why. The round trip is exact, doubles bit for bit (of a
-/// record's header nothing is kept).
+/// generated decoder runs, then a checksum of its own must fit, where it has one, then it must consume
+/// exactly the bytes there are, then every value must make sense: finite numbers, unit quaternions, ids that
+/// can be, indices in range, order where it is promised. None otherwise; `reason`, if not null, says why. The
+/// round trip is exact, doubles bit for bit (of a record's header nothing is kept).
 template <typename Message>
 std::optional<Message> Decode(std::span<const uint8_t> bytes, std::string* reason = nullptr);
 

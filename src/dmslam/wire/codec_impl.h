@@ -4,6 +4,7 @@
 #include <concepts>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -72,12 +73,28 @@ class Put {
   }
   void operator()(const KeyframeId& id, int64_t& wire) { wire = static_cast<int64_t>(id.value); }
   void operator()(const LandmarkId& id, int64_t& wire) { wire = static_cast<int64_t>(id.value); }
+  /// Ids and numbers that count from 1: absent is zero.
+  template <typename Value, std::integral WireValue>
+  void operator()(const std::optional<Value>& value, WireValue& wire) {
+    wire = 0;
+    if (!value) return;
+    (*this)(*value, wire);
+    check_.Require(wire != 0, "an id that is zero");
+  }
+  /// Stamps and indices: absent is -1.
+  template <typename Value, std::integral WireValue>
+  void OrMinusOne(const std::optional<Value>& value, WireValue& wire) {
+    wire = -1;
+    if (!value) return;
+    (*this)(*value, wire);
+    check_.Require(wire != -1, "an index that is -1");
+  }
   void operator()(const std::string& text, std::string& wire) { wire = CleanText(text); }
   void operator()(const Rigid3d& T, double (&rotation)[4], double (&translation)[3]) {
     for (int i = 0; i < 4; ++i) rotation[i] = T.rotation.coeffs()[i];
     for (int i = 0; i < 3; ++i) translation[i] = T.translation[i];
   }
-  void Utime(int64_t stamp_ns, int64_t& wire) { wire = UtimeOf(stamp_ns); }
+  void Utime(std::optional<int64_t> stamp_ns, int64_t& wire) { wire = UtimeOf(stamp_ns.value_or(0)); }
 
   template <typename Item>
   void Count(const std::vector<Item>& items, int32_t& wire,
@@ -138,6 +155,16 @@ class Get {
   }
   void operator()(KeyframeId& id, const int64_t& wire) { id.value = static_cast<uint64_t>(wire); }
   void operator()(LandmarkId& id, const int64_t& wire) { id.value = static_cast<uint64_t>(wire); }
+  template <typename Value, std::integral WireValue>
+  void operator()(std::optional<Value>& value, const WireValue& wire) {
+    value.reset();
+    if (wire != 0) (*this)(value.emplace(), wire);
+  }
+  template <typename Value, std::integral WireValue>
+  void OrMinusOne(std::optional<Value>& value, const WireValue& wire) {
+    value.reset();
+    if (wire != -1) (*this)(value.emplace(), wire);
+  }
   void operator()(std::string& text, const std::string& wire) {
     check_.Require(IsCleanText(wire), "text that is too long or not clean");
     text = wire;
@@ -146,7 +173,7 @@ class Get {
     for (int i = 0; i < 4; ++i) T.rotation.coeffs()[i] = rotation[i];
     for (int i = 0; i < 3; ++i) T.translation[i] = translation[i];
   }
-  void Utime(int64_t, const int64_t&) {}
+  void Utime(std::optional<int64_t>, const int64_t&) {}
 
   template <typename Item>
   void Count(std::vector<Item>& items, const int32_t& wire,
@@ -188,15 +215,22 @@ MessageInfo Info() {
   return {Codec<Message>::kChannel, Wire::getTypeName(), kIsRecord, Wire::getHash()};
 }
 
+/// Where a record stands in its group.
+void GroupFields(auto& s, auto& group, auto& w) {
+  s(group.id, w.group_id);
+  s(group.index, w.group_index);
+  s(group.count, w.group_count);
+}
+
 /// Messages outside the streams carry a checksum of their own behind `utime`; a record's is in its header.
 template <typename Wire>
 concept HasChecksum = requires(Wire wire) {
-  wire.crc32c;
+  wire.checksum;
 };
-/// Of a whole encoded message, its own four bytes taken as zero.
+/// CRC-32, which every language's own library has, of a whole encoded message, its own four bytes taken as
+/// zero.
 uint32_t ChecksumOf(std::span<const uint8_t> bytes);
 void PutChecksum(std::span<uint8_t> bytes);
-/// Zero stands for a sender that does not check.
 bool ChecksumFits(std::span<const uint8_t> bytes);
 
 template <typename Message>
@@ -216,6 +250,9 @@ std::vector<uint8_t> Encode(const Message& message) {
   return bytes;
 }
 
+/// What to say of bytes with the fingerprint of another type.
+std::string OtherTypeFault(int64_t fingerprint);
+
 /// What is wrong with the layout of some bytes that should be a `Wire`; empty: nothing.
 template <typename Wire>
 std::string LayoutFault(std::span<const uint8_t> bytes) {
@@ -223,7 +260,8 @@ std::string LayoutFault(std::span<const uint8_t> bytes) {
   if (bytes.size() > kMaxMessageBytes) return "longer than any message";
   uint64_t fingerprint = 0;
   for (size_t i = 0; i < 8; ++i) fingerprint = (fingerprint << 8) | bytes[i];
-  if (fingerprint != static_cast<uint64_t>(Wire::getHash())) return "another type, or another version of it";
+  if (fingerprint != static_cast<uint64_t>(Wire::getHash()))
+    return OtherTypeFault(static_cast<int64_t>(fingerprint));
   const Schema& schema = Schema::OfProject();
   return schema.FindFault(*schema.Find(Wire::getTypeName()), bytes.subspan(8));
 }

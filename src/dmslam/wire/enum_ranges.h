@@ -11,7 +11,7 @@ struct EnumRange<PlaybackMode> {
 };
 template <>
 struct EnumRange<TrackingState> {
-  static constexpr auto kFirst = TrackingState::kNotInitialized, kLast = TrackingState::kLocalizedLater;
+  static constexpr auto kFirst = TrackingState::kNotInitialized, kLast = TrackingState::kRotationOnly;
   static constexpr const char* kName = "unknown tracking state";
 };
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "dmslam/adjust_request_t.hpp"
 #include "dmslam/features_t.hpp"
 #include "dmslam/frame_done_t.hpp"
 #include "dmslam/frame_evidence_t.hpp"
@@ -9,6 +10,7 @@
 #include "dmslam/keyframe_t.hpp"
 #include "dmslam/map_reset_t.hpp"
 #include "dmslam/pose_t.hpp"
+#include "dmslam/sequence_done_t.hpp"
 #include "dmslam/session_t.hpp"
 #include "dmslam/wire/camera_fields.h"
 #include "dmslam/wire/enum_ranges.h"
@@ -23,6 +25,7 @@ struct Codec<SessionStart> {
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.first_stamp_ns, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.seed, w.seed);
     s(m.configuration_hash, w.configuration_hash);
     s(m.vocabulary_checksum, w.vocabulary_checksum);
@@ -31,11 +34,14 @@ struct Codec<SessionStart> {
     s(m.pyramid.levels, w.pyramid_levels);
     s(m.pyramid.scale_factor, w.pyramid_scale_factor);
     CameraFields(s, m.camera, w);
+    s(m.protocol_version, w.protocol_version);
+    s(m.software, w.software);
     s(m.sequence, w.sequence);
     s(m.profile, w.profile);
   }
   static void Validate(const SessionStart& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.first_stamp_ns);
     check.CameraModel(m.camera);
     check.Require(m.pyramid.levels >= 1 && m.pyramid.levels <= kMaxPyramidLevels,
@@ -52,6 +58,7 @@ void KeyframeFields(auto& s, auto& m, auto& w) {
   s(m.reference, w.reference_id);
   s(m.stamp_ns, w.stamp_ns);
   s(m.map_id, w.map_id);
+  s(m.camera_id, w.camera_id);
   s(m.T_cam_reference, w.rotation_cam_reference, w.translation_cam_reference);
   s(m.reference_scale, w.reference_scale);
   auto& keypoints = m.features.keypoints;
@@ -62,6 +69,12 @@ void KeyframeFields(auto& s, auto& m, auto& w) {
   s.Column(keypoints, w.octave, &Keypoint::octave);
   s.Column(keypoints, w.angle, &Keypoint::angle);
   s.Descriptors(m.features.descriptors, w.num_descriptor_bytes, w.descriptors, std::identity());
+  s.Count(m.features.depths_m, w.num_depths, kMaxFeatures);
+  s.Count(m.features.depth_sigmas_m, w.num_depths, kMaxFeatures);
+  s.Column(m.features.depths_m, w.depth_m, std::identity());
+  s.Column(m.features.depth_sigmas_m, w.depth_sigma_m, std::identity());
+  s.Count(m.features.sigmas_px, w.num_sigmas, kMaxFeatures);
+  s.Column(m.features.sigmas_px, w.sigma_px, std::identity());
   s.Count(m.matches, w.num_matches, kMaxFeatures);
   s.Column(m.matches, w.match_feature, &KeyframeProposal::Match::feature);
   s.Column(m.matches, w.match_landmark, &KeyframeProposal::Match::landmark);
@@ -73,6 +86,7 @@ void ValidateKeyframe(const KeyframeProposal& m, Checker& check) {
   check.Id(m.id, "no keyframe id");
   check.OptionalId(m.reference, "impossible id of the reference keyframe");
   check.Require(m.map_id >= 1, "no map id");
+  check.CameraNumber(m.camera_id);
   check.Stamp(m.stamp_ns);
   check.Pose(m.T_cam_reference, "no pose");
   check.Scale(m.reference_scale, "scale of the reference out of range");
@@ -152,6 +166,12 @@ struct Codec<FramePose> {
     s(m.num_moving, w.num_moving);
     s(m.num_unknown, w.num_unknown);
     s(m.moving_image_share, w.moving_image_share);
+    s(m.camera_id, w.camera_id);
+    s.Count(m.covariance, w.num_covariance, kPoseCovarianceSize);
+    s.Column(m.covariance, w.covariance, std::identity());
+    s.Count(m.step_covariance, w.num_step_covariance, kPoseCovarianceSize);
+    s.Column(m.step_covariance, w.step_covariance, std::identity());
+    s.OrMinusOne(m.step_from, w.step_from);
     s(m.reason, w.reason);
   }
   static void Validate(const FramePose& m, Checker& check) {
@@ -161,6 +181,11 @@ struct Codec<FramePose> {
     check.Pose(m.T_cam_world, "no pose in the map");
     check.Scale(m.reference_scale, "scale of the reference out of range");
     check.Share(static_cast<double>(m.moving_image_share));
+    check.CameraNumber(m.camera_id);
+    check.Covariance(m.covariance);
+    check.Covariance(m.step_covariance);
+    check.Require(m.step_covariance.empty() || m.step_from.has_value(),
+                  "a step's covariance without the frame that it starts from");
   }
 };
 
@@ -173,21 +198,20 @@ struct Codec<FrameEvidence> {
     using Item = FrameEvidence::Item;
     s.Utime(m.stamp_ns, w.utime);
     s(m.map_id, w.map_id);
+    s(m.camera_id, w.camera_id);
     s(m.stamp_ns, w.stamp_ns);
     s.Count(m.items, w.num_landmarks);
     s.Column(m.items, w.landmark, &Item::landmark);
     s.Column(m.items, w.visible, &Item::visible);
     s.Column(m.items, w.found, &Item::found);
     s.Column(m.items, w.moved, &Item::moved);
-    s.Column(m.items, w.chi2_sum, &Item::chi2_sum);
   }
   static void Validate(const FrameEvidence& m, Checker& check) {
     check.Stamp(m.stamp_ns);
+    check.CameraNumber(m.camera_id);
     for (size_t i = 0; i < m.items.size(); ++i) {
       check.Id(m.items[i].landmark, "impossible landmark");
       check.Require(i == 0 || m.items[i - 1].landmark < m.items[i].landmark, "landmarks are not ascending");
-      check.Require(std::isfinite(m.items[i].chi2_sum) && m.items[i].chi2_sum >= 0,
-                    "sum of squares below zero");
     }
   }
 };
@@ -199,12 +223,36 @@ struct Codec<MapReset> {
 
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.stamp_ns, w.utime);
-    s(m.stamp_ns, w.stamp_ns);
+    s.OrMinusOne(m.stamp_ns, w.stamp_ns);
     s(m.map_id, w.map_id);
+    s(m.camera_id, w.camera_id);
     s(m.drop, w.drop);
     s(m.reason, w.reason);
   }
-  static void Validate(const MapReset& m, Checker& check) { check.Stamp(m.stamp_ns); }
+  static void Validate(const MapReset& m, Checker& check) {
+    check.Require(m.map_id >= 1, "a reset of no map");
+    check.CameraNumber(m.camera_id);
+    check.Stamp(m.stamp_ns);
+  }
+};
+
+template <>
+struct Codec<AdjustRequest> {
+  using Wire = adjust_request_t;
+  static constexpr const char* kChannel = channels::kAdjustRequest;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.newest_stamp_ns, w.utime);
+    s.OrMinusOne(m.newest_stamp_ns, w.newest_stamp_ns);
+    s(m.request, w.request);
+    s(m.camera_id, w.camera_id);
+    s(m.reason, w.reason);
+  }
+  static void Validate(const AdjustRequest& m, Checker& check) {
+    check.Require(m.request >= 1, "a request without a number");
+    check.CameraNumber(m.camera_id);
+    check.Stamp(m.newest_stamp_ns);
+  }
 };
 
 template <>
@@ -215,12 +263,33 @@ struct Codec<FrameDone> {
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.stamp_ns, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.frame_index, w.frame_index);
     s(m.stamp_ns, w.done_stamp_ns);
   }
   static void Validate(const FrameDone& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
+  }
+};
+
+template <>
+struct Codec<SequenceDone> {
+  using Wire = sequence_done_t;
+  static constexpr const char* kChannel = channels::kSequenceDone;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s(m.utime, w.utime);
+    s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
+    s(m.frames_processed, w.frames_processed);
+    s(m.frames_skipped, w.frames_skipped);
+  }
+  static void Validate(const SequenceDone& m, Checker& check) {
+    check.Session(m.session);
+    check.CameraNumber(m.camera_id);
+    check.Require(m.frames_processed >= 0 && m.frames_skipped >= 0, "negative number of frames");
   }
 };
 
@@ -232,6 +301,7 @@ struct Codec<PoseView> {
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.stamp_ns, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.stamp_ns, w.stamp_ns);
     s(m.frame_index, w.frame_index);
     s(m.state, w.state);
@@ -253,6 +323,7 @@ struct Codec<PoseView> {
   }
   static void Validate(const PoseView& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
     check.Pose(m.T_world_cam, "no pose");
     check.Require(m.inliers >= 0 && m.moving >= 0 && m.unknown >= 0, "negative number of features");
@@ -277,6 +348,7 @@ struct Codec<FeatureView> {
     using Item = FeatureView::Item;
     s.Utime(m.stamp_ns, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.frame_index, w.frame_index);
     s(m.stamp_ns, w.stamp_ns);
     s.Count(m.items, w.num_features, kMaxFeatures);
@@ -286,6 +358,7 @@ struct Codec<FeatureView> {
   }
   static void Validate(const FeatureView& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
   }
 };
@@ -298,6 +371,7 @@ struct Codec<FrameTrace> {
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.stamp_ns, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.frame_index, w.frame_index);
     s(m.stamp_ns, w.stamp_ns);
     s(m.capture_us, w.capture_us);
@@ -311,6 +385,7 @@ struct Codec<FrameTrace> {
   }
   static void Validate(const FrameTrace& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
   }
 };
@@ -321,7 +396,9 @@ DMSLAM_WIRE_MESSAGE(InitialMap);
 DMSLAM_WIRE_MESSAGE(FramePose);
 DMSLAM_WIRE_MESSAGE(FrameEvidence);
 DMSLAM_WIRE_MESSAGE(MapReset);
+DMSLAM_WIRE_MESSAGE(AdjustRequest);
 DMSLAM_WIRE_MESSAGE(FrameDone);
+DMSLAM_WIRE_MESSAGE(SequenceDone);
 DMSLAM_WIRE_MESSAGE(PoseView);
 DMSLAM_WIRE_MESSAGE(FeatureView);
 DMSLAM_WIRE_MESSAGE(FrameTrace);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "dmslam/features/types.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/util/version.h"
 #include "dmslam/wire/player_messages.h"
 
 namespace dmslam {
@@ -17,23 +19,33 @@ struct SessionStart {
   uint32_t session = 0;
   int64_t first_stamp_ns = 0;
   uint64_t seed = 0;
-  uint64_t configuration_hash = 0;   ///< of all settings that change results
-  uint64_t vocabulary_checksum = 0;  ///< 0: none
+  uint64_t configuration_hash = 0;              ///< of all settings that change results
+  std::optional<uint64_t> vocabulary_checksum;  ///< none: there is no vocabulary
   PlaybackMode mode = PlaybackMode::kRealtime;
   Camera camera;
   Pyramid pyramid;
   std::string sequence;
   std::string profile;
+  int32_t protocol_version = kProtocolVersion;  ///< of its writer
+  std::string software = kVersion;              ///< of its writer
+  CameraId camera_id = 0;
 };
 
-/// The frontend is done with a frame and with all it has to wait for (lock-step).
+/// The answer to a frame: the frontend is done with it and with all it has to wait for (lock-step).
 struct FrameDone {
-  /// In place of a frame's index: the end of the sequence was heard, and all is told.
-  static constexpr uint32_t kEndOfSequence = 0xffffffff;
-
   uint32_t session = 0;
   uint32_t frame_index = 0;
   int64_t stamp_ns = 0;
+  CameraId camera_id = 0;
+};
+
+/// The answer to EndOfSequence: the end was heard, and all is told.
+struct SequenceDone {
+  int64_t utime = 0;  ///< wall time at which it was sent [us]
+  uint32_t session = 0;
+  CameraId camera_id = 0;
+  int64_t frames_processed = 0;
+  int64_t frames_skipped = 0;  ///< a newer one was there already
 };
 
 /// A frame's pose laid out to be watched and plotted.
@@ -42,7 +54,7 @@ struct PoseView {
   uint32_t frame_index = 0;
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::kNotInitialized;
-  MapId map_id = 0;
+  std::optional<MapId> map_id;
   bool has_pose = false;
   Rigid3d T_world_cam;
   int32_t inliers = 0;
@@ -52,6 +64,7 @@ struct PoseView {
   double latency_ms = 0;  ///< from publication of the image to this pose
   double error_m =
       -1;  ///< distance to the ground truth after alignment of what was tracked so far; -1: not known
+  CameraId camera_id = 0;
 };
 
 /// The features of a frame, for pictures.
@@ -66,6 +79,7 @@ struct FeatureView {
   uint32_t frame_index = 0;
   int64_t stamp_ns = 0;
   std::vector<Item> items;
+  CameraId camera_id = 0;
 };
 
 /// When a frame passed each step; wall times [us].
@@ -81,6 +95,7 @@ struct FrameTrace {
   int64_t extracted_us = 0;  ///< features extracted
   int64_t tracked_us = 0;    ///< pose known
   int64_t published_us = 0;  ///< pose published
+  CameraId camera_id = 0;
 };
 
 }  // namespace dmslam

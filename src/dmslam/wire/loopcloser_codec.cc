@@ -44,7 +44,8 @@ struct Codec<LoopAnswer> {
     s.Utime(m.stamp_ns, w.utime);
     s(m.kind, w.kind);
     s(m.keyframe, w.keyframe);
-    s(m.stamp_ns, w.stamp_ns);
+    s.OrMinusOne(m.stamp_ns, w.stamp_ns);
+    GroupFields(s, m.group, w);
     s(m.base_version, w.base_version);
     s(m.correction_id, w.correction_id);
     s(m.matched, w.matched);
@@ -63,6 +64,11 @@ struct Codec<LoopAnswer> {
   static void Validate(const LoopAnswer& m, Checker& check) {
     check.Id(m.keyframe, "no keyframe");
     check.Stamp(m.stamp_ns);
+    check.Group(m.group);
+    check.Require(m.correction_id.has_value() == (m.kind != LoopAnswer::Kind::kNone),
+                  "a correction without an id, or an id without a correction");
+    check.Require(m.matched.has_value() == (m.kind == LoopAnswer::Kind::kLoop),
+                  "a loop has two ends, and nothing else has");
     check.OptionalId(m.matched, "impossible id of the matched keyframe");
     for (const LoopAnswer::KeyframeCorrection& correction : m.corrections) {
       check.Id(correction.keyframe, "a correction of an impossible keyframe");

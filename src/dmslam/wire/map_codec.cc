@@ -8,7 +8,7 @@ namespace dmslam::wire {
 
 template <>
 struct EnumRange<MapEvent> {
-  static constexpr auto kFirst = MapEvent::kKeyframeInserted, kLast = MapEvent::kEnded;
+  static constexpr auto kFirst = MapEvent::kKeyframeInserted, kLast = MapEvent::kFirstMapRefused;
   static constexpr const char* kName = "unknown event of the map";
 };
 
@@ -19,6 +19,8 @@ struct Flat {
   struct KeyframeLists {
     int32_t num_loop_edges = 0;
     int32_t num_features = -1;  ///< -1: its features do not travel
+    int32_t num_depths = 0;
+    int32_t num_sigmas = 0;
   };
   struct LandmarkKeyframes {  ///< indices into landmark_keyframes
     int32_t reference = 0;
@@ -41,12 +43,18 @@ void Append(auto& all, const auto& more) { all.insert(all.end(), more.begin(), m
 Flat Flatten(const MapDelta& m) {
   Flat flat;
   for (const KeyframeState& keyframe : m.keyframes) {
-    flat.keyframes.push_back({static_cast<int32_t>(keyframe.loop_edges.size()),
-                              keyframe.has_features ? static_cast<int32_t>(keyframe.features.size()) : -1});
+    Flat::KeyframeLists& lists = flat.keyframes.emplace_back();
+    lists.num_loop_edges = static_cast<int32_t>(keyframe.loop_edges.size());
     Append(flat.loop_edges, keyframe.loop_edges);
     if (!keyframe.has_features) continue;
+    lists.num_features = static_cast<int32_t>(keyframe.features.size());
+    lists.num_depths = static_cast<int32_t>(keyframe.features.depths_m.size());
+    lists.num_sigmas = static_cast<int32_t>(keyframe.features.sigmas_px.size());
     Append(flat.features.keypoints, keyframe.features.keypoints);
     Append(flat.features.descriptors, keyframe.features.descriptors);
+    Append(flat.features.depths_m, keyframe.features.depths_m);
+    Append(flat.features.depth_sigmas_m, keyframe.features.depth_sigmas_m);
+    Append(flat.features.sigmas_px, keyframe.features.sigmas_px);
   }
   std::unordered_map<KeyframeId, int32_t> index_of;
   const auto index = [&](KeyframeId id) {
@@ -78,18 +86,23 @@ bool TakeNext(const std::vector<Item>& all, size_t& at, int32_t count, std::vect
 }
 
 void UnflattenKeyframes(const Flat& flat, MapDelta& m, Checker& check) {
-  size_t edge = 0, keypoint = 0, descriptor = 0;
+  size_t edge = 0, keypoint = 0, descriptor = 0, depth = 0, depth_sigma = 0, sigma = 0;
   bool sound = flat.keyframes.size() == m.keyframes.size();
   for (size_t i = 0; sound && i < m.keyframes.size(); ++i) {
-    const auto [num_loop_edges, num_features] = flat.keyframes[i];
+    const Flat::KeyframeLists& lists = flat.keyframes[i];
     KeyframeState& keyframe = m.keyframes[i];
-    keyframe.has_features = num_features != -1;
-    const int32_t features = keyframe.has_features ? num_features : 0;
-    sound = TakeNext(flat.loop_edges, edge, num_loop_edges, keyframe.loop_edges) &&
-            TakeNext(flat.features.keypoints, keypoint, features, keyframe.features.keypoints) &&
-            TakeNext(flat.features.descriptors, descriptor, features, keyframe.features.descriptors);
+    keyframe.has_features = lists.num_features != -1;
+    const int32_t num_features = keyframe.has_features ? lists.num_features : 0;
+    FeatureSet& features = keyframe.features;
+    sound = TakeNext(flat.loop_edges, edge, lists.num_loop_edges, keyframe.loop_edges) &&
+            TakeNext(flat.features.keypoints, keypoint, num_features, features.keypoints) &&
+            TakeNext(flat.features.descriptors, descriptor, num_features, features.descriptors) &&
+            TakeNext(flat.features.depths_m, depth, lists.num_depths, features.depths_m) &&
+            TakeNext(flat.features.depth_sigmas_m, depth_sigma, lists.num_depths, features.depth_sigmas_m) &&
+            TakeNext(flat.features.sigmas_px, sigma, lists.num_sigmas, features.sigmas_px);
   }
-  check.Require(sound && edge == flat.loop_edges.size() && keypoint == flat.features.size(),
+  check.Require(sound && edge == flat.loop_edges.size() && keypoint == flat.features.size() &&
+                    depth == flat.features.depths_m.size() && sigma == flat.features.sigmas_px.size(),
                 "keyframes' features or loop edges are not as many as counted");
 }
 
@@ -146,6 +159,7 @@ void KeyframeColumns(auto& s, auto& m, auto& flat, auto& w) {
   s.Count(flat.keyframes, w.num_keyframes);
   s.Column(m.keyframes, w.kf_id, &State::id);
   s.Column(m.keyframes, w.kf_map_id, &State::map_id);
+  s.Column(m.keyframes, w.kf_camera_id, &State::camera_id);
   s.Column(m.keyframes, w.kf_stamp_ns, &State::stamp_ns);
   PoseColumns<&State::T_cam_world>(s, m.keyframes, w.kf_qx, w.kf_qy, w.kf_qz, w.kf_qw, w.kf_tx, w.kf_ty,
                                    w.kf_tz);
@@ -153,6 +167,8 @@ void KeyframeColumns(auto& s, auto& m, auto& flat, auto& w) {
   s.Column(m.keyframes, w.kf_parent, &State::parent);
   s.Column(flat.keyframes, w.kf_num_loop_edges, &Flat::KeyframeLists::num_loop_edges);
   s.Column(flat.keyframes, w.kf_num_features, &Flat::KeyframeLists::num_features);
+  s.Column(flat.keyframes, w.kf_num_depths, &Flat::KeyframeLists::num_depths);
+  s.Column(flat.keyframes, w.kf_num_sigmas, &Flat::KeyframeLists::num_sigmas);
   s.Count(flat.loop_edges, w.num_loop_edges);
   s.Column(flat.loop_edges, w.loop_edge, std::identity());
   s.Count(flat.features.keypoints, w.num_features);
@@ -162,6 +178,12 @@ void KeyframeColumns(auto& s, auto& m, auto& flat, auto& w) {
   s.Column(flat.features.keypoints, w.octave, &Keypoint::octave);
   s.Column(flat.features.keypoints, w.angle, &Keypoint::angle);
   s.Descriptors(flat.features.descriptors, w.num_descriptor_bytes, w.descriptors, std::identity());
+  s.Count(flat.features.depths_m, w.num_depths);
+  s.Count(flat.features.depth_sigmas_m, w.num_depths);
+  s.Column(flat.features.depths_m, w.depth_m, std::identity());
+  s.Column(flat.features.depth_sigmas_m, w.depth_sigma_m, std::identity());
+  s.Count(flat.features.sigmas_px, w.num_sigmas);
+  s.Column(flat.features.sigmas_px, w.sigma_px, std::identity());
 }
 
 void PoseChangeColumns(auto& s, auto& m, auto& w) {
@@ -231,6 +253,15 @@ void ObservationColumns(auto& s, auto& m, auto& flat, auto& w) {
   s.Column(m.observations, w.observation_landmark, &ObservationState::landmark);
 }
 
+/// Positions of landmarks are told in the world. The other frame is reserved: read before it is written, they
+/// would be points at wrong places.
+template <typename Copy>
+void LandmarkFrame(Copy& s, auto& w) {
+  if constexpr (Copy::kToWire) w.landmark_frame = map_record_t::FRAME_WORLD;
+  s.check().Require(w.landmark_frame == map_record_t::FRAME_WORLD,
+                    "landmarks told in another frame than the world's, which this version does not read");
+}
+
 void TombstoneColumns(auto& s, auto& m, auto& w) {
   using Dead = KeyframeTombstone;
   auto& dead = m.keyframe_tombstones;
@@ -258,6 +289,7 @@ void ValidateKeyframes(const MapDelta& m, Checker& check) {
     check.Id(keyframe.id, "impossible id of a keyframe");
     check.OptionalId(keyframe.parent, "impossible id of a parent");
     check.Require(keyframe.map_id >= 1, "a keyframe without a map");
+    check.CameraNumber(keyframe.camera_id);
     check.Stamp(keyframe.stamp_ns);
     check.Pose(keyframe.T_cam_world, "a keyframe without a pose");
     check.Scale(keyframe.scale, "scale of a keyframe out of range");
@@ -312,6 +344,31 @@ void ValidateLandmarks(const MapDelta& m, Checker& check) {
   }
 }
 
+/// What a record is about follows from its event alone: nobody has to guess.
+void ValidateEvent(const MapDelta& m, Checker& check) {
+  switch (m.event) {
+    case MapEvent::kSettled:
+    case MapEvent::kMapped:
+    case MapEvent::kMapStarted:
+      check.Require(m.about.has_value(), "an event of a keyframe that names none");
+      break;
+    case MapEvent::kMapAdjusted:
+    case MapEvent::kMapDropped:
+    case MapEvent::kFirstMapRefused:
+      check.Require(m.map_id.has_value(), "an event of a map that names none");
+      break;
+    case MapEvent::kCorrected:
+    case MapEvent::kGloballyAdjusted:
+    case MapEvent::kRefused:
+      check.Require(m.correction_id.has_value(), "an answer to a correction that names none");
+      break;
+    default:
+      break;
+  }
+  check.Require(m.request.has_value() == (m.event == MapEvent::kRequestDone),
+                "an answer to a request that names none, or a request without its answer");
+}
+
 /// Observations by keyframes that come with their features must name one of them.
 void ValidateObservedFeatures(const MapDelta& m, Checker& check) {
   std::unordered_map<KeyframeId, size_t> num_features;
@@ -339,7 +396,10 @@ struct Codec<MapDelta> {
     s(m.event, w.event);
     s(m.map_id, w.map_id);
     s(m.about, w.about);
-    s(m.stamp_ns, w.stamp_ns);
+    s(m.request, w.request);
+    s.OrMinusOne(m.stamp_ns, w.stamp_ns);
+    GroupFields(s, m.group, w);
+    LandmarkFrame(s, w);
     s(m.version, w.version);
     s(m.correction_id, w.correction_id);
     s(m.progress.frontend.epoch, w.frontend_epoch);
@@ -368,6 +428,8 @@ struct Codec<MapDelta> {
     check.OptionalId(m.about, "impossible id of the keyframe it is about");
     check.OptionalId(m.progress.settled, "impossible id of the keyframe settled last");
     check.Stamp(m.stamp_ns);
+    check.Group(m.group);
+    ValidateEvent(m, check);
     ValidateKeyframes(m, check);
     ValidateLandmarks(m, check);
     ValidateObservedFeatures(m, check);

@@ -15,6 +15,7 @@ struct Codec<CameraInfo> {
   static void Fields(auto& s, auto& m, auto& w) {
     s(m.utime, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     CameraFields(s, m.camera, w);
     s(m.num_frames, w.num_frames);
     s(m.first_frame, w.first_frame);
@@ -24,6 +25,7 @@ struct Codec<CameraInfo> {
   }
   static void Validate(const CameraInfo& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.CameraModel(m.camera);
     check.Require(m.num_frames >= 0, "negative number of frames");
     check.Require(std::isfinite(m.speed) && m.speed >= 0, "speed below zero");
@@ -46,6 +48,7 @@ struct Codec<Frame> {
     s.Count(m.data, w.num_bytes, kMaxMessageBytes);
     s(m.frame_index, w.frame_index);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.stamp_ns, w.stamp_ns);
     s(m.capture_us, w.capture_us);
     s(m.publish_us, w.publish_us);
@@ -56,6 +59,7 @@ struct Codec<Frame> {
   }
   static void Validate(const Frame& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
     check.Require(
         m.width_px >= 0 && m.width_px <= kMaxImageSide && m.height_px >= 0 && m.height_px <= kMaxImageSide,
@@ -79,6 +83,7 @@ struct Codec<EndOfSequence> {
   static void Fields(auto& s, auto& m, auto& w) {
     s(m.utime, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.frames_published, w.frames_published);
     s(m.frames_listed, w.frames_listed);
     s(m.frames_missing, w.frames_missing);
@@ -89,6 +94,7 @@ struct Codec<EndOfSequence> {
   }
   static void Validate(const EndOfSequence& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.last_stamp_ns);
     check.Require(m.last_frame_index >= -1, "negative frame index");
     for (const int64_t count :
@@ -106,12 +112,14 @@ struct Codec<GroundTruthPose> {
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.stamp_ns, w.utime);
     s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
     s(m.stamp_ns, w.stamp_ns);
     s(m.frame_index, w.frame_index);
     s(m.T_world_cam, w.rotation_world_cam, w.translation_world_cam);
   }
   static void Validate(const GroundTruthPose& m, Checker& check) {
     check.Session(m.session);
+    check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
     check.Pose(m.T_world_cam, "no pose");
   }

@@ -6,6 +6,7 @@
 
 #include "dmslam/camera/camera.h"
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/util/ids.h"
 
 namespace dmslam {
 
@@ -24,6 +25,7 @@ struct CameraInfo {
   uint32_t first_frame = 0;  ///< index of the first frame published
   PlaybackMode mode = PlaybackMode::kRealtime;
   double speed = 1.0;  ///< factor on the recorded rate, in real time; 0: as fast as possible
+  CameraId camera_id = 0;
 };
 
 enum class FrameEncoding : uint8_t { kJpeg = 1, kPng = 2, kGray8 = 3, kRgb8 = 4, kBgr8 = 5 };
@@ -39,9 +41,10 @@ struct Frame {
   int height_px = 0;
   FrameEncoding encoding = FrameEncoding::kJpeg;
   std::vector<uint8_t> data;  ///< a file's content, or pixels row by row without padding
+  CameraId camera_id = 0;
 };
 
-/// No more frames follow.
+/// No more frames of a camera follow.
 struct EndOfSequence {
   int64_t utime = 0;  ///< wall time at which it was sent [us]
   uint32_t session = 0;
@@ -52,6 +55,7 @@ struct EndOfSequence {
   int64_t frames_jumped = 0;   ///< left out by jumps, as asked for
   int32_t last_frame_index = -1;
   int64_t last_stamp_ns = 0;
+  CameraId camera_id = 0;
 };
 
 /// Where the camera truly was. For eyes and evaluation; nothing that estimates reads it.
@@ -60,6 +64,7 @@ struct GroundTruthPose {
   uint32_t frame_index = 0;
   int64_t stamp_ns = 0;
   Rigid3d T_world_cam;  ///< [m], in the ground truth's own world
+  CameraId camera_id = 0;
 };
 
 }  // namespace dmslam

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "dmslam/map/proposals.h"
@@ -61,6 +62,7 @@ struct PlayerStatus {
   int32_t frame_index = -1;  ///< of the newest frame
   double fps = 0;            ///< over the last second
   double late_ms = 0;        ///< how late the newest frame was published
+  CameraId camera_id = 0;
 };
 
 struct FrontendStatus {
@@ -84,7 +86,7 @@ struct FrontendStatus {
   double track_ms = 0;
   double step_ms = 0;
   double step_p95_ms = 0;
-  MapId map_id = 0;
+  std::optional<MapId> map_id;
   int64_t map_version = 0;  ///< of its replica
   int32_t map_keyframes = 0;
   int32_t map_landmarks = 0;
@@ -94,6 +96,7 @@ struct FrontendStatus {
   int64_t resets = 0;
   int64_t relocalisations = 0;
   double first_map_s = -1;  ///< from the first frame to the first map that lasted; -1: none yet
+  CameraId camera_id = 0;
 };
 
 struct MapperStatus {
@@ -118,7 +121,7 @@ struct MapperStatus {
   int64_t refused_geometry = 0;
   int64_t corrections_applied = 0;
   int64_t corrections_refused = 0;
-  KeyframeId last_settled;
+  std::optional<KeyframeId> last_settled;
   double landmarks_p50_ms = 0;  ///< keyframe received to its new landmarks published
   double landmarks_p95_ms = 0;
   double landmarks_p99_ms = 0;
@@ -141,13 +144,13 @@ struct LoopcloserStatus {
   int64_t refused_geometry = 0;
   int64_t loops_closed = 0;
   int64_t global_adjustments = 0;
-  KeyframeId last_keyframe;       ///< newest keyframe checked
-  KeyframeId last_loop_keyframe;  ///< newest keyframe that closed a loop
+  std::optional<KeyframeId> last_keyframe;       ///< newest keyframe checked
+  std::optional<KeyframeId> last_loop_keyframe;  ///< newest keyframe that closed a loop
   double query_p50_ms = 0;
   double query_p95_ms = 0;
   double check_p50_ms = 0;  ///< keyframe received to answer published
   double check_p95_ms = 0;
-  uint64_t vocabulary_checksum = 0;
+  std::optional<uint64_t> vocabulary_checksum;
 };
 
 }  // namespace dmslam

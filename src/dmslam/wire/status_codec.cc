@@ -102,8 +102,12 @@ struct Codec<PlayerStatus> {
     s(m.frame_index, w.frame_index);
     s(m.fps, w.fps);
     s(m.late_ms, w.late_ms);
+    s(m.camera_id, w.camera_id);
   }
-  static void Validate(const PlayerStatus& m, Checker& check) { check.Session(m.head.session); }
+  static void Validate(const PlayerStatus& m, Checker& check) {
+    check.Session(m.head.session);
+    check.CameraNumber(m.camera_id);
+  }
 };
 
 template <>
@@ -143,8 +147,9 @@ struct Codec<FrontendStatus> {
     s(m.resets, w.resets);
     s(m.relocalisations, w.relocalisations);
     s(m.first_map_s, w.first_map_s);
+    s(m.camera_id, w.camera_id);
   }
-  static void Validate(const FrontendStatus&, Checker&) {}
+  static void Validate(const FrontendStatus& m, Checker& check) { check.CameraNumber(m.camera_id); }
 };
 
 template <>

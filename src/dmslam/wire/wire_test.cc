@@ -2,10 +2,13 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/version.h"
 #include "dmslam/wire/check.h"
 #include "dmslam/wire/codec.h"
+#include "dmslam/wire/former_types.h"
 #include "dmslam/wire/schema.h"
 #include "dmslam/wire/testing/random_message.h"
 
@@ -29,6 +32,8 @@ bool AllFinite(const T& value) {
     return value.AllFinite();
   } else if constexpr (std::is_same_v<T, Sim3d>) {
     return value.rotation.coeffs().allFinite() && value.translation.allFinite() && std::isfinite(value.scale);
+  } else if constexpr (testing::kIsOptional<T>) {
+    return !value.has_value() || AllFinite(*value);
   } else if constexpr (testing::kIsVector<T> || testing::kIsArray<T>) {
     return std::all_of(value.begin(), value.end(), [](const auto& item) { return AllFinite(item); });
   } else {
@@ -153,12 +158,14 @@ TYPED_TEST(WireTest, HeaderIsSecondAndZero) {
 }
 
 TEST(WireTest, BytesOfAFrameDone) {
-  const FrameDone done{.session = 3, .frame_index = 0x01020304, .stamp_ns = 1'305'031'102'175'304'001};
+  const FrameDone done{
+      .session = 3, .frame_index = 0x01020304, .stamp_ns = 1'305'031'102'175'304'001, .camera_id = 2};
   const std::vector<uint8_t> bytes = Encode(done);
-  ASSERT_EQ(bytes.size(), 40U);
+  ASSERT_EQ(bytes.size(), 44U);
   const std::vector<uint8_t> expected = {
       0x00, 0x04, 0xa2, 0xeb, 0x3b, 0x44, 0x18, 0x48,   // 1305031102175304 us
       0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x03,   // session
+      0x00, 0x00, 0x00, 0x02,                           // camera
       0x01, 0x02, 0x03, 0x04,                           // frame index
       0x12, 0x1c, 0x66, 0xdf, 0x81, 0xfe, 0xd9, 0x41};  // nanoseconds
   std::vector<uint8_t> content(bytes.begin() + 8, bytes.end());
@@ -175,8 +182,10 @@ TEST(WireTest, DamageOutsideTheStreamsIsFound) {
     EXPECT_FALSE(Decode<FrameDone>(bytes).has_value()) << at;
   }
   std::vector<uint8_t> unchecked = sound;
-  std::fill(unchecked.begin() + 16, unchecked.begin() + 20, uint8_t{0});  // of a program that computes none
-  EXPECT_TRUE(Decode<FrameDone>(unchecked).has_value());
+  std::fill(unchecked.begin() + 16, unchecked.begin() + 20, uint8_t{0});  // zero is a checksum like any other
+  std::string reason;
+  EXPECT_FALSE(Decode<FrameDone>(unchecked, &reason).has_value());
+  EXPECT_EQ(reason, "frame_done_t: its checksum does not fit");
 }
 
 TEST(WireTest, ReasonNamesTheField) {
@@ -212,6 +221,115 @@ TEST(WireTest, AStatusIsSentWhateverItHolds) {
   EXPECT_EQ(decoded->latency_p50_ms, -1);
   EXPECT_EQ(decoded->head.reason.size(), kMaxTextBytes);
   EXPECT_EQ(decoded->head.reason.substr(0, 10), "a?b??[31mx");
+}
+
+TEST(WireTest, TheChecksumIsThatOfEveryLanguage) {
+  const FrameDone done{.session = 3, .frame_index = 17, .stamp_ns = 1'305'031'102'175'304'001};
+  const std::vector<uint8_t> bytes = Encode(done);
+  std::vector<uint8_t> blank = bytes;
+  std::fill(blank.begin() + 16, blank.begin() + 20, uint8_t{0});
+  uint32_t crc = 0xffffffff;  // CRC-32 bit by bit
+  for (const uint8_t byte : blank) {
+    crc ^= byte;
+    for (int i = 0; i < 8; ++i) crc = (crc >> 1) ^ ((crc & 1) != 0 ? 0xedb88320 : 0);
+  }
+  crc = ~crc;
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(bytes[16 + i], static_cast<uint8_t>(crc >> (24 - 8 * i)));
+}
+
+TEST(WireTest, WhatIsAbsentStaysAbsent) {
+  FramePose pose;
+  const std::optional<FramePose> nowhere = Decode<FramePose>(Encode(pose));
+  ASSERT_TRUE(nowhere.has_value());
+  EXPECT_FALSE(nowhere->map_id || nowhere->step_from || nowhere->HasPose());
+  EXPECT_TRUE(nowhere->covariance.empty() && nowhere->step_covariance.empty());
+  pose.map_id = 1;
+  pose.covariance.assign(kPoseCovarianceSize, 0.25);
+  pose.step_covariance.assign(kPoseCovarianceSize, 0.5);
+  pose.step_from = 0;  // the first frame is one
+  const std::optional<FramePose> known = Decode<FramePose>(Encode(pose));
+  ASSERT_TRUE(known.has_value());
+  EXPECT_TRUE(Identical(pose, *known));
+  pose.step_from.reset();
+  EXPECT_THROW(Encode(pose), InvariantError) << "a step from nowhere";
+  pose.step_covariance.clear();
+  pose.covariance.pop_back();
+  EXPECT_THROW(Encode(pose), InvariantError);
+  pose.covariance.assign(kPoseCovarianceSize, 0.25);
+  pose.covariance[6] = -1;  // of y
+  EXPECT_THROW(Encode(pose), InvariantError);
+}
+
+TEST(WireTest, AbsentStampsAndCapturesAtZeroAreTwoThings) {
+  MapReset reset{1, false, "lost", {}};
+  EXPECT_FALSE(Decode<MapReset>(Encode(reset))->stamp_ns.has_value());
+  reset.stamp_ns = 0;
+  EXPECT_EQ(Decode<MapReset>(Encode(reset))->stamp_ns, 0);
+  reset.map_id = 0;
+  EXPECT_THROW(Encode(reset), InvariantError) << "a reset is of a map";
+}
+
+TEST(WireTest, DepthsAndSigmasAreOfAllKeypointsOrNone) {
+  KeyframeProposal keyframe = RandomMessage<KeyframeProposal>(4, 30);
+  FeatureSet& features = keyframe.features;
+  ASSERT_GT(features.size(), 1U);
+  features.sigmas_px.assign(features.size(), 0.5F);
+  features.depths_m.assign(features.size(), 2.0F);
+  features.depth_sigmas_m.assign(features.size(), 0.1F);
+  features.depths_m[1] = features.depth_sigmas_m[1] = -1;  // not measured
+  const std::optional<KeyframeProposal> decoded = Decode<KeyframeProposal>(Encode(keyframe));
+  ASSERT_TRUE(decoded.has_value());
+  EXPECT_TRUE(Identical(keyframe, *decoded));
+  features.depths_m.pop_back();
+  EXPECT_THROW(Encode(keyframe), InvariantError);
+  features.depths_m.push_back(-2);
+  EXPECT_THROW(Encode(keyframe), InvariantError);
+}
+
+TEST(WireTest, EventsNameWhatTheyAreAbout) {
+  MapDelta delta;
+  delta.event = MapEvent::kSettled;
+  EXPECT_THROW(Encode(delta), InvariantError)
+      << "settled about no keyframe was an answer to something else once";
+  delta.about = KeyframeId::Make(1, 7);
+  EXPECT_TRUE(Decode<MapDelta>(Encode(delta)).has_value());
+  delta.request = 1;
+  EXPECT_THROW(Encode(delta), InvariantError);
+  delta.event = MapEvent::kRequestDone;
+  delta.about.reset();
+  EXPECT_EQ(Decode<MapDelta>(Encode(delta))->request, 1U);
+  delta.request.reset();
+  EXPECT_THROW(Encode(delta), InvariantError);
+  delta.event = MapEvent::kRefused;
+  EXPECT_THROW(Encode(delta), InvariantError);
+  LoopAnswer answer;
+  answer.keyframe = KeyframeId::Make(1, 7);
+  EXPECT_TRUE(Decode<LoopAnswer>(Encode(answer)).has_value());
+  answer.kind = LoopAnswer::Kind::kLoop;
+  answer.correction_id = 3;
+  EXPECT_THROW(Encode(answer), InvariantError) << "a loop has two ends";
+}
+
+TEST(WireTest, TheFormerVersionIsNamed) {
+  // frame_done_t of protocol 1: 40 bytes, of which the first eight are its fingerprint.
+  std::vector<uint8_t> former = {0x88, 0x81, 0x50, 0x6d, 0x1c, 0x59, 0x00, 0xa5};
+  former.resize(40);
+  std::string reason;
+  EXPECT_FALSE(Decode<FrameDone>(former, &reason).has_value());
+  EXPECT_EQ(reason, std::string("frame_done_t: as version 0.1 sends it; this is version ") + kVersion);
+  EXPECT_EQ(FormerProtocol(Info<FrameDone>().fingerprint), std::nullopt);
+  testing::ForEachMessage([]<typename Message>() {
+    EXPECT_EQ(FormerProtocol(Info<Message>().fingerprint), std::nullopt) << Info<Message>().type;
+  });
+  const std::string told = ToldOfFormer(1);
+  EXPECT_TRUE(told.starts_with("recorded by version 0.1; this is version ")) << told;
+}
+
+TEST(WireTest, NoTwoTypesHaveTheSameFields) {
+  std::set<int64_t> fingerprints;
+  testing::ForEachMessage([&]<typename Message>() {
+    EXPECT_TRUE(fingerprints.insert(Info<Message>().fingerprint).second) << Info<Message>().type;
+  });
 }
 
 TEST(WireTest, TextIsCleanOrNot) {

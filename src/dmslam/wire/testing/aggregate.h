@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <tuple>
 #include <type_traits>
 
@@ -8,9 +9,15 @@
 namespace dmslam::wire::testing {
 
 namespace internal {
+template <typename T>
+inline constexpr bool kIsOptional = false;
+template <typename Value>
+inline constexpr bool kIsOptional<std::optional<Value>> = true;
+
 struct Anything {
+  // Not into an optional itself, which is made of anything that its value is made of.
   template <typename T>
-  operator T() const;  // NOLINT: only ever named, never called
+  requires(!kIsOptional<T>) operator T() const;  // NOLINT: only ever named, never called
 };
 
 template <typename T, typename... Args>

@@ -21,11 +21,38 @@ void MakeSound(Camera& camera, Random& random) {
   camera.fps = random.Uniform(1, 200);
 }
 
+void MakeSound(std::vector<float>& list, size_t size, Random& random) {
+  list.resize(size);
+  for (float& value : list) value = static_cast<float>(random.Uniform(0.01, 10));
+}
+
 void MakeSound(FeatureSet& features, Random& random) {
   Filler fill(random.Next(), 0);
-  features.descriptors.resize(features.keypoints.size());
+  const size_t size = features.keypoints.size();
+  const size_t num_depths = random.Below(2) * size;
+  MakeSound(features.depths_m, num_depths, random);
+  MakeSound(features.depth_sigmas_m, num_depths, random);
+  if (num_depths > 0) features.depths_m[0] = features.depth_sigmas_m[0] = -1;
+  MakeSound(features.sigmas_px, random.Below(2) * size, random);
+  features.descriptors.resize(size);
   for (Descriptor& descriptor : features.descriptors) fill(descriptor);
   for (Keypoint& keypoint : features.keypoints) keypoint.octave %= 32;
+}
+
+/// A sound covariance, or none.
+void MakeSound(std::vector<double>& covariance, Random& random) {
+  covariance.resize(random.Below(2) * kPoseCovarianceSize);
+  for (double& value : covariance) value = random.Uniform(0, 1);
+}
+
+void MakeSoundCamera(auto& m) { m.camera_id %= 256; }
+
+void MakeSound(RecordGroup& group, Random& random) {
+  group = {};
+  if (random.Below(2) == 0) return;
+  group.id = 1 + random.Below(1000);
+  group.count = 2 + random.Below(5);
+  group.index = random.Below(group.count);
 }
 
 /// An index into a list that is not empty.
@@ -42,6 +69,7 @@ void SortUnique(std::vector<T>& items) {
 }  // namespace
 
 void MakeSound(CameraInfo& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.session);
   MakeSound(m.camera, random);
   Draw(m.mode, PlaybackMode::kRealtime, PlaybackMode::kLockstep, random);
@@ -49,6 +77,7 @@ void MakeSound(CameraInfo& m, Random& random) {
 }
 
 void MakeSound(Frame& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.session);
   Draw(m.encoding, FrameEncoding::kJpeg, FrameEncoding::kBgr8, random);
   m.width_px = 1 + static_cast<int>(random.Below(4));
@@ -59,15 +88,24 @@ void MakeSound(Frame& m, Random& random) {
   if (m.encoding == FrameEncoding::kRgb8 || m.encoding == FrameEncoding::kBgr8) m.data.resize(3 * pixels, 7);
 }
 
-void MakeSound(EndOfSequence& m, Random&) { MakeSound(m.session); }
-void MakeSound(GroundTruthPose& m, Random&) { MakeSound(m.session); }
+void MakeSound(EndOfSequence& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.session);
+}
+
+void MakeSound(GroundTruthPose& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.session);
+}
 
 void MakeSound(PlayerStatus& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.head.session);
   Draw(m.state, PlayerStatus::State::kStarting, PlayerStatus::State::kDone, random);
 }
 
 void MakeSound(SessionStart& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.session);
   MakeSound(m.camera, random);
   Draw(m.mode, PlaybackMode::kRealtime, PlaybackMode::kLockstep, random);
@@ -75,6 +113,7 @@ void MakeSound(SessionStart& m, Random& random) {
 }
 
 void MakeSound(KeyframeProposal& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.map_id);
   if (random.Below(4) == 0) m.reference = {};
   m.reference_scale = random.Uniform(0.1, 10);
@@ -97,45 +136,81 @@ void MakeSound(InitialMap& m, Random& random) {
 }
 
 void MakeSound(FramePose& m, Random& random) {
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kLocalizedLater, random);
+  MakeSoundCamera(m);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
   if (random.Below(4) == 0) m.reference = {};
   m.reference_scale = random.Uniform(0.1, 10);
   m.moving_image_share = static_cast<float>(random.Uniform());
+  MakeSound(m.covariance, random);
+  MakeSound(m.step_covariance, random);
+  if (m.step_from) *m.step_from %= 1000000;
+  if (!m.step_from) m.step_covariance.clear();
 }
 
-void MakeSound(FrameEvidence& m, Random& random) {
+void MakeSound(FrameEvidence& m, Random&) {
+  MakeSoundCamera(m);
   const auto before = [](const auto& a, const auto& b) { return a.landmark < b.landmark; };
   const auto same = [](const auto& a, const auto& b) { return a.landmark == b.landmark; };
   std::sort(m.items.begin(), m.items.end(), before);
   m.items.erase(std::unique(m.items.begin(), m.items.end(), same), m.items.end());
-  for (FrameEvidence::Item& item : m.items) item.chi2_sum = static_cast<float>(random.Uniform(0, 100));
 }
 
-void MakeSound(MapReset& m, Random&) { MakeSound(m.map_id); }
-void MakeSound(FrameDone& m, Random&) { MakeSound(m.session); }
+void MakeSound(MapReset& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.map_id);
+}
+
+void MakeSound(AdjustRequest& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.request);
+}
+
+void MakeSound(FrameDone& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.session);
+}
+
+void MakeSound(SequenceDone& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.session);
+}
 
 void MakeSound(PoseView& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.session);
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kLocalizedLater, random);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
   m.moving_share = random.Uniform();
 }
 
 void MakeSound(FeatureView& m, Random& random) {
+  MakeSoundCamera(m);
   MakeSound(m.session);
   for (FeatureView::Item& item : m.items) {
     Draw(item.kind, FeatureView::Kind::kUnmatched, FeatureView::Kind::kMoving, random);
   }
 }
 
-void MakeSound(FrameTrace& m, Random&) { MakeSound(m.session); }
+void MakeSound(FrameTrace& m, Random&) {
+  MakeSoundCamera(m);
+  MakeSound(m.session);
+}
 
 void MakeSound(FrontendStatus& m, Random& random) {
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kLocalizedLater, random);
+  MakeSoundCamera(m);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
 }
 
 void MakeSound(MapDelta& m, Random& random) {
-  Draw(m.event, MapEvent::kKeyframeInserted, MapEvent::kRefused, random);
+  Draw(m.event, MapEvent::kKeyframeInserted, MapEvent::kFirstMapRefused, random);
+  if (!m.about) m.about = KeyframeId::Make(1, 7);
+  if (!m.map_id) m.map_id = 3;
+  if (!m.correction_id) m.correction_id = 5;
+  m.request.reset();
+  if (m.event == MapEvent::kRequestDone) m.request = 1 + random.Below(9);
+  if (m.event == MapEvent::kEnded) m.about.reset(), m.map_id.reset(), m.correction_id.reset();
+  MakeSound(m.group, random);
   for (KeyframeState& keyframe : m.keyframes) {
+    MakeSoundCamera(keyframe);
     MakeSound(keyframe.map_id);
     keyframe.scale = random.Uniform(0.1, 10);
     std::sort(keyframe.loop_edges.begin(), keyframe.loop_edges.end());
@@ -160,7 +235,11 @@ void MakeSound(MapperStatus& m, Random& random) {
 
 void MakeSound(LoopAnswer& m, Random& random) {
   Draw(m.kind, LoopAnswer::Kind::kNone, LoopAnswer::Kind::kGlobalAdjustment, random);
-  if (random.Below(2) == 0) m.matched = {};
+  const bool corrects = m.kind != LoopAnswer::Kind::kNone;
+  m.correction_id = corrects ? std::optional<uint64_t>(1 + random.Below(1000)) : std::nullopt;
+  m.matched.reset();
+  if (m.kind == LoopAnswer::Kind::kLoop) m.matched = KeyframeId::Make(1, random.Below(1000));
+  MakeSound(m.group, random);
 }
 
 void MakeSound(LoopcloserStatus& m, Random& random) {

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <concepts>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,7 @@
 // benchmarks.
 namespace dmslam::wire::testing {
 
+using internal::kIsOptional;
 template <typename T>
 inline constexpr bool kIsVector = false;
 template <typename Item>
@@ -79,6 +82,12 @@ class Filler {
     if constexpr (std::is_enum_v<T>) {
       value = static_cast<T>(
           1);  // known to all enumerations that travel; the messages' own are drawn in MakeSound
+    } else if constexpr (kIsOptional<T>) {
+      value.reset();
+      if (random_.Below(3) == 0) return;
+      (*this)(value.emplace());
+      if constexpr (std::is_unsigned_v<typename T::value_type>)
+        value = std::max<typename T::value_type>(*value, 1);
     } else if constexpr (kIsVector<T>) {
       value.resize(random_.Below(max_items_ + 1));
       for (auto& item : value) (*this)(item);
@@ -112,7 +121,9 @@ void MakeSound(KeyframeProposal& m, Random& random);
 void MakeSound(FramePose& m, Random& random);
 void MakeSound(FrameEvidence& m, Random& random);
 void MakeSound(MapReset& m, Random& random);
+void MakeSound(AdjustRequest& m, Random& random);
 void MakeSound(FrameDone& m, Random& random);
+void MakeSound(SequenceDone& m, Random& random);
 void MakeSound(PoseView& m, Random& random);
 void MakeSound(FeatureView& m, Random& random);
 void MakeSound(FrameTrace& m, Random& random);
@@ -150,6 +161,8 @@ bool Identical(const T& a, const T& b) {
   } else if constexpr (std::is_same_v<T, Sim3d>) {
     return Identical(a.rotation, b.rotation) && Identical(a.translation, b.translation) &&
            Identical(a.scale, b.scale);
+  } else if constexpr (kIsOptional<T>) {
+    return a.has_value() == b.has_value() && (!a.has_value() || Identical(*a, *b));
   } else if constexpr (kIsVector<T> || kIsArray<T>) {
     bool same = a.size() == b.size();
     for (size_t i = 0; same && i < a.size(); ++i) same = Identical(a[i], b[i]);

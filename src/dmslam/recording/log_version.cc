@@ -1,0 +1,32 @@
+#include "dmslam/recording/log_version.h"
+
+#include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/util/version.h"
+#include "dmslam/wire/codec.h"
+#include "dmslam/wire/former_types.h"
+
+namespace dmslam {
+
+std::optional<int32_t> OtherProtocol(const LogEvent& event) {
+  const std::optional<int64_t> fingerprint = FingerprintOf(event.bytes);
+  if (!fingerprint) return std::nullopt;
+  if (fingerprint != head_t::getHash()) return wire::FormerProtocol(*fingerprint);
+  const std::optional<head_t> head = DecodeHead(WithoutPrefix(event.channel), event.bytes);
+  const bool other = head && head->protocol_version != kProtocolVersion;
+  return other ? std::optional<int32_t>(head->protocol_version) : std::nullopt;
+}
+
+void WriteLogVersion(EventLogWriter* log, const std::string& prefix, int64_t utime_us) {
+  head_t head{};
+  head.utime = utime_us;
+  head.protocol_version = kProtocolVersion;
+  head.state = head_t::STATE_CLOSED;
+  head.first_seq = 1;
+  head.schema_hash = wire::SchemaHash();
+  head.name = std::string("log of dmslam ") + kVersion;
+  const Outgoing beacon = SealedMessage(HeadChannel("LOG"), head);
+  log->Write(utime_us, prefix + beacon.channel, *beacon.bytes);
+}
+
+}  // namespace dmslam

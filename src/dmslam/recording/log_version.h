@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "dmslam/messaging/event_log.h"
+
+namespace dmslam {
+
+/// The protocol of a message that another version has written, as far as that can be told: a beacon says it
+/// (its layout never changes), and former types are known.
+std::optional<int32_t> OtherProtocol(const LogEvent& event);
+
+/// Writes the first message of a log that no writer's beacons are in: a beacon of its own, which says the
+/// version to every later one. `prefix` comes before its channel.
+void WriteLogVersion(EventLogWriter* log, const std::string& prefix, int64_t utime_us);
+
+}  // namespace dmslam

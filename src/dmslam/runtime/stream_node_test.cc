@@ -1,0 +1,164 @@
+#include "dmslam/runtime/stream_node.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/replica.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr uint32_t kSession = 4;
+
+/// Holds a replica of the map, and nothing else.
+class Holder : public StreamNode {
+ public:
+  Holder(NodeContext context, NodeOptions options)
+      : StreamNode(std::move(context), std::move(options), "collector"), map_(TestCamera(), Pyramid()) {}
+
+  const Map& map() const { return map_; }
+  int applied() const { return applied_; }
+  int64_t malformed() const { return MakeStatusHead("", {}).health.dropped_malformed; }
+
+ private:
+  void Begin(const CameraInfo&) override { reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap}); }
+  bool WorkOnce() override {
+    const std::optional<Record> record = reader_->Take();
+    if (!record) return false;
+    if (record->begins_anew()) map_.Clear();
+    const auto delta = ReadMapRecord(*record, reader_.get());
+    if (!delta) return true;
+    map_.Apply(*delta);
+    ++applied_;
+    reader_->AcceptTaken();
+    return true;
+  }
+
+  std::unique_ptr<StreamReader> reader_;
+  Replica map_;
+  int applied_ = 0;
+};
+
+Keyframe MakeKeyframe(uint32_t frame) {
+  Keyframe keyframe;
+  keyframe.id = KeyframeId::Make(kSession, frame);
+  keyframe.map_id = 1;
+  keyframe.features = MakeFrameFeatures({}, TestCamera(), Pyramid());
+  return keyframe;
+}
+
+/// A mapper's stream on a bus with one holder of a replica.
+class MapStreamTest : public testing::Test {
+ protected:
+  MapStreamTest()
+      : map_(TestCamera(), Pyramid()),
+        snapshots_(&map_),
+        mapper_(&bus_.AddPort(), [this] { return now_ns_; }) {
+    StreamWriter::Options options;
+    options.session = kSession;
+    options.stream = StreamId::kMap;
+    options.owner = "MAPPER";
+    options.name = "mapper";
+    options.schema_hash = SchemaHash();
+    options.roles = {{"collector", true}};
+    writer_ = std::make_unique<StreamWriter>(options, Term{10, 3}, Version{}, &snapshots_);
+    mapper_.AddWriter(writer_.get(), "MAPPER", {"COLLECTOR"});
+    NodeContext context;
+    context.bus = &bus_.AddPort();
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    context.random_id = 7;
+    context.name = "collector";
+    NodeOptions node;
+    node.session = kSession;
+    holder_ = std::make_unique<Holder>(context, node);
+    CameraInfo info;
+    info.session = kSession;
+    info.camera = TestCamera();
+    mapper_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+    Run();
+  }
+
+  void Run() {
+    for (int i = 0; i < 400; ++i) {
+      mapper_.Advance();
+      holder_->Advance();
+      while (bus_.DeliverOne()) {
+      }
+      now_ns_ += 5 * kMs;
+    }
+  }
+  MapDelta AddKeyframe(uint32_t frame) {
+    map_.AddKeyframe(MakeKeyframe(frame));
+    return map_.TakeDelta(MapEvent::kMapped, KeyframeId::Make(kSession, frame), 1);
+  }
+  int64_t Publish(Bytes bytes) { return writer_->Publish(channels::kMap, std::move(bytes), now_ns_); }
+  int64_t Publish(const MapDelta& delta) { return Publish(wire::Encode(delta)); }
+
+  int64_t now_ns_ = kMs;
+  MemoryBus bus_;
+  MapEditor map_;
+  MapSnapshots snapshots_;
+  Endpoint mapper_;
+  std::unique_ptr<StreamWriter> writer_;
+  std::unique_ptr<Holder> holder_;
+};
+
+TEST_F(MapStreamTest, AReplicaFollows) {
+  const int64_t seq = Publish(AddKeyframe(1));
+  Run();
+  EXPECT_EQ(holder_->map().keyframes().size(), 1U);
+  EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
+  EXPECT_EQ(holder_->malformed(), 0);
+}
+
+TEST_F(MapStreamTest, ARecordThatCannotBeReadIsNamedAndTheMapComesAsASnapshot) {
+  Publish(AddKeyframe(1));
+  Run();
+  Bytes unreadable = wire::Encode(AddKeyframe(2));
+  unreadable[0] ^= 1;  // a type that nobody knows; its seal is sound
+  const int64_t seq = Publish(unreadable);
+  mapper_.Advance();
+  while (bus_.DeliverOne()) {
+  }
+  holder_->Advance();
+  EXPECT_EQ(holder_->malformed(), 1);
+  EXPECT_EQ(holder_->applied(), 1) << "not as an empty change";
+  EXPECT_LT(writer_->AcknowledgedBy("collector").value_or(0), seq)
+      << "what was not applied is not acknowledged";
+  Run();
+  EXPECT_EQ(holder_->map().keyframes().size(), 2U) << "the snapshot has it";
+  Publish(AddKeyframe(3));
+  Run();
+  EXPECT_EQ(holder_->map().keyframes().size(), 3U);
+  EXPECT_EQ(holder_->malformed(), 1);
+}
+
+TEST_F(MapStreamTest, AGroupIsAppliedAsOneOrReplacedByASnapshot) {
+  MapDelta first = AddKeyframe(1), second = AddKeyframe(2);
+  first.group = {5, 0, 2};
+  second.group = {5, 1, 2};
+  Publish(first);
+  Run();
+  EXPECT_EQ(holder_->map().keyframes().size(), 0U);
+  EXPECT_EQ(writer_->AcknowledgedBy("collector").value_or(0), 0);
+  const int64_t seq = Publish(second);
+  Run();
+  EXPECT_EQ(holder_->applied(), 1);
+  EXPECT_EQ(holder_->map().keyframes().size(), 2U);
+  EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
+
+  MapDelta third = AddKeyframe(3), fourth = AddKeyframe(4);
+  third.group = {6, 0, 3};
+  fourth.group = {6, 2, 3};  // the one between is missing
+  Publish(third);
+  Publish(fourth);
+  Run();
+  EXPECT_EQ(holder_->malformed(), 1);
+  EXPECT_EQ(holder_->map().keyframes().size(), 4U) << "the snapshot has them";
+}
+
+}  // namespace
+}  // namespace dmslam
