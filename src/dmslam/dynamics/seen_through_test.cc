@@ -138,7 +138,7 @@ TEST_F(StandingPerson, FurnitureIsProvenByTime) {
 /// Somebody stands where a cupboard of the same depth is seen at other times: nothing looks through him.
 TEST_F(StandingPerson, InFrontOfFurnitureStaysOnlyWhileMoreKeyframesSeeTheFurniture) {
   const auto left = [this](const std::vector<double>& others_s) {
-    map_ = Map(TestCamera(), Pyramid());
+    map_ = MapEditor(TestCamera(), Pyramid());
     std::vector<KeyframeId> others, with;
     uint32_t index = 0;
     for (const double seconds : others_s) others.push_back(AddKeyframe(index++, seconds));

@@ -46,11 +46,17 @@ Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const K
 }
 
 /// The keyframe that sees most of what was found and is no neighbour of `keyframe`; null where there is none.
-const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const PlaceSupport& support) {
+/// A few landmarks in common make no neighbour: local mapping may have fused some across the loop already.
+const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const PlaceSupport& support,
+                             int min_covisibility) {
   std::map<KeyframeId, int> votes;
+  const auto is_neighbour = [&](KeyframeId other) {
+    const auto shared = keyframe.covisible.find(other);
+    return other == keyframe.id || (shared != keyframe.covisible.end() && shared->second >= min_covisibility);
+  };
   for (const LandmarkMatch& match : support.matches) {
     for (const Observation& o : map.FindLandmark(match.landmark)->observations) {
-      if (o.keyframe != keyframe.id && !keyframe.covisible.contains(o.keyframe)) ++votes[o.keyframe];
+      if (!is_neighbour(o.keyframe)) ++votes[o.keyframe];
     }
   }
   const auto best = std::max_element(votes.begin(), votes.end(),
@@ -348,7 +354,7 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
       StaticLandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
   const PlaceSupport seen =
       Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks, 2 * options_.search_radius_px);
-  const Keyframe* place = BestObserver(map, keyframe, seen);
+  const Keyframe* place = BestObserver(map, keyframe, seen, options_.min_covisibility);
   if (place == nullptr) {
     *why = "nothing of the place is seen";
     return std::nullopt;
