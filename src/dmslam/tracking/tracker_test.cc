@@ -278,7 +278,7 @@ class Recovering : public ::testing::Test {
 
   void Start(double map_s) {
     scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
-    const auto keyframes = static_cast<uint32_t>(map_s * 1e9 / MapScene::kKeyframeStepNs) + 1;
+    const auto keyframes = static_cast<uint32_t>(map_s * 1e9 / MapScene::kStepNs) + 1;
     scene_.MapAll(keyframes, 0.2 / keyframes);
     replica_.Apply(scene_.map().TakeDelta(MapEvent::kMapStarted, KeyframeId::Make(MapScene::kSession, 1), 1));
     const char* source = std::getenv("DMSLAM_SOURCE_DIR");
