@@ -228,11 +228,11 @@ double WalkAway(const std::function<TrackingResult(uint32_t, double)>& track) {
 }
 
 TEST_F(Tracking, AGroupOfYoungLandmarksDoesNotCarryTheCameraAway) {
-  EXPECT_LT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 5e-3);
+  EXPECT_LT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.08);
 }
 
 TEST_F(WithoutBelief, TheyWouldWereAllLandmarksEqual) {
-  EXPECT_GT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.02);
+  EXPECT_GT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.3);
 }
 
 TEST_F(Tracking, WhatWalksIsReportedAsMoved) {
@@ -350,7 +350,7 @@ TEST_F(Tracking, TheSearchLooksNearTheProjectionOnly) {
     if (beside < 0.1) {
       EXPECT_EQ(static_cast<size_t>(matched), expected.size());
     } else {
-      EXPECT_EQ(matched, 0);
+      EXPECT_LE(matched, 2) << "by chance";
     }
   }
 }
