@@ -71,6 +71,7 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
   judge_.Judge(map, expected, fit.rejected, frame);
   TrackingReport report = CountClasses(camera_, *frame);
+  report.num_expected = static_cast<int>(expected.size());
   Decide(fit, careful, &report);
   if (report.ok) judge_.Believe(map, expected, *frame);
   return report;

@@ -12,6 +12,8 @@ constexpr int64_t kCarefulNs = 1'000'000'000;  // so long more is asked of a cam
 constexpr int64_t kConfirmNs = 500'000'000;    // so long a place must predict what is seen to be believed
 constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
 constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
+constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
+constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
 constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
 constexpr int kSomeProven = 15;                // ...and that must be among them when it is confirmed by time
 
@@ -73,12 +75,14 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   if (attempt.relocalized) recovery_ = Recovery{frame.stamp_ns, motion_, last_};
   motion_.OnTracked(map, pose, frame.T_cam_world, {frame.index, frame.stamp_ns}, attempt.relocalized);
   last_ = frame;
-  if (recovery_ && IsConfirmed(map, frame)) recovery_.reset();
+  if (recovery_ && IsConfirmed(map, attempt.report, frame)) recovery_.reset();
 }
 
-/// At once where much of what is seen is proven to be no person; else where the place goes on to predict what
+/// At once where the place is seen all over the image and as a whole, which a person is not, or where much of
+/// what is seen is proven to be no person; else where the place goes on to predict what
 /// is seen, and, in a map that is old enough to have them, proven landmarks are among it.
-bool Tracker::IsConfirmed(const Map& map, const TrackedFrame& frame) const {
+bool Tracker::IsConfirmed(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
+  if (report.cells >= kWideCells && report.num_static >= kWholeShare * report.num_expected) return true;
   const int proven = CountProven(map, frame.landmarks, {});
   if (proven >= kManyProven) return true;
   if (frame.stamp_ns - recovery_->since_ns < kConfirmNs) return false;

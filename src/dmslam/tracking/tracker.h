@@ -72,7 +72,7 @@ class Tracker {
   void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
-  bool IsConfirmed(const Map& map, const TrackedFrame& frame) const;
+  bool IsConfirmed(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
   void AbandonRecovery();
 
   TrackingOptions options_;

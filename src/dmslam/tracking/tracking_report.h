@@ -9,6 +9,7 @@ namespace dmslam {
 struct TrackingReport {
   bool ok = false;
   const char* reason = "";  ///< why not
+  int num_expected = 0;     ///< landmarks of the map around that it should see
   int num_static = 0;       ///< inliers
   int num_moving = 0;
   int num_unknown = 0;      ///< matched, neither inlier nor moving
