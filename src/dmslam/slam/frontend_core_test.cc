@@ -171,7 +171,7 @@ TEST_F(Phases, TheTrialEndsInTracking) {
   for (uint32_t frame = 2; frame < 30; ++frame) {
     const FrontendOutput output = Frame(frame);
     ASSERT_EQ(Find<MapReset>(output), nullptr) << frame << ": " << Find<MapReset>(output)->reason;
-    EXPECT_EQ(core_->state(), frame < 16 ? TrackingState::kTrial : TrackingState::kTracking) << frame;
+    EXPECT_EQ(core_->state(), frame < 17 ? TrackingState::kTrial : TrackingState::kTracking) << frame;
   }
   EXPECT_GT(core_->counters().tracked, 25u);
 }
