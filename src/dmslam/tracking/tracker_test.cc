@@ -216,23 +216,25 @@ class WithoutBelief : public Tracking {
   WithoutBelief() : Tracking(false) {}
 };
 
+/// People walk off together from frame 5 on. The largest error from frame 12 on: while they have gone a few
+/// pixels only, nobody can tell their motion from the camera's.
 double WalkAway(const std::function<TrackingResult(uint32_t, double)>& track) {
   double worst = 0;
   for (uint32_t frame = 1; frame < 25; ++frame) {
     const double walked = frame < 5 ? 0.0 : 0.006 * (frame - 4);
     const TrackingResult result = track(frame, walked);
     if (!result.pose) return 1.0;
-    worst = std::max(worst, ErrorAt(result.frame.T_cam_world, kStep * frame));
+    if (frame >= 12) worst = std::max(worst, ErrorAt(result.frame.T_cam_world, kStep * frame));
   }
   return worst;
 }
 
 TEST_F(Tracking, AGroupOfYoungLandmarksDoesNotCarryTheCameraAway) {
-  EXPECT_LT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.08);
+  EXPECT_LT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 2e-3);
 }
 
 TEST_F(WithoutBelief, TheyWouldWereAllLandmarksEqual) {
-  EXPECT_GT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.3);
+  EXPECT_GT(WalkAway([&](uint32_t frame, double walked) { return Track(Frame(frame, walked)); }), 0.1);
 }
 
 TEST_F(Tracking, WhatWalksIsReportedAsMoved) {
@@ -361,7 +363,7 @@ TEST_F(Tracking, TheSearchLooksNearTheProjectionOnly) {
     if (beside < 0.1) {
       EXPECT_EQ(static_cast<size_t>(matched), expected.size());
     } else {
-      EXPECT_LE(matched, 2) << "by chance";
+      EXPECT_LT(matched, 5) << "by chance";
     }
   }
 }
