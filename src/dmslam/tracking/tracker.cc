@@ -98,8 +98,10 @@ void Tracker::AbandonRecovery() {
   relocalized_ns_.reset();
 }
 
-/// While the motion still leads, a place that looks alike is no better guess: people are such places.
+/// While the motion still leads, a place that looks alike is no better guess: people are such places. Who was
+/// nowhere yet has no motion.
 bool Tracker::MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const {
+  if (!motion_.last().reference.valid()) return true;
   const int64_t missing_ns = stamp_ns - motion_.last_stamp_ns();
   return missing_ns > (attempt.weak_pose ? kCoastNs : kNoPlacesNs);
 }

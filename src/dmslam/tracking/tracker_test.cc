@@ -331,6 +331,12 @@ TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
   EXPECT_NEAR((found - kFound) / 30.0, 0.5, 0.05);
 }
 
+TEST_F(Recovering, WhoBeginsInAMapLooksAtOnce) {
+  Start(1.0);
+  tracker_->BeginLost({kFound, kFound * kFrameNs});
+  EXPECT_TRUE(Track(kFound).pose);
+}
+
 TEST_F(Recovering, ManyProvenLandmarksAreBelievedAtOnce) {
   Start(10.0);
   partly_hidden_ = true;
