@@ -20,8 +20,7 @@ namespace {
 
 int Run(const std::vector<std::string>& arguments) {
   const dmslam::Camera camera = dmslam::LoadCamera(arguments[1]);
-  const auto vocabulary =
-      std::make_shared<const dmslam::Vocabulary>(dmslam::LoadOrbVocabulary(arguments[2]));
+  const auto vocabulary = std::make_shared<const dmslam::Vocabulary>(dmslam::LoadOrbVocabulary(arguments[2]));
   const dmslam::Settings settings = dmslam::LoadSettings("", {arguments.begin() + 4, arguments.end()});
   dmslam::Slam slam(dmslam::SlamSetup(settings, camera, vocabulary));
 
@@ -54,7 +53,8 @@ int Run(const std::vector<std::string>& arguments) {
 
 int main(int argc, char** argv) {
   if (argc < 5) {
-    std::fprintf(stderr, "Usage: slam_folder SEQUENCE CAMERA.yaml VOCABULARY.dmv TRAJECTORY.txt [KEY=VALUE ...]\n");
+    std::fprintf(stderr,
+                 "Usage: slam_folder SEQUENCE CAMERA.yaml VOCABULARY.dmv TRAJECTORY.txt [KEY=VALUE ...]\n");
     return 2;
   }
   try {

@@ -43,8 +43,8 @@ TrajectoryBuilder::Trajectories Slam::Finish() {
   return trajectory_.Build();
 }
 
-/// Carries the frontend's records, in their order, to the mapper and the mapper's to the others. Returns the last
-/// pose among them.
+/// Carries the frontend's records, in their order, to the mapper and the mapper's to the others. Returns the
+/// last pose among them.
 FramePose Slam::Handle(const FrontendOutput& output) {
   FramePose last;
   for (const FrontendEvent& event : output.events) {
@@ -82,7 +82,8 @@ void Slam::TellLoopcloser() {
   }
 }
 
-/// As processes do in lock-step: the map as the frontend knows it changes when a keyframe is settled, `all`: now.
+/// As processes do in lock-step: the map as the frontend knows it changes when a keyframe is settled, `all`:
+/// now.
 void Slam::TellFrontend(bool all) {
   TellLoopcloser();
   size_t count = deltas_.size();

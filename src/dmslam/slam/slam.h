@@ -11,8 +11,8 @@
 
 namespace dmslam {
 
-/// The whole SLAM as one value: frontend, mapper and loop closer in lock-step, on the caller's thread. Knows no
-/// bus and no clock. The same frames give the same poses, and those that the processes give in lock-step.
+/// The whole SLAM as one value: frontend, mapper and loop closer in lock-step, on the caller's thread. Knows
+/// no bus and no clock. The same frames give the same poses, and those that the processes give in lock-step.
 class Slam {
  public:
   /// Everything that it is made of; SlamSetup() (dmslam/settings/slam_setup.h) fills it from settings.
@@ -29,8 +29,8 @@ class Slam {
   FramePose Process(uint32_t frame_index, int64_t stamp_ns, const GrayView& image);
   FramePose ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features);
 
-  /// No frame follows: places frames that had no pose, adjusts the maps as a whole, finds every pose once more
-  /// and joins them. Call once; takes about as long as some seconds of frames.
+  /// No frame follows: places frames that had no pose, adjusts the maps as a whole, finds every pose once
+  /// more and joins them. Call once; takes about as long as some seconds of frames.
   TrajectoryBuilder::Trajectories Finish();
 
   const Map& map() const { return mapper_.map(); }
