@@ -56,7 +56,7 @@ TEST(SlamTest, PosesAreRightAndTheSameAgain) {
     found.push_back(trajectories.final[frame].T_world_cam.translation);
     truth.push_back(TruthAt(frame).Center());
   }
-  const std::optional<Sim3d> truth_from_found = AlignSim3(truth, found);
+  const std::optional<Sim3d> truth_from_found = AlignSim3(found, truth);
   ASSERT_TRUE(truth_from_found);
   for (uint32_t frame = 0; frame < kFrames; ++frame)
     EXPECT_LT((*truth_from_found * found[frame] - truth[frame]).norm(), 0.01) << frame;
