@@ -9,7 +9,7 @@
 
 #include "collector/journal.h"
 #include "collector/results.h"
-#include "collector/trajectory_builder.h"
+#include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/runtime/stream_node.h"
 
 namespace dmslam {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "collector/trajectory_builder.h"
+#include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/wire/frontend_messages.h"
 #include "dmslam/wire/status.h"
 

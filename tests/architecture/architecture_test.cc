@@ -40,7 +40,7 @@ const std::map<std::string, Names>& AllowedRooms() {
     a["initialization"] = above(heart, {"motion_segmentation"});
     a["refinement"] = above(heart, {"tracking"});
     a["slam"] =
-        above(heart, {"motion_segmentation", "initialization", "tracking", "refinement", "mapping", "loops"});
+        above(heart, {"motion_segmentation", "initialization", "tracking", "refinement", "mapping", "loops", "dataset"});
     a["settings"] = above(a["slam"], {"slam"});
     a["dataset"] = {"util", "geometry", "camera"};
     a["synthetic"] = a["evaluation"] = {"util", "geometry", "camera", "dataset"};

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installed into a folder: the programs run from there, and a project of somebody else builds against it.
+# Installed into a folder: the programs run from there, and projects of somebody else build against it.
 source "$(dirname "$0")/expect.sh"
 root=${DMSLAM_SOURCE_DIR:?set by ctest} build=$1 sequence=$2 prefix=$work/prefix
 
@@ -41,4 +41,28 @@ expect 0 "seen at \(345.75, 292.00\)" "$work/outside/outside_project" "$prefix/s
   "$sequence/groundtruth.txt" "$work/run/trajectory.txt"
 expect 0 "poses, ATE 0\.0[0-9]+" "$work/outside/outside_project" "$prefix/share/dmslam/config/synthetic.yaml" \
   "$sequence/groundtruth.txt" "$work/run/trajectory.txt"
+
+# The whole SLAM in one program, without LCM: the poses are those of the processes.
+camera=$prefix/share/dmslam/config/synthetic.yaml
+expect 0 "" cmake -S "$root/examples/slam_folder" -B "$work/slam" -DCMAKE_PREFIX_PATH="$prefix" \
+  -DCMAKE_CXX_FLAGS="-Wall -Wextra -Werror" -DCMAKE_BUILD_TYPE=Release
+expect 0 "" cmake --build "$work/slam"
+check "it needs no LCM" test -z "$(ldd "$work/slam/slam_folder" | grep liblcm)"
+check "it has at most 80 lines" test "$(wc -l <"$root/examples/slam_folder/main.cc")" -le 80
+expect 0 "of 150 frames tracked" "$work/slam/slam_folder" "$sequence" "$camera" \
+  "$prefix/share/dmslam/data/vocabulary.dmv" "$work/folder.txt" seed=1
+expect 0 "" "$prefix/bin/dmslam-inprocess" --sequence "$sequence" --camera "$camera" --seed 1 --out "$work/whole"
+check "the trajectory is that of dmslam-inprocess" cmp "$work/folder.txt" "$work/whole/trajectory.txt"
+expect 1 "slam_folder: .*nowhere" "$work/slam/slam_folder" "$work/nowhere" "$camera" \
+  "$prefix/share/dmslam/data/vocabulary.dmv" "$work/folder.txt"
+
+# The library's mapper under a main of its own, in place of the process.
+expect 0 "" cmake -S "$root/examples/own_mapper" -B "$work/mapper" -DCMAKE_PREFIX_PATH="$prefix" \
+  -DCMAKE_CXX_FLAGS="-Wall -Wextra -Werror" -DCMAKE_BUILD_TYPE=Release
+expect 0 "" cmake --build "$work/mapper"
+mv "$prefix/bin/dmslam-mapper" "$work/replaced"
+cp "$work/mapper/own_mapper" "$prefix/bin/dmslam-mapper"
+expect 0 "" "$prefix/bin/dmslam-run" --sequence "$sequence" --camera "$camera" --seed 1 --lockstep --out "$work/own"
+check "it was this mapper" grep -rq "own mapper: [0-9]* turns" "$work/own/log"
+check "the run gives the same trajectory" cmp "$work/own/trajectory.txt" "$work/whole/trajectory.txt"
 finish

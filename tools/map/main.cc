@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "collector/map_ply.h"
-#include "collector/trajectory_builder.h"
+#include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_version.h"

@@ -1,4 +1,4 @@
-#include "collector/trajectory_builder.h"
+#include "dmslam/slam/trajectory_builder.h"
 
 #include <algorithm>
 
