@@ -9,7 +9,8 @@ Usage: scripts/kill_test.sh --sequence DIR --out DIR [options]
 
 Plays a sequence in lock-step without disturbance, and then once per victim while the victim is ended by SIGKILL at seeded
 random frames; scripts/run.sh starts it again each time. Each run must end, hold every keyframe that was proposed (or have
-culled it), lose no record, track online as much as is asked for, and have at most 1.5 times the undisturbed error.
+culled it), lose no record, track online as much as is asked for, and have at most 1.5 times the undisturbed error, or 2 mm
+more than it: the ground truth is not better than that, and a short run errs by 3.5 mm.
 Writes DIR/table.md; runs that are there already are not repeated.
 
   --camera FILE      camera file (YAML)
@@ -17,6 +18,7 @@ Writes DIR/table.md; runs that are there already are not repeated.
                      kill before the first map), with commas; default: frontend,mapper,loopcloser,double,first
   --kills N          per run (default 5)
   --frames N         at most so many frames
+  --set KEY=VALUE    one setting of all runs; may be repeated
   --min-tracked P    least share tracked online [%] (default 90)
   --seed N           of the moments (default 1)
   --build-dir DIR    where the programs are (default: build/release)
@@ -36,7 +38,7 @@ while (($#)); do
       printf -v "${name//-/_}" %s "$2"
       shift 2
       ;;
-    --camera | --frames) arguments+=("$1" "$2"); shift 2 ;;
+    --camera | --frames | --set) arguments+=("$1" "$2"); shift 2 ;;
     *) fail "unknown option $1 (see --help)" ;;
   esac
 done
@@ -109,7 +111,8 @@ verdict() { # NAME: what is wrong with its run
   [[ $(value "$name" records_lost) == 0 ]] || wrong+="records lost; "
   [[ $(value "$name" keyframes_missing) == 0 ]] || wrong+="keyframes missing; "
   awk "BEGIN { exit !($(value "$name" tracked_online_percent) >= $min_tracked) }" || wrong+="tracked too little; "
-  awk "BEGIN { exit !($(value "$name" ate_rmse_final) <= 1.5 * $(value undisturbed ate_rmse_final)) }" || wrong+="error too large; "
+  awk -v error="$(value "$name" ate_rmse_final)" -v undisturbed="$(value undisturbed ate_rmse_final)" \
+    'BEGIN { exit !(error <= 1.5 * undisturbed || error <= undisturbed + 0.002) }' || wrong+="error too large; "
   [[ $name == undisturbed || $name == collector || $(value "$name" restarts) -ge 1 ]] || wrong+="nobody was restarted; "
   [[ -z $(cut -d' ' -f1 "$out/$name/keyframes.txt" | grep -v '#' | sort | uniq -d) ]] || wrong+="a keyframe twice; "
   echo "$wrong"
