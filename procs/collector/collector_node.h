@@ -9,8 +9,8 @@
 
 #include "collector/journal.h"
 #include "collector/results.h"
-#include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/runtime/stream_node.h"
+#include "dmslam/slam/trajectory_builder.h"
 
 namespace dmslam {
 

@@ -22,7 +22,7 @@ class FrontendNode : public StreamNode {
   struct Extras {
     std::shared_ptr<const Vocabulary> vocabulary;
     std::string picture_dir;  ///< empty: no pictures
-    int picture_every = 0;    ///< every so manieth frame
+    int picture_every = 0;    ///< every Nth frame
   };
   FrontendNode(NodeContext context, NodeOptions options, Extras extras);
 

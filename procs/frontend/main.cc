@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   process.app().add_option("--vocabulary", vocabulary,
                            "bag-of-words vocabulary; default: the one that ships");
   process.app().add_option("--picture-dir", extras.picture_dir, "folder for pictures of the features");
-  process.app().add_option("--picture-every", extras.picture_every, "draw every so manieth frame");
+  process.app().add_option("--picture-every", extras.picture_every, "draw every Nth frame");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     extras.vocabulary = dmslam::LoadVocabulary(vocabulary);
     return std::make_unique<dmslam::FrontendNode>(std::move(context), std::move(options), extras);

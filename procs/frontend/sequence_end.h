@@ -20,10 +20,10 @@ class SequenceEnd {
     kGrowingBack,          ///< the map, to before its first keyframe
     kAwaitingAdjustedMap,  ///< the mapper was asked to adjust all maps, so that the last poses are told in
                            ///< the best one
-    kRefining,  ///< frames are looked for once more in that
-    kJoining,   ///< their poses are joined with the camera's motion
-    kTelling,   ///< in portions
-    kDone,      ///< everything is said; stays until the mapper has ended
+    kRefining,             ///< frames are looked for once more in that
+    kJoining,              ///< their poses are joined with the camera's motion
+    kTelling,              ///< in portions
+    kDone,                 ///< everything is said; stays until the mapper has ended
   };
 
   Phase phase() const { return phase_; }

@@ -39,8 +39,8 @@ const std::map<std::string, Names>& AllowedRooms() {
     a["tracking"] = a["mapping"] = a["loops"] = heart;
     a["initialization"] = above(heart, {"motion_segmentation"});
     a["refinement"] = above(heart, {"tracking"});
-    a["slam"] =
-        above(heart, {"motion_segmentation", "initialization", "tracking", "refinement", "mapping", "loops", "dataset"});
+    a["slam"] = above(heart, {"motion_segmentation", "initialization", "tracking", "refinement", "mapping",
+                              "loops", "dataset"});
     a["settings"] = above(a["slam"], {"slam"});
     a["dataset"] = {"util", "geometry", "camera"};
     a["synthetic"] = a["evaluation"] = {"util", "geometry", "camera", "dataset"};

@@ -54,7 +54,7 @@ void Declare(CLI::App& app, Arguments& a) {
   app.add_option("--black-out", a.black_outs,
                  "FROM,SECONDS: black frames from frame FROM on; may be repeated");
   app.add_option("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
-  app.add_option("--pictures", a.pictures, "draw every so manieth frame");
+  app.add_option("--pictures", a.pictures, "draw every Nth frame");
   app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
   app.add_option("--map", a.map_files.load, "saved map or log: begin in this map");
   app.add_flag("--localize", a.localize,

@@ -9,11 +9,11 @@
 #include <tuple>
 
 #include "collector/map_ply.h"
-#include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/recording/map_file.h"
+#include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"

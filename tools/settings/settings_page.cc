@@ -12,7 +12,8 @@ namespace {
 constexpr const char* kHead =
     "# Configuration\n"
     "\n"
-    "Written by `dmslam-settings --out docs/configuration.md`; change `src/dmslam/settings/settings.cc` instead of "
+    "Written by `dmslam-settings --out docs/configuration.md`; change `src/dmslam/settings/settings.cc` "
+    "instead of "
     "this page.\n"
     "\n"
     "A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with "

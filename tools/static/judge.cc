@@ -591,7 +591,8 @@ nlohmann::json JudgeStarts(JudgedSequence& sequence, const InitializerOptions& o
   nlohmann::json each = nlohmann::json::array();
   std::map<std::string, int> reasons;
   for (int k = 0; k < count; ++k) {
-    const size_t first = StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), sequence.size() / 3);
+    const size_t first =
+        StartOf(static_cast<size_t>(k), static_cast<size_t>(count), sequence.size(), sequence.size() / 3);
     const Start start = RunStart(sequence, options, first, seed, &reasons);
     tally.Add(start);
     each.push_back(start.ToJson());

@@ -41,8 +41,7 @@ Layer WidestLayer(std::span<const Layer> layers, std::span<const double> dispari
   for (const Layer& layer : layers) {
     points.clear();
     for (size_t k = 0; k < index.size(); ++k) {
-      if (disparity[k] >= layer.low && disparity[k] <= layer.high)
-        points.push_back(positions_px[index[k]]);
+      if (disparity[k] >= layer.low && disparity[k] <= layer.high) points.push_back(positions_px[index[k]]);
     }
     const double spread = Spread(points);
     const double score = spread * spread * static_cast<double>(points.size());

@@ -70,7 +70,7 @@ struct DlrsacOptions {
   /// A match is called static only if this share of its neighbours in the image agrees with the model too.
   /// What moves agrees by accident, and not all of it together. 0: not asked.
   double neighbor_share = 0.0;
-  int neighbors = 10;             ///< how many nearest matches are asked at most
+  int neighbors = 10;                 ///< how many nearest matches are asked at most
   double neighbor_reach_rad = 0.076;  ///< and how far they may be, about
 
   /// Root of D of the chosen set below this share of the image's diagonal: refused, the motion is too complex
