@@ -9,8 +9,8 @@ Usage: scripts/kill_test.sh --sequence DIR --out DIR [options]
 
 Plays a sequence in lock-step without disturbance, and then once per victim while the victim is ended by SIGKILL at seeded
 random frames; scripts/run.sh starts it again each time. Each run must end, hold every keyframe that was proposed (or have
-culled it), lose no record, track online as much as is asked for, and have at most 1.5 times the undisturbed error, or 2 mm
-more than it: the ground truth is not better than that, and a short run errs by 3.5 mm.
+culled it), lose no record, track online as much as is asked for, and have at most 1.5 times the undisturbed error online.
+Frames from before a restart cannot be refined at the end, so the final error is held to the same bound.
 Writes DIR/table.md; runs that are there already are not repeated.
 
   --camera FILE      camera file (YAML)
@@ -106,13 +106,15 @@ disturbed() {
 }
 
 verdict() { # NAME: what is wrong with its run
-  local name=$1 wrong=""
+  local name=$1 wrong="" error
   [[ -s $out/$name/summary.json ]] || { echo "no results"; return; }
   [[ $(value "$name" records_lost) == 0 ]] || wrong+="records lost; "
   [[ $(value "$name" keyframes_missing) == 0 ]] || wrong+="keyframes missing; "
   awk "BEGIN { exit !($(value "$name" tracked_online_percent) >= $min_tracked) }" || wrong+="tracked too little; "
-  awk -v error="$(value "$name" ate_rmse_final)" -v undisturbed="$(value undisturbed ate_rmse_final)" \
-    'BEGIN { exit !(error <= 1.5 * undisturbed || error <= undisturbed + 0.002) }' || wrong+="error too large; "
+  for error in online final; do
+    awk -v error="$(value "$name" "ate_rmse_$error")" -v undisturbed="$(value undisturbed ate_rmse_online)" \
+      'BEGIN { exit !(error > 0 && error <= 1.5 * undisturbed) }' || wrong+="$error error too large; "
+  done
   [[ $name == undisturbed || $name == collector || $(value "$name" restarts) -ge 1 ]] || wrong+="nobody was restarted; "
   [[ -z $(cut -d' ' -f1 "$out/$name/keyframes.txt" | grep -v '#' | sort | uniq -d) ]] || wrong+="a keyframe twice; "
   echo "$wrong"
