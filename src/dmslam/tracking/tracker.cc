@@ -156,7 +156,9 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 
+/// Not while what was found waits to be confirmed, which asks for more than a number of landmarks.
 bool Tracker::IsCareful(int64_t stamp_ns) const {
+  if (recovery_) return false;
   return relocalized_ns_ && stamp_ns - *relocalized_ns_ < kCarefulNs;
 }
 
