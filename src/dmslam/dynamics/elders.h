@@ -26,6 +26,8 @@ class Elders {
   /// Age [s] from which a matched landmark is an elder; none where there are too few matches to tell them
   /// apart.
   std::optional<double> FromAge(std::span<const double> ages_s);
+  /// Whether elders of this age are older than people stand.
+  bool AreTrusted(double age_s) const { return age_s >= trusted_age_s_; }
   /// Whether so many of the elders agree on a pose that it binds the others.
   bool Decide(int agreeing, size_t elders) const {
     return agreeing >= static_cast<int>(options_.agreement * static_cast<double>(elders));

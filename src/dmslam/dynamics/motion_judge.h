@@ -10,6 +10,7 @@
 #include "dmslam/dynamics/landmark_votes.h"
 #include "dmslam/dynamics/missing_landmarks.h"
 #include "dmslam/dynamics/moved_landmarks.h"
+#include "dmslam/dynamics/rival_motion.h"
 #include "dmslam/map/proposals.h"
 
 namespace dmslam {
@@ -18,6 +19,7 @@ namespace dmslam {
 struct DynamicsOptions {
   VoteOptions vote;
   ElderOptions elders;
+  RivalOptions rivals;
   HiddenPlaceOptions hidden;
   MovedOptions moved;
   MissingOptions missing;
@@ -50,6 +52,7 @@ class MotionJudge {
   bool enabled() const { return votes_.options().motion_belief; }
   const LandmarkVotes& votes() const { return votes_; }
   Elders& elders() { return elders_; }
+  const RivalMotions& rivals() const { return rivals_; }
 
   /// Before the pose is optimised: takes the matches that are there by chance, where somebody hides the map.
   void DropMatchesOfHiddenPlaces(const Map& map, std::span<const ExpectedLandmark> expected,
@@ -57,6 +60,9 @@ class MotionJudge {
   /// When it is: marks the features that see something that moves, and judges what is missing.
   void Judge(const Map& map, std::span<const ExpectedLandmark> expected,
              std::span<const RejectedMatch> rejected, TrackedFrame* frame);
+  /// What it found elsewhere: landmarks and, in parallel, the features that show them.
+  std::span<const LandmarkId> moved() const { return moved_now_; }
+  std::span<const uint16_t> moved_features() const { return moved_.features(); }
   /// Where the pose is believed: adds the judgement to the evidence and to the memory of what moves.
   void Believe(const Map& map, std::span<const ExpectedLandmark> expected, const TrackedFrame& frame);
 
@@ -71,6 +77,7 @@ class MotionJudge {
  private:
   LandmarkVotes votes_;
   Elders elders_;
+  RivalMotions rivals_;
   HiddenPlaces hidden_;
   MovedLandmarks moved_;
   MissingLandmarks missing_;

@@ -12,6 +12,7 @@ const std::vector<LandmarkId>& MovedLandmarks::Find(const Map& map,
   ListMatched(*frame, &used_);
   MarkMatched(*frame, &taken_);
   moved_.clear();
+  features_.clear();
   JudgeRejected(map, rejected, frame);
   std::sort(used_.begin(), used_.end());
   for (const ExpectedLandmark& landmark : expected) {
@@ -29,6 +30,7 @@ void MovedLandmarks::JudgeRejected(const Map& map, std::span<const RejectedMatch
         HammingDistance(landmark.descriptor, frame->features->set.descriptors[match.feature]);
     if (match.chi2 < options_.near_chi2 || distance > options_.near_distance) continue;
     moved_.push_back(match.landmark);
+    features_.push_back(match.feature);
     used_.push_back(match.landmark);
     taken_[match.feature] = 1;
     frame->classes[match.feature] = FeatureClass::kMoving;
@@ -46,6 +48,7 @@ void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected
   if (hit.feature < 0 || hit.distance > options_.max_distance || !alone) return;
   if (NormalizedErrorSquared(*frame->features, hit.feature, *uv, map.pyramid()) < options_.chi2) return;
   moved_.push_back(expected.id);
+  features_.push_back(static_cast<uint16_t>(hit.feature));
   frame->classes[static_cast<size_t>(hit.feature)] = FeatureClass::kMoving;
 }
 

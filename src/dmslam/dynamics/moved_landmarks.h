@@ -27,6 +27,8 @@ class MovedLandmarks {
   /// matches that the pose rejected, then those of `expected` that are found farther off.
   const std::vector<LandmarkId>& Find(const Map& map, std::span<const ExpectedLandmark> expected,
                                       std::span<const RejectedMatch> rejected, TrackedFrame* frame);
+  /// The features that showed them, parallel to what Find() returned.
+  const std::vector<uint16_t>& features() const { return features_; }
 
  private:
   void JudgeRejected(const Map& map, std::span<const RejectedMatch> rejected, TrackedFrame* frame);
@@ -34,6 +36,7 @@ class MovedLandmarks {
 
   MovedOptions options_;
   std::vector<LandmarkId> moved_;
+  std::vector<uint16_t> features_;
   std::vector<LandmarkId> used_;  ///< workspace: landmarks that are accounted for
   std::vector<uint8_t> taken_;    ///< workspace: features that are
 };

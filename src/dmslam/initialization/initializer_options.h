@@ -50,11 +50,11 @@ struct InitializerOptions {
 
   MinimaOptions minima;             ///< how the motion of the pair is searched
   double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
-  double min_runner_up_cost = 2.5;  ///< another motion must cost all views this many times as much
+  double min_runner_up_cost = 1.3;  ///< another motion must cost all views this many times as much
   double min_parallax_rad = 0.015;  ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad =
-      0.035;                   ///< standard deviation of the direction of translation, from the residuals
-  double max_view_chi2 = 9.0;  ///< a view agrees with a point: squared reprojection error / variance
+      0.1;  ///< standard deviation of the direction of translation, from the residuals: later views mend it
+  double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
   int min_points = 80;                 ///< points that all views agree on
 

@@ -67,9 +67,15 @@ bool PoseSearch::FromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t s
 
 TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame) {
   local_map_.Collect(map, *frame);
-  const auto expected = MatchAround(map, careful ? kWiderAfterRelocalization : 1.0, frame);
-  const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
+  const double wider = careful ? kWiderAfterRelocalization : 1.0;
+  auto expected = MatchAround(map, wider, frame);
+  PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
   judge_.Judge(map, expected, fit.rejected, frame);
+  if (!fit.by_trusted_elders && solver_.FollowWiderMotion(map, prior, judge_, frame)) {
+    expected = MatchAround(map, wider, frame);
+    fit = solver_.Solve(map, prior, &judge_, frame, Elderhood::kIgnored);
+    judge_.Judge(map, expected, fit.rejected, frame);
+  }
   TrackingReport report = CountClasses(camera_, *frame);
   report.num_expected = static_cast<int>(expected.size());
   Decide(fit, careful, &report);

@@ -2,71 +2,142 @@
 
 namespace dmslam {
 
+namespace {
+
+double Chi2(const Pinhole& camera, const Rigid3d& T_cam_world, const PoseObservation& o) {
+  return ReprojectionErrorSquared(camera, T_cam_world, o.p_world, o.uv_px) * o.inv_sigma_squared;
+}
+
+}  // namespace
+
+void PoseSolver::Matches::Add(const Map& map, const TrackedFrame& frame, uint16_t feature, LandmarkId id,
+                              double weight) {
+  const Landmark& landmark = *map.FindLandmark(id);
+  matches.push_back({feature, id});
+  ages_s.push_back(static_cast<double>(frame.stamp_ns - landmark.first_ns) * 1e-9);
+  observations.push_back({landmark.p_world, frame.features->uv_px[feature],
+                          1.0 / map.pyramid().SigmaSquared(frame.features->set.keypoints[feature].octave),
+                          weight});
+}
+
+void PoseSolver::Matches::Move(size_t from, size_t to) {
+  matches[to] = matches[from];
+  ages_s[to] = ages_s[from];
+  observations[to] = observations[from];
+}
+
+void PoseSolver::Matches::Resize(size_t count) {
+  matches.resize(count);
+  ages_s.resize(count);
+  observations.resize(count);
+}
+
+PoseOptimizationOptions PoseSolver::Options(const std::optional<PosePrior>& prior) const {
+  PoseOptimizationOptions options;
+  options.max_chi2 = max_chi2_;
+  options.prior = prior;
+  return options;
+}
+
 void PoseSolver::Observe(const Map& map, const LandmarkVotes& votes, const TrackedFrame& frame) {
-  observations_.clear();
-  matches_.clear();
-  ages_s_.clear();
+  all_.Resize(0);
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].valid()) continue;
     const Landmark* landmark = map.FindLandmark(frame.landmarks[i]);
     if (landmark == nullptr) continue;
-    matches_.push_back({static_cast<uint16_t>(i), landmark->id});
-    ages_s_.push_back(static_cast<double>(frame.stamp_ns - landmark->first_ns) * 1e-9);
-    observations_.push_back({landmark->p_world, frame.features->uv_px[i],
-                             1.0 / map.pyramid().SigmaSquared(frame.features->set.keypoints[i].octave),
-                             votes.Trust(*landmark, frame.stamp_ns)});
+    all_.Add(map, frame, static_cast<uint16_t>(i), landmark->id, votes.Trust(*landmark, frame.stamp_ns));
   }
 }
 
-/// Takes out the younger matches that contradict the elders, and weighs the others down.
-void PoseSolver::LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
+/// Takes out the younger matches that contradict the elders, and weighs the others down. False: there are
+/// none who are old enough to be trusted, or they do not agree.
+bool PoseSolver::LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
                                  const PoseOptimizationOptions& options, Elders* elders) {
-  const std::optional<double> elder_age_s = elders->FromAge(ages_s_);
-  if (!elder_age_s) return;
+  const std::optional<double> elder_age_s = elders->FromAge(current_.ages_s);
+  if (!elder_age_s) return false;
   eldest_.clear();
-  for (size_t i = 0; i < matches_.size(); ++i) {
-    if (ages_s_[i] >= *elder_age_s) eldest_.push_back(observations_[i]);
+  for (size_t i = 0; i < current_.matches.size(); ++i) {
+    if (current_.ages_s[i] >= *elder_age_s) eldest_.push_back(current_.observations[i]);
   }
-  if (eldest_.size() == observations_.size()) return;
+  if (eldest_.size() == current_.observations.size()) return false;
   OptimizePose(camera, T_cam_world, eldest_, options, optimized_);
-  if (!optimized_.usable || !elders->Decide(optimized_.num_inliers, eldest_.size())) return;
+  if (!optimized_.usable || !elders->Decide(optimized_.num_inliers, eldest_.size())) return false;
   KeepWhatAgrees(camera, optimized_.T_cam_world, *elder_age_s, optimized_.num_inliers, *elders);
+  return elders->AreTrusted(*elder_age_s);
 }
 
 void PoseSolver::KeepWhatAgrees(const Pinhole& camera, const Rigid3d& T_cam_world, double elder_age_s,
                                 int agreeing, const Elders& elders) {
   size_t kept = 0;
   int young = 0;
-  for (size_t i = 0; i < matches_.size(); ++i) {
-    const PoseObservation& o = observations_[i];
-    if (ages_s_[i] < elder_age_s) {
-      const double chi2 =
-          ReprojectionErrorSquared(camera, T_cam_world, o.p_world, o.uv_px) * o.inv_sigma_squared;
+  for (size_t i = 0; i < current_.matches.size(); ++i) {
+    const PoseObservation& o = current_.observations[i];
+    if (current_.ages_s[i] < elder_age_s) {
+      const double chi2 = Chi2(camera, T_cam_world, o);
       if (!elders.Admit(chi2)) {
-        rejected_.push_back({matches_[i].landmark, matches_[i].feature, chi2});
+        rejected_.push_back({current_.matches[i].landmark, current_.matches[i].feature, chi2});
         continue;
       }
       ++young;
     }
-    matches_[kept] = matches_[i];
-    ages_s_[kept] = ages_s_[i];
-    observations_[kept++] = o;
+    current_.Move(i, kept++);
   }
-  matches_.resize(kept);
-  ages_s_.resize(kept);
-  observations_.resize(kept);
+  current_.Resize(kept);
   const double factor = elders.YoungFactor(agreeing, young);
   for (size_t i = 0; i < kept; ++i) {
-    if (ages_s_[i] < elder_age_s) observations_[i].weight *= factor;
+    if (current_.ages_s[i] < elder_age_s) current_.observations[i].weight *= factor;
   }
 }
 
-void PoseSolver::SetClasses(TrackedFrame* frame) {
-  for (size_t i = 0; i < matches_.size(); ++i) {
-    if (optimized_.inliers[i] != 0) {
-      frame->classes[matches_[i].feature] = FeatureClass::kUsed;
+/// What contradicts the pose may have a motion of its own, and that may be the camera's: none where it holds
+/// less of the image.
+std::optional<Rigid3d> PoseSolver::FindWiderMotion(const Pinhole& camera, const Rigid3d& T_cam_world,
+                                                   const PoseOptimizationOptions& options,
+                                                   const RivalMotions& rivals) {
+  const auto explains = [&](const Rigid3d& T, const PoseObservation& o) {
+    return Chi2(camera, T, o) <= options.max_chi2;
+  };
+  contradicting_.clear();
+  for (const PoseObservation& o : all_.observations) {
+    if (!explains(T_cam_world, o)) contradicting_.push_back(o);
+  }
+  const int contradicting = static_cast<int>(contradicting_.size());
+  if (!rivals.IsWorthALook(contradicting)) return std::nullopt;
+  OptimizePose(camera, T_cam_world, contradicting_, options, rival_);
+  if (!rival_.usable) return std::nullopt;
+  SupportWidth first, rival;
+  for (const PoseObservation& o : all_.observations) {
+    const bool by_first = explains(T_cam_world, o), by_rival = explains(rival_.T_cam_world, o);
+    if (by_first && !by_rival) first.Add(o.uv_px);
+    if (by_rival && !by_first) rival.Add(o.uv_px);
+  }
+  return rivals.RivalWins(first, rival, contradicting) ? std::optional(rival_.T_cam_world) : std::nullopt;
+}
+
+/// Optimises over those of all matches that the pose explains.
+void PoseSolver::GoOnFrom(const Pinhole& camera, const Rigid3d& T_cam_world,
+                          const PoseOptimizationOptions& options) {
+  rejected_.clear();
+  current_ = all_;
+  size_t kept = 0;
+  for (size_t i = 0; i < current_.size(); ++i) {
+    const double chi2 = Chi2(camera, T_cam_world, current_.observations[i]);
+    if (chi2 <= options.max_chi2) {
+      current_.Move(i, kept++);
     } else {
-      rejected_.push_back({matches_[i].landmark, matches_[i].feature, optimized_.chi2[i]});
+      rejected_.push_back({current_.matches[i].landmark, current_.matches[i].feature, chi2});
+    }
+  }
+  current_.Resize(kept);
+  OptimizePose(camera, T_cam_world, current_.observations, options, optimized_);
+}
+
+void PoseSolver::SetClasses(TrackedFrame* frame) {
+  for (size_t i = 0; i < current_.matches.size(); ++i) {
+    if (optimized_.inliers[i] != 0) {
+      frame->classes[current_.matches[i].feature] = FeatureClass::kUsed;
+    } else {
+      rejected_.push_back({current_.matches[i].landmark, current_.matches[i].feature, optimized_.chi2[i]});
     }
   }
   for (const RejectedMatch& rejected : rejected_) {
@@ -76,19 +147,41 @@ void PoseSolver::SetClasses(TrackedFrame* frame) {
 }
 
 PoseFit PoseSolver::Solve(const Map& map, const std::optional<PosePrior>& prior, MotionJudge* judge,
-                          TrackedFrame* frame) {
+                          TrackedFrame* frame, Elderhood elderhood) {
   rejected_.clear();
   Observe(map, judge->votes(), *frame);
-  PoseOptimizationOptions options;
-  options.max_chi2 = max_chi2_;
-  options.prior = prior;
+  current_ = all_;
+  const PoseOptimizationOptions options = Options(prior);
   const Pinhole camera = map.camera().Ideal();
-  if (judge->enabled()) LetEldersDecide(camera, frame->T_cam_world, options, &judge->elders());
-  OptimizePose(camera, frame->T_cam_world, observations_, options, optimized_);
-  if (!optimized_.usable) return {0, optimized_.mean_chi2, rejected_};
+  const bool by_elders = judge->enabled() && elderhood == Elderhood::kCounts &&
+                         LetEldersDecide(camera, frame->T_cam_world, options, &judge->elders());
+  OptimizePose(camera, frame->T_cam_world, current_.observations, options, optimized_);
+  if (judge->enabled() && !by_elders && optimized_.usable) {
+    const auto wider = FindWiderMotion(camera, optimized_.T_cam_world, options, judge->rivals());
+    if (wider) GoOnFrom(camera, *wider, options);
+  }
+  if (!optimized_.usable) return {0, optimized_.mean_chi2, rejected_, by_elders};
   frame->T_cam_world = optimized_.T_cam_world;
   SetClasses(frame);
-  return {optimized_.num_inliers, optimized_.mean_chi2, rejected_};
+  return {optimized_.num_inliers, optimized_.mean_chi2, rejected_, by_elders};
+}
+
+bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior>& prior,
+                                   const MotionJudge& judge, TrackedFrame* frame) {
+  const size_t elsewhere = judge.moved().size();
+  if (!judge.enabled() || !judge.rivals().IsWorthALook(static_cast<int>(elsewhere))) return false;
+  Observe(map, judge.votes(), *frame);
+  for (size_t k = 0; k < elsewhere; ++k)
+    all_.Add(map, *frame, judge.moved_features()[k], judge.moved()[k], 1.0);
+  const PoseOptimizationOptions options = Options(prior);
+  const Pinhole camera = map.camera().Ideal();
+  const auto wider = FindWiderMotion(camera, frame->T_cam_world, options, judge.rivals());
+  if (!wider) return false;
+  GoOnFrom(camera, *wider, options);
+  frame->ClearMatches();
+  for (const LandmarkMatch& match : current_.matches) frame->landmarks[match.feature] = match.landmark;
+  frame->T_cam_world = *wider;
+  return true;
 }
 
 }  // namespace dmslam

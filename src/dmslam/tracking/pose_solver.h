@@ -18,34 +18,59 @@ struct PoseFit {
   int inliers = 0;  ///< 0: there were too few matches, the pose is as it was
   double mean_chi2 = 0;
   std::span<const RejectedMatch> rejected;  ///< valid until the next call
+  bool by_trusted_elders = false;           ///< landmarks that are older than people stand have decided
 };
 
+/// Whether the oldest landmarks decide a pose first.
+enum class Elderhood : uint8_t { kCounts, kIgnored };
+
 /// Optimises a frame's pose over its matches: the elders first, then everyone who agrees with them, each with
-/// the weight that its age deserves. Does not ask the heap for memory once its buffers have grown.
+/// the weight that its age deserves. While no landmark is old enough to be trusted, what contradicts that
+/// pose is asked for a motion of its own, and the one that holds more of the image is the camera's. Does not
+/// ask the heap for memory once its buffers have grown.
 class PoseSolver {
  public:
   explicit PoseSolver(double max_chi2) : max_chi2_(max_chi2) {}
 
   /// Sets the frame's pose and the classes of its matched features; takes the matches that do not agree.
   PoseFit Solve(const Map& map, const std::optional<PosePrior>& prior, MotionJudge* judge,
-                TrackedFrame* frame);
+                TrackedFrame* frame, Elderhood elderhood = Elderhood::kCounts);
+  /// The same question when the judge has found what the frame sees elsewhere. If that has the wider motion,
+  /// the frame is given its pose and matches.
+  bool FollowWiderMotion(const Map& map, const std::optional<PosePrior>& prior, const MotionJudge& judge,
+                         TrackedFrame* frame);
 
  private:
+  /// Some of a frame's matches, in parallel.
+  struct Matches {
+    std::vector<LandmarkMatch> matches;
+    std::vector<double> ages_s;
+    std::vector<PoseObservation> observations;
+
+    void Add(const Map& map, const TrackedFrame& frame, uint16_t feature, LandmarkId id, double weight);
+    void Move(size_t from, size_t to);
+    void Resize(size_t count);
+    size_t size() const { return matches.size(); }
+  };
+
+  PoseOptimizationOptions Options(const std::optional<PosePrior>& prior) const;
   void Observe(const Map& map, const LandmarkVotes& votes, const TrackedFrame& frame);
-  void LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
+  bool LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
                        const PoseOptimizationOptions& options, Elders* elders);
   void KeepWhatAgrees(const Pinhole& camera, const Rigid3d& T_cam_world, double elder_age_s, int agreeing,
                       const Elders& elders);
+  std::optional<Rigid3d> FindWiderMotion(const Pinhole& camera, const Rigid3d& T_cam_world,
+                                         const PoseOptimizationOptions& options, const RivalMotions& rivals);
+  void GoOnFrom(const Pinhole& camera, const Rigid3d& T_cam_world, const PoseOptimizationOptions& options);
   void SetClasses(TrackedFrame* frame);
 
   double max_chi2_;
   std::vector<RejectedMatch> rejected_;
-  // Workspace, the first three parallel:
-  std::vector<LandmarkMatch> matches_;
-  std::vector<double> ages_s_;
-  std::vector<PoseObservation> observations_;
-  std::vector<PoseObservation> eldest_;
-  PoseOptimizationReport optimized_;
+  // Workspace
+  Matches all_;      ///< whatever the frame shows of landmarks
+  Matches current_;  ///< those that have a say
+  std::vector<PoseObservation> eldest_, contradicting_;
+  PoseOptimizationReport optimized_, rival_;
 };
 
 }  // namespace dmslam

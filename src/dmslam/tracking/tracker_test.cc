@@ -216,15 +216,15 @@ class WithoutBelief : public Tracking {
   WithoutBelief() : Tracking(false) {}
 };
 
-/// People walk off together from frame 5 on. The largest error from frame 12 on: while they have gone a few
-/// pixels only, nobody can tell their motion from the camera's.
-double WalkAway(const std::function<TrackingResult(uint32_t, double)>& track) {
+/// People walk off together from frame 5 on. The largest error from frame `from` on: while they have gone a
+/// few pixels only, nobody can tell their motion from the camera's.
+double WalkAway(const std::function<TrackingResult(uint32_t, double)>& track, uint32_t from = 12) {
   double worst = 0;
   for (uint32_t frame = 1; frame < 25; ++frame) {
     const double walked = frame < 5 ? 0.0 : 0.006 * (frame - 4);
     const TrackingResult result = track(frame, walked);
     if (!result.pose) return 1.0;
-    if (frame >= 12) worst = std::max(worst, ErrorAt(result.frame.T_cam_world, kStep * frame));
+    if (frame >= from) worst = std::max(worst, ErrorAt(result.frame.T_cam_world, kStep * frame));
   }
   return worst;
 }
@@ -271,6 +271,43 @@ TEST_F(Tracking, LostForLongItIsNotLedByAnOldPose) {
   for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
   const TrackingResult result = Track(Frame(40, 0.0));
   EXPECT_FALSE(result.pose) << "without a vocabulary nothing else finds it";
+}
+
+/// A map so young that people who stood while it was made are older than the wall.
+class InAYoungMap : public ::testing::Test {
+ protected:
+  static constexpr size_t kPeople = 360, kWall = 260;
+
+  void Start(const Eigen::Vector3d& people_half) {
+    scene_.AddCloud(kPeople, {0, 0, 3}, people_half, kStartNs - 900'000'000);
+    scene_.AddCloud(kWall, {0, 0, 4}, {1.5, 1.1, 0.3}, kStartNs - 500'000'000);
+    scene_.MapAll(4, 0.05, 0, kStartNs);
+    Tracker::Setup setup;
+    setup.camera = TestCamera();
+    tracker_.emplace(setup);
+    tracker_->BeginAt(*scene_.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, 0)));
+  }
+  TrackingResult Track(uint32_t frame, double walked) {
+    const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
+      return scene_.point(i) + Eigen::Vector3d(i < kPeople ? walked : 0.0, 0, 0);
+    };
+    return tracker_->Track(
+        scene_.map(), {},
+        scene_.See(frame, kStartNs + frame * kFrameNs, MapScene::PoseAt(kStep * frame), place));
+  }
+
+  MapScene scene_;
+  std::optional<Tracker> tracker_;
+};
+
+TEST_F(InAYoungMap, TheWiderMotionIsTheCameras) {
+  Start({0.4, 0.4, 0.1});
+  EXPECT_LT(WalkAway([&](uint32_t frame, double walked) { return Track(frame, walked); }, 16), 4e-3);
+}
+
+TEST_F(InAYoungMap, NumbersCountToo) {
+  Start({1.1, 0.8, 0.1});  // as wide as the wall in the image, and more of them: the wall moves
+  EXPECT_GT(WalkAway([&](uint32_t frame, double walked) { return Track(frame, walked); }), 0.05);
 }
 
 /// A camera that was lost for a second, in a map whose keyframes span `map_s`.

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace dmslam {
+
+struct RivalOptions {
+  int min_support = 20;    ///< matches that one motion explains and the other does not, to count as a motion
+  double min_share = 0.5;  ///< of the matches that contradict the first motion, those that the rival explains
+  double min_advantage = 1.5;  ///< the rival's number times D by the other's, from which it is believed
+};
+
+/// Number times D (paper Eq. 3) of points in the image, added one by one: how much of the image they hold.
+class SupportWidth {
+ public:
+  void Add(const Eigen::Vector2d& uv_px);
+  int count() const { return count_; }
+  /// Sum of the squared distances from the points' mean [px^2]: their number times D.
+  double Score() const;
+
+ private:
+  int count_ = 0;
+  Eigen::Vector2d sum_ = Eigen::Vector2d::Zero();
+  double squared_sum_ = 0;
+};
+
+/// Two motions explain what a frame sees, each something that the other does not. People stand close together
+/// in the image and the room is all around them, so the wider one is the camera's. For maps that are too
+/// young for age to tell them apart (elders.h).
+class RivalMotions {
+ public:
+  explicit RivalMotions(const RivalOptions& options) : options_(options) {}
+
+  /// Whether `contradicting` matches are enough to look for a motion of their own.
+  bool IsWorthALook(int contradicting) const { return contradicting >= options_.min_support; }
+  /// Whether what only the rival explains outweighs what only the first motion explains; `contradicting` the
+  /// first one were so many.
+  bool RivalWins(const SupportWidth& first, const SupportWidth& rival, int contradicting) const;
+
+ private:
+  RivalOptions options_;
+};
+
+}  // namespace dmslam
