@@ -333,8 +333,8 @@ FrontendOutput FrontendCore::KeepPlacedLater(const TrackingReport& report) {
   return output;
 }
 
-bool FrontendCore::WorkAtEnd(const std::function<void()>& between) {
-  if (unplaced_.empty()) return last_poses_.Improve(map_, between);
+bool FrontendCore::WorkAtEnd() {
+  if (unplaced_.empty()) return last_poses_.Improve(map_);
   if (PlaceNewestUnplaced()) {
     const KeyframeId reference = tracker_.search().reference();
     last_poses_.AddPlaced(map_, frame_, *map_.FindKeyframe(reference));

@@ -79,9 +79,8 @@ class FrontendCore {
   /// Makes those wait too that no record told of: their maps were not adjusted.
   void RefineRest() { last_poses_.Begin(map_); }
   /// 3. When none waits: a portion of what is left to do, which is to place frames that had no pose when they
-  /// came and to join the poses with the camera's motion. False: all is done. `between` is called from within
-  /// the longest portion, the smoothing of a long trajectory, and must not change the core.
-  bool WorkAtEnd(const std::function<void()>& between = {});
+  /// came and to join the poses with the camera's motion. False: all is done.
+  bool WorkAtEnd();
   /// Whether that must not be interrupted by map records.
   bool NeedsMapUnchanged() const { return last_poses_.NeedsMapUnchanged(); }
   /// 4. Does all that is left and tells the last poses.
