@@ -14,7 +14,7 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
-constexpr size_t kMaxBehind = 15;  // frames: half a second
+constexpr double kMaxBehindS = 0.5;
 
 }  // namespace
 
@@ -320,7 +320,7 @@ void FrontendNode::PublishSequenceDone() {
 /// Catching up has the time between two images. Where that is not enough it comes first until all is done,
 /// and images are skipped.
 bool FrontendNode::FallsBehind() {
-  hurries_ = core_->IsBehind() && (hurries_ || core_->num_behind() > kMaxBehind);
+  hurries_ = core_->IsBehind() && (hurries_ || core_->seconds_behind() >= kMaxBehindS);
   return hurries_;
 }
 

@@ -52,7 +52,8 @@ class FrontendCore {
   FrontendOutput ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features);
   /// Whether frames wait to be tracked, and tracks the oldest of them (there must be one).
   bool IsBehind() const { return !behind_.empty(); }
-  size_t num_behind() const { return behind_.size(); }
+  /// From the oldest frame that waits to the newest.
+  double seconds_behind() const;
   FrontendOutput CatchUp();
   /// A record of the map stream; call between frames.
   void ApplyMapDelta(const MapDelta& delta);
@@ -105,6 +106,7 @@ class FrontendCore {
   FrontendOutput GiveUpMap(bool drop, const std::string& reason);
   MapId NextMapId() const;
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
+  bool IsEvidenceDue();
   void ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output);
   KeyframeProposal ProposeKeyframe(const PlacedPose& pose);
   FramePose NoPose(TrackingState state, std::string reason) const;
@@ -138,8 +140,8 @@ class FrontendCore {
   // Frames
   TrackedFrame frame_;
   UnplacedFrames unplaced_;
-  std::deque<WaitingFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
-  int frames_since_evidence_ = 0;
+  std::deque<WaitingFrame> behind_;     ///< since the first map's second keyframe, not tracked yet
+  std::optional<int64_t> evidence_ns_;  ///< when it was told last
   FrontendCounters counters_;
 };
 
