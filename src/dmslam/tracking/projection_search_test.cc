@@ -105,8 +105,11 @@ TEST_F(Search, KeypointsThatTurnOtherwiseThanMostAreNoMatches) {
 }
 
 TEST_F(Search, AFarOctaveIsAnotherSize) {
-  const TrackedFrame frame = Changed([](FeatureSet* set) { set->keypoints[7].octave = 3; });
-  EXPECT_FALSE(Has(FromFrameBefore(frame), 7));
+  const auto coarse = [](FeatureSet* set) { set->keypoints[7].octave = 3; };
+  EXPECT_FALSE(Has(FromFrameBefore(Changed(coarse)), 7));
+  TrackedFrame before = Changed(coarse);
+  before.landmarks = ids_;
+  EXPECT_FALSE(Has(search_.MatchFrame(scene_.map(), votes_, before, Rigid3d(), 15.0, *Frame().features), 7));
 }
 
 TEST_F(Search, AKeyframesLandmarksAreFoundWhereverTheyAre) {
