@@ -399,7 +399,7 @@ FeatureView FrontendNode::ViewOfFeatures() const {
 /// On the core.
 void FrontendNode::DrawPicture(const FrontendOutput& output) {
   const TrackedFrame& frame = core_->frame();
-  if (extras_.picture_every <= 0 || frame.index % extras_.picture_every != 0) return;
+  if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
   for (auto event = output.events.rbegin(); event != output.events.rend(); ++event) {
     const auto* pose = std::get_if<FramePose>(&*event);
     if (pose) return WritePicture(extras_.picture_dir, image_, frame, *pose);

@@ -24,7 +24,7 @@ std::function<FirstMapSearch()> SearchMaker(const FrontendCore::Setup& setup) {
 
 }  // namespace
 
-FrontendCore::FrontendCore(Setup setup)
+FrontendCore::FrontendCore(const Setup& setup)
     : options_(setup.options),
       camera_(setup.camera),
       pyramid_(setup.pyramid),

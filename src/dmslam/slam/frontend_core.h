@@ -43,7 +43,7 @@ class FrontendCore {
     std::shared_ptr<const Vocabulary>
         vocabulary;  ///< for relocalisation; without one only the newest places are tried
   };
-  explicit FrontendCore(Setup setup);
+  explicit FrontendCore(const Setup& setup);
 
   // ---- While the sequence goes on ----
 
