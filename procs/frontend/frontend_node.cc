@@ -14,7 +14,7 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
-constexpr size_t kMaxBehind = 15;  // frames: half a second
+constexpr double kMaxBehindS = 0.5;
 
 }  // namespace
 
@@ -39,9 +39,12 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.vocabulary = extras_.vocabulary;
   if (!lockstep_) setup.run_search = InBackground;
   setup.catch_up_in_portions = !lockstep_;
+  work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  ServeReplica(&core_->map(), [this] { return HandOverVersion(); });
+  ServeReplica(
+      &core_->map(), [this] { return HandOverVersion(); },
+      [this] { return work_->Idle() && applied_ == promised_; });
   WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
 }
 
@@ -49,7 +52,10 @@ void FrontendNode::Begin(const CameraInfo& info) {
 bool FrontendNode::ReadyToWrite() {
   if (context_.fresh_system) return true;
   if (!map_reader_->term().valid()) return !options_.HasPeer("mapper");
-  TakeMapRecords(true);
+  if (!work_->Idle()) return false;
+  TakeMapRecords();
+  ApplyHeldRecords(NumReadyRecords(true), true);
+  if (!work_->Idle()) return false;
   const bool caught_up =
       map_reader_->state() == StreamReader::State::kFollowing && map_reader_->backlog() == 0 && held_.empty();
   if (!caught_up) return false;
@@ -65,14 +71,12 @@ bool FrontendNode::ReadyToWrite() {
   return true;
 }
 
+/// Nothing that was taken is left behind: a mapper that continued without it would find this reader ahead.
 Version FrontendNode::HandOverVersion() {
-  if (core_->NeedsMapUnchanged()) return applied_;
-  TakeMapRecords(true);
-  while (core_->IsRefining()) {  // what is taken must be applied
-    core_->RefineNext();
-    ApplyHeldRecords(NumReadyRecords(true));
-  }
-  return applied_;
+  if (!work_->Idle() || core_->NeedsMapUnchanged()) return promised_;
+  TakeMapRecords();
+  ApplyHeldRecords(NumReadyRecords(true), true);
+  return promised_;
 }
 
 void FrontendNode::OnWriterOpen() {
@@ -122,20 +126,25 @@ void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   end_.OnEndHeard();
 }
 
-/// In real time records are applied as they come. In lock-step they are applied up to a settled record, so
-/// that which frame sees what does not depend on how fast the mapper was with what nobody waits for
-/// (evidence). A snapshot takes the place of the replica when all of it is here.
-void FrontendNode::TakeMapRecords(bool all) {
+// ---- The map ----
+
+/// A snapshot takes the place of the replica when all of it is here.
+void FrontendNode::TakeMapRecords() {
   while (std::optional<Record> record = map_reader_->Take()) {
-    if (record->begins_anew()) held_.clear();
+    if (record->begins_anew()) {
+      held_.clear();
+      promised_ = applied_;
+    }
     auto delta = ReadMapRecord(*record, map_reader_.get());
     if (!delta) continue;
     held_.push_back({std::move(*delta), record->version(), record->begins_anew(), record->in_snapshot(),
                      record->ends_snapshot()});
   }
-  ApplyHeldRecords(NumReadyRecords(all));
 }
 
+/// In real time records are applied as they come. In lock-step they are applied up to a settled record, so
+/// that which frame sees what does not depend on how fast the mapper was with what nobody waits for
+/// (evidence). `all`: as in real time.
 size_t FrontendNode::NumReadyRecords(bool all) const {
   size_t ready = held_.size();
   const auto is_ready = [&](const HeldRecord& held) {
@@ -146,12 +155,26 @@ size_t FrontendNode::NumReadyRecords(bool all) const {
   return ready;
 }
 
+/// Where the maps have been adjusted, frames are refined before the next record; `at_once`: within this job,
+/// else one by one in jobs of their own.
+void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
+  if (count == 0) return;
+  promised_ = held_[count - 1].version;
+  work_->Post([this, count, at_once] {
+    size_t applied = 0;
+    for (; applied < count && (at_once || !core_->IsRefining()); ++applied) {
+      const HeldRecord& held = held_[applied];
+      if (held.begins_anew) core_->ForgetMap();
+      core_->ApplyMapDelta(held.delta);
+    }
+    work_->Report([this, applied] { OnApplied(applied); });
+  });
+}
+
 /// Only what is applied is accepted: what is held back could not be handed over.
-void FrontendNode::ApplyHeldRecords(size_t count) {
-  for (; count > 0 && !core_->IsRefining(); --count) {
+void FrontendNode::OnApplied(size_t count) {
+  for (; count > 0; --count) {
     const HeldRecord& held = held_.front();
-    if (held.begins_anew) core_->ForgetMap();
-    core_->ApplyMapDelta(held.delta);
     if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer();
     applied_ = held.version;
     held_.pop_front();
@@ -173,26 +196,39 @@ bool FrontendNode::AwaitsSavedMap() const {
   return options_.settings.start.saved_map && core_->map().keyframes().empty();
 }
 
+/// Has the core do something, which ends with what it has to say of itself. The core is idle. Returns whether
+/// it is idle again.
+bool FrontendNode::Run(Job job) {
+  work_->Post([this, job = std::move(job)] {
+    job();
+    work_->Report([this, status = CoreStatus()] { core_status_ = status; });
+  });
+  return work_->Idle();
+}
+
 bool FrontendNode::WorkOnce() {
-  if (core_->IsRefining()) {
-    core_->RefineNext();
-    return false;  // one in a turn: it takes a while, and signals and elections are for between
+  if (!work_->Idle()) return false;
+  LetSnapshotBegin();
+  if (core_->IsRefining()) return Refine();
+  if (!core_->NeedsMapUnchanged()) {
+    TakeMapRecords();
+    ApplyHeldRecords(NumReadyRecords(end_.AppliesAllRecords()), false);
+    if (!work_->Idle()) return false;
   }
-  if (!core_->NeedsMapUnchanged()) TakeMapRecords(end_.AppliesAllRecords());
   if (end_.Is(SequenceEnd::Phase::kDone)) {
     if (!options_.HasPeer("mapper") || MapIsOver(core_->map(), *map_reader_)) Stop();
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
-  if (waiting_ && !FallsBehind()) return ProcessWaiting();
+  if (waiting_ && !FallsBehind()) return TrackWaiting();
   if (core_->IsBehind()) return CatchUp();
   return WorkAtEnd();
 }
 
 int64_t FrontendNode::WorkDeadline() const {
   using Phase = SequenceEnd::Phase;
-  if (!core_) return INT64_MAX;
+  if (!core_ || !work_->Idle()) return INT64_MAX;
   if (core_->IsRefining()) return 0;
   if (end_.Is(Phase::kTelling)) return end_.next_portion_ns();
   if (stopping_ || AwaitsSavedMap()) return INT64_MAX;
@@ -200,53 +236,62 @@ int64_t FrontendNode::WorkDeadline() const {
   return grows || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
 }
 
-/// A portion in a turn: the node answers in between. True: the next step can begin at once.
+// ---- When the sequence has ended ----
+
+/// A portion in a turn: signals and elections are for between. True: the next can begin at once.
 bool FrontendNode::WorkAtEnd() {
   using Phase = SequenceEnd::Phase;
-  if (end_.Is(Phase::kPlaying)) return false;
-  if (end_.Is(Phase::kGrowingBack)) {
-    if (GrowBack()) return false;
-    end_.OnGrown();
+  switch (end_.phase()) {
+    case Phase::kPlaying:
+      return false;
+    case Phase::kGrowingBack:
+      return GrowBack();
+    case Phase::kAwaitingAdjustedMap:
+      if (!MapsAreAdjusted()) return false;
+      end_.OnAdjusted();
+      return Run([this] { core_->RefineRest(); });
+    case Phase::kRefining:
+      ReturnFreeMemory();  // the features that were kept are not needed now
+      end_.OnRefined();
+      return true;
+    case Phase::kJoining:
+      return Join();
+    case Phase::kTelling:
+    case Phase::kDone:
+      return TellLastPoses();
   }
-  if (end_.Is(Phase::kAwaitingAdjustedMap)) {
-    if (!MapsAreAdjusted()) return false;
-    core_->RefineRest();
-    end_.OnAdjusted();
-  }
-  if (core_->IsRefining()) return true;
-  if (end_.Is(Phase::kRefining)) {
-    ReturnFreeMemory();  // the features that were kept are not needed now
-    end_.OnRefined();
-  }
-  if (end_.Is(Phase::kJoining)) {
-    if (core_->WorkAtEnd([this] { AnswerWithinWork(); })) return false;
-    end_.Tell(core_->Finish());
-  }
-  return TellLastPoses();
+  return false;
 }
 
-/// Catching up has the time between two images. Where that is not enough it comes first until all is done,
-/// and images are skipped.
-bool FrontendNode::FallsBehind() {
-  hurries_ = core_->IsBehind() && (hurries_ || core_->num_behind() > kMaxBehind);
-  return hurries_;
-}
-
-bool FrontendNode::CatchUp() {
-  Publish(core_->CatchUp().events);
-  endpoint_.Advance();
-  return true;
-}
-
-/// One frame in a turn, and one keyframe at a time. True: there is more to do.
+/// One keyframe at a time: the mapper has time for it.
 bool FrontendNode::GrowBack() {
-  if (!options_.HasPeer("mapper")) return false;
-  if (core_->awaited().valid() && !core_->map().keyframes().empty()) return true;
-  core_->SetWithheld(false);  // one at a time, the mapper has time for it
-  const std::optional<FrontendOutput> output = core_->GrowBack();
-  if (output) Publish(output->events);
-  endpoint_.Advance();
-  return output.has_value();
+  if (!options_.HasPeer("mapper")) {
+    end_.OnGrown();
+    return true;
+  }
+  if (core_->awaited().valid() && !core_->map().keyframes().empty()) return false;
+  Run([this] {
+    core_->SetWithheld(false);
+    const std::optional<FrontendOutput> output = core_->GrowBack();
+    work_->Report([this, output] {
+      if (!output) return end_.OnGrown();
+      Publish(output->events);
+    });
+  });
+  return work_->Idle() && !end_.Is(SequenceEnd::Phase::kGrowingBack);
+}
+
+/// One frame: it takes a while.
+bool FrontendNode::Refine() {
+  return Run([this] { core_->RefineNext(); }) && !core_->IsRefining();
+}
+
+bool FrontendNode::Join() {
+  Run([this] {
+    if (core_->WorkAtEnd()) return;
+    work_->Report([this, last = core_->Finish()] { end_.Tell(last); });
+  });
+  return false;
 }
 
 /// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.
@@ -257,53 +302,108 @@ bool FrontendNode::MapsAreAdjusted() {
   return end_.IsAnswered();
 }
 
+bool FrontendNode::TellLastPoses() {
+  Publish(end_.NextPortion(context_.now_ns()));
+  if (!end_.Is(SequenceEnd::Phase::kDone)) return false;
+  PublishSequenceDone();
+  PublishStatus();
+  writer_->Complete(context_.now_ns());
+  return true;
+}
+
+void FrontendNode::PublishSequenceDone() {
+  PublishLoose(SequenceDone{context_.wall_us(), session_, 0, frames_processed_, frames_skipped_});
+}
+
+// ---- While it goes on ----
+
+/// Catching up has the time between two images. Where that is not enough it comes first until all is done,
+/// and images are skipped.
+bool FrontendNode::FallsBehind() {
+  hurries_ = core_->IsBehind() && (hurries_ || core_->seconds_behind() >= kMaxBehindS);
+  return hurries_;
+}
+
+bool FrontendNode::CatchUp() {
+  return Run([this] { work_->Report([this, output = core_->CatchUp()] { Publish(output.events); }); });
+}
+
+bool FrontendNode::TrackWaiting() {
+  const auto waiting = std::make_shared<const Waiting>(std::move(*waiting_));
+  waiting_.reset();
+  last_index_ = waiting->frame.frame_index;
+  last_stamp_ns_ = waiting->frame.stamp_ns;
+  if (first_stamp_ns_ == 0) first_stamp_ns_ = last_stamp_ns_;
+  frame_open_ = true;
+  const bool withheld = UnacceptedKeyframes() >= kMaxUnacceptedKeyframes;
+  return Run([this, waiting, withheld] { Track(*waiting, withheld); });
+}
+
+/// On the core.
+void FrontendNode::Track(const Waiting& waiting, bool withheld) {
+  const Frame& frame = waiting.frame;
+  FrameTrace trace{session_,         frame.frame_index,  frame.stamp_ns,    frame.capture_us,
+                   frame.publish_us, waiting.receive_us, context_.wall_us()};
+  if (!DecodeImage(frame)) return;
+  trace.decoded_us = context_.wall_us();
+  core_->SetWithheld(withheld);
+  const auto tracked = std::make_shared<Tracked>();
+  tracked->output = core_->ProcessImage(frame.frame_index, frame.stamp_ns,
+                                        {image_.data.data(), image_.width, image_.height, image_.width});
+  tracked->extract_ms = core_->extract_ms();
+  trace.tracked_us = context_.wall_us();
+  trace.extracted_us = trace.decoded_us + static_cast<int64_t>(1000.0 * tracked->extract_ms);
+  tracked->trace = trace;
+  tracked->features = ViewOfFeatures();
+  work_->Report([this, tracked] { PublishTracked(*tracked); });
+  DrawPicture(tracked->output);
+}
+
+/// On the core.
 bool FrontendNode::DecodeImage(const Frame& frame) {
   const std::string name = "frame " + std::to_string(frame.frame_index);
   try {
     decoder_.Decode(ToImageEncoding(frame.encoding), frame.width_px, frame.height_px, frame.data, name,
                     image_);
   } catch (const InputError& error) {
-    if (frames_bad_++ == 0) spdlog::warn("frontend: {} (further ones are only counted)", error.what());
+    work_->Report([this, problem = std::string(error.what())] { OnBadImage(problem); });
     return false;
   }
   const Camera& camera = camera_info_->camera;
   if (image_.width == camera.width_px && image_.height == camera.height_px) return true;
-  Exit(2, name + " is " + std::to_string(image_.width) + "x" + std::to_string(image_.height) +
-              " pixels, but the camera file says " + std::to_string(camera.width_px) + "x" +
-              std::to_string(camera.height_px) +
-              "; give the camera file that belongs to the sequence (--camera)");
+  work_->Report([this, problem = name + " is " + std::to_string(image_.width) + "x" +
+                                 std::to_string(image_.height) + " pixels, but the camera file says " +
+                                 std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px) +
+                                 "; give the camera file that belongs to the sequence (--camera)"] {
+    Exit(2, problem);
+  });
   return false;
 }
 
-bool FrontendNode::ProcessWaiting() {
-  const Waiting waiting = std::move(*waiting_);
-  waiting_.reset();
-  last_index_ = waiting.frame.frame_index;
-  last_stamp_ns_ = waiting.frame.stamp_ns;
-  if (first_stamp_ns_ == 0) first_stamp_ns_ = last_stamp_ns_;
-  frame_open_ = true;
-  FrameTrace trace{session_,
-                   waiting.frame.frame_index,
-                   waiting.frame.stamp_ns,
-                   waiting.frame.capture_us,
-                   waiting.frame.publish_us,
-                   waiting.receive_us,
-                   context_.wall_us()};
-  if (!DecodeImage(waiting.frame)) return true;
-  trace.decoded_us = context_.wall_us();
-  core_->SetWithheld(UnacceptedKeyframes() >= kMaxUnacceptedKeyframes);
-  const FrontendOutput output =
-      core_->ProcessImage(waiting.frame.frame_index, waiting.frame.stamp_ns,
-                          {image_.data.data(), image_.width, image_.height, image_.width});
-  trace.tracked_us = context_.wall_us();
-  trace.extracted_us = trace.decoded_us + static_cast<int64_t>(1000.0 * core_->extract_ms());
-  Publish(output.events);
-  endpoint_.Advance();
-  ++frames_processed_;
-  PublishViews(waiting, last_pose_, trace);
-  DrawPicture();
-  if (!HoldsBack()) FinishFrame();
-  return true;
+void FrontendNode::OnBadImage(const std::string& problem) {
+  if (frames_bad_++ == 0) spdlog::warn("frontend: {} (further ones are only counted)", problem);
+}
+
+/// On the core.
+FeatureView FrontendNode::ViewOfFeatures() const {
+  const TrackedFrame& frame = core_->frame();
+  FeatureView view{session_, frame.index, frame.stamp_ns, {}};
+  view.items.reserve(frame.classes.size());
+  for (size_t i = 0; i < frame.classes.size(); ++i) {
+    const Keypoint& keypoint = frame.features->set.keypoints[i];
+    view.items.push_back({keypoint.x_q4, keypoint.y_q4, static_cast<FeatureView::Kind>(frame.classes[i])});
+  }
+  return view;
+}
+
+/// On the core.
+void FrontendNode::DrawPicture(const FrontendOutput& output) {
+  const TrackedFrame& frame = core_->frame();
+  if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
+  for (auto event = output.events.rbegin(); event != output.events.rend(); ++event) {
+    const auto* pose = std::get_if<FramePose>(&*event);
+    if (pose) return WritePicture(extras_.picture_dir, image_, frame, *pose);
+  }
 }
 
 void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
@@ -325,13 +425,23 @@ void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
   }
 }
 
-void FrontendNode::PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace) {
+void FrontendNode::PublishTracked(const Tracked& tracked) {
+  Publish(tracked.output.events);
+  endpoint_.Advance();  // before all that may come late
+  ++frames_processed_;
+  FrameTrace trace = tracked.trace;
   trace.published_us = context_.wall_us();
-  latency_.Add(static_cast<double>(trace.published_us - waiting.frame.publish_us) * 1e-3);
+  latency_.Add(static_cast<double>(trace.published_us - trace.publish_us) * 1e-3);
   decode_.Add(static_cast<double>(trace.decoded_us - trace.begin_us) * 1e-3);
-  extract_.Add(core_->extract_ms());
+  extract_.Add(tracked.extract_ms);
   step_.Add(static_cast<double>(trace.tracked_us - trace.begin_us) * 1e-3);
   PublishLoose(trace);
+  PublishView(trace);
+  PublishLoose(tracked.features, options_.link == Link::kLan);
+}
+
+void FrontendNode::PublishView(const FrameTrace& trace) {
+  const FramePose& pose = last_pose_;
   PoseView view;
   view.session = session_;
   view.frame_index = pose.frame_index;
@@ -347,17 +457,8 @@ void FrontendNode::PublishViews(const Waiting& waiting, const FramePose& pose, F
   view.moving = pose.num_moving;
   view.unknown = pose.num_unknown;
   view.moving_share = pose.moving_image_share;
-  view.latency_ms = static_cast<double>(trace.published_us - waiting.frame.publish_us) * 1e-3;
+  view.latency_ms = static_cast<double>(trace.published_us - trace.publish_us) * 1e-3;
   PublishLoose(view);
-  FeatureView features{session_, pose.frame_index, pose.stamp_ns, {}};
-  const TrackedFrame& frame = core_->frame();
-  features.items.reserve(frame.classes.size());
-  for (size_t i = 0; i < frame.classes.size(); ++i) {
-    const Keypoint& keypoint = frame.features->set.keypoints[i];
-    features.items.push_back(
-        {keypoint.x_q4, keypoint.y_q4, static_cast<FeatureView::Kind>(frame.classes[i])});
-  }
-  PublishLoose(features, options_.link == Link::kLan);
 }
 
 void FrontendNode::FinishFrame() {
@@ -365,35 +466,14 @@ void FrontendNode::FinishFrame() {
   PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
 }
 
-void FrontendNode::DrawPicture() {
-  if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
-  WritePicture(extras_.picture_dir, image_, core_->frame(), last_pose_);
-}
-
-void FrontendNode::PublishSequenceDone() {
-  PublishLoose(SequenceDone{context_.wall_us(), session_, 0, frames_processed_, frames_skipped_});
-}
-
-/// The smoothing of a long trajectory takes seconds.
-void FrontendNode::AnswerWithinWork() {
-  PumpWithinWork();
-  PublishStatusIfDue();
-}
-
-bool FrontendNode::TellLastPoses() {
-  Publish(end_.NextPortion(context_.now_ns()));
-  if (!end_.Is(SequenceEnd::Phase::kDone)) return false;
-  PublishSequenceDone();
-  PublishStatus();
-  writer_->Complete(context_.now_ns());
-  return true;
-}
+// ---- Status ----
 
 void FrontendNode::PublishStatus() {
-  FrontendStatus status;
+  if (core_ && work_->Idle()) core_status_ = CoreStatus();
+  FrontendStatus status = core_status_;
   status.head = MakeStatusHead(core_ ? last_pose_.reason : "waiting for a camera", {map_reader_.get()});
   status.head.health.dropped_malformed += frames_bad_;
-  if (HoldsBackForStatus()) status.head.health.waiting_for = "mapper";
+  if (IsHeldUp()) status.head.health.waiting_for = "mapper";
   status.frames_received = frames_received_;
   status.frames_processed = frames_processed_;
   status.frames_skipped = frames_skipped_;
@@ -408,32 +488,47 @@ void FrontendNode::PublishStatus() {
   status.step_p95_ms = step_.Quantile(0.95);
   status.track_ms = status.step_ms - status.decode_ms - status.extract_ms;
   status.first_map_s = first_map_s_;
-  if (core_) FillCoreStatus(&status);
+  if (core_) FillPoseStatus(&status);
   PublishLoose(status);
 }
 
-bool FrontendNode::HoldsBackForStatus() const {
-  return core_ != nullptr && (HoldsBack() || AwaitsSavedMap() ||
-                              (end_.Is(SequenceEnd::Phase::kGrowingBack) && core_->awaited().valid()));
-}
-
-void FrontendNode::FillCoreStatus(FrontendStatus* status) const {
-  status->state = core_->state();
+void FrontendNode::FillPoseStatus(FrontendStatus* status) const {
   status->features = last_pose_.num_features;
   status->inliers = last_pose_.num_static;
   status->moving = last_pose_.num_moving;
   status->unknown = last_pose_.num_unknown;
   status->moving_share = last_pose_.moving_image_share;
   status->map_id = last_pose_.map_id;
-  status->map_version = static_cast<int64_t>(core_->map().version());
-  status->map_keyframes = static_cast<int32_t>(core_->map().keyframes().size());
-  status->map_landmarks = static_cast<int32_t>(core_->map().num_landmarks());
-  const FrontendCounters& counters = core_->counters();
-  status->keyframes_proposed = static_cast<int64_t>(counters.keyframes_proposed);
-  status->keyframes_withheld = static_cast<int64_t>(counters.keyframes_withheld);
   status->keyframes_unacknowledged = static_cast<int32_t>(keyframe_seqs_.size());
-  status->resets = static_cast<int64_t>(counters.resets);
-  status->relocalisations = static_cast<int64_t>(counters.relocalizations);
+}
+
+/// Waits for the mapper before it can go on.
+bool FrontendNode::IsHeldUp() const {
+  return core_ != nullptr && work_->Idle() &&
+         (HoldsBack() || AwaitsSavedMap() ||
+          (end_.Is(SequenceEnd::Phase::kGrowingBack) && core_->awaited().valid()));
+}
+
+/// On the core, or while it is idle.
+FrontendStatus FrontendNode::CoreStatus() const {
+  FrontendStatus status;
+  const Map& map = core_->map();
+  const FrontendCounters& counters = core_->counters();
+  status.state = core_->state();
+  status.map_version = static_cast<int64_t>(map.version());
+  status.map_keyframes = static_cast<int32_t>(map.keyframes().size());
+  status.map_landmarks = static_cast<int32_t>(map.num_landmarks());
+  status.keyframes_proposed = static_cast<int64_t>(counters.keyframes_proposed);
+  status.keyframes_withheld = static_cast<int64_t>(counters.keyframes_withheld);
+  status.resets = static_cast<int64_t>(counters.resets);
+  status.relocalisations = static_cast<int64_t>(counters.relocalizations);
+  return status;
+}
+
+/// A core in work is waited for.
+void FrontendNode::Stop() {
+  if (work_ && !stopping_) work_->Finish();
+  StreamNode::Stop();
 }
 
 }  // namespace dmslam

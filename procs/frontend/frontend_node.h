@@ -1,12 +1,16 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "dmslam/dataset/image.h"
+#include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/frontend_core.h"
@@ -16,7 +20,8 @@
 namespace dmslam {
 
 /// The frontend on the bus: frames in; session, poses, keyframes and evidence out; its map comes from the map
-/// stream.
+/// stream. The core works in jobs, one at a time, and in real time on a thread of its own: what touches the
+/// core is done in a job, or while there is none.
 class FrontendNode : public StreamNode {
  public:
   struct Extras {
@@ -25,6 +30,8 @@ class FrontendNode : public StreamNode {
     int picture_every = 0;    ///< every Nth frame
   };
   FrontendNode(NodeContext context, NodeOptions options, Extras extras);
+
+  void Stop() override;
 
  protected:
   void Begin(const CameraInfo& info) override;
@@ -41,6 +48,14 @@ class FrontendNode : public StreamNode {
     int64_t receive_us = 0;
   };
 
+  /// What the core makes of a frame.
+  struct Tracked {
+    FrameTrace trace;
+    FrontendOutput output;
+    FeatureView features;
+    double extract_ms = 0;
+  };
+
   void OnFrame(std::span<const uint8_t> bytes);
   void OnEndOfSequence(std::span<const uint8_t> bytes);
   /// A map record that is here but not yet applied.
@@ -52,36 +67,46 @@ class FrontendNode : public StreamNode {
     bool ends_snapshot = false;
   };
 
-  void TakeMapRecords(bool all);
+  using Job = std::function<void()>;
+  bool Run(Job job);
+  void TakeMapRecords();
   size_t NumReadyRecords(bool all) const;
-  void ApplyHeldRecords(size_t count);
+  void ApplyHeldRecords(size_t count, bool at_once);
+  void OnApplied(size_t count);
   Version HandOverVersion();
   bool HoldsBack() const;
   bool AwaitsSavedMap() const;
-  bool ProcessWaiting();
-  bool CatchUp();
-  bool FallsBehind();
+  bool TrackWaiting();
+  void Track(const Waiting& waiting, bool withheld);
   bool DecodeImage(const Frame& frame);
+  void OnBadImage(const std::string& problem);
+  FeatureView ViewOfFeatures() const;
+  void DrawPicture(const FrontendOutput& output);
+  bool FallsBehind();
+  bool CatchUp();
   void Publish(const std::vector<FrontendEvent>& events);
-  void PublishViews(const Waiting& waiting, const FramePose& pose, FrameTrace trace);
+  void PublishTracked(const Tracked& tracked);
+  void PublishView(const FrameTrace& trace);
   void FinishFrame();
-  void DrawPicture();
   bool WorkAtEnd();
   bool GrowBack();
+  bool Refine();
+  bool Join();
   bool MapsAreAdjusted();
   void PublishSequenceDone();
-  void AnswerWithinWork();
   bool TellLastPoses();
   int UnacceptedKeyframes();
-  bool HoldsBackForStatus() const;
-  void FillCoreStatus(FrontendStatus* status) const;
+  bool IsHeldUp() const;
+  void FillPoseStatus(FrontendStatus* status) const;
+  FrontendStatus CoreStatus() const;
 
   Extras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
   std::deque<HeldRecord>
-      held_;         ///< lock-step: not yet followed by a settled record; or an unfinished snapshot
-  Version applied_;  ///< of the replica
+      held_;          ///< lock-step: not yet followed by a settled record; or an unfinished snapshot; or next
+  Version applied_;   ///< of the replica
+  Version promised_;  ///< the same, when all that is ready is applied
   std::optional<Waiting> waiting_;
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far
@@ -101,6 +126,8 @@ class FrontendNode : public StreamNode {
   int64_t first_stamp_ns_ = 0;
   double first_map_s_ = -1;
   LatencyWindow latency_, decode_, extract_, step_;
+  FrontendStatus core_status_;        ///< what the core had to say of itself last
+  std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
 };
 
 }  // namespace dmslam

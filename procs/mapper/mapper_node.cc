@@ -155,7 +155,7 @@ void MapperNode::PublishDelta(const MapDelta& delta) {
 bool MapperNode::KeyframeWaits() const {
   return std::any_of(taken_.begin(), taken_.end(),
                      [](const Arrived& arrived) { return arrived.record.channel == channels::kKeyframe; }) ||
-         arrived_.size() + frontend_reader_->backlog() > 60;
+         arrived_.size() + static_cast<size_t>(frontend_reader_->backlog()) > 60;
 }
 
 /// Latencies count from when a record came, not from when there was time for it.

@@ -80,8 +80,7 @@ TEST(Lens, Freiburg1IsTakenOutOfTheKeypoints) {
   const char* source_dir = std::getenv("DMSLAM_SOURCE_DIR");
   const fs::path project = source_dir != nullptr ? source_dir : fs::current_path();
   const Camera camera = LoadCamera((project / "config" / "TUM1.yaml").string());
-  Camera without_lens = camera;
-  without_lens.k1 = without_lens.k2 = without_lens.p1 = without_lens.p2 = without_lens.k3 = 0;
+  const Camera without_lens = camera.WithoutLens();
   const TwoFrames frames = Render(camera);
   const double applied_px = MedianEpipolarError(frames, camera);
   const double ignored_px = MedianEpipolarError(frames, without_lens);

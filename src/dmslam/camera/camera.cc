@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "dmslam/util/check.h"
 
@@ -103,6 +105,18 @@ Eigen::Matrix3d Camera::K() const {
   return k;
 }
 
+Camera Camera::WithoutLens() const {
+  Camera camera = *this;
+  camera.k1 = camera.k2 = camera.p1 = camera.p2 = camera.k3 = 0;
+  return camera;
+}
+
+bool Camera::SeesAs(const Camera& other) const {
+  Camera at_this_rate = other;
+  at_this_rate.fps = fps;
+  return *this == at_this_rate;
+}
+
 Eigen::Vector2d Camera::Distort(const Eigen::Vector2d& ideal_px) const {
   const Eigen::Vector2d n((ideal_px.x() - cx_px) / fx_px, (ideal_px.y() - cy_px) / fy_px);
   const Eigen::Vector2d d = DistortNormalized(*this, n);
@@ -156,6 +170,20 @@ Camera LoadCamera(const std::string& path) {
   if (const auto problem = camera.Problem())
     throw InputError(path + ": " + *problem + "; correct it (see docs/camera.md)");
   return camera;
+}
+
+std::string CameraText(const Camera& camera) {
+  std::ostringstream text;
+  text.precision(12);
+  text << "model: pinhole\nwidth: " << camera.width_px << "\nheight: " << camera.height_px
+       << "\nfx: " << camera.fx_px << "\nfy: " << camera.fy_px << "\ncx: " << camera.cx_px
+       << "\ncy: " << camera.cy_px << "\n";
+  if (camera.HasDistortion()) {
+    text << "distortion: [" << camera.k1 << ", " << camera.k2 << ", " << camera.p1 << ", " << camera.p2
+         << ", " << camera.k3 << "]\n";
+  }
+  text << "fps: " << camera.fps << "\n";
+  return text.str();
 }
 
 }  // namespace dmslam

@@ -19,6 +19,11 @@ struct Camera {
   double fps = 30.0;  ///< Nominal rate; only for rules that speak of frames per second.
 
   bool HasDistortion() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+  /// The same camera, and images that the lens has been taken out of.
+  Camera WithoutLens() const;
+  /// Whether a pixel of one is the same ray in the other: all but the rate is equal.
+  bool SeesAs(const Camera& other) const;
+  bool operator==(const Camera&) const = default;
   Eigen::Matrix3d K() const;
   /// The camera without its lens, for undistorted pixels.
   Pinhole Ideal() const { return {fx_px, fy_px, cx_px, cy_px}; }
@@ -45,5 +50,8 @@ struct Camera {
 /// and model). Throws InputError that names file, field and cure; a model other than "pinhole" is refused by
 /// name.
 Camera LoadCamera(const std::string& path);
+
+/// The text of a camera file that LoadCamera reads.
+std::string CameraText(const Camera& camera);
 
 }  // namespace dmslam

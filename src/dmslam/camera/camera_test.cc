@@ -109,5 +109,24 @@ TEST(CameraFile, TumCamerasHoldThePublishedCalibrations) {
   }
 }
 
+TEST(CameraFile, WhatIsWrittenIsRead) {
+  Camera camera = Freiburg1();
+  camera.fps = 25;
+  const std::string path = ::testing::TempDir() + "/written_camera.yaml";
+  std::ofstream(path) << CameraText(camera);
+  EXPECT_EQ(LoadCamera(path), camera);
+  std::ofstream(path) << CameraText(camera.WithoutLens());
+  EXPECT_EQ(LoadCamera(path), camera.WithoutLens());
+}
+
+TEST(Camera, AnotherRateSeesTheSameAnotherLensDoesNot) {
+  const Camera camera = Freiburg1();
+  Camera other = camera;
+  other.fps = 60;
+  EXPECT_TRUE(camera.SeesAs(other));
+  EXPECT_FALSE(camera.SeesAs(camera.WithoutLens()));
+  EXPECT_FALSE(camera.WithoutLens().HasDistortion());
+}
+
 }  // namespace
 }  // namespace dmslam

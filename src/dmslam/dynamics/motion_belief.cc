@@ -5,7 +5,7 @@
 namespace dmslam {
 namespace {
 
-constexpr uint32_t kEvidenceWindow = 20;  // frames
+constexpr int64_t kLeastAgeNs = 667'000'000;  // who is younger may be missed by chance
 
 LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item, int64_t stamp_ns,
                          const MotionBeliefOptions& options) {
@@ -44,10 +44,10 @@ EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
       ++report.unknown;
       continue;
     }
-    const LandmarkEvidence updated =
-        Updated(map.FindLandmark(*id)->evidence, item, evidence.stamp_ns, options);
+    const Landmark& landmark = map.At(*id);
+    const LandmarkEvidence updated = Updated(landmark.evidence, item, evidence.stamp_ns, options);
     ++report.applied;
-    const bool gone = updated.visible >= kEvidenceWindow &&
+    const bool gone = evidence.stamp_ns - landmark.first_ns >= kLeastAgeNs &&
                       static_cast<double>(updated.found) < options.min_found_share * updated.visible;
     if (options.enabled && (gone || updated.motion_belief > options.remove_above)) {
       map.RemoveLandmark(*id);

@@ -51,34 +51,51 @@ void LoopcloserCore::ForgetMap() {
 }
 
 LoopAnswer LoopcloserCore::Check(KeyframeId id) {
-  ++counters_.checked;
-  counters_.last_keyframe = id;
-  verdicts_.clear();
-  LoopAnswer answer;
-  const Keyframe* keyframe = map_.FindKeyframe(id);
-  if (options_.enabled && places_.usable() && keyframe != nullptr) {
-    places_.Refresh(map_, id);
-    ++keyframes_since_loop_;
-    if (!awaited_correction_) answer = adjustment_due_ ? AdjustAfterLoop(id) : FindLoop(*keyframe);
-  }
+  LoopAnswer answer = FindCorrection(id);
   answer.keyframe = id;
   answer.base_version = map_.version();
-  if (keyframe != nullptr) answer.stamp_ns = keyframe->stamp_ns;
+  if (const Keyframe* keyframe = map_.FindKeyframe(id)) answer.stamp_ns = keyframe->stamp_ns;
   return answer;
 }
 
-LoopAnswer LoopcloserCore::FindLoop(const Keyframe& keyframe) {
-  const LoopDetector::Found found = detector_.Detect(map_, places_, keyframe);
+/// What a keyframe goes through. An answer without a correction: it is all right as it is.
+LoopAnswer LoopcloserCore::FindCorrection(KeyframeId id) {
+  const Keyframe* keyframe = Index(id);
+  if (keyframe == nullptr || awaited_correction_) return {};
+  if (adjustment_due_) return AdjustAfterLoop(id);
+  const std::vector<KeyframeId> candidates = NamePlaces(*keyframe);
+  ForgetUnconfirmed(keyframe->stamp_ns);
+  if (keyframes_since_loop_ <= options_.min_keyframes_between) return {};
+  if (const std::optional<VerifiedLoop> loop = ConfirmProposed(*keyframe)) return Close(*loop);
+  ProposePlace(*keyframe, candidates);
+  return {};
+}
+
+/// The keyframe, in the index of places from now on; null: it is gone, or no places are looked for.
+const Keyframe* LoopcloserCore::Index(KeyframeId id) {
+  ++counters_.checked;
+  counters_.last_keyframe = id;
+  verdicts_.clear();
+  const Keyframe* keyframe = map_.FindKeyframe(id);
+  if (!options_.enabled || !places_.usable() || keyframe == nullptr) return nullptr;
+  places_.Refresh(map_, id);
+  ++keyframes_since_loop_;
+  return keyframe;
+}
+
+/// Places that words name, for this keyframe and for those before it.
+std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
+  LoopDetector::Found found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
+  return std::move(found.candidates);
+}
+
+/// Proposals that nothing has confirmed for long.
+void LoopcloserCore::ForgetUnconfirmed(int64_t now_ns) {
   std::erase_if(proposals_, [&](const Proposal& proposal) {
-    return SecondsBetween(keyframe.stamp_ns, proposal.last_ns) > options_.confirm_within_s;
+    return SecondsBetween(now_ns, proposal.last_ns) > options_.confirm_within_s;
   });
-  if (keyframes_since_loop_ <= options_.min_keyframes_between) return {};
-  const std::optional<VerifiedLoop> loop = ConfirmProposed(keyframe);
-  if (loop) return Close(*loop);
-  ProposePlace(keyframe, found.candidates);
-  return {};
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyframe) {

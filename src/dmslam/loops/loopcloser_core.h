@@ -60,12 +60,15 @@ class LoopcloserCore {
 
  private:
   void HearOfCorrection(const MapDelta& delta);
-  LoopAnswer FindLoop(const Keyframe& keyframe);
-  LoopAnswer Close(const VerifiedLoop& loop);
+  LoopAnswer FindCorrection(KeyframeId id);
+  const Keyframe* Index(KeyframeId id);
+  std::vector<KeyframeId> NamePlaces(const Keyframe& keyframe);
+  void ForgetUnconfirmed(int64_t now_ns);
   /// Follows what earlier keyframes proposed: a loop that enough of them have confirmed for long enough.
   std::optional<VerifiedLoop> ConfirmProposed(const Keyframe& keyframe);
   /// The first of the candidates that geometry bears out is kept as a proposal.
   void ProposePlace(const Keyframe& keyframe, const std::vector<KeyframeId>& candidates);
+  LoopAnswer Close(const VerifiedLoop& loop);
   LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
 
   LoopcloserOptions options_;

@@ -297,7 +297,6 @@ class Smoother {
 
   /// -2 log of the likelihood of the poses, the states integrated out.
   double Unlikelihood(const Variances& variances) const {
-    if (options_.between) options_.between();
     NormalEquations equations = Linearize(variances);
     const StateSteps gradient = equations.gradient;
     StateSteps steps;
@@ -337,7 +336,6 @@ class Smoother {
   }
 
   void Update() {
-    if (options_.between) options_.between();
     NormalEquations equations = Linearize(variances_);
     StateSteps steps;
     if (!Solve(&equations, &steps)) return;

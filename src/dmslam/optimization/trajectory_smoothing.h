@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -37,7 +36,6 @@ struct SmoothingOptions {
   double max_variance = 1.0;         ///< ...what is more must be motion
   double common_variance = 0.1;      ///< of the errors that frames have in common, besides; relative likewise
   std::optional<MotionNoise> noise;  ///< as found before, in the same map; none: it is found from the data
-  std::function<void()> between;     ///< called in each pass over the poses (20 ms for 1000)
 };
 
 struct SmoothedTrajectory {

@@ -36,12 +36,6 @@ RecordHeader HeaderOf(uint32_t session, StreamId stream, int64_t seq) {
   return header;
 }
 
-bool SameLens(const Camera& a, const Camera& b) {
-  return a.width_px == b.width_px && a.height_px == b.height_px && a.fx_px == b.fx_px && a.fy_px == b.fy_px &&
-         a.cx_px == b.cx_px && a.cy_px == b.cy_px && a.k1 == b.k1 && a.k2 == b.k2 && a.p1 == b.p1 &&
-         a.p2 == b.p2 && a.k3 == b.k3;
-}
-
 std::map<MapId, size_t> KeyframesOfMaps(const Map& map) {
   std::map<MapId, size_t> sizes;
   for (const auto& [id, keyframe] : map.keyframes()) ++sizes[keyframe.map_id];
@@ -127,7 +121,7 @@ RebuiltMap LoadMap(const std::string& path) {
 }
 
 void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid) {
-  if (!SameLens(map.map.camera(), camera)) {
+  if (!map.map.camera().SeesAs(camera)) {
     throw InputError(path +
                      ": was made with another camera than the one that plays; give the same camera file");
   }

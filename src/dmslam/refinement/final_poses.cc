@@ -197,7 +197,7 @@ void FinalPoses::GoTo(Step step) {
   if (step == Step::kLandmarks && views_.empty()) SortViews();
 }
 
-void FinalPoses::Improve(const Map& map, const std::function<void()>& between) {
+void FinalPoses::Improve(const Map& map) {
   switch (step_) {
     case Step::kBetweenRounds:
       BeginRound(map);
@@ -211,7 +211,7 @@ void FinalPoses::Improve(const Map& map, const std::function<void()>& between) {
       if (next_ >= poses_.size()) GoTo(Step::kSmoothing);
       break;
     case Step::kSmoothing:
-      SmoothNextMap(map, between);
+      SmoothNextMap(map);
       if (next_ >= poses_.size()) GoTo(Step::kBetweenRounds);
   }
 }
@@ -251,12 +251,11 @@ std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const 
   return estimates;
 }
 
-void FinalPoses::SmoothNextMap(const Map& map, const std::function<void()>& between) {
+void FinalPoses::SmoothNextMap(const Map& map) {
   const auto begin = poses_.begin() + static_cast<ptrdiff_t>(next_);
   const auto end = std::find_if(begin, poses_.end(),
                                 [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
   SmoothingOptions options;
-  options.between = between;
   const MapId map_id = begin->pose.map_id.value_or(0);  // a final pose lies in a map
   const auto known = noise_.find(map_id);
   if (known != noise_.end()) options.noise = known->second;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <map>
 #include <span>
 #include <unordered_map>
@@ -66,8 +65,7 @@ class FinalPoses {
   void Add(const Map& map, FinalPose pose);
   /// One portion of a round: landmarks and frames are placed (not in the first), then the poses of each map
   /// smoothed. After a round they are in order of map and time. The map must not change within one.
-  /// `between` is called within smoothing, every 20 ms for 1000 frames; it must not change the poses.
-  void Improve(const Map& map, const std::function<void()>& between = {});
+  void Improve(const Map& map);
   bool IsMidRound() const { return step_ != Step::kBetweenRounds; }
   /// Whether all rounds are made, or none can be made any more.
   bool IsSettled() const;
@@ -92,7 +90,7 @@ class FinalPoses {
   void GoTo(Step step);
   bool HasMoved(const Map& map) const;
   std::vector<PoseEstimate> Estimates(const Map& map, std::span<const FinalPose> poses) const;
-  void SmoothNextMap(const Map& map, const std::function<void()>& between);
+  void SmoothNextMap(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
   void SortViews();

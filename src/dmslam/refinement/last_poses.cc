@@ -40,9 +40,9 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Keyfr
   final_.Add(map, std::move(later));
 }
 
-bool LastPoses::Improve(const Map& map, const std::function<void()>& between) {
+bool LastPoses::Improve(const Map& map) {
   if (!smooth_ || final_.IsSettled()) return false;
-  final_.Improve(map, between);
+  final_.Improve(map);
   return true;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -33,8 +32,8 @@ class LastPoses {
   /// A frame that was placed just now, relative to keyframe `reference`.
   void AddPlaced(const Map& map, const TrackedFrame& frame, const Keyframe& reference);
 
-  /// A portion of joining the poses. False: nothing is left to do. `between`: see FinalPoses::Improve().
-  bool Improve(const Map& map, const std::function<void()>& between);
+  /// A portion of joining the poses. False: nothing is left to do.
+  bool Improve(const Map& map);
   /// Whether a round of that is under way: the map that is handed in must stay as it is.
   bool NeedsMapUnchanged() const { return final_.IsMidRound(); }
   /// Gives the poses and forgets them.

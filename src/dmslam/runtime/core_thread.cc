@@ -35,7 +35,7 @@ bool CoreThread::HasRoom() const {
 
 bool CoreThread::Idle() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return jobs_.empty() && reports_.empty() && !failure_;
+  return jobs_.empty() && reports_.empty() && !failure_ && delivering_ == 0;
 }
 
 void CoreThread::Post(Job job) {
@@ -73,7 +73,11 @@ void CoreThread::Deliver() {
     failure = std::exchange(failure_, nullptr);
   }
   changed_.notify_all();
-  for (const Job& report : reports) report();
+  delivering_ += reports.size();
+  for (const Job& report : reports) {
+    report();
+    --delivering_;
+  }
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -64,6 +64,7 @@ class CoreThread {
   std::deque<Job> jobs_;  ///< the first one may be in work
   std::deque<Job> reports_;
   std::exception_ptr failure_;
+  size_t delivering_ = 0;  ///< reports that the poster calls just now, or next
   bool stopping_ = false;
   std::thread thread_;  ///< not joinable: jobs run at once
 };

@@ -33,6 +33,19 @@ TEST(CoreThread, SaysTheSameInBothModes) {
   EXPECT_EQ(Conversation(Mode::kOwnThread), "a1a2b1b2c1c2");
 }
 
+TEST(CoreThread, IsNotIdleWhileAReportIsStillDue) {
+  CoreThread core(Mode::kOwnThread);
+  std::vector<bool> idle;
+  core.Post([&] {
+    core.Report([&] { idle.push_back(core.Idle()); });
+    core.Report([&] { idle.push_back(core.Idle()); });
+  });
+  while (!core.HasRoom()) std::this_thread::yield();  // both are there to be delivered
+  core.Deliver();
+  EXPECT_EQ(idle, (std::vector<bool>{false, false}));
+  EXPECT_TRUE(core.Idle());
+}
+
 TEST(CoreThread, AtOnceAJobIsDoneWhenItIsPosted) {
   CoreThread core(Mode::kAtOnce);
   const std::thread::id here = std::this_thread::get_id();

@@ -14,7 +14,7 @@ struct NodeContext {
   Bus* bus = nullptr;
   std::function<int64_t()> now_ns;   ///< monotonic; virtual in one process
   std::function<int64_t()> wall_us;  ///< for utime and terms of office; reaches no result
-  std::function<void()> pump;        ///< delivers what has arrived, from within long work; may do nothing
+  std::function<void()> pump;        ///< delivers what has arrived, between steps of work; may do nothing
   std::function<void(int fd, std::function<void()> on_readable)>
       watch;                  ///< of descriptors of its own; may be none
   int64_t random_id = 1;      ///< of this process: reader and writer id

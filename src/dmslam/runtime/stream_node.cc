@@ -256,7 +256,7 @@ void StreamNode::Advance() {
   if (exit_code_) return;
   if (begun_ && (!plan_ || writer_)) {
     while (!exit_code_ && !stopping_ && WorkOnce()) {
-      PumpWithinWork();
+      PumpBetweenSteps();
       PublishStatusIfDue();  // who has much to do says so too
     }
   }
@@ -274,7 +274,7 @@ void StreamNode::PublishStatusIfDue() {
   next_tidy_ns_ = context_.now_ns() + kTidyEveryNs;
 }
 
-void StreamNode::PumpWithinWork() {
+void StreamNode::PumpBetweenSteps() {
   if (context_.pump) context_.pump();
   endpoint_.Advance();
 }

@@ -123,9 +123,6 @@ class StreamNode : public Node {
   /// The same for what the player says: a recorded session that was accepted is ours.
   bool IsForeignFrame(uint32_t session);
 
-  /// Keeps the protocol alive from within long work.
-  void PumpWithinWork();
-  void PublishStatusIfDue();
   void Exit(int code, std::string problem = {});
   StatusHead MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const;
 
@@ -148,6 +145,9 @@ class StreamNode : public Node {
   void OpenWriter();
   void WatchWriter();
   void WatchReaders();
+  /// Keeps the protocol alive while one step of work follows the other.
+  void PumpBetweenSteps();
+  void PublishStatusIfDue();
 
   bool begun_ = false;
   std::optional<Bytes> camera_message_;  ///< as the player sent it

@@ -1,6 +1,7 @@
 #include "dmslam/slam/frontend_core.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "dmslam/tracking/keyframe_policy.h"
@@ -23,7 +24,7 @@ std::function<FirstMapSearch()> SearchMaker(const FrontendCore::Setup& setup) {
 
 }  // namespace
 
-FrontendCore::FrontendCore(Setup setup)
+FrontendCore::FrontendCore(const Setup& setup)
     : options_(setup.options),
       camera_(setup.camera),
       pyramid_(setup.pyramid),
@@ -178,6 +179,11 @@ FrontendOutput FrontendCore::AwaitTurn() {
   return output;
 }
 
+double FrontendCore::seconds_behind() const {
+  if (behind_.empty()) return 0.0;
+  return 1e-9 * static_cast<double>(behind_.back().stamp_ns - behind_.front().stamp_ns);
+}
+
 FrontendOutput FrontendCore::CatchUp() {
   frame_ = std::move(behind_.front()).ToTracked(camera_, pyramid_);
   behind_.pop_front();
@@ -263,10 +269,16 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId refere
   return gate_.IsOpen();
 }
 
+/// Time runs backwards where the map grows back.
+bool FrontendCore::IsEvidenceDue() {
+  if (!evidence_ns_) evidence_ns_ = frame_.stamp_ns;
+  return std::abs(frame_.stamp_ns - *evidence_ns_) >= ToNs(options_.evidence_every_s);
+}
+
 /// What frames said of landmarks, from time to time and before each keyframe; and the keyframe.
 void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output) {
-  if (++frames_since_evidence_ >= options_.evidence_every_frames || keyframe) {
-    frames_since_evidence_ = 0;
+  if (IsEvidenceDue() || keyframe) {
+    evidence_ns_ = frame_.stamp_ns;
     FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
     if (!evidence.items.empty() && !localize_only_) output->Add(std::move(evidence));
   }
@@ -308,6 +320,7 @@ std::optional<TrackingReport> FrontendCore::PlaceNewestUnplaced() {
 
 std::optional<FrontendOutput> FrontendCore::GrowBack() {
   if (!options_.keyframes_at_end || localize_only_) return std::nullopt;
+  if (!late_.IsGrowing()) evidence_ns_.reset();
   late_.SetGrowing(!unplaced_.empty() && !map_.keyframes().empty());
   if (!late_.IsGrowing()) {
     unplaced_.ReturnSetAside();  // they are tried again in the adjusted map
@@ -333,8 +346,8 @@ FrontendOutput FrontendCore::KeepPlacedLater(const TrackingReport& report) {
   return output;
 }
 
-bool FrontendCore::WorkAtEnd(const std::function<void()>& between) {
-  if (unplaced_.empty()) return last_poses_.Improve(map_, between);
+bool FrontendCore::WorkAtEnd() {
+  if (unplaced_.empty()) return last_poses_.Improve(map_);
   if (PlaceNewestUnplaced()) {
     const KeyframeId reference = tracker_.search().reference();
     last_poses_.AddPlaced(map_, frame_, *map_.FindKeyframe(reference));

@@ -43,7 +43,7 @@ class FrontendCore {
     std::shared_ptr<const Vocabulary>
         vocabulary;  ///< for relocalisation; without one only the newest places are tried
   };
-  explicit FrontendCore(Setup setup);
+  explicit FrontendCore(const Setup& setup);
 
   // ---- While the sequence goes on ----
 
@@ -52,7 +52,8 @@ class FrontendCore {
   FrontendOutput ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features);
   /// Whether frames wait to be tracked, and tracks the oldest of them (there must be one).
   bool IsBehind() const { return !behind_.empty(); }
-  size_t num_behind() const { return behind_.size(); }
+  /// From the oldest frame that waits to the newest.
+  double seconds_behind() const;
   FrontendOutput CatchUp();
   /// A record of the map stream; call between frames.
   void ApplyMapDelta(const MapDelta& delta);
@@ -79,9 +80,8 @@ class FrontendCore {
   /// Makes those wait too that no record told of: their maps were not adjusted.
   void RefineRest() { last_poses_.Begin(map_); }
   /// 3. When none waits: a portion of what is left to do, which is to place frames that had no pose when they
-  /// came and to join the poses with the camera's motion. False: all is done. `between` is called from within
-  /// the longest portion, the smoothing of a long trajectory, and must not change the core.
-  bool WorkAtEnd(const std::function<void()>& between = {});
+  /// came and to join the poses with the camera's motion. False: all is done.
+  bool WorkAtEnd();
   /// Whether that must not be interrupted by map records.
   bool NeedsMapUnchanged() const { return last_poses_.NeedsMapUnchanged(); }
   /// 4. Does all that is left and tells the last poses.
@@ -106,6 +106,7 @@ class FrontendCore {
   FrontendOutput GiveUpMap(bool drop, const std::string& reason);
   MapId NextMapId() const;
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
+  bool IsEvidenceDue();
   void ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output);
   KeyframeProposal ProposeKeyframe(const PlacedPose& pose);
   FramePose NoPose(TrackingState state, std::string reason) const;
@@ -139,8 +140,8 @@ class FrontendCore {
   // Frames
   TrackedFrame frame_;
   UnplacedFrames unplaced_;
-  std::deque<WaitingFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
-  int frames_since_evidence_ = 0;
+  std::deque<WaitingFrame> behind_;     ///< since the first map's second keyframe, not tracked yet
+  std::optional<int64_t> evidence_ns_;  ///< when it was told last
   FrontendCounters counters_;
 };
 

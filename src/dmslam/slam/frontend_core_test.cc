@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <optional>
+#include <variant>
 
 #include "dmslam/map/testing/map_scene.h"
 #include "dmslam/util/check.h"
@@ -77,7 +78,7 @@ class Phases : public ::testing::Test {
  protected:
   static constexpr size_t kPoints = 300;
 
-  Phases() {
+  explicit Phases(bool in_portions = false) {
     scene_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
@@ -85,6 +86,7 @@ class Phases : public ::testing::Test {
     setup.run_search = [this](const FirstMapSearch&) {
       return [this](const InitializerFrame& frame) { return Search(frame); };
     };
+    setup.catch_up_in_portions = in_portions;
     core_.emplace(setup);
   }
 
@@ -103,9 +105,18 @@ class Phases : public ::testing::Test {
 
   FrontendOutput Frame(uint32_t index, bool blind = false) {
     const auto nothing = [](size_t) { return std::optional<Eigen::Vector3d>(); };
-    const TrackedFrame seen = scene_.See(index, index * kFrameNs, MapScene::PoseAt(0.05 * index),
-                                         blind ? MapScene::Place(nothing) : MapScene::Place());
-    return core_->ProcessFeatures(index, index * kFrameNs, seen.features->set);
+    return Frame(index, index * kFrameNs, blind ? MapScene::Place(nothing) : MapScene::Place());
+  }
+  FrontendOutput Frame(uint32_t index, int64_t stamp_ns, const MapScene::Place& place) {
+    const double x = 0.05 * static_cast<double>(stamp_ns) / kFrameNs;
+    const TrackedFrame seen = scene_.See(index, stamp_ns, MapScene::PoseAt(x), place);
+    return core_->ProcessFeatures(index, stamp_ns, seen.features->set);
+  }
+  /// Half of the map is hidden: a keyframe would help.
+  FrontendOutput HalfHidden(uint32_t index) {
+    return Frame(index, index * kFrameNs, [this](size_t point) {
+      return point % 2 == 0 ? std::optional(scene_.point(point)) : std::nullopt;
+    });
   }
   /// The mapper's answer to a first map of frames 0 and 1.
   void MapArrives() {
@@ -205,6 +216,80 @@ TEST_F(Phases, LostForLongItKeepsTheMapAndBeginsAnother) {
   EXPECT_FALSE(reset->drop);
   EXPECT_TRUE(was_uncertain && was_lost);
   EXPECT_NEAR((frame - 30) / 30.0, 5.0, 0.1) << "seconds";
+}
+
+TEST_F(Phases, AKeyframeComesBehindItsEvidenceAndOneAtATime) {
+  Start();
+  const KeyframeProposal* proposal = nullptr;
+  FrontendOutput output;
+  uint32_t frame = 2;
+  for (; frame < 30 && proposal == nullptr; ++frame) {
+    output = HalfHidden(frame);
+    proposal = Find<KeyframeProposal>(output);
+  }
+  ASSERT_NE(proposal, nullptr);
+  ASSERT_GE(output.events.size(), 3u);
+  const size_t last = output.events.size() - 1;
+  EXPECT_TRUE(std::holds_alternative<FrameEvidence>(output.events[last - 2]));
+  EXPECT_TRUE(std::holds_alternative<KeyframeProposal>(output.events[last - 1]));
+  EXPECT_TRUE(std::holds_alternative<FramePose>(output.events[last])) << "the pose is the last word";
+  EXPECT_EQ(proposal->id, KeyframeId::Make(1, frame - 1));
+  EXPECT_GT(proposal->matches.size(), kPoints / 3);
+  EXPECT_EQ(core_->awaited(), proposal->id);
+
+  const KeyframeId awaited = proposal->id;
+  for (const uint32_t end = frame + 20; frame < end; ++frame)
+    EXPECT_EQ(Find<KeyframeProposal>(HalfHidden(frame)), nullptr) << "the mapper has not answered";
+  EXPECT_GT(core_->counters().keyframes_withheld, 0u);
+  MapDelta settled;
+  settled.progress.settled = awaited;
+  core_->ApplyMapDelta(settled);
+  EXPECT_NE(Find<KeyframeProposal>(HalfHidden(frame)), nullptr);
+}
+
+/// How often evidence is told in two seconds of a camera with that many frames a second.
+class EvidenceRate : public Phases {
+ protected:
+  int Told(int fps) {
+    Start();
+    int told = 0;
+    for (uint32_t frame = 1; static_cast<int>(frame) <= 2 * fps; ++frame) {
+      const int64_t stamp_ns = kFrameNs + frame * int64_t{1'000'000'000} / fps;
+      const FrontendOutput output = Frame(1 + frame, stamp_ns, MapScene::Place());
+      if (Find<FrameEvidence>(output) && !Find<KeyframeProposal>(output)) ++told;
+    }
+    return told;
+  }
+};
+
+TEST_F(EvidenceRate, At30FramesASecond) { EXPECT_NEAR(Told(30), 6, 1); }
+TEST_F(EvidenceRate, At60FramesASecond) { EXPECT_NEAR(Told(60), 6, 1); }
+
+class InPortions : public Phases {
+ protected:
+  InPortions() : Phases(true) {}
+};
+
+TEST_F(InPortions, FramesThatWaitedForTheMapAreTrackedOneByOne) {
+  Frame(0);
+  finds_map_ = true;
+  Frame(1);
+  finds_map_ = false;
+  for (uint32_t frame = 2; frame < 10; ++frame) Frame(frame);
+  EXPECT_FALSE(core_->IsBehind());
+  MapArrives();
+  EXPECT_FALSE(Find<FramePose>(Frame(10))->HasPose()) << "it waits its turn";
+  ASSERT_TRUE(core_->IsBehind());
+  EXPECT_NEAR(core_->seconds_behind(), 9 / 30.0, 0.01);
+  for (uint32_t frame = 1; frame <= 10; ++frame) {
+    ASSERT_TRUE(core_->IsBehind()) << frame;
+    const FrontendOutput output = core_->CatchUp();
+    ASSERT_NE(Find<FramePose>(output), nullptr);
+    EXPECT_EQ(Find<FramePose>(output)->frame_index, frame);
+    EXPECT_TRUE(Find<FramePose>(output)->HasPose()) << frame;
+  }
+  EXPECT_FALSE(core_->IsBehind());
+  EXPECT_TRUE(Find<FramePose>(Frame(11))->HasPose());
 }
 
 TEST_F(Phases, AMapThatVanishesIsGivenUp) {

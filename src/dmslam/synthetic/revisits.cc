@@ -93,8 +93,7 @@ class ViewGraph {
 
 std::vector<Revisit> FindRevisits(const Scene& scene, const Camera& camera,
                                   std::span<const Rigid3d> T_world_cam, const RevisitOptions& options) {
-  Camera small = camera;
-  small.k1 = small.k2 = small.p1 = small.p2 = small.k3 = 0;
+  Camera small = camera.WithoutLens();
   const double shrink = 96.0 / camera.width_px;
   small.width_px = 96;
   small.height_px = std::max(32, static_cast<int>(camera.height_px * shrink));

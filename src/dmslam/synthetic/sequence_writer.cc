@@ -35,15 +35,7 @@ class TextFile {
 
 void WriteCamera(const Camera& camera, const fs::path& path) {
   TextFile file(path);
-  file.out().precision(12);
-  file.out() << "model: pinhole\nwidth: " << camera.width_px << "\nheight: " << camera.height_px
-             << "\nfx: " << camera.fx_px << "\nfy: " << camera.fy_px << "\ncx: " << camera.cx_px
-             << "\ncy: " << camera.cy_px << "\n";
-  if (camera.HasDistortion()) {
-    file.out() << "distortion: [" << camera.k1 << ", " << camera.k2 << ", " << camera.p1 << ", " << camera.p2
-               << ", " << camera.k3 << "]\n";
-  }
-  file.out() << "fps: " << camera.fps << "\n";
+  file.out() << CameraText(camera);
   file.Finish();
 }
 

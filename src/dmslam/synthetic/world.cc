@@ -10,7 +10,7 @@ namespace {
 
 /// A camera with the same view and a fraction of the pixels, without lens.
 Camera Thumbnail(const Camera& camera, int divisor) {
-  Camera small = camera;
+  Camera small = camera.WithoutLens();
   small.width_px = std::max(32, camera.width_px / divisor);
   small.height_px = std::max(32, camera.height_px / divisor);
   const double sx = static_cast<double>(small.width_px) / camera.width_px;
@@ -19,7 +19,6 @@ Camera Thumbnail(const Camera& camera, int divisor) {
   small.cx_px = (camera.cx_px + 0.5) * sx - 0.5;
   small.fy_px *= sy;
   small.cy_px = (camera.cy_px + 0.5) * sy - 0.5;
-  small.k1 = small.k2 = small.p1 = small.p2 = small.k3 = 0;
   return small;
 }
 
