@@ -1,10 +1,9 @@
 #include "mapper/mapper_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/util/check.h"
 
@@ -16,15 +15,16 @@ constexpr int64_t kPartEveryNs = 3'000'000;
 }  // namespace
 
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
-    : StreamNode(std::move(context), std::move(options), "mapper"), files_(std::move(files)) {
-  const StartOptions& start = options_.settings.start;
-  if (start.saved_map == files_.load.empty()) {
+    : StreamNode(std::move(context), std::move(options), "mapper"),
+      run_(options_.settings.Read<RunOptions>()),
+      files_(std::move(files)) {
+  if (run_.saved_map == files_.load.empty()) {
     throw InputError(files_.load.empty()
                          ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
                          : "--map " + files_.load +
                                ": set map.saved=on for every process (scripts/run.sh --map does)");
   }
-  if (start.localize_only && !start.saved_map) {
+  if (run_.localize_only && !run_.saved_map) {
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
   if (!files_.load.empty()) saved_ = LoadMap(files_.load);
@@ -32,27 +32,28 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
 
 /// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
 uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
-  CheckFits(files_.load, *saved_, info.camera, options_.settings.pyramid());
+  CheckFits(files_.load, *saved_, info.camera, options_.settings.Read<Pyramid>());
   const Map& map = saved_->map;
   if (session_ <= NewestSession(map)) {
     throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
                      "; give all processes a higher one with --session");
   }
   if (saved_->missing > 0) {
-    spdlog::warn("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
-                 saved_->missing);
+    LogWarning("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
+               saved_->missing);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
-  spdlog::info("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
-               map.num_landmarks());
+  LogInfo("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
+          map.num_landmarks());
   return ordinal;
 }
 
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
   const uint16_t ordinal = saved_ ? ContinueSavedMap(info) : uint16_t{1};
-  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(),
-                                       ordinal, [this](const MapDelta& delta) { PublishDelta(delta); });
+  core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera,
+                                       options_.settings.Read<Pyramid>(), ordinal,
+                                       [this](const MapDelta& delta) { PublishDelta(delta); });
   if (saved_) {
     core_->ContinueSaved(std::exchange(saved_, std::nullopt)->map);
     const KeyframeId newest = core_->map().keyframes().rbegin()->first;
@@ -97,8 +98,8 @@ bool MapperNode::FetchReplica() {
   if (fetch_->state() == ReplicaFetch::State::kNone) return true;
   if (fetch_->state() != ReplicaFetch::State::kDone) return false;
   const Version version = fetch_->version();
-  spdlog::info("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch,
-               version.seq, fetched_->keyframes().size(), fetched_->num_landmarks());
+  LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
+          fetched_->keyframes().size(), fetched_->num_landmarks());
   core_->Continue(std::move(*fetched_));
   saved_parts_.clear();  // what the others hold is newer
   writer_plan().parent = version;
@@ -236,9 +237,12 @@ void MapperNode::Handle(const Record& record) {
   const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
   if (!many) MarkFrontend(current_);
   if (record.channel == channels::kSession) {
-    if (const auto start = Read<SessionStart>(*record.bytes)) session_start_ = *start;
+    if (const auto start = Read<SessionStart>(*record.bytes)) {
+      session_start_ = *start;
+      JoinsSession(*start);
+    }
   }
-  if (options_.settings.start.localize_only) {
+  if (run_.localize_only) {
     // The map stays as it is, but nobody is left waiting.
     if (record.channel == channels::kMapReset) core_->Settle({}, 0);
     return;
@@ -320,7 +324,7 @@ bool MapperNode::EndIfDone() {
   if (!end_announced_) {
     end_announced_ = true;
     while (!answers_.empty()) ApplyFirstAnswer();
-    core_->End(options_.settings.start.localize_only);
+    core_->End(run_.localize_only);
   }
   writer_->Complete(context_.now_ns());
   completing_ = true;

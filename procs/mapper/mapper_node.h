@@ -12,6 +12,7 @@
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
+#include "dmslam/settings/run_options.h"
 
 namespace dmslam {
 
@@ -74,6 +75,7 @@ class MapperNode : public StreamNode {
   bool EndIfDone();
   void FillCoreStatus(MapperStatus* status) const;
 
+  const RunOptions run_;
   Files files_;
   std::optional<RebuiltMap> saved_;  ///< loaded, not yet taken over
   int64_t next_part_ns_ = 0;

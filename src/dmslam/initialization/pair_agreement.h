@@ -24,6 +24,14 @@ struct AgreementOptions {
   double min_distribution_px = 120;  ///< root of D over the static matches
   int min_static = 100;              ///< matches static in all pairs
   double min_static_share = 0.0;     ///< share of the last pair's matches that must be static
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("initializer.min_agreement", min_agreement, 0, 1, "",
+             "smallest Jaccard index of the pairs' static sets");
+    v.Number("initializer.min_distribution_px", min_distribution_px, 0, 10000, "px",
+             "root of the static matches' distribution D");
+  }
 };
 
 enum class AgreementRefusal : uint8_t {

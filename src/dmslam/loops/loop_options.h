@@ -1,5 +1,7 @@
 #pragma once
 
+#include "dmslam/map/conventions.h"
+
 namespace dmslam {
 
 /// Loop closing. Where a number is not explained, it is ORB-SLAM2's.
@@ -7,7 +9,7 @@ struct LoopcloserOptions {
   bool enabled = true;
 
   // Which places are looked at.
-  int min_covisibility = 15;       ///< landmarks in common that make two keyframes neighbours
+  int min_covisibility = kMinCovisibility;
   int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
 
@@ -37,7 +39,23 @@ struct LoopcloserOptions {
   int essential_iterations = 20;
   bool global_adjustment = true;  ///< after a loop, bundle adjustment of the whole map
   int global_iterations = 10;
-  double keypoint_sigma_px = 0.7;  ///< of octave 0, in the global adjustment; the mapper's
+  double keypoint_sigma_px = kKeypointSigmaPx;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("loop.enabled", enabled, "close loops");
+    v.Number("loop.consistency", consistency, 1, 100, "",
+             "keyframes in a row that must name places that belong together");
+    v.Number("loop.min_matches", min_matches, 10, 10000, "",
+             "landmarks of a place that must be found in the keyframe");
+    v.Number("loop.min_share", min_share, 0, 1, "",
+             "of what should be seen of a place: enough to be followed");
+    v.Number("loop.min_confirmed_share", min_confirmed_share, 0, 1, "",
+             "of what should be seen of a place: enough to close the loop");
+    v.Number("loop.plausible_drift", plausible_drift, 0, 10, "",
+             "a loop that moves more than this share of its path needs more");
+    v.Switch("loop.global_adjustment", global_adjustment, "adjust the whole map after a loop");
+  }
 };
 
 }  // namespace dmslam

@@ -11,25 +11,10 @@
 #include "dmslam/messaging/endpoint.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
-#include "dmslam/settings/settings.h"
+#include "dmslam/runtime/node_options.h"
 #include "dmslam/wire/codec.h"
 
 namespace dmslam {
-
-/// What every process of the system is told at its start.
-struct NodeOptions {
-  uint32_t session = 0;  ///< 0: that of the first camera heard
-  std::vector<std::string>
-      peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
-  Link link = Link::kHost;
-  bool accept_recorded =
-      false;               ///< camera and frames of a recorded session (a log that is replayed) are ours
-  bool take_over = false;  ///< asks a present writer of its stream to close
-  bool fresh = false;      ///< a mapper begins with an empty map, whatever replicas there are
-  Settings settings;
-
-  bool HasPeer(std::string_view name) const;
-};
 
 /// Hash over the fingerprints of all message types: processes with another one are refused by name.
 int64_t SchemaHash();
@@ -106,6 +91,9 @@ class StreamNode : public Node {
   /// Counts messages of other sessions; the first is logged.
   bool IsForeign(uint32_t session);
   /// The same for what the player says: a recorded session that was accepted is ours.
+  /// The frontend says on what its session rests. False where this process does not fit: it ends, and says
+  /// why.
+  bool JoinsSession(const SessionStart& start, uint64_t vocabulary_checksum = 0);
   bool IsForeignFrame(uint32_t session);
 
   /// Keeps the protocol alive from within long work.
@@ -133,6 +121,8 @@ class StreamNode : public Node {
   void OpenWriter();
   void WatchWriter();
   void WatchReaders();
+  struct Watched;
+  void RefuseOtherTypes(Watched* watched);
   void CountMalformed(const std::string& channel, const std::string& reason);
 
   bool begun_ = false;
@@ -150,7 +140,8 @@ class StreamNode : public Node {
   std::vector<std::string> logged_;
   struct Watched {
     const StreamReader* reader;
-    std::string problem;  ///< last one logged
+    std::string problem;           ///< last one logged
+    int64_t misfit_since_ns = -1;  ///< its writer has other message types; -1: it has not
   };
   std::vector<Watched> readers_;
   std::unique_ptr<MapSnapshots> replica_snapshots_;

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "dmslam/settings/settings.h"
+#include "dmslam/wire/frontend_messages.h"
+
+namespace dmslam {
+
+/// Exit code of a process that cannot take part in a session as it is: another camera, other settings,
+/// another vocabulary, other message types. Who starts it again would be refused again.
+inline constexpr int kExitMisfit = 2;
+
+/// Why a process with these settings and this vocabulary (0: it has none) does not fit the frontend's
+/// session, with the cure; empty where it fits.
+std::string WhyMisfit(const SessionStart& start, const Settings& settings, uint64_t vocabulary_checksum = 0);
+
+}  // namespace dmslam
