@@ -9,6 +9,7 @@
 #include "dmslam/dataset/image.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/stream_node.h"
+#include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
 #include "frontend/online_error.h"
 #include "frontend/sequence_end.h"
@@ -76,6 +77,7 @@ class FrontendNode : public StreamNode {
   bool HoldsBackForStatus() const;
   void FillCoreStatus(FrontendStatus* status) const;
 
+  const RunOptions run_;
   Extras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
