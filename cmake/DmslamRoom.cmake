@@ -1,13 +1,24 @@
-# dmslam_room(NAME <room> [SRCS ...] [DEPS ...] [TESTS ...] [TEST_DEPS ...] [BENCHES ...])
+# Rooms whose files need the same templates (Eigen's decompositions, JSON, message types) are compiled as one file: a full
+# build takes about half the time. Who works in such a room switches it off (-DDMSLAM_TOGETHER=OFF, as the preset dev
+# does), to compile only what was changed; tools that read compile_commands.json want it off, too.
+option(DMSLAM_TOGETHER "Compile the files of some rooms together" ON)
+function(dmslam_compile_together target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${DMSLAM_TOGETHER} UNITY_BUILD_BATCH_SIZE 0)
+endfunction()
+
+# dmslam_room(NAME <room> [TOGETHER] [SRCS ...] [DEPS ...] [TESTS ...] [TEST_DEPS ...] [BENCHES ...])
 #
 # One library per room: target dmslam_<room>, alias dmslam::<room>. Every file in TESTS becomes its own test
-# program, every file in BENCHES its own benchmark program.
+# program, every file in BENCHES its own benchmark program. TOGETHER: see dmslam_compile_together.
 function(dmslam_room)
-  cmake_parse_arguments(ROOM "" "NAME" "SRCS;DEPS;TESTS;TEST_DEPS;BENCHES" ${ARGN})
+  cmake_parse_arguments(ROOM "TOGETHER" "NAME" "SRCS;DEPS;TESTS;TEST_DEPS;BENCHES" ${ARGN})
   set(target dmslam_${ROOM_NAME})
   if(ROOM_SRCS)
     add_library(${target} STATIC ${ROOM_SRCS})
     target_link_libraries(${target} PUBLIC dmslam_options ${ROOM_DEPS})
+    if(ROOM_TOGETHER)
+      dmslam_compile_together(${target})
+    endif()
   else()
     add_library(${target} INTERFACE)
     target_link_libraries(${target} INTERFACE dmslam_options ${ROOM_DEPS})

@@ -1,12 +1,12 @@
 #include "collector/collector_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
+#include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/settings/run_options.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -24,11 +24,11 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
-  builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.pyramid());
+  builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.Read<Pyramid>());
   run_.sequence = info.sequence;
   run_.mode = info.mode == PlaybackMode::kLockstep ? "lockstep" : "realtime";
-  run_.profile = options_.settings.profile;
-  run_.seed = options_.settings.seed;
+  run_.profile = options_.settings.profile();
+  run_.seed = options_.settings.Read<RunOptions>().seed;
   run_.ground_truth = collector_.ground_truth;
   frames_total_ = info.num_frames;
   OpenJournal();
@@ -141,7 +141,9 @@ void CollectorNode::CountFrame(const FramePose& pose) {
 bool CollectorNode::TakeFrontendRecord() {
   const std::optional<Record> record = frontend_reader_->Take();
   if (!record) return false;
-  if (record->channel == channels::kFramePose) {
+  if (record->channel == channels::kSession) {
+    if (const auto start = Read<SessionStart>(*record->bytes)) JoinsSession(*start);
+  } else if (record->channel == channels::kFramePose) {
     OnFramePose(*record);
   } else if (record->channel == channels::kKeyframe) {
     if (const auto proposal = Read<KeyframeProposal>(*record->bytes))
@@ -279,7 +281,7 @@ void CollectorNode::SayProgress() {
   constexpr int64_t kEveryFrames = 20;
   if (frames_seen_ < next_progress_ || builder_->map().keyframes().empty()) return;
   next_progress_ = frames_seen_ + kEveryFrames;
-  spdlog::info("frame {}{}, {} keyframes", frames_seen_, OfTotal(), builder_->map().keyframes().size());
+  LogInfo("frame {}{}, {} keyframes", frames_seen_, OfTotal(), builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {

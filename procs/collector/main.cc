@@ -7,8 +7,8 @@ int main(int argc, char** argv) {
   dmslam::ProcessMain process("collector",
                               "Collects a run's trajectory, map and statuses and writes its results.");
   dmslam::CollectorOptions collector;
-  process.app().add_option("--out", collector.out_dir, "folder for the results")->required();
-  process.app().add_option("--ground-truth", collector.ground_truth, "trajectory in TUM format");
+  process.app().AddOption("--out", collector.out_dir, "folder for the results").Required();
+  process.app().AddOption("--ground-truth", collector.ground_truth, "trajectory in TUM format");
   collector.progress = isatty(STDERR_FILENO) != 0;
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     return std::make_unique<dmslam::CollectorNode>(std::move(context), std::move(options), collector);

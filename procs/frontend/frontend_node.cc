@@ -1,11 +1,12 @@
 #include "frontend/frontend_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <utility>
 
+#include "dmslam/console/log.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/session_check.h"
+#include "dmslam/settings/frontend_setup.h"
 #include "dmslam/util/check.h"
 #include "frontend/background_search.h"
 #include "frontend/pictures.h"
@@ -19,24 +20,18 @@ constexpr double kMaxBehindS = 0.5;
 }  // namespace
 
 FrontendNode::FrontendNode(NodeContext context, NodeOptions options, Extras extras)
-    : StreamNode(std::move(context), std::move(options), "frontend"), extras_(std::move(extras)) {
+    : StreamNode(std::move(context), std::move(options), "frontend"),
+      run_(options_.settings.Read<RunOptions>()),
+      extras_(std::move(extras)) {
   Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose});
 }
 
 void FrontendNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
-  FrontendCore::Setup setup;
-  const Settings& settings = options_.settings;
-  setup.options = settings.frontend;
-  setup.extractor = settings.extractor;
-  setup.initializer = settings.initializer;
-  setup.camera = info.camera;
-  setup.pyramid = settings.pyramid();
+  FrontendCore::Setup setup = FrontendSetup(options_.settings, info.camera, extras_.vocabulary);
   setup.session = session_;
-  setup.seed = settings.seed;
-  setup.in_saved_map = settings.start.saved_map;
-  setup.localize_only = settings.start.localize_only;
-  setup.vocabulary = extras_.vocabulary;
+  setup.in_saved_map = run_.saved_map;
+  setup.localize_only = run_.localize_only;
   if (!lockstep_) setup.run_search = InBackground;
   setup.catch_up_in_portions = !lockstep_;
   work_ = MakeCoreThread(info.mode);
@@ -67,7 +62,7 @@ bool FrontendNode::ReadyToWrite() {
   core_->Resume();
   if (map.keyframes().empty()) return true;
   last_index_ = static_cast<int64_t>(map.keyframes().rbegin()->first.frame_index()) - 1;
-  spdlog::info("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
+  LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }
 
@@ -83,14 +78,14 @@ void FrontendNode::OnWriterOpen() {
   SessionStart start;
   start.session = session_;
   start.first_stamp_ns = 0;
-  start.seed = options_.settings.seed;
-  start.configuration_hash = SettingsHash(options_.settings);
+  start.seed = run_.seed;
+  start.configuration_hash = options_.settings.Hash();
   if (extras_.vocabulary) start.vocabulary_checksum = extras_.vocabulary->checksum();
   start.mode = camera_info_->mode;
   start.camera = camera_info_->camera;
-  start.pyramid = options_.settings.pyramid();
+  start.pyramid = options_.settings.Read<Pyramid>();
   start.sequence = camera_info_->sequence;
-  start.profile = options_.settings.profile;
+  start.profile = options_.settings.profile();
   PublishRecord(start);
 }
 
@@ -192,9 +187,7 @@ int FrontendNode::UnacceptedKeyframes() {
 bool FrontendNode::HoldsBack() const { return lockstep_ && core_->awaited().valid(); }
 
 /// Nothing can be done before a saved map has come.
-bool FrontendNode::AwaitsSavedMap() const {
-  return options_.settings.start.saved_map && core_->map().keyframes().empty();
-}
+bool FrontendNode::AwaitsSavedMap() const { return run_.saved_map && core_->map().keyframes().empty(); }
 
 /// Has the core do something, which ends with what it has to say of itself. The core is idle. Returns whether
 /// it is idle again.
@@ -375,7 +368,7 @@ bool FrontendNode::DecodeImage(const Frame& frame) {
                                  std::to_string(image_.height) + " pixels, but the camera file says " +
                                  std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px) +
                                  "; give the camera file that belongs to the sequence (--camera)"] {
-    Exit(2, problem);
+    Exit(kExitMisfit, problem);
   });
   return false;
 }

@@ -13,6 +13,7 @@
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/stream_node.h"
+#include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
 #include "frontend/online_error.h"
 #include "frontend/sequence_end.h"
@@ -100,6 +101,7 @@ class FrontendNode : public StreamNode {
   void FillPoseStatus(FrontendStatus* status) const;
   FrontendStatus CoreStatus() const;
 
+  const RunOptions run_;
   Extras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;

@@ -2,18 +2,31 @@
 
 #include <utility>
 
+#include "dmslam/settings/run_options.h"
+
 namespace dmslam {
 
 LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)
-    : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {}
+    : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {
+  Listen({channels::kSession});
+}
+
+/// The frontend's word on its settings and its vocabulary. Its stream is not read here; who comes later has
+/// the same settings as the one before.
+void LoopcloserNode::OnMessage(const std::string&, std::span<const uint8_t> bytes) {
+  const std::optional<SessionStart> start = Read<SessionStart>(bytes);
+  if (!start || IsForeign(start->session)) return;
+  JoinsSession(*start, vocabulary_ ? std::optional(vocabulary_->checksum()) : std::nullopt);
+}
 
 LoopcloserNode::~LoopcloserNode() { stop_ = true; }
 
 void LoopcloserNode::Begin(const CameraInfo& info) {
   const Settings& settings = options_.settings;
   work_ = MakeCoreThread(info.mode);
-  core_ = std::make_unique<LoopcloserCore>(settings.loop, info.camera, settings.pyramid(), settings.seed,
+  core_ = std::make_unique<LoopcloserCore>(settings.Read<LoopcloserOptions>(), info.camera,
+                                           settings.Read<Pyramid>(), settings.Read<RunOptions>().seed,
                                            vocabulary_);
   if (info.mode == PlaybackMode::kRealtime) core_->SetInterrupt([this] { return stop_.load(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});

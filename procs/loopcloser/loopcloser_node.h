@@ -22,6 +22,7 @@ class LoopcloserNode : public StreamNode {
  protected:
   void Begin(const CameraInfo& info) override;
   bool WorkOnce() override;
+  void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
 
  private:

@@ -1,11 +1,11 @@
+#include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "loopcloser/loopcloser_node.h"
 
 int main(int argc, char** argv) {
   dmslam::ProcessMain process("loopcloser", "Keeps a replica of the map and closes loops.");
   std::string vocabulary;
-  process.app().add_option("--vocabulary", vocabulary,
-                           "bag-of-words vocabulary; default: the one that ships");
+  process.app().AddOption("--vocabulary", vocabulary, "bag-of-words vocabulary; default: the one that ships");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     return std::make_unique<dmslam::LoopcloserNode>(std::move(context), std::move(options),
                                                     dmslam::LoadVocabulary(vocabulary));

@@ -4,9 +4,9 @@
 int main(int argc, char** argv) {
   dmslam::ProcessMain process("mapper", "Builds the map: the only process that writes it.");
   dmslam::MapperNode::Files files;
-  process.app().add_option("--map", files.load,
-                           "saved map or log: begin with this map (needs the setting map.saved)");
-  process.app().add_option("--save-map", files.save, "write the map into this file at the end");
+  process.app().AddOption("--map", files.load,
+                          "saved map or log: begin with this map (needs the setting map.saved)");
+  process.app().AddOption("--save-map", files.save, "write the map into this file at the end");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     return std::make_unique<dmslam::MapperNode>(std::move(context), std::move(options), files);
   });

@@ -1,10 +1,9 @@
 #include "mapper/mapper_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/util/check.h"
 
@@ -16,15 +15,16 @@ constexpr int64_t kPartEveryNs = 3'000'000;
 }  // namespace
 
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
-    : StreamNode(std::move(context), std::move(options), "mapper"), files_(std::move(files)) {
-  const StartOptions& start = options_.settings.start;
-  if (start.saved_map == files_.load.empty()) {
+    : StreamNode(std::move(context), std::move(options), "mapper"),
+      run_(options_.settings.Read<RunOptions>()),
+      files_(std::move(files)) {
+  if (run_.saved_map == files_.load.empty()) {
     throw InputError(files_.load.empty()
                          ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
                          : "--map " + files_.load +
                                ": set map.saved=on for every process (scripts/run.sh --map does)");
   }
-  if (start.localize_only && !start.saved_map) {
+  if (run_.localize_only && !run_.saved_map) {
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
   if (!files_.load.empty()) saved_ = LoadMap(files_.load);
@@ -32,19 +32,19 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
 
 /// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
 uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
-  CheckFits(files_.load, *saved_, info.camera, options_.settings.pyramid());
+  CheckFits(files_.load, *saved_, info.camera, options_.settings.Read<Pyramid>());
   const Map& map = saved_->map;
   if (session_ <= NewestSession(map)) {
     throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
                      "; give all processes a higher one with --session");
   }
   if (saved_->missing > 0) {
-    spdlog::warn("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
-                 saved_->missing);
+    LogWarning("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
+               saved_->missing);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
-  spdlog::info("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
-               map.num_landmarks());
+  LogInfo("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
+          map.num_landmarks());
   return ordinal;
 }
 
@@ -55,8 +55,8 @@ void MapperNode::Begin(const CameraInfo& info) {
   const auto publish = [this](const MapDelta& delta) {
     work_->Report([this, delta] { PublishDelta(delta); });
   };
-  core_ = std::make_unique<MapperCore>(options_.settings.mapper, info.camera, options_.settings.pyramid(),
-                                       ordinal, publish);
+  core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera,
+                                       options_.settings.Read<Pyramid>(), ordinal, publish);
   if (saved_) {
     core_->ContinueSaved(std::exchange(saved_, std::nullopt)->map);
     const KeyframeId newest = core_->map().keyframes().rbegin()->first;
@@ -102,8 +102,8 @@ bool MapperNode::FetchReplica() {
   if (fetch_->state() == ReplicaFetch::State::kNone) return true;
   if (fetch_->state() != ReplicaFetch::State::kDone) return false;
   const Version version = fetch_->version();
-  spdlog::info("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch,
-               version.seq, fetched_->keyframes().size(), fetched_->num_landmarks());
+  LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
+          fetched_->keyframes().size(), fetched_->num_landmarks());
   core_->Continue(std::move(*fetched_));
   saved_parts_.clear();  // what the others hold is newer
   writer_plan().parent = version;
@@ -261,7 +261,10 @@ bool MapperNode::HandleFirstRecord() {
   keyframe_arrived_ns_ = taken_.front().at_ns;
   taken_.pop_front();
   if (record.channel == channels::kSession) {
-    if (const auto start = Read<SessionStart>(*record.bytes)) session_start_ = *start;
+    if (const auto start = Read<SessionStart>(*record.bytes)) {
+      session_start_ = *start;
+      JoinsSession(*start);
+    }
   }
   // A keyframe makes several map records: only the last one says that it is done.
   const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
@@ -280,7 +283,7 @@ bool MapperNode::HandleFirstRecord() {
 /// What a record of the frontend asks of the core; empty: nothing.
 MapperNode::Job MapperNode::JobFor(const Record& record) {
   const Version version = record.version();
-  if (options_.settings.start.localize_only) {
+  if (run_.localize_only) {
     // The map stays as it is, but nobody is left waiting.
     if (record.channel != channels::kAdjustRequest) return {};
     if (const auto request = Read<AdjustRequest>(*record.bytes))
@@ -381,7 +384,7 @@ bool MapperNode::EndIfDone() {
   }
   if (!end_announced_) {
     end_announced_ = true;
-    Run([this] { core_->End(options_.settings.start.localize_only); });
+    Run([this] { core_->End(run_.localize_only); });
     return work_->Idle();
   }
   writer_->Complete(context_.now_ns());

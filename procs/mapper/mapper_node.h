@@ -14,6 +14,7 @@
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
+#include "dmslam/settings/run_options.h"
 
 namespace dmslam {
 
@@ -81,6 +82,7 @@ class MapperNode : public StreamNode {
   bool EndIfDone();
   MapperStatus CoreStatus() const;
 
+  const RunOptions run_;
   Files files_;
   std::optional<RebuiltMap> saved_;  ///< loaded, not yet taken over
   int64_t next_part_ns_ = 0;

@@ -1,10 +1,9 @@
 #include "player/live_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/console/log.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
@@ -72,7 +71,7 @@ void LiveNode::TakeFrame() {
   auto live = source_->Take();
   if (!live) {
     if (source_->ended() && !ending_) {
-      spdlog::warn("{}: the camera delivers no more frames", CameraName(options_.sequence));
+      LogWarning("{}: the camera delivers no more frames", CameraName(options_.sequence));
       ending_ = true;
     }
     return;

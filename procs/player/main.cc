@@ -1,7 +1,8 @@
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 
+#include "dmslam/console/command_line.h"
+#include "dmslam/console/log.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
@@ -25,7 +26,7 @@ struct Arguments {
 
 std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, dmslam::PlayerOptions* options) {
   auto log = std::make_shared<const dmslam::LogIndex>(a.log);
-  if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
+  if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
   auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
   options->sequence = frames->camera_info().sequence;
   options->camera = a.camera_file.empty() ? frames->camera_info().camera : dmslam::LoadCamera(a.camera_file);
@@ -86,7 +87,7 @@ int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options, const 
   }
   output.Close();
   if (!node.problem().empty()) throw dmslam::InputError(node.problem());
-  spdlog::info("{} frames written to {}", node.published(), a.to_log);
+  dmslam::LogInfo("{} frames written to {}", node.published(), a.to_log);
   return 0;
 }
 
@@ -94,47 +95,45 @@ std::unique_ptr<dmslam::Node> EnterRecords(const Arguments& a, dmslam::NodeConte
                                            const dmslam::NodeOptions& node) {
   if (a.log.empty()) throw dmslam::InputError("--channels records needs a log: give it with --log");
   auto log = std::make_shared<const dmslam::LogIndex>(a.log);
-  if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
+  if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
   return std::make_unique<dmslam::RecordsNode>(std::move(context), node, log, a.log_session);
 }
 
-void Declare(CLI::App& app, Arguments& a) {
-  app.add_option("--sequence,--video", a.options.sequence,
-                 "TUM RGB-D folder, EuRoC folder, numbered images, a video, or a camera: /dev/videoN or the "
-                 "address of a stream");
-  app.add_option("--fps", a.fps,
-                 "frames per second of numbered images and of videos that do not state it; asked of a "
-                 "camera; default: as the camera file says")
-      ->check(CLI::Range(0.01, 1000.0));
-  app.add_option("--log", a.log,
-                 "log of lcm-logger: its frames are played, with their indices, stamps and bytes");
-  app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
-  app.add_option("--channels", a.channels,
-                 "of a log: camera, or records: the frontend's keyframes are entered as a writer of a new "
-                 "session, without a "
-                 "frontend and without images")
-      ->check(CLI::IsMember({"camera", "records"}));
-  app.add_option("--to-log", a.to_log, "write camera and frames into this log instead of publishing them");
-  app.add_option("--camera", a.camera_file,
-                 "camera file (YAML); found by itself for TUM freiburg1/2/3 and logs");
-  app.add_flag("--lockstep", a.lockstep, "wait for the frontend after each frame");
-  app.add_option("--speed", a.options.speed, "factor on the recorded rate; 0: as fast as possible")
-      ->capture_default_str();
-  app.add_option("--start", a.options.start, "first frame");
-  app.add_option("--frames", a.options.frames, "at most so many frames");
-  app.add_option("--encoding", a.encoding, "of re-encoded frames: jpeg, png, raw")
-      ->check(CLI::IsMember({"jpeg", "png", "raw"}));
-  app.add_option("--jpeg-quality", a.options.encoding.jpeg_quality)
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  app.add_flag("--reencode", a.options.encoding.reencode,
-               "encode frames anew even where files hold JPEG or PNG");
-  app.add_flag("--remote-frontend", a.remote_frontend,
-               "with --link lan: the frontend runs on another host, so frames leave this one");
-  app.add_option("--lead", a.options.lead_s, "seconds before the first frame")->capture_default_str();
-  app.add_option("--black-out", a.black_outs,
-                 "FROM,SECONDS: black frames from frame FROM on; may be repeated");
-  app.add_option("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
+void Declare(dmslam::CommandLine& app, Arguments& a) {
+  app.AddOption("--sequence,--video", a.options.sequence,
+                "TUM RGB-D folder, EuRoC folder, numbered images, a video, or a camera: /dev/videoN or the "
+                "address of a stream");
+  app.AddOption("--fps", a.fps,
+                "frames per second of numbered images and of videos that do not state it; asked of a "
+                "camera; default: as the camera file says")
+      .InRange(0.01, 1000.0);
+  app.AddOption("--log", a.log,
+                "log of lcm-logger: its frames are played, with their indices, stamps and bytes");
+  app.AddOption("--log-session", a.log_session, "which of the log's sessions, where it holds several");
+  app.AddOption("--channels", a.channels,
+                "of a log: camera, or records: the frontend's keyframes are entered as a writer of a new "
+                "session, without a "
+                "frontend and without images")
+      .OneOf({"camera", "records"});
+  app.AddOption("--to-log", a.to_log, "write camera and frames into this log instead of publishing them");
+  app.AddOption("--camera", a.camera_file,
+                "camera file (YAML); found by itself for TUM freiburg1/2/3 and logs");
+  app.AddFlag("--lockstep", a.lockstep, "wait for the frontend after each frame");
+  app.AddOption("--speed", a.options.speed, "factor on the recorded rate; 0: as fast as possible")
+      .ShowDefault();
+  app.AddOption("--start", a.options.start, "first frame");
+  app.AddOption("--frames", a.options.frames, "at most so many frames");
+  app.AddOption("--encoding", a.encoding, "of re-encoded frames: jpeg, png, raw")
+      .OneOf({"jpeg", "png", "raw"});
+  app.AddOption("--jpeg-quality", a.options.encoding.jpeg_quality).InRange(1, 100).ShowDefault();
+  app.AddFlag("--reencode", a.options.encoding.reencode,
+              "encode frames anew even where files hold JPEG or PNG");
+  app.AddFlag("--remote-frontend", a.remote_frontend,
+              "with --link lan: the frontend runs on another host, so frames leave this one");
+  app.AddOption("--lead", a.options.lead_s, "seconds before the first frame").ShowDefault();
+  app.AddOption("--black-out", a.black_outs,
+                "FROM,SECONDS: black frames from frame FROM on; may be repeated");
+  app.AddOption("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
 }
 
 }  // namespace

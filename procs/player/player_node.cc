@@ -1,13 +1,12 @@
 #include "player/player_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
 #include <utility>
 
+#include "dmslam/console/log.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 
@@ -129,7 +128,7 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
 /// The frontend is further than this player, which was started again: goes on where the one before was.
 void PlayerNode::SkipBehind(uint32_t frame_index) {
   const auto next = std::upper_bound(order_.begin(), order_.end(), size_t{frame_index});
-  spdlog::info("player: the frontend has frame {} already; goes on behind it", frame_index);
+  LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
   position_ = static_cast<size_t>(next - order_.begin());
   published_ = static_cast<int64_t>(position_);
   awaiting_done_ = false;
@@ -188,7 +187,7 @@ bool PlayerNode::MakeFrame(size_t index) {
   } catch (const InputError& error) {
     if (unreadable_++ == 0) {
       first_unreadable_ = error.what();
-      spdlog::warn("{} (left out; further ones are only counted)", error.what());
+      LogWarning("{} (left out; further ones are only counted)", error.what());
     }
     if (unreadable_ == order_.size()) problem_ = first_unreadable_ + "; no frame could be read";
     return false;

@@ -1,10 +1,9 @@
 #include "player/records_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <map>
 
+#include "dmslam/console/log.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
 
@@ -29,7 +28,7 @@ RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_p
     throw InputError(log_->path() + ": holds no records of a frontend; was the frontend recorded too?");
   }
   if (records_.missing > 0) {
-    spdlog::warn("{}: {} records of the frontend are missing in it", log_->path(), records_.missing);
+    LogWarning("{}: {} records of the frontend are missing in it", log_->path(), records_.missing);
   }
   recorded_ = Replica(start->camera, start->pyramid);
   live_ = recorded_;
@@ -106,6 +105,8 @@ void RecordsNode::Enter(const RecordedMessage& message) {
       start->session = session_;
       start->mode = PlaybackMode::kLockstep;
       start->software = kVersion;
+      start->configuration_hash = options_.settings.Hash();  // who maps them may do it in another way
+      start->vocabulary_checksum.reset();
       PublishRecord(*start);
     }
   } else if (message.channel == channels::kInitialMap) {
@@ -185,8 +186,8 @@ void RecordsNode::Translate(FrameEvidence* evidence) {
 }
 
 bool RecordsNode::Finish() {
-  spdlog::info("{} keyframes entered; {} of their matches are with landmarks that this map does not have",
-               keyframes_, dropped_);
+  LogInfo("{} keyframes entered; {} of their matches are with landmarks that this map does not have",
+          keyframes_, dropped_);
   writer_->Complete(context_.now_ns());
   finished_ = true;
   return true;

@@ -1,11 +1,10 @@
 #include "viewer/log_playback.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "dmslam/console/log.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/former_types.h"
@@ -37,8 +36,8 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
   }
   if (events == 0)
     throw InputError(path + ": holds no message of this project; record a run with scripts/run.sh --record");
-  if (const std::string gaps = reader.DescribeGaps(); !gaps.empty()) spdlog::warn("{}", gaps);
-  spdlog::info("{}: {} messages, {:.1f} s", path, events, duration_s());
+  if (const std::string gaps = reader.DescribeGaps(); !gaps.empty()) LogWarning("{}", gaps);
+  LogInfo("{}: {} messages, {:.1f} s", path, events, duration_s());
   BeginAnew();
 }
 

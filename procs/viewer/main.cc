@@ -1,7 +1,8 @@
-#include <spdlog/spdlog.h>
 
 #include <optional>
 
+#include "dmslam/console/command_line.h"
+#include "dmslam/console/log.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/runtime/process_main.h"
 #include "viewer/log_playback.h"
@@ -16,7 +17,7 @@ class ServedViewer : public dmslam::Node {
   ServedViewer(dmslam::NodeContext context, dmslam::NodeOptions options, const dmslam::ViewerOptions& viewer,
                const dmslam::WebServerOptions& web)
       : node_(std::move(context), std::move(options), viewer, &exchange_), server_(web, &exchange_) {
-    spdlog::info("to be seen at {}", server_.address());
+    dmslam::LogInfo("to be seen at {}", server_.address());
   }
   void Advance() override { node_.Advance(); }
   int64_t deadline_ns() const override { return node_.deadline_ns(); }
@@ -38,7 +39,7 @@ int ShowLog(const std::string& log, const dmslam::NodeOptions& options, const dm
   dmslam::PlaybackControl control;
   dmslam::LogPlayback playback(log, options, viewer, &exchange);
   const dmslam::WebServer server(web, &exchange, &control);
-  spdlog::info("to be seen at {}", server.address());
+  dmslam::LogInfo("to be seen at {}", server.address());
   loop.Watch(control.fd(), [&] { playback.Fulfil(control.Take(), dmslam::EventLoop::now_ns()); });
   while (loop.PumpOnce(playback.deadline_ns())) playback.Advance(dmslam::EventLoop::now_ns());
   return 0;
@@ -54,16 +55,16 @@ int main(int argc, char** argv) {
   web.three_dir = DMSLAM_THREE_DIR;
   web.chart_dir = DMSLAM_CHART_DIR;
   std::string http, log;
-  CLI::App& app = process.app();
-  app.add_option(
+  dmslam::CommandLine& app = process.app();
+  app.AddOption(
       "--http", http,
       "HOST:PORT to serve on, port 0: any that is free; default: 127.0.0.1:8080, or any where that is taken");
-  app.add_option("--log", log, "show this log of lcm-logger instead of a running system");
-  app.add_option("--ground-truth", viewer.ground_truth,
-                 "trajectory in TUM format; default: what the player says");
-  app.add_option("--web", web.web_dir, "folder of the page; default: the one that ships");
-  app.add_option("--three", web.three_dir, "folder of three.js")->capture_default_str();
-  app.add_option("--chart", web.chart_dir, "folder of Chart.js")->capture_default_str();
+  app.AddOption("--log", log, "show this log of lcm-logger instead of a running system");
+  app.AddOption("--ground-truth", viewer.ground_truth,
+                "trajectory in TUM format; default: what the player says");
+  app.AddOption("--web", web.web_dir, "folder of the page; default: the one that ships");
+  app.AddOption("--three", web.three_dir, "folder of three.js").ShowDefault();
+  app.AddOption("--chart", web.chart_dir, "folder of Chart.js").ShowDefault();
   const auto complete = [&] {
     if (!http.empty()) dmslam::ParseHttpAddress(http, &web);
     if (web.web_dir.empty()) web.web_dir = dmslam::FindDataFolder("procs/viewer/web");

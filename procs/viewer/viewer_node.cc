@@ -31,7 +31,7 @@ ViewerNode::ViewerNode(NodeContext context, NodeOptions options, ViewerOptions v
 }
 
 void ViewerNode::Begin(const CameraInfo& info) {
-  core_ = std::make_unique<ViewerCore>(info.camera, options_.settings.pyramid());
+  core_ = std::make_unique<ViewerCore>(info.camera, options_.settings.Read<Pyramid>());
   if (!viewer_.ground_truth.empty()) core_->SetTruth(ReadGroundTruth(viewer_.ground_truth).poses);
   exchange_->Change([](Scene* scene, FrameSeries* series) {
     scene->Clear();

@@ -22,7 +22,7 @@ using Names = std::set<std::string>;
 const std::map<std::string, Names>& AllowedRooms() {
   static const std::map<std::string, Names> allowed = [] {
     std::map<std::string, Names> a;
-    a["util"] = {};
+    a["util"] = a["console"] = {};
     a["geometry"] = {"util"};
     a["camera"] = a["robust"] = {"util", "geometry"};
     a["features"] = {"util", "geometry", "camera", "robust"};
@@ -46,7 +46,8 @@ const std::map<std::string, Names>& AllowedRooms() {
     a["synthetic"] = a["evaluation"] = {"util", "geometry", "camera", "dataset"};
     a["messaging"] = {"util"};
     a["wire"] = {"util", "geometry", "camera", "features", "map", "messaging"};
-    a["runtime"] = above(a["settings"], {"settings", "messaging", "wire", "dataset"});
+    a["runtime"] = {"util", "console",           "geometry", "camera",    "features",
+                    "map",  "place_recognition", "settings", "messaging", "wire"};
     a["recording"] = {"util", "geometry", "camera", "features", "map", "dataset", "messaging", "wire"};
     return a;
   }();

@@ -3,30 +3,18 @@
 #include <utility>
 #include <variant>
 
+#include "dmslam/settings/frontend_setup.h"
+#include "dmslam/settings/run_options.h"
+
 namespace dmslam::bench {
-namespace {
-
-FrontendCore::Setup SetupOf(const Settings& settings, const Camera& camera,
-                            const std::shared_ptr<const Vocabulary>& vocabulary) {
-  FrontendCore::Setup setup;
-  setup.options = settings.frontend;
-  setup.extractor = settings.extractor;
-  setup.initializer = settings.initializer;
-  setup.camera = camera;
-  setup.pyramid = settings.pyramid();
-  setup.seed = settings.seed;
-  setup.vocabulary = vocabulary;
-  return setup;
-}
-
-}  // namespace
 
 CoreLoop::CoreLoop(const Settings& settings, const Camera& camera,
                    std::shared_ptr<const Vocabulary> vocabulary)
-    : frontend_(SetupOf(settings, camera, vocabulary)),
-      mapper_(settings.mapper, camera, settings.pyramid(), 1,
+    : frontend_(FrontendSetup(settings, camera, vocabulary)),
+      mapper_(settings.Read<MapperOptions>(), camera, settings.Read<Pyramid>(), 1,
               [this](const MapDelta& delta) { OnDelta(delta); }),
-      loopcloser_(settings.loop, camera, settings.pyramid(), settings.seed, vocabulary) {}
+      loopcloser_(settings.Read<LoopcloserOptions>(), camera, settings.Read<Pyramid>(),
+                  settings.Read<RunOptions>().seed, vocabulary) {}
 
 StepTimes CoreLoop::StepImage(uint32_t index, int64_t stamp_ns, const GrayView& image) {
   const Stopwatch watch;

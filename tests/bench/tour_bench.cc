@@ -10,6 +10,7 @@
 
 #include "core_loop.h"
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"

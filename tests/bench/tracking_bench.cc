@@ -14,6 +14,7 @@
 #include "dmslam/camera/camera.h"
 #include "dmslam/features/opencv_convert.h"
 #include "dmslam/features/testing/kitchen_pairs.h"
+#include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 
@@ -38,7 +39,7 @@ struct Series {
 /// One run over the frames with so many features.
 std::vector<Series> Measure(const std::vector<testing::TrueFrame>& frames, int num_features) {
   Settings settings;
-  settings.extractor.num_features = num_features;
+  settings.Set("features.count", std::to_string(num_features));
   const Camera camera = LoadCamera(FindDataFolder("config") + "/kitchen.yaml");
   CoreLoop loop(settings, camera, LoadVocabulary(""));
   const auto orb = cv::ORB::create(kOrbFeatures);

@@ -1,5 +1,4 @@
 // dmslam-eval: the errors of a trajectory against its ground truth.
-#include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -8,6 +7,7 @@
 #include <iostream>
 #include <optional>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/evaluation/report.h"
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/util/check.h"
@@ -143,40 +143,40 @@ void Run(const Arguments& arguments) {
   std::cout << "\nwritten: " << prefix << ".png, " << prefix << ".svg\n";
 }
 
-void Declare(CLI::App* app, Arguments* arguments) {
-  app->add_option("GT", arguments->ground_truth, "ground truth, TUM format")->required();
-  app->add_option("EST", arguments->estimate, "estimated trajectory, TUM format")->required();
-  app->add_option("--align", arguments->align,
-                  "how the estimate is laid onto the ground truth: sim3, se3, scale, none")
-      ->capture_default_str();
-  app->add_option("--max-diff", arguments->max_difference_s, "poses further apart in time are no pair [s]")
-      ->capture_default_str();
-  app->add_option("--rpe-delta", arguments->rpe_deltas,
-                  "lengths of the relative motions: a number and f (frames), s (seconds) or m (metres)")
-      ->capture_default_str();
-  app->add_flag("--rpe-all-pairs", arguments->all_pairs,
-                "in frames and metres, motions from every pose instead of end to end");
-  CLI::Option* const frames = app->add_option("--frames", arguments->frames,
-                                              "image list (rgb.txt) or its folder, for the share covered");
-  app->add_option("--frame-count", arguments->frame_count, "number of frames, where there is no list")
-      ->excludes(frames);
-  app->add_option("--json", arguments->json, "write the figures to this file");
-  app->add_option("--plot", arguments->plot,
-                  "draw PREFIX.png and PREFIX.svg: top and side view, error over time");
-  app->add_option("--title", arguments->title, "title of the plot (default: the estimate's file name)");
-  app->set_version_flag("--version", kVersion);
+void Declare(dmslam::CommandLine* app, Arguments* arguments) {
+  app->AddOption("GT", arguments->ground_truth, "ground truth, TUM format").Required();
+  app->AddOption("EST", arguments->estimate, "estimated trajectory, TUM format").Required();
+  app->AddOption("--align", arguments->align,
+                 "how the estimate is laid onto the ground truth: sim3, se3, scale, none")
+      .ShowDefault();
+  app->AddOption("--max-diff", arguments->max_difference_s, "poses further apart in time are no pair [s]")
+      .ShowDefault();
+  app->AddOption("--rpe-delta", arguments->rpe_deltas,
+                 "lengths of the relative motions: a number and f (frames), s (seconds) or m (metres)")
+      .ShowDefault();
+  app->AddFlag("--rpe-all-pairs", arguments->all_pairs,
+               "in frames and metres, motions from every pose instead of end to end");
+  const dmslam::CommandLineOption frames = app->AddOption(
+      "--frames", arguments->frames, "image list (rgb.txt) or its folder, for the share covered");
+  app->AddOption("--frame-count", arguments->frame_count, "number of frames, where there is no list")
+      .Excludes(frames);
+  app->AddOption("--json", arguments->json, "write the figures to this file");
+  app->AddOption("--plot", arguments->plot,
+                 "draw PREFIX.png and PREFIX.svg: top and side view, error over time");
+  app->AddOption("--title", arguments->title, "title of the plot (default: the estimate's file name)");
+  app->SetVersion(kVersion);
 }
 
 }  // namespace
 }  // namespace dmslam
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  dmslam::CommandLine app(
       "Errors of a trajectory against its ground truth: ATE, RPE and coverage, as text, JSON and pictures.",
       "dmslam-eval");
   dmslam::Arguments arguments;
   dmslam::Declare(&app, &arguments);
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.Parse(argc, argv)) return *code;
   try {
     dmslam::Run(arguments);
     std::cout.flush();

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "collector/collector_node.h"
+#include "dmslam/place_recognition/vocabulary.h"
 #include "dmslam/recording/log_index.h"
 #include "mapper/mapper_node.h"
 #include "player/player_node.h"

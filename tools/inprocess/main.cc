@@ -1,12 +1,12 @@
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 
+#include "dmslam/console/command_line.h"
+#include "dmslam/console/log.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
@@ -28,40 +28,39 @@ struct Arguments {
   bool no_loop = false, localize = false;
 };
 
-void Declare(CLI::App& app, Arguments& a) {
-  app.set_version_flag("--version", dmslam::BuildVersion());
-  app.add_option("--sequence,--video", a.sequence,
-                 "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
-  app.add_option("--fps", a.fps,
-                 "frames per second of numbered images and of videos that do not state it; default: as the "
-                 "camera file says")
-      ->check(CLI::Range(0.01, 1000.0));
-  app.add_option("--encoding", a.encoding, "of frames that are neither JPEG nor PNG: jpeg, png, raw")
-      ->check(CLI::IsMember({"jpeg", "png", "raw"}));
-  app.add_option("--log", a.log, "log of lcm-logger: its frames are played");
-  app.add_option("--records", a.records,
-                 "such a log: its keyframes are entered, without images and without a frontend");
-  app.add_option("--log-session", a.log_session, "which of the log's sessions, where it holds several");
-  app.add_option("--record", a.record, "write all that is said into this log");
-  app.add_option("--out", a.out, "folder for the results")->required();
-  app.add_option("--camera", a.camera, "camera file (YAML); found by itself for TUM freiburg1/2/3");
-  app.add_option("--config", a.config, "settings (YAML)");
-  app.add_option("--set", a.overrides, "one setting: key=value; may be repeated");
-  app.add_option("--profile", a.profile, "dm or baseline")->check(CLI::IsMember({"dm", "baseline"}));
-  app.add_option("--seed", a.seed)->capture_default_str();
-  app.add_option("--start", a.start, "first frame");
-  app.add_option("--frames", a.frames, "at most so many frames");
-  app.add_option("--black-out", a.black_outs,
-                 "FROM,SECONDS: black frames from frame FROM on; may be repeated");
-  app.add_option("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
-  app.add_option("--pictures", a.pictures, "draw every Nth frame");
-  app.add_option("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
-  app.add_option("--map", a.map_files.load, "saved map or log: begin in this map");
-  app.add_flag("--localize", a.localize,
-               "with --map: find the camera in the map, and leave the map as it is");
-  app.add_option("--save-map", a.map_files.save, "write the map into this file at the end");
-  app.add_option("--session", a.session, "of this run; default: 1, with --map one more than the map's");
-  app.add_flag("--no-loop", a.no_loop, "do not close loops");
+void Declare(dmslam::CommandLine& app, Arguments& a) {
+  app.SetVersion(dmslam::BuildVersion());
+  app.AddOption("--sequence,--video", a.sequence,
+                "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.AddOption("--fps", a.fps,
+                "frames per second of numbered images and of videos that do not state it; default: as the "
+                "camera file says")
+      .InRange(0.01, 1000.0);
+  app.AddOption("--encoding", a.encoding, "of frames that are neither JPEG nor PNG: jpeg, png, raw")
+      .OneOf({"jpeg", "png", "raw"});
+  app.AddOption("--log", a.log, "log of lcm-logger: its frames are played");
+  app.AddOption("--records", a.records,
+                "such a log: its keyframes are entered, without images and without a frontend");
+  app.AddOption("--log-session", a.log_session, "which of the log's sessions, where it holds several");
+  app.AddOption("--record", a.record, "write all that is said into this log");
+  app.AddOption("--out", a.out, "folder for the results").Required();
+  app.AddOption("--camera", a.camera, "camera file (YAML); found by itself for TUM freiburg1/2/3");
+  app.AddOption("--config", a.config, "settings (YAML)");
+  app.AddOption("--set", a.overrides, "one setting: key=value; may be repeated");
+  app.AddOption("--profile", a.profile, "dm or baseline").OneOf({"dm", "baseline"});
+  app.AddOption("--seed", a.seed).ShowDefault();
+  app.AddOption("--start", a.start, "first frame");
+  app.AddOption("--frames", a.frames, "at most so many frames");
+  app.AddOption("--black-out", a.black_outs,
+                "FROM,SECONDS: black frames from frame FROM on; may be repeated");
+  app.AddOption("--jump", a.jumps, "FROM,TO: after frame FROM goes on with frame TO; may be repeated");
+  app.AddOption("--pictures", a.pictures, "draw every Nth frame");
+  app.AddOption("--vocabulary", a.vocabulary, "bag-of-words vocabulary; default: the one that ships");
+  app.AddOption("--map", a.map_files.load, "saved map or log: begin in this map");
+  app.AddFlag("--localize", a.localize, "with --map: find the camera in the map, and leave the map as it is");
+  app.AddOption("--save-map", a.map_files.save, "write the map into this file at the end");
+  app.AddOption("--session", a.session, "of this run; default: 1, with --map one more than the map's");
+  app.AddFlag("--no-loop", a.no_loop, "do not close loops");
 }
 
 std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOptions* player) {
@@ -73,7 +72,7 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOpti
     return dmslam::OpenSequence(a.camera, a.fps, player);
   }
   auto log = std::make_shared<const dmslam::LogIndex>(a.log);
-  if (!log->DescribeDamage().empty()) spdlog::warn("{}", log->DescribeDamage());
+  if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
   auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
   player->sequence = frames->camera_info().sequence;
   player->camera = a.camera.empty() ? frames->camera_info().camera : dmslam::LoadCamera(a.camera);
@@ -115,23 +114,23 @@ int Run(const Arguments& a) {
                           : dmslam::RunRecordsInProcess(std::move(options),
                                                         std::make_shared<const dmslam::LogIndex>(a.records),
                                                         a.log_session, &problem);
-  if (!problem.empty()) spdlog::error("{}", problem);
+  if (!problem.empty()) dmslam::LogError("{}", problem);
   return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs frontend, mapper, loop closer and player in one process, in lock-step.",
-               "dmslam-inprocess");
+  dmslam::CommandLine app("Runs frontend, mapper, loop closer and player in one process, in lock-step.",
+                          "dmslam-inprocess");
   Arguments arguments;
   Declare(app, arguments);
-  CLI11_PARSE(app, argc, argv);
-  spdlog::set_default_logger(spdlog::stderr_color_mt("dmslam-inprocess"));
+  if (const auto code = app.Parse(argc, argv)) return *code;
+  dmslam::SetUpLog("dmslam-inprocess");
   try {
     return Run(arguments);
   } catch (const dmslam::InputError& error) {
-    spdlog::error("{}", error.what());
+    dmslam::LogError("{}", error.what());
     return 1;
   }
 }

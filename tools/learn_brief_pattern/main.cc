@@ -1,6 +1,5 @@
 // Learns the comparisons of the descriptor from photographs and prints them as the table that the extractor
 // includes.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/features/opencv_convert.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
@@ -83,23 +83,21 @@ void AddPairs(const cv::Mat& image, Random* random, OrbExtractor* extractor, std
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app{
+  dmslam::CommandLine app{
       "Learns the extractor's comparisons from photographs; prints the table that brief_pattern.cc includes"};
-  app.set_version_flag("--version", kVersion);
+  app.SetVersion(kVersion);
   std::string folder;
   int num_images = 80;
   PatternLearnerOptions options;
   OrbExtractorOptions extractor_options;
   extractor_options.num_features = 400;
   extractor_options.pyramid.levels = 5;
-  app.add_option("folder", folder, "folder of photographs")->required();
-  app.add_option("--images", num_images, "how many of them, evenly spread over the folder")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--candidates", options.num_candidates, "random tests to choose from")
-      ->check(CLI::Range(512, 100000));
-  app.add_option("--sigma", options.sigma_px, "spread of their points [px]")->check(CLI::Range(1.0, 50.0));
-  app.add_option("--seed", options.seed, "seed");
-  CLI11_PARSE(app, argc, argv);
+  app.AddOption("folder", folder, "folder of photographs").Required();
+  app.AddOption("--images", num_images, "how many of them, evenly spread over the folder").Positive();
+  app.AddOption("--candidates", options.num_candidates, "random tests to choose from").InRange(512, 100000);
+  app.AddOption("--sigma", options.sigma_px, "spread of their points [px]").InRange(1.0, 50.0);
+  app.AddOption("--seed", options.seed, "seed");
+  if (const auto code = app.Parse(argc, argv)) return *code;
 
   const std::vector<std::string> files = ImagesIn(folder);
   OrbExtractor extractor(extractor_options);

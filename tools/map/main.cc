@@ -1,7 +1,4 @@
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -9,6 +6,8 @@
 #include <tuple>
 
 #include "collector/map_ply.h"
+#include "dmslam/console/command_line.h"
+#include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_version.h"
@@ -28,21 +27,20 @@ struct Arguments {
   bool channels = false;
 };
 
-void Declare(CLI::App& app, Arguments& a) {
-  app.set_version_flag("--version", dmslam::kVersion);
-  app.add_option("--log,--map", a.log, "log of a run, or a saved map")->required();
-  app.add_option("--log-session", a.session, "which of the log's sessions, where it holds several");
-  app.add_option("--at", a.at_s, "seconds after the log's beginning: the map as it was then")
-      ->check(CLI::NonNegativeNumber);
-  app.add_flag("--channels", a.channels, "list what the log holds: channel, type, messages, bytes");
-  app.add_option("--ply", a.ply, "write the map as coloured points");
-  app.add_option("--trajectory", a.trajectory, "write where the camera was, by the map (TUM format)");
-  app.add_option("--trajectory-online", a.online, "write where the camera was, as told frame by frame");
-  app.add_option("--keyframes", a.keyframes, "write the keyframes' poses (TUM format)");
-  CLI::Option* masks = app.add_option(
+void Declare(dmslam::CommandLine& app, Arguments& a) {
+  app.SetVersion(dmslam::kVersion);
+  app.AddOption("--log,--map", a.log, "log of a run, or a saved map").Required();
+  app.AddOption("--log-session", a.session, "which of the log's sessions, where it holds several");
+  app.AddOption("--at", a.at_s, "seconds after the log's beginning: the map as it was then").NonNegative();
+  app.AddFlag("--channels", a.channels, "list what the log holds: channel, type, messages, bytes");
+  app.AddOption("--ply", a.ply, "write the map as coloured points");
+  app.AddOption("--trajectory", a.trajectory, "write where the camera was, by the map (TUM format)");
+  app.AddOption("--trajectory-online", a.online, "write where the camera was, as told frame by frame");
+  app.AddOption("--keyframes", a.keyframes, "write the keyframes' poses (TUM format)");
+  const dmslam::CommandLineOption masks = app.AddOption(
       "--masks", a.masks, "sequence's folder with masks: say how many landmarks are seen mostly on people");
-  app.add_option("--json", a.json, "also write that into this file")->needs(masks);
-  app.add_option("--save", a.save, "write the map as a file that the mapper can load (--map)");
+  app.AddOption("--json", a.json, "also write that into this file").Needs(masks);
+  app.AddOption("--save", a.save, "write the map as a file that the mapper can load (--map)");
 }
 
 /// Names of all types by their fingerprints.
@@ -79,7 +77,7 @@ int ListChannels(const std::string& path) {
     std::printf("%-36s %-20s %8lld messages %12lld bytes\n", channel.c_str(), content.type.c_str(),
                 static_cast<long long>(content.messages), static_cast<long long>(content.bytes));
   }
-  if (!reader.gaps().empty()) spdlog::warn("{}", reader.DescribeGaps());
+  if (!reader.gaps().empty()) dmslam::LogWarning("{}", reader.DescribeGaps());
   return 0;
 }
 
@@ -135,19 +133,19 @@ void Judge(const Arguments& a, const dmslam::Map& map, dmslam::MapId map_id) {
 int Run(const Arguments& a) {
   if (a.channels) return ListChannels(a.log);
   const dmslam::LogIndex log(a.log);
-  if (!log.DescribeDamage().empty()) spdlog::warn("{}", log.DescribeDamage());
+  if (!log.DescribeDamage().empty()) dmslam::LogWarning("{}", log.DescribeDamage());
   const dmslam::RecordedSession& session = log.Session(a.session);
   const int64_t until_us = a.at_s < 0 ? INT64_MAX : log.begin_us() + std::llround(a.at_s * 1e6);
   const dmslam::RebuiltMap rebuilt = dmslam::RebuildMap(log, session, until_us);
   if (rebuilt.missing > 0) {
-    spdlog::warn("{}: {} map records are missing; what they said is lost, {} references lead nowhere", a.log,
-                 rebuilt.missing, rebuilt.skipped);
+    dmslam::LogWarning("{}: {} map records are missing; what they said is lost, {} references lead nowhere",
+                       a.log, rebuilt.missing, rebuilt.skipped);
   }
   dmslam::TrajectoryBuilder builder(rebuilt.session.camera, rebuilt.session.pyramid);
   builder.SetMap(rebuilt.map);
   if (const int64_t missing = AddFramePoses(log, session, until_us, &builder); missing > 0) {
-    spdlog::warn("{}: {} records of the frontend are missing; some frames' poses are not the last word",
-                 a.log, missing);
+    dmslam::LogWarning("{}: {} records of the frontend are missing; some frames' poses are not the last word",
+                       a.log, missing);
   }
   dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build();
   const dmslam::MapId map_id =
@@ -171,15 +169,15 @@ int Run(const Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Rebuilds the map of a run from its log, and writes it out.", "dmslam-map");
+  dmslam::CommandLine app("Rebuilds the map of a run from its log, and writes it out.", "dmslam-map");
   Arguments arguments;
   Declare(app, arguments);
-  CLI11_PARSE(app, argc, argv);
-  spdlog::set_default_logger(spdlog::stderr_color_mt("dmslam-map"));
+  if (const auto code = app.Parse(argc, argv)) return *code;
+  dmslam::SetUpLog("dmslam-map");
   try {
     return Run(arguments);
   } catch (const dmslam::InputError& error) {
-    spdlog::error("{}", error.what());
+    dmslam::LogError("{}", error.what());
     return 1;
   }
 }

@@ -1,3 +1,4 @@
+#include "dmslam/console/command_line.h"
 #include "dmslam/runtime/process_main.h"
 #include "tour_node.h"
 
@@ -5,15 +6,11 @@ int main(int argc, char** argv) {
   dmslam::ProcessMain process(
       "map-tour", "Writes a made-up map of any size to the bus, in a mapper's place: to try viewers.");
   dmslam::TourNodeOptions tour;
-  CLI::App& app = process.app();
-  app.add_option("--keyframes", tour.tour.keyframes)->check(CLI::Range(1, 1'000'000))->capture_default_str();
-  app.add_option("--landmarks", tour.tour.landmarks)
-      ->check(CLI::Range(1, 100'000'000))
-      ->capture_default_str();
-  app.add_option("--seed", tour.tour.seed)->capture_default_str();
-  app.add_option("--rate", tour.rate, "keyframes per second")
-      ->check(CLI::Range(0.1, 1e6))
-      ->capture_default_str();
+  dmslam::CommandLine& app = process.app();
+  app.AddOption("--keyframes", tour.tour.keyframes).InRange(1, 1'000'000).ShowDefault();
+  app.AddOption("--landmarks", tour.tour.landmarks).InRange(1, 100'000'000).ShowDefault();
+  app.AddOption("--seed", tour.tour.seed).ShowDefault();
+  app.AddOption("--rate", tour.rate, "keyframes per second").InRange(0.1, 1e6).ShowDefault();
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     return std::make_unique<dmslam::TourNode>(std::move(context), std::move(options), tour);
   });

@@ -1,8 +1,8 @@
 #include "tour_node.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
+
+#include "dmslam/console/log.h"
 
 namespace dmslam {
 
@@ -25,8 +25,8 @@ bool TourNode::WorkOnce() {
   endpoint_.Advance();
   PublishPose(tour_->map().keyframes().rbegin()->second);
   if (tour_->done()) {
-    spdlog::info("the map is whole: {} keyframes, {} landmarks", tour_->map().keyframes().size(),
-                 tour_->map().num_landmarks());
+    LogInfo("the map is whole: {} keyframes, {} landmarks", tour_->map().keyframes().size(),
+            tour_->map().num_landmarks());
   }
   return true;
 }

@@ -1,6 +1,6 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/messaging/lcm_bus.h"
 #include "dmslam/util/check.h"
@@ -46,18 +46,16 @@ int64_t MakeNoise(const NoiseOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  dmslam::CommandLine app(
       "Sends noise and damaged messages on every channel of a running system: nothing may come of it.",
       "dmslam-noise");
   NoiseOptions options;
-  app.add_option("--lcm-url", options.url, "LCM bus of the system")->required();
-  app.add_option("--prefix", options.prefix, "of its channels");
-  app.add_option("--count", options.count, "messages")->capture_default_str();
-  app.add_option("--rate", options.rate, "messages per second")
-      ->check(CLI::Range(1, 1'000'000))
-      ->capture_default_str();
-  app.add_option("--seed", options.seed, "of the noise")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  app.AddOption("--lcm-url", options.url, "LCM bus of the system").Required();
+  app.AddOption("--prefix", options.prefix, "of its channels");
+  app.AddOption("--count", options.count, "messages").ShowDefault();
+  app.AddOption("--rate", options.rate, "messages per second").InRange(1, 1'000'000).ShowDefault();
+  app.AddOption("--seed", options.seed, "of the noise").ShowDefault();
+  if (const auto code = app.Parse(argc, argv)) return *code;
   try {
     MakeNoise(options);
   } catch (const dmslam::InputError& error) {

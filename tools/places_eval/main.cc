@@ -1,9 +1,9 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 #include <string>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/util/version.h"
 #include "evaluate.h"
 
@@ -14,27 +14,24 @@ struct Outputs {
   std::string svg;
 };
 
-void AddOptions(CLI::App& app, dmslam::PlacesOptions& options, Outputs& outputs) {
-  app.add_option("--sequence", options.sequence, "TUM RGB-D folder with groundtruth.txt")->required();
-  app.add_option("--vocabulary", options.vocabulary, "Vocabulary, either format")->required();
-  app.add_option("--fx", options.camera.fx_px, "Focal length [px]")->required();
-  app.add_option("--fy", options.camera.fy_px, "Focal length [px]")->required();
-  app.add_option("--cx", options.camera.cx_px, "Principal point [px]")->required();
-  app.add_option("--cy", options.camera.cy_px, "Principal point [px]")->required();
-  app.add_option("--features", options.features, "Features per image")->capture_default_str();
-  app.add_option("--every", options.every, "Every n-th frame is a view")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
-  app.add_option("--min-gap", options.min_gap_s, "Least time between compared views [s]")
-      ->capture_default_str();
-  app.add_option("--max-distance", options.max_distance, "Same view: distance [m]")->capture_default_str();
-  app.add_option("--max-angle", options.max_angle_deg, "Same view: turn [deg]")->capture_default_str();
-  app.add_option("--accept-margin", options.accept_margin, "An estimated pose must be closer by this share")
-      ->capture_default_str();
-  app.add_option("--candidates", options.max_candidates, "Places verified per view")->capture_default_str();
-  app.add_option("--seed", options.seed, "Seed of the verification")->capture_default_str();
-  app.add_option("--csv", outputs.csv, "Write the curves as a table");
-  app.add_option("--svg", outputs.svg, "Draw the curves");
+void AddOptions(dmslam::CommandLine& app, dmslam::PlacesOptions& options, Outputs& outputs) {
+  app.AddOption("--sequence", options.sequence, "TUM RGB-D folder with groundtruth.txt").Required();
+  app.AddOption("--vocabulary", options.vocabulary, "Vocabulary, either format").Required();
+  app.AddOption("--fx", options.camera.fx_px, "Focal length [px]").Required();
+  app.AddOption("--fy", options.camera.fy_px, "Focal length [px]").Required();
+  app.AddOption("--cx", options.camera.cx_px, "Principal point [px]").Required();
+  app.AddOption("--cy", options.camera.cy_px, "Principal point [px]").Required();
+  app.AddOption("--features", options.features, "Features per image").ShowDefault();
+  app.AddOption("--every", options.every, "Every n-th frame is a view").ShowDefault().Positive();
+  app.AddOption("--min-gap", options.min_gap_s, "Least time between compared views [s]").ShowDefault();
+  app.AddOption("--max-distance", options.max_distance, "Same view: distance [m]").ShowDefault();
+  app.AddOption("--max-angle", options.max_angle_deg, "Same view: turn [deg]").ShowDefault();
+  app.AddOption("--accept-margin", options.accept_margin, "An estimated pose must be closer by this share")
+      .ShowDefault();
+  app.AddOption("--candidates", options.max_candidates, "Places verified per view").ShowDefault();
+  app.AddOption("--seed", options.seed, "Seed of the verification").ShowDefault();
+  app.AddOption("--csv", outputs.csv, "Write the curves as a table");
+  app.AddOption("--svg", outputs.svg, "Draw the curves");
 }
 
 void Print(dmslam::Stage stage, const std::vector<dmslam::CurvePoint>& curve) {
@@ -65,12 +62,12 @@ void Run(const dmslam::PlacesOptions& options, const Outputs& outputs) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Place recognition alone, scored against ground-truth poses", "dmslam-places-eval");
-  app.set_version_flag("--version", dmslam::kVersion);
+  dmslam::CommandLine app("Place recognition alone, scored against ground-truth poses", "dmslam-places-eval");
+  app.SetVersion(dmslam::kVersion);
   dmslam::PlacesOptions options;
   Outputs outputs;
   AddOptions(app, options, outputs);
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.Parse(argc, argv)) return *code;
   try {
     Run(options, outputs);
   } catch (const std::exception& error) {

@@ -1,6 +1,5 @@
 // dmslam-report: what scripts/reproduce.sh has to run, and the reports of what it, scripts/sweep.sh and
 // scripts/population.sh have run.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
 #include <iostream>
@@ -9,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
@@ -235,45 +235,47 @@ void RunPopulation(const Arguments& arguments) {
 }  // namespace dmslam
 
 int main(int argc, char** argv) {
-  CLI::App app("The reproduction of the DM-SLAM paper's tables: what to run, and the report of what was run.",
-               "dmslam-report");
-  app.set_version_flag("--version", dmslam::BuildVersion());
-  app.require_subcommand(1);
+  dmslam::CommandLine app(
+      "The reproduction of the DM-SLAM paper's tables: what to run, and the report of what was run.",
+      "dmslam-report");
+  app.SetVersion(dmslam::BuildVersion());
+  app.RequireSubcommand();
   dmslam::Arguments arguments;
-  CLI::App* plan =
-      app.add_subcommand("plan", "find the sequences, add them to plan.json, print one line per run");
-  plan->add_option("--root", arguments.roots, "folder that holds sequences; may be repeated")->required();
-  plan->add_option("--out", arguments.out, "the reproduction's folder")->required();
-  plan->add_option("--seeds", arguments.seeds, "runs of each sequence")->capture_default_str();
-  plan->add_option("--only", arguments.only, "only these sequences");
-  CLI::App* write =
-      app.add_subcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
-  write->add_option("--out", arguments.out, "the reproduction's folder")->required();
-  write->add_option("--root", arguments.roots,
-                    "folder that holds sequences which are not where they were planned; may be repeated");
-  write->add_option("--publish", arguments.publish,
-                    "also write this page, with pictures of rendered sequences only");
-  CLI::App* sweep = app.add_subcommand("sweep", "write the tables and the picture of scripts/sweep.sh");
-  sweep->add_option("--out", arguments.out, "the sweep's folder")->required();
-  sweep->add_option("--seeds", arguments.seeds, "runs of each sequence")->capture_default_str();
-  sweep->add_option("--data", arguments.data, "folder that holds the kitchen sequences");
-  sweep->add_option("--publish", arguments.publish, "also put them between this page's marks");
-  CLI::App* population =
-      app.add_subcommand("population", "write the tables of scripts/population.sh, and print them");
-  population->add_option("--list", arguments.list, "lines of half, name, kind, folder, separated by tabs")
-      ->required();
+  dmslam::CommandLine& plan =
+      app.AddSubcommand("plan", "find the sequences, add them to plan.json, print one line per run");
+  plan.AddOption("--root", arguments.roots, "folder that holds sequences; may be repeated").Required();
+  plan.AddOption("--out", arguments.out, "the reproduction's folder").Required();
+  plan.AddOption("--seeds", arguments.seeds, "runs of each sequence").ShowDefault();
+  plan.AddOption("--only", arguments.only, "only these sequences");
+  dmslam::CommandLine& write =
+      app.AddSubcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
+  write.AddOption("--out", arguments.out, "the reproduction's folder").Required();
+  write.AddOption("--root", arguments.roots,
+                  "folder that holds sequences which are not where they were planned; may be repeated");
+  write.AddOption("--publish", arguments.publish,
+                  "also write this page, with pictures of rendered sequences only");
+  dmslam::CommandLine& sweep =
+      app.AddSubcommand("sweep", "write the tables and the picture of scripts/sweep.sh");
+  sweep.AddOption("--out", arguments.out, "the sweep's folder").Required();
+  sweep.AddOption("--seeds", arguments.seeds, "runs of each sequence").ShowDefault();
+  sweep.AddOption("--data", arguments.data, "folder that holds the kitchen sequences");
+  sweep.AddOption("--publish", arguments.publish, "also put them between this page's marks");
+  dmslam::CommandLine& population =
+      app.AddSubcommand("population", "write the tables of scripts/population.sh, and print them");
+  population.AddOption("--list", arguments.list, "lines of half, name, kind, folder, separated by tabs")
+      .Required();
   population
-      ->add_option("--runs", arguments.runs,
-                   "NAME=FOLDER: a system and the folder with its runs, one per sequence; may be repeated")
-      ->required();
-  population->add_option("--out", arguments.out, "writes OUT.md and OUT.json")->required();
-  population->add_flag("--details", arguments.details, "the report half's single sequences too");
-  CLI11_PARSE(app, argc, argv);
+      .AddOption("--runs", arguments.runs,
+                 "NAME=FOLDER: a system and the folder with its runs, one per sequence; may be repeated")
+      .Required();
+  population.AddOption("--out", arguments.out, "writes OUT.md and OUT.json").Required();
+  population.AddFlag("--details", arguments.details, "the report half's single sequences too");
+  if (const auto code = app.Parse(argc, argv)) return *code;
   try {
-    if (plan->parsed()) dmslam::RunPlan(arguments);
-    if (write->parsed()) dmslam::RunWrite(arguments);
-    if (sweep->parsed()) dmslam::RunSweep(arguments);
-    if (population->parsed()) dmslam::RunPopulation(arguments);
+    if (plan.parsed()) dmslam::RunPlan(arguments);
+    if (write.parsed()) dmslam::RunWrite(arguments);
+    if (sweep.parsed()) dmslam::RunSweep(arguments);
+    if (population.parsed()) dmslam::RunPopulation(arguments);
   } catch (const std::exception& error) {
     std::cerr << "dmslam-report: " << error.what() << "\n";
     return 1;

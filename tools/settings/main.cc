@@ -1,19 +1,20 @@
 // dmslam-settings: writes the page of all settings.
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <string>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/util/version.h"
 #include "settings_page.h"
 
 int main(int argc, char** argv) {
-  CLI::App app("Lists every setting with its default, as the page docs/configuration.md", "dmslam-settings");
-  app.set_version_flag("--version", dmslam::kVersion);
+  dmslam::CommandLine app("Lists every setting with its default, as the page docs/configuration.md",
+                          "dmslam-settings");
+  app.SetVersion(dmslam::kVersion);
   std::string out;
-  app.add_option("--out", out, "file to write; without it the page goes to standard output");
-  CLI11_PARSE(app, argc, argv);
+  app.AddOption("--out", out, "file to write; without it the page goes to standard output");
+  if (const auto code = app.Parse(argc, argv)) return *code;
   const std::string page = dmslam::SettingsPage();
   if (out.empty()) {
     std::fputs(page.c_str(), stdout);

@@ -4,27 +4,25 @@
 #include <utility>
 #include <vector>
 
-#include "dmslam/settings/settings.h"
+#include "dmslam/settings/registry.h"
 
 namespace dmslam {
 namespace {
 
-constexpr const char* kHead =
-    "# Configuration\n"
-    "\n"
-    "Written by `dmslam-settings --out docs/configuration.md`; change `src/dmslam/settings/settings.cc` "
-    "instead of "
-    "this page.\n"
-    "\n"
-    "A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with "
-    "`motion_belief: off`\n"
-    "below it) or from the command line (`--set tracking.motion_belief=off`, which goes before the file). "
-    "The same\n"
-    "settings go to every process; a process whose settings differ from the session's is told so by name.\n"
-    "`profile=baseline` is the same system with a plain RANSAC two-view start, without mutual exclusion of "
-    "new\n"
-    "landmarks, without motion belief, with `mapping.min_depth=0`, and without `tracking.smooth_at_end` and\n"
-    "`keyframe.at_end`.\n";
+constexpr const char* kHead = R"(# Configuration
+
+Written by `dmslam-settings --out docs/configuration.md`. A setting is described beside the field that it sets, in the
+`Describe` of its options struct (for example `src/dmslam/tracking/tracking_options.h`); change that instead of this page.
+
+A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with `motion_belief: off` below it) or
+from the command line (`--set tracking.motion_belief=off`, which goes before the file). The order within a file does not
+matter. `profile` comes before everything else, wherever it stands: `profile=baseline` is the same system with a plain
+RANSAC two-view start and with the values of the column "baseline".
+
+The same settings go to every process. A mapper, loop closer or collector whose settings or vocabulary differ from the
+frontend's refuses the session by name and ends with exit code 2. A setting that does not exist, or a value that is not
+allowed, is refused with file, line, key and what is allowed.
+)";
 
 std::string SectionOf(const std::string& key) {
   const size_t dot = key.find('.');
@@ -40,19 +38,33 @@ std::string Escaped(const std::string& text) {
   return escaped;
 }
 
+std::string RowOf(const SettingInfo& info) {
+  std::string row = "|";
+  for (const std::string& cell :
+       {"`" + info.key + "`", info.value, info.baseline.value_or(""), info.allowed, info.unit, info.help}) {
+    if (!cell.empty()) row += ' ';
+    row += Escaped(cell);
+    row += " |";
+  }
+  return row + "\n";
+}
+
 }  // namespace
 
 std::string SettingsPage() {
   std::vector<std::pair<std::string, std::string>> sections;  // name and rows, in the order of first mention
-  for (const SettingInfo& info : ListSettings(Settings{})) {
+  for (const SettingInfo& info : AllSettings()) {
     const std::string name = SectionOf(info.key);
     auto section = std::ranges::find(sections, name, &std::pair<std::string, std::string>::first);
     if (section == sections.end()) section = sections.insert(section, {name, ""});
-    section->second += "| `" + info.key + "` | " + Escaped(info.value) + " | " + Escaped(info.help) + " |\n";
+    section->second += RowOf(info);
   }
   std::string page = kHead;
   for (const auto& [name, rows] : sections)
-    page += "\n## " + name + "\n\n| setting | default | what it does |\n|---|---|---|\n" + rows;
+    page +=
+        "\n## " + name +
+        "\n\n| setting | default | baseline | allowed | unit | what it does |\n|---|---|---|---|---|---|\n" +
+        rows;
   return page;
 }
 

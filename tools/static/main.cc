@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/console/command_line.h"
 #include "dmslam/dataset/frame_source.h"
 #include "dmslam/map/keyframe.h"
 #include "dmslam/motion_segmentation/match_frames.h"
@@ -403,78 +403,69 @@ void RunTime(const TimeSettings& settings) {
   if (!file) throw InputError(settings.json + ": cannot be written");
 }
 
-void AddTime(CLI::App& app, TimeSettings& s) {
-  CLI::App* time = app.add_subcommand(
+void AddTime(dmslam::CommandLine& app, TimeSettings& s) {
+  dmslam::CommandLine& time = app.AddSubcommand(
       "time",
       "Time the methods as the paper's Table 1 does: fundamental matrices, so many iterations in total");
-  time->add_option("--sequence", s.sequence, "TUM RGB-D folder; the pair in its middle is matched")
-      ->required();
-  time->add_option("--camera", s.camera, "Camera file (YAML)");
-  time->add_option("--gap", s.gap, "Frames between the two of the pair")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  time->add_option("--features", s.features, "Most features per image")->capture_default_str();
-  time->add_option("--matches", s.matches, "Most matches")
-      ->check(CLI::Range(8, 100000))
-      ->capture_default_str();
-  time->add_option("--iterations", s.timing.iterations, "In total; DLRSAC shares them among its cells")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  time->add_option("--rounds", s.timing.rounds, "Measurements of each method, of which the median is told")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  time->add_option("--json", s.json, "File for the same numbers, as the report reads them");
-  time->callback([&s] { RunTime(s); });
+  time.AddOption("--sequence", s.sequence, "TUM RGB-D folder; the pair in its middle is matched").Required();
+  time.AddOption("--camera", s.camera, "Camera file (YAML)");
+  time.AddOption("--gap", s.gap, "Frames between the two of the pair").InRange(1, 100000).ShowDefault();
+  time.AddOption("--features", s.features, "Most features per image").ShowDefault();
+  time.AddOption("--matches", s.matches, "Most matches").InRange(8, 100000).ShowDefault();
+  time.AddOption("--iterations", s.timing.iterations, "In total; DLRSAC shares them among its cells")
+      .InRange(1, 1000000)
+      .ShowDefault();
+  time.AddOption("--rounds", s.timing.rounds, "Measurements of each method, of which the median is told")
+      .InRange(1, 100000)
+      .ShowDefault();
+  time.AddOption("--json", s.json, "File for the same numbers, as the report reads them");
+  time.OnParsed([&s] { RunTime(s); });
 }
 
-void AddOptions(CLI::App& app, Settings& s) {
-  app.add_option("images", s.images, "Two images of the same camera")->expected(0, 2);
-  app.add_option("--sequence", s.sequence, "TUM RGB-D folder, instead of two images");
-  app.add_option("--gap", s.gap, "Frames between the two of a pair, or auto")->capture_default_str();
-  app.add_option("--pairs", s.pairs, "Pairs spread over the sequence")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  app.add_option("--method", s.method, "dlrsac, dlrsac-paper, arsac or ransac")->capture_default_str();
-  app.add_option("--model", s.model,
-                 "e (essential matrix, five points) or f (fundamental matrix, eight points)")
-      ->check(CLI::IsMember({"e", "f"}))
-      ->capture_default_str();
-  app.add_option("--camera", s.camera, "Camera file (YAML)");
-  app.add_option("--features", s.features, "Most features per image")->capture_default_str();
-  app.add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
-  app.add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
-  app.add_flag("--first-maps", s.first_maps,
-               "Instead of pairs: the first maps of an initialiser begun at so many frames of --sequence");
-  app.add_flag("--gated", s.gated, "Pairs with two frames between must agree, as the initialiser asks them");
-  app.add_option("--out", s.out, "Folder for pictures and static.json")->capture_default_str();
+void AddOptions(dmslam::CommandLine& app, Settings& s) {
+  app.AddOption("images", s.images, "Two images of the same camera").Count(0, 2);
+  app.AddOption("--sequence", s.sequence, "TUM RGB-D folder, instead of two images");
+  app.AddOption("--gap", s.gap, "Frames between the two of a pair, or auto").ShowDefault();
+  app.AddOption("--pairs", s.pairs, "Pairs spread over the sequence").InRange(1, 100000).ShowDefault();
+  app.AddOption("--method", s.method, "dlrsac, dlrsac-paper, arsac or ransac").ShowDefault();
+  app.AddOption("--model", s.model,
+                "e (essential matrix, five points) or f (fundamental matrix, eight points)")
+      .OneOf({"e", "f"})
+      .ShowDefault();
+  app.AddOption("--camera", s.camera, "Camera file (YAML)");
+  app.AddOption("--features", s.features, "Most features per image").ShowDefault();
+  app.AddOption("--seed", s.seed, "Same input and seed: same answer").ShowDefault();
+  app.AddFlag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
+  app.AddFlag("--first-maps", s.first_maps,
+              "Instead of pairs: the first maps of an initialiser begun at so many frames of --sequence");
+  app.AddFlag("--gated", s.gated, "Pairs with two frames between must agree, as the initialiser asks them");
+  app.AddOption("--out", s.out, "Folder for pictures and static.json").ShowDefault();
 }
 
-void AddJudge(CLI::App& app, JudgeSettings& s) {
-  CLI::App* judge =
-      app.add_subcommand("judge", "Measure against masks and true poses; prints Markdown tables");
+void AddJudge(dmslam::CommandLine& app, JudgeSettings& s) {
+  dmslam::CommandLine& judge =
+      app.AddSubcommand("judge", "Measure against masks and true poses; prints Markdown tables");
   judge
-      ->add_option("--sequence", s.sequence,
-                   "TUM RGB-D folder with groundtruth.txt, and mask.txt where there are movers")
-      ->required();
-  judge->add_option("--table", s.table, "pairs, ablation, windows, system or starts")->capture_default_str();
-  judge->add_option("--count", s.count, "Pairs, windows or starts, spread over the sequence")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  judge->add_option("--window", s.window, "Frames of a window of table 'system'")
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
-  judge->add_option("--only", s.only,
-                    "Of pairs, windows and system: only methods whose name contains this, as DLRSAC");
-  judge->add_option("--gaps", s.gaps, "Gaps of the pairs [frames]")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  judge->add_option("--camera", s.camera, "Camera file (YAML)");
-  judge->add_option("--features", s.features, "Most features per image")->capture_default_str();
-  judge->add_option("--seed", s.seed, "Same input and seed: same answer")->capture_default_str();
-  judge->add_flag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
-  judge->add_option("--out", s.out, "File to append to, instead of standard output");
-  judge->add_option("--json", s.json, "File for the same numbers as JSON");
-  judge->callback([&s] { RunJudge(s); });
+      .AddOption("--sequence", s.sequence,
+                 "TUM RGB-D folder with groundtruth.txt, and mask.txt where there are movers")
+      .Required();
+  judge.AddOption("--table", s.table, "pairs, ablation, windows, system or starts").ShowDefault();
+  judge.AddOption("--count", s.count, "Pairs, windows or starts, spread over the sequence")
+      .InRange(1, 100000)
+      .ShowDefault();
+  judge.AddOption("--window", s.window, "Frames of a window of table 'system'")
+      .InRange(2, 100000)
+      .ShowDefault();
+  judge.AddOption("--only", s.only,
+                  "Of pairs, windows and system: only methods whose name contains this, as DLRSAC");
+  judge.AddOption("--gaps", s.gaps, "Gaps of the pairs [frames]").InRange(1, 100000).ShowDefault();
+  judge.AddOption("--camera", s.camera, "Camera file (YAML)");
+  judge.AddOption("--features", s.features, "Most features per image").ShowDefault();
+  judge.AddOption("--seed", s.seed, "Same input and seed: same answer").ShowDefault();
+  judge.AddFlag("--no-window", s.no_window, "Match over the whole image, without the orientation check");
+  judge.AddOption("--out", s.out, "File to append to, instead of standard output");
+  judge.AddOption("--json", s.json, "File for the same numbers as JSON");
+  judge.OnParsed([&s] { RunJudge(s); });
 }
 
 void RunSelection(const Settings& settings) {
@@ -501,8 +492,8 @@ void RunSelection(const Settings& settings) {
 }  // namespace dmslam
 
 int main(int argc, char** argv) {
-  CLI::App app("Finds which matches of two frames belong to the static world", "dmslam-static");
-  app.set_version_flag("--version", dmslam::BuildVersion());
+  dmslam::CommandLine app("Finds which matches of two frames belong to the static world", "dmslam-static");
+  app.SetVersion(dmslam::BuildVersion());
   dmslam::Settings settings;
   dmslam::JudgeSettings judge;
   dmslam::AddOptions(app, settings);
@@ -510,10 +501,8 @@ int main(int argc, char** argv) {
   dmslam::TimeSettings time;
   dmslam::AddTime(app, time);
   try {
-    app.parse(argc, argv);
-    if (app.get_subcommands().empty()) dmslam::RunSelection(settings);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    if (const auto code = app.Parse(argc, argv)) return *code;
+    if (!app.HasSubcommand()) dmslam::RunSelection(settings);
   } catch (const std::exception& error) {
     std::cerr << "dmslam-static: " << error.what() << '\n';
     return 1;

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +9,7 @@
 #include <string>
 
 #include "dmslam/camera/camera.h"
+#include "dmslam/console/command_line.h"
 #include "dmslam/synthetic/sequence_writer.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
@@ -25,51 +25,50 @@ struct Arguments {
   dmslam::SequenceOptions sequence;
 };
 
-void AddOptions(CLI::App& app, Arguments& args) {
-  app.add_option("--out", args.out, "Folder to write into (it is made where it is not there)")->required();
-  app.add_option("--scene", args.scene,
-                 "room | office | hall | workshop | corridor | aliased (default: what the path needs)");
-  app.add_option("--path", args.path,
-                 "static | xyz | rpy | halfsphere | turn | tour | forward | ring (default: xyz)");
-  app.add_option(
+void AddOptions(dmslam::CommandLine& app, Arguments& args) {
+  app.AddOption("--out", args.out, "Folder to write into (it is made where it is not there)").Required();
+  app.AddOption("--scene", args.scene,
+                "room | office | hall | workshop | corridor | aliased (default: what the path needs)");
+  app.AddOption("--path", args.path,
+                "static | xyz | rpy | halfsphere | turn | tour | forward | ring (default: xyz)");
+  app.AddOption(
       "--preset", args.preset,
       "walking_xyz | walking_rpy | walking_halfsphere | static_xyz: as the sequences of the TUM benchmark: "
       "same kind of motion, length and rate, two people who walk and sit (none in static_xyz)");
-  app.add_option("--frames", args.frames,
-                 "Frames to render (default: 300; tour and ring: 1.15 rounds, 1500 at least)");
-  app.add_option("--fps", args.fps, "Frames per second")->capture_default_str();
-  app.add_option("--seed", args.seed, "Seed of everything: scene, path, people, noise")
-      ->capture_default_str();
-  app.add_option("--moving-share", args.moving_share,
-                 "Mean share of the image covered by people and other things that move, 0..0.7");
-  app.add_option("--actors", args.actors, "How many people (default: as many as the moving share takes)");
-  app.add_option("--behaviour", args.behaviour, "walk | stop-and-go | sit")->capture_default_str();
-  app.add_flag("--carry", args.sequence.world.props.carried_box, "The first person carries a box");
-  app.add_flag("--cart", args.sequence.world.props.cart, "A cart rolls about by itself, and stops at times");
-  app.add_flag("--door", args.sequence.world.props.door, "A door opens and closes (not in --scene aliased)");
-  app.add_flag("--screen", args.sequence.world.props.screen, "A large screen plays videos");
-  app.add_option("--stand-first", args.sequence.world.actor.stand_first_s,
-                 "Seconds that people stand still at first");
-  app.add_option("--static-start", args.sequence.world.path.static_start_s,
-                 "Seconds that the camera stands still at first");
-  app.add_option("--speed", args.sequence.world.path.speed_mps,
-                 "Walking speed of tour, forward and ring [m/s]");
-  app.add_option("--ring-length", args.sequence.world.scene.ring_length_m,
-                 "Length of the ring of corridors [m]")
-      ->capture_default_str();
-  app.add_option("--camera", args.camera,
-                 "Camera file; its distortion is applied (default: 640x480, fx = fy = 525)");
-  app.add_option("--samples", args.sequence.render.samples, "Pictures averaged per frame: 1 quick, 4 smooth")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 64));
-  app.add_option("--exposure", args.sequence.render.exposure_s, "Exposure time [s]: how much motion blurs")
-      ->capture_default_str();
-  app.add_option("--tremor", args.sequence.world.path.tremor, "How much the hand shakes (1 = ordinary)")
-      ->capture_default_str();
-  app.add_flag("--png", args.sequence.png, "Write PNG instead of JPEG");
-  app.add_flag("--gray", args.sequence.gray, "Write grey images");
-  app.add_option("--quality", args.sequence.jpeg_quality, "JPEG quality")->capture_default_str();
-  app.add_flag("--quiet", args.quiet, "No progress");
+  app.AddOption("--frames", args.frames,
+                "Frames to render (default: 300; tour and ring: 1.15 rounds, 1500 at least)");
+  app.AddOption("--fps", args.fps, "Frames per second").ShowDefault();
+  app.AddOption("--seed", args.seed, "Seed of everything: scene, path, people, noise").ShowDefault();
+  app.AddOption("--moving-share", args.moving_share,
+                "Mean share of the image covered by people and other things that move, 0..0.7");
+  app.AddOption("--actors", args.actors, "How many people (default: as many as the moving share takes)");
+  app.AddOption("--behaviour", args.behaviour, "walk | stop-and-go | sit").ShowDefault();
+  app.AddFlag("--carry", args.sequence.world.props.carried_box, "The first person carries a box");
+  app.AddFlag("--cart", args.sequence.world.props.cart, "A cart rolls about by itself, and stops at times");
+  app.AddFlag("--door", args.sequence.world.props.door, "A door opens and closes (not in --scene aliased)");
+  app.AddFlag("--screen", args.sequence.world.props.screen, "A large screen plays videos");
+  app.AddOption("--stand-first", args.sequence.world.actor.stand_first_s,
+                "Seconds that people stand still at first");
+  app.AddOption("--static-start", args.sequence.world.path.static_start_s,
+                "Seconds that the camera stands still at first");
+  app.AddOption("--speed", args.sequence.world.path.speed_mps,
+                "Walking speed of tour, forward and ring [m/s]");
+  app.AddOption("--ring-length", args.sequence.world.scene.ring_length_m,
+                "Length of the ring of corridors [m]")
+      .ShowDefault();
+  app.AddOption("--camera", args.camera,
+                "Camera file; its distortion is applied (default: 640x480, fx = fy = 525)");
+  app.AddOption("--samples", args.sequence.render.samples, "Pictures averaged per frame: 1 quick, 4 smooth")
+      .ShowDefault()
+      .InRange(1, 64);
+  app.AddOption("--exposure", args.sequence.render.exposure_s, "Exposure time [s]: how much motion blurs")
+      .ShowDefault();
+  app.AddOption("--tremor", args.sequence.world.path.tremor, "How much the hand shakes (1 = ordinary)")
+      .ShowDefault();
+  app.AddFlag("--png", args.sequence.png, "Write PNG instead of JPEG");
+  app.AddFlag("--gray", args.sequence.gray, "Write grey images");
+  app.AddOption("--quality", args.sequence.jpeg_quality, "JPEG quality").ShowDefault();
+  app.AddFlag("--quiet", args.quiet, "No progress");
 }
 
 /// Fills in what the preset stands for; what the user gave goes before.
@@ -150,14 +149,14 @@ void Run(Arguments& args) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  dmslam::CommandLine app(
       "Renders a synthetic sequence (textured room, hand-held camera, walking people, exact ground truth) "
       "into a "
       "folder in the format of the TUM RGB-D benchmark.");
-  app.set_version_flag("--version", dmslam::kVersion);
+  app.SetVersion(dmslam::kVersion);
   Arguments args;
   AddOptions(app, args);
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.Parse(argc, argv)) return *code;
   try {
     Run(args);
   } catch (const std::exception& error) {

@@ -1,50 +1,47 @@
-#include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
 #include <string>
 
 #include "commands.h"
+#include "dmslam/console/command_line.h"
 #include "dmslam/util/version.h"
 
 namespace {
 
-void AddTrain(CLI::App& app, dmslam::TrainCommand& command) {
-  CLI::App* train = app.add_subcommand("train", "Train a vocabulary from images");
-  train->add_option("--images", command.images, "Folder of images, or a TUM RGB-D sequence")->required();
-  train->add_option("--out", command.out, "File to write; .txt gives DBoW2's text format")->required();
-  train->add_option("--k", command.branching, "Children per node (2..64)")->capture_default_str();
-  train->add_option("--levels", command.levels, "Levels below the root (1..10)")->capture_default_str();
-  train->add_option("--features", command.features, "Most features per image")->capture_default_str();
-  train->add_option("--min-split", command.min_split, "Nodes with fewer training features stay words")
-      ->capture_default_str();
-  train->add_option("--every", command.every, "Use every n-th image")->capture_default_str();
-  train->add_option("--seed", command.seed, "Same images, options and seed: same vocabulary")
-      ->capture_default_str();
-  train->callback([&command] { dmslam::Train(command); });
+void AddTrain(dmslam::CommandLine& app, dmslam::TrainCommand& command) {
+  dmslam::CommandLine& train = app.AddSubcommand("train", "Train a vocabulary from images");
+  train.AddOption("--images", command.images, "Folder of images, or a TUM RGB-D sequence").Required();
+  train.AddOption("--out", command.out, "File to write; .txt gives DBoW2's text format").Required();
+  train.AddOption("--k", command.branching, "Children per node (2..64)").ShowDefault();
+  train.AddOption("--levels", command.levels, "Levels below the root (1..10)").ShowDefault();
+  train.AddOption("--features", command.features, "Most features per image").ShowDefault();
+  train.AddOption("--min-split", command.min_split, "Nodes with fewer training features stay words")
+      .ShowDefault();
+  train.AddOption("--every", command.every, "Use every n-th image").ShowDefault();
+  train.AddOption("--seed", command.seed, "Same images, options and seed: same vocabulary").ShowDefault();
+  train.OnParsed([&command] { dmslam::Train(command); });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Trains, describes and converts bag-of-words vocabularies", "dmslam-vocab");
-  app.set_version_flag("--version", dmslam::kVersion);
-  app.require_subcommand(1);
+  dmslam::CommandLine app("Trains, describes and converts bag-of-words vocabularies", "dmslam-vocab");
+  app.SetVersion(dmslam::kVersion);
+  app.RequireSubcommand();
   dmslam::TrainCommand train;
   AddTrain(app, train);
   std::string from;
   std::string to;
-  CLI::App* info = app.add_subcommand("info", "Describe a vocabulary file");
-  info->add_option("file", from, "Vocabulary")->required();
-  info->callback([&] { dmslam::PrintInfo(from); });
-  CLI::App* convert =
-      app.add_subcommand("convert", "Convert between our binary format and DBoW2's text format");
-  convert->add_option("in", from, "Vocabulary to read, either format")->required();
-  convert->add_option("out", to, "File to write; .txt gives the text format")->required();
-  convert->callback([&] { dmslam::Convert(from, to); });
+  dmslam::CommandLine& info = app.AddSubcommand("info", "Describe a vocabulary file");
+  info.AddOption("file", from, "Vocabulary").Required();
+  info.OnParsed([&] { dmslam::PrintInfo(from); });
+  dmslam::CommandLine& convert =
+      app.AddSubcommand("convert", "Convert between our binary format and DBoW2's text format");
+  convert.AddOption("in", from, "Vocabulary to read, either format").Required();
+  convert.AddOption("out", to, "File to write; .txt gives the text format").Required();
+  convert.OnParsed([&] { dmslam::Convert(from, to); });
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    if (const auto code = app.Parse(argc, argv)) return *code;
   } catch (const std::exception& error) {
     std::cerr << "dmslam-vocab: " << error.what() << '\n';
     return 1;

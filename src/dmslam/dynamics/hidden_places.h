@@ -12,6 +12,14 @@ namespace dmslam {
 struct HiddenPlaceOptions {
   double distance = 40;  ///< so few bits are asked of a match where nothing else of the map is found...
   double distance_slope = 200;  ///< ...and so many more are allowed, times the share that is found around it
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("tracking.hidden_distance", distance, 0, 256, "bits",
+             "descriptor distance allowed where nothing of the map is found around");
+    v.Number("tracking.hidden_distance_slope", distance_slope, 0, 10000, "bits",
+             "more of it, times the share of the map that is found around");
+  }
 };
 
 /// What is found where little else of the map is found is mostly found by chance, on whoever hides the map:

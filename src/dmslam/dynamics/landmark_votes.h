@@ -15,6 +15,15 @@ struct VoteOptions {
   double trusted_age_s = 4.0;  ///< ...which grows to one when it stood still for so long
   int streak_without_vote =
       3;  ///< so many sightings elsewhere in a row cost the vote, before the mapper says so
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("tracking.motion_belief", motion_belief, "landmarks that are believed to move have no vote");
+    v.InBaseline("off");
+    v.Number("tracking.young_trust", young_trust, 0, 1, "", "weight of a landmark that was just made");
+    v.Number("tracking.trusted_age_s", trusted_age_s, 0, 1000, "s",
+             "age at which a landmark has full weight");
+  }
 };
 
 /// Which landmarks have a say in a frame's pose, and how much: what the map believes of them, their age, and

@@ -18,6 +18,17 @@ struct MotionBeliefOptions {
   float remove_above = 2.5F;  ///< beyond this it leaves the map
   double min_found_share =
       0.0;  ///< a landmark found in fewer of the recent frames that should see it leaves the map too
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Shared("tracking.motion_belief", enabled);  // one switch for frontend and mapper
+    v.Number("mapping.belief_found_step", found_step, 0, 10, "log odds",
+             "taken by a frame that finds a landmark in its place");
+    v.Number("mapping.belief_moved_step", moved_step, 0, 10, "log odds",
+             "added by a frame that finds it elsewhere");
+    v.Number("mapping.belief_remove_above", remove_above, 0, 100, "log odds",
+             "at which a landmark leaves the map");
+  }
 };
 
 /// Log odds of motion above which a landmark is believed to move.

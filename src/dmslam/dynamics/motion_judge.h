@@ -23,6 +23,12 @@ struct DynamicsOptions {
   HiddenPlaceOptions hidden;
   MovedOptions moved;
   MissingOptions missing;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    vote.Describe(v);
+    hidden.Describe(v);
+  }
 };
 
 /// What frames said of landmarks since it was last asked.

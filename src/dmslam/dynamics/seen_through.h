@@ -29,6 +29,13 @@ struct SeenThroughOptions {
   int rounds_unsupported = 2;      ///< and after them so many times their neighbours
   int max_witnesses = 60;          ///< while mapping
   double witness_angle_rad = 1.0;  ///< between the viewing directions of keyframe and witness
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("mapping.seen_through", enabled,
+             "landmarks go that other keyframes see through (people who stood)");
+    v.InBaseline("off");
+  }
 };
 
 /// Somebody who stands still is mapped like furniture, but what stands behind him is seen through him as soon

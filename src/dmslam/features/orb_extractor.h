@@ -22,6 +22,15 @@ struct OrbExtractorOptions {
   int border_px = 16;  ///< keypoints keep this far from the edges of their level [px of the level], >= 16
   SimdPath simd_path = SimdPath::kBest;
 
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("features.count", num_features, 50, 10000, "", "features per frame");
+    pyramid.Describe(v);
+    v.Number("features.fast_threshold", fast_threshold, 1, 254, "grey values", "least contrast of a corner");
+    v.Number("features.min_fast_threshold", min_fast_threshold, 1, 254, "grey values",
+             "the same where there is no such corner");
+  }
+
   /// Throws InputError that names the field and its range.
   void Check() const;
 };

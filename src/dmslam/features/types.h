@@ -61,6 +61,13 @@ struct Pyramid {
   int levels = 8;
   double scale_factor = 1.2;
 
+  /// The settings, for dmslam/settings: key, field, bounds, unit, what it does.
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("features.levels", levels, 1, 16, "", "levels of the image pyramid");
+    v.Number("features.scale_factor", scale_factor, 1.05, 2, "", "between two levels");
+  }
+
   /// Size of one pixel of a level in pixels of level 0; also the standard deviation of a keypoint's position
   /// [px].
   double Scale(int octave) const { return std::pow(scale_factor, octave); }

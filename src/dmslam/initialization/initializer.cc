@@ -81,14 +81,6 @@ std::string_view ToString(WaitReason reason) {
   return "unknown";
 }
 
-InitializerOptions::InitializerOptions() {
-  selector.sampling.max_iterations = 600;
-  // Agreement over pairs and the comparison of motions over all views decide what one pair leaves open.
-  selector.max_rival_share = 0;
-  agreement.min_agreement = 0.87;
-  agreement.min_distribution_share = 0.175;
-}
-
 namespace {
 
 RansacSelectorOptions RansacOptions(const InitializerOptions& options) {

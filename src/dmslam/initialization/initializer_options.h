@@ -24,7 +24,14 @@ struct ContestOptions {
 
 /// Times are of the frames' stamps.
 struct InitializerOptions {
-  InitializerOptions();  ///< fewer samples than the selector's own default, stricter agreement
+  /// Fewer samples than the selector's own default, stricter agreement.
+  InitializerOptions() {
+    selector.sampling.max_iterations = 600;
+    // Agreement over pairs and the comparison of motions over all views decide what one pair leaves open.
+    selector.max_rival_share = 0;
+    agreement.min_agreement = 0.87;
+    agreement.min_distribution_share = 0.175;
+  }
 
   std::string method = "dlrsac";  ///< which matches are static, per pair of frames: dlrsac, arsac or ransac
   DlrsacOptions selector;      ///< of DLRSAC; its sampling, input and inlier options hold for the others, too
@@ -63,6 +70,17 @@ struct InitializerOptions {
   int past_views = 6;    ///< so many of them at most; 0: none
   double max_past_conflict = 0.08;  ///< of the points, that one of them sees elsewhere; more: wait
   int past_first = 0;  ///< so many frames come before the first reference frame: they testify only
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("initializer.min_matches", min_matches, 8, 10000, "",
+             "matches a frame must have with the reference frame");
+    v.Number("initializer.num_pairs", num_pairs, 1, 5, "", "pairs of frames that must agree");
+    agreement.Describe(v);
+    v.Number("initializer.min_parallax_rad", min_parallax_rad, 0, 1, "rad",
+             "median parallax of the first map's points");
+    selector.Describe(v);
+  }
 };
 
 }  // namespace dmslam

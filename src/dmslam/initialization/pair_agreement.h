@@ -24,6 +24,14 @@ struct AgreementOptions {
   double min_distribution_share = 0.15;  ///< root of D over the static matches, by the image's diagonal
   int min_static = 100;                  ///< matches static in all pairs
   double min_static_share = 0.0;         ///< share of the last pair's matches that must be static
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("initializer.min_agreement", min_agreement, 0, 1, "",
+             "smallest Jaccard index of the pairs' static sets");
+    v.Number("initializer.min_distribution_share", min_distribution_share, 0, 1, "",
+             "root of the static matches' distribution D, as a share of the image's diagonal");
+  }
 };
 
 enum class AgreementRefusal : uint8_t {

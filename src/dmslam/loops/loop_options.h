@@ -2,6 +2,7 @@
 
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/loops/chain_drift.h"
+#include "dmslam/map/conventions.h"
 
 namespace dmslam {
 
@@ -10,7 +11,7 @@ struct LoopcloserOptions {
   bool enabled = true;
 
   // Which places are looked at.
-  int min_covisibility = 15;       ///< landmarks in common that make two keyframes neighbours
+  int min_covisibility = kMinCovisibility;
   int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
 
@@ -50,7 +51,29 @@ struct LoopcloserOptions {
   int essential_iterations = 20;
   bool global_adjustment = true;  ///< after a loop, bundle adjustment of the whole map
   int global_iterations = 10;
-  double keypoint_sigma_px = 0.7;  ///< of octave 0, in the global adjustment; the mapper's
+  double keypoint_sigma_px = kKeypointSigmaPx;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("loop.enabled", enabled, "close loops");
+    v.Number("loop.consistency", consistency, 1, 100, "",
+             "keyframes in a row that must name places that belong together");
+    v.Number("loop.min_matches", min_matches, 10, 10000, "",
+             "landmarks of a place that must be found in the keyframe");
+    v.Number("loop.min_share", min_share, 0, 1, "",
+             "of what should be seen of a place: enough to be followed");
+    v.Number("loop.min_confirmed_share", min_confirmed_share, 0, 1, "",
+             "of what should be seen of a place: enough to close the loop");
+    v.Number(
+        "loop.min_proven", min_proven, 0, 10000, "",
+        "of the landmarks found, seen for longer than people stand: fewer may be somebody who stood in two "
+        "places");
+    v.Number("loop.max_drift_sigmas", max_drift_sigmas, 0, 1e9, "",
+             "a loop that moves more than the keyframes can have drifted is refused");
+    v.Number("loop.confirmations", confirmations, 1, 100, "",
+             "later keyframes that must see the place again");
+    v.Switch("loop.global_adjustment", global_adjustment, "adjust the whole map after a loop");
+  }
 };
 
 }  // namespace dmslam

@@ -2,6 +2,7 @@
 
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/seen_through.h"
+#include "dmslam/map/conventions.h"
 
 namespace dmslam {
 
@@ -22,6 +23,21 @@ struct LandmarkCreationOptions {
   double max_parallax_cos = 0.9998;
   double reprojection_sigmas_squared = 5.991;
   double scale_ratio_slack = 1.5;  ///< times the pyramid's factor
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("mapping.mutual_exclusion", mutual_exclusion,
+             "Algorithm 1: one new landmark per neighbourhood, and a bound on their number");
+    v.InBaseline("off");
+    v.Number("mapping.neighbourhood_px", neighbourhood_px, 0, 1000, "px",
+             "half the side of the neighbourhood");
+    v.Number("mapping.alpha", alpha, 0, 100, "",
+             "bound on the candidates, as a share of the tracked landmarks");
+    v.Number("mapping.min_candidates", min_candidates, 0, 10000, "", "candidates that are always allowed");
+    v.Number("mapping.confirmed_views", confirmed_views, 0, 100, "",
+             "points seen in so many views for a second are free of the bound and the neighbourhood; 0: "
+             "none");
+  }
 };
 
 struct MapperOptions {
@@ -34,19 +50,33 @@ struct MapperOptions {
   int probation_min_observations =
       3;  ///< from the second keyframe on, a landmark on probation needs as many observers
   double redundant_share = 0.9;  ///< a keyframe goes when this share of its landmarks is seen by three others
-  double keypoint_sigma_px = 0.7;  ///< of octave 0, in bundle adjustment
+  double keypoint_sigma_px = kKeypointSigmaPx;
   int local_keyframes = 40;  ///< at most this many keyframes are adjusted at a time (most covisible first)
   int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
   int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
   double min_depth = 0.1;  ///< a landmark goes before that where it is nearer to a keyframe than this share
                            ///< of what the keyframe sees in the median; 0: none does
-  int min_covisibility = 15;  ///< landmarks in common that make two keyframes neighbours
+  int min_covisibility = kMinCovisibility;
   int nearby_keyframes =
       10;  ///< at most so many that look at the same place are fused with, covisible or not
   double nearby_distance = 0.5;   ///< how far they may be, as a share of the scene's depth
   double nearby_angle_rad = 0.6;  ///< how far they may be turned
   double fuse_radius_px = 3.0;    ///< times the scale of the predicted octave
   int max_fuse_distance = 80;     ///< bits, of a landmark and a feature at its place
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    creation.Describe(v);
+    v.Number("mapping.min_depth", min_depth, 0, 1, "",
+             "nearer to a keyframe than this share of what it sees in the median, a landmark goes at the "
+             "end");
+    v.InBaseline("0");
+    seen_through.Describe(v);
+    v.Number("mapping.local_keyframes", local_keyframes, 2, 1000, "", "keyframes adjusted at a time");
+    v.Number("mapping.redundant_share", redundant_share, 0, 1, "",
+             "a keyframe goes when so much of it is seen by three others");
+    belief.Describe(v);
+  }
 };
 
 }  // namespace dmslam

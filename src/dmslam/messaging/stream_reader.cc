@@ -12,8 +12,8 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kMaxTimed = 1000;  // records whose recovery is timed
-constexpr size_t kMaxMissing = 32;  // ranges named in one acknowledgement: it must fit one datagram
+constexpr size_t kMaxTimed = 1000;      // records whose recovery is timed
+constexpr size_t kMaxRangesNamed = 32;  // ranges named in one acknowledgement: it must fit one datagram
 
 Version ParentOf(const head_t& head) { return {head.header.parent_epoch, head.header.parent_seq}; }
 
@@ -366,7 +366,7 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
   ack.wants = snapshot_ && !snapshot_->complete() ? ack_t::WANTS_SNAPSHOT : 0;
   std::vector<MissingRange> missing;
   if (of_snapshot || state_ == State::kFollowing || (snapshot_ && snapshot_->number != 0)) {
-    missing = window.Missing(kMaxMissing);
+    missing = window.Missing(kMaxRangesNamed);
   }
   ack.num_missing = static_cast<int32_t>(missing.size());
   statistics_.requested += ack.num_missing;

@@ -491,8 +491,6 @@ void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
 
 }  // namespace
 
-DlrsacOptions::DlrsacOptions() { sampling.stop_confidence = 0.999; }
-
 DlrsacOptions DlrsacOptions::Paper() {
   DlrsacOptions options;
   options.sampling.stop_confidence = 0.0;

@@ -24,7 +24,7 @@ enum class StaticScope : uint8_t {
 /// is spread widest over the image. What the paper leaves open is a field here; `Paper()` is the paper as
 /// written, the defaults are what selects better (docs/dlrsac.md has the numbers).
 struct DlrsacOptions {
-  DlrsacOptions();
+  DlrsacOptions() { sampling.stop_confidence = 0.999; }
 
   /// max_iterations is shared by the cells kept; stop_confidence works per cell and is 0.999 unless set
   /// otherwise.
@@ -85,6 +85,15 @@ struct DlrsacOptions {
   /// his epipolar lines. So a static scene in two layers of equal strength (a desk close before a far wall)
   /// is refused, too. 0: not asked (the paper).
   double max_rival_share = 0.5;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("initializer.cell_share", cell_share, 0.02, 4, "",
+             "side of DLRSAC's cells, as a share of the side of a square of the image's area");
+    v.Number("initializer.min_cell_matches", min_cell_matches, 8, 10000, "", "matches that a cell needs");
+    v.Number("initializer.couple_threshold", couple_threshold, 0, 1, "",
+             "share of a cell's inliers that couples it");
+  }
 
   /// Throws InputError for values outside their range.
   void Check() const;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -8,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "dmslam/place_recognition/vocabulary.h"
+#include "dmslam/console/command_line.h"
 #include "dmslam/runtime/node.h"
-#include "dmslam/runtime/stream_node.h"
+#include "dmslam/runtime/node_options.h"
 
 namespace dmslam {
 
@@ -23,7 +22,7 @@ class ProcessMain {
   ProcessMain(const std::string& role, const std::string& description);
 
   /// For the process's own options.
-  CLI::App& app() { return app_; }
+  CommandLine& app() { return app_; }
   /// What the options put before every channel; known once they are parsed.
   const std::string& prefix() const { return prefix_; }
   /// Work that needs no bus, if the options ask for it: done after parsing, instead of running a node, where
@@ -37,7 +36,7 @@ class ProcessMain {
  private:
   int RunNode(const Factory& factory);
 
-  CLI::App app_;
+  CommandLine app_;
   std::string role_;
   std::string lcm_url_ = "udpm://239.255.76.67:7670?ttl=0&recv_buf_size=4194304";
   std::string prefix_;
@@ -49,9 +48,6 @@ class ProcessMain {
   bool quiet_ = false;
   std::function<std::optional<int>(const NodeOptions&)> offline_;
 };
-
-/// The vocabulary at `path`, or where that is empty the one that ships with the programs. Throws InputError.
-std::shared_ptr<const Vocabulary> LoadVocabulary(const std::string& path);
 
 /// A folder of the project or of its installation, found from the program's place: "config", "data".
 std::string FindDataFolder(const std::string& name);

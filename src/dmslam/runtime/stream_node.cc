@@ -1,18 +1,20 @@
 #include "dmslam/runtime/stream_node.h"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <tuple>
 
+#include "dmslam/console/log.h"
 #include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/session_check.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
 
+constexpr int64_t kMisfitNs = 2'000'000'000;
 constexpr int64_t kStatusEveryNs = 1'000'000'000;
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kCameraSilentNs = 1'500'000'000;
@@ -73,8 +75,7 @@ void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
   if (session_ == 0) session_ = info->session;
   if (options_.accept_recorded && !recorded_session_ && info->session != session_) {
     recorded_session_ = info->session;
-    spdlog::info("{}: takes the frames of recorded session {} for its own {}", role_, info->session,
-                 session_);
+    LogInfo("{}: takes the frames of recorded session {} for its own {}", role_, info->session, session_);
   }
   if (IsForeignFrame(info->session)) return;
   camera_due_ns_ = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
@@ -99,7 +100,7 @@ bool StreamNode::IsForeignFrame(uint32_t session) {
 bool StreamNode::IsForeign(uint32_t session) {
   if (session == session_) return false;
   if (dropped_foreign_++ == 0)
-    spdlog::warn("{}: dropped a message of session {}; ours is {}", role_, session, session_);
+    LogWarning("{}: dropped a message of session {}; ours is {}", role_, session, session_);
   return true;
 }
 
@@ -107,7 +108,7 @@ void StreamNode::CountMalformed(const std::string& channel, const std::string& r
   ++dropped_malformed_;
   if (std::find(logged_.begin(), logged_.end(), channel) != logged_.end()) return;
   logged_.push_back(channel);
-  spdlog::warn("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
+  LogWarning("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
 }
 
 std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamReader* reader) {
@@ -229,17 +230,39 @@ void StreamNode::WatchWriter() {
                 ", which is newer than what this one began with; start it again");
   }
   if (writer_->close_requested_by() && !stopping_) {
-    spdlog::info("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
+    LogInfo("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
     Stop();
   }
   if (stopping_ && writer_->closed() && !exit_code_) Exit(0);
 }
 
+bool StreamNode::JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum) {
+  const std::string why = WhyMisfit(start, options_.settings, vocabulary_checksum);
+  if (!why.empty()) Exit(kExitMisfit, why);
+  return why.empty();
+}
+
+/// Who comes into a system that speaks other message types leaves; whoever was there before goes on with what
+/// it has. Not at the first word: a damaged beacon is followed by sound ones.
+void StreamNode::RefuseOtherTypes(Watched* watched) {
+  const StreamReader& reader = *watched->reader;
+  const bool misfit = reader.state() == StreamReader::State::kRefusedVersion && reader.held() == Version{} &&
+                      reader.writer_present(context_.now_ns());
+  if (!misfit) {
+    watched->misfit_since_ns = -1;
+  } else if (watched->misfit_since_ns < 0) {
+    watched->misfit_since_ns = context_.now_ns();
+  } else if (context_.now_ns() - watched->misfit_since_ns > kMisfitNs) {
+    Exit(kExitMisfit, reader.problem());
+  }
+}
+
 void StreamNode::WatchReaders() {
   for (Watched& watched : readers_) {
+    RefuseOtherTypes(&watched);
     if (watched.reader->problem() == watched.problem) continue;
     watched.problem = watched.reader->problem();
-    if (!watched.problem.empty()) spdlog::warn("{}: {}", role_, watched.problem);
+    if (!watched.problem.empty()) LogWarning("{}: {}", role_, watched.problem);
   }
 }
 

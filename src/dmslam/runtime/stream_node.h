@@ -12,26 +12,11 @@
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
-#include "dmslam/settings/settings.h"
+#include "dmslam/runtime/node_options.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
 
 namespace dmslam {
-
-/// What every process of the system is told at its start.
-struct NodeOptions {
-  uint32_t session = 0;  ///< 0: that of the first camera heard
-  std::vector<std::string>
-      peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
-  Link link = Link::kHost;
-  bool accept_recorded =
-      false;               ///< camera and frames of a recorded session (a log that is replayed) are ours
-  bool take_over = false;  ///< asks a present writer of its stream to close
-  bool fresh = false;      ///< a mapper begins with an empty map, whatever replicas there are
-  Settings settings;
-
-  bool HasPeer(std::string_view name) const;
-};
 
 /// Hash over the fingerprints of all message types: processes with another one are refused by name.
 int64_t SchemaHash();
@@ -122,6 +107,9 @@ class StreamNode : public Node {
   bool IsForeign(uint32_t session);
   /// The same for what the player says: a recorded session that was accepted is ours.
   bool IsForeignFrame(uint32_t session);
+  /// The frontend says on what its session rests. False where this process does not fit: it ends, and says
+  /// why.
+  bool JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum = std::nullopt);
 
   void Exit(int code, std::string problem = {});
   StatusHead MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const;
@@ -148,6 +136,8 @@ class StreamNode : public Node {
   /// Keeps the protocol alive while one step of work follows the other.
   void PumpBetweenSteps();
   void PublishStatusIfDue();
+  struct Watched;
+  void RefuseOtherTypes(Watched* watched);
 
   bool begun_ = false;
   std::optional<Bytes> camera_message_;  ///< as the player sent it
@@ -165,7 +155,8 @@ class StreamNode : public Node {
   wire::RecordGroups<MapDelta> map_groups_;
   struct Watched {
     const StreamReader* reader;
-    std::string problem;  ///< last one logged
+    std::string problem;           ///< last one logged
+    int64_t misfit_since_ns = -1;  ///< its writer has other message types; -1: it has not
   };
   std::vector<Watched> readers_;
   std::unique_ptr<MapSnapshots> replica_snapshots_;

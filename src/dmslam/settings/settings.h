@@ -1,62 +1,87 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
-#include "dmslam/features/orb_extractor.h"
-#include "dmslam/initialization/initializer.h"
-#include "dmslam/loops/loopcloser_core.h"
-#include "dmslam/mapping/mapper_options.h"
-#include "dmslam/slam/frontend_options.h"
+#include "dmslam/settings/setting_value.h"
 
 namespace dmslam {
 
-/// With which map a run begins.
-struct StartOptions {
-  bool saved_map = false;  ///< the mapper has loaded one: the frontend waits for it and finds itself in it
-  bool localize_only = false;  ///< ... and nothing changes it
-};
-
 /// Everything that can be set and that changes results: the same file and the same `--set`s go to every
-/// process.
-struct Settings {
-  Settings() { extractor.num_features = 2000; }
+/// process. Here settings are text; each process reads the options that it needs out of them, and compiles
+/// nobody else's:
+///
+///   const MapperOptions options = settings.Read<MapperOptions>();
+///
+/// An options struct says with a template `Describe(visitor)` which of its fields can be set (see any of
+/// them), and dmslam/settings/registry.cc collects them.
+class Settings {
+ public:
+  /// The defaults: profile dm.
+  Settings() = default;
+  /// Of a profile. Throws InputError for one that does not exist.
+  explicit Settings(std::string_view profile);
 
-  uint64_t seed = 1;
-  std::string profile = "dm";
-  OrbExtractorOptions extractor;
-  InitializerOptions initializer;
-  FrontendOptions frontend;
-  MapperOptions mapper;
-  LoopcloserOptions loop;
-  StartOptions start;
+  /// Sets one value. Throws InputError that names the key (and the nearest one that exists) and what is
+  /// allowed. A profile is chosen before everything else, so it cannot be set here.
+  void Set(std::string_view key, std::string_view value);
+  /// A value as text: "2000", "on". Throws InvariantError for a key that does not exist.
+  std::string Value(std::string_view key) const;
+  std::string profile() const { return Value("profile"); }
 
-  const Pyramid& pyramid() const { return extractor.pyramid; }
+  /// The options of a room with what is set. Defaults of its other fields are kept.
+  template <typename Options>
+  Options Read() const;
+
+  /// Over all values: two processes with the same hash agree.
+  uint64_t Hash() const;
+
+ private:
+  std::map<std::string, std::string, std::less<>> changed_;  ///< what differs from the defaults
 };
 
-/// One setting as people see it.
-struct SettingInfo {
-  std::string key;    ///< "tracking.motion_belief"
-  std::string value;  ///< as it is set
-  std::string help;
-};
-
-/// Sets one value. Throws InputError that names the key (and the nearest one that exists) or what the value
-/// should be. "profile=baseline" sets several at once: plain RANSAC initialisation, no mutual exclusion, no
-/// motion belief.
-void ApplySetting(std::string_view key, std::string_view value, Settings* settings);
-
-/// Reads a configuration file (YAML: sections of keys) and then the overrides "key=value". Throws InputError
-/// that names file, key and cure.
+/// Reads a configuration file (YAML: sections of keys) and then the overrides "key=value". The profile comes
+/// first wherever it stands; of an override given twice the last one counts. Throws InputError that names
+/// file, line, key and what is allowed.
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& overrides);
 
-/// All settings with their values.
-std::vector<SettingInfo> ListSettings(const Settings& settings);
+namespace internal {
 
-/// Hash over all values: two processes with the same hash agree.
-uint64_t SettingsHash(const Settings& settings);
+/// Takes values over into the fields of an options struct.
+class SettingsReader {
+ public:
+  explicit SettingsReader(const Settings& settings) : settings_(settings) {}
+  template <typename T>
+  void Number(const char* key, T& field, double, double, const char*, const char*) {
+    Shared(key, field);
+  }
+  void Switch(const char* key, bool& field, const char*) { Shared(key, field); }
+  void Choice(const char* key, std::string& field, std::initializer_list<const char*>, const char*) {
+    Shared(key, field);
+  }
+  void InBaseline(const char*) {}
+  template <typename T>
+  void Shared(const char* key, T& field) {
+    if (const std::optional<T> value = ParseSetting<T>(settings_.Value(key))) field = *value;
+  }
+
+ private:
+  const Settings& settings_;
+};
+
+}  // namespace internal
+
+template <typename Options>
+Options Settings::Read() const {
+  Options options;
+  internal::SettingsReader reader(*this);
+  options.Describe(reader);
+  return options;
+}
 
 }  // namespace dmslam

@@ -22,6 +22,31 @@ struct FrontendOptions {
   FrameRefinerOptions refiner;     ///< of the poses told at the end
   bool smooth_at_end = true;       ///< these are joined with the motion of a carried camera
   bool keyframes_at_end = true;  ///< frames that are placed when the sequence has ended become keyframes too
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Choice("initializer.method", initializer_method, {"dlrsac", "arsac", "ransac"},
+             "which matches are static; ransac: two frames and plain RANSAC, without gates");
+    v.InBaseline("ransac");
+    v.Number("initializer.feature_factor", initializer_feature_factor, 0.5, 5, "",
+             "features of a frame while there is no map, times features.count");
+    tracking.Describe(v);
+    v.Number("tracking.trial_s", trial_s, 0, 60, "s", "time for which a first map must predict the frames");
+    v.Number("tracking.new_map_after_s", new_map_after_s, 0.1, 3600, "s",
+             "lost for so long: a new map is started");
+    v.Number("tracking.max_kept_frames", max_kept_frames, 0, 100000, "frames",
+             "unplaced frames kept for localisation at the end");
+    v.InBaseline("300");
+    v.Switch("tracking.smooth_at_end", smooth_at_end,
+             "the poses told at the end: landmarks placed by all frames, weak frames looked for from the "
+             "motion, and joined with it");
+    v.InBaseline("off");
+    keyframe.Describe(v);
+    v.Switch("keyframe.at_end", keyframes_at_end,
+             "frames placed when the sequence has ended become keyframes too, and the map grows to where "
+             "they see");
+    v.InBaseline("off");
+  }
 };
 
 }  // namespace dmslam

@@ -1,7 +1,5 @@
 #include "dmslam/tracking/keyframe_policy.h"
 
-#include <algorithm>
-
 namespace dmslam {
 namespace {
 
@@ -15,8 +13,7 @@ int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
 bool WantsKeyframe(const KeyframeOptions& options, const KeyframeInputs& inputs) {
   if (inputs.num_static <= options.min_inliers) return false;
   const bool weak = inputs.num_static < kWeakShare * inputs.expected || inputs.num_static < kWeak;
-  const int64_t due_ns = ToNs(std::min(options.min_interval_s, options.max_interval_s));
-  const bool due = inputs.since_ns >= due_ns || weak;
+  const bool due = inputs.since_ns >= ToNs(options.min_interval_s) || weak;
   return due && inputs.num_static < options.tracked_ratio * inputs.expected;
 }
 

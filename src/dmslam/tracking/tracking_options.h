@@ -22,14 +22,32 @@ struct TrackingOptions {
   double chi2 = 5.991;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
   int min_cells = 6;          ///< inliers must lie in at least so many cells of an 8 x 6 grid
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    dynamics.Describe(v);
+    v.Number("tracking.motion_radius_px", motion_radius_px, 1, 200, "px",
+             "search around the motion model's prediction");
+    v.Number("tracking.min_inliers", min_local_inliers, 6, 10000, "",
+             "fewer static inliers: the frame is not tracked");
+    v.Number("tracking.max_local_keyframes", max_local_keyframes, 1, 1000, "",
+             "keyframes whose landmarks are searched for");
+  }
 };
 
 /// When a frame becomes a keyframe.
 struct KeyframeOptions {
-  double max_interval_s = 1.0;  ///< at least one per second, where it helps
   double min_interval_s = 0.1;  ///< never closer, unless tracking is weak
   double tracked_ratio = 0.9;   ///< of the reference keyframe's landmarks: fewer tracked asks for a keyframe
   int min_inliers = 15;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("keyframe.min_interval_s", min_interval_s, 0, 60, "s",
+             "no two keyframes within this time, unless tracking is weak");
+    v.Number("keyframe.tracked_ratio", tracked_ratio, 0, 1, "",
+             "of the reference's landmarks; fewer tracked asks for a keyframe");
+  }
 };
 
 }  // namespace dmslam

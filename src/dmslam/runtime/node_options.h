@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dmslam/messaging/types.h"
+#include "dmslam/settings/settings.h"
+
+namespace dmslam {
+
+/// What every process of the system is told at its start.
+struct NodeOptions {
+  uint32_t session = 0;  ///< 0: that of the first camera heard
+  std::vector<std::string>
+      peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
+  Link link = Link::kHost;
+  bool accept_recorded =
+      false;               ///< camera and frames of a recorded session (a log that is replayed) are ours
+  bool take_over = false;  ///< asks a present writer of its stream to close
+  bool fresh = false;      ///< a mapper begins with an empty map, whatever replicas there are
+  Settings settings;       ///< as text: each node reads the options that it needs
+
+  bool HasPeer(std::string_view name) const;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,46 @@
+#include "dmslam/runtime/session_check.h"
+
+#include <gtest/gtest.h>
+
+namespace dmslam {
+namespace {
+
+SessionStart StartOf(const Settings& settings, std::optional<uint64_t> vocabulary) {
+  SessionStart start;
+  start.session = 7;
+  start.seed = 1;
+  start.profile = settings.profile();
+  start.configuration_hash = settings.Hash();
+  start.vocabulary_checksum = vocabulary;
+  return start;
+}
+
+bool Says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(SessionCheckTest, TheSameSettingsAndVocabularyFit) {
+  Settings settings("baseline");
+  settings.Set("features.count", "1500");
+  EXPECT_EQ(WhyMisfit(StartOf(settings, 5), settings, 5), "");
+  EXPECT_EQ(WhyMisfit(StartOf(settings, std::nullopt), settings, 5), "");  // a frontend without one
+  EXPECT_EQ(WhyMisfit(StartOf(settings, 5), settings), "");                // a process without one
+}
+
+TEST(SessionCheckTest, OtherSettingsAreNamedWithTheCure) {
+  Settings ours;
+  ours.Set("tracking.min_inliers", "25");
+  const std::string why = WhyMisfit(StartOf(Settings("baseline"), std::nullopt), ours);
+  EXPECT_TRUE(Says(why, "the frontend of session 7 has other settings (profile baseline, seed 1, hash "))
+      << why;
+  EXPECT_TRUE(Says(why, "this process (profile dm, seed 1, hash ")) << why;
+  EXPECT_TRUE(Says(why, "give every process the same --config and --set")) << why;
+}
+
+TEST(SessionCheckTest, AnotherVocabularyIsNamedWithTheCure) {
+  const std::string why = WhyMisfit(StartOf(Settings(), 5), Settings(), 6);
+  EXPECT_TRUE(
+      Says(why, "another vocabulary (checksum 0000000000000005) than this process (0000000000000006)"))
+      << why;
+}
+
+}  // namespace
+}  // namespace dmslam

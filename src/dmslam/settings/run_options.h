@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+
+namespace dmslam {
+
+/// What concerns every process of a run.
+struct RunOptions {
+  uint64_t seed = 1;
+  bool saved_map = false;  ///< the mapper has loaded one: the frontend waits for it and finds itself in it
+  bool localize_only = false;  ///< ... and nothing changes it
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("seed", seed, 0, 18446744073709551615.0, "", "seed of everything random");
+    v.Switch("map.saved", saved_map, "the run begins in the map that the mapper loads (--map)");
+    v.Switch("map.localize_only", localize_only, "nothing changes that map");
+  }
+};
+
+}  // namespace dmslam
