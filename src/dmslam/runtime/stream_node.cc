@@ -185,7 +185,7 @@ void StreamNode::StartElection() {
   options.take_over = options_.take_over;
   if (context_.fresh_system) options.listen_ns = 0;
   election_ = std::make_unique<WriterElection>(options, context_.now_ns());
-  endpoint_.AddElection(election_.get(), UpperCase(role_));
+  endpoint_.AddElection(election_.get(), UpperCase(role_), ReaderNames());
   election_->Advance(context_.now_ns());
 }
 
@@ -198,6 +198,15 @@ void StreamNode::RunElection() {
   if (election_->state() == WriterElection::State::kRefused) Exit(3, election_->refusal());
 }
 
+/// Of all whose acknowledgements are heard.
+std::vector<std::string> StreamNode::ReaderNames() const {
+  std::vector<std::string> names;
+  for (const auto* roles : {&plan_->readers, &plan_->watchers}) {
+    for (const std::string& role : *roles) names.push_back(UpperCase(role));
+  }
+  return names;
+}
+
 void StreamNode::OpenWriter() {
   StreamWriter::Options options;
   options.session = session_;
@@ -206,16 +215,12 @@ void StreamNode::OpenWriter() {
   options.name = context_.name;
   options.schema_hash = SchemaHash();
   options.link = options_.link;
-  std::vector<std::string> reader_names;
-  for (const std::string& reader : plan_->readers) {
+  for (const std::string& reader : plan_->readers)
     options.roles.push_back({reader, options_.HasPeer(reader)});
-    reader_names.push_back(UpperCase(reader));
-  }
-  for (const std::string& watcher : plan_->watchers) reader_names.push_back(UpperCase(watcher));
-  const Term term = election_->Win(context_.wall_us());
+  const Term term = election_->Win(context_.wall_us(), plan_->parent.epoch);
   endpoint_.Remove(election_.get());
   writer_ = std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots);
-  endpoint_.AddWriter(writer_.get(), UpperCase(role_), reader_names);
+  endpoint_.AddWriter(writer_.get(), UpperCase(role_), ReaderNames());
   OnWriterOpen();
 }
 

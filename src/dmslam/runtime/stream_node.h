@@ -146,6 +146,7 @@ class StreamNode : public Node {
   void RunElection();
   void StartElection();
   void OpenWriter();
+  std::vector<std::string> ReaderNames() const;
   void WatchWriter();
   void WatchReaders();
 
