@@ -290,6 +290,19 @@ TEST(Stream, WithoutSnapshotsAReaderSkipsWhatIsGoneAndCountsWhatItMissed) {
   EXPECT_EQ(pair.reader.statistics().lost, 2);
 }
 
+TEST(Stream, AReaderThatHeldSomethingCountsWhatIsGoneWhenItComesBack) {
+  StreamWriter::Options options = WriterOptions();
+  options.max_records = 3;
+  Pair pair(options);
+  for (int i = 1; i <= 8; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  StreamReader::Options back = ReaderOptions();
+  back.start = {1000, 2};  // was started again, and holds what the one before had accepted
+  pair.reader = StreamReader(back);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{6, 7, 8}));
+  EXPECT_EQ(pair.reader.statistics().lost, 3);
+}
+
 TEST(Stream, ACompleteStreamStaysUntilItIsClosed) {
   StreamWriter::Options options = WriterOptions();
   options.roles = {{"reader", true}};

@@ -240,8 +240,26 @@ void StreamNode::WatchWriter() {
   if (stopping_ && writer_->closed() && !exit_code_) Exit(0);
 }
 
+/// Once for each matter.
+void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
+  if (std::find(logged_.begin(), logged_.end(), matter) != logged_.end()) return;
+  logged_.push_back(matter);
+  spdlog::warn("{}: {} (further ones are only counted)", role_, text);
+}
+
 void StreamNode::WatchReaders() {
+  constexpr char kDoubtful[] =
+      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is gone";
+  if (writer_) {
+    const WriterStatistics s = writer_->statistics();
+    if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
+    if (s.overrun > 0)
+      WarnOnce("overrun", "a reader is so far behind that records which it lacks had to be forgotten");
+  }
   for (Watched& watched : readers_) {
+    const ReaderStatistics s = watched.reader->statistics();
+    if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
+    if (s.lost > 0) WarnOnce("lost", "was away for longer than its writer keeps records: some are lost");
     if (watched.reader->problem() == watched.problem) continue;
     watched.problem = watched.reader->problem();
     if (!watched.problem.empty()) spdlog::warn("{}: {}", role_, watched.problem);
@@ -325,6 +343,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
     health.received_bytes += s.payload_bytes;
     health.dropped_foreign += s.dropped_foreign;
     health.dropped_checksum += s.dropped_bad;
+    health.dropped_malformed += s.dropped_doubtful;
     health.dropped_overflow += s.dropped_no_room;
     health.dropped_duplicate += s.duplicates;
     health.records_repaired += s.repaired;
@@ -339,6 +358,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   health.written = s.records;
   health.written_bytes = s.payload_bytes;
   health.dropped_checksum += s.dropped_bad;
+  health.dropped_malformed += s.dropped_doubtful;
   health.dropped_foreign += s.dropped_foreign;
   health.resent = s.parts_repaired;
   health.resent_bytes = s.repaired_bytes;

@@ -149,6 +149,7 @@ class StreamNode : public Node {
   std::vector<std::string> ReaderNames() const;
   void WatchWriter();
   void WatchReaders();
+  void WarnOnce(const std::string& matter, const std::string& text);
 
   bool begun_ = false;
   std::optional<Bytes> camera_message_;  ///< as the player sent it
