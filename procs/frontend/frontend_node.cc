@@ -374,7 +374,7 @@ bool FrontendNode::DecodeImage(const Frame& frame) {
 }
 
 void FrontendNode::OnBadImage(const std::string& problem) {
-  if (frames_bad_++ == 0) spdlog::warn("frontend: {} (further ones are only counted)", problem);
+  if (frames_bad_++ == 0) LogWarning("frontend: {} (further ones are only counted)", problem);
 }
 
 /// On the core.

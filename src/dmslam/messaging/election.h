@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "dmslam/ack_t.hpp"
+#include "dmslam/head_t.hpp"
+#include "dmslam/messaging/claims.h"
 #include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
 
@@ -15,7 +19,7 @@ namespace dmslam {
 /// when told to take over, asks the present writer to hand over and waits until that has closed. Two
 /// newcomers that both win meet through their beacons: the lower term stops (StreamWriter::superseded_by).
 /// Until the stream is opened it goes on listening: a writer that is heard only then turns the victory into a
-/// refusal.
+/// refusal. One beacon alone decides nothing: it may be the late echo of a writer that is gone, or forged.
 class WriterElection : public StateMachine {
  public:
   struct Options {
@@ -43,22 +47,36 @@ class WriterElection : public StateMachine {
   State state() const { return state_; }
   /// Why it was refused: names the present writer and the cure.
   const std::string& refusal() const { return refusal_; }
-  /// The term won: later than the wall clock (microseconds) and than any term heard.
-  Term Win(int64_t wall_us) const;
+  /// The term won. Terms never go back, whatever the clock of this host: the epoch is the largest of the wall
+  /// clock (microseconds), every epoch that a beacon or a reader's acknowledgement named + 1, and
+  /// `named_epoch` + 1: of the replica that the owner continues. An epoch that was named once only and lies
+  /// far beyond the wall clock is not believed.
+  Term Win(int64_t wall_us, int64_t named_epoch = 0) const;
   /// How far the highest writer heard had come; nothing when none was heard.
   const std::optional<Version>& predecessor() const { return predecessor_; }
 
  private:
+  struct Heard {
+    int64_t utime = INT64_MIN;  // of its newest beacon
+    int64_t seq = 0;
+    int64_t last_ns = 0;
+    int beacons = 0;
+    int closed = 0;  // of the newest ones, how many said that it is closed
+    bool believed() const { return beacons > 1; }
+    bool gone() const { return closed > 1; }
+  };
+  void ReceiveHead(const head_t& head, int64_t now_ns);
+  void ReceiveAck(const ack_t& ack);
+  void Decide(const head_t& head, int64_t now_ns);
+  const std::pair<const Term, Heard>* Highest() const;
   void Ask(int64_t now_ns);
 
   Options options_;
   State state_ = State::kListening;
   int64_t listen_until_ns_;
   int64_t asking_since_ns_ = 0, next_ask_ns_ = 0;
-  Term highest_;
-  int64_t highest_utime_ = INT64_MIN;  // of its newest beacon
-  int64_t last_heard_ns_ = INT64_MIN / 2;
-  bool highest_closed_ = false;
+  std::map<Term, Heard> heard_;
+  Claims<int64_t> epochs_;  // that somebody named
   std::optional<Version> predecessor_;
   std::string refusal_;
   std::vector<Outgoing> outgoing_;

@@ -43,8 +43,11 @@ void Endpoint::AddWriter(StreamWriter* writer, const std::string& owner,
   Add(writer, std::move(channels));
 }
 
-void Endpoint::AddElection(WriterElection* election, const std::string& owner) {
-  Add(election, {HeadChannel(owner)});
+void Endpoint::AddElection(WriterElection* election, const std::string& owner,
+                           const std::vector<std::string>& readers) {
+  std::vector<std::string> channels = {HeadChannel(owner)};
+  for (const std::string& reader : readers) channels.push_back(AckChannel(reader));
+  Add(election, std::move(channels));
 }
 
 void Endpoint::AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels) {

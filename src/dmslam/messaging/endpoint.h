@@ -28,9 +28,10 @@ class Endpoint {
                  const std::vector<std::string>& record_channels);
   /// `readers`: who may acknowledge, by the upper-case names of their processes ("FRONTEND").
   void AddWriter(StreamWriter* writer, const std::string& owner, const std::vector<std::string>& readers);
-  /// An election hears the beacons of its owner; a fetch the holders' answers and records; a server the
-  /// owner's questions and acknowledgements.
-  void AddElection(WriterElection* election, const std::string& owner);
+  /// An election hears the beacons of its owner, and what `readers` acknowledge; a fetch the holders' answers
+  /// and records; a server the owner's questions and acknowledgements.
+  void AddElection(WriterElection* election, const std::string& owner,
+                   const std::vector<std::string>& readers = {});
   void AddFetch(ReplicaFetch* fetch, const std::vector<std::string>& record_channels);
   void AddServer(ReplicaServer* server, const std::string& owner);
   void Remove(const StateMachine* machine);

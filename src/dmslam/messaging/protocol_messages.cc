@@ -39,10 +39,17 @@ uint32_t PartChecksum(std::span<const uint8_t> bytes) {
 
 bool IsCount(int64_t value) { return value >= 0 && value < kMaxSeq; }
 
+bool IsEpoch(int64_t value) { return value >= 0 && value < kMaxEpoch; }
+
+bool IsPlausible(const ack_t& ack) {
+  return IsEpoch(ack.header.epoch) && IsEpoch(ack.header.parent_epoch) && IsCount(ack.header.seq) &&
+         IsCount(ack.header.parent_seq) && IsCount(ack.received);
+}
+
 bool IsPlausible(const head_t& head) {
-  return IsCount(head.header.seq) && IsCount(head.first_seq) && head.first_seq <= head.header.seq + 1 &&
-         head.snapshots >= 0 && head.snapshot_total >= 0 && IsCount(head.snapshot_cut) &&
-         IsCount(head.snapshot_first) && IsCount(head.snapshot_last) && head.header.epoch < 2 * kMaxSeq;
+  return IsEpoch(head.header.epoch) && IsCount(head.header.seq) && IsCount(head.first_seq) &&
+         head.first_seq <= head.header.seq + 1 && head.snapshots >= 0 && head.snapshot_total >= 0 &&
+         IsCount(head.snapshot_cut) && IsCount(head.snapshot_first) && IsCount(head.snapshot_last);
 }
 
 }  // namespace
@@ -54,7 +61,8 @@ std::optional<head_t> DecodeHead(std::string_view channel, std::span<const uint8
 }
 
 std::optional<ack_t> DecodeAck(std::string_view channel, std::span<const uint8_t> bytes) {
-  return DecodeSealed<ack_t>(channel, bytes, AckLayoutFits(bytes));
+  std::optional<ack_t> ack = DecodeSealed<ack_t>(channel, bytes, AckLayoutFits(bytes));
+  return ack && IsPlausible(*ack) ? ack : std::nullopt;
 }
 
 std::optional<take_over_t> DecodeTakeOver(std::string_view channel, std::span<const uint8_t> bytes) {

@@ -16,6 +16,8 @@ namespace dmslam {
 
 /// No stream gets this far: larger numbers are noise, and are kept out of all arithmetic.
 inline constexpr int64_t kMaxSeq = int64_t{1} << 60;
+/// No epoch gets this far: they are microseconds since 1970, or a little more.
+inline constexpr int64_t kMaxEpoch = int64_t{1} << 61;
 
 /// Decode one of the protocol's own messages: nothing unless its checksum, its counts, its lengths and its
 /// total length are right. Nothing here throws, whatever the bytes.

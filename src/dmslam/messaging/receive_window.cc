@@ -17,6 +17,16 @@ void ReceiveWindow::Expose(int64_t seq) {
   newest_ = std::max(newest_, seq);
 }
 
+void ReceiveWindow::Retract(int64_t seq) {
+  newest_ = std::max(seq, next_ - 1);
+  sent_ = std::min(sent_, newest_);
+  received_ = std::min(received_, newest_);
+  for (auto it = whole_.upper_bound(newest_); it != whole_.end(); it = whole_.erase(it))
+    bytes_ -= it->second.bytes->size();
+  for (auto it = pieces_.upper_bound(newest_); it != pieces_.end(); it = pieces_.erase(it))
+    bytes_ -= it->second.data.size();
+}
+
 int64_t ReceiveWindow::GiveUpBefore(int64_t first) {
   if (first <= received_ + 1) return 0;
   pieces_.erase(pieces_.begin(), pieces_.lower_bound(first));

@@ -39,6 +39,9 @@ class ReceiveWindow {
   /// The writer has sent all records up to `seq`: what of them is not here is missing.
   void Expose(int64_t seq);
 
+  /// There are no records behind `seq`: what is here of such is none, and is thrown away.
+  void Retract(int64_t seq);
+
   /// Gives up what is missing of the records before `first`; returns how many that are.
   int64_t GiveUpBefore(int64_t first);
 

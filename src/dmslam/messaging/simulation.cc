@@ -28,6 +28,7 @@ constexpr int64_t kSession = 3;
 constexpr size_t kMaxRecords = 150;
 constexpr size_t kMaxBytes = 600'000;
 constexpr size_t kReaderBytes = 400'000;
+constexpr int64_t kWallUs = 1'700'000'000'000'000;  // at the beginning
 const char kChannel[] = "DMSLAM_OWNER_RECORD";
 
 // The replicated state: every record appends one entry.
@@ -89,18 +90,83 @@ struct Conditions {
     records_per_second = 10.0 + random->Below(60);
     num_faults = static_cast<int>(random->Below(4));
     overlapping = random->Below(5) == 0;
+    wrong_clocks = random->Below(2) == 0;
+    forgeries = random->Below(2) == 0;
   }
   std::string ToText() const {
     return std::string(link == Link::kHost ? "host" : "lan") + ", loss " + std::to_string(loss) +
            ", duplication " + std::to_string(duplication) + ", delay " + std::to_string(delay_ns / kMs) +
            " ms, " + std::to_string(num_readers) + " readers, " + std::to_string(num_faults) + " faults" +
-           (overlapping ? ", overlapping" : "");
+           (overlapping ? ", overlapping" : "") + (wrong_clocks ? ", wrong clocks" : "") +
+           (forgeries ? ", forgeries" : "");
   }
   Link link;
   double loss, duplication, records_per_second;
   int64_t delay_ns;
   int num_readers, num_faults;
   bool overlapping;
+  bool wrong_clocks;  // hosts are up to two hours apart
+  bool forgeries;     // single messages that are changed and sealed again
+};
+
+// Changes what it has heard, one message at a time, and seals it again: what would end, hang or deafen
+// somebody who believed it.
+class Forger {
+ public:
+  void Hear(const Outgoing& message) {
+    if (const auto head = DecodeHead(message.channel, *message.bytes))
+      head_ = *head, head_channel_ = message.channel;
+    if (const auto ack = DecodeAck(message.channel, *message.bytes))
+      ack_ = *ack, ack_channel_ = message.channel;
+  }
+
+  std::optional<Outgoing> Make(Random* random) {
+    if (!head_ || !ack_) return std::nullopt;
+    head_t head = *head_;
+    ack_t ack = *ack_;
+    const int64_t far = kSecond + static_cast<int64_t>(random->Next() >> 16);
+    switch (random->Below(8)) {
+      case 0:
+        head.header.epoch += far;
+        break;
+      case 1:
+        head.state = head_t::STATE_CLOSED;
+        break;
+      case 2:
+        head.header.seq += far;
+        break;
+      case 3:
+        head.utime += far;
+        break;
+      case 4:
+        ack.header.epoch += far;
+        return SealedMessage(ack_channel_, ack);
+      case 5:
+        ack.header.seq += far;
+        return SealedMessage(ack_channel_, ack);
+      case 6:
+        ack.utime += far;
+        return SealedMessage(ack_channel_, ack);
+      default:
+        return TakeOver(head, far);
+    }
+    ++head.utime;  // no copy
+    return SealedMessage(head_channel_, head);
+  }
+
+ private:
+  static Outgoing TakeOver(const head_t& head, int64_t successor) {
+    take_over_t request{};
+    request.header = head.header;
+    request.header.seq = 0;
+    request.successor = successor;
+    request.name = "nobody";
+    return SealedMessage(TakeOverChannel("OWNER"), request);
+  }
+
+  std::optional<head_t> head_;
+  std::optional<ack_t> ack_;
+  std::string head_channel_, ack_channel_;
 };
 
 // Messages on their way between nodes; a node that has a side hears only that side.
@@ -111,6 +177,7 @@ class Network {
   void Send(int from, const std::vector<int>& to, const Outgoing& message, int64_t now_ns) {
     if (message.local) return;
     ++datagrams;
+    if (conditions_.forgeries) forger_.Hear(message);
     const size_t fragments = 1 + message.bytes->size() / 1472;
     for (const int node : to) {
       if (node == from || SideOf(from) != SideOf(node)) continue;
@@ -125,6 +192,13 @@ class Network {
         if (!lost) events_.push({now_ns + delay, order_++, node, message});
       }
     }
+  }
+  /// Somebody else's message, heard by all.
+  bool Forge(const std::vector<int>& to, int64_t now_ns) {
+    const std::optional<Outgoing> forged = forger_.Make(random_);
+    if (!forged) return false;
+    for (const int node : to) events_.push({now_ns + kMs, order_++, node, *forged});
+    return true;
   }
   struct Event {
     int64_t at_ns;
@@ -149,6 +223,7 @@ class Network {
   bool SideOf(int node) const { return far_side.contains(node); }
   const Conditions& conditions_;
   Random* random_;
+  Forger forger_;
   std::priority_queue<Event> events_;
   int64_t order_ = 0;
 };
@@ -256,6 +331,7 @@ class OwnerProcess : public Process {
         next_entry_(next_entry),
         random_(random),
         id_(ReaderProcess::RandomId(random)),
+        clock_offset_us_(conditions.wrong_clocks ? (random->Below(14400) - int64_t{7200}) * 1'000'000 : 0),
         election_(Electing(take_over), now_ns) {}
 
   std::vector<StateMachine*> Machines() override {
@@ -333,7 +409,8 @@ class OwnerProcess : public Process {
     options.spare_bytes = 50'000;
     base_ = history.size();
     source_.emplace(&history);
-    writer_.emplace(options, election_.Win(now_ns / 1000 + 1), parent, &*source_);
+    const int64_t wall_us = kWallUs + clock_offset_us_ + now_ns / 1000;
+    writer_.emplace(options, election_.Win(wall_us, parent.epoch), parent, &*source_);
     next_record_ns_ = now_ns;
     phase_ = Phase::kWriting;
   }
@@ -368,6 +445,7 @@ class OwnerProcess : public Process {
   int64_t* next_entry_;
   Random* random_;
   int64_t id_;
+  int64_t clock_offset_us_;  // of its host's wall clock
   Phase phase_ = Phase::kElecting;
   WriterElection election_;
   std::optional<ReplicaFetch> fetch_;
@@ -401,6 +479,7 @@ class World {
       for (size_t i = 0; i < readers_.size(); ++i) Tick(readers_[i].get(), 2 + static_cast<int>(i));
       Supervise();
       CauseFaults();
+      Forge();
       now_ns_ += kTick;
     }
     if (report_.failure.empty()) CheckConfirmed();
@@ -515,6 +594,12 @@ class World {
     end_ns_ = next_fault_ns_ + 2 * kSecond;
   }
 
+  void Forge() {
+    if (!conditions_.forgeries || network_.healed || now_ns_ < next_forgery_ns_) return;
+    next_forgery_ns_ = now_ns_ + 700 * kMs + random_.Below(2000) * kMs;
+    report_.forgeries += network_.Forge(nodes_, now_ns_);
+  }
+
   void CauseFault(uint32_t kind) {
     const size_t present = owners_[0] ? 0 : 1;
     const size_t vacant = 1 - present;
@@ -603,7 +688,8 @@ class World {
   std::vector<std::unique_ptr<ReaderProcess>> readers_;
   std::vector<int64_t> restart_reader_ns_;
   int64_t now_ns_ = kSecond;
-  int64_t restart_owner_ns_ = 0, split_until_ns_ = 0, next_fault_ns_ = 0, end_ns_ = 0, healed_ns_ = 0;
+  int64_t restart_owner_ns_ = 0, split_until_ns_ = 0, next_fault_ns_ = 0, end_ns_ = 0, healed_ns_ = 0,
+          next_forgery_ns_ = 0;
   int64_t next_entry_ = 0;
   int faults_left_ = 0;
   std::set<int64_t> confirmed_;

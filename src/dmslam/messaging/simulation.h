@@ -16,13 +16,14 @@ struct SimulationReport {
   int64_t parts_repaired = 0;
   int64_t snapshots = 0;
   int64_t hand_overs = 0;  ///< terms that began from a replica
+  int64_t forgeries = 0;   ///< messages of somebody else, with the right checksum
   int64_t faults = 0;      ///< kills, take-overs, second writers and splits
 };
 
 /// One writer's process (restarted by a supervisor when it ends) and two to four readers on a simulated
 /// network, in one thread and virtual time, all drawn from `seed`: loss up to 50 %, duplication, reordering,
-/// delay, kills of either side, take-overs, accidental second writers, splits. At the end the network heals,
-/// and then must hold:
+/// delay, kills of either side, take-overs, accidental second writers, splits, wall clocks that are hours
+/// apart, single forged messages. At the end the network heals, and then must hold:
 ///  - all replicas and the surviving writer have the same history: each record once and in order;
 ///  - exactly one writer survives;
 ///  - no record is missing that a writer knew to be held by another process (schedules with overlapping

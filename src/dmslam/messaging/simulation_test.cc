@@ -29,19 +29,21 @@ TEST(Simulation, EverySchedulesPromisesAreKept) {
     sum.snapshots += report.snapshots;
     sum.hand_overs += report.hand_overs;
     sum.faults += report.faults;
+    sum.forgeries += report.forgeries;
   }
   std::printf(
       "%ld schedules: %ld records, %ld delivered, %ld confirmed, %ld datagrams, %ld parts repaired, "
-      "%ld snapshots, %ld hand-overs, %ld faults\n",
+      "%ld snapshots, %ld hand-overs, %ld faults, %ld forgeries\n",
       static_cast<long>(count), static_cast<long>(sum.published), static_cast<long>(sum.delivered),
       static_cast<long>(sum.confirmed), static_cast<long>(sum.datagrams),
       static_cast<long>(sum.parts_repaired), static_cast<long>(sum.snapshots),
-      static_cast<long>(sum.hand_overs), static_cast<long>(sum.faults));
+      static_cast<long>(sum.hand_overs), static_cast<long>(sum.faults), static_cast<long>(sum.forgeries));
   EXPECT_GT(sum.confirmed, 0);
   if (count >= 100) {  // the schedules really try what they are for
     EXPECT_GT(sum.parts_repaired, 1000);
     EXPECT_GT(sum.snapshots, 20);
     EXPECT_GT(sum.hand_overs, 20);
+    EXPECT_GT(sum.forgeries, 100);
   }
 }
 

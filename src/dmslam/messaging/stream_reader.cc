@@ -12,7 +12,12 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kMaxTimed = 1000;      // records whose recovery is timed
+constexpr size_t kMaxTimed = 1000;               // records whose recovery is timed
+constexpr int64_t kTimeToleranceUs = 5'000'000;  // between the writer's clock and ours, from beacon to beacon
+constexpr int64_t kMaxBurst = 4096;              // records behind the last beacon that can be
+constexpr int64_t kMinNsPerRecord = 50'000;      // no writer is faster for long
+constexpr int kBelieved = 2;                     // beacons
+constexpr int64_t kRefusedAckNs = 100'000'000;   // who holds more than the writer knows says so soon
 constexpr size_t kMaxRangesNamed = 32;  // ranges named in one acknowledgement: it must fit one datagram
 
 Version ParentOf(const head_t& head) { return {head.header.parent_epoch, head.header.parent_seq}; }
@@ -55,19 +60,67 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
     ++statistics_.dropped_foreign;
     return;
   }
+  if (!IsWanted(*head)) return;
   const Term term{head->header.epoch, head->header.writer};
-  const bool wanted = options_.only_writer == 0 || term.writer == options_.only_writer;
-  if (!wanted || term < term_ || term.epoch < held_.epoch || !term.valid()) {
-    ++statistics_.dropped_stale;
-    return;
-  }
-  if (term == term_ && head->utime < last_head_utime_) return;  // late
+  if (term == term_ && (head->utime < last_head_utime_ || !IsPlausible(*head, now_ns))) return;
+  if (!SpeaksOurLanguage(*head)) return;
   last_head_utime_ = head->utime;
   last_head_ns_ = now_ns;
-  if (!SpeaksOurLanguage(*head)) return;
-  if (term > term_ || state_ == State::kRefusedVersion) BeginTerm(*head);
-  writer_closed_ = head->state == head_t::STATE_CLOSED;
+  if (term == term_ && state_ == State::kRefusedVersion) term_ = {};
+  if (term > term_) BeginTerm(*head);
+  head_seq_ = head->header.seq;
+  NoteEnd(*head);
   Follow(*head);
+}
+
+/// Of the term that is followed, or of one that is to be followed from now on.
+bool StreamReader::IsWanted(const head_t& head) {
+  const Term term{head.header.epoch, head.header.writer};
+  const bool of_ours = options_.only_writer == 0 || term.writer == options_.only_writer;
+  if (!of_ours || !term.valid() || term.epoch < held_.epoch || term < term_) {
+    ++statistics_.dropped_stale;
+    return false;
+  }
+  if (term == term_ || options_.only_writer != 0) return true;
+  if (terms_.SaidAgain(term, head.utime)) return true;
+  statistics_.dropped_doubtful += term_.valid() ? 1 : 0;
+  return false;
+}
+
+/// A beacon's time and number follow from those of the one before; where they have leapt in earnest, the next
+/// beacon says so too.
+bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
+  const int64_t elapsed_ns = now_ns - last_head_ns_;
+  const bool in_time = head.utime <= last_head_utime_ + elapsed_ns / 1000 + kTimeToleranceUs;
+  const bool in_number = head.header.seq <= head_seq_ + kMaxBurst + elapsed_ns / kMinNsPerRecord;
+  const bool same_language = state_ == State::kRefusedVersion || (head.protocol_version == kProtocolVersion &&
+                                                                  head.schema_hash == options_.schema_hash);
+  if (in_time && in_number && same_language) {
+    leaps_.Clear();
+    return true;
+  }
+  ++statistics_.dropped_doubtful;
+  return same_language && leaps_.SaidAgain(term_, head.utime);
+}
+
+void StreamReader::NoteEnd(const head_t& head) {
+  closed_beacons_ = head.state == head_t::STATE_CLOSED ? closed_beacons_ + 1 : 0;
+  writer_closed_ = closed_beacons_ >= kBelieved;
+}
+
+/// The writer knows best how far it is: what is behind that, beacon after beacon, was never written.
+void StreamReader::RetractWhatIsNot() {
+  const int64_t newest = std::max(window_.newest(), window_.next() - 1);
+  if (newest <= head_seq_ || newest != beacons_below_of_) beacons_below_ = 0;
+  beacons_below_of_ = newest;
+  if (newest <= head_seq_ || ++beacons_below_ < kBelieved + 1) return;
+  ++statistics_.dropped_doubtful;
+  beacons_below_ = 0;
+  window_.Retract(head_seq_);
+  const bool holds_of_it = held_.epoch == term_.epoch;
+  const int64_t next = holds_of_it ? held_.seq + 1 : 1;
+  if (state_ == State::kFollowing && window_.next() > head_seq_ + 1 && next <= head_seq_ + 1)
+    window_.Reset(next);
 }
 
 bool StreamReader::SpeaksOurLanguage(const head_t& head) {
@@ -94,6 +147,10 @@ void StreamReader::BeginTerm(const head_t& head) {
   term_ = {head.header.epoch, head.header.writer};
   parent_ = parent;
   window_.Reset(same_epoch ? held_.seq + 1 : 1);
+  terms_.Clear();
+  leaps_.Clear();
+  gap_seen_ = false;
+  closed_beacons_ = 0;
   snapshot_.reset();
   missing_since_ns_.clear();
   problem_.clear();
@@ -106,6 +163,8 @@ void StreamReader::BeginTerm(const head_t& head) {
                ToText(end) + " already: let it take over the newest replica, or restart this process";
   } else if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
     NeedSnapshot();
+  } else if (!end.empty()) {  // the former writer's last ones: nobody keeps them
+    statistics_.lost += end.epoch == parent.epoch ? parent.seq - end.seq : 1;
   }
 }
 
@@ -141,9 +200,13 @@ void StreamReader::Follow(const head_t& head) {
   } else if (state_ != State::kFollowing) {
     return;
   }
+  RetractWhatIsNot();
   window_.Expose(head.header.seq);
-  const bool joins = !std::exchange(joined_, true);
-  if (head.first_seq <= window_.received() + 1) return;
+  const bool gap = head.first_seq > window_.received() + 1;
+  if (gap && !std::exchange(gap_seen_, true)) return;
+  const bool joins = !std::exchange(joined_, true) && held_.empty();  // what was before it came is another's
+  gap_seen_ = false;
+  if (!gap) return;
   if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
     NeedSnapshot();
     FollowSnapshot(head);
@@ -192,6 +255,7 @@ void StreamReader::ReceivePart(std::span<const uint8_t> bytes, int64_t now_ns) {
     ++statistics_.dropped_stale;
     return;
   }
+  if (LeapsAhead(*window, part->seq)) return;
   ReceiveWindow::PartResult result = window->AddPart(*part);
   if (result.result == ReceiveWindow::Result::kDuplicate) ++statistics_.duplicates;
   if (result.result == ReceiveWindow::Result::kNoRoom) ++statistics_.dropped_no_room;
@@ -235,8 +299,17 @@ ReceiveWindow* StreamReader::WindowOf(const RecordHeader& header) {
   return state_ == State::kFollowing || in_snapshot ? &window_ : nullptr;
 }
 
+/// Further than a writer can be beyond its last beacon.
+bool StreamReader::LeapsAhead(const ReceiveWindow& window, int64_t seq) {
+  const int64_t known = &window == &window_ ? std::max(window.received(), head_seq_) : window.received();
+  if (seq <= known + kMaxBurst) return false;
+  ++statistics_.dropped_doubtful;
+  return true;
+}
+
 void StreamReader::Add(ReceiveWindow* window, const std::string& channel, Bytes bytes,
                        const RecordHeader& header, int64_t now_ns) {
+  if (LeapsAhead(*window, header.seq)) return;
   Record record{channel, std::make_shared<const Bytes>(std::move(bytes)), header};
   const ReceiveWindow::Result result = window->Add(record);
   if (result == ReceiveWindow::Result::kDuplicate) ++statistics_.duplicates;
@@ -326,7 +399,8 @@ bool StreamReader::AckIsUrgent() const {
 
 int64_t StreamReader::deadline_ns() const {
   if (!term_.valid()) return INT64_MAX;
-  return last_ack_ns_ + (AckIsUrgent() ? options_.ack_ns : options_.idle_ack_ns);
+  if (AckIsUrgent()) return last_ack_ns_ + options_.ack_ns;
+  return last_ack_ns_ + (state_ == State::kRefusedBehind ? kRefusedAckNs : options_.idle_ack_ns);
 }
 
 void StreamReader::Advance(int64_t now_ns) {

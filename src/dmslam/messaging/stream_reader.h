@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dmslam/head_t.hpp"
+#include "dmslam/messaging/claims.h"
 #include "dmslam/messaging/receive_window.h"
 #include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
@@ -23,12 +24,13 @@ struct ReaderStatistics {
   int64_t requested = 0;      ///< ranges of bytes or records named as missing
   int64_t repaired = 0;       ///< records that came late or in pieces, after they had been named as missing
   int64_t lost = 0;       ///< records given up: no longer kept, and the writer offers no snapshot; those that
-                          ///< were gone when this reader came are not counted
+                          ///< were gone before a reader that held nothing came are not counted
   int64_t snapshots = 0;  ///< received whole
-  int64_t dropped_bad = 0;      ///< messages with wrong bytes
-  int64_t dropped_foreign = 0;  ///< of other sessions
-  int64_t dropped_stale = 0;    ///< of other terms, or before any beacon was heard
-  int64_t dropped_no_room = 0;  ///< beyond what is kept ahead; they come again
+  int64_t dropped_bad = 0;       ///< messages with wrong bytes
+  int64_t dropped_foreign = 0;   ///< of other sessions
+  int64_t dropped_stale = 0;     ///< of other terms, or before any beacon was heard
+  int64_t dropped_doubtful = 0;  ///< that say what cannot be, or what must be said again to be believed
+  int64_t dropped_no_room = 0;   ///< beyond what is kept ahead; they come again
   double recovery_p50_ms =
       0;  ///< from a record's being named as missing to its being here, of the newest ones
   double recovery_p99_ms = 0;
@@ -39,7 +41,9 @@ struct ReaderStatistics {
 
 /// The receiving end of a stream: hands out its records once each, strictly in order, whatever is lost,
 /// doubled or late on the way; follows the writer with the highest term; takes a snapshot when it lacks more
-/// than the writer keeps. A pure state machine: no clock, no I/O, no threads.
+/// than the writer keeps. What would end or change much (a higher term, the end, a leap of the numbers,
+/// records given up) is believed when the writer's next beacon says so too: one forged message does no harm.
+/// A pure state machine: no clock, no I/O, no threads.
 class StreamReader : public StateMachine {
  public:
   struct Options {
@@ -120,9 +124,14 @@ class StreamReader : public StateMachine {
   void ReceiveRecord(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
   void Add(ReceiveWindow* window, const std::string& channel, Bytes bytes, const RecordHeader& header,
            int64_t now_ns);
+  bool LeapsAhead(const ReceiveWindow& window, int64_t seq);
   void NoteMissing(const std::vector<MissingRange>& missing, int64_t now_ns);
   void NoteArrival(int64_t seq, int64_t now_ns);
   ReceiveWindow* WindowOf(const RecordHeader& header);
+  bool IsWanted(const head_t& head);
+  bool IsPlausible(const head_t& head, int64_t now_ns);
+  void NoteEnd(const head_t& head);
+  void RetractWhatIsNot();
   bool SpeaksOurLanguage(const head_t& head);
   void BeginTerm(const head_t& head);
   Version DrainFormerTerm(const Version& parent, bool fresh);
@@ -144,7 +153,14 @@ class StreamReader : public StateMachine {
   std::map<int64_t, int64_t> missing_since_ns_;  // by seq: when it was first named as missing
   std::deque<double> recovery_ms_;               // of the newest records that were
   bool writer_closed_ = false;
-  bool joined_ = false;  // has followed a writer: what was there before is another's
+  Claims<Term> terms_;            // that are not followed, yet
+  Claims<Term> leaps_;            // of the beacons of the term that is followed
+  bool gap_seen_ = false;         // the last beacon said that records are gone that are not here
+  int closed_beacons_ = 0;        // of the newest ones, how many said that the stream is closed
+  int64_t head_seq_ = 0;          // of the last beacon
+  int beacons_below_ = 0;         // of the newest ones, how many knew less records than are known here
+  int64_t beacons_below_of_ = 0;  // ... than these
+  bool joined_ = false;           // has followed a writer
   int64_t last_head_ns_ = INT64_MIN / 2;
   int64_t last_head_utime_ = INT64_MIN;
   int64_t last_ack_ns_ = INT64_MIN / 2;

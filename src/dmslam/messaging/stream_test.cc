@@ -119,7 +119,7 @@ TEST(Stream, RepairsTheTailThatOnlyTheBeaconExposes) {
 
 TEST(Stream, OnALanOnlyTheLostPartsAreSentAgain) {
   Pair pair(WriterOptions(Link::kLan));
-  pair.Step();
+  pair.Run(50 * kMs);  // they have met
   int parts = 0;
   pair.drop = [&](const Outgoing& out) { return out.channel == "DMSLAM_TEST_PART" && ++parts % 10 == 0; };
   for (int i = 0; i < 10; ++i) {
@@ -165,7 +165,7 @@ TEST(Packing, ContentComesBackAndDamageDoesNot) {
 
 TEST(Stream, OnALanNothingIsSentAgainWhenNothingIsLost) {
   Pair pair(WriterOptions(Link::kLan));
-  pair.Step();
+  pair.Run(50 * kMs);  // they have met
   for (int i = 0; i < 30; ++i) {
     pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i, 60000), pair.now_ns);
     pair.Run(33 * kMs);
@@ -234,10 +234,13 @@ TEST(Stream, OtherTypesAreRefusedByNameOnBothSides) {
 TEST(Stream, AWriterThatHearsAHigherTermStops) {
   StreamWriter low(WriterOptions(), Term{1000, 5}, Version{});
   StreamWriter high(WriterOptions(), Term{1000, 6}, Version{});
-  low.Advance(0);
-  high.Advance(0);
-  for (const Outgoing& out : high.TakeOutgoing()) low.Receive(out.channel, *out.bytes, 0);
-  for (const Outgoing& out : low.TakeOutgoing()) high.Receive(out.channel, *out.bytes, 0);
+  for (const int64_t now : {int64_t{0}, 100 * kMs}) {
+    low.Advance(now);
+    high.Advance(now);
+    for (const Outgoing& out : high.TakeOutgoing()) low.Receive(out.channel, *out.bytes, now);
+    for (const Outgoing& out : low.TakeOutgoing()) high.Receive(out.channel, *out.bytes, now);
+    EXPECT_EQ(low.superseded_by().has_value(), now > 0) << "one beacon alone may be forged";
+  }
   EXPECT_EQ(low.superseded_by(), "writer");
   EXPECT_FALSE(high.superseded_by());
   low.Publish("DMSLAM_TEST_X", MakeRecord(1), kMs);
@@ -285,6 +288,19 @@ TEST(Stream, WithoutSnapshotsAReaderSkipsWhatIsGoneAndCountsWhatItMissed) {
   pair.Run(300 * kMs);
   EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{11, 12, 13}));
   EXPECT_EQ(pair.reader.statistics().lost, 2);
+}
+
+TEST(Stream, AReaderThatHeldSomethingCountsWhatIsGoneWhenItComesBack) {
+  StreamWriter::Options options = WriterOptions();
+  options.max_records = 3;
+  Pair pair(options);
+  for (int i = 1; i <= 8; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  StreamReader::Options back = ReaderOptions();
+  back.start = {1000, 2};  // was started again, and holds what the one before had accepted
+  pair.reader = StreamReader(back);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{6, 7, 8}));
+  EXPECT_EQ(pair.reader.statistics().lost, 3);
 }
 
 TEST(Stream, ACompleteStreamStaysUntilItIsClosed) {

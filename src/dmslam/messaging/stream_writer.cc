@@ -13,7 +13,9 @@ namespace dmslam {
 namespace {
 
 constexpr size_t kMaxReaders = 64;  // more ids than this are noise
-constexpr int kFarewells = 3;
+constexpr int kFarewells = 6;
+constexpr int64_t kTimeToleranceUs =
+    5'000'000;  // between a reader's clock and ours, from one word to the next
 
 SendWindow::Options WindowOptions(const StreamWriter::Options& options) {
   return {options.link, PartChannel(options.owner), options.part_bytes, options.pack,
@@ -120,7 +122,14 @@ void StreamWriter::ReceiveHead(const std::string& channel, std::span<const uint8
     return;
   }
   const Term other{head->header.epoch, head->header.writer};
-  if (other > term_) superseded_by_ = head->name;
+  if (other > term_ && SaidAgain(other, head->utime)) superseded_by_ = head->name;
+}
+
+/// One message alone may be forged.
+bool StreamWriter::SaidAgain(const Term& term, int64_t utime) {
+  const bool again = terms_.SaidAgain(term, utime);
+  statistics_.dropped_doubtful += again ? 0 : 1;
+  return again;
 }
 
 void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -133,7 +142,7 @@ void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const u
   if (request->header.session != options_.session) {
     ++statistics_.dropped_foreign;
   } else if (Term{request->header.epoch, request->header.writer} == term_) {
-    close_requested_by_ = request->name;
+    if (successors_.SaidAgain(request->successor, request->utime)) close_requested_by_ = request->name;
   } else {
     ++statistics_.dropped_stale;
   }
@@ -166,7 +175,12 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
   Reader* reader = Meet(*ack, now_ns);
   if (reader == nullptr) return;
   const Term followed{ack->header.epoch, ack->header.writer};
-  if (followed > term_) superseded_by_ = "the writer that " + ack->name + " follows";
+  if (followed == term_ && ack->header.seq > window_.last()) {  // what was never written cannot be accepted
+    ++statistics_.dropped_doubtful;
+    return;
+  }
+  if (followed > term_ && SaidAgain(followed, ack->utime))
+    superseded_by_ = "the writer that " + ack->name + " follows";
   reader->following = followed == term_;
   reader->wants_snapshot = ack->wants == ack_t::WANTS_SNAPSHOT && reader->following;
   if (!reader->following) {
@@ -182,15 +196,30 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
 StreamWriter::Reader* StreamWriter::Meet(const ack_t& ack, int64_t now_ns) {
   if (!readers_.contains(ack.reader) && readers_.size() >= kMaxReaders) return nullptr;
   Reader& reader = readers_[ack.reader];
+  const bool in_time = IsInTime(ack, now_ns, &reader);
   reader.last_heard_ns = now_ns;
-  if (ack.utime < reader.last_utime) return nullptr;  // late
+  if (!in_time) return nullptr;
   reader.last_utime = ack.utime;
   reader.role = ack.role;
   reader.lossless = std::any_of(options_.roles.begin(), options_.roles.end(),
                                 [&](const Role& role) { return role.name == ack.role; });
   const Version held{ack.header.parent_epoch, ack.header.parent_seq};
-  if (held.epoch < term_.epoch && held > parent_ && !held.empty() && !parent_.empty()) newer_replica_ = held;
+  const bool newer = held.epoch < term_.epoch && held > parent_ && !held.empty() && !parent_.empty();
+  if (newer && newer_.SaidAgain(held, ack.utime)) newer_replica_ = held;
   return &reader;
+}
+
+/// Neither late, nor from a future that would make all of its next words late. Where a reader's clock has
+/// leapt in earnest, its next word says so too.
+bool StreamWriter::IsInTime(const ack_t& ack, int64_t now_ns, Reader* reader) {
+  if (reader->last_utime == INT64_MIN) return true;
+  const int64_t expected = reader->last_utime + (now_ns - reader->last_heard_ns) / 1000;
+  const bool leaps =
+      ack.utime > expected + kTimeToleranceUs || ack.utime < reader->last_utime - kTimeToleranceUs;
+  if (!leaps) return ack.utime >= reader->last_utime;
+  const int64_t before = std::exchange(reader->doubtful_utime, ack.utime);
+  ++statistics_.dropped_doubtful;
+  return before != INT64_MIN && ack.utime > before && ack.utime - before < kTimeToleranceUs;
 }
 
 // ---- snapshots
@@ -315,7 +344,8 @@ void StreamWriter::Beacon(int64_t now_ns) {
   outgoing_.push_back(SealedMessage(HeadChannel(options_.owner), head));
   statistics_.sent_bytes += static_cast<int64_t>(outgoing_.back().bytes->size());
   beacon_due_ = false;
-  next_beacon_ns_ = now_ns + options_.beacon_ns;
+  const bool early = early_beacons_ > 0 && early_beacons_-- > 0;
+  next_beacon_ns_ = now_ns + (early ? options_.beacon_ns / 10 : options_.beacon_ns);
   if (state_ == State::kClosed && !lingers_) {
     --farewells_;
     next_beacon_ns_ = now_ns + options_.beacon_ns / kFarewells;

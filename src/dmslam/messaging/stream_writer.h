@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dmslam/ack_t.hpp"
+#include "dmslam/messaging/claims.h"
 #include "dmslam/messaging/send_window.h"
 #include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
@@ -45,10 +46,11 @@ struct WriterStatistics {
   int64_t overrun = 0;         ///< records forgotten that a known lossless reader still lacked
   int64_t snapshots = 0;       ///< begun
   int64_t acks = 0;
-  int64_t dropped_bad = 0;      ///< acknowledgements and beacons with wrong bytes
-  int64_t dropped_foreign = 0;  ///< of other sessions
-  int64_t dropped_stale = 0;    ///< of other terms
-  int64_t refused = 0;          ///< from readers of another protocol version or schema
+  int64_t dropped_bad = 0;       ///< acknowledgements and beacons with wrong bytes
+  int64_t dropped_foreign = 0;   ///< of other sessions
+  int64_t dropped_stale = 0;     ///< of other terms
+  int64_t dropped_doubtful = 0;  ///< that say what cannot be, or what must be said again to be believed
+  int64_t refused = 0;           ///< from readers of another protocol version or schema
   size_t kept_records = 0;
   size_t kept_bytes = 0;
 };
@@ -110,10 +112,10 @@ class StreamWriter : public StateMachine {
   bool completed() const { return state_ == State::kClosed; }
   bool closed() const { return state_ == State::kClosed && farewells_ == 0; }
 
-  /// Set when another writer has a higher term: this one is silent from then on, and its owner must stop.
-  /// Names the other.
+  /// Set when another writer has a higher term, and has said so twice: this one is silent from then on, and
+  /// its owner must stop. Names the other.
   const std::optional<std::string>& superseded_by() const { return superseded_by_; }
-  /// Set when a newcomer asked for the stream: finish what is pending, then Close.
+  /// Set when a newcomer asked for the stream, and asked again: finish what is pending, then Close.
   const std::optional<std::string>& close_requested_by() const { return close_requested_by_; }
   /// Names the last reader that was refused because of its protocol version or schema; empty when there was
   /// none.
@@ -147,7 +149,8 @@ class StreamWriter : public StateMachine {
     int64_t accepted = 0;
     int64_t floor = 0;  // needs nothing up to here (accepted, or covered by the snapshot it receives)
     int64_t last_heard_ns = 0;
-    int64_t last_utime = INT64_MIN;  // of its newest word: older ones that come late are ignored
+    int64_t last_utime = INT64_MIN;      // of its newest word: older ones that come late are ignored
+    int64_t doubtful_utime = INT64_MIN;  // of one whose time does not follow from the last: another will tell
   };
   struct Snapshot {
     int64_t number = 0;
@@ -165,6 +168,8 @@ class StreamWriter : public StateMachine {
   void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes);
   void ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes);
   Reader* Meet(const ack_t& ack, int64_t now_ns);
+  bool IsInTime(const ack_t& ack, int64_t now_ns, Reader* reader);
+  bool SaidAgain(const Term& term, int64_t utime);
   void ReceiveSnapshotAck(const ack_t& ack, int64_t now_ns);
   void ForgetSilentReaders(int64_t now_ns);
   void ForgetAccepted();
@@ -190,6 +195,9 @@ class StreamWriter : public StateMachine {
   int32_t snapshots_begun_ = 0;
   std::map<int64_t, Reader> readers_;          // by reader id
   std::map<std::string, int64_t> role_floor_;  // of required roles: what they last accepted
+  Claims<Term> terms_;                         // higher than ours
+  Claims<int64_t> successors_;                 // who asked for the stream
+  Claims<Version> newer_;                      // than what this term continues
   std::optional<std::string> superseded_by_, close_requested_by_;
   std::optional<Version> newer_replica_;
   std::string refusal_;
@@ -197,8 +205,9 @@ class StreamWriter : public StateMachine {
   int64_t next_beacon_ns_ = INT64_MIN;
   int64_t next_burst_ns_ = INT64_MIN / 2;
   int64_t close_deadline_ns_ = INT64_MAX;
-  bool lingers_ = false;  // complete, and not yet told to close
-  int farewells_ = 3;     // beacons that still say goodbye
+  bool lingers_ = false;   // complete, and not yet told to close
+  int early_beacons_ = 3;  // of a new term: one alone is not believed
+  int farewells_ = 6;      // beacons that still say goodbye: two of them are needed
   int burst_left_ = 0;
   int snapshot_left_ = 0;  ///< of burst_left_, for a snapshot
   bool beacon_due_ = true;

@@ -186,7 +186,7 @@ void StreamNode::StartElection() {
   options.take_over = options_.take_over;
   if (context_.fresh_system) options.listen_ns = 0;
   election_ = std::make_unique<WriterElection>(options, context_.now_ns());
-  endpoint_.AddElection(election_.get(), UpperCase(role_));
+  endpoint_.AddElection(election_.get(), UpperCase(role_), ReaderNames());
   election_->Advance(context_.now_ns());
 }
 
@@ -199,6 +199,15 @@ void StreamNode::RunElection() {
   if (election_->state() == WriterElection::State::kRefused) Exit(3, election_->refusal());
 }
 
+/// Of all whose acknowledgements are heard.
+std::vector<std::string> StreamNode::ReaderNames() const {
+  std::vector<std::string> names;
+  for (const auto* roles : {&plan_->readers, &plan_->watchers}) {
+    for (const std::string& role : *roles) names.push_back(UpperCase(role));
+  }
+  return names;
+}
+
 void StreamNode::OpenWriter() {
   StreamWriter::Options options;
   options.session = session_;
@@ -207,16 +216,12 @@ void StreamNode::OpenWriter() {
   options.name = context_.name;
   options.schema_hash = SchemaHash();
   options.link = options_.link;
-  std::vector<std::string> reader_names;
-  for (const std::string& reader : plan_->readers) {
+  for (const std::string& reader : plan_->readers)
     options.roles.push_back({reader, options_.HasPeer(reader)});
-    reader_names.push_back(UpperCase(reader));
-  }
-  for (const std::string& watcher : plan_->watchers) reader_names.push_back(UpperCase(watcher));
-  const Term term = election_->Win(context_.wall_us());
+  const Term term = election_->Win(context_.wall_us(), plan_->parent.epoch);
   endpoint_.Remove(election_.get());
   writer_ = std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots);
-  endpoint_.AddWriter(writer_.get(), UpperCase(role_), reader_names);
+  endpoint_.AddWriter(writer_.get(), UpperCase(role_), ReaderNames());
   OnWriterOpen();
 }
 
@@ -257,9 +262,27 @@ void StreamNode::RefuseOtherTypes(Watched* watched) {
   }
 }
 
+/// Once for each matter.
+void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
+  if (std::find(logged_.begin(), logged_.end(), matter) != logged_.end()) return;
+  logged_.push_back(matter);
+  LogWarning("{}: {} (further ones are only counted)", role_, text);
+}
+
 void StreamNode::WatchReaders() {
+  constexpr char kDoubtful[] =
+      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is gone";
+  if (writer_) {
+    const WriterStatistics s = writer_->statistics();
+    if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
+    if (s.overrun > 0)
+      WarnOnce("overrun", "a reader is so far behind that records which it lacks had to be forgotten");
+  }
   for (Watched& watched : readers_) {
     RefuseOtherTypes(&watched);
+    const ReaderStatistics s = watched.reader->statistics();
+    if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
+    if (s.lost > 0) WarnOnce("lost", "was away for longer than its writer keeps records: some are lost");
     if (watched.reader->problem() == watched.problem) continue;
     watched.problem = watched.reader->problem();
     if (!watched.problem.empty()) LogWarning("{}: {}", role_, watched.problem);
@@ -343,6 +366,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
     health.received_bytes += s.payload_bytes;
     health.dropped_foreign += s.dropped_foreign;
     health.dropped_checksum += s.dropped_bad;
+    health.dropped_malformed += s.dropped_doubtful;
     health.dropped_overflow += s.dropped_no_room;
     health.dropped_duplicate += s.duplicates;
     health.records_repaired += s.repaired;
@@ -357,6 +381,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   health.written = s.records;
   health.written_bytes = s.payload_bytes;
   health.dropped_checksum += s.dropped_bad;
+  health.dropped_malformed += s.dropped_doubtful;
   health.dropped_foreign += s.dropped_foreign;
   health.resent = s.parts_repaired;
   health.resent_bytes = s.repaired_bytes;

@@ -131,6 +131,7 @@ class StreamNode : public Node {
   void RunElection();
   void StartElection();
   void OpenWriter();
+  std::vector<std::string> ReaderNames() const;
   void WatchWriter();
   void WatchReaders();
   /// Keeps the protocol alive while one step of work follows the other.
@@ -138,6 +139,7 @@ class StreamNode : public Node {
   void PublishStatusIfDue();
   struct Watched;
   void RefuseOtherTypes(Watched* watched);
+  void WarnOnce(const std::string& matter, const std::string& text);
 
   bool begun_ = false;
   std::optional<Bytes> camera_message_;  ///< as the player sent it
