@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "dmslam/messaging/codec.h"
 #include "dmslam/settings/run_options.h"
 
 namespace dmslam {
@@ -14,7 +15,11 @@ LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
 
 /// The frontend's word on its settings and its vocabulary. Its stream is not read here; who comes later has
 /// the same settings as the one before.
-void LoopcloserNode::OnMessage(const std::string&, std::span<const uint8_t> bytes) {
+void LoopcloserNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (!IsIntact(channel, bytes)) {
+    CountMalformed(channel, "its checksum does not fit");
+    return;
+  }
   const std::optional<SessionStart> start = Read<SessionStart>(bytes);
   if (!start || IsForeign(start->session)) return;
   JoinsSession(*start, vocabulary_ ? std::optional(vocabulary_->checksum()) : std::nullopt);

@@ -7,7 +7,7 @@ namespace dmslam {
 struct RivalOptions {
   int min_support = 20;    ///< matches that one motion explains and the other does not, to count as a motion
   double min_share = 0.5;  ///< of the matches that contradict the first motion, those that the rival explains
-  double min_advantage = 1.5;  ///< the rival's number times D by the other's, from which it is believed
+  double min_advantage = 3.0;  ///< the rival's number times D by the other's, from which it is believed
 };
 
 /// Number times D (paper Eq. 3) of points in the image, added one by one: how much of the image they hold.

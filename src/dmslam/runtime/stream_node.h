@@ -102,6 +102,7 @@ class StreamNode : public Node {
   std::optional<MapDelta> ReadMapRecord(const Record& record, StreamReader* reader);
   /// The version that a replica made of what ReadMapRecord returned holds.
   Version MapHeld(const StreamReader& reader) const { return map_groups_.open() ? Version() : reader.held(); }
+  /// A message was dropped; the first one of a channel is logged.
   void CountMalformed(const std::string& channel, const std::string& reason);
   /// Counts messages of other sessions; the first is logged.
   bool IsForeign(uint32_t session);
