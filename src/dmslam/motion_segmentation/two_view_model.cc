@@ -246,18 +246,29 @@ void ChooseEssentialPose(const MatchArrays& arrays, std::span<const uint8_t> use
 
 namespace {
 
+/// Levenberg and Marquardt's descent: a step that does not lower the cost is taken back and made shorter.
+/// Along a valley of little parallax whole steps lead anywhere.
 bool DescendEssential(const PackedMatches& matches, int iterations, double bound_scale, TwoViewModel* model) {
-  constexpr double kDamping = 1e-6;
+  double damping = 1e-4;
+  EssentialNormal normal = SumEssentialNormal(matches, *model, Tangent(model->t), bound_scale);
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
-    EssentialNormal normal = SumEssentialNormal(matches, *model, B, bound_scale);
     if (normal.count < 5) return false;
-    normal.matrix.diagonal() *= 1.0 + kDamping;
-    normal.matrix.diagonal().array() += 1e-12;
-    const Vector5d step = -normal.matrix.ldlt().solve(normal.gradient);
-    if (!step.allFinite() || step.head<3>().norm() > 1.0) return false;
-    UpdateEssential(step, B, model);
-    if (step.squaredNorm() < 1e-14) break;
+    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
+    Matrix5d matrix = normal.matrix;
+    matrix.diagonal() *= 1.0 + damping;
+    matrix.diagonal().array() += 1e-12;
+    const Vector5d step = -matrix.ldlt().solve(normal.gradient);
+    if (!step.allFinite()) return false;
+    TwoViewModel trial = *model;
+    UpdateEssential(step, B, &trial);
+    EssentialNormal there = SumEssentialNormal(matches, trial, Tangent(trial.t), bound_scale);
+    const bool lower = there.count >= 5 && there.cost < normal.cost;
+    damping = lower ? std::max(1e-6, 0.1 * damping) : 10.0 * damping;
+    if (lower) {
+      *model = trial;
+      normal = there;
+    }
+    if (step.squaredNorm() < 1e-14 || damping > 1e6) break;
   }
   model->M = Hat(model->t) * model->R;
   model->M /= model->M.norm();
