@@ -441,6 +441,10 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
     return std::nullopt;
   }
+  if (best->cost > options_.max_cost) {
+    *refused = {WaitReason::kInconsistent, "no motion explains all views well"};
+    return std::nullopt;
+  }
   return best;
 }
 

@@ -20,10 +20,10 @@ struct LoopcloserOptions {
   int min_sim3_inliers = 20;  ///< of them, that agree with one similarity
   int min_pose_inliers =
       30;  ///< without such pairs: landmarks of the place that agree with one pose of the keyframe
-  double search_radius_px = 7.5;     ///< of the guided search, times the scale of the predicted octave
-  int max_descriptor_distance = 60;  ///< of the guided search [bits]
-  int min_matches = 40;              ///< landmarks of the place found in the keyframe
-  int min_cells = 8;                 ///< cells of the image (of 48) in which landmarks are found
+  double search_radius_rad = 0.0143;  ///< of the guided search, times the scale of the predicted octave
+  int max_descriptor_distance = 60;   ///< of the guided search [bits]
+  int min_matches = 40;               ///< landmarks of the place found in the keyframe
+  int min_cells = 8;                  ///< cells of the image (of 48) in which landmarks are found
   // Shares: of the place's landmarks that the keyframe should see, those that it does see, over the same
   // share of its own surroundings. A picture that hangs in two places reached 0.27; true returns begin at 0.3
   // and grow as the camera goes on.

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/loops/chain_drift.h"
@@ -214,7 +215,8 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   std::vector<LandmarkId> seen = LandmarksSeenBy(map, {place.id});
   KeepStatic(map, &seen);
   const Rigid3d T_cam_world = (S_keyframe_place * Sim3d(place.T_cam_world)).ToRigid();
-  const PlaceSupport support = Look(map, keyframe, T_cam_world, seen, options_.search_radius_px);
+  const PlaceSupport support =
+      Look(map, keyframe, T_cam_world, seen, SearchRadiusPx(map.camera(), options_.search_radius_rad));
   std::vector<Sim3Match> matches;
   for (const LandmarkMatch& match : support.matches) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
@@ -279,11 +281,12 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
   loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
   const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
-  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks, options_.search_radius_px);
+  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks,
+                      SearchRadiusPx(map.camera(), options_.search_radius_rad));
   const PlaceSupport own =
       Look(map, keyframe, keyframe.T_cam_world,
            StaticLandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
-           options_.search_radius_px);
+           SearchRadiusPx(map.camera(), options_.search_radius_rad));
   loop.share = loop.support.ShareOver(own);
   MeasureProven(map, keyframe, place, own, &loop);
   const auto drift = DriftAlongChain(map, place.id, keyframe.id, options_.drift);
@@ -297,7 +300,7 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
 /// surroundings in the place's keyframe.
 void LoopVerifier::MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                  const PlaceSupport& own, VerifiedLoop* loop) const {
-  const double radius = options_.search_radius_px;
+  const double radius = SearchRadiusPx(map.camera(), options_.search_radius_rad);
   std::vector<LandmarkId> here =
       LandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility);
   std::vector<LandmarkId> there = loop->landmarks;
@@ -352,8 +355,8 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
   const std::vector<LandmarkId> landmarks =
       StaticLandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
-  const PlaceSupport seen =
-      Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks, 2 * options_.search_radius_px);
+  const PlaceSupport seen = Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks,
+                                 2 * SearchRadiusPx(map.camera(), options_.search_radius_rad));
   const Keyframe* place = BestObserver(map, keyframe, seen, options_.min_covisibility);
   if (place == nullptr) {
     *why = "nothing of the place is seen";

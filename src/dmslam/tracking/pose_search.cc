@@ -1,5 +1,7 @@
 #include "dmslam/tracking/pose_search.h"
 
+#include "dmslam/camera/image_scale.h"
+
 namespace dmslam {
 namespace {
 
@@ -31,11 +33,11 @@ void PoseSearch::Reset() {
 bool PoseSearch::FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
                            const Prior& prior, TrackedFrame* frame) {
   const size_t needed = static_cast<size_t>(options_.min_motion_matches);
-  const auto* matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, options_.motion_radius_px,
-                                            *frame->features);
+  const double radius_px = SearchRadiusPx(camera_, options_.motion_radius_rad);
+  const auto* matches =
+      &search_.MatchFrame(map, judge_.votes(), last, T_predicted, radius_px, *frame->features);
   if (matches->size() < needed) {
-    matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * options_.motion_radius_px,
-                                  *frame->features);
+    matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * radius_px, *frame->features);
   }
   if (matches->size() < needed) return false;
   SetMatches(*matches, T_predicted, frame);
