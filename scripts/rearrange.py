@@ -6,6 +6,7 @@ Writes OUT, a TUM RGB-D folder with frames of SEQUENCE, restamped evenly from th
   A*S      frame A for S seconds: a camera that stands still
   dark*S   S seconds of darkness, in which the camera stays where the frame before was taken
   A-B/dark the same as A-B, in darkness
+  gap*S    S seconds without any frame, as while a camera is carried from one place to another
 Images are linked, not copied. OUT/lit.txt has a line "stamp frame" for each frame that is not dark.
 """
 import pathlib
@@ -40,19 +41,22 @@ def write_black(file, width, height):
 
 
 def order_of(pieces, period_s, count):
-    """Pairs (frame, dark)."""
-    order = []
+    """Triples (frame, dark, periods of time since the first one)."""
+    order, now = [], 0
     for piece in pieces:
         what, _, dark = piece.partition("/")
-        if "*" in what:
-            frame, seconds = what.split("*")
+        kind, _, seconds = what.partition("*")
+        if seconds:
             number = round(float(seconds) / period_s)
-            order += [(order[-1][0], True)] * number if frame == "dark" else [(int(frame), False)] * number
+            frame = order[-1][0] if kind == "dark" else None if kind == "gap" else int(kind)
+            added = [(frame, kind == "dark")] * number
         else:
             first, last = (int(x) for x in what.split("-"))
             if not 0 <= first <= last < count:
                 raise SystemExit(f"rearrange.py: {piece}: the sequence has frames 0 to {count - 1}")
-            order += [(frame, dark == "dark") for frame in range(first, last + 1)]
+            added = [(frame, dark == "dark") for frame in range(first, last + 1)]
+        order += [(frame, is_dark, now + i) for i, (frame, is_dark) in enumerate(added) if frame is not None]
+        now += len(added)
     return order
 
 
@@ -71,7 +75,7 @@ def main():
     write_black(out / "dark.png", *size_of(source / frames[0][1]))
     images, poses, lit = [], [], []
     nearest = 0
-    for i, (frame, dark) in enumerate(order_of(sys.argv[3:], period_s, len(frames))):
+    for frame, dark, i in order_of(sys.argv[3:], period_s, len(frames)):
         stamp = f"{stamps[0] + i * period_s:.6f}"
         images.append(f"{stamp} {'dark.png' if dark else frames[frame][1]}")
         nearest = min(range(len(truth)), key=lambda k: abs(truth_stamps[k] - stamps[frame]))
