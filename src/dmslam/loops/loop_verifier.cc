@@ -114,7 +114,10 @@ std::string Describe(const VerifiedLoop& loop) {
       Text("%d of %d landmarks found in %d cells, share %.2f; proven %d of %d in %d, share %.2f",
            loop.support.found, loop.support.expected, loop.support.cells, loop.share, loop.proven.found,
            loop.proven.expected, loop.proven.cells, loop.proven_share);
-  if (loop.counter_share) text += Text("; seen from there %.2f", *loop.counter_share);
+  if (loop.counter_share)
+    text += Text("; seen from there %d of %d, share %.2f", loop.counter.found, loop.counter.expected,
+                 *loop.counter_share);
+  if (loop.joins) text += loop.at_same_time ? "; two maps, at the same time" : "; two maps";
   text += Text("; scale %.3f", 1.0 / loop.S_keyframe_world.scale);
   if (loop.drift_sigmas) text += Text("; drift %.1f sigma", *loop.drift_sigmas);
   return text;
@@ -279,6 +282,9 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
   loop.place = place.id;
   loop.S_keyframe_place = S_keyframe_place;
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
+  loop.joins = keyframe.map_id != place.map_id;
+  loop.at_same_time =
+      static_cast<double>(std::abs(keyframe.stamp_ns - place.stamp_ns)) * 1e-9 <= options_.same_time_s;
   loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
   const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
   loop.support = Look(map, keyframe, T_cam_world, loop.landmarks,
@@ -307,12 +313,15 @@ void LoopVerifier::MeasureProven(const Map& map, const Keyframe& keyframe, const
   KeepProven(map, &here);
   KeepProven(map, &there);
   const PlaceSupport own_here = Look(map, keyframe, keyframe.T_cam_world, here, radius);
-  const PlaceSupport own_there = Look(map, place, place.T_cam_world, there, radius);
+  PlaceSupport own_there = Look(map, place, place.T_cam_world, there, radius);
+  // A young map has nothing that is proven: then by all that stands there.
+  if (loop->joins && own_there.expected < options_.min_told)
+    own_there = Look(map, place, place.T_cam_world, loop->landmarks, radius);
   loop->proven = Look(map, keyframe, loop->S_keyframe_world.ToRigid(), there, radius);
   loop->proven_share = loop->proven.ShareOver(own_here.expected >= options_.min_told ? own_here : own);
   const Sim3d S_place_world = loop->S_keyframe_place.Inverse() * Sim3d(keyframe.T_cam_world);
-  const PlaceSupport counter = Look(map, place, S_place_world.ToRigid(), here, radius);
-  if (counter.expected >= options_.min_told) loop->counter_share = counter.ShareOver(own_there);
+  loop->counter = Look(map, place, S_place_world.ToRigid(), here, radius);
+  if (loop->counter.expected >= options_.min_told) loop->counter_share = loop->counter.ShareOver(own_there);
 }
 
 void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const {
@@ -320,15 +329,23 @@ void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks
                 [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), options_.proven); });
 }
 
+/// Within one map only what is proven around the place says so. Between two either side may: one of them may
+/// be too young to have anything proven. At the same time somebody who stands there is as good as a wall.
+bool LoopVerifier::IsNoPerson(const VerifiedLoop& loop, double min_share) const {
+  const auto says_so = [&](const PlaceSupport& proven, double share) {
+    return proven.found >= options_.min_proven && proven.cells >= options_.min_proven_cells &&
+           share >= min_share;
+  };
+  if (options_.min_proven == 0 || says_so(loop.proven, loop.proven_share)) return true;
+  return loop.joins && (loop.at_same_time || says_so(loop.counter, loop.counter_share.value_or(0.0)));
+}
+
 bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
   const bool seen = loop.support.found >= options_.min_matches && loop.support.cells >= options_.min_cells &&
                     loop.share >= min_share;
-  const bool no_person = options_.min_proven == 0 ||
-                         (loop.proven.found >= options_.min_proven &&
-                          loop.proven.cells >= options_.min_proven_cells && loop.proven_share >= min_share);
   const bool agreed = loop.counter_share.value_or(1.0) >= min_share;
   const bool plausible = loop.drift_sigmas.value_or(0.0) <= options_.max_drift_sigmas;
-  return seen && no_person && agreed && plausible;
+  return seen && IsNoPerson(loop, min_share) && agreed && plausible;
 }
 
 std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,

@@ -88,7 +88,10 @@ std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
   LoopDetector::Found found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
-  return std::move(found.candidates);
+  std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
+  counters_.candidates += places.size();
+  places.insert(places.begin(), found.candidates.begin(), found.candidates.end());
+  return places;
 }
 
 /// Proposals that nothing has confirmed for long.

@@ -96,5 +96,17 @@ TEST_F(Insertion, RefusesAReferenceThatIsUnknownOrOfAnotherMap) {
   EXPECT_EQ(map_.keyframes().size(), 2u);
 }
 
+/// The frontend proposed it before it heard of the weld.
+TEST_F(Insertion, AKeyframeOfAMapThatWasJoinedMeanwhileIsOneOfTheJoinedMap) {
+  std::vector<KeyframeId> all;
+  for (const auto& [id, keyframe] : map_.keyframes()) all.push_back(id);
+  for (const KeyframeId id : all) map_.SetMapId(id, 2);
+  for (const LandmarkId id : ids_) map_.SetMapId(id, 2);
+  const InsertionReport report = InsertKeyframe(map_, Seeing(10));
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_EQ(report.keyframe->map_id, 2u);
+  EXPECT_EQ(report.observations_dropped, 0);
+}
+
 }  // namespace
 }  // namespace dmslam

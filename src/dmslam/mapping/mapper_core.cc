@@ -88,7 +88,7 @@ bool MapperCore::OnInitialMap(const InitialMap& proposal) {
 bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   const Keyframe* keyframe = FindOrInsert(proposal);
   if (keyframe == nullptr) return false;
-  const MapId map_id = proposal.map_id;
+  const MapId map_id = keyframe->map_id;
   CullYoung(map_id);
   CreateLandmarks(map_, *keyframe, proposal.moving, options_.creation, maker_, &counters_.creation);
   RemoveSeenThroughBy(*keyframe);
@@ -118,7 +118,7 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   }
   order_.Add(proposal.id);
   ++counters_.keyframes_inserted;
-  Publish(MapEvent::kKeyframeInserted, proposal.id, proposal.map_id);
+  Publish(MapEvent::kKeyframeInserted, proposal.id, report.keyframe->map_id);
   return report.keyframe;
 }
 

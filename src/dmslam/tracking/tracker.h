@@ -48,6 +48,10 @@ class Tracker {
   /// The map that was tracked in is given up.
   void OnMapGivenUp();
 
+  /// The keyframe that the frame tracked last was placed by.
+  KeyframeId last_reference() const { return motion_.last().reference; }
+  /// Whether a place was recognised that waits to be confirmed.
+  bool IsRecovering() const { return recovery_.has_value(); }
   /// Stamp of the frame tracked last.
   int64_t last_tracked_ns() const { return motion_.last_stamp_ns(); }
   /// What frames said of landmarks since the last call.
