@@ -6,6 +6,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/util/check.h"
 
@@ -239,7 +240,8 @@ bool CollectorNode::EndIfDone() {
   const bool any_pose = std::any_of(builder_->frame_poses().begin(), builder_->frame_poses().end(),
                                     [](const auto& item) { return item.second.HasPose(); });
   std::string why = run_.frontend.head.reason;
-  Exit(any_pose ? 0 : 6, any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
+  Exit(any_pose ? kExitDone : kExitNoFrame,
+       any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
   return false;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dmslam/runtime/exit_codes.h"
+
 namespace dmslam {
 namespace {
 
@@ -25,7 +27,7 @@ std::optional<int> EndOfPlay::ExitCode(int64_t now_ns, bool stopped) const {
     return mapper_done_ || mapper_silent ? std::optional(0) : std::nullopt;
   }
   if (stopped && now_ns - since_ns_ > kNobodyWhenStoppedNs) return 0;
-  if (now_ns - std::max(frontend_heard_ns_, since_ns_) > kNobodyNs) return 5;
+  if (now_ns - std::max(frontend_heard_ns_, since_ns_) > kNobodyNs) return kExitNoFrontend;
   return std::nullopt;
 }
 

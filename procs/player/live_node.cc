@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dmslam/console/log.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
@@ -141,7 +142,7 @@ void LiveNode::Advance() {
   if (!ending_) return;
   if (end_.IsDue(now)) PublishEnd();
   if (const std::optional<int> code = end_.ExitCode(now, stopped_)) exit_code_ = code;
-  if (exit_code_ == 5) problem_ = EndOfPlay::NobodyAnswered();
+  if (exit_code_ == kExitNoFrontend) problem_ = EndOfPlay::NobodyAnswered();
 }
 
 void LiveNode::Stop() {

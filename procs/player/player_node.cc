@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dmslam/console/log.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 
@@ -200,7 +201,7 @@ void PlayerNode::PublishFrame() {
   late_ms_ = static_cast<double>(context_.now_ns() - DueNs(position_)) * 1e-6;
   ++position_;
   if (!MakeFrame(index)) {
-    if (!problem_.empty()) exit_code_ = 1;
+    if (!problem_.empty()) exit_code_ = kExitInput;
     return;
   }
   frame_.publish_us = context_.wall_us();
@@ -271,7 +272,7 @@ void PlayerNode::Advance() {
   if (position_ < order_.size() || awaiting_done_) return;
   if (end_.IsDue(now)) PublishEnd();
   if (const std::optional<int> code = end_.ExitCode(now, false)) exit_code_ = code;
-  if (exit_code_ == 5) problem_ = EndOfPlay::NobodyAnswered();
+  if (exit_code_ == kExitNoFrontend) problem_ = EndOfPlay::NobodyAnswered();
 }
 
 int64_t PlayerNode::deadline_ns() const {

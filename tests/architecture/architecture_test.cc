@@ -160,7 +160,7 @@ std::string Neighbour(const Include& include) {
   std::smatch from, to;
   if (!std::regex_search(include.file, from, place) || !std::regex_search(include.target, to, used))
     return "";
-  static const Names processes = {"player", "frontend", "mapper", "loopcloser", "collector", "viewer"};
+  static const Names processes = {"player", "frontend", "mapper", "loopcloser", "collector", "viewer", "run"};
   if (processes.count(to[1]) == 0 || to[1] == from[1]) return "";
   return "procs/" + from[1].str() + " may not use procs/" + to[1].str();
 }

@@ -62,7 +62,11 @@ CommandLineOption CommandLineOption::Needs(CommandLineOption other) {
 }
 
 CommandLine::CommandLine(const std::string& description, const std::string& name)
-    : owned_(std::make_unique<CLI::App>(description, name)), app_(owned_.get()) {}
+    : owned_(std::make_unique<CLI::App>(description, name)), app_(owned_.get()) {
+  app_->failure_message([](const CLI::App* app, const CLI::Error& error) {
+    return app->get_name() + ": " + error.what() + " (see --help)\n";
+  });
+}
 
 CommandLine::CommandLine(CLI::App* app) : app_(app) {}
 

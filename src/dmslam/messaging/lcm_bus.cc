@@ -16,6 +16,7 @@ namespace {
 constexpr int64_t kWantedReceiveBuffer = 4 << 20;
 
 bool IsUdp(const std::string& url) { return url.rfind("udpm://", 0) == 0; }
+bool IsTcp(const std::string& url) { return url.rfind("tcpq://", 0) == 0; }
 
 // Where the value of `key` stands in the URL's query: its offset and length.
 std::optional<std::pair<size_t, size_t>> FindQueryValue(const std::string& url, const std::string& key) {
@@ -49,7 +50,7 @@ std::string CureFor(const std::string& url) {
            "this host; "
            "the form is udpm://239.255.76.67:PORT?ttl=0";
   }
-  if (url.rfind("tcpq://", 0) == 0) return "is its server running? See docs/two-machines.md";
+  if (IsTcp(url)) return "is its server running? See docs/two-machines.md";
   return "known are udpm://GROUP:PORT?ttl=N, tcpq://HOST:PORT and memq://";
 }
 
@@ -92,7 +93,9 @@ LcmBus::LcmBus(Options options) : options_(std::move(options)) {
   options_.url = UrlWithBuffer(options_.url);
   impl_ = std::make_unique<Impl>(options_.url);
   const auto refuse = [this] {
-    throw InputError("LCM at " + options_.url + " cannot be used: " + CureFor(options_.url));
+    const std::string why = "LCM at " + options_.url + " cannot be used: " + CureFor(options_.url);
+    if (IsUdp(options_.url) || IsTcp(options_.url)) throw BusUnavailable(why);
+    throw InputError(why);
   };
   if (!impl_->lcm.good()) refuse();
   if (IsUdp(options_.url) && QueryValue(options_.url, "ttl").value_or("0") != "0") {
@@ -108,7 +111,7 @@ void LcmBus::Subscribe(const std::string& channel) {
   const std::string pattern = Literally(options_.prefix + channel);
   lcm::Subscription* subscription = impl_->lcm.subscribeFunction(pattern, &Impl::OnMessage, this);
   if (subscription == nullptr || impl_->lcm.getFileno() < 0) {
-    throw InputError("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));
+    throw BusUnavailable("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));
   }
   subscription->setQueueCapacity(options_.queue_capacity);
 }
@@ -129,7 +132,7 @@ int LcmBus::Deliver(int max_messages) {
     const int result = impl_->lcm.handleTimeout(0);
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
     if (result == 0) break;
-    if (result < 0) throw InputError("LCM at " + options_.url + " is lost: " + CureFor(options_.url));
+    if (result < 0) throw BusUnavailable("LCM at " + options_.url + " is lost: " + CureFor(options_.url));
   }
   return delivered;
 }

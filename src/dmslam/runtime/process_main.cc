@@ -10,7 +10,9 @@
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/messaging/lcm_bus.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/service_notice.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 
@@ -53,16 +55,19 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
 }
 
 int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
-  if (const std::optional<int> code = app_.Parse(argc, argv)) return *code;
+  if (const std::optional<int> code = app_.Parse(argc, argv)) return *code == 0 ? kExitDone : kExitUsage;
   SetUpLog(role_, quiet_);
   try {
     return RunNode(factory);
+  } catch (const BusUnavailable& error) {
+    LogError("{}", error.what());
+    return kExitNoBus;
   } catch (const InputError& error) {
     LogError("{}", error.what());
-    return 1;
+    return kExitInput;
   } catch (const std::exception& error) {
     LogCritical("stopped by an internal error: {}", error.what());
-    return 70;
+    return kExitInternal;
   }
 }
 
@@ -79,7 +84,11 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.bus = &bus;
   context.now_ns = &EventLoop::now_ns;
   context.wall_us = &EventLoop::wall_us;
-  context.pump = [&loop] { loop.PumpOnce(); };
+  ServiceNotice notice;
+  context.pump = [&loop, &notice] {
+    loop.PumpOnce();
+    notice.Alive(EventLoop::now_ns());
+  };
   context.watch = [&loop](int fd, std::function<void()> on_readable) {
     loop.Watch(fd, std::move(on_readable));
   };
@@ -88,10 +97,13 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.fresh_system = fresh_system_;
   const std::unique_ptr<Node> node = factory(context, options_);
   loop.Watch(bus.fd(), [&bus] { bus.Deliver(); });
+  notice.Ready();
   while (!node->exit_code()) {
+    notice.Alive(EventLoop::now_ns());
     node->Advance();
     if (node->exit_code()) break;
-    if (!loop.PumpOnce(node->deadline_ns()) || loop.stop_signal() != 0) node->Stop();
+    if (!loop.PumpOnce(std::min(node->deadline_ns(), notice.deadline_ns())) || loop.stop_signal() != 0)
+      node->Stop();
   }
   if (!node->problem().empty()) LogError("{}", node->problem());
   return *node->exit_code();

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "dmslam/console/log.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/util/random.h"
@@ -196,7 +197,7 @@ void StreamNode::RunElection() {
   if (!plan_ || writer_) return;
   if (!election_) StartElection();
   if (election_->state() == WriterElection::State::kWon && ReadyToWrite() && !exit_code_) OpenWriter();
-  if (election_->state() == WriterElection::State::kRefused) Exit(3, election_->refusal());
+  if (election_->state() == WriterElection::State::kRefused) Exit(kExitPresent, election_->refusal());
 }
 
 /// Of all whose acknowledgements are heard.
@@ -228,17 +229,17 @@ void StreamNode::OpenWriter() {
 void StreamNode::WatchWriter() {
   if (!writer_) return;
   if (writer_->superseded_by())
-    Exit(4, "another writer has taken over the stream: " + *writer_->superseded_by());
+    Exit(kExitSuperseded, "another writer has taken over the stream: " + *writer_->superseded_by());
   if (const std::optional<Version>& newer = writer_->newer_replica()) {
-    Exit(8, "another process holds version " + std::to_string(newer->epoch) + ":" +
-                std::to_string(newer->seq) +
-                ", which is newer than what this one began with; start it again");
+    Exit(kExitNewerMap, "another process holds version " + std::to_string(newer->epoch) + ":" +
+                            std::to_string(newer->seq) +
+                            ", which is newer than what this one began with; start it again");
   }
   if (writer_->close_requested_by() && !stopping_) {
     LogInfo("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
     Stop();
   }
-  if (stopping_ && writer_->closed() && !exit_code_) Exit(0);
+  if (stopping_ && writer_->closed() && !exit_code_) Exit(kExitDone);
 }
 
 bool StreamNode::JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum) {
@@ -271,7 +272,8 @@ void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
 
 void StreamNode::WatchReaders() {
   constexpr char kDoubtful[] =
-      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is gone";
+      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is "
+      "gone";
   if (writer_) {
     const WriterStatistics s = writer_->statistics();
     if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
@@ -335,7 +337,7 @@ void StreamNode::Stop() {
   if (writer_) {
     writer_->Close(context_.now_ns());
   } else {
-    Exit(0);
+    Exit(kExitDone);
   }
 }
 

@@ -1,0 +1,216 @@
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <regex>
+
+#include "dmslam/console/command_line.h"
+#include "dmslam/runtime/exit_codes.h"
+#include "dmslam/util/build_version.h"
+#include "dmslam/util/check.h"
+#include "run/run_plan.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using dmslam::ChildEvent;
+
+constexpr int64_t kFarewellNs = 2'000'000'000;  // once the results are there, the others end by themselves
+
+void Say(const std::string& text) { std::fputs(("dmslam-run: " + text + "\n").c_str(), stderr); }
+
+std::string OwnFolder() { return fs::read_symlink("/proc/self/exe").parent_path().string(); }
+
+std::string Seconds(int64_t ns) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1f s", static_cast<double>(ns) * 1e-9);
+  return text;
+}
+
+/// A run from its first process to its results.
+class Run {
+ public:
+  Run(const dmslam::RunArguments& arguments, const dmslam::RunPlace& place,
+      dmslam::Supervisor::Options options)
+      : place_(place), plan_(dmslam::MakeRunPlan(arguments, place)), supervisor_(options) {}
+
+  int Play() {
+    fs::remove(plan_.table);
+    for (const auto* children : {&plan_.companions, &plan_.pipeline}) {
+      for (const dmslam::ChildSpec& child : *children) Begin(child);
+    }
+    Watch();
+    if (signal_ == 0 && code_ == 0) StayOpen();
+    supervisor_.StopAll();
+    PrintTable();
+    if (signal_ == 0 && code_ == 0)
+      std::printf("results: %s (picture: %s/trajectory.png)\n", place_.out.c_str(), place_.out.c_str());
+    return signal_ == 0 ? code_ : dmslam::kExitSignal + signal_;
+  }
+
+ private:
+  void Begin(const dmslam::ChildSpec& child) {
+    if (child.errors != child.output && !child.errors_to_ours) fs::remove(child.errors);
+    if (child.name != "collector") fs::remove(child.output);
+    supervisor_.Start(child);
+    if (child.name == "viewer") ShowViewer();
+  }
+
+  /// Its address, once it has one.
+  void ShowViewer() {
+    const int64_t deadline = dmslam::Supervisor::now_ns() + 5'000'000'000;
+    while (supervisor_.Alive("viewer") && dmslam::Supervisor::now_ns() < deadline) {
+      supervisor_.Wait(dmslam::Supervisor::now_ns() + 50'000'000);
+      std::ifstream log(place_.LogOf("viewer"));
+      const std::string text(std::istreambuf_iterator<char>(log), {});
+      std::smatch match;
+      if (!std::regex_search(text, match, std::regex("to be seen at (http[^ \n]*)"))) continue;
+      Say("to be seen at " + match[1].str());
+      OpenBrowser(match[1]);
+      return;
+    }
+    throw dmslam::InputError("the viewer did not start: " + LastWords("viewer"));
+  }
+
+  static void OpenBrowser(const std::string& address) {
+    if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
+    if (std::system(("xdg-open '" + address + "' </dev/null >/dev/null 2>&1 &").c_str()) != 0) return;
+  }
+
+  bool PipelineAlive() const {
+    const bool only_viewer = !supervisor_.Alive("viewer") && !supervisor_.Alive("logger");
+    const size_t companions =
+        (supervisor_.Alive("viewer") ? 1u : 0u) + (supervisor_.Alive("logger") ? 1u : 0u);
+    return only_viewer ? supervisor_.size() > 0 : supervisor_.size() > companions;
+  }
+
+  /// The collector ends last. Whoever dies before it is started again; whoever fails ends the run.
+  void Watch() {
+    int64_t deadline = INT64_MAX;
+    while (PipelineAlive() && code_ == 0 && signal_ == 0) {
+      const ChildEvent event = supervisor_.Wait(deadline);
+      if (event.kind == ChildEvent::Kind::kTime) return;
+      Handle(event);
+      if (collected_ && deadline == INT64_MAX) deadline = dmslam::Supervisor::now_ns() + kFarewellNs;
+    }
+  }
+
+  void Handle(const ChildEvent& event) {
+    if (event.kind == ChildEvent::Kind::kSignal) return Interrupt(event.code);
+    if (event.kind == ChildEvent::Kind::kRestarted) return SayRestart(event);
+    if (event.name == "viewer" || event.name == "logger") return;
+    if (event.yields) return Say(event.name + ": another one has taken its place, and goes on");
+    if (event.code != 0) return Fail(event);
+    if (event.name != "collector") return;
+    collected_ = true;
+    supervisor_.StopRestarting();
+  }
+
+  void Interrupt(int signal) {
+    signal_ = signal;
+    supervisor_.StopAll();
+    if (signal == SIGINT) Say("interrupted; what was tracked is in " + place_.out);
+  }
+
+  static std::string HowItEnded(const ChildEvent& event) {
+    if (event.hung) return "said nothing for too long and was killed";
+    if (event.code > dmslam::kExitSignal)
+      return "was ended by signal " + std::to_string(event.code - dmslam::kExitSignal);
+    return "ended with code " + std::to_string(event.code);
+  }
+
+  static void SayRestart(const ChildEvent& event) {
+    const std::string when = event.delay_ns > 0 ? " in " + Seconds(event.delay_ns) : "";
+    Say(event.name + " " + HowItEnded(event) + "; started again" + when + " (" +
+        std::to_string(event.restarts) + ")");
+  }
+
+  void Fail(const ChildEvent& event) {
+    code_ = event.code;
+    if (event.name == "collector" && place_.terminal) return;  // it has spoken on the terminal itself
+    const std::string log = "; its log is " + place_.LogOf(event.name);
+    std::string words = event.code > dmslam::kExitSignal ? "" : LastWords(event.name);
+    Say(words.empty() ? event.name + " " + HowItEnded(event) + log : words);
+  }
+
+  std::string LastWords(const std::string& name) const { return dmslam::LastWords(name, place_.LogOf(name)); }
+
+  /// Who has a terminal can go on looking at what was made.
+  void StayOpen() {
+    if (!supervisor_.Alive("viewer") || isatty(STDIN_FILENO) == 0 || !place_.terminal) return;
+    PrintTable();
+    Say("the results are in " + place_.out + "; the viewer stays until Ctrl-C");
+    while (supervisor_.Alive("viewer") && supervisor_.Wait().kind != ChildEvent::Kind::kSignal) {
+    }
+  }
+
+  void PrintTable() {
+    std::ifstream table(plan_.table);
+    if (table && table.peek() != std::ifstream::traits_type::eof()) std::cout << table.rdbuf() << std::flush;
+    table.close();
+    std::error_code ignored;
+    fs::remove(plan_.table, ignored);
+  }
+
+  dmslam::RunPlace place_;
+  dmslam::RunPlan plan_;
+  dmslam::Supervisor supervisor_;
+  int code_ = 0, signal_ = 0;
+  bool collected_ = false;
+};
+
+dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
+  dmslam::RunPlace place;
+  place.programs = a.programs.empty() ? OwnFolder() : a.programs + "/bin";
+  place.out = a.out;
+  place.terminal = isatty(STDERR_FILENO) != 0;
+  if (access((place.programs + "/dmslam-frontend").c_str(), X_OK) != 0)
+    throw dmslam::InputError(place.programs + " has no dmslam-frontend; build first, or check --build-dir");
+  if ((a.viewer || !a.http.empty()) && access((place.programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
+    throw dmslam::InputError(place.programs +
+                             " has no dmslam-viewer; install what it needs with scripts/setup.sh viewer and "
+                             "build again");
+  }
+  std::error_code error;
+  fs::create_directories(a.out + "/log", error);
+  if (error) throw dmslam::InputError(a.out + " cannot be made: " + error.message() + "; check --out");
+  place.port = a.port.empty() ? dmslam::FreePort() : std::atoi(a.port.c_str());
+  return place;
+}
+
+int RunWith(const dmslam::RunArguments& arguments) {
+  dmslam::CheckRunArguments(arguments);
+  dmslam::Supervisor::Options options;
+  options.watchdog_ns = static_cast<int64_t>(arguments.watchdog_s * 1e9);
+  options.wait_for_bus = arguments.wait_for_bus;
+  Run run(arguments, PlaceOf(arguments), options);
+  return run.Play();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  dmslam::CommandLine line(
+      "Plays a sequence through player, frontend, mapper and loop closer, four processes on a private LCM "
+      "port, and writes into the --out folder: trajectory.txt (final, TUM format), trajectory_online.txt, "
+      "keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A process that dies "
+      "or hangs is started again, and goes on where it was.",
+      "dmslam-run");
+  dmslam::RunArguments arguments;
+  line.SetVersion(dmslam::BuildVersion());
+  dmslam::DeclareRunArguments(line, arguments);
+  if (const std::optional<int> code = line.Parse(argc, argv))
+    return *code == 0 ? 0 : static_cast<int>(dmslam::kExitUsage);
+  try {
+    return RunWith(arguments);
+  } catch (const dmslam::InputError& error) {
+    Say(error.what());
+    return dmslam::kExitInput;
+  } catch (const std::exception& error) {
+    Say(std::string("stopped by an internal error: ") + error.what());
+    return dmslam::kExitInternal;
+  }
+}

@@ -1,0 +1,240 @@
+#include "run/run_plan.h"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <regex>
+#include <sstream>
+
+#include "dmslam/recording/log_index.h"
+#include "dmslam/util/check.h"
+#include "run/log_replay.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
+
+void Append(Words* words, const Words& more) { words->insert(words->end(), more.begin(), more.end()); }
+void AppendOption(Words* words, const std::string& option, const std::string& value) {
+  if (!value.empty()) Append(words, {option, value});
+}
+
+uint32_t RandomBelow(uint32_t end) {
+  std::random_device device;
+  return std::uniform_int_distribution<uint32_t>(0, end - 1)(device);
+}
+
+bool InPath(const std::string& program) {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "/usr/bin" : path);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (access((folder + "/" + program).c_str(), X_OK) == 0) return true;
+  }
+  return false;
+}
+
+void NeedTool(const std::string& program) {
+  if (!InPath(program)) throw InputError(program + " is missing; install liblcm-bin (scripts/setup.sh core)");
+}
+
+/// Ids of this run come after those of the map that it begins in.
+uint32_t ChooseSession(const RunArguments& a) {
+  if (a.map.empty()) return 1 + RandomBelow(1u << 30);
+  return LogIndex(a.map).Session().id + 1;
+}
+
+std::string Url(const RunArguments& a, const RunPlace& place) {
+  return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + a.receive_buffer;
+}
+
+/// What all processes are told.
+Words CommonArguments(const RunArguments& a, const RunPlace& place) {
+  Words common;
+  if (!a.profile.empty()) Append(&common, {"--set", "profile=" + a.profile});
+  AppendOption(&common, "--config", a.config);
+  for (const std::string& set : a.sets) Append(&common, {"--set", set});
+  if (a.no_loop) Append(&common, {"--set", "loop.enabled=off"});
+  AppendOption(&common, "--prefix", a.prefix);
+  if (!a.map.empty()) Append(&common, {"--set", "map.saved=on"});
+  if (a.localize) Append(&common, {"--set", "map.localize_only=on"});
+  Append(&common, {"--set", "seed=" + a.seed, "--lcm-url", Url(a, place), "--session",
+                   std::to_string(ChooseSession(a)), "--peers", "frontend,mapper,loopcloser,collector"});
+  if (!a.replay.empty()) common.push_back("--accept-recorded");
+  return common;
+}
+
+/// How frames are changed: also of a copy of a log that is to be replayed.
+Words FrameArguments(const RunArguments& a) {
+  Words words;
+  AppendOption(&words, "--start", a.start);
+  AppendOption(&words, "--frames", a.frames);
+  for (const std::string& text : a.black_outs) Append(&words, {"--black-out", text});
+  for (const std::string& text : a.jumps) Append(&words, {"--jump", text});
+  AppendOption(&words, "--camera", a.camera);
+  return words;
+}
+
+Words PlayerArguments(const RunArguments& a) {
+  Words words = FrameArguments(a);
+  AppendOption(&words, "--encoding", a.encoding);
+  if (a.fps > 0) Append(&words, {"--fps", std::to_string(a.fps)});
+  Append(&words, {"--speed", std::to_string(a.speed)});
+  if (a.lockstep) words.push_back("--lockstep");
+  return words;
+}
+
+/// One word of a shell.
+std::string Quoted(const std::string& word) {
+  std::string quoted = "'";
+  quoted += std::regex_replace(word, std::regex("'"), "'\\''");
+  return quoted += "'";
+}
+
+/// lcm-logplayer plays whole logs, as they are: for anything else it gets a copy.
+std::string LogToReplay(const RunArguments& a, const RunPlace& place) {
+  const Words changes = FrameArguments(a);
+  if (changes.empty() && PrefixOfCamera(a.replay) == a.prefix) return a.replay;
+  const std::string copy = place.out + "/log/replayed.lcmlog";
+  std::string command = Quoted(place.programs + "/dmslam-player");
+  Words words = changes;
+  Append(&words, {"--prefix", a.prefix, "--log", a.replay, "--to-log", copy});
+  for (const std::string& word : words) command += " " + Quoted(word);
+  command += " 2>" + Quoted(place.LogOf("player"));
+  if (std::system(command.c_str()) != 0) throw InputError(LastWords("player", place.LogOf("player")));
+  return copy;
+}
+
+ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPlace& place, Words arguments) {
+  ChildSpec child;
+  child.name = name;
+  child.arguments = std::move(arguments);
+  child.arguments.insert(child.arguments.begin(), place.programs + "/dmslam-" + name);
+  child.first = {"--fresh-system"};  // only at the beginning nobody else can be writing
+  child.output = child.errors = place.LogOf(name);
+  child.pid_file = place.out + "/log/" + name + ".pid";
+  child.restart = !a.no_restart;
+  return child;
+}
+
+ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& common) {
+  if (a.replay.empty()) {
+    Words words = common;
+    Append(&words, PlayerArguments(a));
+    Append(&words, a.log.empty() ? Words{"--sequence", a.sequence} : Words{"--log", a.log});
+    return MakeChild("player", a, place, words);
+  }
+  NeedTool("lcm-logplayer");
+  LogReplay replay;
+  replay.log = LogToReplay(a, place);
+  replay.lcm_url = Url(a, place);
+  replay.speed = a.speed;
+  replay.port = place.port;
+  replay.frontend_pid_file = place.out + "/log/frontend.pid";
+  ChildSpec child = MakeChild("player", a, place, {});
+  child.body = [replay] { return PlayLog(replay); };
+  return child;
+}
+
+Words GroundTruth(const RunArguments& a) {
+  const std::string file = a.sequence + "/groundtruth.txt";
+  return !a.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
+}
+
+ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Words& common) {
+  Words words = common;
+  if (place.terminal) words.push_back("--quiet");
+  Append(&words, {"--out", a.out});
+  Append(&words, GroundTruth(a));
+  ChildSpec child = MakeChild("collector", a, place, words);
+  child.output = place.out + "/log/table.txt";
+  child.errors_to_ours = place.terminal;
+  return child;
+}
+
+ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
+  Words words = common;
+  if (a.pictures != "0") {
+    fs::create_directories(place.out + "/pictures");
+    Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.pictures});
+  }
+  return MakeChild("frontend", a, place, words);
+}
+
+ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
+  AppendOption(&words, "--map", a.map);
+  AppendOption(&words, "--save-map", a.save_map);
+  return MakeChild("mapper", a, place, std::move(words));
+}
+
+ChildSpec MakeCompanion(ChildSpec child) {
+  child.first.clear();
+  child.pid_file.clear();
+  child.restart = false;
+  return child;
+}
+
+ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {
+  NeedTool("lcm-logger");
+  const std::string log = place.out + "/run.lcmlog";
+  fs::remove(log);
+  ChildSpec child = MakeCompanion(MakeChild("logger", a, place, {}));
+  child.arguments = {"lcm-logger", "--quiet", "--lcm-url=" + Url(a, place), log};
+  child.stop_signal = SIGINT;
+  return child;
+}
+
+ChildSpec MakeViewer(const RunArguments& a, const RunPlace& place, const Words& common) {
+  Words words = common;
+  AppendOption(&words, "--http", a.http);
+  Append(&words, GroundTruth(a));
+  return MakeCompanion(MakeChild("viewer", a, place, words));
+}
+
+std::string Matched(const std::string& line, const char* pattern, const char* with) {
+  return std::regex_replace(line, std::regex(pattern), with);
+}
+
+}  // namespace
+
+int FreePort() {
+  int port = 0;
+  for (int i = 0; i < 50; ++i) {
+    port = 20000 + static_cast<int>(RandomBelow(30000));
+    if (!PortTaken(port)) break;
+  }
+  return port;
+}
+
+RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
+  const Words common = CommonArguments(a, place);
+  RunPlan plan;
+  plan.table = place.out + "/log/table.txt";
+  plan.pipeline = {MakeMapper(a, place, common), MakeChild("loopcloser", a, place, common),
+                   MakeFrontend(a, place, common), MakeCollector(a, place, common),
+                   MakePlayer(a, place, common)};
+  if (a.record) plan.companions.push_back(MakeLogger(a, place));
+  if (a.viewer || !a.http.empty()) plan.companions.push_back(MakeViewer(a, place, common));
+  return plan;
+}
+
+std::string LastWords(const std::string& name, const std::string& log) {
+  static const std::regex error(" (error|critical): "), event("^[0-9:.]+ ");
+  std::ifstream lines(log);
+  std::string worst, first_bare, last;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find_first_not_of(' ') == std::string::npos) continue;
+    if (std::regex_search(line, error)) worst = line;
+    if (first_bare.empty() && !std::regex_search(line, event)) first_bare = line;
+    last = line;
+  }
+  if (!worst.empty()) return Matched(Matched(worst, "^[0-9:.]* ", ""), " (error|critical): ", ": ");
+  if (!first_bare.empty()) return name + ": " + first_bare;
+  return Matched(last, "^[0-9:.]* ", "");
+}
+
+}  // namespace dmslam

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "run/run_options.h"
+#include "run/supervisor.h"
+
+namespace dmslam {
+
+/// Who is started for a run, and how.
+struct RunPlan {
+  std::vector<ChildSpec> pipeline;    ///< mapper, loop closer, frontend, collector, player: in this order
+  std::vector<ChildSpec> companions;  ///< logger, viewer: nobody waits for them
+  std::string table;                  ///< file with what the collector printed
+};
+
+/// Where a run writes, and where its programs are.
+struct RunPlace {
+  std::string programs;  ///< folder of the programs
+  std::string out;
+  int port = 0;
+  bool terminal = false;  ///< standard error is one: the collector shows its progress there
+  std::string LogOf(const std::string& name) const { return out + "/log/" + name + ".log"; }
+};
+
+/// Reads what it must: the map's session, the log that is replayed. Throws InputError.
+RunPlan MakeRunPlan(const RunArguments& arguments, const RunPlace& place);
+
+/// A port between 20000 and 49999 that nobody on this host is bound to.
+int FreePort();
+
+/// What a process said before it failed, from its log: its last error, or what its command line lacked.
+std::string LastWords(const std::string& name, const std::string& log);
+
+}  // namespace dmslam

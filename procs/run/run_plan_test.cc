@@ -1,0 +1,118 @@
+#include "run/run_plan.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RunPlanTest : public testing::Test {
+ protected:
+  RunPlanTest() : folder_(testing::TempDir() + "/dmslam_run_" + std::to_string(getpid())) {
+    fs::create_directories(folder_ + "/sequence");
+    fs::create_directories(folder_ + "/log");
+    arguments_.sequence = folder_ + "/sequence";
+    arguments_.out = place_.out = folder_;
+    place_.programs = "/bin";
+    place_.port = 20001;
+  }
+  ~RunPlanTest() override { fs::remove_all(folder_); }
+
+  std::string Refusal() {
+    try {
+      CheckRunArguments(arguments_);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::vector<std::string> ArgumentsOf(const std::string& name) {
+    const RunPlan plan = MakeRunPlan(arguments_, place_);
+    for (const ChildSpec& child : plan.pipeline) {
+      if (child.name == name) return child.arguments;
+    }
+    return {};
+  }
+  std::string Line(const std::string& name) {
+    std::string line;
+    for (const std::string& word : ArgumentsOf(name)) line += word + " ";
+    return line;
+  }
+
+  std::string folder_;
+  RunArguments arguments_;
+  RunPlace place_;
+};
+
+TEST_F(RunPlanTest, RefusesWhatDoesNotFit) {
+  EXPECT_EQ(Refusal(), "");
+  arguments_.log = "there.log";
+  EXPECT_NE(Refusal().find("one of"), std::string::npos);
+  arguments_.log.clear();
+  arguments_.localize = true;
+  EXPECT_NE(Refusal().find("--localize needs a map"), std::string::npos);
+  arguments_.localize = false;
+  arguments_.seed = "many";
+  EXPECT_NE(Refusal().find("whole number"), std::string::npos);
+  arguments_.seed = "1";
+  arguments_.port = "80";
+  EXPECT_NE(Refusal().find("between 1024 and 65535"), std::string::npos);
+  arguments_.port.clear();
+  arguments_.sequence = "/nowhere/at/all";
+  EXPECT_NE(Refusal().find("no such folder"), std::string::npos);
+  arguments_.sequence = "/dev/video77";
+  EXPECT_EQ(Refusal(), "") << "a camera may come later";
+}
+
+TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
+  arguments_.sets = {"features.count=1200"};
+  arguments_.no_loop = arguments_.lockstep = true;
+  arguments_.profile = "baseline";
+  arguments_.black_outs = {"10,1"};
+  arguments_.save_map = "map.log";
+  std::ofstream(arguments_.sequence + "/groundtruth.txt") << "# none\n";
+  std::string session;
+  for (const char* name : {"mapper", "loopcloser", "frontend", "collector", "player"}) {
+    const std::string line = Line(name);
+    EXPECT_EQ(line.rfind("/bin/dmslam-" + std::string(name) + " --set profile=baseline ", 0), 0u) << line;
+    for (const char* part : {"--set features.count=1200 ", "--set loop.enabled=off ", "--set seed=1 ",
+                             "--lcm-url udpm://239.255.76.67:20001?ttl=0&recv_buf_size=4194304 ",
+                             "--peers frontend,mapper,loopcloser,collector "}) {
+      EXPECT_NE(line.find(part), std::string::npos) << line;
+    }
+  }
+  EXPECT_NE(Line("player").find("--black-out 10,1 "), std::string::npos);
+  EXPECT_NE(Line("player").find("--lockstep "), std::string::npos);
+  EXPECT_NE(Line("mapper").find("--save-map map.log "), std::string::npos);
+  EXPECT_NE(Line("collector").find("--ground-truth "), std::string::npos);
+  EXPECT_EQ(Line("frontend").find("--lockstep"), std::string::npos);
+}
+
+TEST_F(RunPlanTest, FindsSocketsOnAPort) {
+  std::ofstream(folder_ + "/udp")
+      << "   sl  local_address rem_address\n"
+         "  12: 00000000:4E21 00000000:0000 07\n  13: 00000000:4E21 0100007F:4E22 07\n";
+  EXPECT_EQ(SocketsOn(0x4e21, folder_), 2);
+  EXPECT_FALSE(PortTaken(0x4e22, folder_)) << "a peer's port is not ours";
+}
+
+TEST_F(RunPlanTest, TellsWhatAProcessSaidLast) {
+  const std::string log = folder_ + "/log/mapper.log";
+  std::ofstream(log) << "12:00:01.123 mapper info: begins\n12:00:02.000 mapper error: x.yaml: is not there\n"
+                        "12:00:03.000 mapper info: ends\n";
+  EXPECT_EQ(LastWords("mapper", log), "mapper: x.yaml: is not there");
+  std::ofstream(log) << "12:00:01.123 mapper info: begins\ndmslam-mapper: what is --this (see --help)\n";
+  EXPECT_EQ(LastWords("mapper", log), "mapper: dmslam-mapper: what is --this (see --help)");
+  EXPECT_EQ(LastWords("mapper", folder_ + "/none"), "");
+}
+
+}  // namespace
+}  // namespace dmslam

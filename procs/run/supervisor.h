@@ -1,0 +1,118 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <csignal>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <list>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dmslam {
+
+/// A process to be started, and started again.
+struct ChildSpec {
+  std::string name;                    ///< "mapper"
+  std::vector<std::string> arguments;  ///< the program's path first
+  std::vector<std::string> first;      ///< only at its first start, behind the others
+  std::function<int()> body;           ///< instead of a program: called in a process of its own
+  std::string output, errors;          ///< files that standard output and standard error are appended to
+  bool errors_to_ours = false;         ///< standard error is the supervisor's own
+  std::string pid_file;                ///< holds its process id; empty: none
+  bool restart = true;                 ///< where that is worth it
+  int stop_signal = SIGTERM;
+};
+
+/// What became of a child, or who spoke to the supervisor.
+struct ChildEvent {
+  enum class Kind : uint8_t {
+    kEnded,      ///< and stays so
+    kRestarted,  ///< died, and is started again after `delay_ns`
+    kSignal,     ///< the supervisor itself was asked to stop; `code` is the signal
+    kTime,       ///< nothing happened until the deadline
+  };
+  Kind kind = Kind::kTime;
+  std::string name;
+  int code = 0;         ///< exit code, or 128 + signal
+  int restarts = 0;     ///< of this child so far
+  bool hung = false;    ///< it said nothing for too long, and was killed
+  bool yields = false;  ///< another process has taken its place: no failure
+  int64_t delay_ns = 0;
+};
+
+/// Starts processes and starts again those that die or hang. It cannot miss a death: whoever has ended is
+/// asked for until nobody is left, however many die at once. Its children end with it, whatever ends it.
+///
+/// One for a program, made before any thread: it takes SIGCHLD, SIGINT, SIGTERM and SIGHUP for itself.
+class Supervisor {
+ public:
+  struct Options {
+    int64_t short_life_ns = 3'000'000'000;  ///< who lives for less has made no progress
+    int most_short_lives = 8;               ///< in a row; then it is past help
+    int64_t first_delay_ns = 200'000'000;   ///< before the second start in a row; doubles with each
+    int64_t longest_delay_ns = 5'000'000'000;
+    int64_t bus_patience_ns = 60'000'000'000;  ///< for so long the bus may be gone; never at the first start
+    bool wait_for_bus = false;                 ///< ... for ever, and at the first start too
+    int64_t watchdog_ns = 0;                   ///< who says nothing for so long hangs; 0: nobody is asked
+    int64_t stop_ns = 10'000'000'000;          ///< who does not end when asked to is killed after so long
+  };
+
+  explicit Supervisor(Options options);
+  /// Kills whom it has.
+  ~Supervisor();
+  Supervisor(const Supervisor&) = delete;
+  Supervisor& operator=(const Supervisor&) = delete;
+
+  /// Starts it. Throws InputError where no process can be made.
+  void Start(ChildSpec spec);
+  /// The next event; kTime when `deadline_ns` (of the monotonic clock) comes before.
+  ChildEvent Wait(int64_t deadline_ns = INT64_MAX);
+  /// From now on nobody is started again.
+  void StopRestarting();
+  /// Asks all to end, kills those that do not, and returns when nobody is left. A signal kills at once.
+  void StopAll();
+
+  bool Alive(const std::string& name) const;
+  /// Of those alive or about to be started again.
+  size_t size() const;
+  /// 0 where it is not alive.
+  pid_t PidOf(const std::string& name) const;
+  static int64_t now_ns();
+
+ private:
+  struct Child {
+    ChildSpec spec;
+    pid_t pid = 0;               // 0: not alive
+    int64_t began_ns = 0;        // its newest life
+    int64_t due_ns = INT64_MAX;  // when it is started again
+    int64_t heard_ns = 0;        // when it last said that it is alive; 0: never
+    int64_t bus_gone_ns = 0;     // since when the bus cannot be had; 0: it can
+    int restarts = 0, short_lives = 0, last_code = 0;
+    bool lived = false;  // long enough to be worth patience
+    bool hung = false;
+  };
+  void Launch(Child* child);
+  [[noreturn]] void BecomeChild(const Child& child, int output, int errors);
+  void Reap();
+  void OnDeath(Child* child, int code);
+  std::optional<int64_t> DelayBeforeRestart(Child* child, int code);
+  void StartDue();
+  void HearNotices();
+  void KillHung();
+  void TakeSignals();
+  void Poll(int64_t deadline_ns);
+  int64_t NextDeadline() const;
+
+  Options options_;
+  std::list<Child> children_;
+  std::deque<ChildEvent> events_;
+  bool restarting_ = true;
+  int signal_fd_ = -1, notice_fd_ = -1;
+  std::string notice_address_;
+  sigset_t former_mask_{};
+};
+
+}  // namespace dmslam

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace dmslam {
+
+/// Tells whoever started this process, dmslam-run or systemd, that it is ready and, again and again, that it
+/// is alive: one that hangs is killed and started again. Speaks the protocol of sd_notify (NOTIFY_SOCKET,
+/// WATCHDOG_USEC); where nobody asked for it, says nothing.
+class ServiceNotice {
+ public:
+  /// Reads the environment.
+  ServiceNotice();
+  ~ServiceNotice();
+  ServiceNotice(const ServiceNotice&) = delete;
+  ServiceNotice& operator=(const ServiceNotice&) = delete;
+
+  void Ready();
+  /// Says so, four times within the time that was asked for. Cheap: to be called from every turn of a loop.
+  void Alive(int64_t now_ns);
+  /// When Alive wants to be called next.
+  int64_t deadline_ns() const { return next_ns_; }
+
+ private:
+  void Send(std::string_view text);
+
+  int socket_ = -1;
+  std::string address_;
+  int64_t every_ns_ = 0;  ///< 0: nobody asked
+  int64_t next_ns_ = INT64_MAX;
+};
+
+}  // namespace dmslam

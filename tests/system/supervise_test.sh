@@ -1,0 +1,53 @@
+# Processes that die together, and one that hangs: dmslam-run misses none, and the run comes to its end.
+source "$(dirname "$0")/lib.sh"
+need_synthetic
+multicast
+arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --lockstep --seed 1 --watchdog 4)
+
+pid_of() { # PROCESS
+  mine | sed -nE "s/^([0-9]+): [^ ]*bin\/dmslam-$1 .*/\1/p" | head -n 1
+}
+frames() { sed -nE 's/.*frame ([0-9]+) of .*/\1/p' "$work/$1/log/collector.log" 2>/dev/null | tail -n 1; }
+# begin NAME FRAME: a run in the background, until its collector has seen that frame; sets `runner`.
+begin() {
+  "$root/scripts/run.sh" --build-dir "$build" "${arguments[@]}" --out "$work/$1" >"$work/$1.said" 2>&1 </dev/null &
+  runner=$!
+  local i frame
+  for ((i = 0; i < 1200; ++i)); do
+    frame=$(frames "$1")
+    ((${frame:--1} < $2)) || return
+    sleep 0.05
+  done
+  failed "'$1' did not begin: $(cat "$work/$1.said")"
+}
+strike() { # SIGNAL PROCESS...: at once
+  local signal=$1 pids=() process
+  shift
+  for process in "$@"; do pids+=("$(pid_of "$process")"); done
+  kill "-$signal" "${pids[@]}"
+}
+ends() { # NAME RESTARTS
+  local status=0
+  wait "$runner" || status=$?
+  ((status == 0)) || failed "'$1' ended with $status; it said: $(cat "$work/$1.said")"
+  (($(grep -c "started again" "$work/$1.said") == $2)) || failed "'$1' did not start $2 again: $(cat "$work/$1.said")"
+  check "'$1' has results" test -s "$work/$1/trajectory.txt"
+  no_orphans "$1"
+}
+
+begin two 40
+strike KILL player collector
+ends two 2
+expect "nothing is lost with player and collector" "$work/two" records_lost "== 0"
+expect "no keyframe is missing with player and collector" "$work/two" keyframes_missing "== 0"
+
+begin five 40
+strike KILL player collector frontend mapper loopcloser
+ends five 5
+
+begin hung 40
+strike STOP mapper
+ends hung 1
+check "it says who hung" grep -q "mapper said nothing for too long" "$work/hung.said"
+expect "nothing is lost with a mapper that hangs" "$work/hung" records_lost "== 0"
+finish
