@@ -15,7 +15,6 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kMisfitNs = 2'000'000'000;
-constexpr int64_t kStatusEveryNs = 1'000'000'000;
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kCameraSilentNs = 1'500'000'000;
 constexpr int64_t kTidyEveryNs = 60'000'000'000;
@@ -271,7 +270,8 @@ void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
 
 void StreamNode::WatchReaders() {
   constexpr char kDoubtful[] =
-      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is gone";
+      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is "
+      "gone";
   if (writer_) {
     const WriterStatistics s = writer_->statistics();
     if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
