@@ -30,7 +30,7 @@ struct Camera {
 
   /// The ideal (undistorted) pixel of a point in the camera frame; none for points at or behind the camera.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_cam) const {
-    if (!(p_cam.z() > 1e-9)) return std::nullopt;
+    if (!(p_cam.z() > kMinDepth)) return std::nullopt;
     return Eigen::Vector2d(fx_px * p_cam.x() / p_cam.z() + cx_px, fy_px * p_cam.y() / p_cam.z() + cy_px);
   }
   /// Undistorted pixel to the ray through it, with z = 1.

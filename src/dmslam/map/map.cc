@@ -4,21 +4,10 @@
 #include <cmath>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/sorted.h"
 
 namespace dmslam {
 namespace {
-
-template <typename T>
-void InsertSorted(std::vector<T>& values, const T& value) {
-  const auto at = std::lower_bound(values.begin(), values.end(), value);
-  if (at == values.end() || *at != value) values.insert(at, value);
-}
-
-template <typename T>
-void EraseSorted(std::vector<T>& values, const T& value) {
-  const auto at = std::lower_bound(values.begin(), values.end(), value);
-  if (at != values.end() && *at == value) values.erase(at);
-}
 
 auto WhereObserved(std::vector<Observation>& observations, KeyframeId keyframe) {
   return std::ranges::lower_bound(observations, keyframe, {}, &Observation::keyframe);

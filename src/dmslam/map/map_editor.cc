@@ -4,18 +4,13 @@
 #include <utility>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/sorted.h"
 
 namespace dmslam {
 namespace {
 
 using KeyframeChange = MapJournal::KeyframeChange;
 using LandmarkChange = MapJournal::LandmarkChange;
-
-template <typename T>
-void InsertSorted(std::vector<T>& values, const T& value) {
-  const auto at = std::lower_bound(values.begin(), values.end(), value);
-  if (at == values.end() || *at != value) values.insert(at, value);
-}
 
 /// The descriptor with the least median distance to all; null where there is none. Ties go to the first.
 const Descriptor* MiddleOf(const std::vector<Descriptor>& seen) {
