@@ -33,6 +33,7 @@ MotionJudge::MotionJudge(const DynamicsOptions& options, const Camera& camera)
       elders_(options.elders, options.vote.trusted_age_s),
       rivals_(options.rivals),
       hidden_(options.hidden),
+      chance_(options.chance),
       moved_(options.moved),
       missing_(options.missing, camera) {}
 
@@ -67,6 +68,7 @@ void MotionJudge::Believe(const Map& map, std::span<const ExpectedLandmark> expe
 
 void MotionJudge::Reset() {
   votes_.Reset();
+  chance_.Reset();
   evidence_.Clear();
 }
 

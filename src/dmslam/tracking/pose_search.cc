@@ -81,6 +81,7 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   TrackingReport report = CountClasses(camera_, *frame);
   report.num_expected = static_cast<int>(expected.size());
   Decide(fit, careful, &report);
+  SuspectChance(frame->stamp_ns, &report);
   if (report.ok) judge_.Believe(map, expected, *frame);
   return report;
 }
@@ -101,6 +102,18 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
     report->reason = "the static features lie in too small a part of the image";
   } else {
     report->ok = true;
+  }
+}
+
+void PoseSearch::SuspectChance(int64_t stamp_ns, TrackingReport* report) {
+  if (!judge_.enabled() || report->num_expected == 0) return;
+  const double share = static_cast<double>(report->num_static) / report->num_expected;
+  report->by_chance = judge_.chance().Suspects(share, report->mean_chi2);
+  if (report->by_chance) {
+    report->ok = false;
+    report->reason = "what is found of the map is found by chance";
+  } else if (report->ok) {
+    judge_.chance().OnTracked(share, report->mean_chi2, stamp_ns);
   }
 }
 

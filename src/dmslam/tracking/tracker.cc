@@ -116,7 +116,7 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns), prediction.prior, frame);
   if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
     Refuse("the pose contradicts the camera's motion", &attempt.report);
-  } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
+  } else if (!attempt.report.by_chance && attempt.report.num_static >= options_.min_coasting_inliers) {
     attempt.weak_pose = frame->T_cam_world;
   }
   return attempt;

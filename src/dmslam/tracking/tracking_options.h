@@ -19,7 +19,7 @@ struct TrackingOptions {
   int max_descriptor_distance = 100;  ///< bits, with a position prior
   int min_local_inliers = 20;         ///< fewer: the frame is not tracked
   int min_coasting_inliers = 8;       ///< so many still lead the search in the next frames
-  int min_inliers_after_relocalization = 50;
+  int min_inliers_after_relocalization = 30;
   double chi2 = 5.991;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
   int min_cells = 6;          ///< inliers must lie in at least so many cells of an 8 x 6 grid

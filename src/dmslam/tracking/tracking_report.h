@@ -9,6 +9,7 @@ namespace dmslam {
 struct TrackingReport {
   bool ok = false;
   const char* reason = "";  ///< why not
+  bool by_chance = false;   ///< what is matched is matched by chance: the pose leads nowhere
   int num_expected = 0;     ///< landmarks of the map around that it should see
   int num_static = 0;       ///< inliers
   int num_moving = 0;
