@@ -441,7 +441,8 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
     return std::nullopt;
   }
-  if (best->cost > options_.max_cost) {
+  const bool alone = runner_up >= options_.alone_runner_up_cost * best->cost;
+  if (best->cost > (alone ? options_.max_cost_alone : options_.max_cost)) {
     *refused = {WaitReason::kInconsistent, "no motion explains all views well"};
     return std::nullopt;
   }

@@ -233,7 +233,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackingReport& report, const Place
 FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
   FrontendOutput output;
   unplaced_.Keep(WaitingFrame(frame_));
-  if (phase_.IsTrial()) {
+  if (phase_.IsTrial() && report.contradicts) {
     output = GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason);
   } else {
     const int64_t missing_ns = frame_.stamp_ns - tracker_.last_tracked_ns();

@@ -129,7 +129,7 @@ class FrontendCore {
   // The map and where tracking stands
   Replica map_;
   std::optional<MapId> map_id_ =
-      1;  ///< of the map tracked in or looked for; none: whichever it finds itself in
+      1;                          ///< of the map tracked in or looked for; none: whichever it finds itself in
   MapId newest_map_ = 1;          ///< the highest number that was given
   std::optional<MapId> dropped_;  ///< the map that was dropped last: the replica may have it for a while yet
   TrackingPhase phase_;
@@ -145,8 +145,8 @@ class FrontendCore {
   // Frames
   TrackedFrame frame_;
   UnplacedFrames unplaced_;
-  std::deque<WaitingFrame> behind_;     ///< since the first map's second keyframe, not tracked yet
-  std::optional<int64_t> evidence_ns_;  ///< when it was told last
+  std::deque<WaitingFrame> behind_;      ///< since the first map's second keyframe, not tracked yet
+  std::optional<int64_t> evidence_ns_;   ///< when it was told last
   std::optional<int64_t> lit_since_ns_;  ///< since when the frames of a lost camera show anything
   FrontendCounters counters_;
 };

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <variant>
 
@@ -52,7 +53,7 @@ TEST(TrackingPhaseTest, ImpossibleStepsAreRefused) {
   EXPECT_THROW(phase.OnTracked(0), InvariantError);
   phase.Propose(KeyframeId::Make(1, 1));
   EXPECT_THROW(phase.Propose(KeyframeId::Make(1, 2)), InvariantError);
-  phase.BeginTrial(1000);
+  phase.GiveUpMap();
   EXPECT_THROW(phase.OnMissing(1), InvariantError);
 }
 
@@ -194,15 +195,32 @@ TEST_F(Phases, TheTrialEndsInTracking) {
   EXPECT_GT(core_->counters().tracked, 25u);
 }
 
-TEST_F(Phases, ATrialThatFailsDropsTheMapAndBeginsAnew) {
+TEST_F(Phases, ATrialThatIsContradictedDropsTheMapAndBeginsAnew) {
   Start();
   Frame(2);
   ASSERT_EQ(core_->state(), TrackingState::kTrial);
-  const FrontendOutput output = Frame(3, true);
+  // Each point lies some pixels beside the place that the map gives it, in a direction of its own.
+  const FrontendOutput output = Frame(3, 3 * kFrameNs, [this](size_t point) {
+    const double turn = 2.4 * static_cast<double>(point);
+    return std::optional<Eigen::Vector3d>(scene_.point(point) +
+                                          0.06 * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0));
+  });
   const auto* reset = Find<MapReset>(output);
   ASSERT_NE(reset, nullptr);
   EXPECT_TRUE(reset->drop);
   EXPECT_EQ(Find<FramePose>(output)->map_id, 2u) << "a number that no map has had";
+}
+
+TEST_F(Phases, ATrialDuringWhichTheMapIsHiddenKeepsIt) {
+  Start();
+  Frame(2);
+  ASSERT_EQ(core_->state(), TrackingState::kTrial);
+  const FrontendOutput hidden = Frame(3, true);
+  EXPECT_EQ(Find<MapReset>(hidden), nullptr);
+  EXPECT_FALSE(Find<FramePose>(hidden)->HasPose());
+  EXPECT_EQ(core_->state(), TrackingState::kUncertain);
+  EXPECT_TRUE(Find<FramePose>(Frame(4))->HasPose());
+  EXPECT_EQ(core_->state(), TrackingState::kTracking);
 }
 
 TEST_F(Phases, InDarknessItIsLostHoweverLong) {

@@ -39,9 +39,12 @@ bool PoseSearch::FromFrame(const Map& map, const TrackedFrame& last, const Rigid
   if (matches->size() < needed) {
     matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * radius_px, *frame->features);
   }
+  contradicts_last_ = false;
   if (matches->size() < needed) return false;
   SetMatches(*matches, T_predicted, frame);
-  return solver_.Solve(map, prior, &judge_, frame).inliers >= options_.min_motion_inliers;
+  const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
+  contradicts_last_ = fit.inliers < options_.min_motion_inliers;
+  return !contradicts_last_;
 }
 
 int PoseSearch::FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior,
@@ -80,6 +83,7 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   }
   TrackingReport report = CountClasses(camera_, *frame);
   report.num_expected = static_cast<int>(expected.size());
+  report.contradicts = static_cast<int>(fit.rejected.size()) > fit.inliers;
   Decide(fit, careful, &report);
   SuspectChance(frame->stamp_ns, &report);
   if (report.ok) judge_.Believe(map, expected, *frame);

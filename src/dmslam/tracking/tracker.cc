@@ -112,10 +112,14 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   attempt.report.reason = "too few features match the last frame";
   const MotionModel::Prediction prediction = motion_.Predict(map, {frame->index, frame->stamp_ns});
   if (!prediction.T_cam_world || !prediction.recent) return attempt;
-  if (!FindByMotion(map, prediction, frame, &attempt)) return attempt;
+  if (!FindByMotion(map, prediction, frame, &attempt)) {
+    attempt.report.contradicts = search_.contradicts_last();
+    return attempt;
+  }
   attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns), prediction.prior, frame);
   if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
     Refuse("the pose contradicts the camera's motion", &attempt.report);
+    attempt.report.contradicts = true;
   } else if (!attempt.report.by_chance && attempt.report.num_static >= options_.min_coasting_inliers) {
     attempt.weak_pose = frame->T_cam_world;
   }
