@@ -10,6 +10,10 @@ bool ChanceMatches::Suspects(double found_share, double mean_chi2) const {
          mean_chi2 > options_.max_error_ratio * usual_->chi2;
 }
 
+bool ChanceMatches::Clears(double found_share, double mean_chi2) const {
+  return !usual_ || found_share >= options_.max_found_share || mean_chi2 <= usual_->chi2;
+}
+
 void ChanceMatches::OnTracked(double found_share, double mean_chi2, int64_t stamp_ns) {
   if (found_share < options_.usual_share) return;
   if (!usual_) usual_ = Usual{mean_chi2, stamp_ns};

@@ -23,6 +23,8 @@ class ChanceMatches {
   /// Whether a frame with this share of what it should see, and this mean squared normalised error, rests on
   /// matches by chance. Nobody is suspected before usual frames were seen.
   bool Suspects(double found_share, double mean_chi2) const;
+  /// Whether a frame clears what was suspected before it: it finds much, or what it finds fits as usual.
+  bool Clears(double found_share, double mean_chi2) const;
   /// A frame that was tracked.
   void OnTracked(double found_share, double mean_chi2, int64_t stamp_ns);
   void Reset() { usual_.reset(); }

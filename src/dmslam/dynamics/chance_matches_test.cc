@@ -16,6 +16,16 @@ TEST(ChanceMatches, FewThatFitBadlyAreSuspected) {
   EXPECT_FALSE(chance.Suspects(0.3, 1.5)) << "they fit badly, but are many: the map is young";
 }
 
+TEST(ChanceMatches, ASuspicionIsClearedByMuchOrByWhatFits) {
+  ChanceMatches chance({});
+  EXPECT_TRUE(chance.Clears(0.01, 9.0)) << "there is none";
+  for (int frame = 0; frame < 30; ++frame) chance.OnTracked(0.3, 0.6, frame * kSecond / 30);
+  EXPECT_TRUE(chance.Clears(0.2, 1.5));
+  EXPECT_TRUE(chance.Clears(0.05, 0.5));
+  EXPECT_FALSE(chance.Clears(0.08, 0.75)) << "no longer suspected, but not cleared";
+  EXPECT_FALSE(chance.Suspects(0.08, 0.75));
+}
+
 TEST(ChanceMatches, WhatIsUsualIsTheCamerasOwn) {
   ChanceMatches blurred({});
   for (int frame = 0; frame < 30; ++frame) blurred.OnTracked(0.3, 2.0, frame * kSecond / 30);

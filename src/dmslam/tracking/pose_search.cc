@@ -110,13 +110,14 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
 }
 
 void PoseSearch::SuspectChance(int64_t stamp_ns, TrackingReport* report) {
-  if (!judge_.enabled() || report->num_expected == 0) return;
+  if (!judge_.enabled() || !report->ok || report->num_expected == 0) return;
   const double share = static_cast<double>(report->num_static) / report->num_expected;
   report->by_chance = judge_.chance().Suspects(share, report->mean_chi2);
+  report->clears_chance = judge_.chance().Clears(share, report->mean_chi2);
   if (report->by_chance) {
     report->ok = false;
-    report->reason = "what is found of the map is found by chance";
-  } else if (report->ok) {
+    report->reason = "what is found of the map may be found by chance";
+  } else {
     judge_.chance().OnTracked(share, report->mean_chi2, stamp_ns);
   }
 }
