@@ -21,6 +21,9 @@ struct LoopcloserOptions {
   int min_sim3_inliers = 20;  ///< of them, that agree with one similarity
   int min_pose_inliers =
       30;  ///< without such pairs: landmarks of the place that agree with one pose of the keyframe
+  /// The same between two maps, where the place is seen from elsewhere or behind people: by chance 3 to 10
+  /// agree. What follows asks for much more there: min_joining_share of all that should be seen.
+  int min_joining_pose_inliers = 15;
   double search_radius_rad = 0.0143;  ///< of the guided search, times the scale of the predicted octave
   int max_descriptor_distance = 60;   ///< of the guided search [bits]
   int min_matches = 40;               ///< landmarks of the place found in the keyframe

@@ -149,7 +149,8 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
       StaticLandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
   const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
   const bool one_map = keyframe.map_id == place.map_id;
-  return SimilarityFromPose(map, keyframe, place, matches, one_map ? std::optional(1.0) : std::nullopt, why);
+  if (one_map) return SimilarityFromPose(map, keyframe, place, matches, 1.0, options_.min_pose_inliers, why);
+  return SimilarityFromPose(map, keyframe, place, matches, {}, options_.min_joining_pose_inliers, why);
 }
 
 /// Landmarks of the place on features of the keyframe give its pose; features that show landmarks of both
@@ -158,13 +159,14 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
 std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyframe& keyframe,
                                                       const Keyframe& place,
                                                       std::vector<LandmarkMatch> matches,
-                                                      std::optional<double> scale, std::string* why) const {
+                                                      std::optional<double> scale, int min_inliers,
+                                                      std::string* why) const {
   std::erase_if(matches, [&](const LandmarkMatch& match) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
     return mine.valid() && !IsStatic(map.FindLandmark(mine));
   });
   PoseRansacOptions options;
-  options.min_inliers = options_.min_pose_inliers;
+  options.min_inliers = min_inliers;
   options.max_iterations = kMaxPoseIterations;
   options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop_pose");
   const auto pose = PoseFromLandmarks(map, *keyframe.features, matches, options);
@@ -243,8 +245,8 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
     *why = pairs;
     return std::nullopt;
   }
-  const auto similarity =
-      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
+  const auto similarity = SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale,
+                                             options_.min_pose_inliers, why);
   if (!similarity) *why = pairs + "; " + *why;
   return similarity;
 }
