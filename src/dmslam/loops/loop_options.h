@@ -34,7 +34,11 @@ struct LoopcloserOptions {
   double min_share = 0.22;            ///< enough to be believed if the next keyframes agree
   double min_confirmed_share = 0.35;  ///< of a keyframe that sees the place where an earlier one said it is
   double min_joining_share = 0.7;     ///< the same between two maps, where no chain tells what drift can be
-  int min_told = 20;                  ///< landmarks that should be seen; of fewer the share seen says nothing
+  // Behind people little of all that should be seen is. Then much of what outlasts them must be: a picture
+  // that hangs in two places shows a quarter of it.
+  int min_joining_proven = 50;
+  double min_joining_proven_share = 0.5;
+  int min_told = 20;  ///< landmarks that should be seen; of fewer the share seen says nothing
 
   // Somebody who stood in two places is matched as well as a room is. What he cannot be is there for long.
   ProvenOptions proven;

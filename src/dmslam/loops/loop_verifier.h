@@ -87,6 +87,7 @@ class LoopVerifier {
   void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
   bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
+  bool HoldsBetweenMaps(const VerifiedLoop& loop) const;
 
   LoopcloserOptions options_;
   uint64_t seed_;

@@ -465,6 +465,14 @@ TEST(LoopcloserCoreTest, AMapTooYoungToProveAnythingIsWeldedByWhatIsProvenInTheO
   ExpectWelds(room, answers.loops.front());
 }
 
+TEST(LoopcloserCoreTest, MapsAreWeldedBehindPeopleByWhatOutlastsThem) {
+  Room room({.person_at = {96, 103, 110, 117}, .second_map_at = kPerRound - 6});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  ExpectWelds(room, answers.loops.front());
+}
+
 TEST(LoopcloserCoreTest, SomebodyWhoStoodInTwoMapsDoesNotWeldThem) {
   const WorldOptions world{.second_visit_elsewhere = true, .person_at = {20, 100}, .second_map_at = 97};
   LoopcloserOptions trusting = Trusting();
