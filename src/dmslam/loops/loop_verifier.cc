@@ -149,7 +149,8 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
       StaticLandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
   const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
   const bool one_map = keyframe.map_id == place.map_id;
-  return SimilarityFromPose(map, keyframe, place, matches, one_map ? std::optional(1.0) : std::nullopt, why);
+  if (one_map) return SimilarityFromPose(map, keyframe, place, matches, 1.0, options_.min_pose_inliers, why);
+  return SimilarityFromPose(map, keyframe, place, matches, {}, options_.min_joining_pose_inliers, why);
 }
 
 /// Landmarks of the place on features of the keyframe give its pose; features that show landmarks of both
@@ -158,13 +159,14 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
 std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyframe& keyframe,
                                                       const Keyframe& place,
                                                       std::vector<LandmarkMatch> matches,
-                                                      std::optional<double> scale, std::string* why) const {
+                                                      std::optional<double> scale, int min_inliers,
+                                                      std::string* why) const {
   std::erase_if(matches, [&](const LandmarkMatch& match) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
     return mine.valid() && !IsStatic(map.FindLandmark(mine));
   });
   PoseRansacOptions options;
-  options.min_inliers = options_.min_pose_inliers;
+  options.min_inliers = min_inliers;
   options.max_iterations = kMaxPoseIterations;
   options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop_pose");
   const auto pose = PoseFromLandmarks(map, *keyframe.features, matches, options);
@@ -239,12 +241,14 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   if (report.success) return report.S_cam1_cam2;
   const std::string pairs =
       Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
-  if (static_cast<int>(matches.size()) >= options_.min_sim3_inliers) {
+  const bool joins = keyframe.map_id != place.map_id;
+  if (static_cast<int>(matches.size()) >= options_.min_sim3_inliers && !joins) {
     *why = pairs;
     return std::nullopt;
   }
+  const int enough = joins ? options_.min_joining_pose_inliers : options_.min_pose_inliers;
   const auto similarity =
-      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
+      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, enough, why);
   if (!similarity) *why = pairs + "; " + *why;
   return similarity;
 }
@@ -348,6 +352,14 @@ bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
   return seen && IsNoPerson(loop, min_share) && agreed && plausible;
 }
 
+/// Most of what should be seen is, or, where people hide the rest, much of what is proven.
+bool LoopVerifier::HoldsBetweenMaps(const VerifiedLoop& loop) const {
+  const bool much_is_proven = loop.proven.found >= options_.min_joining_proven &&
+                              loop.proven.cells >= options_.min_cells &&
+                              loop.proven_share >= options_.min_joining_proven_share;
+  return Holds(loop, options_.min_joining_share) || (much_is_proven && Holds(loop, options_.min_share));
+}
+
 std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,
                                                   const Keyframe& keyframe, const Keyframe& place,
                                                   std::string* why) const {
@@ -383,8 +395,7 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, *place, S_keyframe_place, why);
   if (!refined) return std::nullopt;
   VerifiedLoop loop = Measure(map, keyframe, *place, *refined, why);
-  const bool one_map = place->map_id == keyframe.map_id;
-  if (!Holds(loop, one_map ? options_.min_confirmed_share : options_.min_joining_share)) return std::nullopt;
+  if (!(loop.joins ? HoldsBetweenMaps(loop) : Holds(loop, options_.min_confirmed_share))) return std::nullopt;
   return loop;
 }
 

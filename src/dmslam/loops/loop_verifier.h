@@ -77,7 +77,7 @@ class LoopVerifier {
                                               std::string* why) const;
   std::optional<Sim3d> SimilarityFromPose(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                           std::vector<LandmarkMatch> matches, std::optional<double> scale,
-                                          std::string* why) const;
+                                          int min_inliers, std::string* why) const;
   std::optional<Sim3d> RefinedSimilarity(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                          const Sim3d& S_keyframe_place, std::string* why) const;
   VerifiedLoop Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
@@ -87,6 +87,7 @@ class LoopVerifier {
   void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
   bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
+  bool HoldsBetweenMaps(const VerifiedLoop& loop) const;
 
   LoopcloserOptions options_;
   uint64_t seed_;

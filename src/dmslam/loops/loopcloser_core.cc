@@ -1,5 +1,6 @@
 #include "dmslam/loops/loopcloser_core.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -89,6 +90,9 @@ std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
   std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
+  std::erase_if(places, [&](KeyframeId id) {
+    return std::ranges::find(found.candidates, id) != found.candidates.end();
+  });
   counters_.candidates += places.size();
   places.insert(places.begin(), found.candidates.begin(), found.candidates.end());
   return places;

@@ -36,6 +36,7 @@ struct FrontendOptions {
     v.Number("tracking.trial_s", trial_s, 0, 60, "s", "time for which a first map must predict the frames");
     v.Number("tracking.new_map_after_s", new_map_after_s, 0.1, 3600, "s",
              "lost for so long, darkness not counted: a new map is started as well");
+    v.InBaseline("5");
     v.Number("tracking.max_kept_frames", max_kept_frames, 0, 100000, "frames",
              "unplaced frames kept for localisation at the end");
     v.InBaseline("300");

@@ -160,12 +160,14 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
   const FrameTime time{frame->index, frame->stamp_ns};
-  // Far away only what is proven to be no person is believed.
+  // Far away, and in another map, only what is proven to be no person is believed.
   const auto credible = [&](const TrackedFrame& at) {
-    return motion_.IsReachable(map, at.T_cam_world, time) ||
+    const Keyframe* reference = map.FindKeyframe(search_.reference());
+    const bool here = reference != nullptr && reference->map_id == map_id;
+    return (here && motion_.IsReachable(map, at.T_cam_world, time)) ||
            CountProven(map, at.landmarks, {}) >= kManyProven;
   };
-  Relocalizer::Request request{.map_id = map_id, .last_seen = motion_.last().reference, .seed = seed};
+  Relocalizer::Request request{.last_seen = motion_.last().reference, .seed = seed};
   if (map_id) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);

@@ -36,7 +36,9 @@ class Tracker {
   void BeginLost(const FrameTime& time) { motion_.Begin({}, time); }
 
   struct Request {
-    std::optional<MapId> map_id;  ///< where a lost camera is looked for; none: in all maps
+    /// The map that is tracked in: a lost camera is looked for in all maps, and there it must be within
+    /// reach. None: it was nowhere yet.
+    std::optional<MapId> map_id;
     bool may_relocalize = true;
   };
   /// The next frame of the stream. The map may have changed since the last one.
