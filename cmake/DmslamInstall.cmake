@@ -53,7 +53,7 @@ endfunction()
 
 function(_dmslam_install_data)
   install(DIRECTORY config/ DESTINATION ${DMSLAM_SHARE_DIR}/config COMPONENT runtime FILES_MATCHING PATTERN "*.yaml"
-    PATTERN systemd EXCLUDE)
+    PATTERN "*.nft" PATTERN systemd EXCLUDE)
   install(FILES config/systemd/system.env DESTINATION ${DMSLAM_SHARE_DIR} COMPONENT runtime)
   install(FILES data/vocabulary.dmv data/vocabulary.md DESTINATION ${DMSLAM_SHARE_DIR}/data COMPONENT runtime)
   install(DIRECTORY procs/viewer/web DESTINATION ${DMSLAM_SHARE_DIR}/procs/viewer COMPONENT runtime)
