@@ -64,6 +64,7 @@ void MapperNode::Begin(const CameraInfo& info) {
     saved_parts_.assign(parts.begin(), parts.end());
   }
   if (!lockstep_) core_->SetInterrupt([this] { return keyframe_waits_.load(); });
+  core_->SetStop([this] { return stops_.load(); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
 }
@@ -406,13 +407,13 @@ void MapperNode::Save() {
   SaveMap(path, core_->map(), session_start_);
 }
 
-/// A step in work inserts and creates, and leaves out what takes long.
+/// A step in work inserts and creates, and leaves out what takes long; an adjustment ends where it is.
 void MapperNode::InterruptCore() {
-  keyframe_waits_ = true;
+  keyframe_waits_ = stops_ = true;
   if (work_) work_->Finish();
 }
 
-MapperNode::~MapperNode() { keyframe_waits_ = true; }
+MapperNode::~MapperNode() { keyframe_waits_ = stops_ = true; }
 
 void MapperNode::Stop() {
   if (!stopping_) InterruptCore();

@@ -113,6 +113,7 @@ class MapperNode : public StreamNode {
   LatencyWindow to_landmarks_, to_adjusted_, adjustment_;
   MapperStatus core_status_;                 ///< what the core had to say of itself last
   std::atomic<bool> keyframe_waits_{false};  ///< asked by the core: it finishes early
+  std::atomic<bool> stops_{false};           ///< asked by the core while it adjusts whole maps
   std::unique_ptr<CoreThread> work_;         ///< ends before everything that jobs touch
 };
 

@@ -81,9 +81,10 @@ TEST(Map, CulledKeyframesAndFusedLandmarksResolve) {
     keyframe.features = RandomFeatures(random, 5);
     map.AddKeyframe(keyframe);
   }
-  map.RemoveKeyframe(KeyframeId::Make(1, 3));
-  map.RemoveKeyframe(KeyframeId::Make(1, 2));
-  map.SetPoseAndScale(KeyframeId::Make(1, 1), Rigid3d(Eigen::Quaterniond::Identity(), {-2, 0, 0}), 2.0);
+  map.RemoveKeyframe(map.At(KeyframeId::Make(1, 3)));
+  map.RemoveKeyframe(map.At(KeyframeId::Make(1, 2)));
+  map.SetPoseAndScale(map.At(KeyframeId::Make(1, 1)), Rigid3d(Eigen::Quaterniond::Identity(), {-2, 0, 0}),
+                      2.0);
   const auto pose = map.ResolvePose(KeyframeId::Make(1, 3));
   ASSERT_TRUE(pose.has_value());
   EXPECT_NEAR((pose->T_cam_world.translation - Eigen::Vector3d(-6, 0, 0)).norm(), 0, 1e-12);
@@ -118,7 +119,7 @@ class Viewing : public testing::Test {
     landmark.p_world = {0, 0, 4};
     landmark.reference = KeyframeId::Make(1, 3);
     map_.AddLandmark(landmark);
-    map_.SetObservation(KeyframeId::Make(1, 1), 0, id_);
+    map_.SetObservation(map_.At(KeyframeId::Make(1, 1)), 0, map_.At(id_));
   }
   const Landmark::ViewingRange& Range() const { return map_.Viewing(map_.At(id_)); }
 
@@ -128,7 +129,7 @@ class Viewing : public testing::Test {
 
 TEST_F(Viewing, FollowsFromWhoSeesTheLandmark) {
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0), 1e-12) << "the oldest: its reference does not see it";
-  map_.SetObservation(KeyframeId::Make(1, 3), 0, id_);
+  map_.SetObservation(map_.At(KeyframeId::Make(1, 3)), 0, map_.At(id_));
   const double scale = map_.pyramid().Scale(2);
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0) * scale, 1e-12) << "its reference sees it at octave 2";
   EXPECT_NEAR(Range().mean_direction.x(), 0, 1e-12) << "one from the left, one from the right";
@@ -138,13 +139,13 @@ TEST_F(Viewing, FollowsFromWhoSeesTheLandmark) {
 
 TEST_F(Viewing, IsComputedAnewWhenTheLandmarkMoves) {
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0), 1e-12);
-  map_.SetPosition(id_, {-1, 0, 8});
+  map_.SetPosition(map_.At(id_), {-1, 0, 8});
   EXPECT_NEAR(Range().max_distance, 8, 1e-12);
 }
 
 TEST_F(Viewing, StaysWhenNobodySeesTheLandmarkAnyMore) {
   const double before = Range().max_distance;
-  map_.ClearObservation(KeyframeId::Make(1, 1), 0);
+  map_.ClearObservation(map_.At(KeyframeId::Make(1, 1)), 0);
   EXPECT_EQ(Range().max_distance, before);
 }
 
