@@ -49,6 +49,18 @@ class FrontendNode : public StreamNode {
     int64_t receive_us = 0;
   };
 
+  struct FrameCounts {
+    int64_t received = 0, processed = 0, skipped = 0, bad = 0;
+    int64_t processed_at_status = 0;  ///< when the last status was published
+  };
+  struct FirstMap {
+    int64_t since_ns = 0;  ///< stamp of the first frame
+    double after_s = -1;   ///< below zero: none yet
+  };
+  struct FrameTimes {
+    LatencyWindow latency, decode, extract, step;
+  };
+
   /// What the core makes of a frame.
   struct Tracked {
     FrameTrace trace;
@@ -123,11 +135,9 @@ class FrontendNode : public StreamNode {
   std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
   FramePose last_pose_;
   OnlineError error_;
-  int64_t frames_received_ = 0, frames_processed_ = 0, frames_skipped_ = 0, frames_bad_ = 0;
-  int64_t status_frames_ = 0;
-  int64_t first_stamp_ns_ = 0;
-  double first_map_s_ = -1;
-  LatencyWindow latency_, decode_, extract_, step_;
+  FrameCounts counts_;
+  FirstMap first_map_;
+  FrameTimes times_;
   FrontendStatus core_status_;        ///< what the core had to say of itself last
   std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
 };
