@@ -19,7 +19,11 @@ constexpr double kMaxBehindS = 0.5;
 
 }  // namespace
 
-FrontendNode::FrontendNode(NodeContext context, NodeOptions options, Extras extras)
+std::unique_ptr<Node> MakeFrontend(NodeContext context, NodeOptions options, FrontendExtras extras) {
+  return std::make_unique<FrontendNode>(std::move(context), std::move(options), std::move(extras));
+}
+
+FrontendNode::FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras)
     : StreamNode(std::move(context), std::move(options), "frontend"),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)) {

@@ -15,6 +15,7 @@
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
+#include "frontend/make_frontend.h"
 #include "frontend/online_error.h"
 #include "frontend/sequence_end.h"
 
@@ -25,12 +26,7 @@ namespace dmslam {
 /// core is done in a job, or while there is none.
 class FrontendNode : public StreamNode {
  public:
-  struct Extras {
-    std::shared_ptr<const Vocabulary> vocabulary;
-    std::string picture_dir;  ///< empty: no pictures
-    int picture_every = 0;    ///< every Nth frame
-  };
-  FrontendNode(NodeContext context, NodeOptions options, Extras extras);
+  FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras);
 
   void Stop() override;
 
@@ -114,7 +110,7 @@ class FrontendNode : public StreamNode {
   FrontendStatus CoreStatus() const;
 
   const RunOptions run_;
-  Extras extras_;
+  FrontendExtras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
   std::deque<HeldRecord>

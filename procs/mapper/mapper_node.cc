@@ -14,6 +14,10 @@ constexpr int64_t kPartEveryNs = 3'000'000;
 
 }  // namespace
 
+std::unique_ptr<Node> MakeMapper(NodeContext context, NodeOptions options, MapperFiles files) {
+  return std::make_unique<MapperNode>(std::move(context), std::move(options), std::move(files));
+}
+
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), "mapper"),
       run_(options_.settings.Read<RunOptions>()),

@@ -15,6 +15,7 @@
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
+#include "mapper/make_mapper.h"
 
 namespace dmslam {
 
@@ -24,11 +25,7 @@ namespace dmslam {
 /// done in a job, or while there is none.
 class MapperNode : public StreamNode {
  public:
-  /// Maps as files; empty: none.
-  struct Files {
-    std::string load;  ///< a saved map, or a log: the map to begin with
-    std::string save;  ///< where the map is written at the end
-  };
+  using Files = MapperFiles;
   MapperNode(NodeContext context, NodeOptions options, Files files = {});
   ~MapperNode() override;
 
