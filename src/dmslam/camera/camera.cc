@@ -231,6 +231,16 @@ std::optional<Eigen::Vector2d> Camera::Undistort(const Eigen::Vector2d& raw_px) 
   return Eigen::Vector2d(fx_px * n->x() + cx_px, fy_px * n->y() + cy_px);
 }
 
+double Camera::StretchAt(const Eigen::Vector2d& ideal_px) const {
+  if (!Stretches()) return 1.0;
+  const double tangent =
+      Eigen::Vector2d((ideal_px.x() - cx_px) / fx_px, (ideal_px.y() - cy_px) / fy_px).norm();
+  if (!(tangent > 1e-6)) return 1.0;
+  const FisheyeRadius radius = RadiusOf(*this, std::atan(tangent));
+  const double outwards = (1.0 + tangent * tangent) / radius.slope, around = tangent / radius.value;
+  return std::sqrt(outwards * around);
+}
+
 std::optional<std::string> Camera::Problem() const {
   if (width_px < 32 || height_px < 32 || width_px > 4096 || height_px > 4096) {
     return "field 'width' or 'height' is outside 32..4096 pixels";

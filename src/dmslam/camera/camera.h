@@ -58,6 +58,11 @@ struct Camera {
   /// where the distortion cannot be inverted, and beyond 84 degrees from the optical axis).
   Eigen::Vector2d Distort(const Eigen::Vector2d& ideal_px) const;
   std::optional<Eigen::Vector2d> Undistort(const Eigen::Vector2d& raw_px) const;
+  /// Whether the ideal image is so much larger than the lens's in places that errors must be told apart.
+  bool Stretches() const { return lens == Lens::kFisheye; }
+  /// How many times as long as in the lens's image a short line is at an ideal pixel: the geometric mean over
+  /// its directions. 1 for a lens that does not stretch.
+  double StretchAt(const Eigen::Vector2d& ideal_px) const;
 
   /// What is wrong with the values, or nothing.
   std::optional<std::string> Problem() const;

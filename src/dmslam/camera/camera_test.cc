@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -59,7 +61,7 @@ TEST(Fisheye, UndistortIsInverseOfDistort) {
     const Eigen::Vector2d raw(random.Uniform(0, 511), random.Uniform(0, 511));
     const double angle_rad = (raw - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm() / camera.fx_px;
     const auto ideal = camera.Undistort(raw);
-    const bool near = angle_rad < 1.45, far = angle_rad > 1.50;
+    const bool near = angle_rad<1.45, far = angle_rad> 1.50;
     ASSERT_TRUE(!near || ideal) << raw.transpose();
     ASSERT_TRUE(!far || !ideal) << "no pinhole sees that far to the side: " << raw.transpose();
     if (!ideal) continue;
@@ -91,6 +93,19 @@ TEST(Fisheye, WithoutCoefficientsTheAngleItselfIsThePlace) {
   const Eigen::Vector2d raw = camera.Distort(*camera.Project({1, 0, 1}));
   EXPECT_NEAR(raw.x(), camera.cx_px + camera.fx_px * 0.78539816339744831, 1e-9);
   EXPECT_FALSE(camera.WithoutLens().HasDistortion());
+}
+
+TEST(Fisheye, StretchIsHowMuchLargerAreasAre) {
+  const Camera camera = Fisheye();
+  for (const double x_px : {255.0, 300.0, 380.0, 440.0}) {
+    const Eigen::Vector2d raw(x_px, 300), dx(1e-3, 0), dy(0, 1e-3);
+    const Eigen::Vector2d at = *camera.Undistort(raw);
+    Eigen::Matrix2d J;
+    J << (*camera.Undistort(raw + dx) - *camera.Undistort(raw - dx)) / 2e-3,
+        (*camera.Undistort(raw + dy) - *camera.Undistort(raw - dy)) / 2e-3;
+    EXPECT_NEAR(camera.StretchAt(at), std::sqrt(J.determinant()), 1e-4 * camera.StretchAt(at)) << x_px;
+  }
+  EXPECT_EQ(Freiburg1().StretchAt({10, 10}), 1.0);
 }
 
 std::string WriteTemporary(const std::string& text) {

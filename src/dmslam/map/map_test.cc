@@ -6,11 +6,42 @@
 #include <cmath>
 #include <set>
 
+#include "dmslam/map/projection.h"
 #include "dmslam/map/testing/random_editor.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
+
+/// Two keypoints of octaves 0 and 2, in the middle and 200 pixels beside it.
+FeatureSet TwoKeypoints() {
+  FeatureSet set;
+  set.keypoints = {{320 * 16, 240 * 16, 0, 0}, {520 * 16, 240 * 16, 2, 0}};
+  set.descriptors.resize(2);
+  return set;
+}
+
+TEST(FrameFeatures, OctavesSayHowExactTheyAreUnlessSigmasDo) {
+  const auto by_octave = MakeFrameFeatures(TwoKeypoints(), TestCamera(), Pyramid());
+  EXPECT_TRUE(by_octave->sigmas_px.empty());
+  EXPECT_EQ(by_octave->Variance(1, Pyramid()), Pyramid().SigmaSquared(2));
+  FeatureSet set = TwoKeypoints();
+  set.sigmas_px = {0.5F, 3};
+  const auto measured = MakeFrameFeatures(std::move(set), TestCamera(), Pyramid());
+  EXPECT_EQ(measured->Variance(0, Pyramid()), 0.25);
+  EXPECT_EQ(NormalizedErrorSquared(*measured, 1, measured->uv_px[1] + Eigen::Vector2d(6, 0), Pyramid()), 4.0);
+}
+
+TEST(FrameFeatures, AreLessExactWhereTheLensStretchesTheImage) {
+  Camera camera = TestCamera(300);
+  camera.lens = Lens::kFisheye;
+  const auto features = MakeFrameFeatures(TwoKeypoints(), camera, Pyramid());
+  EXPECT_EQ(features->Variance(0, Pyramid()), 1.0);
+  // An angle of 2/3: the tangent grows by 1 + tan^2 outwards, by tan / angle around.
+  const double tangent = std::tan(2.0 / 3.0);
+  const double stretch_squared = (1 + tangent * tangent) * tangent / (2.0 / 3.0);
+  EXPECT_NEAR(features->Variance(1, Pyramid()), stretch_squared * Pyramid().SigmaSquared(2), 1e-4);
+}
 
 TEST(Map, CovisibilityCountsSharedLandmarks) {
   RandomEditor editor(9);

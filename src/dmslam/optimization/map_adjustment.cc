@@ -54,10 +54,9 @@ void AddObservations(const Map& map, double sigma_px, Window& window) {
       const auto pose = window.index.find(o.keyframe);
       if (pose == window.index.end()) continue;
       const FrameFeatures& features = *window.keyframes[static_cast<size_t>(pose->second)]->features;
-      const int octave = features.set.keypoints[o.feature].octave;
       window.problem.observations.push_back(
           {pose->second, static_cast<int>(point), features.uv_px[o.feature],
-           1.0 / (sigma_px * sigma_px * map.pyramid().SigmaSquared(octave))});
+           1.0 / (sigma_px * sigma_px * features.Variance(o.feature, map.pyramid()))});
       window.features.push_back(o.feature);
     }
   }
