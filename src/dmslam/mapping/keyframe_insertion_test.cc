@@ -101,8 +101,8 @@ TEST_F(Insertion, RefusesAReferenceThatIsUnknownOrOfAnotherMap) {
 TEST_F(Insertion, AKeyframeOfAMapThatWasJoinedMeanwhileIsOneOfTheJoinedMap) {
   std::vector<KeyframeId> all;
   for (const auto& [id, keyframe] : map_.keyframes()) all.push_back(id);
-  for (const KeyframeId id : all) map_.SetMapId(id, 2);
-  for (const LandmarkId id : ids_) map_.SetMapId(id, 2);
+  for (const KeyframeId id : all) map_.SetMapId(map_.At(id), 2);
+  for (const LandmarkId id : ids_) map_.SetMapId(map_.At(id), 2);
   const InsertionReport report = InsertKeyframe(map_, Seeing(10));
   ASSERT_NE(report.keyframe, nullptr);
   EXPECT_EQ(report.keyframe->map_id, 2u);
