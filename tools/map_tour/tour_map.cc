@@ -143,7 +143,7 @@ MapDelta TourMap::Step() {
   for (size_t i = 0; i < wanted; ++i) {
     const Landmark& landmark = map_.AddLandmark(MakeLandmark(keyframe));
     recent_.push_back(landmark.id);
-    see(landmark.id);
+    see(landmark);
   }
   if (recent_.size() > kRecent) recent_.erase(recent_.begin(), recent_.end() - kRecent);
   ++next_;

@@ -46,7 +46,7 @@ Eigen::Vector2d DistortFisheye(const Camera& c, const Eigen::Vector2d& n) {
 
 /// The angle that a fisheye lens puts at `radius`, by Newton's method; none where there is none.
 std::optional<double> AngleAt(const Camera& c, double radius) {
-  double theta = radius;
+  double theta = std::min(radius, std::atan(std::sqrt(kMaxRadiusSquared)));  // where it still grows (Folds)
   for (int i = 0; i < 50; ++i) {
     const FisheyeRadius there = RadiusOf(c, theta);
     if (!(there.slope > 0.0)) return std::nullopt;
