@@ -179,7 +179,7 @@ int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   int removed = 0;
   for (const auto& [id, suspect] : suspects) {
     if (!suspect.condemned) continue;
-    map.RemoveLandmark(id);
+    map.RemoveLandmark(map.At(id));
     ++removed;
   }
   return removed;

@@ -41,8 +41,8 @@ Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const K
   match.p_cam2 = b.T_cam_world * map.FindLandmark(b.landmarks[feature_b])->p_world;
   match.uv1_px = a.features->uv_px[feature_a];
   match.uv2_px = b.features->uv_px[feature_b];
-  match.inv_sigma_squared1 = 1.0 / map.pyramid().SigmaSquared(a.features->set.keypoints[feature_a].octave);
-  match.inv_sigma_squared2 = 1.0 / map.pyramid().SigmaSquared(b.features->set.keypoints[feature_b].octave);
+  match.inv_sigma_squared1 = 1.0 / a.features->Variance(feature_a, map.pyramid());
+  match.inv_sigma_squared2 = 1.0 / b.features->Variance(feature_b, map.pyramid());
   return match;
 }
 

@@ -118,8 +118,8 @@ class Room {
     const size_t step = Round(k) == 0 ? 1 : options_.landmark_every;
     for (size_t feature = 0; feature < seen.size(); feature += step) {
       const LandmarkId landmark = LandmarkFor(seen[feature], k, id);
-      map_.SetObservation(id, static_cast<uint16_t>(feature), landmark);
-      map_.UpdateDescriptor(landmark);
+      map_.SetObservation(map_.At(id), static_cast<uint16_t>(feature), map_.At(landmark));
+      map_.UpdateDescriptor(map_.At(landmark));
     }
     return map_.TakeDelta(MapEvent::kMapped, id, MapOf(k));
   }

@@ -44,14 +44,14 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   const Keyframe& keyframe = map.AddKeyframe(std::move(made));
   for (const KeyframeProposal::Match& match : proposal.matches) {
     if (const Landmark* landmark = Usable(map, keyframe, match)) {
-      map.SetObservation(keyframe.id, match.feature, landmark->id);
-      map.UpdateDescriptor(landmark->id);
+      map.SetObservation(keyframe, match.feature, *landmark);
+      map.UpdateDescriptor(*landmark);
     } else {
       ++report.observations_dropped;
     }
   }
   const std::vector<const Keyframe*> nearest = map.BestCovisible(keyframe, 1, 1);
-  map.SetParent(keyframe.id, nearest.empty() ? *stands_for_it : nearest.front()->id);
+  map.SetParent(keyframe, nearest.empty() ? *stands_for_it : nearest.front()->id);
   report.keyframe = &keyframe;
   return report;
 }

@@ -348,12 +348,12 @@ void CreateLandmarks(MapEditor& map, const Keyframe& keyframe, const std::vector
   };
   for (const NewLandmark& proposed : ProposeLandmarks(map, keyframe, moving, options, diagnostics)) {
     if (taken(proposed.seen_by.front())) continue;
-    const LandmarkId id = maker.Add(map, keyframe, keyframe, proposed.p_world).id;
-    map.SetObservation(keyframe.id, proposed.feature, id);
+    const Landmark& landmark = maker.Add(map, keyframe, keyframe, proposed.p_world);
+    map.SetObservation(keyframe, proposed.feature, landmark);
     for (const NeighbourFeature& seen_by : proposed.seen_by) {
-      if (!taken(seen_by)) map.SetObservation(seen_by.keyframe->id, seen_by.feature, id);
+      if (!taken(seen_by)) map.SetObservation(*seen_by.keyframe, seen_by.feature, landmark);
     }
-    map.UpdateDescriptor(id);
+    map.UpdateDescriptor(landmark);
   }
 }
 

@@ -74,7 +74,7 @@ TEST_F(Creation, NothingIsMadeOfWhatMoves) {
 
 TEST_F(Creation, NeedsABaseline) {
   Build(WallScene(), 2, 20);
-  map_.SetPose(Id(1), WallScene::At(0.4 - 0.02));  // 0.005 of the depth
+  map_.SetPose(map_.At(Id(1)), WallScene::At(0.4 - 0.02));  // 0.005 of the depth
   EXPECT_TRUE(Propose().empty());
   EXPECT_EQ(diagnostics_.matched, 0u);
 }

@@ -82,13 +82,13 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
 void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, const Landmark& landmark) {
   const Landmark* other = map.LandmarkSeenBy(keyframe, feature);
   if (other == nullptr) {
-    map.SetObservation(keyframe.id, feature, landmark.id);
-    map.UpdateDescriptor(landmark.id);
+    map.SetObservation(keyframe, feature, landmark);
+    map.UpdateDescriptor(landmark);
     return;
   }
   const size_t mine = landmark.observations.size(), theirs = other->observations.size();
   const bool keep_other = theirs > mine || (theirs == mine && other->id < landmark.id);
-  keep_other ? map.Fuse(landmark.id, other->id) : map.Fuse(other->id, landmark.id);
+  keep_other ? map.Fuse(landmark, *other) : map.Fuse(*other, landmark);
 }
 
 }  // namespace

@@ -174,8 +174,9 @@ void MapperCore::AdjustMaps() {
   std::set<MapId> maps;
   for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
+    if (Stopped()) return;
     Count(RemoveTooNear(map_, map_id, options_.min_depth), &counters_.landmarks_culled);
-    AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
+    AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, stop_);
     Publish(MapEvent::kMapAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.

@@ -255,8 +255,8 @@ TEST_F(Phases, LostForLongInTheLightItKeepsTheMapAndLooksForAnother) {
 TEST_F(Phases, WhereItsMapBecomesPartOfAnotherItGoesOnThere) {
   Start();
   for (uint32_t frame = 2; frame < 30; ++frame) Frame(frame);
-  for (const auto& [id, keyframe] : scene_.map().keyframes()) scene_.map().SetMapId(id, 7);
-  for (size_t i = 0; i < kPoints; ++i) scene_.map().SetMapId(MapScene::IdOf(i), 7);
+  for (const auto& [id, keyframe] : scene_.map().keyframes()) scene_.map().SetMapId(keyframe, 7);
+  for (size_t i = 0; i < kPoints; ++i) scene_.map().SetMapId(scene_.map().At(MapScene::IdOf(i)), 7);
   MapDelta joined = scene_.map().TakeDelta(MapEvent::kCorrected, KeyframeId::Make(1, 1), 7);
   if (core_->awaited().valid()) joined.progress.settled = core_->awaited();
   core_->ApplyMapDelta(joined);

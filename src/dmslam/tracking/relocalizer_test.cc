@@ -81,8 +81,8 @@ class Wall {
         landmark.reference = landmark.first_keyframe = id;
         map_.AddLandmark(landmark);
       }
-      map_.SetObservation(id, static_cast<uint16_t>(feature), landmark.id);
-      map_.UpdateDescriptor(landmark.id);
+      map_.SetObservation(map_.At(id), static_cast<uint16_t>(feature), map_.At(landmark.id));
+      map_.UpdateDescriptor(map_.At(landmark.id));
     }
     return map_.TakeDelta(MapEvent::kMapped, id, 1);
   }
