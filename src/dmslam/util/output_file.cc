@@ -1,4 +1,4 @@
-#include "dmslam/place_recognition/output_file.h"
+#include "dmslam/util/output_file.h"
 
 #include <unistd.h>
 
