@@ -33,7 +33,6 @@ MotionJudge::MotionJudge(const DynamicsOptions& options, const Camera& camera)
       elders_(options.elders, options.vote.trusted_age_s),
       rivals_(options.rivals),
       hidden_(options.hidden),
-      chance_(options.chance),
       moved_(options.moved),
       missing_(options.missing, camera) {}
 
@@ -68,7 +67,6 @@ void MotionJudge::Believe(const Map& map, std::span<const ExpectedLandmark> expe
 
 void MotionJudge::Reset() {
   votes_.Reset();
-  chance_.Reset();
   evidence_.Clear();
 }
 

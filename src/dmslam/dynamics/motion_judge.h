@@ -5,7 +5,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dmslam/dynamics/chance_matches.h"
 #include "dmslam/dynamics/elders.h"
 #include "dmslam/dynamics/hidden_places.h"
 #include "dmslam/dynamics/landmark_votes.h"
@@ -22,7 +21,6 @@ struct DynamicsOptions {
   ElderOptions elders;
   RivalOptions rivals;
   HiddenPlaceOptions hidden;
-  ChanceOptions chance;
   MovedOptions moved;
   MissingOptions missing;
 
@@ -61,7 +59,6 @@ class MotionJudge {
   const LandmarkVotes& votes() const { return votes_; }
   Elders& elders() { return elders_; }
   const RivalMotions& rivals() const { return rivals_; }
-  ChanceMatches& chance() { return chance_; }
 
   /// Before the pose is optimised: takes the matches that are there by chance, where somebody hides the map.
   void DropMatchesOfHiddenPlaces(const Map& map, std::span<const ExpectedLandmark> expected,
@@ -88,7 +85,6 @@ class MotionJudge {
   Elders elders_;
   RivalMotions rivals_;
   HiddenPlaces hidden_;
-  ChanceMatches chance_;
   MovedLandmarks moved_;
   MissingLandmarks missing_;
   EvidenceCounter evidence_;

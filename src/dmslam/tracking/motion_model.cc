@@ -115,40 +115,10 @@ bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const 
          moved <= options_.speed_slack + options_.max_speed * since_s;
 }
 
-std::optional<MotionModel::Surprise> MotionModel::SurpriseOf(const Map& map, const Rigid3d& T_cam_world,
-                                                             const FrameTime& time) const {
-  const Prediction prediction = Predict(map, time);
-  if (!prediction.prior) return std::nullopt;
-  const Rigid3d& expected = *prediction.T_cam_world;
-  const double steps = std::max(1.0, static_cast<double>(time.stamp_ns - Newest().time.stamp_ns) / kStepNs);
-  return Surprise{AngleBetween(T_cam_world.rotation, expected.rotation) / steps,
-                  (T_cam_world.Center() - expected.Center()).norm() / (Depth(map) * steps)};
-}
-
-bool MotionModel::Surprises(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const {
-  const std::optional<Surprise> surprise = SurpriseOf(map, T_cam_world, time);
-  if (!surprise || !usual_squared_) return false;
-  const auto bound = [&](double usual_squared) {
-    return options_.doubtful_surprise * std::max(options_.min_usual, std::sqrt(usual_squared));
-  };
-  return surprise->turned_rad > bound(usual_squared_->turned_rad) ||
-         surprise->moved > bound(usual_squared_->moved);
-}
-
-void MotionModel::Remember(const Surprise& surprise, int64_t since_ns) {
-  const Surprise squared{surprise.turned_rad * surprise.turned_rad, surprise.moved * surprise.moved};
-  if (!usual_squared_) usual_squared_ = squared;
-  const double newness = 1.0 - std::exp(-static_cast<double>(since_ns) * 1e-9 / options_.usual_s);
-  usual_squared_->turned_rad += newness * (squared.turned_rad - usual_squared_->turned_rad);
-  usual_squared_->moved += newness * (squared.moved - usual_squared_->moved);
-}
-
 void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world,
                             const FrameTime& time, bool jumped) {
   const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
   const bool successive = IsWithin(time, kSuccessiveNs) && !jumped;
-  if (const auto surprise = SurpriseOf(map, T_cam_world, time); surprise && !jumped)
-    Remember(*surprise, time.stamp_ns - Newest().time.stamp_ns);
   const Motion motion = MotionTo(T_cam_world, T_last_world.value_or(T_cam_world), time);
   Begin(pose, time);
   if (successive && T_last_world) motion_ = motion;

@@ -30,11 +30,8 @@ struct MotionModelOptions {
   double prior_rotation_rad = 0.01;  ///< how well a step of 1/30 s is known beforehand...
   double prior_translation = 0.01;   ///< ...and its translation, as a share of the scene's depth
   double max_surprise = 4.0;  ///< a pose that lies more standard deviations of the prior off contradicts it
-  double doubtful_surprise = 1.75;  ///< times what predictions were off of late: more is news
-  double usual_s = 1.0;             ///< of so long a time that is the mean...
-  double min_usual = 0.001;         ///< ...and never less for a step of 1/30 s [rad, and depths of the scene]
-  double max_speed = 1.0;           ///< of a camera whose motion is not known [depths of the scene / s]...
-  double speed_slack = 0.05;        ///< ...and how far it may be off besides [depths]
+  double max_speed = 1.0;     ///< of a camera whose motion is not known [depths of the scene / s]...
+  double speed_slack = 0.05;  ///< ...and how far it may be off besides [depths]
   double max_turn_rad_per_s = 2.0;  ///< the same for its rotation...
   double turn_slack_rad = 0.05;     ///< ...
   double reach_known_s = 5.0;       ///< of where it was longer ago nothing follows
@@ -63,8 +60,6 @@ class MotionModel {
   /// Whether a carried camera can have come to `T_cam_world` since its newest pose: near where its motion
   /// leads, and where that is not known, no faster than hands and cars are.
   bool IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
-  /// Whether `T_cam_world` is farther from where the motion leads than the poses before it were.
-  bool Surprises(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
   /// A frame was tracked. `jumped`: not from the frame before (relocalised), so the step is no motion.
   void OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world, const FrameTime& time,
                  bool jumped);
@@ -87,13 +82,6 @@ class MotionModel {
     Rigid3d T_cam_lastcam;
     int64_t duration_ns = 0;
   };
-  /// How far a prediction was off, for each step of 1/30 s.
-  struct Surprise {
-    double turned_rad = 0;
-    double moved = 0;  ///< [depths of the scene]
-  };
-  std::optional<Surprise> SurpriseOf(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
-  void Remember(const Surprise& surprise, int64_t since_ns);
   const Pose& Newest() const { return coasting_ ? *coasting_ : last_; }
   Motion MotionTo(const Rigid3d& T_cam_world, const Rigid3d& T_last_world, const FrameTime& time) const;
   Rigid3d StepUntil(const FrameTime& time) const;
@@ -104,8 +92,7 @@ class MotionModel {
   MotionModelOptions options_;
   Pose last_;
   std::optional<Pose> coasting_;
-  std::optional<Surprise> usual_squared_;  ///< mean squares of late
-  std::optional<Motion> motion_;           ///< to the newest pose, coasted ones included
+  std::optional<Motion> motion_;  ///< to the newest pose, coasted ones included
 };
 
 }  // namespace dmslam

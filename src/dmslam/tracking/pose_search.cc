@@ -85,7 +85,6 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   report.num_expected = static_cast<int>(expected.size());
   report.contradicts = static_cast<int>(fit.rejected.size()) > fit.inliers;
   Decide(fit, careful, &report);
-  SuspectChance(frame->stamp_ns, &report);
   if (report.ok) judge_.Believe(map, expected, *frame);
   return report;
 }
@@ -106,19 +105,6 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
     report->reason = "the static features lie in too small a part of the image";
   } else {
     report->ok = true;
-  }
-}
-
-void PoseSearch::SuspectChance(int64_t stamp_ns, TrackingReport* report) {
-  if (!judge_.enabled() || !report->ok || report->num_expected == 0) return;
-  const double share = static_cast<double>(report->num_static) / report->num_expected;
-  report->by_chance = judge_.chance().Suspects(share, report->mean_chi2);
-  report->clears_chance = judge_.chance().Clears(share, report->mean_chi2);
-  if (report->by_chance) {
-    report->ok = false;
-    report->reason = "what is found of the map may be found by chance";
-  } else {
-    judge_.chance().OnTracked(share, report->mean_chi2, stamp_ns);
   }
 }
 

@@ -48,7 +48,6 @@ class PoseSearch {
  private:
   std::span<const ExpectedLandmark> MatchAround(const Map& map, double wider, TrackedFrame* frame);
   void Decide(const PoseFit& fit, bool careful, TrackingReport* report) const;
-  void SuspectChance(int64_t stamp_ns, TrackingReport* report);
 
   TrackingOptions options_;
   Camera camera_;

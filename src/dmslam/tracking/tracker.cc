@@ -15,7 +15,7 @@ constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without 
 constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
 constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
 constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
-constexpr int kSomeProven = 15;                // ...and that must be among them when it is confirmed by time
+constexpr int kSomeProven = 8;                 // ...and that must be among them when it is confirmed by time
 
 void Refuse(const char* reason, TrackingReport* report) {
   report->ok = false;
@@ -44,13 +44,11 @@ void Tracker::OnMapForgotten() {
 void Tracker::OnMapGivenUp() {
   search_.Reset();
   motion_.Stop();
-  in_doubt_ = false;
   recovery_.reset();
 }
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
   Attempt attempt = FollowMotion(map, &frame);
-  const bool doubtful = IsDoubtful(map, frame, &attempt.report);
   if (!attempt.report.ok && recovery_) AbandonRecovery();
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request.map_id, &frame, &attempt);
@@ -61,27 +59,14 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   } else if (attempt.weak_pose) {
     motion_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
   }
-  if (recovery_ || doubtful) {
+  if (recovery_) {
     search_.judge().DropEvidence();
     result.pose.reset();
-    Refuse(recovery_ ? "a place was recognised that is not confirmed yet"
-                     : "what is found of the map may be found by chance",
-           &result.report);
+    result.report.ok = false;
+    result.report.reason = "a place was recognised that is not confirmed yet";
   }
   result.frame = std::move(frame);
   return result;
-}
-
-/// Matches by chance carry the camera anywhere. Where they do, from the first that are news until the map is
-/// seen again, the pose is a better guess than none: it is followed, and not believed.
-bool Tracker::IsDoubtful(const Map& map, const TrackedFrame& frame, TrackingReport* report) {
-  if (report->by_chance) {
-    report->ok = true;
-    in_doubt_ = in_doubt_ || motion_.Surprises(map, frame.T_cam_world, {frame.index, frame.stamp_ns});
-  } else if (!report->ok || report->clears_chance) {
-    in_doubt_ = false;
-  }
-  return in_doubt_;
 }
 
 /// Goes on from a frame whose pose was found.
@@ -135,7 +120,6 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
     Refuse("the pose contradicts the camera's motion", &attempt.report);
     attempt.report.contradicts = true;
-    attempt.report.by_chance = false;
   } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
     attempt.weak_pose = frame->T_cam_world;
   }

@@ -80,7 +80,6 @@ class Tracker {
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
   bool IsConfirmed(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
   void AbandonRecovery();
-  bool IsDoubtful(const Map& map, const TrackedFrame& frame, TrackingReport* report);
 
   TrackingOptions options_;
   uint64_t seed_;
@@ -96,7 +95,6 @@ class Tracker {
     TrackedFrame last;
   };
   std::optional<Recovery> recovery_;
-  bool in_doubt_ = false;  ///< the pose may rest on matches by chance: it is followed, and not believed
 };
 
 }  // namespace dmslam
