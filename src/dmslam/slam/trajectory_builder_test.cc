@@ -94,7 +94,7 @@ TEST(TrajectoryOfJoinedMaps, PosesToldInAMapGoWithIt) {
   tell(3);
   tell(4);
   const Sim3d S_1_2(ExpSo3(Eigen::Vector3d(0, 0.4, 0)), Eigen::Vector3d(5, 0, 1), 0.5);
-  map.SetPoseAndScale(KeyframeId::Make(1, 2), (Sim3d(then) * S_1_2.Inverse()).ToRigid(), S_1_2.scale);
+  map.SetPoseAndScale(map.At(KeyframeId::Make(1, 2)), (Sim3d(then) * S_1_2.Inverse()).ToRigid(), S_1_2.scale);
   map.SetMapId(map.At(KeyframeId::Make(1, 2)), 1);
   builder.OnMapDelta(map.TakeDelta(MapEvent::kCorrected, KeyframeId::Make(1, 2), 1));
   tell(5);

@@ -29,7 +29,7 @@ TEST(KeyframePolicyTest, AMapOfTwoKeyframesGrowsAlsoBesideALargerOne) {
     landmark.reference = landmark.first_keyframe = KeyframeId::Make(MapScene::kSession, 100);
     map.AddLandmark(landmark);
     for (uint32_t k = 0; k < 2; ++k)
-      map.SetObservation(KeyframeId::Make(MapScene::kSession, 100 + k), i, landmark.id);
+      map.SetObservation(map.At(KeyframeId::Make(MapScene::kSession, 100 + k)), i, map.At(landmark.id));
   }
   EXPECT_EQ(ExpectedOf(map, map.At(KeyframeId::Make(MapScene::kSession, 101))), 150);
   EXPECT_EQ(ExpectedOf(map, map.At(KeyframeId::Make(MapScene::kSession, 3))), 200);
