@@ -64,6 +64,9 @@ class LoopVerifier {
   std::optional<VerifiedLoop> Confirm(const Map& map, const Keyframe& keyframe, const VerifiedLoop& earlier,
                                       std::string* why) const;
 
+  /// Whether a place of another map is seen so well that the maps may be welded, once others confirm it.
+  bool HoldsBetweenMaps(const VerifiedLoop& loop) const;
+
   /// Which of `landmarks` a camera at `T_cam_world` finds among the features of `keyframe`.
   PlaceSupport Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
                     const std::vector<LandmarkId>& landmarks, double radius_px) const;
@@ -87,7 +90,6 @@ class LoopVerifier {
   void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
   bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
-  bool HoldsBetweenMaps(const VerifiedLoop& loop) const;
 
   LoopcloserOptions options_;
   uint64_t seed_;
