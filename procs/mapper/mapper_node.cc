@@ -39,8 +39,9 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
                      "; give all processes a higher one with --session");
   }
   if (saved_->missing > 0) {
-    LogWarning("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
-               saved_->missing);
+    LogWarning(
+        "{}: {} map records are missing in it, {} references lead nowhere; the map is as good as it can be",
+        files_.load, saved_->missing, saved_->skipped);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
   LogInfo("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
@@ -104,7 +105,7 @@ bool MapperNode::FetchReplica() {
   const Version version = fetch_->version();
   LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
           fetched_->keyframes().size(), fetched_->num_landmarks());
-  core_->Continue(std::move(*fetched_));
+  core_->Continue(std::move(*fetched_), static_cast<uint64_t>(context_.random_id));
   saved_parts_.clear();  // what the others hold is newer
   writer_plan().parent = version;
   return true;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dmslam/place_recognition/output_file.h"
+#include "dmslam/util/output_file.h"
 #include "dmslam/place_recognition/vocabulary_format.h"
 #include "dmslam/util/check.h"
 
