@@ -205,6 +205,7 @@ void HttpServer::Refuse(Connection* c, int status) {
 void HttpServer::Respond(Connection* c, const HttpRequest& request, HttpResponse response) {
   if (response.events) {
     c->listener = hub_->Join();
+    response.type = "text/event-stream";
     if (!c->listener) response = HttpResponse{503, "", "", {}, false};
   }
   if (response.status >= 400) c->close_after = true;
