@@ -9,7 +9,8 @@ Usage: $me [--size WIDTHxHEIGHT] [--fps X] FILE >camera.yaml
 
 Converts the camera file of another program: the result is printed. What FILE is, is seen from its content: settings of
 ORB-SLAM2 or ORB-SLAM3; a calibration by OpenCV (YAML or XML) or by ROS; sensor.yaml of a EuRoC sequence; or one line of
-numbers as TUM publishes them: fx fy cx cy, or these and k1 k2 p1 p2 k3. Fisheye models are refused by name.
+numbers as TUM publishes them: fx fy cx cy, or these and k1 k2 p1 p2 k3. A fisheye lens of four coefficients (equidistant,
+KannalaBrandt8, OpenCV's fisheye module) becomes the model fisheye; other wide models are refused by name.
 
   --size WxH    size of the images in pixels, where the file does not say it
   --fps X       frames per second, where the file does not say it
@@ -65,7 +66,14 @@ refuse_model() { # FIELD VALUE
 }
 holds() { awk "BEGIN { exit !($1) }" </dev/null; }
 
-fx="" fy="" cx="" cy="" distortion=(0 0 0 0 0) width="" height=""
+fx="" fy="" cx="" cy="" model=pinhole distortion=(0 0 0 0 0) width="" height=""
+use_fisheye() { # FIELD VALUES...: four
+  local name=$1 value
+  shift
+  [ $# = 4 ] || fail "$file: field '$name' has $# numbers; a fisheye lens has four: k1, k2, k3, k4"
+  for value in "$@"; do require "$name" "$value"; done
+  model=fisheye distortion=("$@")
+}
 use_distortion() { # FIELD VALUES...: up to five; more only where they are zero
   local name=$1 i=0 value
   shift
@@ -80,16 +88,24 @@ use_distortion() { # FIELD VALUES...: up to five; more only where they are zero
   done
 }
 read_orb_slam() {
-  local type name value i=0 prefix=Camera
+  local type name value i=0 prefix=Camera fisheye=() names="k1 k2 p1 p2 k3"
   [ -z "$(field Camera1.fx)" ] || prefix=Camera1
   type=$(field Camera.type)
-  case "${type,,}" in "" | pinhole | rectified) ;; *) refuse_model Camera.type "$type" ;; esac
+  case "${type,,}" in "" | pinhole | rectified) ;; kannalabrandt8) names="" ;; *) refuse_model Camera.type "$type" ;; esac
   for name in fx fy cx cy; do
     value=$(field "$prefix.$name")
     require "$prefix.$name" "$value"
     printf -v "$name" %s "$value"
   done
-  for name in k1 k2 p1 p2 k3; do
+  if [ -z "$names" ]; then
+    for name in k1 k2 k3 k4; do
+      value=$(field "$prefix.$name")
+      require "$prefix.$name" "$value"
+      fisheye+=("$value")
+    done
+    use_fisheye "$prefix.k1 to k4" "${fisheye[@]}"
+  fi
+  for name in $names; do
     value=$(field "$prefix.$name")
     [ -z "$value" ] || { require "$prefix.$name" "$value"; distortion[i]=$value; }
     i=$((i + 1))
@@ -98,43 +114,51 @@ read_orb_slam() {
   [ -n "$fps" ] || fps=$(field Camera.fps)
 }
 read_matrix() { # OpenCV's tools and ROS: a 3x3 matrix and a list
-  local model k d resolution
-  model=$(field distortion_model camera_model)
-  case "${model,,}" in "" | plumb_bob | pinhole | radtan | rational_polynomial) ;; *) refuse_model distortion_model "$model" ;; esac
-  model=$(field fisheye_model)
-  [ -z "$model" ] || [ "$model" = 0 ] || refuse_model fisheye_model "$model"
+  local lens k d resolution use=use_distortion
+  lens=$(field distortion_model camera_model)
+  case "${lens,,}" in
+    "" | plumb_bob | pinhole | radtan | rational_polynomial) ;;
+    equidistant | fisheye) use=use_fisheye ;;
+    *) refuse_model distortion_model "$lens" ;;
+  esac
+  lens=$(field fisheye_model)
+  [ -z "$lens" ] || [ "$lens" = 0 ] || use=use_fisheye
   read -ra k <<<"$(list camera_matrix cameraMatrix)"
   [ ${#k[@]} = 9 ] || fail "$file: field 'camera_matrix' has ${#k[@]} numbers; nine are wanted"
   fx=${k[0]} cx=${k[2]} fy=${k[4]} cy=${k[5]}
   read -ra d <<<"$(list distortion_coefficients dist_coeffs)"
-  use_distortion distortion_coefficients "${d[@]}"
+  $use distortion_coefficients "${d[@]}"
   width=$(field image_width) height=$(field image_height)
   read -ra resolution <<<"$(list cameraResolution)"
   [ ${#resolution[@]} != 2 ] || width=${resolution[0]} height=${resolution[1]}
 }
 read_euroc() {
-  local model k d resolution
-  model=$(field camera_model)
-  case "${model,,}" in "" | pinhole) ;; *) refuse_model camera_model "$model" ;; esac
-  model=$(field distortion_model)
-  case "${model,,}" in "" | radial-tangential | radtan | plumb_bob) ;; *) refuse_model distortion_model "$model" ;; esac
+  local lens k d resolution use=use_distortion
+  lens=$(field camera_model)
+  case "${lens,,}" in "" | pinhole) ;; *) refuse_model camera_model "$lens" ;; esac
+  lens=$(field distortion_model)
+  case "${lens,,}" in
+    "" | radial-tangential | radtan | plumb_bob) ;;
+    equidistant) use=use_fisheye ;;
+    *) refuse_model distortion_model "$lens" ;;
+  esac
   read -ra k <<<"$(list intrinsics)"
   [ ${#k[@]} = 4 ] || fail "$file: field 'intrinsics' has ${#k[@]} numbers; four are wanted: fx, fy, cx, cy"
   fx=${k[0]} fy=${k[1]} cx=${k[2]} cy=${k[3]}
   read -ra d <<<"$(list distortion_coefficients distortion_coeffs)"
-  use_distortion distortion_coefficients "${d[@]}"
+  $use distortion_coefficients "${d[@]}"
   read -ra resolution <<<"$(list resolution)"
   width=${resolution[0]:-} height=${resolution[1]:-}
   [ -n "$fps" ] || fps=$(field rate_hz)
 }
 read_numbers() { # the benchmark's table, or camera.txt of TUM's monocular sequences
-  local first value model="" w h
+  local first value lens="" w h
   read -ra first <<<"$text"
   [ ${#first[@]} -gt 0 ] || fail "$file: is empty"
-  [[ ${first[0]} =~ $number ]] || { model=${first[0]}; first=("${first[@]:1}"); }
-  case "${model,,}" in
-    "" | pinhole | radtan) ;;
-    equidistant | kannalabrandt | fov) refuse_model model "$model" ;;
+  [[ ${first[0]} =~ $number ]] || { lens=${first[0]}; first=("${first[@]:1}"); }
+  case "${lens,,}" in
+    "" | pinhole | radtan | equidistant | kannalabrandt) ;;
+    fov) refuse_model model "$lens" ;;
     *) fail "$file: is no camera file that is known (see --help)" ;;
   esac
   case ${#first[@]} in
@@ -144,7 +168,10 @@ read_numbers() { # the benchmark's table, or camera.txt of TUM's monocular seque
   for value in "${first[@]}"; do require "line 1" "$value"; done
   [ ${#first[@]} != 5 ] || holds "${first[4]} == 0" || refuse_model "line 1" "FOV, a fisheye lens"
   fx=${first[0]} fy=${first[1]} cx=${first[2]} cy=${first[3]}
-  [ ${#first[@]} = 5 ] || use_distortion "line 1" "${first[@]:4}"
+  case "${lens,,}" in
+    equidistant | kannalabrandt) use_fisheye "line 1" "${first[@]:4}" ;;
+    *) [ ${#first[@]} = 5 ] || use_distortion "line 1" "${first[@]:4}" ;;
+  esac
   read -r width height _ <<<"$(sed -n 2p <<<"$text")" || true
   holds "$fx < 10" || return 0
   w=$width h=$height # the numbers are shares of the image's size, from its corner
@@ -169,15 +196,18 @@ fi
 for name in fx fy cx cy; do require "$name" "${!name}"; done
 fps=${fps:-30}
 require fps "$fps"
+order="k1, k2, p1, p2, k3"
+[ $model = pinhole ] || order="k1, k2, k3, k4"
+printf -v coefficients ', %s' "${distortion[@]}"
 cat <<EOF
 # Converted from $(basename "$file").
-model: pinhole
+model: $model
 width: $width
 height: $height
 fx: $fx
 fy: $fy
 cx: $cx
 cy: $cy
-distortion: [${distortion[0]}, ${distortion[1]}, ${distortion[2]}, ${distortion[3]}, ${distortion[4]}]  # k1, k2, p1, p2, k3
+distortion: [${coefficients#, }]  # $order
 fps: $fps
 EOF

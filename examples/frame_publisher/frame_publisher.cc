@@ -47,9 +47,12 @@ int main(int argc, char** argv) {
   camera.fx_px = file["fx"].as<double>(), camera.fy_px = file["fy"].as<double>();
   camera.cx_px = file["cx"].as<double>(), camera.cy_px = file["cy"].as<double>();
   camera.fps = file["fps"].as<double>(30), camera.speed = 1, camera.sequence = "frame_publisher";
+  const bool fisheye = file["model"].as<std::string>("") == "fisheye";
   const auto lens = file["distortion"].as<std::vector<double>>(std::vector<double>(5));
-  camera.k1 = lens[0], camera.k2 = lens[1], camera.p1 = lens[2], camera.p2 = lens[3];
-  camera.k3 = lens.size() > 4 ? lens[4] : 0;
+  camera.lens = fisheye ? dmslam::camera_info_t::LENS_FISHEYE : dmslam::camera_info_t::LENS_BROWN;
+  camera.k1 = lens[0], camera.k2 = lens[1], (fisheye ? camera.k3 : camera.p1) = lens[2];
+  (fisheye ? camera.k4 : camera.p2) = lens[3];
+  if (!fisheye && lens.size() > 4) camera.k3 = lens[4];
   dmslam::frame_t frame{};
   frame.session = camera.session;
   auto due = Clock::now();

@@ -38,7 +38,8 @@ def stamp_ns(stamp):
 
 
 def camera_from_ros(info, session):
-    if info.distortion_model not in ("plumb_bob", ""):
+    fisheye = info.distortion_model in ("equidistant", "fisheye")
+    if not fisheye and info.distortion_model not in ("plumb_bob", ""):
         raise ValueError(f"distortion model {info.distortion_model} is not supported; undistort the images first")
     k = list(getattr(info, "K", None) or getattr(info, "k"))
     d = list(getattr(info, "D", None) or getattr(info, "d", [])) + [0.0] * 5
@@ -46,7 +47,11 @@ def camera_from_ros(info, session):
     camera.session, camera.mode, camera.speed, camera.fps = session, camera_info_t.MODE_REALTIME, 1.0, 30.0
     camera.width_px, camera.height_px = info.width, info.height
     camera.fx_px, camera.cx_px, camera.fy_px, camera.cy_px = k[0], k[2], k[4], k[5]
-    camera.k1, camera.k2, camera.p1, camera.p2, camera.k3 = d[:5]
+    if fisheye:
+        camera.lens = camera_info_t.LENS_FISHEYE
+        camera.k1, camera.k2, camera.k3, camera.k4 = d[:4]
+    else:
+        camera.k1, camera.k2, camera.p1, camera.p2, camera.k3 = d[:5]
     camera.sequence = "ros"
     return camera
 

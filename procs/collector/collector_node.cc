@@ -29,6 +29,10 @@ constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processe
 
 }  // namespace
 
+std::unique_ptr<Node> MakeCollector(NodeContext context, NodeOptions options, CollectorOptions collector) {
+  return std::make_unique<CollectorNode>(std::move(context), std::move(options), std::move(collector));
+}
+
 CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
     : StreamNode(std::move(context), std::move(options), "collector"), collector_(std::move(collector)) {
   Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,

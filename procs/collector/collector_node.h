@@ -8,17 +8,12 @@
 #include <vector>
 
 #include "collector/journal.h"
+#include "collector/make_collector.h"
 #include "collector/results.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
 namespace dmslam {
-
-struct CollectorOptions {
-  std::string out_dir;
-  std::string ground_truth;  ///< TUM trajectory; empty: none
-  bool progress = false;     ///< show progress on the terminal
-};
 
 /// Reads the frontend's and the mapper's streams and everybody's statuses, and writes the run's results when
 /// the sequence has drained through all streams. A reader like any other.

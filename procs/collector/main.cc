@@ -1,6 +1,6 @@
 #include <unistd.h>
 
-#include "collector/collector_node.h"
+#include "collector/make_collector.h"
 #include "dmslam/runtime/process_main.h"
 
 int main(int argc, char** argv) {
@@ -11,6 +11,6 @@ int main(int argc, char** argv) {
   process.app().AddOption("--ground-truth", collector.ground_truth, "trajectory in TUM format");
   collector.progress = isatty(STDERR_FILENO) != 0;
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
-    return std::make_unique<dmslam::CollectorNode>(std::move(context), std::move(options), collector);
+    return dmslam::MakeCollector(std::move(context), std::move(options), collector);
   });
 }

@@ -19,7 +19,11 @@ constexpr double kMaxBehindS = 0.5;
 
 }  // namespace
 
-FrontendNode::FrontendNode(NodeContext context, NodeOptions options, Extras extras)
+std::unique_ptr<Node> MakeFrontend(NodeContext context, NodeOptions options, FrontendExtras extras) {
+  return std::make_unique<FrontendNode>(std::move(context), std::move(options), std::move(extras));
+}
+
+FrontendNode::FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras)
     : StreamNode(std::move(context), std::move(options), "frontend"),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)) {
@@ -110,8 +114,8 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
     return;
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return;
-  ++frames_received_;
-  if (waiting_) ++frames_skipped_;
+  ++counts_.received;
+  if (waiting_) ++counts_.skipped;
   waiting_ = Waiting{std::move(*frame), context_.wall_us()};
 }
 
@@ -306,7 +310,7 @@ bool FrontendNode::TellLastPoses() {
 }
 
 void FrontendNode::PublishSequenceDone() {
-  PublishLoose(SequenceDone{context_.wall_us(), session_, 0, frames_processed_, frames_skipped_});
+  PublishLoose(SequenceDone{context_.wall_us(), session_, 0, counts_.processed, counts_.skipped});
 }
 
 // ---- While it goes on ----
@@ -327,7 +331,7 @@ bool FrontendNode::TrackWaiting() {
   waiting_.reset();
   last_index_ = waiting->frame.frame_index;
   last_stamp_ns_ = waiting->frame.stamp_ns;
-  if (first_stamp_ns_ == 0) first_stamp_ns_ = last_stamp_ns_;
+  if (first_map_.since_ns == 0) first_map_.since_ns = last_stamp_ns_;
   frame_open_ = true;
   const bool withheld = UnacceptedKeyframes() >= kMaxUnacceptedKeyframes;
   return Run([this, waiting, withheld] { Track(*waiting, withheld); });
@@ -375,7 +379,7 @@ bool FrontendNode::DecodeImage(const Frame& frame) {
 }
 
 void FrontendNode::OnBadImage(const std::string& problem) {
-  if (frames_bad_++ == 0) LogWarning("frontend: {} (further ones are only counted)", problem);
+  if (counts_.bad++ == 0) LogWarning("frontend: {} (further ones are only counted)", problem);
 }
 
 /// On the core.
@@ -408,12 +412,12 @@ void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
     }
     if (const auto* pose = std::get_if<FramePose>(&event)) {
       last_pose_ = *pose;
-      if (first_map_s_ < 0 && pose->HasPose()) {
-        first_map_s_ = static_cast<double>(pose->stamp_ns - first_stamp_ns_) * 1e-9;
+      if (first_map_.after_s < 0 && pose->HasPose()) {
+        first_map_.after_s = static_cast<double>(pose->stamp_ns - first_map_.since_ns) * 1e-9;
       }
     }
     if (std::holds_alternative<MapReset>(event)) {
-      first_map_s_ = -1;
+      first_map_.after_s = -1;
       error_.Reset();
     }
   }
@@ -422,13 +426,13 @@ void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
 void FrontendNode::PublishTracked(const Tracked& tracked) {
   Publish(tracked.output.events);
   endpoint_.Advance();  // before all that may come late
-  ++frames_processed_;
+  ++counts_.processed;
   FrameTrace trace = tracked.trace;
   trace.published_us = context_.wall_us();
-  latency_.Add(static_cast<double>(trace.published_us - trace.publish_us) * 1e-3);
-  decode_.Add(static_cast<double>(trace.decoded_us - trace.begin_us) * 1e-3);
-  extract_.Add(tracked.extract_ms);
-  step_.Add(static_cast<double>(trace.tracked_us - trace.begin_us) * 1e-3);
+  times_.latency.Add(static_cast<double>(trace.published_us - trace.publish_us) * 1e-3);
+  times_.decode.Add(static_cast<double>(trace.decoded_us - trace.begin_us) * 1e-3);
+  times_.extract.Add(tracked.extract_ms);
+  times_.step.Add(static_cast<double>(trace.tracked_us - trace.begin_us) * 1e-3);
   PublishLoose(trace);
   PublishView(trace);
   PublishLoose(tracked.features, options_.link == Link::kLan);
@@ -466,22 +470,23 @@ void FrontendNode::PublishStatus() {
   if (core_ && work_->Idle()) core_status_ = CoreStatus();
   FrontendStatus status = core_status_;
   status.head = MakeStatusHead(core_ ? last_pose_.reason : "waiting for a camera", {map_reader_.get()});
-  status.head.health.dropped_malformed += frames_bad_;
+  status.head.health.dropped_malformed += counts_.bad;
   if (IsHeldUp()) status.head.health.waiting_for = "mapper";
-  status.frames_received = frames_received_;
-  status.frames_processed = frames_processed_;
-  status.frames_skipped = frames_skipped_;
-  status.fps = static_cast<double>(frames_processed_ - std::exchange(status_frames_, frames_processed_));
+  status.frames_received = counts_.received;
+  status.frames_processed = counts_.processed;
+  status.frames_skipped = counts_.skipped;
+  status.fps =
+      static_cast<double>(counts_.processed - std::exchange(counts_.processed_at_status, counts_.processed));
   status.frame_index = static_cast<int32_t>(last_index_);
-  status.latency_p50_ms = latency_.Quantile(0.5);
-  status.latency_p95_ms = latency_.Quantile(0.95);
-  status.latency_p99_ms = latency_.Quantile(0.99);
-  status.decode_ms = decode_.Quantile(0.5);
-  status.extract_ms = extract_.Quantile(0.5);
-  status.step_ms = step_.Quantile(0.5);
-  status.step_p95_ms = step_.Quantile(0.95);
+  status.latency_p50_ms = times_.latency.Quantile(0.5);
+  status.latency_p95_ms = times_.latency.Quantile(0.95);
+  status.latency_p99_ms = times_.latency.Quantile(0.99);
+  status.decode_ms = times_.decode.Quantile(0.5);
+  status.extract_ms = times_.extract.Quantile(0.5);
+  status.step_ms = times_.step.Quantile(0.5);
+  status.step_p95_ms = times_.step.Quantile(0.95);
   status.track_ms = status.step_ms - status.decode_ms - status.extract_ms;
-  status.first_map_s = first_map_s_;
+  status.first_map_s = first_map_.after_s;
   if (core_) FillPoseStatus(&status);
   PublishLoose(status);
 }

@@ -15,6 +15,7 @@
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
+#include "frontend/make_frontend.h"
 #include "frontend/online_error.h"
 #include "frontend/sequence_end.h"
 
@@ -25,12 +26,7 @@ namespace dmslam {
 /// core is done in a job, or while there is none.
 class FrontendNode : public StreamNode {
  public:
-  struct Extras {
-    std::shared_ptr<const Vocabulary> vocabulary;
-    std::string picture_dir;  ///< empty: no pictures
-    int picture_every = 0;    ///< every Nth frame
-  };
-  FrontendNode(NodeContext context, NodeOptions options, Extras extras);
+  FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras);
 
   void Stop() override;
 
@@ -47,6 +43,18 @@ class FrontendNode : public StreamNode {
   struct Waiting {
     Frame frame;
     int64_t receive_us = 0;
+  };
+
+  struct FrameCounts {
+    int64_t received = 0, processed = 0, skipped = 0, bad = 0;
+    int64_t processed_at_status = 0;  ///< when the last status was published
+  };
+  struct FirstMap {
+    int64_t since_ns = 0;  ///< stamp of the first frame
+    double after_s = -1;   ///< below zero: none yet
+  };
+  struct FrameTimes {
+    LatencyWindow latency, decode, extract, step;
   };
 
   /// What the core makes of a frame.
@@ -102,7 +110,7 @@ class FrontendNode : public StreamNode {
   FrontendStatus CoreStatus() const;
 
   const RunOptions run_;
-  Extras extras_;
+  FrontendExtras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
   std::deque<HeldRecord>
@@ -123,11 +131,9 @@ class FrontendNode : public StreamNode {
   std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
   FramePose last_pose_;
   OnlineError error_;
-  int64_t frames_received_ = 0, frames_processed_ = 0, frames_skipped_ = 0, frames_bad_ = 0;
-  int64_t status_frames_ = 0;
-  int64_t first_stamp_ns_ = 0;
-  double first_map_s_ = -1;
-  LatencyWindow latency_, decode_, extract_, step_;
+  FrameCounts counts_;
+  FirstMap first_map_;
+  FrameTimes times_;
   FrontendStatus core_status_;        ///< what the core had to say of itself last
   std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
 };

@@ -4,8 +4,14 @@
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/settings/run_options.h"
+#include "loopcloser/make_loopcloser.h"
 
 namespace dmslam {
+
+std::unique_ptr<Node> MakeLoopcloser(NodeContext context, NodeOptions options,
+                                     std::shared_ptr<const Vocabulary> vocabulary) {
+  return std::make_unique<LoopcloserNode>(std::move(context), std::move(options), std::move(vocabulary));
+}
 
 LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)

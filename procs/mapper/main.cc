@@ -1,13 +1,13 @@
 #include "dmslam/runtime/process_main.h"
-#include "mapper/mapper_node.h"
+#include "mapper/make_mapper.h"
 
 int main(int argc, char** argv) {
   dmslam::ProcessMain process("mapper", "Builds the map: the only process that writes it.");
-  dmslam::MapperNode::Files files;
+  dmslam::MapperFiles files;
   process.app().AddOption("--map", files.load,
                           "saved map or log: begin with this map (needs the setting map.saved)");
   process.app().AddOption("--save-map", files.save, "write the map into this file at the end");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
-    return std::make_unique<dmslam::MapperNode>(std::move(context), std::move(options), files);
+    return dmslam::MakeMapper(std::move(context), std::move(options), files);
   });
 }

@@ -14,6 +14,10 @@ constexpr int64_t kPartEveryNs = 3'000'000;
 
 }  // namespace
 
+std::unique_ptr<Node> MakeMapper(NodeContext context, NodeOptions options, MapperFiles files) {
+  return std::make_unique<MapperNode>(std::move(context), std::move(options), std::move(files));
+}
+
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), "mapper"),
       run_(options_.settings.Read<RunOptions>()),
@@ -27,21 +31,21 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
   if (run_.localize_only && !run_.saved_map) {
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
-  if (!files_.load.empty()) saved_ = LoadMap(files_.load);
+  if (!files_.load.empty()) saved_.loaded = LoadMap(files_.load);
 }
 
 /// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
 uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
-  CheckFits(files_.load, *saved_, info.camera, options_.settings.Read<Pyramid>());
-  const Map& map = saved_->map;
+  CheckFits(files_.load, *saved_.loaded, info.camera, options_.settings.Read<Pyramid>());
+  const Map& map = saved_.loaded->map;
   if (session_ <= NewestSession(map)) {
     throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
                      "; give all processes a higher one with --session");
   }
-  if (saved_->missing > 0) {
+  if (saved_.loaded->missing > 0) {
     LogWarning(
         "{}: {} map records are missing in it, {} references lead nowhere; the map is as good as it can be",
-        files_.load, saved_->missing, saved_->skipped);
+        files_.load, saved_.loaded->missing, saved_.loaded->skipped);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
   LogInfo("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
@@ -51,20 +55,21 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
 
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
-  const uint16_t ordinal = saved_ ? ContinueSavedMap(info) : uint16_t{1};
+  const uint16_t ordinal = saved_.loaded ? ContinueSavedMap(info) : uint16_t{1};
   work_ = MakeCoreThread(info.mode);
   const auto publish = [this](const MapDelta& delta) {
     work_->Report([this, delta] { PublishDelta(delta); });
   };
   core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera,
                                        options_.settings.Read<Pyramid>(), ordinal, publish);
-  if (saved_) {
-    core_->ContinueSaved(std::exchange(saved_, std::nullopt)->map);
+  if (saved_.loaded) {
+    core_->ContinueSaved(std::exchange(saved_.loaded, std::nullopt)->map);
     const KeyframeId newest = core_->map().keyframes().rbegin()->first;
     const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, 56 * 1024);
-    saved_parts_.assign(parts.begin(), parts.end());
+    saved_.parts.assign(parts.begin(), parts.end());
   }
   if (!lockstep_) core_->SetInterrupt([this] { return keyframe_waits_.load(); });
+  core_->SetStop([this] { return stops_.load(); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
 }
@@ -83,45 +88,45 @@ void MapperNode::BeginFetch() {
   for (const ReplicaFetch::Holder& holder : holders) {
     if (options_.peers.empty() || options_.HasPeer(holder.role)) options.holders.push_back(holder);
   }
-  fetch_ = std::make_unique<ReplicaFetch>(options, context_.now_ns());
-  endpoint_.AddFetch(fetch_.get(), {channels::kMap});
+  left_.fetch = std::make_unique<ReplicaFetch>(options, context_.now_ns());
+  endpoint_.AddFetch(left_.fetch.get(), {channels::kMap});
 }
 
 /// Takes the newest replica, if there is one; true when that is done.
 bool MapperNode::FetchReplica() {
-  while (std::optional<Record> record = fetch_->Take()) {
-    if (record->begins_anew()) fetched_.emplace(core_->map().camera(), core_->map().pyramid());
+  while (std::optional<Record> record = left_.fetch->Take()) {
+    if (record->begins_anew()) left_.replica.emplace(core_->map().camera(), core_->map().pyramid());
     const auto delta = Read<MapDelta>(*record->bytes);
     if (!delta) {  // half a map is none: all of it is asked for again
-      endpoint_.Remove(fetch_.get());
-      fetched_.reset();
+      endpoint_.Remove(left_.fetch.get());
+      left_.replica.reset();
       BeginFetch();
       return false;
     }
-    fetched_->Apply(*delta);
+    left_.replica->Apply(*delta);
   }
-  if (fetch_->state() == ReplicaFetch::State::kNone) return true;
-  if (fetch_->state() != ReplicaFetch::State::kDone) return false;
-  const Version version = fetch_->version();
+  if (left_.fetch->state() == ReplicaFetch::State::kNone) return true;
+  if (left_.fetch->state() != ReplicaFetch::State::kDone) return false;
+  const Version version = left_.fetch->version();
   LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
-          fetched_->keyframes().size(), fetched_->num_landmarks());
-  core_->Continue(std::move(*fetched_), static_cast<uint64_t>(context_.random_id));
-  saved_parts_.clear();  // what the others hold is newer
+          left_.replica->keyframes().size(), left_.replica->num_landmarks());
+  core_->Continue(std::move(*left_.replica), static_cast<uint64_t>(context_.random_id));
+  saved_.parts.clear();  // what the others hold is newer
   writer_plan().parent = version;
   return true;
 }
 
 bool MapperNode::ReadyToWrite() {
   if (context_.fresh_system || options_.fresh) return true;
-  if (!fetch_) BeginFetch();
+  if (!left_.fetch) BeginFetch();
   if (!FetchReplica()) return false;
-  endpoint_.Remove(fetch_.get());
+  endpoint_.Remove(left_.fetch.get());
   return true;
 }
 
 void MapperNode::OnWriterOpen() {
-  fetch_.reset();
-  fetched_.reset();
+  left_.fetch.reset();
+  left_.replica.reset();
   const MapProgress progress = core_->map().progress();
   frontend_reader_ =
       MakeReader(StreamId::kFrontend, "FRONTEND",
@@ -131,7 +136,7 @@ void MapperNode::OnWriterOpen() {
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
                             {progress.loopcloser.epoch, progress.loopcloser.seq});
   if (progress.ended) {  // the one before could not say goodbye
-    end_announced_ = completing_ = true;
+    ending_ = Ending::kCompleting;
     Stop();
   } else if (progress.settled) {  // somebody may not have heard it
     const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(*progress.settled);
@@ -145,12 +150,25 @@ void MapperNode::OnWriterOpen() {
 
 void MapperNode::PublishDelta(const MapDelta& delta) {
   PublishRecord(delta);
-  const int64_t now_ns = context_.now_ns();
-  const double elapsed_ms = static_cast<double>(now_ns - keyframe_arrived_ns_) * 1e-6;
-  if (delta.event == MapEvent::kFused) fused_ns_ = now_ns;
-  if (delta.event == MapEvent::kAdjusted) adjustment_.Add(static_cast<double>(now_ns - fused_ns_) * 1e-6);
-  if (delta.event == MapEvent::kLandmarksCreated) to_landmarks_.Add(elapsed_ms);
-  if (delta.event == MapEvent::kAdjusted) to_adjusted_.Add(elapsed_ms);
+  timing_.OnPublished(delta.event, context_.now_ns());
+}
+
+void MapperNode::Timing::OnPublished(MapEvent event, int64_t now_ns) {
+  const double elapsed_ms = static_cast<double>(now_ns - arrived_ns) * 1e-6;
+  if (event == MapEvent::kFused) fused_ns = now_ns;
+  if (event == MapEvent::kAdjusted) adjustment.Add(static_cast<double>(now_ns - fused_ns) * 1e-6);
+  if (event == MapEvent::kLandmarksCreated) to_landmarks.Add(elapsed_ms);
+  if (event == MapEvent::kAdjusted) to_adjusted.Add(elapsed_ms);
+}
+
+void MapperNode::Timing::Fill(MapperStatus* status) const {
+  status->landmarks_p50_ms = to_landmarks.Quantile(0.5);
+  status->landmarks_p95_ms = to_landmarks.Quantile(0.95);
+  status->landmarks_p99_ms = to_landmarks.Quantile(0.99);
+  status->adjusted_p50_ms = to_adjusted.Quantile(0.5);
+  status->adjusted_p95_ms = to_adjusted.Quantile(0.95);
+  status->adjusted_p99_ms = to_adjusted.Quantile(0.99);
+  status->adjustment_ms = adjustment.Quantile(0.5);
 }
 
 bool MapperNode::KeyframeWaits() const {
@@ -179,13 +197,13 @@ void MapperNode::TakeLoopAnswers() {
 /// The loaded map goes out as records like any other, and is settled: then lock-step goes on. One part at a
 /// time: a logger, which nobody repairs, keeps up.
 bool MapperNode::PublishSavedMap() {
-  if (context_.now_ns() < next_part_ns_) return false;
-  next_part_ns_ = context_.now_ns() + kPartEveryNs;
+  if (context_.now_ns() < saved_.next_part_ns) return false;
+  saved_.next_part_ns = context_.now_ns() + kPartEveryNs;
   if (writer_->Full()) return false;
-  PublishDelta(saved_parts_.front());
-  saved_parts_.pop_front();
+  PublishDelta(saved_.parts.front());
+  saved_.parts.pop_front();
   const Keyframe& newest = core_->map().keyframes().rbegin()->second;
-  if (saved_parts_.empty())
+  if (saved_.parts.empty())
     Run([this, id = newest.id, map_id = newest.map_id] { core_->Settle(id, map_id); });
   return true;
 }
@@ -217,11 +235,11 @@ void MapperNode::Run(Job job, std::function<void()> when_done) {
 }
 
 int64_t MapperNode::WorkDeadline() const {
-  return writer_ && !saved_parts_.empty() ? next_part_ns_ : INT64_MAX;
+  return writer_ && !saved_.parts.empty() ? saved_.next_part_ns : INT64_MAX;
 }
 
 bool MapperNode::WorkOnce() {
-  if (completing_) {
+  if (ending_ == Ending::kCompleting) {
     DrainAfterEnd();
     return false;
   }
@@ -232,15 +250,15 @@ bool MapperNode::WorkOnce() {
     return false;
   }
   if (snapshots_->wanted()) endpoint_.Advance();  // now the map may be read
-  if (!saved_parts_.empty()) return PublishSavedMap();
+  if (!saved_.parts.empty()) return PublishSavedMap();
   TakeLoopAnswers();
   while (!arrived_.empty()) {
     taken_.push_back(std::move(arrived_.front()));
     arrived_.pop_front();
   }
-  if (awaited_.valid()) {
+  if (awaited_) {
     SettleAwaited();
-    return !awaited_.valid();
+    return !awaited_;
   }
   if (!lockstep_ && !answers_.empty()) {
     ApplyFirstAnswer();
@@ -259,7 +277,7 @@ void MapperNode::MarkFrontend(const Version& version) {
 /// True: there may be more to do.
 bool MapperNode::HandleFirstRecord() {
   const Record record = std::move(taken_.front().record);
-  keyframe_arrived_ns_ = taken_.front().at_ns;
+  timing_.arrived_ns = taken_.front().at_ns;
   taken_.pop_front();
   if (record.channel == channels::kSession) {
     if (const auto start = Read<SessionStart>(*record.bytes)) {
@@ -275,7 +293,7 @@ bool MapperNode::HandleFirstRecord() {
     if (job) job();
   };
   Run(work, [this, version] {
-    if (!awaited_.valid()) pending_.push_back({version, writer_->last_seq()});
+    if (!awaited_) pending_.push_back({version, writer_->last_seq()});
     AcceptWhatIsSafe();
   });
   return work_->Idle();
@@ -323,12 +341,7 @@ void MapperNode::AfterKeyframe(const Version& version, KeyframeId id, MapId map_
                                bool checked_by_loopcloser) {
   const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer("loopcloser");
   if (!wait) return Settle(id, map_id, version);
-  work_->Report([this, version, id, map_id] {
-    awaited_ = id;
-    awaited_map_ = map_id;
-    awaited_version_ = version;
-    asked_term_ = loop_reader_->term();
-  });
+  work_->Report([this, version, id, map_id] { awaited_ = {id, map_id, version, loop_reader_->term()}; });
 }
 
 /// On the core.
@@ -342,25 +355,25 @@ void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend)
 /// due.
 void MapperNode::SettleAwaited() {
   bool ask_again = false;
-  while (!answers_.empty() && awaited_.valid()) {
+  while (!answers_.empty() && awaited_) {
     const KeyframeId answered = answers_.front().answer.keyframe;
     ApplyFirstAnswer();
-    if (answered != awaited_) {
+    if (answered != awaited_->id) {
       ask_again = true;  // it has just come, and answers what is newest
       continue;
     }
-    const KeyframeId settled = std::exchange(awaited_, {});
-    Run([this, settled] { Settle(settled, awaited_map_, awaited_version_); },
-        [this] {
-          pending_.push_back({awaited_version_, writer_->last_seq()});
+    const Awaited settled = *std::exchange(awaited_, std::nullopt);
+    Run([this, settled] { Settle(settled.id, settled.map_id, settled.version); },
+        [this, settled] {
+          pending_.push_back({settled.version, writer_->last_seq()});
         });
   }
   // Another loop closer than the one that was asked does not know what is due.
-  if (!awaited_.valid()) return;
-  if (!asked_term_.valid()) asked_term_ = loop_reader_->term();
-  if (!ask_again && loop_reader_->term() == asked_term_) return;
-  asked_term_ = loop_reader_->term();
-  Run([this] { core_->AskAgain(awaited_, awaited_map_); });
+  if (!awaited_) return;
+  if (!awaited_->asked.valid()) awaited_->asked = loop_reader_->term();
+  if (!ask_again && loop_reader_->term() == awaited_->asked) return;
+  awaited_->asked = loop_reader_->term();
+  Run([this, awaited = *awaited_] { core_->AskAgain(awaited.id, awaited.map_id); });
 }
 
 void MapperNode::AcceptWhatIsSafe() {
@@ -377,19 +390,19 @@ void MapperNode::AcceptWhatIsSafe() {
 // ---- The end ----
 
 bool MapperNode::EndIfDone() {
-  frontend_ended_ = frontend_ended_ || frontend_reader_->AtEnd();
-  if (!frontend_ended_) return false;
-  if (!answers_.empty() && !end_announced_) {
+  if (ending_ == Ending::kNo && frontend_reader_->AtEnd()) ending_ = Ending::kFrontendEnded;
+  if (ending_ == Ending::kNo) return false;
+  if (!answers_.empty() && ending_ == Ending::kFrontendEnded) {
     ApplyFirstAnswer();
     return work_->Idle();
   }
-  if (!end_announced_) {
-    end_announced_ = true;
+  if (ending_ == Ending::kFrontendEnded) {
+    ending_ = Ending::kAnnounced;
     Run([this] { core_->End(run_.localize_only); });
     return work_->Idle();
   }
   writer_->Complete(context_.now_ns());
-  completing_ = true;
+  ending_ = Ending::kCompleting;
   PublishStatus();
   return true;
 }
@@ -407,13 +420,13 @@ void MapperNode::Save() {
   SaveMap(path, core_->map(), session_start_);
 }
 
-/// A step in work inserts and creates, and leaves out what takes long.
+/// A step in work inserts and creates, and leaves out what takes long; an adjustment ends where it is.
 void MapperNode::InterruptCore() {
-  keyframe_waits_ = true;
+  keyframe_waits_ = stops_ = true;
   if (work_) work_->Finish();
 }
 
-MapperNode::~MapperNode() { keyframe_waits_ = true; }
+MapperNode::~MapperNode() { keyframe_waits_ = stops_ = true; }
 
 void MapperNode::Stop() {
   if (!stopping_) InterruptCore();
@@ -427,17 +440,11 @@ void MapperNode::PublishStatus() {
   status.head =
       MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
   status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
-  if (completing_) status.state = MapperStatus::State::kDone;
+  if (ending_ == Ending::kCompleting) status.state = MapperStatus::State::kDone;
   status.keyframe_queue = static_cast<int32_t>(arrived_.size() + taken_.size());
-  status.keyframes_unaccepted = static_cast<int32_t>(pending_.size()) + (awaited_.valid() ? 1 : 0);
+  status.keyframes_unaccepted = static_cast<int32_t>(pending_.size()) + (awaited_ ? 1 : 0);
   status.last_settled = last_settled_;
-  status.landmarks_p50_ms = to_landmarks_.Quantile(0.5);
-  status.landmarks_p95_ms = to_landmarks_.Quantile(0.95);
-  status.landmarks_p99_ms = to_landmarks_.Quantile(0.99);
-  status.adjusted_p50_ms = to_adjusted_.Quantile(0.5);
-  status.adjusted_p95_ms = to_adjusted_.Quantile(0.95);
-  status.adjusted_p99_ms = to_adjusted_.Quantile(0.99);
-  status.adjustment_ms = adjustment_.Quantile(0.5);
+  timing_.Fill(&status);
   PublishLoose(status);
 }
 

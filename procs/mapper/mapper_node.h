@@ -15,6 +15,7 @@
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
+#include "mapper/make_mapper.h"
 
 namespace dmslam {
 
@@ -24,11 +25,7 @@ namespace dmslam {
 /// done in a job, or while there is none.
 class MapperNode : public StreamNode {
  public:
-  /// Maps as files; empty: none.
-  struct Files {
-    std::string load;  ///< a saved map, or a log: the map to begin with
-    std::string save;  ///< where the map is written at the end
-  };
+  using Files = MapperFiles;
   MapperNode(NodeContext context, NodeOptions options, Files files = {});
   ~MapperNode() override;
 
@@ -57,6 +54,39 @@ class MapperNode : public StreamNode {
     LoopAnswer answer;
     Version version;
   };
+  /// The map to begin with.
+  struct SavedMap {
+    std::optional<RebuiltMap> loaded;  ///< not yet taken over
+    std::deque<MapDelta> parts;        ///< of it, not yet published
+    int64_t next_part_ns = 0;
+  };
+  /// The map that another mapper left, while the newest replica of it is looked for.
+  struct LeftMap {
+    std::unique_ptr<ReplicaFetch> fetch;
+    std::optional<Replica> replica;
+  };
+  /// Lock-step: a keyframe to which the loop closer's answer is due.
+  struct Awaited {
+    KeyframeId id;
+    MapId map_id = 0;
+    Version version;  ///< of the record that brought it
+    Term asked;       ///< of the loop closer that was asked
+  };
+  /// How long keyframes take.
+  struct Timing {
+    int64_t arrived_ns = 0;  ///< the one that is handled
+    int64_t fused_ns = 0;    ///< since then it adjusts
+    LatencyWindow to_landmarks, to_adjusted, adjustment;
+
+    void OnPublished(MapEvent event, int64_t now_ns);
+    void Fill(MapperStatus* status) const;
+  };
+  enum class Ending : uint8_t {
+    kNo,
+    kFrontendEnded,
+    kAnnounced,   ///< the last map record says so
+    kCompleting,  ///< nothing follows; the readers are waited for
+  };
 
   uint16_t ContinueSavedMap(const CameraInfo& info);
   bool PublishSavedMap();
@@ -84,35 +114,26 @@ class MapperNode : public StreamNode {
 
   const RunOptions run_;
   Files files_;
-  std::optional<RebuiltMap> saved_;  ///< loaded, not yet taken over
-  int64_t next_part_ns_ = 0;
-  std::deque<MapDelta> saved_parts_;  ///< of that map, not yet published
-  SessionStart session_start_;        ///< as the frontend said it
+  SavedMap saved_;
+  SessionStart session_start_;  ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   std::unique_ptr<StreamReader> frontend_reader_, loop_reader_;
-  std::unique_ptr<ReplicaFetch> fetch_;  ///< while the newest replica is looked for
-  std::optional<Replica> fetched_;
+  LeftMap left_;
   bool lockstep_ = false;
-  bool frontend_ended_ = false;
-  bool end_announced_ = false;
-  bool completing_ = false;              ///< nothing follows; the readers are waited for
+  Ending ending_ = Ending::kNo;
   std::deque<Arrived> arrived_;          ///< records of the frontend that came while it worked
   std::deque<Arrived> taken_;            ///< the same, to be handled next
   std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
   wire::RecordGroups<LoopAnswer> answer_groups_;
-  KeyframeId awaited_;  ///< lock-step: the loop closer's answer to this keyframe is due
-  MapId awaited_map_ = 0;
-  Version awaited_version_;  ///< of the record that brought it
-  Term asked_term_;          ///< of the loop closer that was asked
+  std::optional<Awaited> awaited_;
   std::optional<KeyframeId> last_settled_;
-  int64_t keyframe_arrived_ns_ = 0;  ///< the one that is handled
-  int64_t fused_ns_ = 0;             ///< since then it adjusts
-  LatencyWindow to_landmarks_, to_adjusted_, adjustment_;
+  Timing timing_;
   MapperStatus core_status_;                 ///< what the core had to say of itself last
   std::atomic<bool> keyframe_waits_{false};  ///< asked by the core: it finishes early
+  std::atomic<bool> stops_{false};           ///< asked by the core while it adjusts whole maps
   std::unique_ptr<CoreThread> work_;         ///< ends before everything that jobs touch
 };
 

@@ -8,12 +8,10 @@
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
+#include "player/intervals.h"
 
 namespace dmslam {
 namespace {
-
-constexpr int64_t kInfoEveryNs = 500'000'000;
-constexpr int64_t kStatusEveryNs = 1'000'000'000;
 
 /// What to call the camera in messages: its device, or the address without a password.
 std::string CameraName(const std::string& path) {

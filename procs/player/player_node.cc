@@ -10,13 +10,12 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/util/check.h"
+#include "player/intervals.h"
 
 namespace dmslam {
 namespace {
 
-constexpr int64_t kInfoEveryNs = 500'000'000;
 constexpr int64_t kRepeatEveryNs = 300'000'000;
-constexpr int64_t kStatusEveryNs = 1'000'000'000;
 
 std::string SequenceName(const std::string& path) {
   const std::filesystem::path p = std::filesystem::path(path).lexically_normal();

@@ -6,13 +6,9 @@
 #include "dmslam/console/log.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
+#include "player/intervals.h"
 
 namespace dmslam {
-namespace {
-
-constexpr int64_t kInfoEveryNs = 500'000'000;
-
-}  // namespace
 
 RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_ptr<const LogIndex> log,
                          uint32_t session)

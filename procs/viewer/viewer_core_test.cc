@@ -46,7 +46,7 @@ class ViewerCoreTest : public testing::Test {
     landmark.reference = landmark.first_keyframe = Kf(seen_by);
     landmark.evidence.motion_belief = belief;
     map_.AddLandmark(landmark);
-    map_.SetObservation(Kf(seen_by), feature, landmark.id);
+    map_.SetObservation(map_.At(Kf(seen_by)), feature, map_.At(landmark.id));
   }
   void Say(MapEvent event = MapEvent::kMapped) {
     core_.OnMapDelta(map_.TakeDelta(event, map_.keyframes().rbegin()->first, kMapId));
@@ -78,7 +78,7 @@ TEST_F(ViewerCoreTest, DrawsWhatTheMapHolds) {
   AddKeyframe(0);
   AddKeyframe(1);
   for (uint64_t i = 1; i <= 35; ++i) AddLandmark(i, 0, static_cast<uint16_t>(i), i == 4 ? 2.0F : -1.0F);
-  for (uint16_t i = 1; i <= 35; ++i) map_.SetObservation(Kf(1), i, LandmarkId::Make(1, i));
+  for (uint16_t i = 1; i <= 35; ++i) map_.SetObservation(map_.At(Kf(1)), i, map_.At(LandmarkId::Make(1, i)));
   Say();
   EXPECT_EQ(scene_.points().size(), 35u);
   EXPECT_EQ(scene_.keyframes().size(), 2u);
@@ -93,9 +93,9 @@ TEST_F(ViewerCoreTest, DrawsWhatTheMapHolds) {
 
 TEST_F(ViewerCoreTest, AParentThatIsDrawnAfterItsChildIsLinked) {
   AddKeyframe(1);
-  map_.SetParent(Kf(1), {});
+  map_.SetParent(map_.At(Kf(1)), {});
   AddKeyframe(0);  // the map grew back to it
-  map_.SetParent(Kf(0), Kf(1));
+  map_.SetParent(map_.At(Kf(0)), Kf(1));
   Say();
   const int64_t slot = scene_.keyframes().Find(Kf(0));
   ASSERT_GE(slot, 0);
@@ -108,8 +108,8 @@ TEST_F(ViewerCoreTest, LandmarksGoWithTheirTombstonesOrTheirKeyframe) {
   for (int i = 0; i < 3; ++i) AddKeyframe(i);
   for (uint64_t i = 1; i <= 20; ++i) AddLandmark(i, static_cast<int>(i % 3), static_cast<uint16_t>(i));
   Say();
-  map_.RemoveLandmark(LandmarkId::Make(1, 6));
-  map_.RemoveKeyframe(Kf(1));
+  map_.RemoveLandmark(map_.At(LandmarkId::Make(1, 6)));
+  map_.RemoveKeyframe(map_.At(Kf(1)));
   Say();
   EXPECT_EQ(scene_.points().size(), map_.num_landmarks());
   EXPECT_EQ(scene_.keyframes().size(), 2u);
@@ -120,12 +120,12 @@ TEST_F(ViewerCoreTest, FramesFollowTheirReferenceEvenWhenItIsCulled) {
   SayFrame(11, 1, Rigid3d(Eigen::Quaterniond::Identity(), {0, 0, 0.5}));
   Say();
   const Eigen::Vector3d before = PathAt(11);
-  map_.RemoveKeyframe(Kf(1));
+  map_.RemoveKeyframe(map_.At(Kf(1)));
   Say();
   EXPECT_NEAR((PathAt(11) - before).norm(), 0, 1e-6);
   const Eigen::Vector3d shift(0.3, -0.2, 0.1);
   const Rigid3d T = map_.FindKeyframe(Kf(0))->T_cam_world;
-  map_.SetPose(Kf(0), T * Rigid3d(Eigen::Quaterniond::Identity(), -shift));
+  map_.SetPose(map_.At(Kf(0)), T * Rigid3d(Eigen::Quaterniond::Identity(), -shift));
   Say();
   EXPECT_NEAR((PathAt(11) - before - shift).norm(), 0, 1e-6) << "the parent that stands for it has moved";
 }

@@ -46,11 +46,11 @@ Json ToJson(const ProcessBoard::Process& process, int64_t now_ns) {
 }
 
 Json EventsJson(const ProcessBoard& board) {
-  constexpr size_t kMost = 40;
+  constexpr size_t kMostListed = 40;
   static constexpr std::array<const char*, 3> kLevels = {"info", "good", "bad"};
   Json events = Json::array();
   const auto& all = board.events();
-  for (size_t i = all.size() > kMost ? all.size() - kMost : 0; i < all.size(); ++i) {
+  for (size_t i = all.size() > kMostListed ? all.size() - kMostListed : 0; i < all.size(); ++i) {
     events.push_back({{"n", all[i].number},
                       {"at", all[i].wall_us / 1000},
                       {"level", kLevels[static_cast<size_t>(all[i].level)]},

@@ -10,6 +10,7 @@
 
 #include "core_loop.h"
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/place_recognition/vocabulary.h"
 #include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/process_main.h"

@@ -14,6 +14,7 @@
 #include "dmslam/camera/camera.h"
 #include "dmslam/features/opencv_convert.h"
 #include "dmslam/features/testing/kitchen_pairs.h"
+#include "dmslam/place_recognition/vocabulary.h"
 #include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"

@@ -1,5 +1,6 @@
-// Rendered frames with freiburg1's lens, as config/TUM1.yaml has it: what the frontend matches on obeys the
-// true motion where the lens is taken out of the keypoints, and does not where it is left in.
+// Rendered frames with freiburg1's lens, as config/TUM1.yaml has it, and with a fisheye lens: what the
+// frontend matches on obeys the true motion where the lens is taken out of the keypoints, and does not where
+// it is left in.
 
 #include <gtest/gtest.h>
 
@@ -76,18 +77,29 @@ double MedianEpipolarError(const TwoFrames& frames, const Camera& camera) {
   return errors[errors.size() / 2];
 }
 
+void ExpectLensIsTakenOut(const Camera& camera) {
+  const TwoFrames frames = Render(camera);
+  const double applied_px = MedianEpipolarError(frames, camera);
+  const double ignored_px = MedianEpipolarError(frames, camera.WithoutLens());
+  EXPECT_LT(applied_px, 0.5);
+  EXPECT_GT(ignored_px, 2 * applied_px);
+  testing::Test::RecordProperty("applied_px", std::to_string(applied_px));
+  testing::Test::RecordProperty("ignored_px", std::to_string(ignored_px));
+}
+
 TEST(Lens, Freiburg1IsTakenOutOfTheKeypoints) {
   const char* source_dir = std::getenv("DMSLAM_SOURCE_DIR");
   const fs::path project = source_dir != nullptr ? source_dir : fs::current_path();
   const Camera camera = LoadCamera((project / "config" / "TUM1.yaml").string());
-  const Camera without_lens = camera.WithoutLens();
-  const TwoFrames frames = Render(camera);
-  const double applied_px = MedianEpipolarError(frames, camera);
-  const double ignored_px = MedianEpipolarError(frames, without_lens);
-  EXPECT_LT(applied_px, 0.5);
-  EXPECT_GT(ignored_px, 2 * applied_px);
-  RecordProperty("applied_px", std::to_string(applied_px));
-  RecordProperty("ignored_px", std::to_string(ignored_px));
+  ExpectLensIsTakenOut(camera);
+}
+
+/// 640 pixels of 112 degrees.
+TEST(Lens, FisheyeIsTakenOutOfTheKeypoints) {
+  Camera camera{640, 480, 330, 330, 319.5, 239.5};
+  camera.lens = Lens::kFisheye;
+  camera.k1 = -0.012, camera.k2 = 0.031, camera.k3 = -0.018, camera.k4 = 0.003;
+  ExpectLensIsTakenOut(camera);
 }
 
 }  // namespace

@@ -22,7 +22,12 @@ expect fail "orb2.yaml: does not say how large.*--size" "$convert" orb2.yaml
 orb 'Camera.type: "PinHole"' 'Camera.width: 640' 'Camera.height: 480' >orb3.yaml
 gives "ORB-SLAM3" "width: 640 height: 480 $freiburg1" "$convert" orb3.yaml
 orb 'Camera.type: "KannalaBrandt8"' >fisheye.yaml
-expect fail "'Camera.type' is 'KannalaBrandt8'" "$convert" fisheye.yaml
+expect fail "field 'Camera.k4' is missing" "$convert" fisheye.yaml
+printf '%s\n' 'Camera.k4: 0.02' 'Camera.width: 640' 'Camera.height: 480' >>fisheye.yaml
+gives "ORB-SLAM3, fisheye" "model: fisheye width: 640 .*distortion: \[0.2624, -0.9531, 1.1633, 0.02\]  # k1, k2, k3, k4" \
+  "$convert" fisheye.yaml
+sed -i 's/KannalaBrandt8/Mei/' fisheye.yaml
+expect fail "'Camera.type' is 'Mei'" "$convert" fisheye.yaml
 orb | grep -v Camera.fy >short.yaml
 expect fail "short.yaml: field 'Camera.fy' is missing" "$convert" --size 640x480 short.yaml
 orb | sed 's/fy: .*/fy: wide/' >word.yaml
@@ -32,6 +37,8 @@ echo "517.3 516.5 318.6 255.3 0.2624 -0.9531 -0.0054 0.0026 1.1633" >tum.txt
 gives "TUM's table" "$freiburg1.*fps: 30" "$convert" --size 640x480 tum.txt
 printf '0.5 0.7 0.49 0.5 0.93\n1280 1024\n' >mono.txt
 expect fail "fisheye" "$convert" mono.txt
+printf 'KannalaBrandt 380 380 320 240 0.01 0.002 -0.003 0.0004\n640 480\n' >fisheye.txt
+gives "a line of a fisheye lens" "model: fisheye width: 640 height: 480 fx: 380 .*\[0.01, 0.002, -0.003, 0.0004\]" "$convert" fisheye.txt
 printf '0.5 0.7 0.49 0.5 0\n1280 1024\n' >mono.txt
 gives "TUM monocular, rectified" "width: 1280 height: 1024 fx: 640 fy: 716.8 cx: 626.7 cy: 511.5" "$convert" mono.txt
 
@@ -41,7 +48,11 @@ printf '%s\n' 'sensor_type: camera' 'T_BS:' '  rows: 4' '  data: [0.0, 1.0,' '  
 gives "EuRoC" "width: 752 .*fx: 458.6 fy: 457.2 cx: 367.2 cy: 248.3 distortion: \[-0.28, 0.07, 0.0001, 1.7e-05, 0\].*fps: 20" \
   "$convert" sensor.yaml
 sed -i 's/radial-tangential/equidistant/' sensor.yaml
-expect fail "'distortion_model' is 'equidistant'" "$convert" sensor.yaml
+gives "EuRoC, fisheye" "model: fisheye .*distortion: \[-0.28, 0.07, 0.0001, 1.7e-05\]" "$convert" sensor.yaml
+sed -i 's/, 1.7e-05\]/]/' sensor.yaml
+expect fail "'distortion_coefficients' has 3 numbers; a fisheye lens has four" "$convert" sensor.yaml
+sed -i 's/equidistant/omni/' sensor.yaml
+expect fail "'distortion_model' is 'omni'" "$convert" sensor.yaml
 
 printf '%s\n' '%YAML:1.0' '---' 'image_width: 640' 'image_height: 480' 'camera_matrix: !!opencv-matrix' '   rows: 3' '   cols: 3' \
   '   dt: d' '   data: [ 5.3e+02, 0., 3.1e+02, 0., 5.4e+02,' '      2.3e+02, 0., 0., 1. ]' \

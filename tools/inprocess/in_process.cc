@@ -5,10 +5,11 @@
 #include <tuple>
 #include <vector>
 
+#include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/event_log.h"
-#include "frontend/frontend_node.h"
-#include "loopcloser/loopcloser_node.h"
-#include "mapper/mapper_node.h"
+#include "dmslam/wire/codec.h"
+#include "frontend/make_frontend.h"
+#include "loopcloser/make_loopcloser.h"
 #include "player/records_node.h"
 
 namespace dmslam {
@@ -100,9 +101,9 @@ void AddMapSide(InProcessOptions* options, System* system) {
   node.session = options->player.session;
   node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   if (!options->record.empty()) system->Record(options->record);
-  system->Add(std::make_unique<CollectorNode>(system->ContextFor("collector"), node, options->collector));
-  system->Add(std::make_unique<LoopcloserNode>(system->ContextFor("loopcloser"), node, options->vocabulary));
-  system->Add(std::make_unique<MapperNode>(system->ContextFor("mapper"), node, options->map_files));
+  system->Add(MakeCollector(system->ContextFor("collector"), node, options->collector));
+  system->Add(MakeLoopcloser(system->ContextFor("loopcloser"), node, options->vocabulary));
+  system->Add(MakeMapper(system->ContextFor("mapper"), node, options->map_files));
 }
 
 }  // namespace
@@ -120,9 +121,8 @@ int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, 
   options.player.mode = PlaybackMode::kLockstep;
   System system;
   AddMapSide(&options, &system);
-  system.Add(std::make_unique<FrontendNode>(
-      system.ContextFor("frontend"), options.node,
-      FrontendNode::Extras{options.vocabulary, options.picture_dir, options.picture_every}));
+  system.Add(MakeFrontend(system.ContextFor("frontend"), options.node,
+                          {options.vocabulary, options.picture_dir, options.picture_every}));
   system.Add(std::make_unique<PlayerNode>(system.ContextFor("player"), options.player, std::move(source)));
   return system.Run(problem);
 }

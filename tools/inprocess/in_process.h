@@ -3,13 +3,14 @@
 #include <memory>
 #include <string>
 
-#include "collector/collector_node.h"
-#include "dmslam/place_recognition/vocabulary.h"
+#include "collector/make_collector.h"
 #include "dmslam/recording/log_index.h"
-#include "mapper/mapper_node.h"
+#include "mapper/make_mapper.h"
 #include "player/player_node.h"
 
 namespace dmslam {
+
+class Vocabulary;
 
 /// A whole run in one process: the nodes of the four processes and of the collector on a bus in memory, in
 /// lock-step, under a virtual clock, one thread. Gives the same bytes as the processes do.
@@ -21,8 +22,8 @@ struct InProcessOptions {
   std::string picture_dir;
   int picture_every = 0;
   bool progress = false;
-  MapperNode::Files map_files;  ///< maps to begin with and to save
-  std::string record;           ///< log of all that is said; empty: none
+  MapperFiles map_files;  ///< maps to begin with and to save
+  std::string record;     ///< log of all that is said; empty: none
 };
 
 /// Returns the collector's exit code; what went wrong is in `problem`. Instead of frames the frontend's

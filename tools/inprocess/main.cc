@@ -5,6 +5,7 @@
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
+#include "dmslam/recording/map_file.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
@@ -23,7 +24,7 @@ struct Arguments {
   size_t start = 0, frames = SIZE_MAX;
   uint64_t seed = 1;
   int pictures = 0;
-  dmslam::MapperNode::Files map_files;
+  dmslam::MapperFiles map_files;
   uint32_t session = 0;
   bool no_loop = false, localize = false;
 };

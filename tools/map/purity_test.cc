@@ -54,12 +54,12 @@ TEST(JudgeMap, CountsWhatIsSeenMostlyOnPeople) {
     keyframes.push_back(AddKeyframe(&map, second, {kPersonX, kWallX, kPersonX, kWallX}));
   const LandmarkId walker = AddLandmark(&map, 1), wall = AddLandmark(&map, 2), half = AddLandmark(&map, 3);
   for (const KeyframeId keyframe : keyframes) {
-    map.SetObservation(keyframe, 0, walker);
-    map.SetObservation(keyframe, 1, wall);
+    map.SetObservation(map.At(keyframe), 0, map.At(walker));
+    map.SetObservation(map.At(keyframe), 1, map.At(wall));
   }
   // On the person in one of two keyframes: not mostly.
-  map.SetObservation(keyframes[0], 2, half);
-  map.SetObservation(keyframes[1], 3, half);
+  map.SetObservation(map.At(keyframes[0]), 2, map.At(half));
+  map.SetObservation(map.At(keyframes[1]), 3, map.At(half));
 
   const MapPurity purity = JudgeMap(map, kMap, LeftHalf);
   EXPECT_EQ(purity.keyframes, 3U);
@@ -77,10 +77,10 @@ TEST(JudgeMap, LeavesOutKeyframesWithoutMaskAndOtherMaps) {
   const KeyframeId other = AddKeyframe(&map, 5, {kPersonX}, 2);
   const LandmarkId walker = AddLandmark(&map, 1), unjudged = AddLandmark(&map, 2),
                    foreign = AddLandmark(&map, 3, 2);
-  map.SetObservation(masked, 0, walker);
-  map.SetObservation(unmasked, 0, walker);
-  map.SetObservation(unmasked, 1, unjudged);
-  map.SetObservation(other, 0, foreign);
+  map.SetObservation(map.At(masked), 0, map.At(walker));
+  map.SetObservation(map.At(unmasked), 0, map.At(walker));
+  map.SetObservation(map.At(unmasked), 1, map.At(unjudged));
+  map.SetObservation(map.At(other), 0, map.At(foreign));
 
   const MapPurity purity = JudgeMap(map, kMap, LeftHalf);
   EXPECT_EQ(purity.keyframes, 2U);

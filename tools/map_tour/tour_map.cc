@@ -133,21 +133,21 @@ MapDelta TourMap::Step() {
   keyframe.T_cam_world = PoseAt(step * static_cast<double>(next_));
   if (!map_.keyframes().empty()) keyframe.parent = map_.keyframes().rbegin()->first;
   keyframe.features = MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid());
-  map_.AddKeyframe(keyframe);
+  const Keyframe& added = map_.AddKeyframe(keyframe);
   size_t feature = 0;
-  const auto see = [&](LandmarkId id) {
-    map_.SetObservation(keyframe.id, static_cast<uint16_t>(feature++), id);
+  const auto see = [&](const Landmark& landmark) {
+    map_.SetObservation(added, static_cast<uint16_t>(feature++), landmark);
   };
-  for (size_t i = 0; i < again; ++i) see(recent_[random_.Below(static_cast<uint32_t>(recent_.size()))]);
+  for (size_t i = 0; i < again; ++i)
+    see(map_.At(recent_[random_.Below(static_cast<uint32_t>(recent_.size()))]));
   for (size_t i = 0; i < wanted; ++i) {
-    const Landmark landmark = MakeLandmark(keyframe);
-    map_.AddLandmark(landmark);
+    const Landmark& landmark = map_.AddLandmark(MakeLandmark(keyframe));
     recent_.push_back(landmark.id);
-    see(landmark.id);
+    see(landmark);
   }
   if (recent_.size() > kRecent) recent_.erase(recent_.begin(), recent_.end() - kRecent);
   ++next_;
-  if (done()) map_.AddLoopEdge(map_.keyframes().begin()->first, keyframe.id);
+  if (done()) map_.AddLoopEdge(map_.keyframes().begin()->second, added);
   return map_.TakeDelta(next_ == 1 ? MapEvent::kMapStarted
                         : done()   ? MapEvent::kCorrected
                                    : MapEvent::kMapped,

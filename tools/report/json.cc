@@ -6,7 +6,7 @@
 namespace dmslam {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 using State = RunResult::State;
 
 constexpr std::pair<Metric, const char*> kMetrics[] = {
@@ -16,14 +16,16 @@ constexpr std::pair<Metric, const char*> kMetrics[] = {
     {Metric::kRpeRotationPerFrame, "rpe_rotation_per_frame_deg"},
     {Metric::kRpeRotationPerSecond, "rpe_rotation_per_second_deg"}};
 
-Json ToJson(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+OrderedJson ToJson(const std::optional<double>& value) {
+  return value ? OrderedJson(*value) : OrderedJson(nullptr);
+}
 
-Json ToJson(const std::optional<Spread>& spread) {
+OrderedJson ToJson(const std::optional<Spread>& spread) {
   if (!spread) return nullptr;
   return {{"median", spread->median}, {"min", spread->min}, {"max", spread->max}, {"runs", spread->count}};
 }
 
-Json ToJson(const Statistics& s) {
+OrderedJson ToJson(const Statistics& s) {
   return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median},
           {"std", s.std},   {"min", s.min},   {"max", s.max}};
 }
@@ -42,22 +44,23 @@ const char* StateName(State state) {
   return "missing";
 }
 
-Json ToJson(const Machine& machine) { return {{"cpu", machine.processor}, {"cores", machine.cores}}; }
+OrderedJson ToJson(const Machine& machine) { return {{"cpu", machine.processor}, {"cores", machine.cores}}; }
 
-Json ToJson(const std::vector<Origin>& origins, const char* what) {
-  Json json = Json::array();
+OrderedJson ToJson(const std::vector<Origin>& origins, const char* what) {
+  OrderedJson json = OrderedJson::array();
   for (const Origin& origin : origins) json.push_back({{what, origin.text}, {"runs", origin.runs}});
   return json;
 }
 
-Json ToJson(const RunResult& run) {
-  Json json = {{"seed", run.key.seed},
-               {"state", StateName(run.state)},
-               {"tracked_percent", ToJson(run.tracked_percent)},
-               {"tracked_online_percent", ToJson(run.tracked_online_percent)},
-               {"tracked_online_after_first_map_percent", ToJson(run.tracked_online_after_first_map_percent)},
-               {"first_map_s", ToJson(run.first_map_s)},
-               {"frontend_ms_median", ToJson(run.frontend_ms_median)}};
+OrderedJson ToJson(const RunResult& run) {
+  OrderedJson json = {
+      {"seed", run.key.seed},
+      {"state", StateName(run.state)},
+      {"tracked_percent", ToJson(run.tracked_percent)},
+      {"tracked_online_percent", ToJson(run.tracked_online_percent)},
+      {"tracked_online_after_first_map_percent", ToJson(run.tracked_online_after_first_map_percent)},
+      {"first_map_s", ToJson(run.first_map_s)},
+      {"frontend_ms_median", ToJson(run.frontend_ms_median)}};
   if (run.version) json["version"] = *run.version;
   if (run.machine) json["machine"] = ToJson(*run.machine);
   if (!run.reason.empty()) json["reason"] = run.reason;
@@ -67,29 +70,30 @@ Json ToJson(const RunResult& run) {
   return json;
 }
 
-Json ToJson(const Cell& cell) {
-  Json json = {{"sequence", cell.sequence},
-               {"settings", cell.setting},
-               {"profile", cell.profile},
-               {"runs_made", cell.Made()},
-               {"runs_failed", cell.Failed()},
-               {"tracked_percent", ToJson(cell.TrackedPercent())},
-               {"tracked_online_percent", ToJson(cell.TrackedOnlinePercent())},
-               {"tracked_online_after_first_map_percent", ToJson(cell.TrackedOnlineAfterFirstMapPercent())},
-               {"first_map_s", ToJson(cell.FirstMapSeconds())}};
+OrderedJson ToJson(const Cell& cell) {
+  OrderedJson json = {
+      {"sequence", cell.sequence},
+      {"settings", cell.setting},
+      {"profile", cell.profile},
+      {"runs_made", cell.Made()},
+      {"runs_failed", cell.Failed()},
+      {"tracked_percent", ToJson(cell.TrackedPercent())},
+      {"tracked_online_percent", ToJson(cell.TrackedOnlinePercent())},
+      {"tracked_online_after_first_map_percent", ToJson(cell.TrackedOnlineAfterFirstMapPercent())},
+      {"first_map_s", ToJson(cell.FirstMapSeconds())}};
   for (const auto& [metric, name] : kMetrics) {
     json[name] = {{"rmse", ToJson(cell.Rmse(metric))},
                   {"mean", ToJson(cell.Mean(metric))},
                   {"median", ToJson(cell.Median(metric))},
                   {"std", ToJson(cell.Std(metric))}};
   }
-  json["runs"] = Json::array();
+  json["runs"] = OrderedJson::array();
   for (const RunResult& run : cell.runs) json["runs"].push_back(ToJson(run));
   return json;
 }
 
-Json ToJson(const PlannedSequence& sequence) {
-  Json json = {
+OrderedJson ToJson(const PlannedSequence& sequence) {
+  OrderedJson json = {
       {"name", sequence.info.name}, {"present", sequence.present()}, {"source", sequence.info.source}};
   if (!sequence.present() && sequence.has_runs) json["runs_not_shown"] = true;
   if (!sequence.info.like.empty()) json["stands_for"] = sequence.info.like;
@@ -101,12 +105,12 @@ Json ToJson(const PlannedSequence& sequence) {
 }
 
 // Of dm against baseline, by the medians over the seeds [%]; the shares tracked stand beside it.
-Json ImprovementJson(const PlannedSequence& sequence, const Cell& baseline, const Cell& dm) {
+OrderedJson ImprovementJson(const PlannedSequence& sequence, const Cell& baseline, const Cell& dm) {
   const std::optional<double> paper = PaperImprovementPercent(sequence.info);
-  Json json = {{"sequence", sequence.info.name},
-               {"settings", dm.setting},
-               {"baseline_tracked_percent", ToJson(baseline.TrackedPercent())},
-               {"dm_tracked_percent", ToJson(dm.TrackedPercent())}};
+  OrderedJson json = {{"sequence", sequence.info.name},
+                      {"settings", dm.setting},
+                      {"baseline_tracked_percent", ToJson(baseline.TrackedPercent())},
+                      {"dm_tracked_percent", ToJson(dm.TrackedPercent())}};
   for (const auto& [metric, name] : kMetrics) {
     json[name] = {{"rmse_percent", ToJson(ImprovementPercent(baseline.Rmse(metric), dm.Rmse(metric)))},
                   {"mean_percent", ToJson(ImprovementPercent(baseline.Mean(metric), dm.Mean(metric)))},
@@ -120,8 +124,8 @@ Json ImprovementJson(const PlannedSequence& sequence, const Cell& baseline, cons
   return json;
 }
 
-Json ImprovementsJson(const Results& results) {
-  Json json = Json::array();
+OrderedJson ImprovementsJson(const Results& results) {
+  OrderedJson json = OrderedJson::array();
   for (const Setting& setting : results.plan.settings) {
     for (const PlannedSequence& sequence : results.plan.sequences) {
       const std::string name(sequence.info.name);
@@ -133,27 +137,27 @@ Json ImprovementsJson(const Results& results) {
   return json;
 }
 
-Json ToJson(const StandIn& one) {
+OrderedJson ToJson(const StandIn& one) {
   const Cell* still = one.dm_without_actors;
   const auto with = one.dm->Rmse(Metric::kAte), baseline = one.baseline->Rmse(Metric::kAte);
-  return {
-      {"sequence", one.sequence->info.name},
-      {"stands_for", one.sequence->info.like},
-      {"settings", one.dm->setting},
-      {"without_actors", still == nullptr ? Json(nullptr) : Json(still->sequence)},
-      {"dm_ate_rmse_m", ToJson(with)},
-      {"dm_ate_rmse_without_actors_m", still == nullptr ? Json(nullptr) : ToJson(still->Rmse(Metric::kAte))},
-      {"ratio", ToJson(one.Ratio())},
-      {"dm_tracked_percent", ToJson(one.dm->TrackedPercent())},
-      {"dm_tracked_after_first_map_percent", ToJson(one.dm->TrackedOnlineAfterFirstMapPercent())},
-      {"baseline_ate_rmse_m", ToJson(baseline)},
-      {"baseline_tracked_percent", ToJson(one.baseline->TrackedPercent())},
-      {"better_by_percent", ToJson(ImprovementPercent(baseline, with))},
-      {"paper_better_by_percent", ToJson(PaperImprovementPercent(one.sequence->info))}};
+  return {{"sequence", one.sequence->info.name},
+          {"stands_for", one.sequence->info.like},
+          {"settings", one.dm->setting},
+          {"without_actors", still == nullptr ? OrderedJson(nullptr) : OrderedJson(still->sequence)},
+          {"dm_ate_rmse_m", ToJson(with)},
+          {"dm_ate_rmse_without_actors_m",
+           still == nullptr ? OrderedJson(nullptr) : ToJson(still->Rmse(Metric::kAte))},
+          {"ratio", ToJson(one.Ratio())},
+          {"dm_tracked_percent", ToJson(one.dm->TrackedPercent())},
+          {"dm_tracked_after_first_map_percent", ToJson(one.dm->TrackedOnlineAfterFirstMapPercent())},
+          {"baseline_ate_rmse_m", ToJson(baseline)},
+          {"baseline_tracked_percent", ToJson(one.baseline->TrackedPercent())},
+          {"better_by_percent", ToJson(ImprovementPercent(baseline, with))},
+          {"paper_better_by_percent", ToJson(PaperImprovementPercent(one.sequence->info))}};
 }
 
-Json StandInsJson(const Results& results) {
-  Json json = Json::array();
+OrderedJson StandInsJson(const Results& results) {
+  OrderedJson json = OrderedJson::array();
   for (const Setting& setting : results.plan.settings) {
     for (const StandIn& one : StandIns(results, setting)) json.push_back(ToJson(one));
   }
@@ -163,12 +167,12 @@ Json StandInsJson(const Results& results) {
 }  // namespace
 
 std::string ReportJson(const Results& results, const std::optional<IterationTimes>& times) {
-  Json json;
+  OrderedJson json;
   json["seeds"] = results.plan.seeds;
   json["versions"] = ToJson(Versions(results, nullptr), "version");
   json["machines_of_runs"] = ToJson(Machines(results), "machine");
   json["machine_of_report"] = ToJson(ThisMachine());
-  json["sequences"] = Json::array();
+  json["sequences"] = OrderedJson::array();
   for (const PlannedSequence& sequence : results.plan.sequences)
     json["sequences"].push_back(ToJson(sequence));
   json["time_of_2000_iterations_ms"] = {
@@ -181,7 +185,7 @@ std::string ReportJson(const Results& results, const std::optional<IterationTime
   }
   json["improvements"] = ImprovementsJson(results);
   json["stand_ins"] = StandInsJson(results);
-  json["results"] = Json::array();
+  json["results"] = OrderedJson::array();
   for (const Cell& cell : results.cells) json["results"].push_back(ToJson(cell));
   return json.dump(1) + "\n";
 }

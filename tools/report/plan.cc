@@ -11,7 +11,7 @@ namespace dmslam {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 bool IsSequence(const fs::path& folder) { return fs::exists(folder / "rgb.txt"); }
 
@@ -156,19 +156,19 @@ Plan MergePlans(const Plan& before, const Plan& now) {
 
 void SavePlan(const Plan& now, const fs::path& out) {
   const Plan plan = fs::exists(out / "plan.json") ? MergePlans(LoadPlan(out), now) : now;
-  Json json;
+  OrderedJson json;
   json["seeds"] = plan.seeds;
   json["profiles"] = plan.profiles;
-  json["settings"] = Json::array();
+  json["settings"] = OrderedJson::array();
   for (const Setting& setting : plan.settings) {
     json["settings"].push_back(
         {{"name", setting.name}, {"title", setting.title}, {"argument", setting.argument}});
   }
-  json["sequences"] = Json::array();
+  json["sequences"] = OrderedJson::array();
   for (const PlannedSequence& sequence : plan.sequences) {
     json["sequences"].push_back(
         {{"name", sequence.info.name},
-         {"folder", sequence.present() ? Json(sequence.folder.string()) : Json(nullptr)}});
+         {"folder", sequence.present() ? OrderedJson(sequence.folder.string()) : OrderedJson(nullptr)}});
   }
   std::error_code error;
   fs::create_directories(out, error);
@@ -186,14 +186,14 @@ Plan LoadPlan(const fs::path& out) {
   if (!file) throw InputError(path + ": cannot be opened; check --out");
   Plan plan;
   try {
-    const Json json = Json::parse(file);
+    const OrderedJson json = OrderedJson::parse(file);
     plan.seeds = json.at("seeds").get<int>();
     plan.profiles = json.at("profiles").get<std::vector<std::string>>();
-    for (const Json& setting : json.at("settings")) {
+    for (const OrderedJson& setting : json.at("settings")) {
       plan.settings.push_back({setting.at("name").get<std::string>(), setting.at("title").get<std::string>(),
                                setting.at("argument").get<std::string>()});
     }
-    for (const Json& sequence : json.at("sequences")) {
+    for (const OrderedJson& sequence : json.at("sequences")) {
       const fs::path folder = sequence.at("folder").is_null() ? "" : sequence.at("folder").get<std::string>();
       plan.sequences.push_back({FindSequence(sequence.at("name").get<std::string>()), folder});
     }

@@ -8,7 +8,7 @@
 namespace dmslam {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 using State = PopulationRun::State;
 
 constexpr const char* kNone = "–";
@@ -125,13 +125,15 @@ std::vector<Part> PartsOf(const std::vector<PopulationRun>& all) {
   return parts;
 }
 
-Json ToJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json ToJson(const std::optional<double>& value) { return value ? ToJson(*value) : Json(nullptr); }
-Json ToJson(const MedianAndWorst& numbers) {
+OrderedJson ToJson(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
+OrderedJson ToJson(const std::optional<double>& value) {
+  return value ? ToJson(*value) : OrderedJson(nullptr);
+}
+OrderedJson ToJson(const MedianAndWorst& numbers) {
   return {{"median", ToJson(numbers.median)}, {"worst", ToJson(numbers.worst)}};
 }
 
-Json ToJson(const PopulationRow& row) {
+OrderedJson ToJson(const PopulationRow& row) {
   return {{"covered", row.title},
           {"system", row.system},
           {"sequences", row.sequences},
@@ -148,21 +150,21 @@ Json ToJson(const PopulationRow& row) {
           {"first_map_s", ToJson(row.first_map_s)}};
 }
 
-Json ToJson(const PopulationRun& run) {
+OrderedJson ToJson(const PopulationRun& run) {
   const RunVerdict& v = run.verdict;
-  Json json = {{"sequence", run.sequence.name},
-               {"system", run.system},
-               {"path_m", run.path_m},
-               {"covered_mean", run.mean_covered_share},
-               {"covered_most", run.max_covered_share},
-               {"state", run.state == State::kDone     ? "done"
-                         : run.state == State::kFailed ? "failed"
-                                                       : "not run"}};
+  OrderedJson json = {{"sequence", run.sequence.name},
+                      {"system", run.system},
+                      {"path_m", run.path_m},
+                      {"covered_mean", run.mean_covered_share},
+                      {"covered_most", run.max_covered_share},
+                      {"state", run.state == State::kDone     ? "done"
+                                : run.state == State::kFailed ? "failed"
+                                                              : "not run"}};
   if (!run.reason.empty()) json["reason"] = run.reason;
   if (run.state == State::kMissing) return json;
   json["version"] = run.version;
   json["success"] = v.success();
-  json["missed"] = Json::array();
+  json["missed"] = OrderedJson::array();
   for (const Shortfall shortfall : v.shortfalls) json["missed"].push_back(ShortfallName(shortfall));
   json["ate_online_m"] = ToJson(v.online_ate_m);
   json["ate_final_m"] = ToJson(v.final_ate_m);
@@ -193,15 +195,15 @@ std::string PopulationMarkdown(const std::vector<PopulationRun>& runs, bool deta
 }
 
 std::string PopulationJson(const std::vector<PopulationRun>& runs, bool details) {
-  Json json = Json::array();
+  OrderedJson json = OrderedJson::array();
   for (const Part& part : PartsOf(runs)) {
-    Json rows = Json::array(), single = Json::array();
+    OrderedJson rows = OrderedJson::array(), single = OrderedJson::array();
     for (const PopulationRow& row : PopulationRows(part.runs)) rows.push_back(ToJson(row));
     for (const PopulationRun& run : part.runs) single.push_back(ToJson(run));
-    Json one = {{"kind", part.kind},
-                {"half", part.half},
-                {"ate_unit", part.rendered() ? "percent of the path" : "m"},
-                {"classes", rows}};
+    OrderedJson one = {{"kind", part.kind},
+                       {"half", part.half},
+                       {"ate_unit", part.rendered() ? "percent of the path" : "m"},
+                       {"classes", rows}};
     if (part.half != "report" || details) one["runs"] = single;
     json.push_back(one);
   }

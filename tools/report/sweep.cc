@@ -158,11 +158,11 @@ PlotSeries SeriesOf(const Sweep& sweep, const SweepKind& kind, Cell SweepPoint::
       if (const auto value = number(run)) values.push_back(*value);
     }
     const std::optional<Spread> spread = SpreadOf(std::move(values));
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
     series.x.push_back(point.coverage_percent);
-    series.y.push_back(spread ? spread->median : kNone);
-    series.y_low.push_back(spread ? spread->min : kNone);
-    series.y_high.push_back(spread ? spread->max : kNone);
+    series.y.push_back(spread ? spread->median : kNothing);
+    series.y_low.push_back(spread ? spread->min : kNothing);
+    series.y_high.push_back(spread ? spread->max : kNothing);
   }
   return series;
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -40,6 +42,72 @@ TEST(Camera, ProjectRefusesPointsBehind) {
   EXPECT_FALSE(Freiburg1().Project({0, 0, 0}).has_value());
 }
 
+/// 512 pixels of 190 degrees, as the cameras of head-mounted devices have them.
+Camera Fisheye() {
+  Camera camera{512, 512, 190.978, 190.973, 254.932, 256.897};
+  camera.lens = Lens::kFisheye;
+  camera.k1 = 0.0034823894;
+  camera.k2 = 0.0007150348;
+  camera.k3 = -0.0020532361;
+  camera.k4 = 0.00020293673;
+  return camera;
+}
+
+TEST(Fisheye, UndistortIsInverseOfDistort) {
+  const Camera camera = Fisheye();
+  Random random(2);
+  int inverted = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector2d raw(random.Uniform(0, 511), random.Uniform(0, 511));
+    const double angle_rad = (raw - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm() / camera.fx_px;
+    const auto ideal = camera.Undistort(raw);
+    const bool near = angle_rad<1.45, far = angle_rad> 1.50;
+    ASSERT_TRUE(!near || ideal) << raw.transpose();
+    ASSERT_TRUE(!far || !ideal) << "no pinhole sees that far to the side: " << raw.transpose();
+    if (!ideal) continue;
+    ++inverted;
+    EXPECT_NEAR((camera.Distort(*ideal) - raw).norm(), 0.0, 1e-7) << raw.transpose();
+  }
+  EXPECT_GT(inverted, 1500);
+  const Eigen::Vector2d middle(camera.cx_px, camera.cy_px);
+  EXPECT_EQ(camera.Distort(middle), middle);
+  EXPECT_EQ(camera.Undistort(middle), middle);
+}
+
+TEST(Fisheye, APointsWayIntoTheImageAndBackIsItsRay) {
+  const Camera camera = Fisheye();
+  Random random(3);
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d p_cam(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(0.5, 4));
+    const Eigen::Vector2d raw = camera.Distort(*camera.Project(p_cam));
+    const auto ideal = camera.Undistort(raw);
+    if (!ideal) continue;  // beyond 84 degrees
+    EXPECT_LT((camera.Ray(*ideal) - p_cam / p_cam.z()).norm(), 1e-8 * p_cam.squaredNorm() / p_cam.z());
+  }
+}
+
+TEST(Fisheye, WithoutCoefficientsTheAngleItselfIsThePlace) {
+  Camera camera = Fisheye();
+  camera.k1 = camera.k2 = camera.k3 = camera.k4 = 0;
+  EXPECT_TRUE(camera.HasDistortion());
+  const Eigen::Vector2d raw = camera.Distort(*camera.Project({1, 0, 1}));
+  EXPECT_NEAR(raw.x(), camera.cx_px + camera.fx_px * 0.78539816339744831, 1e-9);
+  EXPECT_FALSE(camera.WithoutLens().HasDistortion());
+}
+
+TEST(Fisheye, StretchIsHowMuchLargerAreasAre) {
+  const Camera camera = Fisheye();
+  for (const double x_px : {255.0, 300.0, 380.0, 440.0}) {
+    const Eigen::Vector2d raw(x_px, 300), dx(1e-3, 0), dy(0, 1e-3);
+    const Eigen::Vector2d at = *camera.Undistort(raw);
+    Eigen::Matrix2d J;
+    J << (*camera.Undistort(raw + dx) - *camera.Undistort(raw - dx)) / 2e-3,
+        (*camera.Undistort(raw + dy) - *camera.Undistort(raw - dy)) / 2e-3;
+    EXPECT_NEAR(camera.StretchAt(at), std::sqrt(J.determinant()), 1e-4 * camera.StretchAt(at)) << x_px;
+  }
+  EXPECT_EQ(Freiburg1().StretchAt({10, 10}), 1.0);
+}
+
 std::string WriteTemporary(const std::string& text) {
   const std::string path = testing::TempDir() + "/camera_test_" +
                            testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml";
@@ -60,7 +128,8 @@ TEST(CameraFile, NamesTheFieldThatIsWrong) {
   const std::string good = "width: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n";
   EXPECT_EQ(ErrorOf(good), "");
   EXPECT_NE(ErrorOf("width: 640\n").find("'height'"), std::string::npos);
-  EXPECT_NE(ErrorOf(good + "model: fisheye\n").find("fisheye"), std::string::npos);
+  EXPECT_NE(ErrorOf(good + "model: omni\n").find("'omni', which is not supported: pinhole and fisheye are"),
+            std::string::npos);
   EXPECT_NE(ErrorOf(good + "distortion: [1, 2]\n").find("'distortion'"), std::string::npos);
   EXPECT_NE(ErrorOf("width: 640\nheight: 480\nfx: abc\nfy: 500\ncx: 320\ncy: 240\n").find("'fx'"),
             std::string::npos);
@@ -80,6 +149,21 @@ TEST(CameraFile, NamesTheFieldThatIsWrong) {
   }
   EXPECT_NE(ErrorOf("][").find("YAML"), std::string::npos);
   EXPECT_THROW(LoadCamera("/nonexistent.yaml"), InputError);
+}
+
+TEST(CameraFile, NamesWhatIsWrongWithAFisheyeLens) {
+  const std::string good = "model: fisheye\nwidth: 512\nheight: 512\nfx: 190\nfy: 190\ncx: 255\ncy: 255\n";
+  EXPECT_EQ(ErrorOf(good + "distortion: [0, 0, 0, 0]\n"), "");
+  EXPECT_NE(ErrorOf(good).find("'distortion' is missing; a fisheye lens needs it: [k1, k2, k3, k4]"),
+            std::string::npos);
+  EXPECT_NE(
+      ErrorOf(good + "distortion: [0, 0, 0, 0, 0]\n").find("has 5 values; write four: [k1, k2, k3, k4]"),
+      std::string::npos);
+  EXPECT_NE(ErrorOf(good + "distortion: [-1, 0, 0, 0]\n").find("bends the image back within it"),
+            std::string::npos)
+      << "coefficients of a Brown lens, for one";
+  EXPECT_NE(ErrorOf("model: equidistant\n").find("'equidistant', which is called 'fisheye' here"),
+            std::string::npos);
 }
 
 struct PublishedCamera {
@@ -117,6 +201,8 @@ TEST(CameraFile, WhatIsWrittenIsRead) {
   EXPECT_EQ(LoadCamera(path), camera);
   std::ofstream(path) << CameraText(camera.WithoutLens());
   EXPECT_EQ(LoadCamera(path), camera.WithoutLens());
+  std::ofstream(path) << CameraText(Fisheye());
+  EXPECT_EQ(LoadCamera(path), Fisheye());
 }
 
 TEST(Camera, AnotherRateSeesTheSameAnotherLensDoesNot) {

@@ -127,9 +127,17 @@ TEST_F(DatasetTest, EurocFolderAndItsCamera) {
   EXPECT_DOUBLE_EQ(camera->fps, 20);
   Write("mav0/cam0/sensor.yaml", "resolution: [752, 480]\nintrinsics: [458.654]\n");
   EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("'intrinsics'"), std::string::npos);
-  Write("mav0/cam0/sensor.yaml", "camera_model: pinhole\ndistortion_model: equidistant\n");
-  EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("'distortion_model' is 'equidistant'"),
+  Write("mav0/cam0/sensor.yaml", "camera_model: pinhole\ndistortion_model: fov\n");
+  EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("'distortion_model' is 'fov'"),
             std::string::npos);
+  Write("mav0/cam0/sensor.yaml",
+        "resolution: [512, 512]\nintrinsics: [190.978, 190.973, 254.932, 256.897]\n"
+        "camera_model: pinhole\ndistortion_model: equidistant\n"
+        "distortion_coefficients: [0.0034823894, 0.0007150348, -0.0020532361, 0.00020293673]\n");
+  const auto fisheye = FindCamera(root_.string(), "");
+  ASSERT_TRUE(fisheye);
+  EXPECT_EQ(fisheye->lens, Lens::kFisheye);
+  EXPECT_DOUBLE_EQ(fisheye->k4, 0.00020293673);
   Write("mav0/cam0/sensor.yaml", "5\n");
   EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("not a map"), std::string::npos);
   Write("mav0/cam0/data.csv", "5.5,a.png\n");

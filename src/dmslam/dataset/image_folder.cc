@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
@@ -84,11 +85,11 @@ std::vector<double> ReadList(const YAML::Node& node, const std::string& path, co
   return values;
 }
 
-/// A field that names a model must name this one, or be left out.
-void CheckModel(const YAML::Node& node, const std::string& path, const std::string& field,
-                const std::string& supported) {
-  const std::string model = node[field] ? node[field].as<std::string>("") : supported;
-  if (model == supported) return;
+/// What a field that names a model says: one of these, the first where it is left out.
+std::string ReadModel(const YAML::Node& node, const std::string& path, const std::string& field,
+                      std::initializer_list<std::string> supported) {
+  const std::string model = node[field] ? node[field].as<std::string>("") : *supported.begin();
+  if (std::find(supported.begin(), supported.end(), model) != supported.end()) return model;
   throw InputError(path + ": field '" + field + "' is '" + model +
                    "', which is not supported; undistort to a pinhole camera first (see docs/camera.md)");
 }
@@ -166,8 +167,9 @@ Camera EurocSequence::ReadCamera(const std::string& sensor_yaml) {
   }
   if (!node.IsMap())
     throw InputError(sensor_yaml + ": is not a map of fields; give a camera file with --camera");
-  CheckModel(node, sensor_yaml, "camera_model", "pinhole");
-  CheckModel(node, sensor_yaml, "distortion_model", "radial-tangential");
+  ReadModel(node, sensor_yaml, "camera_model", {"pinhole"});
+  const std::string lens =
+      ReadModel(node, sensor_yaml, "distortion_model", {"radial-tangential", "equidistant"});
   const std::vector<double> resolution = ReadList(node, sensor_yaml, "resolution", 2);
   const std::vector<double> intrinsics = ReadList(node, sensor_yaml, "intrinsics", 4);
   const std::vector<double> distortion = ReadList(node, sensor_yaml, "distortion_coefficients", 4);
@@ -178,9 +180,15 @@ Camera EurocSequence::ReadCamera(const std::string& sensor_yaml) {
                 .cx_px = intrinsics[2],
                 .cy_px = intrinsics[3],
                 .k1 = distortion[0],
-                .k2 = distortion[1],
-                .p1 = distortion[2],
-                .p2 = distortion[3]};
+                .k2 = distortion[1]};
+  if (lens == "equidistant") {
+    camera.lens = Lens::kFisheye;
+    camera.k3 = distortion[2];
+    camera.k4 = distortion[3];
+  } else {
+    camera.p1 = distortion[2];
+    camera.p2 = distortion[3];
+  }
   if (node["rate_hz"]) camera.fps = node["rate_hz"].as<double>(30.0);
   if (const auto problem = camera.Problem()) throw InputError(sensor_yaml + ": " + *problem + "; correct it");
   return camera;

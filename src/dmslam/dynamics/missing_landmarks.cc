@@ -43,7 +43,7 @@ void MissingLandmarks::CallWitnesses(const Map& map, const TrackedFrame& frame,
 
 MissingLandmarks::Verdict MissingLandmarks::AskAround(const LandmarkView& view) const {
   int behind = 0, beside = 0, before = 0, moving_beside = 0;
-  witnesses_.ForEachNear(view.uv_px, options_.seen_through_px, [&](const Witness& witness) {
+  witnesses_.ForEachNear(view.uv_px, reach_px_, [&](const Witness& witness) {
     const bool farther = witness.depth > options_.seen_through_depth * view.depth;
     const bool nearer = witness.depth * options_.seen_through_depth < view.depth;
     if (witness.moves) {

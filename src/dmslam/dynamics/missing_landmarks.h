@@ -5,13 +5,14 @@
 #include <span>
 #include <vector>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/frame_expectation.h"
 #include "dmslam/map/map.h"
 
 namespace dmslam {
 
 struct MissingOptions {
-  double seen_through_px = 40.0;    ///< what is seen this near to a missing landmark...
+  double seen_through_rad = 0.076;  ///< what is seen this near to a missing landmark...
   double seen_through_depth = 1.2;  ///< ...and this much farther away says that it has gone...
   int seen_through_min = 2;     ///< ...where at least so many say it, and nothing of its own depth denies it
   int moving_together_min = 3;  ///< a missing landmark goes with so many of its depth around it that move
@@ -58,7 +59,7 @@ class WitnessGrid {
 class MissingLandmarks {
  public:
   MissingLandmarks(const MissingOptions& options, const Camera& camera)
-      : options_(options), witnesses_(camera) {}
+      : options_(options), reach_px_(SearchRadiusPx(camera, options.seen_through_rad)), witnesses_(camera) {}
 
   /// `moved`: seen elsewhere by the frame, and so not missing.
   void Judge(const Map& map, const TrackedFrame& frame, std::span<const ExpectedLandmark> expected,
@@ -76,6 +77,7 @@ class MissingLandmarks {
   Verdict AskAround(const LandmarkView& view) const;
 
   MissingOptions options_;
+  double reach_px_;
   WitnessGrid witnesses_;
   std::vector<LandmarkId> gone_, hidden_;
   std::vector<LandmarkId> known_;  ///< workspace: those that the frame sees, in their place or elsewhere

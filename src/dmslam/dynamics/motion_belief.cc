@@ -50,10 +50,10 @@ EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
     const bool gone = evidence.stamp_ns - landmark.first_ns >= kLeastAgeNs &&
                       static_cast<double>(updated.found) < options.min_found_share * updated.visible;
     if (options.enabled && (gone || updated.motion_belief > options.remove_above)) {
-      map.RemoveLandmark(*id);
+      map.RemoveLandmark(landmark);
       ++report.removed;
     } else {
-      map.SetEvidence(*id, updated);
+      map.SetEvidence(landmark, updated);
     }
   }
   return report;

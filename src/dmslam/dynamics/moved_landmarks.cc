@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "dmslam/camera/image_scale.h"
+
 namespace dmslam {
 
 const std::vector<LandmarkId>& MovedLandmarks::Find(const Map& map,
@@ -42,8 +44,9 @@ void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected
   const Landmark& landmark = *map.FindLandmark(expected.id);
   const std::optional<Eigen::Vector2d> uv = map.camera().Project(frame->T_cam_world * landmark.p_world);
   if (!uv) return;
-  const FeatureHit hit = FindFeature(*frame->features, *uv, options_.radius_px, expected.view.octave - 1,
-                                     expected.view.octave + 1, landmark.descriptor, taken_);
+  const FeatureHit hit =
+      FindFeature(*frame->features, *uv, SearchRadiusPx(map.camera(), options_.radius_rad),
+                  expected.view.octave - 1, expected.view.octave + 1, landmark.descriptor, taken_);
   const bool alone = hit.distance <= options_.ratio * hit.second_distance;
   if (hit.feature < 0 || hit.distance > options_.max_distance || !alone) return;
   if (NormalizedErrorSquared(*frame->features, hit.feature, *uv, map.pyramid()) < options_.chi2) return;

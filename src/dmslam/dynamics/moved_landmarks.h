@@ -13,7 +13,7 @@ struct MovedOptions {
   double chi2 = 4.0 * 5.991;  ///< a strong match farther off than this speaks for motion
   double near_chi2 = 16.0;    ///< a match near its place that is rejected by so much speaks for motion too...
   int near_distance = 60;     ///< ...where it looks like the landmark [bits]
-  double radius_px = 30.0;    ///< how far a landmark that is missed in its place is looked for
+  double radius_rad = 0.057;  ///< how far a landmark that is missed in its place is looked for
   int max_distance = 40;      ///< bits; a match elsewhere must be strong...
   double ratio = 0.7;         ///< ...and alone
 };

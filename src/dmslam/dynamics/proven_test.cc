@@ -40,7 +40,7 @@ MapEditor MapSeenAt(const std::vector<double>& seconds, float motion_belief = 0.
     keyframe.features = MakeFrameFeatures(std::move(features), map.camera(), map.pyramid());
     const KeyframeId id = keyframe.id;
     map.AddKeyframe(std::move(keyframe));
-    map.SetObservation(id, 0, landmark.id);
+    map.SetObservation(map.At(id), 0, map.At(landmark.id));
   }
   return map;
 }

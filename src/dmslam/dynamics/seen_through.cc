@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/proven.h"
 
 namespace dmslam {
@@ -50,7 +51,7 @@ Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3
   const auto uv_px = p_cam.z() > 0 ? map.camera().Project(p_cam) : std::nullopt;
   if (!uv_px || !InImage(map.camera(), *uv_px)) return depths;
   witness.features->grid.ForEachInRadius(
-      *uv_px, options.radius_px, 0, kCoarsestOctave, [&](uint32_t feature) {
+      *uv_px, SearchRadiusPx(map.camera(), options.radius_rad), 0, kCoarsestOctave, [&](uint32_t feature) {
         const LandmarkId other = witness.landmarks[feature];
         if (!other.valid()) return;
         const auto suspect = suspects.find(other);
@@ -96,6 +97,7 @@ int CondemnSeenThrough(const Map& map, const std::vector<KeyframeId>& witnesses,
 double CondemnedAround(const Map& map, LandmarkId id, const Suspects& suspects,
                        const SeenThroughOptions& options) {
   const Landmark& landmark = *map.FindLandmark(id);
+  const double together_px = SearchRadiusPx(map.camera(), options.together_rad);
   int all = 0, condemned = 0;
   for (const Observation& o : landmark.observations) {
     const Keyframe& keyframe = *map.FindKeyframe(o.keyframe);
@@ -109,7 +111,7 @@ double CondemnedAround(const Map& map, LandmarkId id, const Suspects& suspects,
       const auto suspect = suspects.find(other);
       if (suspect != suspects.end() && suspect->second.condemned) ++condemned;
     };
-    keyframe.features->grid.ForEachInRadius(keyframe.features->uv_px[o.feature], options.together_px, 0,
+    keyframe.features->grid.ForEachInRadius(keyframe.features->uv_px[o.feature], together_px, 0,
                                             kCoarsestOctave, visit);
   }
   return all > 0 ? static_cast<double>(condemned) / all : 0.0;
@@ -150,9 +152,10 @@ class CondemnedPlaces {
 int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
   std::vector<LandmarkId> found;
   const CondemnedPlaces condemned(map, *suspects);
+  const double together_px = SearchRadiusPx(map.camera(), options.together_rad);
   for (const auto& [id, suspect] : *suspects) {
     if (suspect.condemned) continue;
-    const bool near = condemned.AnyNear(*map.FindLandmark(id), options.together_px + 1e-6);
+    const bool near = condemned.AnyNear(*map.FindLandmark(id), together_px + 1e-6);
     const double share = near ? CondemnedAround(map, id, *suspects, options) : 0.0;
     if (share >= options.together_share) found.push_back(id);
   }
@@ -176,7 +179,7 @@ int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   int removed = 0;
   for (const auto& [id, suspect] : suspects) {
     if (!suspect.condemned) continue;
-    map.RemoveLandmark(id);
+    map.RemoveLandmark(map.At(id));
     ++removed;
   }
   return removed;

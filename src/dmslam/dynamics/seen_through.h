@@ -13,11 +13,11 @@ struct SeenThroughOptions {
   double standing_s = ProvenOptions().standing_s;  ///< what was seen longer and outside it is proven
   int outer_observations = ProvenOptions().outer_observations;
   double guard_s = 0.5;           ///< witnesses are at least so far in time from when the landmark was seen
-  double radius_px = 28;          ///< around its pixel a witness's landmarks are compared
+  double radius_rad = 0.0533;     ///< around its pixel a witness's landmarks are compared
   double depth_tolerance = 0.11;  ///< relative difference of depth that is still the same place
   double through_per_support =
-      0.2;                  ///< witnesses that see through it, per witness that sees something at its place
-  double together_px = 70;  ///< neighbours within this share its fate...
+      0.2;  ///< witnesses that see through it, per witness that sees something at its place
+  double together_rad = 0.133;  ///< neighbours within this share its fate...
   double together_share = 0.3;  ///< ...when so many of them are condemned
   int rounds = 4;               ///< of both tests
   double stood_share = 0.5;     ///< of the unproven seen through: from here on somebody must have stood there

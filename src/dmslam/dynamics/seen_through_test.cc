@@ -71,7 +71,8 @@ class StandingPerson : public testing::Test {
   void See(KeyframeId keyframe, const std::vector<LandmarkId>& wall, const std::vector<LandmarkId>& person) {
     for (size_t i = 0; i < wall.size(); ++i) {
       const LandmarkId id = !person.empty() && person[i].valid() ? person[i] : wall[i];
-      if (map_.FindLandmark(id) != nullptr) map_.SetObservation(keyframe, static_cast<uint16_t>(i), id);
+      if (map_.FindLandmark(id) != nullptr)
+        map_.SetObservation(map_.At(keyframe), static_cast<uint16_t>(i), map_.At(id));
     }
   }
 

@@ -13,9 +13,15 @@ namespace dmslam {
 struct FrameFeatures {
   FeatureSet set;
   std::vector<Eigen::Vector2d> uv_px;  ///< undistorted pixel of each keypoint
+  std::vector<float> sigmas_px;        ///< of these pixels; empty: Pyramid::Scale says them
   FeatureGrid grid;                    ///< finds features near an undistorted pixel
 
   size_t size() const { return set.size(); }
+  /// Variance of an undistorted pixel, in x and in y.
+  double Variance(size_t feature, const Pyramid& pyramid) const {
+    if (sigmas_px.empty()) return pyramid.SigmaSquared(set.keypoints[feature].octave);
+    return static_cast<double>(sigmas_px[feature]) * static_cast<double>(sigmas_px[feature]);
+  }
 };
 
 }  // namespace dmslam

@@ -1,12 +1,12 @@
 #include "dmslam/geometry/absolute_pose.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "dmslam/geometry/polynomial.h"
 #include "dmslam/geometry/similarity.h"
+#include "dmslam/geometry/solve_symmetric.h"
 
 namespace dmslam {
 namespace {
@@ -191,7 +191,7 @@ Rigid3d RefinePose(const Pinhole& camera, const Rigid3d& T_cam_world,
   NormalEquations now = BuildNormalEquations(camera, T, points_world, uv_px, inv_sigma_squared, indices);
   for (int k = 0; k < iterations; ++k) {
     if (!std::isfinite(now.cost)) return T;
-    const Vector6d step = -now.hessian.ldlt().solve(now.gradient);
+    const Vector6d step = -SolveSymmetric(now.hessian, now.gradient);
     if (!step.allFinite()) return T;
     const Rigid3d candidate = StepPose(T, step);
     NormalEquations next =

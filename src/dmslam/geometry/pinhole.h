@@ -7,6 +7,9 @@
 
 namespace dmslam {
 
+/// A point that is no farther than this in front of the camera is at or behind it, in units of the map.
+inline constexpr double kMinDepth = 1e-9;
+
 /// The four numbers of an ideal pinhole camera [pixels]. Solvers and optimisers work on undistorted pixels
 /// and need no more than this.
 struct Pinhole {
@@ -33,7 +36,7 @@ struct Pinhole {
 inline double ReprojectionErrorSquared(const Pinhole& camera, const Rigid3d& T_cam_world,
                                        const Eigen::Vector3d& p_world, const Eigen::Vector2d& uv_px) {
   const Eigen::Vector3d p_cam = T_cam_world * p_world;
-  if (!(p_cam.z() > 1e-9)) return std::numeric_limits<double>::infinity();
+  if (!(p_cam.z() > kMinDepth)) return std::numeric_limits<double>::infinity();
   return (camera.Project(p_cam) - uv_px).squaredNorm();
 }
 

@@ -1,8 +1,8 @@
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
 
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/geometry/two_view.h"
 
 namespace dmslam {
@@ -95,7 +95,7 @@ Rigid3d RefineRelativePose(const Pinhole& camera, const Rigid3d& T_cam2_cam1,
   for (int k = 0; k < iterations; ++k) {
     Matrix5d damped = now.hessian;
     damped.diagonal() *= 1.0 + damping;
-    const Vector5d step = -damped.ldlt().solve(now.gradient);
+    const Vector5d step = -SolveSymmetric(damped, now.gradient);
     if (!step.allFinite()) return T;
     const Eigen::Vector3d direction = T.translation / length + f.across * step.tail<2>();
     const Rigid3d candidate((ExpSo3(step.head<3>()) * T.rotation).normalized(),

@@ -1,9 +1,9 @@
 #include "dmslam/geometry/triangulation.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -71,7 +71,7 @@ std::optional<Eigen::Vector3d> NearestToRays(std::span<const Rigid3d> T_cam_worl
   // The product of the eigenvalues; for parallel rays one of them vanishes with the square of their angle.
   const double n = static_cast<double>(rays.size());
   if (!(normal.determinant() > 1e-14 * n * n * n)) return std::nullopt;
-  return Eigen::Vector3d(normal.ldlt().solve(right));
+  return SolveSymmetric(normal, right);
 }
 
 /// One Gauss-Newton step on the reprojection errors in normalised coordinates. False if the point is behind a
@@ -91,7 +91,7 @@ bool RefineOnce(std::span<const Rigid3d> T_cam_world, std::span<const Eigen::Vec
     hessian += jacobian.transpose() * jacobian;
     gradient += jacobian.transpose() * error;
   }
-  const Eigen::Vector3d step = hessian.ldlt().solve(gradient);
+  const Eigen::Vector3d step = SolveSymmetric(hessian, gradient);
   if (!step.allFinite()) return false;
   point -= step;
   return true;

@@ -135,41 +135,85 @@ double CandidateBuilder::Cost(const CandidateMap& candidate, std::span<const uin
   return asked > 0 ? total / asked : 1.0;
 }
 
-void CandidateBuilder::PlaceView(const ReferenceView& view, CandidateMap* candidate) const {
-  const ReferenceView& last = candidate->last();
+namespace {
+
+/// Points with their places in one view, all that a pose is found from.
+struct SeenPoints {
   std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> uv;
+  std::vector<Eigen::Vector2d> uv_px;
   std::vector<double> information;
-  std::vector<int> all;
+
+  size_t size() const { return points.size(); }
+};
+
+struct FittedPose {
+  Rigid3d T;
+  std::vector<int> inliers;
+};
+
+std::vector<int> Agreeing(const Pinhole& camera, const Rigid3d& T, const SeenPoints& seen, double max_chi2) {
+  std::vector<int> agreeing;
+  for (size_t k = 0; k < seen.size(); ++k) {
+    const double squared = ReprojectionErrorSquared(camera, T, seen.points[k], seen.uv_px[k]);
+    if (squared * seen.information[k] <= max_chi2) agreeing.push_back(static_cast<int>(k));
+  }
+  return agreeing;
+}
+
+/// The pose near `start` that most of the points agree with. From wide bounds to narrow ones: a start is some
+/// pixels off, and a mismatch a hundred.
+FittedPose PlaceFrom(const Pinhole& camera, const Rigid3d& start, const SeenPoints& seen, double max_chi2) {
+  FittedPose placed{start, {}};
+  for (const double slack : {300.0, 100.0, 10.0, 3.0, 1.0}) {
+    const std::vector<int> agreeing = Agreeing(camera, placed.T, seen, slack * max_chi2);
+    if (agreeing.size() < 10) continue;
+    placed.T = RefinePose(camera, placed.T, seen.points, seen.uv_px, seen.information, agreeing, 5);
+  }
+  placed.inliers = Agreeing(camera, placed.T, seen, max_chi2);
+  return placed;
+}
+
+/// The view placed already that is nearest in time, or the reference frame itself.
+Rigid3d NearestPose(const CandidateMap& candidate, double since_reference_s) {
+  Rigid3d nearest;
+  double least_s = std::abs(since_reference_s);
+  for (const CandidateMap::Placed& placed : candidate.placed) {
+    const double apart_s = std::abs(placed.view->since_reference_s - since_reference_s);
+    if (apart_s < least_s) {
+      least_s = apart_s;
+      nearest = placed.T_k_0;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace
+
+void CandidateBuilder::PlaceView(const ReferenceView& view, CandidateMap* candidate) const {
+  constexpr double kEnough = 0.9;  // of the points agree: no other start is tried
+  const ReferenceView& last = candidate->last();
+  SeenPoints seen;
   const CandidateMap::Placed placed_view{&view, Rigid3d(), 1.0};
-  ForEachSeen(placed_view, last.pair.matches, [&](size_t k, const Match& seen) {
+  ForEachSeen(placed_view, last.pair.matches, [&](size_t k, const Match& match) {
     if (!candidate->use[k]) return;
-    all.push_back(static_cast<int>(points.size()));
-    points.push_back(candidate->points[k]);
-    uv.push_back(seen.uv1_px);
-    information.push_back(1.0 / options_.selector.inlier.pyramid.SigmaSquared(seen.octave1));
+    seen.points.push_back(candidate->points[k]);
+    seen.uv_px.push_back(match.uv1_px);
+    seen.information.push_back(1.0 / options_.selector.inlier.pyramid.SigmaSquared(match.octave1));
   });
-  if (points.size() < 20) return;  // says nothing
+  if (seen.size() < 20) return;  // says nothing
   const Rigid3d& T_last = candidate->T_last_0();
   const double fraction = view.since_reference_s / last.since_reference_s;
-  Rigid3d T(Eigen::Quaterniond::Identity().slerp(fraction, T_last.rotation), fraction * T_last.translation);
-  T = RefinePose(camera_.Ideal(), T, points, uv, information, all, 5);
-  std::vector<int> inliers;
-  for (int round = 0; round < 3; ++round) {
-    inliers.clear();
-    const double slack = round == 0 ? 3.0 : 1.0;  // the first fit is pulled by what does not belong
-    for (const int i : all) {
-      const auto k = static_cast<size_t>(i);
-      if (ReprojectionErrorSquared(camera_.Ideal(), T, points[k], uv[k]) * information[k] <=
-          slack * options_.max_view_chi2) {
-        inliers.push_back(i);
-      }
-    }
-    if (inliers.size() < 10) break;
-    if (round < 2) T = RefinePose(camera_.Ideal(), T, points, uv, information, inliers, 5);
+  const Rigid3d between(Eigen::Quaterniond::Identity().slerp(fraction, T_last.rotation),
+                        fraction * T_last.translation);
+  FittedPose best = PlaceFrom(camera_.Ideal(), between, seen, options_.max_view_chi2);
+  // A hand does not move evenly.
+  if (static_cast<double>(best.inliers.size()) < kEnough * static_cast<double>(seen.size())) {
+    const Rigid3d nearest = NearestPose(*candidate, view.since_reference_s);
+    FittedPose other = PlaceFrom(camera_.Ideal(), nearest, seen, options_.max_view_chi2);
+    if (other.inliers.size() > best.inliers.size()) best = std::move(other);
   }
   candidate->placed.push_back(
-      {&view, T, static_cast<double>(inliers.size()) / static_cast<double>(all.size())});
+      {&view, best.T, static_cast<double>(best.inliers.size()) / static_cast<double>(seen.size())});
 }
 
 void CandidateBuilder::KeepConsistent(CandidateMap* candidate) const {

@@ -83,7 +83,7 @@ std::string_view ToString(WaitReason reason) {
 
 namespace {
 
-RansacSelectorOptions RansacOptions(const InitializerOptions& options) {
+RansacSelectorOptions RansacOptionsOf(const InitializerOptions& options) {
   RansacSelectorOptions own;
   own.sampling = options.selector.sampling;
   own.input = options.selector.input;
@@ -93,7 +93,7 @@ RansacSelectorOptions RansacOptions(const InitializerOptions& options) {
 
 std::unique_ptr<StaticSelector> MakeInitializerSelector(const InitializerOptions& options) {
   if (options.method == "dlrsac") return std::make_unique<Dlrsac>(options.selector);
-  if (options.method == "ransac") return std::make_unique<RansacSelector>(RansacOptions(options));
+  if (options.method == "ransac") return std::make_unique<RansacSelector>(RansacOptionsOf(options));
   if (options.method != "arsac") {
     throw InputError("unknown method '" + options.method + "': use dlrsac, arsac or ransac");
   }
@@ -106,7 +106,7 @@ std::unique_ptr<StaticSelector> MakeInitializerSelector(const InitializerOptions
 
 /// The other motions are wanted even where their matches lie close together.
 RansacSelectorOptions RestOptions(const InitializerOptions& options) {
-  RansacSelectorOptions own = RansacOptions(options);
+  RansacSelectorOptions own = RansacOptionsOf(options);
   own.input.min_extent_share = 0;
   own.input.min_displacement_px = 0;
   own.min_static = options.contest.min_support;
@@ -439,6 +439,11 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
   if (!best) return std::nullopt;
   if (runner_up < options_.min_runner_up_cost * best->cost) {
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
+    return std::nullopt;
+  }
+  const bool alone = runner_up >= options_.alone_runner_up_cost * best->cost;
+  if (best->cost > (alone ? options_.max_cost_alone : options_.max_cost)) {
+    *refused = {WaitReason::kInconsistent, "no motion explains all views well"};
     return std::nullopt;
   }
   return best;

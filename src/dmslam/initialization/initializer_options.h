@@ -57,8 +57,12 @@ struct InitializerOptions {
 
   MinimaOptions minima;             ///< how the motion of the pair is searched
   double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
-  double min_runner_up_cost = 1.3;  ///< another motion must cost all views this many times as much
-  double min_parallax_rad = 0.015;  ///< median over the points; below it the direction is chance
+  double min_runner_up_cost = 1.5;  ///< another motion must cost all views this many times as much
+  double max_cost =
+      0.1;  ///< mean squared error over all views, as a share of the bound: more is no one motion...
+  double max_cost_alone = 0.2;        ///< ...but up to this where nothing else comes near...
+  double alone_runner_up_cost = 3.0;  ///< ...which is to say that another motion costs so many times as much
+  double min_parallax_rad = 0.015;    ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad =
       0.1;  ///< standard deviation of the direction of translation, from the residuals: later views mend it
   double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance

@@ -44,8 +44,8 @@ class Row {
       landmark.map_id = 1;
       landmark.p_world = {0.5 * (a + b), 0, kDepth};
       map_.AddLandmark(landmark);
-      map_.SetObservation(Id(a), used_[a]++, landmark.id);
-      map_.SetObservation(Id(b), used_[b]++, landmark.id);
+      map_.SetObservation(map_.At(Id(a)), used_[a]++, map_.At(landmark.id));
+      map_.SetObservation(map_.At(Id(b)), used_[b]++, map_.At(landmark.id));
     }
   }
   std::optional<ChainDrift> Drift(int a, int b) const {
@@ -106,7 +106,7 @@ TEST(ChainDriftTest, TheSpanningTreeLinksWhatSharesNothing) {
   row.Add(0);
   row.Add(1);
   EXPECT_FALSE(row.Drift(0, 1));
-  row.map().SetParent(Id(1), Id(0));
+  row.map().SetParent(row.map().At(Id(1)), Id(0));
   const auto drift = row.Drift(0, 1);
   ASSERT_TRUE(drift);
   EXPECT_NEAR(drift->rotation_rad, 10 * ChainDriftOptions().link_rotation_rad, 1e-9);

@@ -185,7 +185,9 @@ std::string NoteOf(const Map& map, const VerifiedLoop& loop) {
       loop.keyframe.frame_index(), loop.place.frame_index(), loop.support.found, loop.support.expected,
       loop.support.cells, loop.share, loop.proven.found, loop.proven_share, moved.norm(),
       loop.drift_sigmas.value_or(0.0), 1.0 / loop.S_keyframe_world.scale);
-  return text;
+  if (!loop.joins) return text;
+  return text + ("; map " + std::to_string(keyframe.map_id)) + " becomes part of map " +
+         std::to_string(map.FindKeyframe(loop.place)->map_id);
 }
 
 }  // namespace

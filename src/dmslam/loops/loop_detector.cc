@@ -1,14 +1,28 @@
 #include "dmslam/loops/loop_detector.h"
 
 #include <algorithm>
-#include <limits>
+#include <cstdlib>
 #include <utility>
 
 namespace dmslam {
 namespace {
 
+constexpr size_t kMostAtThatTime = 2, kMostAlike = 3;  // places of other maps that are tried
+
 bool Overlap(const std::set<KeyframeId>& a, const std::set<KeyframeId>& b) {
   return std::any_of(a.begin(), a.end(), [&](KeyframeId id) { return b.contains(id); });
+}
+
+/// Of other maps than that of `keyframe`: those within `seconds` of it, nearest in time first.
+std::vector<const Keyframe*> OfOtherMapsAtThatTime(const Map& map, const Keyframe& keyframe, double seconds) {
+  const auto since = [&](const Keyframe* other) { return std::abs(other->stamp_ns - keyframe.stamp_ns); };
+  std::vector<const Keyframe*> found;
+  for (const auto& [id, other] : map.keyframes()) {
+    if (other.map_id != keyframe.map_id && static_cast<double>(since(&other)) * 1e-9 <= seconds)
+      found.push_back(&other);
+  }
+  std::ranges::stable_sort(found, {}, since);
+  return found;
 }
 
 std::set<KeyframeId> ConnectedWith(const Keyframe& keyframe, int min_shared) {
@@ -53,6 +67,26 @@ LoopDetector::Found LoopDetector::Detect(const Map& map, const MapPlaces& places
     groups.push_back(std::move(group));
   }
   groups_ = std::move(groups);
+  return found;
+}
+
+std::vector<KeyframeId> LoopDetector::DetectInOtherMaps(const Map& map, const MapPlaces& places,
+                                                        const Keyframe& keyframe) const {
+  const bool alone = std::ranges::all_of(
+      map.keyframes(), [&](const auto& item) { return item.second.map_id == keyframe.map_id; });
+  const BowVector* words = places.Words(keyframe.id);
+  if (alone || words == nullptr) return {};
+  std::vector<KeyframeId> found;
+  const auto add = [&](KeyframeId id, size_t most) {
+    if (found.size() < most && std::ranges::find(found, id) == found.end()) found.push_back(id);
+  };
+  for (const Keyframe* other : OfOtherMapsAtThatTime(map, keyframe, options_.same_time_s))
+    add(other->id, kMostAtThatTime);
+  const size_t most = found.size() + kMostAlike;
+  for (const PlaceCandidate& candidate :
+       places.Query(map, *words, 0.0, options_.min_covisibility,
+                    [&](const Keyframe& other) { return other.map_id == keyframe.map_id; }))
+    add(candidate.keyframe, most);
   return found;
 }
 

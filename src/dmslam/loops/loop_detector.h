@@ -21,6 +21,11 @@ class LoopDetector {
   };
   /// Keyframes in order, each once.
   Found Detect(const Map& map, const MapPlaces& places, const Keyframe& keyframe);
+  /// Keyframes of other maps that may show the same place: those taken at nearly the same time, when nothing
+  /// can have moved far, and those that look most alike. A single keyframe's word is enough here: of these
+  /// places geometry asks more.
+  std::vector<KeyframeId> DetectInOtherMaps(const Map& map, const MapPlaces& places,
+                                            const Keyframe& keyframe) const;
   /// A loop was closed, or the map is another one: begins anew.
   void Reset() { groups_.clear(); }
 

@@ -14,23 +14,31 @@ struct LoopcloserOptions {
   int min_covisibility = kMinCovisibility;
   int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
+  double same_time_s = 0.5;        ///< between keyframes of two maps: nothing has moved far meanwhile
 
   // What makes a place the same.
   int min_word_matches = 20;  ///< of landmarks, between the two keyframes
   int min_sim3_inliers = 20;  ///< of them, that agree with one similarity
   int min_pose_inliers =
       30;  ///< without such pairs: landmarks of the place that agree with one pose of the keyframe
-  double search_radius_px = 7.5;     ///< of the guided search, times the scale of the predicted octave
-  int max_descriptor_distance = 60;  ///< of the guided search [bits]
-  int min_matches = 40;              ///< landmarks of the place found in the keyframe
-  int min_cells = 8;                 ///< cells of the image (of 48) in which landmarks are found
+  /// The same between two maps, where the place is seen from elsewhere or behind people: by chance 3 to 10
+  /// agree. What follows asks for much more there: min_joining_share of all that should be seen.
+  int min_joining_pose_inliers = 15;
+  double search_radius_rad = 0.0143;  ///< of the guided search, times the scale of the predicted octave
+  int max_descriptor_distance = 60;   ///< of the guided search [bits]
+  int min_matches = 40;               ///< landmarks of the place found in the keyframe
+  int min_cells = 8;                  ///< cells of the image (of 48) in which landmarks are found
   // Shares: of the place's landmarks that the keyframe should see, those that it does see, over the same
   // share of its own surroundings. A picture that hangs in two places reached 0.27; true returns begin at 0.3
   // and grow as the camera goes on.
   double min_share = 0.22;            ///< enough to be believed if the next keyframes agree
   double min_confirmed_share = 0.35;  ///< of a keyframe that sees the place where an earlier one said it is
   double min_joining_share = 0.7;     ///< the same between two maps, where no chain tells what drift can be
-  int min_told = 20;                  ///< landmarks that should be seen; of fewer the share seen says nothing
+  // Behind people little of all that should be seen is. Then much of what outlasts them must be: a picture
+  // that hangs in two places shows a quarter of it.
+  int min_joining_proven = 50;
+  double min_joining_proven_share = 0.5;
+  int min_told = 20;  ///< landmarks that should be seen; of fewer the share seen says nothing
 
   // Somebody who stood in two places is matched as well as a room is. What he cannot be is there for long.
   ProvenOptions proven;

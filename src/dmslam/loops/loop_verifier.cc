@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/loops/chain_drift.h"
@@ -40,8 +41,8 @@ Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const K
   match.p_cam2 = b.T_cam_world * map.FindLandmark(b.landmarks[feature_b])->p_world;
   match.uv1_px = a.features->uv_px[feature_a];
   match.uv2_px = b.features->uv_px[feature_b];
-  match.inv_sigma_squared1 = 1.0 / map.pyramid().SigmaSquared(a.features->set.keypoints[feature_a].octave);
-  match.inv_sigma_squared2 = 1.0 / map.pyramid().SigmaSquared(b.features->set.keypoints[feature_b].octave);
+  match.inv_sigma_squared1 = 1.0 / a.features->Variance(feature_a, map.pyramid());
+  match.inv_sigma_squared2 = 1.0 / b.features->Variance(feature_b, map.pyramid());
   return match;
 }
 
@@ -113,7 +114,10 @@ std::string Describe(const VerifiedLoop& loop) {
       Text("%d of %d landmarks found in %d cells, share %.2f; proven %d of %d in %d, share %.2f",
            loop.support.found, loop.support.expected, loop.support.cells, loop.share, loop.proven.found,
            loop.proven.expected, loop.proven.cells, loop.proven_share);
-  if (loop.counter_share) text += Text("; seen from there %.2f", *loop.counter_share);
+  if (loop.counter_share)
+    text += Text("; seen from there %d of %d, share %.2f", loop.counter.found, loop.counter.expected,
+                 *loop.counter_share);
+  if (loop.joins) text += loop.at_same_time ? "; two maps, at the same time" : "; two maps";
   text += Text("; scale %.3f", 1.0 / loop.S_keyframe_world.scale);
   if (loop.drift_sigmas) text += Text("; drift %.1f sigma", *loop.drift_sigmas);
   return text;
@@ -145,7 +149,8 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
       StaticLandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
   const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
   const bool one_map = keyframe.map_id == place.map_id;
-  return SimilarityFromPose(map, keyframe, place, matches, one_map ? std::optional(1.0) : std::nullopt, why);
+  if (one_map) return SimilarityFromPose(map, keyframe, place, matches, 1.0, options_.min_pose_inliers, why);
+  return SimilarityFromPose(map, keyframe, place, matches, {}, options_.min_joining_pose_inliers, why);
 }
 
 /// Landmarks of the place on features of the keyframe give its pose; features that show landmarks of both
@@ -154,13 +159,14 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
 std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyframe& keyframe,
                                                       const Keyframe& place,
                                                       std::vector<LandmarkMatch> matches,
-                                                      std::optional<double> scale, std::string* why) const {
+                                                      std::optional<double> scale, int min_inliers,
+                                                      std::string* why) const {
   std::erase_if(matches, [&](const LandmarkMatch& match) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
     return mine.valid() && !IsStatic(map.FindLandmark(mine));
   });
   PoseRansacOptions options;
-  options.min_inliers = options_.min_pose_inliers;
+  options.min_inliers = min_inliers;
   options.max_iterations = kMaxPoseIterations;
   options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop_pose");
   const auto pose = PoseFromLandmarks(map, *keyframe.features, matches, options);
@@ -214,7 +220,8 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   std::vector<LandmarkId> seen = LandmarksSeenBy(map, {place.id});
   KeepStatic(map, &seen);
   const Rigid3d T_cam_world = (S_keyframe_place * Sim3d(place.T_cam_world)).ToRigid();
-  const PlaceSupport support = Look(map, keyframe, T_cam_world, seen, options_.search_radius_px);
+  const PlaceSupport support =
+      Look(map, keyframe, T_cam_world, seen, SearchRadiusPx(map.camera(), options_.search_radius_rad));
   std::vector<Sim3Match> matches;
   for (const LandmarkMatch& match : support.matches) {
     const LandmarkId mine = keyframe.landmarks[match.feature];
@@ -234,12 +241,14 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   if (report.success) return report.S_cam1_cam2;
   const std::string pairs =
       Text("%d of %zu pairs of landmarks agree on both sides", report.num_inliers, matches.size());
-  if (static_cast<int>(matches.size()) >= options_.min_sim3_inliers) {
+  const bool joins = keyframe.map_id != place.map_id;
+  if (static_cast<int>(matches.size()) >= options_.min_sim3_inliers && !joins) {
     *why = pairs;
     return std::nullopt;
   }
+  const int enough = joins ? options_.min_joining_pose_inliers : options_.min_pose_inliers;
   const auto similarity =
-      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, why);
+      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, enough, why);
   if (!similarity) *why = pairs + "; " + *why;
   return similarity;
 }
@@ -277,13 +286,17 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
   loop.place = place.id;
   loop.S_keyframe_place = S_keyframe_place;
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
+  loop.joins = keyframe.map_id != place.map_id;
+  loop.at_same_time =
+      static_cast<double>(std::abs(keyframe.stamp_ns - place.stamp_ns)) * 1e-9 <= options_.same_time_s;
   loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
   const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
-  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks, options_.search_radius_px);
+  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks,
+                      SearchRadiusPx(map.camera(), options_.search_radius_rad));
   const PlaceSupport own =
       Look(map, keyframe, keyframe.T_cam_world,
            StaticLandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
-           options_.search_radius_px);
+           SearchRadiusPx(map.camera(), options_.search_radius_rad));
   loop.share = loop.support.ShareOver(own);
   MeasureProven(map, keyframe, place, own, &loop);
   const auto drift = DriftAlongChain(map, place.id, keyframe.id, options_.drift);
@@ -297,19 +310,22 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
 /// surroundings in the place's keyframe.
 void LoopVerifier::MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                  const PlaceSupport& own, VerifiedLoop* loop) const {
-  const double radius = options_.search_radius_px;
+  const double radius = SearchRadiusPx(map.camera(), options_.search_radius_rad);
   std::vector<LandmarkId> here =
       LandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility);
   std::vector<LandmarkId> there = loop->landmarks;
   KeepProven(map, &here);
   KeepProven(map, &there);
   const PlaceSupport own_here = Look(map, keyframe, keyframe.T_cam_world, here, radius);
-  const PlaceSupport own_there = Look(map, place, place.T_cam_world, there, radius);
+  PlaceSupport own_there = Look(map, place, place.T_cam_world, there, radius);
+  // A young map has nothing that is proven: then by all that stands there.
+  if (loop->joins && own_there.expected < options_.min_told)
+    own_there = Look(map, place, place.T_cam_world, loop->landmarks, radius);
   loop->proven = Look(map, keyframe, loop->S_keyframe_world.ToRigid(), there, radius);
   loop->proven_share = loop->proven.ShareOver(own_here.expected >= options_.min_told ? own_here : own);
   const Sim3d S_place_world = loop->S_keyframe_place.Inverse() * Sim3d(keyframe.T_cam_world);
-  const PlaceSupport counter = Look(map, place, S_place_world.ToRigid(), here, radius);
-  if (counter.expected >= options_.min_told) loop->counter_share = counter.ShareOver(own_there);
+  loop->counter = Look(map, place, S_place_world.ToRigid(), here, radius);
+  if (loop->counter.expected >= options_.min_told) loop->counter_share = loop->counter.ShareOver(own_there);
 }
 
 void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const {
@@ -317,15 +333,31 @@ void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks
                 [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), options_.proven); });
 }
 
+/// Within one map only what is proven around the place says so. Between two either side may: one of them may
+/// be too young to have anything proven. At the same time somebody who stands there is as good as a wall.
+bool LoopVerifier::IsNoPerson(const VerifiedLoop& loop, double min_share) const {
+  const auto says_so = [&](const PlaceSupport& proven, double share) {
+    return proven.found >= options_.min_proven && proven.cells >= options_.min_proven_cells &&
+           share >= min_share;
+  };
+  if (options_.min_proven == 0 || says_so(loop.proven, loop.proven_share)) return true;
+  return loop.joins && (loop.at_same_time || says_so(loop.counter, loop.counter_share.value_or(0.0)));
+}
+
 bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
   const bool seen = loop.support.found >= options_.min_matches && loop.support.cells >= options_.min_cells &&
                     loop.share >= min_share;
-  const bool no_person = options_.min_proven == 0 ||
-                         (loop.proven.found >= options_.min_proven &&
-                          loop.proven.cells >= options_.min_proven_cells && loop.proven_share >= min_share);
   const bool agreed = loop.counter_share.value_or(1.0) >= min_share;
   const bool plausible = loop.drift_sigmas.value_or(0.0) <= options_.max_drift_sigmas;
-  return seen && no_person && agreed && plausible;
+  return seen && IsNoPerson(loop, min_share) && agreed && plausible;
+}
+
+/// Most of what should be seen is, or, where people hide the rest, much of what is proven.
+bool LoopVerifier::HoldsBetweenMaps(const VerifiedLoop& loop) const {
+  const bool much_is_proven = loop.proven.found >= options_.min_joining_proven &&
+                              loop.proven.cells >= options_.min_cells &&
+                              loop.proven_share >= options_.min_joining_proven_share;
+  return Holds(loop, options_.min_joining_share) || (much_is_proven && Holds(loop, options_.min_share));
 }
 
 std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,
@@ -352,8 +384,8 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
   const std::vector<LandmarkId> landmarks =
       StaticLandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
-  const PlaceSupport seen =
-      Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks, 2 * options_.search_radius_px);
+  const PlaceSupport seen = Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks,
+                                 2 * SearchRadiusPx(map.camera(), options_.search_radius_rad));
   const Keyframe* place = BestObserver(map, keyframe, seen, options_.min_covisibility);
   if (place == nullptr) {
     *why = "nothing of the place is seen";
@@ -363,8 +395,7 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   const std::optional<Sim3d> refined = RefinedSimilarity(map, keyframe, *place, S_keyframe_place, why);
   if (!refined) return std::nullopt;
   VerifiedLoop loop = Measure(map, keyframe, *place, *refined, why);
-  const bool one_map = place->map_id == keyframe.map_id;
-  if (!Holds(loop, one_map ? options_.min_confirmed_share : options_.min_joining_share)) return std::nullopt;
+  if (!(loop.joins ? HoldsBetweenMaps(loop) : Holds(loop, options_.min_confirmed_share))) return std::nullopt;
   return loop;
 }
 

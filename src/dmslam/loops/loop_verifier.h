@@ -28,13 +28,17 @@ struct PlaceSupport {
 struct VerifiedLoop {
   KeyframeId keyframe;
   KeyframeId place;
-  Sim3d S_keyframe_place;  ///< camera of the keyframe from camera of the place
-  Sim3d S_keyframe_world;  ///< where the place's landmarks say the keyframe is
+  Sim3d S_keyframe_place;     ///< camera of the keyframe from camera of the place
+  Sim3d S_keyframe_world;     ///< where the place's landmarks say the keyframe is
+  bool joins = false;         ///< the two are of different maps
+  bool at_same_time = false;  ///< they were taken so shortly after one another that nothing has moved far
   PlaceSupport support;
   PlaceSupport proven;  ///< of it, landmarks that are proven to be no person
   double share =
       0;  ///< of what the keyframe should see of the place, seen; over the same share of its own surroundings
   double proven_share = 0;  ///< the same of the proven ones
+  /// What is proven around the keyframe, in the place's keyframe from where the loop puts it.
+  PlaceSupport counter;
   /// Of what is proven around the keyframe, seen by the place's keyframe; over the same share of the place.
   /// None where too little of it should be seen from there.
   std::optional<double> counter_share;
@@ -60,6 +64,9 @@ class LoopVerifier {
   std::optional<VerifiedLoop> Confirm(const Map& map, const Keyframe& keyframe, const VerifiedLoop& earlier,
                                       std::string* why) const;
 
+  /// Whether a place of another map is seen so well that the maps may be welded, once others confirm it.
+  bool HoldsBetweenMaps(const VerifiedLoop& loop) const;
+
   /// Which of `landmarks` a camera at `T_cam_world` finds among the features of `keyframe`.
   PlaceSupport Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
                     const std::vector<LandmarkId>& landmarks, double radius_px) const;
@@ -73,7 +80,7 @@ class LoopVerifier {
                                               std::string* why) const;
   std::optional<Sim3d> SimilarityFromPose(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                           std::vector<LandmarkMatch> matches, std::optional<double> scale,
-                                          std::string* why) const;
+                                          int min_inliers, std::string* why) const;
   std::optional<Sim3d> RefinedSimilarity(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                          const Sim3d& S_keyframe_place, std::string* why) const;
   VerifiedLoop Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
@@ -81,6 +88,7 @@ class LoopVerifier {
   void MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place, const PlaceSupport& own,
                      VerifiedLoop* loop) const;
   void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
+  bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
 
   LoopcloserOptions options_;

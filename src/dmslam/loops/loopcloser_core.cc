@@ -1,5 +1,6 @@
 #include "dmslam/loops/loopcloser_core.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -8,6 +9,8 @@
 
 namespace dmslam {
 namespace {
+
+constexpr int kMostWitnesses = 15;  // keyframes around one that are asked whether they see what it sees
 
 /// Between two keyframes; time runs backwards where the map grows back.
 double SecondsBetween(int64_t a_ns, int64_t b_ns) {
@@ -67,7 +70,7 @@ LoopAnswer LoopcloserCore::FindCorrection(KeyframeId id) {
   ForgetUnconfirmed(keyframe->stamp_ns);
   if (keyframes_since_loop_ <= options_.min_keyframes_between) return {};
   if (const std::optional<VerifiedLoop> loop = ConfirmProposed(*keyframe)) return Close(*loop);
-  ProposePlace(*keyframe, candidates);
+  if (const std::optional<VerifiedLoop> loop = ProposePlace(*keyframe, candidates)) return Close(*loop);
   return {};
 }
 
@@ -88,7 +91,13 @@ std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
   LoopDetector::Found found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
-  return std::move(found.candidates);
+  std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
+  std::erase_if(places, [&](KeyframeId id) {
+    return std::ranges::find(found.candidates, id) != found.candidates.end();
+  });
+  counters_.candidates += places.size();
+  places.insert(places.begin(), found.candidates.begin(), found.candidates.end());
+  return places;
 }
 
 /// Proposals that nothing has confirmed for long.
@@ -117,7 +126,22 @@ std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyf
   return best;
 }
 
-void LoopcloserCore::ProposePlace(const Keyframe& keyframe, const std::vector<KeyframeId>& candidates) {
+/// The neighbours of the keyframe saw the place as later ones would: as many, over as long a time.
+bool LoopcloserCore::IsConfirmedAround(const VerifiedLoop& loop) const {
+  const Keyframe& keyframe = map_.At(loop.keyframe);
+  int confirmations = 0;
+  double longest_s = 0;
+  for (const Keyframe* other : map_.BestCovisible(keyframe, kMostWitnesses, options_.min_covisibility)) {
+    std::string why;
+    if (!verifier_.Confirm(map_, *other, loop, &why)) continue;
+    ++confirmations;
+    longest_s = std::max(longest_s, SecondsBetween(other->stamp_ns, keyframe.stamp_ns));
+  }
+  return confirmations >= options_.confirmations && longest_s >= options_.confirm_for_s;
+}
+
+std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyframe,
+                                                         const std::vector<KeyframeId>& candidates) {
   for (const KeyframeId candidate : candidates) {
     Verdict verdict;
     verdict.place = candidate;
@@ -126,11 +150,13 @@ void LoopcloserCore::ProposePlace(const Keyframe& keyframe, const std::vector<Ke
     verdict.accepted = loop.has_value();
     verdicts_.push_back(std::move(verdict));
     if (loop) {
+      if (loop->joins && verifier_.HoldsBetweenMaps(*loop) && IsConfirmedAround(*loop)) return loop;
       proposals_.push_back({std::move(*loop), keyframe.stamp_ns, keyframe.stamp_ns, 0});
-      return;
+      return std::nullopt;
     }
     ++counters_.refused_geometry;
   }
+  return std::nullopt;
 }
 
 LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {

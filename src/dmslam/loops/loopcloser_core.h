@@ -66,8 +66,11 @@ class LoopcloserCore {
   void ForgetUnconfirmed(int64_t now_ns);
   /// Follows what earlier keyframes proposed: a loop that enough of them have confirmed for long enough.
   std::optional<VerifiedLoop> ConfirmProposed(const Keyframe& keyframe);
-  /// The first of the candidates that geometry bears out is kept as a proposal.
-  void ProposePlace(const Keyframe& keyframe, const std::vector<KeyframeId>& candidates);
+  /// The first of the candidates that geometry bears out is kept as a proposal. A place of another map is a
+  /// loop at once where keyframes that are there already confirm it.
+  std::optional<VerifiedLoop> ProposePlace(const Keyframe& keyframe,
+                                           const std::vector<KeyframeId>& candidates);
+  bool IsConfirmedAround(const VerifiedLoop& loop) const;
   LoopAnswer Close(const VerifiedLoop& loop);
   LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
 

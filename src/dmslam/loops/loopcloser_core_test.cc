@@ -65,7 +65,11 @@ struct WorldOptions {
   /// Keyframes before which somebody stands, near enough to hide most of the wall; he stands for
   /// kPersonStands keyframes each, and looks the same.
   std::vector<int> person_at = {};
+  int second_map_at = 1'000'000;  ///< from this keyframe on the camera is in a map of its own
 };
+
+/// What the second map believes of the world: it lies turned, elsewhere, and is half as large.
+Sim3d SecondWorld() { return Sim3d(ExpSo3(Eigen::Vector3d(0.2, -0.4, 1.0)), Eigen::Vector3d(3, 1, -2), 0.5); }
 
 /// A camera that goes around a room; landmarks of the second round are not known to be those of the first.
 class Room {
@@ -114,10 +118,10 @@ class Room {
     const size_t step = Round(k) == 0 ? 1 : options_.landmark_every;
     for (size_t feature = 0; feature < seen.size(); feature += step) {
       const LandmarkId landmark = LandmarkFor(seen[feature], k, id);
-      map_.SetObservation(id, static_cast<uint16_t>(feature), landmark);
-      map_.UpdateDescriptor(landmark);
+      map_.SetObservation(map_.At(id), static_cast<uint16_t>(feature), map_.At(landmark));
+      map_.UpdateDescriptor(map_.At(landmark));
     }
-    return map_.TakeDelta(MapEvent::kMapped, id, 1);
+    return map_.TakeDelta(MapEvent::kMapped, id, MapOf(k));
   }
 
   /// The mapper's word on a correction. It stays where it is: these tests look at answers alone.
@@ -131,6 +135,8 @@ class Room {
 
  private:
   int Round(int k) const { return k / kPerRound; }
+  MapId MapOf(int k) const { return k < options_.second_map_at ? 1 : 2; }
+  Sim3d Believed(int k) const { return MapOf(k) == 1 ? Drift(k) : SecondWorld(); }
   const Descriptor& DescriptorOf(size_t point, int k) const {
     return Round(k) == 0 ? first_[point] : second_[point];
   }
@@ -169,10 +175,10 @@ class Room {
   void AddKeyframe(int k, KeyframeId id, FeatureSet features) {
     Keyframe keyframe;
     keyframe.id = id;
-    keyframe.map_id = 1;
+    keyframe.map_id = MapOf(k);
     keyframe.stamp_ns = k * kInterval_ns;
-    keyframe.T_cam_world = (Sim3d(TruePose(k)) * Drift(k).Inverse()).ToRigid();
-    if (k > 0) keyframe.parent = KeyframeId::Make(1, static_cast<uint32_t>(k));
+    keyframe.T_cam_world = (Sim3d(TruePose(k)) * Believed(k).Inverse()).ToRigid();
+    if (k > 0 && k != options_.second_map_at) keyframe.parent = KeyframeId::Make(1, static_cast<uint32_t>(k));
     keyframe.features = MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid());
     map_.AddKeyframe(std::move(keyframe));
   }
@@ -181,12 +187,13 @@ class Room {
     // Seen again in the second round it is another landmark; so are those that the first round's end sees of
     // its start.
     const bool fused = options_.fused_every > 0 && point % options_.fused_every == 0;
-    const auto [known, is_new] = landmarks_.try_emplace({point, fused ? 0 : Era(point, k)});
+    const int era = MapOf(k) == 1 ? Era(point, k) : 1000;
+    const auto [known, is_new] = landmarks_.try_emplace({point, fused ? 0 : era});
     if (!is_new) return known->second;
     Landmark landmark;
     landmark.id = known->second = LandmarkId::Make(1, ++last_landmark_);
-    landmark.map_id = 1;
-    landmark.p_world = Drift(k) * points_[point];
+    landmark.map_id = MapOf(k);
+    landmark.p_world = Believed(k) * points_[point];
     landmark.reference = landmark.first_keyframe = id;
     if (options_.first_wall_moves && Round(k) == 0) landmark.evidence.motion_belief = 2.0F;
     map_.AddLandmark(landmark);
@@ -415,6 +422,74 @@ TEST(LoopcloserCoreTest, ALoopThatTheChainCannotHaveDriftedIsRefused) {
   LoopcloserOptions options;
   options.max_drift_sigmas = 0.1;
   LoopcloserCore core = MakeCore(options);
+  EXPECT_TRUE(Play(room, core).loops.empty());
+}
+
+/// Whether the answer lays the two maps onto one another as they are in truth, seen from the loop's
+/// keyframes.
+void ExpectWelds(const Room& room, const LoopAnswer& weld) {
+  const MapId map_id = room.map().FindKeyframe(weld.keyframe)->map_id;
+  EXPECT_NE(map_id, room.map().FindKeyframe(*weld.matched)->map_id);
+  const auto whole = std::ranges::count_if(room.map().KeyframesOf(map_id), [&](const Keyframe* keyframe) {
+    return keyframe->id <= weld.keyframe;
+  });
+  EXPECT_EQ(std::ssize(weld.corrections), whole) << "a map goes as a whole";
+  const int here = static_cast<int>(weld.keyframe.frame_index()) - 1;
+  const int there = static_cast<int>(weld.matched->frame_index()) - 1;
+  const Rigid3d found =
+      Corrected(room, weld, weld.keyframe) * room.map().FindKeyframe(*weld.matched)->T_cam_world.Inverse();
+  const Rigid3d truth = TruePose(here) * TruePose(there).Inverse();
+  EXPECT_LT(AngleBetween(found.rotation, truth.rotation), 0.02);
+  const double unit = map_id == 2 ? Drift(there).scale : SecondWorld().scale;  // of the place's map
+  EXPECT_LT((found.Center() - unit * truth.Center()).norm(), 0.1 * unit);
+  const double scale = map_id == 2 ? 2.0 * unit : unit;
+  EXPECT_NEAR(weld.corrections.front().corrected_from_base.scale / scale, 1.0, 0.03);
+}
+
+TEST(LoopcloserCoreTest, AMapBegunMeanwhileIsWeldedToTheOldOne) {
+  Room room({.second_map_at = kPerRound - 2});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  const LoopAnswer& weld = answers.loops.front();
+  EXPECT_LE(static_cast<int>(weld.keyframe.frame_index()), kPerRound + 6) << "within a few seconds";
+  ExpectWelds(room, weld);
+}
+
+/// The old map is too young to have anything proven; what the camera sees of it now is.
+TEST(LoopcloserCoreTest, AMapTooYoungToProveAnythingIsWeldedByWhatIsProvenInTheOther) {
+  Room room({.second_map_at = 5});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  ExpectWelds(room, answers.loops.front());
+}
+
+TEST(LoopcloserCoreTest, MapsAreWeldedBehindPeopleByWhatOutlastsThem) {
+  Room room({.person_at = {96, 103, 110, 117}, .second_map_at = kPerRound - 6});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 1u);
+  ExpectWelds(room, answers.loops.front());
+}
+
+TEST(LoopcloserCoreTest, SomebodyWhoStoodInTwoMapsDoesNotWeldThem) {
+  const WorldOptions world{.second_visit_elsewhere = true, .person_at = {20, 100}, .second_map_at = 97};
+  LoopcloserOptions trusting = Trusting();
+  trusting.min_joining_share = trusting.min_share;
+  {
+    Room room(world);
+    LoopcloserCore core = MakeCore(trusting);
+    ASSERT_GE(Play(room, core).loops.size(), 1u) << "the scene is no trap";
+  }
+  Room room(world);
+  LoopcloserCore core = MakeCore();
+  EXPECT_TRUE(Play(room, core).loops.empty());
+}
+
+TEST(LoopcloserCoreTest, OnePictureThatHangsInTwoMapsDoesNotWeldThem) {
+  Room room({.second_visit_elsewhere = true, .picture_rad = 0.25, .second_map_at = kPerRound / 4});
+  LoopcloserCore core = MakeCore();
   EXPECT_TRUE(Play(room, core).loops.empty());
 }
 

@@ -5,6 +5,21 @@
 
 namespace dmslam {
 
+namespace {
+
+/// Where keypoints have sigmas of their own, or the lens stretches the image.
+void AddSigmas(const Camera& camera, const Pyramid& pyramid, FrameFeatures* features) {
+  const FeatureSet& set = features->set;
+  if (set.sigmas_px.empty() && !camera.Stretches()) return;
+  for (size_t i = 0; i < set.size(); ++i) {
+    const double raw_px = set.sigmas_px.empty() ? pyramid.Scale(set.keypoints[i].octave)
+                                                : static_cast<double>(set.sigmas_px[i]);
+    features->sigmas_px.push_back(static_cast<float>(raw_px * camera.StretchAt(features->uv_px[i])));
+  }
+}
+
+}  // namespace
+
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera,
                                                        const Pyramid& pyramid) {
   auto features = std::make_shared<FrameFeatures>();
@@ -28,6 +43,7 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Cam
     features->uv_px.push_back(*uv);
   }
   features->set = std::move(kept);
+  AddSigmas(camera, pyramid, features.get());
   features->grid.Build(features->uv_px, features->set.keypoints, camera.width_px, camera.height_px);
   return features;
 }

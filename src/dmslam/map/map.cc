@@ -1,24 +1,14 @@
 #include "dmslam/map/map.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/sorted.h"
 
 namespace dmslam {
 namespace {
-
-template <typename T>
-void InsertSorted(std::vector<T>& values, const T& value) {
-  const auto at = std::lower_bound(values.begin(), values.end(), value);
-  if (at == values.end() || *at != value) values.insert(at, value);
-}
-
-template <typename T>
-void EraseSorted(std::vector<T>& values, const T& value) {
-  const auto at = std::lower_bound(values.begin(), values.end(), value);
-  if (at != values.end() && *at == value) values.erase(at);
-}
 
 auto WhereObserved(std::vector<Observation>& observations, KeyframeId keyframe) {
   return std::ranges::lower_bound(observations, keyframe, {}, &Observation::keyframe);
@@ -237,16 +227,14 @@ Landmark* Map::Find(LandmarkId id) {
   return it == landmarks_.end() ? nullptr : &it->second;
 }
 
-Keyframe& Map::Mutable(KeyframeId id) {
-  Keyframe* keyframe = Find(id);
-  DMSLAM_CHECK(keyframe != nullptr, "edit of an unknown keyframe");
-  return *keyframe;
+Keyframe& Map::Mutable(const Keyframe& keyframe) {
+  assert(FindKeyframe(keyframe.id) == &keyframe);  // no copy, nor one of another map
+  return const_cast<Keyframe&>(keyframe);
 }
 
-Landmark& Map::Mutable(LandmarkId id) {
-  Landmark* landmark = Find(id);
-  DMSLAM_CHECK(landmark != nullptr, "edit of an unknown landmark");
-  return *landmark;
+Landmark& Map::Mutable(const Landmark& landmark) {
+  assert(FindLandmark(landmark.id) == &landmark);
+  return const_cast<Landmark&>(landmark);
 }
 
 void Map::UpdateStandpoint(const Keyframe& keyframe) {

@@ -105,8 +105,9 @@ class Map {
 
   Keyframe* Find(KeyframeId id);
   Landmark* Find(LandmarkId id);
-  Keyframe& Mutable(KeyframeId id);  ///< of one that must be there
-  Landmark& Mutable(LandmarkId id);
+  /// What this map has handed out for reading, for who may edit.
+  Keyframe& Mutable(const Keyframe& keyframe);
+  Landmark& Mutable(const Landmark& landmark);
   Keyframe& Insert(Keyframe keyframe);  ///< without landmarks and covisibility
   Landmark& Insert(Landmark landmark);  ///< without observations
   void Place(Keyframe& keyframe, const Rigid3d& T_cam_world, double scale, MapId map_id);

@@ -4,18 +4,13 @@
 #include <utility>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/sorted.h"
 
 namespace dmslam {
 namespace {
 
 using KeyframeChange = MapJournal::KeyframeChange;
 using LandmarkChange = MapJournal::LandmarkChange;
-
-template <typename T>
-void InsertSorted(std::vector<T>& values, const T& value) {
-  const auto at = std::lower_bound(values.begin(), values.end(), value);
-  if (at == values.end() || *at != value) values.insert(at, value);
-}
 
 /// The descriptor with the least median distance to all; null where there is none. Ties go to the first.
 const Descriptor* MiddleOf(const std::vector<Descriptor>& seen) {
@@ -49,66 +44,63 @@ const Landmark& MapEditor::AddLandmark(Landmark landmark) {
   return added;
 }
 
-void MapEditor::SetObservation(KeyframeId keyframe_id, uint16_t feature, LandmarkId landmark_id) {
-  Keyframe& keyframe = Mutable(keyframe_id);
+void MapEditor::SetObservation(const Keyframe& keyframe, uint16_t feature, const Landmark& landmark) {
   DMSLAM_CHECK(feature < keyframe.landmarks.size(), "observation by an unknown feature");
-  if (keyframe.landmarks[feature] == landmark_id) return;
-  const std::optional<uint16_t> released = Observe(keyframe, feature, Mutable(landmark_id));
-  if (released) journal_.NoteObservation(keyframe_id, *released);
-  journal_.NoteObservation(keyframe_id, feature);
+  if (keyframe.landmarks[feature] == landmark.id) return;
+  const std::optional<uint16_t> released = Observe(Mutable(keyframe), feature, Mutable(landmark));
+  if (released) journal_.NoteObservation(keyframe.id, *released);
+  journal_.NoteObservation(keyframe.id, feature);
 }
 
-void MapEditor::ClearObservation(KeyframeId keyframe_id, uint16_t feature) {
-  Keyframe& keyframe = Mutable(keyframe_id);
+void MapEditor::ClearObservation(const Keyframe& keyframe, uint16_t feature) {
   DMSLAM_CHECK(feature < keyframe.landmarks.size(), "observation by an unknown feature");
   if (!keyframe.landmarks[feature].valid()) return;
-  Release(keyframe, feature);
-  journal_.NoteObservation(keyframe_id, feature);
+  Release(Mutable(keyframe), feature);
+  journal_.NoteObservation(keyframe.id, feature);
 }
 
-void MapEditor::SetPose(KeyframeId id, const Rigid3d& T_cam_world) { SetPoseAndScale(id, T_cam_world, 1.0); }
-
-void MapEditor::SetPoseAndScale(KeyframeId id, const Rigid3d& T_cam_world, double factor) {
-  Keyframe& keyframe = Mutable(id);
-  Place(keyframe, T_cam_world, keyframe.scale * factor, keyframe.map_id);
-  journal_.Note(id, KeyframeChange::kPose);
+void MapEditor::SetPose(const Keyframe& keyframe, const Rigid3d& T_cam_world) {
+  SetPoseAndScale(keyframe, T_cam_world, 1.0);
 }
 
-void MapEditor::SetPosition(LandmarkId id, const Eigen::Vector3d& p_world) {
-  Place(Mutable(id), p_world);
-  journal_.Note(id, LandmarkChange::kPosition);
+void MapEditor::SetPoseAndScale(const Keyframe& keyframe, const Rigid3d& T_cam_world, double factor) {
+  Place(Mutable(keyframe), T_cam_world, keyframe.scale * factor, keyframe.map_id);
+  journal_.Note(keyframe.id, KeyframeChange::kPose);
 }
 
-void MapEditor::SetEvidence(LandmarkId id, const LandmarkEvidence& evidence) {
-  Mutable(id).evidence = evidence;
-  journal_.Note(id, LandmarkChange::kEvidence);
+void MapEditor::SetPosition(const Landmark& landmark, const Eigen::Vector3d& p_world) {
+  Place(Mutable(landmark), p_world);
+  journal_.Note(landmark.id, LandmarkChange::kPosition);
 }
 
-void MapEditor::SetParent(KeyframeId id, KeyframeId parent) {
-  Hang(Mutable(id), parent);
-  journal_.Note(id, KeyframeChange::kState);
+void MapEditor::SetEvidence(const Landmark& landmark, const LandmarkEvidence& evidence) {
+  Mutable(landmark).evidence = evidence;
+  journal_.Note(landmark.id, LandmarkChange::kEvidence);
 }
 
-void MapEditor::AddLoopEdge(KeyframeId a, KeyframeId b) {
-  InsertSorted(Mutable(a).loop_edges, b);
-  InsertSorted(Mutable(b).loop_edges, a);
-  journal_.Note(a, KeyframeChange::kState);
-  journal_.Note(b, KeyframeChange::kState);
+void MapEditor::SetParent(const Keyframe& keyframe, KeyframeId parent) {
+  Hang(Mutable(keyframe), parent);
+  journal_.Note(keyframe.id, KeyframeChange::kState);
 }
 
-void MapEditor::SetMapId(KeyframeId id, MapId map_id) {
-  Keyframe& keyframe = Mutable(id);
-  Place(keyframe, keyframe.T_cam_world, keyframe.scale, map_id);
-  journal_.Note(id, KeyframeChange::kState);
+void MapEditor::AddLoopEdge(const Keyframe& a, const Keyframe& b) {
+  InsertSorted(Mutable(a).loop_edges, b.id);
+  InsertSorted(Mutable(b).loop_edges, a.id);
+  journal_.Note(a.id, KeyframeChange::kState);
+  journal_.Note(b.id, KeyframeChange::kState);
 }
 
-void MapEditor::SetMapId(LandmarkId id, MapId map_id) {
-  Mutable(id).map_id = map_id;
-  journal_.Note(id, LandmarkChange::kState);
+void MapEditor::SetMapId(const Keyframe& keyframe, MapId map_id) {
+  Place(Mutable(keyframe), keyframe.T_cam_world, keyframe.scale, map_id);
+  journal_.Note(keyframe.id, KeyframeChange::kState);
 }
 
-void MapEditor::UpdateDescriptor(LandmarkId id) {
-  Landmark& landmark = Mutable(id);
+void MapEditor::SetMapId(const Landmark& landmark, MapId map_id) {
+  Mutable(landmark).map_id = map_id;
+  journal_.Note(landmark.id, LandmarkChange::kState);
+}
+
+void MapEditor::UpdateDescriptor(const Landmark& landmark) {
   std::vector<Descriptor> seen;
   for (const Observation& o : landmark.observations) {
     const Keyframe* keyframe = FindKeyframe(o.keyframe);
@@ -116,36 +108,41 @@ void MapEditor::UpdateDescriptor(LandmarkId id) {
   }
   const Descriptor* middle = MiddleOf(seen);
   if (middle == nullptr || *middle == landmark.descriptor) return;
-  landmark.descriptor = *middle;
-  journal_.Note(id, LandmarkChange::kState);
+  Mutable(landmark).descriptor = *middle;
+  journal_.Note(landmark.id, LandmarkChange::kState);
 }
 
-void MapEditor::Fuse(LandmarkId from, LandmarkId into) {
-  if (from == into) return;
-  const Landmark& gone = Mutable(from);
-  Landmark& target = Mutable(into);
-  const std::vector<Observation> observations = gone.observations;
+void MapEditor::Fuse(const Landmark& from, const Landmark& into) {
+  if (&from == &into) return;
+  const std::vector<Observation> observations = from.observations;
   for (const Observation& o : observations) {
-    ClearObservation(o.keyframe, o.feature);
-    if (target.SeenBy(o.keyframe) == nullptr) SetObservation(o.keyframe, o.feature, into);
+    const Keyframe& keyframe = At(o.keyframe);
+    ClearObservation(keyframe, o.feature);
+    if (into.SeenBy(o.keyframe) == nullptr) SetObservation(keyframe, o.feature, into);
   }
-  target.evidence.visible += gone.evidence.visible;
-  target.evidence.found += gone.evidence.found;
-  target.evidence.moved += gone.evidence.moved;
-  target.first_ns = std::min(target.first_ns, gone.first_ns);
-  target.first_keyframe = std::min(target.first_keyframe, gone.first_keyframe);
-  journal_.Note(into, LandmarkChange::kState);
-  EraseAndForget(from);
-  Bury(from, into);
-  journal_.NoteTombstone(from);
+  Landmark& target = Mutable(into);
+  target.evidence.visible += from.evidence.visible;
+  target.evidence.found += from.evidence.found;
+  target.evidence.moved += from.evidence.moved;
+  target.first_ns = std::min(target.first_ns, from.first_ns);
+  target.first_keyframe = std::min(target.first_keyframe, from.first_keyframe);
+  journal_.Note(into.id, LandmarkChange::kState);
+  EraseAndBury(from, into.id);
   UpdateDescriptor(into);
 }
 
-void MapEditor::RemoveLandmark(LandmarkId id) {
-  const std::vector<Observation> observations = Mutable(id).observations;
-  for (const Observation& o : observations) ClearObservation(o.keyframe, o.feature);
-  EraseAndForget(id);
-  Bury(id, LandmarkId{});
+void MapEditor::RemoveLandmark(const Landmark& landmark) {
+  const std::vector<Observation> observations = landmark.observations;
+  for (const Observation& o : observations) ClearObservation(At(o.keyframe), o.feature);
+  EraseAndBury(landmark, LandmarkId{});
+}
+
+/// Of a landmark that nobody sees any more.
+void MapEditor::EraseAndBury(const Landmark& landmark, LandmarkId replaced_by) {
+  const LandmarkId id = landmark.id;
+  EraseLandmark(id);
+  journal_.Forget(id);
+  Bury(id, replaced_by);
   journal_.NoteTombstone(id);
 }
 
@@ -169,28 +166,31 @@ void MapEditor::ReparentChildren(const Keyframe& removed) {
       }
     }
     if (best_shared == 0) break;
-    SetParent(best_child, best_parent);
+    SetParent(At(best_child), best_parent);
     candidates.push_back(best_child);
     std::erase(orphans, best_child);
   }
-  for (const KeyframeId child : orphans) SetParent(child, removed.parent);
+  for (const KeyframeId child : orphans) SetParent(At(child), removed.parent);
 }
 
-void MapEditor::RemoveKeyframe(KeyframeId id) {
-  const Keyframe& keyframe = Mutable(id);
-  DMSLAM_CHECK(FindKeyframe(keyframe.parent) != nullptr, "a map's first keyframe stays");
-  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
-    const LandmarkId landmark_id = keyframe.landmarks[i];
-    if (!landmark_id.valid()) continue;
-    ClearObservation(id, static_cast<uint16_t>(i));
-    Landmark& landmark = Mutable(landmark_id);
-    if (landmark.observations.empty()) {
-      RemoveLandmark(landmark_id);
-    } else if (landmark.reference == id) {
-      SetReference(landmark, landmark.observations.front().keyframe);
-      journal_.Note(landmark_id, LandmarkChange::kState);
-    }
+/// The landmark that feature `feature` of a keyframe sees loses it; one that nobody else sees goes.
+void MapEditor::TakeFrom(const Keyframe& keyframe, uint16_t feature) {
+  const Landmark* landmark = LandmarkSeenBy(keyframe, feature);
+  if (landmark == nullptr) return;
+  ClearObservation(keyframe, feature);
+  if (landmark->observations.empty()) {
+    RemoveLandmark(*landmark);
+  } else if (landmark->reference == keyframe.id) {
+    SetReference(Mutable(*landmark), landmark->observations.front().keyframe);
+    journal_.Note(landmark->id, LandmarkChange::kState);
   }
+}
+
+void MapEditor::RemoveKeyframe(const Keyframe& keyframe) {
+  const KeyframeId id = keyframe.id;
+  const Keyframe* parent = FindKeyframe(keyframe.parent);
+  DMSLAM_CHECK(parent != nullptr, "a map's first keyframe stays");
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) TakeFrom(keyframe, static_cast<uint16_t>(i));
   ReparentChildren(keyframe);
   for (const KeyframeId other : keyframe.loop_edges) {
     if (Keyframe* end = Find(other)) {
@@ -198,19 +198,10 @@ void MapEditor::RemoveKeyframe(KeyframeId id) {
       journal_.Note(other, KeyframeChange::kState);
     }
   }
-  const Keyframe& parent = At(keyframe.parent);
-  Bury({id, parent.id, keyframe.stamp_ns, keyframe.T_cam_world * parent.T_cam_world.Inverse(), parent.scale});
+  Bury({id, parent->id, keyframe.stamp_ns, keyframe.T_cam_world * parent->T_cam_world.Inverse(),
+        parent->scale});
   journal_.NoteTombstone(id);
-  EraseAndForget(id);
-}
-
-void MapEditor::EraseAndForget(KeyframeId id) {
   EraseKeyframe(id);
-  journal_.Forget(id);
-}
-
-void MapEditor::EraseAndForget(LandmarkId id) {
-  EraseLandmark(id);
   journal_.Forget(id);
 }
 

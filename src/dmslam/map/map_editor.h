@@ -12,7 +12,8 @@ namespace dmslam {
 /// The map of its one writer, the mapper. Every edit is remembered, and `TakeDelta` turns what was edited
 /// since the last one into absolute values for everybody else's `Replica`.
 ///
-/// Ids must be those of what is in the map.
+/// Ids are resolved at the border (`Find...`, `At`): what is edited is named by reference, as this map has
+/// handed it out.
 class MapEditor : public Map {
  public:
   using Map::Map;
@@ -25,26 +26,27 @@ class MapEditor : public Map {
   const Landmark& AddLandmark(Landmark landmark);
   /// Feature `feature` of `keyframe` sees `landmark`. Replaces what the feature saw; a landmark has at most
   /// one feature per keyframe (an older one is released).
-  void SetObservation(KeyframeId keyframe, uint16_t feature, LandmarkId landmark);
-  void ClearObservation(KeyframeId keyframe, uint16_t feature);
-  void SetPose(KeyframeId id, const Rigid3d& T_cam_world);
+  void SetObservation(const Keyframe& keyframe, uint16_t feature, const Landmark& landmark);
+  void ClearObservation(const Keyframe& keyframe, uint16_t feature);
+  void SetPose(const Keyframe& keyframe, const Rigid3d& T_cam_world);
   /// The pose after a correction that also scales by `factor` what hangs on the keyframe.
-  void SetPoseAndScale(KeyframeId id, const Rigid3d& T_cam_world, double factor);
-  void SetPosition(LandmarkId id, const Eigen::Vector3d& p_world);
-  void SetEvidence(LandmarkId id, const LandmarkEvidence& evidence);
-  void SetParent(KeyframeId id, KeyframeId parent);
-  void AddLoopEdge(KeyframeId a, KeyframeId b);
-  void SetMapId(KeyframeId id, MapId map_id);
-  void SetMapId(LandmarkId id, MapId map_id);
+  void SetPoseAndScale(const Keyframe& keyframe, const Rigid3d& T_cam_world, double factor);
+  void SetPosition(const Landmark& landmark, const Eigen::Vector3d& p_world);
+  void SetEvidence(const Landmark& landmark, const LandmarkEvidence& evidence);
+  /// `parent` need not be there, and may be none.
+  void SetParent(const Keyframe& keyframe, KeyframeId parent);
+  void AddLoopEdge(const Keyframe& a, const Keyframe& b);
+  void SetMapId(const Keyframe& keyframe, MapId map_id);
+  void SetMapId(const Landmark& landmark, MapId map_id);
   /// Chooses the descriptor nearest to all observations (least median distance).
-  void UpdateDescriptor(LandmarkId id);
+  void UpdateDescriptor(const Landmark& landmark);
   /// Moves all observations of `from` to `into` (unless the keyframe sees `into` already) and leaves a
   /// tombstone.
-  void Fuse(LandmarkId from, LandmarkId into);
-  void RemoveLandmark(LandmarkId id);
+  void Fuse(const Landmark& from, const Landmark& into);
+  void RemoveLandmark(const Landmark& landmark);
   /// Removes a keyframe: its children get new parents, a tombstone keeps its place relative to its parent,
   /// landmarks that nobody sees any more go with it. A map's first keyframe cannot be removed.
-  void RemoveKeyframe(KeyframeId id);
+  void RemoveKeyframe(const Keyframe& keyframe);
   /// Forgets the keyframes and landmarks of a whole map.
   void DropMap(MapId map_id);
   void SetProgress(const MapProgress& progress) { SetProgressTo(progress); }
@@ -55,8 +57,8 @@ class MapEditor : public Map {
 
  private:
   void ReparentChildren(const Keyframe& removed);
-  void EraseAndForget(KeyframeId id);
-  void EraseAndForget(LandmarkId id);
+  void TakeFrom(const Keyframe& keyframe, uint16_t feature);
+  void EraseAndBury(const Landmark& landmark, LandmarkId replaced_by);
 
   MapJournal journal_;
 };

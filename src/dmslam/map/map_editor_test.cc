@@ -35,7 +35,7 @@ class Editor : public testing::Test {
       landmark.reference = landmark.first_keyframe = Kf(1);
       map_.AddLandmark(landmark);
       for (uint32_t frame = 1; frame <= 3; ++frame)
-        map_.SetObservation(Kf(frame), static_cast<uint16_t>(number), Lm(number));
+        map_.SetObservation(map_.At(Kf(frame)), static_cast<uint16_t>(number), map_.At(Lm(number)));
     }
     first_ = Take();
   }
@@ -58,9 +58,9 @@ TEST_F(Editor, FirstDeltaHoldsEverythingAndTheNextNothing) {
 }
 
 TEST_F(Editor, AThingThatMovedTravelsWithoutItsState) {
-  map_.SetPose(Kf(2), Rigid3d(Eigen::Quaterniond::Identity(), {7, 0, 0}));
-  map_.SetPosition(Lm(2), {1, 2, 3});
-  map_.SetEvidence(Lm(3), {5, 4, 0, 0.5F, 0});
+  map_.SetPose(map_.At(Kf(2)), Rigid3d(Eigen::Quaterniond::Identity(), {7, 0, 0}));
+  map_.SetPosition(map_.At(Lm(2)), {1, 2, 3});
+  map_.SetEvidence(map_.At(Lm(3)), {5, 4, 0, 0.5F, 0});
   const MapDelta delta = Take();
   EXPECT_TRUE(delta.keyframes.empty());
   ASSERT_EQ(delta.keyframe_poses.size(), 1u);
@@ -73,10 +73,10 @@ TEST_F(Editor, AThingThatMovedTravelsWithoutItsState) {
 }
 
 TEST_F(Editor, AStateIncludesPoseAndPosition) {
-  map_.SetPose(Kf(2), Rigid3d());
-  map_.SetParent(Kf(2), Kf(3));
-  map_.SetPosition(Lm(2), {1, 2, 3});
-  map_.SetMapId(Lm(2), 5);
+  map_.SetPose(map_.At(Kf(2)), Rigid3d());
+  map_.SetParent(map_.At(Kf(2)), Kf(3));
+  map_.SetPosition(map_.At(Lm(2)), {1, 2, 3});
+  map_.SetMapId(map_.At(Lm(2)), 5);
   const MapDelta delta = Take();
   ASSERT_EQ(delta.keyframes.size(), 1u);
   EXPECT_FALSE(delta.keyframes.front().has_features) << "they are known";
@@ -86,7 +86,7 @@ TEST_F(Editor, AStateIncludesPoseAndPosition) {
 }
 
 TEST_F(Editor, ALandmarkHasOneFeaturePerKeyframe) {
-  map_.SetObservation(Kf(2), 9, Lm(1));
+  map_.SetObservation(map_.At(Kf(2)), 9, map_.At(Lm(1)));
   EXPECT_FALSE(map_.At(Kf(2)).landmarks[1].valid()) << "the older one is released";
   EXPECT_EQ(map_.At(Lm(1)).SeenBy(Kf(2))->feature, 9);
   EXPECT_EQ(map_.At(Lm(1)).observations.size(), 3u);
@@ -97,18 +97,18 @@ TEST_F(Editor, ALandmarkHasOneFeaturePerKeyframe) {
 }
 
 TEST_F(Editor, AFeatureSeesOneLandmark) {
-  map_.SetObservation(Kf(2), 1, Lm(4));
+  map_.SetObservation(map_.At(Kf(2)), 1, map_.At(Lm(4)));
   EXPECT_EQ(map_.At(Lm(1)).SeenBy(Kf(2)), nullptr);
   EXPECT_EQ(map_.At(Kf(1)).covisible.at(Kf(2)), 3);
   EXPECT_EQ(map_.At(Kf(1)).covisible.at(Kf(3)), 4);
 }
 
 TEST_F(Editor, FusedLandmarksShareObserversAndEvidence) {
-  map_.ClearObservation(Kf(3), 2);
-  map_.SetEvidence(Lm(1), {10, 8, 1, 0, 0});
-  map_.SetEvidence(Lm(2), {5, 4, 2, 0, 0});
+  map_.ClearObservation(map_.At(Kf(3)), 2);
+  map_.SetEvidence(map_.At(Lm(1)), {10, 8, 1, 0, 0});
+  map_.SetEvidence(map_.At(Lm(2)), {5, 4, 2, 0, 0});
   Take();
-  map_.Fuse(Lm(1), Lm(2));
+  map_.Fuse(map_.At(Lm(1)), map_.At(Lm(2)));
   EXPECT_EQ(map_.FindLandmark(Lm(1)), nullptr);
   EXPECT_EQ(map_.Resolve(Lm(1)), Lm(2));
   EXPECT_EQ(map_.At(Lm(2)).evidence.visible, 15u);
@@ -128,14 +128,14 @@ TEST_F(Editor, RemovedKeyframeHandsOnChildrenAndReferences) {
   own.map_id = 1;
   own.reference = own.first_keyframe = Kf(2);
   map_.AddLandmark(own);
-  map_.SetObservation(Kf(2), 8, Lm(9));
+  map_.SetObservation(map_.At(Kf(2)), 8, map_.At(Lm(9)));
   Landmark shared = own;
   shared.id = Lm(8);
   map_.AddLandmark(shared);
-  map_.SetObservation(Kf(2), 7, Lm(8));
-  map_.SetObservation(Kf(3), 7, Lm(8));
-  map_.AddLoopEdge(Kf(1), Kf(2));
-  map_.RemoveKeyframe(Kf(2));
+  map_.SetObservation(map_.At(Kf(2)), 7, map_.At(Lm(8)));
+  map_.SetObservation(map_.At(Kf(3)), 7, map_.At(Lm(8)));
+  map_.AddLoopEdge(map_.At(Kf(1)), map_.At(Kf(2)));
+  map_.RemoveKeyframe(map_.At(Kf(2)));
   EXPECT_EQ(map_.At(Kf(3)).parent, Kf(1));
   EXPECT_EQ(map_.Children(Kf(1)), std::vector<KeyframeId>{Kf(3)});
   EXPECT_EQ(map_.FindLandmark(Lm(9)), nullptr) << "nobody else saw it";
@@ -154,8 +154,8 @@ TEST_F(Editor, NothingIsSaidOfWhatCameAndWentBetweenTwoDeltas) {
   keyframe.parent = Kf(3);
   keyframe.features = RandomFeatures(random, 5);
   map_.AddKeyframe(keyframe);
-  map_.SetObservation(Kf(4), 0, Lm(1));
-  map_.RemoveKeyframe(Kf(4));
+  map_.SetObservation(map_.At(Kf(4)), 0, map_.At(Lm(1)));
+  map_.RemoveKeyframe(map_.At(Kf(4)));
   const MapDelta delta = Take();
   EXPECT_TRUE(delta.keyframes.empty());
   EXPECT_TRUE(delta.observations.empty());
@@ -163,7 +163,7 @@ TEST_F(Editor, NothingIsSaidOfWhatCameAndWentBetweenTwoDeltas) {
 }
 
 TEST_F(Editor, ADroppedMapIsAllThatIsSaidOfIt) {
-  map_.SetPosition(Lm(1), {1, 1, 1});
+  map_.SetPosition(map_.At(Lm(1)), {1, 1, 1});
   map_.DropMap(1);
   EXPECT_TRUE(map_.keyframes().empty());
   EXPECT_EQ(map_.num_landmarks(), 0u);
@@ -191,11 +191,11 @@ TEST_F(Editor, TheMiddleDescriptorStandsForTheLandmark) {
   landmark.id = Lm(20);
   landmark.reference = Kf(10);
   map_.AddLandmark(landmark);
-  for (uint16_t i = 0; i < 3; ++i) map_.SetObservation(Kf(10 + i), i, Lm(20));
-  map_.UpdateDescriptor(Lm(20));
+  for (uint16_t i = 0; i < 3; ++i) map_.SetObservation(map_.At(Kf(10 + i)), i, map_.At(Lm(20)));
+  map_.UpdateDescriptor(map_.At(Lm(20)));
   EXPECT_EQ(map_.At(Lm(20)).descriptor.words[0], 0u) << "1 and 16 bits from the others; ties: the first";
-  map_.ClearObservation(Kf(10), 0);
-  map_.UpdateDescriptor(Lm(20));
+  map_.ClearObservation(map_.At(Kf(10)), 0);
+  map_.UpdateDescriptor(map_.At(Lm(20)));
   EXPECT_EQ(map_.At(Lm(20)).descriptor.words[0], 1u);
 }
 
@@ -205,12 +205,14 @@ TEST_F(Editor, AMapThatIsContinuedIsKnown) {
   EXPECT_TRUE(next.TakeDelta(MapEvent::kSettled, {}, 1).Empty());
 }
 
-TEST_F(Editor, FirstKeyframeCannotBeRemoved) { EXPECT_THROW(map_.RemoveKeyframe(Kf(1)), InvariantError); }
+TEST_F(Editor, FirstKeyframeCannotBeRemoved) {
+  EXPECT_THROW(map_.RemoveKeyframe(map_.At(Kf(1))), InvariantError);
+}
 
 TEST_F(Editor, EditsOfWhatIsNotThereAreNamed) {
-  EXPECT_THROW(map_.SetPose(Kf(9), Rigid3d()), InvariantError);
-  EXPECT_THROW(map_.SetPosition(Lm(9), {0, 0, 1}), InvariantError);
-  EXPECT_THROW(map_.SetObservation(Kf(1), 10, Lm(1)), InvariantError);
+  EXPECT_THROW(map_.SetPose(map_.At(Kf(9)), Rigid3d()), InvariantError);
+  EXPECT_THROW(map_.SetPosition(map_.At(Lm(9)), {0, 0, 1}), InvariantError);
+  EXPECT_THROW(map_.SetObservation(map_.At(Kf(1)), 10, map_.At(Lm(1))), InvariantError);
   EXPECT_THROW(map_.AddLandmark(map_.At(Lm(1))), InvariantError);
 }
 

@@ -6,11 +6,42 @@
 #include <cmath>
 #include <set>
 
+#include "dmslam/map/projection.h"
 #include "dmslam/map/testing/random_editor.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
+
+/// Two keypoints of octaves 0 and 2, in the middle and 200 pixels beside it.
+FeatureSet TwoKeypoints() {
+  FeatureSet set;
+  set.keypoints = {{320 * 16, 240 * 16, 0, 0}, {520 * 16, 240 * 16, 2, 0}};
+  set.descriptors.resize(2);
+  return set;
+}
+
+TEST(FrameFeatures, OctavesSayHowExactTheyAreUnlessSigmasDo) {
+  const auto by_octave = MakeFrameFeatures(TwoKeypoints(), TestCamera(), Pyramid());
+  EXPECT_TRUE(by_octave->sigmas_px.empty());
+  EXPECT_EQ(by_octave->Variance(1, Pyramid()), Pyramid().SigmaSquared(2));
+  FeatureSet set = TwoKeypoints();
+  set.sigmas_px = {0.5F, 3};
+  const auto measured = MakeFrameFeatures(std::move(set), TestCamera(), Pyramid());
+  EXPECT_EQ(measured->Variance(0, Pyramid()), 0.25);
+  EXPECT_EQ(NormalizedErrorSquared(*measured, 1, measured->uv_px[1] + Eigen::Vector2d(6, 0), Pyramid()), 4.0);
+}
+
+TEST(FrameFeatures, AreLessExactWhereTheLensStretchesTheImage) {
+  Camera camera = TestCamera(300);
+  camera.lens = Lens::kFisheye;
+  const auto features = MakeFrameFeatures(TwoKeypoints(), camera, Pyramid());
+  EXPECT_EQ(features->Variance(0, Pyramid()), 1.0);
+  // An angle of 2/3: the tangent grows by 1 + tan^2 outwards, by tan / angle around.
+  const double tangent = std::tan(2.0 / 3.0);
+  const double stretch_squared = (1 + tangent * tangent) * tangent / (2.0 / 3.0);
+  EXPECT_NEAR(features->Variance(1, Pyramid()), stretch_squared * Pyramid().SigmaSquared(2), 1e-4);
+}
 
 TEST(Map, CovisibilityCountsSharedLandmarks) {
   RandomEditor editor(9);
@@ -81,9 +112,10 @@ TEST(Map, CulledKeyframesAndFusedLandmarksResolve) {
     keyframe.features = RandomFeatures(random, 5);
     map.AddKeyframe(keyframe);
   }
-  map.RemoveKeyframe(KeyframeId::Make(1, 3));
-  map.RemoveKeyframe(KeyframeId::Make(1, 2));
-  map.SetPoseAndScale(KeyframeId::Make(1, 1), Rigid3d(Eigen::Quaterniond::Identity(), {-2, 0, 0}), 2.0);
+  map.RemoveKeyframe(map.At(KeyframeId::Make(1, 3)));
+  map.RemoveKeyframe(map.At(KeyframeId::Make(1, 2)));
+  map.SetPoseAndScale(map.At(KeyframeId::Make(1, 1)), Rigid3d(Eigen::Quaterniond::Identity(), {-2, 0, 0}),
+                      2.0);
   const auto pose = map.ResolvePose(KeyframeId::Make(1, 3));
   ASSERT_TRUE(pose.has_value());
   EXPECT_NEAR((pose->T_cam_world.translation - Eigen::Vector3d(-6, 0, 0)).norm(), 0, 1e-12);
@@ -118,7 +150,7 @@ class Viewing : public testing::Test {
     landmark.p_world = {0, 0, 4};
     landmark.reference = KeyframeId::Make(1, 3);
     map_.AddLandmark(landmark);
-    map_.SetObservation(KeyframeId::Make(1, 1), 0, id_);
+    map_.SetObservation(map_.At(KeyframeId::Make(1, 1)), 0, map_.At(id_));
   }
   const Landmark::ViewingRange& Range() const { return map_.Viewing(map_.At(id_)); }
 
@@ -128,7 +160,7 @@ class Viewing : public testing::Test {
 
 TEST_F(Viewing, FollowsFromWhoSeesTheLandmark) {
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0), 1e-12) << "the oldest: its reference does not see it";
-  map_.SetObservation(KeyframeId::Make(1, 3), 0, id_);
+  map_.SetObservation(map_.At(KeyframeId::Make(1, 3)), 0, map_.At(id_));
   const double scale = map_.pyramid().Scale(2);
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0) * scale, 1e-12) << "its reference sees it at octave 2";
   EXPECT_NEAR(Range().mean_direction.x(), 0, 1e-12) << "one from the left, one from the right";
@@ -138,13 +170,13 @@ TEST_F(Viewing, FollowsFromWhoSeesTheLandmark) {
 
 TEST_F(Viewing, IsComputedAnewWhenTheLandmarkMoves) {
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0), 1e-12);
-  map_.SetPosition(id_, {-1, 0, 8});
+  map_.SetPosition(map_.At(id_), {-1, 0, 8});
   EXPECT_NEAR(Range().max_distance, 8, 1e-12);
 }
 
 TEST_F(Viewing, StaysWhenNobodySeesTheLandmarkAnyMore) {
   const double before = Range().max_distance;
-  map_.ClearObservation(KeyframeId::Make(1, 1), 0);
+  map_.ClearObservation(map_.At(KeyframeId::Make(1, 1)), 0);
   EXPECT_EQ(Range().max_distance, before);
 }
 

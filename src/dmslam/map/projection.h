@@ -43,11 +43,11 @@ FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_
                        int min_octave, int max_octave, const Descriptor& descriptor,
                        const std::vector<uint8_t>& taken);
 
-/// Squared reprojection error over the feature's variance (sigma of a pixel at its octave).
+/// Squared reprojection error over the feature's variance.
 inline double NormalizedErrorSquared(const FrameFeatures& features, int feature, const Eigen::Vector2d& uv_px,
                                      const Pyramid& pyramid) {
   const size_t i = static_cast<size_t>(feature);
-  return (features.uv_px[i] - uv_px).squaredNorm() / pyramid.SigmaSquared(features.set.keypoints[i].octave);
+  return (features.uv_px[i] - uv_px).squaredNorm() / features.Variance(i, pyramid);
 }
 
 }  // namespace dmslam

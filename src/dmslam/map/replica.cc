@@ -120,7 +120,7 @@ void Replica::ApplyTombstones(const MapDelta& delta) {
 
 void Replica::RemoveLandmark(const Landmark& landmark) {
   const std::vector<Observation> observations = landmark.observations;
-  for (const Observation& o : observations) Release(Mutable(o.keyframe), o.feature);
+  for (const Observation& o : observations) Release(Mutable(At(o.keyframe)), o.feature);
   EraseLandmark(landmark.id);
 }
 

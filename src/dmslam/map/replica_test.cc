@@ -12,11 +12,11 @@ namespace {
 
 template <typename T>
 concept CanSetPose = requires(T map) {
-  map.SetPose(KeyframeId(), Rigid3d());
+  map.SetPose(map.At(KeyframeId()), Rigid3d());
 };
 template <typename T>
 concept CanRemoveLandmark = requires(T map) {
-  map.RemoveLandmark(LandmarkId());
+  map.RemoveLandmark(map.At(LandmarkId()));
 };
 
 TEST(Replica, CannotBeEdited) {
@@ -81,7 +81,7 @@ TEST(Replica, ACulledKeyframeDoesNotComeBack) {
     if (keyframe.parent.valid()) culled = id;
   }
   ASSERT_TRUE(culled.valid());
-  editor.map().RemoveKeyframe(culled);
+  editor.map().RemoveKeyframe(editor.map().At(culled));
   replica.Apply(editor.map().TakeDelta(MapEvent::kSettled, {}, 1));
   replica.Apply(everything);  // an old record once more
   EXPECT_EQ(replica.FindKeyframe(culled), nullptr);
@@ -114,7 +114,7 @@ TEST(Replica, TombstonesOfLandmarksAreBounded) {
     landmark.map_id = 1;
     landmark.reference = landmark.first_keyframe = first;
     map.AddLandmark(std::move(landmark));
-    map.RemoveLandmark(id);
+    map.RemoveLandmark(map.At(id));
   };
   add_and_remove(LandmarkId::Make(2, 1));  // of the highest epoch, and the first to die
   constexpr uint64_t kMany = 3 * Map::kLandmarkTombstones;

@@ -53,7 +53,7 @@ void MoveLandmarks(MapEditor& map, const LoopAnswer& answer, const Corrections& 
     if (correction == nullptr) continue;
     const auto offset = offsets.find(id);
     const Eigen::Vector3d beyond = offset == offsets.end() ? Eigen::Vector3d::Zero() : offset->second;
-    map.SetPosition(id, *correction * landmark.p_world + beyond);
+    map.SetPosition(landmark, *correction * landmark.p_world + beyond);
   }
 }
 
@@ -62,7 +62,7 @@ void MoveKeyframes(MapEditor& map, const Corrections& corrections) {
     const Sim3d* correction = corrections.Of(id);
     if (correction == nullptr) continue;
     const Sim3d corrected = Sim3d(keyframe.T_cam_world) * correction->Inverse();
-    map.SetPoseAndScale(id, corrected.ToRigid(), correction->scale);
+    map.SetPoseAndScale(keyframe, corrected.ToRigid(), correction->scale);
   }
 }
 
@@ -113,7 +113,7 @@ LoopSide SideOf(const Map& map, const LoopEnds& ends, int min_covisibility) {
 void FuseAsTold(MapEditor& map, const LoopAnswer& answer) {
   for (const auto& fusion : answer.fusions) {
     const std::optional<LandmarkId> gone = map.Resolve(fusion.from), kept = map.Resolve(fusion.into);
-    if (gone && kept && *gone != *kept) map.Fuse(*gone, *kept);
+    if (gone && kept) map.Fuse(map.At(*gone), map.At(*kept));
   }
 }
 
@@ -137,7 +137,7 @@ int TieToPlace(MapEditor& map, const LoopEnds& ends, const LoopSide& side, std::
 int Connect(MapEditor& map, const LoopAnswer& answer, const LoopEnds& ends, const LoopSide& side,
             const MapperOptions& options) {
   if (ends.here.map_id != ends.there.map_id) JoinMaps(map, ends.here, ends.there);
-  map.AddLoopEdge(ends.here.id, ends.there.id);
+  map.AddLoopEdge(ends.here, ends.there);
   const std::vector<LandmarkId> place =
       LandmarksAround(map, ends.there.id, kPlaceNeighbours, options.min_covisibility);
   FuseAsTold(map, answer);
@@ -148,8 +148,9 @@ int Connect(MapEditor& map, const LoopAnswer& answer, const LoopEnds& ends, cons
 /// Turns the spanning tree of a keyframe around, so that it hangs from `parent`.
 void Reroot(MapEditor& map, KeyframeId id, KeyframeId parent) {
   while (id.valid()) {
-    const KeyframeId next = map.At(id).parent;
-    map.SetParent(id, parent);
+    const Keyframe& keyframe = map.At(id);
+    const KeyframeId next = keyframe.parent;
+    map.SetParent(keyframe, parent);
     parent = id;
     id = next;
   }
@@ -186,8 +187,8 @@ int ApplyCorrection(MapEditor& map, const LoopAnswer& answer, const MapperOption
 
 void JoinMaps(MapEditor& map, const Keyframe& end, const Keyframe& place) {
   const MapId from = end.map_id;
-  for (const Keyframe* keyframe : map.KeyframesOf(from)) map.SetMapId(keyframe->id, place.map_id);
-  for (const Landmark* landmark : map.LandmarksOf(from)) map.SetMapId(landmark->id, place.map_id);
+  for (const Keyframe* keyframe : map.KeyframesOf(from)) map.SetMapId(*keyframe, place.map_id);
+  for (const Landmark* landmark : map.LandmarksOf(from)) map.SetMapId(*landmark, place.map_id);
   Reroot(map, end.id, place.id);
 }
 

@@ -15,7 +15,7 @@ class Correction : public testing::Test {
   Correction() {
     for (uint32_t frame = 1; frame <= 3; ++frame) {
       scene_.AddKeyframe(map_, frame, 0.1 * frame);
-      if (frame > 1) map_.SetParent(Id(frame), Id(frame - 1));
+      if (frame > 1) map_.SetParent(map_.At(Id(frame)), Id(frame - 1));
       own_.push_back(scene_.AddLandmark(map_, frame, static_cast<uint16_t>(frame), {frame}));
     }
     map_.TakeDelta(MapEvent::kMapStarted, Id(3), 1);
@@ -52,7 +52,7 @@ TEST_F(Correction, KeyframesMadeMeanwhileFollowTheirParent) {
 
 TEST_F(Correction, ACulledParentStillLeads) {
   const LoopAnswer answer = Answer({{Id(1), Up(0)}, {Id(2), Up(1)}});
-  map_.RemoveKeyframe(Id(2));  // with its own landmark; 3 hangs from 1 now
+  map_.RemoveKeyframe(map_.At(Id(2)));  // with its own landmark; 3 hangs from 1 now
   ApplyCorrection(map_, answer, options_);
   EXPECT_NEAR(HeightOf(3), 0, 1e-12);
 }
@@ -107,14 +107,14 @@ class Joining : public Correction {
     for (uint16_t i = 20; i < 60; ++i) scene_.AddLandmark(map_, 100U + i, i, {1, 2, 3});
     for (uint32_t frame = 11; frame <= 13; ++frame) {
       scene_.AddKeyframe(map_, frame, 0.1 * (frame - 10));
-      map_.SetParent(Id(frame), frame > 11 ? Id(frame - 1) : KeyframeId());
-      map_.SetMapId(Id(frame), 2);
-      map_.SetPose(Id(frame), map_.At(Id(frame)).T_cam_world * Lift(-1));
+      map_.SetParent(map_.At(Id(frame)), frame > 11 ? Id(frame - 1) : KeyframeId());
+      map_.SetMapId(map_.At(Id(frame)), 2);
+      map_.SetPose(map_.At(Id(frame)), map_.At(Id(frame)).T_cam_world * Lift(-1));
     }
     for (uint16_t i = 20; i < 60; ++i) {
       const LandmarkId id = scene_.AddLandmark(map_, 200U + i, i, {11, 12, 13});
-      map_.SetMapId(id, 2);
-      map_.SetPosition(id, Lift(1) * scene_.point(i));
+      map_.SetMapId(map_.At(id), 2);
+      map_.SetPosition(map_.At(id), Lift(1) * scene_.point(i));
     }
     map_.TakeDelta(MapEvent::kSettled, Id(13), 2);
   }

@@ -45,10 +45,10 @@ bool IsRedundant(const Map& map, const Keyframe& keyframe, double share) {
 /// Removes a keyframe, and of its landmarks those that no two others see.
 void RemoveWithLonelyLandmarks(MapEditor& map, const Keyframe& keyframe) {
   const std::vector<LandmarkId> seen = keyframe.landmarks;
-  map.RemoveKeyframe(keyframe.id);
+  map.RemoveKeyframe(keyframe);
   for (const LandmarkId id : seen) {
     const Landmark* left = id.valid() ? map.FindLandmark(id) : nullptr;
-    if (left != nullptr && left->observations.size() < 2) map.RemoveLandmark(id);
+    if (left != nullptr && left->observations.size() < 2) map.RemoveLandmark(*left);
   }
 }
 
@@ -60,8 +60,9 @@ int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order
   const std::vector<KeyframeId> newest = order.Newest(map, map_id, 2 * options.probation_keyframes + 2);
   int culled = 0;
   for (const LandmarkId id : LandmarksSeenBy(map, newest)) {
-    if (!FailsProbation(map, map.At(id), order, options)) continue;
-    map.RemoveLandmark(id);
+    const Landmark& landmark = map.At(id);
+    if (!FailsProbation(map, landmark, order, options)) continue;
+    map.RemoveLandmark(landmark);
     ++culled;
   }
   return culled;
@@ -81,7 +82,7 @@ int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, KeyframeId 
 
 int RemoveTooNear(MapEditor& map, MapId map_id, double share) {
   if (share <= 0) return 0;
-  std::vector<LandmarkId> near;
+  std::vector<const Landmark*> near;
   for (const Keyframe* keyframe : map.KeyframesOf(map_id)) {
     const std::optional<double> depth = map.MedianDepth(*keyframe);
     if (!depth) continue;
@@ -89,12 +90,12 @@ int RemoveTooNear(MapEditor& map, MapId map_id, double share) {
       const Landmark* landmark = map.LandmarkSeenBy(*keyframe, i);
       if (landmark == nullptr) continue;
       const double z = (keyframe->T_cam_world * landmark->p_world).z();
-      if (z < share * *depth) near.push_back(landmark->id);
+      if (z < share * *depth) near.push_back(landmark);
     }
   }
-  std::sort(near.begin(), near.end());
+  std::ranges::sort(near, {}, &Landmark::id);
   near.erase(std::unique(near.begin(), near.end()), near.end());
-  for (const LandmarkId id : near) map.RemoveLandmark(id);
+  for (const Landmark* landmark : near) map.RemoveLandmark(*landmark);
   return static_cast<int>(near.size());
 }
 

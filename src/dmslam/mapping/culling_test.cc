@@ -49,8 +49,8 @@ TEST_F(Culling, ProbationEndsAfterThreeKeyframes) {
 
 TEST_F(Culling, AYoungLandmarkThatIsSeldomFoundGoes) {
   Insert({10, 20, 30});
-  map_.SetEvidence(See(1, {30, 10}), {20, 4, 0, 0, 0});
-  map_.SetEvidence(See(2, {30, 10}), {20, 5, 0, 0, 0});
+  map_.SetEvidence(map_.At(See(1, {30, 10})), {20, 4, 0, 0, 0});
+  map_.SetEvidence(map_.At(See(2, {30, 10})), {20, 5, 0, 0, 0});
   EXPECT_EQ(CullYoungLandmarks(map_, 1, order_, options_), 1);
   EXPECT_FALSE(Has(1));
 }
@@ -81,7 +81,7 @@ TEST_F(Redundancy, AKeyframeWhoseLandmarksThreeOthersSeeGoes) {
 }
 
 TEST_F(Redundancy, TheFirstTheKeptAndThoseOfALoopStay) {
-  map_.AddLoopEdge(Id(2), Id(1));
+  map_.AddLoopEdge(map_.At(Id(2)), map_.At(Id(1)));
   EXPECT_EQ(CullRedundantKeyframes(map_, map_.At(Id(5)), Id(3), options_), 1);
   EXPECT_NE(map_.FindKeyframe(Id(1)), nullptr) << "a map's first";
   EXPECT_NE(map_.FindKeyframe(Id(2)), nullptr) << "of a loop";
@@ -101,9 +101,9 @@ TEST_F(Redundancy, AKeyframeThatSeesWhatOthersDoNotStays) {
 TEST_F(Culling, WhatLiesJustBeforeALensGoes) {
   Insert({1, 2});
   for (uint64_t number = 1; number <= 5; ++number) See(number, {1, 2});
-  map_.SetPosition(See(6, {1, 2}), {0, 0, 0.1});
-  map_.SetPosition(See(7, {1, 2}), {0, 0, 0.5});
-  map_.SetPosition(See(8, {1, 2}), {0, 0, -1});
+  map_.SetPosition(map_.At(See(6, {1, 2})), {0, 0, 0.1});
+  map_.SetPosition(map_.At(See(7, {1, 2})), {0, 0, 0.5});
+  map_.SetPosition(map_.At(See(8, {1, 2})), {0, 0, -1});
   EXPECT_EQ(RemoveTooNear(map_, 1, 0.0), 0) << "switched off";
   EXPECT_EQ(RemoveTooNear(map_, 2, 0.05), 0) << "another map";
   EXPECT_EQ(RemoveTooNear(map_, 1, 0.05), 2);

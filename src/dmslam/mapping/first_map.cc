@@ -17,10 +17,10 @@ void ScaleToUnitDepth(MapEditor& map, const Keyframe& first) {
   if (!depth || !(*depth > 0)) return;
   for (const Keyframe* keyframe : map.KeyframesOf(first.map_id)) {
     const Rigid3d& pose = keyframe->T_cam_world;
-    map.SetPose(keyframe->id, Rigid3d(pose.rotation, pose.translation / *depth));
+    map.SetPose(*keyframe, Rigid3d(pose.rotation, pose.translation / *depth));
   }
   for (const Landmark* landmark : map.LandmarksOf(first.map_id))
-    map.SetPosition(landmark->id, landmark->p_world / *depth);
+    map.SetPosition(*landmark, landmark->p_world / *depth);
 }
 
 }  // namespace
@@ -34,10 +34,10 @@ bool BuildFirstMap(MapEditor& map, const InitialMap& proposal, LandmarkMaker& ma
     const bool known =
         point.feature_first < first.landmarks.size() && point.feature_second < second.landmarks.size();
     if (!known) continue;
-    const LandmarkId id = maker.Add(map, first, second, point.p_world).id;
-    map.SetObservation(first.id, point.feature_first, id);
-    map.SetObservation(second.id, point.feature_second, id);
-    map.UpdateDescriptor(id);
+    const Landmark& landmark = maker.Add(map, first, second, point.p_world);
+    map.SetObservation(first, point.feature_first, landmark);
+    map.SetObservation(second, point.feature_second, landmark);
+    map.UpdateDescriptor(landmark);
   }
   AdjustWholeMap(map, proposal.map_id, kIterations, 1.0, nullptr);
   if (map.CountTracked(second, 2) < kMinLandmarks) return false;

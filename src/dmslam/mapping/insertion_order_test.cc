@@ -33,7 +33,7 @@ TEST_F(Order, CountsKeyframesAsTheyCameNotAsTheyWereSeen) {
 
 TEST_F(Order, CulledKeyframesCount) {
   Insert({50, 40, 30});
-  map_.RemoveKeyframe(Id(40));
+  map_.RemoveKeyframe(map_.At(Id(40)));
   EXPECT_EQ(order_.CountSince(map_, Id(50), 3), 2);
   EXPECT_EQ(order_.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(30), Id(50)}));
 }

@@ -33,22 +33,25 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   if (report.repeated) return report;
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(proposal.reference);
   const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(proposal.reference);
-  if (!reference || !stands_for_it || reference->map_id != proposal.map_id) return report;
+  if (!reference || !stands_for_it) return report;
+  // A map that is gone has been joined with another since the frontend heard of it last.
+  if (reference->map_id != proposal.map_id && !map.KeyframesOf(proposal.map_id).empty()) return report;
   Keyframe made =
       MakeKeyframe(map, proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
+  made.map_id = reference->map_id;
   made.scale = reference->scale;
   made.parent = *stands_for_it;
   const Keyframe& keyframe = map.AddKeyframe(std::move(made));
   for (const KeyframeProposal::Match& match : proposal.matches) {
     if (const Landmark* landmark = Usable(map, keyframe, match)) {
-      map.SetObservation(keyframe.id, match.feature, landmark->id);
-      map.UpdateDescriptor(landmark->id);
+      map.SetObservation(keyframe, match.feature, *landmark);
+      map.UpdateDescriptor(*landmark);
     } else {
       ++report.observations_dropped;
     }
   }
   const std::vector<const Keyframe*> nearest = map.BestCovisible(keyframe, 1, 1);
-  map.SetParent(keyframe.id, nearest.empty() ? *stands_for_it : nearest.front()->id);
+  map.SetParent(keyframe, nearest.empty() ? *stands_for_it : nearest.front()->id);
   report.keyframe = &keyframe;
   return report;
 }

@@ -30,7 +30,8 @@ class Insertion : public testing::Test {
 };
 
 TEST_F(Insertion, PutsItWhereItsReferenceIsNow) {
-  map_.SetPoseAndScale(Id(2), WallScene::At(1.5), 2.0);  // corrected while the proposal was on its way
+  map_.SetPoseAndScale(map_.At(Id(2)), WallScene::At(1.5),
+                       2.0);  // corrected while the proposal was on its way
   const InsertionReport report = InsertKeyframe(map_, Seeing(10));
   ASSERT_NE(report.keyframe, nullptr);
   EXPECT_NEAR(PlaceOf(report), 1.5 + 2.0 * 0.3, 1e-12) << "all lengths have doubled";
@@ -40,7 +41,7 @@ TEST_F(Insertion, PutsItWhereItsReferenceIsNow) {
 
 TEST_F(Insertion, ResolvesAReferenceThatWasCulled) {
   const KeyframeProposal proposal = Seeing(10);
-  map_.RemoveKeyframe(Id(2));
+  map_.RemoveKeyframe(map_.At(Id(2)));
   const InsertionReport report = InsertKeyframe(map_, proposal);
   ASSERT_NE(report.keyframe, nullptr);
   EXPECT_NEAR(PlaceOf(report), 0.8, 1e-12);
@@ -49,9 +50,9 @@ TEST_F(Insertion, ResolvesAReferenceThatWasCulled) {
 
 TEST_F(Insertion, SeesWhatItsLandmarksHaveBecome) {
   KeyframeProposal proposal = Seeing(10);
-  map_.Fuse(ids_[3], ids_[20]);
-  map_.RemoveLandmark(ids_[4]);
-  map_.SetMapId(ids_[5], 2);
+  map_.Fuse(map_.At(ids_[3]), map_.At(ids_[20]));
+  map_.RemoveLandmark(map_.At(ids_[4]));
+  map_.SetMapId(map_.At(ids_[5]), 2);
   proposal.matches.push_back({60000, ids_[6]});  // no such feature
   const InsertionReport report = InsertKeyframe(map_, proposal);
   ASSERT_NE(report.keyframe, nullptr);
@@ -64,9 +65,9 @@ TEST_F(Insertion, SeesWhatItsLandmarksHaveBecome) {
 
 TEST_F(Insertion, HangsFromWhomItSharesMostWith) {
   scene_.AddKeyframe(map_, 9, 0.7);
-  for (uint16_t i = 0; i < 6; ++i) map_.SetObservation(Id(9), i, ids_[i]);
-  map_.ClearObservation(Id(1), 0);
-  map_.ClearObservation(Id(2), 0);
+  for (uint16_t i = 0; i < 6; ++i) map_.SetObservation(map_.At(Id(9)), i, map_.At(ids_[i]));
+  map_.ClearObservation(map_.At(Id(1)), 0);
+  map_.ClearObservation(map_.At(Id(2)), 0);
   const InsertionReport report = InsertKeyframe(map_, Seeing(6));
   ASSERT_NE(report.keyframe, nullptr);
   EXPECT_EQ(report.keyframe->parent, Id(9));
@@ -81,7 +82,7 @@ TEST_F(Insertion, HangsFromItsReferenceWhereItSharesNothing) {
 TEST_F(Insertion, OneProposedTwiceIsRecognisedAlsoWhenItWasCulled) {
   EXPECT_NE(InsertKeyframe(map_, Seeing(10)).keyframe, nullptr);
   EXPECT_TRUE(InsertKeyframe(map_, Seeing(10)).repeated);
-  map_.RemoveKeyframe(Id(3));
+  map_.RemoveKeyframe(map_.At(Id(3)));
   const InsertionReport again = InsertKeyframe(map_, Seeing(10));
   EXPECT_TRUE(again.repeated);
   EXPECT_EQ(again.keyframe, nullptr);
@@ -91,9 +92,21 @@ TEST_F(Insertion, RefusesAReferenceThatIsUnknownOrOfAnotherMap) {
   const InsertionReport unknown = InsertKeyframe(map_, Seeing(10, 77));
   EXPECT_EQ(unknown.keyframe, nullptr);
   EXPECT_FALSE(unknown.repeated);
-  map_.SetMapId(Id(2), 2);
+  map_.SetMapId(map_.At(Id(2)), 2);
   EXPECT_EQ(InsertKeyframe(map_, Seeing(10)).keyframe, nullptr);
   EXPECT_EQ(map_.keyframes().size(), 2u);
+}
+
+/// The frontend proposed it before it heard of the weld.
+TEST_F(Insertion, AKeyframeOfAMapThatWasJoinedMeanwhileIsOneOfTheJoinedMap) {
+  std::vector<KeyframeId> all;
+  for (const auto& [id, keyframe] : map_.keyframes()) all.push_back(id);
+  for (const KeyframeId id : all) map_.SetMapId(map_.At(id), 2);
+  for (const LandmarkId id : ids_) map_.SetMapId(map_.At(id), 2);
+  const InsertionReport report = InsertKeyframe(map_, Seeing(10));
+  ASSERT_NE(report.keyframe, nullptr);
+  EXPECT_EQ(report.keyframe->map_id, 2u);
+  EXPECT_EQ(report.observations_dropped, 0);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/geometry/triangulation.h"
 #include "dmslam/map/projection.h"
 
@@ -178,8 +179,9 @@ std::vector<uint8_t> FreeFeatures(const Keyframe& keyframe, const std::vector<ui
 /// The gate of Algorithm 1: one candidate per neighbourhood, at most alpha * Ln of them.
 class MutualExclusion {
  public:
-  MutualExclusion(const LandmarkCreationOptions& options, int tracked_landmarks)
+  MutualExclusion(const LandmarkCreationOptions& options, const Camera& camera, int tracked_landmarks)
       : options_(options),
+        neighbourhood_px_(options.neighbourhood_rad * FocalPx(camera)),
         limit_(std::max(options.min_candidates, static_cast<int>(options.alpha * tracked_landmarks))) {}
 
   bool Admit(const Eigen::Vector2d& uv_px, CreationDiagnostics* diagnostics) {
@@ -189,7 +191,7 @@ class MutualExclusion {
       return false;
     }
     for (const Eigen::Vector2d& other : accepted_) {
-      if ((uv_px - other).cwiseAbs().maxCoeff() <= options_.neighbourhood_px) {
+      if ((uv_px - other).cwiseAbs().maxCoeff() <= neighbourhood_px_) {
         ++diagnostics->refused_neighbourhood;
         return false;
       }
@@ -200,6 +202,7 @@ class MutualExclusion {
 
  private:
   const LandmarkCreationOptions& options_;
+  double neighbourhood_px_;
   int limit_;
   std::vector<Eigen::Vector2d> accepted_;
 };
@@ -327,7 +330,7 @@ std::vector<NewLandmark> ProposeLandmarks(const Map& map, const Keyframe& keyfra
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.landmark.seen_by.size() > b.landmark.seen_by.size();
   });
-  MutualExclusion gate(options, map.CountTracked(keyframe, 1));
+  MutualExclusion gate(options, map.camera(), map.CountTracked(keyframe, 1));
   std::vector<NewLandmark> proposed;
   for (const Candidate& candidate : candidates) {
     const Eigen::Vector2d& uv_px = keyframe.features->uv_px[candidate.landmark.feature];
@@ -345,12 +348,12 @@ void CreateLandmarks(MapEditor& map, const Keyframe& keyframe, const std::vector
   };
   for (const NewLandmark& proposed : ProposeLandmarks(map, keyframe, moving, options, diagnostics)) {
     if (taken(proposed.seen_by.front())) continue;
-    const LandmarkId id = maker.Add(map, keyframe, keyframe, proposed.p_world).id;
-    map.SetObservation(keyframe.id, proposed.feature, id);
+    const Landmark& landmark = maker.Add(map, keyframe, keyframe, proposed.p_world);
+    map.SetObservation(keyframe, proposed.feature, landmark);
     for (const NeighbourFeature& seen_by : proposed.seen_by) {
-      if (!taken(seen_by)) map.SetObservation(seen_by.keyframe->id, seen_by.feature, id);
+      if (!taken(seen_by)) map.SetObservation(*seen_by.keyframe, seen_by.feature, landmark);
     }
-    map.UpdateDescriptor(id);
+    map.UpdateDescriptor(landmark);
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/mapping/testing/wall_scene.h"
 
 namespace dmslam {
@@ -73,7 +74,7 @@ TEST_F(Creation, NothingIsMadeOfWhatMoves) {
 
 TEST_F(Creation, NeedsABaseline) {
   Build(WallScene(), 2, 20);
-  map_.SetPose(Id(1), WallScene::At(0.4 - 0.02));  // 0.005 of the depth
+  map_.SetPose(map_.At(Id(1)), WallScene::At(0.4 - 0.02));  // 0.005 of the depth
   EXPECT_TRUE(Propose().empty());
   EXPECT_EQ(diagnostics_.matched, 0u);
 }
@@ -96,13 +97,14 @@ class DenseWall : public Creation {
     options_.min_candidates = 10000;
   }
   int LargestCrowd(const std::vector<NewLandmark>& made) const {
+    const double neighbourhood_px = options_.neighbourhood_rad * FocalPx(map_.camera());
     int largest = 0;
     for (const NewLandmark& a : made) {
       int near = 0;
       for (const NewLandmark& b : made) {
         const Eigen::Vector2d apart =
             newest_->features->uv_px[a.feature] - newest_->features->uv_px[b.feature];
-        near += apart.cwiseAbs().maxCoeff() <= options_.neighbourhood_px ? 1 : 0;
+        near += apart.cwiseAbs().maxCoeff() <= neighbourhood_px ? 1 : 0;
       }
       largest = std::max(largest, near);
     }
@@ -126,7 +128,7 @@ TEST_F(DenseWall, WithoutTheRuleTheyDoNot) {
 }
 
 TEST_F(DenseWall, ThereAreNoMoreThanAlphaTimesWhatIsTracked) {
-  options_.neighbourhood_px = 1;
+  options_.neighbourhood_rad = 0.002;
   options_.min_candidates = 10;
   options_.alpha = 0.5;
   EXPECT_EQ(Propose().size(), 30u) << "of 60 tracked";

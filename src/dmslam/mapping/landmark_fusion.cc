@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 
@@ -66,7 +67,8 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
   static const std::vector<uint8_t> kNoneTaken;
   const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world);
   if (!view) return std::nullopt;
-  const double radius_px = options.fuse_radius_px * map.pyramid().Scale(view->octave);
+  const double radius_px =
+      SearchRadiusPx(map.camera(), options.fuse_radius_rad) * map.pyramid().Scale(view->octave);
   const FeatureHit hit =
       FindFeature(*keyframe.features, view->uv_px, radius_px, std::max(0, view->octave - 1), view->octave,
                   landmark.descriptor, kNoneTaken);
@@ -80,13 +82,13 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
 void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, const Landmark& landmark) {
   const Landmark* other = map.LandmarkSeenBy(keyframe, feature);
   if (other == nullptr) {
-    map.SetObservation(keyframe.id, feature, landmark.id);
-    map.UpdateDescriptor(landmark.id);
+    map.SetObservation(keyframe, feature, landmark);
+    map.UpdateDescriptor(landmark);
     return;
   }
   const size_t mine = landmark.observations.size(), theirs = other->observations.size();
   const bool keep_other = theirs > mine || (theirs == mine && other->id < landmark.id);
-  keep_other ? map.Fuse(landmark.id, other->id) : map.Fuse(other->id, landmark.id);
+  keep_other ? map.Fuse(landmark, *other) : map.Fuse(*other, landmark);
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ TEST_F(TwoKeyframes, WhatLooksOtherwiseIsNotTheSame) {
   const LandmarkId id = Add(1, 50, {1});
   FeatureSet features = map_.At(Id(2)).features->set;
   for (uint64_t& word : features.descriptors[50].words) word = ~word;
-  map_.RemoveKeyframe(Id(2));
+  map_.RemoveKeyframe(map_.At(Id(2)));
   Keyframe changed;
   changed.id = Id(4);
   changed.map_id = 1;
@@ -68,14 +68,15 @@ TEST_F(TwoKeyframes, WhatLooksOtherwiseIsNotTheSame) {
   changed.T_cam_world = WallScene::At(0.3);
   changed.features = MakeFrameFeatures(features, map_.camera(), map_.pyramid());
   map_.AddKeyframe(changed);
-  for (uint16_t i = 0; i < 20; ++i) map_.SetObservation(Id(4), i, LandmarkId::Make(1, 100U + i));
+  for (uint16_t i = 0; i < 20; ++i)
+    map_.SetObservation(map_.At(Id(4)), i, map_.At(LandmarkId::Make(1, 100U + i)));
   EXPECT_EQ(Fuse(1), 0);
   EXPECT_EQ(map_.At(id).observations.size(), 1u);
 }
 
 TEST_F(TwoKeyframes, WhatIsBelievedToMoveSpeaksForNoPlace) {
   const LandmarkId id = Add(1, 50, {1});
-  map_.SetEvidence(id, {10, 2, 6, 1.0F, 0});
+  map_.SetEvidence(map_.At(id), {10, 2, 6, 1.0F, 0});
   EXPECT_EQ(Fuse(1), 0);
   options_.belief.enabled = false;
   EXPECT_EQ(Fuse(1), 1);
@@ -103,7 +104,7 @@ TEST_F(Fusion, KeyframesNearbyAreJoinedWithoutAnythingInCommon) {
 
 TEST_F(TwoKeyframes, ProjectsFromThePoseThatIsTold) {
   const LandmarkId id = Add(1, 50, {1});
-  map_.SetPose(Id(2), WallScene::At(0.6));  // not where it stood when it saw the wall
+  map_.SetPose(map_.At(Id(2)), WallScene::At(0.6));  // not where it stood when it saw the wall
   EXPECT_EQ(FuseInto(map_, map_.At(Id(2)), map_.At(Id(2)).T_cam_world, {id}, options_), 0);
   EXPECT_EQ(FuseInto(map_, map_.At(Id(2)), WallScene::At(0.3), {id}, options_), 1);
   EXPECT_EQ(Seen(2, 50), id);

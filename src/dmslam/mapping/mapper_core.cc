@@ -88,7 +88,7 @@ bool MapperCore::OnInitialMap(const InitialMap& proposal) {
 bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   const Keyframe* keyframe = FindOrInsert(proposal);
   if (keyframe == nullptr) return false;
-  const MapId map_id = proposal.map_id;
+  const MapId map_id = keyframe->map_id;
   CullYoung(map_id);
   CreateLandmarks(map_, *keyframe, proposal.moving, options_.creation, maker_, &counters_.creation);
   RemoveSeenThroughBy(*keyframe);
@@ -118,7 +118,7 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   }
   order_.Add(proposal.id);
   ++counters_.keyframes_inserted;
-  Publish(MapEvent::kKeyframeInserted, proposal.id, proposal.map_id);
+  Publish(MapEvent::kKeyframeInserted, proposal.id, report.keyframe->map_id);
   return report.keyframe;
 }
 
@@ -174,8 +174,9 @@ void MapperCore::AdjustMaps() {
   std::set<MapId> maps;
   for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
+    if (Stopped()) return;
     Count(RemoveTooNear(map_, map_id, options_.min_depth), &counters_.landmarks_culled);
-    AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, nullptr);
+    AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, stop_);
     Publish(MapEvent::kMapAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.

@@ -47,6 +47,9 @@ class MapperCore {
 
   /// Asked now and then during long work; true: finish early (a keyframe waits). May be empty (lock-step).
   void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
+  /// Asked now and then while whole maps are adjusted, which no keyframe cuts short; true: the map stays as
+  /// far as it has come. May be empty.
+  void SetStop(std::function<bool()> stop) { stop_ = std::move(stop); }
 
   /// Continues a map that others kept (after a restart) or that was saved: new landmarks get ids of an
   /// ordinal that the map does not know, and the local mapping of the keyframe that is proposed first is done
@@ -93,6 +96,7 @@ class MapperCore {
                std::optional<uint64_t> correction_id = {}, std::string note = {});
   void Emit(MapDelta delta);
   bool Interrupted();
+  bool Stopped() const { return stop_ && stop_(); }
 
   MapperOptions options_;
   MapEditor map_;
@@ -102,7 +106,7 @@ class MapperCore {
   bool maybe_unfinished_ = false;  ///< the map is continued: its mapper may have ended in the middle of the
                                    ///< keyframe that comes first
   Sink sink_;
-  std::function<bool()> interrupt_;
+  std::function<bool()> interrupt_, stop_;
   MapperCounters counters_;
 };
 

@@ -166,8 +166,8 @@ class SecondVisit : public Corrections {
     landmark.reference = landmark.first_keyframe = Id(frames.front());
     const LandmarkId id = landmark.id;
     map.AddLandmark(std::move(landmark));
-    for (const uint32_t frame : frames) map.SetObservation(Id(frame), feature, id);
-    map.UpdateDescriptor(id);
+    for (const uint32_t frame : frames) map.SetObservation(map.At(Id(frame)), feature, map.At(id));
+    map.UpdateDescriptor(map.At(id));
   }
 };
 
@@ -334,6 +334,19 @@ TEST_F(KeyframeStep, AnInterruptedStepStillInsertsAndCreates) {
   EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kKeyframeInserted,
                                                         MapEvent::kLandmarksCreated, MapEvent::kMapped}));
   EXPECT_EQ(core_.counters().adjustments_interrupted, 1u);
+}
+
+TEST_F(KeyframeStep, TheAdjustmentOfWholeMapsStopsWhenItIsAskedTo) {
+  ASSERT_TRUE(Start());
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  int asked = 0;
+  core_.SetInterrupt([] { return true; });  // a keyframe that waits does not cut it short
+  core_.SetStop([&] { return ++asked > 1; });
+  const size_t before = said_.size();
+  core_.OnAdjustRequest({.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
+  EXPECT_EQ(asked, 2) << "before the map, and after the first evaluation";
+  EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kMapAdjusted, MapEvent::kRequestDone}))
+      << "what was reached is said, and the request is answered";
 }
 
 TEST_F(KeyframeStep, OneThatComesTwiceIsDoneOnce) {

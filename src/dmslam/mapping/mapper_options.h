@@ -9,8 +9,8 @@ namespace dmslam {
 /// Creation of landmarks: DM-SLAM's Algorithm 1 (paper 2.2) and the checks around it.
 struct LandmarkCreationOptions {
   bool mutual_exclusion = true;  ///< Algorithm 1; off: every match that passes the checks becomes a landmark
-  double neighbourhood_px =
-      25;                    ///< half the side of the neighbourhood in which one candidate excludes others
+  double neighbourhood_rad =
+      0.0476;                ///< half the side of the neighbourhood in which one candidate excludes others
   double alpha = 1.0;        ///< candidates of a keyframe are at most alpha * Ln...
   int min_candidates = 120;  ///< ...but never fewer than this
   int confirmed_views = 4;   ///< a point seen in as many views or more...
@@ -29,7 +29,7 @@ struct LandmarkCreationOptions {
     v.Switch("mapping.mutual_exclusion", mutual_exclusion,
              "Algorithm 1: one new landmark per neighbourhood, and a bound on their number");
     v.InBaseline("off");
-    v.Number("mapping.neighbourhood_px", neighbourhood_px, 0, 1000, "px",
+    v.Number("mapping.neighbourhood_rad", neighbourhood_rad, 0, 1, "rad",
              "half the side of the neighbourhood");
     v.Number("mapping.alpha", alpha, 0, 100, "",
              "bound on the candidates, as a share of the tracked landmarks");
@@ -59,10 +59,10 @@ struct MapperOptions {
   int min_covisibility = kMinCovisibility;
   int nearby_keyframes =
       10;  ///< at most so many that look at the same place are fused with, covisible or not
-  double nearby_distance = 0.5;   ///< how far they may be, as a share of the scene's depth
-  double nearby_angle_rad = 0.6;  ///< how far they may be turned
-  double fuse_radius_px = 3.0;    ///< times the scale of the predicted octave
-  int max_fuse_distance = 80;     ///< bits, of a landmark and a feature at its place
+  double nearby_distance = 0.5;     ///< how far they may be, as a share of the scene's depth
+  double nearby_angle_rad = 0.6;    ///< how far they may be turned
+  double fuse_radius_rad = 0.0057;  ///< times the scale of the predicted octave
+  int max_fuse_distance = 80;       ///< bits, of a landmark and a feature at its place
 
   template <typename Visitor>
   void Describe(Visitor& v) {

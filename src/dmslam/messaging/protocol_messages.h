@@ -18,6 +18,8 @@ namespace dmslam {
 inline constexpr int64_t kMaxSeq = int64_t{1} << 60;
 /// No epoch gets this far: they are microseconds since 1970, or a little more.
 inline constexpr int64_t kMaxEpoch = int64_t{1} << 61;
+/// Between another process's wall clock and ours, from one of its words to the next.
+inline constexpr int64_t kTimeToleranceUs = 5'000'000;
 
 /// Decode one of the protocol's own messages: nothing unless its checksum, its counts, its lengths and its
 /// total length are right. Nothing here throws, whatever the bytes.

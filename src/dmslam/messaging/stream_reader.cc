@@ -12,12 +12,11 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kMaxTimed = 1000;               // records whose recovery is timed
-constexpr int64_t kTimeToleranceUs = 5'000'000;  // between the writer's clock and ours, from beacon to beacon
-constexpr int64_t kMaxBurst = 4096;              // records behind the last beacon that can be
-constexpr int64_t kMinNsPerRecord = 50'000;      // no writer is faster for long
-constexpr int kBelieved = 2;                     // beacons
-constexpr int64_t kRefusedAckNs = 100'000'000;   // who holds more than the writer knows says so soon
+constexpr size_t kMaxTimed = 1000;              // records whose recovery is timed
+constexpr int64_t kMaxBurst = 4096;             // records behind the last beacon that can be
+constexpr int64_t kMinNsPerRecord = 50'000;     // no writer is faster for long
+constexpr int kBelieved = 2;                    // beacons
+constexpr int64_t kRefusedAckNs = 100'000'000;  // who holds more than the writer knows says so soon
 constexpr size_t kMaxRangesNamed = 32;  // ranges named in one acknowledgement: it must fit one datagram
 
 Version ParentOf(const head_t& head) { return {head.header.parent_epoch, head.header.parent_seq}; }

@@ -14,8 +14,6 @@ namespace {
 
 constexpr size_t kMaxReaders = 64;  // more ids than this are noise
 constexpr int kFarewells = 6;
-constexpr int64_t kEchoToleranceUs =
-    5'000'000;  // between a reader's clock and ours, from one word to the next
 
 SendWindow::Options WindowOptions(const StreamWriter::Options& options) {
   return {options.link, PartChannel(options.owner), options.part_bytes, options.pack,
@@ -215,11 +213,11 @@ bool StreamWriter::IsInTime(const ack_t& ack, int64_t now_ns, Reader* reader) {
   if (reader->last_utime == INT64_MIN) return true;
   const int64_t expected = reader->last_utime + (now_ns - reader->last_heard_ns) / 1000;
   const bool leaps =
-      ack.utime > expected + kEchoToleranceUs || ack.utime < reader->last_utime - kEchoToleranceUs;
+      ack.utime > expected + kTimeToleranceUs || ack.utime < reader->last_utime - kTimeToleranceUs;
   if (!leaps) return ack.utime >= reader->last_utime;
   const int64_t before = std::exchange(reader->doubtful_utime, ack.utime);
   ++statistics_.dropped_doubtful;
-  return before != INT64_MIN && ack.utime > before && ack.utime - before < kEchoToleranceUs;
+  return before != INT64_MIN && ack.utime > before && ack.utime - before < kTimeToleranceUs;
 }
 
 // ---- snapshots

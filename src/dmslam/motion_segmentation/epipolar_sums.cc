@@ -21,7 +21,7 @@ constexpr size_t WholeVectors(size_t n) { return (n + kLanes - 1) / kLanes * kLa
 /// residual, Sampson's denominator.
 struct Terms {
   std::array<Column, 4> row;
-  Column last, residual, bound, weight;
+  Column last, residual, bound, weight, cost;
 };
 
 /// For `n` matches from `begin` on. A sum of three is (a + b) + c, but for the third row of a product with
@@ -42,19 +42,28 @@ struct Terms {
     // Sampson's denominator.
     const double lx = m00 * px + m01 * py + m02, ly = m10 * px + m11 * py + m12;
     const double kx = m00 * qx + m10 * qy + m20, ky = m01 * qx + m11 * qy + m21;
-    const double bound =
-        bound_scale * (a.bound1[begin + k] * (lx * lx + ly * ly) + a.bound0[begin + k] * (kx * kx + ky * ky));
+    const double b1 = bound_scale * a.bound1[begin + k], b0 = bound_scale * a.bound0[begin + k];
+    const double bound = b1 * (lx * lx + ly * ly) + b0 * (kx * kx + ky * ky);
     // y = R ray0, normal = y x ray1, turned = ray1 x t.
     const double y0 = r00 * px + r01 * py + r02, y1 = r10 * px + r11 * py + r12,
                  y2 = r20 * px + (r21 * py + r22);
     const double n0 = y1 - y2 * qy, n1 = y2 * qx - y0, n2 = y0 * qy - y1 * qx;
     const double c0 = qy * t2 - t1, c1 = t0 - qx * t2, c2 = qx * t1 - qy * t0;
-    out->row[0][k] = y1 * c2 - y2 * c1;
-    out->row[1][k] = y2 * c0 - y0 * c2;
-    out->row[2][k] = y0 * c1 - y1 * c0;
-    out->row[3][k] = u0 * n0 + u1 * n1 + u2 * n2;
-    out->last[k] = v0 * n0 + v1 * n1 + v2 * n2;
-    out->residual[k] = t0 * n0 + t1 * n1 + t2 * n2;
+    const double residual = t0 * n0 + t1 * n1 + t2 * n2;
+    // The denominator changes with the parameters, too: half its derivative is b1 (y x l) + b0 (z x ray1)
+    // along t and b1 (y x (l x t)) + b0 (z x turned) along the rotation, l and k the two lines, z = R k.
+    const double z0 = r00 * kx + r01 * ky, z1 = r10 * kx + r11 * ky, z2 = r20 * kx + r21 * ky;
+    const double s0 = ly * t2, s1 = 0.0 - lx * t2, s2 = lx * t1 - ly * t0;
+    const double shrink = residual / bound, f1 = shrink * b1, f0 = shrink * b0;
+    const double w0 = n0 - (f0 * (z1 - z2 * qy) - f1 * (y2 * ly));
+    const double w1 = n1 - (f0 * (z2 * qx - z0) + f1 * (y2 * lx));
+    const double w2 = n2 - (f0 * (z0 * qy - z1 * qx) + f1 * (y0 * ly - y1 * lx));
+    out->row[0][k] = y1 * c2 - y2 * c1 - (f1 * (y1 * s2 - y2 * s1) + f0 * (z1 * c2 - z2 * c1));
+    out->row[1][k] = y2 * c0 - y0 * c2 - (f1 * (y2 * s0 - y0 * s2) + f0 * (z2 * c0 - z0 * c2));
+    out->row[2][k] = y0 * c1 - y1 * c0 - (f1 * (y0 * s1 - y1 * s0) + f0 * (z0 * c1 - z1 * c0));
+    out->row[3][k] = u0 * w0 + u1 * w1 + u2 * w2;
+    out->last[k] = v0 * w0 + v1 * w1 + v2 * w2;
+    out->residual[k] = residual;
     out->bound[k] = bound;
   }
 }
@@ -68,6 +77,7 @@ struct Terms {
     const double weight = 1.0 / (bound * (1.0 + squared) * (1.0 + squared));
     terms->weight[k] = weight;
     terms->residual[k] = weight * residual;
+    terms->cost[k] = squared * (1.0 + squared) * (bound * weight);
   }
 }
 
@@ -75,6 +85,7 @@ struct Terms {
 /// last elements of both.
 struct Sums {
   Lanes column0{}, column1{}, column2{}, column3{}, last_row{}, gradient{}, ends{};
+  double cost = 0;
   int count = 0;
 };
 
@@ -89,6 +100,7 @@ struct Sums {
   s->last_row += weighted * last;
   s->gradient += row * residual;
   s->ends += Lanes{terms.weight[k] * last, residual, 0, 0} * last;
+  s->cost += terms.cost[k];
   ++s->count;
 }
 
@@ -135,6 +147,7 @@ struct Sums {
   }
   normal.matrix(4, 4) = sums.ends[0];
   normal.gradient(4) = sums.ends[1];
+  normal.cost = sums.cost;
   normal.count = sums.count;
   return normal;
 }

@@ -22,13 +22,14 @@ struct PackedMatches {
 // Sums over matches are taken in vector code across a match's terms and, for the terms themselves, across
 // matches; each sum is added up match by match in their order. So every path gives the same bits.
 
-/// Normal equations of the algebraic epipolar residual t . (R ray0 x ray1), each match weighted by Sampson's
-/// denominator and Geman-McClure's factor: three parameters of a left rotation, then two of t along
-/// `tangent`.
+/// Normal equations of Sampson's distance, t . (R ray0 x ray1) over the root of its variance, each match
+/// weighted by Geman-McClure's factor: three parameters of a left rotation, then two of t along `tangent`.
+/// The variance is differentiated, too: with little parallax the minimum is elsewhere without.
 struct EssentialNormal {
   Eigen::Matrix<double, 5, 5> matrix;  ///< lower half
   Eigen::Matrix<double, 5, 1> gradient;
-  int count = 0;  ///< matches with a denominator above zero, which take part
+  double cost = 0;  ///< sum of s / (1 + s), s the squared distance over its bound
+  int count = 0;    ///< matches with a denominator above zero, which take part
 };
 /// `bound_scale` widens the robust cost's bounds (squared).
 EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewModel& model,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "dmslam/geometry/rigid3.h"
@@ -33,34 +34,83 @@ struct Input {
   }
 };
 
+/// Root of the normalised Sampson distance, with the sign of the algebraic residual.
+double SampsonResidual(const Input& in, const TwoViewModel& model, double bound_scale, size_t i) {
+  const Eigen::Matrix3d M = Hat(model.t) * model.R;
+  const double algebraic = in.arrays.ray1[i].dot(M * in.arrays.ray0[i]);
+  return std::copysign(std::sqrt(NormalizedSampson(M, in.arrays, i) / bound_scale), -algebraic);
+}
+
+/// The model `by` along parameter k: a left rotation, then t along its tangents.
+TwoViewModel Moved(const Input& in, int k, double by) {
+  TwoViewModel moved = in.model;
+  if (k < 3) {
+    moved.R = ExpSo3(by * Eigen::Vector3d::Unit(k)).toRotationMatrix() * moved.R;
+  } else {
+    moved.t = (moved.t + by * in.tangent.col(k - 3)).normalized();
+  }
+  return moved;
+}
+
 TEST(SumEssentialNormal, IsTheSumOfItsFormulaAndTheSameOnEveryPath) {
+  constexpr double kScale = 10.0, kStep = 1e-6;
   const Input in;
   const PackedMatches matches(in.arrays, in.use);
   Eigen::Matrix<double, 5, 5> matrix = Eigen::Matrix<double, 5, 5>::Zero();
   Eigen::Matrix<double, 5, 1> gradient = Eigen::Matrix<double, 5, 1>::Zero();
+  double cost = 0;
   for (size_t i = 0; i < in.arrays.size(); ++i) {
     if (!in.use[i]) continue;
-    const Eigen::Vector3d y = in.model.R * in.arrays.ray0[i], normal = y.cross(in.arrays.ray1[i]);
-    const double residual = in.model.t.dot(normal);
-    const double squared = NormalizedSampson(in.model.M, in.arrays, i) / 10.0;
-    const double weight = squared / (residual * residual * (1.0 + squared) * (1.0 + squared));
+    const double residual = SampsonResidual(in, in.model, kScale, i), squared = residual * residual;
     Eigen::Matrix<double, 5, 1> row;
-    row << y.cross(in.arrays.ray1[i].cross(in.model.t)), in.tangent.transpose() * normal;
+    for (int k = 0; k < 5; ++k) {
+      row[k] = (SampsonResidual(in, Moved(in, k, kStep), kScale, i) -
+                SampsonResidual(in, Moved(in, k, -kStep), kScale, i)) /
+               (2 * kStep);
+    }
+    const double weight = 1.0 / ((1.0 + squared) * (1.0 + squared));
     matrix += weight * row * row.transpose();
     gradient += weight * residual * row;
+    cost += squared / (1.0 + squared);
   }
   const EssentialNormal plain =
-      SumEssentialNormal(matches, in.model, in.tangent, 10.0, VectorPath::kBaseline);
+      SumEssentialNormal(matches, in.model, in.tangent, kScale, VectorPath::kBaseline);
   EXPECT_EQ(static_cast<size_t>(plain.count), matches.count);
   const Eigen::Matrix<double, 5, 5> lower = matrix.triangularView<Eigen::Lower>();
-  EXPECT_LT((plain.matrix - lower).norm(), 1e-9 * lower.norm());
-  EXPECT_LT((plain.gradient - gradient).norm(), 1e-9 * gradient.norm());
+  EXPECT_LT((plain.matrix - lower).norm(), 1e-6 * lower.norm());
+  EXPECT_LT((plain.gradient - gradient).norm(), 1e-6 * gradient.norm());
+  EXPECT_NEAR(plain.cost, cost, 1e-9 * cost);
   for (const VectorPath path : VectorPaths()) {
-    const EssentialNormal other = SumEssentialNormal(matches, in.model, in.tangent, 10.0, path);
+    const EssentialNormal other = SumEssentialNormal(matches, in.model, in.tangent, kScale, path);
     EXPECT_EQ(other.matrix, plain.matrix);
     EXPECT_EQ(other.gradient, plain.gradient);
+    EXPECT_EQ(other.cost, plain.cost);
     EXPECT_EQ(other.count, plain.count);
   }
+}
+
+/// A few millimetres of baseline: the cost is a valley along which the direction hardly matters.
+TEST(FindEssentialMinima, FindsTheLowestWhereTheParallaxIsSmall) {
+  SyntheticPairOptions options;
+  options.translation = {0.05, 0.01, 0.015};
+  int lowest = 0, near = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    const SyntheticPair pair = MakeSyntheticPair(options, seed);
+    std::vector<uint32_t> order(pair.matches.size());
+    std::iota(order.begin(), order.end(), 0U);
+    const MatchArrays arrays = MakeArrays(pair.matches, order, pair.camera, {});
+    const std::vector<uint8_t> use(arrays.size(), 1);
+    TwoViewModel truth{.R = pair.T_1_0.rotation.toRotationMatrix(), .t = pair.T_1_0.translation.normalized()};
+    truth.M = Hat(truth.t) * truth.R;
+    const PackedMatches matches(arrays, use);
+    const auto minima = FindEssentialMinima(arrays, use, {.max_matches = 10000}, seed);
+    ASSERT_FALSE(minima.empty());
+    const double true_cost = SumEpipolarCost(matches, truth.M) / static_cast<double>(matches.count);
+    lowest += minima.front().cost <= true_cost ? 1 : 0;
+    near += std::abs(minima.front().model.t.dot(truth.t)) > std::cos(0.15) ? 1 : 0;
+  }
+  EXPECT_EQ(lowest, 20) << "the truth is no minimum, but no minimum lies higher than it";
+  EXPECT_GE(near, 18);
 }
 
 TEST(SumEssentialNormal, LeavesOutWhatHasNoDenominator) {

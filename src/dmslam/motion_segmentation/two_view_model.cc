@@ -1,6 +1,5 @@
 #include "dmslam/motion_segmentation/two_view_model.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <cmath>
 
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/epipolar_sums.h"
 #include "dmslam/robust/ransac.h"
@@ -133,11 +133,11 @@ template <typename Sink>
 /// Counts until the rest cannot bring it above `more_than`.
 [[gnu::always_inline]] inline int Count(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range,
                                         int more_than) {
-  constexpr size_t kBlock = 32;
+  constexpr size_t kAtOnce = 32;
   int count = 0;
   for (Range block = range; block.begin < range.end; block.begin = block.end) {
     if (count + static_cast<int>(range.end - block.begin) <= more_than) break;
-    block.end = std::min(range.end, block.begin + kBlock);
+    block.end = std::min(range.end, block.begin + kAtOnce);
     ForEachSampson(
         M, arrays, block, [&count](size_t, int inlier) __attribute__((always_inline)) { count += inlier; });
   }
@@ -246,18 +246,29 @@ void ChooseEssentialPose(const MatchArrays& arrays, std::span<const uint8_t> use
 
 namespace {
 
+/// Levenberg and Marquardt's descent: a step that does not lower the cost is taken back and made shorter.
+/// Along a valley of little parallax whole steps lead anywhere.
 bool DescendEssential(const PackedMatches& matches, int iterations, double bound_scale, TwoViewModel* model) {
-  constexpr double kDamping = 1e-6;
+  double damping = 1e-4;
+  EssentialNormal normal = SumEssentialNormal(matches, *model, Tangent(model->t), bound_scale);
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
-    EssentialNormal normal = SumEssentialNormal(matches, *model, B, bound_scale);
     if (normal.count < 5) return false;
-    normal.matrix.diagonal() *= 1.0 + kDamping;
-    normal.matrix.diagonal().array() += 1e-12;
-    const Vector5d step = -normal.matrix.ldlt().solve(normal.gradient);
-    if (!step.allFinite() || step.head<3>().norm() > 1.0) return false;
-    UpdateEssential(step, B, model);
-    if (step.squaredNorm() < 1e-14) break;
+    const Eigen::Matrix<double, 3, 2> B = Tangent(model->t);
+    Matrix5d matrix = normal.matrix;
+    matrix.diagonal() *= 1.0 + damping;
+    matrix.diagonal().array() += 1e-12;
+    const Vector5d step = -SolveSymmetric(matrix, normal.gradient);
+    if (!step.allFinite()) return false;
+    TwoViewModel trial = *model;
+    UpdateEssential(step, B, &trial);
+    EssentialNormal there = SumEssentialNormal(matches, trial, Tangent(trial.t), bound_scale);
+    const bool lower = there.count >= 5 && there.cost < normal.cost;
+    damping = lower ? std::max(1e-6, 0.1 * damping) : 10.0 * damping;
+    if (lower) {
+      *model = trial;
+      normal = there;
+    }
+    if (step.squaredNorm() < 1e-14 || damping > 1e6) break;
   }
   model->M = Hat(model->t) * model->R;
   model->M /= model->M.norm();
@@ -268,7 +279,7 @@ bool DescendRotation(const PackedMatches& matches, int iterations, Eigen::Matrix
   const UnitRays rays1(matches);
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const RotationNormal normal = SumRotationNormal(matches, rays1, *R);
-    const Eigen::Vector3d step = normal.matrix.ldlt().solve(normal.gradient);
+    const Eigen::Vector3d step = SolveSymmetric(normal.matrix, normal.gradient);
     if (!step.allFinite()) return false;
     *R = SmallRotation(step) * *R;
     if (step.squaredNorm() < 1e-14) break;
@@ -448,7 +459,7 @@ double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, d
   const Eigen::Matrix3d rotation = information.topLeftCorner<3, 3>() + 1e-9 * Eigen::Matrix3d::Identity();
   const Eigen::Matrix<double, 3, 2> mixed = information.topRightCorner<3, 2>();
   const Eigen::Matrix2d direction =
-      information.bottomRightCorner<2, 2>() - mixed.transpose() * rotation.ldlt().solve(mixed);
+      information.bottomRightCorner<2, 2>() - mixed.transpose() * SolveSymmetric(rotation, mixed);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(direction);
   const double weakest = eigen.eigenvalues()[0];
   return weakest > 0.1 ? std::min(M_PI, 1.0 / std::sqrt(weakest)) : M_PI;

@@ -14,7 +14,7 @@ struct Window {
   BundleProblem problem;
   std::vector<const Keyframe*> keyframes;  ///< parallel to the problem's poses
   std::vector<const Landmark*> landmarks;  ///< parallel to the problem's points
-  std::vector<Observation> sources;        ///< parallel to the problem's observations
+  std::vector<uint16_t> features;          ///< of those keyframes, parallel to the problem's observations
   std::map<KeyframeId, int> index;
   int free_keyframes = 0;
 
@@ -54,27 +54,27 @@ void AddObservations(const Map& map, double sigma_px, Window& window) {
       const auto pose = window.index.find(o.keyframe);
       if (pose == window.index.end()) continue;
       const FrameFeatures& features = *window.keyframes[static_cast<size_t>(pose->second)]->features;
-      const int octave = features.set.keypoints[o.feature].octave;
       window.problem.observations.push_back(
           {pose->second, static_cast<int>(point), features.uv_px[o.feature],
-           1.0 / (sigma_px * sigma_px * map.pyramid().SigmaSquared(octave))});
-      window.sources.push_back(o);
+           1.0 / (sigma_px * sigma_px * features.Variance(o.feature, map.pyramid()))});
+      window.features.push_back(o.feature);
     }
   }
 }
 
 void WriteBack(MapEditor& map, const Window& window, const BundleReport& report) {
   for (size_t i = 0; i < window.keyframes.size(); ++i) {
-    if (!window.problem.pose_fixed[i]) map.SetPose(window.keyframes[i]->id, window.problem.T_cam_world[i]);
+    if (!window.problem.pose_fixed[i]) map.SetPose(*window.keyframes[i], window.problem.T_cam_world[i]);
   }
   for (size_t i = 0; i < window.landmarks.size(); ++i)
-    map.SetPosition(window.landmarks[i]->id, window.problem.points[i]);
-  if (report.outliers.size() != window.sources.size()) return;
-  for (size_t i = 0; i < window.sources.size(); ++i) {
-    if (report.outliers[i]) map.ClearObservation(window.sources[i].keyframe, window.sources[i].feature);
+    map.SetPosition(*window.landmarks[i], window.problem.points[i]);
+  if (report.outliers.size() != window.features.size()) return;
+  for (size_t i = 0; i < window.features.size(); ++i) {
+    const auto pose = static_cast<size_t>(window.problem.observations[i].pose);
+    if (report.outliers[i]) map.ClearObservation(*window.keyframes[pose], window.features[i]);
   }
   for (const Landmark* landmark : window.landmarks) {
-    if (landmark->observations.size() < 2) map.RemoveLandmark(landmark->id);
+    if (landmark->observations.size() < 2) map.RemoveLandmark(*landmark);
   }
 }
 

@@ -1,16 +1,15 @@
 #include "dmslam/optimization/pose_optimization.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
 
 namespace dmslam {
 namespace {
 
-constexpr double kMinDepth = 1e-9;
 constexpr double kCostBehind =
     1e5;  ///< Of an observation behind the camera: no step is to gain by moving one there.
 
@@ -143,7 +142,7 @@ int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options,
   for (int k = 0; k < options.iterations; ++k) {
     Matrix6d damped = now.hessian;
     damped.diagonal() += damping * now.hessian.diagonal();
-    const Vector6d step = -damped.ldlt().solve(now.gradient);
+    const Vector6d step = -SolveSymmetric(damped, now.gradient);
     if (!step.allFinite()) return k;
     const Rigid3d candidate = StepPose(T, step);
     const bool tiny = step.squaredNorm() < options.min_step * options.min_step;

@@ -1,20 +1,18 @@
 #include "dmslam/optimization/sim3_optimization.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "dmslam/geometry/similarity.h"
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
 #include "dmslam/optimization/sim3_cost.h"
 #include "dmslam/robust/ransac.h"
 
 namespace dmslam {
 namespace {
-
-constexpr double kMinDepth = 1e-9;
 
 double Chi2(const Pinhole& camera, const Eigen::Vector3d& p_cam, const Eigen::Vector2d& uv_px,
             double inv_sigma_squared) {
@@ -164,9 +162,9 @@ int Minimize(const TwoSides& sides, const std::vector<char>& inliers, int iterat
     damped.diagonal() *= 1.0 + damping;
     Vector7d step = Vector7d::Zero();
     if (fix_scale) {
-      step.head<6>() = -damped.topLeftCorner<6, 6>().ldlt().solve(now.gradient.head<6>());
+      step.head<6>() = -SolveSymmetric<6, 1>(damped.topLeftCorner<6, 6>(), now.gradient.head<6>());
     } else {
-      step = -damped.ldlt().solve(now.gradient);
+      step = -SolveSymmetric(damped, now.gradient);
     }
     if (!step.allFinite()) return k;
     const Sim3d candidate = StepSim3(S_12, step);

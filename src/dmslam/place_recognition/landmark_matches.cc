@@ -36,8 +36,7 @@ RansacReport<Rigid3d> PoseFromLandmarks(const Map& map, const FrameFeatures& fea
   for (const LandmarkMatch& match : matches) {
     points.push_back(map.FindLandmark(match.landmark)->p_world);
     pixels.push_back(features.uv_px[match.feature]);
-    inv_sigma_squared.push_back(1.0 /
-                                map.pyramid().SigmaSquared(features.set.keypoints[match.feature].octave));
+    inv_sigma_squared.push_back(1.0 / features.Variance(match.feature, map.pyramid()));
   }
   return PoseFromMatches(map.camera().Ideal(), points, pixels, inv_sigma_squared, options);
 }

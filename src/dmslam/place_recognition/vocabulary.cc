@@ -12,10 +12,10 @@
 #include <utility>
 
 #include "dmslam/features/brief_pattern.h"
-#include "dmslam/util/output_file.h"
 #include "dmslam/place_recognition/vocabulary_format.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/crc32c.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "dmslam/util/output_file.h"
 #include "dmslam/place_recognition/vocabulary_format.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam::vocabulary_format {
 namespace {

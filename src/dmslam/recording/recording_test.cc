@@ -55,11 +55,11 @@ class TinyMapper {
     const auto num_features = static_cast<uint16_t>(keyframe.features->size());
     map_.AddKeyframe(std::move(keyframe));
     for (uint16_t i = 0; i < num_features; ++i) AddLandmark(id, i);
-    map_.SetPosition(LandmarkId::Make(1, 1 + random_.Below(10)), Eigen::Vector3d::Random());
-    map_.SetPose(KeyframeId::Make(kSession, 1),
+    map_.SetPosition(map_.At(LandmarkId::Make(1, 1 + random_.Below(10))), Eigen::Vector3d::Random());
+    map_.SetPose(map_.At(KeyframeId::Make(kSession, 1)),
                  Rigid3d(Eigen::Quaterniond::UnitRandom(), Eigen::Vector3d::Random()));
-    if (frame_ == 5) map_.RemoveKeyframe(KeyframeId::Make(kSession, 3));
-    if (frame_ == 6) map_.Fuse(LandmarkId::Make(1, 15), LandmarkId::Make(1, 16));
+    if (frame_ == 5) map_.RemoveKeyframe(map_.At(KeyframeId::Make(kSession, 3)));
+    if (frame_ == 6) map_.Fuse(map_.At(LandmarkId::Make(1, 15)), map_.At(LandmarkId::Make(1, 16)));
     return map_.TakeDelta(MapEvent::kMapped, id, 1);
   }
   const Map& map() const { return map_; }
@@ -72,9 +72,10 @@ class TinyMapper {
     landmark.p_world = Eigen::Vector3d::Random();
     landmark.reference = landmark.first_keyframe = id;
     map_.AddLandmark(landmark);
-    map_.SetObservation(id, feature, landmark.id);
-    if (frame_ > 1) map_.SetObservation(KeyframeId::Make(kSession, 1), feature, landmark.id);
-    map_.UpdateDescriptor(landmark.id);
+    map_.SetObservation(map_.At(id), feature, map_.At(landmark.id));
+    if (frame_ > 1)
+      map_.SetObservation(map_.At(KeyframeId::Make(kSession, 1)), feature, map_.At(landmark.id));
+    map_.UpdateDescriptor(map_.At(landmark.id));
   }
 
   Random random_{3};
@@ -211,7 +212,7 @@ TEST_F(Recording, ATermCountsUpToWhereTheNextOneTookItOver) {
   TinyMapper other;
   for (int i = 0; i < 4; ++i) other.Step();
   MapEditor expected(other.map());
-  expected.SetPosition(LandmarkId::Make(1, 1), {9, 9, 9});
+  expected.SetPosition(expected.At(LandmarkId::Make(1, 1)), {9, 9, 9});
   WriteRecord(log, 10, expected.TakeDelta(MapEvent::kAdjusted, {}, 1),
               Header(StreamId::kMap, 1, two, {100, 4}));
   log.Close();

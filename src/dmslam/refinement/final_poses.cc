@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
 
 namespace dmslam {
@@ -286,7 +287,7 @@ Eigen::Vector3d FinalPoses::FromViews(const Map& map, std::span<const View> view
       const Sight& sight = from.sights[view.sight];
       equations.Add(map, from.pose.T_cam_world, p_world, sight.uv_px.cast<double>(), sight.octave);
     }
-    const Eigen::Vector3d move = -equations.information.ldlt().solve(equations.gradient);
+    const Eigen::Vector3d move = -SolveSymmetric(equations.information, equations.gradient);
     if (!move.allFinite()) return p_world;
     p_world += move;
   }

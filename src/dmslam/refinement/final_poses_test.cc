@@ -57,7 +57,7 @@ class PosesAtTheEnd : public testing::Test {
       information += J.transpose() * J;
       gradient += J.transpose() * (map_.camera().Ideal().Project(p_cam) - keyframe.features->uv_px[feature]);
     }
-    map_.SetPosition(id, landmark.p_world - information.ldlt().solve(gradient));
+    map_.SetPosition(map_.At(id), landmark.p_world - information.ldlt().solve(gradient));
   }
 
   std::optional<Eigen::Vector2d> See(int landmark, int frame) {
@@ -90,7 +90,8 @@ class PosesAtTheEnd : public testing::Test {
     keyframe.landmarks.resize(seen.size());
     const KeyframeId id = keyframe.id;
     map_.AddKeyframe(std::move(keyframe));
-    for (size_t i = 0; i < seen.size(); ++i) map_.SetObservation(id, static_cast<uint16_t>(i), seen[i]);
+    for (size_t i = 0; i < seen.size(); ++i)
+      map_.SetObservation(map_.At(id), static_cast<uint16_t>(i), map_.At(seen[i]));
   }
 
   std::vector<Sight> SightsAt(int frame) {
@@ -222,7 +223,7 @@ TEST_F(PosesAtTheEnd, AKeyframeThatMovesTakesItsFramesAlong) {
   const KeyframeId id = KeyframeId::Make(1, 0);
   const Rigid3d before = map_.FindKeyframe(id)->T_cam_world;
   const Rigid3d moved = before * Rigid3d(ExpSo3({0.0, 0.3, 0.0}), {1.0, 0.0, 0.0});
-  map_.SetPose(id, moved);
+  map_.SetPose(map_.At(id), moved);
   poses.Improve(map_);
   EXPECT_TRUE(poses.IsSettled()) << "no more can be improved";
   for (const FramePose& pose : poses.Take()) {

@@ -84,7 +84,7 @@ TEST_F(Refining, FrameThatTheMapContradictsIsLeftOut) {
   Random random(3);
   for (const LandmarkId id : map_.LandmarkIdsSorted()) {
     const Eigen::Vector3d shift(random.Uniform(-1, 1), random.Uniform(-1, 1), 0);
-    map_.SetPosition(id, map_.FindLandmark(id)->p_world + shift);
+    map_.SetPosition(map_.At(id), map_.FindLandmark(id)->p_world + shift);
   }
   EXPECT_TRUE(Refine(refiner).empty());
 }
@@ -93,7 +93,7 @@ TEST_F(Refining, FrameThatWasNeverToldKeepsItsPlaceWithNothingMeasured) {
   FrameRefiner refiner;
   told_.state = TrackingState::kLocalizedLater;
   refiner.Keep(frame_, told_);
-  for (const LandmarkId id : map_.LandmarkIdsSorted()) map_.RemoveLandmark(id);
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) map_.RemoveLandmark(map_.At(id));
   refiner.Begin(map_);
   const std::optional<FinalPose> kept = refiner.RefineNext(map_, {});
   ASSERT_TRUE(kept);

@@ -111,9 +111,9 @@ TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
   placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
   const Rigid3d shift(Eigen::Quaterniond::Identity(), {-3.0, 0, 0});
   const KeyframeId id = KeyframeId::Make(MapScene::kSession, kFirst);
-  scene_.map().SetPose(id, scene_.map().FindKeyframe(id)->T_cam_world * shift);
+  scene_.map().SetPose(scene_.map().At(id), scene_.map().FindKeyframe(id)->T_cam_world * shift);
   for (size_t i = 0; i < scene_.size(); ++i)
-    scene_.map().SetPosition(MapScene::IdOf(i), scene_.point(i) + Eigen::Vector3d(3, 0, 0));
+    scene_.map().SetPosition(scene_.map().At(MapScene::IdOf(i)), scene_.point(i) + Eigen::Vector3d(3, 0, 0));
   placement_.OnMapChanged(scene_.map());
   TrackedFrame next = Frame(kFirst - 2, -0.04);
   ASSERT_TRUE(Place(&next).ok);

@@ -4,7 +4,6 @@
 #include <poll.h>
 
 #include <atomic>
-#include <chrono>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -26,6 +25,10 @@ std::string Conversation(Mode mode) {
   }
   core.Finish();
   return said;
+}
+
+void AwaitAtLeast(int value, const std::atomic<int>& counter) {
+  for (int now = counter; now < value; now = counter) counter.wait(now);
 }
 
 TEST(CoreThread, SaysTheSameInBothModes) {
@@ -97,10 +100,15 @@ TEST(CoreThread, AJobWaitsWhereTooMuchWasNotDelivered) {
     for (int i = 0; i < 100; ++i) {
       core.Report([&] { ++heard; });
       ++made;
+      made.notify_one();
     }
   });
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_LE(made, 4);
+  for (int delivered = 0; delivered < 100; delivered += 4) {
+    AwaitAtLeast(delivered + 4, made);
+    EXPECT_LE(made, delivered + 4);
+    core.Deliver();
+    EXPECT_EQ(heard, delivered + 4);
+  }
   core.Finish();
   EXPECT_EQ(heard, 100);
 }
@@ -127,7 +135,8 @@ TEST(CoreThread, EndsWhileAJobWaitsForItsReportsToBeHeard) {
   core.Post([&] {
     for (int i = 0; i < 10; ++i) core.Report([] { FAIL() << "nobody listens any more"; });
   });
-  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  pollfd readable{core.fd(), POLLIN, 0};
+  EXPECT_EQ(poll(&readable, 1, 10000), 1) << "the first report takes all the room there is";
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "dmslam/runtime/load_vocabulary.h"
 
+#include "dmslam/place_recognition/vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 
 namespace dmslam {

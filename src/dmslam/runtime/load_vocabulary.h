@@ -3,9 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "dmslam/place_recognition/vocabulary.h"
-
 namespace dmslam {
+
+class Vocabulary;
 
 /// The vocabulary at `path`, or where that is empty the one that ships with the programs. Throws InputError.
 std::shared_ptr<const Vocabulary> LoadVocabulary(const std::string& path);

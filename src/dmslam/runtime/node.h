@@ -9,6 +9,9 @@
 
 namespace dmslam {
 
+/// So often every process says how it fares.
+inline constexpr int64_t kStatusEveryNs = 1'000'000'000;
+
 /// What a node knows of the world around it.
 struct NodeContext {
   Bus* bus = nullptr;

@@ -16,7 +16,6 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kMisfitNs = 2'000'000'000;
-constexpr int64_t kStatusEveryNs = 1'000'000'000;
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kCameraSilentNs = 1'500'000'000;
 constexpr int64_t kTidyEveryNs = 60'000'000'000;

@@ -14,7 +14,9 @@ OrbExtractorOptions WithMoreFeatures(OrbExtractorOptions options, double factor)
 }  // namespace
 
 FeatureStage::FeatureStage(const OrbExtractorOptions& options, double first_map_factor)
-    : extractor_(options), first_map_extractor_(WithMoreFeatures(options, first_map_factor)) {}
+    : extractor_(options),
+      first_map_extractor_(WithMoreFeatures(options, first_map_factor)),
+      wanted_(options.num_features) {}
 
 FeatureSet FeatureStage::Extract(const GrayView& image, bool for_first_map) {
   const auto start = std::chrono::steady_clock::now();

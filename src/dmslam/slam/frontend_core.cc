@@ -12,6 +12,8 @@ namespace {
 constexpr int kWellSeen = 100;      // static features of a frame that becomes a keyframe at the end...
 constexpr int kWellSeenCells = 12;  // ...and the cells of an 8 x 6 grid that hold them
 
+constexpr double kDarkShare = 0.1;  // of the features that are looked for: with fewer it is dark
+
 int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
 
 std::function<FirstMapSearch()> SearchMaker(const FrontendCore::Setup& setup) {
@@ -50,6 +52,7 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   late_.OnMapChanged(map_);
   tracker_.OnMapChanged(map_);
+  FollowJoinedMap();
   if (delta.progress.settled) gate_.OnSettled(*delta.progress.settled, !late_.IsGrowing());
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
   if (delta.event == MapEvent::kMapAdjusted) last_poses_.Begin(map_, delta.map_id);
@@ -73,6 +76,7 @@ FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
   if (map_id_) output.Add(MapReset{*map_id_, drop, reason, frame_.stamp_ns});
+  if (drop) dropped_ = map_id_;
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
   if (drop && options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(map_id_.value_or(0)));
@@ -84,11 +88,22 @@ FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
   return output;
 }
 
-/// A number that no map has had: those of a saved one are taken.
-MapId FrontendCore::NextMapId() const {
-  MapId highest = map_id_.value_or(0);
-  for (const auto& [id, keyframe] : map_.keyframes()) highest = std::max(highest, keyframe.map_id);
-  return highest + 1;
+/// A number that no map has had: those of a saved one are taken, and those of maps that were joined.
+MapId FrontendCore::NextMapId() {
+  newest_map_ = std::max(newest_map_, map_id_.value_or(0));
+  for (const auto& [id, keyframe] : map_.keyframes()) newest_map_ = std::max(newest_map_, keyframe.map_id);
+  return ++newest_map_;
+}
+
+/// The map that was tracked in may have become part of another.
+void FrontendCore::FollowJoinedMap() {
+  if (!phase_.HasMap() || !map_id_ || !map_.KeyframesOf(*map_id_).empty()) return;
+  newest_map_ = std::max(newest_map_, *map_id_);
+  if (const auto last = map_.ResolvePose(tracker_.last_reference())) map_id_ = last->map_id;
+}
+
+TrackingState FrontendCore::state() const {
+  return phase_.IsSearching() && !map_.keyframes().empty() ? TrackingState::kLost : phase_.state();
 }
 
 // ---- Frames ----
@@ -118,7 +133,7 @@ FrontendOutput FrontendCore::ProcessFrame() {
 /// While a first map is looked for, every frame also asks the maps that there are where it is: who is
 /// recognised goes on there.
 std::optional<FrontendOutput> FrontendCore::FindAgain() {
-  if (map_.keyframes().empty()) return std::nullopt;
+  if (map_.keyframes().empty() || (dropped_ && !map_.KeyframesOf(*dropped_).empty())) return std::nullopt;
   TrackingResult result = tracker_.Track(map_, {std::nullopt, true}, std::move(frame_));
   frame_ = std::move(result.frame);
   if (!result.pose) return std::nullopt;
@@ -141,7 +156,7 @@ FrontendOutput FrontendCore::Initialize() {
     ++counters_.keyframes_proposed;
     output.Add(std::move(*answer.proposal));
   }
-  output.Add(NoPose(phase_.state(), std::move(answer.reason)));
+  output.Add(NoPose(state(), std::move(answer.reason)));
   return output;
 }
 
@@ -199,12 +214,13 @@ FrontendOutput FrontendCore::Track() {
   frame_ = std::move(result.frame);
   if (result.relocalized) ++counters_.relocalizations;
   if (!result.pose) return OnNotTracked(result.report);
-  if (!map_id_) map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
+  map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
   return OnTracked(result.report, *result.pose);
 }
 
 FrontendOutput FrontendCore::OnTracked(const TrackingReport& report, const PlacedPose& pose) {
   ++counters_.tracked;
+  lit_since_ns_.reset();
   phase_.OnTracked(frame_.stamp_ns);
   FrontendOutput output;
   ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &output);
@@ -217,17 +233,29 @@ FrontendOutput FrontendCore::OnTracked(const TrackingReport& report, const Place
 FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
   FrontendOutput output;
   unplaced_.Keep(WaitingFrame(frame_));
-  if (phase_.IsTrial()) {
+  if (phase_.IsTrial() && report.contradicts) {
     output = GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason);
   } else {
     const int64_t missing_ns = frame_.stamp_ns - tracker_.last_tracked_ns();
     phase_.OnMissing(missing_ns);
     ++(phase_.state() == TrackingState::kLost ? counters_.lost : counters_.uncertain);
-    if (missing_ns > ToNs(options_.new_map_after_s) && !localize_only_)
+    if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsRecovering())
       output = GiveUpMap(false, "lost for too long");
   }
   output.Add(MakePose(phase_.state(), report, std::nullopt));
   return output;
+}
+
+/// For so long that another map is looked for. Darkness is no new place.
+bool FrontendCore::IsLostInTheLight(int64_t missing_ns) {
+  const size_t wanted = static_cast<size_t>(features_.wanted());
+  if (static_cast<double>(frame_.features->size()) < kDarkShare * static_cast<double>(wanted)) {
+    lit_since_ns_.reset();
+    return false;
+  }
+  if (!lit_since_ns_) lit_since_ns_ = frame_.stamp_ns;
+  const int64_t lost_ns = std::min(missing_ns, frame_.stamp_ns - *lit_since_ns_);
+  return lost_ns > ToNs(options_.new_map_after_s);
 }
 
 FramePose FrontendCore::NoPose(TrackingState state, std::string reason) const {

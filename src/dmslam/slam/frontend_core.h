@@ -87,7 +87,8 @@ class FrontendCore {
   /// 4. Does all that is left and tells the last poses.
   FrontendOutput Finish();
 
-  TrackingState state() const { return phase_.state(); }
+  /// While a first map is looked for and there are others, the camera is lost in those.
+  TrackingState state() const;
   const TrackedFrame& frame() const { return frame_; }
   const Map& map() const { return map_; }
   const FrontendCounters& counters() const { return counters_; }
@@ -103,8 +104,10 @@ class FrontendCore {
   FrontendOutput Track();
   FrontendOutput OnTracked(const TrackingReport& report, const PlacedPose& pose);
   FrontendOutput OnNotTracked(const TrackingReport& report);
+  bool IsLostInTheLight(int64_t missing_ns);
   FrontendOutput GiveUpMap(bool drop, const std::string& reason);
-  MapId NextMapId() const;
+  MapId NextMapId();
+  void FollowJoinedMap();
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
   bool IsEvidenceDue();
   void ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output);
@@ -126,7 +129,9 @@ class FrontendCore {
   // The map and where tracking stands
   Replica map_;
   std::optional<MapId> map_id_ =
-      1;  ///< of the map tracked in or looked for; none: whichever it finds itself in
+      1;                          ///< of the map tracked in or looked for; none: whichever it finds itself in
+  MapId newest_map_ = 1;          ///< the highest number that was given
+  std::optional<MapId> dropped_;  ///< the map that was dropped last: the replica may have it for a while yet
   TrackingPhase phase_;
 
   // What does the work
@@ -140,8 +145,9 @@ class FrontendCore {
   // Frames
   TrackedFrame frame_;
   UnplacedFrames unplaced_;
-  std::deque<WaitingFrame> behind_;     ///< since the first map's second keyframe, not tracked yet
-  std::optional<int64_t> evidence_ns_;  ///< when it was told last
+  std::deque<WaitingFrame> behind_;      ///< since the first map's second keyframe, not tracked yet
+  std::optional<int64_t> evidence_ns_;   ///< when it was told last
+  std::optional<int64_t> lit_since_ns_;  ///< since when the frames of a lost camera show anything
   FrontendCounters counters_;
 };
 

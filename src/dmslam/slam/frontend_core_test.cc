@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <variant>
 
@@ -52,7 +53,7 @@ TEST(TrackingPhaseTest, ImpossibleStepsAreRefused) {
   EXPECT_THROW(phase.OnTracked(0), InvariantError);
   phase.Propose(KeyframeId::Make(1, 1));
   EXPECT_THROW(phase.Propose(KeyframeId::Make(1, 2)), InvariantError);
-  phase.BeginTrial(1000);
+  phase.GiveUpMap();
   EXPECT_THROW(phase.OnMissing(1), InvariantError);
 }
 
@@ -80,6 +81,7 @@ class Phases : public ::testing::Test {
 
   explicit Phases(bool in_portions = false) {
     scene_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
+    strange_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
     setup.options.keyframes_at_end = true;
@@ -106,6 +108,12 @@ class Phases : public ::testing::Test {
   FrontendOutput Frame(uint32_t index, bool blind = false) {
     const auto nothing = [](size_t) { return std::optional<Eigen::Vector3d>(); };
     return Frame(index, index * kFrameNs, blind ? MapScene::Place(nothing) : MapScene::Place());
+  }
+  /// The camera looks at something that nobody has seen.
+  FrontendOutput Strange(uint32_t index) {
+    const int64_t stamp_ns = index * kFrameNs;
+    return core_->ProcessFeatures(index, stamp_ns,
+                                  strange_.See(index, stamp_ns, MapScene::PoseAt(0)).features->set);
   }
   FrontendOutput Frame(uint32_t index, int64_t stamp_ns, const MapScene::Place& place) {
     const double x = 0.05 * static_cast<double>(stamp_ns) / kFrameNs;
@@ -142,7 +150,7 @@ class Phases : public ::testing::Test {
     return nullptr;
   }
 
-  MapScene scene_;
+  MapScene scene_, strange_{77};
   bool finds_map_ = false;
   std::optional<InitializerFrame> first_;
   std::optional<FrontendCore> core_;
@@ -187,19 +195,44 @@ TEST_F(Phases, TheTrialEndsInTracking) {
   EXPECT_GT(core_->counters().tracked, 25u);
 }
 
-TEST_F(Phases, ATrialThatFailsDropsTheMapAndBeginsAnew) {
+TEST_F(Phases, ATrialThatIsContradictedDropsTheMapAndBeginsAnew) {
   Start();
   Frame(2);
   ASSERT_EQ(core_->state(), TrackingState::kTrial);
-  const FrontendOutput output = Frame(3, true);
+  // Each point lies some pixels beside the place that the map gives it, in a direction of its own.
+  const FrontendOutput output = Frame(3, 3 * kFrameNs, [this](size_t point) {
+    const double turn = 2.4 * static_cast<double>(point);
+    return std::optional<Eigen::Vector3d>(scene_.point(point) +
+                                          0.06 * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0));
+  });
   const auto* reset = Find<MapReset>(output);
   ASSERT_NE(reset, nullptr);
   EXPECT_TRUE(reset->drop);
-  EXPECT_EQ(core_->state(), TrackingState::kNotInitialized);
   EXPECT_EQ(Find<FramePose>(output)->map_id, 2u) << "a number that no map has had";
 }
 
-TEST_F(Phases, LostForLongItKeepsTheMapAndBeginsAnother) {
+TEST_F(Phases, ATrialDuringWhichTheMapIsHiddenKeepsIt) {
+  Start();
+  Frame(2);
+  ASSERT_EQ(core_->state(), TrackingState::kTrial);
+  const FrontendOutput hidden = Frame(3, true);
+  EXPECT_EQ(Find<MapReset>(hidden), nullptr);
+  EXPECT_FALSE(Find<FramePose>(hidden)->HasPose());
+  EXPECT_EQ(core_->state(), TrackingState::kUncertain);
+  EXPECT_TRUE(Find<FramePose>(Frame(4))->HasPose());
+  EXPECT_EQ(core_->state(), TrackingState::kTracking);
+}
+
+TEST_F(Phases, InDarknessItIsLostHoweverLong) {
+  Start();
+  for (uint32_t frame = 2; frame < 30; ++frame) Frame(frame);
+  for (uint32_t frame = 30; frame < 900; ++frame)
+    ASSERT_EQ(Find<MapReset>(Frame(frame, true)), nullptr) << frame;
+  EXPECT_EQ(core_->state(), TrackingState::kLost);
+  EXPECT_EQ(Find<MapReset>(Strange(900)), nullptr) << "the light has just come back";
+}
+
+TEST_F(Phases, LostForLongInTheLightItKeepsTheMapAndLooksForAnother) {
   Start();
   for (uint32_t frame = 2; frame < 30; ++frame) Frame(frame);
   ASSERT_EQ(core_->state(), TrackingState::kTracking);
@@ -207,7 +240,7 @@ TEST_F(Phases, LostForLongItKeepsTheMapAndBeginsAnother) {
   std::optional<MapReset> reset;
   uint32_t frame = 30;
   for (; frame < 300 && !reset; ++frame) {
-    const FrontendOutput output = Frame(frame, true);
+    const FrontendOutput output = Strange(frame);
     if (const auto* found = Find<MapReset>(output)) reset = *found;
     was_uncertain = was_uncertain || core_->state() == TrackingState::kUncertain;
     was_lost = was_lost || core_->state() == TrackingState::kLost;
@@ -215,7 +248,26 @@ TEST_F(Phases, LostForLongItKeepsTheMapAndBeginsAnother) {
   ASSERT_TRUE(reset);
   EXPECT_FALSE(reset->drop);
   EXPECT_TRUE(was_uncertain && was_lost);
-  EXPECT_NEAR((frame - 30) / 30.0, 5.0, 0.1) << "seconds";
+  EXPECT_NEAR((frame - 30) / 30.0, FrontendOptions().new_map_after_s, 0.1) << "seconds";
+  EXPECT_EQ(core_->state(), TrackingState::kLost) << "it may be in the old map all the same";
+}
+
+TEST_F(Phases, WhereItsMapBecomesPartOfAnotherItGoesOnThere) {
+  Start();
+  for (uint32_t frame = 2; frame < 30; ++frame) Frame(frame);
+  for (const auto& [id, keyframe] : scene_.map().keyframes()) scene_.map().SetMapId(keyframe, 7);
+  for (size_t i = 0; i < kPoints; ++i) scene_.map().SetMapId(scene_.map().At(MapScene::IdOf(i)), 7);
+  MapDelta joined = scene_.map().TakeDelta(MapEvent::kCorrected, KeyframeId::Make(1, 1), 7);
+  if (core_->awaited().valid()) joined.progress.settled = core_->awaited();
+  core_->ApplyMapDelta(joined);
+  std::optional<KeyframeProposal> proposal;
+  for (uint32_t frame = 30; frame < 60; ++frame) {
+    const FrontendOutput output = HalfHidden(frame);
+    EXPECT_EQ(Find<FramePose>(output)->map_id, 7u) << frame;
+    if (const auto* found = Find<KeyframeProposal>(output)) proposal = *found;
+  }
+  ASSERT_TRUE(proposal);
+  EXPECT_EQ(proposal->map_id, 7u);
 }
 
 TEST_F(Phases, AKeyframeComesBehindItsEvidenceAndOneAtATime) {

@@ -15,8 +15,10 @@ struct FrontendOptions {
       2.0;  ///< features of a frame while there is no map, times those of others
   TrackingOptions tracking;
   KeyframeOptions keyframe;
-  double trial_s = 0.5;            ///< a first map must predict the frames of this time, else it is dropped
-  double new_map_after_s = 5.0;    ///< lost for so long: a new map is started, the old one is kept
+  double trial_s = 0.5;  ///< a first map must predict the frames of this time, else it is dropped
+  /// Lost for so long with the eyes open: a first map of another one is looked for, while every frame goes on
+  /// asking all maps where it is. The old map is kept.
+  double new_map_after_s = 1.5;
   double evidence_every_s = 0.32;  ///< what frames said of landmarks is told so often, and before a keyframe
   int max_kept_frames = 900;       ///< unplaced frames kept for localisation at the end
   FrameRefinerOptions refiner;     ///< of the poses told at the end
@@ -33,7 +35,8 @@ struct FrontendOptions {
     tracking.Describe(v);
     v.Number("tracking.trial_s", trial_s, 0, 60, "s", "time for which a first map must predict the frames");
     v.Number("tracking.new_map_after_s", new_map_after_s, 0.1, 3600, "s",
-             "lost for so long: a new map is started");
+             "lost for so long, darkness not counted: a new map is started as well");
+    v.InBaseline("5");
     v.Number("tracking.max_kept_frames", max_kept_frames, 0, 100000, "frames",
              "unplaced frames kept for localisation at the end");
     v.InBaseline("300");

@@ -43,7 +43,7 @@ void TrackingPhase::OnTracked(int64_t stamp_ns) {
 }
 
 void TrackingPhase::OnMissing(int64_t since_ns) {
-  DMSLAM_CHECK(HasMap() && !IsTrial(), "a trial fails with the first frame that is not tracked");
+  DMSLAM_CHECK(HasMap(), "frames are missed in a map");
   if (since_ns > kLostAfterNs) {
     phase_ = Lost{};
   } else {

@@ -12,7 +12,7 @@ namespace dmslam {
 /// Where the frontend is between having no map and tracking in one:
 ///
 ///   NotInitialized --Propose--> WaitingForMap --BeginTrial--> Trial --OnTracked--> Tracking
-///   Trial: a frame that is not tracked gives the map up.
+///   Trial: a frame that contradicts the map gives it up; one that does not show it ends the trial.
 ///   Tracking, Uncertain, Lost: OnTracked and OnMissing go from any of them to any.
 ///   GiveUpMap: from all of them to NotInitialized.     BeginLost: in a map that is there already.
 class TrackingPhase {
@@ -32,7 +32,7 @@ class TrackingPhase {
   void BeginTrial(int64_t until_ns);
   void BeginLost();
   void OnTracked(int64_t stamp_ns);
-  /// A frame was not tracked, `since_ns` after the last one that was. Not in a trial, which has failed then.
+  /// A frame was not tracked, `since_ns` after the last one that was.
   void OnMissing(int64_t since_ns);
   void GiveUpMap();
 

@@ -4,7 +4,50 @@
 
 namespace dmslam {
 
-void TrajectoryBuilder::OnFramePose(const FramePose& pose) {
+namespace {
+
+/// World to camera in the units of a world that has grown by `growth`.
+Sim3d InGrownWorld(const Rigid3d& T_cam_world, double growth) {
+  return Sim3d(T_cam_world.rotation, T_cam_world.translation / growth, 1.0 / growth);
+}
+
+}  // namespace
+
+void TrajectoryBuilder::Carry(const Joined& joined, FramePose* pose) {
+  pose->map_id = joined.into;
+  pose->T_cam_world = (Sim3d(pose->T_cam_world) * joined.S_into_from.Inverse()).ToRigid();
+}
+
+std::map<MapId, TrajectoryBuilder::Joined> TrajectoryBuilder::JoinedBy(const MapDelta& delta) const {
+  std::map<MapId, Joined> joined;
+  for (const KeyframeState& now : delta.keyframes) {
+    const Keyframe* then = map_.FindKeyframe(now.id);
+    if (then == nullptr || then->map_id == now.map_id) continue;
+    const Sim3d S_cam_into = InGrownWorld(now.T_cam_world, now.scale / then->scale);
+    joined.try_emplace(then->map_id, Joined{now.map_id, S_cam_into.Inverse() * Sim3d(then->T_cam_world)});
+  }
+  return joined;
+}
+
+void TrajectoryBuilder::OnMapDelta(const MapDelta& delta) {
+  const std::map<MapId, Joined> joined = JoinedBy(delta);
+  map_.Apply(delta);
+  if (delta.event == MapEvent::kMapStarted && delta.map_id) joined_.erase(*delta.map_id);
+  if (joined.empty()) return;
+  for (auto& [index, pose] : poses_) {
+    const auto from = joined.find(pose.map_id.value_or(0));
+    if (from != joined.end()) Carry(from->second, &pose);
+  }
+  for (const auto& [from, into] : joined) joined_.insert_or_assign(from, into);
+}
+
+/// What was told in a map that is part of another by now is taken as told there.
+void TrajectoryBuilder::OnFramePose(const FramePose& told) {
+  FramePose pose = told;
+  for (auto from = joined_.find(pose.map_id.value_or(0)); from != joined_.end();
+       from = joined_.find(pose.map_id.value_or(0))) {
+    Carry(from->second, &pose);
+  }
   const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
   if (inserted) return;
   const bool later = pose.state == TrackingState::kLocalizedLater;

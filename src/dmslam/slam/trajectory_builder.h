@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dmslam/dataset/trajectory.h"
+#include "dmslam/geometry/similarity.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/map/replica.h"
 
@@ -20,7 +21,8 @@ class TrajectoryBuilder {
   /// Poses told in a map that was wrong from the beginning count for nothing: a later map may have its
   /// keyframes again, of the same frames and so of the same names.
   void OnMapReset(const MapReset& reset);
-  void OnMapDelta(const MapDelta& delta) { map_.Apply(delta); }
+  /// Where a map becomes part of another, the poses that were told in it go along.
+  void OnMapDelta(const MapDelta& delta);
 
   /// The map as it is known from elsewhere.
   void SetMap(Replica map) { map_ = std::move(map); }
@@ -41,9 +43,18 @@ class TrajectoryBuilder {
   const std::map<uint32_t, FramePose>& frame_poses() const { return poses_; }
 
  private:
+  /// A map that became part of another one, and how points of it lie there.
+  struct Joined {
+    MapId into = 0;
+    Sim3d S_into_from;
+  };
+
   MapId MapOfFrame(const FramePose& pose) const;
+  std::map<MapId, Joined> JoinedBy(const MapDelta& delta) const;
+  static void Carry(const Joined& joined, FramePose* pose);
 
   Replica map_;
+  std::map<MapId, Joined> joined_;  ///< by the number that is gone
   std::map<uint32_t, FramePose>
       poses_;  ///< by frame index; a later placement does not replace an online one...
   std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory

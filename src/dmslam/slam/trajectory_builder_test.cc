@@ -64,5 +64,51 @@ TEST_F(TrajectoryOfTwoMaps, PosesOfOtherMapsAndOfOneThatIsKeptStay) {
   EXPECT_EQ(builder_.Build().final.size(), 1U);
 }
 
+/// A map becomes part of another that is turned, moved, and half as large.
+TEST(TrajectoryOfJoinedMaps, PosesToldInAMapGoWithIt) {
+  MapEditor map(TestCamera(), Pyramid());
+  const auto add = [&](uint32_t frame, MapId map_id, const Rigid3d& T_cam_world) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId::Make(1, frame);
+    keyframe.map_id = map_id;
+    keyframe.T_cam_world = T_cam_world;
+    keyframe.features = MakeFrameFeatures(FeatureSet(), map.camera(), map.pyramid());
+    map.AddKeyframe(std::move(keyframe));
+  };
+  add(1, 1, Rigid3d());
+  const Rigid3d then(ExpSo3(Eigen::Vector3d(0.1, 0.2, 0.3)), Eigen::Vector3d(1, 2, 3));
+  add(2, 2, then);
+  TrajectoryBuilder builder(TestCamera(), Pyramid());
+  builder.OnMapDelta(map.TakeDelta(MapEvent::kMapped, std::nullopt, std::nullopt));
+  const auto tell = [&](uint32_t frame) {
+    FramePose pose;
+    pose.frame_index = frame;
+    pose.stamp_ns = frame;
+    pose.map_id = 2;
+    pose.state = TrackingState::kTracking;
+    pose.reference = KeyframeId::Make(1, 2);
+    pose.T_cam_reference.translation = Eigen::Vector3d(0.5, 0.0, frame);
+    pose.T_cam_world = pose.T_cam_reference * then;
+    builder.OnFramePose(pose);
+  };
+  tell(3);
+  tell(4);
+  const Sim3d S_1_2(ExpSo3(Eigen::Vector3d(0, 0.4, 0)), Eigen::Vector3d(5, 0, 1), 0.5);
+  map.SetPoseAndScale(map.At(KeyframeId::Make(1, 2)), (Sim3d(then) * S_1_2.Inverse()).ToRigid(), S_1_2.scale);
+  map.SetMapId(map.At(KeyframeId::Make(1, 2)), 1);
+  builder.OnMapDelta(map.TakeDelta(MapEvent::kCorrected, KeyframeId::Make(1, 2), 1));
+  tell(5);
+  const TrajectoryBuilder::Trajectories built = builder.Build();
+  EXPECT_EQ(built.map_id, 1u);
+  EXPECT_TRUE(built.other_maps.empty());
+  ASSERT_EQ(built.online.size(), 3u) << "the one told before its frontend heard of it is no other";
+  ASSERT_EQ(built.final.size(), 3u);
+  for (size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3d difference =
+        built.online[i].T_world_cam.translation - built.final[i].T_world_cam.translation;
+    EXPECT_LT(difference.norm(), 1e-12) << i;
+  }
+}
+
 }  // namespace
 }  // namespace dmslam

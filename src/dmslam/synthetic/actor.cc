@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
+#include "dmslam/synthetic/angles.h"
 #include "dmslam/synthetic/paint.h"
 #include "dmslam/util/check.h"
 
@@ -14,12 +14,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3f;
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kStepS = 0.01;
 constexpr double kWalkSpeed = 1.15;
 constexpr double kStrideM = 1.35;  ///< Length of two steps.
-
-double WrapAngle(double angle) { return std::remainder(angle, 2.0 * kPi); }
 
 /// Walks, stops, sits down and gets up, step by step.
 class Simulation {

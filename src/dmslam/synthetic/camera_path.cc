@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "dmslam/synthetic/angles.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180.0;
 constexpr double kEyeHeight = 1.42;
 
@@ -39,8 +38,6 @@ void AppendRoundedRectangle(const Eigen::Vector2d& low, const Eigen::Vector2d& h
   }
   points.push_back(Eigen::Vector2d(0.5 * (low.x() + high.x()), low.y()));
 }
-
-double WrapAngle(double angle) { return std::remainder(angle, 2.0 * kPi); }
 
 }  // namespace
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "dmslam/synthetic/angles.h"
 #include "dmslam/synthetic/paint.h"
 #include "dmslam/synthetic/scene_builder.h"
 #include "dmslam/util/check.h"
@@ -17,13 +17,6 @@ using Eigen::Translation3f;
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-uint32_t Add(TextureList& textures, const Canvas& canvas) {
-  textures.push_back(std::make_shared<const Texture>(canvas));
-  return static_cast<uint32_t>(textures.size() - 1);
-}
-
 int TextureSize(int full, int halvings) { return std::max(32, full >> halvings); }
 
 /// Light from above on both sides: what moves about is lit alike wherever it is.
@@ -36,8 +29,6 @@ Mesh Placed(Mesh mesh, const Affine3f& world_from_mesh) {
   mesh.UpdateBounds();
   return mesh;
 }
-
-Vector3f On(const Vector2f& floor, float z) { return {floor.x(), floor.y(), z}; }
 
 /// Where a screen stands, and where it looks to.
 struct Stand {
@@ -117,7 +108,7 @@ PropState Cart::At(double time_s, std::span<const Person>) const {
   const ActorState state = ways_.At(time_s);
   const Affine3f world_from_cart =
       Translation3f(On(state.position.cast<float>(), 0)) *
-      AngleAxisf(static_cast<float>(state.heading_rad) - 0.5f * kPi, Vector3f::UnitZ());
+      AngleAxisf(static_cast<float>(state.heading_rad) - 0.5f * kPiF, Vector3f::UnitZ());
   return {Placed(cart_, world_from_cart), state.moving};
 }
 

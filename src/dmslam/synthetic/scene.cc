@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "dmslam/synthetic/angles.h"
 #include "dmslam/synthetic/scene_builder.h"
 #include "dmslam/util/check.h"
 
@@ -17,14 +17,11 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 constexpr float kRoomLength = 7.0f, kRoomWidth = 6.0f, kRoomHeight = 2.7f;
-constexpr float kPi = std::numbers::pi_v<float>;
-
-Vector3f On(const Vector2f& floor, float z) { return {floor.x(), floor.y(), z}; }
 
 /// The frame of a thing whose front, at `position`, looks to `facing` (unit, on the floor).
 Affine3f FrameFacing(const Vector2f& position, const Vector2f& facing) {
   // The thing's y axis points away from who looks at it, against `facing`.
-  const float yaw = std::atan2(-facing.y(), -facing.x()) - 0.5f * kPi;
+  const float yaw = std::atan2(-facing.y(), -facing.x()) - 0.5f * kPiF;
   return Translation3f(On(position, 0)) * AngleAxisf(yaw, Vector3f::UnitZ());
 }
 
@@ -204,10 +201,10 @@ void AddDeskGroup(SceneBuilder& builder, const Assets& assets, const Vector2f& c
     for (const float facing : {-1.0f, 1.0f}) {
       const Vector2f seat =
           center + Vector2f(facing * builder.Uniform(0.72f, 0.82f), side * builder.Uniform(0.42f, 0.65f));
-      const float heading = facing < 0 ? 0.0f : kPi;
+      const float heading = facing < 0 ? 0.0f : kPiF;
       // The chair's back is behind the sitter; its frame's +y points there.
       AddChair(builder, assets,
-               Translation3f(On(seat, 0)) * AngleAxisf(heading + 0.5f * kPi, Vector3f::UnitZ()));
+               Translation3f(On(seat, 0)) * AngleAxisf(heading + 0.5f * kPiF, Vector3f::UnitZ()));
       scene.seats.push_back({seat, heading});
     }
   }

@@ -10,12 +10,12 @@ namespace {
 
 using Eigen::Vector3f;
 
+}  // namespace
+
 uint32_t Add(TextureList& textures, const Canvas& canvas) {
   textures.push_back(std::make_shared<const Texture>(canvas));
   return static_cast<uint32_t>(textures.size() - 1);
 }
-
-}  // namespace
 
 Assets PaintAssets(uint64_t seed, int posters, int halvings, TextureList& textures) {
   const auto size = [halvings](int full) { return std::max(32, full >> halvings); };

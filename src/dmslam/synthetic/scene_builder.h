@@ -21,8 +21,14 @@ struct Assets {
   Skin floor, ceiling, keyboard, leaf, door, page, metal;
 };
 
+/// Puts a picture at the end of the list and returns its index.
+uint32_t Add(TextureList& textures, const Canvas& canvas);
+
 /// Paints all pictures. `posters` is how many different ones; `halvings` lowers the resolution.
 Assets PaintAssets(uint64_t seed, int posters, int halvings, TextureList& textures);
+
+/// The point at the height z above a point of the floor.
+inline Eigen::Vector3f On(const Eigen::Vector2f& floor, float z) { return {floor.x(), floor.y(), z}; }
 
 /// Builds meshes out of lit quads and boxes. Frames put a thing into the world: x to its right, y into it, z
 /// up, as seen by who stands before it; the origin is on the floor, in the middle of its front.

@@ -1,5 +1,7 @@
 #include "dmslam/tracking/keyframe_policy.h"
 
+#include <ranges>
+
 namespace dmslam {
 namespace {
 
@@ -7,6 +9,15 @@ constexpr double kWeakShare = 0.5;  // of the expected landmarks
 constexpr int kWeak = 60;           // landmarks
 
 int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
+
+/// Young maps have the newest keyframes.
+bool IsOfTwoKeyframes(const Map& map, MapId map_id) {
+  int found = 0;
+  for (const auto& [id, keyframe] : map.keyframes() | std::views::reverse) {
+    if (keyframe.map_id == map_id && ++found > 2) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -19,7 +30,7 @@ bool WantsKeyframe(const KeyframeOptions& options, const KeyframeInputs& inputs)
 
 /// A map of two keyframes has no landmark that three see.
 int ExpectedOf(const Map& map, const Keyframe& reference) {
-  return map.CountTracked(reference, map.keyframes().size() <= 2 ? 2 : 3);
+  return map.CountTracked(reference, IsOfTwoKeyframes(map, reference.map_id) ? 2 : 3);
 }
 
 }  // namespace dmslam

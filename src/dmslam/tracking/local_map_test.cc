@@ -49,7 +49,7 @@ class Chain : public ::testing::Test {
           landmark.reference = landmark.first_keyframe = Kf(k);
           map_.AddLandmark(landmark);
         }
-        map_.SetObservation(Kf(k), static_cast<uint16_t>(i), id);
+        map_.SetObservation(map_.At(Kf(k)), static_cast<uint16_t>(i), map_.At(id));
       }
     }
   }
@@ -108,7 +108,7 @@ TEST_F(Chain, WhatHasLeftTheMapIsTakenOut) {
   LocalMap local(60);
   local.Collect(map_, Seeing(60, 60));
   ASSERT_TRUE(Has(local, 70));
-  map_.RemoveLandmark(Lm(70));
+  map_.RemoveLandmark(map_.At(Lm(70)));
   local.DropGone(map_);
   EXPECT_FALSE(Has(local, 70));
   EXPECT_TRUE(Has(local, 71));

@@ -1,5 +1,7 @@
 #include "dmslam/tracking/pose_search.h"
 
+#include "dmslam/camera/image_scale.h"
+
 namespace dmslam {
 namespace {
 
@@ -31,15 +33,18 @@ void PoseSearch::Reset() {
 bool PoseSearch::FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
                            const Prior& prior, TrackedFrame* frame) {
   const size_t needed = static_cast<size_t>(options_.min_motion_matches);
-  const auto* matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, options_.motion_radius_px,
-                                            *frame->features);
+  const double radius_px = SearchRadiusPx(camera_, options_.motion_radius_rad);
+  const auto* matches =
+      &search_.MatchFrame(map, judge_.votes(), last, T_predicted, radius_px, *frame->features);
   if (matches->size() < needed) {
-    matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * options_.motion_radius_px,
-                                  *frame->features);
+    matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * radius_px, *frame->features);
   }
+  contradicts_last_ = false;
   if (matches->size() < needed) return false;
   SetMatches(*matches, T_predicted, frame);
-  return solver_.Solve(map, prior, &judge_, frame).inliers >= options_.min_motion_inliers;
+  const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
+  contradicts_last_ = fit.inliers < options_.min_motion_inliers;
+  return !contradicts_last_;
 }
 
 int PoseSearch::FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior,
@@ -78,6 +83,7 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   }
   TrackingReport report = CountClasses(camera_, *frame);
   report.num_expected = static_cast<int>(expected.size());
+  report.contradicts = static_cast<int>(fit.rejected.size()) > fit.inliers;
   Decide(fit, careful, &report);
   if (report.ok) judge_.Believe(map, expected, *frame);
   return report;

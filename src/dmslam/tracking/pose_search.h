@@ -37,6 +37,8 @@ class PoseSearch {
   /// says of landmarks is added to the judge's evidence.
   TrackingReport InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
 
+  /// Whether enough of what the last frame saw was found near its place, and not in it.
+  bool contradicts_last() const { return contradicts_last_; }
   /// The keyframe that shares most landmarks with the frame searched for last.
   KeyframeId reference() const { return local_map_.reference(); }
   MotionJudge& judge() { return judge_; }
@@ -53,6 +55,7 @@ class PoseSearch {
   ProjectionSearch search_;
   PoseSolver solver_;
   MotionJudge judge_;
+  bool contradicts_last_ = false;
 };
 
 }  // namespace dmslam

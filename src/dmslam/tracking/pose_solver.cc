@@ -16,8 +16,7 @@ void PoseSolver::Matches::Add(const Map& map, const TrackedFrame& frame, uint16_
   matches.push_back({feature, id});
   ages_s.push_back(static_cast<double>(frame.stamp_ns - landmark.first_ns) * 1e-9);
   observations.push_back({landmark.p_world, frame.features->uv_px[feature],
-                          1.0 / map.pyramid().SigmaSquared(frame.features->set.keypoints[feature].octave),
-                          weight});
+                          1.0 / frame.features->Variance(feature, map.pyramid()), weight});
 }
 
 void PoseSolver::Matches::Move(size_t from, size_t to) {

@@ -5,6 +5,8 @@
 #include <functional>
 #include <optional>
 
+#include "dmslam/camera/image_scale.h"
+
 namespace dmslam {
 namespace {
 
@@ -87,16 +89,17 @@ std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& ma
   ListMatched(*frame, &matched_);
   MarkMatched(*frame, &taken_);
   expected_.clear();
+  const double oblique_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_rad);
+  const double frontal_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_frontal_rad);
   for (const LandmarkId id : landmarks) {
     const Landmark& landmark = *map.FindLandmark(id);
     const std::optional<LandmarkView> view = PredictView(map, landmark, frame->T_cam_world);
     if (!view) continue;
     expected_.push_back({id, *view});
     if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), id)) continue;
-    const double radius =
-        wider * (view->view_cos > kFrontalCos ? options_.local_radius_frontal : options_.local_radius);
+    const double radius_px = view->view_cos > kFrontalCos ? frontal_px : oblique_px;
     const FeatureHit hit =
-        FindFeature(*frame->features, view->uv_px, radius * map.pyramid().Scale(view->octave),
+        FindFeature(*frame->features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
                     view->octave - 1, view->octave, landmark.descriptor, taken_);
     if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
     if (hit.octave == hit.second_octave && hit.distance > options_.local_ratio * hit.second_distance)

@@ -54,7 +54,7 @@ class Search : public ::testing::Test {
   void BelieveToMove(size_t point) {
     LandmarkEvidence evidence;
     evidence.motion_belief = 1.0F;
-    scene_.map().SetEvidence(ids_[point], evidence);
+    scene_.map().SetEvidence(scene_.map().At(ids_[point]), evidence);
   }
   /// Features 8 and 9 look much like landmark 9: they differ from it in 11 and 10 bits.
   static void MakeTwins(FeatureSet* set) {
@@ -80,7 +80,7 @@ TEST_F(Search, WhatTheFrameBeforeSawIsFoundWhereItIs) {
 }
 
 TEST_F(Search, ALandmarkThatWasFusedIsTheOneItBecame) {
-  scene_.map().Fuse(ids_[3], ids_[4]);
+  scene_.map().Fuse(scene_.map().At(ids_[3]), scene_.map().At(ids_[4]));
   for (const LandmarkMatch& match : FromFrameBefore(Frame())) EXPECT_NE(match.landmark, ids_[3]);
 }
 

@@ -44,12 +44,11 @@ void Relocalizer::Clear() { places_.Clear(); }
 
 void Relocalizer::Update(const Replica& map) { places_.Update(map); }
 
-std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<MapId> map_id,
-                                                KeyframeId last_seen, const BowImage& image) const {
-  const auto of_another_map = [&](const Keyframe& keyframe) { return map_id && keyframe.map_id != *map_id; };
+std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, KeyframeId last_seen,
+                                                const BowImage& image) const {
+  const auto none = [](const Keyframe&) { return false; };
   std::vector<KeyframeId> ids;
-  for (const PlaceCandidate& candidate :
-       places_.Query(map, image.words, 0.0, kMinCovisibility, of_another_map)) {
+  for (const PlaceCandidate& candidate : places_.Query(map, image.words, 0.0, kMinCovisibility, none)) {
     if (ids.size() < kMaxCandidates) ids.push_back(candidate.keyframe);
   }
   const auto add = [&](KeyframeId id) {
@@ -130,7 +129,7 @@ bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch*
     return Refine(map, search, frame) && (!request.credible || request.credible(*frame));
   };
   const BowImage image = places_.Transform(frame->features->set);
-  const std::vector<KeyframeId> candidates = Candidates(map, request.map_id, request.last_seen, image);
+  const std::vector<KeyframeId> candidates = Candidates(map, request.last_seen, image);
   for (const KeyframeId id : candidates) {
     if (TryKeyframe(map, *map.FindKeyframe(id), image, request.seed, frame) && fits()) return true;
   }

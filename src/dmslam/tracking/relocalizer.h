@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "dmslam/map/replica.h"
@@ -23,9 +22,8 @@ class Relocalizer {
   /// Keeps the index in step with the replica: call after each applied delta.
   void Update(const Replica& map);
   void Clear();
-  /// Where the camera is looked for.
+  /// The camera is looked for in all maps.
   struct Request {
-    std::optional<MapId> map_id = std::nullopt;           ///< none: in any map
     KeyframeId last_seen{};                               ///< invalid: not known
     std::function<bool(const TrackedFrame&)> credible{};  ///< asked of a frame with its pose; empty: all are
     uint64_t seed = 0;
@@ -36,8 +34,7 @@ class Relocalizer {
   bool Relocalize(const Map& map, const Request& request, PoseSearch* search, TrackedFrame* frame) const;
 
  private:
-  std::vector<KeyframeId> Candidates(const Map& map, std::optional<MapId> map_id, KeyframeId last_seen,
-                                     const BowImage& image) const;
+  std::vector<KeyframeId> Candidates(const Map& map, KeyframeId last_seen, const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                    TrackedFrame* frame) const;
   /// All that these places and their neighbours show, by descriptor alone.

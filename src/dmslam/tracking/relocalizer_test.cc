@@ -15,6 +15,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/replica.h"
+#include "dmslam/tracking/tracker.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -80,8 +81,8 @@ class Wall {
         landmark.reference = landmark.first_keyframe = id;
         map_.AddLandmark(landmark);
       }
-      map_.SetObservation(id, static_cast<uint16_t>(feature), landmark.id);
-      map_.UpdateDescriptor(landmark.id);
+      map_.SetObservation(map_.At(id), static_cast<uint16_t>(feature), map_.At(landmark.id));
+      map_.UpdateDescriptor(map_.At(landmark.id));
     }
     return map_.TakeDelta(MapEvent::kMapped, id, 1);
   }
@@ -155,9 +156,8 @@ class Lost {
       relocalizer_.Update(replica_);
     }
   }
-  bool Find(TrackedFrame* frame, std::optional<MapId> map_id = 1,
-            std::function<bool(const TrackedFrame&)> credible = {}) {
-    return relocalizer_.Relocalize(replica_, {map_id, {}, std::move(credible), 1}, &search_, frame);
+  bool Find(TrackedFrame* frame, std::function<bool(const TrackedFrame&)> credible = {}) {
+    return relocalizer_.Relocalize(replica_, {{}, std::move(credible), 1}, &search_, frame);
   }
   void Clear() { relocalizer_.Clear(); }
 
@@ -230,18 +230,35 @@ TEST(RelocalizerTest, APlaceThatIsNotCredibleIsRefused) {
       return (found.T_cam_world.Center() - PoseAt(x).Center()).norm() < 0.6;
     };
   };
-  EXPECT_FALSE(lost.Find(&frame, 1, near(0.5)));
-  EXPECT_TRUE(lost.Find(&frame, 1, near(4.2)));
+  EXPECT_FALSE(lost.Find(&frame, near(0.5)));
+  EXPECT_TRUE(lost.Find(&frame, near(4.2)));
 }
 
-TEST(RelocalizerTest, OnlyTheMapThatIsAskedForIsSearched) {
+TEST(RelocalizerTest, AMapThatIsForgottenIsNotSearched) {
   Wall wall;
   Lost lost(wall);
   TrackedFrame frame = wall.Frame(4.4);
-  EXPECT_FALSE(lost.Find(&frame, 2));
-  EXPECT_TRUE(lost.Find(&frame, std::nullopt));
+  EXPECT_TRUE(lost.Find(&frame));
   lost.Clear();
-  EXPECT_FALSE(lost.Find(&frame, std::nullopt));
+  EXPECT_FALSE(lost.Find(&frame));
+}
+
+TEST(RelocalizerTest, WhoIsLostInOneMapIsLookedForInAll) {
+  Wall wall;  // map 1
+  Replica replica(TestCamera(525, 319.5, 239.5), Pyramid());
+  Tracker tracker({{}, replica.camera(), ShippedVocabulary(), 1});
+  for (int k = 0; k < kKeyframes; ++k) {
+    replica.Apply(wall.Next());
+    tracker.OnMapChanged(replica);
+  }
+  const int64_t now_ns = kKeyframes * kInterval_ns;
+  tracker.BeginLost({0, now_ns});
+  TrackedFrame frame = wall.Frame(4.4);
+  frame.stamp_ns = now_ns + 1'000'000'000;
+  const TrackingResult result = tracker.Track(replica, {MapId{7}, true}, std::move(frame));
+  ASSERT_TRUE(result.pose) << result.report.reason;
+  EXPECT_TRUE(result.relocalized);
+  EXPECT_LT((result.frame.T_cam_world.Center() - PoseAt(4.4).Center()).norm(), 0.02);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without 
 constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
 constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
 constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
-constexpr int kSomeProven = 15;                // ...and that must be among them when it is confirmed by time
+constexpr int kSomeProven = 8;                 // ...and that must be among them when it is confirmed by time
 
 void Refuse(const char* reason, TrackingReport* report) {
   report->ok = false;
@@ -112,10 +112,14 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   attempt.report.reason = "too few features match the last frame";
   const MotionModel::Prediction prediction = motion_.Predict(map, {frame->index, frame->stamp_ns});
   if (!prediction.T_cam_world || !prediction.recent) return attempt;
-  if (!FindByMotion(map, prediction, frame, &attempt)) return attempt;
+  if (!FindByMotion(map, prediction, frame, &attempt)) {
+    attempt.report.contradicts = search_.contradicts_last();
+    return attempt;
+  }
   attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns), prediction.prior, frame);
   if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
     Refuse("the pose contradicts the camera's motion", &attempt.report);
+    attempt.report.contradicts = true;
   } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
     attempt.weak_pose = frame->T_cam_world;
   }
@@ -140,12 +144,14 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
   const FrameTime time{frame->index, frame->stamp_ns};
-  // Far away only what is proven to be no person is believed.
+  // Far away, and in another map, only what is proven to be no person is believed.
   const auto credible = [&](const TrackedFrame& at) {
-    return motion_.IsReachable(map, at.T_cam_world, time) ||
+    const Keyframe* reference = map.FindKeyframe(search_.reference());
+    const bool here = reference != nullptr && reference->map_id == map_id;
+    return (here && motion_.IsReachable(map, at.T_cam_world, time)) ||
            CountProven(map, at.landmarks, {}) >= kManyProven;
   };
-  Relocalizer::Request request{.map_id = map_id, .last_seen = motion_.last().reference, .seed = seed};
+  Relocalizer::Request request{.last_seen = motion_.last().reference, .seed = seed};
   if (map_id) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);

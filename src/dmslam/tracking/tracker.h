@@ -36,7 +36,9 @@ class Tracker {
   void BeginLost(const FrameTime& time) { motion_.Begin({}, time); }
 
   struct Request {
-    std::optional<MapId> map_id;  ///< where a lost camera is looked for; none: in all maps
+    /// The map that is tracked in: a lost camera is looked for in all maps, and there it must be within
+    /// reach. None: it was nowhere yet.
+    std::optional<MapId> map_id;
     bool may_relocalize = true;
   };
   /// The next frame of the stream. The map may have changed since the last one.
@@ -48,6 +50,10 @@ class Tracker {
   /// The map that was tracked in is given up.
   void OnMapGivenUp();
 
+  /// The keyframe that the frame tracked last was placed by.
+  KeyframeId last_reference() const { return motion_.last().reference; }
+  /// Whether a place was recognised that waits to be confirmed.
+  bool IsRecovering() const { return recovery_.has_value(); }
   /// Stamp of the frame tracked last.
   int64_t last_tracked_ns() const { return motion_.last_stamp_ns(); }
   /// What frames said of landmarks since the last call.

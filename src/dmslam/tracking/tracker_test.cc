@@ -124,7 +124,8 @@ TEST_F(Motion, FollowsACorrectionOfTheMap) {
   TrackTo(1);
   TrackTo(2);
   const Rigid3d shift(Eigen::Quaterniond::Identity(), {-1.0, 0, 0});
-  scene_.map().SetPose(Reference(), scene_.map().FindKeyframe(Reference())->T_cam_world * shift);
+  scene_.map().SetPose(scene_.map().At(Reference()),
+                       scene_.map().FindKeyframe(Reference())->T_cam_world * shift);
   EXPECT_LT(ErrorAt(*Predict(3).T_cam_world, 1.0 + 3 * kStep), 1e-9);
 }
 

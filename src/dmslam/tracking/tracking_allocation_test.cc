@@ -63,7 +63,7 @@ class Tracking : public ::testing::Test {
     landmark.reference = landmark.first_keyframe = KeyframeId::Make(1, 0);
     map_.AddLandmark(landmark);
     for (uint32_t k = 0; k < kKeyframes; ++k) {
-      map_.SetObservation(KeyframeId::Make(1, k), static_cast<uint16_t>(i), landmark.id);
+      map_.SetObservation(map_.At(KeyframeId::Make(1, k)), static_cast<uint16_t>(i), map_.At(landmark.id));
     }
   }
 

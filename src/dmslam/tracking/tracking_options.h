@@ -7,18 +7,19 @@ namespace dmslam {
 
 /// Tracking (paper 2.3; ORB-SLAM2's constants where nothing better was found).
 struct TrackingOptions {
-  DynamicsOptions dynamics;        ///< which landmarks have a say, and what is said of the others
-  double motion_radius_px = 15.0;  ///< search around the motion model's prediction, times the octave's scale
-  int min_motion_matches = 20;     ///< fewer: the radius is doubled
+  DynamicsOptions dynamics;  ///< which landmarks have a say, and what is said of the others
+  double motion_radius_rad =
+      0.0285;                   ///< search around the motion model's prediction, times the octave's scale
+  int min_motion_matches = 20;  ///< fewer: the radius is doubled
   int min_motion_inliers = 10;
   int max_local_keyframes = 60;
-  double local_radius = 4.0;          ///< search around a projected landmark, times the octave's scale
-  double local_radius_frontal = 2.5;  ///< the same where the view is nearly the mean view
+  double local_radius_rad = 0.0076;  ///< search around a projected landmark, times the octave's scale
+  double local_radius_frontal_rad = 0.00476;  ///< the same where the view is nearly the mean view
   double local_ratio = 0.8;           ///< best over second best descriptor distance at the same octave
   int max_descriptor_distance = 100;  ///< bits, with a position prior
   int min_local_inliers = 20;         ///< fewer: the frame is not tracked
   int min_coasting_inliers = 8;       ///< so many still lead the search in the next frames
-  int min_inliers_after_relocalization = 50;
+  int min_inliers_after_relocalization = 30;
   double chi2 = 5.991;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
   int min_cells = 6;          ///< inliers must lie in at least so many cells of an 8 x 6 grid
@@ -26,7 +27,7 @@ struct TrackingOptions {
   template <typename Visitor>
   void Describe(Visitor& v) {
     dynamics.Describe(v);
-    v.Number("tracking.motion_radius_px", motion_radius_px, 1, 200, "px",
+    v.Number("tracking.motion_radius_rad", motion_radius_rad, 0.001, 0.5, "rad",
              "search around the motion model's prediction");
     v.Number("tracking.min_inliers", min_local_inliers, 6, 10000, "",
              "fewer static inliers: the frame is not tracked");

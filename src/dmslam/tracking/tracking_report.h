@@ -8,9 +8,10 @@ namespace dmslam {
 /// What tracking one frame against the map came to.
 struct TrackingReport {
   bool ok = false;
-  const char* reason = "";  ///< why not
-  int num_expected = 0;     ///< landmarks of the map around that it should see
-  int num_static = 0;       ///< inliers
+  const char* reason = "";   ///< why not
+  bool contradicts = false;  ///< what looks like the map lies elsewhere than it says; else it is not seen
+  int num_expected = 0;      ///< landmarks of the map around that it should see
+  int num_static = 0;        ///< inliers
   int num_moving = 0;
   int num_unknown = 0;      ///< matched, neither inlier nor moving
   int cells = 0;            ///< of an 8 x 6 grid that hold inliers

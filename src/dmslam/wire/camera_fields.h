@@ -16,6 +16,8 @@ void CameraFields(auto& s, auto& camera, auto& w) {
   s(camera.p2, w.p2);
   s(camera.k3, w.k3);
   s(camera.fps, w.fps);
+  s(camera.lens, w.lens);
+  s(camera.k4, w.k4);
 }
 
 }  // namespace dmslam::wire

@@ -25,11 +25,14 @@ void Checker::CameraModel(const Camera& camera) {
               camera.height_px <= kMaxImageSide,
           "image size of the camera out of range");
   for (const double value : {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.k1, camera.k2,
-                             camera.p1, camera.p2, camera.k3, camera.fps}) {
+                             camera.p1, camera.p2, camera.k3, camera.k4, camera.fps}) {
     Finite(value, "a value of the camera is not finite");
   }
   Require(camera.fx_px > 0 && camera.fy_px > 0, "focal length not above zero");
   Require(camera.fps > 0, "rate of the camera not above zero");
+  const bool fisheye = camera.lens == Lens::kFisheye;
+  Require(fisheye ? camera.p1 == 0 && camera.p2 == 0 : camera.k4 == 0,
+          "a coefficient that the lens does not have");
 }
 
 void Checker::Features(const FeatureSet& features) {

@@ -10,6 +10,11 @@ struct EnumRange<PlaybackMode> {
   static constexpr const char* kName = "unknown mode";
 };
 template <>
+struct EnumRange<Lens> {
+  static constexpr auto kFirst = Lens::kBrown, kLast = Lens::kFisheye;
+  static constexpr const char* kName = "unknown lens";
+};
+template <>
 struct EnumRange<TrackingState> {
   static constexpr auto kFirst = TrackingState::kNotInitialized, kLast = TrackingState::kRotationOnly;
   static constexpr const char* kName = "unknown tracking state";

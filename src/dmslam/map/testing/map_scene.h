@@ -66,7 +66,8 @@ class MapScene {
       landmark.first_ns = first_ns_[i];
       map_.AddLandmark(landmark);
       for (uint32_t k = 0; k < num_keyframes; ++k)
-        map_.SetObservation(KeyframeId::Make(kSession, first + k), static_cast<uint16_t>(i), landmark.id);
+        map_.SetObservation(map_.At(KeyframeId::Make(kSession, first + k)), static_cast<uint16_t>(i),
+                            map_.At(landmark.id));
     }
   }
 

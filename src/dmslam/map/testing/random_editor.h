@@ -96,36 +96,37 @@ class RandomEditor {
     const KeyframeId observer = landmark.reference;
     const LandmarkId id = landmark.id;
     map_.AddLandmark(landmark);
-    map_.SetObservation(observer, static_cast<uint16_t>(random_.Below(30)), id);
+    map_.SetObservation(map_.At(observer), static_cast<uint16_t>(random_.Below(30)), map_.At(id));
   }
   void Observe() {
     const LandmarkId landmark = AnyLandmark();
     if (!landmark.valid()) return;
     const KeyframeId keyframe = AnyKeyframe();
-    map_.SetObservation(keyframe, static_cast<uint16_t>(random_.Below(30)), landmark);
-    if (random_.Below(3) == 0) map_.UpdateDescriptor(landmark);
+    map_.SetObservation(map_.At(keyframe), static_cast<uint16_t>(random_.Below(30)), map_.At(landmark));
+    if (random_.Below(3) == 0) map_.UpdateDescriptor(map_.At(landmark));
   }
   void MoveSomething() {
     if (const KeyframeId id = AnyKeyframe(); id.valid()) {
-      map_.SetPoseAndScale(id, Rigid3d(ExpSo3({random_.Uniform(), 0, 0}), {random_.Uniform(), 0, 0}), 1.25);
+      map_.SetPoseAndScale(map_.At(id), Rigid3d(ExpSo3({random_.Uniform(), 0, 0}), {random_.Uniform(), 0, 0}),
+                           1.25);
     }
     if (const LandmarkId id = AnyLandmark(); id.valid()) {
-      map_.SetPosition(id, {random_.Uniform(), random_.Uniform(), 4});
+      map_.SetPosition(map_.At(id), {random_.Uniform(), random_.Uniform(), 4});
       LandmarkEvidence evidence;
       evidence.found = random_.Below(100);
-      map_.SetEvidence(id, evidence);
+      map_.SetEvidence(map_.At(id), evidence);
     }
   }
   void FuseSomething() {
     const LandmarkId a = AnyLandmark(), b = AnyLandmark();
-    if (a.valid() && a != b) map_.Fuse(a, b);
+    if (a.valid() && a != b) map_.Fuse(map_.At(a), map_.At(b));
   }
   void RemoveSomeLandmark() {
-    if (const LandmarkId id = AnyLandmark(); id.valid()) map_.RemoveLandmark(id);
+    if (const LandmarkId id = AnyLandmark(); id.valid()) map_.RemoveLandmark(map_.At(id));
   }
   void RemoveSomeKeyframe() {
     const KeyframeId id = AnyKeyframe();
-    if (id.valid() && map_.FindKeyframe(id)->parent.valid()) map_.RemoveKeyframe(id);
+    if (id.valid() && map_.FindKeyframe(id)->parent.valid()) map_.RemoveKeyframe(map_.At(id));
   }
 
   Random random_;

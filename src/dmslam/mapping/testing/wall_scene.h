@@ -77,7 +77,7 @@ class WallScene {
     landmark.reference = landmark.first_keyframe = Id(frames.front());
     landmark.first_ns = map.At(landmark.reference).stamp_ns;
     const LandmarkId id = map.AddLandmark(std::move(landmark)).id;
-    for (const uint32_t frame : frames) map.SetObservation(Id(frame), at, id);
+    for (const uint32_t frame : frames) map.SetObservation(map.At(Id(frame)), at, map.At(id));
     return id;
   }
   /// A frame that sees all points, `x` to the right of the first camera, told from keyframe `reference` at

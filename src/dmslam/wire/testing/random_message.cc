@@ -19,6 +19,12 @@ void MakeSound(Camera& camera, Random& random) {
   camera.fx_px = random.Uniform(1, 4000);
   camera.fy_px = random.Uniform(1, 4000);
   camera.fps = random.Uniform(1, 200);
+  Draw(camera.lens, Lens::kBrown, Lens::kFisheye, random);
+  if (camera.lens == Lens::kFisheye) {
+    camera.p1 = camera.p2 = 0;
+  } else {
+    camera.k4 = 0;
+  }
 }
 
 void MakeSound(std::vector<float>& list, size_t size, Random& random) {

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "dmslam/runtime/node.h"
+#include "dmslam/runtime/node_options.h"
+
+namespace dmslam {
+
+struct CollectorOptions {
+  std::string out_dir;
+  std::string ground_truth;  ///< TUM trajectory; empty: none
+  bool progress = false;     ///< show progress on the terminal
+};
+
+/// A `CollectorNode`, for those who only run one: its own header is much to compile.
+std::unique_ptr<Node> MakeCollector(NodeContext context, NodeOptions options, CollectorOptions collector);
+
+}  // namespace dmslam

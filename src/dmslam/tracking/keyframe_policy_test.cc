@@ -1,0 +1,39 @@
+// When a tracked frame becomes a keyframe.
+#include "dmslam/tracking/keyframe_policy.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/map/testing/map_scene.h"
+
+namespace dmslam {
+namespace {
+
+using testing::MapScene;
+
+TEST(KeyframePolicyTest, AMapOfTwoKeyframesGrowsAlsoBesideALargerOne) {
+  MapScene scene;
+  scene.AddCloud(200, {0, 0, 4}, {1.0, 0.8, 0.5});
+  scene.MapAll(4);
+  MapEditor& map = scene.map();
+  for (uint32_t k = 0; k < 2; ++k) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId::Make(MapScene::kSession, 100 + k);
+    keyframe.map_id = 2;
+    keyframe.features = scene.See(100 + k, 0, MapScene::PoseAt(0.1 * k)).features;
+    map.AddKeyframe(std::move(keyframe));
+  }
+  for (uint16_t i = 0; i < 150; ++i) {
+    Landmark landmark;
+    landmark.id = LandmarkId::Make(2, i + 1);
+    landmark.map_id = 2;
+    landmark.reference = landmark.first_keyframe = KeyframeId::Make(MapScene::kSession, 100);
+    map.AddLandmark(landmark);
+    for (uint32_t k = 0; k < 2; ++k)
+      map.SetObservation(map.At(KeyframeId::Make(MapScene::kSession, 100 + k)), i, map.At(landmark.id));
+  }
+  EXPECT_EQ(ExpectedOf(map, map.At(KeyframeId::Make(MapScene::kSession, 101))), 150);
+  EXPECT_EQ(ExpectedOf(map, map.At(KeyframeId::Make(MapScene::kSession, 3))), 200);
+}
+
+}  // namespace
+}  // namespace dmslam
