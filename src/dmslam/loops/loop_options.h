@@ -37,7 +37,7 @@ struct LoopcloserOptions {
   // Behind people little of all that should be seen is. Then much of what outlasts them must be: a picture
   // that hangs in two places shows a quarter of it.
   int min_joining_proven = 50;
-  double min_joining_proven_share = 0.5;
+  double min_joining_proven_share = 0.7;
   int min_told = 20;  ///< landmarks that should be seen; of fewer the share seen says nothing
 
   // Somebody who stood in two places is matched as well as a room is. What he cannot be is there for long.
