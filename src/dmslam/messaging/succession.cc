@@ -6,8 +6,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int kMostReopenings = 8;                 // beside a mapper that lives a replica never stands still
-constexpr int64_t kReopenPauseNs = 100'000'000;    // before the first; doubles with each
 constexpr int64_t kIdleServerNs = 10'000'000'000;  // a hand-over nobody takes ends after so long
 
 ReplicaSearch::Options SearchOptions(const ReplicaFetch::Options& options) {
@@ -111,14 +109,8 @@ void ReplicaServer::Receive(const std::string& channel, std::span<const uint8_t>
 void ReplicaServer::Advance(int64_t now_ns) {
   Append(holder_.TakeOutgoing(), &outgoing_);
   const bool chosen_anew = holder_.chosen_by() && holder_.chosen_by() != served_;
-  if (chosen_anew) {
-    reopened_ = 0;
-    Open(now_ns);
-  } else if (writer_ && held_() != offered_) {
-    BeginAgainLater(now_ns);
-  } else if (now_ns >= reopen_ns_) {
-    Open(now_ns);
-  }
+  // A replica that grew while it is handed over is begun again: parent and content must be of one version.
+  if (chosen_anew || (writer_ && held_() != offered_)) Open(now_ns);
   if (!writer_) return;
   writer_->Advance(now_ns);
   Append(writer_->TakeOutgoing(), &outgoing_);
@@ -126,17 +118,8 @@ void ReplicaServer::Advance(int64_t now_ns) {
   if (now_ns - idle_since_ns_ > kIdleServerNs) writer_.reset();
 }
 
-/// A replica that grew while it is handed over is begun again, since parent and content must be of one
-/// version; not for ever: whoever asks has to ask anew.
-void ReplicaServer::BeginAgainLater(int64_t now_ns) {
-  writer_.reset();
-  reopen_ns_ = reopened_ < kMostReopenings ? now_ns + (kReopenPauseNs << reopened_) : INT64_MAX;
-  ++reopened_;
-}
-
 void ReplicaServer::Open(int64_t now_ns) {
   writer_.reset();
-  reopen_ns_ = INT64_MAX;
   served_ = holder_.chosen_by();
   offered_ = held_();
   idle_since_ns_ = now_ns;
@@ -158,7 +141,7 @@ std::vector<Outgoing> ReplicaServer::TakeOutgoing() { return std::exchange(outgo
 int64_t ReplicaServer::deadline_ns() const {
   const bool chosen_anew = holder_.chosen_by() && holder_.chosen_by() != served_;
   if (chosen_anew || holder_.has_outgoing()) return INT64_MIN;
-  return writer_ ? writer_->deadline_ns() : reopen_ns_;
+  return writer_ ? writer_->deadline_ns() : INT64_MAX;
 }
 
 }  // namespace dmslam

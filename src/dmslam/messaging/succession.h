@@ -94,7 +94,6 @@ class ReplicaServer : public StateMachine {
 
  private:
   void Open(int64_t now_ns);
-  void BeginAgainLater(int64_t now_ns);
 
   Options options_;
   std::function<Version()> held_;
@@ -104,8 +103,6 @@ class ReplicaServer : public StateMachine {
   Version offered_;
   int64_t epoch_ = 0;
   int64_t idle_since_ns_ = 0;
-  int reopened_ = 0;               ///< for this asker, since the replica grew under its hands
-  int64_t reopen_ns_ = INT64_MAX;  ///< when it is begun again
   std::unique_ptr<StreamWriter> writer_;
   std::vector<Outgoing> outgoing_;
 };

@@ -79,14 +79,5 @@ TEST_F(ReplicaServerTest, AReplicaThatGrewIsHandedOverAgain) {
   EXPECT_TRUE(server_.serving());
 }
 
-TEST_F(ReplicaServerTest, BesideALiveMapperItDoesNotBeginAgainForEver) {
-  Choose(21);
-  EXPECT_LE(Pass(60, true).size(), 10u);
-  EXPECT_FALSE(server_.serving());
-  EXPECT_TRUE(Pass(60, true).empty());
-  Choose(22);
-  EXPECT_FALSE(Pass(0.05, false).empty()) << "who asks anew is answered";
-}
-
 }  // namespace
 }  // namespace dmslam
