@@ -3,16 +3,28 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <sstream>
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/runtime/process_info.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
 
+constexpr int64_t ProcessHealth::*kHealthCounters[] = {
+    &ProcessHealth::dropped_foreign,  &ProcessHealth::dropped_malformed, &ProcessHealth::dropped_checksum,
+    &ProcessHealth::records_repaired, &ProcessHealth::records_lost,      &ProcessHealth::repairs_requested,
+    &ProcessHealth::resent,           &ProcessHealth::resent_bytes,      &ProcessHealth::written,
+    &ProcessHealth::written_bytes};
+constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
+    &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
+    &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
+    &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
+constexpr int64_t kSyncEveryNs = 5'000'000'000;
 constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
 
 }  // namespace
@@ -70,6 +82,42 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
 
+/// A process is heard; where another one of its name was before it, that one's counters are kept. What a
+/// collector after this one must know of it goes into the journal.
+void CollectorNode::OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
+  std::set<int32_t>& known = process_ids_[process];
+  if (known.contains(pid) || !journal_) return;
+  known.insert(pid);
+  std::ostringstream note;
+  note << "process " << process << ' ' << pid;
+  if (known.size() > 1) {
+    ++run_.restarts;
+    former_[process] = so_far;
+    if (process == "frontend") former_frontend_ = run_.frontend;
+    for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << so_far.*counter;
+    if (process == "frontend")
+      for (int64_t FrontendStatus::*counter : kFrontendCounters) note << ' ' << run_.frontend.*counter;
+  }
+  journal_->AppendNote(note.str());
+}
+
+/// What a collector before this one has noted.
+void CollectorNode::ReadNote(const std::string& text) {
+  std::istringstream note(text);
+  std::string kind, process;
+  note >> kind;
+  uint64_t keyframe = 0;
+  MapId map_id = 0;
+  int32_t pid = 0;
+  if (kind == "keyframe" && note >> keyframe >> map_id) proposed_[KeyframeId{keyframe}] = map_id;
+  if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
+  if (kind != "process" || !(note >> process >> pid)) return;
+  if (process_ids_[process].insert(pid).second && process_ids_[process].size() > 1) ++run_.restarts;
+  for (int64_t ProcessHealth::*counter : kHealthCounters) note >> former_[process].*counter;
+  if (process != "frontend") return;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> former_frontend_.*counter;
+}
+
 /// Counters begin at zero in a process that was started again: those of the ones before it are added. False
 /// for a process of another session.
 bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
@@ -77,38 +125,25 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
       head.session == 0 || (process == "player" ? !IsForeignFrame(head.session) : !IsForeign(head.session));
   if (!ours) return false;
   ProcessHealth& health = run_.health[process];
-  if (process_ids_[process].insert(head.health.pid).second && process_ids_[process].size() > 1) {
-    ++run_.restarts;
-    former_[process] = health;
-    if (process == "frontend") former_frontend_ = run_.frontend;
-  }
+  OnProcess(process, head.health.pid, health);
   const ProcessHealth& former = former_[process];
   const double largest = std::max(health.rss_mb, head.health.rss_mb);
   run_.memory[process].push_back({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
   health = head.health;
   health.rss_mb = largest;
-  for (int64_t ProcessHealth::*counter :
-       {&ProcessHealth::dropped_foreign, &ProcessHealth::dropped_malformed, &ProcessHealth::dropped_checksum,
-        &ProcessHealth::records_repaired, &ProcessHealth::records_lost, &ProcessHealth::repairs_requested,
-        &ProcessHealth::resent, &ProcessHealth::resent_bytes, &ProcessHealth::written,
-        &ProcessHealth::written_bytes}) {
-    health.*counter += former.*counter;
-  }
+  for (int64_t ProcessHealth::*counter : kHealthCounters) health.*counter += former.*counter;
   return true;
 }
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
   if (!OnHealth("frontend", status.head)) return;
-  for (int64_t FrontendStatus::*counter :
-       {&FrontendStatus::frames_received, &FrontendStatus::frames_processed, &FrontendStatus::frames_skipped,
-        &FrontendStatus::keyframes_proposed, &FrontendStatus::keyframes_withheld,
-        &FrontendStatus::relocalisations}) {
-    status.*counter += former_frontend_.*counter;
-  }
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) status.*counter += former_frontend_.*counter;
   run_.frontend = std::move(status);
 }
 
 void CollectorNode::OnProposal(KeyframeId id, MapId map_id) {
+  if (!proposed_.contains(id))
+    journal_->AppendNote("keyframe " + std::to_string(id.value) + " " + std::to_string(map_id));
   proposed_[id] = map_id;
   heard_ns_.emplace(id, context_.now_ns());
 }
@@ -126,14 +161,24 @@ void CollectorNode::OnFramePose(const Record& record) {
   const auto pose = Read<FramePose>(*record.bytes);
   if (!pose) return;
   CountFrame(*pose);
-  journal_->Append(*record.bytes);
+  KeepOnDisk(*record.bytes);
 }
 
 void CollectorNode::OnMapReset(const Record& record) {
   const auto reset = Read<MapReset>(*record.bytes);
   if (!reset) return;
   ++run_.resets;
-  journal_->Append(*record.bytes);
+  KeepOnDisk(*record.bytes);
+}
+
+/// A disk that is full ends no run: what it does not take waits in memory.
+void CollectorNode::KeepOnDisk(const Bytes& record) {
+  journal_->Append(record);
+  if (journal_->problem().empty() || disk_warned_) return;
+  disk_warned_ = true;
+  run_.disk_problems.push_back(journal_->problem());
+  LogError("{}; the run goes on, and frame poses are kept in memory until there is room",
+           journal_->problem());
 }
 
 /// Those that were placed later have been seen before.
@@ -177,15 +222,23 @@ void CollectorNode::CountMissingKeyframes() {
 
 /// Behind what a collector that was before this one had accepted.
 void CollectorNode::OpenJournal() {
-  std::filesystem::create_directories(collector_.out_dir);
+  std::error_code error;
+  std::filesystem::create_directories(collector_.out_dir, error);
+  if (error) throw InputError(collector_.out_dir + ": cannot be made (" + error.message() + "); check --out");
   journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
   Version newest;
-  journal_->Resume(context_.fresh_system ? 0 : session_, [&](std::span<const uint8_t> record) {
+  const auto take = [&](std::span<const uint8_t> record) {
     if (const auto pose = wire::Decode<FramePose>(record)) CountFrame(*pose);
     if (wire::Decode<MapReset>(record)) ++run_.resets;
     const std::optional<RecordHeader> header = ParseHeader(record);
     newest = {header->epoch, header->seq};
-  });
+  };
+  if (context_.fresh_system) {
+    journal_->Begin(session_);
+  } else {
+    journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
+  }
+  OnProcess("collector", MeasureProcess().pid, {});
   frontend_reader_ =
       MakeReader(StreamId::kFrontend, "FRONTEND",
                  {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
@@ -224,7 +277,9 @@ bool CollectorNode::TakeMapRecord() {
   builder_->OnMapDelta(*delta);
   if (!record->in_snapshot()) TimeKeyframe(*delta);
   if (delta->correction_id) OnCorrection(*delta, loops_before);
-  dropped_maps_.insert(delta->dropped_maps.begin(), delta->dropped_maps.end());
+  for (const MapId dropped : delta->dropped_maps) {
+    if (dropped_maps_.insert(dropped).second) journal_->AppendNote("dropped " + std::to_string(dropped));
+  }
   map_reader_->AcceptTaken();
   return true;
 }
@@ -265,10 +320,13 @@ void CollectorNode::Write() {
     run_.frames_jumped = end_->frames_jumped;
   }
   CountMissingKeyframes();
-  const std::string table = WriteResults(collector_.out_dir, run_, *builder_);
+  if (journal_->lost() > 0)
+    run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
+  const WrittenResults results = WriteResults(collector_.out_dir, run_, *builder_);
   if (collector_.progress) std::fputs("\n", stderr);
-  std::fputs(table.c_str(), stdout);
+  std::fputs(results.table.c_str(), stdout);
   std::fflush(stdout);
+  if (!results.problem.empty()) return Exit(kExitInput, results.problem);
   journal_->Remove();
 }
 
@@ -291,6 +349,10 @@ void CollectorNode::SayProgress() {
 }
 
 void CollectorNode::PublishStatus() {
+  if (journal_ && !written_ && context_.now_ns() >= next_sync_ns_) {
+    next_sync_ns_ = context_.now_ns() + kSyncEveryNs;
+    journal_->Sync();
+  }
   if (!collector_.progress || !builder_ || written_) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",
                run_.sequence.c_str(), static_cast<long long>(frames_seen_), OfTotal().c_str(),

@@ -36,12 +36,15 @@ class CollectorNode : public StreamNode {
   std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
+  void OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far);
+  void ReadNote(const std::string& text);
   bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);
   void OnProposal(KeyframeId id, MapId map_id);
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
   void OnMapReset(const Record& record);
+  void KeepOnDisk(const Bytes& record);
   void CountFrame(const FramePose& pose);
   void CountMissingKeyframes();
   void OpenJournal();
@@ -62,6 +65,8 @@ class CollectorNode : public StreamNode {
   std::map<KeyframeId, int64_t> heard_ns_;  ///< when each was said to be one
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
+  bool disk_warned_ = false;
+  int64_t next_sync_ns_ = 0;
   int64_t next_progress_ = 0;
   std::optional<EndOfSequence> end_;
   int64_t frames_total_ = 0;

@@ -1,7 +1,9 @@
 #pragma once
 
-#include <cstdio>
+#include <cstdint>
+#include <deque>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,23 +22,54 @@ class Journal {
   Journal& operator=(const Journal&) = delete;
 
   using Handler = std::function<void(std::span<const uint8_t> record)>;
+  using NoteHandler = std::function<void(const std::string& note)>;
 
-  /// Hands out the records of `session` that are there, in order, and goes on behind them.
-  void Resume(int64_t session, const Handler& handle);
+  /// Hands out the records of `session` that are there, in order, and goes on behind them. A journal of
+  /// another session is set aside (FILE.former).
+  void Resume(int64_t session, const Handler& handle, const NoteHandler& read = {});
+  /// Begins an empty one; what is there is set aside.
+  void Begin(int64_t session);
   /// Hands out all records, in order.
   void ForEach(const Handler& handle);
-  /// Throws InputError where it cannot be written.
+  /// Where the disk takes no more the record is kept in memory, at most kMostKept bytes of them, and written
+  /// as soon as the disk takes some again.
   void Append(std::span<const uint8_t> record);
+  /// A note of its owner's, between the records.
+  void AppendNote(const std::string& note);
+  /// Why the disk took no more when it first did not; empty where it always did.
+  const std::string& problem() const { return problem_; }
+  /// How many records were given up, because the disk took none for too long.
+  int64_t lost() const { return lost_; }
+  /// On the disk, whatever becomes of this host.
+  void Sync();
   /// It is no longer needed.
   void Remove();
 
  private:
+  static constexpr size_t kMostKept = 64u << 20;
+
   void Open();
-  bool ReadNext(std::vector<uint8_t>* record);
   void Close();
+  void SetAside();
+  std::vector<uint8_t> ReadAt(int64_t offset, size_t size) const;
+  struct Entry {
+    bool is_note = false;
+    std::vector<uint8_t> bytes;  ///< of a note: its session and its text
+  };
+  std::optional<Entry> ReadEntry(int64_t* offset) const;
+  static bool IsOf(int64_t session, const Entry& entry);
+  void AppendEntry(const Entry& entry);
+  bool WriteFramed(const std::vector<uint8_t>& framed);
+  void WriteKept();
 
   std::string path_;
-  std::FILE* file_ = nullptr;
+  int64_t session_ = 0;
+  int fd_ = -1;
+  int64_t size_ = 0;                       ///< of the whole records on the disk
+  std::deque<std::vector<uint8_t>> kept_;  ///< with their lengths, not on the disk yet
+  size_t kept_bytes_ = 0;
+  std::string problem_;
+  int64_t lost_ = 0;
 };
 
 }  // namespace dmslam

@@ -1,16 +1,16 @@
 #include "collector/map_ply.h"
 
 #include <cstdio>
-#include <fstream>
+#include <sstream>
 #include <vector>
 
 #include "dmslam/dynamics/motion_belief.h"
-#include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 
 void WriteMapPly(const std::string& path, const Map& map, MapId map_id) {
-  std::ofstream file(path);
+  std::ostringstream file;
   std::vector<const Landmark*> landmarks;
   for (const LandmarkId id : map.LandmarkIdsSorted()) {
     const Landmark* landmark = map.FindLandmark(id);
@@ -38,7 +38,7 @@ void WriteMapPly(const std::string& path, const Map& map, MapId map_id) {
     std::snprintf(line, sizeof(line), "%.17g %.17g %.17g 30 90 230\n", center.x(), center.y(), center.z());
     file << line;
   }
-  if (!file.flush()) throw InputError(path + ": cannot be written; check its folder");
+  WriteFile(path, file.str());
 }
 
 }  // namespace dmslam

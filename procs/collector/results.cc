@@ -5,15 +5,18 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include "collector/map_ply.h"
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/machine.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 namespace {
@@ -39,7 +42,7 @@ Json Quantiles(const std::vector<double>& values) {
 /// The covisibility graph: a line "frame frame landmarks" for each two keyframes that share landmarks; "loop"
 /// behind it where a loop was closed between them.
 void WriteGraph(const std::string& path, const Map& map) {
-  std::ofstream file(path);
+  std::ostringstream file;
   file << "# frame frame shared_landmarks [loop]\n";
   for (const auto& [id, keyframe] : map.keyframes()) {
     for (const auto& [other, shared] : keyframe.covisible) {
@@ -49,7 +52,7 @@ void WriteGraph(const std::string& path, const Map& map) {
       file << id.frame_index() << " " << other.frame_index() << " " << shared << (loop ? " loop\n" : "\n");
     }
   }
-  if (!file.flush()) throw InputError(path + ": cannot be written; check the folder given with --out");
+  WriteFile(path, file.str());
 }
 
 Json LoopJson(const RunRecord& run) {
@@ -228,6 +231,7 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["records_repaired"] = repaired;
   json["dropped_of_other_sessions"] = foreign;
   json["restarts"] = run.restarts;
+  json["disk_problems"] = run.disk_problems;
   json["keyframes_proposed"] = run.keyframes_proposed;
   json["keyframes_missing"] = run.keyframes_missing;
   int64_t dropped = 0;
@@ -291,22 +295,30 @@ void FrameDurations::Add(const FrameTrace& trace) {
   add(trace.publish_us, trace.published_us, &image_to_pose);
 }
 
-std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder) {
-  std::filesystem::create_directories(dir);
+WrittenResults WriteResults(const std::string& dir, RunRecord run, const TrajectoryBuilder& builder) {
+  WrittenResults written;
+  const auto attempt = [&](const std::function<void()>& write) {
+    try {
+      write();
+    } catch (const std::exception& error) {
+      if (written.problem.empty()) written.problem = error.what();
+    }
+  };
+  attempt([&] { std::filesystem::create_directories(dir); });
   const TrajectoryBuilder::Trajectories trajectories = builder.Build();
-  WriteTrajectory(dir + "/trajectory.txt", trajectories.final);
-  WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online);
-  WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes);
-  WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id);
-  WriteGraph(dir + "/graph.txt", builder.map());
+  attempt([&] { WriteTrajectory(dir + "/trajectory.txt", trajectories.final); });
+  attempt([&] { WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online); });
+  attempt([&] { WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes); });
+  attempt([&] { WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id); });
+  attempt([&] { WriteGraph(dir + "/graph.txt", builder.map()); });
   const Errors errors = Evaluate(run, trajectories);
-  if (!trajectories.final.empty()) WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png");
+  if (!trajectories.final.empty())
+    attempt([&] { WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png"); });
+  if (!written.problem.empty()) run.disk_problems.push_back(written.problem);
   const Json summary = SummaryJson(run, builder, trajectories, errors);
-  std::ofstream file(dir + "/summary.json");
-  file << summary.dump(2) << "\n";
-  if (!file.flush())
-    throw InputError(dir + "/summary.json: cannot be written; check the folder given with --out");
-  return Table(summary);
+  attempt([&] { WriteFile(dir + "/summary.json", summary.dump(2) + "\n"); });
+  written.table = Table(summary);
+  return written;
 }
 
 }  // namespace dmslam

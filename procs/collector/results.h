@@ -55,12 +55,18 @@ struct RunRecord {
     double rss_mb = 0;
   };
   std::map<std::string, std::vector<MemorySample>> memory;  ///< of each process, about once a second
+  std::vector<std::string> disk_problems;  ///< why something could not be written while it ran
   size_t keyframes_missing = 0;  ///< proposed for a map that stands, and neither in it nor culled from it
 };
 
+struct WrittenResults {
+  std::string table;    ///< the summary, for people
+  std::string problem;  ///< the first file that could not be written, and why; empty: all are there
+};
+
 /// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, graph.txt, trajectory.png and
-/// summary.json into `dir`, and returns the summary as a table for people. Throws InputError naming what
-/// cannot be written.
-std::string WriteResults(const std::string& dir, const RunRecord& run, const TrajectoryBuilder& builder);
+/// summary.json into `dir`. Each text file is there as a whole or not at all; one that cannot be written
+/// does not keep the others from being written.
+WrittenResults WriteResults(const std::string& dir, RunRecord run, const TrajectoryBuilder& builder);
 
 }  // namespace dmslam

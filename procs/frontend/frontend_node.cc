@@ -107,7 +107,8 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   std::optional<Frame> frame = Read<Frame>(bytes);
   if (!frame || IsForeignFrame(frame->session)) return;
   const int64_t index = frame->frame_index;
-  if (index <= last_index_) {
+  const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && frame->stamp_ns <= last_stamp_ns_;
+  if (index <= last_index_ || (goes_back && last_index_ >= 0)) {
     // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
     if (!frame_open_) PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
     return;

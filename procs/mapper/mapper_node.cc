@@ -43,8 +43,9 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
                      "; give all processes a higher one with --session");
   }
   if (saved_.loaded->missing > 0) {
-    LogWarning("{}: {} map records are missing in it; the map is as good as it can be", files_.load,
-               saved_.loaded->missing);
+    LogWarning(
+        "{}: {} map records are missing in it, {} references lead nowhere; the map is as good as it can be",
+        files_.load, saved_.loaded->missing, saved_.loaded->skipped);
   }
   const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
   LogInfo("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
@@ -109,7 +110,7 @@ bool MapperNode::FetchReplica() {
   const Version version = left_.fetch->version();
   LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
           left_.replica->keyframes().size(), left_.replica->num_landmarks());
-  core_->Continue(std::move(*left_.replica));
+  core_->Continue(std::move(*left_.replica), static_cast<uint64_t>(context_.random_id));
   saved_.parts.clear();  // what the others hold is newer
   writer_plan().parent = version;
   return true;

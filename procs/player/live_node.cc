@@ -22,12 +22,13 @@ std::string CameraName(const std::string& path) {
 }  // namespace
 
 LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<LiveSource> source)
-    : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
-  context_.bus->Subscribe(channels::kFrameDone);
-  context_.bus->Subscribe(channels::kSequenceDone);
-  context_.bus->Subscribe(channels::kMapperStatus);
-  context_.bus->Subscribe(channels::kFrontendStatus);
-  context_.bus->SetHandler(
+    : context_(std::move(context)),
+      options_(std::move(options)),
+      source_(std::move(source)),
+      endpoint_(context_.bus, context_.now_ns),
+      office_(context_, options_.session, options_.take_over, &endpoint_) {
+  endpoint_.SetOtherHandler(
+      {channels::kFrameDone, channels::kSequenceDone, channels::kMapperStatus, channels::kFrontendStatus},
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
   if (context_.watch) context_.watch(source_->fd(), [this] { TakeFrame(); });
 }
@@ -58,10 +59,34 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
     return;
   }
   const auto done = wire::Decode<FrameDone>(bytes);
-  if (!done || done->session != options_.session) return;
-  if (done->frame_index > frame_.frame_index || published_ == 0) {
-    first_index_ = std::max(first_index_, done->frame_index + 1);  // a player before this one was further
+  if (done && done->session == options_.session) OnFrameDone(*done);
+}
+
+/// A player before this one was further: its frames are followed by ours, and its time by ours, whatever the
+/// clock of this host says.
+void LiveNode::OnFrameDone(const FrameDone& done) {
+  if (published_ > 0 && done.frame_index <= frame_.frame_index) return;
+  first_index_ = std::max(first_index_, done.frame_index + 1);
+  floor_stamp_ns_ = std::max(floor_stamp_ns_, done.stamp_ns);
+}
+
+/// In the dataset's time: behind what a player before this one has said.
+int64_t LiveNode::InSessionTime(int64_t stamp_ns) {
+  if (stamp_ns + shift_ns_ <= floor_stamp_ns_) {
+    const double period_s = options_.camera.fps > 0 ? 1 / options_.camera.fps : 0.05;
+    shift_ns_ = floor_stamp_ns_ - stamp_ns + static_cast<int64_t>(period_s * 1e9);
+    LogWarning("player: the session is {:.1f} s ahead of this host's clock; stamps go on behind it",
+               static_cast<double>(shift_ns_) * 1e-9);
   }
+  return stamp_ns + shift_ns_;
+}
+
+void LiveNode::SayWhetherAway() {
+  const std::string away = source_->away();
+  if (away == away_) return;
+  if (away_.empty()) LogWarning("{}; it is looked for until it is back", away);
+  if (away.empty()) LogInfo("{}: the camera is back", CameraName(options_.sequence));
+  away_ = away;
 }
 
 /// Called when the camera has something to say. Late frames were dropped by the source, which keeps the
@@ -75,11 +100,11 @@ void LiveNode::TakeFrame() {
     }
     return;
   }
-  if (ending_) return;
+  if (ending_ || !office_.held()) return;
   frame_ = Frame();
   frame_.session = options_.session;
   frame_.frame_index = first_index_ + live->index;
-  frame_.stamp_ns = live->stamp_ns;
+  frame_.stamp_ns = InSessionTime(live->stamp_ns);
   frame_.capture_us = live->stamp_ns / 1000;
   EncodeFrame(live->image, CameraName(options_.sequence), options_.encoding, false, &frame_);
   frame_.publish_us = context_.wall_us();
@@ -105,6 +130,7 @@ void LiveNode::PublishStatus() {
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
   status.head.health = MeasureProcess();
+  if (!away_.empty()) status.head.reason = "the camera is away";
   status.state = ending_ ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying;
   status.frames_published = published_;
   status.frames_missing = source_->dropped();
@@ -128,10 +154,17 @@ void LiveNode::PublishEnd() {
 void LiveNode::Advance() {
   const int64_t now = context_.now_ns();
   if (exit_code_) return;
+  office_.Advance();
+  if (office_.exit_code()) {
+    exit_code_ = office_.exit_code();
+    problem_ = office_.problem();
+  }
+  if (exit_code_ || !office_.held()) return;
   if (now >= next_info_ns_) {
     next_info_ns_ = now + kInfoEveryNs;
     PublishCameraInfo();
   }
+  SayWhetherAway();
   if (now >= next_status_ns_) {
     next_status_ns_ = now + kStatusEveryNs;
     PublishStatus();
@@ -144,12 +177,14 @@ void LiveNode::Advance() {
 }
 
 void LiveNode::Stop() {
+  if (!office_.held()) exit_code_ = kExitDone;  // it has not begun
   ending_ = true;
   stopped_ = true;
 }
 
 int64_t LiveNode::deadline_ns() const {
-  const int64_t deadline = std::min(next_info_ns_, next_status_ns_);
+  if (!office_.held()) return endpoint_.deadline_ns();
+  const int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
   return ending_ ? std::min(deadline, end_.due_ns()) : deadline;
 }
 

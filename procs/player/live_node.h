@@ -9,11 +9,13 @@
 #include "dmslam/runtime/node.h"
 #include "player/end_of_play.h"
 #include "player/player_node.h"
+#include "player/player_office.h"
 
 namespace dmslam {
 
-/// Feeds a camera's frames to the bus as they come, until the camera ends, so many were published, or
-/// somebody asks to stop; then says that the sequence has ended, until the frontend has heard it.
+/// Feeds a camera's frames to the bus as they come, until so many were published, or somebody asks to stop (a
+/// camera that goes away is waited for); then says that the sequence has ended, until the frontend has heard
+/// it.
 class LiveNode : public Node {
  public:
   /// Of the options those of a recording (start, speed, black-outs, jumps, mode) mean nothing here.
@@ -30,6 +32,9 @@ class LiveNode : public Node {
 
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnFrameDone(const FrameDone& done);
+  int64_t InSessionTime(int64_t stamp_ns);
+  void SayWhetherAway();
   void TakeFrame();
   void PublishCameraInfo();
   void PublishStatus();
@@ -40,9 +45,14 @@ class LiveNode : public Node {
   NodeContext context_;
   PlayerOptions options_;
   std::unique_ptr<LiveSource> source_;
+  Endpoint endpoint_;
+  PlayerOffice office_;
   uint32_t first_index_ =
-      0;         ///< of the camera's first frame: above 0 where a player before this one has published
-  Frame frame_;  ///< the newest one published
+      0;  ///< of the camera's first frame: above 0 where a player before this one has published
+  int64_t floor_stamp_ns_ = 0;  ///< of the newest frame of a player before this one
+  int64_t shift_ns_ = 0;        ///< from this host's time to the session's
+  std::string away_;            ///< why the camera is; empty while it is there
+  Frame frame_;                 ///< the newest one published
   int64_t published_ = 0;
   bool ending_ = false, stopped_ = false;
   EndOfPlay end_;

@@ -14,6 +14,7 @@ namespace {
 struct Store {
   std::deque<LiveFrame> frames;
   bool ended = false;
+  std::string away;
 };
 
 class FakeCamera : public LiveSource {
@@ -28,6 +29,7 @@ class FakeCamera : public LiveSource {
   }
   bool ended() const override { return store_->ended && store_->frames.empty(); }
   int64_t dropped() const override { return 3; }
+  std::string away() const override { return store_->away; }
 
  private:
   Store* store_;
@@ -43,11 +45,13 @@ LiveFrame Picture(uint32_t index, int64_t stamp_ns) {
 class LiveNodeTest : public testing::Test {
  protected:
   LiveNodeTest() : player_port_(bus_.AddPort()), ear_(bus_.AddPort()) {
-    for (const char* channel : {channels::kFrame, channels::kCameraInfo, channels::kEndOfSequence})
+    for (const char* channel :
+         {channels::kFrame, channels::kCameraInfo, channels::kEndOfSequence, channels::kPlayerStatus})
       ear_.Subscribe(channel);
     ear_.SetHandler([this](const std::string& channel, std::span<const uint8_t> bytes) {
       if (channel == channels::kFrame) frames_.push_back(*wire::Decode<Frame>(bytes));
       if (channel == channels::kCameraInfo) infos_.push_back(*wire::Decode<CameraInfo>(bytes));
+      if (channel == channels::kPlayerStatus) status_ = *wire::Decode<PlayerStatus>(bytes);
       if (channel == channels::kEndOfSequence) ends_.push_back(*wire::Decode<EndOfSequence>(bytes));
     });
   }
@@ -56,6 +60,7 @@ class LiveNodeTest : public testing::Test {
     context.bus = &player_port_;
     context.now_ns = [this] { return now_ns_; };
     context.wall_us = [this] { return now_ns_ / 1000; };
+    context.fresh_system = true;
     PlayerOptions options;
     options.sequence = "rtsp://user:secret@robot/stream";
     options.session = 9;
@@ -86,6 +91,7 @@ class LiveNodeTest : public testing::Test {
   std::vector<Frame> frames_;
   std::vector<CameraInfo> infos_;
   std::vector<EndOfSequence> ends_;
+  PlayerStatus status_;
 };
 
 TEST_F(LiveNodeTest, PublishesWhatComesUntilEnoughAndThenItsEnd) {
@@ -165,6 +171,37 @@ TEST_F(LiveNodeTest, StartedAgainItGoesOnBehindTheFramesBefore) {
   Advance(node);
   ASSERT_EQ(frames_.size(), 1u);
   EXPECT_EQ(frames_[0].frame_index, 42u);
+}
+
+TEST_F(LiveNodeTest, StartedAgainOnAClockThatIsBehindItDoesNotGoBackInTime) {
+  LiveNode node = Make();
+  Advance(node);
+  Say(FrameDone{9, 41, 60'000'000'000});
+  store_.frames = {Picture(0, 1'000'000'000), Picture(1, 1'100'000'000)};
+  Advance(node);
+  Advance(node);
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_GT(frames_[0].stamp_ns, 60'000'000'000);
+  EXPECT_LT(frames_[0].stamp_ns, 60'100'000'000);
+  EXPECT_EQ(frames_[1].stamp_ns - frames_[0].stamp_ns, 100'000'000)
+      << "what passed between frames stays as it was";
+}
+
+TEST_F(LiveNodeTest, SaysThatTheCameraIsAwayAndWaits) {
+  LiveNode node = Make();
+  store_.frames = {Picture(0, 100)};
+  Advance(node);
+  store_.away = "/dev/video0: delivers no more frames";
+  Advance(node, 2'000'000'000);
+  Advance(node, 2'000'000'000);
+  EXPECT_EQ(status_.head.reason, "the camera is away");
+  EXPECT_TRUE(ends_.empty());
+  EXPECT_FALSE(node.exit_code().has_value());
+  store_.away.clear();
+  store_.frames = {Picture(1, 300)};
+  Advance(node, 2'000'000'000);
+  EXPECT_EQ(frames_.size(), 2u);
+  EXPECT_EQ(status_.head.reason, "");
 }
 
 }  // namespace

@@ -38,6 +38,7 @@ void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::Pla
   *options = a.options;
   options->mode = a.lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
   options->session = node.session == 0 ? 1 : node.session;
+  options->take_over = node.take_over;
   options->local_frames = node.link == dmslam::Link::kLan && !a.remote_frontend;
   options->encoding.encoding = dmslam::ParseFrameEncoding(a.encoding);
   for (const std::string& text : a.black_outs) options->black_outs.push_back(dmslam::ParseBlackOut(text));
@@ -80,6 +81,7 @@ int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options, const 
   context.bus = &output;
   context.now_ns = [&output] { return output.now_ns(); };
   context.wall_us = [&output] { return output.now_ns() / 1000; };
+  context.fresh_system = true;
   dmslam::PlayerNode node(std::move(context), options, std::move(source));
   while (!node.exit_code() && !output.ended()) {
     node.Advance();

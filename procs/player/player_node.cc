@@ -72,20 +72,36 @@ PlayerOptions::Jump ParseJump(const std::string& text) {
 }
 
 PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_ptr<FrameSource> source)
-    : context_(std::move(context)), options_(std::move(options)), source_(std::move(source)) {
+    : context_(std::move(context)),
+      options_(std::move(options)),
+      source_(std::move(source)),
+      endpoint_(context_.bus, context_.now_ns),
+      office_(context_, options_.session, options_.take_over, &endpoint_) {
   order_ = OrderOfPlay(options_, source_->size(), &jumped_);
   if (order_.empty()) {
     throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
                      " leaves no frame of " + std::to_string(source_->size()));
   }
   ground_truth_ = source_->GroundTruth();
-  context_.bus->Subscribe(channels::kFrameDone);
-  context_.bus->Subscribe(channels::kSequenceDone);
-  context_.bus->Subscribe(channels::kMapperStatus);
-  context_.bus->Subscribe(channels::kFrontendStatus);
-  context_.bus->SetHandler(
+  endpoint_.SetOtherHandler(
+      {channels::kFrameDone, channels::kSequenceDone, channels::kMapperStatus, channels::kFrontendStatus},
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
-  start_ns_ = context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
+}
+
+/// Whether nobody else plays this session. The first time that is certain the sequence begins.
+bool PlayerNode::MayPlay() {
+  office_.Advance();
+  if (office_.exit_code()) {
+    exit_code_ = office_.exit_code();
+    problem_ = office_.problem();
+    return false;
+  }
+  if (office_.held() && !playing_) {
+    playing_ = true;
+    if (position_ > 0) LogInfo("player: others have {} frames already; goes on behind them", position_);
+    start_ns_ += context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
+  }
+  return playing_;
 }
 
 template <typename Message>
@@ -118,7 +134,7 @@ void PlayerNode::OnSequenceDone(const SequenceDone& done) {
 
 void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session) return;
-  if (published_ > 0 && done.frame_index > frame_.frame_index) {
+  if ((published_ > 0 || !playing_) && done.frame_index >= frame_.frame_index + (playing_ ? 1 : 0)) {
     SkipBehind(done.frame_index);
   } else if (awaiting_done_ && done.frame_index == frame_.frame_index) {
     awaiting_done_ = false;
@@ -128,11 +144,11 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
 /// The frontend is further than this player, which was started again: goes on where the one before was.
 void PlayerNode::SkipBehind(uint32_t frame_index) {
   const auto next = std::upper_bound(order_.begin(), order_.end(), size_t{frame_index});
-  LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
+  if (playing_) LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
   position_ = static_cast<size_t>(next - order_.begin());
   published_ = static_cast<int64_t>(position_);
   awaiting_done_ = false;
-  if (position_ < order_.size()) start_ns_ += context_.now_ns() - DueNs(position_);
+  if (position_ < order_.size()) start_ns_ += (playing_ ? context_.now_ns() : 0) - DueNs(position_);
 }
 
 void PlayerNode::PublishCameraInfo() {
@@ -253,7 +269,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
 
 void PlayerNode::Advance() {
   const int64_t now = context_.now_ns();
-  if (exit_code_) return;
+  if (exit_code_ || !MayPlay()) return;
   if (now >= next_info_ns_) {
     next_info_ns_ = now + kInfoEveryNs;
     PublishCameraInfo();
@@ -275,7 +291,8 @@ void PlayerNode::Advance() {
 }
 
 int64_t PlayerNode::deadline_ns() const {
-  int64_t deadline = std::min(next_info_ns_, next_status_ns_);
+  if (!playing_) return endpoint_.deadline_ns();
+  int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
   if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
   if (position_ < order_.size()) return std::min(deadline, DueNs(position_));
   return std::min(deadline, end_.due_ns());

@@ -14,6 +14,7 @@
 #include "dmslam/wire/codec.h"
 #include "player/end_of_play.h"
 #include "player/frame_encoding.h"
+#include "player/player_office.h"
 
 namespace dmslam {
 
@@ -22,6 +23,7 @@ struct PlayerOptions {
   std::string sequence;  ///< path of what is played; its last part names it
   Camera camera;
   uint32_t session = 1;
+  bool take_over = false;  ///< asks a present player of the session to leave
   PlaybackMode mode = PlaybackMode::kRealtime;
   double speed = 1.0;        ///< factor on the recorded rate; 0: as fast as possible
   size_t start = 0;          ///< first frame
@@ -60,6 +62,7 @@ class PlayerNode : public Node {
   size_t total() const { return order_.size(); }
 
  private:
+  bool MayPlay();
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnFrameDone(const FrameDone& done);
   void OnSequenceDone(const SequenceDone& done);
@@ -79,6 +82,8 @@ class PlayerNode : public Node {
   NodeContext context_;
   PlayerOptions options_;
   std::unique_ptr<FrameSource> source_;
+  Endpoint endpoint_;
+  PlayerOffice office_;
   std::vector<StampedPose> ground_truth_;
   std::vector<size_t> order_;  ///< indices into the source, in order of play
   size_t jumped_ = 0, black_ = 0, unreadable_ = 0;
@@ -87,6 +92,7 @@ class PlayerNode : public Node {
   SharedBytes frame_bytes_;
   bool awaiting_done_ = false;  ///< lock-step
   EndOfPlay end_;
+  bool playing_ = false;  ///< the office is held: nobody else plays this session
   int64_t start_ns_ = 0;  ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
   int64_t published_ = 0, repeats_ = 0;

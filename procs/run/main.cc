@@ -185,7 +185,7 @@ int RunWith(const dmslam::RunArguments& arguments) {
   dmslam::CheckRunArguments(arguments);
   dmslam::Supervisor::Options options;
   options.watchdog_ns = static_cast<int64_t>(arguments.watchdog_s * 1e9);
-  options.wait_for_bus = arguments.wait_for_bus;
+  options.wait_for_what_may_come = arguments.wait;
   Run run(arguments, PlaceOf(arguments), options);
   return run.Play();
 }

@@ -105,8 +105,8 @@ void DeclareRunArguments(CommandLine& line, RunArguments& a) {
                  "watches")
       .NonNegative()
       .ShowDefault();
-  line.AddFlag("--wait-for-network", a.wait_for_bus,
-               "where there is no multicast route yet, try again until there is one");
+  line.AddFlag("--wait", a.wait,
+               "where there is no multicast route or no camera yet, try again until there is one");
   line.AddOption("--build-dir", a.programs,
                  "folder whose bin has the programs; default: those beside this one");
 }

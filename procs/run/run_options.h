@@ -17,7 +17,7 @@ struct RunArguments {
   std::vector<std::string> sets, black_outs, jumps;
   double speed = 1, fps = 0, watchdog_s = 60;
   bool localize = false, lockstep = false, no_loop = false, viewer = false, record = false,
-       share_port = false, no_restart = false, wait_for_bus = false;
+       share_port = false, no_restart = false, wait = false;
 };
 
 /// Declares the options on `line`; the arguments must outlive it.

@@ -201,18 +201,18 @@ std::optional<int64_t> Supervisor::DelayBeforeRestart(Child* child, int code) {
   if (!short_life) {
     child->lived = true;
     child->short_lives = 0;
-    child->bus_gone_ns = 0;
+    child->missing_since_ns = 0;
   }
   ++child->short_lives;
   const int doubled = std::clamp(child->short_lives - 2, 0, 20);
   const int64_t delay =
       child->short_lives < 2 ? 0 : std::min(options_.longest_delay_ns, options_.first_delay_ns << doubled);
-  if (code != kExitNoBus) {
+  if (code != kExitNotYet) {
     return child->short_lives <= options_.most_short_lives ? std::optional(delay) : std::nullopt;
   }
-  if (child->bus_gone_ns == 0) child->bus_gone_ns = now;
-  const bool patience =
-      options_.wait_for_bus || (child->lived && now - child->bus_gone_ns < options_.bus_patience_ns);
+  if (child->missing_since_ns == 0) child->missing_since_ns = now;
+  const bool patience = options_.wait_for_what_may_come ||
+                        (child->lived && now - child->missing_since_ns < options_.patience_ns);
   return patience ? std::optional(std::max(delay, options_.first_delay_ns)) : std::nullopt;
 }
 

@@ -54,10 +54,11 @@ class Supervisor {
     int most_short_lives = 8;               ///< in a row; then it is past help
     int64_t first_delay_ns = 200'000'000;   ///< before the second start in a row; doubles with each
     int64_t longest_delay_ns = 5'000'000'000;
-    int64_t bus_patience_ns = 60'000'000'000;  ///< for so long the bus may be gone; never at the first start
-    bool wait_for_bus = false;                 ///< ... for ever, and at the first start too
-    int64_t watchdog_ns = 0;                   ///< who says nothing for so long hangs; 0: nobody is asked
-    int64_t stop_ns = 10'000'000'000;          ///< who does not end when asked to is killed after so long
+    int64_t patience_ns =
+        60'000'000'000;                   ///< bus or camera may be gone for so long; never at the first start
+    bool wait_for_what_may_come = false;  ///< ... for ever, and at the first start too
+    int64_t watchdog_ns = 0;              ///< who says nothing for so long hangs; 0: nobody is asked
+    int64_t stop_ns = 10'000'000'000;     ///< who does not end when asked to is killed after so long
   };
 
   explicit Supervisor(Options options);
@@ -85,11 +86,11 @@ class Supervisor {
  private:
   struct Child {
     ChildSpec spec;
-    pid_t pid = 0;               // 0: not alive
-    int64_t began_ns = 0;        // its newest life
-    int64_t due_ns = INT64_MAX;  // when it is started again
-    int64_t heard_ns = 0;        // when it last said that it is alive; 0: never
-    int64_t bus_gone_ns = 0;     // since when the bus cannot be had; 0: it can
+    pid_t pid = 0;                 // 0: not alive
+    int64_t began_ns = 0;          // its newest life
+    int64_t due_ns = INT64_MAX;    // when it is started again
+    int64_t heard_ns = 0;          // when it last said that it is alive; 0: never
+    int64_t missing_since_ns = 0;  // since when bus or camera cannot be had; 0: they can
     int restarts = 0, short_lives = 0, last_code = 0;
     bool lived = false;  // long enough to be worth patience
     bool hung = false;

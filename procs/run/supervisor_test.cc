@@ -112,7 +112,7 @@ TEST(SupervisorTest, StartsAgainWhatIsWorthIt) {
 
 TEST(SupervisorTest, WaitsForTheBusWhereItIsToldTo) {
   Supervisor::Options options = Eager();
-  options.wait_for_bus = true;
+  options.wait_for_what_may_come = true;
   Supervisor supervisor(options);
   supervisor.Start(Shell("child", "exit 7"));
   for (int i = 0; i < 20; ++i) EXPECT_EQ(supervisor.Wait().kind, Kind::kRestarted);
@@ -121,7 +121,7 @@ TEST(SupervisorTest, WaitsForTheBusWhereItIsToldTo) {
 TEST(SupervisorTest, WhoHasLivedIsWorthPatienceWithTheBus) {
   Supervisor::Options options = Eager();
   options.short_life_ns = 50'000'000;
-  options.bus_patience_ns = 300'000'000;
+  options.patience_ns = 300'000'000;
   Supervisor supervisor(options);
   const std::string first = testing::TempDir() + "/dmslam_lived_" + std::to_string(getpid());
   supervisor.Start(Shell("child", "[ -e " + first + " ] && exit 7; touch " + first + "; sleep 0.1; exit 7"));

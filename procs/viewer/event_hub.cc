@@ -1,6 +1,11 @@
 #include "viewer/event_hub.h"
 
+#include <sys/eventfd.h>
+#include <unistd.h>
+
 #include <algorithm>
+
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -8,6 +13,17 @@ namespace {
 constexpr std::array<const char*, kNumEventKinds> kNames = {"status", "pose", "features", "map", "playback"};
 
 }  // namespace
+
+EventHub::EventHub() : fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  DMSLAM_CHECK(fd_ >= 0, "eventfd is part of every Linux");
+}
+
+EventHub::~EventHub() { close(fd_); }
+
+void EventHub::ClearFd() {
+  eventfd_t count = 0;
+  eventfd_read(fd_, &count);
+}
 
 std::string EventHub::Listener::Next(std::chrono::milliseconds wait) {
   std::unique_lock lock(mutex_);
@@ -63,6 +79,7 @@ void EventHub::Send(EventKind kind, const std::string& json) {
   const std::lock_guard lock(mutex_);
   newest_[index] = text;
   for (const auto& listener : listeners_) Put(listener.get(), index, text);
+  eventfd_write(fd_, 1);
 }
 
 void EventHub::Close() {

@@ -36,6 +36,15 @@ class EventHub {
     bool closed_ = false;
   };
 
+  EventHub();
+  ~EventHub();
+  EventHub(const EventHub&) = delete;
+  EventHub& operator=(const EventHub&) = delete;
+
+  /// Can be read when something was sent since ClearFd.
+  int fd() const { return fd_; }
+  void ClearFd();
+
   /// A new listener, who first gets the newest event of each kind. None when closed or when there are
   /// `kMostListeners`.
   std::shared_ptr<Listener> Join();
@@ -54,6 +63,7 @@ class EventHub {
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Listener>> listeners_;
   std::array<std::shared_ptr<const std::string>, kNumEventKinds> newest_;
+  int fd_;
   int64_t skipped_by_former_ = 0;
   bool closed_ = false;
 };

@@ -70,4 +70,14 @@ std::shared_ptr<ServedImage> Exchange::FindImage(std::optional<uint32_t> frame_i
   return images_.empty() ? nullptr : images_.back();
 }
 
+void Exchange::SetHealth(HealthText health) {
+  const std::lock_guard lock(mutex_);
+  health_ = std::move(health);
+}
+
+HealthText Exchange::Health() const {
+  const std::lock_guard lock(mutex_);
+  return health_;
+}
+
 }  // namespace dmslam

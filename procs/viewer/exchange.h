@@ -12,6 +12,7 @@
 #include "dmslam/wire/player_messages.h"
 #include "viewer/event_hub.h"
 #include "viewer/frame_series.h"
+#include "viewer/health_text.h"
 #include "viewer/scene.h"
 
 namespace dmslam {
@@ -47,12 +48,17 @@ class Exchange {
   /// The image of that frame; the newest one where it is not (or no longer) there. Null: none yet.
   std::shared_ptr<ServedImage> FindImage(std::optional<uint32_t> frame_index) const;
 
+  /// How the system fares, for machines.
+  void SetHealth(HealthText health);
+  HealthText Health() const;
+
   EventHub& hub() { return hub_; }
 
  private:
   mutable std::mutex mutex_;
   Scene scene_;
   FrameSeries series_;
+  HealthText health_;
   std::deque<std::shared_ptr<ServedImage>> images_;
   EventHub hub_;
 };

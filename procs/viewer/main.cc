@@ -59,6 +59,13 @@ int main(int argc, char** argv) {
   app.AddOption(
       "--http", http,
       "HOST:PORT to serve on, port 0: any that is free; default: 127.0.0.1:8080, or any where that is taken");
+  app.AddOption(
+      "--http-token", web.token,
+      "ask every browser for this word (?token=WORD); default: a random one where HOST can be reached from "
+      "elsewhere, else none");
+  app.AddOption(
+      "--http-name", web.names,
+      "serve requests for this host name too; default: localhost and literal addresses. May be repeated");
   app.AddOption("--log", log, "show this log of lcm-logger instead of a running system");
   app.AddOption("--ground-truth", viewer.ground_truth,
                 "trajectory in TUM format; default: what the player says");

@@ -238,6 +238,7 @@ void ViewerNode::ReportIfDue() {
   board_.OnSign("viewer", now);
   board_.Advance(now, context_.wall_us());
   exchange_->hub().Send(EventKind::kStatus, StatusJson());
+  exchange_->SetHealth(WriteHealth(board_, frontend_, mapper_));
 }
 
 void ViewerNode::PublishStatus() {

@@ -1,23 +1,20 @@
 #include "viewer/web_server.h"
 
-#include <httplib.h>
-#include <sys/socket.h>
-
 #include <charconv>
+#include <cstdio>
 #include <filesystem>
-#include <future>
 #include <map>
-#include <thread>
+#include <optional>
+#include <random>
 #include <utility>
 
 #include "dmslam/dataset/image.h"
 #include "dmslam/util/check.h"
+#include "viewer/http_server.h"
 
 namespace dmslam {
 namespace {
 
-constexpr size_t kThreads = EventHub::kMostListeners + 32;  // a listener keeps one busy
-constexpr std::chrono::milliseconds kKeepAlive{1000};
 constexpr int64_t kMostSeries = 4000;
 
 struct File {
@@ -68,12 +65,34 @@ std::map<std::string, File> LoadFiles(const WebServerOptions& options) {
 
 /// A number in the address's query; none where it is missing or no number.
 template <typename Number>
-std::optional<Number> Query(const httplib::Request& request, const std::string& name) {
-  const std::string text = request.get_param_value(name);
+std::optional<Number> Query(const HttpRequest& request, const std::string& name) {
+  const auto it = request.query.find(name);
+  if (it == request.query.end()) return std::nullopt;
+  const std::string& text = it->second;
   Number value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+HttpResponse Content(std::string type, std::string body) {
+  HttpResponse response;
+  response.type = std::move(type);
+  response.body = std::move(body);
+  return response;
+}
+
+HttpResponse Status(int status) {
+  HttpResponse response;
+  response.status = status;
+  return response;
+}
+
+std::string RandomToken() {
+  std::random_device device;
+  char text[33];
+  std::snprintf(text, sizeof(text), "%08x%08x%08x%08x", device(), device(), device(), device());
+  return text;
 }
 
 }  // namespace
@@ -94,123 +113,108 @@ void ParseHttpAddress(const std::string& text, WebServerOptions* options) {
 
 struct WebServer::Impl {
   Impl(Exchange* the_exchange, PlaybackControl* the_control) : exchange(the_exchange), control(the_control) {}
-  void Route();
-  void ServeScene(const httplib::Request& request, httplib::Response& response) const;
-  void ServeImage(const httplib::Request& request, httplib::Response& response) const;
-  void ServeEvents(httplib::Response& response) const;
+  HttpResponse Handle(const HttpRequest& request) const;
+  HttpResponse Serve(const HttpRequest& request) const;
+  HttpResponse ServeScene(const HttpRequest& request) const;
+  HttpResponse ServeImage(const HttpRequest& request) const;
+  HttpResponse TakeWish(const HttpRequest& request) const;
 
   Exchange* exchange;
   PlaybackControl* control;
   std::map<std::string, File> files;
-  httplib::Server server;
-  std::thread thread;
+  HttpGate gate;
+  std::unique_ptr<HttpServer> server;
 };
 
-void WebServer::Impl::Route() {
-  for (const auto& item : files) {
-    const File& file = item.second;
-    std::string pattern;
-    for (const char c : item.first) pattern += c == '.' ? std::string("\\.") : std::string(1, c);
-    server.Get(pattern, [&file](const httplib::Request&, httplib::Response& response) {
-      response.set_content(file.content, file.type);
-    });
-  }
-  server.Get("/api/map", [this](const auto& request, auto& response) { ServeScene(request, response); });
-  server.Get("/api/frame\\.jpg",
-             [this](const auto& request, auto& response) { ServeImage(request, response); });
-  server.Get("/api/series", [this](const auto& request, auto& response) {
-    response.set_content(exchange->SeriesJson(Query<int64_t>(request, "since").value_or(0), kMostSeries),
-                         "application/json");
-  });
-  server.Get("/api/events", [this](const auto&, auto& response) { ServeEvents(response); });
-  if (control == nullptr) return;
-  server.Post("/api/playback", [this](const auto& request, auto& response) {
-    PlaybackWish wish{Query<double>(request, "position"), std::nullopt, Query<double>(request, "speed")};
-    if (const auto playing = Query<int>(request, "playing")) wish.playing = *playing != 0;
-    control->Wish(wish);
-    response.status = 204;
-  });
+HttpResponse WebServer::Impl::Handle(const HttpRequest& request) const {
+  const int refusal = gate.Refusal(request);
+  HttpResponse response = refusal != 0 ? Status(refusal) : Serve(request);
+  response.headers.insert(response.headers.end(),
+                          {{"Cache-Control", "no-store"},
+                           {"X-Content-Type-Options", "nosniff"},
+                           {"X-Frame-Options", "DENY"},
+                           {"Referrer-Policy", "no-referrer"},
+                           {"Cross-Origin-Resource-Policy", "same-origin"},
+                           {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:"}});
+  if (refusal == 0 && gate.BringsToken(request))
+    response.headers.emplace_back("Set-Cookie",
+                                  "dmslam_token=" + gate.token + "; HttpOnly; SameSite=Strict; Path=/");
+  return response;
 }
 
-void WebServer::Impl::ServeScene(const httplib::Request& request, httplib::Response& response) const {
+HttpResponse WebServer::Impl::Serve(const HttpRequest& request) const {
+  if (request.method == "POST") return TakeWish(request);
+  if (request.method != "GET" && request.method != "HEAD") return Status(405);
+  if (const auto file = files.find(request.path); file != files.end())
+    return Content(file->second.type, file->second.content);
+  if (request.path == "/api/map") return ServeScene(request);
+  if (request.path == "/api/frame.jpg") return ServeImage(request);
+  if (request.path == "/api/series") {
+    const int64_t since = Query<int64_t>(request, "since").value_or(0);
+    return Content("application/json", exchange->SeriesJson(since, kMostSeries));
+  }
+  if (request.path == "/metrics")
+    return Content("text/plain; version=0.0.4; charset=utf-8", exchange->Health().prometheus);
+  if (request.path == "/healthz") {
+    const HealthText health = exchange->Health();
+    HttpResponse response = Content("application/json", health.json);
+    response.status = health.well ? 200 : 503;
+    return response;
+  }
+  if (request.path != "/api/events") return Status(404);
+  HttpResponse response = Content("text/event-stream", "");
+  response.events = true;
+  return response;
+}
+
+HttpResponse WebServer::Impl::TakeWish(const HttpRequest& request) const {
+  if (control == nullptr || request.path != "/api/playback") return Status(404);
+  PlaybackWish wish{Query<double>(request, "position"), std::nullopt, Query<double>(request, "speed")};
+  if (const auto playing = Query<int>(request, "playing")) wish.playing = *playing != 0;
+  control->Wish(wish);
+  return Status(204);
+}
+
+HttpResponse WebServer::Impl::ServeScene(const HttpRequest& request) const {
   const auto generation = Query<uint32_t>(request, "generation").value_or(0);
   const std::vector<uint8_t> bytes =
       exchange->EncodeScene(generation, Query<uint64_t>(request, "since").value_or(0));
-  response.set_content(std::string(bytes.begin(), bytes.end()), "application/octet-stream");
+  return Content("application/octet-stream", std::string(bytes.begin(), bytes.end()));
 }
 
-void WebServer::Impl::ServeImage(const httplib::Request& request, httplib::Response& response) const {
+HttpResponse WebServer::Impl::ServeImage(const HttpRequest& request) const {
   const std::shared_ptr<ServedImage> image = exchange->FindImage(Query<uint32_t>(request, "frame"));
-  if (!image || image->Jpeg().empty()) {
-    response.status = 204;
-    return;
-  }
+  if (!image || image->Jpeg().empty()) return Status(204);
   const std::vector<uint8_t>& jpeg = image->Jpeg();
-  response.set_header("X-Frame-Index", std::to_string(image->frame_index()));
-  response.set_content(std::string(jpeg.begin(), jpeg.end()), "image/jpeg");
-}
-
-/// The one request that lasts. A browser that does not read blocks its own thread, until the write times out.
-void WebServer::Impl::ServeEvents(httplib::Response& response) const {
-  EventHub* hub = &exchange->hub();
-  const std::shared_ptr<EventHub::Listener> listener = hub->Join();
-  if (!listener) {
-    response.status = 503;
-    return;
-  }
-  response.set_chunked_content_provider(
-      "text/event-stream",
-      [listener](size_t, httplib::DataSink& sink) {
-        const std::string text = listener->Next(kKeepAlive);
-        return !text.empty() && sink.write(text.data(), text.size());
-      },
-      [hub, listener](bool) { hub->Leave(listener); });
+  HttpResponse response = Content("image/jpeg", std::string(jpeg.begin(), jpeg.end()));
+  response.headers.emplace_back("X-Frame-Index", std::to_string(image->frame_index()));
+  return response;
 }
 
 WebServer::WebServer(WebServerOptions options, Exchange* exchange, PlaybackControl* control)
     : impl_(std::make_unique<Impl>(exchange, control)) {
   impl_->files = LoadFiles(options);
-  httplib::Server& server = impl_->server;
-  std::promise<void> serving;  // only then can it be stopped
-  server.new_task_queue = [&serving] {
-    serving.set_value();
-    return new httplib::ThreadPool(kThreads);
-  };
-  server.set_socket_options(
-      [](socket_t socket) {  // not SO_REUSEPORT: two viewers must not share a port unseen
-        const int yes = 1;
-        setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
-      });
-  server.set_tcp_nodelay(true);
-  server.set_keep_alive_max_count(10000);
-  server.set_keep_alive_timeout(3);
-  server.set_write_timeout(10);
-  server.set_payload_max_length(4096);
-  server.set_default_headers({{"Cache-Control", "no-store"},
-                              {"X-Content-Type-Options", "nosniff"},
-                              {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:"}});
-  impl_->Route();
-  bool bound = options.port > 0 && server.bind_to_port(options.host, options.port);
-  if (!bound && (options.port == 0 || options.or_any_port)) {
-    const int port = server.bind_to_any_port(options.host);
-    bound = port > 0;
-    if (bound) options.port = port;
+  if (options.token.empty() && !IsLoopback(options.host)) options.token = RandomToken();
+  impl_->gate.token = options.token;
+  impl_->gate.names.insert(options.names.begin(), options.names.end());
+  HttpServer::Options http;
+  http.host = options.host;
+  http.port = options.port;
+  const auto handle = [impl = impl_.get()](const HttpRequest& request) { return impl->Handle(request); };
+  try {
+    impl_->server = std::make_unique<HttpServer>(http, &exchange->hub(), handle);
+  } catch (const InputError&) {
+    if (options.port == 0 || !options.or_any_port) throw;
+    http.port = 0;
+    impl_->server = std::make_unique<HttpServer>(http, &exchange->hub(), handle);
   }
   const std::string host =
       options.host.find(':') == std::string::npos ? options.host : "[" + options.host + "]";
-  if (!bound) {
-    throw InputError("--http " + host + ":" + std::to_string(options.port) +
-                     ": the address is taken, or not of this machine; choose another");
-  }
-  address_ = "http://" + host + ":" + std::to_string(options.port) + "/";
-  impl_->thread = std::thread([this] { impl_->server.listen_after_bind(); });
-  serving.get_future().wait();
+  address_ = "http://" + host + ":" + std::to_string(impl_->server->port()) + "/";
+  if (!options.token.empty()) address_ += "?token=" + options.token;
+  impl_->server->Begin();
 }
 
-WebServer::~WebServer() {
-  impl_->exchange->hub().Close();
-  impl_->server.stop();
-  impl_->thread.join();
-}
+WebServer::~WebServer() { impl_->exchange->hub().Close(); }
 
 }  // namespace dmslam

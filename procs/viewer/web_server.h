@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "viewer/exchange.h"
 #include "viewer/playback_control.h"
@@ -13,16 +14,18 @@ struct WebServerOptions {
   std::string host = "127.0.0.1";
   int port = 8080;          ///< 0: any that is free
   bool or_any_port = true;  ///< takes any free port where that one is taken
-  std::string web_dir;      ///< the page
-  std::string three_dir;    ///< three.js, as Debian's libjs-three lays it out
-  std::string chart_dir;    ///< Chart.js, as Debian's libjs-chart.js lays it out
+  std::string token;  ///< asked of every browser; empty: one is made where others than this host can come
+  std::vector<std::string> names;  ///< by which this host is called, besides localhost and its addresses
+  std::string web_dir;             ///< the page
+  std::string three_dir;           ///< three.js, as Debian's libjs-three lays it out
+  std::string chart_dir;           ///< Chart.js, as Debian's libjs-chart.js lays it out
 };
 
 /// "HOST:PORT", also "[::1]:8080". Throws InputError.
 void ParseHttpAddress(const std::string& text, WebServerOptions* options);
 
-/// Serves the page, the map and the events over HTTP, in threads of its own that touch nothing but the
-/// exchange.
+/// Serves the page, the map and the events over HTTP, in a thread of its own that touches nothing but the
+/// exchange. Where others than this host can come, who comes must bring a token.
 class WebServer {
  public:
   /// Binds and begins to serve. Throws InputError that names what is missing and the cure.
@@ -30,7 +33,7 @@ class WebServer {
   WebServer(WebServerOptions options, Exchange* exchange, PlaybackControl* control = nullptr);
   ~WebServer();
 
-  /// "http://127.0.0.1:8080/"
+  /// "http://127.0.0.1:8080/", with the token behind it where one is asked for.
   const std::string& address() const { return address_; }
 
  private:

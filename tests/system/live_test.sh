@@ -7,12 +7,18 @@ ip link set lo up
 python3 - "$synthetic/rgb" >"$work/port" 2>"$work/server.log" <<'EOF' &
 import http.server, pathlib, sys, time
 images = [p.read_bytes() for p in sorted(pathlib.Path(sys.argv[1]).glob("*.jpg"))]
+asked = 0  # how often somebody wanted the flickering camera
 class Camera(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
+        global asked
+        flickers = self.path == "/flickers.mjpg"
+        asked += flickers
+        if flickers and asked in (2, 3):  # it is away
+            return self.send_error(503)
         self.send_response(200)
         self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
         self.end_headers()
-        for i in range(100000):  # there and back
+        for i in range(20 if flickers and asked == 1 else 100000):  # there and back
             image = images[i % (2 * len(images)) if i % (2 * len(images)) < len(images) else -1 - i % len(images)]
             self.wfile.write(b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n%s\r\n" % (len(image), image))
             time.sleep(1 / 15)
@@ -47,5 +53,13 @@ wait $running || status=$?
 no_orphans "the run"
 expect "frames were published" "$work/live" frames ">= 5"
 expect "frames were worked on" "$work/live" frames_processed ">= 5"
+
+# A camera that goes away for a while.
+run --video "http://127.0.0.1:$(<"$work/port")/flickers.mjpg" --camera "$camera" --frames 40 --out "$work/away" >"$work/said" 2>&1 ||
+  (($? == 6)) || failed "the run with a camera that goes away ended with $?: $(tail -n 3 "$work/said")"
+no_orphans "the run with a camera that goes away"
+check "it says that the camera is away" grep -q "it is looked for until it is back" "$work/away/log/player.log"
+check "it says that the camera is back" grep -q "the camera is back" "$work/away/log/player.log"
+expect "it goes on" "$work/away" frames "== 40"
 kill $server
 finish

@@ -1,7 +1,7 @@
 # The viewer in a headless Chromium: a run is drawn, counters move, who is killed is seen as down and then as back.
 source "$(dirname "$0")/lib.sh"
 skip() { echo "SKIPPED: $*"; exit $SKIPPED; }
-[[ -x $build/bin/dmslam-viewer ]] || skip "dmslam-viewer was not built: cpp-httplib is missing (scripts/setup.sh viewer)"
+[[ -x $build/bin/dmslam-viewer ]] || skip "dmslam-viewer was not built"
 command -v chromium >/dev/null || skip "chromium is missing (scripts/setup.sh browser)"
 /usr/bin/python3 -c 'import websocket' 2>/dev/null || skip "python3-websocket is missing (scripts/setup.sh browser)"
 multicast

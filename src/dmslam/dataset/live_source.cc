@@ -1,7 +1,9 @@
 #include "dmslam/dataset/live_source.h"
 
 #include "dmslam/dataset/bgr_frame.h"
+#include "dmslam/dataset/joined_clock.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/not_yet_error.h"
 
 namespace dmslam {
 
@@ -27,18 +29,19 @@ bool IsLive(const std::string& path) {
 namespace dmslam {
 namespace {
 
-int64_t WallNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
+constexpr int64_t kFirstPauseMs = 200, kLongestPauseMs = 5000;
+
+template <typename Clock>
+int64_t Now() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count();
 }
 
 cv::VideoCapture OpenCapture(const std::string& path, const Camera& camera) {
   cv::VideoCapture capture;
   if (!capture.open(path, path.starts_with("/dev/") ? cv::CAP_V4L2 : cv::CAP_ANY)) {
-    throw InputError(path +
-                     ": cannot be opened as a camera; check that it is there, that no other program "
-                     "uses it and that you may read it (group video)");
+    throw NotYetError(path +
+                      ": cannot be opened as a camera; check that it is there, that no other program "
+                      "uses it and that you may read it (group video)");
   }
   capture.set(cv::CAP_PROP_FRAME_WIDTH, camera.width_px);
   capture.set(cv::CAP_PROP_FRAME_HEIGHT, camera.height_px);
@@ -49,7 +52,7 @@ cv::VideoCapture OpenCapture(const std::string& path, const Camera& camera) {
 
 /// Throws InputError unless the frame is as the camera file says.
 void CheckFrame(const cv::Mat& frame, const std::string& path, const Camera& camera) {
-  if (frame.empty()) throw InputError(path + ": delivers no image; is the camera working?");
+  if (frame.empty()) throw NotYetError(path + ": delivers no image; is the camera working?");
   if (frame.cols == camera.width_px && frame.rows == camera.height_px && frame.type() == CV_8UC3) return;
   throw InputError(path + ": delivers images of " + std::to_string(frame.cols) + "x" +
                    std::to_string(frame.rows) + " pixels, the camera file says " +
@@ -61,7 +64,11 @@ void CheckFrame(const cv::Mat& frame, const std::string& path, const Camera& cam
 class OpenCvCamera : public LiveSource {
  public:
   OpenCvCamera(const std::string& path, const Camera& camera)
-      : capture_(OpenCapture(path, camera)), event_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+      : path_(path),
+        camera_(camera),
+        clock_(Now<std::chrono::system_clock>(), Now<std::chrono::steady_clock>()),
+        capture_(OpenCapture(path, camera)),
+        event_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
     DMSLAM_CHECK(event_ >= 0, "eventfd is part of every Linux");
     cv::Mat first;
     capture_.read(first);
@@ -87,29 +94,89 @@ class OpenCvCamera : public LiveSource {
     const std::lock_guard lock(mutex_);
     return ended_ && !newest_;
   }
+  std::string away() const override {
+    const std::lock_guard lock(mutex_);
+    return away_;
+  }
   int64_t dropped() const override { return dropped_; }
 
  private:
   void Read() {
     cv::Mat frame;
-    int64_t last_stamp_ns = 0;
     for (uint32_t index = 0; !stop_; ++index) {
       const bool good = capture_.read(frame) && frame.type() == CV_8UC3;
-      const int64_t stamp_ns = std::max(WallNs(), last_stamp_ns + 1);
-      last_stamp_ns = stamp_ns;
-      std::optional<LiveFrame> next;
-      if (good) next = LiveFrame{index, stamp_ns, ToEncoded(frame)};
-      {
-        const std::lock_guard lock(mutex_);
-        if (good && newest_) ++dropped_;
-        if (good) newest_ = std::move(next);
-        ended_ = !good;
+      if (good) {
+        Deliver({index, StampOfNewest(), ToEncoded(frame)});
+      } else if (IsLive(path_)) {
+        Reconnect();
+      } else {
+        return End();
       }
-      const uint64_t one = 1;
-      if (write(event_, &one, sizeof(one)) < 0 || !good) return;
     }
   }
 
+  int64_t StampOfNewest() {
+    const double driver_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
+    return clock_.Stamp(Now<std::chrono::steady_clock>(), static_cast<int64_t>(driver_ms * 1e6));
+  }
+
+  void Deliver(LiveFrame frame) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (newest_) ++dropped_;
+      newest_ = std::move(frame);
+    }
+    Wake();
+  }
+
+  void End() {
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+    }
+    Wake();
+  }
+
+  /// Until the camera is back as it was, or nobody wants it any more.
+  void Reconnect() {
+    std::string why = path_ + ": delivers no more frames";
+    for (int64_t pause_ms = kFirstPauseMs; !stop_; pause_ms = std::min(2 * pause_ms, kLongestPauseMs)) {
+      SetAway(why);
+      Pause(pause_ms);
+      try {
+        capture_ = OpenCapture(path_, camera_);
+        cv::Mat first;
+        capture_.read(first);
+        CheckFrame(first, path_, camera_);
+        return SetAway("");
+      } catch (const std::exception& error) {
+        why = error.what();
+      }
+    }
+  }
+
+  void SetAway(const std::string& why) {
+    {
+      const std::lock_guard lock(mutex_);
+      away_ = why;
+    }
+    Wake();
+  }
+
+  void Pause(int64_t milliseconds) const {
+    constexpr int64_t kStepMs = 50;
+    for (int64_t waited = 0; waited < milliseconds && !stop_; waited += kStepMs)
+      std::this_thread::sleep_for(std::chrono::milliseconds(kStepMs));
+  }
+
+  void Wake() const {
+    const uint64_t one = 1;
+    if (write(event_, &one, sizeof(one)) < 0) return;  // it is awake
+  }
+
+  const std::string path_;
+  const Camera camera_;
+  JoinedClock clock_;  ///< of the thread
   cv::VideoCapture capture_;
   const int event_;
   std::atomic<bool> stop_ = false;
@@ -117,6 +184,7 @@ class OpenCvCamera : public LiveSource {
   mutable std::mutex mutex_;
   std::optional<LiveFrame> newest_;  ///< under mutex_
   bool ended_ = false;               ///< under mutex_
+  std::string away_;                 ///< under mutex_
   std::thread thread_;
 };
 

@@ -13,7 +13,7 @@ namespace dmslam {
 /// One image as a camera delivered it.
 struct LiveFrame {
   uint32_t index = 0;    ///< counts what the camera delivered, taken or not
-  int64_t stamp_ns = 0;  ///< wall time at which it was there, nanoseconds since 1970; rises strictly
+  int64_t stamp_ns = 0;  ///< when it was taken, nanoseconds since 1970 (JoinedClock); rises strictly
   EncodedImage image;
 };
 
@@ -27,6 +27,8 @@ class LiveSource {
   virtual std::optional<LiveFrame> Take() = 0;
   /// No more frames will come, and the last one was taken.
   virtual bool ended() const = 0;
+  /// The camera went away, and is being looked for: why, in a few words; empty while it is there.
+  virtual std::string away() const { return {}; }
   /// How many frames were replaced by a newer one before they were taken.
   virtual int64_t dropped() const = 0;
 };
@@ -36,7 +38,8 @@ class LiveSource {
 bool IsLive(const std::string& path);
 
 /// Opens a camera with OpenCV's videoio and asks it for the size and rate that `camera` states. A thread
-/// reads it. Throws InputError where it cannot be opened, or where it delivers images of another size.
+/// reads it; a camera that goes away is looked for until it is back, at first every 0.2 s and then every 5 s.
+/// Throws NotYetError where it cannot be opened, InputError where it delivers images of another size.
 std::unique_ptr<LiveSource> OpenLive(const std::string& path, const Camera& camera);
 
 }  // namespace dmslam

@@ -7,6 +7,7 @@
 #include <opencv2/videoio.hpp>
 #include <string>
 
+#include "dmslam/dataset/joined_clock.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -31,6 +32,17 @@ TEST(LiveSource, TellsCamerasFromRecordings) {
   EXPECT_TRUE(IsLive("rtsp://robot/stream"));
   EXPECT_FALSE(IsLive("video.avi"));
   EXPECT_FALSE(IsLive("/data/kitchen"));
+}
+
+TEST(JoinedClock, AWallClockThatIsSetChangesNothing) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  JoinedClock clock(1000 * kSecond, 5 * kSecond);
+  EXPECT_EQ(clock.Stamp(6 * kSecond, 0), 1001 * kSecond)
+      << "a driver that says nothing, or counts from elsewhere";
+  EXPECT_EQ(clock.Stamp(8 * kSecond, 7'900'000'000), 1002'900'000'000)
+      << "the driver knows better when it was";
+  EXPECT_EQ(clock.Stamp(8 * kSecond, 9 * kSecond), 1003 * kSecond) << "no frame is from the future";
+  EXPECT_EQ(clock.Stamp(8 * kSecond, 8 * kSecond), 1003 * kSecond + 1) << "stamps rise";
 }
 
 // A file stands for the camera: it delivers as fast as it can be read, and ends.

@@ -9,6 +9,7 @@
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 #include "dmslam/util/time.h"
 
 namespace dmslam {
@@ -91,11 +92,9 @@ std::string FormatPose(const StampedPose& pose) {
 }
 
 void WriteTrajectory(const std::string& path, std::span<const StampedPose> poses) {
-  std::ofstream file(path, std::ios::binary);
-  file << "# timestamp tx ty tz qx qy qz qw\n";
-  for (const StampedPose& pose : poses) file << FormatPose(pose) << '\n';
-  file.flush();
-  if (!file) throw InputError(path + ": cannot be written; check that the folder exists and has space");
+  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
+  for (const StampedPose& pose : poses) text.append(FormatPose(pose)).append("\n");
+  WriteFile(path, text);
 }
 
 }  // namespace dmslam

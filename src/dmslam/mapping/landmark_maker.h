@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dmslam/map/map_editor.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 
@@ -14,9 +15,15 @@ class LandmarkMaker {
  public:
   explicit LandmarkMaker(uint16_t epoch_ordinal) : epoch_ordinal_(epoch_ordinal) {}
 
-  /// The same for a map that others began: ids of an ordinal above all that it knows.
-  void Continue(const Map& map) {
-    epoch_ordinal_ = static_cast<uint16_t>(std::max(map.HighestOrdinal(), epoch_ordinal_) + 1);
+  /// The same for a map that others began: ids of an ordinal above all that it knows. `successor`: a random
+  /// number of the one who continues it: after a network was split there may be two, and their ordinals are
+  /// to differ. It chooses among the next ordinals, of which the fewer there are left the fewer are passed
+  /// over.
+  void Continue(const Map& map, uint64_t successor = 0) {
+    const uint32_t highest = std::max(map.HighestOrdinal(), epoch_ordinal_);
+    DMSLAM_CHECK(highest < kLastOrdinal, "the ordinals of landmarks are used up");
+    const uint32_t choice = std::clamp<uint32_t>((kLastOrdinal - highest) / 64, 1, kMostChoice);
+    epoch_ordinal_ = static_cast<uint16_t>(highest + 1 + successor % choice);
     next_ = 1;
   }
 
@@ -37,6 +44,8 @@ class LandmarkMaker {
   }
 
  private:
+  static constexpr uint32_t kLastOrdinal = 0xffff, kMostChoice = 1021;
+
   uint16_t epoch_ordinal_;
   uint64_t next_ = 1;
 };

@@ -29,9 +29,9 @@ void MapperCore::ContinueSaved(Map map) {
   Continue(std::move(saved));
 }
 
-void MapperCore::Continue(Map map) {
+void MapperCore::Continue(Map map, uint64_t successor) {
   map_ = MapEditor(std::move(map));
-  maker_.Continue(map_);
+  maker_.Continue(map_, successor);
   order_.Assume(map_);
   maybe_unfinished_ = true;
 }

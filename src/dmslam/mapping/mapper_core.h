@@ -54,7 +54,8 @@ class MapperCore {
   /// Continues a map that others kept (after a restart) or that was saved: new landmarks get ids of an
   /// ordinal that the map does not know, and the local mapping of the keyframe that is proposed first is done
   /// again where the map has it: what was done of it is not known.
-  void Continue(Map map);
+  /// `successor`: see LandmarkMaker.
+  void Continue(Map map, uint64_t successor = 0);
   /// The same with a map that was saved: the streams it was made of are not today's.
   void ContinueSaved(Map map);
   /// What of the streams is worked into the map; travels with the next deltas.

@@ -381,6 +381,18 @@ TEST_F(KeyframeStep, AMapperThatContinuesNumbersItsLandmarksAnew) {
   for (const LandmarkId id : core_.map().LandmarkIdsSorted()) EXPECT_EQ(id.epoch_ordinal(), 1);
 }
 
+TEST_F(KeyframeStep, TwoThatContinueTheSameMapNumberTheirLandmarksDifferently) {
+  ASSERT_TRUE(Start());
+  const auto ordinal = [&](uint64_t successor) {
+    MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1, [](const MapDelta&) {});
+    next.Continue(Map(core_.map()), successor);
+    next.OnKeyframe(Frame(2));
+    return next.map().HighestOrdinal();
+  };
+  EXPECT_NE(ordinal(4'611'686'018'427'387'905), ordinal(2'305'843'009'213'693'955));
+  EXPECT_GE(ordinal(4'611'686'018'427'387'905), 2);
+}
+
 TEST_F(KeyframeStep, AFirstMapThatDoesNotHoldIsDroppedWithARecord) {
   InitialMap proposal = FirstMap();
   proposal.points.resize(20);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/not_yet_error.h"
 
 namespace dmslam {
 namespace {
@@ -94,7 +95,7 @@ LcmBus::LcmBus(Options options) : options_(std::move(options)) {
   impl_ = std::make_unique<Impl>(options_.url);
   const auto refuse = [this] {
     const std::string why = "LCM at " + options_.url + " cannot be used: " + CureFor(options_.url);
-    if (IsUdp(options_.url) || IsTcp(options_.url)) throw BusUnavailable(why);
+    if (IsUdp(options_.url) || IsTcp(options_.url)) throw NotYetError(why);
     throw InputError(why);
   };
   if (!impl_->lcm.good()) refuse();
@@ -111,7 +112,7 @@ void LcmBus::Subscribe(const std::string& channel) {
   const std::string pattern = Literally(options_.prefix + channel);
   lcm::Subscription* subscription = impl_->lcm.subscribeFunction(pattern, &Impl::OnMessage, this);
   if (subscription == nullptr || impl_->lcm.getFileno() < 0) {
-    throw BusUnavailable("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));
+    throw NotYetError("LCM at " + options_.url + " does not receive: " + CureFor(options_.url));
   }
   subscription->setQueueCapacity(options_.queue_capacity);
 }
@@ -132,7 +133,7 @@ int LcmBus::Deliver(int max_messages) {
     const int result = impl_->lcm.handleTimeout(0);
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
     if (result == 0) break;
-    if (result < 0) throw BusUnavailable("LCM at " + options_.url + " is lost: " + CureFor(options_.url));
+    if (result < 0) throw NotYetError("LCM at " + options_.url + " is lost: " + CureFor(options_.url));
   }
   return delivered;
 }

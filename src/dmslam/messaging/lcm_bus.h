@@ -5,16 +5,8 @@
 #include <string>
 
 #include "dmslam/messaging/bus.h"
-#include "dmslam/util/check.h"
 
 namespace dmslam {
-
-/// The bus cannot be had now: there is no multicast route yet, or the TCP service is gone. It may be had
-/// later.
-class BusUnavailable : public InputError {
- public:
-  using InputError::InputError;
-};
 
 /// The bus of processes: LCM. Its receiving thread only copies datagrams; handlers run in the thread that
 /// calls Deliver.
@@ -28,7 +20,7 @@ class LcmBus : public Bus {
     int queue_capacity = 10000;  ///< messages per subscription; LCM's own 30 would lose records silently
   };
 
-  /// Throws BusUnavailable that names the URL and the cure when LCM cannot be had: no multicast route, no
+  /// Throws NotYetError that names the URL and the cure when LCM cannot be had: no multicast route, no
   /// server; InputError for a URL of another form.
   explicit LcmBus(Options options);
   ~LcmBus() override;
@@ -40,7 +32,7 @@ class LcmBus : public Bus {
   /// Readable when Deliver has something to do.
   int fd() const;
   /// Hands all that has arrived, up to `max_messages`, to the handler without waiting. What a handler throws
-  /// comes out here, after LCM has returned. Throws BusUnavailable when the connection is gone (tcpq).
+  /// comes out here, after LCM has returned. Throws NotYetError when the connection is gone (tcpq).
   int Deliver(int max_messages = 1000);
 
   /// How large the receive buffer really is, and how to raise it if that is less than was asked for; empty

@@ -82,6 +82,10 @@ void LogIndex::Add(const LogEvent& event, Parts* parts) {
     ++of_protocol_[*protocol];
     return;
   }
+  if (const std::optional<LogContent> content = ReadLogContent(event)) {
+    sessions_[content->session].id = content->session;
+    sessions_[content->session].saved_records = content->records;
+  }
   RecordedMessage message;
   message.utime_us = event.utime_us;
   message.order = num_messages_;

@@ -48,6 +48,7 @@ struct RecordedSession {
   std::map<int64_t, GroundTruthPose> ground_truth;  ///< by stamp
   std::optional<EndOfSequence> end;
   std::map<StreamId, RecordedStream> streams;
+  int64_t saved_records = 0;  ///< of a saved map: how many map records it was written with; else 0
 
   const RecordedStream& Stream(StreamId id) const;
 };

@@ -13,7 +13,16 @@ namespace dmslam {
 std::optional<int32_t> OtherProtocol(const LogEvent& event);
 
 /// Writes the first message of a log that no writer's beacons are in: a beacon of its own, which says the
-/// version to every later one. `prefix` comes before its channel.
-void WriteLogVersion(EventLogWriter* log, const std::string& prefix, int64_t utime_us);
+/// version to every later one. `prefix` comes before its channel. `records`: how many map records of a
+/// session follow, where that is known: a log that lacks some of them is not whole.
+struct LogContent {
+  uint32_t session = 0;
+  int64_t records = 0;
+};
+void WriteLogVersion(EventLogWriter* log, const std::string& prefix, int64_t utime_us,
+                     const LogContent& content = {});
+
+/// What such a beacon says; nothing for any other message, and where it names no content.
+std::optional<LogContent> ReadLogContent(const LogEvent& event);
 
 }  // namespace dmslam

@@ -1,13 +1,13 @@
 #include "dmslam/recording/map_file.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include "dmslam/map/snapshot.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
@@ -34,6 +34,12 @@ RecordHeader HeaderOf(uint32_t session, StreamId stream, int64_t seq) {
   header.writer = 1;
   header.seq = seq;
   return header;
+}
+
+int64_t RecordsOf(const RecordedStream& stream) {
+  int64_t records = 0;
+  for (const auto& [term, recorded] : stream) records += static_cast<int64_t>(recorded.records.size());
+  return records;
 }
 
 std::map<MapId, size_t> KeyframesOfMaps(const Map& map) {
@@ -63,6 +69,12 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us) {
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
   const std::optional<SessionStart> start = FindSessionStart(log, session);
+  const int64_t absent = session.saved_records - RecordsOf(session.Stream(StreamId::kMap));
+  if (session.saved_records > 0 && absent > 0) {
+    throw InputError(log.path() + ": is not whole: " + std::to_string(absent) + " of the " +
+                     std::to_string(session.saved_records) +
+                     " records of the saved map are missing or damaged; copy or save it again");
+  }
   if (replay.steps.empty()) {
     throw InputError(log.path() + ": holds no map record of session " + std::to_string(session.id) +
                      (until_us == INT64_MAX ? "; was the mapper recorded too?" : " up to that time"));
@@ -97,20 +109,19 @@ void SaveMap(const std::string& path, const Map& map, const SessionStart& sessio
   if (map.keyframes().empty()) throw InputError(path + ": is not written: the map is empty");
   const Keyframe& newest = map.keyframes().rbegin()->second;
   const int64_t utime_us = newest.stamp_ns / 1000;
+  const std::vector<MapDelta> pieces = CutSnapshot(map, newest.id, kPieceBytes);
   const std::string partial = path + ".part";
   EventLogWriter log(partial);
-  WriteLogVersion(&log, "", utime_us);
+  WriteLogVersion(&log, "", utime_us, {session.session, static_cast<int64_t>(pieces.size())});
   SessionStart start = session;  // of this program, whoever wrote the one it goes on from
   start.protocol_version = kProtocolVersion;
   start.software = kVersion;
   WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), start);
   int64_t seq = 0;
-  for (const MapDelta& delta : CutSnapshot(map, newest.id, kPieceBytes)) {
+  for (const MapDelta& delta : pieces)
     WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kMap, ++seq), delta);
-  }
   log.Close();
-  if (std::rename(partial.c_str(), path.c_str()) != 0)
-    throw InputError(path + ": cannot be written; check the path");
+  if (!RenameDurably(partial, path)) throw InputError(path + ": cannot be written; check the path");
 }
 
 RebuiltMap LoadMap(const std::string& path) {

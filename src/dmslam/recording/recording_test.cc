@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -296,6 +297,42 @@ TEST_F(Recording, ASavedMapIsTheMap) {
   coarse.levels = 4;
   EXPECT_THROW(CheckFits("map", loaded, TestCamera(), coarse), InputError);
   EXPECT_THROW(SaveMap(path_ + ".map", Map(TestCamera(), Pyramid()), start), InputError);
+}
+
+/// Why the map is not loaded; empty where it is.
+std::string WhyNotLoaded(const std::string& path) {
+  try {
+    LoadMap(path);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(Recording, HalfASavedMapIsRefusedByName) {
+  TinyMapper mapper;
+  for (int i = 0; i < 60; ++i) mapper.Step();
+  SessionStart start;
+  start.session = kSession;
+  start.camera = TestCamera();
+  const std::string map = path_ + ".map", part = path_ + ".map2";
+  SaveMap(map, mapper.map(), start);
+  EXPECT_EQ(WhyNotLoaded(map), "");
+  const std::vector<uint8_t> whole_bytes = ReadFileBytes(map);
+  const std::string whole(whole_bytes.begin(), whole_bytes.end());
+  const auto write = [&](const std::string& bytes) { std::ofstream(part, std::ios::binary) << bytes; };
+  // Wherever it was cut off, the last byte included.
+  for (size_t size = whole.size() / 16; size < whole.size(); size += whole.size() / 16) {
+    write(whole.substr(0, size));
+    EXPECT_NE(WhyNotLoaded(part), "") << size << " of " << whole.size() << " bytes";
+  }
+  write(whole.substr(0, whole.size() - 1));
+  EXPECT_NE(WhyNotLoaded(part).find("is not whole: 1 of the "), std::string::npos) << WhyNotLoaded(part);
+  // A block in the middle that was lost.
+  std::string damaged = whole;
+  std::fill_n(damaged.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2), 4096, '\0');
+  write(damaged);
+  EXPECT_NE(WhyNotLoaded(part).find("is not whole"), std::string::npos) << WhyNotLoaded(part);
 }
 
 TEST_F(Recording, FramesKeepTheirIndicesAndBytes) {

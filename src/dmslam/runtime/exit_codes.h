@@ -12,7 +12,7 @@ enum ExitCode : int {
   kExitSuperseded = 4,   ///< another one took the stream over
   kExitNoFrontend = 5,   ///< no frontend answered the end of the sequence
   kExitNoFrame = 6,      ///< no frame was tracked
-  kExitNoBus = 7,        ///< the bus cannot be had: no multicast route (yet), the TCP service is gone
+  kExitNotYet = 7,       ///< needs what is not there (yet): a multicast route, the TCP service, the camera
   kExitNewerMap = 8,     ///< another process holds a newer map than the mapper began with
   kExitUsage = 64,       ///< the command line
   kExitInternal = 70,    ///< an internal error
@@ -23,7 +23,7 @@ enum ExitCode : int {
 /// Whether a process that ended so may do better when it is started again. What it refused, as a wrong option
 /// or a stream that somebody else writes, it would refuse again.
 constexpr bool WorthRestarting(int code) {
-  return code == kExitSuperseded || code == kExitNoBus || code == kExitNewerMap || code == kExitInternal ||
+  return code == kExitSuperseded || code == kExitNotYet || code == kExitNewerMap || code == kExitInternal ||
          code > kExitSignal;
 }
 

@@ -15,6 +15,7 @@
 #include "dmslam/runtime/service_notice.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/not_yet_error.h"
 
 namespace dmslam {
 namespace {
@@ -59,9 +60,9 @@ int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
   SetUpLog(role_, quiet_);
   try {
     return RunNode(factory);
-  } catch (const BusUnavailable& error) {
+  } catch (const NotYetError& error) {
     LogError("{}", error.what());
-    return kExitNoBus;
+    return kExitNotYet;
   } catch (const InputError& error) {
     LogError("{}", error.what());
     return kExitInput;

@@ -1,7 +1,10 @@
 #include "dmslam/util/output_file.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -9,6 +12,20 @@
 #include "dmslam/util/check.h"
 
 namespace dmslam {
+namespace {
+
+bool Sync(const std::filesystem::path& path, int how) {
+  const int fd = open(path.c_str(), how | O_CLOEXEC);
+  if (fd < 0) return false;
+  // What knows no sync (a pipe, some network disks) has no more to offer.
+  const bool synced = fsync(fd) == 0 || errno == EINVAL || errno == EROFS;
+  const int reason = errno;
+  close(fd);
+  errno = reason;
+  return synced;
+}
+
+}  // namespace
 
 OutputFile::OutputFile(std::filesystem::path path)
     : path_(std::move(path)), temporary_(path_.string() + ".part" + std::to_string(getpid())) {
@@ -28,14 +45,25 @@ void OutputFile::Write(std::span<const std::byte> bytes) {
 
 void OutputFile::Commit() {
   if (std::fclose(std::exchange(file_, nullptr)) != 0) Fail();
-  std::error_code error;
-  std::filesystem::rename(temporary_, path_, error);
-  if (error) Fail();
+  if (!RenameDurably(temporary_, path_)) Fail();
 }
 
 void OutputFile::Fail() const {
-  throw InputError(path_.string() +
-                   ": cannot be written; check that the folder exists, may be written and has room");
+  const int reason = errno;
+  throw InputError(path_.string() + ": cannot be written (" + std::strerror(reason) +
+                   "); check that the folder exists, may be written and has room");
+}
+
+void WriteFile(const std::filesystem::path& path, std::string_view text) {
+  OutputFile file(path);
+  file.Write(text);
+  file.Commit();
+}
+
+bool RenameDurably(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (!Sync(from, O_RDONLY) || std::rename(from.c_str(), to.c_str()) != 0) return false;
+  const std::filesystem::path folder = to.parent_path().empty() ? "." : to.parent_path();
+  return Sync(folder, O_RDONLY | O_DIRECTORY);
 }
 
 }  // namespace dmslam

@@ -3,12 +3,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace dmslam {
 
-/// A file that appears under its name only when it is complete: written beside it and renamed by Commit.
-/// Dropped without Commit it leaves nothing. Throws InputError naming the file when it cannot be written.
+/// A file that appears under its name only when it is complete and on the disk: written beside it, synced and
+/// renamed by Commit. Dropped without Commit it leaves nothing. Throws InputError naming the file and the
+/// reason when it cannot be written.
 class OutputFile {
  public:
   explicit OutputFile(std::filesystem::path path);
@@ -27,5 +29,12 @@ class OutputFile {
   std::filesystem::path temporary_;
   std::FILE* file_ = nullptr;
 };
+
+/// Writes a whole file: the former one stays until the new one is complete.
+void WriteFile(const std::filesystem::path& path, std::string_view text);
+
+/// Renames a file that is complete, so that a power cut leaves either the former one or all of this one: its
+/// content is synced first, and then the folder. False where that fails; errno says why.
+bool RenameDurably(const std::filesystem::path& from, const std::filesystem::path& to);
 
 }  // namespace dmslam

@@ -1,0 +1,141 @@
+#include "collector/journal.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dmslam/messaging/codec.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+void LimitFiles(rlim_t bytes) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  limit.rlim_cur = std::min(bytes, limit.rlim_max);
+  setrlimit(RLIMIT_FSIZE, &limit);
+}
+
+class JournalTest : public testing::Test {
+ protected:
+  JournalTest() : path_(testing::TempDir() + "/dmslam_journal_" + std::to_string(getpid())) {}
+  ~JournalTest() override {
+    LimitFiles(RLIM_INFINITY);
+    fs::remove(path_);
+    fs::remove(path_ + ".former");
+  }
+  static Bytes RecordOf(int64_t session, int64_t seq) {
+    FramePose pose;
+    pose.frame_index = static_cast<uint32_t>(seq);
+    RecordHeader header{};
+    header.session = session;
+    header.stream = static_cast<int32_t>(StreamId::kFrontend);
+    header.epoch = 1;
+    header.writer = 1;
+    header.seq = seq;
+    Bytes bytes = wire::Encode(pose);
+    Seal(header, channels::kFramePose, bytes);
+    return bytes;
+  }
+  static std::vector<int64_t> Numbers(Journal& journal) {
+    std::vector<int64_t> numbers;
+    journal.ForEach([&](std::span<const uint8_t> record) { numbers.push_back(ParseHeader(record)->seq); });
+    return numbers;
+  }
+  static std::vector<int64_t> UpTo(int64_t last) {
+    std::vector<int64_t> numbers;
+    for (int64_t i = 1; i <= last; ++i) numbers.push_back(i);
+    return numbers;
+  }
+  std::vector<int64_t> Resumed(int64_t session) {
+    std::vector<int64_t> numbers;
+    Journal journal(path_);
+    journal.Resume(session,
+                   [&](std::span<const uint8_t> record) { numbers.push_back(ParseHeader(record)->seq); });
+    return numbers;
+  }
+  std::string path_;
+};
+
+TEST_F(JournalTest, AFullDiskLosesNothingAndLeavesNoHalfRecord) {
+  {
+    Journal journal(path_);
+    journal.Resume(7, [](std::span<const uint8_t>) {});
+    for (int64_t i = 1; i <= 3; ++i) journal.Append(RecordOf(7, i));
+    EXPECT_EQ(journal.problem(), "");
+    LimitFiles(fs::file_size(path_) + 10);
+    for (int64_t i = 4; i <= 20; ++i) journal.Append(RecordOf(7, i));
+    EXPECT_NE(journal.problem().find("cannot be written"), std::string::npos);
+    EXPECT_EQ(Numbers(journal), UpTo(20)) << "what the disk did not take is in memory";
+    EXPECT_EQ(Resumed(7), UpTo(3)) << "what is on the disk is whole";
+    LimitFiles(RLIM_INFINITY);
+    journal.Append(RecordOf(7, 21));
+    EXPECT_EQ(Numbers(journal), UpTo(21));
+    EXPECT_EQ(journal.lost(), 0);
+  }
+  EXPECT_EQ(Resumed(7), UpTo(21)) << "it is written once there is room";
+}
+
+TEST_F(JournalTest, AnotherSessionsJournalIsSetAsideAndNotTruncated) {
+  {
+    Journal journal(path_);
+    journal.Resume(7, [](std::span<const uint8_t>) {});
+    for (int64_t i = 1; i <= 5; ++i) journal.Append(RecordOf(7, i));
+  }
+  EXPECT_TRUE(Resumed(8).empty());
+  fs::rename(path_ + ".former", path_);
+  EXPECT_EQ(Resumed(7), UpTo(5));
+}
+
+TEST_F(JournalTest, OneThatBeginsSetsAsideWhatIsThere) {
+  for (int i = 0; i < 2; ++i) {
+    Journal journal(path_);
+    journal.Begin(7);
+    EXPECT_TRUE(Numbers(journal).empty());
+    journal.Append(RecordOf(7, 1));
+    journal.AppendNote("x");
+  }
+  EXPECT_EQ(Resumed(7), UpTo(1));
+  EXPECT_TRUE(fs::exists(path_ + ".former"));
+}
+
+TEST_F(JournalTest, NotesAreReadAgainAndAreNoRecords) {
+  const auto nothing = [](std::span<const uint8_t>) {};
+  {
+    Journal journal(path_);
+    journal.Resume(7, nothing);
+    journal.AppendNote("keyframe 3 1");
+    journal.Append(RecordOf(7, 1));
+    journal.AppendNote("dropped 1");
+    EXPECT_EQ(Numbers(journal), UpTo(1));
+  }
+  std::vector<std::string> notes;
+  Journal journal(path_);
+  journal.Resume(7, nothing, [&](const std::string& note) { notes.push_back(note); });
+  EXPECT_EQ(notes, (std::vector<std::string>{"keyframe 3 1", "dropped 1"}));
+  EXPECT_EQ(Numbers(journal), UpTo(1));
+  Journal other(path_);
+  other.Resume(8, nothing, [&](const std::string&) { FAIL() << "of another session"; });
+}
+
+TEST_F(JournalTest, HalfARecordIsNotThere) {
+  {
+    Journal journal(path_);
+    journal.Resume(7, [](std::span<const uint8_t>) {});
+    for (int64_t i = 1; i <= 5; ++i) journal.Append(RecordOf(7, i));
+  }
+  fs::resize_file(path_, fs::file_size(path_) - 3);
+  EXPECT_EQ(Resumed(7), UpTo(4));
+}
+
+}  // namespace
+}  // namespace dmslam

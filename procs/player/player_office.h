@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dmslam/messaging/endpoint.h"
+#include "dmslam/runtime/node.h"
+
+namespace dmslam {
+
+/// Who plays a session is elected as any writer is: it listens first whether another one plays, is refused by
+/// name where one does, and says ten times a second that it is there. Frames carry no records; the stream has
+/// none.
+class PlayerOffice {
+ public:
+  PlayerOffice(const NodeContext& context, uint32_t session, bool take_over, Endpoint* endpoint);
+  ~PlayerOffice();
+  PlayerOffice(const PlayerOffice&) = delete;
+  PlayerOffice& operator=(const PlayerOffice&) = delete;
+
+  /// To be called before each turn.
+  void Advance();
+  /// The election is won.
+  bool held() const { return writer_ != nullptr; }
+  /// Set when it may not play (any more): the process's exit code, and why. 0: another player asked to go on
+  /// in this one's place.
+  std::optional<int> exit_code() const { return exit_code_; }
+  const std::string& problem() const { return problem_; }
+
+ private:
+  void Open();
+
+  NodeContext context_;
+  uint32_t session_;
+  Endpoint* endpoint_;
+  WriterElection election_;
+  std::unique_ptr<StreamWriter> writer_;
+  std::optional<int> exit_code_;
+  std::string problem_;
+};
+
+}  // namespace dmslam

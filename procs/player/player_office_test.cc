@@ -1,0 +1,93 @@
+#include "player/player_office.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "dmslam/runtime/exit_codes.h"
+
+namespace dmslam {
+namespace {
+
+/// Players on one bus; time goes on in steps of 20 ms.
+class PlayerOfficeTest : public testing::Test {
+ protected:
+  struct Player {
+    Player(MemoryBus& bus, int64_t id, const int64_t* now_ns, uint32_t session, bool take_over)
+        : endpoint(&bus.AddPort(), [now_ns] { return *now_ns; }),
+          office(ContextOf(id, now_ns), session, take_over, &endpoint) {}
+    static NodeContext ContextOf(int64_t id, const int64_t* now_ns) {
+      NodeContext context;
+      context.now_ns = [now_ns] { return *now_ns; };
+      context.wall_us = [now_ns] { return *now_ns / 1000; };
+      context.random_id = id;
+      context.name = "player on host (pid " + std::to_string(id) + ")";
+      return context;
+    }
+    Endpoint endpoint;
+    PlayerOffice office;
+  };
+  Player& Add(uint32_t session = 7, bool take_over = false) {
+    players_.push_back(std::make_unique<Player>(bus_, static_cast<int64_t>(players_.size()) + 17, &now_ns_,
+                                                session, take_over));
+    return *players_.back();
+  }
+  void Pass(double seconds) {
+    for (const int64_t end = now_ns_ + static_cast<int64_t>(seconds * 1e9); now_ns_ < end;
+         now_ns_ += 20'000'000) {
+      for (const auto& player : players_) {
+        if (!player->office.exit_code()) player->office.Advance();
+      }
+      while (bus_.DeliverOne()) {
+      }
+    }
+  }
+
+  MemoryBus bus_;
+  int64_t now_ns_ = 1'000'000'000;
+  std::vector<std::unique_ptr<Player>> players_;
+};
+
+TEST_F(PlayerOfficeTest, ASecondPlayerIsRefusedByNameAndTheFirstGoesOn) {
+  Player& first = Add();
+  Pass(1.9);
+  EXPECT_FALSE(first.office.held()) << "it listens first";
+  Pass(0.5);
+  ASSERT_TRUE(first.office.held());
+  Player& second = Add();
+  Pass(10);
+  EXPECT_EQ(second.office.exit_code(), kExitPresent);
+  EXPECT_FALSE(second.office.held());
+  EXPECT_NE(second.office.problem().find("session 7"), std::string::npos);
+  EXPECT_NE(second.office.problem().find("pid 17"), std::string::npos) << second.office.problem();
+  EXPECT_TRUE(first.office.held());
+  EXPECT_EQ(first.office.exit_code(), std::nullopt);
+}
+
+TEST_F(PlayerOfficeTest, AnotherSessionIsNotItsBusiness) {
+  Player& first = Add(7);
+  Player& second = Add(8);
+  Pass(4);
+  EXPECT_TRUE(first.office.held());
+  EXPECT_TRUE(second.office.held());
+}
+
+TEST_F(PlayerOfficeTest, WhoIsAskedToLeaveLeaves) {
+  Player& first = Add();
+  Pass(3);
+  Player& second = Add(7, true);
+  Pass(6);
+  EXPECT_EQ(first.office.exit_code(), kExitDone);
+  EXPECT_TRUE(second.office.held());
+}
+
+TEST_F(PlayerOfficeTest, OfTwoThatBeginTogetherOneStops) {
+  Player& first = Add();
+  Player& second = Add();
+  Pass(6);
+  EXPECT_NE(first.office.held() && !first.office.exit_code(),
+            second.office.held() && !second.office.exit_code());
+}
+
+}  // namespace
+}  // namespace dmslam

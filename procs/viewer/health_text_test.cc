@@ -1,0 +1,52 @@
+#include "viewer/health_text.h"
+
+#include <gtest/gtest.h>
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;
+
+bool Has(const std::string& text, const std::string& line) {
+  return ("\n" + text).find("\n" + line + "\n") != std::string::npos;
+}
+
+TEST(HealthTextTest, SaysWhoIsThereAndWhoIsSilent) {
+  ProcessBoard board({"player", "frontend", "mapper", "loopcloser"});
+  const auto health = [&] { return WriteHealth(board, {}, {}); };
+  const auto say = [&](const std::string& name, int32_t pid, int64_t now_ns) {
+    StatusHead head;
+    head.health.pid = pid;
+    head.health.rss_mb = 12.5;
+    head.health.records_lost = 3;
+    board.OnStatus(name, head, "", now_ns, 0);
+  };
+  EXPECT_FALSE(health().well) << "nobody was heard";
+  for (const char* name : {"player", "frontend", "mapper"}) say(name, 7, kSecond);
+  EXPECT_TRUE(health().well) << "the loop closer may be left out";
+  EXPECT_NE(health().json.find("\"loopcloser\": \"awaited\""), std::string::npos);
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_up{process=\"mapper\"} 1"));
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_resident_megabytes{process=\"mapper\"} 12.5"));
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_records_lost_total{process=\"mapper\"} 3"));
+  say("mapper", 8, 2 * kSecond);
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_restarts_total{process=\"mapper\"} 1"));
+  say("player", 7, 5 * kSecond);
+  say("frontend", 7, 5 * kSecond);
+  board.Advance(6 * kSecond, 0);
+  EXPECT_FALSE(health().well);
+  EXPECT_NE(health().json.find("\"mapper\": \"down\""), std::string::npos);
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_up{process=\"mapper\"} 0"));
+}
+
+TEST(HealthTextTest, EveryFamilySaysItsTypeOnce) {
+  const std::string text = WriteHealth(ProcessBoard({"player"}), {}, {}).prometheus;
+  size_t types = 0, helps = 0;
+  for (size_t at = text.find("# TYPE "); at != std::string::npos; at = text.find("# TYPE ", at + 1)) ++types;
+  for (size_t at = text.find("# HELP "); at != std::string::npos; at = text.find("# HELP ", at + 1)) ++helps;
+  EXPECT_GT(types, 15u);
+  EXPECT_EQ(types, helps);
+  EXPECT_TRUE(Has(text, "# TYPE dmslam_frames_processed_total counter"));
+}
+
+}  // namespace
+}  // namespace dmslam

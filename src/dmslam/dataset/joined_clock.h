@@ -1,0 +1,30 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+namespace dmslam {
+
+/// Stamps of a camera: its driver's monotonic time, or the moment at which a frame was there, joined to wall
+/// time once. A wall clock that is set meanwhile changes nothing; stamps rise strictly.
+class JoinedClock {
+ public:
+  /// Wall and monotonic time of one moment [ns].
+  JoinedClock(int64_t wall_ns, int64_t monotonic_ns) : offset_ns_(wall_ns - monotonic_ns) {}
+
+  /// The stamp of a frame that was there at `arrival_ns`. `driver_ns`: when the driver says that it was
+  /// taken; believed where that is on the same clock: within the last second.
+  int64_t Stamp(int64_t arrival_ns, int64_t driver_ns) {
+    const bool same_clock = driver_ns <= arrival_ns && arrival_ns - driver_ns < kSecondNs;
+    const int64_t stamp_ns = (same_clock ? driver_ns : arrival_ns) + offset_ns_;
+    last_ns_ = std::max(stamp_ns, last_ns_ + 1);
+    return last_ns_;
+  }
+
+ private:
+  static constexpr int64_t kSecondNs = 1'000'000'000;
+  int64_t offset_ns_;
+  int64_t last_ns_ = INT64_MIN / 2;
+};
+
+}  // namespace dmslam

@@ -1,0 +1,80 @@
+#include "dmslam/util/output_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A disk that takes no file above so many bytes, as long as this lives.
+class SmallDisk {
+ public:
+  explicit SmallDisk(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &former_);
+    const rlimit small{bytes, former_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~SmallDisk() { setrlimit(RLIMIT_FSIZE, &former_); }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+ private:
+  rlimit former_{};
+};
+
+class OutputFileTest : public testing::Test {
+ protected:
+  OutputFileTest() : folder_(testing::TempDir() + "/dmslam_output_" + std::to_string(getpid())) {
+    fs::create_directories(folder_);
+  }
+  ~OutputFileTest() override { fs::remove_all(folder_); }
+  static std::string Read(const fs::path& path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  fs::path folder_;
+};
+
+TEST_F(OutputFileTest, AppearsWhenItIsComplete) {
+  const fs::path path = folder_ / "trajectory.txt";
+  {
+    OutputFile file(path);
+    file.Write("half");
+    EXPECT_FALSE(fs::exists(path));
+  }
+  EXPECT_TRUE(fs::is_empty(folder_)) << "what is dropped leaves nothing";
+  WriteFile(path, "whole");
+  EXPECT_EQ(Read(path), "whole");
+}
+
+TEST_F(OutputFileTest, AFullDiskLeavesTheFormerFile) {
+  const fs::path path = folder_ / "trajectory.txt";
+  WriteFile(path, "former");
+  {
+    const SmallDisk disk(1000);
+    try {
+      WriteFile(path, std::string(100'000, 'x'));
+      FAIL() << "the disk is full";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("trajectory.txt: cannot be written (File too large)"),
+                std::string::npos)
+          << error.what();
+    }
+  }
+  EXPECT_EQ(Read(path), "former");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1) << "nothing else is left";
+}
+
+}  // namespace
+}  // namespace dmslam
