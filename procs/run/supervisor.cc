@@ -26,8 +26,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kLookAgainNs = 1'000'000'000;  // even without a signal
-
 int CodeOf(int status) { return WIFSIGNALED(status) ? kExitSignal + WTERMSIG(status) : WEXITSTATUS(status); }
 
 /// A file that a child writes to. Where its folder was removed it is made again; where nothing helps, what is
@@ -121,7 +119,7 @@ void Supervisor::Start(ChildSpec spec) {
 
 void Supervisor::Launch(Child* child) {
   child->due_ns = INT64_MAX;
-  child->heard_ns = 0;
+  child->heard_ns.reset();
   child->hung = false;
   const int output = OpenForChild(child->spec.output);
   const int errors = child->spec.errors_to_ours ? dup(STDERR_FILENO) : OpenForChild(child->spec.errors);
@@ -201,7 +199,7 @@ std::optional<int64_t> Supervisor::DelayBeforeRestart(Child* child, int code) {
   if (!short_life) {
     child->lived = true;
     child->short_lives = 0;
-    child->missing_since_ns = 0;
+    child->missing_since_ns.reset();
   }
   ++child->short_lives;
   const int doubled = std::clamp(child->short_lives - 2, 0, 20);
@@ -210,9 +208,9 @@ std::optional<int64_t> Supervisor::DelayBeforeRestart(Child* child, int code) {
   if (code != kExitNotYet) {
     return child->short_lives <= options_.most_short_lives ? std::optional(delay) : std::nullopt;
   }
-  if (child->missing_since_ns == 0) child->missing_since_ns = now;
+  if (!child->missing_since_ns) child->missing_since_ns = now;
   const bool patience = options_.wait_for_what_may_come ||
-                        (child->lived && now - child->missing_since_ns < options_.patience_ns);
+                        (child->lived && now - *child->missing_since_ns < options_.patience_ns);
   return patience ? std::optional(std::max(delay, options_.first_delay_ns)) : std::nullopt;
 }
 
@@ -237,7 +235,7 @@ void Supervisor::KillHung() {
   if (notice_fd_ < 0) return;
   const int64_t now = now_ns();
   for (Child& child : children_) {
-    const bool silent = child.heard_ns > 0 && now - child.heard_ns > options_.watchdog_ns;
+    const bool silent = child.heard_ns && now - *child.heard_ns > options_.watchdog_ns;
     if (child.pid <= 0 || child.hung || !silent) continue;
     child.hung = true;
     kill(child.pid, SIGKILL);
@@ -256,16 +254,21 @@ void Supervisor::TakeSignals() {
 }
 
 int64_t Supervisor::NextDeadline() const {
-  int64_t deadline = now_ns() + kLookAgainNs;
-  for (const Child& child : children_) deadline = std::min(deadline, child.due_ns);
+  int64_t deadline = INT64_MAX;
+  for (const Child& child : children_) {
+    deadline = std::min(deadline, child.due_ns);
+    const bool watched = child.pid > 0 && child.heard_ns && !child.hung;
+    if (watched) deadline = std::min(deadline, *child.heard_ns + options_.watchdog_ns + 1);
+  }
   return deadline;
 }
 
 void Supervisor::Poll(int64_t deadline_ns) {
   pollfd fds[2] = {{signal_fd_, POLLIN, 0}, {notice_fd_, POLLIN, 0}};
-  const int64_t wait_ns = std::max<int64_t>(0, std::min(deadline_ns, NextDeadline()) - now_ns());
+  const int64_t until_ns = std::min(deadline_ns, NextDeadline());
+  const int64_t wait_ns = std::max<int64_t>(0, until_ns - now_ns());
   const timespec timeout{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
-  ppoll(fds, 2, &timeout, nullptr);
+  ppoll(fds, 2, until_ns == INT64_MAX ? nullptr : &timeout, nullptr);
   TakeSignals();
   Reap();
   HearNotices();

@@ -86,11 +86,11 @@ class Supervisor {
  private:
   struct Child {
     ChildSpec spec;
-    pid_t pid = 0;                 // 0: not alive
-    int64_t began_ns = 0;          // its newest life
-    int64_t due_ns = INT64_MAX;    // when it is started again
-    int64_t heard_ns = 0;          // when it last said that it is alive; 0: never
-    int64_t missing_since_ns = 0;  // since when bus or camera cannot be had; 0: they can
+    pid_t pid = 0;                            // 0: not alive
+    int64_t began_ns = 0;                     // its newest life
+    int64_t due_ns = INT64_MAX;               // when it is started again
+    std::optional<int64_t> heard_ns;          // when it last said that it is alive
+    std::optional<int64_t> missing_since_ns;  // since when bus or camera cannot be had
     int restarts = 0, short_lives = 0, last_code = 0;
     bool lived = false;  // long enough to be worth patience
     bool hung = false;

@@ -66,7 +66,7 @@ TrackingReport LatePlacement::TrackBackwards(const Map& map, double depth, PoseS
   PoseSearch::Prior prior;
   if (predicted) prior = MotionPrior(motion_, *predicted, depth);
   const Rigid3d guess = predicted.value_or(next_->T_cam_world);
-  if (!search->FromFrame(map, *next_, guess, prior, frame)) return {};
+  if (search->FromFrame(map, *next_, guess, prior, frame) != PoseSearch::FromFrameResult::kFound) return {};
   TrackingReport report = search->InLocalMap(map, false, prior, frame);
   report.ok = report.ok && IsPlausible(*frame, depth);
   return report;

@@ -35,8 +35,12 @@ void TrajectoryBuilder::OnMapDelta(const MapDelta& delta) {
   if (delta.event == MapEvent::kMapStarted && delta.map_id) joined_.erase(*delta.map_id);
   if (joined.empty()) return;
   for (auto& [index, pose] : poses_) {
-    const auto from = joined.find(pose.map_id.value_or(0));
-    if (from != joined.end()) Carry(from->second, &pose);
+    if (!pose.map_id) continue;
+    if (const auto from = joined.find(*pose.map_id); from != joined.end()) Carry(from->second, &pose);
+  }
+  for (auto& [gone, then] : joined_) {
+    const auto next = joined.find(then.into);
+    if (next != joined.end()) then = {next->second.into, next->second.S_into_from * then.S_into_from};
   }
   for (const auto& [from, into] : joined) joined_.insert_or_assign(from, into);
 }
@@ -44,9 +48,8 @@ void TrajectoryBuilder::OnMapDelta(const MapDelta& delta) {
 /// What was told in a map that is part of another by now is taken as told there.
 void TrajectoryBuilder::OnFramePose(const FramePose& told) {
   FramePose pose = told;
-  for (auto from = joined_.find(pose.map_id.value_or(0)); from != joined_.end();
-       from = joined_.find(pose.map_id.value_or(0))) {
-    Carry(from->second, &pose);
+  if (pose.map_id) {
+    if (const auto from = joined_.find(*pose.map_id); from != joined_.end()) Carry(from->second, &pose);
   }
   const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
   if (inserted) return;

@@ -54,7 +54,7 @@ class TrajectoryBuilder {
   static void Carry(const Joined& joined, FramePose* pose);
 
   Replica map_;
-  std::map<MapId, Joined> joined_;  ///< by the number that is gone
+  std::map<MapId, Joined> joined_;  ///< by the number that is gone; into maps that there are
   std::map<uint32_t, FramePose>
       poses_;  ///< by frame index; a later placement does not replace an online one...
   std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory

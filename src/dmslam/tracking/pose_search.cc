@@ -30,8 +30,9 @@ void PoseSearch::Reset() {
   judge_.Reset();
 }
 
-bool PoseSearch::FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
-                           const Prior& prior, TrackedFrame* frame) {
+PoseSearch::FromFrameResult PoseSearch::FromFrame(const Map& map, const TrackedFrame& last,
+                                                  const Rigid3d& T_predicted, const Prior& prior,
+                                                  TrackedFrame* frame) {
   const size_t needed = static_cast<size_t>(options_.min_motion_matches);
   const double radius_px = SearchRadiusPx(camera_, options_.motion_radius_rad);
   const auto* matches =
@@ -39,12 +40,11 @@ bool PoseSearch::FromFrame(const Map& map, const TrackedFrame& last, const Rigid
   if (matches->size() < needed) {
     matches = &search_.MatchFrame(map, judge_.votes(), last, T_predicted, 2 * radius_px, *frame->features);
   }
-  contradicts_last_ = false;
-  if (matches->size() < needed) return false;
+  if (matches->size() < needed) return FromFrameResult::kNotSeen;
   SetMatches(*matches, T_predicted, frame);
   const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
-  contradicts_last_ = fit.inliers < options_.min_motion_inliers;
-  return !contradicts_last_;
+  return fit.inliers >= options_.min_motion_inliers ? FromFrameResult::kFound
+                                                    : FromFrameResult::kContradicted;
 }
 
 int PoseSearch::FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior,

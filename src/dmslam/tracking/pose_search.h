@@ -23,9 +23,14 @@ class PoseSearch {
 
   PoseSearch(const TrackingOptions& options, const Camera& camera);
 
+  enum class FromFrameResult : uint8_t {
+    kFound,
+    kNotSeen,       ///< too little of what the last frame saw is near its place
+    kContradicted,  ///< enough is, but not in its place
+  };
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
-  bool FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted, const Prior& prior,
-                 TrackedFrame* frame);
+  FromFrameResult FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
+                            const Prior& prior, TrackedFrame* frame);
   /// Matches the landmarks around the frame searched for last, many more than it saw itself, near their
   /// projections at `T_predicted`, and optimises the pose. Returns the number of inliers.
   int FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior, TrackedFrame* frame);
@@ -37,8 +42,6 @@ class PoseSearch {
   /// says of landmarks is added to the judge's evidence.
   TrackingReport InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
 
-  /// Whether enough of what the last frame saw was found near its place, and not in it.
-  bool contradicts_last() const { return contradicts_last_; }
   /// The keyframe that shares most landmarks with the frame searched for last.
   KeyframeId reference() const { return local_map_.reference(); }
   MotionJudge& judge() { return judge_; }
@@ -55,7 +58,6 @@ class PoseSearch {
   ProjectionSearch search_;
   PoseSolver solver_;
   MotionJudge judge_;
-  bool contradicts_last_ = false;
 };
 
 }  // namespace dmslam

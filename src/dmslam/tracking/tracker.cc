@@ -112,10 +112,7 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   attempt.report.reason = "too few features match the last frame";
   const MotionModel::Prediction prediction = motion_.Predict(map, {frame->index, frame->stamp_ns});
   if (!prediction.T_cam_world || !prediction.recent) return attempt;
-  if (!FindByMotion(map, prediction, frame, &attempt)) {
-    attempt.report.contradicts = search_.contradicts_last();
-    return attempt;
-  }
+  if (!FindByMotion(map, prediction, frame, &attempt)) return attempt;
   attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns), prediction.prior, frame);
   if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
     Refuse("the pose contradicts the camera's motion", &attempt.report);
@@ -129,7 +126,10 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
 /// A first pose: by the last frame's matches, by all that lies around it, or by its keyframe.
 bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
                            Attempt* attempt) {
-  if (search_.FromFrame(map, last_, *prediction.T_cam_world, prediction.prior, frame)) return true;
+  using Result = PoseSearch::FromFrameResult;
+  const Result last = search_.FromFrame(map, last_, *prediction.T_cam_world, prediction.prior, frame);
+  if (last == Result::kFound) return true;
+  attempt->report.contradicts = last == Result::kContradicted;
   if (prediction.prior) {
     const int inliers = search_.FromPrediction(map, *prediction.T_cam_world, prediction.prior, frame);
     if (inliers >= options_.min_local_inliers) return true;

@@ -71,7 +71,7 @@ class Tracking : public ::testing::Test {
   size_t TrackBoth(TrackedFrame* a, TrackedFrame* b) {
     const size_t before = testing::NumAllocations();
     for (int round = 0; round < 4; ++round) {
-      EXPECT_TRUE(search_.FromFrame(map_, *a, a->T_cam_world, {}, b));
+      EXPECT_EQ(search_.FromFrame(map_, *a, a->T_cam_world, {}, b), PoseSearch::FromFrameResult::kFound);
       const TrackingReport report = search_.InLocalMap(map_, false, {}, b);
       EXPECT_TRUE(report.ok) << report.reason;
       EXPECT_GT(report.num_static, 250);
@@ -91,7 +91,8 @@ TEST_F(Tracking, SteadyStateDoesNotAllocate) {
   TrackedFrame first = Seen(1, 2.3, false), second = Seen(2, 2.5, true);
   first.T_cam_world = PoseAt(2.3);
   for (uint32_t i = 0; i < kLandmarks; ++i) first.landmarks[i] = LandmarkId::Make(1, i + 1);
-  EXPECT_TRUE(search_.FromFrame(map_, first, first.T_cam_world, {}, &second));
+  EXPECT_EQ(search_.FromFrame(map_, first, first.T_cam_world, {}, &second),
+            PoseSearch::FromFrameResult::kFound);
   EXPECT_TRUE(search_.InLocalMap(map_, false, {}, &second).ok);
   TrackedFrame third = Seen(3, 2.7, true);
   EXPECT_GT(TrackBoth(&second, &third), 0u);  // The counter works.
