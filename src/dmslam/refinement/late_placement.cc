@@ -1,6 +1,9 @@
 #include "dmslam/refinement/late_placement.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "dmslam/util/random.h"
 
@@ -10,6 +13,15 @@ namespace {
 constexpr int64_t kNearNs = 350'000'000;  // a placed frame so near in time bounds where a frame may be
 constexpr double kMaxSpeed = 1.5;         // depths of the scene per second
 constexpr double kMaxTurn_rad_per_s = 3.0;
+constexpr int kKeyframesAside = 3;      // whose motion bounds that of the frames between them...
+constexpr double kFasterThanAside = 2;  // ...which may be so many times as fast...
+constexpr double kSlack = 0.05;         // ...and this beside [depths of the scene]
+
+double SecondsBetween(int64_t a_ns, int64_t b_ns) {
+  return std::abs(static_cast<double>(a_ns - b_ns)) * 1e-9;
+}
+
+double DistanceBetween(const Rigid3d& a, const Rigid3d& b) { return (a.Center() - b.Center()).norm(); }
 
 }  // namespace
 
@@ -17,6 +29,32 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
   const Rigid3d motion = a * b.Inverse();
   return motion.translation.norm() <= kMaxSpeed * depth * seconds &&
          AngleBetween(motion.rotation, Eigen::Quaterniond::Identity()) <= kMaxTurn_rad_per_s * seconds;
+}
+
+bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
+                              double depth) {
+  std::vector<const Keyframe*> aside;
+  const auto after = map.keyframes().lower_bound(KeyframeId::Make(session, frame.index));
+  auto before = after;
+  for (int i = 0; i < kKeyframesAside && before != map.keyframes().begin(); ++i) {
+    if (const Keyframe& keyframe = (--before)->second; keyframe.map_id == map_id) aside.push_back(&keyframe);
+  }
+  std::ranges::reverse(aside);
+  auto next = after;
+  for (int i = 0; i < kKeyframesAside && next != map.keyframes().end(); ++i, ++next) {
+    if (next->second.map_id == map_id) aside.push_back(&next->second);
+  }
+  double speed = 0;
+  for (size_t i = 1; i < aside.size(); ++i) {
+    const double seconds = SecondsBetween(aside[i]->stamp_ns, aside[i - 1]->stamp_ns);
+    const double distance = DistanceBetween(aside[i]->T_cam_world, aside[i - 1]->T_cam_world);
+    if (seconds > 0) speed = std::max(speed, distance / seconds);
+  }
+  return std::ranges::all_of(aside, [&](const Keyframe* keyframe) {
+    const double seconds = SecondsBetween(frame.stamp_ns, keyframe->stamp_ns);
+    return DistanceBetween(frame.T_cam_world, keyframe->T_cam_world) <=
+           kFasterThanAside * speed * seconds + kSlack * depth;
+  });
 }
 
 void LatePlacement::Forget() {
@@ -68,7 +106,7 @@ TrackingReport LatePlacement::TrackBackwards(const Map& map, double depth, PoseS
   const Rigid3d guess = predicted.value_or(next_->T_cam_world);
   if (search->FromFrame(map, *next_, guess, prior, frame) != PoseSearch::FromFrameResult::kFound) return {};
   TrackingReport report = search->InLocalMap(map, false, prior, frame);
-  report.ok = report.ok && IsPlausible(*frame, depth);
+  report.ok = report.ok && !report.doubtful && IsPlausible(*frame, depth);
   return report;
 }
 
@@ -77,14 +115,18 @@ TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Re
   FindNeighbour(map, *frame);
   const Keyframe* reference = map.FindKeyframe(search->reference());
   const double depth = reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
+  const auto agrees = [&] {
+    const Keyframe* there = map.FindKeyframe(search->reference());
+    return there != nullptr && AgreesWithKeyframesAside(map, there->map_id, *frame, session_, depth);
+  };
   TrackingReport report = TrackBackwards(map, depth, search, frame);
-  if (report.ok) return report;
+  if (report.ok && agrees()) return report;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
   if (!relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   report = search->InLocalMap(map, true, std::nullopt, frame);
-  report.ok = report.ok && (!next_ || IsPlausible(*frame, depth));
+  report.ok = report.ok && !report.doubtful && (!next_ || IsPlausible(*frame, depth)) && agrees();
   return report;
 }
 

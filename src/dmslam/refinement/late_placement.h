@@ -15,6 +15,11 @@ namespace dmslam {
 /// scene [map units].
 bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, double depth);
 
+/// Whether the camera gets from the keyframes before and after the frame to its pose and back, moving at most
+/// about as fast as it does between them; `depth` of the scene [map units].
+bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
+                              double depth);
+
 /// Places frames when the sequence has ended, the newest first: each from the placed frame that follows it
 /// and its motion, or else like a lost camera. The map may grow meanwhile by frames that become keyframes.
 class LatePlacement {

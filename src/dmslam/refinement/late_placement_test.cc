@@ -55,6 +55,22 @@ TEST(PlausibleMotion, IsBoundedInTimeAndDepth) {
   EXPECT_FALSE(IsPlausibleMotion(here, turned, 0.1, 1.0));
 }
 
+TEST(KeyframesAside, BoundWhatLiesBetweenThem) {
+  MapScene scene;
+  scene.AddCloud(100, {0, 0, 4}, {1.6, 1.2, 0.5});
+  scene.MapAll(4, 0.05, 10, 10 * MapScene::kStepNs);
+  const auto agrees = [&](uint32_t index, double x) {
+    TrackedFrame frame = scene.See(index, index * MapScene::kStepNs, MapScene::PoseAt(x));
+    return AgreesWithKeyframesAside(scene.map(), MapScene::kMap, frame, MapScene::kSession, 4.0);
+  };
+  EXPECT_TRUE(agrees(12, 0.1));
+  EXPECT_TRUE(agrees(20, 0.5)) << "as far as it goes at this speed";
+  EXPECT_TRUE(agrees(5, -0.2));
+  EXPECT_FALSE(agrees(12, 0.6)) << "and back again within a moment";
+  EXPECT_FALSE(agrees(20, 2.0));
+  EXPECT_FALSE(agrees(5, -2.0));
+}
+
 /// Frames before the map's first keyframe, which is frame 20.
 class GrowingBack : public ::testing::Test {
  protected:

@@ -1,5 +1,7 @@
 #include "dmslam/tracking/pose_search.h"
 
+#include <algorithm>
+
 #include "dmslam/camera/image_scale.h"
 
 namespace dmslam {
@@ -8,6 +10,13 @@ namespace {
 constexpr double kWiderAfterRelocalization = 2.0;  // times the radius of the search
 constexpr double kWiderAroundPrediction = 4.0;
 constexpr size_t kMinKeyframeMatches = 15;
+// Somebody who fills the picture hides the room: of so many landmarks that are older than people stand, less
+// than this share is seen.
+constexpr int kEnoughOld = 60;
+constexpr double kLeastOldShare = 0.02;
+// Matches by chance are spread over all that is allowed, true ones are near: the mean squared error tells.
+constexpr double kChanceChi2 = 1.3;
+constexpr double kChanceShare = 0.1;  // of what is expected: more is not matched by chance
 
 void SetMatches(const std::vector<LandmarkMatch>& matches, const Rigid3d& T_cam_world, TrackedFrame* frame) {
   frame->ClearMatches();
@@ -70,6 +79,17 @@ bool PoseSearch::FromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t s
   return solver_.Solve(map, prior, &judge_, frame).inliers >= options_.min_motion_inliers;
 }
 
+bool PoseSearch::FromTurn(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world,
+                          double reach_rad, TrackedFrame* frame) {
+  local_map_.Collect(map, last);
+  const std::optional<Rigid3d> T_turned =
+      turns_.Find(map, judge_.votes(), local_map_.landmarks(), T_cam_world, reach_rad, *frame->features);
+  if (!T_turned) return false;
+  SetMatches({}, *T_turned, frame);
+  MatchAround(map, kWiderAroundPrediction, frame);
+  return solver_.Solve(map, std::nullopt, &judge_, frame).inliers >= options_.min_motion_inliers;
+}
+
 TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame) {
   local_map_.Collect(map, *frame);
   const double wider = careful ? kWiderAfterRelocalization : 1.0;
@@ -82,10 +102,10 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
     judge_.Judge(map, expected, fit.rejected, frame);
   }
   TrackingReport report = CountClasses(camera_, *frame);
-  report.num_expected = static_cast<int>(expected.size());
+  CountExpected(map, expected, *frame, &report);
   report.contradicts = static_cast<int>(fit.rejected.size()) > fit.inliers;
   Decide(fit, careful, &report);
-  if (report.ok) judge_.Believe(map, expected, *frame);
+  if (report.ok && !report.doubtful) judge_.Believe(map, expected, *frame);
   return report;
 }
 
@@ -93,6 +113,18 @@ std::span<const ExpectedLandmark> PoseSearch::MatchAround(const Map& map, double
   const auto expected = search_.MatchLandmarks(map, judge_.votes(), local_map_.landmarks(), wider, frame);
   judge_.DropMatchesOfHiddenPlaces(map, expected, frame);
   return expected;
+}
+
+void PoseSearch::CountExpected(const Map& map, std::span<const ExpectedLandmark> expected,
+                               const TrackedFrame& frame, TrackingReport* report) const {
+  report->num_expected = static_cast<int>(expected.size());
+  const auto is_old = [&](LandmarkId id) {
+    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+    return landmark != nullptr && static_cast<double>(frame.stamp_ns - landmark->first_ns) * 1e-9 >=
+                                      options_.dynamics.vote.trusted_age_s;
+  };
+  report->num_old_expected = static_cast<int>(std::ranges::count_if(expected, is_old, &ExpectedLandmark::id));
+  report->num_old = static_cast<int>(std::ranges::count_if(frame.landmarks, is_old));
 }
 
 void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report) const {
@@ -105,7 +137,19 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
     report->reason = "the static features lie in too small a part of the image";
   } else {
     report->ok = true;
+    Doubt(fit, report);
   }
+}
+
+void PoseSearch::Doubt(const PoseFit& fit, TrackingReport* report) {
+  if (report->num_old_expected >= kEnoughOld && report->num_old < kLeastOldShare * report->num_old_expected) {
+    report->reason = "what has stood here for long is not seen";
+  } else if (fit.mean_chi2 > kChanceChi2 && fit.inliers < kChanceShare * report->num_expected) {
+    report->reason = "what matches the map may do so by chance";
+  } else {
+    return;
+  }
+  report->doubtful = true;
 }
 
 }  // namespace dmslam

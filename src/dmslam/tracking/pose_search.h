@@ -11,6 +11,7 @@
 #include "dmslam/tracking/projection_search.h"
 #include "dmslam/tracking/tracking_options.h"
 #include "dmslam/tracking/tracking_report.h"
+#include "dmslam/tracking/turn_search.h"
 
 namespace dmslam {
 
@@ -31,6 +32,10 @@ class PoseSearch {
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
   FromFrameResult FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
                             const Prior& prior, TrackedFrame* frame);
+  /// Finds how far the camera has turned since it saw `last` from `T_cam_world`, matches what lies around,
+  /// and optimises the pose. `reach_rad`: it has not turned farther.
+  bool FromTurn(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double reach_rad,
+                TrackedFrame* frame);
   /// Matches the landmarks around the frame searched for last, many more than it saw itself, near their
   /// projections at `T_predicted`, and optimises the pose. Returns the number of inliers.
   int FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior, TrackedFrame* frame);
@@ -50,12 +55,16 @@ class PoseSearch {
 
  private:
   std::span<const ExpectedLandmark> MatchAround(const Map& map, double wider, TrackedFrame* frame);
+  void CountExpected(const Map& map, std::span<const ExpectedLandmark> expected, const TrackedFrame& frame,
+                     TrackingReport* report) const;
   void Decide(const PoseFit& fit, bool careful, TrackingReport* report) const;
+  static void Doubt(const PoseFit& fit, TrackingReport* report);
 
   TrackingOptions options_;
   Camera camera_;
   LocalMap local_map_;
   ProjectionSearch search_;
+  TurnSearch turns_;
   PoseSolver solver_;
   MotionJudge judge_;
 };

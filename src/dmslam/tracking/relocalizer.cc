@@ -115,7 +115,7 @@ bool Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame
   int found = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
     const TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
-    if (report.ok) return true;
+    if (report.ok && !report.doubtful) return true;
     if (report.num_static <= found) return false;
     found = report.num_static;
   }

@@ -1,5 +1,6 @@
 #include "dmslam/tracking/tracker.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "dmslam/dynamics/proven.h"
@@ -11,7 +12,12 @@ namespace {
 constexpr int64_t kCarefulNs = 1'000'000'000;  // so long more is asked of a camera that was found
 constexpr int64_t kConfirmNs = 500'000'000;    // so long a place must predict what is seen to be believed
 constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
+constexpr int64_t kDoubtNs = 1'000'000'000;    // so long what may be no part of the room leads on
 constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
+constexpr double kTurnKnownS = 5.0;            // so long a lost camera is looked for where it was...
+constexpr double kTurnReachRad = 0.06;         // ...turned by so much...
+constexpr double kTurnRadPerS = 0.3;           // ...and more with time...
+constexpr double kMostTurnRad = 0.3;           // ...up to this
 constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
 constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
 constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
@@ -49,7 +55,9 @@ void Tracker::OnMapGivenUp() {
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
   Attempt attempt = FollowMotion(map, &frame);
+  if (attempt.report.ok && attempt.report.doubtful) OnDoubt(frame.stamp_ns, &attempt);
   if (!attempt.report.ok && recovery_) AbandonRecovery();
+  if (!attempt.report.ok) FindTurned(map, &frame, &attempt);
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request.map_id, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
@@ -58,6 +66,11 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
     Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
     motion_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
+  }
+  if (!attempt.report.doubtful) believed_ns_.reset();
+  if (result.pose && attempt.report.doubtful) {
+    result.pose.reset();
+    result.report.ok = false;
   }
   if (recovery_) {
     search_.judge().DropEvidence();
@@ -88,6 +101,12 @@ bool Tracker::IsConfirmed(const Map& map, const TrackingReport& report, const Tr
   if (frame.stamp_ns - recovery_->since_ns < kConfirmNs) return false;
   const Keyframe* reference = map.FindKeyframe(search_.reference());
   return proven >= kSomeProven || reference == nullptr || !CanBeProven(map, reference->map_id, {});
+}
+
+/// What is doubtful is followed for a while, and not believed.
+void Tracker::OnDoubt(int64_t stamp_ns, Attempt* attempt) {
+  if (!believed_ns_) believed_ns_ = motion_.last_stamp_ns();
+  if (stamp_ns - *believed_ns_ > kDoubtNs) Refuse(attempt->report.reason, &attempt->report);
 }
 
 /// What was recognised does not predict what is seen: the camera is as lost as it was.
@@ -139,6 +158,25 @@ bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& predic
   return search_.FromKeyframe(map, motion_.last().reference, seed, prediction.prior, frame);
 }
 
+/// A camera that was lost a moment ago is nearly where it was, and may look elsewhere. The frame stays as it
+/// was where nothing is found.
+void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) {
+  const std::optional<Rigid3d> T_last = motion_.last().In(map);
+  const double since_s = static_cast<double>(frame->stamp_ns - motion_.last_stamp_ns()) * 1e-9;
+  if (!T_last || since_s > kTurnKnownS) return;
+  const double reach_rad = std::min(kTurnReachRad + kTurnRadPerS * since_s, kMostTurnRad);
+  TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
+  if (!search_.FromTurn(map, last_, *T_last, reach_rad, &found)) return;
+  const TrackingReport report = search_.InLocalMap(map, true, std::nullopt, &found);
+  if (!report.ok || report.doubtful ||
+      !motion_.IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}))
+    return;
+  *frame = std::move(found);
+  attempt->report = report;
+  attempt->relocalized = frame->stamp_ns - motion_.last_stamp_ns() > kCoastNs;
+  if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
+}
+
 /// The frame stays as it was where no place in the map fits.
 void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt) {
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
@@ -158,6 +196,7 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
   if (request.credible && !credible(*frame))
     Refuse("the place that was recognised is out of reach", &attempt->report);
+  if (attempt->report.doubtful) attempt->report.ok = false;
   attempt->relocalized = attempt->report.ok;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }

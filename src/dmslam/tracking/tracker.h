@@ -74,11 +74,13 @@ class Tracker {
   bool FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
                     Attempt* attempt);
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
+  void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
   void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
   bool IsConfirmed(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
+  void OnDoubt(int64_t stamp_ns, Attempt* attempt);
   void AbandonRecovery();
 
   TrackingOptions options_;
@@ -87,6 +89,7 @@ class Tracker {
   Relocalizer relocalizer_;
   MotionModel motion_;
   TrackedFrame last_;                      ///< the frame tracked last
+  std::optional<int64_t> believed_ns_;     ///< where frames are doubtful: when the last was that is not
   std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
   /// A lost camera that was found is followed, but not believed before it is confirmed.
   struct Recovery {

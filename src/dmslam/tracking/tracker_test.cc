@@ -270,8 +270,45 @@ TEST_F(Tracking, InlierThatLieInOneCornerAreNotBelieved) {
 
 TEST_F(Tracking, LostForLongItIsNotLedByAnOldPose) {
   for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
-  const TrackingResult result = Track(Frame(40, 0.0));
-  EXPECT_FALSE(result.pose) << "without a vocabulary nothing else finds it";
+  EXPECT_FALSE(Track(Frame(200, 0.0)).pose) << "without a vocabulary nothing else finds it";
+}
+
+TEST_F(Tracking, WhoTurnedAwayTooFastIsFoundWhereItWas) {
+  for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  const auto turned = [&](uint32_t frame) {
+    const Rigid3d T_cam_world =
+        Rigid3d(ExpSo3({0, 0.12, 0}), Eigen::Vector3d::Zero()) * MapScene::PoseAt(CameraAt(frame));
+    return scene_.See(frame, kStartNs + frame * kFrameNs, T_cam_world);
+  };
+  const TrackingResult result = Track(turned(9));
+  ASSERT_TRUE(result.pose) << result.report.reason;
+  EXPECT_LT(ErrorAt(result.frame.T_cam_world, CameraAt(9)), 5e-3);
+}
+
+TEST_F(Tracking, WhoHidesTheRoomIsNotTheRoom) {
+  for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  const auto wall = [](size_t i) { return !IsPerson(i); };
+  const TrackingResult result = Track(Frame(4, 0.0, wall));
+  EXPECT_FALSE(result.pose) << "hundreds of landmarks agree, and none of those that have stood for long";
+  EXPECT_GT(result.report.num_static, 300);
+  EXPECT_TRUE(Track(Frame(5, 0.0)).pose) << "it was followed meanwhile";
+}
+
+TEST_F(Tracking, FewMatchesThatLieAnywhereAreChance) {
+  for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  const auto most = [](size_t i) { return i % 12 != 0; };
+  Random random(1);
+  const auto scattered = [&](uint32_t frame, double by) {
+    return scene_.See(frame, kStartNs + frame * kFrameNs, MapScene::PoseAt(CameraAt(frame)),
+                      [&](size_t i) -> std::optional<Eigen::Vector3d> {
+                        if (most(i)) return std::nullopt;
+                        const Eigen::Vector3d off(random.Uniform(-by, by), random.Uniform(-by, by), 0);
+                        return scene_.point(i) + off;
+                      });
+  };
+  EXPECT_TRUE(Track(scattered(4, 0.0)).pose) << "few that are where they should be are enough";
+  const TrackingResult result = Track(scattered(5, 0.014));
+  EXPECT_FALSE(result.pose) << result.report.mean_chi2 << " over " << result.report.num_static;
 }
 
 /// A map so young that people who stood while it was made are older than the wall.
