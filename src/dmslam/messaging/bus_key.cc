@@ -17,7 +17,7 @@ namespace dmslam {
 namespace {
 
 constexpr std::array<uint8_t, 8> kMark = {0xD5, 'K', 'e', 'y', 'T', 'a', 'g', 0x01};
-constexpr size_t kCounterAt = 4, kSenderAt = 12, kMacAt = 20, kMarkAt = 36;
+constexpr size_t kCounterAt = 4, kSenderAt = 12, kMacAt = 20;
 // Of what the file holds one key is made for this purpose alone; another version of the tag gets another key.
 constexpr char kPurpose[] = "dmslam bus tag 1";
 
@@ -99,6 +99,8 @@ std::optional<BusKey> BusKey::LoadIfWanted(const std::string& file) {
 }
 
 BusKey::BusKey(std::span<const uint8_t> secret) {
+  static_assert(sizeof(key_) == crypto_shorthash_siphashx24_KEYBYTES);
+  static_assert(kMacBytes == crypto_shorthash_siphashx24_BYTES);
   DMSLAM_CHECK(sodium_init() >= 0, "libsodium must find what it needs of the system");
   DMSLAM_CHECK(secret.size() >= kLeastBytes, "a key must be long enough");
   crypto_generichash_state state;
@@ -109,41 +111,35 @@ BusKey::BusKey(std::span<const uint8_t> secret) {
 
 BusKey::~BusKey() { sodium_memzero(key_.data(), key_.size()); }
 
-/// The channel's length before it: no other channel and message make the same bytes.
-BusKey::Mac BusKey::Compute(std::string_view channel, std::span<const uint8_t> message,
-                            std::span<const uint8_t> said) const {
-  std::array<uint8_t, 4> length{};
-  PutInt(static_cast<uint32_t>(channel.size()), 0, length);
-  Mac mac{};
-  crypto_generichash_state state;
-  crypto_generichash_init(&state, key_.data(), key_.size(), mac.size());
-  crypto_generichash_update(&state, length.data(), length.size());
-  crypto_generichash_update(&state, reinterpret_cast<const uint8_t*>(channel.data()), channel.size());
-  crypto_generichash_update(&state, message.data(), message.size());
-  crypto_generichash_update(&state, said.data(), said.size());
-  crypto_generichash_final(&state, mac.data(), mac.size());
+/// With a key for each channel: no tag fits on another one.
+BusKey::Mac BusKey::Compute(std::string_view channel, std::span<const uint8_t> message_and_said) const {
+  Mac channel_key{}, mac{};
+  crypto_shorthash_siphashx24(channel_key.data(), reinterpret_cast<const uint8_t*>(channel.data()),
+                              channel.size(), key_.data());
+  crypto_shorthash_siphashx24(mac.data(), message_and_said.data(), message_and_said.size(),
+                              channel_key.data());
   return mac;
 }
 
 Bytes BusKey::WithTag(std::string_view channel, std::span<const uint8_t> message, const Tag& tag) const {
-  std::array<uint8_t, kTagBytes> end{};
-  PutInt(tag.session, 0, end);
-  PutInt(tag.counter, kCounterAt, end);
-  PutInt(tag.sender, kSenderAt, end);
-  const Mac mac = Compute(channel, message, std::span(end).first(kMacAt));
-  std::copy(mac.begin(), mac.end(), end.begin() + kMacAt);
-  std::copy(kMark.begin(), kMark.end(), end.begin() + kMarkAt);
+  std::array<uint8_t, kMacAt> said{};
+  PutInt(tag.session, 0, said);
+  PutInt(tag.counter, kCounterAt, said);
+  PutInt(tag.sender, kSenderAt, said);
   Bytes tagged;
   tagged.reserve(message.size() + kTagBytes);
   tagged.insert(tagged.end(), message.begin(), message.end());
-  tagged.insert(tagged.end(), end.begin(), end.end());
+  tagged.insert(tagged.end(), said.begin(), said.end());
+  const Mac mac = Compute(channel, tagged);
+  tagged.insert(tagged.end(), mac.begin(), mac.end());
+  tagged.insert(tagged.end(), kMark.begin(), kMark.end());
   return tagged;
 }
 
 std::optional<Tag> BusKey::Verify(std::string_view channel, std::span<const uint8_t> tagged) const {
   if (!HasTag(tagged)) return std::nullopt;
   const std::span<const uint8_t> end = tagged.last(kTagBytes);
-  const Mac mac = Compute(channel, WithoutTag(tagged), end.first(kMacAt));
+  const Mac mac = Compute(channel, tagged.first(tagged.size() - kTagBytes + kMacAt));
   if (sodium_memcmp(mac.data(), end.data() + kMacAt, mac.size()) != 0) return std::nullopt;
   return Tag{GetInt<uint32_t>(end, 0), GetInt<uint64_t>(end, kCounterAt), GetInt<uint64_t>(end, kSenderAt)};
 }

@@ -27,12 +27,13 @@ bool HasTag(std::span<const uint8_t> message);
 /// The message itself; all of it where it has no tag.
 std::span<const uint8_t> WithoutTag(std::span<const uint8_t> message);
 
-/// The secret that all processes of a system share. The MAC is BLAKE2b with a key and 16 bytes of output
-/// (RFC 7693), over the channel, the message and what its tag says.
+/// The secret that all processes of a system share. The MAC is SipHash-2-4 with 16 bytes of output (Aumasson
+/// and Bernstein, 2012), over the message and what its tag says, with a key for each channel.
 class BusKey {
  public:
   static constexpr size_t kLeastBytes = 32;
   static constexpr size_t kMostBytes = 4096;
+  static constexpr size_t kMacBytes = 16;
 
   /// Reads a file that nobody but its owner, who must be the user of this process, may read (mode 0600 or
   /// 0400), or that systemd handed over as a credential. A line's end at its end does not count. Throws
@@ -53,12 +54,10 @@ class BusKey {
   std::optional<Tag> Verify(std::string_view channel, std::span<const uint8_t> tagged) const;
 
  private:
-  static constexpr size_t kMacBytes = 16;
   using Mac = std::array<uint8_t, kMacBytes>;
-  Mac Compute(std::string_view channel, std::span<const uint8_t> message,
-              std::span<const uint8_t> said) const;
+  Mac Compute(std::string_view channel, std::span<const uint8_t> message_and_said) const;
 
-  std::array<uint8_t, 32> key_{};
+  std::array<uint8_t, 16> key_{};  ///< from it the channels' keys are made
 };
 
 }  // namespace dmslam
