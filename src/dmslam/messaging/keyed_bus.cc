@@ -150,15 +150,16 @@ void KeyedBus::Admit(const Tag& tag) {
   proven_.emplace(tag.sender, Proven{CounterWindow(tag.counter), options_.now_ns()});
 }
 
+/// Who was silent for long, as one that loads a file before it listens, is new again.
 KeyedBus::Unproven& KeyedBus::Remember(uint64_t sender) {
   const int64_t now = options_.now_ns();
-  const auto known = unproven_.find(sender);
+  auto known = unproven_.find(sender);
   if (known == unproven_.end() && unproven_.size() >= kMaxUnproven)
     unproven_.erase(LongestSilent(unproven_, 0));
-  Unproven& unproven =
-      unproven_.try_emplace(sender, Unproven{now, now, now, now, kFirstPauseNs}).first->second;
-  unproven.heard_ns = now;
-  return unproven;
+  if (known == unproven_.end() || now - known->second.heard_ns >= kPatienceNs)
+    known = unproven_.insert_or_assign(sender, Unproven{now, now, now, now, kFirstPauseNs}).first;
+  known->second.heard_ns = now;
+  return known->second;
 }
 
 /// Questions and answers may be lost: asked again when it is heard again, ever more seldom.

@@ -268,12 +268,29 @@ TEST_F(KeyedBusTest, TheDeadAreNotHeardByWhoNeverKnewThem) {
   air_.SendAgain(former);
   EXPECT_EQ(late->counts().refused(), 0) << "they might still answer";
   EXPECT_EQ(late->counts().early, 1);
-  air_.now_ns += 2000 * kMs;
+  for (int i = 0; i < 20; ++i, air_.now_ns += 100 * kMs) air_.SendAgain(former);
+  EXPECT_EQ(late->counts().refused(), 0);
   air_.SendAgain(former);
   EXPECT_TRUE(late->heard.empty());
   EXPECT_EQ(late->counts().echoes, static_cast<int64_t>(former.size()));
   ASSERT_EQ(late->warnings.size(), 1u);
   EXPECT_NE(late->warnings[0].find("echo"), std::string::npos);
+}
+
+TEST_F(KeyedBusTest, WhoLoadsAFileBeforeItListensIsNoEcho) {
+  const auto a = Start();
+  air_.lossy = [](const Outgoing& message) { return message.channel == kProofChannel; };
+  const auto b = Start();
+  Say(*b, 1);
+  air_.now_ns += 5000 * kMs;
+  Say(*b, 2);
+  air_.lossy = nullptr;
+  air_.now_ns += 20 * kMs;
+  Say(*b, 3);
+  Say(*b, 4);
+  EXPECT_EQ(a->heard, (std::vector<Bytes>{{4}}));
+  EXPECT_EQ(a->counts().refused(), 0);
+  EXPECT_EQ(a->counts().early, 3);
 }
 
 TEST_F(KeyedBusTest, EchoesOfTheDeadMakeNobodyTalkative) {
