@@ -100,8 +100,8 @@ class Forger {
     const std::optional<CameraInfo> info = Last<CameraInfo>();
     if (!frame || !info) return;
     frame->encoding = FrameEncoding::kGray8;
-    frame->width_px = info->camera.width_px();
-    frame->height_px = info->camera.height_px();
+    frame->width_px = info->camera.width_px;
+    frame->height_px = info->camera.height_px;
     frame->data.assign(static_cast<size_t>(frame->width_px) * static_cast<size_t>(frame->height_px), 100);
     for (int ahead = 1; ahead < 3; ++ahead) {
       ++frame->frame_index;
@@ -183,7 +183,8 @@ class Forger {
     const auto header = ParseHeader(WithoutTag(heard->second));
     if (!header) return;
     MapReset reset;
-    reset.session = static_cast<uint32_t>(header->session);
+    reset.map_id = 1;
+    reset.drop = true;
     SendRecord(channels::kMapReset, *header, wire::Encode(reset));
   }
   void Acks() {
