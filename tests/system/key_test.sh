@@ -42,10 +42,8 @@ forge 23463 "${kinds[@]}" --key "$other"
 forge 23463 --kind replay
 "$build/bin/dmslam-noise" --lcm-url "udpm://239.255.76.67:23463?ttl=0" --rate 1000 >/dev/null 2>&1 &
 forgers+=($!)
-lcm-logplayer -s 0.5 -l "udpm://239.255.76.67:23463?ttl=0" "$work/keyed/run.lcmlog" >/dev/null 2>&1 &
-forgers+=($!)
 check "a run among forgers ends with 0" env DMSLAM_KEY_FILE="$key" "$root/scripts/run.sh" --build-dir "$build" "${sequence[@]}" \
-  --out "$work/attacked" --port 23463 --share-port --record
+  --out "$work/attacked" --port 23463 --share-port
 stop_forging
 same attacked
 expect "forgeries are counted" "$work/attacked" messages_dropped ">= 1000"
@@ -57,15 +55,28 @@ for process in player frontend mapper loopcloser collector; do
 done
 check "it is logged" grep -q "refused a message on .* (further ones are only counted)" "$work/attacked/log/frontend.log"
 
-# What a logger records, who has no key, holds the forgeries as well; the key tells them apart.
+# A whole log of another session, with tags of the same key: its senders are gone.
+lcm-logplayer -s 0.5 -l "udpm://239.255.76.67:23466?ttl=0" "$work/keyed/run.lcmlog" >/dev/null 2>&1 &
+forgers+=($!)
+check "a run beside a ghost ends with 0" run "${sequence[@]}" --out "$work/haunted" --port 23466 --share-port --key "$key"
+stop_forging
+same haunted
+expect "the ghost is counted" "$work/haunted" messages_dropped ">= 100"
+
+# What a logger records, who has no key, holds forgeries as well; the key tells them apart. (Few of them: it queues 30 messages.)
+forge 23467 --kind record --kind end --kind reset --kind frame
+check "a run with a few forgeries is recorded" run "${sequence[@]}" --out "$work/recorded" --port 23467 --share-port --key "$key" --record
+stop_forging
 map() { "$build/bin/dmslam-map" "$@"; }
-for which in keyed attacked; do
-  check "the map of '$which' is rebuilt" map --log "$work/$which/run.lcmlog" --key "$key" --ply "$work/$which.ply" >/dev/null 2>&1
+for which in keyed recorded; do
+  check "the map of '$which' is rebuilt" map --log "$work/$which/run.lcmlog" --key "$key" --ply "$work/$which.ply" >"$work/$which.said" 2>&1
   check "it is the run's" cmp "$work/quiet/map.ply" "$work/$which.ply"
 done
-check "without the key too, where nobody forged" map --log "$work/keyed/run.lcmlog" --ply "$work/open.ply" >/dev/null 2>&1
+check "what was left out is said" grep -q "[0-9]* messages have no tag that fits the key and were left out" "$work/recorded.said"
+check "and only that" test "$(grep -c "no tag that fits" "$work/keyed.said")" = 0
+check "without the key too, where nobody forged" map --log "$work/keyed/run.lcmlog" --ply "$work/open.ply" >"$work/said"
 check "it is the run's own" cmp "$work/quiet/map.ply" "$work/open.ply"
-check "the owner plays the log again" run --log "$work/attacked/run.lcmlog" --seed 3 --lockstep --key "$key" --out "$work/again" --port 23464
+check "the owner plays the log again" run --log "$work/recorded/run.lcmlog" --seed 3 --lockstep --key "$key" --out "$work/again" --port 23464
 same again
 
 refused "--replay plays by lcm-logplayer, which has no key; --log" run --replay "$work/keyed/run.lcmlog" --key "$key" --out "$work/replayed"

@@ -130,8 +130,9 @@ bool EventLogReader::UseKey(const BusKey& key) {
 
 std::optional<LogEvent> EventLogReader::Next() {
   while (std::optional<LogEvent> event = NextWhole()) {
-    if (key_ && !key_->Verify(WithoutPrefix(event->channel), event->bytes)) {
-      ++refused_;
+    const std::string channel = WithoutPrefix(event->channel);
+    if (key_ && !key_->Verify(channel, event->bytes)) {
+      if (!channel.empty()) ++refused_;
       continue;
     }
     event->bytes.resize(WithoutTag(event->bytes).size());
