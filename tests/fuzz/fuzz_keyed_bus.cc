@@ -9,7 +9,6 @@
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/keyed_bus.h"
-#include "dmslam/proof_t.hpp"
 #include "fuzz_target.h"
 
 namespace dmslam::fuzz {
@@ -79,7 +78,11 @@ class Attack {
  private:
   void HandInProof(uint8_t what, uint8_t who, uint8_t detail, const Tag& tag) {
     proof_t proof = wire_.asked();
-    proof.kind = what % 8 == 4 ? proof_t::KIND_ASKS : what % 8 == 5 ? detail : proof_t::KIND_ANSWERS;
+    if (what % 8 == 4) {
+      proof.kind = proof_t::KIND_ASKS;
+    } else {
+      proof.kind = what % 8 == 5 ? static_cast<int32_t>(detail) : static_cast<int32_t>(proof_t::KIND_ANSWERS);
+    }
     if (what % 8 == 7) proof.challenge[detail % 2] ^= 1;
     if (proof.kind == proof_t::KIND_ANSWERS && what % 8 != 7 && tag.session == 5) answered_.insert(who);
     Bytes body = Encode(proof);

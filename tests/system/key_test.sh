@@ -63,6 +63,24 @@ stop_forging
 same haunted
 expect "the ghost is counted" "$work/haunted" messages_dropped ">= 100"
 
+# Processes that were killed come back and are heard; what the dead have said is repeated all the time, and is not.
+forge 23468 --kind replay
+run "${sequence[@]}" --out "$work/killed" --port 23468 --share-port --key "$key" >"$work/killed.said" 2>&1 &
+runner=$!
+for victim in mapper loopcloser; do
+  for ((i = 0; i < 600; ++i)); do
+    grep -qs "frame [0-9]* of" "$work/killed/log/collector.log" && break
+    sleep 0.05
+  done
+  sleep 0.5
+  kill -KILL "$(<"$work/killed/log/$victim.pid")" || failed "$victim was not there to be killed"
+done
+check "the run with killed processes ends with 0" wait $runner
+stop_forging
+expect "they were started again" "$work/killed" restarts "== 2"
+expect "nothing is lost with them" "$work/killed" records_lost "== 0"
+expect "the frames are tracked" "$work/killed" tracked_percent ">= 60"
+
 # What a logger records, who has no key, holds forgeries as well; the key tells them apart. (Few of them: it queues 30 messages.)
 forge 23467 --kind record --kind end --kind reset --kind frame
 check "a run with a few forgeries is recorded" run "${sequence[@]}" --out "$work/recorded" --port 23467 --share-port --key "$key" --record

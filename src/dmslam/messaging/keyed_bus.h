@@ -9,6 +9,7 @@
 
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/bus_key.h"
+#include "dmslam/proof_t.hpp"
 
 namespace dmslam {
 

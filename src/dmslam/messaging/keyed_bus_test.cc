@@ -8,7 +8,6 @@
 #include <set>
 
 #include "dmslam/messaging/codec.h"
-#include "dmslam/proof_t.hpp"
 
 namespace dmslam {
 namespace {
