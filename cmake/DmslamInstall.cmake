@@ -94,7 +94,7 @@ macro(_dmslam_package)
   set(CPACK_DEBIAN_DEV_PACKAGE_NAME dmslam-dev)
   set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
   string(CONCAT CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "dmslam (= ${PROJECT_VERSION}), liblcm-dev, libeigen3-dev, "
-    "libceres-dev, libyaml-cpp-dev, nlohmann-json3-dev, libspdlog-dev, zlib1g-dev, libturbojpeg0-dev, libopencv-core-dev, "
+    "libceres-dev, libyaml-cpp-dev, nlohmann-json3-dev, libspdlog-dev, zlib1g-dev, libsodium-dev, libturbojpeg0-dev, libopencv-core-dev, "
     "libopencv-imgproc-dev, libopencv-imgcodecs-dev, libopencv-videoio-dev")
   set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Programs, message definitions, cameras, vocabulary, units, man pages.")
   set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers and static libraries of the rooms, message types, CMake configuration.")

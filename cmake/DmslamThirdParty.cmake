@@ -32,3 +32,12 @@ if(NOT TARGET dmslam_turbojpeg)
   target_include_directories(dmslam_turbojpeg SYSTEM INTERFACE ${TURBOJPEG_INCLUDE_DIR})
   target_link_libraries(dmslam_turbojpeg INTERFACE ${TURBOJPEG_LIBRARY})
 endif()
+
+# dmslam_sodium (libsodium-dev).
+find_library(SODIUM_LIBRARY sodium REQUIRED)
+find_path(SODIUM_INCLUDE_DIR sodium.h REQUIRED)
+if(NOT TARGET dmslam_sodium)
+  add_library(dmslam_sodium INTERFACE IMPORTED GLOBAL)
+  target_include_directories(dmslam_sodium SYSTEM INTERFACE ${SODIUM_INCLUDE_DIR})
+  target_link_libraries(dmslam_sodium INTERFACE ${SODIUM_LIBRARY})
+endif()

@@ -5,7 +5,7 @@ core=(build-essential cmake ninja-build ccache pkg-config
   liblcm-dev liblcm-bin libglib2.0-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-features2d-dev libopencv-calib3d-dev
   libopencv-videoio-dev libeigen3-dev libceres-dev libspdlog-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
-  libturbojpeg0-dev zlib1g-dev)
+  libturbojpeg0-dev zlib1g-dev libsodium-dev)
 test=(libgtest-dev libbenchmark-dev iproute2 nftables python3-minimal)
 tools=(default-jre default-jdk-headless liblcm-java libjchart2d-java xvfb xdotool imagemagick)
 viewer=(libjs-three libjs-chart.js)

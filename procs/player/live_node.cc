@@ -130,6 +130,7 @@ void LiveNode::PublishStatus() {
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
   status.head.health = MeasureProcess();
+  status.head.health.dropped_foreign = context_.refused();
   if (!away_.empty()) status.head.reason = "the camera is away";
   status.state = ending_ ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying;
   status.frames_published = published_;

@@ -24,8 +24,9 @@ struct Arguments {
   std::vector<std::string> black_outs, jumps;
 };
 
-std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, dmslam::PlayerOptions* options) {
-  auto log = std::make_shared<const dmslam::LogIndex>(a.log);
+std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, const dmslam::NodeOptions& node,
+                                             dmslam::PlayerOptions* options) {
+  auto log = std::make_shared<const dmslam::LogIndex>(a.log, node.key);
   if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
   auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
   options->sequence = frames->camera_info().sequence;
@@ -52,7 +53,7 @@ void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::Pla
 std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::NodeOptions& node,
                                           dmslam::PlayerOptions* options) {
   SetOptions(a, node, options);
-  return a.log.empty() ? dmslam::OpenSequence(a.camera_file, a.fps, options) : OpenLog(a, options);
+  return a.log.empty() ? dmslam::OpenSequence(a.camera_file, a.fps, options) : OpenLog(a, node, options);
 }
 
 std::unique_ptr<dmslam::Node> WatchCamera(const Arguments& a, dmslam::NodeContext context,
@@ -96,7 +97,7 @@ int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options, const 
 std::unique_ptr<dmslam::Node> EnterRecords(const Arguments& a, dmslam::NodeContext context,
                                            const dmslam::NodeOptions& node) {
   if (a.log.empty()) throw dmslam::InputError("--channels records needs a log: give it with --log");
-  auto log = std::make_shared<const dmslam::LogIndex>(a.log);
+  auto log = std::make_shared<const dmslam::LogIndex>(a.log, node.key);
   if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
   return std::make_unique<dmslam::RecordsNode>(std::move(context), node, log, a.log_session);
 }

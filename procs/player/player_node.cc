@@ -256,6 +256,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
   status.head.health = MeasureProcess();
+  status.head.health.dropped_foreign = context_.refused();
   if (awaiting_done_) status.head.health.waiting_for = "frontend";
   status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
   status.frames_published = published_;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "dmslam/messaging/bus_key.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -38,6 +39,16 @@ void CheckSource(const RunArguments& a) {
   if (a.lockstep && !a.replay.empty()) {
     throw InputError(
         "--replay plays in real time, since lcm-logplayer waits for nobody; in lock-step plays --log");
+  }
+}
+
+void CheckKey(const RunArguments& a) {
+  const bool keyed = BusKey::LoadIfWanted(a.key).has_value();
+  if (keyed && !a.replay.empty()) {
+    throw InputError(
+        "--replay plays by lcm-logplayer, which has no key; --log plays the same frames by our player, at "
+        "the "
+        "same rate");
   }
 }
 
@@ -95,6 +106,10 @@ void DeclareRunArguments(CommandLine& line, RunArguments& a) {
   line.AddFlag("--share-port", a.share_port,
                "others may be on that port already: lcm-spy, a logger, a system with another --prefix");
   line.AddOption("--prefix", a.prefix, "put before every channel: separates systems on one port");
+  line.AddOption(
+      "--key", a.key,
+      "file with a key (mode 0600): every message carries a tag made with it, and only such ones are "
+      "heard; default: what DMSLAM_KEY_FILE names");
   line.AddOption("--receive-buffer", a.receive_buffer,
                  "bytes that the kernel is asked to hold for each process")
       .ShowDefault();
@@ -121,6 +136,7 @@ void CheckRunArguments(const RunArguments& a) {
   if (a.localize && a.map.empty()) throw InputError("--localize needs a map: give it with --map");
   if (!a.profile.empty() && a.profile != "dm" && a.profile != "baseline")
     throw InputError("--profile " + a.profile + ": write dm or baseline");
+  CheckKey(a);
   CheckPort(a);
 }
 

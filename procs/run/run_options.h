@@ -12,7 +12,7 @@ namespace dmslam {
 /// What the command line of dmslam-run says.
 struct RunArguments {
   std::string sequence, log, replay, map, save_map, out, camera, seed = "1", config, profile, pictures = "0",
-                                                                 http, port, prefix, programs;
+                                                                 http, port, prefix, key, programs;
   std::string receive_buffer = "4194304", encoding, start, frames;
   std::vector<std::string> sets, black_outs, jumps;
   double speed = 1, fps = 0, watchdog_s = 60;

@@ -60,6 +60,7 @@ Words CommonArguments(const RunArguments& a, const RunPlace& place) {
   for (const std::string& set : a.sets) Append(&common, {"--set", set});
   if (a.no_loop) Append(&common, {"--set", "loop.enabled=off"});
   AppendOption(&common, "--prefix", a.prefix);
+  AppendOption(&common, "--key", a.key);
   if (!a.map.empty()) Append(&common, {"--set", "map.saved=on"});
   if (a.localize) Append(&common, {"--set", "map.localize_only=on"});
   Append(&common, {"--set", "seed=" + a.seed, "--lcm-url", Url(a, place), "--session",

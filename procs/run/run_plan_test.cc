@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -70,6 +71,26 @@ TEST_F(RunPlanTest, RefusesWhatDoesNotFit) {
   EXPECT_NE(Refusal().find("no such folder"), std::string::npos);
   arguments_.sequence = "/dev/video77";
   EXPECT_EQ(Refusal(), "") << "a camera may come later";
+}
+
+TEST_F(RunPlanTest, HandsTheKeyToAllOnceItIsSafe) {
+  unsetenv("DMSLAM_KEY_FILE");
+  arguments_.key = folder_ + "/key";
+  std::ofstream(arguments_.key) << std::string(40, 'k');
+  fs::permissions(arguments_.key, fs::perms::owner_read | fs::perms::group_read);
+  EXPECT_NE(Refusal().find("chmod 600 " + arguments_.key), std::string::npos) << Refusal();
+  fs::permissions(arguments_.key, fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_EQ(Refusal(), "");
+  for (const char* name : {"mapper", "loopcloser", "frontend", "collector", "player"})
+    EXPECT_NE(Line(name).find("--key " + arguments_.key), std::string::npos) << name;
+  std::ofstream(folder_ + "/some.lcmlog") << "log";
+  arguments_.sequence.clear();
+  arguments_.replay = folder_ + "/some.lcmlog";
+  EXPECT_NE(Refusal().find("lcm-logplayer, which has no key; --log"), std::string::npos) << Refusal();
+  setenv("DMSLAM_KEY_FILE", arguments_.key.c_str(), 1);
+  arguments_.key.clear();
+  EXPECT_NE(Refusal().find("no key"), std::string::npos) << "the environment counts as well";
+  unsetenv("DMSLAM_KEY_FILE");
 }
 
 TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {

@@ -26,6 +26,7 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
                          Exchange* exchange)
     : path_(path), options_(std::move(options)), viewer_(std::move(viewer)), exchange_(exchange) {
   EventLogReader reader(path);
+  if (options_.key) reader.UseKey(*options_.key);
   int64_t events = 0;
   while (const std::optional<LogEvent> event = reader.Next()) {
     if (WithoutPrefix(event->channel).empty()) continue;
@@ -45,6 +46,7 @@ void LogPlayback::BeginAnew() {
   node_.reset();
   bus_ = std::make_unique<LogBus>();
   reader_ = std::make_unique<EventLogReader>(path_);
+  if (options_.key) reader_->UseKey(*options_.key);
   next_ = reader_->Next();
   at_us_ = begin_us_;
   NodeContext context;

@@ -132,6 +132,7 @@ std::string Misplaced(const Include& include) {
     return room == "messaging" || room == "wire" ? ""
                                                  : "LCM and its generated types belong to messaging and wire";
   }
+  if (target == "sodium.h") return room == "messaging" ? "" : "libsodium belongs to messaging";
   if (StartsWith(target, "opencv2/")) {
     const bool drawing = FileName(include.file).find("plot") != std::string::npos ||
                          FileName(include.file).find("picture") != std::string::npos ||

@@ -9,6 +9,7 @@
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/keyed_bus.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/recording/map_file.h"
@@ -21,7 +22,7 @@
 namespace {
 
 struct Arguments {
-  std::string log, ply, trajectory, online, keyframes, save, masks, json;
+  std::string log, key, ply, trajectory, online, keyframes, save, masks, json;
   uint32_t session = 0;
   double at_s = -1;
   bool channels = false;
@@ -31,6 +32,10 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.SetVersion(dmslam::kVersion);
   app.AddOption("--log,--map", a.log, "log of a run, or a saved map").Required();
   app.AddOption("--log-session", a.session, "which of the log's sessions, where it holds several");
+  app.AddOption(
+      "--key", a.key,
+      "file with the key under which the log was recorded: what others sent is left out; default: what "
+      "DMSLAM_KEY_FILE names");
   app.AddOption("--at", a.at_s, "seconds after the log's beginning: the map as it was then").NonNegative();
   app.AddFlag("--channels", a.channels, "list what the log holds: channel, type, messages, bytes");
   app.AddOption("--ply", a.ply, "write the map as coloured points");
@@ -48,7 +53,8 @@ std::map<int64_t, std::string> TypeNames() {
   std::map<int64_t, std::string> names = {
       {dmslam::head_t::getHash(), "head_t"},           {dmslam::ack_t::getHash(), "ack_t"},
       {dmslam::part_t::getHash(), "part_t"},           {dmslam::take_over_t::getHash(), "take_over_t"},
-      {dmslam::hand_over_t::getHash(), "hand_over_t"}, {dmslam::replica_t::getHash(), "replica_t"}};
+      {dmslam::hand_over_t::getHash(), "hand_over_t"}, {dmslam::replica_t::getHash(), "replica_t"},
+      {dmslam::proof_t::getHash(), "proof_t"}};
   const auto add = [&]<typename... Message>(const std::tuple<Message...>*) {
     (names.emplace(dmslam::wire::Info<Message>().fingerprint, dmslam::wire::Info<Message>().type), ...);
   };
@@ -57,7 +63,7 @@ std::map<int64_t, std::string> TypeNames() {
 }
 
 /// One line per channel. What is not ours has the type "?".
-int ListChannels(const std::string& path) {
+int ListChannels(const std::string& path, const std::optional<dmslam::BusKey>& key) {
   struct Content {
     std::string type;
     int64_t messages = 0, bytes = 0;
@@ -65,6 +71,7 @@ int ListChannels(const std::string& path) {
   const std::map<int64_t, std::string> names = TypeNames();
   std::map<std::string, Content> contents;
   dmslam::EventLogReader reader(path);
+  if (key) reader.UseKey(*key);
   while (const auto event = reader.Next()) {
     Content& content = contents[event->channel];
     const auto name = names.find(dmslam::FingerprintOf(event->bytes).value_or(0));
@@ -131,8 +138,9 @@ void Judge(const Arguments& a, const dmslam::Map& map, dmslam::MapId map_id) {
 }
 
 int Run(const Arguments& a) {
-  if (a.channels) return ListChannels(a.log);
-  const dmslam::LogIndex log(a.log);
+  const std::optional<dmslam::BusKey> key = dmslam::BusKey::LoadIfWanted(a.key);
+  if (a.channels) return ListChannels(a.log, key);
+  const dmslam::LogIndex log(a.log, key);
   if (!log.DescribeDamage().empty()) dmslam::LogWarning("{}", log.DescribeDamage());
   const dmslam::RecordedSession& session = log.Session(a.session);
   const int64_t until_us = a.at_s < 0 ? INT64_MAX : log.begin_us() + std::llround(a.at_s * 1e6);

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <vector>
 
+#include "dmslam/messaging/keyed_bus.h"
 #include "dmslam/messaging/types.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
@@ -81,6 +82,7 @@ std::vector<ChannelRow> ProtocolRows() {
       {TakeOverChannel(owner), "take_over_t", "a successor", "the present writer", "at a take-over"},
       {HandOverChannel(owner), "hand_over_t", "a starting writer", "holders of replicas", "at a start"},
       {ReplicaChannel("<HOLDER>"), "replica_t", "holders of replicas", "a starting writer", "at a start"},
+      {kProofChannel, "proof_t", "each process, where the bus has a key", "each process", "at a start"},
   };
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dmslam/messaging/keyed_bus.h"
 #include "dmslam/util/crc32c.h"
 #include "dmslam/wire/channels.h"
 
@@ -34,6 +35,7 @@ std::vector<std::string> AllChannels() {
       all.push_back(name);
     }
   }
+  all.emplace_back(kProofChannel);
   return all;
 }
 

@@ -25,6 +25,8 @@ class Bus {
   /// Who gets them. Called from within the bus's delivery; may publish.
   virtual void SetHandler(Handler handler) = 0;
   virtual void Publish(const Outgoing& message) = 0;
+  /// What the bus adds to each message: parts that shall fit a datagram leave room for it.
+  virtual size_t overhead_bytes() const { return 0; }
 };
 
 /// A bus within one process: lossless, first in first out, delivered when asked to. Each process has a port

@@ -118,7 +118,30 @@ void EventLogReader::CountGap(int64_t offset, int64_t end) {
   gap_open_ = true;
 }
 
+bool EventLogReader::UseKey(const BusKey& key) {
+  EventLogReader log(path_);
+  while (const std::optional<LogEvent> event = log.NextWhole()) {
+    if (!key.Verify(WithoutPrefix(event->channel), event->bytes)) continue;
+    key_ = key;
+    return true;
+  }
+  return false;
+}
+
 std::optional<LogEvent> EventLogReader::Next() {
+  while (std::optional<LogEvent> event = NextWhole()) {
+    const std::string channel = WithoutPrefix(event->channel);
+    if (key_ && !key_->Verify(channel, event->bytes)) {
+      if (!channel.empty()) ++refused_;
+      continue;
+    }
+    event->bytes.resize(WithoutTag(event->bytes).size());
+    return event;
+  }
+  return std::nullopt;
+}
+
+std::optional<LogEvent> EventLogReader::NextWhole() {
   while (at_ < size_) {
     const std::optional<Lengths> lengths = HeaderAt(at_);
     if (!lengths || !IsFollowed(at_, *lengths)) {

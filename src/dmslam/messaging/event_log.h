@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/messaging/bus_key.h"
 #include "dmslam/messaging/types.h"
 
 namespace dmslam {
@@ -44,7 +45,11 @@ class EventLogReader {
   /// Throws InputError for a file that cannot be opened, or that holds no event at all.
   explicit EventLogReader(std::string path);
 
-  /// The next whole event; nothing at the end.
+  /// Where the log was recorded under this key: from now on only messages with a tag that fits are read,
+  /// since lcm-logger, which has no key, records what anybody sends. Else nothing changes, and the result is
+  /// false.
+  bool UseKey(const BusKey& key);
+  /// The next whole event, without its tag if it has one; nothing at the end.
   std::optional<LogEvent> Next();
   /// The next event read begins at `offset` (LogEvent::offset), or is the first one after it. No gap is
   /// counted for the jump.
@@ -52,6 +57,8 @@ class EventLogReader {
 
   const std::string& path() const { return path_; }
   int64_t size() const { return size_; }
+  /// Messages that were left out since their tags do not fit the key.
+  int64_t refused() const { return refused_; }
   const std::vector<LogGap>& gaps() const { return gaps_; }
   /// What was skipped so far, for people: places, bytes, events; empty when nothing was.
   std::string DescribeGaps() const;
@@ -63,6 +70,7 @@ class EventLogReader {
     int64_t total() const;
   };
 
+  std::optional<LogEvent> NextWhole();
   bool Load(int64_t offset, size_t num_bytes);
   std::optional<Lengths> HeaderAt(int64_t offset);
   bool IsFollowed(int64_t offset, const Lengths& lengths);
@@ -73,6 +81,8 @@ class EventLogReader {
   std::string path_;
   std::unique_ptr<std::FILE, CloseFile> file_;
   int64_t size_ = 0;
+  std::optional<BusKey> key_;
+  int64_t refused_ = 0;
   int64_t at_ = 0;
   int64_t last_number_ = -1;
   bool gap_open_ = false;  ///< the newest gap waits for the number of the event behind it

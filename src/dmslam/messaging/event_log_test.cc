@@ -196,5 +196,33 @@ TEST_F(EventLog, RandomDamageNeverStopsIt) {
   }
 }
 
+TEST_F(EventLog, ALogThatWasRecordedUnderAKeyIsReadWithoutItsTags) {
+  const BusKey key(Bytes(32, 1)), other(Bytes(32, 2));
+  {
+    EventLogWriter writer(path_);
+    writer.Write(1, "LCM_SELF_TEST", Bytes{1});
+    writer.Write(2, "DMSLAM_TEST_A", key.WithTag("DMSLAM_TEST_A", Bytes{2}, {1, 1, 1}));
+    writer.Write(3, "DMSLAM_TEST_A", Bytes{3});
+    writer.Write(4, "P_DMSLAM_TEST_A", other.WithTag("DMSLAM_TEST_A", Bytes{4}, {1, 1, 1}));
+    writer.Write(5, "P_DMSLAM_TEST_B", key.WithTag("DMSLAM_TEST_B", Bytes{5}, {1, 2, 1}));
+    writer.Close();
+  }
+  const auto read = [](EventLogReader* reader) {
+    Bytes contents;
+    while (const auto event = reader->Next()) {
+      EXPECT_EQ(event->bytes.size(), 1u);
+      contents.push_back(event->bytes[0]);
+    }
+    return contents;
+  };
+  EventLogReader open(path_), keyed(path_), foreign(path_);
+  EXPECT_EQ(read(&open), (Bytes{1, 2, 3, 4, 5}));
+  EXPECT_TRUE(keyed.UseKey(key));
+  EXPECT_EQ(read(&keyed), (Bytes{2, 5})) << "what a logger recorded of others is left out";
+  EXPECT_EQ(keyed.refused(), 2) << "what is not ours is not counted";
+  EXPECT_FALSE(foreign.UseKey(BusKey(Bytes(32, 3))));
+  EXPECT_EQ(read(&foreign), (Bytes{1, 2, 3, 4, 5})) << "recorded under no key, or another one: as it is";
+}
+
 }  // namespace
 }  // namespace dmslam

@@ -1,5 +1,5 @@
 // One forged message each, with the right checksum: nobody is ended, hung or deafened by it. Whoever keeps
-// sending can still forge anything: there are no keys.
+// sending can still forge anything where the bus has no key (keyed_bus.h).
 
 #include <gtest/gtest.h>
 

@@ -59,7 +59,8 @@ class LogIndex {
  public:
   /// Throws InputError for what is no log, or a log without any message of ours; one that another version has
   /// recorded is called that.
-  explicit LogIndex(const std::string& path);
+  /// `key`: of the bus; a log that was recorded under it gives only what was said by those who have it.
+  explicit LogIndex(const std::string& path, const std::optional<BusKey>& key = std::nullopt);
 
   /// The session `id`; 0: the only one there is. Throws InputError that names the sessions there are.
   const RecordedSession& Session(uint32_t id = 0) const;

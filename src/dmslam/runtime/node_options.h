@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "dmslam/messaging/bus_key.h"
 #include "dmslam/messaging/types.h"
 #include "dmslam/settings/settings.h"
 
@@ -17,10 +19,11 @@ struct NodeOptions {
       peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
   Link link = Link::kHost;
   bool accept_recorded =
-      false;               ///< camera and frames of a recorded session (a log that is replayed) are ours
-  bool take_over = false;  ///< asks a present writer of its stream to close
-  bool fresh = false;      ///< a mapper begins with an empty map, whatever replicas there are
-  Settings settings;       ///< as text: each node reads the options that it needs
+      false;                  ///< camera and frames of a recorded session (a log that is replayed) are ours
+  bool take_over = false;     ///< asks a present writer of its stream to close
+  bool fresh = false;         ///< a mapper begins with an empty map, whatever replicas there are
+  std::optional<BusKey> key;  ///< of the bus; what is recorded under it can be told from what is not
+  Settings settings;          ///< as text: each node reads the options that it needs
 
   bool HasPeer(std::string_view name) const;
 };

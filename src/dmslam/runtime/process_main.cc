@@ -33,6 +33,9 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
   app_.SetVersion(BuildVersion());
   app_.AddOption("--lcm-url", lcm_url_, "LCM bus; separate systems by port").ShowDefault();
   app_.AddOption("--prefix", prefix_, "put before every channel: separates systems that share a port");
+  app_.AddOption("--key", key_,
+                 "file with the key of the bus (mode 0600): only those who have it are heard; default: what "
+                 "DMSLAM_KEY_FILE names");
   app_.AddOption("--link", link_, "host: records travel whole; lan: in parts of at most 1380 bytes")
       .OneOf({"host", "lan"})
       .ShowDefault();
@@ -72,17 +75,33 @@ int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
   }
 }
 
+std::unique_ptr<KeyedBus> ProcessMain::MakeKeyedBus(Bus* bus) const {
+  if (!options_.key) return nullptr;
+  KeyedBus::Options options;
+  options.session = options_.session;
+  options.now_ns = &EventLoop::now_ns;
+  options.wall_us = &EventLoop::wall_us;
+  options.warn = [this](const std::string& text) { LogWarning("{}: {}", role_, text); };
+  return std::make_unique<KeyedBus>(bus, *options_.key, options);
+}
+
 int ProcessMain::RunNode(const Factory& factory) {
   options_.settings = LoadSettings(config_, overrides_);
   options_.link = link_ == "lan" ? Link::kLan : Link::kHost;
+  options_.key = BusKey::LoadIfWanted(key_);
   if (offline_) {
     if (const std::optional<int> code = offline_(options_)) return *code;
   }
   EventLoop loop;
   LcmBus bus({lcm_url_, prefix_});
   if (!bus.receive_buffer_note().empty()) LogInfo("{}", bus.receive_buffer_note());
+  const std::unique_ptr<KeyedBus> keyed = MakeKeyedBus(&bus);
   NodeContext context;
   context.bus = &bus;
+  if (keyed) {
+    context.bus = keyed.get();
+    context.refused = [&keyed] { return keyed->statistics().refused(); };
+  }
   context.now_ns = &EventLoop::now_ns;
   context.wall_us = &EventLoop::wall_us;
   ServiceNotice notice;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dmslam/console/command_line.h"
+#include "dmslam/messaging/keyed_bus.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/node_options.h"
 
@@ -35,11 +36,13 @@ class ProcessMain {
 
  private:
   int RunNode(const Factory& factory);
+  std::unique_ptr<KeyedBus> MakeKeyedBus(Bus* bus) const;
 
   CommandLine app_;
   std::string role_;
   std::string lcm_url_ = "udpm://239.255.76.67:7670?ttl=0&recv_buf_size=4194304";
   std::string prefix_;
+  std::string key_;
   std::string link_ = "host";
   std::string config_;
   std::vector<std::string> overrides_;

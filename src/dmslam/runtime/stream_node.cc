@@ -216,6 +216,7 @@ void StreamNode::OpenWriter() {
   options.name = context_.name;
   options.schema_hash = SchemaHash();
   options.link = options_.link;
+  options.part_bytes -= static_cast<int32_t>(context_.bus->overhead_bytes());
   for (const std::string& reader : plan_->readers)
     options.roles.push_back({reader, options_.HasPeer(reader)});
   const Term term = election_->Win(context_.wall_us(), plan_->parent.epoch);
@@ -357,7 +358,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;
   health.received = received_;
   health.received_bytes = received_bytes_;
-  health.dropped_foreign = dropped_foreign_;
+  health.dropped_foreign = dropped_foreign_ + context_.refused();
   health.dropped_malformed = dropped_malformed_;
   for (const StreamReader* reader : readers) {
     if (reader == nullptr) continue;

@@ -21,6 +21,9 @@ namespace dmslam {
 /// Hash over the fingerprints of all message types: processes with another one are refused by name.
 int64_t SchemaHash();
 
+/// Why a process without a key understands nothing of those that have one.
+inline constexpr char kHasTag[] = "its sender has a key; give every process the same --key";
+
 /// What the processes have in common: they learn camera and session from the player, decide by election who
 /// writes (those that write a stream), keep their streams going, and say how they fare once a second.
 class StreamNode : public Node {
@@ -93,7 +96,7 @@ class StreamNode : public Node {
   std::optional<Message> Read(std::span<const uint8_t> bytes) {
     std::string reason;
     std::optional<Message> message = wire::Decode<Message>(bytes, &reason);
-    if (!message) CountMalformed(wire::Info<Message>().channel, reason);
+    if (!message) CountMalformed(wire::Info<Message>().channel, HasTag(bytes) ? kHasTag : reason);
     return message;
   }
   /// The change that is complete with a record of the map stream; none while its group is not whole. None,
