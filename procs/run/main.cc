@@ -11,6 +11,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
+#include "run/resume.h"
 #include "run/run_plan.h"
 
 namespace {
@@ -39,6 +40,7 @@ class Run {
 
   int Play() {
     fs::remove(plan_.table);
+    if (place_.resume) SayResume(*place_.resume);
     for (const auto* children : {&plan_.companions, &plan_.pipeline}) {
       for (const dmslam::ChildSpec& child : *children) Begin(child);
     }
@@ -52,11 +54,21 @@ class Run {
   }
 
  private:
+  static void SayResume(const dmslam::ResumePoint& point) {
+    if (!point.warning.empty()) Say(point.warning);
+    const std::string frame = point.last_frame ? " behind frame " + std::to_string(*point.last_frame) : "";
+    Say("goes on" + frame + " in a map of " + std::to_string(point.keyframes) + " keyframes");
+  }
+
   void Begin(const dmslam::ChildSpec& child) {
-    if (child.errors != child.output && !child.errors_to_ours) fs::remove(child.errors);
-    if (child.name != "collector") fs::remove(child.output);
+    if (!place_.resume) RemoveLogs(child);
     supervisor_.Start(child);
     if (child.name == "viewer") ShowViewer();
+  }
+
+  static void RemoveLogs(const dmslam::ChildSpec& child) {
+    if (child.errors != child.output && !child.errors_to_ours) fs::remove(child.errors);
+    if (child.name != "collector") fs::remove(child.output);
   }
 
   /// Its address, once it has one.
@@ -181,13 +193,55 @@ dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
   return place;
 }
 
-int RunWith(const dmslam::RunArguments& arguments) {
-  dmslam::CheckRunArguments(arguments);
+int Start(const dmslam::RunArguments& arguments, dmslam::RunIdentity identity,
+          const std::optional<dmslam::ResumePoint>& resume) {
   dmslam::Supervisor::Options options;
   options.watchdog_ns = static_cast<int64_t>(arguments.watchdog_s * 1e9);
   options.wait_for_what_may_come = arguments.wait;
-  Run run(arguments, PlaceOf(arguments), options);
+  dmslam::RunPlace place = PlaceOf(arguments);
+  place.session = identity.session;
+  place.resume = resume;
+  identity.pid = getpid();
+  Run run(arguments, place, options);
+  identity.Write(arguments.out);
   return run.Play();
+}
+
+int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
+  dmslam::CheckRunArguments(arguments);
+  std::error_code error;
+  fs::create_directories(arguments.out, error);
+  const dmslam::RunLock lock(arguments.out);
+  dmslam::RunIdentity identity;
+  identity.session = dmslam::ChooseSession(arguments);
+  identity.folder = fs::current_path().string();
+  identity.arguments.assign(argv + 1, argv + argc);
+  return Start(arguments, identity, std::nullopt);
+}
+
+/// The same run again, from where it stood when all its processes died.
+int Resume(const std::string& folder) {
+  if (!fs::is_directory(folder)) throw dmslam::InputError(folder + ": no such folder; check --resume");
+  const std::string out = fs::absolute(folder).lexically_normal().string();
+  const dmslam::RunLock lock(out);
+  dmslam::RunIdentity identity = dmslam::RunIdentity::Read(out);
+  const dmslam::ResumePoint point = dmslam::FindResumePoint(out, identity);
+  std::error_code gone;
+  fs::current_path(identity.folder, gone);
+  if (gone)
+    throw dmslam::InputError(identity.folder + ": the run was begun there, and it is not there any more");
+  dmslam::CommandLine line("", "dmslam-run");
+  dmslam::RunArguments arguments;
+  dmslam::DeclareRunArguments(line, arguments);
+  std::vector<const char*> words = {"dmslam-run"};
+  for (const std::string& word : identity.arguments) words.push_back(word.c_str());
+  if (line.Parse(static_cast<int>(words.size()), words.data()))
+    throw dmslam::InputError(out +
+                             "/run.json: its arguments are not those of this dmslam-run; begin it anew");
+  arguments.out = out;
+  dmslam::CheckRunArguments(arguments);
+  ++identity.resumed;
+  return Start(arguments, identity, point);
 }
 
 }  // namespace
@@ -197,7 +251,7 @@ int main(int argc, char** argv) {
       "Plays a sequence through player, frontend, mapper and loop closer, four processes on a private LCM "
       "port, and writes into the --out folder: trajectory.txt (final, TUM format), trajectory_online.txt, "
       "keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A process that dies "
-      "or hangs is started again, and goes on where it was.",
+      "or hangs is started again, and goes on where it was; where all died at once, --resume does so.",
       "dmslam-run");
   dmslam::RunArguments arguments;
   line.SetVersion(dmslam::BuildVersion());
@@ -205,7 +259,10 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = line.Parse(argc, argv))
     return *code == 0 ? 0 : static_cast<int>(dmslam::kExitUsage);
   try {
-    return RunWith(arguments);
+    if (arguments.resume.empty()) return Begin(arguments, argc, argv);
+    if (argc > 3)
+      throw dmslam::InputError("--resume goes on with what the run was begun with: give no other option");
+    return Resume(arguments.resume);
   } catch (const dmslam::InputError& error) {
     Say(error.what());
     return dmslam::kExitInput;

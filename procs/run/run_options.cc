@@ -64,6 +64,10 @@ void DeclareRunArguments(CommandLine& line, RunArguments& a) {
                  "instead of --sequence: the camera channels of such a log, by the real lcm-logplayer, in "
                  "real time (--start, --frames, --black-out, --jump, --camera, --prefix: of a copy of them)");
   line.AddOption("--out", a.out, "folder for the results");
+  line.AddOption(
+      "--resume", a.resume,
+      "instead of all else: go on with the run of this --out folder, whose processes all died (power, "
+      "memory), from its last checkpoint");
   line.AddOption("--fps", a.fps,
                  "rate of numbered images, of videos that state none, and asked of a camera; default: as the "
                  "camera file says");

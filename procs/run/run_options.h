@@ -11,6 +11,7 @@ namespace dmslam {
 
 /// What the command line of dmslam-run says.
 struct RunArguments {
+  std::string resume;  ///< folder of a run whose processes all died: it is gone on with
   std::string sequence, log, replay, map, save_map, out, camera, seed = "1", config, profile, pictures = "0",
                                                                  http, port, prefix, programs;
   std::string receive_buffer = "4194304", encoding, start, frames;

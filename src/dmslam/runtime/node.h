@@ -23,6 +23,7 @@ struct NodeContext {
   int64_t random_id = 1;      ///< of this process: reader and writer id
   std::string name;           ///< "mapper on host (pid 17)"
   bool fresh_system = false;  ///< nobody else can be writing: no listening before a stream begins
+  bool resumed = false;  ///< ... and what a run whose processes all died has left on disk is gone on with
 };
 
 /// A process without its main: connects a core to the bus. Message handlers only store what comes; all work
