@@ -36,11 +36,14 @@ class Run {
  public:
   Run(const dmslam::RunArguments& arguments, const dmslam::RunPlace& place,
       dmslam::Supervisor::Options options)
-      : place_(place), plan_(dmslam::MakeRunPlan(arguments, place)), supervisor_(options) {}
+      : place_(place),
+        camera_(dmslam::IsCamera(arguments.sequence)),
+        plan_(dmslam::MakeRunPlan(arguments, place)),
+        supervisor_(options) {}
 
   int Play() {
     fs::remove(plan_.table);
-    if (place_.resume) SayResume(*place_.resume);
+    if (place_.resume) SayResume(*place_.resume, camera_);
     for (const auto* children : {&plan_.companions, &plan_.pipeline}) {
       for (const dmslam::ChildSpec& child : *children) Begin(child);
     }
@@ -54,10 +57,15 @@ class Run {
   }
 
  private:
-  static void SayResume(const dmslam::ResumePoint& point) {
+  static void SayResume(const dmslam::ResumePoint& point, bool camera) {
     if (!point.warning.empty()) Say(point.warning);
-    const std::string frame = point.last_frame ? " behind frame " + std::to_string(*point.last_frame) : "";
-    Say("goes on" + frame + " in a map of " + std::to_string(point.keyframes) + " keyframes");
+    std::string frame = point.last_frame ? " behind frame " + std::to_string(*point.last_frame) : "";
+    if (!camera && point.play_behind && point.play_behind != point.last_frame)
+      frame +=
+          ", playing again from " + std::to_string(*point.play_behind + 1) + " on what is not in the map,";
+    const std::string newest =
+        point.newest_keyframe ? ", the newest of frame " + std::to_string(*point.newest_keyframe) : "";
+    Say("goes on" + frame + " in a map of " + std::to_string(point.keyframes) + " keyframes" + newest);
   }
 
   void Begin(const dmslam::ChildSpec& child) {
@@ -168,6 +176,7 @@ class Run {
   }
 
   dmslam::RunPlace place_;
+  bool camera_;
   dmslam::RunPlan plan_;
   dmslam::Supervisor supervisor_;
   int code_ = 0, signal_ = 0;

@@ -38,7 +38,11 @@ class RunLock {
 struct ResumePoint {
   uint32_t session = 0;
   std::optional<uint32_t> last_frame;  ///< the newest one of which there is a word on the disk
+  /// A recording is played again behind this one: the first keyframe that is in no checkpoint comes next, so
+  /// that the map that is lost is made again. A camera's are numbered behind `last_frame`.
+  std::optional<uint32_t> play_behind;
   size_t keyframes = 0;
+  std::optional<uint32_t> newest_keyframe;  ///< its frame, where it is of this session
   double lead_s = 0;    ///< that mapper and frontend need to have the map again, before the first frame
   std::string warning;  ///< what is worse than it should be; empty: nothing
 };

@@ -102,8 +102,41 @@ TEST_F(ResumeTest, GoesOnBehindTheNewestFrameInTheCheckpointsMap) {
   EXPECT_EQ(point.session, kSession);
   EXPECT_EQ(point.last_frame, std::optional<uint32_t>(41)) << "what was placed later was there before";
   EXPECT_EQ(point.keyframes, 3U);
+  EXPECT_EQ(point.newest_keyframe, std::optional<uint32_t>(2));
   EXPECT_GT(point.lead_s, 0);
   EXPECT_EQ(point.warning, "");
+}
+
+/// A keyframe that was proposed and is in no checkpoint: the recording is played again from there.
+TEST_F(ResumeTest, ARecordingIsPlayedAgainFromTheFirstKeyframeThatIsLost) {
+  const auto propose = [](Journal* journal, uint32_t frame, MapId map_id) {
+    journal->AppendNote("keyframe " + std::to_string(KeyframeId::Make(kSession, frame).value) + " " +
+                        std::to_string(map_id));
+  };
+  const auto behind = [this] { return FindResumePoint(out_, identity_).play_behind; };
+  Journal journal(out_ + "/collector.journal");
+  journal.Begin(kSession);
+  for (uint32_t frame : {0, 1, 2}) propose(&journal, frame, 1);
+  propose(&journal, 7, 9);
+  journal.AppendNote("dropped 9");
+  for (uint32_t frame = 0; frame <= 40; ++frame) AppendPose(&journal, frame);
+  WriteMap(3);
+  EXPECT_EQ(behind(), std::optional<uint32_t>(40)) << "all that is not in it was dropped";
+  propose(&journal, 20, 1);
+  propose(&journal, 30, 1);
+  EXPECT_EQ(behind(), std::optional<uint32_t>(19));
+  EXPECT_EQ(FindResumePoint(out_, identity_).last_frame, std::optional<uint32_t>(40));
+  journal.AppendNote("resumed");
+  EXPECT_EQ(behind(), std::optional<uint32_t>(19)) << "it died again before its first frame";
+  AppendPose(&journal, 20);
+  AppendPose(&journal, 21);
+  EXPECT_EQ(behind(), std::optional<uint32_t>(21)) << "what this life has not seen is still to be played";
+  propose(&journal, 21, 1);
+  EXPECT_EQ(behind(), std::optional<uint32_t>(20));
+  EXPECT_EQ(FindResumePoint(out_, identity_).last_frame, std::optional<uint32_t>(40));
+  journal.AppendNote("resumed");
+  journal.AppendNote("resumed");
+  EXPECT_EQ(behind(), std::optional<uint32_t>(20));
 }
 
 TEST_F(ResumeTest, ATornJournalEndsAtItsLastWholePose) {
@@ -168,7 +201,11 @@ TEST_F(ResumeTest, ProcessesAreToldToGoOn) {
   place.out = out_;
   place.port = 20001;
   place.session = kSession;
-  place.resume = ResumePoint{kSession, 41, 3, 1.5, ""};
+  ResumePoint point;
+  point.session = kSession;
+  point.last_frame = 41;
+  point.play_behind = 30;
+  place.resume = point;
   const auto line = [](const std::vector<std::string>& words) {
     std::string text;
     for (const std::string& word : words) text += word + " ";
@@ -179,12 +216,17 @@ TEST_F(ResumeTest, ProcessesAreToldToGoOn) {
     EXPECT_NE(always.find("--session 7 "), std::string::npos) << always;
     EXPECT_EQ(first.rfind("--fresh-system --resumed ", 0), 0U) << first;
     EXPECT_EQ(always.find("--resumed"), std::string::npos) << "whoever dies alone is begun as ever";
-    EXPECT_EQ(always.find("--behind 41 ") != std::string::npos, child.name == "player") << always;
+    EXPECT_EQ(always.find("--behind 30 ") != std::string::npos, child.name == "player") << always;
     EXPECT_EQ(first.find("--lead ") != std::string::npos, child.name == "player") << first;
     EXPECT_EQ(always.find("--checkpoint " + out_ + "/checkpoint.lcmlog ") != std::string::npos,
               child.name == "mapper")
         << always;
   }
+  arguments.sequence = "/dev/video0";
+  EXPECT_NE(line(MakeRunPlan(arguments, place).pipeline.back().arguments).find("--behind 41 "),
+            std::string::npos)
+      << "what a camera saw is not seen again";
+  arguments.sequence = out_;
   place.resume.reset();
   for (const ChildSpec& child : MakeRunPlan(arguments, place).pipeline) {
     EXPECT_EQ(line(child.first), "--fresh-system ");
@@ -192,7 +234,7 @@ TEST_F(ResumeTest, ProcessesAreToldToGoOn) {
   }
   arguments.sequence.clear();
   arguments.replay = "a.log";
-  place.resume = ResumePoint{kSession, 41, 3, 1.5, ""};
+  place.resume = point;
   EXPECT_THROW(MakeRunPlan(arguments, place), InputError);
 }
 

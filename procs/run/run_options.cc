@@ -30,8 +30,7 @@ void CheckSource(const RunArguments& a) {
   const int sources = (a.sequence.empty() ? 0 : 1) + (a.log.empty() ? 0 : 1) + (a.replay.empty() ? 0 : 1);
   if (sources == 0) throw InputError("--sequence is missing (see --help)");
   if (sources > 1) throw InputError("give one of --sequence, --log and --replay");
-  const bool live = a.sequence.find("://") != std::string::npos || a.sequence.rfind("/dev/", 0) == 0;
-  if (!a.sequence.empty() && !live && !fs::exists(a.sequence))
+  if (!a.sequence.empty() && !IsCamera(a.sequence) && !fs::exists(a.sequence))
     throw InputError(a.sequence + ": no such folder or file; check --sequence");
   CheckFile("--log", a.log);
   CheckFile("--replay", a.replay);
@@ -126,6 +125,10 @@ void CheckRunArguments(const RunArguments& a) {
   if (!a.profile.empty() && a.profile != "dm" && a.profile != "baseline")
     throw InputError("--profile " + a.profile + ": write dm or baseline");
   CheckPort(a);
+}
+
+bool IsCamera(const std::string& sequence) {
+  return sequence.find("://") != std::string::npos || sequence.rfind("/dev/", 0) == 0;
 }
 
 int SocketsOn(int port, const std::string& proc_net) {

@@ -27,6 +27,9 @@ void DeclareRunArguments(CommandLine& line, RunArguments& arguments);
 /// Throws InputError that names what does not fit, with the cure.
 void CheckRunArguments(const RunArguments& arguments);
 
+/// Whether its frames come from a camera, and not from a recording.
+bool IsCamera(const std::string& sequence);
+
 /// Whether somebody on this host is bound to the UDP port. `proc_net`: the folder of the kernel's tables.
 bool PortTaken(int port, const std::string& proc_net = "/proc/net");
 /// The number of sockets bound to it.

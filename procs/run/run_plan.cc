@@ -118,9 +118,11 @@ ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPla
   return child;
 }
 
-/// What was played before all processes died is not played again; the first frame waits for the map.
-void GoOnBehind(const ResumePoint& point, ChildSpec* player) {
-  if (point.last_frame) Append(&player->arguments, {"--behind", std::to_string(*point.last_frame)});
+/// What was played before all processes died, and is in the map, is not played again; the first frame waits
+/// for the map.
+void GoOnBehind(const ResumePoint& point, bool camera, ChildSpec* player) {
+  const std::optional<uint32_t> behind = camera ? point.last_frame : point.play_behind;
+  if (behind) Append(&player->arguments, {"--behind", std::to_string(*behind)});
   Append(&player->first, {"--lead", std::to_string(point.lead_s)});
 }
 
@@ -130,7 +132,7 @@ ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& 
     Append(&words, PlayerArguments(a));
     Append(&words, a.log.empty() ? Words{"--sequence", a.sequence} : Words{"--log", a.log});
     ChildSpec player = MakeChild("player", a, place, words);
-    if (place.resume) GoOnBehind(*place.resume, &player);
+    if (place.resume) GoOnBehind(*place.resume, IsCamera(a.sequence), &player);
     return player;
   }
   if (place.resume) {

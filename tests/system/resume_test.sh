@@ -10,7 +10,7 @@ else
   arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml")
   frames=150 middle=100 tracked=40
 fi
-arguments+=(--lockstep --seed 1)
+arguments+=(--lockstep --seed 1 --set collector.checkpoint_s=2)
 
 strike() { # all at once
   local pid pids=()
@@ -57,9 +57,21 @@ check "the run is resumed" run --resume "$work/out" >"$work/resumed.said" 2>&1
 cat "$work/resumed.said"
 no_orphans "the resumed run"
 complete "after SIGKILL" "$work/out" 1
-check "it went on behind the last frame" grep -qE "goes on behind frame [0-9]+ in a map of [0-9]+ keyframes" "$work/resumed.said"
-behind=$(sed -nE 's/.*goes on behind frame ([0-9]+) .*/\1/p' "$work/resumed.said")
-((behind >= at - 1)) || failed "frames up to $at were told, but it went on behind $behind"
+behind=$(sed -nE 's/.*goes on behind frame ([0-9]+).* in a map of [0-9]+ keyframes.*/\1/p' "$work/resumed.said")
+newest=$(sed -nE 's/.* keyframes, the newest of frame ([0-9]+)$/\1/p' "$work/resumed.said")
+((behind >= at - 1)) || failed "frames up to $at were told, but it went on behind ${behind:-none}"
+((newest >= behind - 75)) || failed "the map ends at frame ${newest:-none}, more than 2 s and a keyframe before $behind"
+
+# ---- No pose that was written is lost: what an undisturbed run, which is the same up to there, placed of these frames
+check "the undisturbed run" run "${arguments[@]}" --out "$work/undisturbed" >"$work/said" 2>&1
+stamps() { cut -d' ' -f1 "$1" | grep -v '#' | sort; }
+last=$(grep -v '^#' "${arguments[1]}/rgb.txt" | sed -n "$((behind + 1))p" | cut -d' ' -f1)
+for name in trajectory trajectory_online; do
+  lost=$(comm -23 <(stamps "$work/undisturbed/$name.txt" | awk -v last="$last" '$1 <= last + 1e-4') <(stamps "$work/out/$name.txt"))
+  [[ -z $lost ]] || failed "$name.txt lacks $(wc -l <<<"$lost") poses that were written, as of $(head -n 1 <<<"$lost")"
+done
+holds "$(field "$work/out" ate_rmse_final) <= 1.5 * $(field "$work/undisturbed" ate_rmse_final)" ||
+  failed "the final error is $(field "$work/out" ate_rmse_final), undisturbed $(field "$work/undisturbed" ate_rmse_final)"
 
 # ---- The copy: the run as it was earlier
 check "a copy that was taken while it ran is resumed" run --resume "$work/snapshot" >"$work/snapshot.said" 2>&1
