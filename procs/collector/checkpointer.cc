@@ -26,13 +26,14 @@ void Checkpointer::OnMap(const Map& map, bool whole, int64_t newest_stamp_ns,
 }
 
 void Checkpointer::Begin(const Map& map, const SessionStart& session) {
-  const int64_t begun_ns = options_.now_ns();
+  Copied copied;
+  copied.begun_ns = options_.now_ns();
   const auto cut = std::make_shared<const CutMap>(Cut(options_.path, map));
-  const int64_t cut_ns = options_.now_ns();
-  LogInfo("checkpoint of {} keyframes and {} landmarks: copied in {:.1f} ms", map.keyframes().size(),
-          map.num_landmarks(), static_cast<double>(cut_ns - begun_ns) * 1e-6);
+  copied.ended_ns = options_.now_ns();
+  copied.keyframes = map.keyframes().size();
+  copied.landmarks = map.num_landmarks();
   schedule_.OnBegun();
-  thread_->Post([this, cut, session] {
+  thread_->Post([this, copied, cut, session] {
     std::string problem;
     try {
       journal_->Sync();
@@ -40,14 +41,18 @@ void Checkpointer::Begin(const Map& map, const SessionStart& session) {
     } catch (const InputError& error) {
       problem = error.what();
     }
-    thread_->Report([this, problem] { OnEnded(problem); });
+    thread_->Report([this, copied, problem] { OnEnded(copied, problem); });
   });
 }
 
-void Checkpointer::OnEnded(const std::string& problem) {
-  schedule_.OnEnded(problem.empty(), options_.now_ns());
+void Checkpointer::OnEnded(const Copied& copied, const std::string& problem) {
+  const int64_t now_ns = options_.now_ns();
+  schedule_.OnEnded(problem.empty(), now_ns);
   if (problem.empty()) {
     ++written_;
+    LogInfo("checkpoint of {} keyframes and {} landmarks: copied in {:.1f} ms, on the disk {:.1f} ms later",
+            copied.keyframes, copied.landmarks, static_cast<double>(copied.ended_ns - copied.begun_ns) * 1e-6,
+            static_cast<double>(now_ns - copied.ended_ns) * 1e-6);
   } else if (!std::exchange(warned_, true)) {
     problem_ = problem;
   }

@@ -43,7 +43,12 @@ class Checkpointer {
 
  private:
   void Begin(const Map& map, const SessionStart& session);
-  void OnEnded(const std::string& problem);
+  /// The work of the thread that reads the streams.
+  struct Copied {
+    int64_t begun_ns = 0, ended_ns = 0;
+    size_t keyframes = 0, landmarks = 0;
+  };
+  void OnEnded(const Copied& copied, const std::string& problem);
 
   static constexpr int64_t kLookAgainNs = 100'000'000;
   Options options_;

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <sstream>
+#include <utility>
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
@@ -278,11 +279,7 @@ void CollectorNode::OpenJournal() {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
   OnProcess("collector", MeasureProcess().pid, {});
-  if (context_.resumed) {
-    OnResume();
-    journal_->AppendNote("resumed");
-    newest = {};  // the frontend that wrote it is gone, too
-  }
+  if (context_.resumed) newest = {};  // the frontend that wrote it is gone, too
   frontend_reader_ =
       MakeReader(StreamId::kFrontend, "FRONTEND",
                  {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
@@ -290,7 +287,7 @@ void CollectorNode::OpenJournal() {
                  newest);
 }
 
-/// All processes had died: keyframes that were made after the last checkpoint are gone.
+/// All who held the map had died, and a mapper begins with the last checkpoint: what came after it is gone.
 void CollectorNode::OnResume() {
   ++run_.resumes;
   for (const auto& [id, map_id] : proposed_) proposed_before_crash_.insert(id);
@@ -351,9 +348,16 @@ void CollectorNode::OnCorrection(const MapDelta& delta, const std::vector<Keyfra
 bool CollectorNode::TakeMapRecord() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return false;
-  if (record->begins_anew()) builder_->ForgetMap();
+  if (record->begins_anew()) {
+    builder_->ForgetMap();
+    map_is_fresh_ = !record->in_snapshot();
+  }
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
+  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot && !proposed_.empty()) {
+    OnResume();
+    journal_->AppendNote("resumed");
+  }
   const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
   builder_->OnMapDelta(*delta);
   if (!record->in_snapshot()) TimeKeyframe(*delta);

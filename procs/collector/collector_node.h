@@ -86,6 +86,7 @@ class CollectorNode : public StreamNode {
   int64_t frames_seen_ = 0;
   int64_t newest_frame_ = -1;
   int64_t drained_ns_ = 0;
+  bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
   bool frontend_ended_ = false;
   bool written_ = false;
 };

@@ -67,7 +67,7 @@ check "the undisturbed run" run "${arguments[@]}" --out "$work/undisturbed" >"$w
 stamps() { cut -d' ' -f1 "$1" | grep -v '#' | sort; }
 last=$(grep -v '^#' "${arguments[1]}/rgb.txt" | sed -n "$((behind + 1))p" | cut -d' ' -f1)
 for name in trajectory trajectory_online; do
-  lost=$(comm -23 <(stamps "$work/undisturbed/$name.txt" | awk -v last="$last" '$1 <= last + 1e-4') <(stamps "$work/out/$name.txt"))
+  lost=$(comm -23 <(stamps "$work/undisturbed/trajectory_online.txt" | awk -v last="$last" '$1 <= last + 1e-4') <(stamps "$work/out/$name.txt"))
   [[ -z $lost ]] || failed "$name.txt lacks $(wc -l <<<"$lost") poses that were written, as of $(head -n 1 <<<"$lost")"
 done
 holds "$(field "$work/out" ate_rmse_final) <= 1.5 * $(field "$work/undisturbed" ate_rmse_final)" ||

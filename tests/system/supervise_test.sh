@@ -59,6 +59,8 @@ strike KILL player collector frontend mapper loopcloser
 ends five 5
 expect "all five are counted" "$work/five" restarts "== 5"
 expect "all frames are there" "$work/five" frames "== 150"
+expect "it is known that all had died" "$work/five" resumed "== 1"
+expect "keyframes that came after the checkpoint are not missing without a word" "$work/five" keyframes_missing "== 0"
 check "the map was on the disk" grep -q "checkpoint.lcmlog: continues with [0-9]* keyframes" "$work/five/log/mapper.log"
 
 begin hung 40
