@@ -43,7 +43,7 @@ struct ResumePoint {
   std::optional<uint32_t> play_behind;
   size_t keyframes = 0;
   std::optional<uint32_t> newest_keyframe;  ///< its frame, where it is of this session
-  double lead_s = 0;    ///< that mapper and frontend need to have the map again, before the first frame
+  double lead_s = 0;    ///< before the first frame: mapper and frontend need it to have the map again
   std::string warning;  ///< what is worse than it should be; empty: nothing
 };
 /// Throws InputError that says why the run in `out` cannot be resumed.
