@@ -87,7 +87,7 @@ class JournalState {
 /// A mapper reads some 50 MB a second, and publishes a part of 56 KB every 3 ms; with room for a busy host.
 double LeadFor(const std::string& checkpoint) {
   const double megabytes = static_cast<double>(fs::file_size(checkpoint)) * 1e-6;
-  return 1.0 + 0.2 * megabytes;
+  return 2.0 + 0.2 * megabytes;
 }
 
 }  // namespace
