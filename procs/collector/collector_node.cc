@@ -255,7 +255,9 @@ void CollectorNode::CountMissingKeyframes() {
   for (const auto& [id, map_id] : proposed_) {
     const bool known = map.FindKeyframe(id) != nullptr || map.keyframe_tombstones().contains(id);
     if (known || dropped_maps_.contains(map_id)) continue;
-    ++(proposed_before_crash_.contains(id) ? run_.keyframes_lost_in_crash : run_.keyframes_missing);
+    const bool before_crash = proposed_before_crash_.contains(id);
+    ++(before_crash ? run_.keyframes_lost_in_crash : run_.keyframes_missing);
+    if (!before_crash) LogWarning("the keyframe of frame {} is missing in map {}", id.frame_index(), map_id);
   }
 }
 
