@@ -15,8 +15,10 @@ undisturbed error online instead: what frames before its restart saw was in its 
 Writes DIR/table.md; runs that are there already are not repeated.
 
   --camera FILE      camera file (YAML)
-  --victims LIST     of frontend, mapper, loopcloser, player, collector, double (two at once, three times) and first (one
-                     kill before the first map), with commas; default: frontend,mapper,loopcloser,double,first
+  --victims LIST     of frontend, mapper, loopcloser, player, collector, double (two at once, three times), pairs and triples
+                     (all ten sets of two, and of three, of these five), all (the five at once, twice: the map comes from the
+                     collector's checkpoint) and first (one kill before the first map), with commas; default:
+                     frontend,mapper,loopcloser,double,first
   --kills N          per run (default 5)
   --frames N         at most so many frames
   --set KEY=VALUE    one setting of all runs; may be repeated
@@ -72,23 +74,38 @@ pid_of() { # PROCESS PORT
   done
   return 0
 }
-strike() { # PORT PROCESS...
-  local port=$1 process pid
+strike() { # PORT PROCESS...: at once
+  local port=$1 process pids=()
   shift
-  for process in "$@"; do
-    for pid in $(pid_of "$process" "$port"); do kill -KILL "$pid" 2>/dev/null && echo "killed $process"; done
-  done
-  return 0
+  for process in "$@"; do mapfile -t -O "${#pids[@]}" pids < <(pid_of "$process" "$port"); done
+  ((${#pids[@]} == 0)) || kill -KILL "${pids[@]}" 2>/dev/null || true
+  printf 'killed %s\n' "$*"
 }
 random() { awk -v seed="$1" -v low="$2" -v high="$3" 'BEGIN { srand(seed); for (i = 0; i < 7; ++i) x = rand(); printf "%d", low + x * (high - low) }'; }
 
+# sets NAME: who is killed at once, a line for each strike.
+sets() {
+  local all=(frontend mapper loopcloser player collector) i j k
+  case $1 in
+    double) printf '%s\n' 'frontend mapper' 'mapper loopcloser' 'frontend loopcloser' ;;
+    pairs) for ((i = 0; i < 5; ++i)); do for ((j = i + 1; j < 5; ++j)); do echo "${all[i]} ${all[j]}"; done; done ;;
+    triples)
+      for ((i = 0; i < 5; ++i)); do
+        for ((j = i + 1; j < 5; ++j)); do for ((k = j + 1; k < 5; ++k)); do echo "${all[i]} ${all[j]} ${all[k]}"; done; done
+      done
+      ;;
+    all) printf '%s\n' "${all[*]}" "${all[*]}" ;;
+    first) echo mapper ;;
+    *) for ((i = 0; i < kills; ++i)); do echo "$1"; done ;;
+  esac
+}
+
 # disturbed NAME FIRST LAST: kills at random frames after FIRST.
 disturbed() {
-  local name=$1 first=$2 last=$3 port runner i at pairs=(frontend\ mapper mapper\ loopcloser frontend\ loopcloser) count=$kills
-  local whom
+  local name=$1 first=$2 last=$3 port runner i at count whom
+  mapfile -t whom < <(sets "$name")
+  count=${#whom[@]}
   port=$(free_port)
-  [[ $name != double ]] || count=3
-  [[ $name != first ]] || count=1
   play "$out/$name" "$port" >"$out/$name.said" 2>&1 &
   runner=$!
   for ((i = 0; i < count; ++i)); do
@@ -97,11 +114,8 @@ disturbed() {
     [[ $name != first ]] || at=-2
     while kill -0 "$runner" 2>/dev/null && (($(frame_of "$out/$name") < at)); do sleep 0.05; done
     if [[ $name == first ]]; then sleep 1; else sleep "0.$(random $((seed + i)) 0 9)"; fi
-    whom=$name
-    [[ $name != double ]] || whom=${pairs[i]}
-    [[ $name != first ]] || whom=mapper
     # shellcheck disable=SC2086
-    strike "$port" $whom >>"$out/$name.kills"
+    strike "$port" ${whom[i]} >>"$out/$name.kills"
   done
   wait "$runner"
 }
@@ -114,7 +128,7 @@ verdict() { # NAME: what is wrong with its run
   awk "BEGIN { exit !($(value "$name" tracked_online_percent) >= $min_tracked) }" || wrong+="tracked too little; "
   for error in online final; do
     bound=$error
-    [[ $name != frontend && $name != double ]] || bound=online
+    [[ $name != frontend && $name != double && $name != pairs && $name != triples && $name != all ]] || bound=online
     awk -v error="$(value "$name" "ate_rmse_$error")" -v undisturbed="$(value undisturbed "ate_rmse_$bound")" \
       'BEGIN { exit !(error > 0 && error <= 1.5 * undisturbed) }' || wrong+="$error error too large; "
   done

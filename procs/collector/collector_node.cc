@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <sstream>
+#include <utility>
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
@@ -24,7 +25,8 @@ constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
     &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
     &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
     &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
-constexpr int64_t kSyncEveryNs = 5'000'000'000;
+constexpr int64_t kSyncEveryNs = 1'000'000'000;
+constexpr int64_t kCountersEveryNs = 5'000'000'000;
 constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
 
 }  // namespace
@@ -49,6 +51,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
   run_.ground_truth = collector_.ground_truth;
   frames_total_ = info.num_frames;
   OpenJournal();
+  BeginCheckpoints();
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(&builder_->map(), [this] { return MapHeld(*map_reader_); });
 }
@@ -101,6 +104,18 @@ void CollectorNode::OnProcess(const std::string& process, int32_t pid, const Pro
   journal_->AppendNote(note.str());
 }
 
+/// What each process has counted so far: where all die at once, nobody else knows it.
+void CollectorNode::NoteCounters() {
+  for (const auto& [process, health] : run_.health) {
+    std::ostringstream note;
+    note << "counters " << process << ' ' << health.pid;
+    for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << health.*counter;
+    if (process == "frontend")
+      for (int64_t FrontendStatus::*counter : kFrontendCounters) note << ' ' << run_.frontend.*counter;
+    journal_->AppendNote(note.str());
+  }
+}
+
 /// What a collector before this one has noted.
 void CollectorNode::ReadNote(const std::string& text) {
   std::istringstream note(text);
@@ -111,6 +126,14 @@ void CollectorNode::ReadNote(const std::string& text) {
   int32_t pid = 0;
   if (kind == "keyframe" && note >> keyframe >> map_id) proposed_[KeyframeId{keyframe}] = map_id;
   if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
+  if (kind == "resumed") OnResume();
+  if (kind == "counters" && note >> process >> pid) {
+    ProcessHealth& health = run_.health[process];
+    health.pid = pid;
+    for (int64_t ProcessHealth::*counter : kHealthCounters) note >> health.*counter;
+    if (process != "frontend") return;
+    for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> run_.frontend.*counter;
+  }
   if (kind != "process" || !(note >> process >> pid)) return;
   if (process_ids_[process].insert(pid).second && process_ids_[process].size() > 1) ++run_.restarts;
   for (int64_t ProcessHealth::*counter : kHealthCounters) note >> former_[process].*counter;
@@ -164,11 +187,25 @@ void CollectorNode::OnFramePose(const Record& record) {
   KeepOnDisk(*record.bytes);
 }
 
+/// Kept too: a collector that is started again does not hear it a second time.
+void CollectorNode::OnSessionStart(const Record& record) {
+  std::optional<SessionStart> start = Read<SessionStart>(*record.bytes);
+  if (!start) return;
+  JoinsSession(*start);
+  session_start_ = std::move(start);
+  KeepOnDisk(*record.bytes);
+}
+
 void CollectorNode::OnMapReset(const Record& record) {
   const auto reset = Read<MapReset>(*record.bytes);
   if (!reset) return;
-  ++run_.resets;
+  CountReset(*reset);
   KeepOnDisk(*record.bytes);
+}
+
+void CollectorNode::CountReset(const MapReset& reset) {
+  ++run_.resets;
+  if (reset.drop) dropped_maps_.insert(reset.map_id);
 }
 
 /// A disk that is full ends no run: what it does not take waits in memory.
@@ -185,6 +222,7 @@ void CollectorNode::KeepOnDisk(const Bytes& record) {
 void CollectorNode::CountFrame(const FramePose& pose) {
   if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frame_) return;
   newest_frame_ = pose.frame_index;
+  newest_stamp_ns_ = pose.stamp_ns;
   ++frames_seen_;
 }
 
@@ -192,7 +230,7 @@ bool CollectorNode::TakeFrontendRecord() {
   const std::optional<Record> record = frontend_reader_->Take();
   if (!record) return false;
   if (record->channel == channels::kSession) {
-    if (const auto start = Read<SessionStart>(*record->bytes)) JoinsSession(*start);
+    OnSessionStart(*record);
   } else if (record->channel == channels::kFramePose) {
     OnFramePose(*record);
   } else if (record->channel == channels::kKeyframe) {
@@ -216,7 +254,10 @@ void CollectorNode::CountMissingKeyframes() {
   run_.keyframes_proposed = proposed_.size();
   for (const auto& [id, map_id] : proposed_) {
     const bool known = map.FindKeyframe(id) != nullptr || map.keyframe_tombstones().contains(id);
-    if (!known && !dropped_maps_.contains(map_id)) ++run_.keyframes_missing;
+    if (known || dropped_maps_.contains(map_id)) continue;
+    const bool before_crash = proposed_before_crash_.contains(id);
+    ++(before_crash ? run_.keyframes_lost_in_crash : run_.keyframes_missing);
+    if (!before_crash) LogWarning("the keyframe of frame {} is missing in map {}", id.frame_index(), map_id);
   }
 }
 
@@ -229,21 +270,60 @@ void CollectorNode::OpenJournal() {
   Version newest;
   const auto take = [&](std::span<const uint8_t> record) {
     if (const auto pose = wire::Decode<FramePose>(record)) CountFrame(*pose);
-    if (wire::Decode<MapReset>(record)) ++run_.resets;
+    if (const auto reset = wire::Decode<MapReset>(record)) CountReset(*reset);
+    if (auto start = wire::Decode<SessionStart>(record)) session_start_ = std::move(start);
     const std::optional<RecordHeader> header = ParseHeader(record);
     newest = {header->epoch, header->seq};
   };
-  if (context_.fresh_system) {
+  if (context_.fresh_system && !context_.resumed) {
     journal_->Begin(session_);
   } else {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
   OnProcess("collector", MeasureProcess().pid, {});
+  if (context_.resumed) newest = {};  // the frontend that wrote it is gone, too
   frontend_reader_ =
       MakeReader(StreamId::kFrontend, "FRONTEND",
                  {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
                   channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
                  newest);
+}
+
+/// All who held the map had died, and a mapper begins with the last checkpoint: what came after it is gone.
+void CollectorNode::OnResume() {
+  ++run_.resumes;
+  for (const auto& [id, map_id] : proposed_) proposed_before_crash_.insert(id);
+}
+
+void CollectorNode::BeginCheckpoints() {
+  Checkpointer::Options options;
+  options.path = CheckpointPath(collector_.out_dir);
+  options.now_ns = context_.now_ns;
+  options.every_s = collector_.checkpoints ? options_.settings.Read<CheckpointOptions>().every_s : 0;
+  if (collector_.checkpoints && context_.fresh_system && !context_.resumed) RemoveCheckpoints(options.path);
+  checkpointer_ =
+      std::make_unique<Checkpointer>(options, MakeCoreThread(PlaybackMode::kRealtime), journal_.get());
+}
+
+/// It is whole, and no newer than the poses in the journal.
+bool CollectorNode::MapMayBeKept() const {
+  const auto& keyframes = builder_->map().keyframes();
+  if (keyframes.empty() || MapHeld(*map_reader_).empty()) return false;
+  const KeyframeId newest = keyframes.rbegin()->first;
+  return newest.session() != session_ || newest.frame_index() <= newest_frame_;
+}
+
+void CollectorNode::KeepCheckpoint() {
+  if (written_) return;
+  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), newest_stamp_ns_, session_start_);
+  const std::string problem = checkpointer_->TakeProblem();
+  if (problem.empty()) return;
+  run_.disk_problems.push_back(problem);
+  LogError("{}; the run goes on, with the checkpoint before it", problem);
+}
+
+int64_t CollectorNode::WorkDeadline() const {
+  return checkpointer_ && !written_ ? checkpointer_->deadline_ns() : INT64_MAX;
 }
 
 std::vector<KeyframeId> CollectorNode::LoopsOf(std::optional<KeyframeId> id) const {
@@ -270,9 +350,16 @@ void CollectorNode::OnCorrection(const MapDelta& delta, const std::vector<Keyfra
 bool CollectorNode::TakeMapRecord() {
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return false;
-  if (record->begins_anew()) builder_->ForgetMap();
+  if (record->begins_anew()) {
+    builder_->ForgetMap();
+    map_is_fresh_ = !record->in_snapshot();
+  }
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
+  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot && !proposed_.empty()) {
+    OnResume();
+    journal_->AppendNote("resumed");
+  }
   const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
   builder_->OnMapDelta(*delta);
   if (!record->in_snapshot()) TimeKeyframe(*delta);
@@ -287,6 +374,7 @@ bool CollectorNode::TakeMapRecord() {
 bool CollectorNode::WorkOnce() {
   const bool any = TakeFrontendRecord() || TakeMapRecord();
   SayProgress();
+  KeepCheckpoint();
   return any ? true : EndIfDone();
 }
 
@@ -295,7 +383,7 @@ bool CollectorNode::EndIfDone() {
   if (!frontend_ended_ || !MapIsOver(builder_->map(), *map_reader_)) return false;
   if (drained_ns_ == 0) drained_ns_ = context_.now_ns();
   if (context_.now_ns() - drained_ns_ < kLastStatusesNs) return false;
-  Write();
+  Write(true);
   const bool any_pose = std::any_of(builder_->frame_poses().begin(), builder_->frame_poses().end(),
                                     [](const auto& item) { return item.second.HasPose(); });
   std::string why = run_.frontend.head.reason;
@@ -304,9 +392,12 @@ bool CollectorNode::EndIfDone() {
   return false;
 }
 
-void CollectorNode::Write() {
+/// `ended`: the sequence has come to its end. One that is interrupted can be resumed.
+void CollectorNode::Write(bool ended) {
   if (written_ || !builder_) return;
   written_ = true;
+  if (ended) checkpointer_->Finish();
+  if (!ended) checkpointer_->WriteLast(builder_->map(), MapMayBeKept(), session_start_);
   journal_->ForEach([this](std::span<const uint8_t> record) {
     if (const auto pose = wire::Decode<FramePose>(record)) builder_->OnFramePose(*pose);
     if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
@@ -319,6 +410,7 @@ void CollectorNode::Write() {
     run_.frames_blacked = end_->frames_blacked;
     run_.frames_jumped = end_->frames_jumped;
   }
+  builder_->BridgeLostKeyframes();
   CountMissingKeyframes();
   if (journal_->lost() > 0)
     run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
@@ -327,11 +419,13 @@ void CollectorNode::Write() {
   std::fputs(results.table.c_str(), stdout);
   std::fflush(stdout);
   if (!results.problem.empty()) return Exit(kExitInput, results.problem);
+  if (!ended) return;
   journal_->Remove();
+  if (collector_.checkpoints) RemoveCheckpoints(CheckpointPath(collector_.out_dir));
 }
 
 void CollectorNode::Stop() {
-  Write();
+  Write(false);
   Exit(0);
 }
 
@@ -351,7 +445,11 @@ void CollectorNode::SayProgress() {
 void CollectorNode::PublishStatus() {
   if (journal_ && !written_ && context_.now_ns() >= next_sync_ns_) {
     next_sync_ns_ = context_.now_ns() + kSyncEveryNs;
-    journal_->Sync();
+    checkpointer_->SyncJournal();
+  }
+  if (journal_ && !written_ && context_.now_ns() >= next_counters_ns_) {
+    next_counters_ns_ = context_.now_ns() + kCountersEveryNs;
+    NoteCounters();
   }
   if (!collector_.progress || !builder_ || written_) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",

@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "collector/journal.h"
+#include "collector/checkpointer.h"
 #include "collector/make_collector.h"
 #include "collector/results.h"
+#include "dmslam/recording/journal.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
@@ -28,6 +29,7 @@ class CollectorNode : public StreamNode {
   void Begin(const CameraInfo& info) override;
   bool WorkOnce() override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
+  int64_t WorkDeadline() const override;
   void PublishStatus() override;
 
  private:
@@ -36,6 +38,7 @@ class CollectorNode : public StreamNode {
   std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
+  void BeginCheckpoints();
   void OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far);
   void ReadNote(const std::string& text);
   bool OnHealth(const std::string& process, const StatusHead& head);
@@ -44,6 +47,12 @@ class CollectorNode : public StreamNode {
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
   void OnMapReset(const Record& record);
+  void OnSessionStart(const Record& record);
+  void CountReset(const MapReset& reset);
+  void NoteCounters();
+  void OnResume();
+  bool MapMayBeKept() const;
+  void KeepCheckpoint();
   void KeepOnDisk(const Bytes& record);
   void CountFrame(const FramePose& pose);
   void CountMissingKeyframes();
@@ -51,7 +60,7 @@ class CollectorNode : public StreamNode {
   std::string OfTotal() const;
   void SayProgress();
   bool EndIfDone();
-  void Write();
+  void Write(bool ended);
 
   CollectorOptions collector_;
   RunRecord run_;
@@ -61,18 +70,23 @@ class CollectorNode : public StreamNode {
   std::map<std::string, ProcessHealth>
       former_;  ///< counters of processes that another has followed, together
   FrontendStatus former_frontend_;
-  std::map<KeyframeId, MapId> proposed_;    ///< keyframes that the frontend said should be
-  std::map<KeyframeId, int64_t> heard_ns_;  ///< when each was said to be one
+  std::map<KeyframeId, MapId> proposed_;        ///< keyframes that the frontend said should be
+  std::map<KeyframeId, int64_t> heard_ns_;      ///< when each was said to be one
+  std::set<KeyframeId> proposed_before_crash_;  ///< of them, those of before all processes died
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
+  std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal
+  std::optional<SessionStart> session_start_;   ///< as the frontend said it
+  int64_t newest_stamp_ns_ = 0;                 ///< of the newest frame
   bool disk_warned_ = false;
-  int64_t next_sync_ns_ = 0;
+  int64_t next_sync_ns_ = 0, next_counters_ns_ = 0;
   int64_t next_progress_ = 0;
   std::optional<EndOfSequence> end_;
   int64_t frames_total_ = 0;
   int64_t frames_seen_ = 0;
   int64_t newest_frame_ = -1;
   int64_t drained_ns_ = 0;
+  bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
   bool frontend_ended_ = false;
   bool written_ = false;
 };

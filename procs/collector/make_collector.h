@@ -12,6 +12,7 @@ struct CollectorOptions {
   std::string out_dir;
   std::string ground_truth;  ///< TUM trajectory; empty: none
   bool progress = false;     ///< show progress on the terminal
+  bool checkpoints = true;   ///< as the settings say; false: none, whatever they say
 };
 
 /// A `CollectorNode`, for those who only run one: its own header is much to compile.

@@ -231,9 +231,11 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["records_repaired"] = repaired;
   json["dropped_of_other_sessions"] = foreign;
   json["restarts"] = run.restarts;
+  json["resumed"] = run.resumes;
   json["disk_problems"] = run.disk_problems;
   json["keyframes_proposed"] = run.keyframes_proposed;
   json["keyframes_missing"] = run.keyframes_missing;
+  json["keyframes_lost_in_crash"] = run.keyframes_lost_in_crash;
   int64_t dropped = 0;
   for (const auto& [process, health] : run.health) {
     dropped += health.dropped_malformed + health.dropped_checksum + health.dropped_foreign;

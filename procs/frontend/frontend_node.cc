@@ -49,14 +49,15 @@ void FrontendNode::Begin(const CameraInfo& info) {
 
 /// Into a running system a frontend comes with the map; where nobody has one it begins with a first.
 bool FrontendNode::ReadyToWrite() {
-  if (context_.fresh_system) return true;
+  if (context_.fresh_system && !context_.resumed) return true;
   if (!map_reader_->term().valid()) return !options_.HasPeer("mapper");
   if (!work_->Idle()) return false;
   TakeMapRecords();
   ApplyHeldRecords(NumReadyRecords(true), true);
   if (!work_->Idle()) return false;
-  const bool caught_up =
-      map_reader_->state() == StreamReader::State::kFollowing && map_reader_->backlog() == 0 && held_.empty();
+  const bool caught_up = map_reader_->state() == StreamReader::State::kFollowing &&
+                         map_reader_->backlog() == 0 && held_.empty() && !MapComesInParts() &&
+                         !(context_.resumed && core_->map().keyframes().empty());
   if (!caught_up) return false;
   const Map& map = core_->map();
   if (map.progress().ended) {

@@ -6,6 +6,9 @@ int main(int argc, char** argv) {
   dmslam::MapperFiles files;
   process.app().AddOption("--map", files.load,
                           "saved map or log: begin with this map (needs the setting map.saved)");
+  process.app().AddOption("--checkpoint", files.checkpoint,
+                          "the collector's checkpoint of this session: go on from it where no other process "
+                          "has the map any more");
   process.app().AddOption("--save-map", files.save, "write the map into this file at the end");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
     return dmslam::MakeMapper(std::move(context), std::move(options), files);

@@ -10,8 +10,9 @@ namespace dmslam {
 
 /// Maps as files; empty: none.
 struct MapperFiles {
-  std::string load;  ///< a saved map, or a log: the map to begin with
-  std::string save;  ///< where the map is written at the end
+  std::string load;        ///< a saved map, or a log: the map to begin with
+  std::string save;        ///< where the map is written at the end
+  std::string checkpoint;  ///< of this session, written by the collector: begun with where nobody has the map
 };
 
 /// A `MapperNode`, for those who only run one: its own header is much to compile.

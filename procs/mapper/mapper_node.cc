@@ -5,6 +5,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
+#include "dmslam/recording/checkpoint.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -53,6 +54,13 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
   return ordinal;
 }
 
+/// What the core has is to be published as records.
+void MapperNode::PutInParts() {
+  const KeyframeId newest = core_->map().keyframes().rbegin()->first;
+  const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, 56 * 1024);
+  saved_.parts.assign(parts.begin(), parts.end());
+}
+
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
   const uint16_t ordinal = saved_.loaded ? ContinueSavedMap(info) : uint16_t{1};
@@ -64,9 +72,7 @@ void MapperNode::Begin(const CameraInfo& info) {
                                        options_.settings.Read<Pyramid>(), ordinal, publish);
   if (saved_.loaded) {
     core_->ContinueSaved(std::exchange(saved_.loaded, std::nullopt)->map);
-    const KeyframeId newest = core_->map().keyframes().rbegin()->first;
-    const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, 56 * 1024);
-    saved_.parts.assign(parts.begin(), parts.end());
+    PutInParts();
   }
   if (!lockstep_) core_->SetInterrupt([this] { return keyframe_waits_.load(); });
   core_->SetStop([this] { return stops_.load(); });
@@ -116,11 +122,31 @@ bool MapperNode::FetchReplica() {
   return true;
 }
 
+/// Whoever held the map has died with the mapper: what is on the disk is all there is. False: nothing is.
+bool MapperNode::TakeCheckpoint() {
+  if (files_.checkpoint.empty()) return false;
+  FoundCheckpoint found = FindCheckpoint(files_.checkpoint, session_);
+  if (!found.problem.empty()) LogWarning("{}", found.problem);
+  if (!found.map) return false;
+  CheckFits(found.path, *found.map, camera_info_->camera, options_.settings.Read<Pyramid>());
+  LogInfo("{}: continues with {} keyframes and {} landmarks", found.path, found.map->map.keyframes().size(),
+          found.map->map.num_landmarks());
+  core_->ContinueSaved(std::move(found.map->map), static_cast<uint64_t>(context_.random_id));
+  PutInParts();
+  return true;
+}
+
 bool MapperNode::ReadyToWrite() {
-  if (context_.fresh_system || options_.fresh) return true;
+  if (options_.fresh) return true;
+  if (context_.fresh_system) {
+    if (context_.resumed && !TakeCheckpoint())
+      throw InputError(files_.checkpoint + ": holds no map of this session to go on from");
+    return true;
+  }
   if (!left_.fetch) BeginFetch();
   if (!FetchReplica()) return false;
   endpoint_.Remove(left_.fetch.get());
+  if (left_.fetch->state() == ReplicaFetch::State::kNone) TakeCheckpoint();
   return true;
 }
 

@@ -91,6 +91,8 @@ class MapperNode : public StreamNode {
   uint16_t ContinueSavedMap(const CameraInfo& info);
   bool PublishSavedMap();
   void Save();
+  void PutInParts();
+  bool TakeCheckpoint();
   void BeginFetch();
   bool FetchReplica();
   void TakeLoopAnswers();

@@ -27,6 +27,7 @@ LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<L
       source_(std::move(source)),
       endpoint_(context_.bus, context_.now_ns),
       office_(context_, options_.session, options_.take_over, &endpoint_) {
+  if (options_.behind) first_index_ = *options_.behind + 1;
   endpoint_.SetOtherHandler(
       {channels::kFrameDone, channels::kSequenceDone, channels::kMapperStatus, channels::kFrontendStatus},
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
@@ -144,8 +145,8 @@ void LiveNode::PublishEnd() {
   EndOfSequence end;
   end.utime = context_.wall_us();
   end.session = options_.session;
-  end.frames_published = published_;
-  end.frames_listed = published_ + source_->dropped();
+  end.frames_published = published_ + first_index_;  // with those of players before this one
+  end.frames_listed = end.frames_published + source_->dropped();
   end.frames_missing = source_->dropped();
   end.last_frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   end.last_stamp_ns = frame_.stamp_ns;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <optional>
 #include <utility>
 
 #include "dmslam/wire/codec.h"
@@ -55,7 +56,7 @@ class LiveNodeTest : public testing::Test {
       if (channel == channels::kEndOfSequence) ends_.push_back(*wire::Decode<EndOfSequence>(bytes));
     });
   }
-  LiveNode Make(size_t frames = SIZE_MAX) {
+  LiveNode Make(size_t frames = SIZE_MAX, std::optional<uint32_t> behind = std::nullopt) {
     NodeContext context;
     context.bus = &player_port_;
     context.now_ns = [this] { return now_ns_; };
@@ -66,6 +67,7 @@ class LiveNodeTest : public testing::Test {
     options.session = 9;
     options.camera = {.width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 32, .cy_px = 24};
     options.frames = frames;
+    options.behind = behind;
     options.encoding.encoding = FrameEncoding::kGray8;
     return LiveNode(std::move(context), options, std::make_unique<FakeCamera>(&store_));
   }
@@ -93,6 +95,17 @@ class LiveNodeTest : public testing::Test {
   std::vector<EndOfSequence> ends_;
   PlayerStatus status_;
 };
+
+TEST_F(LiveNodeTest, GoesOnBehindTheFramesOfARunThatDied) {
+  LiveNode node = Make(1, 41);
+  Advance(node);
+  store_.frames = {Picture(2, 100)};
+  for (int i = 0; i < 3; ++i) Advance(node);
+  ASSERT_EQ(frames_.size(), 1u);
+  EXPECT_EQ(frames_[0].frame_index, 44u);
+  ASSERT_FALSE(ends_.empty());
+  EXPECT_EQ(ends_[0].frames_published, 43) << "the 42 before it count";
+}
 
 TEST_F(LiveNodeTest, PublishesWhatComesUntilEnoughAndThenItsEnd) {
   LiveNode node = Make(2);

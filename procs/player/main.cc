@@ -1,5 +1,6 @@
 
 #include <algorithm>
+#include <charconv>
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
@@ -21,6 +22,7 @@ struct Arguments {
   double fps = 0;
   uint32_t log_session = 0;
   bool lockstep = false, remote_frontend = false;
+  std::string behind;
   std::vector<std::string> black_outs, jumps;
 };
 
@@ -34,6 +36,14 @@ std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, const dmslam::N
   return frames;
 }
 
+uint32_t ParseFrame(const std::string& option, const std::string& text) {
+  uint32_t frame = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), frame);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw dmslam::InputError(option + " " + text + ": write the number of a frame");
+  return frame;
+}
+
 /// How it is to be played, of all but the camera.
 void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::PlayerOptions* options) {
   *options = a.options;
@@ -41,6 +51,7 @@ void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::Pla
   options->session = node.session == 0 ? 1 : node.session;
   options->take_over = node.take_over;
   options->local_frames = node.link == dmslam::Link::kLan && !a.remote_frontend;
+  if (!a.behind.empty()) options->behind = ParseFrame("--behind", a.behind);
   options->encoding.encoding = dmslam::ParseFrameEncoding(a.encoding);
   for (const std::string& text : a.black_outs) options->black_outs.push_back(dmslam::ParseBlackOut(text));
   for (const std::string& text : a.jumps) options->jumps.push_back(dmslam::ParseJump(text));
@@ -126,6 +137,10 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
       .ShowDefault();
   app.AddOption("--start", a.options.start, "first frame");
   app.AddOption("--frames", a.options.frames, "at most so many frames");
+  app.AddOption(
+      "--behind", a.behind,
+      "frames up to the one of this number were played before all processes died: they count, and are "
+      "not played again");
   app.AddOption("--encoding", a.encoding, "of re-encoded frames: jpeg, png, raw")
       .OneOf({"jpeg", "png", "raw"});
   app.AddOption("--jpeg-quality", a.options.encoding.jpeg_quality).InRange(1, 100).ShowDefault();

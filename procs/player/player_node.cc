@@ -82,6 +82,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
     throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
                      " leaves no frame of " + std::to_string(source_->size()));
   }
+  if (options_.behind) SkipBehind(*options_.behind);
   ground_truth_ = source_->GroundTruth();
   endpoint_.SetOtherHandler(
       {channels::kFrameDone, channels::kSequenceDone, channels::kMapperStatus, channels::kFrontendStatus},
@@ -141,9 +142,13 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
   }
 }
 
-/// The frontend is further than this player, which was started again: goes on where the one before was.
+/// The frontend is further than this player, which was started again: goes on where the one before was, and
+/// never back.
 void PlayerNode::SkipBehind(uint32_t frame_index) {
-  const auto next = std::upper_bound(order_.begin(), order_.end(), size_t{frame_index});
+  const auto next =
+      std::upper_bound(order_.begin(), order_.end(), frame_index,
+                       [this](uint32_t frame, size_t index) { return frame < source_->FrameIndex(index); });
+  if (next - order_.begin() <= static_cast<std::ptrdiff_t>(position_)) return;
   if (playing_) LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
   position_ = static_cast<size_t>(next - order_.begin());
   published_ = static_cast<int64_t>(position_);
@@ -246,8 +251,9 @@ void PlayerNode::PublishEnd() {
   end.frames_missing = static_cast<int64_t>(source_->missing() + unreadable_);
   end.frames_blacked = static_cast<int64_t>(black_);
   end.frames_jumped = static_cast<int64_t>(jumped_);
-  end.last_frame_index = static_cast<int32_t>(frame_.frame_index);
-  end.last_stamp_ns = frame_.stamp_ns;
+  const size_t last = order_[std::max<size_t>(position_, 1) - 1];
+  end.last_frame_index = static_cast<int32_t>(source_->FrameIndex(last));
+  end.last_stamp_ns = source_->StampNs(last);
   Publish(end);
 }
 

@@ -28,6 +28,9 @@ struct PlayerOptions {
   double speed = 1.0;        ///< factor on the recorded rate; 0: as fast as possible
   size_t start = 0;          ///< first frame
   size_t frames = SIZE_MAX;  ///< at most so many
+  /// Frames up to the one of this index were played before this process began: they count, and are not played
+  /// again.
+  std::optional<uint32_t> behind;
   EncodingOptions encoding;
   bool local_frames = false;  ///< frames stay on this host: the frontend runs here, and the bus leaves it
   double lead_s = 0.5;  ///< between the first camera info and the first frame, so that others can get ready

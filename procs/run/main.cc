@@ -11,6 +11,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
+#include "run/resume.h"
 #include "run/run_plan.h"
 
 namespace {
@@ -35,10 +36,14 @@ class Run {
  public:
   Run(const dmslam::RunArguments& arguments, const dmslam::RunPlace& place,
       dmslam::Supervisor::Options options)
-      : place_(place), plan_(dmslam::MakeRunPlan(arguments, place)), supervisor_(options) {}
+      : place_(place),
+        camera_(dmslam::IsCamera(arguments.sequence)),
+        plan_(dmslam::MakeRunPlan(arguments, place)),
+        supervisor_(options) {}
 
   int Play() {
     fs::remove(plan_.table);
+    if (place_.resume) SayResume(*place_.resume, camera_);
     for (const auto* children : {&plan_.companions, &plan_.pipeline}) {
       for (const dmslam::ChildSpec& child : *children) Begin(child);
     }
@@ -52,11 +57,26 @@ class Run {
   }
 
  private:
+  static void SayResume(const dmslam::ResumePoint& point, bool camera) {
+    if (!point.warning.empty()) Say(point.warning);
+    std::string frame = point.last_frame ? " behind frame " + std::to_string(*point.last_frame) : "";
+    if (!camera && point.play_behind && point.play_behind != point.last_frame)
+      frame +=
+          ", playing again from " + std::to_string(*point.play_behind + 1) + " on what is not in the map,";
+    const std::string newest =
+        point.newest_keyframe ? ", the newest of frame " + std::to_string(*point.newest_keyframe) : "";
+    Say("goes on" + frame + " in a map of " + std::to_string(point.keyframes) + " keyframes" + newest);
+  }
+
   void Begin(const dmslam::ChildSpec& child) {
-    if (child.errors != child.output && !child.errors_to_ours) fs::remove(child.errors);
-    if (child.name != "collector") fs::remove(child.output);
+    if (!place_.resume) RemoveLogs(child);
     supervisor_.Start(child);
     if (child.name == "viewer") ShowViewer();
+  }
+
+  static void RemoveLogs(const dmslam::ChildSpec& child) {
+    if (child.errors != child.output && !child.errors_to_ours) fs::remove(child.errors);
+    if (child.name != "collector") fs::remove(child.output);
   }
 
   /// Its address, once it has one.
@@ -156,6 +176,7 @@ class Run {
   }
 
   dmslam::RunPlace place_;
+  bool camera_;
   dmslam::RunPlan plan_;
   dmslam::Supervisor supervisor_;
   int code_ = 0, signal_ = 0;
@@ -181,13 +202,55 @@ dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
   return place;
 }
 
-int RunWith(const dmslam::RunArguments& arguments) {
-  dmslam::CheckRunArguments(arguments);
+int Start(const dmslam::RunArguments& arguments, dmslam::RunIdentity identity,
+          const std::optional<dmslam::ResumePoint>& resume) {
   dmslam::Supervisor::Options options;
   options.watchdog_ns = static_cast<int64_t>(arguments.watchdog_s * 1e9);
   options.wait_for_what_may_come = arguments.wait;
-  Run run(arguments, PlaceOf(arguments), options);
+  dmslam::RunPlace place = PlaceOf(arguments);
+  place.session = identity.session;
+  place.resume = resume;
+  identity.pid = getpid();
+  Run run(arguments, place, options);
+  identity.Write(arguments.out);
   return run.Play();
+}
+
+int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
+  dmslam::CheckRunArguments(arguments);
+  std::error_code error;
+  fs::create_directories(arguments.out, error);
+  const dmslam::RunLock lock(arguments.out);
+  dmslam::RunIdentity identity;
+  identity.session = dmslam::ChooseSession(arguments);
+  identity.folder = fs::current_path().string();
+  identity.arguments.assign(argv + 1, argv + argc);
+  return Start(arguments, identity, std::nullopt);
+}
+
+/// The same run again, from where it stood when all its processes died.
+int Resume(const std::string& folder) {
+  if (!fs::is_directory(folder)) throw dmslam::InputError(folder + ": no such folder; check --resume");
+  const std::string out = fs::absolute(folder).lexically_normal().string();
+  const dmslam::RunLock lock(out);
+  dmslam::RunIdentity identity = dmslam::RunIdentity::Read(out);
+  const dmslam::ResumePoint point = dmslam::FindResumePoint(out, identity);
+  std::error_code gone;
+  fs::current_path(identity.folder, gone);
+  if (gone)
+    throw dmslam::InputError(identity.folder + ": the run was begun there, and it is not there any more");
+  dmslam::CommandLine line("", "dmslam-run");
+  dmslam::RunArguments arguments;
+  dmslam::DeclareRunArguments(line, arguments);
+  std::vector<const char*> words = {"dmslam-run"};
+  for (const std::string& word : identity.arguments) words.push_back(word.c_str());
+  if (line.Parse(static_cast<int>(words.size()), words.data()))
+    throw dmslam::InputError(out +
+                             "/run.json: its arguments are not those of this dmslam-run; begin it anew");
+  arguments.out = out;
+  dmslam::CheckRunArguments(arguments);
+  ++identity.resumed;
+  return Start(arguments, identity, point);
 }
 
 }  // namespace
@@ -197,7 +260,7 @@ int main(int argc, char** argv) {
       "Plays a sequence through player, frontend, mapper and loop closer, four processes on a private LCM "
       "port, and writes into the --out folder: trajectory.txt (final, TUM format), trajectory_online.txt, "
       "keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A process that dies "
-      "or hangs is started again, and goes on where it was.",
+      "or hangs is started again, and goes on where it was; where all died at once, --resume does so.",
       "dmslam-run");
   dmslam::RunArguments arguments;
   line.SetVersion(dmslam::BuildVersion());
@@ -205,7 +268,10 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = line.Parse(argc, argv))
     return *code == 0 ? 0 : static_cast<int>(dmslam::kExitUsage);
   try {
-    return RunWith(arguments);
+    if (arguments.resume.empty()) return Begin(arguments, argc, argv);
+    if (argc > 3)
+      throw dmslam::InputError("--resume goes on with what the run was begun with: give no other option");
+    return Resume(arguments.resume);
   } catch (const dmslam::InputError& error) {
     Say(error.what());
     return dmslam::kExitInput;

@@ -31,8 +31,7 @@ void CheckSource(const RunArguments& a) {
   const int sources = (a.sequence.empty() ? 0 : 1) + (a.log.empty() ? 0 : 1) + (a.replay.empty() ? 0 : 1);
   if (sources == 0) throw InputError("--sequence is missing (see --help)");
   if (sources > 1) throw InputError("give one of --sequence, --log and --replay");
-  const bool live = a.sequence.find("://") != std::string::npos || a.sequence.rfind("/dev/", 0) == 0;
-  if (!a.sequence.empty() && !live && !fs::exists(a.sequence))
+  if (!a.sequence.empty() && !IsCamera(a.sequence) && !fs::exists(a.sequence))
     throw InputError(a.sequence + ": no such folder or file; check --sequence");
   CheckFile("--log", a.log);
   CheckFile("--replay", a.replay);
@@ -75,6 +74,10 @@ void DeclareRunArguments(CommandLine& line, RunArguments& a) {
                  "instead of --sequence: the camera channels of such a log, by the real lcm-logplayer, in "
                  "real time (--start, --frames, --black-out, --jump, --camera, --prefix: of a copy of them)");
   line.AddOption("--out", a.out, "folder for the results");
+  line.AddOption(
+      "--resume", a.resume,
+      "instead of all else: go on with the run of this --out folder, whose processes all died (power, "
+      "memory), from its last checkpoint");
   line.AddOption("--fps", a.fps,
                  "rate of numbered images, of videos that state none, and asked of a camera; default: as the "
                  "camera file says");
@@ -138,6 +141,10 @@ void CheckRunArguments(const RunArguments& a) {
     throw InputError("--profile " + a.profile + ": write dm or baseline");
   CheckKey(a);
   CheckPort(a);
+}
+
+bool IsCamera(const std::string& sequence) {
+  return sequence.find("://") != std::string::npos || sequence.rfind("/dev/", 0) == 0;
 }
 
 int SocketsOn(int port, const std::string& proc_net) {

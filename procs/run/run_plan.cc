@@ -9,6 +9,7 @@
 #include <regex>
 #include <sstream>
 
+#include "dmslam/recording/checkpoint.h"
 #include "dmslam/recording/log_index.h"
 #include "dmslam/util/check.h"
 #include "run/log_replay.h"
@@ -42,12 +43,6 @@ void NeedTool(const std::string& program) {
   if (!InPath(program)) throw InputError(program + " is missing; install liblcm-bin (scripts/setup.sh core)");
 }
 
-/// Ids of this run come after those of the map that it begins in.
-uint32_t ChooseSession(const RunArguments& a) {
-  if (a.map.empty()) return 1 + RandomBelow(1u << 30);
-  return LogIndex(a.map).Session().id + 1;
-}
-
 std::string Url(const RunArguments& a, const RunPlace& place) {
   return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + a.receive_buffer;
 }
@@ -64,7 +59,8 @@ Words CommonArguments(const RunArguments& a, const RunPlace& place) {
   if (!a.map.empty()) Append(&common, {"--set", "map.saved=on"});
   if (a.localize) Append(&common, {"--set", "map.localize_only=on"});
   Append(&common, {"--set", "seed=" + a.seed, "--lcm-url", Url(a, place), "--session",
-                   std::to_string(ChooseSession(a)), "--peers", "frontend,mapper,loopcloser,collector"});
+                   std::to_string(place.session == 0 ? ChooseSession(a) : place.session), "--peers",
+                   "frontend,mapper,loopcloser,collector"});
   if (!a.replay.empty()) common.push_back("--accept-recorded");
   return common;
 }
@@ -116,10 +112,19 @@ ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPla
   child.arguments = std::move(arguments);
   child.arguments.insert(child.arguments.begin(), place.programs + "/dmslam-" + name);
   child.first = {"--fresh-system"};  // only at the beginning nobody else can be writing
+  if (place.resume) child.first.emplace_back("--resumed");
   child.output = child.errors = place.LogOf(name);
   child.pid_file = place.out + "/log/" + name + ".pid";
   child.restart = !a.no_restart;
   return child;
+}
+
+/// What was played before all processes died, and is in the map, is not played again; the first frame waits
+/// for the map.
+void GoOnBehind(const ResumePoint& point, bool camera, ChildSpec* player) {
+  const std::optional<uint32_t> behind = camera ? point.last_frame : point.play_behind;
+  if (behind) Append(&player->arguments, {"--behind", std::to_string(*behind)});
+  Append(&player->first, {"--lead", std::to_string(point.lead_s)});
 }
 
 ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& common) {
@@ -127,7 +132,14 @@ ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& 
     Words words = common;
     Append(&words, PlayerArguments(a));
     Append(&words, a.log.empty() ? Words{"--sequence", a.sequence} : Words{"--log", a.log});
-    return MakeChild("player", a, place, words);
+    ChildSpec player = MakeChild("player", a, place, words);
+    if (place.resume) GoOnBehind(*place.resume, IsCamera(a.sequence), &player);
+    return player;
+  }
+  if (place.resume) {
+    throw InputError(
+        "--replay: lcm-logplayer cannot begin in the middle; begin the run anew, with --log it could "
+        "have been resumed");
   }
   NeedTool("lcm-logplayer");
   LogReplay replay;
@@ -168,6 +180,7 @@ ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words
 
 ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
   AppendOption(&words, "--map", a.map);
+  Append(&words, {"--checkpoint", CheckpointPath(place.out)});
   AppendOption(&words, "--save-map", a.save_map);
   return MakeChild("mapper", a, place, std::move(words));
 }
@@ -181,8 +194,9 @@ ChildSpec MakeCompanion(ChildSpec child) {
 
 ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {
   NeedTool("lcm-logger");
-  const std::string log = place.out + "/run.lcmlog";
-  fs::remove(log);
+  std::string log = place.out + "/run.lcmlog";
+  if (!place.resume) fs::remove(log);
+  for (int i = 2; fs::exists(log); ++i) log = place.out + "/run." + std::to_string(i) + ".lcmlog";
   ChildSpec child = MakeCompanion(MakeChild("logger", a, place, {}));
   child.arguments = {"lcm-logger", "--quiet", "--lcm-url=" + Url(a, place), log};
   child.stop_signal = SIGINT;
@@ -201,6 +215,11 @@ std::string Matched(const std::string& line, const char* pattern, const char* wi
 }
 
 }  // namespace
+
+uint32_t ChooseSession(const RunArguments& a) {
+  if (a.map.empty()) return 1 + RandomBelow(1u << 30);
+  return LogIndex(a.map).Session().id + 1;
+}
 
 int FreePort() {
   int port = 0;

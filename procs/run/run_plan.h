@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "run/resume.h"
 #include "run/run_options.h"
 #include "run/supervisor.h"
 
@@ -20,12 +23,17 @@ struct RunPlace {
   std::string programs;  ///< folder of the programs
   std::string out;
   int port = 0;
-  bool terminal = false;  ///< standard error is one: the collector shows its progress there
+  bool terminal = false;              ///< standard error is one: the collector shows its progress there
+  uint32_t session = 0;               ///< 0: one is chosen
+  std::optional<ResumePoint> resume;  ///< the run goes on from there
   std::string LogOf(const std::string& name) const { return out + "/log/" + name + ".log"; }
 };
 
 /// Reads what it must: the map's session, the log that is replayed. Throws InputError.
 RunPlan MakeRunPlan(const RunArguments& arguments, const RunPlace& place);
+
+/// Ids of a run come after those of the map that it begins in. Throws InputError.
+uint32_t ChooseSession(const RunArguments& arguments);
 
 /// A port between 20000 and 49999 that nobody on this host is bound to.
 int FreePort();

@@ -9,7 +9,7 @@ fi
 multicast
 mkdir "$work/disk"
 trap 'umount -l "$work/disk" 2>/dev/null; cleanup' EXIT
-mount -t tmpfs -o size=1m none "$work/disk" 2>/dev/null || { echo "SKIPPED: no tmpfs can be mounted"; exit $SKIPPED; }
+mount -t tmpfs -o size=6m none "$work/disk" 2>/dev/null || { echo "SKIPPED: no tmpfs can be mounted"; exit $SKIPPED; }
 arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --lockstep --seed 1 --out "$work/disk/out")
 
 begin() { # a run, until its collector has seen some frames and the disk is full
@@ -17,7 +17,7 @@ begin() { # a run, until its collector has seen some frames and the disk is full
   "$root/scripts/run.sh" --build-dir "$build" "${arguments[@]}" >"$work/said" 2>&1 </dev/null &
   runner=$!
   until grep -qs "frame [0-9]* of" "$work/disk/out/log/collector.log" || ! kill -0 "$runner" 2>/dev/null; do sleep 0.05; done
-  head -c 2000000 /dev/zero >"$work/disk/filler" 2>/dev/null
+  head -c 8000000 /dev/zero >"$work/disk/filler" 2>/dev/null
 }
 journal() { stat -c %s "$work/disk/out/collector.journal" 2>/dev/null || echo 0; }
 

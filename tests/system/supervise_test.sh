@@ -40,10 +40,28 @@ strike KILL player collector
 ends two 2
 expect "nothing is lost with player and collector" "$work/two" records_lost "== 0"
 expect "no keyframe is missing with player and collector" "$work/two" keyframes_missing "== 0"
+expect "both are counted" "$work/two" restarts "== 2"
 
-begin five 40
+# What a collector counted is known to the next one.
+begin counted 40
+strike KILL mapper
+until grep -qs "mapper .*started again" "$work/counted.said"; do sleep 0.05; done
+sleep 2
+strike KILL collector
+ends counted 2
+expect "who died before the collector is counted" "$work/counted" restarts "== 2"
+expect "no keyframe is missing" "$work/counted" keyframes_missing "== 0"
+expect "no record is lost" "$work/counted" records_lost "== 0"
+expect "all frames were processed, whoever counted them" "$work/counted" frames_processed "== 150"
+
+begin five 80
 strike KILL player collector frontend mapper loopcloser
 ends five 5
+expect "all five are counted" "$work/five" restarts "== 5"
+expect "all frames are there" "$work/five" frames "== 150"
+expect "it is known that all had died" "$work/five" resumed "== 1"
+expect "keyframes that came after the checkpoint are not missing without a word" "$work/five" keyframes_missing "== 0"
+check "the map was on the disk" grep -q "checkpoint.lcmlog: continues with [0-9]* keyframes" "$work/five/log/mapper.log"
 
 begin hung 40
 strike STOP mapper

@@ -101,6 +101,7 @@ void AddMapSide(InProcessOptions* options, System* system) {
   node.session = options->player.session;
   node.peers = {"frontend", "mapper", "loopcloser", "collector"};
   if (!options->record.empty()) system->Record(options->record);
+  options->collector.checkpoints = false;  // nobody resumes it
   system->Add(MakeCollector(system->ContextFor("collector"), node, options->collector));
   system->Add(MakeLoopcloser(system->ContextFor("loopcloser"), node, options->vocabulary));
   system->Add(MakeMapper(system->ContextFor("mapper"), node, options->map_files));

@@ -23,10 +23,10 @@ MapperCore::MapperCore(const MapperOptions& options, const Camera& camera, const
                        uint16_t epoch_ordinal, Sink sink)
     : options_(options), map_(camera, pyramid), maker_(epoch_ordinal), sink_(std::move(sink)) {}
 
-void MapperCore::ContinueSaved(Map map) {
+void MapperCore::ContinueSaved(Map map, uint64_t successor) {
   MapEditor saved(std::move(map));
   saved.SetProgress({});
-  Continue(std::move(saved));
+  Continue(std::move(saved), successor);
 }
 
 void MapperCore::Continue(Map map, uint64_t successor) {

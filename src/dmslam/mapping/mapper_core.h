@@ -57,7 +57,7 @@ class MapperCore {
   /// `successor`: see LandmarkMaker.
   void Continue(Map map, uint64_t successor = 0);
   /// The same with a map that was saved: the streams it was made of are not today's.
-  void ContinueSaved(Map map);
+  void ContinueSaved(Map map, uint64_t successor = 0);
   /// What of the streams is worked into the map; travels with the next deltas.
   void SetProgress(const MapProgress& progress) { map_.SetProgress(progress); }
 

@@ -105,20 +105,27 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
   return rebuilt;
 }
 
-void SaveMap(const std::string& path, const Map& map, const SessionStart& session) {
+CutMap Cut(const std::string& path, const Map& map) {
   if (map.keyframes().empty()) throw InputError(path + ": is not written: the map is empty");
   const Keyframe& newest = map.keyframes().rbegin()->second;
-  const int64_t utime_us = newest.stamp_ns / 1000;
-  const std::vector<MapDelta> pieces = CutSnapshot(map, newest.id, kPieceBytes);
+  return {CutSnapshot(map, newest.id, kPieceBytes), newest.stamp_ns};
+}
+
+void SaveMap(const std::string& path, const Map& map, const SessionStart& session) {
+  SaveMap(path, Cut(path, map), session);
+}
+
+void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session) {
+  const int64_t utime_us = map.stamp_ns / 1000;
   const std::string partial = path + ".part";
   EventLogWriter log(partial);
-  WriteLogVersion(&log, "", utime_us, {session.session, static_cast<int64_t>(pieces.size())});
+  WriteLogVersion(&log, "", utime_us, {session.session, static_cast<int64_t>(map.pieces.size())});
   SessionStart start = session;  // of this program, whoever wrote the one it goes on from
   start.protocol_version = kProtocolVersion;
   start.software = kVersion;
   WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), start);
   int64_t seq = 0;
-  for (const MapDelta& delta : pieces)
+  for (const MapDelta& delta : map.pieces)
     WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kMap, ++seq), delta);
   log.Close();
   if (!RenameDurably(partial, path)) throw InputError(path + ": cannot be written; check the path");

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dmslam/map/replica.h"
 #include "dmslam/recording/log_index.h"
@@ -29,9 +30,18 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
 /// session.
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us = INT64_MAX);
 
+/// A map as it will be written: taken from a map at one time, whoever writes it when and where.
+struct CutMap {
+  std::vector<MapDelta> pieces;
+  int64_t stamp_ns = 0;  ///< of the newest keyframe
+};
+/// Throws InputError for an empty map.
+CutMap Cut(const std::string& path, const Map& map);
+
 /// Writes a map as a log: a beacon, which says the version to every later one, its session, then the whole
 /// map as records. The same map gives the same bytes. Throws InputError when that cannot be written.
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session);
+void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session);
 
 /// Reads what SaveMap has written, or rebuilds the map of any other log of a run. Throws InputError.
 RebuiltMap LoadMap(const std::string& path);

@@ -25,6 +25,7 @@ struct NodeContext {
   /// Messages that the bus kept from the node, since it has a key and they had no tag that fits.
   std::function<int64_t()> refused = [] { return int64_t{0}; };
   bool fresh_system = false;  ///< nobody else can be writing: no listening before a stream begins
+  bool resumed = false;  ///< ... and what a run whose processes all died has left on disk is gone on with
 };
 
 /// A process without its main: connects a core to the bus. Message handlers only store what comes; all work

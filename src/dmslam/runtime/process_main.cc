@@ -55,6 +55,8 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
                "ask a present writer of the same stream to close, and follow it");
   app_.AddFlag("--fresh", options_.fresh, "a mapper begins with an empty map, whatever the others hold");
   app_.AddFlag("--fresh-system", fresh_system_, "nobody else can be writing: begin without listening first");
+  app_.AddFlag("--resumed", resumed_,
+               "with --fresh-system: go on with what a run whose processes all died has left on disk");
   app_.AddFlag("--quiet", quiet_, "log warnings only");
 }
 
@@ -115,6 +117,7 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.random_id = RandomId();
   context.name = ProcessName(role_);
   context.fresh_system = fresh_system_;
+  context.resumed = resumed_;
   const std::unique_ptr<Node> node = factory(context, options_);
   loop.Watch(bus.fd(), [&bus] { bus.Deliver(); });
   notice.Ready();

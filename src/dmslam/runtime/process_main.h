@@ -48,6 +48,7 @@ class ProcessMain {
   std::vector<std::string> overrides_;
   NodeOptions options_;
   bool fresh_system_ = false;
+  bool resumed_ = false;
   bool quiet_ = false;
   std::function<std::optional<int>(const NodeOptions&)> offline_;
 };

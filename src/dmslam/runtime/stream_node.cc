@@ -119,7 +119,10 @@ std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamRe
     delta = map_groups_.Add(std::move(*delta));
     reason = map_groups_.fault();
   }
-  if (reason.empty()) return delta;
+  if (reason.empty()) {
+    if (delta) map_in_parts_ = delta->event == MapEvent::kSnapshot && !record.in_snapshot();
+    return delta;
+  }
   CountMalformed(record.channel, reason + "; asks for a snapshot of the map");
   map_groups_.Clear();
   reader->Forget();

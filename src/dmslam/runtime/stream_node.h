@@ -104,7 +104,11 @@ class StreamNode : public Node {
   /// for a snapshot, so that nothing is applied to a replica that lacks it, and nothing acknowledged.
   std::optional<MapDelta> ReadMapRecord(const Record& record, StreamReader* reader);
   /// The version that a replica made of what ReadMapRecord returned holds.
-  Version MapHeld(const StreamReader& reader) const { return map_groups_.open() ? Version() : reader.held(); }
+  Version MapHeld(const StreamReader& reader) const {
+    return map_groups_.open() || map_in_parts_ ? Version() : reader.held();
+  }
+  /// Whether a saved map is being published, and more of it is to come: what is here of it is no whole map.
+  bool MapComesInParts() const { return map_in_parts_; }
   /// A message was dropped; the first one of a channel is logged.
   void CountMalformed(const std::string& channel, const std::string& reason);
   /// Counts messages of other sessions; the first is logged.
@@ -159,6 +163,7 @@ class StreamNode : public Node {
   int64_t received_ = 0, received_bytes_ = 0, dropped_foreign_ = 0, dropped_malformed_ = 0;
   std::vector<std::string> logged_;
   wire::RecordGroups<MapDelta> map_groups_;
+  bool map_in_parts_ = false;
   struct Watched {
     const StreamReader* reader;
     std::string problem;           ///< last one logged

@@ -119,6 +119,7 @@ std::vector<SettingInfo> CollectAll() {
   Collect(collector, FrontendOptions());
   Collect(collector, MapperOptions());
   Collect(collector, LoopcloserOptions());
+  Collect(collector, CheckpointOptions());
   std::vector<SettingInfo> all = collector.Finish();
   all.insert(all.begin(), ProfileInfo());
   return all;

@@ -18,4 +18,16 @@ struct RunOptions {
   }
 };
 
+/// What the collector keeps on disk while a run goes on.
+struct CheckpointOptions {
+  double every_s = 10.0;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("collector.checkpoint_s", every_s, 0, 3600, "s",
+             "age at which a change of the map must be in OUT/checkpoint.lcmlog, from which a run whose "
+             "processes all died goes on; 0: no checkpoints");
+  }
+};
+
 }  // namespace dmslam

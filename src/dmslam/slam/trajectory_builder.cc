@@ -66,6 +66,33 @@ void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
   std::erase_if(refined_, [&reset](const auto& entry) { return entry.second.map_id == reset.map_id; });
 }
 
+/// Where its reference is no longer known: over the frame that became it, which was placed in the same map.
+bool TrajectoryBuilder::Bridge(FramePose* pose) const {
+  const auto frame = poses_.find(pose->reference.frame_index());
+  if (frame == poses_.end() || MapOfFrame(frame->second) == 0) return false;
+  const FramePose& reference = frame->second;
+  if (reference.map_id != pose->map_id) return false;  // its units are others
+  Rigid3d T_cam_lost = pose->T_cam_reference;
+  T_cam_lost.translation /= pose->reference_scale;  // to the units in which the lost one was placed
+  pose->T_cam_reference = T_cam_lost * reference.T_cam_reference;
+  pose->reference = reference.reference;
+  pose->reference_scale = reference.reference_scale;
+  return true;
+}
+
+/// Until nothing changes: what one hangs from is bridged before, mostly in the order of time.
+void TrajectoryBuilder::BridgeLostKeyframes() {
+  for (bool any = true; any;) {
+    any = false;
+    for (auto& [index, pose] : poses_) {
+      if (pose.HasPose() && MapOfFrame(pose) == 0) any |= Bridge(&pose);
+    }
+  }
+  for (auto& [index, pose] : refined_) {
+    if (MapOfFrame(pose) == 0) Bridge(&pose);
+  }
+}
+
 MapId TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {
   if (!pose.HasPose()) return 0;
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);

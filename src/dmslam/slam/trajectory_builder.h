@@ -29,6 +29,11 @@ class TrajectoryBuilder {
   /// The map is void: a fresh stream, or a snapshot, begins.
   void ForgetMap() { map_.Clear(); }
 
+  /// A frame whose reference keyframe is in no map (all who held it died at once) is told again, relative to
+  /// the keyframe to which that one's own frame was told, where there is such a one. To be called when all is
+  /// in.
+  void BridgeLostKeyframes();
+
   struct Trajectories {
     MapId map_id = 0;                 ///< the map that holds most frames
     std::vector<StampedPose> final;   ///< every placed frame, by its reference keyframe's final pose
@@ -49,6 +54,7 @@ class TrajectoryBuilder {
     Sim3d S_into_from;
   };
 
+  bool Bridge(FramePose* pose) const;
   MapId MapOfFrame(const FramePose& pose) const;
   std::map<MapId, Joined> JoinedBy(const MapDelta& delta) const;
   static void Carry(const Joined& joined, FramePose* pose);

@@ -64,6 +64,42 @@ TEST_F(TrajectoryOfTwoMaps, PosesOfOtherMapsAndOfOneThatIsKeptStay) {
   EXPECT_EQ(builder_.Build().final.size(), 1U);
 }
 
+/// Frames 10 and 20 became keyframes that were lost with all processes; frame 20 was told relative to 10's,
+/// frame 10 relative to keyframe 0, which is left.
+TEST_F(TrajectoryOfTwoMaps, FramesOfLostKeyframesAreToldOverTheFramesThatBecameThem) {
+  const auto add = [this](uint32_t frame, uint32_t reference, double x, double scale) {
+    FramePose pose = PoseIn(2, TrackingState::kTracking, x);
+    pose.frame_index = frame;
+    pose.stamp_ns = frame;
+    pose.reference = KeyframeId::Make(1, reference);
+    pose.reference_scale = scale;
+    builder_.OnFramePose(pose);
+  };
+  add(10, 0, 1.0, 1.0);
+  add(20, 10, 1.0, 1.0);
+  add(21, 20, 1.0, 2.0);  // the world had grown to twice its size since keyframe 20 was made
+  add(31, 30, 1.0, 1.0);  // nobody knows where frame 30 was
+  EXPECT_EQ(builder_.Build().final.size(), 1U);
+  builder_.BridgeLostKeyframes();
+  const TrajectoryBuilder::Trajectories built = builder_.Build();
+  ASSERT_EQ(built.final.size(), 3U);
+  EXPECT_NEAR(built.final[0].T_world_cam.translation.x(), -8.0, 1e-12);
+  EXPECT_NEAR(built.final[1].T_world_cam.translation.x(), -9.0, 1e-12);
+  EXPECT_NEAR(built.final[2].T_world_cam.translation.x(), -9.5, 1e-12);
+}
+
+TEST_F(TrajectoryOfTwoMaps, AFrameIsNotToldOverOneOfAnotherMap) {
+  FramePose lost = PoseIn(2, TrackingState::kTracking, 1.0);
+  lost.frame_index = 10;
+  builder_.OnFramePose(lost);
+  FramePose pose = PoseIn(1, TrackingState::kTracking, 1.0);
+  pose.frame_index = 11;
+  pose.reference = KeyframeId::Make(1, 10);
+  builder_.OnFramePose(pose);
+  builder_.BridgeLostKeyframes();
+  EXPECT_EQ(builder_.Build().final.size(), 1U);
+}
+
 /// A map becomes part of another that is turned, moved, and half as large.
 TEST(TrajectoryOfJoinedMaps, PosesToldInAMapGoWithIt) {
   MapEditor map(TestCamera(), Pyramid());

@@ -1,4 +1,4 @@
-#include "collector/journal.h"
+#include "dmslam/recording/journal.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -6,6 +6,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -135,6 +136,47 @@ TEST_F(JournalTest, HalfARecordIsNotThere) {
   }
   fs::resize_file(path_, fs::file_size(path_) - 3);
   EXPECT_EQ(Resumed(7), UpTo(4));
+}
+
+/// After a power cut a file may end in zeros, or in what another file once held there.
+TEST_F(JournalTest, WhatIsDamagedIsCutOffAndWhatComesBeforeStays) {
+  {
+    Journal journal(path_);
+    journal.Resume(7, [](std::span<const uint8_t>) {});
+    for (int64_t i = 1; i <= 5; ++i) journal.Append(RecordOf(7, i));
+    journal.AppendNote("counters 1");
+  }
+  const auto whole = static_cast<std::streamoff>(fs::file_size(path_));
+  std::fstream(path_, std::ios::in | std::ios::out | std::ios::binary).seekp(whole - 6).write("\0\0", 2);
+  EXPECT_EQ(Resumed(7), UpTo(5)) << "the note's text does not fit its checksum";
+  const auto records = static_cast<std::streamoff>(fs::file_size(path_));
+  ASSERT_LT(records, whole);
+  std::ofstream(path_, std::ios::app | std::ios::binary) << std::string(4096, '\0');
+  EXPECT_EQ(Resumed(7), UpTo(5));
+  std::fstream(path_, std::ios::in | std::ios::out | std::ios::binary).seekp(records - 60).write("x", 1);
+  EXPECT_EQ(Resumed(7), UpTo(4));
+  EXPECT_FALSE(fs::exists(path_ + ".former")) << "damage is no other session";
+}
+
+TEST_F(JournalTest, IsReadWhileSomebodyWritesIt) {
+  std::vector<int64_t> numbers;
+  std::vector<std::string> notes;
+  const auto take = [&](std::span<const uint8_t> record) { numbers.push_back(ParseHeader(record)->seq); };
+  const auto read = [&](const std::string& note) { notes.push_back(note); };
+  EXPECT_FALSE(Journal::Read(path_, 7, take, read)) << "there is none";
+  EXPECT_FALSE(fs::exists(path_)) << "and none is made";
+  Journal journal(path_);
+  journal.Begin(7);
+  journal.Append(RecordOf(7, 1));
+  journal.AppendNote("x");
+  const auto whole = fs::file_size(path_);
+  journal.Append(RecordOf(7, 2));
+  fs::resize_file(path_, fs::file_size(path_) - 1);
+  EXPECT_TRUE(Journal::Read(path_, 7, take, read));
+  EXPECT_EQ(numbers, UpTo(1));
+  EXPECT_EQ(notes, std::vector<std::string>{"x"});
+  EXPECT_GT(fs::file_size(path_), whole) << "nothing is cut off";
+  EXPECT_FALSE(Journal::Read(path_, 8, take, read));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "collector/journal.h"
+#include "dmslam/recording/journal.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -11,6 +11,7 @@
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/crc32c.h"
 
 namespace dmslam {
 namespace {
@@ -18,7 +19,17 @@ namespace {
 constexpr size_t kLengthBytes = 4;
 constexpr size_t kSessionBytes = 8;
 constexpr uint32_t kMostBytes = 1u << 24;  // of a record: beyond it is damage
-constexpr uint32_t kNoteBit = 1u << 31;    // of the length: the owner's note, no record
+constexpr size_t kChecksumBytes = 4;
+constexpr uint32_t kNoteBit = 1u << 31;      // of the length: the owner's note, no record
+constexpr uint32_t kChecksumBit = 1u << 30;  // ... the last bytes are the CRC32C of those before
+
+/// The bytes without their checksum; none where it does not fit them.
+std::optional<std::span<const uint8_t>> Verified(std::span<const uint8_t> bytes) {
+  if (bytes.size() < kChecksumBytes) return std::nullopt;
+  const std::span<const uint8_t> payload = bytes.first(bytes.size() - kChecksumBytes);
+  if (GetInt<uint32_t>(bytes, payload.size()) != Crc32c(payload)) return std::nullopt;
+  return payload;
+}
 
 }  // namespace
 
@@ -34,10 +45,15 @@ std::optional<Journal::Entry> Journal::ReadEntry(int64_t* offset) const {
   const std::vector<uint8_t> length_bytes = ReadAt(*offset, kLengthBytes);
   if (length_bytes.size() < kLengthBytes) return std::nullopt;
   const auto framing = GetInt<uint32_t>(length_bytes, 0);
-  const uint32_t length = framing & ~kNoteBit;
+  const uint32_t length = framing & ~(kNoteBit | kChecksumBit);
   if (length == 0 || length > kMostBytes) return std::nullopt;
   Entry entry{(framing & kNoteBit) != 0, ReadAt(*offset + static_cast<int64_t>(kLengthBytes), length)};
   if (entry.bytes.size() != length) return std::nullopt;
+  if ((framing & kChecksumBit) != 0) {
+    const auto payload = Verified(entry.bytes);
+    if (!payload) return std::nullopt;
+    entry.bytes.resize(payload->size());
+  }
   *offset += static_cast<int64_t>(kLengthBytes + length);
   return entry;
 }
@@ -48,22 +64,37 @@ bool Journal::IsOf(int64_t session, const Entry& entry) {
   return header && header->session == session;
 }
 
-void Journal::Resume(int64_t session, const Handler& handle, const NoteHandler& read) {
-  session_ = session;
-  Open();
+/// False where it begins with another session's.
+bool Journal::ReadAll(const Handler& handle, const NoteHandler& read) {
+  size_ = 0;
   int64_t whole = 0;
   while (const std::optional<Entry> entry = ReadEntry(&whole)) {
-    if (!IsOf(session, *entry)) return SetAside();
-    if (!entry->is_note) handle(entry->bytes);
+    if (!IsOf(session_, *entry)) return size_ > 0;
+    if (!entry->is_note && handle) handle(entry->bytes);
     if (entry->is_note && read) read({entry->bytes.begin() + kSessionBytes, entry->bytes.end()});
     size_ = whole;
   }
+  return true;
+}
+
+void Journal::Resume(int64_t session, const Handler& handle, const NoteHandler& read) {
+  session_ = session;
+  Open(O_RDWR | O_CREAT);
+  if (!ReadAll(handle, read)) return SetAside();
   if (ftruncate(fd_, size_) != 0) throw InputError(path_ + ": cannot be written; check its rights");
+}
+
+bool Journal::Read(const std::string& path, int64_t session, const Handler& handle, const NoteHandler& read) {
+  if (access(path.c_str(), F_OK) != 0) return false;
+  Journal journal(path);
+  journal.session_ = session;
+  journal.Open(O_RDONLY);
+  return journal.ReadAll(handle, read) && journal.size_ > 0;
 }
 
 void Journal::Begin(int64_t session) {
   session_ = session;
-  Open();
+  Open(O_RDWR | O_CREAT);
   if (!ReadAt(0, 1).empty()) SetAside();
 }
 
@@ -76,7 +107,8 @@ void Journal::ForEach(const Handler& handle) {
   }
   for (const std::vector<uint8_t>& framed : kept_) {
     const bool is_note = (GetInt<uint32_t>(framed, 0) & kNoteBit) != 0;
-    if (!is_note) handle(std::span(framed).subspan(kLengthBytes));
+    const size_t length = framed.size() - kLengthBytes - kChecksumBytes;
+    if (!is_note) handle(std::span(framed).subspan(kLengthBytes, length));
   }
 }
 
@@ -92,9 +124,12 @@ void Journal::AppendNote(const std::string& note) {
 }
 
 void Journal::AppendEntry(const Entry& entry) {
-  std::vector<uint8_t> framed(kLengthBytes + entry.bytes.size());
-  PutInt(static_cast<uint32_t>(entry.bytes.size()) | (entry.is_note ? kNoteBit : 0), 0, framed);
+  const size_t length = entry.bytes.size() + kChecksumBytes;
+  std::vector<uint8_t> framed(kLengthBytes + length);
+  const uint32_t note_bit = entry.is_note ? kNoteBit : 0;
+  PutInt(static_cast<uint32_t>(length) | kChecksumBit | note_bit, 0, framed);
   std::copy(entry.bytes.begin(), entry.bytes.end(), framed.begin() + kLengthBytes);
+  PutInt(Crc32c(entry.bytes), kLengthBytes + entry.bytes.size(), framed);
   kept_bytes_ += framed.size();
   kept_.push_back(std::move(framed));
   WriteKept();
@@ -142,14 +177,15 @@ void Journal::SetAside() {
   std::error_code error;
   std::filesystem::rename(path_, aside, error);
   if (error) throw InputError(path_ + ": is of another session, and cannot be renamed; check its rights");
-  Open();
+  Open(O_RDWR | O_CREAT);
 }
 
-void Journal::Open() {
+void Journal::Open(int how) {
   Close();
-  fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  fd_ = open(path_.c_str(), how | O_CLOEXEC, 0644);
   if (fd_ < 0) {
-    throw InputError(path_ + ": cannot be written (" + std::strerror(errno) +
+    const std::string what = how == O_RDONLY ? "read" : "written";
+    throw InputError(path_ + ": cannot be " + what + " (" + std::strerror(errno) +
                      "); check the folder given with --out");
   }
   size_ = 0;

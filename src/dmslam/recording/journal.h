@@ -13,7 +13,8 @@
 namespace dmslam {
 
 /// Records on disk: what a run of any length needs only at its end takes no memory, and a collector that is
-/// started again has what the one before it had accepted. A record that was not written whole is not there.
+/// started again has what the one before it had accepted. A record that was not written whole is not there,
+/// nor is what follows it: each carries a checksum, since after a power cut a file may end in anything.
 class Journal {
  public:
   explicit Journal(std::string path) : path_(std::move(path)) {}
@@ -25,10 +26,14 @@ class Journal {
   using NoteHandler = std::function<void(const std::string& note)>;
 
   /// Hands out the records of `session` that are there, in order, and goes on behind them. A journal of
-  /// another session is set aside (FILE.former).
+  /// another session is set aside (FILE.former); what is damaged is cut off.
   void Resume(int64_t session, const Handler& handle, const NoteHandler& read = {});
   /// Begins an empty one; what is there is set aside.
   void Begin(int64_t session);
+  /// Hands out the same as Resume, of a file that others may write, and changes nothing. False where there is
+  /// no journal of this session.
+  static bool Read(const std::string& path, int64_t session, const Handler& handle,
+                   const NoteHandler& read = {});
   /// Hands out all records, in order.
   void ForEach(const Handler& handle);
   /// Where the disk takes no more the record is kept in memory, at most kMostKept bytes of them, and written
@@ -48,8 +53,9 @@ class Journal {
  private:
   static constexpr size_t kMostKept = 64u << 20;
 
-  void Open();
+  void Open(int how);
   void Close();
+  bool ReadAll(const Handler& handle, const NoteHandler& read);
   void SetAside();
   std::vector<uint8_t> ReadAt(int64_t offset, size_t size) const;
   struct Entry {

@@ -1,0 +1,84 @@
+#include "collector/checkpointer.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "dmslam/console/log.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+
+Checkpointer::Checkpointer(Options options, std::unique_ptr<CoreThread> thread, Journal* journal)
+    : options_(std::move(options)),
+      schedule_(options_.every_s),
+      journal_(journal),
+      thread_(std::move(thread)) {}
+
+Checkpointer::~Checkpointer() = default;
+
+void Checkpointer::OnMap(const Map& map, bool whole, int64_t newest_stamp_ns,
+                         const std::optional<SessionStart>& session) {
+  if (map.keyframes().empty()) return;  // an empty map takes no other one's place
+  schedule_.OnMap(map.version(), newest_stamp_ns, options_.now_ns());
+  if (!schedule_.Due()) return;
+  if (whole && session && thread_->Idle()) return Begin(map, *session);
+  look_again_ns_ = options_.now_ns() + kLookAgainNs;
+}
+
+void Checkpointer::Begin(const Map& map, const SessionStart& session) {
+  Copied copied;
+  copied.begun_ns = options_.now_ns();
+  const auto cut = std::make_shared<const CutMap>(Cut(options_.path, map));
+  copied.ended_ns = options_.now_ns();
+  copied.keyframes = map.keyframes().size();
+  copied.landmarks = map.num_landmarks();
+  schedule_.OnBegun();
+  thread_->Post([this, copied, cut, session] {
+    std::string problem;
+    try {
+      journal_->Sync();
+      WriteCheckpoint(options_.path, *cut, session);
+    } catch (const InputError& error) {
+      problem = error.what();
+    }
+    thread_->Report([this, copied, problem] { OnEnded(copied, problem); });
+  });
+}
+
+void Checkpointer::OnEnded(const Copied& copied, const std::string& problem) {
+  const int64_t now_ns = options_.now_ns();
+  schedule_.OnEnded(problem.empty(), now_ns);
+  if (problem.empty()) {
+    ++written_;
+    LogInfo("checkpoint of {} keyframes and {} landmarks: copied in {:.1f} ms, on the disk {:.1f} ms later",
+            copied.keyframes, copied.landmarks, static_cast<double>(copied.ended_ns - copied.begun_ns) * 1e-6,
+            static_cast<double>(now_ns - copied.ended_ns) * 1e-6);
+  } else if (!std::exchange(warned_, true)) {
+    problem_ = problem;
+  }
+}
+
+void Checkpointer::SyncJournal() {
+  if (thread_->Idle()) thread_->Post([this] { journal_->Sync(); });
+}
+
+int64_t Checkpointer::deadline_ns() const {
+  const int64_t due_ns = schedule_.deadline_ns();
+  return due_ns == INT64_MAX ? due_ns : std::max(due_ns, look_again_ns_);
+}
+
+void Checkpointer::Finish() { thread_->Finish(); }
+
+void Checkpointer::WriteLast(const Map& map, bool whole, const std::optional<SessionStart>& session) {
+  thread_->Finish();
+  if (whole && session && !map.keyframes().empty() && schedule_.HasUnsaved()) {
+    Begin(map, *session);
+  } else {
+    SyncJournal();
+  }
+  thread_->Finish();
+}
+
+std::string Checkpointer::TakeProblem() { return std::exchange(problem_, ""); }
+
+}  // namespace dmslam

@@ -1,0 +1,120 @@
+#include "dmslam/recording/checkpoint.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string NewPath(const std::string& path) { return path + ".new"; }
+
+}  // namespace
+
+std::string CheckpointPath(const std::string& folder) { return folder + "/checkpoint.lcmlog"; }
+std::string FormerCheckpointPath(const std::string& path) { return path + ".former"; }
+
+// ---- When
+
+CheckpointSchedule::CheckpointSchedule(double every_s)
+    : every_ns_(static_cast<int64_t>(std::llround(every_s * 1e9))) {}
+
+void CheckpointSchedule::OnMap(uint64_t version, int64_t stamp_ns, int64_t now_ns) {
+  newest_ = {now_ns, stamp_ns};
+  version_ = version;
+  if (!changed_ && begun_version_ != version) changed_ = newest_;
+}
+
+/// Of the oldest change that is on no disk, when what is begun now will be there.
+int64_t CheckpointSchedule::Age() const {
+  const int64_t age = std::max(newest_.now_ns - changed_->now_ns, newest_.stamp_ns - changed_->stamp_ns);
+  return age + std::min(duration_ns_, every_ns_ / 2);
+}
+
+bool CheckpointSchedule::Due() const {
+  if (every_ns_ == 0 || writing_ || !changed_ || newest_.now_ns < retry_ns_) return false;
+  return !any_ || Age() >= every_ns_;
+}
+
+int64_t CheckpointSchedule::deadline_ns() const {
+  if (every_ns_ == 0 || writing_ || !changed_) return INT64_MAX;
+  const int64_t due_ns =
+      any_ ? changed_->now_ns + every_ns_ - std::min(duration_ns_, every_ns_ / 2) : INT64_MIN;
+  return std::max(due_ns, retry_ns_);
+}
+
+void CheckpointSchedule::OnBegun() {
+  writing_ = true;
+  begun_version_ = version_;
+  begun_changed_ = changed_.value_or(newest_);
+  begun_ns_ = newest_.now_ns;
+  changed_.reset();
+}
+
+void CheckpointSchedule::OnEnded(bool written, int64_t now_ns) {
+  writing_ = false;
+  duration_ns_ = now_ns - begun_ns_;
+  if (written) {
+    any_ = true;
+    retry_ns_ = INT64_MIN;
+    return;
+  }
+  changed_ = begun_changed_;
+  begun_version_.reset();
+  retry_ns_ = now_ns + every_ns_;
+}
+
+// ---- How
+
+void WriteCheckpoint(const std::string& path, const CutMap& map, const SessionStart& session) {
+  const std::string fresh = NewPath(path);
+  std::error_code error;
+  try {
+    SaveMap(fresh, map, session);
+  } catch (const InputError&) {
+    fs::remove(fresh + ".part", error);
+    fs::remove(fresh, error);
+    throw;
+  }
+  // At no time is there none: a second name for the one that is there, before the first is taken from it.
+  const std::string former = FormerCheckpointPath(path);
+  fs::remove(former, error);
+  fs::create_hard_link(path, former, error);
+  if (error && fs::exists(path)) fs::rename(path, former, error);  // this disk knows no second names
+  if (!RenameDurably(fresh, path))
+    throw InputError(path + ": cannot be written (" + std::strerror(errno) + "); check the folder");
+}
+
+FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session) {
+  FoundCheckpoint found;
+  for (const std::string& candidate : {path, FormerCheckpointPath(path)}) {
+    if (!fs::exists(candidate)) continue;
+    try {
+      RebuiltMap map = LoadMap(candidate);
+      if (map.session.session != session) continue;
+      found.map = std::move(map);
+      found.path = candidate;
+      return found;
+    } catch (const InputError& error) {
+      if (found.problem.empty()) found.problem = error.what();
+    }
+  }
+  if (found.problem.empty()) found.problem = path + ": there is no checkpoint of this run";
+  return found;
+}
+
+void RemoveCheckpoints(const std::string& path) {
+  std::error_code ignored;
+  for (const std::string& name : {FormerCheckpointPath(path), path, NewPath(path), NewPath(path) + ".part"})
+    fs::remove(name, ignored);
+}
+
+}  // namespace dmslam
