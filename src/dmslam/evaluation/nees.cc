@@ -11,6 +11,7 @@
 namespace dmslam {
 namespace {
 
+constexpr int kTrial = 2;  // STATE_TRIAL of dmslam_frame_pose_t
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
 /// A told pose and the true one of its instant.
@@ -26,6 +27,7 @@ std::vector<Known> Associate(std::span<const StampedPose> truth, std::span<const
                              std::span<const double> coverage, int64_t max_difference_ns) {
   std::vector<Known> known;
   for (const ToldPose& pose : told) {
+    if (pose.state == kTrial) continue;
     const auto next = std::ranges::lower_bound(truth, pose.pose.stamp_ns, {}, &StampedPose::stamp_ns);
     const StampedPose* nearest = next == truth.end() ? nullptr : &*next;
     if (next != truth.begin() && (nearest == nullptr || pose.pose.stamp_ns - (next - 1)->stamp_ns <

@@ -33,9 +33,10 @@ struct NeesPair {
 inline constexpr double kBound999 = 16.266;
 
 /// Relative poses `after_s` apart, each frame to the one so much later, of frames of one map whose covariance
-/// was told. `coverage`: the share of the image that moving things cover, by frame; may be empty. Position
-/// and rotation apart (NEES, Bar-Shalom et al., Estimation with Applications to Tracking and Navigation,
-/// 2001, ch. 5.4). Empty where the first seconds do not determine the scale.
+/// was told. Those of a map on trial, which may be taken back, are left out. `coverage`: the share of the
+/// image that moving things cover, by frame; may be empty. Position and rotation apart (NEES, Bar-Shalom et
+/// al., Estimation with Applications to Tracking and Navigation, 2001, ch. 5.4). Empty where the first
+/// seconds do not determine the scale.
 std::vector<NeesPair> ComputeNees(std::span<const StampedPose> ground_truth, std::span<const ToldPose> told,
                                   std::span<const double> coverage, double after_s,
                                   const NeesOptions& options = {});
