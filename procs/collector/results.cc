@@ -13,6 +13,7 @@
 
 #include "collector/map_ply.h"
 #include "dmslam/evaluation/trajectory_plot.h"
+#include "dmslam/evaluation/uncertain_trajectory.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/machine.h"
@@ -53,6 +54,38 @@ void WriteGraph(const std::string& path, const Map& map) {
     }
   }
   WriteFile(path, file.str());
+}
+
+/// Depth of the scene where a pose was told, by what its keyframe sees; 1 where nothing is left of that.
+double DepthAt(const Map& map, const FramePose& pose) {
+  const std::optional<KeyframeId> id = map.ResolveKeyframe(pose.reference);
+  const Keyframe* keyframe = id ? map.FindKeyframe(*id) : nullptr;
+  if (keyframe == nullptr) return 1.0;
+  return map.MedianDepth(*keyframe).value_or(1.0) * pose.reference_scale / keyframe->scale;
+}
+
+std::optional<Matrix6d> CovarianceOf(const std::vector<double>& upper) {
+  return upper.empty() ? std::nullopt : std::optional(FromUpperTriangle(upper));
+}
+
+/// The poses as they were told while it went on, and how well they were known.
+std::vector<ToldPose> ToldPoses(const TrajectoryBuilder& builder) {
+  std::vector<ToldPose> poses;
+  for (const auto& [index, pose] : builder.frame_poses()) {
+    if (!pose.HasPose() || pose.state == TrackingState::kLocalizedLater) continue;
+    poses.push_back({{pose.stamp_ns, pose.T_cam_world.Inverse()},
+                     index,
+                     static_cast<int>(pose.state),
+                     pose.map_id.value_or(0),
+                     pose.reference.frame_index(),
+                     pose.T_cam_reference,
+                     pose.reference_scale,
+                     DepthAt(builder.map(), pose),
+                     CovarianceOf(pose.covariance),
+                     pose.step_from,
+                     CovarianceOf(pose.step_covariance)});
+  }
+  return poses;
 }
 
 Json LoopJson(const RunRecord& run) {
@@ -310,6 +343,7 @@ WrittenResults WriteResults(const std::string& dir, RunRecord run, const Traject
   const TrajectoryBuilder::Trajectories trajectories = builder.Build();
   attempt([&] { WriteTrajectory(dir + "/trajectory.txt", trajectories.final); });
   attempt([&] { WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online); });
+  attempt([&] { WriteToldPoses(dir + "/poses_online.csv", ToldPoses(builder)); });
   attempt([&] { WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes); });
   attempt([&] { WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id); });
   attempt([&] { WriteGraph(dir + "/graph.txt", builder.map()); });

@@ -66,9 +66,9 @@ struct WrittenResults {
   std::string problem;  ///< the first file that could not be written, and why; empty: all are there
 };
 
-/// Writes trajectory.txt, trajectory_online.txt, keyframes.txt, map.ply, graph.txt, trajectory.png and
-/// summary.json into `dir`. Each text file is there as a whole or not at all; one that cannot be written
-/// does not keep the others from being written.
+/// Writes trajectory.txt, trajectory_online.txt, poses_online.csv, keyframes.txt, map.ply, graph.txt,
+/// trajectory.png and summary.json into `dir`. Each text file is there as a whole or not at all; one that
+/// cannot be written does not keep the others from being written.
 WrittenResults WriteResults(const std::string& dir, RunRecord run, const TrajectoryBuilder& builder);
 
 }  // namespace dmslam

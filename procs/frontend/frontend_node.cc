@@ -349,6 +349,7 @@ void FrontendNode::Track(const Waiting& waiting, bool withheld) {
   const auto tracked = std::make_shared<Tracked>();
   tracked->output = core_->ProcessImage(frame.frame_index, frame.stamp_ns,
                                         {image_.data.data(), image_.width, image_.height, image_.width});
+  tracked->odometry = core_->odometry();
   tracked->extract_ms = core_->extract_ms();
   trace.tracked_us = context_.wall_us();
   trace.extracted_us = trace.decoded_us + static_cast<int64_t>(1000.0 * tracked->extract_ms);
@@ -434,9 +435,36 @@ void FrontendNode::PublishTracked(const Tracked& tracked) {
   times_.decode.Add(static_cast<double>(trace.decoded_us - trace.begin_us) * 1e-3);
   times_.extract.Add(tracked.extract_ms);
   times_.step.Add(static_cast<double>(trace.tracked_us - trace.begin_us) * 1e-3);
+  PublishOdometry(tracked.odometry, trace);
   PublishLoose(trace);
   PublishView(trace);
   PublishLoose(tracked.features, options_.link == Link::kLan);
+}
+
+void FrontendNode::PublishOdometry(const OdometryState& odometry, const FrameTrace& trace) {
+  Odometry told;
+  told.session = session_;
+  told.frame_index = trace.frame_index;
+  told.stamp_ns = trace.stamp_ns;
+  told.state = last_pose_.state;
+  told.segment = odometry.segment;
+  told.measured = odometry.measured;
+  told.T_odom_cam = odometry.T_odom_cam;
+  told.has_velocity = odometry.velocity.has_value();
+  if (odometry.velocity) {
+    told.linear_velocity = odometry.velocity->linear_per_s;
+    told.angular_velocity = odometry.velocity->angular_rad_per_s;
+  }
+  told.map_id = odometry.map_id;
+  told.T_map_odom = {odometry.map_from_odom.rotation, odometry.map_from_odom.translation};
+  told.scale_map_odom = odometry.map_from_odom.scale;
+  told.depth = odometry.depth;
+  told.latency_ms = static_cast<double>(trace.published_us - trace.publish_us) * 1e-3;
+  if (odometry.step) {
+    told.step_from = odometry.step->from;
+    told.step_covariance = UpperTriangle(odometry.step->covariance);
+  }
+  PublishLoose(told);
 }
 
 void FrontendNode::PublishView(const FrameTrace& trace) {

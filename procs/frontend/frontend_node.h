@@ -61,6 +61,7 @@ class FrontendNode : public StreamNode {
   struct Tracked {
     FrameTrace trace;
     FrontendOutput output;
+    OdometryState odometry;
     FeatureView features;
     double extract_ms = 0;
   };
@@ -95,6 +96,7 @@ class FrontendNode : public StreamNode {
   bool CatchUp();
   void Publish(const std::vector<FrontendEvent>& events);
   void PublishTracked(const Tracked& tracked);
+  void PublishOdometry(const OdometryState& odometry, const FrameTrace& trace);
   void PublishView(const FrameTrace& trace);
   void FinishFrame();
   bool WorkAtEnd();

@@ -259,8 +259,9 @@ int main(int argc, char** argv) {
   dmslam::CommandLine line(
       "Plays a sequence through player, frontend, mapper and loop closer, four processes on a private LCM "
       "port, and writes into the --out folder: trajectory.txt (final, TUM format), trajectory_online.txt, "
-      "keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A process that dies "
-      "or hangs is started again, and goes on where it was; where all died at once, --resume does so.",
+      "poses_online.csv, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A "
+      "process that dies or hangs is started again, and goes on where it was; where all died at once, "
+      "--resume does so.",
       "dmslam-run");
   dmslam::RunArguments arguments;
   line.SetVersion(dmslam::BuildVersion());

@@ -7,7 +7,7 @@ multicast
 sequence=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --seed 3)
 check "the run ends with 0" run "${sequence[@]}" --lockstep --out "$work/first" --pictures 40
 no_orphans "the run"
-for file in trajectory.txt trajectory_online.txt keyframes.txt map.ply trajectory.png summary.json; do
+for file in trajectory.txt trajectory_online.txt poses_online.csv keyframes.txt map.ply trajectory.png summary.json; do
   check "$file is there" test -s "$work/first/$file"
 done
 check "pictures are drawn" test -n "$(ls "$work/first/pictures")"
@@ -24,7 +24,7 @@ check "a run with a small buffer ends with 0" run "${sequence[@]}" --lockstep --
 expect "nothing is lost with a small buffer" "$work/small" records_lost "== 0"
 check "in one process it ends with 0" "$build/bin/dmslam-inprocess" "${sequence[@]}" --out "$work/one"
 for other in small one; do
-  for file in trajectory.txt trajectory_online.txt keyframes.txt map.ply; do
+  for file in trajectory.txt trajectory_online.txt poses_online.csv keyframes.txt map.ply; do
     check "$file of '$other' has the same bytes" cmp "$work/first/$file" "$work/$other/$file"
   done
 done

@@ -12,6 +12,7 @@
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
+#include "nees_main.h"
 
 namespace dmslam {
 namespace {
@@ -171,8 +172,10 @@ void Declare(dmslam::CommandLine* app, Arguments* arguments) {
 }  // namespace dmslam
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string(argv[1]) == "nees") return dmslam::NeesMain(argc - 1, argv + 1);
   dmslam::CommandLine app(
-      "Errors of a trajectory against its ground truth: ATE, RPE and coverage, as text, JSON and pictures.",
+      "Errors of a trajectory against its ground truth: ATE, RPE and coverage, as text, JSON and pictures. "
+      "\"dmslam-eval nees\" judges covariances (see \"dmslam-eval nees --help\").",
       "dmslam-eval");
   dmslam::Arguments arguments;
   dmslam::Declare(&app, &arguments);

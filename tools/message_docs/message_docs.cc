@@ -56,6 +56,7 @@ std::vector<ChannelRow> FrontendRows() {
       Row<AdjustRequest>("frontend", "mapper", "at the end"),
       Row<FrameDone>("frontend", "player", "per frame"),
       Row<SequenceDone>("frontend", "player", "at the end, once for each end_of_sequence_t"),
+      Row<Odometry>("frontend", "who controls the motion", "per frame"),
       Row<PoseView>("frontend", "eyes and plots, viewer", "per frame"),
       Row<FeatureView>("frontend", "viewer, pictures", "per frame"),
       Row<FrameTrace>("frontend", "latency reports", "per frame"),
@@ -192,7 +193,7 @@ Made by `dmslam-message-docs` from `lcmtypes/*.lcm` and the table in `tools/mess
 - One meaning, one message: a request to adjust the maps (`adjust_request_t`) is not a reset (`map_reset_t`), the end of a
   sequence is answered by `sequence_done_t`. What the mapper says travels in one type, `map_record_t`, since an answer and the
   change that it concludes must not come apart: `event` says which answer it is, and nothing else has to be looked at.
-- Reserved, and not written yet: `camera_id` other than 0; covariances; depths and sigmas of keypoints; positions of landmarks in
+- Reserved, and not written yet: `camera_id` other than 0; depths and sigmas of keypoints; positions of landmarks in
   their reference keyframe (`landmark_frame`; the world's coordinates are what the mapper computes with, and a change of frame
   there and back changes their last bits); groups of records, which readers apply already.
 - `checksum` is CRC-32 as zlib, Python's `zlib.crc32` and Java's `CRC32` compute it. A message without it is dropped.

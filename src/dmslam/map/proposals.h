@@ -67,7 +67,7 @@ enum class TrackingState : uint8_t {
   kWaitingForMap = 1,   ///< a first map was proposed and has not come back yet
   kTrial = 2,           ///< a young map must still prove that it predicts
   kTracking = 3,        ///< enough static landmarks fix position and rotation
-  kUncertain = 4,       ///< too few static inliers: the pose is a prediction
+  kUncertain = 4,       ///< the landmarks fix the pose badly, as its covariance says; or too few: none
   kLost = 5,
   kLocalizedLater = 6,  ///< a frame placed in the map, or placed better, after the fact
   kRotationOnly = 7,    ///< the rotation is measured, the position is a prediction

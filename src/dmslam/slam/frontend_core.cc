@@ -12,7 +12,24 @@ namespace {
 constexpr int kWellSeen = 100;      // static features of a frame that becomes a keyframe at the end...
 constexpr int kWellSeenCells = 12;  // ...and the cells of an 8 x 6 grid that hold them
 
+constexpr double kUncertainPosition = 0.03;     // standard deviation over the depth of the scene, and...
+constexpr double kUncertainRotationRad = 0.03;  // ...of the rotation: beyond, a pose is called uncertain
+
 constexpr double kDarkShare = 0.1;  // of the features that are looked for: with fewer it is dark
+
+/// Of a pose that was told a moment ago; what is told of it later is another matter.
+void TellCertainty(const PoseCertainty& certainty, FramePose* told) {
+  const bool badly =
+      certainty.position_share > kUncertainPosition || certainty.rotation_rad > kUncertainRotationRad;
+  if (badly && told->state == TrackingState::kTracking) {
+    told->state = TrackingState::kUncertain;
+    told->reason = "the static features fix the pose badly";
+  }
+  told->covariance = UpperTriangle(certainty.covariance);
+  if (!certainty.step) return;
+  told->step_from = certainty.step->from;
+  told->step_covariance = UpperTriangle(certainty.step->covariance);
+}
 
 int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
 
@@ -115,6 +132,7 @@ FrontendOutput FrontendCore::ProcessImage(uint32_t frame_index, int64_t stamp_ns
 FrontendOutput FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features) {
   frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
   // In a saved map it is lost from now on.
+  odometry_.Predict({frame_index, stamp_ns});
   if (++counters_.frames == 1) tracker_.BeginLost({frame_index, stamp_ns});
   if (IsBehind()) return AwaitTurn();
   FrontendOutput output;
@@ -141,7 +159,7 @@ std::optional<FrontendOutput> FrontendCore::FindAgain() {
   map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
   first_map_.Restart();
   phase_.BeginLost();
-  return OnTracked(result.report, *result.pose);
+  return OnTracked(result);
 }
 
 FrontendOutput FrontendCore::Initialize() {
@@ -202,6 +220,7 @@ double FrontendCore::seconds_behind() const {
 FrontendOutput FrontendCore::CatchUp() {
   frame_ = std::move(behind_.front()).ToTracked(camera_, pyramid_);
   behind_.pop_front();
+  odometry_.Predict({frame_.index, frame_.stamp_ns});
   if (!map_.keyframes().empty()) return Track();
   unplaced_.Keep(WaitingFrame(frame_));
   return GiveUpMap(true, "the mapper began with an empty map");
@@ -215,17 +234,22 @@ FrontendOutput FrontendCore::Track() {
   if (result.relocalized) ++counters_.relocalizations;
   if (!result.pose) return OnNotTracked(result.report);
   map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
-  return OnTracked(result.report, *result.pose);
+  return OnTracked(result);
 }
 
-FrontendOutput FrontendCore::OnTracked(const TrackingReport& report, const PlacedPose& pose) {
+FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
+  const TrackingReport& report = result.report;
+  const PlacedPose& pose = *result.pose;
   ++counters_.tracked;
   lit_since_ns_.reset();
   phase_.OnTracked(frame_.stamp_ns);
+  odometry_.OnTracked(map_, {frame_.index, frame_.stamp_ns}, pose, frame_.T_cam_world, result.certainty,
+                      !result.relocalized);
   FrontendOutput output;
   ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &output);
   FramePose told = MakePose(phase_.state(), report, pose);
   last_poses_.Keep(frame_, told);
+  if (result.certainty) TellCertainty(*result.certainty, &told);
   output.Add(std::move(told));
   return output;
 }

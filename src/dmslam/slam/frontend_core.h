@@ -17,6 +17,7 @@
 #include "dmslam/slam/frontend_output.h"
 #include "dmslam/slam/keyframe_gate.h"
 #include "dmslam/slam/tracking_phase.h"
+#include "dmslam/tracking/odometry.h"
 #include "dmslam/tracking/tracker.h"
 
 namespace dmslam {
@@ -90,6 +91,8 @@ class FrontendCore {
   /// While a first map is looked for and there are others, the camera is lost in those.
   TrackingState state() const;
   const TrackedFrame& frame() const { return frame_; }
+  /// As of the newest frame.
+  const OdometryState& odometry() const { return odometry_.state(); }
   const Map& map() const { return map_; }
   const FrontendCounters& counters() const { return counters_; }
   double extract_ms() const { return features_.last_ms(); }
@@ -102,7 +105,7 @@ class FrontendCore {
   void BeginTrial(const Keyframe& second);
   FrontendOutput AwaitTurn();
   FrontendOutput Track();
-  FrontendOutput OnTracked(const TrackingReport& report, const PlacedPose& pose);
+  FrontendOutput OnTracked(const TrackingResult& result);
   FrontendOutput OnNotTracked(const TrackingReport& report);
   bool IsLostInTheLight(int64_t missing_ns);
   FrontendOutput GiveUpMap(bool drop, const std::string& reason);
@@ -138,6 +141,7 @@ class FrontendCore {
   FeatureStage features_;
   FirstMapPhase first_map_;
   Tracker tracker_;
+  Odometer odometry_;
   KeyframeGate gate_;
   LatePlacement late_;
   LastPoses last_poses_;

@@ -49,6 +49,8 @@ class PoseSearch {
 
   /// The keyframe that shares most landmarks with the frame searched for last.
   KeyframeId reference() const { return local_map_.reference(); }
+  /// What the pose of the frame searched for last rests on.
+  PoseBasis basis() const { return solver_.basis(); }
   MotionJudge& judge() { return judge_; }
   /// Forgets what belongs to a map that is gone.
   void Reset();

@@ -21,6 +21,15 @@ struct PoseFit {
   bool by_trusted_elders = false;           ///< landmarks that are older than people stand have decided
 };
 
+/// What the pose found last rests on; valid until the next call.
+struct PoseBasis {
+  std::span<const LandmarkMatch> matches;
+  std::span<const PoseObservation> observations;  ///< parallel to the matches
+  std::span<const char> inliers;                  ///< likewise
+  Matrix6d information = Matrix6d::Zero();        ///< as in PoseOptimizationReport
+  double mean_chi2 = 0;
+};
+
 /// Whether the oldest landmarks decide a pose first.
 enum class Elderhood : uint8_t { kCounts, kIgnored };
 
@@ -39,6 +48,10 @@ class PoseSolver {
   /// the frame is given its pose and matches.
   bool FollowWiderMotion(const Map& map, const std::optional<PosePrior>& prior, const MotionJudge& judge,
                          TrackedFrame* frame);
+  PoseBasis basis() const {
+    return {current_.matches, current_.observations, optimized_.inliers, optimized_.information,
+            optimized_.mean_chi2};
+  }
 
  private:
   /// Some of a frame's matches, in parallel.

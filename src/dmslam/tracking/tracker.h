@@ -6,6 +6,7 @@
 
 #include "dmslam/map/replica.h"
 #include "dmslam/tracking/motion_model.h"
+#include "dmslam/tracking/pose_certainty.h"
 #include "dmslam/tracking/pose_search.h"
 #include "dmslam/tracking/relocalizer.h"
 
@@ -13,10 +14,11 @@ namespace dmslam {
 
 /// What tracking a frame came to.
 struct TrackingResult {
-  TrackedFrame frame{};                           ///< with its matches and classes
-  TrackingReport report{};                        ///< what it sees of the map
-  std::optional<PlacedPose> pose = std::nullopt;  ///< of the frame; none: the report says why
-  bool relocalized = false;                       ///< found without the motion model
+  TrackedFrame frame{};                                   ///< with its matches and classes
+  TrackingReport report{};                                ///< what it sees of the map
+  std::optional<PlacedPose> pose = std::nullopt;          ///< of the frame; none: the report says why
+  std::optional<PoseCertainty> certainty = std::nullopt;  ///< of the pose
+  bool relocalized = false;                               ///< found without the motion model
 };
 
 /// Follows the camera through the frames of a stream, in a map that is given with each and only read.
@@ -88,6 +90,7 @@ class Tracker {
   PoseSearch search_;
   Relocalizer relocalizer_;
   MotionModel motion_;
+  PoseCertaintyEstimator certainty_;
   TrackedFrame last_;                      ///< the frame tracked last
   std::optional<int64_t> believed_ns_;     ///< where frames are doubtful: when the last was that is not
   std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last

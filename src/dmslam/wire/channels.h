@@ -23,6 +23,7 @@ inline constexpr char kAdjustRequest[] = "DMSLAM_FRONTEND_ADJUST_REQUEST";
 // Not records: what may be lost.
 inline constexpr char kFrameDone[] = "DMSLAM_FRONTEND_FRAME_DONE";
 inline constexpr char kSequenceDone[] = "DMSLAM_FRONTEND_SEQUENCE_DONE";
+inline constexpr char kOdometry[] = "DMSLAM_FRONTEND_ODOMETRY";
 inline constexpr char kPoseView[] = "DMSLAM_FRONTEND_POSE";
 inline constexpr char kFeatureView[] = "DMSLAM_FRONTEND_FEATURES";
 inline constexpr char kFrameTrace[] = "DMSLAM_FRONTEND_TRACE";

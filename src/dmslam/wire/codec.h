@@ -18,10 +18,10 @@ namespace dmslam::wire {
 
 /// All that travels between processes, except the protocol's own messages.
 using Messages =
-    std::tuple<CameraInfo, Frame, EndOfSequence, GroundTruthPose, PlayerStatus,                            //
-               SessionStart, InitialMap, KeyframeProposal, FramePose, FrameEvidence, MapReset,             //
-               AdjustRequest, FrameDone, SequenceDone, PoseView, FeatureView, FrameTrace, FrontendStatus,  //
-               MapDelta, MapperStatus, LoopAnswer, LoopcloserStatus>;
+    std::tuple<CameraInfo, Frame, EndOfSequence, GroundTruthPose, PlayerStatus,                      //
+               SessionStart, InitialMap, KeyframeProposal, FramePose, FrameEvidence, MapReset,       //
+               AdjustRequest, FrameDone, SequenceDone, Odometry, PoseView, FeatureView, FrameTrace,  //
+               FrontendStatus, MapDelta, MapperStatus, LoopAnswer, LoopcloserStatus>;
 
 /// Where a message travels and what it is there.
 struct MessageInfo {

@@ -9,6 +9,7 @@
 #include "dmslam/initial_map_t.hpp"
 #include "dmslam/keyframe_t.hpp"
 #include "dmslam/map_reset_t.hpp"
+#include "dmslam/odometry_t.hpp"
 #include "dmslam/pose_t.hpp"
 #include "dmslam/sequence_done_t.hpp"
 #include "dmslam/session_t.hpp"
@@ -294,6 +295,52 @@ struct Codec<SequenceDone> {
 };
 
 template <>
+struct Codec<Odometry> {
+  using Wire = odometry_t;
+  static constexpr const char* kChannel = channels::kOdometry;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s(m.session, w.session);
+    s(m.camera_id, w.camera_id);
+    s(m.frame_index, w.frame_index);
+    s(m.stamp_ns, w.stamp_ns);
+    s(m.state, w.state);
+    s(m.segment, w.segment);
+    s(m.measured, w.measured);
+    s(m.T_odom_cam, w.rotation_odom_cam, w.translation_odom_cam);
+    s(m.has_velocity, w.has_velocity);
+    for (int i = 0; i < 3; ++i) {
+      s(m.linear_velocity[i], w.linear_velocity[i]);
+      s(m.angular_velocity[i], w.angular_velocity[i]);
+    }
+    s(m.map_id, w.map_id);
+    s(m.T_map_odom, w.rotation_map_odom, w.translation_map_odom);
+    s(m.scale_map_odom, w.scale_map_odom);
+    s(m.depth, w.depth);
+    s(m.latency_ms, w.latency_ms);
+    s.OrMinusOne(m.step_from, w.step_from);
+    s.Count(m.step_covariance, w.num_step_covariance, kPoseCovarianceSize);
+    s.Column(m.step_covariance, w.step_covariance, std::identity());
+  }
+  static void Validate(const Odometry& m, Checker& check) {
+    check.Session(m.session);
+    check.CameraNumber(m.camera_id);
+    check.Stamp(m.stamp_ns);
+    check.Pose(m.T_odom_cam, "no pose in odom");
+    check.Position(m.linear_velocity, "a velocity is not finite");
+    check.Position(m.angular_velocity, "an angular velocity is not finite");
+    check.Pose(m.T_map_odom, "no pose of odom in the map");
+    check.Scale(m.scale_map_odom, "scale of odom in the map out of range");
+    check.Scale(m.depth, "depth of the scene out of range");
+    check.Finite(m.latency_ms, "latency is not finite");
+    check.Covariance(m.step_covariance);
+    check.Require(m.step_covariance.empty() || m.step_from.has_value(),
+                  "a step's covariance without the frame that it starts from");
+  }
+};
+
+template <>
 struct Codec<PoseView> {
   using Wire = pose_t;
   static constexpr const char* kChannel = channels::kPoseView;
@@ -399,6 +446,7 @@ DMSLAM_WIRE_MESSAGE(MapReset);
 DMSLAM_WIRE_MESSAGE(AdjustRequest);
 DMSLAM_WIRE_MESSAGE(FrameDone);
 DMSLAM_WIRE_MESSAGE(SequenceDone);
+DMSLAM_WIRE_MESSAGE(Odometry);
 DMSLAM_WIRE_MESSAGE(PoseView);
 DMSLAM_WIRE_MESSAGE(FeatureView);
 DMSLAM_WIRE_MESSAGE(FrameTrace);

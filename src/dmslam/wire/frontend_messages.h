@@ -48,6 +48,29 @@ struct SequenceDone {
   int64_t frames_skipped = 0;  ///< a newer one was there already
 };
 
+/// Where the camera is for who controls its motion: in odom, which never jumps, and where odom lies in the
+/// map. OdometryState says what the values mean.
+struct Odometry {
+  uint32_t session = 0;
+  uint32_t frame_index = 0;
+  int64_t stamp_ns = 0;
+  TrackingState state = TrackingState::kNotInitialized;
+  uint32_t segment = 0;  ///< 0: no frame was tracked yet
+  bool measured = false;
+  Rigid3d T_odom_cam;
+  bool has_velocity = false;
+  Eigen::Vector3d linear_velocity = Eigen::Vector3d::Zero();   ///< [units of odom / s], camera's axes
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad / s], camera's axes
+  std::optional<MapId> map_id;
+  Rigid3d T_map_odom;           ///< map_from_odom, whose...
+  double scale_map_odom = 1.0;  ///< ...scale comes first: p_map = scale * R * p_odom + t
+  double depth = 1.0;           ///< of the scene [units of odom]
+  double latency_ms = 0;        ///< from publication of the image to this message
+  std::optional<uint32_t> step_from;
+  std::vector<double> step_covariance;  ///< as FramePose's, in units of odom
+  CameraId camera_id = 0;
+};
+
 /// A frame's pose laid out to be watched and plotted.
 struct PoseView {
   uint32_t session = 0;

@@ -181,6 +181,17 @@ void MakeSound(SequenceDone& m, Random&) {
   MakeSound(m.session);
 }
 
+void MakeSound(Odometry& m, Random& random) {
+  MakeSoundCamera(m);
+  MakeSound(m.session);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
+  m.segment &= 0x7fffffff;
+  m.scale_map_odom = random.Uniform(0.1, 10);
+  m.depth = random.Uniform(0.1, 10);
+  MakeSound(m.step_covariance, random);
+  if (!m.step_from) m.step_covariance.clear();
+}
+
 void MakeSound(PoseView& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.session);

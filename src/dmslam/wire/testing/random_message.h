@@ -124,6 +124,7 @@ void MakeSound(MapReset& m, Random& random);
 void MakeSound(AdjustRequest& m, Random& random);
 void MakeSound(FrameDone& m, Random& random);
 void MakeSound(SequenceDone& m, Random& random);
+void MakeSound(Odometry& m, Random& random);
 void MakeSound(PoseView& m, Random& random);
 void MakeSound(FeatureView& m, Random& random);
 void MakeSound(FrameTrace& m, Random& random);

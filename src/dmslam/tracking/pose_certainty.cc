@@ -1,0 +1,114 @@
+#include "dmslam/tracking/pose_certainty.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kLongestStepNs = 500'000'000;  // so long a step is still one motion
+constexpr double kMaxTurnOfMap = 0.02;           // [rad] the map may have turned under a step to be the same
+constexpr size_t kMaxViews = 8;         // of a landmark, spread over all: what more say changes little
+constexpr int kColumns = 8, kRows = 6;  // cells of the image
+constexpr double kExpectedChi2 = 2.0;   // of a residual in two dimensions, in sigmas
+constexpr double kMinNoiseVariance = 0.05;
+
+int CellAt(const Camera& camera, const Eigen::Vector2d& uv_px) {
+  const auto at = [](double share, int count) {
+    return std::clamp(static_cast<int>(share * count), 0, count - 1);
+  };
+  return at(uv_px.y() / camera.height_px, kRows) * kColumns + at(uv_px.x() / camera.width_px, kColumns);
+}
+
+double MedianDepth(const Rigid3d& T_cam_world, const std::vector<PoseSight>& sights) {
+  std::vector<double> depths;
+  depths.reserve(sights.size());
+  for (const PoseSight& sight : sights) depths.push_back((T_cam_world * sight.p_world).z());
+  if (depths.empty()) return 1.0;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+}
+
+}  // namespace
+
+Eigen::Matrix3d PoseCertaintyEstimator::CovarianceOf(const Map& map, const Pinhole& camera,
+                                                     const Landmark& landmark) {
+  views_.clear();
+  const size_t count = landmark.observations.size(), used = std::min(count, kMaxViews);
+  for (size_t i = 0; i < used; ++i) {
+    const Observation& seen = landmark.observations[used == 1 ? 0 : i * (count - 1) / (used - 1)];
+    const Keyframe* keyframe = map.FindKeyframe(seen.keyframe);
+    if (keyframe == nullptr) continue;
+    // The views that are left out say as much as those that are not.
+    const double variance = keyframe->features->Variance(seen.feature, map.pyramid());
+    views_.push_back(
+        {keyframe->T_cam_world, variance * static_cast<double>(used) / static_cast<double>(count)});
+  }
+  return LandmarkCovariance(camera, landmark.p_world, views_);
+}
+
+std::vector<PoseSight> PoseCertaintyEstimator::SightsOf(const Map& map, const PoseBasis& basis) {
+  const Pinhole camera = map.camera().Ideal();
+  std::vector<PoseSight> sights;
+  sights.reserve(basis.matches.size());
+  for (size_t i = 0; i < basis.matches.size(); ++i) {
+    const Landmark* landmark = map.FindLandmark(basis.matches[i].landmark);
+    if (basis.inliers[i] == 0 || landmark == nullptr) continue;
+    const PoseObservation& seen = basis.observations[i];
+    sights.push_back({landmark->id, landmark->p_world, CovarianceOf(map, camera, *landmark),
+                      1.0 / seen.inv_sigma_squared, seen.weight, CellAt(map.camera(), seen.uv_px)});
+  }
+  std::ranges::sort(sights, {}, &PoseSight::landmark);
+  return sights;
+}
+
+/// None where the frames are far apart, or where the map has turned meanwhile.
+std::optional<PoseCertainty::Step> PoseCertaintyEstimator::StepTo(const Map& map, const Told& now,
+                                                                  double depth) const {
+  if (!last_ || now.stamp_ns - last_->stamp_ns > kLongestStepNs) return std::nullopt;
+  const std::optional<Rigid3d> T_last_world = last_->pose.In(map);
+  if (!T_last_world || AngleBetween(T_last_world->rotation, last_->T_cam_world.rotation) > kMaxTurnOfMap)
+    return std::nullopt;
+  const Rigid3d T_now_last = now.T_cam_world * T_last_world->Inverse();
+  Matrix6d covariance = StepUncertainty({*T_last_world, last_->sights, &last_->uncertainty},
+                                        {now.T_cam_world, now.sights, &now.uncertainty}, model_);
+  const double change = ViewChange(T_now_last, depth);
+  covariance += SharedErrors(model_, {change, change}, depth);
+  return PoseCertainty::Step{last_->index, ToPoseInReference(covariance, T_now_last)};
+}
+
+std::optional<PoseCertainty> PoseCertaintyEstimator::Estimate(const Map& map, const TrackedFrame& frame,
+                                                              const PlacedPose& pose, const PoseBasis& basis,
+                                                              bool follows) {
+  if (!follows) last_.reset();
+  const double noise = std::max(basis.mean_chi2 / kExpectedChi2, kMinNoiseVariance);
+  Told now{frame.index, frame.stamp_ns, pose, frame.T_cam_world, SightsOf(map, basis), {}};
+  std::optional<PoseUncertainty> uncertainty = EstimatePoseUncertainty(
+      map.camera().Ideal(), frame.T_cam_world, now.sights, basis.information, noise, model_);
+  if (!uncertainty) {
+    last_.reset();
+    return std::nullopt;
+  }
+  now.uncertainty = std::move(*uncertainty);
+  PoseCertainty result;
+  result.depth = MedianDepth(frame.T_cam_world, now.sights);
+  const double change = ViewChange(pose.T_cam_reference, result.depth);
+  result.covariance = ToPoseInReference(
+      now.uncertainty.Sum() + SharedErrors(model_, {change, change}, result.depth), pose.T_cam_reference);
+  result.position_share = LargestSigma(result.covariance.topLeftCorner<3, 3>()) / result.depth;
+  result.rotation_rad = LargestSigma(result.covariance.bottomRightCorner<3, 3>());
+  result.step = StepTo(map, now, result.depth);
+  last_ = std::move(now);
+  return result;
+}
+
+}  // namespace dmslam
