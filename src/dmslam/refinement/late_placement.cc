@@ -13,8 +13,10 @@ namespace {
 constexpr int64_t kNearNs = 350'000'000;  // a placed frame so near in time bounds where a frame may be
 constexpr double kMaxSpeed = 1.5;         // depths of the scene per second
 constexpr double kMaxTurn_rad_per_s = 3.0;
-constexpr int kKeyframesAside = 3;      // whose motion bounds that of the frames between them...
+constexpr size_t kKeyframesAside = 3;   // whose motion bounds that of the frames between them...
+constexpr double kApartS = 0.3;         // ...apart, so that it is motion and not noise...
 constexpr double kFasterThanAside = 2;  // ...which may be so many times as fast...
+constexpr int kSureInliers = 30;        // nothing hurries: what rests on fewer is not placed
 constexpr double kSlack = 0.05;         // ...and this beside [depths of the scene]
 
 double SecondsBetween(int64_t a_ns, int64_t b_ns) {
@@ -34,16 +36,16 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
                               double depth) {
   std::vector<const Keyframe*> aside;
+  const auto add = [&](const Keyframe& keyframe) {
+    const bool apart = aside.empty() || SecondsBetween(keyframe.stamp_ns, aside.back()->stamp_ns) >= kApartS;
+    if (keyframe.map_id == map_id && apart) aside.push_back(&keyframe);
+  };
   const auto after = map.keyframes().lower_bound(KeyframeId::Make(session, frame.index));
-  auto before = after;
-  for (int i = 0; i < kKeyframesAside && before != map.keyframes().begin(); ++i) {
-    if (const Keyframe& keyframe = (--before)->second; keyframe.map_id == map_id) aside.push_back(&keyframe);
-  }
+  for (auto it = after; it != map.keyframes().begin() && aside.size() < kKeyframesAside;) add((--it)->second);
   std::ranges::reverse(aside);
-  auto next = after;
-  for (int i = 0; i < kKeyframesAside && next != map.keyframes().end(); ++i, ++next) {
-    if (next->second.map_id == map_id) aside.push_back(&next->second);
-  }
+  const size_t before = aside.size();
+  for (auto it = after; it != map.keyframes().end() && aside.size() < before + kKeyframesAside; ++it)
+    add(it->second);
   double speed = 0;
   for (size_t i = 1; i < aside.size(); ++i) {
     const double seconds = SecondsBetween(aside[i]->stamp_ns, aside[i - 1]->stamp_ns);
@@ -120,7 +122,7 @@ TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Re
     return there != nullptr && AgreesWithKeyframesAside(map, there->map_id, *frame, session_, depth);
   };
   TrackingReport report = TrackBackwards(map, depth, search, frame);
-  if (report.ok && agrees()) return report;
+  if (report.ok && report.num_static >= kSureInliers && agrees()) return report;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
