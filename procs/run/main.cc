@@ -164,28 +164,29 @@ class Run {
 
 dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
   dmslam::RunPlace place;
-  place.programs = a.programs.empty() ? OwnFolder() : a.programs + "/bin";
-  place.out = a.out;
+  place.programs = a.build_folder.empty() ? OwnFolder() : a.build_folder + "/bin";
+  place.out = a.output.folder;
   place.terminal = isatty(STDERR_FILENO) != 0;
   if (access((place.programs + "/dmslam-frontend").c_str(), X_OK) != 0)
     throw dmslam::InputError(place.programs + " has no dmslam-frontend; build first, or check --build-dir");
-  if ((a.viewer || !a.http.empty()) && access((place.programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
+  if (a.output.WantsViewer() && access((place.programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
     throw dmslam::InputError(place.programs +
                              " has no dmslam-viewer; install what it needs with scripts/setup.sh viewer and "
                              "build again");
   }
   std::error_code error;
-  fs::create_directories(a.out + "/log", error);
-  if (error) throw dmslam::InputError(a.out + " cannot be made: " + error.message() + "; check --out");
-  place.port = a.port.empty() ? dmslam::FreePort() : std::atoi(a.port.c_str());
+  fs::create_directories(a.output.folder + "/log", error);
+  if (error)
+    throw dmslam::InputError(a.output.folder + " cannot be made: " + error.message() + "; check --out");
+  place.port = a.bus.port.empty() ? dmslam::FreePort() : std::atoi(a.bus.port.c_str());
   return place;
 }
 
 int RunWith(const dmslam::RunArguments& arguments) {
   dmslam::CheckRunArguments(arguments);
   dmslam::Supervisor::Options options;
-  options.watchdog_ns = static_cast<int64_t>(arguments.watchdog_s * 1e9);
-  options.wait_for_what_may_come = arguments.wait;
+  options.watchdog_ns = static_cast<int64_t>(arguments.care.watchdog_s * 1e9);
+  options.wait_for_what_may_come = arguments.care.wait;
   Run run(arguments, PlaceOf(arguments), options);
   return run.Play();
 }

@@ -43,48 +43,48 @@ void NeedTool(const std::string& program) {
 }
 
 /// Ids of this run come after those of the map that it begins in.
-uint32_t ChooseSession(const RunArguments& a) {
-  if (a.map.empty()) return 1 + RandomBelow(1u << 30);
-  return LogIndex(a.map).Session().id + 1;
+uint32_t ChooseSession(const RunArguments::MapFiles& map) {
+  if (map.begin.empty()) return 1 + RandomBelow(1u << 30);
+  return LogIndex(map.begin).Session().id + 1;
 }
 
-std::string Url(const RunArguments& a, const RunPlace& place) {
-  return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + a.receive_buffer;
+std::string Url(const RunArguments::Bus& bus, const RunPlace& place) {
+  return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + bus.receive_buffer;
 }
 
 /// What all processes are told.
 Words CommonArguments(const RunArguments& a, const RunPlace& place) {
   Words common;
-  if (!a.profile.empty()) Append(&common, {"--set", "profile=" + a.profile});
-  AppendOption(&common, "--config", a.config);
-  for (const std::string& set : a.sets) Append(&common, {"--set", set});
-  if (a.no_loop) Append(&common, {"--set", "loop.enabled=off"});
-  AppendOption(&common, "--prefix", a.prefix);
-  if (!a.map.empty()) Append(&common, {"--set", "map.saved=on"});
-  if (a.localize) Append(&common, {"--set", "map.localize_only=on"});
-  Append(&common, {"--set", "seed=" + a.seed, "--lcm-url", Url(a, place), "--session",
-                   std::to_string(ChooseSession(a)), "--peers", "frontend,mapper,loopcloser,collector"});
-  if (!a.replay.empty()) common.push_back("--accept-recorded");
+  if (!a.settings.profile.empty()) Append(&common, {"--set", "profile=" + a.settings.profile});
+  AppendOption(&common, "--config", a.settings.config);
+  for (const std::string& set : a.settings.sets) Append(&common, {"--set", set});
+  if (a.settings.no_loop) Append(&common, {"--set", "loop.enabled=off"});
+  AppendOption(&common, "--prefix", a.bus.prefix);
+  if (!a.map.begin.empty()) Append(&common, {"--set", "map.saved=on"});
+  if (a.map.localize) Append(&common, {"--set", "map.localize_only=on"});
+  Append(&common, {"--set", "seed=" + a.settings.seed, "--lcm-url", Url(a.bus, place), "--session",
+                   std::to_string(ChooseSession(a.map)), "--peers", "frontend,mapper,loopcloser,collector"});
+  if (!a.source.replay.empty()) common.push_back("--accept-recorded");
   return common;
 }
 
 /// How frames are changed: also of a copy of a log that is to be replayed.
 Words FrameArguments(const RunArguments& a) {
   Words words;
-  AppendOption(&words, "--start", a.start);
-  AppendOption(&words, "--frames", a.frames);
-  for (const std::string& text : a.black_outs) Append(&words, {"--black-out", text});
-  for (const std::string& text : a.jumps) Append(&words, {"--jump", text});
-  AppendOption(&words, "--camera", a.camera);
+  AppendOption(&words, "--start", a.source.start);
+  AppendOption(&words, "--frames", a.source.frames);
+  for (const std::string& text : a.source.black_outs) Append(&words, {"--black-out", text});
+  for (const std::string& text : a.source.jumps) Append(&words, {"--jump", text});
+  AppendOption(&words, "--camera", a.camera.file);
   return words;
 }
 
 Words PlayerArguments(const RunArguments& a) {
   Words words = FrameArguments(a);
-  AppendOption(&words, "--encoding", a.encoding);
-  if (a.fps > 0) Append(&words, {"--fps", std::to_string(a.fps)});
-  Append(&words, {"--speed", std::to_string(a.speed)});
-  if (a.lockstep) words.push_back("--lockstep");
+  AppendOption(&words, "--encoding", a.camera.encoding);
+  if (a.camera.fps > 0) Append(&words, {"--fps", std::to_string(a.camera.fps)});
+  Append(&words, {"--speed", std::to_string(a.pace.speed)});
+  if (a.pace.lockstep) words.push_back("--lockstep");
   return words;
 }
 
@@ -98,11 +98,11 @@ std::string Quoted(const std::string& word) {
 /// lcm-logplayer plays whole logs, as they are: for anything else it gets a copy.
 std::string LogToReplay(const RunArguments& a, const RunPlace& place) {
   const Words changes = FrameArguments(a);
-  if (changes.empty() && PrefixOfCamera(a.replay) == a.prefix) return a.replay;
+  if (changes.empty() && PrefixOfCamera(a.source.replay) == a.bus.prefix) return a.source.replay;
   const std::string copy = place.out + "/log/replayed.lcmlog";
   std::string command = Quoted(place.programs + "/dmslam-player");
   Words words = changes;
-  Append(&words, {"--prefix", a.prefix, "--log", a.replay, "--to-log", copy});
+  Append(&words, {"--prefix", a.bus.prefix, "--log", a.source.replay, "--to-log", copy});
   for (const std::string& word : words) command += " " + Quoted(word);
   command += " 2>" + Quoted(place.LogOf("player"));
   if (std::system(command.c_str()) != 0) throw InputError(LastWords("player", place.LogOf("player")));
@@ -117,22 +117,23 @@ ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPla
   child.first = {"--fresh-system"};  // only at the beginning nobody else can be writing
   child.output = child.errors = place.LogOf(name);
   child.pid_file = place.out + "/log/" + name + ".pid";
-  child.restart = !a.no_restart;
+  child.restart = !a.care.no_restart;
   return child;
 }
 
 ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& common) {
-  if (a.replay.empty()) {
+  if (a.source.replay.empty()) {
     Words words = common;
     Append(&words, PlayerArguments(a));
-    Append(&words, a.log.empty() ? Words{"--sequence", a.sequence} : Words{"--log", a.log});
+    Append(&words,
+           a.source.log.empty() ? Words{"--sequence", a.source.sequence} : Words{"--log", a.source.log});
     return MakeChild("player", a, place, words);
   }
   NeedTool("lcm-logplayer");
   LogReplay replay;
   replay.log = LogToReplay(a, place);
-  replay.lcm_url = Url(a, place);
-  replay.speed = a.speed;
+  replay.lcm_url = Url(a.bus, place);
+  replay.speed = a.pace.speed;
   replay.port = place.port;
   replay.frontend_pid_file = place.out + "/log/frontend.pid";
   ChildSpec child = MakeChild("player", a, place, {});
@@ -140,16 +141,16 @@ ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& 
   return child;
 }
 
-Words GroundTruth(const RunArguments& a) {
-  const std::string file = a.sequence + "/groundtruth.txt";
-  return !a.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
+Words GroundTruth(const RunArguments::Source& source) {
+  const std::string file = source.sequence + "/groundtruth.txt";
+  return !source.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
 }
 
 ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = common;
   if (place.terminal) words.push_back("--quiet");
-  Append(&words, {"--out", a.out});
-  Append(&words, GroundTruth(a));
+  Append(&words, {"--out", a.output.folder});
+  Append(&words, GroundTruth(a.source));
   ChildSpec child = MakeChild("collector", a, place, words);
   child.output = place.out + "/log/table.txt";
   child.errors_to_ours = place.terminal;
@@ -158,16 +159,16 @@ ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Word
 
 ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = common;
-  if (a.pictures != "0") {
+  if (a.output.pictures != "0") {
     fs::create_directories(place.out + "/pictures");
-    Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.pictures});
+    Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.output.pictures});
   }
   return MakeChild("frontend", a, place, words);
 }
 
 ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
-  AppendOption(&words, "--map", a.map);
-  AppendOption(&words, "--save-map", a.save_map);
+  AppendOption(&words, "--map", a.map.begin);
+  AppendOption(&words, "--save-map", a.map.save);
   return MakeChild("mapper", a, place, std::move(words));
 }
 
@@ -183,15 +184,15 @@ ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {
   const std::string log = place.out + "/run.lcmlog";
   fs::remove(log);
   ChildSpec child = MakeCompanion(MakeChild("logger", a, place, {}));
-  child.arguments = {"lcm-logger", "--quiet", "--lcm-url=" + Url(a, place), log};
+  child.arguments = {"lcm-logger", "--quiet", "--lcm-url=" + Url(a.bus, place), log};
   child.stop_signal = SIGINT;
   return child;
 }
 
 ChildSpec MakeViewer(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = common;
-  AppendOption(&words, "--http", a.http);
-  Append(&words, GroundTruth(a));
+  AppendOption(&words, "--http", a.output.http);
+  Append(&words, GroundTruth(a.source));
   return MakeCompanion(MakeChild("viewer", a, place, words));
 }
 
@@ -217,8 +218,8 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   plan.pipeline = {MakeMapper(a, place, common), MakeChild("loopcloser", a, place, common),
                    MakeFrontend(a, place, common), MakeCollector(a, place, common),
                    MakePlayer(a, place, common)};
-  if (a.record) plan.companions.push_back(MakeLogger(a, place));
-  if (a.viewer || !a.http.empty()) plan.companions.push_back(MakeViewer(a, place, common));
+  if (a.output.record) plan.companions.push_back(MakeLogger(a, place));
+  if (a.output.WantsViewer()) plan.companions.push_back(MakeViewer(a, place, common));
   return plan;
 }
 

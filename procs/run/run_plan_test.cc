@@ -19,8 +19,8 @@ class RunPlanTest : public testing::Test {
   RunPlanTest() : folder_(testing::TempDir() + "/dmslam_run_" + std::to_string(getpid())) {
     fs::create_directories(folder_ + "/sequence");
     fs::create_directories(folder_ + "/log");
-    arguments_.sequence = folder_ + "/sequence";
-    arguments_.out = place_.out = folder_;
+    arguments_.source.sequence = folder_ + "/sequence";
+    arguments_.output.folder = place_.out = folder_;
     place_.programs = "/bin";
     place_.port = 20001;
   }
@@ -54,31 +54,31 @@ class RunPlanTest : public testing::Test {
 
 TEST_F(RunPlanTest, RefusesWhatDoesNotFit) {
   EXPECT_EQ(Refusal(), "");
-  arguments_.log = "there.log";
+  arguments_.source.log = "there.log";
   EXPECT_NE(Refusal().find("one of"), std::string::npos);
-  arguments_.log.clear();
-  arguments_.localize = true;
+  arguments_.source.log.clear();
+  arguments_.map.localize = true;
   EXPECT_NE(Refusal().find("--localize needs a map"), std::string::npos);
-  arguments_.localize = false;
-  arguments_.seed = "many";
+  arguments_.map.localize = false;
+  arguments_.settings.seed = "many";
   EXPECT_NE(Refusal().find("whole number"), std::string::npos);
-  arguments_.seed = "1";
-  arguments_.port = "80";
+  arguments_.settings.seed = "1";
+  arguments_.bus.port = "80";
   EXPECT_NE(Refusal().find("between 1024 and 65535"), std::string::npos);
-  arguments_.port.clear();
-  arguments_.sequence = "/nowhere/at/all";
+  arguments_.bus.port.clear();
+  arguments_.source.sequence = "/nowhere/at/all";
   EXPECT_NE(Refusal().find("no such folder"), std::string::npos);
-  arguments_.sequence = "/dev/video77";
+  arguments_.source.sequence = "/dev/video77";
   EXPECT_EQ(Refusal(), "") << "a camera may come later";
 }
 
 TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
-  arguments_.sets = {"features.count=1200"};
-  arguments_.no_loop = arguments_.lockstep = true;
-  arguments_.profile = "baseline";
-  arguments_.black_outs = {"10,1"};
-  arguments_.save_map = "map.log";
-  std::ofstream(arguments_.sequence + "/groundtruth.txt") << "# none\n";
+  arguments_.settings.sets = {"features.count=1200"};
+  arguments_.settings.no_loop = arguments_.pace.lockstep = true;
+  arguments_.settings.profile = "baseline";
+  arguments_.source.black_outs = {"10,1"};
+  arguments_.map.save = "map.log";
+  std::ofstream(arguments_.source.sequence + "/groundtruth.txt") << "# none\n";
   std::string session;
   for (const char* name : {"mapper", "loopcloser", "frontend", "collector", "player"}) {
     const std::string line = Line(name);
