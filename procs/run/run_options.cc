@@ -160,21 +160,18 @@ void CheckRunArguments(const RunArguments& a) {
   CheckPort(a.bus);
 }
 
-int SocketsOn(int port, const std::string& proc_net) {
+bool PortTaken(int port, const std::string& proc_net) {
   char wanted[8];
   std::snprintf(wanted, sizeof(wanted), ":%04X", static_cast<unsigned>(port));
-  int sockets = 0;
   for (const char* table : {"udp", "udp6"}) {
     std::ifstream lines(proc_net + "/" + table);
-    for (std::string line, slot, local; std::getline(lines, line);) {
+    for (std::string line; std::getline(lines, line);) {
       const size_t colon = line.find(':');  // behind the slot's number
       const size_t address = colon == std::string::npos ? colon : line.find(':', colon + 1);
-      if (address != std::string::npos && line.compare(address, 5, wanted) == 0) ++sockets;
+      if (address != std::string::npos && line.compare(address, 5, wanted) == 0) return true;
     }
   }
-  return sockets;
+  return false;
 }
-
-bool PortTaken(int port, const std::string& proc_net) { return SocketsOn(port, proc_net) > 0; }
 
 }  // namespace dmslam

@@ -69,7 +69,5 @@ void CheckRunArguments(const RunArguments& arguments);
 
 /// Whether somebody on this host is bound to the UDP port. `proc_net`: the folder of the kernel's tables.
 bool PortTaken(int port, const std::string& proc_net = "/proc/net");
-/// The number of sockets bound to it.
-int SocketsOn(int port, const std::string& proc_net = "/proc/net");
 
 }  // namespace dmslam

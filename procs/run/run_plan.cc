@@ -121,24 +121,40 @@ ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPla
   return child;
 }
 
-ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& common) {
-  if (a.source.replay.empty()) {
-    Words words = common;
-    Append(&words, PlayerArguments(a));
-    Append(&words,
-           a.source.log.empty() ? Words{"--sequence", a.source.sequence} : Words{"--log", a.source.log});
-    return MakeChild("player", a, place, words);
-  }
-  NeedTool("lcm-logplayer");
+ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, Words words) {
+  Append(&words, PlayerArguments(a));
+  Append(&words,
+         a.source.log.empty() ? Words{"--sequence", a.source.sequence} : Words{"--log", a.source.log});
+  return MakeChild("player", a, place, std::move(words));
+}
+
+/// A child that runs a program of somebody else's.
+ChildSpec MakeForeign(const std::string& name, const RunArguments& a, const RunPlace& place, Words command) {
+  NeedTool(command[0]);
+  ChildSpec child = MakeChild(name, a, place, {});
+  child.arguments = std::move(command);
+  child.first.clear();
+  return child;
+}
+
+ChildSpec MakeCompanion(ChildSpec child) {
+  child.first.clear();
+  child.pid_file.clear();
+  child.restart = false;
+  return child;
+}
+
+/// lcm-logplayer in the player's place: nobody would repeat what was played before the others listen.
+void PlanReplay(const RunArguments& a, const RunPlace& place, RunPlan* plan) {
   LogReplay replay;
   replay.log = LogToReplay(a, place);
   replay.lcm_url = Url(a.bus, place);
   replay.speed = a.pace.speed;
-  replay.port = place.port;
-  replay.frontend_pid_file = place.out + "/log/frontend.pid";
-  ChildSpec child = MakeChild("player", a, place, {});
-  child.body = [replay] { return PlayLog(replay); };
-  return child;
+  ChildSpec player = MakeForeign("player", a, place, PlayCamera(replay));
+  for (const ChildSpec& listener : plan->pipeline) player.after.push_back(listener.name);
+  plan->pipeline.push_back(std::move(player));
+  plan->replay_end = MakeCompanion(MakeForeign("end of the sequence", a, place, PlayEnd(replay)));
+  plan->replay_end->output = plan->replay_end->errors = place.LogOf("player");
 }
 
 Words GroundTruth(const RunArguments::Source& source) {
@@ -172,19 +188,11 @@ ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) 
   return MakeChild("mapper", a, place, std::move(words));
 }
 
-ChildSpec MakeCompanion(ChildSpec child) {
-  child.first.clear();
-  child.pid_file.clear();
-  child.restart = false;
-  return child;
-}
-
 ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {
-  NeedTool("lcm-logger");
   const std::string log = place.out + "/run.lcmlog";
   fs::remove(log);
-  ChildSpec child = MakeCompanion(MakeChild("logger", a, place, {}));
-  child.arguments = {"lcm-logger", "--quiet", "--lcm-url=" + Url(a.bus, place), log};
+  ChildSpec child = MakeCompanion(
+      MakeForeign("logger", a, place, {"lcm-logger", "--quiet", "--lcm-url=" + Url(a.bus, place), log}));
   child.stop_signal = SIGINT;
   return child;
 }
@@ -216,10 +224,18 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   RunPlan plan;
   plan.table = place.out + "/log/table.txt";
   plan.pipeline = {MakeMapper(a, place, common), MakeChild("loopcloser", a, place, common),
-                   MakeFrontend(a, place, common), MakeCollector(a, place, common),
-                   MakePlayer(a, place, common)};
+                   MakeFrontend(a, place, common), MakeCollector(a, place, common)};
+  if (a.source.replay.empty()) {
+    plan.pipeline.push_back(MakePlayer(a, place, common));
+  } else {
+    PlanReplay(a, place, &plan);
+  }
   if (a.output.record) plan.companions.push_back(MakeLogger(a, place));
-  if (a.output.WantsViewer()) plan.companions.push_back(MakeViewer(a, place, common));
+  if (a.output.WantsViewer()) {
+    plan.companions.push_back(MakeViewer(a, place, common));
+    for (ChildSpec& child : plan.pipeline)
+      child.after.push_back("viewer");  // it shows the run from its beginning
+  }
   return plan;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,9 +11,10 @@ namespace dmslam {
 
 /// Who is started for a run, and how.
 struct RunPlan {
-  std::vector<ChildSpec> pipeline;    ///< mapper, loop closer, frontend, collector, player: in this order
-  std::vector<ChildSpec> companions;  ///< logger, viewer: nobody waits for them
-  std::string table;                  ///< file with what the collector printed
+  std::vector<ChildSpec> pipeline;      ///< mapper, loop closer, frontend, collector, player: in this order
+  std::vector<ChildSpec> companions;    ///< logger, viewer: nobody waits for their end
+  std::optional<ChildSpec> replay_end;  ///< of a replay: plays the end of the sequence again
+  std::string table;                    ///< file with what the collector printed
 };
 
 /// Where a run writes, and where its programs are.
