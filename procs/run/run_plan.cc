@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <random>
-#include <regex>
 #include <sstream>
 
 #include "dmslam/recording/log_index.h"
@@ -91,7 +91,7 @@ Words PlayerArguments(const RunArguments& a) {
 /// One word of a shell.
 std::string Quoted(const std::string& word) {
   std::string quoted = "'";
-  quoted += std::regex_replace(word, std::regex("'"), "'\\''");
+  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
   return quoted += "'";
 }
 
@@ -204,8 +204,23 @@ ChildSpec MakeViewer(const RunArguments& a, const RunPlace& place, const Words& 
   return MakeCompanion(MakeChild("viewer", a, place, words));
 }
 
-std::string Matched(const std::string& line, const char* pattern, const char* with) {
-  return std::regex_replace(line, std::regex(pattern), with);
+/// A line of a log behind the time it begins with; none where it begins with none.
+std::optional<std::string> BehindTime(const std::string& line) {
+  const size_t end = line.find_first_not_of("0123456789:.");
+  if (end == 0 || end == std::string::npos || line[end] != ' ') return std::nullopt;
+  return line.substr(end + 1);
+}
+
+/// "mapper error: why" as "mapper: why"; none where the line is of no error.
+std::optional<std::string> ErrorIn(const std::string& line) {
+  for (const std::string level : {" error: ", " critical: "}) {
+    const size_t at = line.find(level);
+    if (at != std::string::npos) {
+      const std::string head = line.substr(0, at);
+      return BehindTime(head).value_or(head) + ": " + line.substr(at + level.size());
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -240,18 +255,18 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
 }
 
 std::string LastWords(const std::string& name, const std::string& log) {
-  static const std::regex error(" (error|critical): "), event("^[0-9:.]+ ");
   std::ifstream lines(log);
-  std::string worst, first_bare, last;
+  std::optional<std::string> error, bare;
+  std::string last;
   for (std::string line; std::getline(lines, line);) {
     if (line.find_first_not_of(' ') == std::string::npos) continue;
-    if (std::regex_search(line, error)) worst = line;
-    if (first_bare.empty() && !std::regex_search(line, event)) first_bare = line;
-    last = line;
+    const std::optional<std::string> event = BehindTime(line);
+    if (const auto found = ErrorIn(line)) error = found;
+    if (!bare && !event) bare = line;
+    last = event.value_or(line);
   }
-  if (!worst.empty()) return Matched(Matched(worst, "^[0-9:.]* ", ""), " (error|critical): ", ": ");
-  if (!first_bare.empty()) return name + ": " + first_bare;
-  return Matched(last, "^[0-9:.]* ", "");
+  if (error) return *error;
+  return bare ? name + ": " + *bare : last;
 }
 
 }  // namespace dmslam
