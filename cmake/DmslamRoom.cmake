@@ -3,10 +3,31 @@
 # (-DDMSLAM_TOGETHER=OFF, as the preset dev does): only what was changed is compiled, every file shows that it includes
 # what it needs, and compile_commands.json, which clang-tidy and editors read, lists each file.
 option(DMSLAM_TOGETHER "Compile the files of a room together" ON)
+# The headers that nearly all rooms read (Eigen, the standard library) are then compiled once, which saves a second in
+# every room. Where there is a compile cache it is off: the cache does not know what to make of such files.
+set(precompile OFF)
+if(DMSLAM_TOGETHER AND NOT CCACHE_PROGRAM AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  set(precompile ON)
+endif()
+option(DMSLAM_PRECOMPILE "Compile the headers of Eigen and of the standard library once" ${precompile})
+if(DMSLAM_PRECOMPILE)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled.cc CONTENT "// It has headers only.\n")
+  add_library(dmslam_precompiled STATIC ${PROJECT_BINARY_DIR}/precompiled.cc)
+  target_link_libraries(dmslam_precompiled PRIVATE dmslam_options)
+  target_precompile_headers(dmslam_precompiled PRIVATE <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <algorithm> <array>
+    <chrono> <deque> <fstream> <functional> <limits> <map> <memory> <numeric> <optional> <random> <set> <span> <sstream>
+    <string> <thread> <unordered_map> <unordered_set> <variant> <vector>)
+endif()
+
+# For a library: a program is compiled with other options (-fPIE).
 function(dmslam_compile_together target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${DMSLAM_TOGETHER} UNITY_BUILD_BATCH_SIZE 0)
   if(DMSLAM_TOGETHER)  # the warning takes a file for a header where another one includes it
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
+  get_target_property(type ${target} TYPE)
+  if(DMSLAM_PRECOMPILE AND type STREQUAL STATIC_LIBRARY)
+    target_precompile_headers(${target} REUSE_FROM dmslam_precompiled)
   endif()
 endfunction()
 
@@ -14,6 +35,7 @@ endfunction()
 function(dmslam_compile_lightly)
   foreach(target ${ARGN})
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+    set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # made for other options
   endforeach()
 endfunction()
 

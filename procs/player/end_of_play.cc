@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/wire/channels.h"
 
 namespace dmslam {
 namespace {
@@ -13,6 +14,19 @@ constexpr int64_t kNobodyWhenStoppedNs = 2'000'000'000;
 constexpr int64_t kMapperSilentNs = 5'000'000'000;  // nobody to wait for
 
 }  // namespace
+
+void EndOfPlay::OnStatus(const std::string& channel, std::span<const uint8_t> bytes, uint32_t session,
+                         int64_t now_ns) {
+  if (channel == channels::kMapperStatus) {
+    const auto status = wire::Decode<MapperStatus>(bytes);
+    if (!status || status->head.session != session) return;
+    mapper_heard_ns_ = now_ns;
+    mapper_done_ = status->state == MapperStatus::State::kDone;
+  } else if (channel == channels::kFrontendStatus) {
+    const auto status = wire::Decode<FrontendStatus>(bytes);
+    if (status && status->head.session == session) frontend_heard_ns_ = now_ns;
+  }
+}
 
 bool EndOfPlay::IsDue(int64_t now_ns) {
   if (since_ns_ == 0) since_ns_ = now_ns;

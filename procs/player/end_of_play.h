@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "dmslam/wire/codec.h"
@@ -13,12 +14,9 @@ namespace dmslam {
 class EndOfPlay {
  public:
   void OnFrontendHeard() { heard_ = true; }
-  /// A frontend of this session is alive: it may still be tracking, adjusting or telling its last poses.
-  void OnFrontendStatus(int64_t now_ns) { frontend_heard_ns_ = now_ns; }
-  void OnMapperStatus(const MapperStatus& status, int64_t now_ns) {
-    mapper_heard_ns_ = now_ns;
-    mapper_done_ = status.state == MapperStatus::State::kDone;
-  }
+  /// A message on any channel. The statuses of this session's mapper and frontend say that these are alive: a
+  /// frontend may still be tracking, adjusting or telling its last poses. All others are left alone.
+  void OnStatus(const std::string& channel, std::span<const uint8_t> bytes, uint32_t session, int64_t now_ns);
 
   /// Whether the end is to be told now. The first call begins it.
   bool IsDue(int64_t now_ns);

@@ -6,6 +6,7 @@
 #include "dmslam/console/log.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 #include "player/intervals.h"
@@ -34,24 +35,8 @@ LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<L
   if (context_.watch) context_.watch(source_->fd(), [this] { TakeFrame(); });
 }
 
-template <typename Message>
-void LiveNode::Publish(const Message& message) {
-  context_.bus->Publish(
-      {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
-}
-
 void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
-  if (channel == channels::kMapperStatus) {
-    const auto status = wire::Decode<MapperStatus>(bytes);
-    if (!status || status->head.session != options_.session) return;
-    end_.OnMapperStatus(*status, context_.now_ns());
-    return;
-  }
-  if (channel == channels::kFrontendStatus) {
-    const auto status = wire::Decode<FrontendStatus>(bytes);
-    if (status && status->head.session == options_.session) end_.OnFrontendStatus(context_.now_ns());
-    return;
-  }
+  end_.OnStatus(channel, bytes, options_.session, context_.now_ns());
   if (channel == channels::kSequenceDone) {
     const auto done = wire::Decode<SequenceDone>(bytes);
     if (!done || done->session != options_.session) return;
@@ -123,7 +108,7 @@ void LiveNode::PublishCameraInfo() {
   info.sequence = CameraName(options_.sequence);
   info.num_frames = options_.frames == SIZE_MAX ? 0 : static_cast<int64_t>(options_.frames);
   info.mode = PlaybackMode::kRealtime;
-  Publish(info);
+  PublishLoose(context_.bus, info);
 }
 
 void LiveNode::PublishStatus() {
@@ -138,7 +123,7 @@ void LiveNode::PublishStatus() {
   status.frames_missing = source_->dropped();
   status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   status.late_ms = published_ > 0 ? static_cast<double>(frame_.publish_us - frame_.capture_us) * 1e-3 : 0;
-  Publish(status);
+  PublishLoose(context_.bus, status);
 }
 
 void LiveNode::PublishEnd() {
@@ -150,7 +135,7 @@ void LiveNode::PublishEnd() {
   end.frames_missing = source_->dropped();
   end.last_frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   end.last_stamp_ns = frame_.stamp_ns;
-  Publish(end);
+  PublishLoose(context_.bus, end);
 }
 
 void LiveNode::Advance() {

@@ -39,8 +39,6 @@ class LiveNode : public Node {
   void PublishCameraInfo();
   void PublishStatus();
   void PublishEnd();
-  template <typename Message>
-  void Publish(const Message& message);
 
   NodeContext context_;
   PlayerOptions options_;

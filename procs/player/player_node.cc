@@ -9,6 +9,7 @@
 #include "dmslam/console/log.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
 #include "player/intervals.h"
 
@@ -105,24 +106,12 @@ bool PlayerNode::MayPlay() {
   return playing_;
 }
 
-template <typename Message>
-void PlayerNode::Publish(const Message& message) {
-  context_.bus->Publish(
-      {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
-}
-
 void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  end_.OnStatus(channel, bytes, options_.session, context_.now_ns());
   if (channel == channels::kFrameDone) {
     if (const auto done = wire::Decode<FrameDone>(bytes)) OnFrameDone(*done);
   } else if (channel == channels::kSequenceDone) {
     if (const auto done = wire::Decode<SequenceDone>(bytes)) OnSequenceDone(*done);
-  } else if (channel == channels::kMapperStatus) {
-    const auto status = wire::Decode<MapperStatus>(bytes);
-    if (!status || status->head.session != options_.session) return;
-    end_.OnMapperStatus(*status, context_.now_ns());
-  } else if (channel == channels::kFrontendStatus) {
-    const auto status = wire::Decode<FrontendStatus>(bytes);
-    if (status && status->head.session == options_.session) end_.OnFrontendStatus(context_.now_ns());
   }
 }
 
@@ -166,7 +155,7 @@ void PlayerNode::PublishCameraInfo() {
   info.first_frame = source_->FrameIndex(order_.front());
   info.mode = options_.mode;
   info.speed = options_.speed;
-  Publish(info);
+  PublishLoose(context_.bus, info);
 }
 
 int64_t PlayerNode::DueNs(size_t position) const {
@@ -239,7 +228,8 @@ void PlayerNode::PublishGroundTruth(size_t index) {
       std::lower_bound(ground_truth_.begin(), ground_truth_.end(), stamp_ns,
                        [](const StampedPose& pose, int64_t stamp) { return pose.stamp_ns < stamp; });
   if (at == ground_truth_.end() || at->stamp_ns - stamp_ns > 10'000'000) return;
-  Publish(GroundTruthPose{options_.session, source_->FrameIndex(index), at->stamp_ns, at->T_world_cam});
+  PublishLoose(context_.bus,
+               GroundTruthPose{options_.session, source_->FrameIndex(index), at->stamp_ns, at->T_world_cam});
 }
 
 void PlayerNode::PublishEnd() {
@@ -254,7 +244,7 @@ void PlayerNode::PublishEnd() {
   const size_t last = order_[std::max<size_t>(position_, 1) - 1];
   end.last_frame_index = static_cast<int32_t>(source_->FrameIndex(last));
   end.last_stamp_ns = source_->StampNs(last);
-  Publish(end);
+  PublishLoose(context_.bus, end);
 }
 
 void PlayerNode::PublishStatus(PlayerStatus::State state) {
@@ -271,7 +261,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.repeats = repeats_;
   status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   status.late_ms = late_ms_;
-  Publish(status);
+  PublishLoose(context_.bus, status);
 }
 
 void PlayerNode::Advance() {

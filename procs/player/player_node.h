@@ -79,8 +79,6 @@ class PlayerNode : public Node {
   void PublishStatus(PlayerStatus::State state);
   int64_t DueNs(size_t position) const;
   bool IsBlack(size_t index) const;
-  template <typename Message>
-  void Publish(const Message& message);
 
   NodeContext context_;
   PlayerOptions options_;

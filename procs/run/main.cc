@@ -1,16 +1,18 @@
 #include <unistd.h>
 
+#include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <regex>
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
+#include "run/log_replay.h"
 #include "run/resume.h"
 #include "run/run_plan.h"
 
@@ -37,7 +39,7 @@ class Run {
   Run(const dmslam::RunArguments& arguments, const dmslam::RunPlace& place,
       dmslam::Supervisor::Options options)
       : place_(place),
-        camera_(dmslam::IsCamera(arguments.sequence)),
+        camera_(dmslam::IsCamera(arguments.source.sequence)),
         plan_(dmslam::MakeRunPlan(arguments, place)),
         supervisor_(options) {}
 
@@ -71,7 +73,6 @@ class Run {
   void Begin(const dmslam::ChildSpec& child) {
     if (!place_.resume) RemoveLogs(child);
     supervisor_.Start(child);
-    if (child.name == "viewer") ShowViewer();
   }
 
   static void RemoveLogs(const dmslam::ChildSpec& child) {
@@ -79,20 +80,11 @@ class Run {
     if (child.name != "collector") fs::remove(child.output);
   }
 
-  /// Its address, once it has one.
-  void ShowViewer() {
-    const int64_t deadline = dmslam::Supervisor::now_ns() + 5'000'000'000;
-    while (supervisor_.Alive("viewer") && dmslam::Supervisor::now_ns() < deadline) {
-      supervisor_.Wait(dmslam::Supervisor::now_ns() + 50'000'000);
-      std::ifstream log(place_.LogOf("viewer"));
-      const std::string text(std::istreambuf_iterator<char>(log), {});
-      std::smatch match;
-      if (!std::regex_search(text, match, std::regex("to be seen at (http[^ \n]*)"))) continue;
-      Say("to be seen at " + match[1].str());
-      OpenBrowser(match[1]);
-      return;
-    }
-    throw dmslam::InputError("the viewer did not start: " + LastWords("viewer"));
+  void OnReady(const ChildEvent& event) {
+    if (event.name != "viewer") return;
+    viewer_ready_ = true;
+    Say(event.text);
+    OpenBrowser(event.text.substr(std::min(event.text.find("http"), event.text.size())));
   }
 
   static void OpenBrowser(const std::string& address) {
@@ -100,33 +92,58 @@ class Run {
     if (std::system(("xdg-open '" + address + "' </dev/null >/dev/null 2>&1 &").c_str()) != 0) return;
   }
 
+  static bool IsCompanion(const std::string& name) { return name == "viewer" || name == "logger"; }
+
   bool PipelineAlive() const {
-    const bool only_viewer = !supervisor_.Alive("viewer") && !supervisor_.Alive("logger");
     const size_t companions =
         (supervisor_.Alive("viewer") ? 1u : 0u) + (supervisor_.Alive("logger") ? 1u : 0u);
-    return only_viewer ? supervisor_.size() > 0 : supervisor_.size() > companions;
+    return supervisor_.size() > companions;
   }
 
   /// The collector ends last. Whoever dies before it is started again; whoever fails ends the run.
   void Watch() {
-    int64_t deadline = INT64_MAX;
     while (PipelineAlive() && code_ == 0 && signal_ == 0) {
-      const ChildEvent event = supervisor_.Wait(deadline);
-      if (event.kind == ChildEvent::Kind::kTime) return;
-      Handle(event);
-      if (collected_ && deadline == INT64_MAX) deadline = dmslam::Supervisor::now_ns() + kFarewellNs;
+      const ChildEvent event = supervisor_.Wait(std::min(farewell_ns_, replay_end_.due_ns()));
+      if (event.kind != ChildEvent::Kind::kTime) {
+        Handle(event);
+      } else if (dmslam::Supervisor::now_ns() >= farewell_ns_) {
+        return;
+      } else {
+        EndReplay();
+      }
     }
   }
 
   void Handle(const ChildEvent& event) {
     if (event.kind == ChildEvent::Kind::kSignal) return Interrupt(event.code);
-    if (event.kind == ChildEvent::Kind::kRestarted) return SayRestart(event);
-    if (event.name == "viewer" || event.name == "logger") return;
+    if (event.kind == ChildEvent::Kind::kRestarted) return OnRestart(event);
+    if (event.kind == ChildEvent::Kind::kReady) return OnReady(event);
+    if (event.name == "viewer" && !viewer_ready_)
+      throw dmslam::InputError("the viewer did not start: " + LastWords("viewer"));
+    if (IsCompanion(event.name) || (plan_.replay_end && event.name == plan_.replay_end->name)) return;
     if (event.yields) return Say(event.name + ": another one has taken its place, and goes on");
     if (event.code != 0) return Fail(event);
-    if (event.name != "collector") return;
-    collected_ = true;
+    OnSuccess(event.name);
+  }
+
+  void OnSuccess(const std::string& name) {
+    const int64_t now = dmslam::Supervisor::now_ns();
+    if (name == "player" && plan_.replay_end) replay_end_.Begin(now);
+    if (name == "frontend") replay_end_.Finish();
+    if (name != "collector") return;
+    farewell_ns_ = now + kFarewellNs;
     supervisor_.StopRestarting();
+  }
+
+  void EndReplay() {
+    const dmslam::ReplayEnd::Step step = replay_end_.Next(dmslam::Supervisor::now_ns());
+    const pid_t frontend = supervisor_.PidOf("frontend");
+    if (frontend == 0) return;
+    if (step == dmslam::ReplayEnd::Step::kPlayAgain && !supervisor_.Alive(plan_.replay_end->name))
+      supervisor_.Start(*plan_.replay_end);
+    if (step != dmslam::ReplayEnd::Step::kStopFrontend) return;
+    Say("the log has no end of the sequence; the frontend is told to finish");
+    kill(frontend, SIGTERM);
   }
 
   void Interrupt(int signal) {
@@ -142,7 +159,8 @@ class Run {
     return "ended with code " + std::to_string(event.code);
   }
 
-  static void SayRestart(const ChildEvent& event) {
+  void OnRestart(const ChildEvent& event) {
+    if (event.name == "frontend" && replay_end_.begun()) replay_end_.Begin(dmslam::Supervisor::now_ns());
     const std::string when = event.delay_ns > 0 ? " in " + Seconds(event.delay_ns) : "";
     Say(event.name + " " + HowItEnded(event) + "; started again" + when + " (" +
         std::to_string(event.restarts) + ")");
@@ -179,50 +197,53 @@ class Run {
   bool camera_;
   dmslam::RunPlan plan_;
   dmslam::Supervisor supervisor_;
+  dmslam::ReplayEnd replay_end_;
   int code_ = 0, signal_ = 0;
-  bool collected_ = false;
+  bool viewer_ready_ = false;
+  int64_t farewell_ns_ = INT64_MAX;  ///< until when the others may end, once there are results
 };
 
 dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
   dmslam::RunPlace place;
-  place.programs = a.programs.empty() ? OwnFolder() : a.programs + "/bin";
-  place.out = a.out;
+  place.programs = a.build_folder.empty() ? OwnFolder() : a.build_folder + "/bin";
+  place.out = a.output.folder;
   place.terminal = isatty(STDERR_FILENO) != 0;
   if (access((place.programs + "/dmslam-frontend").c_str(), X_OK) != 0)
     throw dmslam::InputError(place.programs + " has no dmslam-frontend; build first, or check --build-dir");
-  if ((a.viewer || !a.http.empty()) && access((place.programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
+  if (a.output.WantsViewer() && access((place.programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
     throw dmslam::InputError(place.programs +
                              " has no dmslam-viewer; install what it needs with scripts/setup.sh viewer and "
                              "build again");
   }
   std::error_code error;
-  fs::create_directories(a.out + "/log", error);
-  if (error) throw dmslam::InputError(a.out + " cannot be made: " + error.message() + "; check --out");
-  place.port = a.port.empty() ? dmslam::FreePort() : std::atoi(a.port.c_str());
+  fs::create_directories(a.output.folder + "/log", error);
+  if (error)
+    throw dmslam::InputError(a.output.folder + " cannot be made: " + error.message() + "; check --out");
+  place.port = a.bus.port.empty() ? dmslam::FreePort() : std::atoi(a.bus.port.c_str());
   return place;
 }
 
 int Start(const dmslam::RunArguments& arguments, dmslam::RunIdentity identity,
           const std::optional<dmslam::ResumePoint>& resume) {
   dmslam::Supervisor::Options options;
-  options.watchdog_ns = static_cast<int64_t>(arguments.watchdog_s * 1e9);
-  options.wait_for_what_may_come = arguments.wait;
+  options.watchdog_ns = static_cast<int64_t>(arguments.care.watchdog_s * 1e9);
+  options.wait_for_what_may_come = arguments.care.wait;
   dmslam::RunPlace place = PlaceOf(arguments);
   place.session = identity.session;
   place.resume = resume;
   identity.pid = getpid();
   Run run(arguments, place, options);
-  identity.Write(arguments.out);
+  identity.Write(place.out);
   return run.Play();
 }
 
 int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
   dmslam::CheckRunArguments(arguments);
   std::error_code error;
-  fs::create_directories(arguments.out, error);
-  const dmslam::RunLock lock(arguments.out);
+  fs::create_directories(arguments.output.folder, error);
+  const dmslam::RunLock lock(arguments.output.folder);
   dmslam::RunIdentity identity;
-  identity.session = dmslam::ChooseSession(arguments);
+  identity.session = dmslam::ChooseSession(arguments.map);
   identity.folder = fs::current_path().string();
   identity.arguments.assign(argv + 1, argv + argc);
   return Start(arguments, identity, std::nullopt);
@@ -247,7 +268,7 @@ int Resume(const std::string& folder) {
   if (line.Parse(static_cast<int>(words.size()), words.data()))
     throw dmslam::InputError(out +
                              "/run.json: its arguments are not those of this dmslam-run; begin it anew");
-  arguments.out = out;
+  arguments.output.folder = out;
   dmslam::CheckRunArguments(arguments);
   ++identity.resumed;
   return Start(arguments, identity, point);

@@ -194,8 +194,8 @@ TEST_F(ResumeTest, AFolderIsHeldByOneRun) {
 
 TEST_F(ResumeTest, ProcessesAreToldToGoOn) {
   RunArguments arguments;
-  arguments.sequence = arguments.out = out_;
-  arguments.frames = "100";
+  arguments.source.sequence = arguments.output.folder = out_;
+  arguments.source.frames = "100";
   RunPlace place;
   place.programs = "/bin";
   place.out = out_;
@@ -222,18 +222,18 @@ TEST_F(ResumeTest, ProcessesAreToldToGoOn) {
               child.name == "mapper")
         << always;
   }
-  arguments.sequence = "/dev/video0";
+  arguments.source.sequence = "/dev/video0";
   EXPECT_NE(line(MakeRunPlan(arguments, place).pipeline.back().arguments).find("--behind 41 "),
             std::string::npos)
       << "what a camera saw is not seen again";
-  arguments.sequence = out_;
+  arguments.source.sequence = out_;
   place.resume.reset();
   for (const ChildSpec& child : MakeRunPlan(arguments, place).pipeline) {
     EXPECT_EQ(line(child.first), "--fresh-system ");
     EXPECT_EQ(line(child.arguments).find("--behind"), std::string::npos);
   }
-  arguments.sequence.clear();
-  arguments.replay = "a.log";
+  arguments.source.sequence.clear();
+  arguments.source.replay = "a.log";
   place.resume = point;
   EXPECT_THROW(MakeRunPlan(arguments, place), InputError);
 }

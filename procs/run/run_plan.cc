@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <random>
-#include <regex>
 #include <sstream>
 
 #include "dmslam/recording/checkpoint.h"
@@ -43,63 +43,63 @@ void NeedTool(const std::string& program) {
   if (!InPath(program)) throw InputError(program + " is missing; install liblcm-bin (scripts/setup.sh core)");
 }
 
-std::string Url(const RunArguments& a, const RunPlace& place) {
-  return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + a.receive_buffer;
+std::string Url(const RunArguments::Bus& bus, const RunPlace& place) {
+  return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + bus.receive_buffer;
 }
 
 /// What all processes are told.
 Words CommonArguments(const RunArguments& a, const RunPlace& place) {
   Words common;
-  if (!a.profile.empty()) Append(&common, {"--set", "profile=" + a.profile});
-  AppendOption(&common, "--config", a.config);
-  for (const std::string& set : a.sets) Append(&common, {"--set", set});
-  if (a.no_loop) Append(&common, {"--set", "loop.enabled=off"});
-  AppendOption(&common, "--prefix", a.prefix);
-  AppendOption(&common, "--key", a.key);
-  if (!a.map.empty()) Append(&common, {"--set", "map.saved=on"});
-  if (a.localize) Append(&common, {"--set", "map.localize_only=on"});
-  Append(&common, {"--set", "seed=" + a.seed, "--lcm-url", Url(a, place), "--session",
-                   std::to_string(place.session == 0 ? ChooseSession(a) : place.session), "--peers",
+  if (!a.settings.profile.empty()) Append(&common, {"--set", "profile=" + a.settings.profile});
+  AppendOption(&common, "--config", a.settings.config);
+  for (const std::string& set : a.settings.sets) Append(&common, {"--set", set});
+  if (a.settings.no_loop) Append(&common, {"--set", "loop.enabled=off"});
+  AppendOption(&common, "--prefix", a.bus.prefix);
+  AppendOption(&common, "--key", a.bus.key);
+  if (!a.map.begin.empty()) Append(&common, {"--set", "map.saved=on"});
+  if (a.map.localize) Append(&common, {"--set", "map.localize_only=on"});
+  Append(&common, {"--set", "seed=" + a.settings.seed, "--lcm-url", Url(a.bus, place), "--session",
+                   std::to_string(place.session == 0 ? ChooseSession(a.map) : place.session), "--peers",
                    "frontend,mapper,loopcloser,collector"});
-  if (!a.replay.empty()) common.push_back("--accept-recorded");
+  if (!a.source.replay.empty()) common.push_back("--accept-recorded");
   return common;
 }
 
 /// How frames are changed: also of a copy of a log that is to be replayed.
 Words FrameArguments(const RunArguments& a) {
   Words words;
-  AppendOption(&words, "--start", a.start);
-  AppendOption(&words, "--frames", a.frames);
-  for (const std::string& text : a.black_outs) Append(&words, {"--black-out", text});
-  for (const std::string& text : a.jumps) Append(&words, {"--jump", text});
-  AppendOption(&words, "--camera", a.camera);
+  AppendOption(&words, "--start", a.source.start);
+  AppendOption(&words, "--frames", a.source.frames);
+  for (const std::string& text : a.source.black_outs) Append(&words, {"--black-out", text});
+  for (const std::string& text : a.source.jumps) Append(&words, {"--jump", text});
+  AppendOption(&words, "--camera", a.camera.file);
   return words;
 }
 
 Words PlayerArguments(const RunArguments& a) {
   Words words = FrameArguments(a);
-  AppendOption(&words, "--encoding", a.encoding);
-  if (a.fps > 0) Append(&words, {"--fps", std::to_string(a.fps)});
-  Append(&words, {"--speed", std::to_string(a.speed)});
-  if (a.lockstep) words.push_back("--lockstep");
+  AppendOption(&words, "--encoding", a.camera.encoding);
+  if (a.camera.fps > 0) Append(&words, {"--fps", std::to_string(a.camera.fps)});
+  Append(&words, {"--speed", std::to_string(a.pace.speed)});
+  if (a.pace.lockstep) words.push_back("--lockstep");
   return words;
 }
 
 /// One word of a shell.
 std::string Quoted(const std::string& word) {
   std::string quoted = "'";
-  quoted += std::regex_replace(word, std::regex("'"), "'\\''");
+  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
   return quoted += "'";
 }
 
 /// lcm-logplayer plays whole logs, as they are: for anything else it gets a copy.
 std::string LogToReplay(const RunArguments& a, const RunPlace& place) {
   const Words changes = FrameArguments(a);
-  if (changes.empty() && PrefixOfCamera(a.replay) == a.prefix) return a.replay;
+  if (changes.empty() && PrefixOfCamera(a.source.replay) == a.bus.prefix) return a.source.replay;
   const std::string copy = place.out + "/log/replayed.lcmlog";
   std::string command = Quoted(place.programs + "/dmslam-player");
   Words words = changes;
-  Append(&words, {"--prefix", a.prefix, "--log", a.replay, "--to-log", copy});
+  Append(&words, {"--prefix", a.bus.prefix, "--log", a.source.replay, "--to-log", copy});
   for (const std::string& word : words) command += " " + Quoted(word);
   command += " 2>" + Quoted(place.LogOf("player"));
   if (std::system(command.c_str()) != 0) throw InputError(LastWords("player", place.LogOf("player")));
@@ -115,7 +115,7 @@ ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPla
   if (place.resume) child.first.emplace_back("--resumed");
   child.output = child.errors = place.LogOf(name);
   child.pid_file = place.out + "/log/" + name + ".pid";
-  child.restart = !a.no_restart;
+  child.restart = !a.care.no_restart;
   return child;
 }
 
@@ -127,62 +127,22 @@ void GoOnBehind(const ResumePoint& point, bool camera, ChildSpec* player) {
   Append(&player->first, {"--lead", std::to_string(point.lead_s)});
 }
 
-ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, const Words& common) {
-  if (a.replay.empty()) {
-    Words words = common;
-    Append(&words, PlayerArguments(a));
-    Append(&words, a.log.empty() ? Words{"--sequence", a.sequence} : Words{"--log", a.log});
-    ChildSpec player = MakeChild("player", a, place, words);
-    if (place.resume) GoOnBehind(*place.resume, IsCamera(a.sequence), &player);
-    return player;
-  }
-  if (place.resume) {
-    throw InputError(
-        "--replay: lcm-logplayer cannot begin in the middle; begin the run anew, with --log it could "
-        "have been resumed");
-  }
-  NeedTool("lcm-logplayer");
-  LogReplay replay;
-  replay.log = LogToReplay(a, place);
-  replay.lcm_url = Url(a, place);
-  replay.speed = a.speed;
-  replay.port = place.port;
-  replay.frontend_pid_file = place.out + "/log/frontend.pid";
-  ChildSpec child = MakeChild("player", a, place, {});
-  child.body = [replay] { return PlayLog(replay); };
+ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, Words words) {
+  Append(&words, PlayerArguments(a));
+  Append(&words,
+         a.source.log.empty() ? Words{"--sequence", a.source.sequence} : Words{"--log", a.source.log});
+  ChildSpec player = MakeChild("player", a, place, std::move(words));
+  if (place.resume) GoOnBehind(*place.resume, IsCamera(a.source.sequence), &player);
+  return player;
+}
+
+/// A child that runs a program of somebody else's.
+ChildSpec MakeForeign(const std::string& name, const RunArguments& a, const RunPlace& place, Words command) {
+  NeedTool(command[0]);
+  ChildSpec child = MakeChild(name, a, place, {});
+  child.arguments = std::move(command);
+  child.first.clear();
   return child;
-}
-
-Words GroundTruth(const RunArguments& a) {
-  const std::string file = a.sequence + "/groundtruth.txt";
-  return !a.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
-}
-
-ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Words& common) {
-  Words words = common;
-  if (place.terminal) words.push_back("--quiet");
-  Append(&words, {"--out", a.out});
-  Append(&words, GroundTruth(a));
-  ChildSpec child = MakeChild("collector", a, place, words);
-  child.output = place.out + "/log/table.txt";
-  child.errors_to_ours = place.terminal;
-  return child;
-}
-
-ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
-  Words words = common;
-  if (a.pictures != "0") {
-    fs::create_directories(place.out + "/pictures");
-    Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.pictures});
-  }
-  return MakeChild("frontend", a, place, words);
-}
-
-ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
-  AppendOption(&words, "--map", a.map);
-  Append(&words, {"--checkpoint", CheckpointPath(place.out)});
-  AppendOption(&words, "--save-map", a.save_map);
-  return MakeChild("mapper", a, place, std::move(words));
 }
 
 ChildSpec MakeCompanion(ChildSpec child) {
@@ -192,33 +152,97 @@ ChildSpec MakeCompanion(ChildSpec child) {
   return child;
 }
 
+/// lcm-logplayer in the player's place: nobody would repeat what was played before the others listen.
+void PlanReplay(const RunArguments& a, const RunPlace& place, RunPlan* plan) {
+  if (place.resume) {
+    throw InputError(
+        "--replay: lcm-logplayer cannot begin in the middle; begin the run anew, with --log it could "
+        "have been resumed");
+  }
+  LogReplay replay;
+  replay.log = LogToReplay(a, place);
+  replay.lcm_url = Url(a.bus, place);
+  replay.speed = a.pace.speed;
+  ChildSpec player = MakeForeign("player", a, place, PlayCamera(replay));
+  for (const ChildSpec& listener : plan->pipeline) player.after.push_back(listener.name);
+  plan->pipeline.push_back(std::move(player));
+  plan->replay_end = MakeCompanion(MakeForeign("end of the sequence", a, place, PlayEnd(replay)));
+  plan->replay_end->output = plan->replay_end->errors = place.LogOf("player");
+}
+
+Words GroundTruth(const RunArguments::Source& source) {
+  const std::string file = source.sequence + "/groundtruth.txt";
+  return !source.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
+}
+
+ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Words& common) {
+  Words words = common;
+  if (place.terminal) words.push_back("--quiet");
+  Append(&words, {"--out", a.output.folder});
+  Append(&words, GroundTruth(a.source));
+  ChildSpec child = MakeChild("collector", a, place, words);
+  child.output = place.out + "/log/table.txt";
+  child.errors_to_ours = place.terminal;
+  return child;
+}
+
+ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
+  Words words = common;
+  if (a.output.pictures != "0") {
+    fs::create_directories(place.out + "/pictures");
+    Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.output.pictures});
+  }
+  return MakeChild("frontend", a, place, words);
+}
+
+ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
+  AppendOption(&words, "--map", a.map.begin);
+  Append(&words, {"--checkpoint", CheckpointPath(place.out)});
+  AppendOption(&words, "--save-map", a.map.save);
+  return MakeChild("mapper", a, place, std::move(words));
+}
+
 ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {
-  NeedTool("lcm-logger");
   std::string log = place.out + "/run.lcmlog";
   if (!place.resume) fs::remove(log);
   for (int i = 2; fs::exists(log); ++i) log = place.out + "/run." + std::to_string(i) + ".lcmlog";
-  ChildSpec child = MakeCompanion(MakeChild("logger", a, place, {}));
-  child.arguments = {"lcm-logger", "--quiet", "--lcm-url=" + Url(a, place), log};
+  ChildSpec child = MakeCompanion(
+      MakeForeign("logger", a, place, {"lcm-logger", "--quiet", "--lcm-url=" + Url(a.bus, place), log}));
   child.stop_signal = SIGINT;
   return child;
 }
 
 ChildSpec MakeViewer(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = common;
-  AppendOption(&words, "--http", a.http);
-  Append(&words, GroundTruth(a));
+  AppendOption(&words, "--http", a.output.http);
+  Append(&words, GroundTruth(a.source));
   return MakeCompanion(MakeChild("viewer", a, place, words));
 }
 
-std::string Matched(const std::string& line, const char* pattern, const char* with) {
-  return std::regex_replace(line, std::regex(pattern), with);
+/// A line of a log behind the time it begins with; none where it begins with none.
+std::optional<std::string> BehindTime(const std::string& line) {
+  const size_t end = line.find_first_not_of("0123456789:.");
+  if (end == 0 || end == std::string::npos || line[end] != ' ') return std::nullopt;
+  return line.substr(end + 1);
+}
+
+/// "mapper error: why" as "mapper: why"; none where the line is of no error.
+std::optional<std::string> ErrorIn(const std::string& line) {
+  for (const std::string level : {" error: ", " critical: "}) {
+    const size_t at = line.find(level);
+    if (at != std::string::npos) {
+      const std::string head = line.substr(0, at);
+      return BehindTime(head).value_or(head) + ": " + line.substr(at + level.size());
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
-uint32_t ChooseSession(const RunArguments& a) {
-  if (a.map.empty()) return 1 + RandomBelow(1u << 30);
-  return LogIndex(a.map).Session().id + 1;
+uint32_t ChooseSession(const RunArguments::MapFiles& map) {
+  if (map.begin.empty()) return 1 + RandomBelow(1u << 30);
+  return LogIndex(map.begin).Session().id + 1;
 }
 
 int FreePort() {
@@ -235,26 +259,34 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   RunPlan plan;
   plan.table = place.out + "/log/table.txt";
   plan.pipeline = {MakeMapper(a, place, common), MakeChild("loopcloser", a, place, common),
-                   MakeFrontend(a, place, common), MakeCollector(a, place, common),
-                   MakePlayer(a, place, common)};
-  if (a.record) plan.companions.push_back(MakeLogger(a, place));
-  if (a.viewer || !a.http.empty()) plan.companions.push_back(MakeViewer(a, place, common));
+                   MakeFrontend(a, place, common), MakeCollector(a, place, common)};
+  if (a.source.replay.empty()) {
+    plan.pipeline.push_back(MakePlayer(a, place, common));
+  } else {
+    PlanReplay(a, place, &plan);
+  }
+  if (a.output.record) plan.companions.push_back(MakeLogger(a, place));
+  if (a.output.WantsViewer()) {
+    plan.companions.push_back(MakeViewer(a, place, common));
+    for (ChildSpec& child : plan.pipeline)
+      child.after.push_back("viewer");  // it shows the run from its beginning
+  }
   return plan;
 }
 
 std::string LastWords(const std::string& name, const std::string& log) {
-  static const std::regex error(" (error|critical): "), event("^[0-9:.]+ ");
   std::ifstream lines(log);
-  std::string worst, first_bare, last;
+  std::optional<std::string> error, bare;
+  std::string last;
   for (std::string line; std::getline(lines, line);) {
     if (line.find_first_not_of(' ') == std::string::npos) continue;
-    if (std::regex_search(line, error)) worst = line;
-    if (first_bare.empty() && !std::regex_search(line, event)) first_bare = line;
-    last = line;
+    const std::optional<std::string> event = BehindTime(line);
+    if (const auto found = ErrorIn(line)) error = found;
+    if (!bare && !event) bare = line;
+    last = event.value_or(line);
   }
-  if (!worst.empty()) return Matched(Matched(worst, "^[0-9:.]* ", ""), " (error|critical): ", ": ");
-  if (!first_bare.empty()) return name + ": " + first_bare;
-  return Matched(last, "^[0-9:.]* ", "");
+  if (error) return *error;
+  return bare ? name + ": " + *bare : last;
 }
 
 }  // namespace dmslam

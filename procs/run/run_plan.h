@@ -13,9 +13,10 @@ namespace dmslam {
 
 /// Who is started for a run, and how.
 struct RunPlan {
-  std::vector<ChildSpec> pipeline;    ///< mapper, loop closer, frontend, collector, player: in this order
-  std::vector<ChildSpec> companions;  ///< logger, viewer: nobody waits for them
-  std::string table;                  ///< file with what the collector printed
+  std::vector<ChildSpec> pipeline;      ///< mapper, loop closer, frontend, collector, player: in this order
+  std::vector<ChildSpec> companions;    ///< logger, viewer: nobody waits for their end
+  std::optional<ChildSpec> replay_end;  ///< of a replay: plays the end of the sequence again
+  std::string table;                    ///< file with what the collector printed
 };
 
 /// Where a run writes, and where its programs are.
@@ -33,7 +34,7 @@ struct RunPlace {
 RunPlan MakeRunPlan(const RunArguments& arguments, const RunPlace& place);
 
 /// Ids of a run come after those of the map that it begins in. Throws InputError.
-uint32_t ChooseSession(const RunArguments& arguments);
+uint32_t ChooseSession(const RunArguments::MapFiles& map);
 
 /// A port between 20000 and 49999 that nobody on this host is bound to.
 int FreePort();

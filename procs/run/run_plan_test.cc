@@ -20,8 +20,8 @@ class RunPlanTest : public testing::Test {
   RunPlanTest() : folder_(testing::TempDir() + "/dmslam_run_" + std::to_string(getpid())) {
     fs::create_directories(folder_ + "/sequence");
     fs::create_directories(folder_ + "/log");
-    arguments_.sequence = folder_ + "/sequence";
-    arguments_.out = place_.out = folder_;
+    arguments_.source.sequence = folder_ + "/sequence";
+    arguments_.output.folder = place_.out = folder_;
     place_.programs = "/bin";
     place_.port = 20001;
   }
@@ -55,51 +55,51 @@ class RunPlanTest : public testing::Test {
 
 TEST_F(RunPlanTest, RefusesWhatDoesNotFit) {
   EXPECT_EQ(Refusal(), "");
-  arguments_.log = "there.log";
+  arguments_.source.log = "there.log";
   EXPECT_NE(Refusal().find("one of"), std::string::npos);
-  arguments_.log.clear();
-  arguments_.localize = true;
+  arguments_.source.log.clear();
+  arguments_.map.localize = true;
   EXPECT_NE(Refusal().find("--localize needs a map"), std::string::npos);
-  arguments_.localize = false;
-  arguments_.seed = "many";
+  arguments_.map.localize = false;
+  arguments_.settings.seed = "many";
   EXPECT_NE(Refusal().find("whole number"), std::string::npos);
-  arguments_.seed = "1";
-  arguments_.port = "80";
+  arguments_.settings.seed = "1";
+  arguments_.bus.port = "80";
   EXPECT_NE(Refusal().find("between 1024 and 65535"), std::string::npos);
-  arguments_.port.clear();
-  arguments_.sequence = "/nowhere/at/all";
+  arguments_.bus.port.clear();
+  arguments_.source.sequence = "/nowhere/at/all";
   EXPECT_NE(Refusal().find("no such folder"), std::string::npos);
-  arguments_.sequence = "/dev/video77";
+  arguments_.source.sequence = "/dev/video77";
   EXPECT_EQ(Refusal(), "") << "a camera may come later";
 }
 
 TEST_F(RunPlanTest, HandsTheKeyToAllOnceItIsSafe) {
   unsetenv("DMSLAM_KEY_FILE");
-  arguments_.key = folder_ + "/key";
-  std::ofstream(arguments_.key) << std::string(40, 'k');
-  fs::permissions(arguments_.key, fs::perms::owner_read | fs::perms::group_read);
-  EXPECT_NE(Refusal().find("chmod 600 " + arguments_.key), std::string::npos) << Refusal();
-  fs::permissions(arguments_.key, fs::perms::owner_read | fs::perms::owner_write);
+  arguments_.bus.key = folder_ + "/key";
+  std::ofstream(arguments_.bus.key) << std::string(40, 'k');
+  fs::permissions(arguments_.bus.key, fs::perms::owner_read | fs::perms::group_read);
+  EXPECT_NE(Refusal().find("chmod 600 " + arguments_.bus.key), std::string::npos) << Refusal();
+  fs::permissions(arguments_.bus.key, fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_EQ(Refusal(), "");
   for (const char* name : {"mapper", "loopcloser", "frontend", "collector", "player"})
-    EXPECT_NE(Line(name).find("--key " + arguments_.key), std::string::npos) << name;
+    EXPECT_NE(Line(name).find("--key " + arguments_.bus.key), std::string::npos) << name;
   std::ofstream(folder_ + "/some.lcmlog") << "log";
-  arguments_.sequence.clear();
-  arguments_.replay = folder_ + "/some.lcmlog";
+  arguments_.source.sequence.clear();
+  arguments_.source.replay = folder_ + "/some.lcmlog";
   EXPECT_NE(Refusal().find("lcm-logplayer, which has no key; --log"), std::string::npos) << Refusal();
-  setenv("DMSLAM_KEY_FILE", arguments_.key.c_str(), 1);
-  arguments_.key.clear();
+  setenv("DMSLAM_KEY_FILE", arguments_.bus.key.c_str(), 1);
+  arguments_.bus.key.clear();
   EXPECT_NE(Refusal().find("no key"), std::string::npos) << "the environment counts as well";
   unsetenv("DMSLAM_KEY_FILE");
 }
 
 TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
-  arguments_.sets = {"features.count=1200"};
-  arguments_.no_loop = arguments_.lockstep = true;
-  arguments_.profile = "baseline";
-  arguments_.black_outs = {"10,1"};
-  arguments_.save_map = "map.log";
-  std::ofstream(arguments_.sequence + "/groundtruth.txt") << "# none\n";
+  arguments_.settings.sets = {"features.count=1200"};
+  arguments_.settings.no_loop = arguments_.pace.lockstep = true;
+  arguments_.settings.profile = "baseline";
+  arguments_.source.black_outs = {"10,1"};
+  arguments_.map.save = "map.log";
+  std::ofstream(arguments_.source.sequence + "/groundtruth.txt") << "# none\n";
   std::string session;
   for (const char* name : {"mapper", "loopcloser", "frontend", "collector", "player"}) {
     const std::string line = Line(name);
@@ -117,11 +117,11 @@ TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
   EXPECT_EQ(Line("frontend").find("--lockstep"), std::string::npos);
 }
 
-TEST_F(RunPlanTest, FindsSocketsOnAPort) {
+TEST_F(RunPlanTest, SeesWhetherAPortIsTaken) {
   std::ofstream(folder_ + "/udp")
       << "   sl  local_address rem_address\n"
          "  12: 00000000:4E21 00000000:0000 07\n  13: 00000000:4E21 0100007F:4E22 07\n";
-  EXPECT_EQ(SocketsOn(0x4e21, folder_), 2);
+  EXPECT_TRUE(PortTaken(0x4e21, folder_));
   EXPECT_FALSE(PortTaken(0x4e22, folder_)) << "a peer's port is not ours";
 }
 

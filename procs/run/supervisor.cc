@@ -17,6 +17,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -62,8 +63,13 @@ int OpenNoticeSocket(std::string* address) {
   return fd;
 }
 
-/// The sender of the next notice; 0: there is none.
-pid_t NextNotice(int fd) {
+struct Notice {
+  pid_t sender = 0;
+  std::string text;  ///< lines of KEY=VALUE
+};
+
+/// The next one; none: there is none. Without a sender: the kernel did not say who.
+std::optional<Notice> NextNotice(int fd) {
   char text[256], control[CMSG_SPACE(sizeof(ucred))];
   iovec part{text, sizeof(text)};
   msghdr message{};
@@ -71,14 +77,26 @@ pid_t NextNotice(int fd) {
   message.msg_iovlen = 1;
   message.msg_control = control;
   message.msg_controllen = sizeof(control);
-  if (recvmsg(fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC) < 0) return 0;
+  const ssize_t size = recvmsg(fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+  if (size < 0) return std::nullopt;
+  Notice notice;
+  notice.text.assign(text, static_cast<size_t>(size));
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_CREDENTIALS) continue;
     ucred sender{};
     std::memcpy(&sender, CMSG_DATA(c), sizeof(sender));
-    return sender.pid;
+    notice.sender = sender.pid;
   }
-  return -1;
+  return notice;
+}
+
+/// What a notice says of KEY; none where it does not name it.
+std::optional<std::string> ValueOf(const std::string& notice, const std::string& key) {
+  std::istringstream lines(notice);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with(key + "=")) return line.substr(key.size() + 1);
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -96,7 +114,7 @@ Supervisor::Supervisor(Options options) : options_(options) {
   pthread_sigmask(SIG_BLOCK, &signals, &former_mask_);
   signal_fd_ = signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC);
   DMSLAM_CHECK(signal_fd_ >= 0, "signalfd is part of every Linux");
-  if (options_.watchdog_ns > 0) notice_fd_ = OpenNoticeSocket(&notice_address_);
+  notice_fd_ = OpenNoticeSocket(&notice_address_);
 }
 
 Supervisor::~Supervisor() {
@@ -112,15 +130,26 @@ Supervisor::~Supervisor() {
 }
 
 void Supervisor::Start(ChildSpec spec) {
+  std::erase_if(children_, [&](const Child& child) {
+    return child.spec.name == spec.name && child.pid == 0 && child.due_ns == INT64_MAX && !child.waits;
+  });
   children_.emplace_back();
   children_.back().spec = std::move(spec);
-  Launch(&children_.back());
+  if (MayBegin(children_.back())) Launch(&children_.back());
+}
+
+bool Supervisor::MayBegin(const Child& child) const {
+  const auto is_ready = [this](const std::string& name) {
+    return std::any_of(children_.begin(), children_.end(),
+                       [&](const Child& other) { return other.spec.name == name && other.ready; });
+  };
+  return std::all_of(child.spec.after.begin(), child.spec.after.end(), is_ready);
 }
 
 void Supervisor::Launch(Child* child) {
   child->due_ns = INT64_MAX;
   child->heard_ns.reset();
-  child->hung = false;
+  child->waits = child->hung = false;
   const int output = OpenForChild(child->spec.output);
   const int errors = child->spec.errors_to_ours ? dup(STDERR_FILENO) : OpenForChild(child->spec.errors);
   const pid_t parent = getpid();
@@ -146,9 +175,8 @@ void Supervisor::BecomeChild(const Child& child, int output, int errors) {
   dup2(nothing, STDIN_FILENO);
   dup2(output, STDOUT_FILENO);
   dup2(errors, STDERR_FILENO);
-  if (child.spec.body) _exit(child.spec.body());
-  if (notice_fd_ >= 0) {
-    setenv("NOTIFY_SOCKET", notice_address_.c_str(), 1);
+  if (notice_fd_ >= 0) setenv("NOTIFY_SOCKET", notice_address_.c_str(), 1);
+  if (notice_fd_ >= 0 && options_.watchdog_ns > 0) {
     setenv("WATCHDOG_USEC", std::to_string(options_.watchdog_ns / 1000).c_str(), 1);
   }
   std::vector<char*> arguments;
@@ -179,6 +207,7 @@ void Supervisor::OnDeath(Child* child, int code) {
   event.code = code;
   event.hung = child->hung;
   child->pid = 0;
+  child->ready = false;
   const std::optional<int64_t> delay_ns = DelayBeforeRestart(child, code);
   event.kind = delay_ns ? ChildEvent::Kind::kRestarted : ChildEvent::Kind::kEnded;
   event.yields = code == kExitPresent && child->last_code == kExitSuperseded;
@@ -217,22 +246,31 @@ std::optional<int64_t> Supervisor::DelayBeforeRestart(Child* child, int code) {
 void Supervisor::StartDue() {
   const int64_t now = now_ns();
   for (Child& child : children_) {
-    if (child.due_ns <= now) Launch(&child);
+    if (child.due_ns <= now || (child.waits && MayBegin(child))) Launch(&child);
   }
 }
 
 void Supervisor::HearNotices() {
   if (notice_fd_ < 0) return;
-  const int64_t now = now_ns();
-  for (pid_t sender = NextNotice(notice_fd_); sender != 0; sender = NextNotice(notice_fd_)) {
-    for (Child& child : children_) {
-      if (child.pid > 0 && child.pid == sender) child.heard_ns = now;
-    }
-  }
+  while (const std::optional<Notice> notice = NextNotice(notice_fd_)) OnNotice(notice->sender, notice->text);
+}
+
+void Supervisor::OnNotice(pid_t sender, const std::string& text) {
+  const auto child = std::find_if(children_.begin(), children_.end(),
+                                  [&](const Child& c) { return c.pid > 0 && c.pid == sender; });
+  if (child == children_.end()) return;
+  child->heard_ns = now_ns();
+  if (ValueOf(text, "READY") != "1") return;
+  child->ready = true;
+  ChildEvent event;
+  event.kind = ChildEvent::Kind::kReady;
+  event.name = child->spec.name;
+  event.text = ValueOf(text, "STATUS").value_or("");
+  events_.push_back(std::move(event));
 }
 
 void Supervisor::KillHung() {
-  if (notice_fd_ < 0) return;
+  if (options_.watchdog_ns <= 0) return;
   const int64_t now = now_ns();
   for (Child& child : children_) {
     const bool silent = child.heard_ns && now - *child.heard_ns > options_.watchdog_ns;
@@ -257,7 +295,7 @@ int64_t Supervisor::NextDeadline() const {
   int64_t deadline = INT64_MAX;
   for (const Child& child : children_) {
     deadline = std::min(deadline, child.due_ns);
-    const bool watched = child.pid > 0 && child.heard_ns && !child.hung;
+    const bool watched = options_.watchdog_ns > 0 && child.pid > 0 && child.heard_ns && !child.hung;
     if (watched) deadline = std::min(deadline, *child.heard_ns + options_.watchdog_ns + 1);
   }
   return deadline;
@@ -270,8 +308,8 @@ void Supervisor::Poll(int64_t deadline_ns) {
   const timespec timeout{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
   ppoll(fds, 2, until_ns == INT64_MAX ? nullptr : &timeout, nullptr);
   TakeSignals();
+  HearNotices();  // who has just died may have said something before
   Reap();
-  HearNotices();
   KillHung();
   StartDue();
 }
@@ -288,7 +326,10 @@ ChildEvent Supervisor::Wait(int64_t deadline_ns) {
 
 void Supervisor::StopRestarting() {
   restarting_ = false;
-  for (Child& child : children_) child.due_ns = INT64_MAX;
+  for (Child& child : children_) {
+    child.due_ns = INT64_MAX;
+    child.waits = false;
+  }
 }
 
 void Supervisor::StopAll() {
@@ -314,7 +355,7 @@ bool Supervisor::Alive(const std::string& name) const { return PidOf(name) > 0; 
 
 size_t Supervisor::size() const {
   return static_cast<size_t>(std::count_if(children_.begin(), children_.end(), [](const Child& child) {
-    return child.pid > 0 || child.due_ns != INT64_MAX;
+    return child.pid > 0 || child.due_ns != INT64_MAX || child.waits;
   }));
 }
 

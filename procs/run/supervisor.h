@@ -5,7 +5,6 @@
 #include <csignal>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <list>
 #include <optional>
 #include <string>
@@ -18,7 +17,7 @@ struct ChildSpec {
   std::string name;                    ///< "mapper"
   std::vector<std::string> arguments;  ///< the program's path first
   std::vector<std::string> first;      ///< only at its first start, behind the others
-  std::function<int()> body;           ///< instead of a program: called in a process of its own
+  std::vector<std::string> after;      ///< first started when these have said that they are ready
   std::string output, errors;          ///< files that standard output and standard error are appended to
   bool errors_to_ours = false;         ///< standard error is the supervisor's own
   std::string pid_file;                ///< holds its process id; empty: none
@@ -29,6 +28,7 @@ struct ChildSpec {
 /// What became of a child, or who spoke to the supervisor.
 struct ChildEvent {
   enum class Kind : uint8_t {
+    kReady,      ///< said so (sd_notify); `text` is the status it gave with it
     kEnded,      ///< and stays so
     kRestarted,  ///< died, and is started again after `delay_ns`
     kSignal,     ///< the supervisor itself was asked to stop; `code` is the signal
@@ -36,6 +36,7 @@ struct ChildEvent {
   };
   Kind kind = Kind::kTime;
   std::string name;
+  std::string text;
   int code = 0;         ///< exit code, or 128 + signal
   int restarts = 0;     ///< of this child so far
   bool hung = false;    ///< it said nothing for too long, and was killed
@@ -67,7 +68,8 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Starts it. Throws InputError where no process can be made.
+  /// Starts it, once those it is to come after are ready; an ended child of the same name is forgotten.
+  /// Throws InputError where no process can be made.
   void Start(ChildSpec spec);
   /// The next event; kTime when `deadline_ns` (of the monotonic clock) comes before.
   ChildEvent Wait(int64_t deadline_ns = INT64_MAX);
@@ -77,7 +79,7 @@ class Supervisor {
   void StopAll();
 
   bool Alive(const std::string& name) const;
-  /// Of those alive or about to be started again.
+  /// Of those alive or about to be started.
   size_t size() const;
   /// 0 where it is not alive.
   pid_t PidOf(const std::string& name) const;
@@ -92,9 +94,12 @@ class Supervisor {
     std::optional<int64_t> heard_ns;          // when it last said that it is alive
     std::optional<int64_t> missing_since_ns;  // since when bus or camera cannot be had
     int restarts = 0, short_lives = 0, last_code = 0;
+    bool waits = true;   // has never been started
+    bool ready = false;  // its newest life has said so
     bool lived = false;  // long enough to be worth patience
     bool hung = false;
   };
+  bool MayBegin(const Child& child) const;
   void Launch(Child* child);
   [[noreturn]] void BecomeChild(const Child& child, int output, int errors);
   void Reap();
@@ -102,6 +107,7 @@ class Supervisor {
   std::optional<int64_t> DelayBeforeRestart(Child* child, int code);
   void StartDue();
   void HearNotices();
+  void OnNotice(pid_t sender, const std::string& text);
   void KillHung();
   void TakeSignals();
   void Poll(int64_t deadline_ns);

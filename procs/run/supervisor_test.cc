@@ -1,16 +1,17 @@
 #include "run/supervisor.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <random>
-#include <thread>
 
 #include "dmslam/runtime/exit_codes.h"
 
@@ -30,6 +31,15 @@ ChildSpec Program(const std::string& name, std::vector<std::string> arguments) {
 ChildSpec Sleeper(const std::string& name) { return Program(name, {"sleep", "1000"}); }
 ChildSpec Shell(const std::string& name, const std::string& script) {
   return Program(name, {"sh", "-c", script});
+}
+/// A program that can talk to who started it: notify("READY=1").
+ChildSpec Python(const std::string& name, const std::string& script) {
+  return Program(name, {"python3", "-c",
+                        "import os, signal, socket\n"
+                        "def notify(text):\n"
+                        "  s = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)\n"
+                        "  s.sendto(text.encode(), '\\0' + os.environ['NOTIFY_SOCKET'][1:])\n" +
+                            script});
 }
 
 Supervisor::Options Eager() {
@@ -165,12 +175,7 @@ TEST(SupervisorTest, KillsWhoHangsAndStartsItAgain) {
   options.watchdog_ns = 200'000'000;
   Supervisor supervisor(options);
   supervisor.Start(Sleeper("silent"));  // has never spoken: nobody expects it to
-  // Says that it is alive once, and then hangs.
-  supervisor.Start(Program("hangs", {"python3", "-c",
-                                     "import os, socket, time\n"
-                                     "s = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)\n"
-                                     "s.sendto(b'WATCHDOG=1', '\\0' + os.environ['NOTIFY_SOCKET'][1:])\n"
-                                     "time.sleep(1000)"}));
+  supervisor.Start(Python("hangs", "notify('WATCHDOG=1')\nsignal.pause()\n"));
   const ChildEvent event = supervisor.Wait(Supervisor::now_ns() + 20 * kSecondNs);
   EXPECT_EQ(event.kind, Kind::kRestarted);
   EXPECT_EQ(event.name, "hangs");
@@ -183,9 +188,15 @@ TEST(SupervisorTest, StopsAllAndKillsWhoDoesNotListen) {
   options.stop_ns = 300'000'000;
   Supervisor supervisor(options);
   supervisor.Start(Sleeper("willing"));
-  supervisor.Start(Shell("deaf", "trap '' TERM; while :; do sleep 0.05; done"));
+  supervisor.Start(Python("deaf",
+                          "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+                          "notify('READY=1\\nSTATUS=hears nothing')\n"
+                          "while True: signal.pause()\n"));
   supervisor.Start(Sleeper("stopped"));
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  const ChildEvent ready = supervisor.Wait(Supervisor::now_ns() + 20 * kSecondNs);
+  ASSERT_EQ(ready.kind, Kind::kReady);
+  EXPECT_EQ(ready.name, "deaf");
+  EXPECT_EQ(ready.text, "hears nothing");
   kill(supervisor.PidOf("stopped"), SIGSTOP);
   const int64_t began = Supervisor::now_ns();
   supervisor.StopAll();
@@ -203,33 +214,58 @@ TEST(SupervisorTest, ReportsWhoAsksItToStop) {
 }
 
 TEST(SupervisorTest, ItsChildrenEndWithIt) {
-  const std::string file = testing::TempDir() + "/dmslam_orphan_" + std::to_string(getpid());
+  int channel[2];
+  ASSERT_EQ(pipe2(channel, O_CLOEXEC), 0);
   const pid_t runner = fork();
   if (runner == 0) {
     Supervisor supervisor(Eager());
-    ChildSpec child = Sleeper("child");
-    child.pid_file = file;
-    supervisor.Start(child);
-    std::ofstream(file + ".ready") << "yes";
+    supervisor.Start(Sleeper("child"));
+    const pid_t child = supervisor.PidOf("child");
+    (void)!write(channel[1], &child, sizeof(child));
     supervisor.Wait();
     _exit(0);
   }
-  while (!std::filesystem::exists(file + ".ready")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
   pid_t child = 0;
-  std::ifstream(file) >> child;
-  ASSERT_GT(child, 0);
+  ASSERT_EQ(read(channel[0], &child, sizeof(child)), static_cast<ssize_t>(sizeof(child)));
+  const int child_fd = static_cast<int>(syscall(SYS_pidfd_open, child, 0));
+  ASSERT_GE(child_fd, 0);
   kill(runner, SIGKILL);
   waitpid(runner, nullptr, 0);
-  const auto gone = [&] {
-    std::ifstream stat("/proc/" + std::to_string(child) + "/stat");
-    std::string id, name, state;
-    return !(stat >> id >> name >> state) || state == "Z";
-  };
-  for (int i = 0; i < 400 && !gone(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  EXPECT_TRUE(gone());
-  std::filesystem::remove(file);
-  std::filesystem::remove(file + ".ready");
+  pollfd end{child_fd, POLLIN, 0};
+  EXPECT_EQ(poll(&end, 1, 10'000), 1) << "it lives on";
+  for (const int fd : {child_fd, channel[0], channel[1]}) close(fd);
+}
+
+TEST(SupervisorTest, StartsWhoComesAfterOthersWhenAllAreReady) {
+  Supervisor supervisor(Eager());
+  supervisor.Start(Python("mapper", "notify('READY=1')\nsignal.pause()\n"));
+  ChildSpec player = Sleeper("player");
+  player.after = {"mapper", "frontend"};
+  supervisor.Start(player);
+  EXPECT_EQ(supervisor.Wait(Supervisor::now_ns() + 20 * kSecondNs).kind, Kind::kReady);
+  EXPECT_FALSE(supervisor.Alive("player")) << "there is no frontend yet";
+  EXPECT_EQ(supervisor.size(), 2u);
+  supervisor.Start(Python("frontend", "notify('READY=1')\nsignal.pause()\n"));
+  EXPECT_EQ(supervisor.Wait(Supervisor::now_ns() + 20 * kSecondNs).name, "frontend");
+  EXPECT_TRUE(supervisor.Alive("player"));
+}
+
+TEST(SupervisorTest, WhoStillWaitsForOthersIsNotStartedWhenAllAreStopped) {
+  Supervisor supervisor(Eager());
+  ChildSpec player = Sleeper("player");
+  player.after = {"mapper"};
+  supervisor.Start(player);
+  EXPECT_EQ(supervisor.size(), 1u);
+  supervisor.StopAll();
+  EXPECT_EQ(supervisor.size(), 0u);
+}
+
+TEST(SupervisorTest, ANameCanBeGivenAgainAfterItsEnd) {
+  Supervisor supervisor(Eager());
+  supervisor.Start(Shell("child", "exit 0"));
+  EXPECT_EQ(supervisor.Wait().kind, Kind::kEnded);
+  supervisor.Start(Sleeper("child"));
+  EXPECT_TRUE(supervisor.Alive("child"));
 }
 
 TEST(SupervisorTest, AFolderThatWasRemovedIsMadeAgain) {

@@ -61,6 +61,7 @@ std::shared_ptr<EventHub::Listener> EventHub::Join() {
   auto listener = std::make_shared<Listener>();
   for (size_t kind = 0; kind < kNumEventKinds; ++kind) listener->waiting_[kind] = newest_[kind];
   listeners_.push_back(listener);
+  joined_or_left_.notify_all();
   return listener;
 }
 
@@ -70,6 +71,7 @@ void EventHub::Leave(const std::shared_ptr<Listener>& listener) {
   if (it == listeners_.end()) return;
   skipped_by_former_ += listener->skipped();
   listeners_.erase(it);
+  joined_or_left_.notify_all();
 }
 
 void EventHub::Send(EventKind kind, const std::string& json) {
@@ -97,6 +99,11 @@ void EventHub::Close() {
 size_t EventHub::num_listeners() const {
   const std::lock_guard lock(mutex_);
   return listeners_.size();
+}
+
+bool EventHub::WaitForListeners(size_t count, std::chrono::milliseconds patience) const {
+  std::unique_lock lock(mutex_);
+  return joined_or_left_.wait_for(lock, patience, [&] { return listeners_.size() == count; });
 }
 
 int64_t EventHub::skipped() const {

@@ -53,6 +53,8 @@ class EventHub {
   void Send(EventKind kind, const std::string& json);
   void Close();
   size_t num_listeners() const;
+  /// Whether there are so many listeners, or will be within `patience`.
+  bool WaitForListeners(size_t count, std::chrono::milliseconds patience) const;
   int64_t skipped() const;  ///< by all listeners, those that have left too
 
   static constexpr size_t kMostListeners = 64;
@@ -61,6 +63,7 @@ class EventHub {
   static void Put(Listener* listener, size_t kind, const std::shared_ptr<const std::string>& text);
 
   mutable std::mutex mutex_;
+  mutable std::condition_variable joined_or_left_;
   std::vector<std::shared_ptr<Listener>> listeners_;
   std::array<std::shared_ptr<const std::string>, kNumEventKinds> newest_;
   int fd_;

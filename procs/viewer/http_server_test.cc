@@ -14,6 +14,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr size_t kLargeBytes = 64 << 20;
+
 /// A raw connection.
 class Client {
  public:
@@ -47,16 +49,23 @@ class Client {
     return heard;
   }
   /// Whether the other side has closed, or does within four seconds.
-  bool Closed() const {
+  bool Closed() {
+    ReadAll();
+    return closed_;
+  }
+  /// The bytes that come until the other side closes, or says nothing for four seconds.
+  size_t ReadAll() {
     char buffer[65536];
+    size_t bytes = 0;
     ssize_t got = 0;
-    while ((got = recv(fd_, buffer, sizeof(buffer), 0)) > 0) {
-    }
-    return got == 0 || errno == ECONNRESET;
+    while ((got = recv(fd_, buffer, sizeof(buffer), 0)) > 0) bytes += static_cast<size_t>(got);
+    closed_ = got == 0 || errno == ECONNRESET;
+    return bytes;
   }
 
  private:
   int fd_;
+  bool closed_ = false;
   bool connected_ = false;
 };
 
@@ -75,7 +84,7 @@ class HttpServerTest : public testing::Test {
     server_ = std::make_unique<HttpServer>(options_, &hub_, [](const HttpRequest& request) {
       HttpResponse response;
       response.type = "text/plain";
-      response.body = request.path == "/large" ? std::string(64 << 20, 'x') : "here is " + request.path;
+      response.body = request.path == "/large" ? std::string(kLargeBytes, 'x') : "here is " + request.path;
       response.events = request.path == "/events";
       return response;
     });
@@ -83,7 +92,7 @@ class HttpServerTest : public testing::Test {
   }
   /// Whether somebody who comes now is served.
   bool Serves() const {
-    const Client client(server_->port());
+    Client client(server_->port());
     return client.Say("GET /page HTTP/1.1\r\nHost: a\r\n\r\n") &&
            client.Hear("here is /page").find("200 OK") != std::string::npos;
   }
@@ -95,14 +104,14 @@ class HttpServerTest : public testing::Test {
 
 TEST_F(HttpServerTest, ServesOneRequestAfterTheOther) {
   Begin();
-  const Client client(server_->port());
+  Client client(server_->port());
   ASSERT_TRUE(client.Say("GET /a HTTP/1.1\r\nHost: a\r\n\r\nGET /b HTTP/1.1\r\nHost: a\r\n\r\n"));
   EXPECT_NE(client.Hear("here is /b").find("here is /a"), std::string::npos);
 }
 
 TEST_F(HttpServerTest, AnEndlessBodyIsNotTaken) {
   Begin();
-  const Client client(server_->port());
+  Client client(server_->port());
   client.Say("POST /a HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n");
   int sent = 0;
   while (sent < 1000 && client.Say("1000\r\n" + std::string(4096, 'x') + "\r\n")) ++sent;
@@ -112,7 +121,7 @@ TEST_F(HttpServerTest, AnEndlessBodyIsNotTaken) {
 
 TEST_F(HttpServerTest, EndlessHeadersAreNotTaken) {
   Begin();
-  const Client client(server_->port());
+  Client client(server_->port());
   client.Say("GET /a HTTP/1.1\r\nHost: a\r\n");
   for (int i = 0; i < 20000 && client.Say("X-" + std::to_string(i) + ": y\r\n"); ++i) {
   }
@@ -135,7 +144,7 @@ TEST_F(HttpServerTest, SlowConnectionsShutNobodyOut) {
 
 TEST_F(HttpServerTest, WhoSaysNothingIsDropped) {
   Begin();
-  const Client idle(server_->port());
+  Client idle(server_->port());
   ASSERT_TRUE(idle.connected());
   EXPECT_TRUE(idle.Closed());
 }
@@ -148,23 +157,18 @@ TEST_F(HttpServerTest, WhoDoesNotReadIsDroppedAndShutsNobodyOut) {
     stalled.push_back(std::make_unique<Client>(server_->port(), 4096));
     stalled.back()->Say("GET /events HTTP/1.1\r\nHost: a\r\n\r\n");
   }
-  const std::string event(200'000, 'x');
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (hub_.num_listeners() < EventHub::kMostListeners && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(milliseconds(10));
+  for (const auto& client : stalled) client->Hear("\r\n\r\n");
   EXPECT_EQ(hub_.num_listeners(), EventHub::kMostListeners);
-  while (hub_.num_listeners() > 0 && std::chrono::steady_clock::now() < deadline) {
-    hub_.Send(EventKind::kPose, event);
-    std::this_thread::sleep_for(milliseconds(50));
-  }
-  EXPECT_EQ(hub_.num_listeners(), 0u);
+  hub_.Send(EventKind::kPose, std::string(200'000, 'x'));  // more than all buffers hold
+  EXPECT_TRUE(hub_.WaitForListeners(0, std::chrono::seconds(10)));
   const Client reader(server_->port());
   reader.Say("GET /events HTTP/1.1\r\nHost: a\r\n\r\n");
   EXPECT_NE(reader.Hear("event: pose").find("200 OK"), std::string::npos);
-  const Client large(server_->port(), 4096);
+  Client large(server_->port(), 4096);
   large.Say("GET /large HTTP/1.1\r\nHost: a\r\n\r\n");
-  std::this_thread::sleep_for(milliseconds(1200));
   EXPECT_TRUE(Serves());
+  EXPECT_TRUE(Client(server_->port()).Closed()) << "its time is longer than that of who does not read";
+  EXPECT_LT(large.ReadAll(), kLargeBytes);
 }
 
 TEST_F(HttpServerTest, AStreamLastsAsLongAsItIsRead) {
@@ -172,7 +176,9 @@ TEST_F(HttpServerTest, AStreamLastsAsLongAsItIsRead) {
   const Client reader(server_->port());
   reader.Say("GET /events HTTP/1.1\r\nHost: a\r\n\r\n");
   EXPECT_NE(reader.Hear(":\n\n:\n\n").find("text/event-stream"), std::string::npos);
-  std::this_thread::sleep_for(milliseconds(900));
+  std::string beats;
+  for (int i = 0; i < 9; ++i) beats += ":\n\n";  // longer than a connection may be idle
+  EXPECT_NE(reader.Hear(beats).find(beats), std::string::npos);
   hub_.Send(EventKind::kMap, "7");
   EXPECT_NE(reader.Hear("data: 7").find("event: map"), std::string::npos);
   EXPECT_EQ(hub_.num_listeners(), 1u);

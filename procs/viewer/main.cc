@@ -17,13 +17,14 @@ class ServedViewer : public dmslam::Node {
   ServedViewer(dmslam::NodeContext context, dmslam::NodeOptions options, const dmslam::ViewerOptions& viewer,
                const dmslam::WebServerOptions& web)
       : node_(std::move(context), std::move(options), viewer, &exchange_), server_(web, &exchange_) {
-    dmslam::LogInfo("to be seen at {}", server_.address());
+    dmslam::LogInfo("{}", ready_text());
   }
   void Advance() override { node_.Advance(); }
   int64_t deadline_ns() const override { return node_.deadline_ns(); }
   void Stop() override { node_.Stop(); }
   std::optional<int> exit_code() const override { return node_.exit_code(); }
   std::string problem() const override { return node_.problem(); }
+  std::string ready_text() const override { return "to be seen at " + server_.address(); }
 
  private:
   dmslam::Exchange exchange_;

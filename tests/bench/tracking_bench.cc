@@ -46,7 +46,8 @@ std::vector<Series> Measure(const std::vector<testing::TrueFrame>& frames, int n
   const auto orb = cv::ORB::create(kOrbFeatures);
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
-  const std::string of = "/" + std::to_string(num_features);
+  std::string of = "/";
+  of += std::to_string(num_features);
   Series frontend{"FrontendStep" + of, {}}, orb_times{"CvOrbBeside" + of, {}},
       landmarks{"KeyframeToLandmarks" + of, {}}, adjusted{"KeyframeToAdjusted" + of, {}},
       check{"LoopCheck" + of, {}}, replica{"ReplicaUpdateOfKeyframe" + of, {}},

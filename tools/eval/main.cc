@@ -1,7 +1,6 @@
 // dmslam-eval: the errors of a trajectory against its ground truth.
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -179,14 +178,9 @@ int main(int argc, char** argv) {
       "dmslam-eval");
   dmslam::Arguments arguments;
   dmslam::Declare(&app, &arguments);
-  if (const auto code = app.Parse(argc, argv)) return *code;
-  try {
+  return app.Run(argc, argv, [&] {
     dmslam::Run(arguments);
     std::cout.flush();
     if (!std::cout) throw dmslam::InputError("the standard output cannot be written; is its disk full?");
-  } catch (const std::exception& error) {
-    std::cerr << "dmslam-eval: " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -82,47 +82,48 @@ void AddPairs(const cv::Mat& image, Random* random, OrbExtractor* extractor, std
   }
 }
 
-int Main(int argc, char** argv) {
-  dmslam::CommandLine app{
-      "Learns the extractor's comparisons from photographs; prints the table that brief_pattern.cc includes"};
-  app.SetVersion(kVersion);
+struct Arguments {
   std::string folder;
   int num_images = 80;
   PatternLearnerOptions options;
+};
+
+void Declare(CommandLine& app, Arguments& a) {
+  app.SetVersion(kVersion);
+  app.AddOption("folder", a.folder, "folder of photographs").Required();
+  app.AddOption("--images", a.num_images, "how many of them, evenly spread over the folder").Positive();
+  app.AddOption("--candidates", a.options.num_candidates, "random tests to choose from").InRange(512, 100000);
+  app.AddOption("--sigma", a.options.sigma_px, "spread of their points [px]").InRange(1.0, 50.0);
+  app.AddOption("--seed", a.options.seed, "seed");
+}
+
+void Learn(const Arguments& a) {
   OrbExtractorOptions extractor_options;
   extractor_options.num_features = 400;
   extractor_options.pyramid.levels = 5;
-  app.AddOption("folder", folder, "folder of photographs").Required();
-  app.AddOption("--images", num_images, "how many of them, evenly spread over the folder").Positive();
-  app.AddOption("--candidates", options.num_candidates, "random tests to choose from").InRange(512, 100000);
-  app.AddOption("--sigma", options.sigma_px, "spread of their points [px]").InRange(1.0, 50.0);
-  app.AddOption("--seed", options.seed, "seed");
-  if (const auto code = app.Parse(argc, argv)) return *code;
-
-  const std::vector<std::string> files = ImagesIn(folder);
+  const std::vector<std::string> files = ImagesIn(a.folder);
   OrbExtractor extractor(extractor_options);
   std::vector<PatchPair> pairs;
-  const size_t step = std::max<size_t>(1, files.size() / static_cast<size_t>(num_images));
+  const size_t step = std::max<size_t>(1, files.size() / static_cast<size_t>(a.num_images));
   for (size_t i = 0; i < files.size(); i += step) {
     const cv::Mat image = cv::imread(files[i], cv::IMREAD_GRAYSCALE);
-    Random random(DeriveSeed(options.seed, i, "warp"));
+    Random random(DeriveSeed(a.options.seed, i, "warp"));
     if (!image.empty()) AddPairs(image, &random, &extractor, &pairs);
   }
   std::fprintf(stderr, "%zu corners seen twice\n", pairs.size());
-  for (const BriefTest& test : LearnPattern(pairs, options)) {
+  for (const BriefTest& test : LearnPattern(pairs, a.options)) {
     std::printf("{%d, %d, %d, %d},\n", test.x0, test.y0, test.x1, test.y1);
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace dmslam
 
 int main(int argc, char** argv) {
-  try {
-    return dmslam::Main(argc, argv);
-  } catch (const dmslam::InputError& error) {
-    std::fprintf(stderr, "learn_brief_pattern: %s\n", error.what());
-    return 1;
-  }
+  dmslam::CommandLine app(
+      "Learns the extractor's comparisons from photographs; prints the table that brief_pattern.cc includes",
+      "learn_brief_pattern");
+  dmslam::Arguments arguments;
+  dmslam::Declare(app, arguments);
+  return app.Run(argc, argv, [&] { dmslam::Learn(arguments); });
 }

@@ -1,4 +1,3 @@
-#include <exception>
 #include <fstream>
 #include <iostream>
 #include <string>
@@ -13,17 +12,12 @@ int main(int argc, char** argv) {
   app.SetVersion(dmslam::kVersion);
   std::string out;
   app.AddOption("--out", out, "File to write; without it the page goes to standard output");
-  try {
-    if (const auto code = app.Parse(argc, argv)) return *code;
+  return app.Run(argc, argv, [&] {
     const std::string page = dmslam::MessageDocs();
     if (out.empty()) {
       std::cout << page;
     } else if (!(std::ofstream(out) << page).flush()) {
       throw dmslam::InputError("cannot write " + out + ": is its folder there, and writable?");
     }
-  } catch (const std::exception& error) {
-    std::cerr << "dmslam-message-docs: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -55,12 +55,5 @@ int main(int argc, char** argv) {
   app.AddOption("--count", options.count, "messages").ShowDefault();
   app.AddOption("--rate", options.rate, "messages per second").InRange(1, 1'000'000).ShowDefault();
   app.AddOption("--seed", options.seed, "of the noise").ShowDefault();
-  if (const auto code = app.Parse(argc, argv)) return *code;
-  try {
-    MakeNoise(options);
-  } catch (const dmslam::InputError& error) {
-    std::fprintf(stderr, "dmslam-noise: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  return app.Run(argc, argv, [&] { MakeNoise(options); });
 }

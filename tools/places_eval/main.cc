@@ -1,6 +1,4 @@
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <string>
 
 #include "dmslam/console/command_line.h"
@@ -67,12 +65,5 @@ int main(int argc, char** argv) {
   dmslam::PlacesOptions options;
   Outputs outputs;
   AddOptions(app, options, outputs);
-  if (const auto code = app.Parse(argc, argv)) return *code;
-  try {
-    Run(options, outputs);
-  } catch (const std::exception& error) {
-    std::cerr << "dmslam-places-eval: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  return app.Run(argc, argv, [&] { Run(options, outputs); });
 }

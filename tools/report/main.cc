@@ -231,6 +231,50 @@ void RunPopulation(const Arguments& arguments) {
   std::cout << markdown << "\nwritten: " << arguments.out << ".md, " << arguments.out << ".json\n";
 }
 
+void AddPlan(CommandLine& app, Arguments& arguments) {
+  CommandLine& plan =
+      app.AddSubcommand("plan", "find the sequences, add them to plan.json, print one line per run");
+  plan.AddOption("--root", arguments.roots, "folder that holds sequences; may be repeated").Required();
+  plan.AddOption("--out", arguments.out, "the reproduction's folder").Required();
+  plan.AddOption("--seeds", arguments.seeds, "runs of each sequence").ShowDefault();
+  plan.AddOption("--only", arguments.only, "only these sequences");
+  plan.OnParsed([&arguments] { RunPlan(arguments); });
+}
+
+void AddWrite(CommandLine& app, Arguments& arguments) {
+  CommandLine& write =
+      app.AddSubcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
+  write.AddOption("--out", arguments.out, "the reproduction's folder").Required();
+  write.AddOption("--root", arguments.roots,
+                  "folder that holds sequences which are not where they were planned; may be repeated");
+  write.AddOption("--publish", arguments.publish,
+                  "also write this page, with pictures of rendered sequences only");
+  write.OnParsed([&arguments] { RunWrite(arguments); });
+}
+
+void AddSweep(CommandLine& app, Arguments& arguments) {
+  CommandLine& sweep = app.AddSubcommand("sweep", "write the tables and the picture of scripts/sweep.sh");
+  sweep.AddOption("--out", arguments.out, "the sweep's folder").Required();
+  sweep.AddOption("--seeds", arguments.seeds, "runs of each sequence").ShowDefault();
+  sweep.AddOption("--data", arguments.data, "folder that holds the kitchen sequences");
+  sweep.AddOption("--publish", arguments.publish, "also put them between this page's marks");
+  sweep.OnParsed([&arguments] { RunSweep(arguments); });
+}
+
+void AddPopulation(CommandLine& app, Arguments& arguments) {
+  CommandLine& population =
+      app.AddSubcommand("population", "write the tables of scripts/population.sh, and print them");
+  population.AddOption("--list", arguments.list, "lines of half, name, kind, folder, separated by tabs")
+      .Required();
+  population
+      .AddOption("--runs", arguments.runs,
+                 "NAME=FOLDER: a system and the folder with its runs, one per sequence; may be repeated")
+      .Required();
+  population.AddOption("--out", arguments.out, "writes OUT.md and OUT.json").Required();
+  population.AddFlag("--details", arguments.details, "the report half's single sequences too");
+  population.OnParsed([&arguments] { RunPopulation(arguments); });
+}
+
 }  // namespace
 }  // namespace dmslam
 
@@ -241,44 +285,9 @@ int main(int argc, char** argv) {
   app.SetVersion(dmslam::BuildVersion());
   app.RequireSubcommand();
   dmslam::Arguments arguments;
-  dmslam::CommandLine& plan =
-      app.AddSubcommand("plan", "find the sequences, add them to plan.json, print one line per run");
-  plan.AddOption("--root", arguments.roots, "folder that holds sequences; may be repeated").Required();
-  plan.AddOption("--out", arguments.out, "the reproduction's folder").Required();
-  plan.AddOption("--seeds", arguments.seeds, "runs of each sequence").ShowDefault();
-  plan.AddOption("--only", arguments.only, "only these sequences");
-  dmslam::CommandLine& write =
-      app.AddSubcommand("write", "write report.md, report.json and pictures/ from the runs done so far");
-  write.AddOption("--out", arguments.out, "the reproduction's folder").Required();
-  write.AddOption("--root", arguments.roots,
-                  "folder that holds sequences which are not where they were planned; may be repeated");
-  write.AddOption("--publish", arguments.publish,
-                  "also write this page, with pictures of rendered sequences only");
-  dmslam::CommandLine& sweep =
-      app.AddSubcommand("sweep", "write the tables and the picture of scripts/sweep.sh");
-  sweep.AddOption("--out", arguments.out, "the sweep's folder").Required();
-  sweep.AddOption("--seeds", arguments.seeds, "runs of each sequence").ShowDefault();
-  sweep.AddOption("--data", arguments.data, "folder that holds the kitchen sequences");
-  sweep.AddOption("--publish", arguments.publish, "also put them between this page's marks");
-  dmslam::CommandLine& population =
-      app.AddSubcommand("population", "write the tables of scripts/population.sh, and print them");
-  population.AddOption("--list", arguments.list, "lines of half, name, kind, folder, separated by tabs")
-      .Required();
-  population
-      .AddOption("--runs", arguments.runs,
-                 "NAME=FOLDER: a system and the folder with its runs, one per sequence; may be repeated")
-      .Required();
-  population.AddOption("--out", arguments.out, "writes OUT.md and OUT.json").Required();
-  population.AddFlag("--details", arguments.details, "the report half's single sequences too");
-  if (const auto code = app.Parse(argc, argv)) return *code;
-  try {
-    if (plan.parsed()) dmslam::RunPlan(arguments);
-    if (write.parsed()) dmslam::RunWrite(arguments);
-    if (sweep.parsed()) dmslam::RunSweep(arguments);
-    if (population.parsed()) dmslam::RunPopulation(arguments);
-  } catch (const std::exception& error) {
-    std::cerr << "dmslam-report: " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
+  dmslam::AddPlan(app, arguments);
+  dmslam::AddWrite(app, arguments);
+  dmslam::AddSweep(app, arguments);
+  dmslam::AddPopulation(app, arguments);
+  return app.Run(argc, argv, [] {});  // the subcommands work while they are parsed
 }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "dmslam/util/check.h"
+#include "testing/even_tables.h"
 #include "testing/wavy_path.h"
 
 namespace dmslam {
@@ -145,15 +146,7 @@ TEST_F(PopulationFolder, TheReportHalfShowsNoSingleSequence) {
 
 TEST_F(PopulationFolder, TablesAreEven) {
   for (const char* name : {"few", "many", "secret", "drawn"}) AddRun("dm", name, 0.02);
-  std::istringstream lines(PopulationMarkdown(Read(), true));
-  std::string line;
-  long wanted = 0;
-  while (std::getline(lines, line)) {
-    const long bars = std::count(line.begin(), line.end(), '|');
-    if (bars == 0) wanted = 0;
-    if (wanted == 0) wanted = bars;
-    EXPECT_EQ(bars, wanted) << line;
-  }
+  ExpectEvenTables(PopulationMarkdown(Read(), true));
 }
 
 TEST_F(PopulationFolder, DamageIsNamed) {

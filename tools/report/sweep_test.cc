@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "dmslam/util/check.h"
+#include "testing/even_tables.h"
 #include "testing/wavy_path.h"
 
 namespace dmslam {
@@ -73,15 +74,7 @@ TEST_F(SweepFolder, TablesAreEvenAndSayHowManyRuns) {
                            "(picture.png)", "`tracking.motion_belief=off`"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
   }
-  std::istringstream lines(text);
-  std::string line;
-  long wanted = 0;
-  while (std::getline(lines, line)) {
-    const long bars = std::count(line.begin(), line.end(), '|');
-    if (bars == 0) wanted = 0;
-    if (wanted == 0) wanted = bars;
-    EXPECT_EQ(bars, wanted) << line;
-  }
+  ExpectEvenTables(text);
 }
 
 TEST_F(SweepFolder, FigureHasBandsOverTheSeeds) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "dmslam/console/command_line.h"
+#include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "settings_page.h"
 
@@ -14,14 +15,12 @@ int main(int argc, char** argv) {
   app.SetVersion(dmslam::kVersion);
   std::string out;
   app.AddOption("--out", out, "file to write; without it the page goes to standard output");
-  if (const auto code = app.Parse(argc, argv)) return *code;
-  const std::string page = dmslam::SettingsPage();
-  if (out.empty()) {
-    std::fputs(page.c_str(), stdout);
-  } else if (!(std::ofstream(out) << page).flush()) {
-    std::fprintf(stderr, "dmslam-settings: %s cannot be written; is its folder there, and writable?\n",
-                 out.c_str());
-    return 1;
-  }
-  return 0;
+  return app.Run(argc, argv, [&] {
+    const std::string page = dmslam::SettingsPage();
+    if (out.empty()) {
+      std::fputs(page.c_str(), stdout);
+    } else if (!(std::ofstream(out) << page).flush()) {
+      throw dmslam::InputError(out + " cannot be written; is its folder there, and writable?");
+    }
+  });
 }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -500,12 +499,7 @@ int main(int argc, char** argv) {
   dmslam::AddJudge(app, judge);
   dmslam::TimeSettings time;
   dmslam::AddTime(app, time);
-  try {
-    if (const auto code = app.Parse(argc, argv)) return *code;
+  return app.Run(argc, argv, [&] {
     if (!app.HasSubcommand()) dmslam::RunSelection(settings);
-  } catch (const std::exception& error) {
-    std::cerr << "dmslam-static: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  });
 }

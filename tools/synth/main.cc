@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <string>
 
 #include "dmslam/camera/camera.h"
@@ -151,17 +150,10 @@ void Run(Arguments& args) {
 int main(int argc, char** argv) {
   dmslam::CommandLine app(
       "Renders a synthetic sequence (textured room, hand-held camera, walking people, exact ground truth) "
-      "into a "
-      "folder in the format of the TUM RGB-D benchmark.");
+      "into a folder in the format of the TUM RGB-D benchmark.",
+      "dmslam-synth");
   app.SetVersion(dmslam::kVersion);
   Arguments args;
   AddOptions(app, args);
-  if (const auto code = app.Parse(argc, argv)) return *code;
-  try {
-    Run(args);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "dmslam-synth: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  return app.Run(argc, argv, [&] { Run(args); });
 }

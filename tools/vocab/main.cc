@@ -1,5 +1,3 @@
-#include <exception>
-#include <iostream>
 #include <string>
 
 #include "commands.h"
@@ -40,11 +38,5 @@ int main(int argc, char** argv) {
   convert.AddOption("in", from, "Vocabulary to read, either format").Required();
   convert.AddOption("out", to, "File to write; .txt gives the text format").Required();
   convert.OnParsed([&] { dmslam::Convert(from, to); });
-  try {
-    if (const auto code = app.Parse(argc, argv)) return *code;
-  } catch (const std::exception& error) {
-    std::cerr << "dmslam-vocab: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  return app.Run(argc, argv, [] {});  // the subcommands work while they are parsed
 }

@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <exception>
+#include <iostream>
 #include <utility>
 
 namespace dmslam {
@@ -116,6 +118,17 @@ std::optional<int> CommandLine::Parse(int argc, const char* const* argv) {
     return app_->exit(error);
   }
   return std::nullopt;
+}
+
+int CommandLine::Run(int argc, const char* const* argv, const std::function<void()>& work) {
+  try {
+    if (const std::optional<int> code = Parse(argc, argv)) return *code;
+    work();
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << app_->get_name() << ": " << error.what() << '\n';
+    return 1;
+  }
 }
 
 }  // namespace dmslam

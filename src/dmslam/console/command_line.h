@@ -69,6 +69,9 @@ class CommandLine {
   /// Reads the arguments. Returns an exit code where the program is to end: after --help and --version, and
   /// where something is wrong, which is printed.
   std::optional<int> Parse(int argc, const char* const* argv);
+  /// A whole main: parses, and does the work. What is thrown is said in one line behind the program's name.
+  /// Returns the exit code: 0, that of Parse, or 1 where something was thrown.
+  int Run(int argc, const char* const* argv, const std::function<void()>& work);
 
  private:
   explicit CommandLine(CLI::App* app);

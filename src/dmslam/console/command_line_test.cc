@@ -58,6 +58,18 @@ TEST(CommandLineTest, WhatIsWrongEndsTheProgram) {
   EXPECT_EQ(parse({"--help"}), 0);
 }
 
+TEST(CommandLineTest, AMainSaysWhatWasThrownAndEndsWithOne) {
+  CommandLine line("what it is for", "program");
+  const std::vector<const char*> none = {"program"}, wrong = {"program", "--unheard-of"};
+  int worked = 0;
+  EXPECT_EQ(line.Run(1, none.data(), [&] { ++worked; }), 0);
+  EXPECT_GT(line.Run(2, wrong.data(), [&] { ++worked; }), 1);
+  EXPECT_EQ(worked, 1);
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(line.Run(1, none.data(), [] { throw std::runtime_error("a.txt is missing"); }), 1);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "program: a.txt is missing\n");
+}
+
 TEST(CommandLineTest, TheSubcommandThatWasNamedIsCalled) {
   CommandLine line("what it is for", "program");
   line.RequireSubcommand();

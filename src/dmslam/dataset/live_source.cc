@@ -21,6 +21,7 @@ bool IsLive(const std::string& path) {
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <mutex>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
@@ -76,7 +77,11 @@ class OpenCvCamera : public LiveSource {
     thread_ = std::thread([this] { Read(); });
   }
   ~OpenCvCamera() override {
-    stop_ = true;
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    stopped_.notify_all();
     thread_.join();
     close(event_);
   }
@@ -163,10 +168,9 @@ class OpenCvCamera : public LiveSource {
     Wake();
   }
 
-  void Pause(int64_t milliseconds) const {
-    constexpr int64_t kStepMs = 50;
-    for (int64_t waited = 0; waited < milliseconds && !stop_; waited += kStepMs)
-      std::this_thread::sleep_for(std::chrono::milliseconds(kStepMs));
+  void Pause(int64_t milliseconds) {
+    std::unique_lock lock(mutex_);
+    stopped_.wait_for(lock, std::chrono::milliseconds(milliseconds), [this] { return stop_.load(); });
   }
 
   void Wake() const {
@@ -182,6 +186,7 @@ class OpenCvCamera : public LiveSource {
   std::atomic<bool> stop_ = false;
   std::atomic<int64_t> dropped_ = 0;
   mutable std::mutex mutex_;
+  std::condition_variable stopped_;
   std::optional<LiveFrame> newest_;  ///< under mutex_
   bool ended_ = false;               ///< under mutex_
   std::string away_;                 ///< under mutex_

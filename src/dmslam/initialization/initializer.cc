@@ -121,6 +121,12 @@ InitializerReport Wait(WaitReason reason, const std::string& text) {
 }
 InitializerReport Wait(const Refused& refused) { return Wait(refused.wait, refused.text); }
 
+/// No single motion could be told from the pairs of a reference frame; there may be more than one.
+bool MayHideSeveralMotions(WaitReason wait) {
+  return wait == WaitReason::kDisagreement || wait == WaitReason::kTooFewStatic ||
+         wait == WaitReason::kSelectionRefused || wait == WaitReason::kDistributionTooSmall;
+}
+
 /// That with a map, or of two that wait, that which came farther.
 InitializerReport Farther(InitializerReport a, InitializerReport b) {
   const bool first = a.result || (!b.result && a.wait > b.wait);
@@ -153,6 +159,7 @@ class Initializer::Impl {
 
  private:
   InitializerReport Consider(const InitializerFrame& frame);
+  InitializerReport TryWindows(const InitializerFrame& frame);
   void KeepRecent(const InitializerFrame& frame);
   void DropOld(const InitializerFrame& frame);
   void BeginWindow(const InitializerFrame& frame);
@@ -202,31 +209,32 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s) return last_wait_;
   last_looked_ns_ = frame.stamp_ns;
   DropOld(frame);
+  InitializerReport report = TryWindows(frame);
+  if (!report.result && (windows_.empty() || windows_.back().AgeAt(frame) >= options_.reference_step_s)) {
+    BeginWindow(frame);
+  }
+  KeepRecent(frame);
+  return report;
+}
+
+/// What the reference frames make of this one, the oldest first, until one has a map. At most one of them may
+/// try a contest with a frame: it is dear.
+InitializerReport Initializer::Impl::TryWindows(const InitializerFrame& frame) {
   InitializerReport report = Wait(WaitReason::kTooFewFrames, "a new reference frame");
   bool may_contend =
       options_.contest.enabled && SecondsSince(last_contest_ns_, frame) >= options_.contest.step_s;
   for (auto window = windows_.begin(); window != windows_.end() && !report.result;) {
     InitializerReport own;
-    if (!AddView(frame, &*window, &own)) {
-      report = Farther(std::move(report), std::move(own));
-      window = windows_.erase(window);
-      continue;
-    }
-    if (window->views().back().moved) own = TryAgreed(&*window);
-    if (may_contend &&
-        (own.wait == WaitReason::kDisagreement || own.wait == WaitReason::kTooFewStatic ||
-         own.wait == WaitReason::kSelectionRefused || own.wait == WaitReason::kDistributionTooSmall)) {
+    const bool seen = AddView(frame, &*window, &own);
+    if (seen && window->views().back().moved) own = TryAgreed(&*window);
+    if (seen && may_contend && MayHideSeveralMotions(own.wait)) {
       may_contend = false;
       last_contest_ns_ = frame.stamp_ns;
       own = TryContest(&*window);
     }
     report = Farther(std::move(report), std::move(own));
-    ++window;
+    window = seen ? std::next(window) : windows_.erase(window);
   }
-  if (!report.result && (windows_.empty() || windows_.back().AgeAt(frame) >= options_.reference_step_s)) {
-    BeginWindow(frame);
-  }
-  KeepRecent(frame);
   return report;
 }
 
@@ -235,14 +243,13 @@ void Initializer::Impl::KeepRecent(const InitializerFrame& frame) {
   while (SecondsBetween(recent_.front(), frame) > options_.past_s) recent_.pop_front();
 }
 
-/// What is too old; and of more windows than there may be, with the one that is to begin, the oldest that
-/// promises nothing.
 void Initializer::Impl::DropOld(const InitializerFrame& frame) {
   std::erase_if(windows_, [&](const ReferenceWindow& window) {
     return window.AgeAt(frame) > (window.promising ? options_.max_promising_age_s : options_.max_age_s);
   });
 }
 
+/// Of more windows than there may be, with the one that begins, the oldest that promises nothing goes.
 void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
   while (static_cast<int>(windows_.size()) >= options_.max_references) {
     const auto idle = std::find_if(windows_.begin(), windows_.end(), [](const ReferenceWindow& window) {

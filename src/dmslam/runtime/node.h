@@ -43,6 +43,8 @@ class Node {
   virtual std::optional<int> exit_code() const = 0;
   /// Why it ended, when not well; one line with the cure.
   virtual std::string problem() const { return {}; }
+  /// What whoever started the process (dmslam-run, systemd) is told once it is ready; one line.
+  virtual std::string ready_text() const { return {}; }
 };
 
 }  // namespace dmslam

@@ -120,7 +120,7 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.resumed = resumed_;
   const std::unique_ptr<Node> node = factory(context, options_);
   loop.Watch(bus.fd(), [&bus] { bus.Deliver(); });
-  notice.Ready();
+  notice.Ready(node->ready_text());
   while (!node->exit_code()) {
     notice.Alive(EventLoop::now_ns());
     node->Advance();

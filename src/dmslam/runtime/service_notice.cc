@@ -30,7 +30,11 @@ ServiceNotice::~ServiceNotice() {
   if (socket_ >= 0) close(socket_);
 }
 
-void ServiceNotice::Ready() { Send("READY=1"); }
+void ServiceNotice::Ready(std::string_view status) {
+  std::string text = "READY=1";
+  if (!status.empty()) text.append("\nSTATUS=").append(status);
+  Send(text);
+}
 
 void ServiceNotice::Alive(int64_t now_ns) {
   if (every_ns_ <= 0 || now_ns < next_ns_) return;

@@ -17,7 +17,8 @@ class ServiceNotice {
   ServiceNotice(const ServiceNotice&) = delete;
   ServiceNotice& operator=(const ServiceNotice&) = delete;
 
-  void Ready();
+  /// `status`: one line that is shown with it; may be empty.
+  void Ready(std::string_view status = "");
   /// Says so, four times within the time that was asked for. Cheap: to be called from every turn of a loop.
   void Alive(int64_t now_ns);
   /// When Alive wants to be called next.

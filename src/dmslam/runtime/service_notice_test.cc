@@ -43,6 +43,8 @@ TEST_F(ServiceNoticeTest, SaysThatItIsReadyAndFourTimesAPeriodThatItIsAlive) {
   ServiceNotice notice;
   notice.Ready();
   EXPECT_EQ(Heard(), "READY=1");
+  notice.Ready("to be seen there");
+  EXPECT_EQ(Heard(), "READY=1\nSTATUS=to be seen there");
   notice.Alive(5'000'000'000);
   EXPECT_EQ(Heard(), "WATCHDOG=1");
   EXPECT_EQ(notice.deadline_ns(), 6'000'000'000);

@@ -13,6 +13,7 @@
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/node_options.h"
+#include "dmslam/runtime/publish.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
 
@@ -88,8 +89,7 @@ class StreamNode : public Node {
   /// Publishes a message that may be lost. `local`: large, and of use on this host only.
   template <typename Message>
   void PublishLoose(const Message& message, bool local = false) {
-    context_.bus->Publish(
-        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), local});
+    dmslam::PublishLoose(context_.bus, message, local);
   }
   /// Decodes one of ours; bad and foreign ones are counted, the first of each kind is logged.
   template <typename Message>
