@@ -63,8 +63,7 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
   if (attempt.report.ok) result.pose = PlacedPose::Of(map, frame.T_cam_world, search_.reference());
   if (result.pose) {
-    result.certainty =
-        certainty_.Estimate(map, frame, *result.pose, search_.basis(), !attempt.relocalized);
+    result.certainty = certainty_.Estimate(map, frame, *result.pose, search_.basis(), !attempt.relocalized);
     Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
     motion_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
