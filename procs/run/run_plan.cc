@@ -197,9 +197,10 @@ ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words
 
 ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
   AppendOption(&words, "--map", a.map.begin);
-  Append(&words, {"--checkpoint", CheckpointPath(place.out)});
   AppendOption(&words, "--save-map", a.map.save);
-  return MakeChild("mapper", a, place, std::move(words));
+  ChildSpec mapper = MakeChild("mapper", a, place, std::move(words));
+  mapper.environment["DMSLAM_CHECKPOINT"] = CheckpointPath(place.out);  // a mapper of one's own need not know
+  return mapper;
 }
 
 ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {

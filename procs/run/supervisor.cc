@@ -179,6 +179,7 @@ void Supervisor::BecomeChild(const Child& child, int output, int errors) {
   if (notice_fd_ >= 0 && options_.watchdog_ns > 0) {
     setenv("WATCHDOG_USEC", std::to_string(options_.watchdog_ns / 1000).c_str(), 1);
   }
+  for (const auto& [name, value] : child.spec.environment) setenv(name.c_str(), value.c_str(), 1);
   std::vector<char*> arguments;
   for (const auto* list : {&child.spec.arguments, &child.spec.first}) {
     if (list == &child.spec.first && child.restarts > 0) break;

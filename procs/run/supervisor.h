@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <list>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,14 +15,15 @@ namespace dmslam {
 
 /// A process to be started, and started again.
 struct ChildSpec {
-  std::string name;                    ///< "mapper"
-  std::vector<std::string> arguments;  ///< the program's path first
-  std::vector<std::string> first;      ///< only at its first start, behind the others
-  std::vector<std::string> after;      ///< first started when these have said that they are ready
-  std::string output, errors;          ///< files that standard output and standard error are appended to
-  bool errors_to_ours = false;         ///< standard error is the supervisor's own
-  std::string pid_file;                ///< holds its process id; empty: none
-  bool restart = true;                 ///< where that is worth it
+  std::string name;                                ///< "mapper"
+  std::vector<std::string> arguments;              ///< the program's path first
+  std::vector<std::string> first;                  ///< only at its first start, behind the others
+  std::map<std::string, std::string> environment;  ///< beside our own
+  std::vector<std::string> after;                  ///< first started when these have said that they are ready
+  std::string output, errors;   ///< files that standard output and standard error are appended to
+  bool errors_to_ours = false;  ///< standard error is the supervisor's own
+  std::string pid_file;         ///< holds its process id; empty: none
+  bool restart = true;          ///< where that is worth it
   int stop_signal = SIGTERM;
 };
 
