@@ -15,29 +15,17 @@ foreach(module core imgproc imgcodecs features2d calib3d flann videoio highgui)
   endif()
 endforeach()
 
-# dmslam_lcm: the LCM library (liblcm-dev).
-find_library(LCM_LIBRARY lcm REQUIRED)
-find_path(LCM_INCLUDE_DIR lcm/lcm-cpp.hpp REQUIRED)
-if(NOT TARGET dmslam_lcm)
-  add_library(dmslam_lcm INTERFACE IMPORTED GLOBAL)
-  target_include_directories(dmslam_lcm SYSTEM INTERFACE ${LCM_INCLUDE_DIR})
-  target_link_libraries(dmslam_lcm INTERFACE ${LCM_LIBRARY})
-endif()
-
-# dmslam_turbojpeg (libturbojpeg0-dev).
-find_library(TURBOJPEG_LIBRARY turbojpeg REQUIRED)
-find_path(TURBOJPEG_INCLUDE_DIR turbojpeg.h REQUIRED)
-if(NOT TARGET dmslam_turbojpeg)
-  add_library(dmslam_turbojpeg INTERFACE IMPORTED GLOBAL)
-  target_include_directories(dmslam_turbojpeg SYSTEM INTERFACE ${TURBOJPEG_INCLUDE_DIR})
-  target_link_libraries(dmslam_turbojpeg INTERFACE ${TURBOJPEG_LIBRARY})
-endif()
-
-# dmslam_sodium (libsodium-dev).
-find_library(SODIUM_LIBRARY sodium REQUIRED)
-find_path(SODIUM_INCLUDE_DIR sodium.h REQUIRED)
-if(NOT TARGET dmslam_sodium)
-  add_library(dmslam_sodium INTERFACE IMPORTED GLOBAL)
-  target_include_directories(dmslam_sodium SYSTEM INTERFACE ${SODIUM_INCLUDE_DIR})
-  target_link_libraries(dmslam_sodium INTERFACE ${SODIUM_LIBRARY})
-endif()
+# dmslam_<name>: the library <NAME>_LIBRARY with the header <NAME>_INCLUDE_DIR; both can be given by hand.
+function(dmslam_third_party name library header)
+  string(TOUPPER ${name} prefix)
+  find_library(${prefix}_LIBRARY ${library} REQUIRED)
+  find_path(${prefix}_INCLUDE_DIR ${header} REQUIRED)
+  if(NOT TARGET dmslam_${name})
+    add_library(dmslam_${name} INTERFACE IMPORTED GLOBAL)
+    target_include_directories(dmslam_${name} SYSTEM INTERFACE ${${prefix}_INCLUDE_DIR})
+    target_link_libraries(dmslam_${name} INTERFACE ${${prefix}_LIBRARY})
+  endif()
+endfunction()
+dmslam_third_party(lcm lcm lcm/lcm-cpp.hpp)            # liblcm-dev
+dmslam_third_party(turbojpeg turbojpeg turbojpeg.h)    # libturbojpeg0-dev
+dmslam_third_party(sodium sodium sodium.h)             # libsodium-dev

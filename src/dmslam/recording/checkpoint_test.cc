@@ -1,6 +1,7 @@
 #include "dmslam/recording/checkpoint.h"
 
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -218,6 +219,33 @@ TEST_F(CheckpointTest, AFullDiskLeavesTheFormerOne) {
   EXPECT_EQ(Found(), 4U);
 }
 
+/// What happens to the files of a folder: they are made, written, renamed, removed.
+class FolderEvents {
+ public:
+  explicit FolderEvents(const std::string& folder) : fd_(inotify_init1(IN_CLOEXEC)) {
+    inotify_add_watch(fd_, folder.c_str(), IN_CREATE | IN_MODIFY | IN_MOVE | IN_DELETE | IN_CLOSE_WRITE);
+  }
+  ~FolderEvents() { close(fd_); }
+  FolderEvents(const FolderEvents&) = delete;
+  FolderEvents& operator=(const FolderEvents&) = delete;
+
+  /// Returns when so many things have happened.
+  void WaitFor(int count) {
+    alignas(inotify_event) char buffer[4096];
+    while (count > 0) {
+      const ssize_t size = read(fd_, buffer, sizeof(buffer));
+      ASSERT_GT(size, 0);
+      for (ssize_t at = 0; at < size; --count) {
+        at += static_cast<ssize_t>(sizeof(inotify_event) +
+                                   reinterpret_cast<const inotify_event*>(buffer + at)->len);
+      }
+    }
+  }
+
+ private:
+  int fd_;
+};
+
 /// Somebody writes one after the other and is killed at some moment: whatever was said to be written, or what
 /// came after it, is there.
 TEST_F(CheckpointTest, IsWholeWheneverTheWriterIsKilled) {
@@ -226,6 +254,7 @@ TEST_F(CheckpointTest, IsWholeWheneverTheWriterIsKilled) {
     fs::create_directories(folder_);
     int said[2];
     ASSERT_EQ(pipe(said), 0);
+    FolderEvents events(folder_);
     const pid_t child = fork();
     if (child == 0) {
       for (uint32_t keyframes = 1;; ++keyframes) {
@@ -237,7 +266,7 @@ TEST_F(CheckpointTest, IsWholeWheneverTheWriterIsKilled) {
     close(said[1]);
     uint8_t number = 0;
     ASSERT_EQ(read(said[0], &number, 1), 1);
-    usleep(static_cast<useconds_t>(1000 + round * 3700));
+    events.WaitFor(10 + 7 * round);
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
     for (uint8_t next = 0; read(said[0], &next, 1) == 1;) number = next;
