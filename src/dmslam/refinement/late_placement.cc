@@ -16,7 +16,6 @@ constexpr double kMaxTurn_rad_per_s = 3.0;
 constexpr size_t kKeyframesAside = 3;   // whose motion bounds that of the frames between them...
 constexpr double kApartS = 0.3;         // ...apart, so that it is motion and not noise...
 constexpr double kFasterThanAside = 2;  // ...which may be so many times as fast...
-constexpr int kSureInliers = 30;        // nothing hurries: what rests on fewer is not placed
 constexpr double kSlack = 0.05;         // ...and this beside [depths of the scene]
 
 double SecondsBetween(int64_t a_ns, int64_t b_ns) {
@@ -107,7 +106,7 @@ TrackingReport LatePlacement::TrackBackwards(const Map& map, double depth, PoseS
   if (predicted) prior = MotionPrior(motion_, *predicted, depth);
   const Rigid3d guess = predicted.value_or(next_->T_cam_world);
   if (search->FromFrame(map, *next_, guess, prior, frame) != PoseSearch::FromFrameResult::kFound) return {};
-  TrackingReport report = search->InLocalMap(map, false, prior, frame);
+  TrackingReport report = search->InLocalMap(map, true, prior, frame);  // nothing hurries
   report.ok = report.ok && !report.doubtful && IsPlausible(*frame, depth);
   return report;
 }
@@ -122,7 +121,7 @@ TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Re
     return there != nullptr && AgreesWithKeyframesAside(map, there->map_id, *frame, session_, depth);
   };
   TrackingReport report = TrackBackwards(map, depth, search, frame);
-  if (report.ok && report.num_static >= kSureInliers && agrees()) return report;
+  if (report.ok && agrees()) return report;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");

@@ -263,7 +263,7 @@ FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
     const int64_t missing_ns = frame_.stamp_ns - tracker_.last_tracked_ns();
     phase_.OnMissing(missing_ns);
     ++(phase_.state() == TrackingState::kLost ? counters_.lost : counters_.uncertain);
-    if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsRecovering())
+    if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsUndecided())
       output = GiveUpMap(false, "lost for too long");
   }
   output.Add(MakePose(phase_.state(), report, std::nullopt));

@@ -10,6 +10,7 @@ namespace {
 
 constexpr int64_t kLongestStepNs = 500'000'000;  // so long a step is still one motion
 constexpr double kMaxTurnOfMap = 0.02;           // [rad] the map may have turned under a step to be the same
+constexpr size_t kMostKnown = 20'000;            // landmarks whose covariances are kept
 constexpr size_t kMaxViews = 8;         // of a landmark, spread over all: what more say changes little
 constexpr int kColumns = 8, kRows = 6;  // cells of the image
 constexpr double kExpectedChi2 = 2.0;   // of a residual in two dimensions, in sigmas
@@ -40,8 +41,24 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
 
 }  // namespace
 
-Eigen::Matrix3d PoseCertaintyEstimator::CovarianceOf(const Map& map, const Pinhole& camera,
-                                                     const Landmark& landmark) {
+void PoseCertaintyEstimator::Forget() {
+  last_.reset();
+  known_.clear();
+}
+
+const Eigen::Matrix3d& PoseCertaintyEstimator::CovarianceOf(const Map& map, const Pinhole& camera,
+                                                            const Landmark& landmark) {
+  if (known_.size() > kMostKnown) known_.clear();
+  const auto [it, is_new] = known_.try_emplace(landmark.id);
+  Known& known = it->second;
+  const size_t observations = landmark.observations.size();
+  if (is_new || known.observations != observations || known.p_world != landmark.p_world)
+    known = {observations, landmark.p_world, WorkOutCovariance(map, camera, landmark)};
+  return known.covariance;
+}
+
+Eigen::Matrix3d PoseCertaintyEstimator::WorkOutCovariance(const Map& map, const Pinhole& camera,
+                                                          const Landmark& landmark) {
   views_.clear();
   const size_t count = landmark.observations.size(), used = std::min(count, kMaxViews);
   for (size_t i = 0; i < used; ++i) {

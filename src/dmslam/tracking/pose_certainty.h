@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "dmslam/map/map.h"
@@ -38,6 +39,8 @@ class PoseCertaintyEstimator {
   /// nothing determines it.
   std::optional<PoseCertainty> Estimate(const Map& map, const TrackedFrame& frame, const PlacedPose& pose,
                                         const PoseBasis& basis, bool follows);
+  /// The map is void.
+  void Forget();
 
  private:
   struct Told {
@@ -49,12 +52,21 @@ class PoseCertaintyEstimator {
     PoseUncertainty uncertainty;
   };
 
+  /// A landmark's covariance, which holds until keyframes see it anew or it is moved.
+  struct Known {
+    size_t observations = 0;
+    Eigen::Vector3d p_world;
+    Eigen::Matrix3d covariance;
+  };
+
   std::vector<PoseSight> SightsOf(const Map& map, const PoseBasis& basis);
-  Eigen::Matrix3d CovarianceOf(const Map& map, const Pinhole& camera, const Landmark& landmark);
+  const Eigen::Matrix3d& CovarianceOf(const Map& map, const Pinhole& camera, const Landmark& landmark);
+  Eigen::Matrix3d WorkOutCovariance(const Map& map, const Pinhole& camera, const Landmark& landmark);
   std::optional<PoseCertainty::Step> StepTo(const Map& map, const Told& now, double depth) const;
 
   PoseErrorModel model_;
   std::optional<Told> last_;
+  std::unordered_map<LandmarkId, Known> known_;
   std::vector<LandmarkRay> views_;  ///< workspace
 };
 

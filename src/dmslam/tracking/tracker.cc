@@ -12,8 +12,8 @@ namespace {
 constexpr int64_t kCarefulNs = 1'000'000'000;  // so long more is asked of a camera that was found
 constexpr int64_t kConfirmNs = 500'000'000;    // so long a place must predict what is seen to be believed
 constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
-constexpr int64_t kDoubtNs = 1'000'000'000;    // so long what may be no part of the room leads on
 constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
+constexpr int64_t kDoubtNs = 1'000'000'000;    // so long what may be no part of the room leads on
 constexpr double kTurnKnownS = 5.0;            // so long a lost camera is looked for where it was...
 constexpr double kTurnReachRad = 0.06;         // ...turned by so much...
 constexpr double kTurnRadPerS = 0.3;           // ...and more with time...
@@ -45,41 +45,39 @@ void Tracker::BeginAt(const Keyframe& keyframe) {
 void Tracker::OnMapForgotten() {
   relocalizer_.Clear();
   search_.Reset();
+  certainty_.Forget();
 }
 
 void Tracker::OnMapGivenUp() {
   search_.Reset();
   motion_.Stop();
-  recovery_.reset();
+  unbelieved_.reset();
 }
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
   Attempt attempt = FollowMotion(map, &frame);
-  if (attempt.report.ok && attempt.report.doubtful) OnDoubt(frame.stamp_ns, &attempt);
-  if (!attempt.report.ok && recovery_) AbandonRecovery();
+  if (IsDoubtfulForLong(attempt.report, frame.stamp_ns)) attempt.report.ok = false;
+  if (!attempt.report.ok && unbelieved_) GoBack();
   if (!attempt.report.ok) FindTurned(map, &frame, &attempt);
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request.map_id, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
   if (attempt.report.ok) result.pose = PlacedPose::Of(map, frame.T_cam_world, search_.reference());
   if (result.pose) {
-    result.certainty = certainty_.Estimate(map, frame, *result.pose, search_.basis(), !attempt.relocalized);
     Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
     motion_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
   }
-  if (!attempt.report.doubtful) believed_ns_.reset();
-  if (result.pose && attempt.report.doubtful) {
+  if (unbelieved_) {
     result.pose.reset();
     result.report.ok = false;
+    if (unbelieved_->why == Unbelieved::Why::kFoundAnew) {
+      search_.judge().DropEvidence();
+      result.report.reason = "a place was recognised that is not confirmed yet";
+    }
   }
-  if (recovery_) {
-    search_.judge().DropEvidence();
-    result.pose.reset();
-    result.certainty.reset();
-    result.report.ok = false;
-    result.report.reason = "a place was recognised that is not confirmed yet";
-  }
+  if (result.pose)
+    result.certainty = certainty_.Estimate(map, frame, *result.pose, search_.basis(), !attempt.relocalized);
   result.frame = std::move(frame);
   return result;
 }
@@ -87,36 +85,41 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
 /// Goes on from a frame whose pose was found.
 void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame,
                      const Attempt& attempt) {
-  if (attempt.relocalized) recovery_ = Recovery{frame.stamp_ns, motion_, last_};
+  if (attempt.relocalized) {
+    unbelieved_ = Unbelieved{Unbelieved::Why::kFoundAnew, frame.stamp_ns, motion_, last_};
+  } else if (attempt.report.doubtful && !unbelieved_) {
+    unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, motion_.last_stamp_ns(), motion_, last_};
+  }
   motion_.OnTracked(map, pose, frame.T_cam_world, {frame.index, frame.stamp_ns}, attempt.relocalized);
   last_ = frame;
-  if (recovery_ && IsConfirmed(map, attempt.report, frame)) recovery_.reset();
+  if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
 }
 
-/// At once where the place is seen all over the image and as a whole, which a person is not, or where much of
-/// what is seen is proven to be no person; else where the place goes on to predict what
-/// is seen, and, in a map that is old enough to have them, proven landmarks are among it.
-bool Tracker::IsConfirmed(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
+/// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
+/// over the image and as a whole, which a person is not, or if much of what is seen is proven to be no
+/// person; else when the place goes on to predict what is seen, and, in a map that is old enough to have
+/// them, proven landmarks are among it.
+bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
+  if (report.doubtful) return false;
+  if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
   if (report.cells >= kWideCells && report.num_static >= kWholeShare * report.num_expected) return true;
   const int proven = CountProven(map, frame.landmarks, {});
   if (proven >= kManyProven) return true;
-  if (frame.stamp_ns - recovery_->since_ns < kConfirmNs) return false;
+  if (frame.stamp_ns - unbelieved_->since_ns < kConfirmNs) return false;
   const Keyframe* reference = map.FindKeyframe(search_.reference());
   return proven >= kSomeProven || reference == nullptr || !CanBeProven(map, reference->map_id, {});
 }
 
-/// What is doubtful is followed for a while, and not believed.
-void Tracker::OnDoubt(int64_t stamp_ns, Attempt* attempt) {
-  if (!believed_ns_) believed_ns_ = motion_.last_stamp_ns();
-  if (stamp_ns - *believed_ns_ > kDoubtNs) Refuse(attempt->report.reason, &attempt->report);
+bool Tracker::IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const {
+  return report.ok && report.doubtful && unbelieved_ && stamp_ns - unbelieved_->since_ns > kDoubtNs;
 }
 
-/// What was recognised does not predict what is seen: the camera is as lost as it was.
-void Tracker::AbandonRecovery() {
-  motion_ = recovery_->motion;
-  last_ = std::move(recovery_->last);
-  recovery_.reset();
-  relocalized_ns_.reset();
+/// What was followed does not predict what is seen: the camera is where it was believed last, and lost.
+void Tracker::GoBack() {
+  motion_ = unbelieved_->motion;
+  last_ = std::move(unbelieved_->last);
+  if (unbelieved_->why == Unbelieved::Why::kFoundAnew) relocalized_ns_.reset();
+  unbelieved_.reset();
 }
 
 /// While the motion still leads, a place that looks alike is no better guess: people are such places. Who was
@@ -205,7 +208,7 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
 
 /// Not while what was found waits to be confirmed, which asks for more than a number of landmarks.
 bool Tracker::IsCareful(int64_t stamp_ns) const {
-  if (recovery_) return false;
+  if (unbelieved_) return false;
   return relocalized_ns_ && stamp_ns - *relocalized_ns_ < kCarefulNs;
 }
 

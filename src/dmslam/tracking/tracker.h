@@ -54,8 +54,8 @@ class Tracker {
 
   /// The keyframe that the frame tracked last was placed by.
   KeyframeId last_reference() const { return motion_.last().reference; }
-  /// Whether a place was recognised that waits to be confirmed.
-  bool IsRecovering() const { return recovery_.has_value(); }
+  /// Whether the camera is followed and not believed: that will show.
+  bool IsUndecided() const { return unbelieved_.has_value(); }
   /// Stamp of the frame tracked last.
   int64_t last_tracked_ns() const { return motion_.last_stamp_ns(); }
   /// What frames said of landmarks since the last call.
@@ -81,9 +81,9 @@ class Tracker {
   void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
-  bool IsConfirmed(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
-  void OnDoubt(int64_t stamp_ns, Attempt* attempt);
-  void AbandonRecovery();
+  bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
+  bool IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const;
+  void GoBack();
 
   TrackingOptions options_;
   uint64_t seed_;
@@ -92,15 +92,19 @@ class Tracker {
   MotionModel motion_;
   PoseCertaintyEstimator certainty_;
   TrackedFrame last_;                      ///< the frame tracked last
-  std::optional<int64_t> believed_ns_;     ///< where frames are doubtful: when the last was that is not
   std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
-  /// A lost camera that was found is followed, but not believed before it is confirmed.
-  struct Recovery {
+  /// A camera that is followed and not believed.
+  struct Unbelieved {
+    enum class Why : uint8_t {
+      kFoundAnew,  ///< it was lost, and waits to be confirmed where it was found
+      kDoubtful,   ///< what it sees may be no part of the room
+    };
+    Why why = Why::kFoundAnew;
     int64_t since_ns = 0;
-    MotionModel motion;  ///< and the last frame, as they were when it was lost
+    MotionModel motion;  ///< and the last frame, as they were when it was believed last
     TrackedFrame last;
   };
-  std::optional<Recovery> recovery_;
+  std::optional<Unbelieved> unbelieved_;
 };
 
 }  // namespace dmslam
