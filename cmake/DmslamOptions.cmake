@@ -16,11 +16,13 @@ endif()
 
 set(DMSLAM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 
-# The promise of identical bytes needs products and sums to be rounded one by one.
+# The promise of identical bytes needs products and sums to be rounded one by one. Nobody replaces a function of ours
+# when a program is loaded, and a compiler that knows may inline what is in the same file.
 add_library(dmslam_options INTERFACE)
 target_compile_options(dmslam_options INTERFACE
   $<BUILD_INTERFACE:-Wall> $<BUILD_INTERFACE:-Wextra> $<BUILD_INTERFACE:-Wconversion> $<BUILD_INTERFACE:-Wshadow>
-  $<BUILD_INTERFACE:-Werror> $<BUILD_INTERFACE:-ffp-contract=off>)
+  $<BUILD_INTERFACE:-Werror> $<BUILD_INTERFACE:-ffp-contract=off>
+  $<BUILD_INTERFACE:-fno-semantic-interposition>)
 target_compile_features(dmslam_options INTERFACE cxx_std_20)
 if(DMSLAM_SANITIZE)
   target_compile_options(dmslam_options INTERFACE

@@ -60,17 +60,14 @@ class ViewGraph {
 
   /// Shares of the smaller view that the new view has in common with each earlier one.
   std::vector<double> Shares(const std::vector<uint64_t>& voxels) const {
-    std::vector<size_t> common(sizes_.size(), 0);
+    std::vector<double> shares(sizes_.size(), 0);
     for (const uint64_t voxel : voxels) {
       const auto found = views_of_.find(voxel);
       if (found == views_of_.end()) continue;
-      for (const size_t view : found->second) ++common[view];
+      for (const size_t view : found->second) shares[view] += 1;
     }
-    std::vector<double> shares;
-    for (size_t i = 0; i < common.size(); ++i) {
-      const double smaller = static_cast<double>(std::max<size_t>(1, std::min(sizes_[i], voxels.size())));
-      shares.push_back(static_cast<double>(common[i]) / smaller);
-    }
+    for (size_t i = 0; i < shares.size(); ++i)
+      shares[i] /= static_cast<double>(std::max<size_t>(1, std::min(sizes_[i], voxels.size())));
     return shares;
   }
   void Add(const std::vector<uint64_t>& voxels, const std::vector<size_t>& neighbours) {

@@ -1,11 +1,36 @@
 #include "dmslam/tracking/local_map.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 
 namespace dmslam {
 namespace {
 
 constexpr int kNeighboursAsked = 10;
+
+/// Ids that lie closer than this are marked in a table; it is smaller than the list and never compares.
+constexpr uint64_t kWidestRange = 64;  // ids between the ends, for each in the list
+
+/// Sorts, and leaves each once. `marks` is workspace.
+void SortUnique(std::vector<LandmarkId>* ids, std::vector<uint64_t>* marks) {
+  if (ids->empty()) return;
+  const auto [least, most] = std::minmax_element(ids->begin(), ids->end());
+  const uint64_t first = least->value, range = most->value - first;
+  if (range / kWidestRange >= ids->size()) {
+    std::sort(ids->begin(), ids->end());
+    ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
+    return;
+  }
+  marks->assign(range / 64 + 1, 0);
+  for (const LandmarkId id : *ids)
+    (*marks)[(id.value - first) / 64] |= uint64_t{1} << ((id.value - first) % 64);
+  ids->clear();
+  for (size_t word = 0; word < marks->size(); ++word) {
+    for (uint64_t left = (*marks)[word]; left != 0; left &= left - 1)
+      ids->push_back({first + 64 * word + static_cast<uint64_t>(std::countr_zero(left))});
+  }
+}
 
 }  // namespace
 
@@ -66,8 +91,7 @@ void LocalMap::ListLandmarks(const Map& map) {
       if (landmark.valid()) landmarks_.push_back(landmark);
     }
   }
-  std::sort(landmarks_.begin(), landmarks_.end());
-  landmarks_.erase(std::unique(landmarks_.begin(), landmarks_.end()), landmarks_.end());
+  SortUnique(&landmarks_, &marks_);
 }
 
 void LocalMap::Collect(const Map& map, const TrackedFrame& frame) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -39,6 +40,7 @@ class LocalMap {
   std::vector<KeyframeId> votes_;  ///< one for each observation of the frame's landmarks
   std::vector<std::pair<int, KeyframeId>> ranked_;
   std::vector<KeyframeId> listed_;  ///< keyframes_, sorted
+  std::vector<uint64_t> marks_;     ///< one bit for each landmark id
 };
 
 }  // namespace dmslam

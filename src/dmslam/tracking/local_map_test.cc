@@ -85,6 +85,22 @@ TEST_F(Chain, ItGoesBeyondWhatTheFrameSeesButNotToTheEnd) {
   EXPECT_EQ(std::adjacent_find(local.landmarks().begin(), local.landmarks().end()), local.landmarks().end());
 }
 
+TEST_F(Chain, LandmarksOfAMapperThatTookOverAreSortedBehindTheOthers) {
+  Landmark landmark;
+  landmark.id = LandmarkId::Make(2, 1);  // far from the others' numbers
+  landmark.map_id = 1;
+  landmark.p_world = {0, 0, 4};
+  landmark.reference = landmark.first_keyframe = Kf(0);
+  map_.AddLandmark(landmark);
+  for (const uint32_t k : {0u, 1u}) map_.SetObservation(map_.At(Kf(k)), 90, map_.At(landmark.id));
+  LocalMap local(60);
+  local.Collect(map_, Seeing(0, 60));
+  const std::vector<LandmarkId>& all = local.landmarks();
+  EXPECT_TRUE(std::is_sorted(all.begin(), all.end()));
+  EXPECT_EQ(std::count(all.begin(), all.end(), landmark.id), 1);
+  EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
+}
+
 TEST_F(Chain, NoMoreKeyframesThanAllowed) {
   LocalMap all(60), one(1);
   const TrackedFrame frame = Seeing(0, 100);
