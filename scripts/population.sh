@@ -28,7 +28,7 @@ the kitchen. Stopped at any time, the same command continues.
   --list FILE      lines of a composited or a rendered sequence; may be repeated (default: population/grid.txt of
                    \$DMSLAM_SHARED, config/population_known.txt and config/population_rendered.txt)
   --only WHICH     composited, rendered, or the name of a sequence; may be repeated
-  --profile NAME   dm (default) or baseline
+  --profile NAME   dm (default), baseline or paper
   --seed N         of the runs (default 1)
   --set KEY=VALUE  a setting of the runs; may be repeated
   --jobs N         so many runs at a time (default 1)

@@ -103,8 +103,10 @@ void DeclareSettings(CommandLine& line, RunArguments::Settings& settings) {
   line.AddOption("--seed", settings.seed, "seed of everything random").ShowDefault();
   line.AddOption("--config", settings.config, "settings (YAML)");
   line.AddOption("--set", settings.sets, "KEY=VALUE: one setting; may be repeated (docs/configuration.md)");
-  line.AddOption("--profile", settings.profile,
-                 "dm (default) or baseline: plain RANSAC start, no mutual exclusion, no motion belief");
+  line.AddOption(
+      "--profile", settings.profile,
+      "dm (default), baseline (plain RANSAC start, no mutual exclusion, no motion belief) or paper (the "
+      "DM-SLAM paper alone)");
   line.AddFlag("--no-loop", settings.no_loop, "do not close loops");
 }
 
@@ -171,8 +173,9 @@ void CheckRunArguments(const RunArguments& a) {
   CheckNumber("--receive-buffer", a.bus.receive_buffer);
   CheckFile("--map", a.map.begin);
   if (a.map.localize && a.map.begin.empty()) throw InputError("--localize needs a map: give it with --map");
-  if (!a.settings.profile.empty() && a.settings.profile != "dm" && a.settings.profile != "baseline")
-    throw InputError("--profile " + a.settings.profile + ": write dm or baseline");
+  if (!a.settings.profile.empty() && a.settings.profile != "dm" && a.settings.profile != "baseline" &&
+      a.settings.profile != "paper")
+    throw InputError("--profile " + a.settings.profile + ": write dm, baseline or paper");
   CheckKey(a.bus, a.source);
   CheckPort(a.bus);
 }

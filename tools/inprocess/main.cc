@@ -47,7 +47,7 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddOption("--camera", a.camera, "camera file (YAML); found by itself for TUM freiburg1/2/3");
   app.AddOption("--config", a.config, "settings (YAML)");
   app.AddOption("--set", a.overrides, "one setting: key=value; may be repeated");
-  app.AddOption("--profile", a.profile, "dm or baseline").OneOf({"dm", "baseline"});
+  app.AddOption("--profile", a.profile, "dm, baseline or paper").OneOf({"dm", "baseline", "paper"});
   app.AddOption("--seed", a.seed).ShowDefault();
   app.AddOption("--start", a.start, "first frame");
   app.AddOption("--frames", a.frames, "at most so many frames");

@@ -17,7 +17,8 @@ Written by `dmslam-settings --out docs/configuration.md`. A setting is described
 A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with `motion_belief: off` below it) or
 from the command line (`--set tracking.motion_belief=off`, which goes before the file). The order within a file does not
 matter. `profile` comes before everything else, wherever it stands: `profile=baseline` is the same system with a plain
-RANSAC two-view start and with the values of the column "baseline".
+RANSAC two-view start and with the values of the column "baseline"; `profile=paper` is the system of the DM-SLAM paper alone:
+DLRSAC as published, Algorithm 1 with a bound that bites, and the values of the column "paper".
 
 The same settings go to every process. A mapper, loop closer or collector whose settings or vocabulary differ from the
 frontend's refuses the session by name and ends with exit code 2. A setting that does not exist, or a value that is not
@@ -40,8 +41,8 @@ std::string Escaped(const std::string& text) {
 
 std::string RowOf(const SettingInfo& info) {
   std::string row = "|";
-  for (const std::string& cell :
-       {"`" + info.key + "`", info.value, info.baseline.value_or(""), info.allowed, info.unit, info.help}) {
+  for (const std::string& cell : {"`" + info.key + "`", info.value, info.baseline.value_or(""),
+                                  info.paper.value_or(""), info.allowed, info.unit, info.help}) {
     if (!cell.empty()) row += ' ';
     row += Escaped(cell);
     row += " |";
@@ -61,10 +62,10 @@ std::string SettingsPage() {
   }
   std::string page = kHead;
   for (const auto& [name, rows] : sections)
-    page +=
-        "\n## " + name +
-        "\n\n| setting | default | baseline | allowed | unit | what it does |\n|---|---|---|---|---|---|\n" +
-        rows;
+    page += "\n## " + name +
+            "\n\n| setting | default | baseline | paper | allowed | unit | what it does "
+            "|\n|---|---|---|---|---|---|---|\n" +
+            rows;
   return page;
 }
 

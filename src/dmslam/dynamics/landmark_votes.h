@@ -20,6 +20,7 @@ struct VoteOptions {
   void Describe(Visitor& v) {
     v.Switch("tracking.motion_belief", motion_belief, "landmarks that are believed to move have no vote");
     v.InBaseline("off");
+    v.InPaper("off");
     v.Number("tracking.young_trust", young_trust, 0, 1, "", "weight of a landmark that was just made");
     v.Number("tracking.trusted_age_s", trusted_age_s, 0, 1000, "s",
              "age at which a landmark has full weight");

@@ -35,6 +35,7 @@ struct SeenThroughOptions {
     v.Switch("mapping.seen_through", enabled,
              "landmarks go that other keyframes see through (people who stood)");
     v.InBaseline("off");
+    v.InPaper("off");
   }
 };
 

@@ -20,6 +20,7 @@ struct ReferenceView {
   PairView pair;
   double since_reference_s = 0;  ///< negative for frames before the reference frame
   bool moved = false;            ///< far enough for the selector to be asked
+  Eigen::Quaterniond R_k_0 = Eigen::Quaterniond::Identity();  ///< roughly: how far the camera has turned
 };
 
 /// A map of a reference frame and some views of it, whose matches share the feature of the reference frame.

@@ -9,6 +9,7 @@
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/initialization/motion_contest.h"
 #include "dmslam/initialization/reference_window.h"
+#include "dmslam/motion_segmentation/turn.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
 #include "dmslam/util/check.h"
 
@@ -163,7 +164,7 @@ class Initializer::Impl {
   void KeepRecent(const InitializerFrame& frame);
   void DropOld(const InitializerFrame& frame);
   void BeginWindow(const InitializerFrame& frame);
-  ReferenceView MakeView(const InitializerFrame& reference, const InitializerFrame& frame);
+  ReferenceView MakeView(const ReferenceWindow& window, const InitializerFrame& frame);
   bool AddView(const InitializerFrame& frame, ReferenceWindow* window, InitializerReport* report);
   InitializerReport TryAgreed(ReferenceWindow* window);
   InitializerReport TryContest(ReferenceWindow* window);
@@ -268,12 +269,15 @@ void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
   last_looked_ns_ = frame.stamp_ns;
 }
 
-ReferenceView Initializer::Impl::MakeView(const InitializerFrame& reference, const InitializerFrame& frame) {
+ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window, const InitializerFrame& frame) {
+  const FrameFeatures& features0 = *window.reference().features;
   ReferenceView view;
   view.frame = frame;
-  view.since_reference_s = SecondsBetween(reference, frame);
-  view.pair.matches =
-      MatchFrames(*reference.features, *frame.features, camera_, options_.matching, &matcher_);
+  view.since_reference_s = SecondsBetween(window.reference(), frame);
+  const Eigen::Quaterniond R_k_0 = window.TurnAt(view.since_reference_s);
+  view.pair.matches = MatchFrames(features0, *frame.features, camera_, options_.matching, &matcher_,
+                                  Turned(features0.uv_px, camera_, R_k_0));
+  view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;
 }
@@ -281,7 +285,7 @@ ReferenceView Initializer::Impl::MakeView(const InitializerFrame& reference, con
 /// False: the frame shows too little of what the reference frame showed.
 bool Initializer::Impl::AddView(const InitializerFrame& frame, ReferenceWindow* window,
                                 InitializerReport* report) {
-  ReferenceView view = MakeView(window->reference(), frame);
+  ReferenceView view = MakeView(*window, frame);
   const size_t matches = view.pair.matches.size();
   if (static_cast<int>(matches) < options_.min_matches) {
     *report = Wait(WaitReason::kTooFewMatches, std::to_string(matches) + " with the reference frame");
@@ -502,8 +506,7 @@ bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindo
 /// just stopped, and what is his cannot be told from the rest: what these frames do not show is not dropped.
 bool Initializer::Impl::AgreesWithPast(ReferenceWindow* window, CandidateMap* candidate, Refused* refused) {
   CandidateMap longer = *candidate;
-  const InitializerFrame& reference = window->reference();
-  const auto match = [&](const InitializerFrame& frame) { return MakeView(reference, frame); };
+  const auto match = [&](const InitializerFrame& frame) { return MakeView(*window, frame); };
   for (const ReferenceView& view : window->Past(match)) builder_.PlaceView(view, &longer);
   builder_.KeepConsistent(&longer);
   const int points = candidate->NumPoints(), left = longer.NumPoints();

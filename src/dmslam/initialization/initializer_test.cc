@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "dmslam/initialization/two_frame_initializer.h"
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 #include "dmslam/util/check.h"
 
@@ -33,9 +34,11 @@ class SyntheticRoom {
 
   const Camera& camera() const { return camera_; }
   Rigid3d TruePose(uint32_t frame) const {
-    return Rigid3d(ExpSo3({0.0, 0.002 * frame, 0.0}), speed_ * frame * Eigen::Vector3d(1.0, 0.1, 0.2));
+    return Rigid3d(ExpSo3({0.0, turn_ * frame, 0.0}), speed_ * frame * Eigen::Vector3d(1.0, 0.1, 0.2));
   }
   void SetSpeed(double speed) { speed_ = speed; }
+  /// How far the camera turns from frame to frame [rad].
+  void SetTurn(double turn) { turn_ = turn; }
   /// The walker stands from this frame on.
   void StopWalkerAt(uint32_t frame) { stop_ = frame; }
   bool IsWalkers(const Descriptor& descriptor) const {
@@ -80,6 +83,7 @@ class SyntheticRoom {
   Camera camera_;
   std::vector<Point> points_;
   double speed_ = 0.012;
+  double turn_ = 0.002;
   uint32_t stop_ = UINT32_MAX;
 };
 
@@ -201,6 +205,16 @@ TEST(Initializer, StartsAtAnyRate) {
   }
 }
 
+// At 0.6 rad/s what the reference frame saw is soon far from where it was, but always where the turn puts it.
+TEST(Initializer, StartsWhileTheCameraTurnsFast) {
+  SyntheticRoom room(900, 0);
+  room.SetTurn(-0.02);
+  const auto found = MapAtRate(room, 1);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT(found->second, 1.2);
+  EXPECT_LT(DirectionError(room, 1, found->first), 0.1);
+}
+
 TEST(Initializer, StartsAtAnySize) {
   for (const double scale : {0.5, 2.0}) {
     const SyntheticRoom room(600, 100, 7, Scaled(SyntheticCamera(), scale));
@@ -290,6 +304,42 @@ TEST(Initializer, IsDeterministic) {
   ASSERT_EQ(maps[0].points.size(), maps[1].points.size());
   for (size_t k = 0; k < maps[0].points.size(); ++k)
     EXPECT_EQ(maps[0].points[k].p_world, maps[1].points[k].p_world);
+}
+
+/// The map of two frames of the room, of the stream from its beginning.
+std::optional<FirstMap> TwoFrameMap(const SyntheticRoom& room, const ReconstructPair& reconstruct,
+                                    const TwoFrameOptions& options) {
+  TwoFrameInitializer initializer(options, room.camera(), reconstruct, 1);
+  for (uint32_t frame = 0; frame < 45; ++frame) {
+    InitializerReport report = initializer.AddFrame(room.Frame(frame));
+    if (report.result) return std::move(report.result);
+  }
+  return std::nullopt;
+}
+
+TEST(TwoFrameInitializer, ThePaperTakesTheRoomWhereRansacTakesTheCrowd) {
+  const SyntheticRoom room(300, 500);
+  const auto paper = TwoFrameMap(room, ReconstructByPaper(room.camera()), {});
+  ASSERT_TRUE(paper.has_value());
+  EXPECT_LT(ShareOfWalker(room, *paper), 0.5);
+  const auto ransac = TwoFrameMap(room, ReconstructByRansac(room.camera()), {});
+  ASSERT_TRUE(ransac.has_value());
+  EXPECT_GT(ShareOfWalker(room, *ransac), 0.5);
+}
+
+TEST(TwoFrameInitializer, TheFramesAreAsFarApartAsAsked) {
+  const SyntheticRoom room(600, 0);
+  TwoFrameOptions options;
+  options.min_gap_s = 0.5;
+  const auto map = TwoFrameMap(room, ReconstructByPaper(room.camera()), options);
+  ASSERT_TRUE(map.has_value());
+  EXPECT_GE(map->frame1.stamp_ns - map->frame0.stamp_ns, 500'000'000);
+}
+
+TEST(TwoFrameInitializer, ThePaperWaitsWhileTheCameraOnlyTurns) {
+  SyntheticRoom room(600, 0);
+  room.SetSpeed(0);
+  EXPECT_FALSE(TwoFrameMap(room, ReconstructByPaper(room.camera()), {}).has_value());
 }
 
 TEST(ReconstructBaseline, FindsThePoseOfARoom) {

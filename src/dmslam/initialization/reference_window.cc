@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dmslam/geometry/rigid3.h"
+
 namespace dmslam {
 
 std::vector<const ReferenceView*> ReferenceWindow::PairsToAgree(const InitializerOptions& options) const {
@@ -16,6 +18,20 @@ std::vector<const ReferenceView*> ReferenceWindow::PairsToAgree(const Initialize
   if (asked == 1) return {moved.back()};
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
   return chosen;
+}
+
+Eigen::Quaterniond ReferenceWindow::TurnAt(double since_reference_s) const {
+  if (views_.empty()) return Eigen::Quaterniond::Identity();
+  const size_t newer = since_reference_s < 0 ? 0 : views_.size() - 1;
+  const ReferenceView& b = views_[newer];
+  Eigen::Quaterniond R_a_0 = Eigen::Quaterniond::Identity();
+  double time_a_s = 0;
+  if (newer > 0) {
+    R_a_0 = views_[newer - 1].R_k_0;
+    time_a_s = views_[newer - 1].since_reference_s;
+  }
+  const Eigen::Vector3d rate = LogSo3(b.R_k_0 * R_a_0.conjugate()) / (b.since_reference_s - time_a_s);
+  return ExpSo3(rate * (since_reference_s - b.since_reference_s)) * b.R_k_0;
 }
 
 std::vector<const ReferenceView*> ReferenceWindow::ViewsBetween(const ReferenceView& last, int most) const {

@@ -21,6 +21,10 @@ class ReferenceWindow {
   const ReferenceView& AddView(ReferenceView view) { return views_.emplace_back(std::move(view)); }
   const std::deque<ReferenceView>& views() const { return views_; }
 
+  /// How far the camera will have turned from the reference frame at that time, if it goes on as it does at
+  /// the nearest views; before the reference frame, as just after it.
+  Eigen::Quaterniond TurnAt(double since_reference_s) const;
+
   /// The newest view last, and as many before it as must agree, spread evenly over those that moved; empty
   /// while there are too few, or all within too short a time.
   std::vector<const ReferenceView*> PairsToAgree(const InitializerOptions& options) const;

@@ -76,8 +76,10 @@ struct LoopcloserOptions {
         "loop.min_proven", min_proven, 0, 10000, "",
         "of the landmarks found, seen for longer than people stand: fewer may be somebody who stood in two "
         "places");
+    v.InPaper("0");
     v.Number("loop.max_drift_sigmas", max_drift_sigmas, 0, 1e9, "",
              "a loop that moves more than the keyframes can have drifted is refused");
+    v.InPaper("1e+09");
     v.Number("loop.confirmations", confirmations, 1, 100, "",
              "later keyframes that must see the place again");
     v.Switch("loop.global_adjustment", global_adjustment, "adjust the whole map after a loop");

@@ -33,10 +33,13 @@ struct LandmarkCreationOptions {
              "half the side of the neighbourhood");
     v.Number("mapping.alpha", alpha, 0, 100, "",
              "bound on the candidates, as a share of the tracked landmarks");
+    v.InPaper("0.3");
     v.Number("mapping.min_candidates", min_candidates, 0, 10000, "", "candidates that are always allowed");
+    v.InPaper("0");
     v.Number("mapping.confirmed_views", confirmed_views, 0, 100, "",
              "points seen in so many views for a second are free of the bound and the neighbourhood; 0: "
              "none");
+    v.InPaper("0");
   }
 };
 
@@ -71,6 +74,7 @@ struct MapperOptions {
              "nearer to a keyframe than this share of what it sees in the median, a landmark goes at the "
              "end");
     v.InBaseline("0");
+    v.InPaper("0");
     seen_through.Describe(v);
     v.Number("mapping.local_keyframes", local_keyframes, 2, 1000, "", "keyframes adjusted at a time");
     v.Number("mapping.redundant_share", redundant_share, 0, 1, "",

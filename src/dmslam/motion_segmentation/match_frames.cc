@@ -4,7 +4,8 @@
 namespace dmslam {
 
 std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
-                               const MatchingOptions& options, FeatureMatcher* matcher) {
+                               const MatchingOptions& options, FeatureMatcher* matcher,
+                               std::span<const Eigen::Vector2d> predicted_px) {
   const MatchSide side0{frame0.set.keypoints, frame0.set.descriptors, frame0.uv_px, {}};
   const MatchSide side1{frame1.set.keypoints, frame1.set.descriptors, frame1.uv_px, {}};
   MatchOptions match;
@@ -17,7 +18,7 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
     window.match = match;
     window.window_px = options.window_rad * FocalPx(camera);
     window.octave_slack = options.octave_slack;
-    matcher->MatchWindow(side0, side1, frame1.grid, window, &found);
+    matcher->MatchWindow(side0, side1, frame1.grid, window, &found, predicted_px);
   } else {
     matcher->MatchAll(side0, side1, match, &found);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "dmslam/camera/camera.h"
@@ -19,9 +20,11 @@ struct MatchingOptions {
   bool check_orientation = true;  ///< keep the turns that most matches share
 };
 
-/// Matches of two frames of the camera by the options, sorted by index0.
+/// Matches of two frames of the camera by the options, sorted by index0. `predicted_px`: where the features
+/// of the first are looked for in the second; empty: where they were.
 std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
-                               const MatchingOptions& options, FeatureMatcher* matcher);
+                               const MatchingOptions& options, FeatureMatcher* matcher,
+                               std::span<const Eigen::Vector2d> predicted_px = {});
 
 /// At most so many of the matches, spread evenly over them.
 std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most);

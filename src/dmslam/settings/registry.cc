@@ -62,6 +62,8 @@ class Collector {
   }
   /// Of the setting just described: its value in the profile `baseline`.
   void InBaseline(const char* value) { settings_.back().baseline = value; }
+  /// The same in the profile `paper`.
+  void InPaper(const char* value) { settings_.back().paper = value; }
   /// A field that takes a setting which another struct describes: the defaults must be the same.
   template <typename T>
   void Shared(const char* key, T& field) {
@@ -102,9 +104,10 @@ SettingInfo ProfileInfo() {
   info.key = "profile";
   info.value = "dm";
   info.baseline = "baseline";
+  info.paper = "paper";
   info.help = "sets several at once, before all others";
   info.type = Type::kChoice;
-  info.choices = {"dm", "baseline"};
+  info.choices = {"dm", "baseline", "paper"};
   info.allowed = JoinWithOr(info.choices);
   return info;
 }

@@ -12,6 +12,7 @@ struct SettingInfo {
   std::string key;                      ///< "tracking.motion_belief"
   std::string value;                    ///< the default
   std::optional<std::string> baseline;  ///< in the profile of this name, where that sets it
+  std::optional<std::string> paper;     ///< likewise
   std::string unit;                     ///< empty: none
   std::string help;
   std::string allowed;  ///< "1 to 16", "on or off", "dlrsac, arsac or ransac"

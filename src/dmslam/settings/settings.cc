@@ -111,9 +111,11 @@ void At(const Given& given, Act act) {
 }  // namespace
 
 Settings::Settings(std::string_view profile) {
-  if (CanonicalValue("profile", profile) != "baseline") return;
+  const std::string name = CanonicalValue("profile", profile);
+  if (name == "dm") return;
   for (const SettingInfo& setting : AllSettings()) {
-    if (setting.baseline) changed_[setting.key] = *setting.baseline;
+    const std::optional<std::string>& own = name == "baseline" ? setting.baseline : setting.paper;
+    if (own) changed_[setting.key] = *own;
   }
 }
 

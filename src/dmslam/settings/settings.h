@@ -65,6 +65,7 @@ class SettingsReader {
     Shared(key, field);
   }
   void InBaseline(const char*) {}
+  void InPaper(const char*) {}
   template <typename T>
   void Shared(const char* key, T& field) {
     if (const std::optional<T> value = ParseSetting<T>(settings_.Value(key))) field = *value;

@@ -90,6 +90,8 @@ TEST(SettingsTest, EverySettingIsExplainedBoundedAndCanBeSetToItsDefault) {
     EXPECT_EQ(info.Canonical(info.value), info.value) << info.key;
     const std::string baseline = info.baseline.value_or(info.value);
     EXPECT_EQ(info.Canonical(baseline), baseline) << info.key;
+    const std::string paper = info.paper.value_or(info.value);
+    EXPECT_EQ(info.Canonical(paper), paper) << info.key;
     if (info.key != "profile") settings.Set(info.key, info.value);
   }
   EXPECT_EQ(settings.Hash(), Settings().Hash());
@@ -150,9 +152,9 @@ TEST(SettingsTest, WhatIsWrongIsNamedWithFileLineAndCure) {
   EXPECT_EQ(Refusal("loop:\n  enabled: perhaps\n"),
             "FILE:2: setting 'loop.enabled': 'perhaps' is not allowed; write on or off");
   EXPECT_EQ(Refusal("initializer:\n  method: magic\n"),
-            "FILE:2: setting 'initializer.method': 'magic' is not allowed; write dlrsac, arsac or ransac");
+            "FILE:2: setting 'initializer.method': 'magic' is not allowed; write dlrsac, arsac, ransac or paper");
   EXPECT_EQ(Refusal("seed: 1\nprofile: fast\n"),
-            "FILE:2: setting 'profile': 'fast' is not allowed; write dm or baseline");
+            "FILE:2: setting 'profile': 'fast' is not allowed; write dm, baseline or paper");
   EXPECT_EQ(Refusal("mapping:\n  alpha: [1, 2]\n"),
             "FILE:2: setting 'mapping.alpha' is neither a value nor a section; write 'key: value'");
   EXPECT_EQ(Refusal("seed: 1\nfeatures.count: 1000\nfeatures:\n  count: 1200\n"),

@@ -1,17 +1,30 @@
 #include "dmslam/slam/first_map_phase.h"
 
 #include <memory>
+#include <utility>
 
-#include "dmslam/initialization/baseline_initializer.h"
 #include "dmslam/initialization/initial_map.h"
+#include "dmslam/initialization/two_frame_initializer.h"
 
 namespace dmslam {
+namespace {
+
+constexpr double kPaperGapS = 0.15;  // between the two frames; the paper: some frames
+
+FirstMapSearch Search(TwoFrameInitializer initializer) {
+  auto shared = std::make_shared<TwoFrameInitializer>(std::move(initializer));
+  return [shared](const InitializerFrame& frame) { return shared->AddFrame(frame); };
+}
+
+}  // namespace
 
 FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
                                   const Camera& camera, uint64_t seed) {
-  if (method == "ransac") {
-    auto baseline = std::make_shared<BaselineInitializer>(BaselineInitializerOptions(), camera, seed);
-    return [baseline](const InitializerFrame& frame) { return baseline->AddFrame(frame); };
+  if (method == "ransac") return Search(TwoFrameInitializer({}, camera, ReconstructByRansac(camera), seed));
+  if (method == "paper") {
+    TwoFrameOptions some_frames_apart;
+    some_frames_apart.min_gap_s = kPaperGapS;
+    return Search(TwoFrameInitializer(some_frames_apart, camera, ReconstructByPaper(camera), seed));
   }
   InitializerOptions chosen = options;
   chosen.method = method;

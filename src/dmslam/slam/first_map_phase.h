@@ -13,7 +13,7 @@ namespace dmslam {
 /// Takes a frame of the stream in which a first map is looked for, and says what is known by now.
 using FirstMapSearch = std::function<InitializerReport(const InitializerFrame&)>;
 
-/// The search that `method` stands for: dlrsac, arsac, or ransac (two frames, no gates).
+/// The search that `method` stands for: dlrsac, arsac, or of two frames alone: ransac, paper.
 FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
                                   const Camera& camera, uint64_t seed);
 

@@ -8,8 +8,8 @@
 namespace dmslam {
 
 struct FrontendOptions {
-  /// dlrsac; arsac, behind the same gates; or ransac: two frames and plain RANSAC without gates (the
-  /// baseline).
+  /// dlrsac; arsac, behind the same gates; or of two frames alone: ransac, without gates (the baseline), and
+  /// paper, DLRSAC with the failure tests of its paper.
   std::string initializer_method = "dlrsac";
   double initializer_feature_factor =
       2.0;  ///< features of a frame while there is no map, times those of others
@@ -27,28 +27,35 @@ struct FrontendOptions {
 
   template <typename Visitor>
   void Describe(Visitor& v) {
-    v.Choice("initializer.method", initializer_method, {"dlrsac", "arsac", "ransac"},
-             "which matches are static; ransac: two frames and plain RANSAC, without gates");
+    v.Choice("initializer.method", initializer_method, {"dlrsac", "arsac", "ransac", "paper"},
+             "which matches are static; of two frames alone: ransac, without gates, and paper, DLRSAC as "
+             "published");
     v.InBaseline("ransac");
+    v.InPaper("paper");
     v.Number("initializer.feature_factor", initializer_feature_factor, 0.5, 5, "",
              "features of a frame while there is no map, times features.count");
     tracking.Describe(v);
     v.Number("tracking.trial_s", trial_s, 0, 60, "s", "time for which a first map must predict the frames");
+    v.InPaper("0");
     v.Number("tracking.new_map_after_s", new_map_after_s, 0.1, 3600, "s",
              "lost for so long, darkness not counted: a new map is started as well");
     v.InBaseline("5");
+    v.InPaper("5");
     v.Number("tracking.max_kept_frames", max_kept_frames, 0, 100000, "frames",
              "unplaced frames kept for localisation at the end");
     v.InBaseline("300");
+    v.InPaper("300");
     v.Switch("tracking.smooth_at_end", smooth_at_end,
              "the poses told at the end: landmarks placed by all frames, weak frames looked for from the "
              "motion, and joined with it");
     v.InBaseline("off");
+    v.InPaper("off");
     keyframe.Describe(v);
     v.Switch("keyframe.at_end", keyframes_at_end,
              "frames placed when the sequence has ended become keyframes too, and the map grows to where "
              "they see");
     v.InBaseline("off");
+    v.InPaper("off");
   }
 };
 

@@ -137,7 +137,7 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
     report->reason = "the static features lie in too small a part of the image";
   } else {
     report->ok = true;
-    Doubt(fit, report);
+    if (options_.doubt) Doubt(fit, report);
   }
 }
 

@@ -22,7 +22,8 @@ struct TrackingOptions {
   int min_inliers_after_relocalization = 30;
   double chi2 = 5.991;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
-  int min_cells = 6;          ///< inliers must lie in at least so many cells of an 8 x 6 grid
+  bool doubt = true;  ///< poses that may rest on what is no part of the room are followed, but not told
+  int min_cells = 6;  ///< inliers must lie in at least so many cells of an 8 x 6 grid
 
   template <typename Visitor>
   void Describe(Visitor& v) {
@@ -33,6 +34,10 @@ struct TrackingOptions {
              "fewer static inliers: the frame is not tracked");
     v.Number("tracking.max_local_keyframes", max_local_keyframes, 1, 1000, "",
              "keyframes whose landmarks are searched for");
+    v.Switch("tracking.doubt", doubt,
+             "poses that may rest on what is no part of the room are followed for a second, but not told");
+    v.InBaseline("off");
+    v.InPaper("off");
   }
 };
 
