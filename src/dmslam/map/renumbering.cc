@@ -69,9 +69,7 @@ class Namer {
   const Renumbering& names_;
 };
 
-MapDelta Whole(const Map& map) {
-  return std::move(CutSnapshot(map, KeyframeId{}, kAtOnce).front());
-}
+MapDelta Whole(const Map& map) { return std::move(CutSnapshot(map, KeyframeId{}, kAtOnce).front()); }
 
 }  // namespace
 

@@ -22,8 +22,10 @@ TEST(RenumberingTest, TwoMapsOfTheSameNamesStandSideBySide) {
   const Replica both = Beside(a, b, names);
   EXPECT_EQ(both.keyframes().size(), a.keyframes().size() + b.keyframes().size());
   EXPECT_EQ(both.num_landmarks(), a.num_landmarks() + b.num_landmarks());
-  EXPECT_EQ(both.keyframe_tombstones().size(), a.keyframe_tombstones().size() + b.keyframe_tombstones().size());
-  EXPECT_EQ(both.landmark_tombstones().size(), a.landmark_tombstones().size() + b.landmark_tombstones().size());
+  EXPECT_EQ(both.keyframe_tombstones().size(),
+            a.keyframe_tombstones().size() + b.keyframe_tombstones().size());
+  EXPECT_EQ(both.landmark_tombstones().size(),
+            a.landmark_tombstones().size() + b.landmark_tombstones().size());
   EXPECT_EQ(both.skipped_references(), 0u);
   EXPECT_EQ(MapsOf(both).size(), MapsOf(a).size() + MapsOf(b).size());
   // Every keyframe of b sees what it saw, under its new name.

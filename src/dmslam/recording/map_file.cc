@@ -131,8 +131,8 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
   if (!RenameDurably(partial, path)) throw InputError(path + ": cannot be written; check the path");
 }
 
-RebuiltMap LoadMap(const std::string& path) {
-  const LogIndex log(path);
+RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key) {
+  const LogIndex log(path, key);
   RebuiltMap map = RebuildMap(log, log.Session());
   if (map.map.keyframes().empty()) throw InputError(path + ": holds a map without keyframes");
   return map;

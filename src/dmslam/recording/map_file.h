@@ -43,8 +43,9 @@ CutMap Cut(const std::string& path, const Map& map);
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session);
 void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session);
 
-/// Reads what SaveMap has written, or rebuilds the map of any other log of a run. Throws InputError.
-RebuiltMap LoadMap(const std::string& path);
+/// Reads what SaveMap has written, or rebuilds the map of any other log of a run. `key`: as for LogIndex.
+/// Throws InputError.
+RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key = std::nullopt);
 
 /// Throws InputError unless `map` can be continued with this camera and pyramid.
 void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid);

@@ -37,8 +37,8 @@ struct MapMergeReport {
 /// And no two keyframes count as taken at the same time, since nothing says that the clocks are the same: a
 /// person who stands in both is no proof.
 ///
-/// Where it ends the joined map lies where `a` lay: the first keyframe of its largest map has the pose and the
-/// scale that it had.
+/// Where it ends the joined map lies where `a` lay: the first keyframe of its largest map has the pose and
+/// the scale that it had.
 class MapMerge {
  public:
   /// `names_of_b`: see NamesBeside.

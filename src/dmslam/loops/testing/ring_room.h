@@ -68,7 +68,9 @@ struct WorldOptions {
 };
 
 /// What the second map believes of the world: it lies turned, elsewhere, and is half as large.
-inline Sim3d SecondWorld() { return Sim3d(ExpSo3(Eigen::Vector3d(0.2, -0.4, 1.0)), Eigen::Vector3d(3, 1, -2), 0.5); }
+inline Sim3d SecondWorld() {
+  return Sim3d(ExpSo3(Eigen::Vector3d(0.2, -0.4, 1.0)), Eigen::Vector3d(3, 1, -2), 0.5);
+}
 
 /// A camera that goes around a room; landmarks of the second round are not known to be those of the first.
 class Room {
