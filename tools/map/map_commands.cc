@@ -124,8 +124,8 @@ void PrintKeyframes(const char* mark, const std::vector<KeyframeId>& ids) {
 }
 
 std::string DisplacementText(const char* name, const Displacement& displacement, size_t of) {
-  return Text("  %-9s %zu of %zu moved, median %.5f, largest %.5f of the scene's depth\n", name,
-              displacement.moved, of, displacement.median_depths, displacement.max_depths);
+  return Text("  %-9s %zu of %zu moved, median %.5f, largest %.5f of the depth\n", name, displacement.moved,
+              of, displacement.median_depths, displacement.max_depths);
 }
 
 void PrintCommon(const CommonMap& common) {
@@ -180,10 +180,8 @@ void CheckMayJoin(const WholeMap& a, const WholeMap& b, bool renumber) {
 }
 
 void CheckVocabulary(const WholeMap& map, uint64_t checksum) {
-  const std::optional<uint64_t> its = map.rebuilt.session.vocabulary_checksum;
-  if (!its || *its == checksum) return;
-  throw InputError(map.path + ": was made with another vocabulary (checksum " + Hex(*its) +
-                   ") than the one that is given (" + Hex(checksum) + "); give its own with --vocabulary");
+  const std::string why = WhyOtherVocabulary(map.path, map.rebuilt.session, checksum);
+  if (!why.empty()) throw InputError(why);
 }
 
 std::string Listing(const std::string& path, const Map& map, const SessionStart& session) {

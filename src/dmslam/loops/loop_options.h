@@ -15,9 +15,7 @@ struct LoopcloserOptions {
   int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
   bool within_maps = true;         ///< off: only places of other maps are looked for
-  /// Between keyframes of two maps: nothing has moved far meanwhile. Below zero: never, the clocks of the two
-  /// may be different ones.
-  double same_time_s = 0.5;
+  double same_time_s = 0.5;        ///< between keyframes of two maps: nothing has moved far meanwhile
 
   // What makes a place the same.
   int min_word_matches = 20;  ///< of landmarks, between the two keyframes

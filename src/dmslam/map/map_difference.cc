@@ -31,55 +31,70 @@ double Middle(std::vector<double>& values) {
   return *middle;
 }
 
-/// Places of the same things in two maps.
-struct Places {
-  std::vector<Eigen::Vector3d> a, b;
-
-  void Add(const Eigen::Vector3d& in_a, const Eigen::Vector3d& in_b) {
-    a.push_back(in_a);
-    b.push_back(in_b);
+/// Places of the same things in two maps, and how deep the scene is there.
+class Places {
+ public:
+  /// `depth_a`, `depth_b`: in units of each map; 0: not known.
+  void Add(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double depth_a, double depth_b) {
+    a_.push_back(a);
+    b_.push_back(b);
+    depth_a_.push_back(depth_a);
+    depth_b_.push_back(depth_b);
   }
+  size_t size() const { return a_.size(); }
   size_t NumMoved() const {
     size_t moved = 0;
-    for (size_t i = 0; i < a.size(); ++i) moved += a[i] == b[i] ? 0 : 1;
+    for (size_t i = 0; i < a_.size(); ++i) moved += a_[i] == b_[i] ? 0 : 1;
     return moved;
   }
-  Displacement Beyond(const Sim3d& S_b_a, double depth) const {
+  std::optional<Sim3d> Align() const { return AlignSim3(a_, b_); }
+  Displacement Beyond(const Sim3d& S_b_a) const {
     Displacement displacement;
     displacement.moved = NumMoved();
-    if (displacement.moved == 0 || !(depth > 0)) return displacement;
     std::vector<double> depths;
-    for (size_t i = 0; i < a.size(); ++i) depths.push_back((b[i] - S_b_a * a[i]).norm() / depth);
+    for (size_t i = 0; i < a_.size(); ++i) {
+      const double depth = std::max(S_b_a.scale * depth_a_[i], depth_b_[i]);
+      if (depth > 0) depths.push_back((b_[i] - S_b_a * a_[i]).norm() / depth);
+    }
+    if (displacement.moved == 0 || depths.empty()) return displacement;
     displacement.max_depths = *std::ranges::max_element(depths);
     displacement.median_depths = Middle(depths);
     return displacement;
   }
+
+ private:
+  std::vector<Eigen::Vector3d> a_, b_;
+  std::vector<double> depth_a_, depth_b_;
 };
+
+double DepthAt(const Map& map, const Landmark& landmark) {
+  const Keyframe* reference = map.FindKeyframe(landmark.reference);
+  return reference == nullptr ? 0.0 : (landmark.p_world - reference->T_cam_world.Center()).norm();
+}
 
 CommonMap CompareMap(const Map& a, const Map& b, MapId in_a, MapId in_b) {
   CommonMap common;
   common.a = in_a;
   common.b = in_b;
   Places cameras, points;
-  std::vector<double> depths;
   for (const Keyframe* keyframe : a.KeyframesOf(in_a)) {
     const Keyframe* other = b.FindKeyframe(keyframe->id);
     if (other == nullptr || other->map_id != in_b) continue;
-    cameras.Add(keyframe->T_cam_world.Center(), other->T_cam_world.Center());
-    if (const auto depth = b.MedianDepth(*other)) depths.push_back(*depth);
+    cameras.Add(keyframe->T_cam_world.Center(), other->T_cam_world.Center(),
+                a.MedianDepth(*keyframe).value_or(0.0), b.MedianDepth(*other).value_or(0.0));
   }
   for (const Landmark* landmark : a.LandmarksOf(in_a)) {
     const Landmark* other = b.FindLandmark(landmark->id);
-    if (other != nullptr && other->map_id == in_b) points.Add(landmark->p_world, other->p_world);
+    if (other != nullptr && other->map_id == in_b)
+      points.Add(landmark->p_world, other->p_world, DepthAt(a, *landmark), DepthAt(b, *other));
   }
-  common.keyframes = cameras.a.size();
-  common.landmarks = points.a.size();
+  common.keyframes = cameras.size();
+  common.landmarks = points.size();
   // Where most stand as they stood the map has not moved, though some of it may have.
-  if (2 * cameras.NumMoved() > cameras.a.size()) common.S_b_a = AlignSim3(cameras.a, cameras.b);
-  const double depth = depths.empty() ? 0.0 : Middle(depths);
+  if (2 * cameras.NumMoved() > cameras.size()) common.S_b_a = cameras.Align();
   const Sim3d S_b_a = common.S_b_a.value_or(Sim3d());
-  common.cameras = cameras.Beyond(S_b_a, depth);
-  common.points = points.Beyond(S_b_a, depth);
+  common.cameras = cameras.Beyond(S_b_a);
+  common.points = points.Beyond(S_b_a);
   return common;
 }
 

@@ -14,7 +14,8 @@ struct NamesApart {
   size_t both = 0;
 };
 
-/// By how much things stand elsewhere, in units of the median depth of the scene.
+/// By how much things stand elsewhere, in units of depth: a camera's of the median depth of what it sees, a
+/// landmark's of its distance from its reference keyframe (in the map where that is larger).
 struct Displacement {
   size_t moved = 0;  ///< of those in both, not exactly where they were
   double median_depths = 0, max_depths = 0;

@@ -49,6 +49,10 @@ RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key = s
 
 /// Throws InputError unless `map` can be continued with this camera and pyramid.
 void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid);
+/// Why a map that was `made` so does not go with the vocabulary of that checksum; empty: it does, or one of
+/// the two has none.
+std::string WhyOtherVocabulary(const std::string& path, const SessionStart& made,
+                               std::optional<uint64_t> checksum);
 
 /// The highest session and the highest epoch's ordinal that the map's ids name: new ids must lie above.
 uint32_t NewestSession(const Map& map);

@@ -46,7 +46,6 @@ std::set<MapId> Shared(const Map& map, const std::vector<KeyframeId>& a, const s
 LoopcloserOptions BetweenMaps(LoopcloserOptions options) {
   options.enabled = true;
   options.within_maps = false;
-  options.same_time_s = -1;
   return options;
 }
 
@@ -101,7 +100,7 @@ void MapMerge::Weld(std::shared_ptr<const Vocabulary> vocabulary, const Progress
     }
     if (answer.kind == LoopAnswer::Kind::kNone) continue;
     const std::string why_refused = WhyRefused(map_, answer);
-    DMSLAM_CHECK(why_refused.empty(), why_refused);
+    DMSLAM_CHECK(why_refused.empty(), why_refused.c_str());
     ApplyCorrection(map_, answer, options_.mapper);
     if (answer.kind == LoopAnswer::Kind::kLoop) report_.welds.push_back(answer.note);
     MapDelta delta = map_.TakeDelta(MapEvent::kCorrected, id, map_.At(id).map_id);

@@ -33,9 +33,9 @@ struct MapMergeReport {
 /// keyframe of one is looked for in the other as if it had just come (`LoopcloserCore`, with all that it asks
 /// before it believes: docs/loops.md), first those of `b`, then those of `a`; what is found carries one map
 /// over to the other (`ApplyCorrection`); then landmarks are fused wherever keyframes of both look at the
-/// same, and the whole is adjusted. Two things differ. Loops within a map are left to the run that made it.
-/// And no two keyframes count as taken at the same time, since nothing says that the clocks are the same: a
-/// person who stands in both is no proof.
+/// same, and the whole is adjusted. One thing differs: loops within a map are left to the run that made it.
+/// Keyframes of two sessions never count as taken at the same time, so a person who stands in both maps is no
+/// proof.
 ///
 /// Where it ends the joined map lies where `a` lay: the first keyframe of its largest map has the pose and
 /// the scale that it had.
