@@ -6,6 +6,7 @@
 #include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/recording/checkpoint.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
