@@ -1,4 +1,5 @@
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -220,6 +221,7 @@ int Run(const Arguments& a) {
       if (keyframe.map_id == map_id)
         trajectories.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
     }
+    std::ranges::stable_sort(trajectories.keyframes, {}, &dmslam::StampedPose::stamp_ns);
   }
   if (!a.ply.empty()) dmslam::WriteMapPly(a.ply, rebuilt.map, map_id);
   if (!a.trajectory.empty()) dmslam::WriteTrajectory(a.trajectory, trajectories.final);

@@ -72,20 +72,18 @@ MapMergeOptions OptionsOf(const MergeArguments& arguments) {
   return options;
 }
 
-/// Says what is being done when that changes, and every some seconds.
+/// Says what is being done where it takes long.
 class Progress {
  public:
   void operator()(const std::string& what, size_t done, size_t of) {
     const auto now = std::chrono::steady_clock::now();
-    if (what == what_ && now - said_ < std::chrono::seconds(5)) return;
-    what_ = what;
+    if (now - said_ < std::chrono::seconds(3)) return;
     said_ = now;
     LogInfo("{}: {} of {} keyframes", what, done, of);
   }
 
  private:
-  std::string what_;
-  std::chrono::steady_clock::time_point said_;
+  std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
 };
 
 SessionStart StartOfJoined(const WholeMap& a, const WholeMap& b, const Map& joined) {
@@ -208,11 +206,8 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
   CheckVocabulary(a, vocabulary->checksum());
   CheckVocabulary(b, vocabulary->checksum());
   const Renumbering names = NamesBeside(a.map(), b.map(), arguments.renumber);
-  for (const auto& [session, number] : names.sessions)
-    std::printf("session %u of %s is called %u\n", session, b.path.c_str(), number);
   MapMerge merge(a.map(), b.map(), names, OptionsOf(arguments));
   const MapMergeReport report = merge.Run(vocabulary, Progress());
-  for (const std::string& weld : report.welds) std::printf("joined: %s\n", weld.c_str());
   if (!report.joined && !arguments.apart) {
     LogError(
         "{} and {}: do not show the same place: of {} keyframes {} places looked alike, {} of them held in "
@@ -220,6 +215,9 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
         a.path, b.path, report.keyframes_asked, report.places_tried, report.places_proposed);
     return 1;
   }
+  for (const auto& [session, number] : names.sessions)
+    std::printf("session %u of %s is called %u\n", session, b.path.c_str(), number);
+  for (const std::string& weld : report.welds) std::printf("joined: %s\n", weld.c_str());
   if (report.joined)
     std::printf("fused: %d observations and landmarks beside those of the welds\n", report.fused);
   Save(arguments.save, merge.map(), StartOfJoined(a, b, merge.map()));
