@@ -61,7 +61,20 @@ for command in "merge $work/a.map $work/half.map --save $work/none.map" "diff $w
   refused "half.map: is not whole: [0-9]+ of the [0-9]+ records of the saved map" map $command
 done
 refused "half.map: is not whole" "${play[@]}" --map "$work/half.map" --out "$work/o"
-refused "is missing.*LCM|none.map|no such" map merge "$work/a.map" "$work/none.map" --save "$work/new.map"
+python3 - "$work/old.map" <<'EOP'
+import struct
+import sys
+
+# A record of the map as version 0.1 wrote it, in a log of lcm-logger.
+channel, record = b"DMSLAM_MAPPER_MAP", bytes.fromhex("60594f88dd67af37") + bytes(192)
+with open(sys.argv[1], "wb") as log:
+    log.write(struct.pack(">IqqII", 0xEDA1DA01, 0, 1, len(channel), len(record)) + channel + record)
+EOP
+for command in "merge $work/old.map $work/a.map --save $work/none.map" "diff $work/a.map $work/old.map"; do
+  # shellcheck disable=SC2086  # several words
+  refused "old.map: recorded by version 0.1; this is version" map $command
+done
+refused "none.map: cannot be read" map merge "$work/a.map" "$work/none.map" --save "$work/new.map"
 awk '/^fx:/ { $2 *= 1.01 } { print }' "$camera" >"$work/other.yaml"
 check "a map of another camera" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$work/other.yaml" --seed 3 \
   --frames 60 --session 77 --save-map "$work/other.map" --out "$work/o" >/dev/null 2>&1
