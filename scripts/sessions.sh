@@ -38,7 +38,7 @@ run() {
   map --map "$out/$name.map" --keyframes "$out/$name.keyframes.txt"
 }
 
-# judge NAME WHAT JOINED PART...: every part is a run whose saved map went into that of JOINED; "=" is before a run that was
+# judge WHAT JOINED PART...: every part is a run whose saved map went into that of JOINED; "=" is before a run that was
 # made in that map, whose frames need no carrying over.
 judge() {
   python3 - "$top/scripts/lib" "$data/kitchen/groundtruth.txt" "$out" "$@" <<'EOP'
@@ -64,9 +64,9 @@ def turned(q, v):
 def carried(poses, before, after):
     """Centres of frames beside the nearest of the keyframes that are in both maps."""
     both = [s for s in before if s in after]
-    far = [(math.dist(before[a][:3], before[b][:3]), math.dist(after[a][:3], after[b][:3]))
-           for a in both for b in both if a < b]
-    scale = sum(after for _, after in far) / sum(before for before, _ in far)
+    pairs = [(a, b) for a in both for b in both if a < b]
+    spread = [sum(math.dist(m[a][:3], m[b][:3]) for a, b in pairs) for m in (before, after)]
+    scale = spread[1] / spread[0]
     result = {}
     for stamp, pose in poses.items():
         near = min(both, key=lambda s: abs(s - stamp))

@@ -8,7 +8,8 @@ camera=$root/config/synthetic.yaml
 play=(run --sequence "$synthetic" --camera "$camera" --seed 3 --lockstep)
 map() { "$build/bin/dmslam-map" "$@"; }
 listed() { # FILE PATTERN
-  map list "$1" >"$work/listed" && grep -qE -- "$2" "$work/listed" || { cat "$work/listed"; return 1; }
+  map list "$1" >"$work/listed" || return
+  grep -qE -- "$2" "$work/listed" || { cat "$work/listed"; return 1; }
 }
 
 check "the first run ends with 0" "${play[@]}" --frames 90 --save-map "$work/a.map" --out "$work/a"
