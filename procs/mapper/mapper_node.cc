@@ -6,6 +6,7 @@
 #include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/recording/checkpoint.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -32,7 +33,9 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
   if (run_.localize_only && !run_.saved_map) {
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
-  if (!files_.load.empty()) saved_.loaded = LoadMap(files_.load);
+  if (files_.load.empty()) return;
+  saved_.loaded = LoadMap(files_.load);
+  saved_.made = saved_.loaded->session;
 }
 
 /// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
@@ -300,16 +303,22 @@ void MapperNode::MarkFrontend(const Version& version) {
   core_->SetProgress(progress);
 }
 
+/// It must have the settings of this process, and the vocabulary with which the map was made that it begins
+/// in.
+void MapperNode::JoinFrontend(const SessionStart& start) {
+  session_start_ = start;
+  if (!JoinsSession(start)) return;
+  const std::string why = WhyOtherVocabulary(files_.load, saved_.made, start.vocabulary_checksum);
+  if (!why.empty()) Exit(kExitMisfit, why);
+}
+
 /// True: there may be more to do.
 bool MapperNode::HandleFirstRecord() {
   const Record record = std::move(taken_.front().record);
   timing_.arrived_ns = taken_.front().at_ns;
   taken_.pop_front();
   if (record.channel == channels::kSession) {
-    if (const auto start = Read<SessionStart>(*record.bytes)) {
-      session_start_ = *start;
-      JoinsSession(*start);
-    }
+    if (const auto start = Read<SessionStart>(*record.bytes)) JoinFrontend(*start);
   }
   // A keyframe makes several map records: only the last one says that it is done.
   const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;

@@ -59,6 +59,7 @@ class MapperNode : public StreamNode {
     std::optional<RebuiltMap> loaded;  ///< not yet taken over
     std::deque<MapDelta> parts;        ///< of it, not yet published
     int64_t next_part_ns = 0;
+    SessionStart made;  ///< how it was made
   };
   /// The map that another mapper left, while the newest replica of it is looked for.
   struct LeftMap {
@@ -90,6 +91,7 @@ class MapperNode : public StreamNode {
 
   uint16_t ContinueSavedMap(const CameraInfo& info);
   bool PublishSavedMap();
+  void JoinFrontend(const SessionStart& start);
   void Save();
   void PutInParts();
   bool TakeCheckpoint();

@@ -1,8 +1,11 @@
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <map>
+#include <optional>
 #include <tuple>
 
 #include "collector/map_ply.h"
@@ -17,6 +20,7 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
+#include "map_commands.h"
 #include "purity.h"
 
 namespace {
@@ -28,9 +32,15 @@ struct Arguments {
   bool channels = false;
 };
 
+/// list, merge, diff and split: what is done to whole files.
+struct CommandArguments {
+  std::string file, other, prefix, key;
+  dmslam::MergeArguments merge;
+};
+
 void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.SetVersion(dmslam::kVersion);
-  app.AddOption("--log,--map", a.log, "log of a run, or a saved map").Required();
+  app.AddOption("--log,--map", a.log, "log of a run, or a saved map");
   app.AddOption("--log-session", a.session, "which of the log's sessions, where it holds several");
   app.AddOption(
       "--key", a.key,
@@ -46,6 +56,52 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
       "--masks", a.masks, "sequence's folder with masks: say how many landmarks are seen mostly on people");
   app.AddOption("--json", a.json, "also write that into this file").Needs(masks);
   app.AddOption("--save", a.save, "write the map as a file that the mapper can load (--map)");
+}
+
+using Command = std::function<int(const std::optional<dmslam::BusKey>& key)>;
+
+dmslam::CommandLine& AddCommand(dmslam::CommandLine& app, const std::string& name,
+                                const std::string& description, CommandArguments& a, Command& chosen,
+                                const Command& command) {
+  dmslam::CommandLine& line = app.AddSubcommand(name, description);
+  line.AddOption("--key", a.key, "of logs: file with the key under which they were recorded");
+  line.OnParsed([&chosen, command] { chosen = command; });
+  return line;
+}
+
+void DeclareMerge(dmslam::CommandLine& app, CommandArguments& a, Command& chosen) {
+  dmslam::MergeArguments& m = a.merge;
+  dmslam::CommandLine& line =
+      AddCommand(app, "merge", "Joins two maps that show the same place. 1: they do not; nothing is written",
+                 a, chosen, [&m](const auto& key) { return dmslam::MergeMaps(m, key); });
+  line.AddOption("A", m.a, "saved map or log of a run: what is joined lies where this one lies").Required();
+  line.AddOption("B", m.b, "the other one").Required();
+  line.AddOption("--save", m.save, "where the joined map is written").Required();
+  line.AddFlag("--renumber", m.renumber,
+               "sessions that both have get another number in B, instead of being refused");
+  line.AddFlag("--apart", m.apart,
+               "where they do not show the same place: write both, as two maps in one file");
+  line.AddOption("--vocabulary", m.vocabulary, "bag-of-words vocabulary; default: the one that ships");
+  line.AddOption("--config", m.config, "settings (YAML)");
+  line.AddOption("--set", m.overrides, "one setting: key=value; may be repeated");
+}
+
+void DeclareCommands(dmslam::CommandLine& app, CommandArguments& a, Command& chosen) {
+  AddCommand(app, "list", "Says which maps are in a file", a, chosen,
+             [&a](const auto& key) { return dmslam::ListMaps(a.file, key); })
+      .AddOption("FILE", a.file, "saved map or log of a run")
+      .Required();
+  DeclareMerge(app, a, chosen);
+  dmslam::CommandLine& diff =
+      AddCommand(app, "diff", "Says what two maps have apart. 0: nothing, 1: something, 2: a file is no map",
+                 a, chosen, [&a](const auto& key) { return dmslam::DiffMaps(a.file, a.other, key); });
+  diff.AddOption("A", a.file, "saved map or log of a run").Required();
+  diff.AddOption("B", a.other, "the other one").Required();
+  dmslam::CommandLine& split =
+      AddCommand(app, "split", "Writes each of several maps into a file of its own", a, chosen,
+                 [&a](const auto& key) { return dmslam::SplitMaps(a.file, a.prefix, key); });
+  split.AddOption("FILE", a.file, "saved map or log of a run").Required();
+  split.AddOption("--save-prefix", a.prefix, "how the files begin: PREFIX1.map for map 1").Required();
 }
 
 /// Names of all types by their fingerprints.
@@ -138,6 +194,8 @@ void Judge(const Arguments& a, const dmslam::Map& map, dmslam::MapId map_id) {
 }
 
 int Run(const Arguments& a) {
+  if (a.log.empty())
+    throw dmslam::InputError("give --log FILE, or one of list, merge, diff and split (see --help)");
   const std::optional<dmslam::BusKey> key = dmslam::BusKey::LoadIfWanted(a.key);
   if (a.channels) return ListChannels(a.log, key);
   const dmslam::LogIndex log(a.log, key);
@@ -163,6 +221,7 @@ int Run(const Arguments& a) {
       if (keyframe.map_id == map_id)
         trajectories.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
     }
+    std::ranges::stable_sort(trajectories.keyframes, {}, &dmslam::StampedPose::stamp_ns);
   }
   if (!a.ply.empty()) dmslam::WriteMapPly(a.ply, rebuilt.map, map_id);
   if (!a.trajectory.empty()) dmslam::WriteTrajectory(a.trajectory, trajectories.final);
@@ -177,15 +236,21 @@ int Run(const Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  dmslam::CommandLine app("Rebuilds the map of a run from its log, and writes it out.", "dmslam-map");
+  dmslam::CommandLine app(
+      "Rebuilds the map of a run from its log, and writes it out; joins, compares and lists saved maps.",
+      "dmslam-map");
   Arguments arguments;
+  CommandArguments command_arguments;
+  Command command;
   Declare(app, arguments);
+  DeclareCommands(app, command_arguments, command);
   if (const auto code = app.Parse(argc, argv)) return *code;
   dmslam::SetUpLog("dmslam-map");
+  const bool is_diff = !command_arguments.other.empty();
   try {
-    return Run(arguments);
+    return command ? command(dmslam::BusKey::LoadIfWanted(command_arguments.key)) : Run(arguments);
   } catch (const dmslam::InputError& error) {
     dmslam::LogError("{}", error.what());
-    return 1;
+    return is_diff ? 2 : 1;
   }
 }

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "dmslam/loops/same_time.h"
+
 namespace dmslam {
 namespace {
 
@@ -18,8 +20,7 @@ std::vector<const Keyframe*> OfOtherMapsAtThatTime(const Map& map, const Keyfram
   const auto since = [&](const Keyframe* other) { return std::abs(other->stamp_ns - keyframe.stamp_ns); };
   std::vector<const Keyframe*> found;
   for (const auto& [id, other] : map.keyframes()) {
-    if (other.map_id != keyframe.map_id && static_cast<double>(since(&other)) * 1e-9 <= seconds)
-      found.push_back(&other);
+    if (other.map_id != keyframe.map_id && AreAtSameTime(other, keyframe, seconds)) found.push_back(&other);
   }
   std::ranges::stable_sort(found, {}, since);
   return found;

@@ -14,6 +14,7 @@ struct LoopcloserOptions {
   int min_covisibility = kMinCovisibility;
   int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
+  bool within_maps = true;         ///< off: only places of other maps are looked for
   double same_time_s = 0.5;        ///< between keyframes of two maps: nothing has moved far meanwhile
 
   // What makes a place the same.

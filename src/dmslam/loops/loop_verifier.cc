@@ -10,6 +10,7 @@
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/loops/chain_drift.h"
+#include "dmslam/loops/same_time.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 #include "dmslam/optimization/sim3_optimization.h"
@@ -287,8 +288,7 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
   loop.S_keyframe_place = S_keyframe_place;
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
   loop.joins = keyframe.map_id != place.map_id;
-  loop.at_same_time =
-      static_cast<double>(std::abs(keyframe.stamp_ns - place.stamp_ns)) * 1e-9 <= options_.same_time_s;
+  loop.at_same_time = AreAtSameTime(keyframe, place, options_.same_time_s);
   loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
   const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
   loop.support = Look(map, keyframe, T_cam_world, loop.landmarks,

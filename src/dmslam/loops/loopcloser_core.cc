@@ -88,7 +88,8 @@ const Keyframe* LoopcloserCore::Index(KeyframeId id) {
 
 /// Places that words name, for this keyframe and for those before it.
 std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
-  LoopDetector::Found found = detector_.Detect(map_, places_, keyframe);
+  LoopDetector::Found found;
+  if (options_.within_maps) found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
   std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);

@@ -1,6 +1,8 @@
 #include "dmslam/recording/map_file.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <utility>
 
 #include "dmslam/map/snapshot.h"
@@ -131,8 +133,8 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
   if (!RenameDurably(partial, path)) throw InputError(path + ": cannot be written; check the path");
 }
 
-RebuiltMap LoadMap(const std::string& path) {
-  const LogIndex log(path);
+RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key) {
+  const LogIndex log(path, key);
   RebuiltMap map = RebuildMap(log, log.Session());
   if (map.map.keyframes().empty()) throw InputError(path + ": holds a map without keyframes");
   return map;
@@ -148,6 +150,18 @@ void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& cam
     throw InputError(path + ": was made with features.levels=" + std::to_string(its.levels) +
                      " and features.scale_factor=" + std::to_string(its.scale_factor) + "; set the same");
   }
+}
+
+std::string WhyOtherVocabulary(const std::string& path, const SessionStart& made,
+                               std::optional<uint64_t> checksum) {
+  if (!made.vocabulary_checksum || !checksum || *made.vocabulary_checksum == *checksum) return "";
+  std::array<char, 160> text{};
+  std::snprintf(
+      text.data(), text.size(),
+      ": was made with another vocabulary (checksum %016llx) than the one in use (%016llx); give its "
+      "own with --vocabulary",
+      static_cast<unsigned long long>(*made.vocabulary_checksum), static_cast<unsigned long long>(*checksum));
+  return path + text.data();
 }
 
 uint32_t NewestSession(const Map& map) {

@@ -43,11 +43,16 @@ CutMap Cut(const std::string& path, const Map& map);
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session);
 void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session);
 
-/// Reads what SaveMap has written, or rebuilds the map of any other log of a run. Throws InputError.
-RebuiltMap LoadMap(const std::string& path);
+/// Reads what SaveMap has written, or rebuilds the map of any other log of a run. `key`: as for LogIndex.
+/// Throws InputError.
+RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key = std::nullopt);
 
 /// Throws InputError unless `map` can be continued with this camera and pyramid.
 void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid);
+/// Why a map that was `made` so does not go with the vocabulary of that checksum; empty: it does, or one of
+/// the two has none.
+std::string WhyOtherVocabulary(const std::string& path, const SessionStart& made,
+                               std::optional<uint64_t> checksum);
 
 /// The highest session and the highest epoch's ordinal that the map's ids name: new ids must lie above.
 uint32_t NewestSession(const Map& map);

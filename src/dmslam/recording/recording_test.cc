@@ -309,6 +309,17 @@ std::string WhyNotLoaded(const std::string& path) {
   return "";
 }
 
+TEST_F(Recording, AMapBesideAnotherVocabularyIsNamed) {
+  SessionStart made;
+  EXPECT_EQ(WhyOtherVocabulary("a.map", made, 0xabc), "");
+  made.vocabulary_checksum = 0xabc;
+  EXPECT_EQ(WhyOtherVocabulary("a.map", made, std::nullopt), "");
+  EXPECT_EQ(WhyOtherVocabulary("a.map", made, 0xabc), "");
+  EXPECT_EQ(WhyOtherVocabulary("a.map", made, 0xdef),
+            "a.map: was made with another vocabulary (checksum 0000000000000abc) than the one in use "
+            "(0000000000000def); give its own with --vocabulary");
+}
+
 TEST_F(Recording, HalfASavedMapIsRefusedByName) {
   TinyMapper mapper;
   for (int i = 0; i < 60; ++i) mapper.Step();

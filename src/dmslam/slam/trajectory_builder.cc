@@ -128,6 +128,7 @@ TrajectoryBuilder::Trajectories TrajectoryBuilder::Build() const {
     if (keyframe.map_id == result.map_id)
       result.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
   }
+  std::ranges::stable_sort(result.keyframes, {}, &StampedPose::stamp_ns);  // sessions may be in any order
   return result;
 }
 

@@ -1,0 +1,87 @@
+#include "dmslam/map/map_difference.h"
+
+#include <gtest/gtest.h>
+
+#include "dmslam/map/testing/map_scene.h"
+
+namespace dmslam {
+namespace {
+
+using testing::MapScene;
+
+MapEditor SceneMap() {
+  MapScene scene;
+  scene.AddCloud(60, {0, 0, 4}, {1, 1, 0.5});
+  scene.MapAll(6);
+  return scene.map();
+}
+
+TEST(MapDifferenceTest, AMapDiffersNotFromItself) {
+  const MapEditor map = SceneMap();
+  const MapDifference difference = Compare(map, map);
+  EXPECT_TRUE(difference.Equal());
+  EXPECT_EQ(difference.keyframes.both, 6u);
+  EXPECT_EQ(difference.landmarks.both, 60u);
+  ASSERT_EQ(difference.common.size(), 1u);
+  EXPECT_FALSE(difference.common[0].S_b_a);
+}
+
+TEST(MapDifferenceTest, WhatOneHasAloneIsListed) {
+  const MapEditor a = SceneMap();
+  MapEditor b = SceneMap();
+  b.RemoveLandmark(b.At(MapScene::IdOf(7)));
+  b.RemoveKeyframe(b.At(KeyframeId::Make(MapScene::kSession, 5)));
+  const MapDifference there = Compare(a, b), back = Compare(b, a);
+  EXPECT_FALSE(there.Equal());
+  EXPECT_EQ(there.landmarks.only_a, std::vector{MapScene::IdOf(7)});
+  EXPECT_TRUE(there.landmarks.only_b.empty());
+  EXPECT_EQ(there.keyframes.only_a, std::vector{KeyframeId::Make(MapScene::kSession, 5)});
+  EXPECT_EQ(back.keyframes.only_b, there.keyframes.only_a);
+  EXPECT_EQ(there.changed_landmarks, 59u) << "each has an observer less";
+  EXPECT_EQ(there.common[0].points.moved, 0u);
+}
+
+TEST(MapDifferenceTest, WhatMovedIsToldInDepthsOfTheScene) {
+  const MapEditor a = SceneMap();
+  MapEditor b = SceneMap();
+  const Landmark& landmark = b.At(MapScene::IdOf(3));
+  b.SetPosition(landmark, landmark.p_world + Eigen::Vector3d(0.4, 0, 0));
+  const MapDifference difference = Compare(a, b);
+  EXPECT_FALSE(difference.Equal());
+  ASSERT_EQ(difference.common.size(), 1u);
+  EXPECT_EQ(difference.common[0].points.moved, 1u);
+  EXPECT_EQ(difference.common[0].points.median_depths, 0.0);
+  EXPECT_NEAR(difference.common[0].points.max_depths, 0.1, 0.02);
+  EXPECT_EQ(difference.common[0].cameras.moved, 0u);
+}
+
+TEST(MapDifferenceTest, AMapThatLiesElsewhereAsAWholeIsTheSameBeyondThat) {
+  MapEditor a = SceneMap();
+  // Not all cameras on a line: only then do they say how the map lies.
+  const Keyframe& off = a.At(KeyframeId::Make(MapScene::kSession, 2));
+  a.SetPose(off, Rigid3d(off.T_cam_world.rotation, off.T_cam_world.translation + Eigen::Vector3d(0, 0.3, 0)));
+  MapEditor b = a;
+  const Sim3d moved(ExpSo3(Eigen::Vector3d(0.3, -0.1, 0.7)), Eigen::Vector3d(5, 2, 1), 2.5);
+  for (const Keyframe* keyframe : b.KeyframesOf(MapScene::kMap))
+    b.SetPoseAndScale(*keyframe, (Sim3d(keyframe->T_cam_world) * moved.Inverse()).ToRigid(), moved.scale);
+  for (const Landmark* landmark : b.LandmarksOf(MapScene::kMap))
+    b.SetPosition(*landmark, moved * landmark->p_world);
+  const MapDifference difference = Compare(a, b);
+  ASSERT_TRUE(difference.common[0].S_b_a);
+  EXPECT_NEAR(difference.common[0].S_b_a->scale, 2.5, 1e-9);
+  EXPECT_EQ(difference.common[0].points.moved, 60u);
+  EXPECT_LT(difference.common[0].points.max_depths, 1e-9);
+  EXPECT_LT(difference.common[0].cameras.max_depths, 1e-9);
+  EXPECT_FALSE(difference.Equal());
+}
+
+TEST(MapDifferenceTest, OtherRunsOfOneNumberAreToldApart) {
+  MapScene early, late;
+  for (MapScene* scene : {&early, &late}) scene->AddCloud(60, {0, 0, 4}, {1, 1, 0.5});
+  early.MapAll(3);
+  late.MapAll(3, 0.05, 0, 5'000'000'000);
+  EXPECT_EQ(Compare(early.map(), late.map()).other_times.size(), 3u);
+}
+
+}  // namespace
+}  // namespace dmslam

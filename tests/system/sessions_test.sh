@@ -1,0 +1,94 @@
+# What a second run adds to a saved map is in it; saved maps are listed, joined, compared and split; what does not fit is
+# refused by name, and nothing is written.
+source "$(dirname "$0")/lib.sh"
+need_synthetic
+multicast
+
+camera=$root/config/synthetic.yaml
+play=(run --sequence "$synthetic" --camera "$camera" --seed 3 --lockstep)
+map() { "$build/bin/dmslam-map" "$@"; }
+listed() { # FILE PATTERN
+  map list "$1" >"$work/listed" || return
+  grep -qE -- "$2" "$work/listed" || { cat "$work/listed"; return 1; }
+}
+
+check "the first run ends with 0" "${play[@]}" --frames 90 --save-map "$work/a.map" --out "$work/a"
+check "the second one begins in its map" "${play[@]}" --start 60 --map "$work/a.map" --save-map "$work/ab.map" --out "$work/ab"
+expect "the second run is tracked" "$work/ab" tracked_percent ">= 90"
+expect "and well" "$work/ab" ate_rmse_final "<= 0.05"
+check "both are one map" listed "$work/ab.map" "^$work/ab.map: 1 map, sessions [0-9]+, [0-9]+, "
+check "the other one alone" "${play[@]}" --start 60 --save-map "$work/b.map" --out "$work/b"
+
+# Four seconds in all: nothing is proven to be no person.
+sure=(--set loop.min_proven=0)
+check "two maps of one room are joined" map merge "$work/a.map" "$work/b.map" "${sure[@]}" --save "$work/c.map" >"$work/said" 2>&1
+check "it says by what" grep -q "^joined: .*becomes part of map 1" "$work/said"
+check "they are one map" listed "$work/c.map" "^$work/c.map: 1 map, sessions [0-9]+, [0-9]+, "
+check "the same again" map merge "$work/a.map" "$work/b.map" "${sure[@]}" --save "$work/again.map" >/dev/null 2>&1
+check "gives the same bytes" cmp "$work/c.map" "$work/again.map"
+check "its cameras" map --map "$work/c.map" --keyframes "$work/both.txt" >/dev/null
+awk '!seen[$1]++' "$work/both.txt" >"$work/c.txt" # some frames are keyframes of both runs
+check "are where they were" "$build/bin/dmslam-eval" "$synthetic/groundtruth.txt" "$work/c.txt" --json "$work/c.json" >/dev/null
+check "to a few centimetres" holds "$(sed -nE '/"ate/,/}/s/^ *"rmse": *([0-9.]+),?$/\1/p' "$work/c.json" | head -n 1) <= 0.05"
+check "a run begins in the joined map" "${play[@]}" --frames 40 --map "$work/c.map" --localize --out "$work/in_c"
+expect "and finds itself" "$work/in_c" tracked_online_percent ">= 90"
+
+check "a map does not differ from itself" map diff "$work/a.map" "$work/a.map" >"$work/said"
+check "nothing is said then" test ! -s "$work/said"
+map diff "$work/a.map" "$work/c.map" >"$work/said"
+check "1: they differ" test $? = 1
+check "all of A is in both" grep -qE "^keyframes +0 only in A +[1-9][0-9]* only in B +[1-9]" "$work/said"
+map diff "$work/a.map" "$camera" 2>/dev/null
+check "2: that is no map" test $? = 2
+
+# Where nothing is proven they are not joined.
+refused "a.map and $work/b.map: do not show the same place.*nothing is written" map merge "$work/a.map" "$work/b.map" \
+  --set loop.min_proven=10000 --save "$work/none.map"
+check "nothing is written" test ! -e "$work/none.map"
+check "unless they may stay apart" map merge "$work/a.map" "$work/b.map" --set loop.min_proven=10000 --apart \
+  --save "$work/apart.map" >/dev/null 2>&1
+check "then there are two" listed "$work/apart.map" "^$work/apart.map: 2 maps"
+check "which are split" map split "$work/apart.map" --save-prefix "$work/part" >/dev/null
+check "the first is as it was" map diff "$work/a.map" "$work/part1.map"
+check "the second is a map" listed "$work/part2.map" "^$work/part2.map: 1 map"
+refused "a.map: holds one map.*nothing to split" map split "$work/a.map" --save-prefix "$work/part"
+
+# What does not fit.
+refused "a.map and $work/a.map: both hold session [0-9]+;.*--renumber" map merge "$work/a.map" "$work/a.map" --save "$work/none.map"
+head -c $(($(wc -c <"$work/b.map") / 2)) "$work/b.map" >"$work/half.map"
+for command in "merge $work/a.map $work/half.map --save $work/none.map" "diff $work/a.map $work/half.map" "list $work/half.map" \
+  "split $work/half.map --save-prefix $work/none"; do
+  # shellcheck disable=SC2086  # several words
+  refused "half.map: is not whole: [0-9]+ of the [0-9]+ records of the saved map" map $command
+done
+refused "half.map: is not whole" "${play[@]}" --map "$work/half.map" --out "$work/o"
+python3 - "$work/old.map" <<'EOP'
+import struct
+import sys
+
+# A record of the map as version 0.1 wrote it, in a log of lcm-logger.
+channel, record = b"DMSLAM_MAPPER_MAP", bytes.fromhex("60594f88dd67af37") + bytes(192)
+with open(sys.argv[1], "wb") as log:
+    log.write(struct.pack(">IqqII", 0xEDA1DA01, 0, 1, len(channel), len(record)) + channel + record)
+EOP
+for command in "merge $work/old.map $work/a.map --save $work/none.map" "diff $work/a.map $work/old.map"; do
+  # shellcheck disable=SC2086  # several words
+  refused "old.map: recorded by version 0.1; this is version" map $command
+done
+refused "none.map: cannot be read" map merge "$work/a.map" "$work/none.map" --save "$work/new.map"
+awk '/^fx:/ { $2 *= 1.01 } { print }' "$camera" >"$work/other.yaml"
+check "a map of another camera" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$work/other.yaml" --seed 3 \
+  --frames 60 --session 77 --save-map "$work/other.map" --out "$work/o" >/dev/null 2>&1
+refused "a.map and $work/other.map: were made with different cameras" map merge "$work/a.map" "$work/other.map" --save "$work/none.map"
+mkdir "$work/few"
+find "$synthetic/rgb" -type f | sort | head -n 3 | xargs -I{} cp {} "$work/few"
+check "a small vocabulary is trained" "$build/bin/dmslam-vocab" train --images "$work/few" --k 4 --levels 2 \
+  --out "$work/small.dmv" >/dev/null 2>&1
+refused "a.map: was made with another vocabulary .*--vocabulary" map merge "$work/a.map" "$work/b.map" --vocabulary "$work/small.dmv" \
+  --save "$work/none.map"
+"$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --frames 20 --map "$work/a.map" \
+  --vocabulary "$work/small.dmv" --save-map "$work/none.map" --out "$work/o" >"$work/said" 2>&1
+check "2: a run with another vocabulary than the map's" test $? = 2
+check "is refused by name: $(tail -n 1 "$work/said")" grep -q "a.map: was made with another vocabulary .*--vocabulary" "$work/said"
+check "nothing was written" test ! -e "$work/none.map"
+finish

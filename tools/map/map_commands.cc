@@ -1,0 +1,255 @@
+#include "map_commands.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdarg>
+#include <cstdio>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "dmslam/console/log.h"
+#include "dmslam/map/map_difference.h"
+#include "dmslam/map/renumbering.h"
+#include "dmslam/place_recognition/vocabulary.h"
+#include "dmslam/runtime/load_vocabulary.h"
+#include "dmslam/settings/settings.h"
+#include "dmslam/slam/map_merge.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+[[gnu::format(printf, 1, 2)]] std::string Text(const char* format, ...) {
+  char text[400];
+  va_list values;
+  va_start(values, format);
+  std::vsnprintf(text, sizeof(text), format, values);
+  va_end(values);
+  return text;
+}
+
+template <typename Numbers>
+std::string Listed(const Numbers& numbers) {
+  std::string text;
+  for (const auto number : numbers) text += (text.empty() ? "" : ", ") + std::to_string(number);
+  return text;
+}
+
+std::string Hex(uint64_t checksum) { return Text("%016llx", static_cast<unsigned long long>(checksum)); }
+
+double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+/// Who begins in the map afterwards takes the next session.
+SessionStart StartOf(SessionStart start, const Map& map) {
+  start.session = std::max(start.session, NewestSession(map));
+  return start;
+}
+
+std::string LineOf(const Map& map, MapId map_id) {
+  const std::vector<const Keyframe*> keyframes = map.KeyframesOf(map_id);
+  std::map<uint32_t, size_t> sessions;
+  int64_t first_ns = INT64_MAX, last_ns = INT64_MIN;
+  for (const Keyframe* keyframe : keyframes) {
+    ++sessions[keyframe->id.session()];
+    first_ns = std::min(first_ns, keyframe->stamp_ns);
+    last_ns = std::max(last_ns, keyframe->stamp_ns);
+  }
+  std::string line =
+      Text("map %-8u %6zu keyframes %8zu landmarks  %.3f to %.3f (%.1f s)", map_id, keyframes.size(),
+           map.LandmarksOf(map_id).size(), Seconds(first_ns), Seconds(last_ns), Seconds(last_ns - first_ns));
+  for (const auto& [session, count] : sessions) line += Text("  session %u: %zu", session, count);
+  return line + "\n";
+}
+
+MapMergeOptions OptionsOf(const MergeArguments& arguments) {
+  const Settings settings = LoadSettings(arguments.config, arguments.overrides);
+  MapMergeOptions options;
+  options.mapper = settings.Read<MapperOptions>();
+  options.loop = settings.Read<LoopcloserOptions>();
+  return options;
+}
+
+/// Says what is being done where it takes long.
+class Progress {
+ public:
+  void operator()(const std::string& what, size_t done, size_t of) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - said_ < std::chrono::seconds(3)) return;
+    said_ = now;
+    LogInfo("{}: {} of {} keyframes", what, done, of);
+  }
+
+ private:
+  std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
+};
+
+SessionStart StartOfJoined(const WholeMap& a, const WholeMap& b, const Map& joined) {
+  SessionStart start = StartOf(a.rebuilt.session, joined);
+  start.sequence += " + " + b.rebuilt.session.sequence;
+  return start;
+}
+
+void Save(const std::string& path, const Map& map, const SessionStart& session) {
+  SaveMap(path, map, session);
+  std::fputs(Listing(path, map, session).c_str(), stdout);
+}
+
+// ---- The difference ----
+
+template <typename Id>
+std::string CountsOf(const char* name, const NamesApart<Id>& names) {
+  return Text("%-11s %8zu only in A  %8zu only in B  %8zu in both", name, names.only_a.size(),
+              names.only_b.size(), names.both);
+}
+
+void PrintKeyframes(const char* mark, const std::vector<KeyframeId>& ids) {
+  constexpr size_t kPerLine = 16;
+  size_t on_line = 0;
+  uint32_t session = 0;
+  for (const KeyframeId id : ids) {
+    if (id.session() != session || on_line == kPerLine) {
+      std::printf("%s%s session %u frames", session == 0 ? "" : "\n", mark, id.session());
+      session = id.session();
+      on_line = 0;
+    }
+    std::printf(" %u", id.frame_index());
+    ++on_line;
+  }
+  if (!ids.empty()) std::printf("\n");
+}
+
+std::string DisplacementText(const char* name, const Displacement& displacement, size_t of) {
+  return Text("  %-9s %zu of %zu moved, median %.5f, largest %.5f of the depth\n", name, displacement.moved,
+              of, displacement.median_depths, displacement.max_depths);
+}
+
+void PrintCommon(const CommonMap& common) {
+  std::printf("map %u of A is in map %u of B", common.a, common.b);
+  if (common.S_b_a) {
+    const Eigen::Vector3d& t = common.S_b_a->translation;
+    std::printf("; as a whole it is scaled by %.5f, turned by %.5f rad, shifted by (%.5f %.5f %.5f)",
+                common.S_b_a->scale, LogSo3(common.S_b_a->rotation).norm(), t.x(), t.y(), t.z());
+  }
+  std::printf("\n%s%s", DisplacementText("keyframes", common.cameras, common.keyframes).c_str(),
+              DisplacementText("landmarks", common.points, common.landmarks).c_str());
+}
+
+void Print(const MapDifference& difference) {
+  std::printf("%s\n", CountsOf("maps", difference.maps).c_str());
+  std::printf("%s, %zu of them with other links\n", CountsOf("keyframes", difference.keyframes).c_str(),
+              difference.changed_keyframes);
+  std::printf("%s, %zu of them with another history\n", CountsOf("landmarks", difference.landmarks).c_str(),
+              difference.changed_landmarks);
+  PrintKeyframes("<", difference.keyframes.only_a);
+  PrintKeyframes(">", difference.keyframes.only_b);
+  for (const CommonMap& common : difference.common) PrintCommon(common);
+}
+
+}  // namespace
+
+WholeMap OpenWhole(const std::string& path, const std::optional<BusKey>& key) {
+  WholeMap whole{path, LoadMap(path, key)};
+  if (whole.rebuilt.missing > 0) {
+    throw InputError(path + ": is not whole: " + std::to_string(whole.rebuilt.missing) +
+                     " map records are missing; what is there is taken with dmslam-map --log " + path +
+                     " --save FILE");
+  }
+  return whole;
+}
+
+void CheckMayJoin(const WholeMap& a, const WholeMap& b, bool renumber) {
+  const std::string both = a.path + " and " + b.path + ": ";
+  if (!a.map().camera().SeesAs(b.map().camera())) throw InputError(both + "were made with different cameras");
+  const Pyramid &of_a = a.map().pyramid(), &of_b = b.map().pyramid();
+  if (of_a.levels != of_b.levels || of_a.scale_factor != of_b.scale_factor)
+    throw InputError(both + "were made with other features.levels or features.scale_factor");
+  const std::set<uint32_t> sessions_a = SessionsOf(a.map()), sessions_b = SessionsOf(b.map());
+  std::vector<uint32_t> common;
+  std::ranges::set_intersection(sessions_a, sessions_b, std::back_inserter(common));
+  if (!common.empty() && !renumber) {
+    throw InputError(
+        both + "both hold session " + Listed(common) +
+        "; where these are different runs, or parts of one, --renumber gives those of the second "
+        "file another number");
+  }
+}
+
+void CheckVocabulary(const WholeMap& map, uint64_t checksum) {
+  const std::string why = WhyOtherVocabulary(map.path, map.rebuilt.session, checksum);
+  if (!why.empty()) throw InputError(why);
+}
+
+std::string Listing(const std::string& path, const Map& map, const SessionStart& session) {
+  const std::set<MapId> maps = MapsOf(map);
+  std::string text = Text("%s: %zu map%s, sessions %s, vocabulary %s, sequence %s\n", path.c_str(),
+                          maps.size(), maps.size() == 1 ? "" : "s", Listed(SessionsOf(map)).c_str(),
+                          session.vocabulary_checksum ? Hex(*session.vocabulary_checksum).c_str() : "none",
+                          session.sequence.c_str());
+  for (const MapId map_id : maps) text += LineOf(map, map_id);
+  return text;
+}
+
+int ListMaps(const std::string& path, const std::optional<BusKey>& key) {
+  const RebuiltMap rebuilt = LoadMap(path, key);
+  if (rebuilt.missing > 0) LogWarning("{}: {} map records are missing", path, rebuilt.missing);
+  std::fputs(Listing(path, rebuilt.map, rebuilt.session).c_str(), stdout);
+  return 0;
+}
+
+int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key) {
+  const WholeMap a = OpenWhole(arguments.a, key), b = OpenWhole(arguments.b, key);
+  CheckMayJoin(a, b, arguments.renumber);
+  const std::shared_ptr<const Vocabulary> vocabulary = LoadVocabulary(arguments.vocabulary);
+  CheckVocabulary(a, vocabulary->checksum());
+  CheckVocabulary(b, vocabulary->checksum());
+  const Renumbering names = NamesBeside(a.map(), b.map(), arguments.renumber);
+  MapMerge merge(a.map(), b.map(), names, OptionsOf(arguments));
+  const MapMergeReport report = merge.Run(vocabulary, Progress());
+  if (!report.joined && !arguments.apart) {
+    LogError(
+        "{} and {}: do not show the same place: of {} keyframes {} places looked alike, {} of them held in "
+        "part, none well enough to join the maps; nothing is written (--apart keeps both in one file)",
+        a.path, b.path, report.keyframes_asked, report.places_tried, report.places_proposed);
+    return 1;
+  }
+  for (const auto& [session, number] : names.sessions)
+    std::printf("session %u of %s is called %u\n", session, b.path.c_str(), number);
+  for (const std::string& weld : report.welds) std::printf("joined: %s\n", weld.c_str());
+  if (report.joined)
+    std::printf("fused: %d observations and landmarks beside those of the welds\n", report.fused);
+  Save(arguments.save, merge.map(), StartOfJoined(a, b, merge.map()));
+  return 0;
+}
+
+int DiffMaps(const std::string& path_a, const std::string& path_b, const std::optional<BusKey>& key) {
+  const WholeMap a = OpenWhole(path_a, key), b = OpenWhole(path_b, key);
+  const MapDifference difference = Compare(a.map(), b.map());
+  if (difference.Equal()) return 0;
+  std::printf("A: %sB: %s", Listing(a.path, a.map(), a.rebuilt.session).c_str(),
+              Listing(b.path, b.map(), b.rebuilt.session).c_str());
+  if (!difference.other_times.empty()) {
+    const KeyframeId first = difference.other_times.front();
+    std::printf("session %u is another run in each: its frame %u was taken at %.6f in A, at %.6f in B\n",
+                first.session(), first.frame_index(), Seconds(a.map().At(first).stamp_ns),
+                Seconds(b.map().At(first).stamp_ns));
+  }
+  Print(difference);
+  return 1;
+}
+
+int SplitMaps(const std::string& path, const std::string& prefix, const std::optional<BusKey>& key) {
+  const WholeMap whole = OpenWhole(path, key);
+  const std::set<MapId> maps = MapsOf(whole.map());
+  if (maps.size() == 1)
+    throw InputError(path + ": holds one map, number " + Listed(maps) + "; there is nothing to split");
+  for (const MapId map_id : maps) {
+    const Replica only = OnlyMap(whole.map(), map_id);
+    Save(prefix + std::to_string(map_id) + ".map", only, StartOf(whole.rebuilt.session, only));
+  }
+  return 0;
+}
+
+}  // namespace dmslam
