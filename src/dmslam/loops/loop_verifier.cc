@@ -288,6 +288,7 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
   loop.joins = keyframe.map_id != place.map_id;
   loop.at_same_time =
+      keyframe.camera_id == place.camera_id &&
       static_cast<double>(std::abs(keyframe.stamp_ns - place.stamp_ns)) * 1e-9 <= options_.same_time_s;
   loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
   const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
