@@ -37,19 +37,35 @@ std::unique_ptr<Node> MakeCollector(NodeContext context, NodeOptions options, Co
 
 CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
     : StreamNode(std::move(context), std::move(options), "collector"), collector_(std::move(collector)) {
-  Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
-          channels::kPlayerStatus, channels::kFrontendStatus, channels::kMapperStatus,
-          channels::kLoopcloserStatus});
+  Listen({channels::kMapperStatus, channels::kLoopcloserStatus});
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
+            channels::kPlayerStatus, channels::kFrontendStatus},
+           camera);
+    newest_frames_[camera] = -1;
+  }
+  collector_.ground_truth.resize(options_.NumCameras());
+  run_.others.resize(options_.NumCameras() - 1);
+  for (std::string& path : collector_.ground_truth) path = path == "-" ? "" : path;
+}
+
+void CollectorNode::OnCamera(const CameraInfo& info) {
+  frames_total_ += info.num_frames;
+  if (info.camera_id == 0) {
+    run_.sequence = info.sequence;
+  } else {
+    run_.others[info.camera_id - 1].sequence = info.sequence;
+  }
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
   builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.Read<Pyramid>());
-  run_.sequence = info.sequence;
   run_.mode = info.mode == PlaybackMode::kLockstep ? "lockstep" : "realtime";
   run_.profile = options_.settings.profile();
   run_.seed = options_.settings.Read<RunOptions>().seed;
-  run_.ground_truth = collector_.ground_truth;
-  frames_total_ = info.num_frames;
+  run_.ground_truth = collector_.ground_truth[0];
+  for (CameraId camera = 1; camera < options_.NumCameras(); ++camera)
+    run_.others[camera - 1].ground_truth = collector_.ground_truth[camera];
   OpenJournal();
   BeginCheckpoints();
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
@@ -58,15 +74,17 @@ void CollectorNode::Begin(const CameraInfo& info) {
 
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrameTrace) {
-    if (const auto trace = Read<FrameTrace>(bytes); trace && !IsForeign(trace->session))
+    if (const auto trace = Read<FrameTrace>(bytes);
+        trace && !IsForeign(trace->session) && trace->camera_id == 0)
       run_.durations.Add(*trace);
   } else if (channel == channels::kEndOfSequence) {
-    if (auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session)) end_ = std::move(end);
+    if (const auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session)) OnEnd(*end);
   } else if (channel == channels::kGroundTruthPose) {
     if (const auto pose = Read<GroundTruthPose>(bytes); pose && !IsForeignFrame(pose->session))
       OnGroundTruth(*pose);
   } else if (channel == channels::kPlayerStatus) {
-    if (const auto status = Read<PlayerStatus>(bytes)) OnHealth("player", status->head);
+    if (const auto status = Read<PlayerStatus>(bytes))
+      OnHealth(OfCamera("player", status->camera_id), status->head);
   } else if (channel == channels::kFrontendStatus) {
     if (auto status = Read<FrontendStatus>(bytes)) OnFrontendStatus(std::move(*status));
   } else if (channel == channels::kMapperStatus) {
@@ -78,9 +96,12 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
   }
 }
 
+void CollectorNode::OnEnd(const EndOfSequence& end) { ends_[end.camera_id] = end; }
+
 void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
-  if (!run_.ground_truth.empty()) return;
-  std::vector<StampedPose>& heard = run_.heard_ground_truth;
+  if (pose.camera_id >= options_.NumCameras() || !collector_.ground_truth[pose.camera_id].empty()) return;
+  std::vector<StampedPose>& heard =
+      pose.camera_id == 0 ? run_.heard_ground_truth : run_.others[pose.camera_id - 1].heard_ground_truth;
   if (!heard.empty() && pose.stamp_ns <= heard.back().stamp_ns) return;
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
@@ -96,7 +117,7 @@ void CollectorNode::OnProcess(const std::string& process, int32_t pid, const Pro
   if (known.size() > 1) {
     ++run_.restarts;
     former_[process] = so_far;
-    if (process == "frontend") former_frontend_ = run_.frontend;
+    if (process == "frontend") former_frontends_[0] = run_.frontend;
     for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << so_far.*counter;
     if (process == "frontend")
       for (int64_t FrontendStatus::*counter : kFrontendCounters) note << ' ' << run_.frontend.*counter;
@@ -138,14 +159,14 @@ void CollectorNode::ReadNote(const std::string& text) {
   if (process_ids_[process].insert(pid).second && process_ids_[process].size() > 1) ++run_.restarts;
   for (int64_t ProcessHealth::*counter : kHealthCounters) note >> former_[process].*counter;
   if (process != "frontend") return;
-  for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> former_frontend_.*counter;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> former_frontends_[0].*counter;
 }
 
 /// Counters begin at zero in a process that was started again: those of the ones before it are added. False
 /// for a process of another session.
 bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
-  const bool ours =
-      head.session == 0 || (process == "player" ? !IsForeignFrame(head.session) : !IsForeign(head.session));
+  const bool ours = head.session == 0 || (process.starts_with("player") ? !IsForeignFrame(head.session)
+                                                                        : !IsForeign(head.session));
   if (!ours) return false;
   ProcessHealth& health = run_.health[process];
   OnProcess(process, head.health.pid, health);
@@ -159,9 +180,11 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
 }
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
-  if (!OnHealth("frontend", status.head)) return;
-  for (int64_t FrontendStatus::*counter : kFrontendCounters) status.*counter += former_frontend_.*counter;
-  run_.frontend = std::move(status);
+  const CameraId camera = status.camera_id;
+  if (camera >= options_.NumCameras() || !OnHealth(OfCamera("frontend", camera), status.head)) return;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters)
+    status.*counter += former_frontends_[camera].*counter;
+  (camera == 0 ? run_.frontend : run_.others[camera - 1].frontend) = std::move(status);
 }
 
 void CollectorNode::OnProposal(KeyframeId id, MapId map_id) {
@@ -192,7 +215,7 @@ void CollectorNode::OnSessionStart(const Record& record) {
   std::optional<SessionStart> start = Read<SessionStart>(*record.bytes);
   if (!start) return;
   JoinsSession(*start);
-  session_start_ = std::move(start);
+  if (start->camera_id == 0) session_start_ = std::move(start);
   KeepOnDisk(*record.bytes);
 }
 
@@ -220,15 +243,24 @@ void CollectorNode::KeepOnDisk(const Bytes& record) {
 
 /// Those that were placed later have been seen before.
 void CollectorNode::CountFrame(const FramePose& pose) {
-  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frame_) return;
-  newest_frame_ = pose.frame_index;
+  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frames_[pose.camera_id])
+    return;
+  newest_frames_[pose.camera_id] = pose.frame_index;
   newest_stamp_ns_ = pose.stamp_ns;
   ++frames_seen_;
 }
 
 bool CollectorNode::TakeFrontendRecord() {
-  const std::optional<Record> record = frontend_reader_->Take();
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    if (TakeFrontendRecord(camera)) return true;
+  }
+  return false;
+}
+
+bool CollectorNode::TakeFrontendRecord(CameraId camera) {
+  std::optional<Record> record = frontend_readers_[camera]->Take();
   if (!record) return false;
+  record->channel = SplitCamera(record->channel).channel;
   if (record->channel == channels::kSession) {
     OnSessionStart(*record);
   } else if (record->channel == channels::kFramePose) {
@@ -244,7 +276,7 @@ bool CollectorNode::TakeFrontendRecord() {
   } else if (record->channel == channels::kMapReset) {
     OnMapReset(*record);
   }
-  frontend_reader_->AcceptTaken();
+  frontend_readers_[camera]->AcceptTaken();
   return true;
 }
 
@@ -267,13 +299,21 @@ void CollectorNode::OpenJournal() {
   std::filesystem::create_directories(collector_.out_dir, error);
   if (error) throw InputError(collector_.out_dir + ": cannot be made (" + error.message() + "); check --out");
   journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
-  Version newest;
+  std::map<CameraId, Version> newest;
   const auto take = [&](std::span<const uint8_t> record) {
-    if (const auto pose = wire::Decode<FramePose>(record)) CountFrame(*pose);
-    if (const auto reset = wire::Decode<MapReset>(record)) CountReset(*reset);
-    if (auto start = wire::Decode<SessionStart>(record)) session_start_ = std::move(start);
+    CameraId camera = 0;
+    if (const auto pose = wire::Decode<FramePose>(record)) {
+      CountFrame(*pose);
+      camera = pose->camera_id;
+    } else if (const auto reset = wire::Decode<MapReset>(record)) {
+      CountReset(*reset);
+      camera = reset->camera_id;
+    } else if (auto start = wire::Decode<SessionStart>(record)) {
+      camera = start->camera_id;
+      if (camera == 0) session_start_ = std::move(start);
+    }
     const std::optional<RecordHeader> header = ParseHeader(record);
-    newest = {header->epoch, header->seq};
+    newest[camera] = {header->epoch, header->seq};
   };
   if (context_.fresh_system && !context_.resumed) {
     journal_->Begin(session_);
@@ -281,12 +321,14 @@ void CollectorNode::OpenJournal() {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
   OnProcess("collector", MeasureProcess().pid, {});
-  if (context_.resumed) newest = {};  // the frontend that wrote it is gone, too
-  frontend_reader_ =
-      MakeReader(StreamId::kFrontend, "FRONTEND",
-                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-                  channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
-                 newest);
+  if (context_.resumed) newest.clear();  // the frontend that wrote it is gone, too
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    frontend_readers_.push_back(MakeReader(
+        StreamId::kFrontend, "FRONTEND",
+        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
+        newest[camera], camera));
+  }
 }
 
 /// All who held the map had died, and a mapper begins with the last checkpoint: what came after it is gone.
@@ -307,10 +349,12 @@ void CollectorNode::BeginCheckpoints() {
 
 /// It is whole, and no newer than the poses in the journal.
 bool CollectorNode::MapMayBeKept() const {
-  const auto& keyframes = builder_->map().keyframes();
-  if (keyframes.empty() || MapHeld(*map_reader_).empty()) return false;
-  const KeyframeId newest = keyframes.rbegin()->first;
-  return newest.session() != session_ || newest.frame_index() <= newest_frame_;
+  const Map& map = builder_->map();
+  if (map.keyframes().empty() || MapHeld(*map_reader_).empty()) return false;
+  return std::ranges::all_of(newest_frames_, [&](const auto& item) {
+    const Keyframe* newest = map.NewestKeyframeOf(item.first);
+    return newest == nullptr || newest->id.session() != session_ || newest->id.frame_index() <= item.second;
+  });
 }
 
 void CollectorNode::KeepCheckpoint() {
@@ -379,8 +423,10 @@ bool CollectorNode::WorkOnce() {
 }
 
 bool CollectorNode::EndIfDone() {
-  frontend_ended_ = frontend_ended_ || frontend_reader_->AtEnd();
-  if (!frontend_ended_ || !MapIsOver(builder_->map(), *map_reader_)) return false;
+  frontends_ended_ = frontends_ended_ || std::ranges::all_of(frontend_readers_, [](const auto& reader) {
+                       return reader->AtEnd();
+                     });
+  if (!frontends_ended_ || !MapIsOver(builder_->map(), *map_reader_)) return false;
   if (drained_ns_ == 0) drained_ns_ = context_.now_ns();
   if (context_.now_ns() - drained_ns_ < kLastStatusesNs) return false;
   Write(true);
@@ -390,6 +436,24 @@ bool CollectorNode::EndIfDone() {
   Exit(any_pose ? kExitDone : kExitNoFrame,
        any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
   return false;
+}
+
+/// How many frames there were, as the players said it at the end, or else as far as is known.
+void CollectorNode::TakeEnds() {
+  for (const auto& [frame, pose] : builder_->frame_poses())
+    ++(frame.camera == 0 ? run_.frames_published : run_.others[frame.camera - 1].frames_published);
+  for (const auto& [camera, end] : ends_) {
+    if (camera > 0 && camera <= run_.others.size()) {
+      run_.others[camera - 1].frames_published = end.frames_published;
+      run_.others[camera - 1].frames_missing = end.frames_missing;
+    }
+    if (camera != 0) continue;
+    run_.end_heard = true;
+    run_.frames_published = end.frames_published;
+    run_.frames_missing = end.frames_missing;
+    run_.frames_blacked = end.frames_blacked;
+    run_.frames_jumped = end.frames_jumped;
+  }
 }
 
 /// `ended`: the sequence has come to its end. One that is interrupted can be resumed.
@@ -402,14 +466,7 @@ void CollectorNode::Write(bool ended) {
     if (const auto pose = wire::Decode<FramePose>(record)) builder_->OnFramePose(*pose);
     if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
   });
-  run_.frames_published = static_cast<int64_t>(builder_->frame_poses().size());
-  if (end_) {
-    run_.end_heard = true;
-    run_.frames_published = end_->frames_published;
-    run_.frames_missing = end_->frames_missing;
-    run_.frames_blacked = end_->frames_blacked;
-    run_.frames_jumped = end_->frames_jumped;
-  }
+  TakeEnds();
   builder_->BridgeLostKeyframes();
   CountMissingKeyframes();
   if (journal_->lost() > 0)

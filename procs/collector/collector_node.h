@@ -27,6 +27,7 @@ class CollectorNode : public StreamNode {
 
  protected:
   void Begin(const CameraInfo& info) override;
+  void OnCamera(const CameraInfo& info) override;
   bool WorkOnce() override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   int64_t WorkDeadline() const override;
@@ -34,6 +35,9 @@ class CollectorNode : public StreamNode {
 
  private:
   bool TakeFrontendRecord();
+  bool TakeFrontendRecord(CameraId camera);
+  void OnEnd(const EndOfSequence& end);
+  void TakeEnds();
   bool TakeMapRecord();
   std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
@@ -65,11 +69,12 @@ class CollectorNode : public StreamNode {
   CollectorOptions collector_;
   RunRecord run_;
   std::unique_ptr<TrajectoryBuilder> builder_;
-  std::unique_ptr<StreamReader> frontend_reader_, map_reader_;
+  std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
+  std::unique_ptr<StreamReader> map_reader_;
   std::map<std::string, std::set<int32_t>> process_ids_;
   std::map<std::string, ProcessHealth>
       former_;  ///< counters of processes that another has followed, together
-  FrontendStatus former_frontend_;
+  std::map<CameraId, FrontendStatus> former_frontends_;
   std::map<KeyframeId, MapId> proposed_;        ///< keyframes that the frontend said should be
   std::map<KeyframeId, int64_t> heard_ns_;      ///< when each was said to be one
   std::set<KeyframeId> proposed_before_crash_;  ///< of them, those of before all processes died
@@ -81,13 +86,13 @@ class CollectorNode : public StreamNode {
   bool disk_warned_ = false;
   int64_t next_sync_ns_ = 0, next_counters_ns_ = 0;
   int64_t next_progress_ = 0;
-  std::optional<EndOfSequence> end_;
+  std::map<CameraId, EndOfSequence> ends_;
   int64_t frames_total_ = 0;
   int64_t frames_seen_ = 0;
-  int64_t newest_frame_ = -1;
+  std::map<CameraId, int64_t> newest_frames_;  ///< -1 where none has come
   int64_t drained_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
-  bool frontend_ended_ = false;
+  bool frontends_ended_ = false;
   bool written_ = false;
 };
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/node_options.h"
@@ -10,9 +11,9 @@ namespace dmslam {
 
 struct CollectorOptions {
   std::string out_dir;
-  std::string ground_truth;  ///< TUM trajectory; empty: none
-  bool progress = false;     ///< show progress on the terminal
-  bool checkpoints = true;   ///< as the settings say; false: none, whatever they say
+  std::vector<std::string> ground_truth;  ///< TUM trajectory of each camera; empty, or left out: none
+  bool progress = false;                  ///< show progress on the terminal
+  bool checkpoints = true;                ///< as the settings say; false: none, whatever they say
 };
 
 /// A `CollectorNode`, for those who only run one: its own header is much to compile.

@@ -40,6 +40,12 @@ Json Quantiles(const std::vector<double>& values) {
   return {{"p50", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"p99", Quantile(values, 0.99)}};
 }
 
+/// Of camera 1: "1:123".
+std::string FrameName(KeyframeId id) {
+  const std::string frame = std::to_string(id.frame_index());
+  return id.camera() == 0 ? frame : std::to_string(id.camera()) + ":" + frame;
+}
+
 /// The covisibility graph: a line "frame frame landmarks" for each two keyframes that share landmarks; "loop"
 /// behind it where a loop was closed between them.
 void WriteGraph(const std::string& path, const Map& map) {
@@ -50,7 +56,7 @@ void WriteGraph(const std::string& path, const Map& map) {
       if (other < id) continue;
       const auto& loops = keyframe.loop_edges;
       const bool loop = std::binary_search(loops.begin(), loops.end(), other);
-      file << id.frame_index() << " " << other.frame_index() << " " << shared << (loop ? " loop\n" : "\n");
+      file << FrameName(id) << " " << FrameName(other) << " " << shared << (loop ? " loop\n" : "\n");
     }
   }
   WriteFile(path, file.str());
@@ -71,10 +77,10 @@ std::optional<Matrix6d> CovarianceOf(const std::vector<double>& upper) {
 /// The poses as they were told while it went on, and how well they were known.
 std::vector<ToldPose> ToldPoses(const TrajectoryBuilder& builder) {
   std::vector<ToldPose> poses;
-  for (const auto& [index, pose] : builder.frame_poses()) {
-    if (!pose.HasPose() || pose.state == TrackingState::kLocalizedLater) continue;
+  for (const auto& [frame, pose] : builder.frame_poses()) {
+    if (frame.camera != 0 || !pose.HasPose() || pose.state == TrackingState::kLocalizedLater) continue;
     poses.push_back({{pose.stamp_ns, pose.T_cam_world.Inverse()},
-                     index,
+                     frame.index,
                      static_cast<int>(pose.state),
                      pose.map_id.value_or(0),
                      pose.reference.frame_index(),
@@ -117,16 +123,69 @@ struct Errors {
   std::vector<StampedPose> ground_truth;
 };
 
-Errors Evaluate(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories) {
+/// From the file, or as it was heard; none: empty.
+std::vector<StampedPose> GroundTruthOf(const std::string& path, const std::vector<StampedPose>& heard) {
+  return path.empty() ? heard : ReadGroundTruth(path).poses;
+}
+
+Errors Evaluate(std::vector<StampedPose> ground_truth, const TrajectoryBuilder::Trajectories& trajectories) {
   Errors errors;
-  if (run.ground_truth.empty() && run.heard_ground_truth.empty()) return errors;
-  errors.ground_truth =
-      run.ground_truth.empty() ? run.heard_ground_truth : ReadGroundTruth(run.ground_truth).poses;
+  if (ground_truth.empty()) return errors;
+  errors.ground_truth = std::move(ground_truth);
   AteReport final = EvaluateAte(errors.ground_truth, trajectories.final);
   AteReport online = EvaluateAte(errors.ground_truth, trajectories.online);
   if (final.usable()) errors.final = std::move(final);
   if (online.usable()) errors.online = std::move(online);
   return errors;
+}
+
+/// Several cameras beside one another.
+struct CameraResults {
+  const CameraRecord* run = nullptr;
+  TrajectoryBuilder::Trajectories trajectories;
+  Errors errors;
+};
+
+/// Cameras from 1 on.
+std::vector<CameraResults> ResultsOfOthers(const RunRecord& run, const TrajectoryBuilder& builder) {
+  std::vector<CameraResults> others;
+  for (const CameraRecord& other : run.others) {
+    CameraResults results{&other, builder.Build(static_cast<CameraId>(others.size() + 1)), {}};
+    results.errors =
+        Evaluate(GroundTruthOf(other.ground_truth, other.heard_ground_truth), results.trajectories);
+    others.push_back(std::move(results));
+  }
+  return others;
+}
+
+constexpr int64_t kBetweenCamerasNs = int64_t{1} << 55;  // a year: what is between no two stamps of one
+
+/// So that the stamps of several cameras, which go at the same time, can be told apart.
+void AppendShifted(const std::vector<StampedPose>& poses, size_t camera, std::vector<StampedPose>* all) {
+  for (StampedPose pose : poses) {
+    pose.stamp_ns += kBetweenCamerasNs * static_cast<int64_t>(camera);
+    all->push_back(pose);
+  }
+}
+
+/// Of all cameras, with one similarity for all: the world is one.
+std::optional<AteReport> EvaluateJointly(const TrajectoryBuilder::Trajectories& first,
+                                         const Errors& first_errors, const std::vector<CameraResults>& others,
+                                         std::vector<StampedPose> TrajectoryBuilder::Trajectories::*which) {
+  std::vector<StampedPose> truth, poses;
+  AppendShifted(first_errors.ground_truth, 0, &truth);
+  AppendShifted(first.*which, 0, &poses);
+  for (size_t i = 0; i < others.size(); ++i) {
+    AppendShifted(others[i].errors.ground_truth, i + 1, &truth);
+    AppendShifted(others[i].trajectories.*which, i + 1, &poses);
+  }
+  if (truth.empty()) return std::nullopt;
+  AteReport report = EvaluateAte(truth, poses);
+  return report.usable() ? std::optional(std::move(report)) : std::nullopt;
+}
+
+Json NumberOrNull(const std::optional<AteReport>& report) {
+  return report ? Json(report->rmse()) : Json(nullptr);
 }
 
 PlotFigure FigureOf(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories,
@@ -188,7 +247,7 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
   const auto& poses = builder.frame_poses();
   if (!t.online.empty()) {
     after_first = static_cast<size_t>(std::count_if(poses.begin(), poses.end(), [&](const auto& item) {
-      return item.second.stamp_ns >= t.online.front().stamp_ns;
+      return item.first.camera == 0 && item.second.stamp_ns >= t.online.front().stamp_ns;
     }));
   }
   json["tracked_online_percent"] = Percent(t.online.size(), run.frames_published);
@@ -205,6 +264,44 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
   for (const auto& [map_id, frames] : t.other_maps) others.push_back({{"map", map_id}, {"frames", frames}});
   json["map"] = t.map_id;
   json["other_maps"] = others;
+  return json;
+}
+
+Json CameraJson(CameraId camera, const std::string& sequence, int64_t frames, int64_t skipped,
+                const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
+  Json json;
+  json["camera"] = camera;
+  json["sequence"] = sequence;
+  json["frames"] = frames;
+  json["frames_skipped"] = skipped;
+  json["tracked_online_percent"] = Percent(t.online.size(), frames);
+  json["tracked_percent"] = Percent(t.final.size(), frames);
+  json["keyframes"] = t.keyframes.size();
+  json["map"] = t.map_id;
+  Json others = Json::array();
+  for (const auto& [map_id, count] : t.other_maps) others.push_back({{"map", map_id}, {"frames", count}});
+  json["other_maps"] = others;
+  json["ate_rmse_final"] = NumberOrNull(errors.final);
+  json["ate_rmse_online"] = NumberOrNull(errors.online);
+  return json;
+}
+
+/// Of several cameras: each, and all together.
+Json CamerasJson(const RunRecord& run, const TrajectoryBuilder::Trajectories& first, const Errors& errors,
+                 const std::vector<CameraResults>& others) {
+  using Trajectories = TrajectoryBuilder::Trajectories;
+  Json json;
+  Json cameras = Json::array();
+  cameras.push_back(
+      CameraJson(0, run.sequence, run.frames_published, run.frontend.frames_skipped, first, errors));
+  for (size_t i = 0; i < others.size(); ++i) {
+    const CameraRecord& record = *others[i].run;
+    cameras.push_back(CameraJson(static_cast<CameraId>(i + 1), record.sequence, record.frames_published,
+                                 record.frontend.frames_skipped, others[i].trajectories, others[i].errors));
+  }
+  json["cameras"] = cameras;
+  json["ate_rmse_joint"] = NumberOrNull(EvaluateJointly(first, errors, others, &Trajectories::final));
+  json["ate_rmse_joint_online"] = NumberOrNull(EvaluateJointly(first, errors, others, &Trajectories::online));
   return json;
 }
 
@@ -305,6 +402,16 @@ std::string Table(const Json& summary) {
                                                number("frames_lost", "%.0f"));
   row("tracked online / in the end [%]",
       number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
+  if (summary.contains("cameras")) {
+    for (const Json& camera : summary["cameras"]) {
+      char text[80];
+      std::snprintf(text, sizeof(text), "%.1f / %.1f", camera["tracked_online_percent"].get<double>(),
+                    camera["tracked_percent"].get<double>());
+      row(("... of camera " + std::to_string(camera["camera"].get<int>())).c_str(), text);
+    }
+    row("joint ATE RMSE final / online [m]",
+        number("ate_rmse_joint", "%.4f") + " / " + number("ate_rmse_joint_online", "%.4f"));
+  }
   row("first map after [s]", number("first_init_s", "%.2f"));
   row("ATE RMSE final / online [m]",
       number("ate_rmse_final", "%.4f") + " / " + number("ate_rmse_online", "%.4f"));
@@ -340,18 +447,27 @@ WrittenResults WriteResults(const std::string& dir, RunRecord run, const Traject
     }
   };
   attempt([&] { std::filesystem::create_directories(dir); });
-  const TrajectoryBuilder::Trajectories trajectories = builder.Build();
+  const TrajectoryBuilder::Trajectories trajectories = builder.Build(0);
   attempt([&] { WriteTrajectory(dir + "/trajectory.txt", trajectories.final); });
   attempt([&] { WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online); });
   attempt([&] { WriteToldPoses(dir + "/poses_online.csv", ToldPoses(builder)); });
   attempt([&] { WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes); });
   attempt([&] { WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id); });
   attempt([&] { WriteGraph(dir + "/graph.txt", builder.map()); });
-  const Errors errors = Evaluate(run, trajectories);
+  const Errors errors = Evaluate(GroundTruthOf(run.ground_truth, run.heard_ground_truth), trajectories);
+  const std::vector<CameraResults> others = ResultsOfOthers(run, builder);
+  for (size_t i = 0; i < others.size(); ++i) {
+    const std::string number = "_" + std::to_string(i + 1) + ".txt";
+    const TrajectoryBuilder::Trajectories& of_camera = others[i].trajectories;
+    attempt([&] { WriteTrajectory(dir + "/trajectory" + number, of_camera.final); });
+    attempt([&] { WriteTrajectory(dir + "/trajectory_online" + number, of_camera.online); });
+    attempt([&] { WriteTrajectory(dir + "/keyframes" + number, of_camera.keyframes); });
+  }
   if (!trajectories.final.empty())
     attempt([&] { WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png"); });
   if (!written.problem.empty()) run.disk_problems.push_back(written.problem);
-  const Json summary = SummaryJson(run, builder, trajectories, errors);
+  Json summary = SummaryJson(run, builder, trajectories, errors);
+  if (!others.empty()) summary.update(CamerasJson(run, trajectories, errors, others));
   attempt([&] { WriteFile(dir + "/summary.json", summary.dump(2) + "\n"); });
   written.table = Table(summary);
   return written;

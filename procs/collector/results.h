@@ -31,6 +31,14 @@ struct FrameDurations {
   void Add(const FrameTrace& trace);
 };
 
+/// Of a camera beside the first one.
+struct CameraRecord {
+  std::string sequence, ground_truth;
+  std::vector<StampedPose> heard_ground_truth;
+  int64_t frames_published = 0, frames_missing = 0;
+  FrontendStatus frontend;
+};
+
 /// All that the summary of a run is made of.
 struct RunRecord {
   std::string sequence, mode, profile, ground_truth;
@@ -39,6 +47,7 @@ struct RunRecord {
   bool end_heard = false;  ///< of the sequence: how many frames there were is known
   int64_t frames_published = 0, frames_missing = 0, frames_blacked = 0, frames_jumped = 0;
   FrontendStatus frontend;
+  std::vector<CameraRecord> others;  ///< cameras from 1 on
   MapperStatus mapper;
   LoopcloserStatus loopcloser;
   std::map<std::string, ProcessHealth> health;
@@ -68,7 +77,9 @@ struct WrittenResults {
 
 /// Writes trajectory.txt, trajectory_online.txt, poses_online.csv, keyframes.txt, map.ply, graph.txt,
 /// trajectory.png and summary.json into `dir`. Each text file is there as a whole or not at all; one that
-/// cannot be written does not keep the others from being written.
+/// cannot be written does not keep the others from being written. Of several cameras these are of the first
+/// one (map and graph of all), and camera 1 has trajectory_1.txt, trajectory_online_1.txt and
+/// keyframes_1.txt.
 WrittenResults WriteResults(const std::string& dir, RunRecord run, const TrajectoryBuilder& builder);
 
 }  // namespace dmslam

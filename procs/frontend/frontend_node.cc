@@ -16,6 +16,7 @@ namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
 constexpr double kMaxBehindS = 0.5;
+constexpr uint32_t kTheEnd = kMaxFrames - 1;  // in the place of a frame: what is done when none follows
 
 }  // namespace
 
@@ -24,7 +25,7 @@ std::unique_ptr<Node> MakeFrontend(NodeContext context, NodeOptions options, Fro
 }
 
 FrontendNode::FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras)
-    : StreamNode(std::move(context), std::move(options), "frontend"),
+    : StreamNode(std::move(context), options, OfCamera("frontend", options.camera_id)),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)) {
   Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose});
@@ -32,8 +33,10 @@ FrontendNode::FrontendNode(NodeContext context, NodeOptions options, FrontendExt
 
 void FrontendNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
+  takes_turns_ = lockstep_ && options_.NumCameras() > 1;
   FrontendCore::Setup setup = FrontendSetup(options_.settings, info.camera, extras_.vocabulary);
   setup.session = session_;
+  setup.camera_id = options_.camera_id;
   setup.in_saved_map = run_.saved_map;
   setup.localize_only = run_.localize_only;
   if (!lockstep_) setup.run_search = InBackground;
@@ -66,7 +69,8 @@ bool FrontendNode::ReadyToWrite() {
   }
   core_->Resume();
   if (map.keyframes().empty()) return true;
-  last_index_ = static_cast<int64_t>(map.keyframes().rbegin()->first.frame_index()) - 1;
+  if (const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id))
+    last_index_ = static_cast<int64_t>(newest->id.frame_index()) - 1;
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }
@@ -82,6 +86,7 @@ Version FrontendNode::HandOverVersion() {
 void FrontendNode::OnWriterOpen() {
   SessionStart start;
   start.session = session_;
+  start.camera_id = options_.camera_id;
   start.first_stamp_ns = 0;
   start.seed = run_.seed;
   start.configuration_hash = options_.settings.Hash();
@@ -107,6 +112,8 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   if (!camera_info_) return;  // it comes again, or it is too early
   std::optional<Frame> frame = Read<Frame>(bytes);
   if (!frame || IsForeignFrame(frame->session)) return;
+  if (frame->frame_index >= kTheEnd)
+    return CountMalformed(channels::kFrame, "its number is beyond what a session can hold; begin a new one");
   const int64_t index = frame->frame_index;
   const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && frame->stamp_ns <= last_stamp_ns_;
   if (index <= last_index_ || (goes_back && last_index_ >= 0)) {
@@ -150,7 +157,8 @@ size_t FrontendNode::NumReadyRecords(bool all) const {
   size_t ready = held_.size();
   const auto is_ready = [&](const HeldRecord& held) {
     if (held.in_snapshot) return held.ends_snapshot;
-    return all || !lockstep_ || held.delta.event == MapEvent::kSettled;
+    const MapEvent event = held.delta.event;
+    return all || !lockstep_ || event == MapEvent::kSettled || event == MapEvent::kTurn;
   };
   while (ready > 0 && !is_ready(held_[ready - 1])) --ready;
   return ready;
@@ -177,6 +185,8 @@ void FrontendNode::OnApplied(size_t count) {
   for (; count > 0; --count) {
     const HeldRecord& held = held_.front();
     if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer();
+    const bool ours = held.delta.event == MapEvent::kTurn && held.delta.about->camera() == options_.camera_id;
+    if (ours && turn_.asked == held.delta.about->frame_index()) turn_.given = turn_.asked;
     applied_ = held.version;
     held_.pop_front();
   }
@@ -194,6 +204,17 @@ bool FrontendNode::HoldsBack() const { return lockstep_ && core_->awaited().vali
 
 /// Nothing can be done before a saved map has come.
 bool FrontendNode::AwaitsSavedMap() const { return run_.saved_map && core_->map().keyframes().empty(); }
+
+/// Where several cameras go in lock-step, a frame waits until the mapper has all that comes before it. A
+/// mapper that was started again is asked again.
+bool FrontendNode::HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns) {
+  if (!takes_turns_ || turn_.given == frame_index) return true;
+  if (!map_reader_->term().valid()) return false;
+  if (turn_.asked == frame_index && turn_.asked_of == map_reader_->term()) return false;
+  turn_ = {frame_index, std::nullopt, map_reader_->term()};
+  PublishRecord(TurnRequest{frame_index, stamp_ns, options_.camera_id});
+  return false;
+}
 
 /// Has the core do something, which ends with what it has to say of itself. The core is idle. Returns whether
 /// it is idle again.
@@ -220,7 +241,8 @@ bool FrontendNode::WorkOnce() {
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
   if (frame_open_) FinishFrame();
-  if (waiting_ && !FallsBehind()) return TrackWaiting();
+  if (waiting_ && !FallsBehind())
+    return HasTurn(waiting_->frame.frame_index, waiting_->frame.stamp_ns) && TrackWaiting();
   if (core_->IsBehind()) return CatchUp();
   return WorkAtEnd();
 }
@@ -230,7 +252,7 @@ int64_t FrontendNode::WorkDeadline() const {
   if (!core_ || !work_->Idle()) return INT64_MAX;
   if (core_->IsRefining()) return 0;
   if (end_.Is(Phase::kTelling)) return end_.next_portion_ns();
-  if (stopping_ || AwaitsSavedMap()) return INT64_MAX;
+  if (stopping_ || AwaitsSavedMap() || (takes_turns_ && turn_.asked != turn_.given)) return INT64_MAX;
   const bool grows = end_.Is(Phase::kGrowingBack) && !core_->awaited().valid();
   return grows || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
 }
@@ -244,7 +266,7 @@ bool FrontendNode::WorkAtEnd() {
     case Phase::kPlaying:
       return false;
     case Phase::kGrowingBack:
-      return GrowBack();
+      return HasTurn(kTheEnd, std::nullopt) && GrowBack();
     case Phase::kAwaitingAdjustedMap:
       if (!MapsAreAdjusted()) return false;
       end_.OnAdjusted();
@@ -297,7 +319,7 @@ bool FrontendNode::Join() {
 bool FrontendNode::MapsAreAdjusted() {
   if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
   if (end_.Asks(context_.now_ns()))
-    PublishRecord(AdjustRequest{++requests_, "the sequence has ended", last_stamp_ns_});
+    PublishRecord(AdjustRequest{++requests_, "the sequence has ended", last_stamp_ns_, options_.camera_id});
   return end_.IsAnswered();
 }
 

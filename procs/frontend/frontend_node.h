@@ -77,8 +77,15 @@ class FrontendNode : public StreamNode {
     bool ends_snapshot = false;
   };
 
+  /// Several cameras in lock-step: the frame that waits for its turn.
+  struct Turn {
+    std::optional<uint32_t> asked, given;
+    Term asked_of;  ///< the mapper
+  };
+
   using Job = std::function<void()>;
   bool Run(Job job);
+  bool HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns);
   void TakeMapRecords();
   size_t NumReadyRecords(bool all) const;
   void ApplyHeldRecords(size_t count, bool at_once);
@@ -123,6 +130,8 @@ class FrontendNode : public StreamNode {
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far
   bool lockstep_ = false;
+  bool takes_turns_ = false;
+  Turn turn_;
   bool hurries_ = false;  ///< catches up before it takes another image
   bool frame_open_ =
       false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)

@@ -16,13 +16,16 @@ std::unique_ptr<Node> MakeLoopcloser(NodeContext context, NodeOptions options,
 LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)
     : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {
-  Listen({channels::kSession});
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) Listen({channels::kSession}, camera);
 }
 
 /// The frontend's word on its settings and its vocabulary. Its stream is not read here; who comes later has
 /// the same settings as the one before.
 void LoopcloserNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
-  if (!IsIntact(channel, bytes)) {
+  bool intact = false;
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    intact = intact || IsIntact(ChannelOfCamera(channel, camera), bytes);
+  if (!intact) {
     CountMalformed(channel, "its checksum does not fit");
     return;
   }
@@ -73,11 +76,13 @@ void LoopcloserNode::WorkOn(const Record& record) {
     if (delta) core_->ApplyMapDelta(*delta);
     const bool asks = delta && (delta->event == MapEvent::kMapped || delta->event == MapEvent::kMapStarted);
     if (asks) Answer(*delta->about);
-    // The newest keyframe of a snapshot may be waiting for an answer that the one before this process did not
-    // give.
-    const Map& map = core_->map();
-    const bool may_wait = ends_snapshot && !map.keyframes().empty() && !map.progress().ended;
-    if (may_wait) Answer(map.keyframes().rbegin()->first);
+    // The newest keyframe of a snapshot (of each camera) may be waiting for an answer that the one before
+    // this process did not give.
+    const bool may_wait = ends_snapshot && !core_->map().progress().ended;
+    for (CameraId camera = 0; may_wait && camera < options_.NumCameras(); ++camera) {
+      const Keyframe* newest = core_->map().NewestKeyframeOf(camera);
+      if (newest != nullptr) Answer(newest->id);
+    }
     work_->Report([this, status = CoreStatus(), whole = delta.has_value()] {
       core_status_ = status;
       if (whole) map_reader_->AcceptTaken();

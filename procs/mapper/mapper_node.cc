@@ -23,7 +23,8 @@ std::unique_ptr<Node> MakeMapper(NodeContext context, NodeOptions options, Mappe
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), "mapper"),
       run_(options_.settings.Read<RunOptions>()),
-      files_(std::move(files)) {
+      files_(std::move(files)),
+      num_cameras_(options_.NumCameras()) {
   if (run_.saved_map == files_.load.empty()) {
     throw InputError(files_.load.empty()
                          ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
@@ -80,7 +81,10 @@ void MapperNode::Begin(const CameraInfo& info) {
   if (!lockstep_) core_->SetInterrupt([this] { return keyframe_waits_.load(); });
   core_->SetStop([this] { return stops_.load(); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
-  WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
+  std::vector<std::string> readers;
+  for (CameraId camera = 0; camera < num_cameras_; ++camera) readers.push_back(OfCamera("frontend", camera));
+  readers.insert(readers.end(), {"loopcloser", "collector"});
+  WantWriter({StreamId::kMap, readers, {}, snapshots_.get()});
 }
 
 // ---- Continuing what another mapper began ----
@@ -92,8 +96,10 @@ void MapperNode::BeginFetch() {
   options.name = context_.name;
   options.id = context_.random_id;
   options.schema_hash = SchemaHash();
-  const std::vector<ReplicaFetch::Holder> holders = {
-      {"frontend", "FRONTEND"}, {"loopcloser", "LOOPCLOSER"}, {"collector", "COLLECTOR"}};
+  std::vector<ReplicaFetch::Holder> holders;
+  for (CameraId camera = 0; camera < num_cameras_; ++camera)
+    holders.push_back({OfCamera("frontend", camera), OfCamera("FRONTEND", camera)});
+  holders.insert(holders.end(), {{"loopcloser", "LOOPCLOSER"}, {"collector", "COLLECTOR"}});
   for (const ReplicaFetch::Holder& holder : holders) {
     if (options_.peers.empty() || options_.HasPeer(holder.role)) options.holders.push_back(holder);
   }
@@ -157,21 +163,32 @@ void MapperNode::OnWriterOpen() {
   left_.fetch.reset();
   left_.replica.reset();
   const MapProgress progress = core_->map().progress();
-  frontend_reader_ =
-      MakeReader(StreamId::kFrontend, "FRONTEND",
-                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-                  channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
-                 {progress.frontend.epoch, progress.frontend.seq});
+  frontends_.resize(num_cameras_);
+  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+    const StreamPosition from = core_->map().progress(camera).frontend;
+    frontends_[camera].reader = MakeReader(
+        StreamId::kFrontend, "FRONTEND",
+        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
+        {from.epoch, from.seq}, camera);
+  }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
                             {progress.loopcloser.epoch, progress.loopcloser.seq});
   if (progress.ended) {  // the one before could not say goodbye
     ending_ = Ending::kCompleting;
     Stop();
-  } else if (progress.settled) {  // somebody may not have heard it
-    const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(*progress.settled);
-    Run([this, id = *progress.settled, map_id = settled ? std::optional(settled->map_id) : std::nullopt] {
-      core_->Settle(id, map_id);
-    });
+  } else {
+    Run([this] { SettleAgain(); });
+  }
+}
+
+/// On the core. Somebody may not have heard it.
+void MapperNode::SettleAgain() {
+  for (const CameraId camera : core_->map().cameras()) {
+    const std::optional<KeyframeId> id = core_->map().progress(camera).settled;
+    if (!id) continue;
+    const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(*id);
+    core_->Settle(*id, settled ? std::optional(settled->map_id) : std::nullopt);
   }
 }
 
@@ -203,14 +220,29 @@ void MapperNode::Timing::Fill(MapperStatus* status) const {
 bool MapperNode::KeyframeWaits() const {
   return std::any_of(taken_.begin(), taken_.end(),
                      [](const Arrived& arrived) { return arrived.record.channel == channels::kKeyframe; }) ||
-         arrived_.size() + static_cast<size_t>(frontend_reader_->backlog()) > 60;
+         arrived_.size() + static_cast<size_t>(FrontendBacklog()) > 60;
+}
+
+/// Of the frontend that is furthest ahead.
+int64_t MapperNode::FrontendBacklog() const {
+  int64_t most = 0;
+  for (const Frontend& frontend : frontends_) most = std::max<int64_t>(most, frontend.reader->backlog());
+  return most;
+}
+
+bool MapperNode::AllFrontends(const std::function<bool(const Frontend&)>& is_so) const {
+  return std::ranges::all_of(frontends_, is_so);
 }
 
 /// Latencies count from when a record came, not from when there was time for it.
 void MapperNode::NoteArrivals() {
   const int64_t now_ns = context_.now_ns();
-  while (std::optional<Record> record = frontend_reader_->Take())
-    arrived_.push_back({std::move(*record), now_ns});
+  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+    while (std::optional<Record> record = frontends_[camera].reader->Take()) {
+      record->channel = SplitCamera(record->channel).channel;
+      arrived_.push_back({camera, std::move(*record), now_ns});
+    }
+  }
 }
 
 void MapperNode::TakeLoopAnswers() {
@@ -247,7 +279,7 @@ void MapperNode::ApplyFirstAnswer() {
     core_->OnLoopAnswer(pending.answer);
   };
   Run(apply, [this, version = pending.version] {
-    pending_answers_.push_back({version, writer_->last_seq()});
+    pending_answers_.push_back({0, version, writer_->last_seq()});
   });
 }
 
@@ -293,20 +325,21 @@ bool MapperNode::WorkOnce() {
     ApplyFirstAnswer();
     return work_->Idle();
   }
-  return taken_.empty() ? EndIfDone() : HandleFirstRecord();
+  if (!taken_.empty()) return HandleFirstRecord();
+  return AnswerRequests() || GiveTurn() || EndIfDone();
 }
 
 /// The records up to here are worked into the map: the next map record says so.
-void MapperNode::MarkFrontend(const Version& version) {
-  MapProgress progress = core_->map().progress();
+void MapperNode::MarkFrontend(CameraId camera, const Version& version) {
+  MapProgress progress = core_->map().progress(camera);
   progress.frontend = {version.epoch, version.seq};
   core_->SetProgress(progress);
 }
 
 /// It must have the settings of this process, and the vocabulary with which the map was made that it begins
 /// in.
-void MapperNode::JoinFrontend(const SessionStart& start) {
-  session_start_ = start;
+void MapperNode::JoinFrontend(CameraId camera, const SessionStart& start) {
+  if (camera == 0) session_start_ = start;
   if (!JoinsSession(start)) return;
   const std::string why = WhyOtherVocabulary(files_.load, saved_.made, start.vocabulary_checksum);
   if (!why.empty()) Exit(kExitMisfit, why);
@@ -315,28 +348,33 @@ void MapperNode::JoinFrontend(const SessionStart& start) {
 /// True: there may be more to do.
 bool MapperNode::HandleFirstRecord() {
   const Record record = std::move(taken_.front().record);
+  const CameraId camera = taken_.front().camera;
   timing_.arrived_ns = taken_.front().at_ns;
   taken_.pop_front();
   if (record.channel == channels::kSession) {
-    if (const auto start = Read<SessionStart>(*record.bytes)) JoinFrontend(*start);
+    if (const auto start = Read<SessionStart>(*record.bytes)) JoinFrontend(camera, *start);
   }
   // A keyframe makes several map records: only the last one says that it is done.
   const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
   const Version version = record.version();
-  const auto work = [this, many, version, job = JobFor(record)] {
-    if (!many) MarkFrontend(version);
+  const auto work = [this, many, camera, version, job = JobFor(camera, record)] {
+    if (!many) MarkFrontend(camera, version);
     if (job) job();
   };
-  Run(work, [this, version] {
-    if (!awaited_) pending_.push_back({version, writer_->last_seq()});
+  Run(work, [this, camera, version] {
+    if (!awaited_) pending_.push_back({camera, version, writer_->last_seq()});
     AcceptWhatIsSafe();
   });
   return work_->Idle();
 }
 
 /// What a record of the frontend asks of the core; empty: nothing.
-MapperNode::Job MapperNode::JobFor(const Record& record) {
+MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
   const Version version = record.version();
+  if (record.channel == channels::kTurnRequest) {
+    NoteTurnRequest(camera, record);
+    return {};
+  }
   if (run_.localize_only) {
     // The map stays as it is, but nobody is left waiting.
     if (record.channel != channels::kAdjustRequest) return {};
@@ -364,8 +402,10 @@ MapperNode::Job MapperNode::JobFor(const Record& record) {
   } else if (record.channel == channels::kMapReset) {
     if (const auto reset = Read<MapReset>(*record.bytes)) return [this, reset] { core_->OnReset(*reset); };
   } else if (record.channel == channels::kAdjustRequest) {
-    if (const auto request = Read<AdjustRequest>(*record.bytes))
-      return [this, request] { core_->OnAdjustRequest(*request); };
+    if (const auto request = Read<AdjustRequest>(*record.bytes)) {
+      if (num_cameras_ == 1) return [this, request] { core_->OnAdjustRequest(*request); };
+      frontends_[camera].request = request->request;  // the others go on mapping
+    }
   }
   return {};
 }
@@ -381,7 +421,7 @@ void MapperNode::AfterKeyframe(const Version& version, KeyframeId id, MapId map_
 
 /// On the core.
 void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend) {
-  MarkFrontend(of_frontend);
+  MarkFrontend(id.camera(), of_frontend);
   core_->Settle(id, map_id);
   work_->Report([this, id] { last_settled_ = id; });
 }
@@ -400,7 +440,7 @@ void MapperNode::SettleAwaited() {
     const Awaited settled = *std::exchange(awaited_, std::nullopt);
     Run([this, settled] { Settle(settled.id, settled.map_id, settled.version); },
         [this, settled] {
-          pending_.push_back({settled.version, writer_->last_seq()});
+          pending_.push_back({settled.id.camera(), settled.version, writer_->last_seq()});
         });
   }
   // Another loop closer than the one that was asked does not know what is due.
@@ -413,7 +453,7 @@ void MapperNode::SettleAwaited() {
 
 void MapperNode::AcceptWhatIsSafe() {
   while (!pending_.empty() && writer_->AcknowledgedByAny(pending_.front().map_seq)) {
-    frontend_reader_->Accept(pending_.front().version);
+    frontends_[pending_.front().camera].reader->Accept(pending_.front().version);
     pending_.pop_front();
   }
   while (!pending_answers_.empty() && writer_->AcknowledgedByAny(pending_answers_.front().map_seq)) {
@@ -422,10 +462,56 @@ void MapperNode::AcceptWhatIsSafe() {
   }
 }
 
+// ---- Several cameras ----
+
+/// What was answered already is not answered again.
+void MapperNode::NoteTurnRequest(CameraId camera, const Record& record) {
+  const auto request = Read<TurnRequest>(*record.bytes);
+  if (!request) return;
+  const Version asked{record.version().epoch, request->frame_index};
+  if (frontends_[camera].given != asked) frontends_[camera].turn = request;
+}
+
+/// Lock-step: frames are taken by stamp, then by camera. The next one is known when every camera has named
+/// its own; true: there may be more to do.
+bool MapperNode::GiveTurn() {
+  if (!lockstep_ || num_cameras_ == 1 || ending_ != Ending::kNo) return false;
+  Frontend* next = nullptr;
+  for (Frontend& frontend : frontends_) {
+    if (frontend.IsDone()) continue;
+    if (!frontend.turn) return false;
+    const auto when = [](const Frontend& f) { return f.turn->stamp_ns.value_or(INT64_MAX); };
+    if (next == nullptr || when(frontend) < when(*next)) next = &frontend;
+  }
+  if (next == nullptr) return false;
+  const TurnRequest request = *std::exchange(next->turn, std::nullopt);
+  const CameraId camera = static_cast<CameraId>(next - frontends_.data());
+  next->given = {next->reader->term().epoch, request.frame_index};
+  Run([this, frame = KeyframeId::Make(session_, request.frame_index, camera)] { core_->GiveTurn(frame); });
+  return work_->Idle();
+}
+
+/// The maps are adjusted as a whole when no camera adds to them any more.
+bool MapperNode::AnswerRequests() {
+  if (num_cameras_ == 1 || !AllFrontends([](const Frontend& frontend) { return frontend.IsDone(); }))
+    return false;
+  std::vector<AdjustRequest> requests;
+  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+    const std::optional<uint32_t> request = std::exchange(frontends_[camera].request, std::nullopt);
+    if (request) requests.push_back({*request, "the sequences have ended", std::nullopt, camera});
+  }
+  if (requests.empty()) return false;
+  Run([this, requests] {
+    for (const AdjustRequest& request : requests) core_->OnAdjustRequest(request);
+  });
+  return work_->Idle();
+}
+
 // ---- The end ----
 
 bool MapperNode::EndIfDone() {
-  if (ending_ == Ending::kNo && frontend_reader_->AtEnd()) ending_ = Ending::kFrontendEnded;
+  const bool all_ended = AllFrontends([](const Frontend& frontend) { return frontend.reader->AtEnd(); });
+  if (ending_ == Ending::kNo && all_ended) ending_ = Ending::kFrontendEnded;
   if (ending_ == Ending::kNo) return false;
   if (!answers_.empty() && ending_ == Ending::kFrontendEnded) {
     ApplyFirstAnswer();
@@ -444,7 +530,9 @@ bool MapperNode::EndIfDone() {
 
 /// All readers take the last record before this process leaves. What still comes in changes nothing any more.
 void MapperNode::DrainAfterEnd() {
-  while (frontend_reader_->Take()) frontend_reader_->AcceptTaken();
+  for (const Frontend& frontend : frontends_) {
+    while (frontend.reader->Take()) frontend.reader->AcceptTaken();
+  }
   while (loop_reader_->Take()) loop_reader_->AcceptTaken();
   if (writer_->completed()) Stop();
 }
@@ -472,8 +560,10 @@ void MapperNode::Stop() {
 void MapperNode::PublishStatus() {
   if (core_ && work_->Idle()) core_status_ = CoreStatus();
   MapperStatus status = core_status_;
-  status.head =
-      MakeStatusHead(core_ ? "" : "waiting for a camera", {frontend_reader_.get(), loop_reader_.get()});
+  std::vector<const StreamReader*> readers;
+  for (const Frontend& frontend : frontends_) readers.push_back(frontend.reader.get());
+  readers.push_back(loop_reader_.get());
+  status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", readers);
   status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
   if (ending_ == Ending::kCompleting) status.state = MapperStatus::State::kDone;
   status.keyframe_queue = static_cast<int32_t>(arrived_.size() + taken_.size());

@@ -42,11 +42,23 @@ class MapperNode : public StreamNode {
 
  private:
   struct Arrived {
+    CameraId camera = 0;
     Record record;
     int64_t at_ns = 0;
   };
+  /// A camera's frontend.
+  struct Frontend {
+    std::unique_ptr<StreamReader> reader;
+    std::optional<TurnRequest> turn;  ///< several cameras in lock-step: its next frame, which waits
+    Version given;                    ///< the request that was answered last: its term and frame
+    std::optional<uint32_t> request;  ///< of several cameras: to adjust the maps, not answered yet
+
+    /// No frame of it follows, and nothing that changes the map.
+    bool IsDone() const { return request || reader->AtEnd(); }
+  };
   /// A record whose effect is in the map, and the map record that must be safe before it is accepted.
   struct Pending {
+    CameraId camera = 0;  ///< of a frontend's
     Version version;
     int64_t map_seq = 0;
   };
@@ -91,23 +103,29 @@ class MapperNode : public StreamNode {
 
   uint16_t ContinueSavedMap(const CameraInfo& info);
   bool PublishSavedMap();
-  void JoinFrontend(const SessionStart& start);
+  void JoinFrontend(CameraId camera, const SessionStart& start);
   void Save();
   void PutInParts();
   bool TakeCheckpoint();
   void BeginFetch();
   bool FetchReplica();
   void TakeLoopAnswers();
+  void SettleAgain();
   void ApplyFirstAnswer();
   void DrainAfterEnd();
   bool HandleFirstRecord();
+  void NoteTurnRequest(CameraId camera, const Record& record);
+  bool GiveTurn();
+  bool AnswerRequests();
+  bool AllFrontends(const std::function<bool(const Frontend&)>& is_so) const;
+  int64_t FrontendBacklog() const;
   using Job = std::function<void()>;
   void Run(Job job, std::function<void()> when_done = {});
-  Job JobFor(const Record& record);
+  Job JobFor(CameraId camera, const Record& record);
   void AfterKeyframe(const Version& version, KeyframeId id, MapId map_id, bool checked_by_loopcloser);
   void Settle(KeyframeId id, MapId map_id, const Version& of_frontend);
   void SettleAwaited();
-  void MarkFrontend(const Version& version);
+  void MarkFrontend(CameraId camera, const Version& version);
   void AcceptWhatIsSafe();
   bool KeyframeWaits() const;
   void NoteArrivals();
@@ -122,9 +140,11 @@ class MapperNode : public StreamNode {
   SessionStart session_start_;  ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
-  std::unique_ptr<StreamReader> frontend_reader_, loop_reader_;
+  std::vector<Frontend> frontends_;  ///< by camera
+  std::unique_ptr<StreamReader> loop_reader_;
   LeftMap left_;
   bool lockstep_ = false;
+  const CameraId num_cameras_;
   Ending ending_ = Ending::kNo;
   std::deque<Arrived> arrived_;          ///< records of the frontend that came while it worked
   std::deque<Arrived> taken_;            ///< the same, to be handled next

@@ -27,11 +27,12 @@ LiveNode::LiveNode(NodeContext context, PlayerOptions options, std::unique_ptr<L
       options_(std::move(options)),
       source_(std::move(source)),
       endpoint_(context_.bus, context_.now_ns),
-      office_(context_, options_.session, options_.take_over, &endpoint_) {
+      office_(context_, {options_.session, options_.camera_id}, options_.take_over, &endpoint_) {
   if (options_.behind) first_index_ = *options_.behind + 1;
-  endpoint_.SetOtherHandler(
-      {channels::kFrameDone, channels::kSequenceDone, channels::kMapperStatus, channels::kFrontendStatus},
-      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
+  endpoint_.SetOtherHandler(PlayerOffice::AnswersTo(options_.camera_id),
+                            [this](const std::string& channel, std::span<const uint8_t> bytes) {
+                              Receive(SplitCamera(channel).channel, bytes);
+                            });
   if (context_.watch) context_.watch(source_->fd(), [this] { TakeFrame(); });
 }
 
@@ -88,14 +89,15 @@ void LiveNode::TakeFrame() {
   }
   if (ending_ || !office_.held()) return;
   frame_ = Frame();
+  frame_.camera_id = options_.camera_id;
   frame_.session = options_.session;
   frame_.frame_index = first_index_ + live->index;
   frame_.stamp_ns = InSessionTime(live->stamp_ns);
   frame_.capture_us = live->stamp_ns / 1000;
   EncodeFrame(live->image, CameraName(options_.sequence), options_.encoding, false, &frame_);
   frame_.publish_us = context_.wall_us();
-  context_.bus->Publish(
-      {channels::kFrame, std::make_shared<const Bytes>(wire::Encode(frame_)), options_.local_frames});
+  context_.bus->Publish({ChannelOfCamera(channels::kFrame, options_.camera_id),
+                         std::make_shared<const Bytes>(wire::Encode(frame_)), options_.local_frames});
   ++published_;
   ending_ = static_cast<size_t>(published_) >= options_.frames;
 }
@@ -108,7 +110,7 @@ void LiveNode::PublishCameraInfo() {
   info.sequence = CameraName(options_.sequence);
   info.num_frames = options_.frames == SIZE_MAX ? 0 : static_cast<int64_t>(options_.frames);
   info.mode = PlaybackMode::kRealtime;
-  PublishLoose(context_.bus, info);
+  PublishLoose(context_.bus, info, false, options_.camera_id);
 }
 
 void LiveNode::PublishStatus() {
@@ -123,7 +125,7 @@ void LiveNode::PublishStatus() {
   status.frames_missing = source_->dropped();
   status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   status.late_ms = published_ > 0 ? static_cast<double>(frame_.publish_us - frame_.capture_us) * 1e-3 : 0;
-  PublishLoose(context_.bus, status);
+  PublishLoose(context_.bus, status, false, options_.camera_id);
 }
 
 void LiveNode::PublishEnd() {
@@ -135,7 +137,7 @@ void LiveNode::PublishEnd() {
   end.frames_missing = source_->dropped();
   end.last_frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   end.last_stamp_ns = frame_.stamp_ns;
-  PublishLoose(context_.bus, end);
+  PublishLoose(context_.bus, end, false, options_.camera_id);
 }
 
 void LiveNode::Advance() {

@@ -49,6 +49,7 @@ void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::Pla
   *options = a.options;
   options->mode = a.lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
   options->session = node.session == 0 ? 1 : node.session;
+  options->camera_id = node.camera_id;
   options->take_over = node.take_over;
   options->local_frames = node.link == dmslam::Link::kLan && !a.remote_frontend;
   if (!a.behind.empty()) options->behind = ParseFrame("--behind", a.behind);

@@ -77,7 +77,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
       options_(std::move(options)),
       source_(std::move(source)),
       endpoint_(context_.bus, context_.now_ns),
-      office_(context_, options_.session, options_.take_over, &endpoint_) {
+      office_(context_, {options_.session, options_.camera_id}, options_.take_over, &endpoint_) {
   order_ = OrderOfPlay(options_, source_->size(), &jumped_);
   if (order_.empty()) {
     throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
@@ -85,9 +85,10 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
   }
   if (options_.behind) SkipBehind(*options_.behind);
   ground_truth_ = source_->GroundTruth();
-  endpoint_.SetOtherHandler(
-      {channels::kFrameDone, channels::kSequenceDone, channels::kMapperStatus, channels::kFrontendStatus},
-      [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
+  endpoint_.SetOtherHandler(PlayerOffice::AnswersTo(options_.camera_id),
+                            [this](const std::string& channel, std::span<const uint8_t> bytes) {
+                              Receive(SplitCamera(channel).channel, bytes);
+                            });
 }
 
 /// Whether nobody else plays this session. The first time that is certain the sequence begins.
@@ -155,7 +156,7 @@ void PlayerNode::PublishCameraInfo() {
   info.first_frame = source_->FrameIndex(order_.front());
   info.mode = options_.mode;
   info.speed = options_.speed;
-  PublishLoose(context_.bus, info);
+  PublishLoose(context_.bus, info, false, options_.camera_id);
 }
 
 int64_t PlayerNode::DueNs(size_t position) const {
@@ -180,6 +181,7 @@ bool PlayerNode::IsBlack(size_t index) const {
 
 bool PlayerNode::MakeFrame(size_t index) {
   frame_ = Frame();
+  frame_.camera_id = options_.camera_id;
   frame_.session = options_.session;
   frame_.frame_index = source_->FrameIndex(index);
   frame_.stamp_ns = source_->StampNs(index);
@@ -215,7 +217,8 @@ void PlayerNode::PublishFrame() {
   }
   frame_.publish_us = context_.wall_us();
   frame_bytes_ = std::make_shared<const Bytes>(wire::Encode(frame_));
-  context_.bus->Publish({channels::kFrame, frame_bytes_, options_.local_frames});
+  context_.bus->Publish(
+      {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
   ++published_;
   PublishGroundTruth(index);
   awaiting_done_ = options_.mode == PlaybackMode::kLockstep;
@@ -229,7 +232,8 @@ void PlayerNode::PublishGroundTruth(size_t index) {
                        [](const StampedPose& pose, int64_t stamp) { return pose.stamp_ns < stamp; });
   if (at == ground_truth_.end() || at->stamp_ns - stamp_ns > 10'000'000) return;
   PublishLoose(context_.bus,
-               GroundTruthPose{options_.session, source_->FrameIndex(index), at->stamp_ns, at->T_world_cam});
+               GroundTruthPose{options_.session, source_->FrameIndex(index), at->stamp_ns, at->T_world_cam},
+               false, options_.camera_id);
 }
 
 void PlayerNode::PublishEnd() {
@@ -244,7 +248,7 @@ void PlayerNode::PublishEnd() {
   const size_t last = order_[std::max<size_t>(position_, 1) - 1];
   end.last_frame_index = static_cast<int32_t>(source_->FrameIndex(last));
   end.last_stamp_ns = source_->StampNs(last);
-  PublishLoose(context_.bus, end);
+  PublishLoose(context_.bus, end, false, options_.camera_id);
 }
 
 void PlayerNode::PublishStatus(PlayerStatus::State state) {
@@ -261,7 +265,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.repeats = repeats_;
   status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   status.late_ms = late_ms_;
-  PublishLoose(context_.bus, status);
+  PublishLoose(context_.bus, status, false, options_.camera_id);
 }
 
 void PlayerNode::Advance() {
@@ -279,7 +283,8 @@ void PlayerNode::Advance() {
   if (awaiting_done_ && now >= next_repeat_ns_) {
     next_repeat_ns_ = now + kRepeatEveryNs;
     ++repeats_;
-    context_.bus->Publish({channels::kFrame, frame_bytes_, options_.local_frames});
+    context_.bus->Publish(
+        {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
   }
   if (position_ < order_.size() || awaiting_done_) return;
   if (end_.IsDue(now)) PublishEnd();

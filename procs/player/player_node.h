@@ -23,6 +23,7 @@ struct PlayerOptions {
   std::string sequence;  ///< path of what is played; its last part names it
   Camera camera;
   uint32_t session = 1;
+  CameraId camera_id = 0;  ///< of several that work on one map
   bool take_over = false;  ///< asks a present player of the session to leave
   PlaybackMode mode = PlaybackMode::kRealtime;
   double speed = 1.0;        ///< factor on the recorded rate; 0: as fast as possible

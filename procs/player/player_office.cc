@@ -1,19 +1,22 @@
 #include "player/player_office.h"
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/stream_node.h"
+#include "dmslam/wire/channels.h"
 
 namespace dmslam {
 namespace {
 
 constexpr char kOwner[] = "PLAYER";
 
-WriterElection::Options ElectionOptions(const NodeContext& context, uint32_t session, bool take_over) {
+WriterElection::Options ElectionOptions(const NodeContext& context, const PlayerOffice::Part& part,
+                                        bool take_over) {
   WriterElection::Options options;
-  options.session = session;
-  options.stream = StreamId::kPlayer;
-  options.owner = kOwner;
+  options.session = part.session;
+  options.stream = StreamOfCamera(StreamId::kPlayer, part.camera_id);
+  options.owner = OfCamera(kOwner, part.camera_id);
   options.name = context.name;
   options.writer = context.random_id;
   options.schema_hash = SchemaHash();
@@ -24,12 +27,18 @@ WriterElection::Options ElectionOptions(const NodeContext& context, uint32_t ses
 
 }  // namespace
 
-PlayerOffice::PlayerOffice(const NodeContext& context, uint32_t session, bool take_over, Endpoint* endpoint)
+PlayerOffice::PlayerOffice(const NodeContext& context, const Part& part, bool take_over, Endpoint* endpoint)
     : context_(context),
-      session_(session),
+      part_(part),
       endpoint_(endpoint),
-      election_(ElectionOptions(context, session, take_over), context.now_ns()) {
-  endpoint_->AddElection(&election_, kOwner);
+      election_(ElectionOptions(context, part, take_over), context.now_ns()) {
+  endpoint_->AddElection(&election_, OfCamera(kOwner, part_.camera_id));
+}
+
+std::vector<std::string> PlayerOffice::AnswersTo(CameraId camera_id) {
+  return {ChannelOfCamera(channels::kFrameDone, camera_id),
+          ChannelOfCamera(channels::kSequenceDone, camera_id), channels::kMapperStatus,
+          ChannelOfCamera(channels::kFrontendStatus, camera_id)};
 }
 
 PlayerOffice::~PlayerOffice() {
@@ -43,31 +52,31 @@ void PlayerOffice::Advance() {
   if (!writer_ && election_.state() == WriterElection::State::kWon) Open();
   if (election_.state() == WriterElection::State::kRefused) {
     exit_code_ = kExitPresent;
-    problem_ = "session " + std::to_string(session_) + ": " + election_.refusal();
+    problem_ = "session " + std::to_string(part_.session) + ": " + election_.refusal();
   }
   if (!writer_) return;
   if (writer_->close_requested_by()) {
-    LogInfo("player: hands session {} over to {}", session_, *writer_->close_requested_by());
+    LogInfo("player: hands session {} over to {}", part_.session, *writer_->close_requested_by());
     exit_code_ = kExitDone;
   }
   if (writer_->superseded_by()) {
     exit_code_ = kExitSuperseded;
-    problem_ = "another player has taken over session " + std::to_string(session_) + ": " +
+    problem_ = "another player has taken over session " + std::to_string(part_.session) + ": " +
                *writer_->superseded_by();
   }
 }
 
 void PlayerOffice::Open() {
   StreamWriter::Options options;
-  options.session = session_;
-  options.stream = StreamId::kPlayer;
-  options.owner = kOwner;
+  options.session = part_.session;
+  options.stream = StreamOfCamera(StreamId::kPlayer, part_.camera_id);
+  options.owner = OfCamera(kOwner, part_.camera_id);
   options.name = context_.name;
   options.schema_hash = SchemaHash();
   const Term term = election_.Win(context_.wall_us());
   endpoint_->Remove(&election_);
   writer_ = std::make_unique<StreamWriter>(options, term, Version{});
-  endpoint_->AddWriter(writer_.get(), kOwner, {});
+  endpoint_->AddWriter(writer_.get(), options.owner, {});
   endpoint_->Advance();
 }
 

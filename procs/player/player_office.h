@@ -4,9 +4,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dmslam/messaging/endpoint.h"
 #include "dmslam/runtime/node.h"
+#include "dmslam/util/ids.h"
 
 namespace dmslam {
 
@@ -15,10 +17,18 @@ namespace dmslam {
 /// none.
 class PlayerOffice {
  public:
-  PlayerOffice(const NodeContext& context, uint32_t session, bool take_over, Endpoint* endpoint);
+  /// What is played: a camera of a session.
+  struct Part {
+    uint32_t session = 1;
+    CameraId camera_id = 0;
+  };
+  PlayerOffice(const NodeContext& context, const Part& part, bool take_over, Endpoint* endpoint);
   ~PlayerOffice();
   PlayerOffice(const PlayerOffice&) = delete;
   PlayerOffice& operator=(const PlayerOffice&) = delete;
+
+  /// The channels on which a player of that camera is answered.
+  static std::vector<std::string> AnswersTo(CameraId camera_id);
 
   /// To be called before each turn.
   void Advance();
@@ -33,7 +43,7 @@ class PlayerOffice {
   void Open();
 
   NodeContext context_;
-  uint32_t session_;
+  Part part_;
   Endpoint* endpoint_;
   WriterElection election_;
   std::unique_ptr<StreamWriter> writer_;

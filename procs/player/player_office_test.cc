@@ -13,9 +13,9 @@ namespace {
 class PlayerOfficeTest : public testing::Test {
  protected:
   struct Player {
-    Player(MemoryBus& bus, int64_t id, const int64_t* now_ns, uint32_t session, bool take_over)
+    Player(MemoryBus& bus, int64_t id, const int64_t* now_ns, const PlayerOffice::Part& part, bool take_over)
         : endpoint(&bus.AddPort(), [now_ns] { return *now_ns; }),
-          office(ContextOf(id, now_ns), session, take_over, &endpoint) {}
+          office(ContextOf(id, now_ns), part, take_over, &endpoint) {}
     static NodeContext ContextOf(int64_t id, const int64_t* now_ns) {
       NodeContext context;
       context.now_ns = [now_ns] { return *now_ns; };
@@ -27,9 +27,9 @@ class PlayerOfficeTest : public testing::Test {
     Endpoint endpoint;
     PlayerOffice office;
   };
-  Player& Add(uint32_t session = 7, bool take_over = false) {
+  Player& Add(uint32_t session = 7, bool take_over = false, CameraId camera_id = 0) {
     players_.push_back(std::make_unique<Player>(bus_, static_cast<int64_t>(players_.size()) + 17, &now_ns_,
-                                                session, take_over));
+                                                PlayerOffice::Part{session, camera_id}, take_over));
     return *players_.back();
   }
   void Pass(double seconds) {
@@ -70,6 +70,17 @@ TEST_F(PlayerOfficeTest, AnotherSessionIsNotItsBusiness) {
   Pass(4);
   EXPECT_TRUE(first.office.held());
   EXPECT_TRUE(second.office.held());
+}
+
+TEST_F(PlayerOfficeTest, EachCameraHasAPlayerOfItsOwn) {
+  Player& first = Add();
+  Player& second = Add(7, false, 1);
+  Pass(4);
+  EXPECT_TRUE(first.office.held());
+  EXPECT_TRUE(second.office.held());
+  Player& third = Add(7, false, 1);
+  Pass(4);
+  EXPECT_EQ(third.office.exit_code(), kExitPresent);
 }
 
 TEST_F(PlayerOfficeTest, WhoIsAskedToLeaveLeaves) {

@@ -8,6 +8,7 @@
 
 #include "dmslam/messaging/bus_key.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/ids.h"
 
 namespace dmslam {
 namespace {
@@ -34,6 +35,14 @@ void CheckSource(const RunArguments::Source& source, const RunArguments::Pace& p
   if (sources > 1) throw InputError("give one of --sequence, --log and --replay");
   if (!source.sequence.empty() && !IsCamera(source.sequence) && !fs::exists(source.sequence))
     throw InputError(source.sequence + ": no such folder or file; check --sequence");
+  for (const std::string& other : source.others) {
+    if (!IsCamera(other) && !fs::exists(other))
+      throw InputError(other + ": no such folder or file; check --also");
+  }
+  if (!source.others.empty() && source.sequence.empty())
+    throw InputError("--also goes with --sequence, not with a log");
+  if (source.others.size() >= kMaxCameras)
+    throw InputError("--also: at most " + std::to_string(kMaxCameras) + " cameras work on one map");
   CheckFile("--log", source.log);
   CheckFile("--replay", source.replay);
   if (pace.lockstep && !source.replay.empty()) {
@@ -66,6 +75,9 @@ void DeclareSource(CommandLine& line, RunArguments::Source& source) {
   line.AddOption("--sequence,--video", source.sequence,
                  "TUM RGB-D folder, EuRoC folder, numbered images, a video, a camera (/dev/videoN), or the "
                  "address of a camera's stream");
+  line.AddOption("--also", source.others,
+                 "sequence of another camera, of the same model, that goes at the same time and works on the "
+                 "same map; may be repeated (docs/many-cameras.md)");
   line.AddOption("--log", source.log,
                  "instead of --sequence: the frames of a log of lcm-logger, by our player (any mode)");
   line.AddOption("--replay", source.replay,

@@ -9,6 +9,7 @@
 #include <random>
 #include <sstream>
 
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/recording/log_index.h"
 #include "dmslam/util/check.h"
@@ -61,6 +62,7 @@ Words CommonArguments(const RunArguments& a, const RunPlace& place) {
   Append(&common, {"--set", "seed=" + a.settings.seed, "--lcm-url", Url(a.bus, place), "--session",
                    std::to_string(place.session == 0 ? ChooseSession(a.map) : place.session), "--peers",
                    "frontend,mapper,loopcloser,collector"});
+  if (!a.source.others.empty()) Append(&common, {"--cameras", std::to_string(a.source.others.size() + 1)});
   if (!a.source.replay.empty()) common.push_back("--accept-recorded");
   return common;
 }
@@ -106,11 +108,14 @@ std::string LogToReplay(const RunArguments& a, const RunPlace& place) {
   return copy;
 }
 
-ChildSpec MakeChild(const std::string& name, const RunArguments& a, const RunPlace& place, Words arguments) {
+ChildSpec MakeChild(const std::string& program, const RunArguments& a, const RunPlace& place, Words arguments,
+                    CameraId camera = 0) {
+  const std::string name = OfCamera(program, camera);
+  if (camera != 0) Append(&arguments, {"--camera-id", std::to_string(camera)});
   ChildSpec child;
   child.name = name;
   child.arguments = std::move(arguments);
-  child.arguments.insert(child.arguments.begin(), place.programs + "/dmslam-" + name);
+  child.arguments.insert(child.arguments.begin(), place.programs + "/dmslam-" + program);
   child.first = {"--fresh-system"};  // only at the beginning nobody else can be writing
   if (place.resume) child.first.emplace_back("--resumed");
   child.output = child.errors = place.LogOf(name);
@@ -125,6 +130,22 @@ void GoOnBehind(const ResumePoint& point, bool camera, ChildSpec* player) {
   const std::optional<uint32_t> behind = camera ? point.last_frame : point.play_behind;
   if (behind) Append(&player->arguments, {"--behind", std::to_string(*behind)});
   Append(&player->first, {"--lead", std::to_string(point.lead_s)});
+}
+
+/// Player and frontend of each further camera.
+std::vector<ChildSpec> MakeOtherCameras(const RunArguments& a, const RunPlace& place, const Words& common) {
+  if (place.resume && !a.source.others.empty())
+    throw InputError("a run of several cameras cannot be resumed; begin it anew");
+  std::vector<ChildSpec> children;
+  for (size_t i = 0; i < a.source.others.size(); ++i) {
+    const CameraId camera = static_cast<CameraId>(i + 1);
+    children.push_back(MakeChild("frontend", a, place, common, camera));
+    Words words = common;
+    Append(&words, PlayerArguments(a));
+    Append(&words, {"--sequence", a.source.others[i]});
+    children.push_back(MakeChild("player", a, place, std::move(words), camera));
+  }
+  return children;
 }
 
 ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, Words words) {
@@ -175,11 +196,24 @@ Words GroundTruth(const RunArguments::Source& source) {
   return !source.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
 }
 
+/// Of every camera: a dash stands for none.
+Words GroundTruths(const RunArguments::Source& source) {
+  if (source.others.empty()) return GroundTruth(source);
+  Words words;
+  std::vector<std::string> sequences = source.others;
+  sequences.insert(sequences.begin(), source.sequence);
+  for (const std::string& sequence : sequences) {
+    const std::string file = sequence + "/groundtruth.txt";
+    words.push_back("--ground-truth=" + (fs::is_regular_file(file) ? file : "-"));
+  }
+  return words;
+}
+
 ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = common;
   if (place.terminal) words.push_back("--quiet");
   Append(&words, {"--out", a.output.folder});
-  Append(&words, GroundTruth(a.source));
+  Append(&words, GroundTruths(a.source));
   ChildSpec child = MakeChild("collector", a, place, words);
   child.output = place.out + "/log/table.txt";
   child.errors_to_ours = place.terminal;
@@ -266,6 +300,7 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   } else {
     PlanReplay(a, place, &plan);
   }
+  for (ChildSpec& child : MakeOtherCameras(a, place, common)) plan.pipeline.push_back(std::move(child));
   if (a.output.record) plan.companions.push_back(MakeLogger(a, place));
   if (a.output.WantsViewer()) {
     plan.companions.push_back(MakeViewer(a, place, common));

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/ids.h"
 
 namespace dmslam {
 namespace {
@@ -115,6 +116,26 @@ TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
   EXPECT_NE(Line("mapper").find("--save-map map.log "), std::string::npos);
   EXPECT_NE(Line("collector").find("--ground-truth "), std::string::npos);
   EXPECT_EQ(Line("frontend").find("--lockstep"), std::string::npos);
+}
+
+TEST_F(RunPlanTest, EachFurtherCameraHasAFrontendAndAPlayer) {
+  EXPECT_EQ(Line("mapper").find("--cameras"), std::string::npos);
+  arguments_.source.others = {folder_ + "/second", folder_ + "/third"};
+  EXPECT_NE(Refusal().find("/second: no such folder"), std::string::npos);
+  fs::create_directories(folder_ + "/second");
+  fs::create_directories(folder_ + "/third");
+  EXPECT_EQ(Refusal(), "");
+  std::ofstream(folder_ + "/third/groundtruth.txt") << "# none\n";
+  for (const char* name : {"mapper", "loopcloser", "collector", "frontend", "frontend1", "player2"})
+    EXPECT_NE(Line(name).find("--cameras 3 "), std::string::npos) << name;
+  EXPECT_EQ(ArgumentsOf("frontend2").front(), "/bin/dmslam-frontend");
+  EXPECT_NE(Line("frontend2").find("--camera-id 2 "), std::string::npos);
+  EXPECT_NE(Line("player1").find("--sequence " + folder_ + "/second "), std::string::npos);
+  EXPECT_EQ(Line("player").find("--camera-id"), std::string::npos);
+  EXPECT_NE(Line("collector").find("--ground-truth=- --ground-truth=- --ground-truth=" + folder_ + "/third"),
+            std::string::npos);
+  arguments_.source.others.resize(kMaxCameras, folder_ + "/second");
+  EXPECT_NE(Refusal().find("at most 16"), std::string::npos);
 }
 
 TEST_F(RunPlanTest, SeesWhetherAPortIsTaken) {

@@ -99,7 +99,7 @@ class System {
 void AddMapSide(InProcessOptions* options, System* system) {
   NodeOptions& node = options->node;
   node.session = options->player.session;
-  node.peers = {"frontend", "mapper", "loopcloser", "collector"};
+  node.peers.insert(node.peers.end(), {"frontend", "mapper", "loopcloser", "collector"});
   if (!options->record.empty()) system->Record(options->record);
   options->collector.checkpoints = false;  // nobody resumes it
   system->Add(MakeCollector(system->ContextFor("collector"), node, options->collector));
@@ -118,13 +118,26 @@ int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex
   return system.Run(problem);
 }
 
-int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem) {
+int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem,
+                 std::vector<AnotherCamera> others) {
   options.player.mode = PlaybackMode::kLockstep;
+  for (size_t i = 0; i < others.size(); ++i)
+    options.node.peers.push_back(OfCamera("frontend", static_cast<CameraId>(i + 1)));
   System system;
   AddMapSide(&options, &system);
   system.Add(MakeFrontend(system.ContextFor("frontend"), options.node,
                           {options.vocabulary, options.picture_dir, options.picture_every}));
   system.Add(std::make_unique<PlayerNode>(system.ContextFor("player"), options.player, std::move(source)));
+  for (AnotherCamera& other : others) {
+    NodeOptions node = options.node;
+    node.camera_id = other.player.camera_id = ++options.node.camera_id;
+    other.player.mode = PlaybackMode::kLockstep;
+    other.player.session = options.player.session;
+    system.Add(MakeFrontend(system.ContextFor(OfCamera("frontend", node.camera_id)), node,
+                            {options.vocabulary, "", 0}));
+    system.Add(std::make_unique<PlayerNode>(system.ContextFor(OfCamera("player", node.camera_id)),
+                                            other.player, std::move(other.source)));
+  }
   return system.Run(problem);
 }
 

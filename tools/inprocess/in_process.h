@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "collector/make_collector.h"
 #include "dmslam/recording/log_index.h"
@@ -31,7 +32,14 @@ struct InProcessOptions {
 int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex> log, uint32_t log_session,
                         std::string* problem);
 
+/// A camera beside the first one: what is played, and how.
+struct AnotherCamera {
+  PlayerOptions player;
+  std::unique_ptr<FrameSource> source;
+};
+
 /// Returns the collector's exit code; what went wrong is in `problem`.
-int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem);
+int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem,
+                 std::vector<AnotherCamera> others = {});
 
 }  // namespace dmslam

@@ -19,7 +19,7 @@ struct Arguments {
   std::string sequence, log, records, record, out, camera, config, vocabulary, profile, encoding = "jpeg";
   double fps = 0;
   uint32_t log_session = 0;
-  std::vector<std::string> overrides, black_outs, jumps;
+  std::vector<std::string> overrides, black_outs, jumps, others;
   size_t start = 0, frames = SIZE_MAX;
   uint64_t seed = 1;
   int pictures = 0;
@@ -32,6 +32,10 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.SetVersion(dmslam::BuildVersion());
   app.AddOption("--sequence,--video", a.sequence,
                 "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
+  app.AddOption(
+      "--also", a.others,
+      "sequence of another camera, of the same model, that goes at the same time by its stamps; may "
+      "be repeated");
   app.AddOption("--fps", a.fps,
                 "frames per second of numbered images and of videos that do not state it; default: as the "
                 "camera file says")
@@ -79,6 +83,19 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOpti
   return frames;
 }
 
+std::vector<dmslam::AnotherCamera> OpenOthers(const Arguments& a, dmslam::PlayerOptions player,
+                                              std::vector<std::string>* ground_truth) {
+  std::vector<dmslam::AnotherCamera> others;
+  for (const std::string& sequence : a.others) {
+    player.sequence = sequence;
+    dmslam::AnotherCamera& other = others.emplace_back();
+    other.player = player;
+    other.source = dmslam::OpenSequence(a.camera, a.fps, &other.player);
+    ground_truth->push_back(other.source->GroundTruthPath().value_or(""));
+  }
+  return others;
+}
+
 int Run(const Arguments& a) {
   dmslam::InProcessOptions options;
   std::vector<std::string> overrides;
@@ -104,16 +121,20 @@ int Run(const Arguments& a) {
     options.player.black_outs.push_back(dmslam::ParseBlackOut(text));
   for (const std::string& text : a.jumps) options.player.jumps.push_back(dmslam::ParseJump(text));
   options.collector.out_dir = a.out;
-  options.collector.ground_truth = source ? source->GroundTruthPath().value_or("") : "";
+  options.collector.ground_truth = {source ? source->GroundTruthPath().value_or("") : ""};
+  if (!source && !a.others.empty())
+    throw dmslam::InputError("--also goes with --sequence, not with --records");
+  auto others = OpenOthers(a, options.player, &options.collector.ground_truth);
   options.vocabulary = dmslam::LoadVocabulary(a.vocabulary);
   options.picture_every = a.pictures;
   options.picture_dir = a.out + "/pictures";
   std::filesystem::create_directories(a.pictures > 0 ? options.picture_dir : a.out);
   std::string problem;
-  const int code = source ? dmslam::RunInProcess(std::move(options), std::move(source), &problem)
-                          : dmslam::RunRecordsInProcess(std::move(options),
-                                                        std::make_shared<const dmslam::LogIndex>(a.records),
-                                                        a.log_session, &problem);
+  const int code =
+      source ? dmslam::RunInProcess(std::move(options), std::move(source), &problem, std::move(others))
+             : dmslam::RunRecordsInProcess(std::move(options),
+                                           std::make_shared<const dmslam::LogIndex>(a.records), a.log_session,
+                                           &problem);
   if (!problem.empty()) dmslam::LogError("{}", problem);
   return code;
 }

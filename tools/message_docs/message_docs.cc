@@ -54,6 +54,7 @@ std::vector<ChannelRow> FrontendRows() {
       Row<FrameEvidence>("frontend", "mapper", "with keyframes, and between"),
       Row<MapReset>("frontend", "mapper, collector", "rare"),
       Row<AdjustRequest>("frontend", "mapper", "at the end"),
+      Row<TurnRequest>("frontend", "mapper", "per frame, of several cameras in lock-step"),
       Row<FrameDone>("frontend", "player", "per frame"),
       Row<SequenceDone>("frontend", "player", "at the end, once for each end_of_sequence_t"),
       Row<Odometry>("frontend", "who controls the motion", "per frame"),
@@ -188,12 +189,15 @@ Made by `dmslam-message-docs` from `lcmtypes/*.lcm` and the table in `tools/mess
   `src/dmslam/messaging/README.md`), and a program that only watches can ignore it.
 - Poses are named by what they do: `cam_world` takes points of the world into the camera (x right, y down, z forward).
   Lengths are map units. Quaternions are unit, in the order x, y, z, w.
-- Keyframe ids are `session << 32 | frame index`; landmark ids `ordinal of the mapper's epoch << 48 | number`. Ids and what else
+- Keyframe ids are `session << 32 | camera_id << 28 | frame index`; landmark ids `ordinal of the mapper's epoch << 48 | number`. Ids and what else
   counts from 1 is 0 where there is none; stamps and indices are -1. What is measured only sometimes is an array that is empty.
 - One meaning, one message: a request to adjust the maps (`adjust_request_t`) is not a reset (`map_reset_t`), the end of a
   sequence is answered by `sequence_done_t`. What the mapper says travels in one type, `map_record_t`, since an answer and the
   change that it concludes must not come apart: `event` says which answer it is, and nothing else has to be looked at.
-- Reserved, and not written yet: `camera_id` other than 0; depths and sigmas of keypoints; positions of landmarks in
+- Several cameras on one map: each has a player and a frontend of its own. Those of camera 0 speak on the channels below; those of
+  camera 1 on `DMSLAM_PLAYER1_...` and `DMSLAM_FRONTEND1_...`, and so on to 15, in streams whose number is higher by 1000 for each.
+  Maps that camera 1 begins are numbered from 1000001. A map record says of one camera how far it is (`frontend_seq`).
+- Reserved, and not written yet: depths and sigmas of keypoints; positions of landmarks in
   their reference keyframe (`landmark_frame`; the world's coordinates are what the mapper computes with, and a change of frame
   there and back changes their last bits); groups of records, which readers apply already.
 - `checksum` is CRC-32 as zlib, Python's `zlib.crc32` and Java's `CRC32` compute it. A message without it is dropped.

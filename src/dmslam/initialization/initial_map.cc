@@ -7,9 +7,11 @@ namespace {
 
 constexpr int kIterations = 15;
 
-KeyframeProposal ProposalOf(const InitializerFrame& frame, uint32_t session, MapId map_id) {
+KeyframeProposal ProposalOf(const InitializerFrame& frame, uint32_t session, CameraId camera_id,
+                            MapId map_id) {
   KeyframeProposal proposal;
-  proposal.id = KeyframeId::Make(session, frame.index);
+  proposal.id = KeyframeId::Make(session, frame.index, camera_id);
+  proposal.camera_id = camera_id;
   proposal.map_id = map_id;
   proposal.stamp_ns = frame.stamp_ns;
   proposal.features = frame.features->set;
@@ -38,11 +40,11 @@ AdjustFunction AdjustInitialMap(const Pinhole& camera) {
   };
 }
 
-InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, MapId map_id) {
+InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, CameraId camera_id, MapId map_id) {
   InitialMap proposal;
   proposal.map_id = map_id;
-  proposal.first = ProposalOf(first_map.frame0, session, map_id);
-  proposal.second = ProposalOf(first_map.frame1, session, map_id);
+  proposal.first = ProposalOf(first_map.frame0, session, camera_id, map_id);
+  proposal.second = ProposalOf(first_map.frame1, session, camera_id, map_id);
   proposal.second.reference = proposal.first.id;
   proposal.second.T_cam_reference = first_map.T_1_0;
   for (const FirstMap::Point& point : first_map.points) {

@@ -10,6 +10,6 @@ namespace dmslam {
 AdjustFunction AdjustInitialMap(const Pinhole& camera);
 
 /// A first map as the frontend's stream tells it.
-InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, MapId map_id);
+InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, CameraId camera_id, MapId map_id);
 
 }  // namespace dmslam

@@ -29,7 +29,7 @@ TEST(MakeInitialMap, TellsBothKeyframesAndWhatEachSees) {
   map.frame1 = Frame(19, 40);
   map.T_1_0 = Rigid3d(Eigen::Quaterniond(0.8, 0.6, 0, 0), {1, 2, 3});
   map.points = {{7, 9, {0.1, 0.2, 1.0}}, {8, 3, {0.3, 0.4, 2.0}}};
-  const InitialMap told = MakeInitialMap(map, 5, 2);
+  const InitialMap told = MakeInitialMap(map, 5, 0, 2);
   EXPECT_EQ(told.map_id, 2u);
   EXPECT_EQ(told.first.id, KeyframeId::Make(5, 4));
   EXPECT_EQ(told.second.id, KeyframeId::Make(5, 19));

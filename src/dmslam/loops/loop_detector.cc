@@ -15,7 +15,7 @@ bool Overlap(const std::set<KeyframeId>& a, const std::set<KeyframeId>& b) {
   return std::any_of(a.begin(), a.end(), [&](KeyframeId id) { return b.contains(id); });
 }
 
-/// Of other maps than that of `keyframe`: those within `seconds` of it, nearest in time first.
+/// Of other maps of its camera than that of `keyframe`: those within `seconds` of it, nearest in time first.
 std::vector<const Keyframe*> OfOtherMapsAtThatTime(const Map& map, const Keyframe& keyframe, double seconds) {
   const auto since = [&](const Keyframe* other) { return std::abs(other->stamp_ns - keyframe.stamp_ns); };
   std::vector<const Keyframe*> found;
@@ -61,13 +61,13 @@ LoopDetector::Found LoopDetector::Detect(const Map& map, const MapPlaces& places
   for (const PlaceCandidate& candidate : Candidates(map, places, keyframe)) {
     ++found.named;
     Group group = GroupOf(map, candidate.keyframe);
-    for (const Group& before : groups_) {
+    for (const Group& before : groups_[keyframe.camera_id]) {
       if (Overlap(group.members, before.members)) group.seen = std::max(group.seen, before.seen + 1);
     }
     if (group.seen >= options_.consistency) found.candidates.push_back(candidate.keyframe);
     groups.push_back(std::move(group));
   }
-  groups_ = std::move(groups);
+  groups_[keyframe.camera_id] = std::move(groups);
   return found;
 }
 

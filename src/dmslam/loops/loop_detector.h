@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <set>
 #include <vector>
 
@@ -41,7 +42,7 @@ class LoopDetector {
   Group GroupOf(const Map& map, KeyframeId id) const;
 
   LoopcloserOptions options_;
-  std::vector<Group> groups_;  ///< what the keyframe before named
+  std::map<CameraId, std::vector<Group>> groups_;  ///< what the keyframe before named, of each camera
 };
 
 }  // namespace dmslam

@@ -111,6 +111,8 @@ void LoopcloserCore::ForgetUnconfirmed(int64_t now_ns) {
 std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyframe) {
   std::optional<VerifiedLoop> best;
   for (Proposal& proposal : proposals_) {
+    if (proposal.loop.keyframe.camera() != keyframe.id.camera())
+      continue;  // it sees another part of the world
     Verdict verdict;
     verdict.place = proposal.loop.place;
     verdict.confirms = true;

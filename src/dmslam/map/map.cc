@@ -373,4 +373,41 @@ Map::Forgotten Map::Forget(MapId map_id) {
   return gone;
 }
 
+const Keyframe* Map::NewestKeyframeOf(CameraId camera) const {
+  for (auto end = keyframes_.end(); end != keyframes_.begin();) {
+    const uint32_t session = std::prev(end)->first.session();
+    const auto after = keyframes_.upper_bound(KeyframeId::Make(session, kMaxFrames - 1, camera));
+    if (after != keyframes_.begin()) {
+      const auto& [id, keyframe] = *std::prev(after);
+      if (id.session() == session && id.camera() == camera) return &keyframe;
+    }
+    end = keyframes_.lower_bound(KeyframeId::Make(session, 0));
+  }
+  return nullptr;
+}
+
+// ---- Progress ----
+
+MapProgress Map::progress(CameraId camera) const {
+  MapProgress progress = progress_;
+  const auto told = progress_of_.find(camera);
+  const MapProgress of_camera = told == progress_of_.end() ? MapProgress() : told->second;
+  progress.camera = camera;
+  progress.frontend = of_camera.frontend;
+  progress.settled = of_camera.settled;
+  return progress;
+}
+
+std::vector<CameraId> Map::cameras() const {
+  std::vector<CameraId> cameras;
+  for (const auto& [camera, progress] : progress_of_) cameras.push_back(camera);
+  return cameras;
+}
+
+void Map::SetProgressTo(const MapProgress& progress) {
+  if (progress == MapProgress()) progress_of_.clear();
+  progress_ = progress;
+  progress_of_[progress.camera] = progress;
+}
+
 }  // namespace dmslam

@@ -36,11 +36,17 @@ class Map {
   uint64_t version() const { return version_; }
   /// How far the streams are that the map is made of; travels with every delta and snapshot.
   const MapProgress& progress() const { return progress_; }
+  /// The same as far as it concerns one camera.
+  MapProgress progress(CameraId camera) const;
+  /// The cameras whose streams are worked into it, in order.
+  std::vector<CameraId> cameras() const;
 
   const std::map<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   const Keyframe* FindKeyframe(KeyframeId id) const;
   /// A keyframe that is known to be there.
   const Keyframe& At(KeyframeId id) const;
+  /// The newest keyframe of a camera, of the newest session in which it has any; null: none.
+  const Keyframe* NewestKeyframeOf(CameraId camera) const;
   size_t num_landmarks() const { return landmarks_.size(); }
   const Landmark* FindLandmark(LandmarkId id) const;
   /// A landmark that is known to be there.
@@ -131,7 +137,8 @@ class Map {
   };
   Forgotten Forget(MapId map_id);
   void SetVersion(uint64_t version) { version_ = version; }
-  void SetProgressTo(const MapProgress& progress) { progress_ = progress; }
+  /// Of one camera; none at all (a default one): of all.
+  void SetProgressTo(const MapProgress& progress);
 
  private:
   /// Where a camera stands. Kept beside the keyframes, which lie all over the memory: thousands are compared
@@ -151,7 +158,8 @@ class Map {
   Camera camera_;
   Pyramid pyramid_;
   uint64_t version_ = 0;
-  MapProgress progress_;
+  MapProgress progress_;                         ///< as told last
+  std::map<CameraId, MapProgress> progress_of_;  ///< by camera
   std::map<KeyframeId, Keyframe> keyframes_;
   std::vector<Standpoint> standpoints_;  ///< of all keyframes, by id
   std::unordered_map<LandmarkId, Landmark> landmarks_;

@@ -34,6 +34,7 @@ enum class MapEvent : uint8_t {
   kMapAdjusted = 15,      ///< `map_id` as a whole, after the last frame
   kRequestDone = 16,      ///< the answer to an AdjustRequest, `request`: all maps are adjusted
   kFirstMapRefused = 17,  ///< of `map_id`, with second keyframe `about`; `note` says why
+  kTurn = 18,             ///< the answer to a TurnRequest: all that comes before frame `about` is in the map
 };
 
 /// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.
@@ -108,8 +109,10 @@ struct StreamPosition {
   auto operator<=>(const StreamPosition&) const = default;
 };
 
-/// What a map contains of the streams it is made of: whoever continues it goes on from here.
+/// What a map contains of the streams it is made of: whoever continues it goes on from here. Where several
+/// cameras work on it each record tells how far one of them is: the map keeps what was told of each.
 struct MapProgress {
+  CameraId camera = 0;                ///< whose `frontend` and `settled` these are
   StreamPosition frontend;            ///< records of the frontend's stream up to here are worked into it
   StreamPosition loopcloser;          ///< the loop closer's
   std::optional<KeyframeId> settled;  ///< the keyframe all of whose work was done last

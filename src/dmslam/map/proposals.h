@@ -121,6 +121,14 @@ struct AdjustRequest {
   CameraId camera_id = 0;
 };
 
+/// Several cameras in lock-step: a frame has come, and waits until the mapper says that all that comes before
+/// it, by stamp and then by camera, is in the map (MapEvent::kTurn).
+struct TurnRequest {
+  uint32_t frame_index = 0;
+  std::optional<int64_t> stamp_ns;  ///< none: no frame follows, and what is done at the end waits
+  CameraId camera_id = 0;
+};
+
 /// The loop closer's answer to keyframe `keyframe`.
 struct LoopAnswer {
   KeyframeId keyframe;

@@ -25,7 +25,7 @@ class Namer {
   explicit Namer(const Renumbering& names) : names_(names) {}
 
   void Rename(KeyframeId& id) const {
-    if (id.valid()) id = KeyframeId::Make(Named(names_.sessions, id.session()), id.frame_index());
+    if (id.valid()) id = KeyframeId::Make(Named(names_.sessions, id.session()), id.frame_index(), id.camera());
   }
   void Rename(LandmarkId& id) const {
     if (id.valid()) id = LandmarkId::Make(Named(names_.ordinals, id.epoch_ordinal()), id.number());

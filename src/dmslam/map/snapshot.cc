@@ -1,5 +1,6 @@
 #include "dmslam/map/snapshot.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
@@ -81,10 +82,13 @@ std::vector<MapDelta> CutSnapshot(const Map& map, KeyframeId center, size_t max_
   cutter.AddUnobserved();
   cutter.AddTombstones();
   std::vector<MapDelta> parts = cutter.Take();
-  for (MapDelta& part : parts) {
+  const std::vector<CameraId> cameras = map.cameras();
+  parts.resize(std::max(parts.size(), cameras.size()));  // each tells of one
+  for (size_t i = 0; i < parts.size(); ++i) {
+    MapDelta& part = parts[i];
     part.event = MapEvent::kSnapshot;
     part.version = map.version();
-    part.progress = map.progress();
+    part.progress = cameras.empty() ? map.progress() : map.progress(cameras[i % cameras.size()]);
     if (center.valid()) part.about = center;
   }
   return parts;

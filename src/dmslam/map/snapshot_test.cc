@@ -57,6 +57,26 @@ TEST(Snapshot, EveryPartNamesVersionAndProgress) {
   }
 }
 
+TEST(Snapshot, TellsHowFarEveryCameraIs) {
+  RandomEditor editor(2);
+  editor.Steps(100);
+  for (const CameraId camera : {0u, 1u, 4u}) {
+    MapProgress progress = editor.map().progress(camera);
+    progress.frontend = {3 + camera, 77 * (camera + 1)};
+    progress.settled = KeyframeId::Make(1, 10 + camera, camera);
+    progress.loopcloser = {9, 5};
+    editor.map().SetProgress(progress);
+  }
+  Replica replica(TestCamera(), Pyramid());
+  for (const MapDelta& part : CutSnapshot(editor.map(), {}, 1000000)) replica.Apply(part);
+  EXPECT_EQ(replica.cameras(), (std::vector<CameraId>{0, 1, 4}));
+  for (const CameraId camera : {0u, 1u, 4u})
+    EXPECT_EQ(replica.progress(camera), editor.map().progress(camera)) << camera;
+  EXPECT_EQ(replica.progress(2).frontend, StreamPosition()) << "nothing is known of it";
+  editor.map().SetProgress({});
+  EXPECT_EQ(editor.map().progress(1).frontend, StreamPosition()) << "the streams are others";
+}
+
 TEST(Snapshot, OfAnEmptyMapIsOneEmptyPart) {
   const std::vector<MapDelta> parts = CutSnapshot(Map(TestCamera(), Pyramid()), {}, 1000);
   ASSERT_EQ(parts.size(), 1u);

@@ -1,6 +1,7 @@
 #include "dmslam/mapping/insertion_order.h"
 
 #include <algorithm>
+#include <map>
 
 namespace dmslam {
 namespace {
@@ -27,16 +28,19 @@ void InsertionOrder::Assume(const Map& map) {
 int InsertionOrder::CountSince(const Map& map, KeyframeId id, int most) const {
   int count = 0;
   for (auto it = ids_.rbegin(); it != ids_.rend() && *it != id && count < most; ++it) {
-    if (map.HasKnown(*it)) ++count;  // not those of a dropped map
+    if (it->camera() == id.camera() && map.HasKnown(*it)) ++count;  // not those of a dropped map
   }
   return count;
 }
 
 std::vector<KeyframeId> InsertionOrder::Newest(const Map& map, MapId map_id, int most) const {
   std::vector<KeyframeId> newest;
-  for (auto it = ids_.rbegin(); it != ids_.rend() && static_cast<int>(newest.size()) < most; ++it) {
+  std::map<CameraId, int> taken;
+  for (auto it = ids_.rbegin(); it != ids_.rend(); ++it) {
     const Keyframe* keyframe = map.FindKeyframe(*it);
-    if (keyframe != nullptr && keyframe->map_id == map_id) newest.push_back(*it);
+    if (keyframe == nullptr || keyframe->map_id != map_id || taken[it->camera()] == most) continue;
+    ++taken[it->camera()];
+    newest.push_back(*it);
   }
   return newest;
 }

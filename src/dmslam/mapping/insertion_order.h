@@ -13,9 +13,9 @@ class InsertionOrder {
   void Add(KeyframeId id);
   /// Of a map that others made: by stamp, as nothing better is known than which keyframe was settled last.
   void Assume(const Map& map);
-  /// How many keyframes were inserted after `id`, up to `most`; culled ones count.
+  /// How many keyframes of its camera were inserted after `id`, up to `most`; culled ones count.
   int CountSince(const Map& map, KeyframeId id, int most) const;
-  /// The newest keyframes of a map, up to `most`.
+  /// The newest keyframes of a map, up to `most` of each camera.
   std::vector<KeyframeId> Newest(const Map& map, MapId map_id, int most) const;
 
  private:

@@ -38,6 +38,22 @@ TEST_F(Order, CulledKeyframesCount) {
   EXPECT_EQ(order_.Newest(map_, 1, 8), (std::vector<KeyframeId>{Id(30), Id(50)}));
 }
 
+TEST_F(Order, KeyframesOfAnotherCameraDoNotCount) {
+  const auto of_other = [](uint32_t frame) { return KeyframeId::Make(Id(1).session(), frame, 1); };
+  for (const uint32_t frame : {10u, 20u, 30u}) {
+    Insert({frame});
+    Keyframe keyframe;
+    keyframe.id = of_other(frame);
+    keyframe.map_id = 1;
+    keyframe.features = MakeFrameFeatures(FeatureSet(), map_.camera(), map_.pyramid());
+    map_.AddKeyframe(std::move(keyframe));
+    order_.Add(of_other(frame));
+  }
+  EXPECT_EQ(order_.CountSince(map_, Id(10), 10), 2);
+  EXPECT_EQ(order_.CountSince(map_, of_other(20), 10), 1);
+  EXPECT_EQ(order_.Newest(map_, 1, 1).size(), 2u) << "the newest of each";
+}
+
 TEST_F(Order, KeyframesOfADroppedMapDoNotCount) {
   Insert({50, 40});
   EXPECT_EQ(order_.CountSince(map_, Id(50), 3), 1);

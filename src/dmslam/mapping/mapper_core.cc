@@ -1,5 +1,6 @@
 #include "dmslam/mapping/mapper_core.h"
 
+#include <algorithm>
 #include <optional>
 #include <set>
 #include <utility>
@@ -33,7 +34,7 @@ void MapperCore::Continue(Map map, uint64_t successor) {
   map_ = MapEditor(std::move(map));
   maker_.Continue(map_, successor);
   order_.Assume(map_);
-  maybe_unfinished_ = true;
+  finished_.emplace();
 }
 
 void MapperCore::Publish(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id,
@@ -48,7 +49,7 @@ void MapperCore::Publish(MapEvent event, std::optional<KeyframeId> about, std::o
 void MapperCore::Emit(MapDelta delta) {
   const bool answers = delta.event == MapEvent::kSettled || delta.event == MapEvent::kRefused ||
                        delta.event == MapEvent::kMapped || delta.event == MapEvent::kRequestDone ||
-                       delta.event == MapEvent::kEnded;
+                       delta.event == MapEvent::kEnded || delta.event == MapEvent::kTurn;
   if (answers || !delta.Empty()) sink_(delta);
 }
 
@@ -107,7 +108,7 @@ bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
 /// The keyframe in the map. Null: what follows was done with it before, or it cannot be inserted.
 const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   adjusted_ = false;
-  const bool maybe_unfinished = std::exchange(maybe_unfinished_, false);
+  const bool maybe_unfinished = finished_ && finished_->insert(proposal.id.camera()).second;
   const Keyframe* there = map_.FindKeyframe(proposal.id);
   if (maybe_unfinished && there != nullptr) return there;
   const InsertionReport report = InsertKeyframe(map_, proposal);
@@ -146,11 +147,19 @@ void MapperCore::OnEvidence(const FrameEvidence& evidence) {
 }
 
 void MapperCore::OnReset(const MapReset& reset) {
-  if (!reset.drop) return;
+  if (!reset.drop || IsShared(reset.map_id, reset.camera_id)) return;
   ++counters_.maps_dropped;
   map_.DropMap(reset.map_id);
   Publish(MapEvent::kMapDropped, {}, reset.map_id, {}, reset.reason);
 }
+
+/// Whether another camera than `camera` has a part in it, as that one may not have heard yet.
+bool MapperCore::IsShared(MapId map_id, CameraId camera) const {
+  return std::ranges::any_of(map_.KeyframesOf(map_id),
+                             [&](const Keyframe* keyframe) { return keyframe->camera_id != camera; });
+}
+
+void MapperCore::GiveTurn(KeyframeId frame) { Publish(MapEvent::kTurn, frame, {}); }
 
 void MapperCore::OnAdjustRequest(const AdjustRequest& request) {
   if (!adjusted_) AdjustMaps();
@@ -164,7 +173,7 @@ void MapperCore::AnswerRequest(uint32_t request) {
 }
 
 void MapperCore::Settle(KeyframeId id, std::optional<MapId> map_id) {
-  MapProgress progress = map_.progress();
+  MapProgress progress = map_.progress(id.camera());
   progress.settled = id;
   map_.SetProgress(progress);
   Publish(MapEvent::kSettled, id, map_id);

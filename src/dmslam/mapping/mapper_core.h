@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "dmslam/map/map_editor.h"
@@ -77,6 +78,8 @@ class MapperCore {
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says once more that keyframe `id` is mapped, for a loop closer that has not heard it.
   void AskAgain(KeyframeId id, MapId map_id) { Publish(MapEvent::kMapped, id, map_id); }
+  /// Says that all that comes before a frame is in the map: its camera may work on it (lock-step of several).
+  void GiveTurn(KeyframeId frame);
   /// Says that all work that keyframe `id` caused is done.
   void Settle(KeyframeId id, std::optional<MapId> map_id);
   /// Says that the sequence has ended and that all it caused is done; first adjusts all maps, unless it
@@ -88,6 +91,7 @@ class MapperCore {
 
  private:
   const Keyframe* FindOrInsert(const KeyframeProposal& proposal);
+  bool IsShared(MapId map_id, CameraId camera) const;
   void CullYoung(MapId map_id);
   void RemoveSeenThroughBy(const Keyframe& keyframe);
   void Adjust(const Keyframe& keyframe);
@@ -102,9 +106,10 @@ class MapperCore {
   MapEditor map_;
   LandmarkMaker maker_;
   InsertionOrder order_;
-  bool adjusted_ = false;          ///< as a whole, since the last keyframe
-  bool maybe_unfinished_ = false;  ///< the map is continued: its mapper may have ended in the middle of the
-                                   ///< keyframe that comes first
+  bool adjusted_ = false;  ///< as a whole, since the last keyframe
+  /// The map is continued: its mapper may have ended in the middle of the keyframe that comes first, of each
+  /// camera; the cameras of which one has come. None: it is not.
+  std::optional<std::set<CameraId>> finished_;
   Sink sink_;
   std::function<bool()> interrupt_, stop_;
   MapperCounters counters_;

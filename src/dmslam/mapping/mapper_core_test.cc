@@ -116,6 +116,29 @@ TEST_F(Corrections, OneWhoseKeyframesAreGoneIsRefused) {
   EXPECT_EQ(said_.back().note, "its keyframes are gone");
 }
 
+TEST_F(Corrections, AMapInWhichAnotherCameraHasAPartIsNotDropped) {
+  MapReset reset;
+  reset.map_id = 1;
+  reset.drop = true;
+  reset.camera_id = 1;  // as that one knew it before it was joined
+  core_.OnReset(reset);
+  EXPECT_EQ(core_.map().keyframes().size(), 3u);
+  EXPECT_EQ(core_.counters().maps_dropped, 0u);
+  reset.camera_id = 0;
+  core_.OnReset(reset);
+  EXPECT_TRUE(core_.map().keyframes().empty());
+}
+
+TEST_F(Corrections, EachCameraIsToldOfItsOwnKeyframes) {
+  core_.Settle(Id(3), 1);
+  core_.Settle(KeyframeId::Make(1, 3, 2), 1);
+  EXPECT_EQ(said_.back().progress.camera, 2u);
+  EXPECT_EQ(core_.map().progress(0).settled, Id(3));
+  core_.GiveTurn(KeyframeId::Make(1, 9, 1));
+  EXPECT_EQ(said_.back().event, MapEvent::kTurn);
+  EXPECT_EQ(said_.back().about, KeyframeId::Make(1, 9, 1));
+}
+
 /// Two keyframes that see the wall of a third one again. They share landmarks of their own on its first half;
 /// of its second half they have none.
 class SecondVisit : public Corrections {

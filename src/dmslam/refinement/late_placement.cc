@@ -33,13 +33,14 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
 }
 
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
-                              double depth) {
+                              double depth, CameraId camera_id) {
   std::vector<const Keyframe*> aside;
   const auto add = [&](const Keyframe& keyframe) {
     const bool apart = aside.empty() || SecondsBetween(keyframe.stamp_ns, aside.back()->stamp_ns) >= kApartS;
-    if (keyframe.map_id == map_id && apart) aside.push_back(&keyframe);
+    const bool ours = keyframe.id.camera() == camera_id && keyframe.map_id == map_id;
+    if (ours && apart) aside.push_back(&keyframe);
   };
-  const auto after = map.keyframes().lower_bound(KeyframeId::Make(session, frame.index));
+  const auto after = map.keyframes().lower_bound(KeyframeId::Make(session, frame.index, camera_id));
   for (auto it = after; it != map.keyframes().begin() && aside.size() < kKeyframesAside;) add((--it)->second);
   std::ranges::reverse(aside);
   const size_t before = aside.size();
@@ -65,7 +66,7 @@ void LatePlacement::Forget() {
 
 void LatePlacement::OnMapChanged(const Map& map) {
   if (!next_) return;
-  const bool is_keyframe = map.FindKeyframe(KeyframeId::Make(session_, next_->index)) != nullptr;
+  const bool is_keyframe = map.FindKeyframe(KeyframeId::Make(session_, next_->index, camera_id_)) != nullptr;
   const bool follows = growing_ && last_ && last_->index == next_->index && !is_keyframe;
   const std::optional<Rigid3d> T_cam_world = follows ? last_->pose.In(map) : std::nullopt;
   if (T_cam_world) {
@@ -81,8 +82,9 @@ void LatePlacement::FindNeighbour(const Map& map, const TrackedFrame& frame) {
   if (after_ns >= 0 && after_ns <= kNearNs) return;
   next_.reset();
   const uint32_t from = growing_ ? frame.index + 1 : frame.index;
-  const auto next = map.keyframes().lower_bound(KeyframeId::Make(session_, from));
-  if (next != map.keyframes().end()) next_ = TrackedFrame::Of(next->second);
+  const auto next = map.keyframes().lower_bound(KeyframeId::Make(session_, from, camera_id_));
+  if (next != map.keyframes().end() && next->first.camera() == camera_id_)
+    next_ = TrackedFrame::Of(next->second);
 }
 
 /// By constant velocity backwards, where the three frames are consecutive.
@@ -118,7 +120,8 @@ TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Re
   const double depth = reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
   const auto agrees = [&] {
     const Keyframe* there = map.FindKeyframe(search->reference());
-    return there != nullptr && AgreesWithKeyframesAside(map, there->map_id, *frame, session_, depth);
+    return there != nullptr &&
+           AgreesWithKeyframesAside(map, there->map_id, *frame, session_, depth, camera_id_);
   };
   TrackingReport report = TrackBackwards(map, depth, search, frame);
   if (report.ok && agrees()) return report;

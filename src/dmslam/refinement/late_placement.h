@@ -16,16 +16,16 @@ namespace dmslam {
 bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, double depth);
 
 /// Whether the camera gets from the keyframes before and after the frame to its pose and back, moving at most
-/// about as fast as it does between them; `depth` of the scene [map units].
+/// about as fast as it does between them; `depth` of the scene [map units]. Keyframes of that camera count.
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
-                              double depth);
+                              double depth, CameraId camera_id = 0);
 
 /// Places frames when the sequence has ended, the newest first: each from the placed frame that follows it
 /// and its motion, or else like a lost camera. The map may grow meanwhile by frames that become keyframes.
 class LatePlacement {
  public:
-  LatePlacement(uint32_t session, uint64_t seed, const MotionModelOptions& motion)
-      : session_(session), seed_(seed), motion_(motion) {}
+  LatePlacement(uint32_t session, CameraId camera_id, uint64_t seed, const MotionModelOptions& motion)
+      : session_(session), camera_id_(camera_id), seed_(seed), motion_(motion) {}
 
   /// While the map grows the neighbour is a later frame, that may move with the map; afterwards it can also
   /// be the keyframe that was made of the frame itself.
@@ -57,6 +57,7 @@ class LatePlacement {
   TrackingReport TrackBackwards(const Map& map, double depth, PoseSearch* search, TrackedFrame* frame) const;
 
   uint32_t session_;
+  CameraId camera_id_;
   uint64_t seed_;
   MotionModelOptions motion_;
   bool growing_ = false;

@@ -77,7 +77,7 @@ class GrowingBack : public ::testing::Test {
   static constexpr uint32_t kFirst = 20;
   static constexpr int64_t kFrameNs = 33'333'333;
 
-  GrowingBack() : relocalizer_(nullptr), search_({}, TestCamera()), placement_(MapScene::kSession, 0, {}) {
+  GrowingBack() : relocalizer_(nullptr), search_({}, TestCamera()), placement_(MapScene::kSession, 0, 0, {}) {
     scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
     scene_.MapAll(1, 0.0, kFirst, kFirst * kFrameNs);
     placement_.SetGrowing(true);

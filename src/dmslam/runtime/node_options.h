@@ -9,12 +9,14 @@
 #include "dmslam/messaging/bus_key.h"
 #include "dmslam/messaging/types.h"
 #include "dmslam/settings/settings.h"
+#include "dmslam/util/ids.h"
 
 namespace dmslam {
 
 /// What every process of the system is told at its start.
 struct NodeOptions {
-  uint32_t session = 0;  ///< 0: that of the first camera heard
+  uint32_t session = 0;    ///< 0: that of the first camera heard
+  CameraId camera_id = 0;  ///< of a player and a frontend: whose they are
   std::vector<std::string>
       peers;  ///< processes that take part: they are waited for, and hold their streams' writers back
   Link link = Link::kHost;
@@ -26,6 +28,8 @@ struct NodeOptions {
   Settings settings;          ///< as text: each node reads the options that it needs
 
   bool HasPeer(std::string_view name) const;
+  /// How many cameras take part, by the frontends among the peers.
+  CameraId NumCameras() const;
 };
 
 }  // namespace dmslam

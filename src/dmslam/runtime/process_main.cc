@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/messaging/lcm_bus.h"
 #include "dmslam/runtime/exit_codes.h"
@@ -46,6 +47,16 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
   app_.AddOption("--peers", options_.peers, "processes that take part: they are waited for")
       .Delimiter(',')
       .ShowDefault();
+  app_.AddOption(
+          "--cameras", cameras_,
+          "how many cameras take part, each with a player and a frontend of its own: those of camera 1 "
+          "are the peers player1 and frontend1")
+      .InRange(1, static_cast<int>(kMaxCameras))
+      .ShowDefault();
+  if (role == "player" || role == "frontend") {
+    app_.AddOption("--camera-id", options_.camera_id, "whose it is, from 0, where several cameras take part")
+        .InRange(0, static_cast<int>(kMaxCameras) - 1);
+  }
   app_.AddOption("--config", config_, "settings (YAML)");
   app_.AddOption("--set", overrides_, "one setting: key=value; may be repeated");
   app_.AddFlag(
@@ -77,6 +88,17 @@ int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
   }
 }
 
+/// Where the first frontend is waited for, so are the others.
+void ProcessMain::AddCameras() {
+  if (options_.camera_id >= cameras_) {
+    throw InputError("--camera-id " + std::to_string(options_.camera_id) + ": there are --cameras " +
+                     std::to_string(cameras_) + ", numbered from 0");
+  }
+  if (!options_.HasPeer("frontend")) return;
+  for (CameraId camera = 1; camera < cameras_; ++camera)
+    options_.peers.push_back(OfCamera("frontend", camera));
+}
+
 std::unique_ptr<KeyedBus> ProcessMain::MakeKeyedBus(Bus* bus) const {
   if (!options_.key) return nullptr;
   KeyedBus::Options options;
@@ -91,6 +113,7 @@ int ProcessMain::RunNode(const Factory& factory) {
   options_.settings = LoadSettings(config_, overrides_);
   options_.link = link_ == "lan" ? Link::kLan : Link::kHost;
   options_.key = BusKey::LoadIfWanted(key_);
+  AddCameras();
   if (offline_) {
     if (const std::optional<int> code = offline_(options_)) return *code;
   }
@@ -115,7 +138,7 @@ int ProcessMain::RunNode(const Factory& factory) {
     loop.Watch(fd, std::move(on_readable));
   };
   context.random_id = RandomId();
-  context.name = ProcessName(role_);
+  context.name = ProcessName(OfCamera(role_, options_.camera_id));
   context.fresh_system = fresh_system_;
   context.resumed = resumed_;
   const std::unique_ptr<Node> node = factory(context, options_);

@@ -36,6 +36,7 @@ class ProcessMain {
 
  private:
   int RunNode(const Factory& factory);
+  void AddCameras();
   std::unique_ptr<KeyedBus> MakeKeyedBus(Bus* bus) const;
 
   CommandLine app_;
@@ -44,6 +45,7 @@ class ProcessMain {
   std::string prefix_;
   std::string key_;
   std::string link_ = "host";
+  CameraId cameras_ = 1;
   std::string config_;
   std::vector<std::string> overrides_;
   NodeOptions options_;

@@ -38,6 +38,14 @@ bool NodeOptions::HasPeer(std::string_view name) const {
   return std::find(peers.begin(), peers.end(), name) != peers.end();
 }
 
+CameraId NodeOptions::NumCameras() const {
+  CameraId count = 1;
+  for (CameraId camera = 1; camera < kMaxCameras; ++camera) {
+    if (HasPeer(OfCamera("frontend", camera))) count = camera + 1;
+  }
+  return count;
+}
+
 int64_t SchemaHash() { return HashOf(static_cast<const wire::Messages*>(nullptr)); }
 
 StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string role)
@@ -48,12 +56,20 @@ StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string rol
       session_(options_.session),
       started_ns_(context_.now_ns()) {
   Listen({channels::kCameraInfo});
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    if (camera != options_.camera_id) Listen({channels::kCameraInfo}, camera);
+  }
 }
+
+/// Whether it is one camera's, as a frontend is.
+bool StreamNode::IsOfCamera() const { return role_ == OfCamera("frontend", options_.camera_id); }
 
 void StreamNode::OnMessage(const std::string&, std::span<const uint8_t>) {}
 
-void StreamNode::Listen(const std::vector<std::string>& channels) {
-  other_channels_.insert(other_channels_.end(), channels.begin(), channels.end());
+void StreamNode::Listen(const std::vector<std::string>& channels) { Listen(channels, options_.camera_id); }
+
+void StreamNode::Listen(const std::vector<std::string>& channels, CameraId camera) {
+  for (const std::string& channel : channels) other_channels_.push_back(ChannelOfCamera(channel, camera));
   endpoint_.SetOtherHandler(
       other_channels_,
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
@@ -62,35 +78,55 @@ void StreamNode::Listen(const std::vector<std::string>& channels) {
 void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
   ++received_;
   received_bytes_ += static_cast<int64_t>(bytes.size());
-  if (channel == channels::kCameraInfo) {
-    OnCameraInfo(bytes);
-  } else if (std::find(other_channels_.begin(), other_channels_.end(), channel) != other_channels_.end()) {
-    OnMessage(channel, bytes);
+  if (std::find(other_channels_.begin(), other_channels_.end(), channel) == other_channels_.end()) return;
+  const CameraChannel of_camera = SplitCamera(channel);
+  if (of_camera.channel == channels::kCameraInfo) {
+    OnCameraInfo(of_camera.camera, bytes);
+  } else {
+    OnMessage(of_camera.channel, bytes);
   }
 }
 
-void StreamNode::OnCameraInfo(std::span<const uint8_t> bytes) {
+void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   std::optional<CameraInfo> info = Read<CameraInfo>(bytes);
   if (!info) return;
+  info->camera_id = camera;
+  if (IsOfCamera() && camera != options_.camera_id) return OnOtherCamera(*info);
   if (session_ == 0) session_ = info->session;
   if (options_.accept_recorded && !recorded_session_ && info->session != session_) {
     recorded_session_ = info->session;
     LogInfo("{}: takes the frames of recorded session {} for its own {}", role_, info->session, session_);
   }
   if (IsForeignFrame(info->session)) return;
-  camera_due_ns_ = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
-  if (camera_info_) return;
-  if (!recorded_session_) camera_message_.emplace(bytes.begin(), bytes.end());
+  const bool is_new = !cameras_.contains(camera);
+  KnownCamera& known = cameras_[camera];
+  known.due_ns = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
+  if (!is_new) return;
+  if (!recorded_session_) known.message.assign(bytes.begin(), bytes.end());
   if (recorded_session_) info->mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
-  camera_info_ = std::move(info);
+  if (!camera_info_) camera_info_ = *info;
+  OnCamera(*info);
+}
+
+/// What all see is projected by one model: the camera that comes later, by its number, leaves.
+void StreamNode::OnOtherCamera(const CameraInfo& info) {
+  const bool ours = session_ == 0 || info.session == session_;
+  if (!ours || !camera_info_ || info.camera_id > options_.camera_id || info.camera == camera_info_->camera)
+    return;
+  Exit(kExitMisfit, "camera " + std::to_string(options_.camera_id) + " is another model than camera " +
+                        std::to_string(info.camera_id) +
+                        "; all cameras of a session need the same calibration (--camera)");
 }
 
 /// A process that starts after the player has left still learns the camera, from those who write: one of them
 /// repeats what the player said.
 void StreamNode::KeepCameraKnown() {
-  if (!camera_message_ || !plan_ || context_.now_ns() < camera_due_ns_) return;
-  camera_due_ns_ = context_.now_ns() + kCameraSilentNs;
-  context_.bus->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(*camera_message_), false});
+  for (auto& [camera, known] : cameras_) {
+    if (known.message.empty() || !plan_ || context_.now_ns() < known.due_ns) continue;
+    known.due_ns = context_.now_ns() + kCameraSilentNs;
+    context_.bus->Publish({ChannelOfCamera(channels::kCameraInfo, camera),
+                           std::make_shared<const Bytes>(known.message), false});
+  }
 }
 
 bool StreamNode::IsForeignFrame(uint32_t session) {
@@ -131,11 +167,11 @@ std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamRe
 
 std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
                                                      const std::vector<std::string>& record_channels,
-                                                     Version start) {
+                                                     Version start, CameraId camera) {
   StreamReader::Options options;
   options.session = session_;
-  options.stream = stream;
-  options.owner = owner;
+  options.stream = StreamOfCamera(stream, camera);
+  options.owner = OfCamera(owner, camera);
   options.reader = UpperCase(role_);
   options.role = role_;
   options.name = context_.name;
@@ -143,7 +179,10 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   options.schema_hash = SchemaHash();
   options.start = start;
   auto reader = std::make_unique<StreamReader>(options);
-  endpoint_.AddReader(reader.get(), owner, record_channels);
+  std::vector<std::string> record_channels_of_camera;
+  for (const std::string& channel : record_channels)
+    record_channels_of_camera.push_back(ChannelOfCamera(channel, camera));
+  endpoint_.AddReader(reader.get(), options.owner, record_channels_of_camera);
   readers_.push_back({reader.get(), {}});
   return reader;
 }
@@ -181,7 +220,7 @@ bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader) const
 void StreamNode::StartElection() {
   WriterElection::Options options;
   options.session = session_;
-  options.stream = plan_->stream;
+  options.stream = StreamOfCamera(plan_->stream, options_.camera_id);
   options.owner = UpperCase(role_);
   options.name = context_.name;
   options.writer = context_.random_id;
@@ -214,7 +253,7 @@ std::vector<std::string> StreamNode::ReaderNames() const {
 void StreamNode::OpenWriter() {
   StreamWriter::Options options;
   options.session = session_;
-  options.stream = plan_->stream;
+  options.stream = StreamOfCamera(plan_->stream, options_.camera_id);
   options.owner = UpperCase(role_);
   options.name = context_.name;
   options.schema_hash = SchemaHash();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -8,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/endpoint.h"
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/map_snapshots.h"
@@ -48,16 +50,20 @@ class StreamNode : public Node {
   virtual void OnWriterOpen() {}
   /// Some work, if there is any; called as long as it returns true.
   virtual bool WorkOnce() = 0;
-  /// A message outside the streams.
+  /// A message outside the streams; `channel` as it is called where there is one camera.
   virtual void OnMessage(const std::string& channel, std::span<const uint8_t> bytes);
+  /// A camera is known: of a frontend its own, of the others every one.
+  virtual void OnCamera(const CameraInfo&) {}
   virtual void PublishStatus() {}
   /// When WorkOnce has something to do without a message.
   virtual int64_t WorkDeadline() const { return INT64_MAX; }
 
+  /// By the names that channels have where there is one camera; of this process's camera, or of another.
   void Listen(const std::vector<std::string>& channels);
+  void Listen(const std::vector<std::string>& channels, CameraId camera);
   std::unique_ptr<StreamReader> MakeReader(StreamId stream, const std::string& owner,
                                            const std::vector<std::string>& record_channels,
-                                           Version start = {});
+                                           Version start = {}, CameraId camera = 0);
   struct WriterPlan {
     StreamId stream = StreamId::kTest;
     std::vector<std::string> readers;  ///< roles of the lossless readers
@@ -84,12 +90,13 @@ class StreamNode : public Node {
   /// Publishes a record of this node's stream; returns its sequence number.
   template <typename Message>
   int64_t PublishRecord(const Message& message) {
-    return writer_->Publish(wire::Info<Message>().channel, wire::Encode(message), context_.now_ns());
+    return writer_->Publish(ChannelOfCamera(wire::Info<Message>().channel, options_.camera_id),
+                            wire::Encode(message), context_.now_ns());
   }
   /// Publishes a message that may be lost. `local`: large, and of use on this host only.
   template <typename Message>
   void PublishLoose(const Message& message, bool local = false) {
-    dmslam::PublishLoose(context_.bus, message, local);
+    dmslam::PublishLoose(context_.bus, message, local, options_.camera_id);
   }
   /// Decodes one of ours; bad and foreign ones are counted, the first of each kind is logged.
   template <typename Message>
@@ -134,7 +141,9 @@ class StreamNode : public Node {
 
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
-  void OnCameraInfo(std::span<const uint8_t> bytes);
+  void OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes);
+  void OnOtherCamera(const CameraInfo& info);
+  bool IsOfCamera() const;
   void KeepCameraKnown();
   void RunElection();
   void StartElection();
@@ -150,8 +159,11 @@ class StreamNode : public Node {
   void WarnOnce(const std::string& matter, const std::string& text);
 
   bool begun_ = false;
-  std::optional<Bytes> camera_message_;  ///< as the player sent it
-  int64_t camera_due_ns_ = 0;            ///< when it is repeated, unless somebody else says it before
+  struct KnownCamera {
+    Bytes message;       ///< as the player sent it; empty: of a recorded session, and not repeated
+    int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
+  };
+  std::map<CameraId, KnownCamera> cameras_;
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterElection> election_;
   std::optional<int> exit_code_;

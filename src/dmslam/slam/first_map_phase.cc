@@ -32,10 +32,11 @@ FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOp
   return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
 }
 
-FirstMapPhase::Answer FirstMapPhase::AddFrame(const TrackedFrame& frame, uint32_t session, MapId map_id) {
+FirstMapPhase::Answer FirstMapPhase::AddFrame(const TrackedFrame& frame, uint32_t session, CameraId camera_id,
+                                              MapId map_id) {
   const InitializerReport report = search_({frame.index, frame.stamp_ns, frame.features});
   if (!report.result) return {std::nullopt, report.reason};
-  return {MakeInitialMap(*report.result, session, map_id), "a first map was proposed"};
+  return {MakeInitialMap(*report.result, session, camera_id, map_id), "a first map was proposed"};
 }
 
 }  // namespace dmslam

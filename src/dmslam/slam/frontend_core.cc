@@ -48,13 +48,16 @@ FrontendCore::FrontendCore(const Setup& setup)
       camera_(setup.camera),
       pyramid_(setup.pyramid),
       session_(setup.session),
+      camera_id_(setup.camera_id),
       localize_only_(setup.localize_only),
       catch_up_in_portions_(setup.catch_up_in_portions),
       map_(setup.camera, setup.pyramid),
+      map_id_(setup.camera_id * kMapsPerCamera + 1),
+      newest_map_(*map_id_),
       features_(setup.extractor, setup.options.initializer_feature_factor),
       first_map_(SearchMaker(setup)),
       tracker_({setup.options.tracking, setup.camera, setup.vocabulary, setup.seed}),
-      late_(setup.session, setup.seed, setup.options.tracking.motion),
+      late_(setup.session, setup.camera_id, setup.seed, setup.options.tracking.motion),
       last_poses_(setup.options.refiner, setup.options.smooth_at_end, setup.options.tracking, setup.camera),
       unplaced_(setup.options.max_kept_frames) {
   if (!setup.in_saved_map) return;
@@ -77,10 +80,16 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
 
 void FrontendCore::Resume() {
   if (map_.keyframes().empty()) return;
-  const Keyframe& newest = map_.keyframes().rbegin()->second;
+  const Keyframe* own = map_.NewestKeyframeOf(camera_id_);
   phase_.BeginLost();
-  map_id_ = newest.map_id;
-  gate_.ContinueAfter(newest.stamp_ns);
+  map_id_ = own != nullptr ? own->map_id : map_.keyframes().rbegin()->second.map_id;
+  if (own != nullptr) gate_.ContinueAfter(own->stamp_ns);
+}
+
+/// Whether another camera has a part in it: then it is not this one's to drop.
+bool FrontendCore::IsSharedMap(MapId map_id) const {
+  return std::ranges::any_of(map_.KeyframesOf(map_id),
+                             [&](const Keyframe* keyframe) { return keyframe->id.camera() != camera_id_; });
 }
 
 void FrontendCore::ForgetMap() {
@@ -92,7 +101,8 @@ void FrontendCore::ForgetMap() {
 FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
-  if (map_id_) output.Add(MapReset{*map_id_, drop, reason, frame_.stamp_ns});
+  drop = drop && !(map_id_ && IsSharedMap(*map_id_));
+  if (map_id_) output.Add(MapReset{*map_id_, drop, reason, frame_.stamp_ns, camera_id_});
   if (drop) dropped_ = map_id_;
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
@@ -105,17 +115,21 @@ FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
   return output;
 }
 
-/// A number that no map has had: those of a saved one are taken, and those of maps that were joined.
+/// A number that no map has had: those of a saved one are taken, and those of maps that were joined. Of this
+/// camera's own numbers: the others number theirs at the same time.
 MapId FrontendCore::NextMapId() {
-  newest_map_ = std::max(newest_map_, map_id_.value_or(0));
-  for (const auto& [id, keyframe] : map_.keyframes()) newest_map_ = std::max(newest_map_, keyframe.map_id);
+  const auto take = [this](MapId taken) {
+    if (taken / kMapsPerCamera == camera_id_) newest_map_ = std::max(newest_map_, taken);
+  };
+  take(map_id_.value_or(0));
+  for (const auto& [id, keyframe] : map_.keyframes()) take(keyframe.map_id);
   return ++newest_map_;
 }
 
 /// The map that was tracked in may have become part of another.
 void FrontendCore::FollowJoinedMap() {
   if (!phase_.HasMap() || !map_id_ || !map_.KeyframesOf(*map_id_).empty()) return;
-  newest_map_ = std::max(newest_map_, *map_id_);
+  if (*map_id_ / kMapsPerCamera == camera_id_) newest_map_ = std::max(newest_map_, *map_id_);
   if (const auto last = map_.ResolvePose(tracker_.last_reference())) map_id_ = last->map_id;
 }
 
@@ -166,7 +180,7 @@ FrontendOutput FrontendCore::Initialize() {
   if (std::optional<FrontendOutput> found = FindAgain()) return std::move(*found);
   FrontendOutput output;
   unplaced_.Keep(WaitingFrame(frame_));
-  FirstMapPhase::Answer answer = first_map_.AddFrame(frame_, session_, *map_id_);
+  FirstMapPhase::Answer answer = first_map_.AddFrame(frame_, session_, camera_id_, *map_id_);
   if (answer.proposal) {
     const KeyframeProposal& second = answer.proposal->second;
     gate_.OnProposed(second.id, second.stamp_ns);
@@ -292,6 +306,7 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
                                  const std::optional<PlacedPose>& pose) const {
   FramePose told;
   told.frame_index = frame_.index;
+  told.camera_id = camera_id_;
   told.stamp_ns = frame_.stamp_ns;
   told.state = state;
   told.map_id = map_id_;
@@ -332,6 +347,7 @@ void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, Fronte
   if (IsEvidenceDue() || keyframe) {
     evidence_ns_ = frame_.stamp_ns;
     FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
+    evidence.camera_id = camera_id_;
     if (!evidence.items.empty() && !localize_only_) output->Add(std::move(evidence));
   }
   if (keyframe) output->Add(ProposeKeyframe(pose));
@@ -339,7 +355,8 @@ void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, Fronte
 
 KeyframeProposal FrontendCore::ProposeKeyframe(const PlacedPose& pose) {
   KeyframeProposal proposal;
-  proposal.id = KeyframeId::Make(session_, frame_.index);
+  proposal.id = ThisFrame();
+  proposal.camera_id = camera_id_;
   proposal.map_id = map_id_.value_or(0);
   proposal.stamp_ns = frame_.stamp_ns;
   proposal.reference = pose.reference;
@@ -390,7 +407,7 @@ FrontendOutput FrontendCore::KeepPlacedLater(const TrackingReport& report) {
   map_id_ = map_.FindKeyframe(pose.reference)->map_id;
   // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
   const bool well_seen = report.num_static >= kWellSeen && report.cells >= kWellSeenCells;
-  const bool known = map_.ResolveKeyframe(KeyframeId::Make(session_, frame_.index)).has_value();
+  const bool known = map_.ResolveKeyframe(ThisFrame()).has_value();
   FrontendOutput output;
   ReportLandmarks(pose, well_seen && !known && WantsKeyframe(report, pose.reference), &output);
   last_poses_.Keep(frame_, MakePose(TrackingState::kLocalizedLater, report, pose));

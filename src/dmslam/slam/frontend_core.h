@@ -33,6 +33,7 @@ class FrontendCore {
     Camera camera;
     Pyramid pyramid;
     uint32_t session = 1;
+    CameraId camera_id = 0;  ///< of several that work on one map
     uint64_t seed = 0;
     bool in_saved_map = false;   ///< begins lost in a map that is there already
     bool localize_only = false;  ///< ... and adds nothing to it
@@ -109,11 +110,13 @@ class FrontendCore {
   FrontendOutput OnNotTracked(const TrackingReport& report);
   bool IsLostInTheLight(int64_t missing_ns);
   FrontendOutput GiveUpMap(bool drop, const std::string& reason);
+  bool IsSharedMap(MapId map_id) const;
   MapId NextMapId();
   void FollowJoinedMap();
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
   bool IsEvidenceDue();
   void ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output);
+  KeyframeId ThisFrame() const { return KeyframeId::Make(session_, frame_.index, camera_id_); }
   KeyframeProposal ProposeKeyframe(const PlacedPose& pose);
   FramePose NoPose(TrackingState state, std::string reason) const;
   FramePose MakePose(TrackingState state, const TrackingReport& report,
@@ -126,14 +129,14 @@ class FrontendCore {
   Camera camera_;
   Pyramid pyramid_;
   uint32_t session_;
+  CameraId camera_id_;
   bool localize_only_;
   bool catch_up_in_portions_;
 
   // The map and where tracking stands
   Replica map_;
-  std::optional<MapId> map_id_ =
-      1;                          ///< of the map tracked in or looked for; none: whichever it finds itself in
-  MapId newest_map_ = 1;          ///< the highest number that was given
+  std::optional<MapId> map_id_;   ///< of the map tracked in or looked for; none: whichever it finds itself in
+  MapId newest_map_;              ///< the highest number that was given to a map that this camera began
   std::optional<MapId> dropped_;  ///< the map that was dropped last: the replica may have it for a while yet
   TrackingPhase phase_;
 

@@ -74,16 +74,26 @@ TEST(KeyframeGateTest, OneAtATime) {
   EXPECT_EQ(gate.SinceNs(400), 600);
 }
 
+TEST(KeyframeGateTest, WhatIsSettledOfAnotherCameraOpensNothing) {
+  KeyframeGate gate;
+  gate.OnProposed(KeyframeId::Make(1, 50, 0), 1000);
+  gate.OnSettled(KeyframeId::Make(1, 60, 1), true);
+  EXPECT_FALSE(gate.IsOpen());
+  gate.OnSettled(KeyframeId::Make(1, 50, 0), true);
+  EXPECT_TRUE(gate.IsOpen());
+}
+
 /// A frontend whose search finds a first map when it is told to; the test is the mapper.
 class Phases : public ::testing::Test {
  protected:
   static constexpr size_t kPoints = 300;
 
-  explicit Phases(bool in_portions = false) {
+  explicit Phases(bool in_portions = false, CameraId camera_id = 0) {
     scene_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     strange_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
+    setup.camera_id = camera_id;
     setup.options.keyframes_at_end = true;
     setup.run_search = [this](const FirstMapSearch&) {
       return [this](const InitializerFrame& frame) { return Search(frame); };
@@ -370,6 +380,35 @@ TEST_F(Phases, FramesBeforeTheMapArePlacedWhenTheSequenceHasEnded) {
     EXPECT_TRUE(pose.HasPose());
     EXPECT_LT((pose.T_cam_world.Center() - Eigen::Vector3d(0.05 * pose.frame_index, 0, 0)).norm(), 0.01);
   }
+}
+
+/// Camera 1 of several; what it finds in the map is camera 0's.
+class SecondCamera : public Phases {
+ protected:
+  SecondCamera() : Phases(false, 1) {}
+};
+
+TEST_F(SecondCamera, NumbersItsMapsAndKeyframesApartFromOthers) {
+  Frame(0);
+  finds_map_ = true;
+  const FrontendOutput output = Frame(1);
+  const auto* proposal = Find<InitialMap>(output);
+  ASSERT_NE(proposal, nullptr);
+  EXPECT_EQ(proposal->map_id, kMapsPerCamera + 1);
+  EXPECT_EQ(proposal->first.id, KeyframeId::Make(1, 0, 1));
+  EXPECT_EQ(proposal->second.id, KeyframeId::Make(1, 1, 1));
+  EXPECT_EQ(proposal->second.camera_id, 1u);
+  EXPECT_EQ(Find<FramePose>(output)->camera_id, 1u);
+}
+
+TEST_F(SecondCamera, AFirstMapOfAnotherDoesNotAnswerItsOwn) {
+  Frame(0);
+  finds_map_ = true;
+  Frame(1);
+  finds_map_ = false;
+  MapArrives();  // of camera 0, settled and all
+  EXPECT_TRUE(core_->awaited().valid());
+  EXPECT_EQ(core_->state(), TrackingState::kWaitingForMap);
 }
 
 }  // namespace

@@ -22,9 +22,10 @@ class KeyframeGate {
     awaited_ = id;
     last_ns_ = stamp_ns;
   }
-  /// All work on keyframe `id` is done. `in_order`: and on all before it, as keyframes come in the order of
-  /// their frames.
+  /// All work on keyframe `id` is done. `in_order`: and on all before it, as the keyframes of a camera come
+  /// in the order of their frames.
   void OnSettled(KeyframeId id, bool in_order) {
+    if (id.camera() != awaited_.camera()) return;
     if (in_order ? id >= awaited_ : id == awaited_) awaited_ = {};
   }
   /// The map whose keyframe was awaited is given up.

@@ -51,24 +51,26 @@ void TrajectoryBuilder::OnFramePose(const FramePose& told) {
   if (pose.map_id) {
     if (const auto from = joined_.find(*pose.map_id); from != joined_.end()) Carry(from->second, &pose);
   }
-  const auto [it, inserted] = poses_.emplace(pose.frame_index, pose);
+  const auto [it, inserted] = poses_.emplace(FrameName{pose.camera_id, pose.frame_index}, pose);
   if (inserted) return;
   const bool later = pose.state == TrackingState::kLocalizedLater;
-  if (later && pose.HasPose() && it->second.HasPose()) refined_[pose.frame_index] = pose;
+  if (later && pose.HasPose() && it->second.HasPose()) refined_[{pose.camera_id, pose.frame_index}] = pose;
   if (!it->second.HasPose() || (pose.HasPose() && !later)) it->second = pose;
 }
 
 void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
   if (!reset.drop) return;
   for (auto& [index, pose] : poses_) {
-    if (pose.map_id == reset.map_id) pose.reference = {};
+    if (index.camera == reset.camera_id && pose.map_id == reset.map_id) pose.reference = {};
   }
-  std::erase_if(refined_, [&reset](const auto& entry) { return entry.second.map_id == reset.map_id; });
+  std::erase_if(refined_, [&reset](const auto& entry) {
+    return entry.first.camera == reset.camera_id && entry.second.map_id == reset.map_id;
+  });
 }
 
 /// Where its reference is no longer known: over the frame that became it, which was placed in the same map.
 bool TrajectoryBuilder::Bridge(FramePose* pose) const {
-  const auto frame = poses_.find(pose->reference.frame_index());
+  const auto frame = poses_.find({pose->reference.camera(), pose->reference.frame_index()});
   if (frame == poses_.end() || MapOfFrame(frame->second) == 0) return false;
   const FramePose& reference = frame->second;
   if (reference.map_id != pose->map_id) return false;  // its units are others
@@ -99,20 +101,28 @@ MapId TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {
   return reference ? reference->map_id : 0;
 }
 
-TrajectoryBuilder::Trajectories TrajectoryBuilder::Build() const {
-  std::map<MapId, size_t> frames_of;
-  for (const auto& [index, pose] : poses_) {
+/// Of all cameras together; and how many frames of `camera` the others hold.
+void TrajectoryBuilder::ChooseMap(std::optional<CameraId> camera, Trajectories* result) const {
+  std::map<MapId, size_t> frames_of, frames_of_camera;
+  for (const auto& [frame, pose] : poses_) {
     const MapId map_id = MapOfFrame(pose);
-    if (map_id != 0) ++frames_of[map_id];
+    if (map_id == 0) continue;
+    ++frames_of[map_id];
+    if (!camera || frame.camera == *camera) ++frames_of_camera[map_id];
   }
+  for (const auto& [map_id, count] : frames_of) {
+    if (result->map_id == 0 || count > frames_of.at(result->map_id)) result->map_id = map_id;
+  }
+  for (const auto& [map_id, count] : frames_of_camera) {
+    if (map_id != result->map_id) result->other_maps.emplace_back(map_id, count);
+  }
+}
+
+TrajectoryBuilder::Trajectories TrajectoryBuilder::Build(std::optional<CameraId> camera) const {
   Trajectories result;
-  for (const auto& [map_id, count] : frames_of) {
-    if (result.map_id == 0 || count > frames_of.at(result.map_id)) result.map_id = map_id;
-  }
-  for (const auto& [map_id, count] : frames_of) {
-    if (map_id != result.map_id) result.other_maps.emplace_back(map_id, count);
-  }
+  ChooseMap(camera, &result);
   for (const auto& [index, pose] : poses_) {
+    if (camera && index.camera != *camera) continue;
     if (MapOfFrame(pose) != result.map_id || result.map_id == 0) continue;
     const auto later = refined_.find(index);
     const FramePose& best =
@@ -125,7 +135,8 @@ TrajectoryBuilder::Trajectories TrajectoryBuilder::Build() const {
     }
   }
   for (const auto& [id, keyframe] : map_.keyframes()) {
-    if (keyframe.map_id == result.map_id)
+    const bool wanted = !camera || keyframe.camera_id == *camera;
+    if (wanted && keyframe.map_id == result.map_id)
       result.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
   }
   std::ranges::stable_sort(result.keyframes, {}, &StampedPose::stamp_ns);  // sessions may be in any order

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -41,11 +43,18 @@ class TrajectoryBuilder {
     std::vector<StampedPose> keyframes;
     std::vector<std::pair<MapId, size_t>> other_maps;  ///< and how many frames they hold
   };
-  /// World-from-camera, in map units, of the map that holds most frames.
-  Trajectories Build() const;
+  /// World-from-camera, in map units, of the map that holds most frames of all cameras together; of all
+  /// cameras one after another, or of one.
+  Trajectories Build(std::optional<CameraId> camera = std::nullopt) const;
 
   const Map& map() const { return map_; }
-  const std::map<uint32_t, FramePose>& frame_poses() const { return poses_; }
+  /// Which frame of which camera.
+  struct FrameName {
+    CameraId camera = 0;
+    uint32_t index = 0;
+    auto operator<=>(const FrameName&) const = default;
+  };
+  const std::map<FrameName, FramePose>& frame_poses() const { return poses_; }
 
  private:
   /// A map that became part of another one, and how points of it lie there.
@@ -56,14 +65,14 @@ class TrajectoryBuilder {
 
   bool Bridge(FramePose* pose) const;
   MapId MapOfFrame(const FramePose& pose) const;
+  void ChooseMap(std::optional<CameraId> camera, Trajectories* result) const;
   std::map<MapId, Joined> JoinedBy(const MapDelta& delta) const;
   static void Carry(const Joined& joined, FramePose* pose);
 
   Replica map_;
-  std::map<MapId, Joined> joined_;  ///< by the number that is gone; into maps that there are
-  std::map<uint32_t, FramePose>
-      poses_;  ///< by frame index; a later placement does not replace an online one...
-  std::map<uint32_t, FramePose> refined_;  ///< ...but is the better one for the final trajectory
+  std::map<MapId, Joined> joined_;          ///< by the number that is gone; into maps that there are
+  std::map<FrameName, FramePose> poses_;    ///< a later placement does not replace an online one...
+  std::map<FrameName, FramePose> refined_;  ///< ...but is the better one for the final trajectory
 };
 
 }  // namespace dmslam

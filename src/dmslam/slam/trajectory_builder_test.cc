@@ -47,6 +47,26 @@ TEST_F(TrajectoryOfTwoMaps, PosesOfADroppedMapDoNotComeBackWithAKeyframeOfTheSam
   EXPECT_EQ(builder_.frame_poses().size(), 1U) << "the frame is counted all the same";
 }
 
+TEST_F(TrajectoryOfTwoMaps, FramesOfSeveralCamerasAreToldApart) {
+  FramePose other = PoseIn(2, TrackingState::kTracking, 2.0);
+  other.camera_id = 1;
+  builder_.OnFramePose(PoseIn(2, TrackingState::kTracking, 1.0));
+  builder_.OnFramePose(other);
+  ASSERT_EQ(builder_.Build().final.size(), 2U);
+  ASSERT_EQ(builder_.Build(1).final.size(), 1U);
+  EXPECT_NEAR(builder_.Build(0).final[0].T_world_cam.translation.x(), -8.0, 1e-12);
+  EXPECT_NEAR(builder_.Build(1).final[0].T_world_cam.translation.x(), -9.0, 1e-12);
+  EXPECT_EQ(builder_.Build(0).keyframes.size(), 1U);
+  EXPECT_TRUE(builder_.Build(1).keyframes.empty());
+  MapReset reset;
+  reset.map_id = 2;
+  reset.drop = true;
+  reset.camera_id = 1;
+  builder_.OnMapReset(reset);
+  EXPECT_TRUE(builder_.Build(1).final.empty());
+  EXPECT_EQ(builder_.Build(0).final.size(), 1U) << "the other camera has not given it up";
+}
+
 TEST_F(TrajectoryOfTwoMaps, AFrameOfADroppedMapThatIsPlacedLaterHasThatPose) {
   builder_.OnFramePose(PoseIn(1, TrackingState::kTracking, 0.5));
   builder_.OnMapReset({1, true, "", 0});

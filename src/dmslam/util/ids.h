@@ -6,17 +6,26 @@
 
 namespace dmslam {
 
-/// Which keyframe, for ever: the session in the high 32 bits, the index of its frame in the low ones. A
-/// keyframe that is proposed twice therefore carries the same id twice. Zero is no keyframe (sessions start
-/// at 1).
+/// Which camera of a session, from 0.
+using CameraId = uint32_t;
+/// So many cameras may work on one map.
+inline constexpr CameraId kMaxCameras = 16;
+/// So many frames of a camera may become keyframes: at 30 Hz those of three months.
+inline constexpr uint32_t kMaxFrames = 1U << 28;
+
+/// Which keyframe, for ever: the session in the high 32 bits, then the camera in 4, and the index of its
+/// frame in the low 28. A keyframe that is proposed twice therefore carries the same id twice. Zero is no
+/// keyframe (sessions start at 1). Those of one camera are ordered by their frames.
 struct KeyframeId {
   uint64_t value = 0;
 
-  static constexpr KeyframeId Make(uint32_t session, uint32_t frame_index) {
-    return KeyframeId{(static_cast<uint64_t>(session) << 32) | frame_index};
+  static constexpr KeyframeId Make(uint32_t session, uint32_t frame_index, CameraId camera = 0) {
+    return KeyframeId{(static_cast<uint64_t>(session) << 32) | (static_cast<uint64_t>(camera) << 28) |
+                      frame_index};
   }
   constexpr uint32_t session() const { return static_cast<uint32_t>(value >> 32); }
-  constexpr uint32_t frame_index() const { return static_cast<uint32_t>(value); }
+  constexpr CameraId camera() const { return static_cast<uint32_t>(value) >> 28; }
+  constexpr uint32_t frame_index() const { return static_cast<uint32_t>(value) & (kMaxFrames - 1); }
   constexpr bool valid() const { return value != 0; }
   auto operator<=>(const KeyframeId&) const = default;
 };
@@ -37,9 +46,9 @@ struct LandmarkId {
 
 /// Which map, from 1: after a reset there may be several. Where there may be none it is a std::optional.
 using MapId = uint32_t;
-
-/// Which camera of a session, from 0.
-using CameraId = uint32_t;
+/// A camera numbers the maps that it begins from behind this times its own number, so that no two begin maps
+/// of one number.
+inline constexpr MapId kMapsPerCamera = 1'000'000;
 
 }  // namespace dmslam
 

@@ -24,6 +24,16 @@ TEST(Ids, KeyframeIdHoldsSessionAndFrame) {
   EXPECT_FALSE(KeyframeId{}.valid());
 }
 
+TEST(Ids, KeyframesOfSeveralCamerasDifferAndAreOrderedByFrameWithinOne) {
+  const KeyframeId id = KeyframeId::Make(7, kMaxFrames - 1, kMaxCameras - 1);
+  EXPECT_EQ(id.session(), 7u);
+  EXPECT_EQ(id.camera(), kMaxCameras - 1);
+  EXPECT_EQ(id.frame_index(), kMaxFrames - 1);
+  EXPECT_EQ(KeyframeId::Make(7, 5, 0), KeyframeId::Make(7, 5)) << "one camera is camera 0";
+  EXPECT_LT(KeyframeId::Make(7, 5, 1), KeyframeId::Make(7, 6, 1));
+  EXPECT_LT(KeyframeId::Make(7, kMaxFrames - 1, 0), KeyframeId::Make(7, 0, 1));
+}
+
 TEST(Time, ParsesDecimalExactly) {
   EXPECT_EQ(ParseStampNs("1305031102.175304"), 1305031102175304000);
   EXPECT_EQ(ParseStampNs("1305031102.1753040001"), std::nullopt);

@@ -20,6 +20,7 @@ inline constexpr char kFramePose[] = "DMSLAM_FRONTEND_FRAME_POSE";
 inline constexpr char kFrameEvidence[] = "DMSLAM_FRONTEND_EVIDENCE";
 inline constexpr char kMapReset[] = "DMSLAM_FRONTEND_RESET";
 inline constexpr char kAdjustRequest[] = "DMSLAM_FRONTEND_ADJUST_REQUEST";
+inline constexpr char kTurnRequest[] = "DMSLAM_FRONTEND_TURN_REQUEST";
 // Not records: what may be lost.
 inline constexpr char kFrameDone[] = "DMSLAM_FRONTEND_FRAME_DONE";
 inline constexpr char kSequenceDone[] = "DMSLAM_FRONTEND_SEQUENCE_DONE";

@@ -21,7 +21,7 @@ using Messages =
     std::tuple<CameraInfo, Frame, EndOfSequence, GroundTruthPose, PlayerStatus,                      //
                SessionStart, InitialMap, KeyframeProposal, FramePose, FrameEvidence, MapReset,       //
                AdjustRequest, FrameDone, SequenceDone, Odometry, PoseView, FeatureView, FrameTrace,  //
-               FrontendStatus, MapDelta, MapperStatus, LoopAnswer, LoopcloserStatus>;
+               FrontendStatus, MapDelta, MapperStatus, LoopAnswer, LoopcloserStatus, TurnRequest>;
 
 /// Where a message travels and what it is there.
 struct MessageInfo {

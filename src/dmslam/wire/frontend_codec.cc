@@ -13,6 +13,7 @@
 #include "dmslam/pose_t.hpp"
 #include "dmslam/sequence_done_t.hpp"
 #include "dmslam/session_t.hpp"
+#include "dmslam/turn_request_t.hpp"
 #include "dmslam/wire/camera_fields.h"
 #include "dmslam/wire/enum_ranges.h"
 
@@ -257,6 +258,24 @@ struct Codec<AdjustRequest> {
 };
 
 template <>
+struct Codec<TurnRequest> {
+  using Wire = turn_request_t;
+  static constexpr const char* kChannel = channels::kTurnRequest;
+
+  static void Fields(auto& s, auto& m, auto& w) {
+    s.Utime(m.stamp_ns, w.utime);
+    s.OrMinusOne(m.stamp_ns, w.stamp_ns);
+    s(m.frame_index, w.frame_index);
+    s(m.camera_id, w.camera_id);
+  }
+  static void Validate(const TurnRequest& m, Checker& check) {
+    check.Require(m.frame_index < kMaxFrames, "number of the frame out of range");
+    check.Require(m.camera_id < kMaxCameras, "number of the camera out of range");
+    check.Stamp(m.stamp_ns);
+  }
+};
+
+template <>
 struct Codec<FrameDone> {
   using Wire = frame_done_t;
   static constexpr const char* kChannel = channels::kFrameDone;
@@ -444,6 +463,7 @@ DMSLAM_WIRE_MESSAGE(FramePose);
 DMSLAM_WIRE_MESSAGE(FrameEvidence);
 DMSLAM_WIRE_MESSAGE(MapReset);
 DMSLAM_WIRE_MESSAGE(AdjustRequest);
+DMSLAM_WIRE_MESSAGE(TurnRequest);
 DMSLAM_WIRE_MESSAGE(FrameDone);
 DMSLAM_WIRE_MESSAGE(SequenceDone);
 DMSLAM_WIRE_MESSAGE(Odometry);

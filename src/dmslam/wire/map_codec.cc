@@ -8,7 +8,7 @@ namespace dmslam::wire {
 
 template <>
 struct EnumRange<MapEvent> {
-  static constexpr auto kFirst = MapEvent::kKeyframeInserted, kLast = MapEvent::kFirstMapRefused;
+  static constexpr auto kFirst = MapEvent::kKeyframeInserted, kLast = MapEvent::kTurn;
   static constexpr const char* kName = "unknown event of the map";
 };
 
@@ -350,6 +350,7 @@ void ValidateEvent(const MapDelta& m, Checker& check) {
     case MapEvent::kSettled:
     case MapEvent::kMapped:
     case MapEvent::kMapStarted:
+    case MapEvent::kTurn:
       check.Require(m.about.has_value(), "an event of a keyframe that names none");
       break;
     case MapEvent::kMapAdjusted:
@@ -367,6 +368,20 @@ void ValidateEvent(const MapDelta& m, Checker& check) {
   }
   check.Require(m.request.has_value() == (m.event == MapEvent::kRequestDone),
                 "an answer to a request that names none, or a request without its answer");
+}
+
+constexpr int kSeqBits = 56;
+constexpr int64_t kSeqEnd = int64_t{1} << kSeqBits;
+
+/// With the camera whose frontend it is in the highest byte: of a single one it is the number alone.
+template <typename Copy, typename Progress>
+void FrontendSeq(Copy&, Progress& progress, int64_t& wire) {
+  if constexpr (Copy::kToWire) {
+    wire = (static_cast<int64_t>(progress.camera) << kSeqBits) | progress.frontend.seq;
+  } else {
+    progress.camera = static_cast<CameraId>(static_cast<uint64_t>(wire) >> kSeqBits);
+    progress.frontend.seq = wire & (kSeqEnd - 1);
+  }
 }
 
 /// Observations by keyframes that come with their features must name one of them.
@@ -403,7 +418,7 @@ struct Codec<MapDelta> {
     s(m.version, w.version);
     s(m.correction_id, w.correction_id);
     s(m.progress.frontend.epoch, w.frontend_epoch);
-    s(m.progress.frontend.seq, w.frontend_seq);
+    FrontendSeq(s, m.progress, w.frontend_seq);
     s(m.progress.loopcloser.epoch, w.loopcloser_epoch);
     s(m.progress.loopcloser.seq, w.loopcloser_seq);
     s(m.progress.settled, w.settled);
@@ -426,6 +441,9 @@ struct Codec<MapDelta> {
   }
   static void Validate(const MapDelta& m, Checker& check) {
     check.OptionalId(m.about, "impossible id of the keyframe it is about");
+    check.Require(m.progress.camera < kMaxCameras, "number of the camera out of range");
+    check.Require(m.progress.frontend.seq >= 0 && m.progress.frontend.seq < kSeqEnd,
+                  "impossible place in a stream");
     check.OptionalId(m.progress.settled, "impossible id of the keyframe settled last");
     check.Stamp(m.stamp_ns);
     check.Group(m.group);

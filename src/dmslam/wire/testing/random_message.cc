@@ -171,6 +171,11 @@ void MakeSound(AdjustRequest& m, Random&) {
   MakeSound(m.request);
 }
 
+void MakeSound(TurnRequest& m, Random&) {
+  m.camera_id %= kMaxCameras;
+  m.frame_index %= kMaxFrames;
+}
+
 void MakeSound(FrameDone& m, Random&) {
   MakeSoundCamera(m);
   MakeSound(m.session);
@@ -218,7 +223,9 @@ void MakeSound(FrontendStatus& m, Random& random) {
 }
 
 void MakeSound(MapDelta& m, Random& random) {
-  Draw(m.event, MapEvent::kKeyframeInserted, MapEvent::kFirstMapRefused, random);
+  Draw(m.event, MapEvent::kKeyframeInserted, MapEvent::kTurn, random);
+  m.progress.camera %= kMaxCameras;
+  m.progress.frontend.seq &= (int64_t{1} << 56) - 1;
   if (!m.about) m.about = KeyframeId::Make(1, 7);
   if (!m.map_id) m.map_id = 3;
   if (!m.correction_id) m.correction_id = 5;

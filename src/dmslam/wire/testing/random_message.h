@@ -122,6 +122,7 @@ void MakeSound(FramePose& m, Random& random);
 void MakeSound(FrameEvidence& m, Random& random);
 void MakeSound(MapReset& m, Random& random);
 void MakeSound(AdjustRequest& m, Random& random);
+void MakeSound(TurnRequest& m, Random& random);
 void MakeSound(FrameDone& m, Random& random);
 void MakeSound(SequenceDone& m, Random& random);
 void MakeSound(Odometry& m, Random& random);
