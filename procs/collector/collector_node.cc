@@ -49,7 +49,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
   run_.profile = options_.settings.profile();
   run_.seed = options_.settings.Read<RunOptions>().seed;
   run_.ground_truth = collector_.ground_truth;
-  frames_total_ = info.num_frames;
+  frames_.total = info.num_frames;
   OpenJournal();
   BeginCheckpoints();
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
@@ -220,10 +220,10 @@ void CollectorNode::KeepOnDisk(const Bytes& record) {
 
 /// Those that were placed later have been seen before.
 void CollectorNode::CountFrame(const FramePose& pose) {
-  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frame_) return;
-  newest_frame_ = pose.frame_index;
-  newest_stamp_ns_ = pose.stamp_ns;
-  ++frames_seen_;
+  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= frames_.newest) return;
+  frames_.newest = pose.frame_index;
+  frames_.newest_stamp_ns = pose.stamp_ns;
+  ++frames_.seen;
 }
 
 bool CollectorNode::TakeFrontendRecord() {
@@ -310,12 +310,12 @@ bool CollectorNode::MapMayBeKept() const {
   const auto& keyframes = builder_->map().keyframes();
   if (keyframes.empty() || MapHeld(*map_reader_).empty()) return false;
   const KeyframeId newest = keyframes.rbegin()->first;
-  return newest.session() != session_ || newest.frame_index() <= newest_frame_;
+  return newest.session() != session_ || newest.frame_index() <= frames_.newest;
 }
 
 void CollectorNode::KeepCheckpoint() {
   if (written_) return;
-  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), newest_stamp_ns_, session_start_);
+  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), frames_.newest_stamp_ns, session_start_);
   const std::string problem = checkpointer_->TakeProblem();
   if (problem.empty()) return;
   run_.disk_problems.push_back(problem);
@@ -431,15 +431,15 @@ void CollectorNode::Stop() {
 
 /// A camera has no end that is known.
 std::string CollectorNode::OfTotal() const {
-  return frames_total_ > 0 ? " of " + std::to_string(frames_total_) : "";
+  return frames_.total > 0 ? " of " + std::to_string(frames_.total) : "";
 }
 
 /// Into the log: where a first map stands, and every so many frames.
 void CollectorNode::SayProgress() {
   constexpr int64_t kEveryFrames = 20;
-  if (frames_seen_ < next_progress_ || builder_->map().keyframes().empty()) return;
-  next_progress_ = frames_seen_ + kEveryFrames;
-  LogInfo("frame {}{}, {} keyframes", frames_seen_, OfTotal(), builder_->map().keyframes().size());
+  if (frames_.seen < next_progress_ || builder_->map().keyframes().empty()) return;
+  next_progress_ = frames_.seen + kEveryFrames;
+  LogInfo("frame {}{}, {} keyframes", frames_.seen, OfTotal(), builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {
@@ -453,7 +453,7 @@ void CollectorNode::PublishStatus() {
   }
   if (!collector_.progress || !builder_ || written_) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",
-               run_.sequence.c_str(), static_cast<long long>(frames_seen_), OfTotal().c_str(),
+               run_.sequence.c_str(), static_cast<long long>(frames_.seen), OfTotal().c_str(),
                run_.frontend.inliers > 0 ? "tracking" : "waiting", run_.frontend.inliers,
                builder_->map().keyframes().size(), builder_->map().num_landmarks());
   std::fflush(stderr);

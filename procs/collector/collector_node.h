@@ -33,6 +33,13 @@ class CollectorNode : public StreamNode {
   void PublishStatus() override;
 
  private:
+  struct FrameCount {
+    int64_t total = 0;            ///< of the sequence, as far as the player said; 0: it did not
+    int64_t seen = 0;             ///< whose poses were heard
+    int64_t newest = -1;          ///< index of the newest
+    int64_t newest_stamp_ns = 0;  ///< its time
+  };
+
   bool TakeFrontendRecord();
   bool TakeMapRecord();
   std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
@@ -77,14 +84,11 @@ class CollectorNode : public StreamNode {
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
   std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal
   std::optional<SessionStart> session_start_;   ///< as the frontend said it
-  int64_t newest_stamp_ns_ = 0;                 ///< of the newest frame
   bool disk_warned_ = false;
   int64_t next_sync_ns_ = 0, next_counters_ns_ = 0;
   int64_t next_progress_ = 0;
   std::optional<EndOfSequence> end_;
-  int64_t frames_total_ = 0;
-  int64_t frames_seen_ = 0;
-  int64_t newest_frame_ = -1;
+  FrameCount frames_;
   int64_t drained_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
   bool frontend_ended_ = false;
