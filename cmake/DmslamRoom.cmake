@@ -19,15 +19,42 @@ if(DMSLAM_PRECOMPILE)
     <string> <thread> <unordered_map> <unordered_set> <variant> <vector>)
 endif()
 
-# For a library: a program is compiled with other options (-fPIE).
+# The files of <target> read the headers that were compiled once. CMake compiles a program's files with -fPIE; the compiler
+# takes headers compiled with -fPIC only where it says -fPIC, too. It compares the options by itself, and CMake asks it to say so (-Winvalid-pch).
+function(dmslam_use_precompiled target)
+  if(NOT DMSLAM_PRECOMPILE)
+    return()
+  endif()
+  get_target_property(type ${target} TYPE)
+  if(type STREQUAL EXECUTABLE)
+    target_compile_options(${target} PRIVATE -fPIC)
+  endif()
+  target_precompile_headers(${target} REUSE_FROM dmslam_precompiled)
+endfunction()
+
+# All programs of this project under <folder>.
+function(dmslam_programs_use_precompiled folder)
+  get_property(folders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(subfolder ${folders})
+    dmslam_programs_use_precompiled(${subfolder})
+  endforeach()
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  foreach(target ${targets})
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL EXECUTABLE)
+      dmslam_use_precompiled(${target})
+    endif()
+  endforeach()
+endfunction()
+
 function(dmslam_compile_together target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${DMSLAM_TOGETHER} UNITY_BUILD_BATCH_SIZE 0)
   if(DMSLAM_TOGETHER)  # the warning takes a file for a header where another one includes it
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()
   get_target_property(type ${target} TYPE)
-  if(DMSLAM_PRECOMPILE AND type STREQUAL STATIC_LIBRARY)
-    target_precompile_headers(${target} REUSE_FROM dmslam_precompiled)
+  if(type STREQUAL STATIC_LIBRARY)  # programs: dmslam_programs_use_precompiled
+    dmslam_use_precompiled(${target})
   endif()
 endfunction()
 
@@ -35,7 +62,7 @@ endfunction()
 function(dmslam_compile_lightly)
   foreach(target ${ARGN})
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
-    set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # made for other options
+    set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # measured: no faster with them, or slower
   endforeach()
 endfunction()
 
@@ -50,7 +77,9 @@ function(dmslam_room)
   if(ROOM_SRCS)
     add_library(${target} STATIC ${ROOM_SRCS})
     target_link_libraries(${target} PUBLIC dmslam_options ${ROOM_DEPS})
-    if(NOT ROOM_APART)
+    if(ROOM_APART)
+      dmslam_use_precompiled(${target})
+    else()
       dmslam_compile_together(${target})
     endif()
   else()

@@ -42,7 +42,7 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
     Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
             channels::kPlayerStatus, channels::kFrontendStatus},
            camera);
-    newest_frames_[camera] = -1;
+    frames_.newest[camera] = -1;
   }
   collector_.ground_truth.resize(options_.NumCameras());
   run_.others.resize(options_.NumCameras() - 1);
@@ -50,7 +50,7 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
-  frames_total_ += info.num_frames;
+  frames_.total += info.num_frames;
   if (info.camera_id == 0) {
     run_.sequence = info.sequence;
   } else {
@@ -243,11 +243,11 @@ void CollectorNode::KeepOnDisk(const Bytes& record) {
 
 /// Those that were placed later have been seen before.
 void CollectorNode::CountFrame(const FramePose& pose) {
-  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest_frames_[pose.camera_id])
-    return;
-  newest_frames_[pose.camera_id] = pose.frame_index;
-  newest_stamp_ns_ = pose.stamp_ns;
-  ++frames_seen_;
+  int64_t& newest = frames_.newest[pose.camera_id];
+  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest) return;
+  newest = pose.frame_index;
+  frames_.newest_stamp_ns = pose.stamp_ns;
+  ++frames_.seen;
 }
 
 bool CollectorNode::TakeFrontendRecord() {
@@ -351,7 +351,7 @@ void CollectorNode::BeginCheckpoints() {
 bool CollectorNode::MapMayBeKept() const {
   const Map& map = builder_->map();
   if (map.keyframes().empty() || MapHeld(*map_reader_).empty()) return false;
-  return std::ranges::all_of(newest_frames_, [&](const auto& item) {
+  return std::ranges::all_of(frames_.newest, [&](const auto& item) {
     const Keyframe* newest = map.NewestKeyframeOf(item.first);
     return newest == nullptr || newest->id.session() != session_ || newest->id.frame_index() <= item.second;
   });
@@ -359,7 +359,7 @@ bool CollectorNode::MapMayBeKept() const {
 
 void CollectorNode::KeepCheckpoint() {
   if (written_) return;
-  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), newest_stamp_ns_, session_start_);
+  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), frames_.newest_stamp_ns, session_start_);
   const std::string problem = checkpointer_->TakeProblem();
   if (problem.empty()) return;
   run_.disk_problems.push_back(problem);
@@ -488,15 +488,15 @@ void CollectorNode::Stop() {
 
 /// A camera has no end that is known.
 std::string CollectorNode::OfTotal() const {
-  return frames_total_ > 0 ? " of " + std::to_string(frames_total_) : "";
+  return frames_.total > 0 ? " of " + std::to_string(frames_.total) : "";
 }
 
 /// Into the log: where a first map stands, and every so many frames.
 void CollectorNode::SayProgress() {
   constexpr int64_t kEveryFrames = 20;
-  if (frames_seen_ < next_progress_ || builder_->map().keyframes().empty()) return;
-  next_progress_ = frames_seen_ + kEveryFrames;
-  LogInfo("frame {}{}, {} keyframes", frames_seen_, OfTotal(), builder_->map().keyframes().size());
+  if (frames_.seen < next_progress_ || builder_->map().keyframes().empty()) return;
+  next_progress_ = frames_.seen + kEveryFrames;
+  LogInfo("frame {}{}, {} keyframes", frames_.seen, OfTotal(), builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {
@@ -510,7 +510,7 @@ void CollectorNode::PublishStatus() {
   }
   if (!collector_.progress || !builder_ || written_) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",
-               run_.sequence.c_str(), static_cast<long long>(frames_seen_), OfTotal().c_str(),
+               run_.sequence.c_str(), static_cast<long long>(frames_.seen), OfTotal().c_str(),
                run_.frontend.inliers > 0 ? "tracking" : "waiting", run_.frontend.inliers,
                builder_->map().keyframes().size(), builder_->map().num_landmarks());
   std::fflush(stderr);

@@ -34,6 +34,13 @@ class CollectorNode : public StreamNode {
   void PublishStatus() override;
 
  private:
+  struct FrameCount {
+    int64_t total = 0;                   ///< of the sequence, as far as the player said; 0: it did not
+    int64_t seen = 0;                    ///< whose poses were heard
+    int64_t newest_stamp_ns = 0;         ///< time of the newest
+    std::map<CameraId, int64_t> newest;  ///< of every camera, its index; -1: none has come
+  };
+
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
   void OnEnd(const EndOfSequence& end);
@@ -82,14 +89,11 @@ class CollectorNode : public StreamNode {
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
   std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal
   std::optional<SessionStart> session_start_;   ///< as the frontend said it
-  int64_t newest_stamp_ns_ = 0;                 ///< of the newest frame
   bool disk_warned_ = false;
   int64_t next_sync_ns_ = 0, next_counters_ns_ = 0;
   int64_t next_progress_ = 0;
   std::map<CameraId, EndOfSequence> ends_;
-  int64_t frames_total_ = 0;
-  int64_t frames_seen_ = 0;
-  std::map<CameraId, int64_t> newest_frames_;  ///< -1 where none has come
+  FrameCount frames_;
   int64_t drained_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
   bool frontends_ended_ = false;
