@@ -489,10 +489,11 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
   return false;
 }
 
-/// Where motions were hard to tell apart before: whether the map found last says the same of the camera's.
-/// What holds for one view by chance seldom holds for the next.
+/// Where motions were hard to tell apart before, or the views are near each other in time: whether the map
+/// found last says the same of the camera's. What holds for one view by chance seldom holds for the next.
 bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
-  if (!window->doubtful) return true;
+  const bool sure = !window->doubtful && candidate.last().since_reference_s >= options_.sure_age_s;
+  if (sure) return true;
   const auto before = window->found;
   window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};
   if (!before) return false;

@@ -45,7 +45,8 @@ struct InitializerOptions {
   int max_references = 3;         ///< reference frames that are kept side by side
   double reference_step_s = 0.3;  ///< a new one is taken so long after the last
   int num_pairs = 3;              ///< pairs with the reference frame that must agree
-  double min_pair_step_s = 0.16;  ///< the frames of two such pairs are apart by so much at least
+  double min_pair_step_s = 0.1;   ///< the frames of two such pairs are apart by so much at least
+  double sure_age_s = 0.4;        ///< a map of views that are nearer in time must be found by the next, too
   double max_age_s = 2.0;         ///< an older reference frame is given up...
   double max_promising_age_s =
       4.0;                 ///< ...or one as old as this, where the pairs agree and only parallax is missing

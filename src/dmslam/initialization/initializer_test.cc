@@ -215,6 +215,19 @@ TEST(Initializer, StartsWhileTheCameraTurnsFast) {
   EXPECT_LT(DirectionError(room, 1, found->first), 0.1);
 }
 
+// A moment can be explained by somebody's motion that the next moment shows to be wrong.
+TEST(Initializer, AMapOfViewsNearInTimeMustBeFoundTwice) {
+  SyntheticRoom room(600, 100);
+  room.SetSpeed(0.03);
+  InitializerOptions options;
+  options.sure_age_s = 0;
+  const auto once = MapFrom(room, options, 0);
+  options.sure_age_s = 10;
+  const auto twice = MapFrom(room, options, 0);
+  ASSERT_TRUE(once.has_value() && twice.has_value());
+  EXPECT_GT(twice->frame1.index, once->frame1.index);
+}
+
 TEST(Initializer, StartsAtAnySize) {
   for (const double scale : {0.5, 2.0}) {
     const SyntheticRoom room(600, 100, 7, Scaled(SyntheticCamera(), scale));
