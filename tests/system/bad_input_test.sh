@@ -10,7 +10,7 @@ refused "no such folder" run --sequence "$work/none" --out "$work/o"
 refused "no-such-option" run --no-such-option
 refused "--out is missing" run --sequence "$synthetic"
 refused "whole number" run --sequence "$synthetic" --out "$work/o" --seed many
-refused "dm or baseline" run --sequence "$synthetic" --out "$work/o" --profile other
+refused "dm, baseline or paper" run --sequence "$synthetic" --out "$work/o" --profile other
 refused "speed" run --sequence "$synthetic" --camera "$camera" --out "$work/o" --speed fast
 
 mkdir -p "$work/empty"
