@@ -221,6 +221,17 @@ bool FinalPoses::IsSettled() const {
   return !IsMidRound() && (poses_.empty() || map_has_moved_ || rounds_ >= kRounds);
 }
 
+void FinalPoses::Drop(std::span<const uint8_t> drop) {
+  size_t kept = 0;
+  for (size_t i = 0; i < poses_.size(); ++i) {
+    if (drop[i] != 0) continue;
+    if (kept != i) poses_[kept] = std::move(poses_[i]);
+    ++kept;
+  }
+  poses_.resize(kept);
+  views_.clear();
+}
+
 std::vector<FramePose> FinalPoses::Take() {
   std::vector<FramePose> told;
   for (FinalPose& last : poses_) told.push_back(std::move(last.pose));

@@ -69,6 +69,9 @@ class FinalPoses {
   bool IsMidRound() const { return step_ != Step::kBetweenRounds; }
   /// Whether all rounds are made, or none can be made any more.
   bool IsSettled() const;
+  /// Forgets those that `drop` marks, by their present order.
+  void Drop(std::span<const uint8_t> drop);
+  std::span<const FinalPose> poses() const { return poses_; }
   /// Gives the poses and forgets them.
   std::vector<FramePose> Take();
 

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "dmslam/refinement/lone_poses.h"
+
 namespace dmslam {
 namespace {
 
@@ -14,7 +16,17 @@ FrameRefinerOptions ForSmoothing(FrameRefinerOptions options, bool smooth) {
 
 LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
                      const Camera& camera)
-    : refiner_(ForSmoothing(refiner, smooth)), search_(tracking, camera), smooth_(smooth) {}
+    : refiner_(ForSmoothing(refiner, smooth)),
+      search_(tracking, camera),
+      smooth_(smooth),
+      max_frames_(refiner.max_frames) {}
+
+void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
+  refiner_.Keep(frame, pose);
+  if (pose.state == TrackingState::kLocalizedLater) return;
+  tracked_ns_.push_back(pose.stamp_ns);
+  if (tracked_ns_.size() > max_frames_) tracked_ns_.pop_front();
+}
 
 void LastPoses::RefineNext(const Map& map) {
   const auto search = [&](TrackedFrame* frame) {
@@ -38,6 +50,11 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Keyfr
   }
   later.SetPose(reference, smooth_ ? later.measured : frame.T_cam_world);
   final_.Add(map, std::move(later));
+}
+
+std::vector<FramePose> LastPoses::Take() {
+  final_.Drop(StandAlone(final_.poses(), std::vector<int64_t>(tracked_ns_.begin(), tracked_ns_.end())));
+  return final_.Take();
 }
 
 bool LastPoses::Improve(const Map& map) {

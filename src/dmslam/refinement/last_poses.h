@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -20,7 +21,7 @@ class LastPoses {
             const Camera& camera);
 
   /// Keeps a tracked frame and the pose that was told of it.
-  void Keep(const TrackedFrame& frame, const FramePose& pose) { refiner_.Keep(frame, pose); }
+  void Keep(const TrackedFrame& frame, const FramePose& pose);
   /// Gives back the frames of a map that was wrong.
   std::vector<WaitingFrame> TakeFramesOf(MapId map_id) { return refiner_.TakeFramesOf(map_id); }
 
@@ -36,14 +37,16 @@ class LastPoses {
   bool Improve(const Map& map);
   /// Whether a round of that is under way: the map that is handed in must stay as it is.
   bool NeedsMapUnchanged() const { return final_.IsMidRound(); }
-  /// Gives the poses and forgets them.
-  std::vector<FramePose> Take() { return final_.Take(); }
+  /// Gives the poses, but those that stand alone, and forgets them.
+  std::vector<FramePose> Take();
 
  private:
   FrameRefiner refiner_;
   FinalPoses final_;
   PoseSearch search_;  ///< what refined frames see is not news of the map
   bool smooth_;
+  size_t max_frames_;
+  std::deque<int64_t> tracked_ns_;  ///< stamps of the newest frames that were tracked as they came
 };
 
 }  // namespace dmslam
