@@ -17,7 +17,7 @@ usage() {
   cat <<EOF
 Usage: reproduce.sh --tum DIR --out DIR [--seeds 10] [options]
 
-Runs 'baseline' and 'dm' with 3000 features per frame (as the DM-SLAM paper did) and with the defaults on the paper's
+Runs 'baseline', 'paper' and 'dm' with 3000 features per frame (as the DM-SLAM paper did) and with the defaults on the paper's
 four TUM RGB-D sequences, on the kitchen sequences and on rendered stand-ins, each with as many seeds as said, and writes
 DIR/report.md, DIR/report.json and DIR/pictures. Stopped at any time, the same command continues. Sequences that are not
 there are listed in the report with the address to get them from (scripts/get_tum.sh paper does it). The report shows all

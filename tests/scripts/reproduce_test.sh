@@ -77,19 +77,19 @@ for option in '--seeds 1' '--only fr1_xyz'; do
   expect 1 'report-only tells of all runs.*leave --seeds and --only out' "$reproduce" --out "$work/p" --report-only $option
 done
 
-# A whole run: 2 sequences x 2 profiles x 2 settings x 2 seeds. In a pipe, nothing is said but what is absent.
+# A whole run: 2 sequences x 3 profiles x 2 settings x 2 seeds. In a pipe, nothing is said but what is absent.
 expect 0 'report.json' "${run[@]}" --out "$work/a" --seeds 2
-check "16 runs" test "$(wc -l <"$CALLS")" -eq 16
-check "half of them with 3000 features" test "$(grep -c 'features.count=3000' "$CALLS")" -eq 8
-check "freiburg1 with its own camera" test "$(grep 'freiburg1_xyz' "$CALLS" | grep -c 'config/TUM1.yaml')" -eq 8
-check "pictures of the first seed only" test "$(grep -c -- '--pictures 31' "$CALLS")" -eq 8
-check "no progress in a pipe" test -z "$(grep -F '[1/16]' <<<"$output")"
+check "24 runs" test "$(wc -l <"$CALLS")" -eq 24
+check "half of them with 3000 features" test "$(grep -c 'features.count=3000' "$CALLS")" -eq 12
+check "freiburg1 with its own camera" test "$(grep 'freiburg1_xyz' "$CALLS" | grep -c 'config/TUM1.yaml')" -eq 12
+check "pictures of the first seed only" test "$(grep -c -- '--pictures 31' "$CALLS")" -eq 12
+check "no progress in a pipe" test -z "$(grep -F '[1/24]' <<<"$output")"
 for what in '\*0\.329\*' '\*0\.143\*' 'fr3_walking_rpy \| \*absent\*' 'cvg\.cit\.tum\.de' 'kitchen_walk2' '\| 98\.5 \| 1\.00 \| 2/2' \
-  'pictures/fr3_walking_xyz_defaults.png' '16 of 16 runs' 'Version of the programs: not recorded'; do
+  'pictures/fr3_walking_xyz_defaults.png' '24 of 24 runs' 'Version of the programs: not recorded'; do
   check "the report has $what" grep -qE -- "$what" "$work/a/report.md"
 done
 check "a picture" test -s "$work/a/pictures/fr1_xyz_features3000.png"
-for what in '^now: finished' '^runs done: 16 of 16' '^time left: 0 s' '^last run: fr1_xyz/defaults/dm/seed_2, done at '; do
+for what in '^now: finished' '^runs done: 24 of 24' '^time left: 0 s' '^last run: fr1_xyz/defaults/dm/seed_2, done at '; do
   check "progress.txt has $what" grep -qE -- "$what" "$work/a/progress.txt"
 done
 
@@ -100,7 +100,7 @@ check "nothing is run twice" test ! -s "$CALLS"
 expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 3
 check "only the new seed is run" test "$(grep -c -- '--seed 3' "$CALLS")" -eq "$(wc -l <"$CALLS")"
 expect 0 'report.md' "${run[@]}" --out "$work/a" --seeds 1 --only fr1_xyz
-check "one sequence and seed more leave the others in the report" grep -q '24 of 24 runs' "$work/a/report.md"
+check "one sequence and seed more leave the others in the report" grep -q '36 of 36 runs' "$work/a/report.md"
 check "with both sequences" grep -q '^| fr3_walking_xyz | dm | 3/3 ' "$work/a/report.md"
 for again in no yes; do
   expect 0 'report.md' "$reproduce" --out "$work/a" --report-only --publish "$work/docs/results.md"
@@ -121,10 +121,10 @@ cp -r "$tum" "$work/moved"
 rm "$work/h/plan.json"
 expect 0 'runs/fr1_xyz is not shown: the sequence is not where it was' "$reproduce" --out "$work/h" --report-only
 expect 0 'report.md' "$reproduce" --out "$work/h" --report-only --tum "$work/moved"
-check "the runs are shown" grep -q '24 of 24 runs' "$work/h/report.md"
+check "the runs are shown" grep -q '36 of 36 runs' "$work/h/report.md"
 check "no run is said not to be" test -z "$(grep 'is not shown' <<<"$output")"
 expect 0 'report.md' "$reproduce" --out "$work/h" --report-only
-check "and are the next time" grep -q '24 of 24 runs' "$work/h/report.md"
+check "and are the next time" grep -q '36 of 36 runs' "$work/h/report.md"
 check "from there" grep -qF "$work/moved/" "$work/h/plan.json"
 check "the plan is never there in halves" test ! -e "$work/h/plan.json.part"
 
@@ -141,18 +141,18 @@ check "so does progress.txt" grep -q '^now: stopped; the same command continues'
 check "its runner is gone" test ! -d "/proc/$(cat "$CALLS.pid")"
 before=$(wc -l <"$CALLS")
 expect 0 'report.md' "${run[@]}" --out "$work/b" --seeds 2 --only fr1_xyz
-check "it goes on where it was" test $(($(wc -l <"$CALLS") - before)) -eq 4
+check "it goes on where it was" test $(($(wc -l <"$CALLS") - before)) -eq 6
 
 # Runs that fail are reported, tried again the next time, and three in a row end it.
 expect 0 'dm/seed_1: exit status 7: it fell over' env FAIL=dm "${run[@]}" --out "$work/c" --seeds 1
-check "the report counts them" grep -q '4 of 8 failed or gave no trajectory' "$work/c/report.md"
+check "the report counts them" grep -q '4 of 12 failed or gave no trajectory' "$work/c/report.md"
 check "as nothing tracked" grep -qE '^\| fr1_xyz \| dm \| 0/1 \| 1 of 1 \| – \| 0\.0 \| 0\.0 \| 0\.0 ' "$work/c/report.md"
 check "progress.txt counts them" grep -q '^failed this time: 4' "$work/c/progress.txt"
 check "the report lists them" grep -q 'the run failed: exit status 7: it fell over' "$work/c/report.md"
 expect 0 'report.md' "${run[@]}" --out "$work/c" --seeds 1
 check "the second time they are well" test -z "$(grep 'the run failed' "$work/c/report.md")"
 expect 0 'seed_1: exit status 9: it fell over in the end' env FALL=dm "${run[@]}" --out "$work/f" --seeds 1 --only fr1_xyz
-check "a summary does not make a run that failed a good one" grep -q '2 of 4 failed' "$work/f/report.md"
+check "a summary does not make a run that failed a good one" grep -q '2 of 6 failed' "$work/f/report.md"
 printf '#!/bin/sh\necho it fell over\nexit 7\n' >"$work/broken"
 chmod +x "$work/broken"
 expect 1 '3 runs failed in a row; see .*log.txt' "${run[@]}" --out "$work/d" --runner "$work/broken"
@@ -168,7 +168,7 @@ cp -r "$tum/rgbd_dataset_freiburg1_xyz" "$work/short/fr1_xyz"
 cp -r "$tum/rgbd_dataset_freiburg3_walking_xyz" "$work/short/deeper/fr3_walking_xyz"
 : >"$CALLS"
 expect 0 'report.md' "$reproduce" --tum "$work/short" --no-render --data "$work/none" --runner "$work/runner" --out "$work/s" --seeds 1
-check "are found" test "$(wc -l <"$CALLS")" -eq 8
+check "are found" test "$(wc -l <"$CALLS")" -eq 12
 
 # A summary that was written in halves is a failed run in the report, and is run again.
 printf '{"tracked_percent": 98' >"$work/f/runs/fr1_xyz/defaults/dm/seed_1/summary.json"
@@ -178,7 +178,7 @@ check "half a summary is a failed run" grep -q 'the run failed: .*summary.json: 
 : >"$CALLS"
 expect 0 'report.md' "${run[@]}" --out "$work/f" --seeds 1 --only fr1_xyz
 check "it is run again" grep -q -- '--out [^ ]*/runs/fr1_xyz/defaults/dm/seed_1' "$CALLS"
-check "all four are well now" grep -q '4 of 4 runs' "$work/f/report.md"
+check "all six are well now" grep -q '6 of 6 runs' "$work/f/report.md"
 
 # Nothing is there: a report that lists what is absent.
 mkdir "$work/empty"

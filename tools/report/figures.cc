@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 constexpr double kNoPoint = std::numeric_limits<double>::quiet_NaN();
 
 PlotColor ColorOfProfile(const std::string& profile) {
-  return profile == "dm" ? kPlotPalette[0] : kPlotPalette[1];
+  if (profile == "dm") return kPlotPalette[0];
+  return profile == "paper" ? kPlotPalette[2] : kPlotPalette[1];
 }
 
 /// A run with the trajectories it is about.
@@ -136,12 +137,13 @@ void DrawSequence(const Results& results, const PlannedSequence& sequence, const
   pictures->push_back(Save(figure, FigureSection::kTrajectories, name, name + "_" + setting.name, out));
 }
 
-/// One point per seed, both profiles side by side above each sequence's name.
+/// One point per seed, the profiles side by side above each sequence's name.
 PlotPanel SeedsPanel(const Results& results, const Setting& setting, const std::vector<std::string>& names,
                      const std::function<std::optional<double>(const RunResult&)>& number) {
   PlotPanel panel;
   panel.column_span = 1;
   panel.x_categories = names;
+  const double middle = 0.5 * (static_cast<double>(results.plan.profiles.size()) - 1);
   for (size_t p = 0; p < results.plan.profiles.size(); ++p) {
     const std::string& profile = results.plan.profiles[p];
     PlotSeries series;
@@ -155,7 +157,7 @@ PlotPanel SeedsPanel(const Results& results, const Setting& setting, const std::
       for (const RunResult& run : cell == nullptr ? std::vector<RunResult>() : cell->runs) {
         const std::optional<double> value = number(run);
         if (!value) continue;
-        series.x.push_back(static_cast<double>(i) + (p == 0 ? -0.14 : 0.14));
+        series.x.push_back(static_cast<double>(i) + 0.2 * (static_cast<double>(p) - middle));
         series.y.push_back(*value);
       }
     }

@@ -80,7 +80,7 @@ int LargestSeedIn(const fs::path& runs_of_sequence) {
   return largest;
 }
 
-std::vector<std::string> PaperProfiles() { return {"baseline", "dm"}; }
+std::vector<std::string> PaperProfiles() { return {"baseline", "paper", "dm"}; }
 
 std::vector<Setting> PaperSettings() {
   return {{"features3000", "3000 features per frame, as in the paper", "features.count=3000"},

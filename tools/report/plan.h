@@ -30,7 +30,7 @@ struct Plan {
   int seeds = 10;
   std::vector<PlannedSequence> sequences;
   std::vector<Setting> settings;
-  std::vector<std::string> profiles;  // "baseline", "dm"
+  std::vector<std::string> profiles;  // "baseline", "paper", "dm"
 };
 
 /// One run of it.

@@ -59,7 +59,7 @@ TEST_F(Reproduction, FindsSequencesInTheRootAndOneFolderDeeper) {
   size_t present = 0;
   for (const PlannedSequence& sequence : plan.sequences) present += sequence.present() ? 1 : 0;
   EXPECT_EQ(present, 3u);
-  EXPECT_EQ(Runs(plan).size(), 3u * 2 * 2 * 3);
+  EXPECT_EQ(Runs(plan).size(), 3u * 2 * 3 * 3);
   SavePlan(plan, root_ / "out");
   EXPECT_EQ(Runs(LoadPlan(root_ / "out")).size(), Runs(plan).size());
   options_.only = {"kitchen", "fr3_walking_xyz"};
@@ -106,7 +106,7 @@ TEST_F(Reproduction, ReportHoldsOurFiguresThePapersAndWhatIsAbsent) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
   }
   const auto json = nlohmann::json::parse(ReportJson(results, std::nullopt));
-  EXPECT_EQ(json["results"].size(), 3u * 2 * 2);
+  EXPECT_EQ(json["results"].size(), 3u * 2 * 3);
   EXPECT_EQ(json["results"][0]["runs"].size(), 3u);
 }
 
@@ -252,7 +252,7 @@ TEST_F(Reproduction, WithoutAPlanTheRunsTell) {
   EXPECT_EQ(plan.seeds, 3);
   EXPECT_EQ(plan.sequences.size(), 3u);
   EXPECT_TRUE(Runs(plan).empty());  // nobody says where they are
-  EXPECT_EQ(Runs(PlanOfFolder(root_ / "out", options_.roots)).size(), 3u * 2 * 2 * 3);
+  EXPECT_EQ(Runs(PlanOfFolder(root_ / "out", options_.roots)).size(), 3u * 2 * 3 * 3);
   EXPECT_THROW(PlanOfFolder(root_ / "out", {root_ / "nowhere"}), InputError);
 }
 
