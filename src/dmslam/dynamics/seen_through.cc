@@ -212,8 +212,11 @@ int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& o
 
 int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
   Suspects suspects;
+  size_t landmarks = 0;
   for (const LandmarkId id : map.LandmarkIdsSorted()) {
-    if (map.FindLandmark(id)->map_id == map_id) AddIfUnproven(map, id, options, &suspects);
+    if (map.FindLandmark(id)->map_id != map_id) continue;
+    AddIfUnproven(map, id, options, &suspects);
+    ++landmarks;
   }
   std::vector<KeyframeId> witnesses;
   for (const auto& [id, keyframe] : map.keyframes()) {
@@ -221,8 +224,9 @@ int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const 
   }
   const double before = static_cast<double>(removed_before);
   const double seen_through = before + CondemnSeenThrough(map, witnesses, options, &suspects);
+  const bool any_proven = suspects.size() < landmarks;
   const bool somebody_stood =
-      seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
+      any_proven && seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
   for (auto& [id, suspect] : suspects) {
     if (somebody_stood && map.FindLandmark(id)->evidence.moved > 0) suspect.condemned = true;
   }

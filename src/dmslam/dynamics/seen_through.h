@@ -51,7 +51,8 @@ int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& o
 
 /// The same over a whole map when its sequence has ended. Where so many of the unproven were seen through
 /// (now, or `removed_before` while mapping) that somebody must have stood there, unproven landmarks that were
-/// ever found elsewhere go too, and those that nothing supports. Returns how many.
+/// ever found elsewhere go too, and those that nothing supports; not in a map too short to prove anything.
+/// Returns how many.
 int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options);
 
 }  // namespace dmslam

@@ -123,6 +123,15 @@ TEST_F(StandingPerson, GoesAtTheEndWhenTheWallWasSeenAfter) {
   EXPECT_EQ(CountLeft(map_, person), 0);
 }
 
+// Nothing is proven within two seconds: that a landmark is not says nothing against it.
+TEST_F(StandingPerson, AMapTooShortToProveAnythingIsNotEmptied) {
+  const std::vector<KeyframeId> all = {AddKeyframe(0, 0), AddKeyframe(10, 0.4), AddKeyframe(60, 2)};
+  const auto wall = AddLandmarks(kWallDepth, all.back(), false);
+  for (const KeyframeId id : all) See(id, wall, {});
+  constexpr uint64_t kManyBefore = 1000;
+  EXPECT_EQ(RemoveUnproven(map_, 1, kManyBefore, SeenThroughOptions()), 0);
+}
+
 TEST_F(StandingPerson, FurnitureIsProvenByTime) {
   const KeyframeId early = AddKeyframe(0, 0), early_too = AddKeyframe(10, 0.4);
   const KeyframeId late = AddKeyframe(300, 10), late_too = AddKeyframe(310, 10.4);

@@ -202,6 +202,7 @@ LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerif
       one_map ? SpreadOverGraph(map, loop, group, fusions, options, interrupt) : CarryMap(map, loop);
   if (answer.corrections.empty()) return {};
   answer.kind = LoopAnswer::Kind::kLoop;
+  answer.seen_from = loop.keyframe;
   answer.matched = loop.place;
   answer.correction_id = loop.keyframe.value;
   answer.fusions = std::move(fusions.pairs);

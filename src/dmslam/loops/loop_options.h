@@ -16,6 +16,7 @@ struct LoopcloserOptions {
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
   bool within_maps = true;         ///< off: only places of other maps are looked for
   double same_time_s = 0.5;        ///< between keyframes of two maps: nothing has moved far meanwhile
+  int asked_again = 2;  ///< with each keyframe, so many of other maps are looked for in all maps once more
 
   // What makes a place the same.
   int min_word_matches = 20;  ///< of landmarks, between the two keyframes

@@ -50,6 +50,7 @@ void LoopcloserCore::ForgetMap() {
   places_.Clear();
   detector_.Reset();
   proposals_.clear();
+  asked_again_ = {};
   awaited_correction_.reset();
 }
 
@@ -71,6 +72,7 @@ LoopAnswer LoopcloserCore::FindCorrection(KeyframeId id) {
   if (keyframes_since_loop_ <= options_.min_keyframes_between) return {};
   if (const std::optional<VerifiedLoop> loop = ConfirmProposed(*keyframe)) return Close(*loop);
   if (const std::optional<VerifiedLoop> loop = ProposePlace(*keyframe, candidates)) return Close(*loop);
+  if (const std::optional<VerifiedLoop> loop = AskAgain(*keyframe)) return Close(*loop);
   return {};
 }
 
@@ -158,6 +160,39 @@ std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyfram
       return std::nullopt;
     }
     ++counters_.refused_geometry;
+  }
+  return std::nullopt;
+}
+
+/// In turn, by their ids.
+std::vector<KeyframeId> LoopcloserCore::NextToAsk(const Keyframe& newest) const {
+  std::vector<KeyframeId> of_others;
+  for (const auto& [id, keyframe] : map_.keyframes()) {
+    if (keyframe.map_id != newest.map_id) of_others.push_back(id);
+  }
+  const auto next = std::ranges::upper_bound(of_others, asked_again_);
+  std::rotate(of_others.begin(), next, of_others.end());
+  of_others.resize(std::min(of_others.size(), static_cast<size_t>(std::max(0, options_.asked_again))));
+  return of_others;
+}
+
+std::optional<VerifiedLoop> LoopcloserCore::AskAgain(const Keyframe& newest) {
+  for (const KeyframeId id : NextToAsk(newest)) {
+    asked_again_ = id;
+    if (std::optional<VerifiedLoop> loop = FindInOtherMaps(map_.At(id))) return loop;
+  }
+  return std::nullopt;
+}
+
+std::optional<VerifiedLoop> LoopcloserCore::FindInOtherMaps(const Keyframe& keyframe) {
+  for (const KeyframeId candidate : detector_.DetectInOtherMaps(map_, places_, keyframe)) {
+    Verdict verdict;
+    verdict.place = candidate;
+    std::optional<VerifiedLoop> loop =
+        verifier_.Propose(map_, places_, keyframe, map_.At(candidate), &verdict.why);
+    verdict.accepted = loop && verifier_.HoldsBetweenMaps(*loop) && IsConfirmedAround(*loop);
+    verdicts_.push_back(verdict);
+    if (verdict.accepted) return loop;
   }
   return std::nullopt;
 }

@@ -70,6 +70,10 @@ class LoopcloserCore {
   /// loop at once where keyframes that are there already confirm it.
   std::optional<VerifiedLoop> ProposePlace(const Keyframe& keyframe,
                                            const std::vector<KeyframeId>& candidates);
+  /// Keyframes of maps that the camera has left see places that were not there when they came.
+  std::optional<VerifiedLoop> AskAgain(const Keyframe& newest);
+  std::optional<VerifiedLoop> FindInOtherMaps(const Keyframe& keyframe);
+  std::vector<KeyframeId> NextToAsk(const Keyframe& newest) const;
   bool IsConfirmedAround(const VerifiedLoop& loop) const;
   LoopAnswer Close(const VerifiedLoop& loop);
   LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
@@ -89,6 +93,7 @@ class LoopcloserCore {
     int confirmations = 0;
   };
   std::vector<Proposal> proposals_;  ///< oldest first
+  KeyframeId asked_again_;           ///< the last one; invalid: none
   int keyframes_since_loop_;
   bool adjustment_due_ = false;
   std::optional<uint64_t>

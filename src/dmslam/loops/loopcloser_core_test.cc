@@ -230,16 +230,17 @@ TEST(LoopcloserCoreTest, ALoopThatTheChainCannotHaveDriftedIsRefused) {
 /// Whether the answer lays the two maps onto one another as they are in truth, seen from the loop's
 /// keyframes.
 void ExpectWelds(const Room& room, const LoopAnswer& weld) {
-  const MapId map_id = room.map().FindKeyframe(weld.keyframe)->map_id;
+  const KeyframeId end = *weld.seen_from;
+  const MapId map_id = room.map().FindKeyframe(end)->map_id;
   EXPECT_NE(map_id, room.map().FindKeyframe(*weld.matched)->map_id);
   const auto whole = std::ranges::count_if(room.map().KeyframesOf(map_id), [&](const Keyframe* keyframe) {
     return keyframe->id <= weld.keyframe;
   });
   EXPECT_EQ(std::ssize(weld.corrections), whole) << "a map goes as a whole";
-  const int here = static_cast<int>(weld.keyframe.frame_index()) - 1;
+  const int here = static_cast<int>(end.frame_index()) - 1;
   const int there = static_cast<int>(weld.matched->frame_index()) - 1;
   const Rigid3d found =
-      Corrected(room, weld, weld.keyframe) * room.map().FindKeyframe(*weld.matched)->T_cam_world.Inverse();
+      Corrected(room, weld, end) * room.map().FindKeyframe(*weld.matched)->T_cam_world.Inverse();
   const Rigid3d truth = TruePose(here) * TruePose(there).Inverse();
   EXPECT_LT(AngleBetween(found.rotation, truth.rotation), 0.02);
   const double unit = map_id == 2 ? Drift(there).scale : SecondWorld().scale;  // of the place's map
@@ -256,6 +257,30 @@ TEST(LoopcloserCoreTest, AMapBegunMeanwhileIsWeldedToTheOldOne) {
   const LoopAnswer& weld = answers.loops.front();
   EXPECT_LE(static_cast<int>(weld.keyframe.frame_index()), kPerRound + 6) << "within a few seconds";
   ExpectWelds(room, weld);
+}
+
+/// The camera goes on to where the old map shows nothing. What that one has seen is there again in the new
+/// map.
+TEST(LoopcloserCoreTest, KeyframesOfAMapThatWasLeftAreAskedAgain) {
+  for (const int asked_again : {0, 2}) {
+    Room room({.second_map_at = 8});
+    LoopcloserOptions options;
+    options.asked_again = asked_again;
+    LoopcloserCore core = MakeCore(options);
+    std::optional<LoopAnswer> weld;
+    for (int k = 0; k < kKeyframes && !weld; ++k) {
+      const MapDelta delta = room.Next();
+      core.ApplyMapDelta(delta);
+      if (k < kPerRound + 18) continue;  // past what the old map shows
+      LoopAnswer answer = core.Check(*delta.about);
+      if (answer.kind == LoopAnswer::Kind::kLoop) weld = std::move(answer);
+    }
+    ASSERT_EQ(weld.has_value(), asked_again > 0);
+    if (!weld) continue;
+    EXPECT_EQ(room.map().FindKeyframe(*weld->seen_from)->map_id, 1u);
+    EXPECT_EQ(room.map().FindKeyframe(*weld->matched)->map_id, 2u);
+    ExpectWelds(room, *weld);
+  }
 }
 
 /// The old map is too young to have anything proven; what the camera sees of it now is.

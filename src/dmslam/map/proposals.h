@@ -135,7 +135,9 @@ struct LoopAnswer {
   uint64_t base_version = 0;              ///< map version it was computed on
   std::optional<uint64_t> correction_id;  ///< of a loop or a global adjustment
   enum class Kind : uint8_t { kNone = 0, kLoop = 1, kGlobalAdjustment = 2 } kind = Kind::kNone;
-  std::optional<KeyframeId> matched;  ///< the other end of a loop
+  /// The ends of a loop: the keyframe that sees the place, which is that answered or an older one that was
+  /// asked again; and the keyframe there.
+  std::optional<KeyframeId> seen_from, matched;
   struct KeyframeCorrection {
     KeyframeId keyframe;
     Sim3d corrected_from_base;  ///< world (corrected) from world (base), for what hangs on this keyframe

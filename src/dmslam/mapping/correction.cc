@@ -73,9 +73,9 @@ struct LoopEnds {
 };
 
 std::optional<LoopEnds> EndsOf(const Map& map, const LoopAnswer& answer) {
-  const std::optional<KeyframeId> here = map.ResolveKeyframe(answer.keyframe);
-  const std::optional<KeyframeId> there =
-      answer.matched ? map.ResolveKeyframe(*answer.matched) : std::nullopt;
+  if (!answer.seen_from || !answer.matched) return std::nullopt;
+  const std::optional<KeyframeId> here = map.ResolveKeyframe(*answer.seen_from);
+  const std::optional<KeyframeId> there = map.ResolveKeyframe(*answer.matched);
   if (!here || !there || *here == *there) return std::nullopt;
   return LoopEnds{map.At(*here), map.At(*there)};
 }

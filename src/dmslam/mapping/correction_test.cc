@@ -123,6 +123,7 @@ class Joining : public Correction {
     LoopAnswer answer = Answer({{Id(11), Up(-1)}, {Id(12), Up(-1)}, {Id(13), Up(-1)}});
     answer.kind = LoopAnswer::Kind::kLoop;
     answer.keyframe = Id(12);
+    answer.seen_from = Id(12);
     answer.matched = Id(2);
     answer.fusions.push_back({LandmarkId::Make(1, 220), LandmarkId::Make(1, 120)});
     return answer;

@@ -129,7 +129,10 @@ void MapperCore::CullYoung(MapId map_id) {
 
 void MapperCore::RemoveSeenThroughBy(const Keyframe& keyframe) {
   if (!options_.seen_through.enabled) return;
-  Count(RemoveSeenThrough(map_, keyframe.id, options_.seen_through), &counters_.landmarks_seen_through);
+  const MapId map_id = keyframe.map_id;
+  const int removed = RemoveSeenThrough(map_, keyframe.id, options_.seen_through);
+  Count(removed, &counters_.landmarks_seen_through);
+  Count(removed, &seen_through_[map_id]);
 }
 
 void MapperCore::Adjust(const Keyframe& keyframe) {
@@ -189,7 +192,7 @@ void MapperCore::AdjustMaps() {
     Publish(MapEvent::kMapAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.
-    Count(RemoveUnproven(map_, map_id, counters_.landmarks_seen_through, options_.seen_through),
+    Count(RemoveUnproven(map_, map_id, seen_through_[map_id], options_.seen_through),
           &counters_.landmarks_seen_through);
   }
   adjusted_ = true;
@@ -217,9 +220,10 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   MapProgress progress = map_.progress();
   progress.corrected = map_.version() + 1;  // that of the record which says so
   map_.SetProgress(progress);
-  const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(answer.keyframe);
+  const KeyframeId about = answer.seen_from.value_or(answer.keyframe);
+  const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(about);
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
-  Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe,
+  Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, about,
           anchor ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id, answer.note);
 }
 

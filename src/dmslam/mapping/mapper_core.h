@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -113,6 +114,7 @@ class MapperCore {
   Sink sink_;
   std::function<bool()> interrupt_, stop_;
   MapperCounters counters_;
+  std::map<MapId, uint64_t> seen_through_;  ///< landmarks of each map that were removed for it
 };
 
 }  // namespace dmslam

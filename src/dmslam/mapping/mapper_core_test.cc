@@ -197,6 +197,7 @@ class SecondVisit : public Corrections {
 TEST_F(SecondVisit, TiesEveryKeyframeOfItsSideToThePlace) {
   LoopAnswer answer;
   answer.keyframe = Id(3);
+  answer.seen_from = Id(3);
   answer.matched = Id(1);
   answer.base_version = core_.map().version();
   answer.correction_id = 7;

@@ -46,6 +46,7 @@ std::set<MapId> Shared(const Map& map, const std::vector<KeyframeId>& a, const s
 LoopcloserOptions BetweenMaps(LoopcloserOptions options) {
   options.enabled = true;
   options.within_maps = false;
+  options.asked_again = 0;  // each is asked here
   return options;
 }
 

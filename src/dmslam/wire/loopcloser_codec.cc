@@ -48,6 +48,7 @@ struct Codec<LoopAnswer> {
     GroupFields(s, m.group, w);
     s(m.base_version, w.base_version);
     s(m.correction_id, w.correction_id);
+    s(m.seen_from, w.seen_from);
     s(m.matched, w.matched);
     s.Count(m.corrections, w.num_corrections);
     CorrectionFields(s, m.corrections, w);
@@ -67,8 +68,10 @@ struct Codec<LoopAnswer> {
     check.Group(m.group);
     check.Require(m.correction_id.has_value() == (m.kind != LoopAnswer::Kind::kNone),
                   "a correction without an id, or an id without a correction");
-    check.Require(m.matched.has_value() == (m.kind == LoopAnswer::Kind::kLoop),
+    const bool loop = m.kind == LoopAnswer::Kind::kLoop;
+    check.Require(m.matched.has_value() == loop && m.seen_from.has_value() == loop,
                   "a loop has two ends, and nothing else has");
+    check.OptionalId(m.seen_from, "impossible id of the keyframe that sees the place");
     check.OptionalId(m.matched, "impossible id of the matched keyframe");
     for (const LoopAnswer::KeyframeCorrection& correction : m.corrections) {
       check.Id(correction.keyframe, "a correction of an impossible keyframe");

@@ -262,7 +262,11 @@ void MakeSound(LoopAnswer& m, Random& random) {
   const bool corrects = m.kind != LoopAnswer::Kind::kNone;
   m.correction_id = corrects ? std::optional<uint64_t>(1 + random.Below(1000)) : std::nullopt;
   m.matched.reset();
-  if (m.kind == LoopAnswer::Kind::kLoop) m.matched = KeyframeId::Make(1, random.Below(1000));
+  m.seen_from.reset();
+  if (m.kind == LoopAnswer::Kind::kLoop) {
+    m.matched = KeyframeId::Make(1, random.Below(1000));
+    m.seen_from = KeyframeId::Make(1, 1000 + random.Below(1000));
+  }
   MakeSound(m.group, random);
 }
 
