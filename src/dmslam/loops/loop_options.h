@@ -40,6 +40,10 @@ struct LoopcloserOptions {
   // that hangs in two places shows a quarter of it.
   int min_joining_proven = 50;
   double min_joining_proven_share = 0.7;
+  // Maps are joined where keyframes around see the place as well, or where so many others, each for itself,
+  // were found where the joined maps would have them, over so much time.
+  int joining_sightings = 2;
+  double joining_sightings_s = 0.5;
   int min_told = 20;  ///< landmarks that should be seen; of fewer the share seen says nothing
 
   // Somebody who stood in two places is matched as well as a room is. What he cannot be is there for long.

@@ -51,6 +51,7 @@ void LoopcloserCore::ForgetMap() {
   detector_.Reset();
   proposals_.clear();
   asked_again_ = {};
+  sightings_.Clear();
   awaited_correction_.reset();
 }
 
@@ -155,13 +156,19 @@ std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyfram
     verdict.accepted = loop.has_value();
     verdicts_.push_back(std::move(verdict));
     if (loop) {
-      if (loop->joins && verifier_.HoldsBetweenMaps(*loop) && IsConfirmedAround(*loop)) return loop;
+      if (loop->joins) sightings_.Add(*loop);
+      if (MayJoin(*loop)) return loop;
       proposals_.push_back({std::move(*loop), keyframe.stamp_ns, keyframe.stamp_ns, 0});
       return std::nullopt;
     }
     ++counters_.refused_geometry;
   }
   return std::nullopt;
+}
+
+bool LoopcloserCore::MayJoin(const VerifiedLoop& loop) const {
+  if (!loop.joins || !verifier_.HoldsBetweenMaps(loop)) return false;
+  return IsConfirmedAround(loop) || sightings_.BearOut(map_, loop, options_);
 }
 
 /// In turn, by their ids.
@@ -190,7 +197,8 @@ std::optional<VerifiedLoop> LoopcloserCore::FindInOtherMaps(const Keyframe& keyf
     verdict.place = candidate;
     std::optional<VerifiedLoop> loop =
         verifier_.Propose(map_, places_, keyframe, map_.At(candidate), &verdict.why);
-    verdict.accepted = loop && verifier_.HoldsBetweenMaps(*loop) && IsConfirmedAround(*loop);
+    if (loop) sightings_.Add(*loop);
+    verdict.accepted = loop && MayJoin(*loop);
     verdicts_.push_back(verdict);
     if (verdict.accepted) return loop;
   }

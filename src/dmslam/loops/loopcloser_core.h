@@ -10,6 +10,7 @@
 #include "dmslam/loops/loop_detector.h"
 #include "dmslam/loops/loop_options.h"
 #include "dmslam/loops/loop_verifier.h"
+#include "dmslam/loops/sightings.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/place_recognition/map_places.h"
@@ -74,6 +75,8 @@ class LoopcloserCore {
   std::optional<VerifiedLoop> AskAgain(const Keyframe& newest);
   std::optional<VerifiedLoop> FindInOtherMaps(const Keyframe& keyframe);
   std::vector<KeyframeId> NextToAsk(const Keyframe& newest) const;
+  /// Whether what was found of another map is enough to join the two.
+  bool MayJoin(const VerifiedLoop& loop) const;
   bool IsConfirmedAround(const VerifiedLoop& loop) const;
   LoopAnswer Close(const VerifiedLoop& loop);
   LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
@@ -94,6 +97,7 @@ class LoopcloserCore {
   };
   std::vector<Proposal> proposals_;  ///< oldest first
   KeyframeId asked_again_;           ///< the last one; invalid: none
+  Sightings sightings_;              ///< of one map in another
   int keyframes_since_loop_;
   bool adjustment_due_ = false;
   std::optional<uint64_t>

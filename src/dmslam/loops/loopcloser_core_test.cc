@@ -283,6 +283,20 @@ TEST(LoopcloserCoreTest, KeyframesOfAMapThatWasLeftAreAskedAgain) {
   }
 }
 
+/// What the neighbours of a keyframe see is not asked for here: others say the same of the two maps.
+TEST(LoopcloserCoreTest, KeyframesThatAgreeJoinTwoMaps) {
+  for (const int sightings : {2, 1000}) {
+    Room room({.second_map_at = kPerRound - 2});
+    LoopcloserOptions options;
+    options.confirm_for_s = 1000;
+    options.joining_sightings = sightings;
+    LoopcloserCore core = MakeCore(options);
+    const Answers answers = Play(room, core);
+    ASSERT_EQ(answers.loops.empty(), sightings == 1000);
+    if (!answers.loops.empty()) ExpectWelds(room, answers.loops.front());
+  }
+}
+
 /// The old map is too young to have anything proven; what the camera sees of it now is.
 TEST(LoopcloserCoreTest, AMapTooYoungToProveAnythingIsWeldedByWhatIsProvenInTheOther) {
   Room room({.second_map_at = 5});
