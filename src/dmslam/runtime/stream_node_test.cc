@@ -141,6 +141,7 @@ TEST_F(MapStreamTest, AGroupIsAppliedAsOneOrReplacedByASnapshot) {
   MapDelta first = AddKeyframe(1), second = AddKeyframe(2);
   first.group = {5, 0, 2};
   second.group = {5, 1, 2};
+  second.version = first.version, second.about = first.about;
   Publish(first);
   Run();
   EXPECT_EQ(holder_->map().keyframes().size(), 0U);
