@@ -159,10 +159,12 @@ MapDelta TourMap::Step() {
   if (recent_.size() > kRecent) recent_.erase(recent_.begin(), recent_.end() - kRecent);
   ++next_;
   if (done()) map_.AddLoopEdge(map_.keyframes().begin()->second, added);
-  return map_.TakeDelta(next_ == 1 ? MapEvent::kMapStarted
-                        : done()   ? MapEvent::kCorrected
-                                   : MapEvent::kMapped,
-                        keyframe.id, 1);
+  MapDelta change = map_.TakeDelta(next_ == 1 ? MapEvent::kMapStarted
+                                   : done()   ? MapEvent::kCorrected
+                                              : MapEvent::kMapped,
+                                   keyframe.id, 1);
+  if (done()) change.correction_id = keyframe.id.value;
+  return change;
 }
 
 }  // namespace dmslam
