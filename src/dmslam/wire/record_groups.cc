@@ -8,8 +8,8 @@ namespace dmslam::wire {
 namespace {
 
 /// What items take at most when they are encoded, and a record without any [bytes].
-constexpr size_t kRecordBytes = 512, kPoseBytes = 72, kLandmarkBytes = 124, kPositionBytes = 32,
-                 kEvidenceBytes = 32, kObservationBytes = 22, kDeadKeyframeBytes = 88,
+constexpr size_t kRecordBytes = 512, kPoseBytes = 72, kMoveBytes = 72, kLandmarkBytes = 124,
+                 kPositionBytes = 32, kEvidenceBytes = 32, kObservationBytes = 22, kDeadKeyframeBytes = 88,
                  kDeadLandmarkBytes = 16, kMapIdBytes = 4, kCorrectionBytes = 72, kFusionBytes = 16,
                  kOffsetBytes = 32;
 
@@ -27,6 +27,7 @@ auto Each(size_t bytes) {
 void ForEachList(const MapDelta*, const auto& visit) {
   visit(&MapDelta::keyframes, [](const KeyframeState& keyframe) { return BytesOf(keyframe); });
   visit(&MapDelta::keyframe_poses, Each(kPoseBytes));
+  visit(&MapDelta::reference_moves, Each(kMoveBytes));
   visit(&MapDelta::landmarks, Each(kLandmarkBytes));
   visit(&MapDelta::landmark_positions, Each(kPositionBytes));
   visit(&MapDelta::landmark_evidence, Each(kEvidenceBytes));
