@@ -115,6 +115,7 @@ LoopAnswer MakeLoop(const Map& map, double yaw_rad, double scale) {
   LoopAnswer answer;
   answer.kind = LoopAnswer::Kind::kLoop;
   answer.keyframe = map.keyframes().rbegin()->first;
+  answer.seen_from = answer.keyframe;
   answer.matched = map.keyframes().begin()->first;
   answer.correction_id = answer.keyframe.value;
   answer.base_version = map.version();
@@ -133,6 +134,7 @@ LoopAnswer MakeLoop(const Map& map, double yaw_rad, double scale) {
 LoopAnswer MakeAdjustment(const Map& map) {
   LoopAnswer answer = MakeLoop(map, 1e-4, 1.0001);
   answer.kind = LoopAnswer::Kind::kGlobalAdjustment;
+  answer.seen_from.reset();
   answer.matched.reset();
   for (const LandmarkId id : map.LandmarkIdsSorted())
     answer.landmark_offsets.push_back({id, {1e-4, -2e-4, 3e-4}});

@@ -63,6 +63,7 @@ LoopAnswer HeaderOf(const LoopAnswer& answer) {
   header.base_version = answer.base_version;
   header.correction_id = answer.correction_id;
   header.kind = answer.kind;
+  header.seen_from = answer.seen_from;
   header.matched = answer.matched;
   header.stamp_ns = answer.stamp_ns;
   return header;
@@ -140,8 +141,8 @@ bool TellOfOneChange(const MapDelta& a, const MapDelta& b) {
 
 bool TellOfOneChange(const LoopAnswer& a, const LoopAnswer& b) {
   const auto header = [](const LoopAnswer& answer) {
-    return std::tie(answer.keyframe, answer.base_version, answer.correction_id, answer.kind, answer.matched,
-                    answer.stamp_ns);
+    return std::tie(answer.keyframe, answer.base_version, answer.correction_id, answer.kind, answer.seen_from,
+                    answer.matched, answer.stamp_ns);
   };
   return header(a) == header(b);
 }
