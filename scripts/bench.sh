@@ -39,7 +39,7 @@ benches=(features_bench tracking_bench optimization_bench motion_segmentation_be
 if [[ -z $build ]]; then
   build=$top/build/release
   cmake -S "$top" --preset release -DDMSLAM_BUILD_BENCH=ON >/dev/null
-  ninja -C "$build" "${benches[@]}" extractor_quality hot_paths tour_bench late_comer dmslam-map-tour >&2
+  ninja -C "$build" "${benches[@]}" extractor_quality hot_paths tour_bench late_comer map_size dmslam-map-tour >&2
 fi
 mkdir -p "$out"
 for bench in "${benches[@]}"; do
@@ -84,6 +84,7 @@ status=0
 if ((tour)); then
   "$build/bin/tour_bench" | tee "$out/tour.txt" >&2 || status=1
   join_late | tee -a "$out/tour.txt" >&2 || status=1
+  "$build/bin/map_size" --file "$out/map_size.log" | tee "$out/map_size.txt" >&2 || status=1
 fi
 python3 "$top/scripts/bench_table.py" "$out" || status=1
 exit $status

@@ -142,11 +142,12 @@ void FrontendNode::TakeMapRecords() {
     if (record->begins_anew()) {
       held_.clear();
       promised_ = applied_;
+      map_begins_anew_ = true;
     }
     auto delta = ReadMapRecord(*record, map_reader_.get());
     if (!delta) continue;
-    held_.push_back({std::move(*delta), record->version(), record->begins_anew(), record->in_snapshot(),
-                     record->ends_snapshot()});
+    held_.push_back({std::move(*delta), record->version(), std::exchange(map_begins_anew_, false),
+                     record->in_snapshot(), record->ends_snapshot()});
   }
 }
 

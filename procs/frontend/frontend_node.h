@@ -123,9 +123,10 @@ class FrontendNode : public StreamNode {
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
   std::deque<HeldRecord>
-      held_;          ///< lock-step: not yet followed by a settled record; or an unfinished snapshot; or next
-  Version applied_;   ///< of the replica
-  Version promised_;  ///< the same, when all that is ready is applied
+      held_;  ///< lock-step: not yet followed by a settled record; or an unfinished snapshot; or next
+  bool map_begins_anew_ = false;  ///< with the next change that is whole
+  Version applied_;               ///< of the replica
+  Version promised_;              ///< the same, when all that is ready is applied
   std::optional<Waiting> waiting_;
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far

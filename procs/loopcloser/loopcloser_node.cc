@@ -55,7 +55,7 @@ void LoopcloserNode::Answer(KeyframeId keyframe) {
   const LoopAnswer answer = core_->Check(keyframe);
   const double ms = static_cast<double>(context_.now_ns() - begin_ns) * 1e-6;
   work_->Report([this, answer, ms] {
-    PublishRecord(answer);
+    PublishChange(answer);
     check_.Add(ms);
   });
 }

@@ -110,15 +110,21 @@ void MapperNode::BeginFetch() {
 /// Takes the newest replica, if there is one; true when that is done.
 bool MapperNode::FetchReplica() {
   while (std::optional<Record> record = left_.fetch->Take()) {
-    if (record->begins_anew()) left_.replica.emplace(core_->map().camera(), core_->map().pyramid());
-    const auto delta = Read<MapDelta>(*record->bytes);
-    if (!delta) {  // half a map is none: all of it is asked for again
+    if (record->begins_anew()) {
+      left_.replica.emplace(core_->map().camera(), core_->map().pyramid());
+      left_.groups.Clear();
+    }
+    auto delta = Read<MapDelta>(*record->bytes);
+    const bool readable = delta.has_value();
+    if (readable) delta = left_.groups.Add(std::move(*delta), record->term());
+    if (!left_.groups.fault().empty()) CountMalformed(record->channel, left_.groups.fault());
+    if (!readable || !left_.groups.fault().empty()) {  // half a map is none: all of it is asked for again
       endpoint_.Remove(left_.fetch.get());
       left_.replica.reset();
       BeginFetch();
       return false;
     }
-    left_.replica->Apply(*delta);
+    if (delta) left_.replica->Apply(*delta);
   }
   if (left_.fetch->state() == ReplicaFetch::State::kNone) return true;
   if (left_.fetch->state() != ReplicaFetch::State::kDone) return false;
@@ -194,9 +200,10 @@ void MapperNode::SettleAgain() {
 
 // ---- The frontend's and the loop closer's records ----
 
-void MapperNode::PublishDelta(const MapDelta& delta) {
-  PublishRecord(delta);
-  timing_.OnPublished(delta.event, context_.now_ns());
+void MapperNode::PublishDelta(MapDelta delta) {
+  const MapEvent event = delta.event;
+  PublishChange(std::move(delta));
+  timing_.OnPublished(event, context_.now_ns());
 }
 
 void MapperNode::Timing::OnPublished(MapEvent event, int64_t now_ns) {
@@ -248,11 +255,27 @@ void MapperNode::NoteArrivals() {
 void MapperNode::TakeLoopAnswers() {
   while (std::optional<Record> record = loop_reader_->Take()) {
     auto answer = Read<LoopAnswer>(*record->bytes);
+    answer_broken_ = answer_broken_ || !answer;
     if (!answer) continue;
-    answer = answer_groups_.Add(std::move(*answer));
-    if (!answer_groups_.fault().empty()) CountMalformed(record->channel, answer_groups_.fault());
+    const std::optional<uint64_t> correction_id = answer->correction_id;
+    answer = answer_groups_.Add(std::move(*answer), record->term());
+    if (!answer_groups_.abandoned().empty()) CountMalformed(record->channel, answer_groups_.abandoned());
+    if (!answer_groups_.fault().empty()) {
+      CountMalformed(record->channel, answer_groups_.fault());
+      answer_broken_ = true;
+      if (correction_id) broken_corrections_.push_back(*correction_id);
+    }
     if (answer) answers_.push_back({std::move(*answer), record->version()});
   }
+  RefuseBrokenCorrections();
+}
+
+/// Whoever proposed a correction that did not come whole hears so, and may propose it again.
+void MapperNode::RefuseBrokenCorrections() {
+  if (broken_corrections_.empty()) return;
+  Run([this, ids = std::exchange(broken_corrections_, {})] {
+    for (const uint64_t id : ids) core_->RefuseCorrection(id, "its records did not come whole");
+  });
 }
 
 /// The loaded map goes out as records like any other, and is settled: then lock-step goes on. One part at a
@@ -313,6 +336,7 @@ bool MapperNode::WorkOnce() {
   if (snapshots_->wanted()) endpoint_.Advance();  // now the map may be read
   if (!saved_.parts.empty()) return PublishSavedMap();
   TakeLoopAnswers();
+  if (!work_->Idle()) return false;
   while (!arrived_.empty()) {
     taken_.push_back(std::move(arrived_.front()));
     arrived_.pop_front();
@@ -429,7 +453,7 @@ void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend)
 /// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
 /// due.
 void MapperNode::SettleAwaited() {
-  bool ask_again = false;
+  bool ask_again = std::exchange(answer_broken_, false);
   while (!answers_.empty() && awaited_) {
     const KeyframeId answered = answers_.front().answer.keyframe;
     ApplyFirstAnswer();

@@ -77,6 +77,7 @@ class MapperNode : public StreamNode {
   struct LeftMap {
     std::unique_ptr<ReplicaFetch> fetch;
     std::optional<Replica> replica;
+    wire::RecordGroups<MapDelta> groups;
   };
   /// Lock-step: a keyframe to which the loop closer's answer is due.
   struct Awaited {
@@ -110,6 +111,7 @@ class MapperNode : public StreamNode {
   void BeginFetch();
   bool FetchReplica();
   void TakeLoopAnswers();
+  void RefuseBrokenCorrections();
   void SettleAgain();
   void ApplyFirstAnswer();
   void DrainAfterEnd();
@@ -129,7 +131,7 @@ class MapperNode : public StreamNode {
   void AcceptWhatIsSafe();
   bool KeyframeWaits() const;
   void NoteArrivals();
-  void PublishDelta(const MapDelta& delta);
+  void PublishDelta(MapDelta delta);
   void InterruptCore();
   bool EndIfDone();
   MapperStatus CoreStatus() const;
@@ -152,6 +154,8 @@ class MapperNode : public StreamNode {
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
   wire::RecordGroups<LoopAnswer> answer_groups_;
+  bool answer_broken_ = false;                ///< one was lost: who awaits it asks again
+  std::vector<uint64_t> broken_corrections_;  ///< whose records did not come whole: to be refused
   std::optional<Awaited> awaited_;
   std::optional<KeyframeId> last_settled_;
   Timing timing_;

@@ -89,8 +89,14 @@ void RecordsNode::AdvanceRecordedMap(int64_t until_order) {
   for (; next_map_record_ < map_records_.steps.size(); ++next_map_record_) {
     const ReplayStep& step = map_records_.steps[next_map_record_];
     if (step.message->order > until_order) return;
-    if (step.begins_anew) recorded_.Clear();
-    if (const auto delta = Read<MapDelta>(log_->Read(*step.message))) recorded_.Apply(*delta);
+    if (step.begins_anew) {
+      recorded_.Clear();
+      recorded_groups_.Clear();
+    }
+    auto delta = Read<MapDelta>(log_->Read(*step.message));
+    if (delta) delta = recorded_groups_.Add(std::move(*delta), step.term);
+    if (!recorded_groups_.fault().empty()) CountMalformed(channels::kMap, recorded_groups_.fault());
+    if (delta) recorded_.Apply(*delta);
   }
 }
 

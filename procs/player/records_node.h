@@ -41,7 +41,8 @@ class RecordsNode : public StreamNode {
   std::shared_ptr<const LogIndex> log_;
   Replay records_, map_records_;
   size_t next_record_ = 0, next_map_record_ = 0;
-  Replica recorded_;           ///< the map as it was when the next record was made
+  Replica recorded_;  ///< the map as it was when the next record was made
+  wire::RecordGroups<MapDelta> recorded_groups_;
   Replica live_;               ///< the map that is being made
   std::deque<MapDelta> held_;  ///< not yet followed by a settled record
   std::unique_ptr<StreamReader> map_reader_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "dmslam/evaluation/alignment.h"
 
@@ -44,12 +45,21 @@ void ViewerCore::OnMapDelta(const MapDelta& delta) {
 void ViewerCore::Mark(const MapDelta& delta) {
   for (const auto& state : delta.landmarks) dirty_points_.insert(state.id);
   for (const auto& state : delta.landmark_positions) dirty_points_.insert(state.id);
+  if (!delta.reference_moves.empty()) MarkMoved(delta.reference_moves);
   for (const auto& state : delta.landmark_evidence) dirty_points_.insert(state.id);
   for (const auto& tombstone : delta.landmark_tombstones) dirty_points_.insert(tombstone.id);
   for (const auto& state : delta.keyframes) dirty_keyframes_.insert(state.id);
   for (const auto& state : delta.keyframe_poses) dirty_keyframes_.insert(state.id);
   for (const auto& state : delta.observations) dirty_keyframes_.insert(state.keyframe);
   for (const auto& tombstone : delta.keyframe_tombstones) dirty_keyframes_.insert(tombstone.id);
+}
+
+void ViewerCore::MarkMoved(const std::vector<ReferenceMove>& moves) {
+  std::set<KeyframeId> references;
+  for (const ReferenceMove& move : moves) references.insert(move.reference);
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) {
+    if (references.contains(map_.At(id).reference)) dirty_points_.insert(id);
+  }
 }
 
 /// Frames that were told from a keyframe that is culled hang on the one that stands for it; those of a

@@ -60,6 +60,7 @@ class ViewerCore {
   void ChooseMap();
   void MarkAll();
   void Mark(const MapDelta& delta);
+  void MarkMoved(const std::vector<ReferenceMove>& moves);
   void HandFramesOn(const MapDelta& delta);
   void DrawPoint(LandmarkId id, Scene* scene);
   void DrawKeyframe(KeyframeId id, Scene* scene);

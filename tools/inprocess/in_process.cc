@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <tuple>
 #include <vector>
 
@@ -55,16 +56,18 @@ class System {
     recorder_ = std::make_unique<Recorder>(&bus_.AddPort(), path, [this] { return now_ns_ / 1000; });
   }
 
-  /// Runs until all are done, or one fails. Returns the first exit code that is not zero.
-  int Run(std::string* problem) {
-    const int code = RunNodes(problem);
+  /// Runs until all are done, one fails, or `stop` says so: then everyone writes what it has. Returns the
+  /// first exit code that is not zero.
+  int Run(const std::function<bool()>& stop, std::string* problem) {
+    const int code = RunNodes(stop, problem);
     if (recorder_) recorder_->Close();
     return code;
   }
 
  private:
-  int RunNodes(std::string* problem) {
+  int RunNodes(const std::function<bool()>& stop, std::string* problem) {
     while (true) {
+      if (stop && stop()) return StopNodes(problem);
       bool all_done = true;
       for (const auto& node : nodes_) {
         if (!node->exit_code()) node->Advance();
@@ -79,6 +82,18 @@ class System {
       while (bus_.DeliverOne()) delivered = true;
       if (!delivered) AdvanceClock();
     }
+  }
+
+  /// The collector, which was added first, last: by then the others have said what they had to say.
+  int StopNodes(std::string* problem) {
+    for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) {
+      if ((*node)->exit_code()) continue;
+      (*node)->Stop();
+      if ((*node)->exit_code().value_or(0) == 0) continue;
+      *problem = (*node)->problem();
+      return *(*node)->exit_code();
+    }
+    return 0;
   }
 
   void AdvanceClock() {
@@ -115,7 +130,7 @@ int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex
   AddMapSide(&options, &system);
   system.Add(
       std::make_unique<RecordsNode>(system.ContextFor("player"), options.node, std::move(log), log_session));
-  return system.Run(problem);
+  return system.Run(options.stop, problem);
 }
 
 int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, std::string* problem,
@@ -138,7 +153,7 @@ int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, 
     system.Add(std::make_unique<PlayerNode>(system.ContextFor(OfCamera("player", node.camera_id)),
                                             other.player, std::move(other.source)));
   }
-  return system.Run(problem);
+  return system.Run(options.stop, problem);
 }
 
 }  // namespace dmslam

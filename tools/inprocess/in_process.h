@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,8 +24,9 @@ struct InProcessOptions {
   std::string picture_dir;
   int picture_every = 0;
   bool progress = false;
-  MapperFiles map_files;  ///< maps to begin with and to save
-  std::string record;     ///< log of all that is said; empty: none
+  MapperFiles map_files;       ///< maps to begin with and to save
+  std::string record;          ///< log of all that is said; empty: none
+  std::function<bool()> stop;  ///< asked between steps: whether to write what there is and end; empty: never
 };
 
 /// Returns the collector's exit code; what went wrong is in `problem`. Instead of frames the frontend's

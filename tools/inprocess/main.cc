@@ -1,3 +1,4 @@
+#include <signal.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -96,6 +97,25 @@ std::vector<dmslam::AnotherCamera> OpenOthers(const Arguments& a, dmslam::Player
   return others;
 }
 
+/// SIGINT and SIGTERM wait until they are asked for: between two steps, so that results are complete.
+void BlockStopSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+/// The one that has come; 0: none.
+int StopSignal() {
+  sigset_t pending;
+  sigpending(&pending);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    if (sigismember(&pending, signal) == 1) return signal;
+  }
+  return 0;
+}
+
 int Run(const Arguments& a) {
   dmslam::InProcessOptions options;
   std::vector<std::string> overrides;
@@ -129,6 +149,8 @@ int Run(const Arguments& a) {
   options.picture_every = a.pictures;
   options.picture_dir = a.out + "/pictures";
   std::filesystem::create_directories(a.pictures > 0 ? options.picture_dir : a.out);
+  BlockStopSignals();
+  options.stop = [] { return StopSignal() != 0; };
   std::string problem;
   const int code =
       source ? dmslam::RunInProcess(std::move(options), std::move(source), &problem, std::move(others))
@@ -136,7 +158,7 @@ int Run(const Arguments& a) {
                                            std::make_shared<const dmslam::LogIndex>(a.records), a.log_session,
                                            &problem);
   if (!problem.empty()) dmslam::LogError("{}", problem);
-  return code;
+  return code == 0 && StopSignal() != 0 ? 128 + StopSignal() : code;
 }
 
 }  // namespace

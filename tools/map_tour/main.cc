@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   dmslam::CommandLine& app = process.app();
   app.AddOption("--keyframes", tour.tour.keyframes).InRange(1, 1'000'000).ShowDefault();
   app.AddOption("--landmarks", tour.tour.landmarks).InRange(1, 100'000'000).ShowDefault();
+  app.AddOption("--features", tour.tour.features, "of a keyframe, at least").InRange(0, 10'000).ShowDefault();
   app.AddOption("--seed", tour.tour.seed).ShowDefault();
   app.AddOption("--rate", tour.rate, "keyframes per second").InRange(0.1, 1e6).ShowDefault();
   return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "dmslam/mapping/correction.h"
+
 namespace dmslam {
 namespace {
 
@@ -115,12 +117,21 @@ Landmark TourMap::MakeLandmark(const Keyframe& keyframe) {
   return landmark;
 }
 
+MapDelta TourMap::Correct(const LoopAnswer& answer) {
+  ApplyCorrection(map_, answer, {});
+  const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
+  MapDelta change =
+      map_.TakeDelta(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, answer.keyframe, 1);
+  change.correction_id = answer.correction_id;
+  return change;
+}
+
 MapDelta TourMap::Step() {
   const double step = way_.back().walked / static_cast<double>(std::max<size_t>(1, options_.keyframes - 1));
   const size_t wanted = options_.landmarks * (next_ + 1) / options_.keyframes - landmarks_made_;
   const size_t again = std::min(kSeenAgain, recent_.size());
   FeatureSet features;
-  for (size_t i = 0; i < wanted + again; ++i) {
+  for (size_t i = 0; i < std::max(wanted + again, options_.features); ++i) {
     features.keypoints.push_back(
         {static_cast<uint16_t>(random_.Below(639 * 16)), static_cast<uint16_t>(random_.Below(479 * 16)),
          static_cast<uint8_t>(random_.Below(8)), static_cast<uint8_t>(random_.Below(256))});
@@ -148,10 +159,12 @@ MapDelta TourMap::Step() {
   if (recent_.size() > kRecent) recent_.erase(recent_.begin(), recent_.end() - kRecent);
   ++next_;
   if (done()) map_.AddLoopEdge(map_.keyframes().begin()->second, added);
-  return map_.TakeDelta(next_ == 1 ? MapEvent::kMapStarted
-                        : done()   ? MapEvent::kCorrected
-                                   : MapEvent::kMapped,
-                        keyframe.id, 1);
+  MapDelta change = map_.TakeDelta(next_ == 1 ? MapEvent::kMapStarted
+                                   : done()   ? MapEvent::kCorrected
+                                              : MapEvent::kMapped,
+                                   keyframe.id, 1);
+  if (done()) change.correction_id = keyframe.id.value;
+  return change;
 }
 
 }  // namespace dmslam

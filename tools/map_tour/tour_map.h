@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dmslam/map/map_editor.h"
+#include "dmslam/map/proposals.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -12,6 +13,7 @@ namespace dmslam {
 struct TourOptions {
   size_t keyframes = 5000;
   size_t landmarks = 300'000;
+  size_t features = 0;  ///< of a keyframe, at least; those beyond what it sees of the map see nothing
   uint64_t seed = 1;
 };
 
@@ -25,6 +27,8 @@ class TourMap {
   bool done() const { return next_ >= options_.keyframes; }
   /// Adds the next keyframe with its landmarks and returns the change.
   MapDelta Step();
+  /// Applies a correction, as a mapper would, and returns the change.
+  MapDelta Correct(const LoopAnswer& answer);
   const Map& map() const { return map_; }
   static Camera TourCamera();
 

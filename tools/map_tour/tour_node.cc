@@ -21,7 +21,7 @@ bool TourNode::WorkOnce() {
   const int64_t now = context_.now_ns();
   if (tour_->done() || now < next_ns_) return false;
   next_ns_ = std::max(next_ns_, now - 50'000'000) + static_cast<int64_t>(1e9 / tour_options_.rate);
-  PublishRecord(tour_->Step());
+  PublishChange(tour_->Step());
   endpoint_.Advance();
   PublishPose(tour_->map().keyframes().rbegin()->second);
   if (tour_->done()) {

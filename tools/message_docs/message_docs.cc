@@ -199,7 +199,12 @@ Made by `dmslam-message-docs` from `lcmtypes/*.lcm` and the table in `tools/mess
   Maps that camera 1 begins are numbered from 1000001. A map record says of one camera how far it is (`frontend_seq`).
 - Reserved, and not written yet: depths and sigmas of keypoints; positions of landmarks in
   their reference keyframe (`landmark_frame`; the world's coordinates are what the mapper computes with, and a change of frame
-  there and back changes their last bits); groups of records, which readers apply already.
+  there and back changes their last bits).
+- No record is longer than 1 MiB. A change that would be (`map_record_t`, `checked_t`) is a group of records, one behind the other in
+  their stream, with the same header of their own (event, version, progress ...), which are applied as one or not at all. Where one
+  is missing, doubled or of another change, nothing of the group is applied; a reader of the map then asks for a snapshot. A group
+  whose writer is succeeded before it is whole never happened: the successor goes on from before it.
+- A correction tells of keyframes: landmarks follow their reference keyframe (`move_...`), but for those whose position it tells.
 - `checksum` is CRC-32 as zlib, Python's `zlib.crc32` and Java's `CRC32` compute it. A message without it is dropped.
 - LCM has no unsigned integers: what is called unsigned keeps its bits.
 - Counts stand before the arrays that they count. Whoever receives checks the length, the counts and the values before

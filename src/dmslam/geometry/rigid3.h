@@ -50,6 +50,11 @@ struct Sim3d {
   Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
     return scale * (rotation * point) + translation;
   }
+  /// To the last bit.
+  bool operator==(const Sim3d& other) const {
+    return rotation.coeffs() == other.rotation.coeffs() && translation == other.translation &&
+           scale == other.scale;
+  }
   /// The pose with the scale taken out of the translation (ORB-SLAM's convention for corrected keyframes).
   Rigid3d ToRigid() const { return {rotation, translation / scale}; }
 };

@@ -290,6 +290,17 @@ void Map::Place(Landmark& landmark, const Eigen::Vector3d& p_world) {
   landmark.viewing_stale_ = true;
 }
 
+/// Each by itself: the order does not matter.
+void Map::MoveLandmarks(const std::vector<ReferenceMove>& moves) {
+  if (moves.empty()) return;
+  std::unordered_map<KeyframeId, const Sim3d*> move_of;
+  for (const ReferenceMove& move : moves) move_of[move.reference] = &move.after_from_before;
+  for (auto& [id, landmark] : landmarks_) {
+    const auto move = move_of.find(landmark.reference);
+    if (move != move_of.end()) Place(landmark, *move->second * landmark.p_world);
+  }
+}
+
 void Map::Hang(Keyframe& keyframe, KeyframeId parent) {
   Detach(keyframe.id, keyframe.parent);
   keyframe.parent = parent;

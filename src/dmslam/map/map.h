@@ -118,6 +118,8 @@ class Map {
   Landmark& Insert(Landmark landmark);  ///< without observations
   void Place(Keyframe& keyframe, const Rigid3d& T_cam_world, double scale, MapId map_id);
   static void Place(Landmark& landmark, const Eigen::Vector3d& p_world);
+  /// All landmarks whose reference is among those of `moves`, with it.
+  void MoveLandmarks(const std::vector<ReferenceMove>& moves);
   void Hang(Keyframe& keyframe, KeyframeId parent);
   /// The landmark is seen anew; its viewing range is stale.
   static void SetReference(Landmark& landmark, KeyframeId reference);

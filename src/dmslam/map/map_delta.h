@@ -70,6 +70,13 @@ struct LandmarkState {
   LandmarkEvidence evidence;
 };
 
+/// How all landmarks whose reference is `reference` move, unless the delta tells their positions: the world
+/// (after) from the world (before). The one thing in a delta that is told relative to what was.
+struct ReferenceMove {
+  KeyframeId reference;
+  Sim3d after_from_before;
+};
+
 struct LandmarkPosition {
   LandmarkId id;
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
@@ -121,8 +128,9 @@ struct MapProgress {
   bool operator==(const MapProgress&) const = default;
 };
 
-/// A change of the map as absolute values: applying it twice is applying it once. One delta becomes one map
-/// record.
+/// A change of the map as absolute values: applying it twice is applying it once. What is relative in it
+/// (ReferenceMove) is applied by whoever holds an older version alone. One delta becomes one map record, or a
+/// group of them.
 struct MapDelta {
   MapEvent event = MapEvent::kSnapshot;
   std::optional<KeyframeId> about;  ///< the keyframe whose arrival caused it
@@ -136,6 +144,7 @@ struct MapDelta {
   MapProgress progress;
   std::vector<KeyframeState> keyframes;
   std::vector<KeyframePose> keyframe_poses;
+  std::vector<ReferenceMove> reference_moves;  ///< a reference once
   std::vector<LandmarkState> landmarks;
   std::vector<LandmarkPosition> landmark_positions;
   std::vector<LandmarkEvidenceState> landmark_evidence;
@@ -145,9 +154,9 @@ struct MapDelta {
   std::vector<MapId> dropped_maps;
 
   bool Empty() const {
-    return keyframes.empty() && keyframe_poses.empty() && landmarks.empty() && landmark_positions.empty() &&
-           landmark_evidence.empty() && observations.empty() && keyframe_tombstones.empty() &&
-           landmark_tombstones.empty() && dropped_maps.empty();
+    return keyframes.empty() && keyframe_poses.empty() && reference_moves.empty() && landmarks.empty() &&
+           landmark_positions.empty() && landmark_evidence.empty() && observations.empty() &&
+           keyframe_tombstones.empty() && landmark_tombstones.empty() && dropped_maps.empty();
   }
 };
 

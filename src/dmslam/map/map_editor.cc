@@ -73,6 +73,11 @@ void MapEditor::SetPosition(const Landmark& landmark, const Eigen::Vector3d& p_w
   journal_.Note(landmark.id, LandmarkChange::kPosition);
 }
 
+void MapEditor::MoveWithReference(const Landmark& landmark, const Sim3d& after_from_before) {
+  Place(Mutable(landmark), after_from_before * landmark.p_world);
+  journal_.NoteMoveWithReference(landmark, after_from_before);
+}
+
 void MapEditor::SetEvidence(const Landmark& landmark, const LandmarkEvidence& evidence) {
   Mutable(landmark).evidence = evidence;
   journal_.Note(landmark.id, LandmarkChange::kEvidence);

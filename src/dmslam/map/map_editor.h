@@ -32,6 +32,9 @@ class MapEditor : public Map {
   /// The pose after a correction that also scales by `factor` what hangs on the keyframe.
   void SetPoseAndScale(const Keyframe& keyframe, const Rigid3d& T_cam_world, double factor);
   void SetPosition(const Landmark& landmark, const Eigen::Vector3d& p_world);
+  /// Moves a landmark as its reference moves. Once between two deltas, and all that have this reference are
+  /// either moved so or set: the delta tells the move once for all of them.
+  void MoveWithReference(const Landmark& landmark, const Sim3d& after_from_before);
   void SetEvidence(const Landmark& landmark, const LandmarkEvidence& evidence);
   /// `parent` need not be there, and may be none.
   void SetParent(const Keyframe& keyframe, KeyframeId parent);

@@ -19,6 +19,11 @@ void MapJournal::Forget(KeyframeId id) {
   observations_.erase(observations_.lower_bound({id, 0}), observations_.upper_bound({id, 0xffff}));
 }
 
+void MapJournal::NoteMoveWithReference(const Landmark& landmark, const Sim3d& after_from_before) {
+  const Sim3d& noted = reference_moves_.emplace(landmark.reference, after_from_before).first->second;
+  if (!(noted == after_from_before)) Note(landmark.id, LandmarkChange::kPosition);
+}
+
 void MapJournal::Write(const Map& map, MapDelta* delta) const {
   for (const auto& [id, changes] : keyframes_) {
     const Keyframe& keyframe = map.At(id);
@@ -29,6 +34,7 @@ void MapJournal::Write(const Map& map, MapDelta* delta) const {
       delta->keyframe_poses.push_back({id, keyframe.T_cam_world, keyframe.scale});
     }
   }
+  for (const auto& [reference, move] : reference_moves_) delta->reference_moves.push_back({reference, move});
   std::vector<std::pair<LandmarkId, uint8_t>> landmarks(landmarks_.begin(), landmarks_.end());
   std::sort(landmarks.begin(), landmarks.end());
   for (const auto& [id, changes] : landmarks) {

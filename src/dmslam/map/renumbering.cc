@@ -25,7 +25,8 @@ class Namer {
   explicit Namer(const Renumbering& names) : names_(names) {}
 
   void Rename(KeyframeId& id) const {
-    if (id.valid()) id = KeyframeId::Make(Named(names_.sessions, id.session()), id.frame_index(), id.camera());
+    if (id.valid())
+      id = KeyframeId::Make(Named(names_.sessions, id.session()), id.frame_index(), id.camera());
   }
   void Rename(LandmarkId& id) const {
     if (id.valid()) id = LandmarkId::Make(Named(names_.ordinals, id.epoch_ordinal()), id.number());
@@ -40,6 +41,7 @@ class Namer {
     std::ranges::sort(state.loop_edges);
   }
   void Rename(KeyframePose& pose) const { Rename(pose.id); }
+  void Rename(ReferenceMove& move) const { Rename(move.reference); }
   void Rename(LandmarkState& state) const {
     Rename(state.id);
     RenameMap(state.map_id);
@@ -121,6 +123,7 @@ MapDelta Renumbered(MapDelta delta, const Renumbering& names) {
   if (delta.progress.settled) namer.Rename(*delta.progress.settled);
   namer.RenameAll(delta.keyframes);
   namer.RenameAll(delta.keyframe_poses);
+  namer.RenameAll(delta.reference_moves);
   namer.RenameAll(delta.landmarks);
   namer.RenameAll(delta.landmark_positions);
   namer.RenameAll(delta.landmark_evidence);

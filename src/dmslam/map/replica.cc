@@ -13,6 +13,7 @@ void Replica::Apply(const MapDelta& delta) {
     applied_removed_keyframes_.insert(applied_removed_keyframes_.end(), gone.keyframes.begin(),
                                       gone.keyframes.end());
   }
+  if (delta.version > version()) MoveLandmarks(delta.reference_moves);
   ApplyKeyframes(delta);
   ApplyLandmarks(delta);
   ApplyObservations(delta);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "dmslam/map/snapshot.h"
@@ -39,6 +40,43 @@ TEST(Replica, EqualsTheOriginalAfterRandomEdits) {
     EXPECT_EQ(replica.version(), editor.map().version());
     EXPECT_EQ(replica.skipped_references(), 0u);
   }
+}
+
+TEST(Replica, FollowsCorrectionsThatAreToldOfKeyframesAlone) {
+  size_t moves = 0, landmarks_moved = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    RandomEditor editor(seed);
+    Replica replica(TestCamera(), Pyramid());
+    for (int round = 0; round < 20; ++round) {
+      editor.Steps(20);
+      if (round % 2 == 0) replica.Apply(editor.map().TakeDelta(MapEvent::kSettled, {}, 1));
+      if (round % 4 < 2) editor.Correct();
+      if (round % 4 == 0) editor.Steps(20);
+      const MapDelta delta = editor.map().TakeDelta(MapEvent::kSettled, {}, 1);
+      replica.Apply(delta);
+      if (round % 3 == 0) replica.Apply(delta);  // twice is once
+      moves += delta.reference_moves.size();
+      landmarks_moved += editor.map().num_landmarks() -
+                         std::min(editor.map().num_landmarks(), delta.landmark_positions.size());
+    }
+    ExpectSameMaps(editor.map(), replica);
+    EXPECT_EQ(replica.skipped_references(), 0u);
+  }
+  EXPECT_GT(moves, 100u);
+  EXPECT_GT(landmarks_moved, 1000u);
+}
+
+TEST(Replica, ALateComerDoesNotMoveLandmarksAgain) {
+  RandomEditor editor(3);
+  editor.Steps(300);
+  editor.map().TakeDelta(MapEvent::kSettled, {}, 1);
+  editor.Correct();
+  const MapDelta correction = editor.map().TakeDelta(MapEvent::kCorrected, {}, 1);
+  ASSERT_FALSE(correction.reference_moves.empty());
+  Replica replica(TestCamera(), Pyramid());
+  for (const MapDelta& part : CutSnapshot(editor.map(), {}, 3000)) replica.Apply(part);
+  replica.Apply(correction);
+  ExpectSameMaps(editor.map(), replica);
 }
 
 TEST(Replica, NamesTheKeyframesThatCameAndWent) {

@@ -52,8 +52,11 @@ void MoveLandmarks(MapEditor& map, const LoopAnswer& answer, const Corrections& 
     const Sim3d* correction = corrections.Of(landmark.reference);
     if (correction == nullptr) continue;
     const auto offset = offsets.find(id);
-    const Eigen::Vector3d beyond = offset == offsets.end() ? Eigen::Vector3d::Zero() : offset->second;
-    map.SetPosition(landmark, *correction * landmark.p_world + beyond);
+    if (offset == offsets.end()) {
+      map.MoveWithReference(landmark, *correction);
+    } else {
+      map.SetPosition(landmark, *correction * landmark.p_world + offset->second);
+    }
   }
 }
 

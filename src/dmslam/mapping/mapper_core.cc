@@ -208,6 +208,11 @@ void MapperCore::End(bool as_it_is) {
 
 // ---- Corrections ----
 
+void MapperCore::RefuseCorrection(uint64_t correction_id, const std::string& why) {
+  ++counters_.corrections_refused;
+  Publish(MapEvent::kRefused, {}, {}, correction_id, why);
+}
+
 void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   if (answer.kind == LoopAnswer::Kind::kNone) return;
   if (const std::string why = WhyRefused(map_, answer); !why.empty()) {

@@ -79,6 +79,8 @@ class MapperCore {
   void OnLoopAnswer(const LoopAnswer& answer);
   /// Says once more that keyframe `id` is mapped, for a loop closer that has not heard it.
   void AskAgain(KeyframeId id, MapId map_id) { Publish(MapEvent::kMapped, id, map_id); }
+  /// Says that a correction is not applied.
+  void RefuseCorrection(uint64_t correction_id, const std::string& why);
   /// Says that all that comes before a frame is in the map: its camera may work on it (lock-step of several).
   void GiveTurn(KeyframeId frame);
   /// Says that all work that keyframe `id` caused is done.

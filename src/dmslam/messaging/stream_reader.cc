@@ -31,6 +31,7 @@ StreamReader::StreamReader(Options options)
     : options_(std::move(options)),
       held_(options_.start),
       accepted_(options_.start),
+      taken_(options_.start),
       window_(options_.limits) {
   DMSLAM_CHECK(options_.id != 0, "a reader needs an id");
 }
@@ -116,8 +117,8 @@ void StreamReader::RetractWhatIsNot() {
   ++statistics_.dropped_doubtful;
   beacons_below_ = 0;
   window_.Retract(head_seq_);
-  const bool holds_of_it = held_.epoch == term_.epoch;
-  const int64_t next = holds_of_it ? held_.seq + 1 : 1;
+  const bool holds_of_it = taken_.epoch == term_.epoch;
+  const int64_t next = holds_of_it ? taken_.seq + 1 : 1;
   if (state_ == State::kFollowing && window_.next() > head_seq_ + 1 && next <= head_seq_ + 1)
     window_.Reset(next);
 }
@@ -185,7 +186,7 @@ void StreamReader::NeedSnapshot() {
 }
 
 void StreamReader::Forget() {
-  held_ = accepted_ = {};
+  held_ = accepted_ = taken_ = {};
   former_.clear();
   if (!term_.valid() || state_ == State::kRefusedVersion) return;
   problem_.clear();
@@ -347,14 +348,14 @@ std::optional<Record> StreamReader::Take() {
   if (!former_.empty()) {
     record = std::move(former_.front());
     former_.pop_front();
-    held_ = record->version();
   } else if (state_ == State::kSnapshot) {
     record = TakeFromSnapshot();
   } else if (state_ == State::kFollowing) {
     record = window_.Take();
-    if (record) held_ = record->version();
   }
   if (!record) return std::nullopt;
+  held_before_ = record->begins_anew() ? Version() : held_;
+  held_ = taken_ = record->version();
   ++statistics_.records;
   statistics_.payload_bytes += static_cast<int64_t>(record->bytes->size());
   return record;
@@ -363,7 +364,6 @@ std::optional<Record> StreamReader::Take() {
 std::optional<Record> StreamReader::TakeFromSnapshot() {
   std::optional<Record> record = snapshot_->window.Take();
   if (!record) return std::nullopt;
-  held_ = record->version();
   accepted_ = {};
   if (record->ends_snapshot()) {
     ++statistics_.snapshots;

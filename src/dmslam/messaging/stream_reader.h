@@ -77,6 +77,10 @@ class StreamReader : public StateMachine {
   /// The next record in order. The owner applies it now. When `begins_anew()` it forgets what it held before.
   std::optional<Record> Take();
 
+  /// The record taken last is a part of what the owner will apply as one: until the rest is here, what is
+  /// held stays as it was before.
+  void KeepHeld() { held_ = held_before_; }
+
   /// The owner has all records up to this version safe: this is what the writer hears. Versions of earlier
   /// terms and those that were not yet taken are ignored.
   void Accept(const Version& version);
@@ -99,7 +103,7 @@ class StreamReader : public StateMachine {
   bool AtEnd() const;
   /// What keeps this reader from following; empty when nothing does. Names the writer and the cure.
   const std::string& problem() const { return problem_; }
-  /// All records up to here were taken; empty inside a snapshot.
+  /// All records up to here were taken (KeepHeld: and are whole); empty inside a snapshot.
   const Version& held() const { return held_; }
   const Version& accepted() const { return accepted_; }
   const Term& term() const { return term_; }
@@ -147,6 +151,8 @@ class StreamReader : public StateMachine {
   State state_ = State::kNoWriter;
   Term term_;
   Version parent_, held_, accepted_;
+  Version taken_;        // the record taken last, be it of what is not whole yet
+  Version held_before_;  // what was held before that
   ReceiveWindow window_;
   std::deque<Record> former_;  // of the former term: complete, in order, not yet taken
   std::optional<Snapshot> snapshot_;

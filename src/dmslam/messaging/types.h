@@ -65,6 +65,8 @@ struct Record {
   /// Whether what the reader's owner holds is void from here on: the first record of a term that continues
   /// nothing, or of a snapshot.
   bool begins_anew() const { return header.seq == 1 && (fresh() || in_snapshot()); }
+  /// Who wrote it.
+  Term term() const { return {header.epoch, header.writer}; }
   /// What its owner holds once it has applied this; inside a snapshot nothing that is whole.
   Version version() const {
     if (!in_snapshot()) return {header.epoch, header.seq};

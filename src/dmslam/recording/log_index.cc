@@ -222,7 +222,8 @@ Extent ExtentOf(const RecordedTerm& term, int64_t last_seq, int64_t until_us) {
   return extent;
 }
 
-void AppendTerm(const RecordedTerm& term, int64_t last_seq, int64_t until_us, Replay* replay) {
+void AppendTerm(const Term& of, const RecordedTerm& term, int64_t last_seq, int64_t until_us,
+                Replay* replay) {
   const Extent extent = ExtentOf(term, last_seq, until_us);
   int64_t after = 0;
   const RecordedTerm::Snapshot* bridge = nullptr;
@@ -233,7 +234,7 @@ void AppendTerm(const RecordedTerm& term, int64_t last_seq, int64_t until_us, Re
   }
   if (bridge != nullptr) {
     *replay = Replay();
-    for (const auto& [number, piece] : bridge->pieces) replay->steps.push_back({&piece, number == 1});
+    for (const auto& [number, piece] : bridge->pieces) replay->steps.push_back({&piece, number == 1, of});
     after = bridge->cut;
   } else {
     replay->missing += extent.num_missing;
@@ -242,7 +243,7 @@ void AppendTerm(const RecordedTerm& term, int64_t last_seq, int64_t until_us, Re
   bool first = bridge == nullptr && term.fresh;
   for (const auto& [seq, message] : term.records) {
     if (seq <= after || seq > extent.last || message.utime_us > until_us) continue;
-    replay->steps.push_back({&message, std::exchange(first, false)});
+    replay->steps.push_back({&message, std::exchange(first, false), of});
   }
 }
 
@@ -251,7 +252,12 @@ void AppendTerm(const RecordedTerm& term, int64_t last_seq, int64_t until_us, Re
 Replay PlanReplay(const RecordedStream& stream, int64_t until_us) {
   // From the last term back through what each continues; a term counts up to where its successor took it
   // over.
-  std::vector<std::pair<const RecordedTerm*, int64_t>> chain;
+  struct Office {
+    Term term;
+    const RecordedTerm* recorded = nullptr;
+    int64_t last_seq = 0;
+  };
+  std::vector<Office> chain;
   int64_t last_seq = INT64_MAX;
   Version wanted{INT64_MAX, 0};
   for (auto it = stream.rbegin(); it != stream.rend(); ++it) {
@@ -260,14 +266,14 @@ Replay PlanReplay(const RecordedStream& stream, int64_t until_us) {
                                    [&](const auto& item) { return item.second.utime_us <= until_us; }) ||
                        !recorded.snapshots.empty();
     if (!begun || term.epoch > wanted.epoch) continue;
-    chain.emplace_back(&recorded, last_seq);
+    chain.push_back({term, &recorded, last_seq});
     if (recorded.fresh || recorded.parent.empty()) break;
     wanted = recorded.parent;
     last_seq = recorded.parent.seq;
   }
   Replay replay;
   for (auto link = chain.rbegin(); link != chain.rend(); ++link)
-    AppendTerm(*link->first, link->second, until_us, &replay);
+    AppendTerm(link->term, *link->recorded, link->last_seq, until_us, &replay);
   return replay;
 }
 

@@ -96,6 +96,7 @@ class LogIndex {
 struct ReplayStep {
   const RecordedMessage* message = nullptr;
   bool begins_anew = false;  ///< what was held before is void
+  Term term;                 ///< in which it was written
 };
 
 struct Replay {

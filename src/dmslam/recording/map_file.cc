@@ -93,8 +93,8 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
     std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
     if (delta) {
       ++rebuilt.records;
-      delta = groups.Add(std::move(*delta));
-      if (!groups.fault().empty()) ++rebuilt.missing;
+      delta = groups.Add(std::move(*delta), step.term);
+      if (!groups.fault().empty() || !groups.abandoned().empty()) ++rebuilt.missing;
     } else {
       ++rebuilt.missing;
     }

@@ -152,8 +152,10 @@ std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamRe
   std::string reason;
   std::optional<MapDelta> delta = wire::Decode<MapDelta>(*record.bytes, &reason);
   if (delta) {
-    delta = map_groups_.Add(std::move(*delta));
+    delta = map_groups_.Add(std::move(*delta), record.term());
     reason = map_groups_.fault();
+    if (!map_groups_.abandoned().empty()) CountMalformed(record.channel, map_groups_.abandoned());
+    if (map_groups_.open()) reader->KeepHeld();
   }
   if (reason.empty()) {
     if (delta) map_in_parts_ = delta->event == MapEvent::kSnapshot && !record.in_snapshot();
@@ -163,6 +165,17 @@ std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamRe
   map_groups_.Clear();
   reader->Forget();
   return std::nullopt;
+}
+
+/// What is too large for a record is a mistake of who made it; the others are spared it.
+int64_t StreamNode::PublishBytes(const std::string& channel, Bytes bytes) {
+  if (bytes.size() > wire::kMaxRecordBytes) {
+    WarnOnce("too large " + channel, "refused to publish a record of " + std::to_string(bytes.size()) +
+                                         " bytes on " + channel + "; at most " +
+                                         std::to_string(wire::kMaxRecordBytes) + " are allowed");
+    return writer_->last_seq();
+  }
+  return writer_->Publish(ChannelOfCamera(channel, options_.camera_id), std::move(bytes), context_.now_ns());
 }
 
 std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,

@@ -90,8 +90,14 @@ class StreamNode : public Node {
   /// Publishes a record of this node's stream; returns its sequence number.
   template <typename Message>
   int64_t PublishRecord(const Message& message) {
-    return writer_->Publish(ChannelOfCamera(wire::Info<Message>().channel, options_.camera_id),
-                            wire::Encode(message), context_.now_ns());
+    return PublishBytes(wire::Info<Message>().channel, wire::Encode(message));
+  }
+  /// Publishes a change that may be too large for one record; returns the number of the last one.
+  template <typename Message>
+  int64_t PublishChange(Message change) {
+    int64_t last = 0;
+    for (const Message& record : wire::Split(std::move(change))) last = PublishRecord(record);
+    return last;
   }
   /// Publishes a message that may be lost. `local`: large, and of use on this host only.
   template <typename Message>
@@ -111,9 +117,7 @@ class StreamNode : public Node {
   /// for a snapshot, so that nothing is applied to a replica that lacks it, and nothing acknowledged.
   std::optional<MapDelta> ReadMapRecord(const Record& record, StreamReader* reader);
   /// The version that a replica made of what ReadMapRecord returned holds.
-  Version MapHeld(const StreamReader& reader) const {
-    return map_groups_.open() || map_in_parts_ ? Version() : reader.held();
-  }
+  Version MapHeld(const StreamReader& reader) const { return map_in_parts_ ? Version() : reader.held(); }
   /// Whether a saved map is being published, and more of it is to come: what is here of it is no whole map.
   bool MapComesInParts() const { return map_in_parts_; }
   /// A message was dropped; the first one of a channel is logged.
@@ -140,6 +144,7 @@ class StreamNode : public Node {
   bool stopping_ = false;
 
  private:
+  int64_t PublishBytes(const std::string& channel, Bytes bytes);
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes);
   void OnOtherCamera(const CameraInfo& info);

@@ -20,6 +20,7 @@ class Holder : public StreamNode {
 
   const Map& map() const { return map_; }
   int applied() const { return applied_; }
+  Version held() const { return MapHeld(*reader_); }
   int64_t malformed() const { return MakeStatusHead("", {}).health.dropped_malformed; }
 
  private:
@@ -140,6 +141,7 @@ TEST_F(MapStreamTest, AGroupIsAppliedAsOneOrReplacedByASnapshot) {
   MapDelta first = AddKeyframe(1), second = AddKeyframe(2);
   first.group = {5, 0, 2};
   second.group = {5, 1, 2};
+  second.version = first.version, second.about = first.about;
   Publish(first);
   Run();
   EXPECT_EQ(holder_->map().keyframes().size(), 0U);
@@ -158,6 +160,156 @@ TEST_F(MapStreamTest, AGroupIsAppliedAsOneOrReplacedByASnapshot) {
   Run();
   EXPECT_EQ(holder_->malformed(), 1);
   EXPECT_EQ(holder_->map().keyframes().size(), 4U) << "the snapshot has them";
+}
+
+/// A group is broken in every way that there is: nothing of it is applied, it is counted, and the snapshot
+/// that is asked for brings what it should have brought.
+class BrokenGroupTest : public MapStreamTest {
+ protected:
+  struct Parts {
+    MapDelta a, b, c;
+  };
+  /// A change of three keyframes as a group of three records.
+  Parts Group(uint32_t frame) {
+    for (uint32_t i = 0; i < 3; ++i) map_.AddKeyframe(MakeKeyframe(frame + i));
+    const MapDelta change = map_.TakeDelta(MapEvent::kMapped, KeyframeId::Make(kSession, frame), 1);
+    std::vector<MapDelta> records = wire::Split(change, 1);
+    EXPECT_EQ(records.size(), 3U);
+    return {records[0], records[1], records[2]};
+  }
+  void ExpectRefused(const std::vector<MapDelta>& records) {
+    const int applied = holder_->applied();
+    for (const MapDelta& record : records) Publish(record);
+    mapper_.Advance();
+    while (bus_.DeliverOne()) {
+    }
+    holder_->Advance();
+    EXPECT_EQ(holder_->malformed(), 1);
+    EXPECT_EQ(holder_->applied(), applied) << "nothing of it";
+    Run();
+    EXPECT_EQ(holder_->map().keyframes().size(), map_.keyframes().size()) << "the snapshot has them";
+    const int64_t seq = Publish(AddKeyframe(100));
+    Run();
+    EXPECT_EQ(holder_->map().keyframes().size(), map_.keyframes().size());
+    EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
+    EXPECT_EQ(holder_->malformed(), 1);
+  }
+};
+
+TEST_F(BrokenGroupTest, APartIsMissing) {
+  const Parts group = Group(1);
+  ExpectRefused({group.a, group.c});
+}
+
+TEST_F(BrokenGroupTest, APartIsDoubled) {
+  const Parts group = Group(1);
+  ExpectRefused({group.a, group.b, group.b});
+}
+
+TEST_F(BrokenGroupTest, PartsAreOutOfOrder) {
+  const Parts group = Group(1);
+  ExpectRefused({group.b});
+}
+
+TEST_F(BrokenGroupTest, APartIsOfAnotherVersion) {
+  Parts group = Group(1);
+  ++group.b.version;
+  ExpectRefused({group.a, group.b});
+}
+
+TEST_F(BrokenGroupTest, AnotherGroupComesBetween) {
+  const Parts one = Group(1), other = Group(11);
+  ExpectRefused({one.a, other.a});
+}
+
+TEST_F(BrokenGroupTest, ARecordThatStandsAloneComesBetween) {
+  const Parts group = Group(1);
+  ExpectRefused({group.a, AddKeyframe(9)});
+}
+
+/// The mapper dies within a group. Its successor continues the replica, which is as it was before the group.
+TEST_F(BrokenGroupTest, TheWriterIsSucceededWithinAGroup) {
+  const int64_t before = Publish(AddKeyframe(30));
+  Run();
+  MapEditor successor_map(map_);
+  const Parts lost = Group(1);
+  Publish(lost.a);
+  Publish(lost.b);
+  Run();
+  EXPECT_EQ(holder_->map().keyframes().size(), 1U);
+  EXPECT_EQ(holder_->held(), (Version{10, before})) << "what a successor may continue";
+
+  StreamWriter::Options options;
+  options.session = kSession;
+  options.stream = StreamId::kMap;
+  options.owner = "MAPPER";
+  options.name = "successor";
+  options.schema_hash = SchemaHash();
+  options.roles = {{"collector", true}};
+  MapSnapshots snapshots(&successor_map);
+  mapper_.Remove(writer_.get());
+  writer_ = std::make_unique<StreamWriter>(options, Term{20, 9}, holder_->held(), &snapshots);
+  mapper_.AddWriter(writer_.get(), "MAPPER", {"COLLECTOR"});
+  successor_map.AddKeyframe(MakeKeyframe(40));
+  Publish(successor_map.TakeDelta(MapEvent::kMapped, KeyframeId::Make(kSession, 40), 1));
+  Run();
+  EXPECT_EQ(holder_->map().keyframes().size(), 2U);
+  EXPECT_NE(holder_->map().FindKeyframe(KeyframeId::Make(kSession, 40)), nullptr);
+  EXPECT_EQ(holder_->map().FindKeyframe(KeyframeId::Make(kSession, 1)), nullptr);
+  EXPECT_EQ(holder_->malformed(), 1) << "the group is named";
+  EXPECT_EQ(writer_->statistics().snapshots, 0) << "the replica is good";
+  EXPECT_EQ(holder_->held(), (Version{20, 1}));
+}
+
+/// Publishes whatever it is told to.
+class Publisher : public StreamNode {
+ public:
+  Publisher(NodeContext context, NodeOptions options)
+      : StreamNode(std::move(context), std::move(options), "mapper") {}
+  using StreamNode::PublishChange;
+  using StreamNode::PublishRecord;
+  const StreamWriter* writer() const { return writer_.get(); }
+
+ private:
+  void Begin(const CameraInfo&) override { WantWriter({StreamId::kMap, {"collector"}, {}, nullptr}); }
+  bool WorkOnce() override { return false; }
+};
+
+TEST(RecordBoundTest, ARecordAboveTheBoundIsRefusedAndAChangeIsSplit) {
+  MemoryBus bus;
+  int64_t now_ns = kMs;
+  NodeContext context;
+  context.bus = &bus.AddPort();
+  Bus* other = &bus.AddPort();
+  context.now_ns = [&] { return now_ns; };
+  context.wall_us = [&] { return now_ns / 1000; };
+  context.random_id = 7;
+  context.fresh_system = true;
+  NodeOptions options;
+  options.session = kSession;
+  Publisher publisher(context, options);
+  CameraInfo info;
+  info.session = kSession;
+  info.camera = TestCamera();
+  other->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+  for (int i = 0; i < 10; ++i) {
+    while (bus.DeliverOne()) {
+    }
+    publisher.Advance();
+    now_ns += 10 * kMs;
+  }
+  ASSERT_NE(publisher.writer(), nullptr);
+  MapDelta change;
+  change.event = MapEvent::kGloballyAdjusted;
+  change.correction_id = 1;
+  change.version = 5;
+  for (uint64_t i = 0; i < 100'000; ++i)
+    change.landmark_positions.push_back({LandmarkId::Make(1, i + 1), {1, 2, 3}});
+  ASSERT_GT(wire::Encode(change).size(), wire::kMaxRecordBytes);
+  EXPECT_EQ(publisher.PublishRecord(change), 0) << "nothing is published";
+  EXPECT_EQ(publisher.writer()->last_seq(), 0);
+  EXPECT_EQ(publisher.PublishChange(change), 4);
+  EXPECT_EQ(publisher.writer()->last_seq(), 4);
 }
 
 }  // namespace

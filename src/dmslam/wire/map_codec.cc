@@ -195,6 +195,17 @@ void PoseChangeColumns(auto& s, auto& m, auto& w) {
   s.Column(m.keyframe_poses, w.pose_scale, &Pose::scale);
 }
 
+void ReferenceMoveColumns(auto& s, auto& m, auto& w) {
+  using Move = ReferenceMove;
+  auto& moves = m.reference_moves;
+  s.Count(moves, w.num_moves);
+  s.Column(moves, w.move_reference, &Move::reference);
+  PoseColumns<&Move::after_from_before>(s, moves, w.move_qx, w.move_qy, w.move_qz, w.move_qw, w.move_tx,
+                                        w.move_ty, w.move_tz);
+  s.Column(
+      moves, w.move_scale, [](auto& item) -> auto& { return item.after_from_before.scale; });
+}
+
 void LandmarkColumns(auto& s, auto& m, auto& flat, auto& w) {
   using State = LandmarkState;
   s.Count(flat.landmark_keyframes, w.num_landmark_keyframes);
@@ -316,6 +327,12 @@ void ValidateKeyframes(const MapDelta& m, Checker& check) {
 }
 
 void ValidateLandmarks(const MapDelta& m, Checker& check) {
+  for (const ReferenceMove& move : m.reference_moves) {
+    check.OptionalId(move.reference, "landmarks move with an impossible keyframe");
+    check.UnitQuaternion(move.after_from_before.rotation, "landmarks move without a rotation");
+    check.Position(move.after_from_before.translation, "landmarks move without a translation");
+    check.Scale(move.after_from_before.scale, "scale of a move of landmarks out of range");
+  }
   for (const LandmarkState& landmark : m.landmarks) {
     check.Id(landmark.id, "impossible id of a landmark");
     check.Require(landmark.map_id >= 1, "a landmark without a map");
@@ -428,6 +445,7 @@ struct Codec<MapDelta> {
     if constexpr (Copy::kToWire) flat = Flatten(m);
     KeyframeColumns(s, m, flat, w);
     PoseChangeColumns(s, m, w);
+    ReferenceMoveColumns(s, m, w);
     LandmarkColumns(s, m, flat, w);
     LandmarkChangeColumns(s, m, w);
     ObservationColumns(s, m, flat, w);

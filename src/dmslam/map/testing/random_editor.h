@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -33,6 +34,29 @@ class RandomEditor {
   explicit RandomEditor(uint64_t seed) : random_(seed), map_(TestCamera(), Pyramid()) {}
 
   MapEditor& map() { return map_; }
+
+  /// What a loop does: keyframes move, and landmarks with their references. Once between two deltas.
+  void Correct() {
+    std::map<KeyframeId, Sim3d> moves;
+    for (const auto& [id, keyframe] : map_.keyframes()) {
+      if (random_.Below(3) == 0) continue;
+      const Sim3d move(ExpSo3({0, random_.Uniform(-0.1, 0.1), 0}), {random_.Uniform(), 0, random_.Uniform()},
+                       random_.Uniform(0.9, 1.1));
+      const Sim3d corrected = Sim3d(keyframe.T_cam_world) * move.Inverse();
+      map_.SetPoseAndScale(keyframe, corrected.ToRigid(), move.scale);
+      moves.emplace(id, move);
+    }
+    for (const LandmarkId id : map_.LandmarkIdsSorted()) {
+      const Landmark& landmark = map_.At(id);
+      const auto move = moves.find(landmark.reference);
+      if (move == moves.end()) continue;
+      if (random_.Below(5) == 0) {
+        map_.SetPosition(landmark, {random_.Uniform(), random_.Uniform(), 4});
+      } else {
+        map_.MoveWithReference(landmark, move->second);
+      }
+    }
+  }
 
   void Step() {
     switch (random_.Below(10)) {

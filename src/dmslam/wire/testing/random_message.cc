@@ -242,6 +242,7 @@ void MakeSound(MapDelta& m, Random& random) {
     MakeSound(keyframe.features, random);
   }
   for (KeyframePose& pose : m.keyframe_poses) pose.scale = random.Uniform(0.1, 10);
+  for (ReferenceMove& move : m.reference_moves) move.after_from_before.scale = random.Uniform(0.1, 10);
   for (LandmarkState& landmark : m.landmarks) MakeSound(landmark.map_id);
   for (KeyframeTombstone& dead : m.keyframe_tombstones) dead.parent_scale = random.Uniform(0.1, 10);
   for (LandmarkTombstone& dead : m.landmark_tombstones) {
