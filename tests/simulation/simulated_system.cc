@@ -1,0 +1,323 @@
+#include "simulated_system.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include "collector/make_collector.h"
+#include "dmslam/recording/checkpoint.h"
+#include "dmslam/runtime/exit_codes.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/not_yet_error.h"
+#include "frontend/make_frontend.h"
+#include "loopcloser/make_loopcloser.h"
+#include "mapper/make_mapper.h"
+#include "player/player_node.h"
+
+namespace dmslam::simulation {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kSecond = 1000 * kMs;
+constexpr int64_t kBeginNs = kSecond;
+constexpr int64_t kWallUs = 1'700'000'000'000'000;  // at the beginning
+constexpr int64_t kLongestNs = 3600 * kSecond;
+constexpr int64_t kStepNs = 20'000;  // what happens within it happens at once
+constexpr uint32_t kSession = 1;
+
+/// Plays a sequence that is in memory.
+class StoredFrames : public FrameSource {
+ public:
+  explicit StoredFrames(const std::vector<StoredFrame>* frames) : frames_(frames) {}
+  size_t size() const override { return frames_->size(); }
+  int64_t StampNs(size_t index) const override { return (*frames_)[index].stamp_ns; }
+  std::string Name(size_t index) const override { return "frame " + std::to_string(index); }
+  EncodedImage Read(size_t index) override { return (*frames_)[index].image; }
+
+ private:
+  const std::vector<StoredFrame>* frames_;
+};
+
+/// The clocks of a host: none agrees with another one's.
+struct Host {
+  int64_t up_since_ns = 0;  ///< of its monotonic clock
+  int64_t wall_us = 0;      ///< how far its wall clock is off
+};
+
+/// A process, or the place where one was and will be again.
+struct Process {
+  std::string role;
+  int host = 0;
+  int lives = 0;  ///< how many have begun
+  std::unique_ptr<Node> node;
+  SimulatedNetwork::Port* port = nullptr;
+  PlayerNode* player = nullptr;  ///< the same, of the player
+  std::optional<int64_t> begins_ns;
+  int64_t due_ns = 0;         ///< when it looks again, at the latest
+  int64_t busy_until_ns = 0;  ///< before that it does not look
+  std::optional<int64_t> paused_until_ns;
+  bool done = false;
+};
+
+class SimulatedSystem {
+ public:
+  SimulatedSystem(const Workload& workload, const Schedule& schedule, std::string folder)
+      : workload_(workload),
+        schedule_(schedule),
+        folder_(std::move(folder)),
+        random_(DeriveSeed(schedule.seed, 0, "run")),
+        network_(schedule.network, &random_) {
+    for (int i = 0; i < schedule.num_hosts; ++i) {
+      hosts_.push_back({static_cast<int64_t>(random_.Below(100'000)) * kSecond,
+                        i == 0 ? 0 : (random_.Below(7200) - int64_t{3600}) * 1'000'000});
+    }
+    for (const std::string& role : Roles()) {
+      Process process;
+      process.role = role;
+      process.host = schedule.host_of.at(role);
+      process.begins_ns =
+          kBeginNs + static_cast<int64_t>(random_.Uniform() * static_cast<double>(schedule.latest_start_ns));
+      processes_.push_back(std::move(process));
+    }
+  }
+
+  Outcome Run() {
+    while (outcome_.failure.empty() && !AllDone()) {
+      now_ns_ = std::max(now_ns_ + kStepNs, NextNs());
+      network_.set_now(now_ns_);
+      if (now_ns_ > kLongestNs) Fail("does not end");
+      CauseFaults();
+      GoOn();
+      const std::set<const SimulatedNetwork::Port*> heard = network_.Deliver(now_ns_);
+      for (Process& process : processes_) {
+        if (process.begins_ns && *process.begins_ns <= now_ns_) Begin(&process);
+        if (heard.contains(process.port)) process.due_ns = now_ns_;
+        if (MayWork(process) && process.due_ns <= now_ns_) TakeTurn(&process);
+      }
+    }
+    outcome_.virtual_s = static_cast<double>(now_ns_ - kBeginNs) * 1e-9;
+    outcome_.network = network_.statistics();
+    ReadResults(folder_, &outcome_);
+    return std::move(outcome_);
+  }
+
+ private:
+  // ---- Time
+
+  static bool MayWork(const Process& process) { return process.node && !process.paused_until_ns; }
+  bool AllDone() const {
+    return std::ranges::all_of(processes_, [](const Process& process) { return process.done; });
+  }
+
+  int64_t NextNs() const {
+    int64_t next = network_.next_ns();
+    for (const Process& process : processes_) {
+      if (process.begins_ns) next = std::min(next, *process.begins_ns);
+      if (process.paused_until_ns) next = std::min(next, *process.paused_until_ns);
+      if (MayWork(process)) next = std::min(next, std::max(process.due_ns, process.busy_until_ns));
+    }
+    if (next_fault_ < schedule_.faults.size() && frames_played_ >= schedule_.faults[next_fault_].at_frame)
+      next = std::min(next, FaultNs());
+    return next;
+  }
+
+  void TakeTurn(Process* process) {
+    if (process->busy_until_ns > now_ns_) return;
+    ++outcome_.turns;
+    std::optional<int> code;
+    std::string problem;
+    try {
+      process->node->Advance();
+      code = process->node->exit_code();
+      problem = process->node->problem();
+    } catch (const NotYetError& error) {
+      code = kExitNotYet, problem = error.what();
+    } catch (const InputError& error) {
+      code = kExitInput, problem = error.what();
+    } catch (const std::exception& error) {
+      code = kExitInternal, problem = error.what();
+    }
+    if (code) return OnEnd(process, *code, problem);
+    const int64_t deadline = process->node->deadline_ns();
+    process->due_ns = deadline == INT64_MAX ? INT64_MAX : deadline - hosts_[process->host].up_since_ns;
+    process->busy_until_ns =
+        now_ns_ + static_cast<int64_t>(random_.Uniform() * static_cast<double>(schedule_.slowest_turn_ns));
+    if (process->player != nullptr)
+      frames_played_ = std::max(frames_played_, static_cast<uint32_t>(process->player->published()));
+  }
+
+  // ---- Processes
+
+  void Tell(const Process& process, const std::string& what) {
+    char when[32];
+    std::snprintf(when, sizeof(when), "%9.3f s ", static_cast<double>(now_ns_ - kBeginNs) * 1e-9);
+    outcome_.story +=
+        when + ("frame " + std::to_string(frames_played_) + ": ") + process.role + " " + what + "\n";
+  }
+  void Fail(const std::string& why) {
+    if (outcome_.failure.empty()) outcome_.failure = why;
+  }
+
+  NodeContext ContextFor(const Process& process) {
+    NodeContext context;
+    const Host* host = &hosts_[process.host];
+    context.bus = process.port;
+    context.now_ns = [this, host] { return now_ns_ + host->up_since_ns; };
+    context.wall_us = [this, host] { return kWallUs + now_ns_ / 1000 + host->wall_us; };
+    context.random_id = static_cast<int64_t>(random_.Next() >> 2) + 1;
+    context.name = process.role + " on host " + std::to_string(process.host) + " (life " +
+                   std::to_string(process.lives) + ")";
+    context.fresh_system = schedule_.fresh_system && process.lives == 1;
+    return context;
+  }
+
+  NodeOptions OptionsFor(const Process&) const {
+    NodeOptions options;
+    options.session = kSession;
+    options.peers = {"frontend", "mapper", "loopcloser", "collector"};
+    options.link = schedule_.link;
+    options.settings = workload_.settings;
+    return options;
+  }
+
+  void Begin(Process* process) {
+    process->begins_ns.reset();
+    process->port = network_.AddPort(process->host);
+    ++process->lives;
+    process->node = MakeNode(process);
+    process->due_ns = now_ns_;
+    process->busy_until_ns = 0;
+    Tell(*process, "begins on host " + std::to_string(process->host));
+  }
+
+  std::unique_ptr<Node> MakeNode(Process* process) {
+    NodeContext context = ContextFor(*process);
+    const NodeOptions options = OptionsFor(*process);
+    if (process->role == "mapper") return MakeMapper(context, options, {"", "", CheckpointPath(folder_)});
+    if (process->role == "loopcloser") return MakeLoopcloser(context, options, workload_.vocabulary);
+    if (process->role == "frontend") return MakeFrontend(context, options, {workload_.vocabulary, "", 0});
+    if (process->role == "collector") {
+      CollectorOptions collector;
+      collector.out_dir = folder_;
+      collector.ground_truth = {"-"};
+      collector.table = false;
+      return MakeCollector(context, options, collector);
+    }
+    PlayerOptions player;
+    player.sequence = "simulated";
+    player.camera = workload_.camera;
+    player.session = kSession;
+    player.mode = PlaybackMode::kLockstep;
+    auto node =
+        std::make_unique<PlayerNode>(context, player, std::make_unique<StoredFrames>(&workload_.frames));
+    process->player = node.get();
+    return node;
+  }
+
+  /// What was on its way from it still arrives.
+  void Remove(Process* process) {
+    process->node.reset();
+    process->player = nullptr;
+    network_.Close(process->port);
+    process->port = nullptr;
+    process->paused_until_ns.reset();
+  }
+
+  void OnEnd(Process* process, int code, const std::string& problem) {
+    Tell(*process, "ends with " + std::to_string(code) + (problem.empty() ? "" : ": " + problem));
+    Remove(process);
+    if (WorthRestarting(code)) {
+      process->begins_ns = now_ns_ + kSecond / 2;
+    } else {
+      process->done = true;
+      if (code != kExitDone) Fail(process->role + " has ended with " + std::to_string(code) + ": " + problem);
+    }
+  }
+
+  // ---- Faults
+
+  int64_t FaultNs() const {
+    return std::max(frame_ns_.value_or(now_ns_), kBeginNs) + schedule_.faults[next_fault_].after_ns;
+  }
+
+  void CauseFaults() {
+    while (next_fault_ < schedule_.faults.size() &&
+           frames_played_ >= schedule_.faults[next_fault_].at_frame) {
+      if (!frame_ns_) frame_ns_ = now_ns_;
+      if (FaultNs() > now_ns_) return;
+      Cause(schedule_.faults[next_fault_++]);
+      frame_ns_.reset();
+    }
+  }
+
+  void Cause(const Fault& fault) {
+    Process* process = Find(fault.process);
+    if (process == nullptr) return;
+    switch (fault.kind) {
+      case Fault::Kind::kPause:
+        Tell(*process, "stands still");
+        network_.Pause(process->port);
+        process->paused_until_ns = now_ns_ + fault.lasts_ns;
+        break;
+    }
+  }
+
+  /// The newest of its role that is there.
+  Process* Find(const std::string& role) {
+    const auto found = std::ranges::find_if(
+        processes_.rbegin(), processes_.rend(),
+        [&](const Process& process) { return process.role == role && process.node != nullptr; });
+    return found == processes_.rend() ? nullptr : &*found;
+  }
+
+  void GoOn() {
+    for (Process& process : processes_) {
+      if (!process.paused_until_ns || *process.paused_until_ns > now_ns_) continue;
+      process.paused_until_ns.reset();
+      network_.Resume(process.port);
+      process.due_ns = now_ns_;
+      Tell(process, "goes on");
+    }
+  }
+
+  const Workload& workload_;
+  const Schedule& schedule_;
+  const std::string folder_;
+  Random random_;
+  SimulatedNetwork network_;
+  std::vector<Host> hosts_;
+  std::vector<Process> processes_;
+  int64_t now_ns_ = kBeginNs;
+  size_t next_fault_ = 0;
+  std::optional<int64_t> frame_ns_;  ///< when the next fault's frame was played
+  uint32_t frames_played_ = 0;
+  Outcome outcome_;
+};
+
+std::string ReadText(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace
+
+void ReadResults(const std::string& folder, Outcome* outcome) {
+  outcome->trajectory = ReadText(fs::path(folder) / "trajectory.txt");
+  outcome->online = ReadText(fs::path(folder) / "trajectory_online.txt");
+  outcome->keyframes = ReadText(fs::path(folder) / "keyframes.txt");
+  outcome->map = ReadText(fs::path(folder) / "map.ply");
+  outcome->summary = ReadText(fs::path(folder) / "summary.json");
+}
+
+Outcome RunSchedule(const Workload& workload, const Schedule& schedule, const std::string& folder) {
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  return SimulatedSystem(workload, schedule, folder).Run();
+}
+
+}  // namespace dmslam::simulation
