@@ -1,6 +1,7 @@
 #include "simulated_network.h"
 
-#include <algorithm>
+#include <iterator>
+#include <optional>
 #include <utility>
 
 namespace dmslam::simulation {
@@ -39,7 +40,8 @@ void SimulatedNetwork::Fly(Port* to, const Outgoing& message) {
 void SimulatedNetwork::Send(const Port& from, const Outgoing& message) {
   if (from.closed_ || message.local) return;  // a tap for tools; its parts arrive as well
   ++statistics_.sent;
-  Overhear(message);
+  forger_.Hear(message);
+  newest_[message.channel] = message;
   for (const auto& to : ports_) {
     if (to.get() == &from || to->closed_ || !to->channels_.contains(message.channel)) continue;
     if (cut_off_.contains(from.host_) != cut_off_.contains(to->host_)) continue;
@@ -78,26 +80,19 @@ std::set<const SimulatedNetwork::Port*> SimulatedNetwork::Deliver(int64_t now_ns
   return heard;
 }
 
-void SimulatedNetwork::Forge(const Outgoing& message, int64_t now_ns) {
+void SimulatedNetwork::FlyToAll(const Outgoing& message) {
   for (const auto& to : ports_) {
-    if (!to->closed_ && to->channels_.contains(message.channel))
-      flying_.push({now_ns, order_++, to.get(), message});
+    if (!to->closed_ && to->channels_.contains(message.channel)) Fly(to.get(), message);
   }
 }
 
-void SimulatedNetwork::Overhear(const Outgoing& message) {
-  const auto known = std::ranges::find(overheard_, message.channel, &Outgoing::channel);
-  if (known == overheard_.end()) {
-    overheard_.push_back(message);
-  } else {
-    *known = message;
-  }
+void SimulatedNetwork::Forge() {
+  if (const std::optional<Outgoing> forged = forger_.Make(random_)) FlyToAll(*forged);
 }
 
-void SimulatedNetwork::Heal() {
-  conditions_.loss = conditions_.duplication = 0;
-  conditions_.max_delay_ns = conditions_.min_delay_ns + 1000;
-  cut_off_.clear();
+void SimulatedNetwork::Echo() {
+  if (newest_.empty()) return;
+  FlyToAll(std::next(newest_.begin(), random_->Below(static_cast<uint32_t>(newest_.size())))->second);
 }
 
 }  // namespace dmslam::simulation

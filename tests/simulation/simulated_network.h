@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
-#include <optional>
 #include <queue>
 #include <set>
 #include <string>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dmslam/messaging/bus.h"
+#include "dmslam/messaging/forger.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam::simulation {
@@ -65,16 +66,20 @@ class SimulatedNetwork {
   /// Hands over what has arrived; the ports that heard something.
   std::set<const Port*> Deliver(int64_t now_ns);
 
-  /// One message of nobody's, heard by all who want its channel.
-  void Forge(const Outgoing& message, int64_t now_ns);
-  /// The last messages, one of each channel: for who forges.
-  const std::vector<Outgoing>& overheard() const { return overheard_; }
+  /// A beacon or an acknowledgement that somebody has changed, heard by all who want its channel.
+  void Forge();
+  /// The newest message of some channel, once more.
+  void Echo();
+
+  /// The newest message of a channel; null: there was none.
+  const Outgoing* Newest(const std::string& channel) const {
+    const auto newest = newest_.find(channel);
+    return newest == newest_.end() ? nullptr : &newest->second;
+  }
 
   void set_now(int64_t now_ns) { now_ns_ = now_ns; }
   /// Hosts of this set and the others do not hear each other.
   void Cut(std::set<int> hosts) { cut_off_ = std::move(hosts); }
-  /// From here on nothing is lost, repeated or late.
-  void Heal();
 
   struct Statistics {
     int64_t sent = 0, lost = 0, repeated = 0, overflown = 0, delivered = 0;
@@ -96,7 +101,7 @@ class SimulatedNetwork {
   void Send(const Port& from, const Outgoing& message);
   bool IsLost(const Outgoing& message);
   void Fly(Port* to, const Outgoing& message);
-  void Overhear(const Outgoing& message);
+  void FlyToAll(const Outgoing& message);
 
   NetworkConditions conditions_;
   Random* random_;
@@ -105,7 +110,8 @@ class SimulatedNetwork {
   std::vector<std::unique_ptr<Port>> ports_;
   std::priority_queue<Flying> flying_;
   std::set<int> cut_off_;
-  std::vector<Outgoing> overheard_;
+  std::map<std::string, Outgoing> newest_;  ///< of each channel
+  Forger forger_;
   Statistics statistics_;
 };
 

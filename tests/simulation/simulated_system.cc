@@ -1,7 +1,11 @@
 #include "simulated_system.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -26,7 +30,8 @@ constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kSecond = 1000 * kMs;
 constexpr int64_t kBeginNs = kSecond;
 constexpr int64_t kWallUs = 1'700'000'000'000'000;  // at the beginning
-constexpr int64_t kLongestNs = 3600 * kSecond;
+constexpr int64_t kLongestNs = 1200 * kSecond;
+constexpr int64_t kFarewellNs = 5 * kSecond;
 constexpr int64_t kStepNs = 20'000;  // what happens within it happens at once
 constexpr uint32_t kSession = 1;
 
@@ -61,7 +66,29 @@ struct Process {
   int64_t due_ns = 0;         ///< when it looks again, at the latest
   int64_t busy_until_ns = 0;  ///< before that it does not look
   std::optional<int64_t> paused_until_ns;
+  bool takes_over = false;  ///< from one that is there
+  int last_code = 0;
   bool done = false;
+};
+
+/// While it lives this program can write into no file.
+class FullDisk {
+ public:
+  FullDisk() : former_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &former_);
+    const rlimit none{0, former_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &former_);
+    std::signal(SIGXFSZ, former_handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  void (*former_handler_)(int);
+  rlimit former_{};
 };
 
 class SimulatedSystem {
@@ -90,7 +117,8 @@ class SimulatedSystem {
     while (outcome_.failure.empty() && !AllDone()) {
       now_ns_ = std::max(now_ns_ + kStepNs, NextNs());
       network_.set_now(now_ns_);
-      if (now_ns_ > kLongestNs) Fail("does not end");
+      if (now_ns_ > kLongestNs) Fail("does not end:" + WhoWaits());
+      Farewell();
       CauseFaults();
       GoOn();
       const std::set<const SimulatedNetwork::Port*> heard = network_.Deliver(now_ns_);
@@ -121,6 +149,8 @@ class SimulatedSystem {
       if (process.paused_until_ns) next = std::min(next, *process.paused_until_ns);
       if (MayWork(process)) next = std::min(next, std::max(process.due_ns, process.busy_until_ns));
     }
+    if (farewell_ns_) next = std::min(next, *farewell_ns_ + (*farewell_ns_ > now_ns_ ? 0 : kFarewellNs));
+    if (cut_until_ns_) next = std::min(next, *cut_until_ns_);
     if (next_fault_ < schedule_.faults.size() && frames_played_ >= schedule_.faults[next_fault_].at_frame)
       next = std::min(next, FaultNs());
     return next;
@@ -131,6 +161,11 @@ class SimulatedSystem {
     ++outcome_.turns;
     std::optional<int> code;
     std::string problem;
+    std::optional<FullDisk> full_disk;
+    if (process->role == "collector" && now_ns_ < disk_full_until_ns_ &&
+        frames_played_ < workload_.frames.size()) {  // where there is no room in the end the results are lost
+      full_disk.emplace();
+    }
     try {
       process->node->Advance();
       code = process->node->exit_code();
@@ -142,6 +177,7 @@ class SimulatedSystem {
     } catch (const std::exception& error) {
       code = kExitInternal, problem = error.what();
     }
+    full_disk.reset();
     if (code) return OnEnd(process, *code, problem);
     const int64_t deadline = process->node->deadline_ns();
     process->due_ns = deadline == INT64_MAX ? INT64_MAX : deadline - hosts_[process->host].up_since_ns;
@@ -153,11 +189,44 @@ class SimulatedSystem {
 
   // ---- Processes
 
-  void Tell(const Process& process, const std::string& what) {
+  /// What the processes last said of themselves.
+  std::string WhoWaits() const {
+    return WaitOf<PlayerStatus>() + WaitOf<FrontendStatus>() + WaitOf<MapperStatus>() +
+           WaitOf<LoopcloserStatus>();
+  }
+  template <typename Status>
+  std::string WaitOf() const {
+    const std::string& channel = wire::Info<Status>().channel;
+    const Outgoing* newest = network_.Newest(channel);
+    const auto status = newest == nullptr ? std::nullopt : wire::Decode<Status>(*newest->bytes);
+    if (!status) return "";
+    const ProcessHealth& health = status->head.health;
+    std::string text = "\n  " + channel + ": queue " + std::to_string(health.queue_depth) +
+                       ", lacked by readers " + std::to_string(health.unacknowledged);
+    if (!health.waiting_for.empty()) text += ", waits for " + health.waiting_for;
+    if (!status->head.reason.empty()) text += " (" + status->head.reason + ")";
+    return text;
+  }
+
+  /// The collector ends last; whoever is there a while later is told to end.
+  void Farewell() {
+    if (!farewell_ns_ || *farewell_ns_ > now_ns_) return;
+    for (Process& process : processes_) {
+      process.begins_ns.reset();
+      if (!process.node) {
+        process.done = true;
+      } else if (!process.node->exit_code()) {
+        process.node->Stop();
+        process.due_ns = now_ns_;
+      }
+    }
+    if (*farewell_ns_ + kFarewellNs < now_ns_) Fail("does not end when it is told to:" + WhoWaits());
+  }
+
+  void Tell(const std::string& who, const std::string& what) {
     char when[32];
     std::snprintf(when, sizeof(when), "%9.3f s ", static_cast<double>(now_ns_ - kBeginNs) * 1e-9);
-    outcome_.story +=
-        when + ("frame " + std::to_string(frames_played_) + ": ") + process.role + " " + what + "\n";
+    outcome_.story += when + ("frame " + std::to_string(frames_played_) + ": ") + who + " " + what + "\n";
   }
   void Fail(const std::string& why) {
     if (outcome_.failure.empty()) outcome_.failure = why;
@@ -172,12 +241,13 @@ class SimulatedSystem {
     context.random_id = static_cast<int64_t>(random_.Next() >> 2) + 1;
     context.name = process.role + " on host " + std::to_string(process.host) + " (life " +
                    std::to_string(process.lives) + ")";
-    context.fresh_system = schedule_.fresh_system && process.lives == 1;
+    context.fresh_system = schedule_.fresh_system && process.lives == 1 && !process.takes_over;
     return context;
   }
 
-  NodeOptions OptionsFor(const Process&) const {
+  NodeOptions OptionsFor(const Process& process) const {
     NodeOptions options;
+    options.take_over = process.takes_over;
     options.session = kSession;
     options.peers = {"frontend", "mapper", "loopcloser", "collector"};
     options.link = schedule_.link;
@@ -192,7 +262,7 @@ class SimulatedSystem {
     process->node = MakeNode(process);
     process->due_ns = now_ns_;
     process->busy_until_ns = 0;
-    Tell(*process, "begins on host " + std::to_string(process->host));
+    Tell(process->role, "begins on host " + std::to_string(process->host));
   }
 
   std::unique_ptr<Node> MakeNode(Process* process) {
@@ -205,13 +275,14 @@ class SimulatedSystem {
       CollectorOptions collector;
       collector.out_dir = folder_;
       collector.ground_truth = {"-"};
-      collector.table = false;
+      collector.for_people = false;
       return MakeCollector(context, options, collector);
     }
     PlayerOptions player;
     player.sequence = "simulated";
     player.camera = workload_.camera;
     player.session = kSession;
+    player.take_over = options.take_over;
     player.mode = PlaybackMode::kLockstep;
     auto node =
         std::make_unique<PlayerNode>(context, player, std::make_unique<StoredFrames>(&workload_.frames));
@@ -229,13 +300,17 @@ class SimulatedSystem {
   }
 
   void OnEnd(Process* process, int code, const std::string& problem) {
-    Tell(*process, "ends with " + std::to_string(code) + (problem.empty() ? "" : ": " + problem));
+    Tell(process->role, "ends with " + std::to_string(code) + (problem.empty() ? "" : ": " + problem));
     Remove(process);
+    const bool yields = code == kExitPresent && process->last_code == kExitSuperseded;
+    process->last_code = code;
+    if (process->role == "collector" && code == kExitDone && !moving_) farewell_ns_ = now_ns_ + kFarewellNs;
     if (WorthRestarting(code)) {
       process->begins_ns = now_ns_ + kSecond / 2;
     } else {
       process->done = true;
-      if (code != kExitDone) Fail(process->role + " has ended with " + std::to_string(code) + ": " + problem);
+      if (code != kExitDone && !yields)
+        Fail(process->role + " has ended with " + std::to_string(code) + ": " + problem);
     }
   }
 
@@ -256,14 +331,53 @@ class SimulatedSystem {
   }
 
   void Cause(const Fault& fault) {
-    Process* process = Find(fault.process);
-    if (process == nullptr) return;
+    ++outcome_.faults;
     switch (fault.kind) {
+      case Fault::Kind::kPartition:
+        network_.Cut({fault.host});
+        cut_until_ns_ = now_ns_ + fault.lasts_ns;
+        return Tell("the network", ToText(fault));
+      case Fault::Kind::kClockStep:
+        hosts_[fault.host].wall_us += fault.step_us;
+        return Tell("somebody", ToText(fault));
+      case Fault::Kind::kForgery:
+        network_.Forge();
+        return Tell("somebody", ToText(fault));
+      case Fault::Kind::kEcho:
+        network_.Echo();
+        return Tell("somebody", ToText(fault));
+      case Fault::Kind::kFullDisk:
+        disk_full_until_ns_ = now_ns_ + fault.lasts_ns;
+        return Tell("the disk", ToText(fault));
       case Fault::Kind::kPause:
-        Tell(*process, "stands still");
-        network_.Pause(process->port);
-        process->paused_until_ns = now_ns_ + fault.lasts_ns;
-        break;
+      case Fault::Kind::kKill:
+      case Fault::Kind::kMove:
+        if (Process* process = Find(fault.process)) Meet(fault, process);
+    }
+  }
+
+  void Meet(const Fault& fault, Process* process) {
+    Tell(process->role, ToText(fault));
+    if (fault.kind == Fault::Kind::kPause) {
+      network_.Pause(process->port);
+      process->paused_until_ns = now_ns_ + fault.lasts_ns;
+    } else if (fault.kind == Fault::Kind::kKill) {
+      Remove(process);
+      process->host = fault.host;
+      process->begins_ns = now_ns_ + fault.lasts_ns;
+    } else {
+      Process successor;
+      successor.role = process->role;
+      successor.host = fault.host;
+      successor.begins_ns = now_ns_;
+      successor.takes_over = true;
+      if (process->role == "collector") {  // it writes no stream: it is ended, and begins elsewhere
+        moving_ = true;
+        process->node->Stop();
+        OnEnd(process, process->node->exit_code().value_or(kExitInternal), "");
+        moving_ = false;
+      }
+      processes_.push_back(std::move(successor));
     }
   }
 
@@ -276,12 +390,17 @@ class SimulatedSystem {
   }
 
   void GoOn() {
+    if (cut_until_ns_ && *cut_until_ns_ <= now_ns_) {
+      network_.Cut({});
+      cut_until_ns_.reset();
+      Tell("the network", "is whole again");
+    }
     for (Process& process : processes_) {
       if (!process.paused_until_ns || *process.paused_until_ns > now_ns_) continue;
       process.paused_until_ns.reset();
       network_.Resume(process.port);
       process.due_ns = now_ns_;
-      Tell(process, "goes on");
+      Tell(process.role, "goes on");
     }
   }
 
@@ -291,11 +410,15 @@ class SimulatedSystem {
   Random random_;
   SimulatedNetwork network_;
   std::vector<Host> hosts_;
-  std::vector<Process> processes_;
+  std::deque<Process> processes_;
   int64_t now_ns_ = kBeginNs;
   size_t next_fault_ = 0;
   std::optional<int64_t> frame_ns_;  ///< when the next fault's frame was played
   uint32_t frames_played_ = 0;
+  std::optional<int64_t> cut_until_ns_;
+  int64_t disk_full_until_ns_ = 0;
+  std::optional<int64_t> farewell_ns_;  ///< who is there then is told to end
+  bool moving_ = false;                 ///< who ends now begins elsewhere
   Outcome outcome_;
 };
 

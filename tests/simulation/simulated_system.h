@@ -36,7 +36,7 @@ struct Outcome {
   std::string trajectory, online, keyframes, map, summary;  ///< the collector's files
   std::string story;                                        ///< what happened when, a line each
   double virtual_s = 0;
-  int64_t turns = 0;
+  int64_t turns = 0, faults = 0;
   SimulatedNetwork::Statistics network;
 };
 

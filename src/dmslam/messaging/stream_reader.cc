@@ -102,8 +102,10 @@ bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
   return same_language && leaps_.SaidAgain(term_, head.utime);
 }
 
+/// A stream that is handed over goes on in the next term.
 void StreamReader::NoteEnd(const head_t& head) {
-  closed_beacons_ = head.state == head_t::STATE_CLOSED ? closed_beacons_ + 1 : 0;
+  const bool ends = head.state == head_t::STATE_CLOSED && (head.offers & head_t::OFFERS_SUCCESSOR) == 0;
+  closed_beacons_ = ends ? closed_beacons_ + 1 : 0;
   writer_closed_ = closed_beacons_ >= kBelieved;
 }
 
