@@ -35,19 +35,6 @@ constexpr int64_t kFarewellNs = 5 * kSecond;
 constexpr int64_t kStepNs = 20'000;  // what happens within it happens at once
 constexpr uint32_t kSession = 1;
 
-/// Plays a sequence that is in memory.
-class StoredFrames : public FrameSource {
- public:
-  explicit StoredFrames(const std::vector<StoredFrame>* frames) : frames_(frames) {}
-  size_t size() const override { return frames_->size(); }
-  int64_t StampNs(size_t index) const override { return (*frames_)[index].stamp_ns; }
-  std::string Name(size_t index) const override { return "frame " + std::to_string(index); }
-  EncodedImage Read(size_t index) override { return (*frames_)[index].image; }
-
- private:
-  const std::vector<StoredFrame>* frames_;
-};
-
 /// The clocks of a host: none agrees with another one's.
 struct Host {
   int64_t up_since_ns = 0;  ///< of its monotonic clock

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "dmslam/camera/camera.h"
-#include "dmslam/dataset/image.h"
+#include "dmslam/dataset/frame_source.h"
 #include "dmslam/settings/settings.h"
 #include "schedule.h"
 
@@ -20,6 +20,19 @@ namespace dmslam::simulation {
 struct StoredFrame {
   int64_t stamp_ns = 0;
   EncodedImage image;
+};
+
+/// Plays it. The frames must stay where they are.
+class StoredFrames : public FrameSource {
+ public:
+  explicit StoredFrames(const std::vector<StoredFrame>* frames) : frames_(frames) {}
+  size_t size() const override { return frames_->size(); }
+  int64_t StampNs(size_t index) const override { return (*frames_)[index].stamp_ns; }
+  std::string Name(size_t index) const override { return "frame " + std::to_string(index); }
+  EncodedImage Read(size_t index) override { return (*frames_)[index].image; }
+
+ private:
+  const std::vector<StoredFrame>* frames_;
 };
 
 /// What the simulated system works on.
