@@ -71,7 +71,7 @@ Fault DrawDeath(const Schedule& schedule, const std::vector<std::string>& roles,
 
 void Place(Fault* fault, uint32_t frame, uint32_t num_frames, Random* random) {
   fault->at_frame = frame;
-  fault->after_ns = Between(0, frame == num_frames ? 3 * kSecond : kSecond / 2, random);
+  fault->after_ns = Between(0, frame == num_frames ? 3 * kSecond : 30 * kMs, random);
 }
 
 void DrawDeaths(uint32_t num_frames, Schedule* schedule, Random* random) {

@@ -31,6 +31,8 @@ constexpr int64_t kSecond = 1000 * kMs;
 constexpr int64_t kBeginNs = kSecond;
 constexpr int64_t kWallUs = 1'700'000'000'000'000;  // at the beginning
 constexpr int64_t kLongestNs = 1200 * kSecond;
+constexpr int64_t kLookAgainNs = kSecond / 500;
+constexpr int64_t kBackNs = 8 * kSecond;  // who begins is surely back in the run
 constexpr int64_t kFarewellNs = 5 * kSecond;
 constexpr int64_t kStepNs = 20'000;  // what happens within it happens at once
 constexpr uint32_t kSession = 1;
@@ -139,7 +141,7 @@ class SimulatedSystem {
     if (farewell_ns_) next = std::min(next, *farewell_ns_ + (*farewell_ns_ > now_ns_ ? 0 : kFarewellNs));
     if (cut_until_ns_) next = std::min(next, *cut_until_ns_);
     if (next_fault_ < schedule_.faults.size() && frames_played_ >= schedule_.faults[next_fault_].at_frame)
-      next = std::min(next, FaultNs());
+      next = std::min(next, std::max(FaultNs(), now_ns_ + kLookAgainNs));
     return next;
   }
 
@@ -249,6 +251,8 @@ class SimulatedSystem {
     process->node = MakeNode(process);
     process->due_ns = now_ns_;
     process->busy_until_ns = 0;
+    begun_ns_ = now_ns_;
+    begun_frame_ = frames_played_;
     Tell(process->role, "begins on host " + std::to_string(process->host));
   }
 
@@ -307,11 +311,20 @@ class SimulatedSystem {
     return std::max(frame_ns_.value_or(now_ns_), kBeginNs) + schedule_.faults[next_fault_].after_ns;
   }
 
+  /// Who dies next does so when the one before is there again: where several holders of something die at
+  /// once, it is lost.
+  bool MayHappen(const Fault& fault) const {
+    if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) return true;
+    const auto is_away = [](const Process& process) { return process.begins_ns || process.paused_until_ns; };
+    if (std::ranges::any_of(processes_, is_away)) return false;
+    return now_ns_ >= begun_ns_ + kBackNs || frames_played_ >= begun_frame_ + 3;
+  }
+
   void CauseFaults() {
     while (next_fault_ < schedule_.faults.size() &&
            frames_played_ >= schedule_.faults[next_fault_].at_frame) {
       if (!frame_ns_) frame_ns_ = now_ns_;
-      if (FaultNs() > now_ns_) return;
+      if (FaultNs() > now_ns_ || !MayHappen(schedule_.faults[next_fault_])) return;
       Cause(schedule_.faults[next_fault_++]);
       frame_ns_.reset();
     }
@@ -402,6 +415,8 @@ class SimulatedSystem {
   size_t next_fault_ = 0;
   std::optional<int64_t> frame_ns_;  ///< when the next fault's frame was played
   uint32_t frames_played_ = 0;
+  int64_t begun_ns_ = kBeginNs;  ///< when the newest process began ...
+  uint32_t begun_frame_ = 0;     ///< ... and how far it was then
   std::optional<int64_t> cut_until_ns_;
   int64_t disk_full_until_ns_ = 0;
   std::optional<int64_t> farewell_ns_;  ///< who is there then is told to end

@@ -25,7 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kFramesLostPerDeath = 6;  // from there on until it knows again where it is
+constexpr int64_t kFramesLost = 3;             // while something moves
+constexpr int64_t kFramesLostByFrontend = 25;  // it may have been about to make the first map
 
 int64_t FromEnvironment(const char* name, int64_t otherwise) {
   const char* value = std::getenv(name);
@@ -94,12 +95,12 @@ class SystemSimulation : public ::testing::Test {
   /// Why the promises are not kept; empty: they are.
   static std::string Broken(const Schedule& schedule, const Outcome& outcome) {
     if (!schedule.meets_writers) return Difference(outcome, common_->undisturbed);
-    const auto dies = [](const Fault& fault) {
-      return fault.kind == Fault::Kind::kKill || fault.kind == Fault::Kind::kMove;
-    };
-    const int64_t deaths = std::ranges::count_if(schedule.faults, dies);
-    return Loss(outcome, common_->undisturbed, Spread(), kFramesLostPerDeath * deaths,
-                common_->folder.string());
+    int64_t frames_lost = 0;
+    for (const Fault& fault : schedule.faults) {
+      if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) continue;
+      frames_lost += fault.process == "frontend" ? kFramesLostByFrontend : kFramesLost;
+    }
+    return Loss(outcome, common_->undisturbed, Spread(), frames_lost, common_->folder.string());
   }
 
   static void Tell(const Schedule& schedule, const Outcome& outcome) {
