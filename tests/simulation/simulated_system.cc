@@ -317,6 +317,8 @@ class SimulatedSystem {
     if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) return true;
     const auto is_away = [](const Process& process) { return process.begins_ns || process.paused_until_ns; };
     if (std::ranges::any_of(processes_, is_away)) return false;
+    if (fault.process == "collector" && now_ns_ < disk_full_until_ns_)
+      return false;  // it holds what the disk does not
     return now_ns_ >= begun_ns_ + kBackNs || frames_played_ >= begun_frame_ + 3;
   }
 

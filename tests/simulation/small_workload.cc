@@ -60,13 +60,15 @@ Settings SmallSettings(uint64_t seed, int features) {
   return LoadSettings("", {"features.count=" + std::to_string(features), "seed=" + std::to_string(seed)});
 }
 
-Outcome RunUndisturbed(const Workload& workload, const Settings& settings, const std::string& folder) {
+Outcome RunUndisturbed(const Workload& workload, const Settings& settings, const std::string& folder,
+                       size_t start) {
   fs::create_directories(folder);
   InProcessOptions options;
   options.node.settings = settings;
   options.player.session = 1;
   options.player.camera = workload.camera;
   options.player.sequence = "simulated";
+  options.player.start = start;
   options.collector.out_dir = folder;
   options.collector.ground_truth = {"-"};
   options.collector.for_people = false;

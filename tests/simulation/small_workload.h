@@ -15,7 +15,9 @@ Workload MakeSmallWorkload(const std::string& folder);
 /// The settings it is run with.
 Settings SmallSettings(uint64_t seed, int features = 500);
 
-/// All nodes on a bus that loses nothing, in lock-step; `folder` is the collector's.
-Outcome RunUndisturbed(const Workload& workload, const Settings& settings, const std::string& folder);
+/// All nodes on a bus that loses nothing, in lock-step; `folder` is the collector's. `start`: the first
+/// frame.
+Outcome RunUndisturbed(const Workload& workload, const Settings& settings, const std::string& folder,
+                       size_t start = 0);
 
 }  // namespace dmslam::simulation
