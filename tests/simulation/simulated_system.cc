@@ -316,7 +316,7 @@ class SimulatedSystem {
   bool MayHappen(const Fault& fault) const {
     if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) return true;
     const auto is_away = [](const Process& process) { return process.begins_ns || process.paused_until_ns; };
-    if (std::ranges::any_of(processes_, is_away)) return false;
+    if (std::ranges::any_of(processes_, is_away) || now_ns_ < caught_up_ns_) return false;
     if (fault.process == "collector" && now_ns_ < disk_full_until_ns_)
       return false;  // it holds what the disk does not
     return now_ns_ >= begun_ns_ + kBackNs || frames_played_ >= begun_frame_ + 3;
@@ -402,6 +402,7 @@ class SimulatedSystem {
       process.paused_until_ns.reset();
       network_.Resume(process.port);
       process.due_ns = now_ns_;
+      caught_up_ns_ = now_ns_ + kSecond;
       Tell(process.role, "goes on");
     }
   }
@@ -418,6 +419,7 @@ class SimulatedSystem {
   std::optional<int64_t> frame_ns_;  ///< when the next fault's frame was played
   uint32_t frames_played_ = 0;
   int64_t begun_ns_ = kBeginNs;  ///< when the newest process began ...
+  int64_t caught_up_ns_ = 0;     ///< who stood still has heard by then what it missed
   uint32_t begun_frame_ = 0;     ///< ... and how far it was then
   std::optional<int64_t> cut_until_ns_;
   int64_t disk_full_until_ns_ = 0;
