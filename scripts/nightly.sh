@@ -2,7 +2,7 @@
 # The long bars. Stopped at any time, the same command continues. See --help.
 set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-readonly SCHEDULES=10000 SCHEDULES_PER_STEP=1000 SEEDS=5
+readonly SCHEDULES=10000 SCHEDULES_PER_STEP=1000 SYSTEM_SCHEDULES=2000 SYSTEM_SCHEDULES_PER_STEP=500 SEEDS=5
 out=$top/out/nightly data=${DMSLAM_DATA:-$top/../shared/data} fuzz_seconds=60
 only=""
 usage() {
@@ -11,7 +11,7 @@ Usage: scripts/nightly.sh [--out DIR] [--data DIR] [--only PATTERN] [--fuzz-seco
 
 Runs what takes too long for every commit, each step once, and writes DIR/table.md with what was reached and what is asked:
 all tests; kitchen seeds 1..$SEEDS in lock-step, the same seed twice, kitchen in real time; kitchen_walk1 and kitchen_walk2;
-localisation in a saved map; recording and replay; $SCHEDULES seeded schedules of the stream protocol; 5,000 keyframes and 300,000 landmarks in the viewer; benchmarks, their
+localisation in a saved map; recording and replay; $SCHEDULES seeded schedules of the stream protocol and $SYSTEM_SCHEDULES of the whole system; 5,000 keyframes and 300,000 landmarks in the viewer; benchmarks, their
 ratios to cv::ORB and a map that grows to 5,000 keyframes; a run under
 AddressSanitizer and UBSan; fuzzing of every reader of bytes.
 A step that is done (DIR/<step>/done) is not done again; remove DIR to begin anew.
@@ -66,6 +66,10 @@ step_schedules() { # FOLDER FIRST
   DMSLAM_FIRST_SCHEDULE=$2 DMSLAM_SCHEDULES=$SCHEDULES_PER_STEP "$top/build/release/bin/simulation_test" \
     --gtest_filter=Simulation.EverySchedulesPromisesAreKept
 }
+step_system() { # FOLDER FIRST: all processes on a simulated network
+  DMSLAM_SOURCE_DIR=$top DMSLAM_FIRST_SCHEDULE=$2 DMSLAM_SCHEDULES=$SYSTEM_SCHEDULES_PER_STEP \
+    "$top/build/release/bin/system_simulation_test" --gtest_filter=SystemSimulation.EverySchedulesPromisesAreKept
+}
 step_sanitizers() {
   "$top/scripts/build.sh" asan-ubsan dmslam-inprocess dmslam-synth
   local bin=$top/build/asan-ubsan/bin
@@ -116,6 +120,7 @@ for name in walk1 walk2; do
   for ((seed = 1; seed <= SEEDS; ++seed)); do steps+=("${name}_$seed $seed"); done
 done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
+for ((first = 1; first <= SYSTEM_SCHEDULES; first += SYSTEM_SCHEDULES_PER_STEP)); do steps+=("system_$first $first"); done
 steps+=("lost" "loops")
 steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "noise" "localize" "sessions" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
 ((EUID != 0)) || steps+=("twohosts") # it makes network namespaces

@@ -471,9 +471,9 @@ void CollectorNode::Write(bool ended) {
   CountMissingKeyframes();
   if (journal_->lost() > 0)
     run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
-  const WrittenResults results = WriteResults(collector_.out_dir, run_, *builder_);
+  const WrittenResults results = WriteResults(collector_.out_dir, run_, *builder_, collector_.for_people);
   if (collector_.progress) std::fputs("\n", stderr);
-  std::fputs(results.table.c_str(), stdout);
+  if (collector_.for_people) std::fputs(results.table.c_str(), stdout);
   std::fflush(stdout);
   if (!results.problem.empty()) return Exit(kExitInput, results.problem);
   if (!ended) return;

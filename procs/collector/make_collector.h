@@ -13,6 +13,7 @@ struct CollectorOptions {
   std::string out_dir;
   std::vector<std::string> ground_truth;  ///< TUM trajectory of each camera; empty, or left out: none
   bool progress = false;                  ///< show progress on the terminal
+  bool for_people = true;                 ///< also draw trajectory.png, and print the summary
   bool checkpoints = true;                ///< as the settings say; false: none, whatever they say
 };
 

@@ -437,7 +437,8 @@ void FrameDurations::Add(const FrameTrace& trace) {
   add(trace.publish_us, trace.published_us, &image_to_pose);
 }
 
-WrittenResults WriteResults(const std::string& dir, RunRecord run, const TrajectoryBuilder& builder) {
+WrittenResults WriteResults(const std::string& dir, RunRecord run, const TrajectoryBuilder& builder,
+                            bool figure) {
   WrittenResults written;
   const auto attempt = [&](const std::function<void()>& write) {
     try {
@@ -463,7 +464,7 @@ WrittenResults WriteResults(const std::string& dir, RunRecord run, const Traject
     attempt([&] { WriteTrajectory(dir + "/trajectory_online" + number, of_camera.online); });
     attempt([&] { WriteTrajectory(dir + "/keyframes" + number, of_camera.keyframes); });
   }
-  if (!trajectories.final.empty())
+  if (figure && !trajectories.final.empty())
     attempt([&] { WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png"); });
   if (!written.problem.empty()) run.disk_problems.push_back(written.problem);
   Json summary = SummaryJson(run, builder, trajectories, errors);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 
@@ -15,8 +16,10 @@ class Claims {
   bool SaidAgain(const Key& key, int64_t utime) {
     Claim& claim = claims_[key];
     claim.order = ++order_;
-    if (claim.first_utime == kNever) claim.first_utime = utime;
-    claim.again = claim.again || utime > claim.first_utime;
+    const bool first = claim.first_utime == kNever;
+    claim.again = claim.again || (!first && utime > claim.first_utime);
+    claim.first_utime =
+        first ? utime : std::min(claim.first_utime, utime);  // one from the future counts once
     const bool again = claim.again;
     if (claims_.size() > kMost) Forget();
     return again;

@@ -47,7 +47,10 @@ void WriterElection::ReceiveHead(const head_t& head, int64_t now_ns) {
   epochs_.SaidAgain(term.epoch, head.utime);
   if (heard_.size() >= kMaxHeard && !heard_.contains(term)) return;
   Heard& heard = heard_[term];
-  if (head.utime <= heard.utime) return;
+  if (head.utime <= heard.utime) {  // late, or the one before was from the future and counts no longer
+    if (heard.utime - head.utime > kTimeToleranceUs) heard.utime = head.utime;
+    return;
+  }
   heard.utime = head.utime;
   heard.seq = head.header.seq;
   heard.last_ns = now_ns;

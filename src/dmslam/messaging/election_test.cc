@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "dmslam/messaging/hand_over.h"
+#include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/stream_writer.h"
 
 namespace dmslam {
@@ -69,6 +72,20 @@ TEST(Election, ALiveWriterMeansRefusalThatNamesIt) {
   EXPECT_NE(election.refusal().find("mapper on alpha, pid 17"), std::string::npos);
   EXPECT_NE(election.refusal().find("--take-over"), std::string::npos);
   EXPECT_FALSE(writer.superseded_by());
+}
+
+TEST(Election, AForgedBeaconFromTheFutureLetsNoSecondWriterIn) {
+  WriterElection election(Newcomer(), 0);
+  StreamWriter writer = OldWriter();
+  writer.Advance(0);
+  for (const Outgoing& out : writer.TakeOutgoing()) {
+    std::optional<head_t> head = DecodeHead(out.channel, *out.bytes);
+    ASSERT_TRUE(head);
+    head->utime += 3'600'000'000;
+    election.Receive(out.channel, *SealedMessage(out.channel, *head).bytes, 0);
+  }
+  Pump(&election, &writer, kMs, 2500 * kMs);
+  EXPECT_EQ(election.state(), WriterElection::State::kRefused);
 }
 
 TEST(Election, ALateEchoOfADeadWriterIsNoRefusalButCountsForTheTerm) {

@@ -125,6 +125,32 @@ TEST(Forgery, AHeadWithAHigherEpochBeforeAnyOtherIsHeard) {
   EXPECT_EQ(wire.reader.term(), wire.writer.term());
 }
 
+/// `before`: how many of the writer's own beacons a reader that has just begun heard before the forged one.
+void ForgeTheFuture(int before) {
+  Wire wire;
+  wire.reader = StreamReader(Wire::ReaderOptions());
+  wire.taken.clear();
+  for (int heard = 0; heard < before; ++heard) {
+    wire.head->utime = wire.now_ns / 1000 + heard;
+    wire.reader.Receive(HeadChannel("TEST"), *SealedMessage(HeadChannel("TEST"), *wire.head).bytes,
+                        wire.now_ns);
+  }
+  wire.ForgeHead([](head_t& forged) { forged.utime += kHourUs; });
+  wire.Run(2000);
+  EXPECT_EQ(wire.reader.term(), wire.writer.term());
+  wire.ForgeHead([](head_t& forged) { ++forged.utime; });
+  wire.Run(3000);
+  wire.Run(100, false);
+  EXPECT_EQ(wire.reader.backlog(), 0);
+  EXPECT_EQ(wire.writer.Backlog("reader"), 0);
+  wire.writer.Complete(wire.now_ns);
+  wire.Run(3000, false);
+  EXPECT_TRUE(wire.reader.AtEnd()) << "the writer's own beacons count again";
+}
+
+TEST(Forgery, AHeadFromTheFutureBeforeAnyOtherIsHeard) { ForgeTheFuture(0); }
+TEST(Forgery, AHeadFromTheFutureThatIsTheSecondOneHeard) { ForgeTheFuture(1); }
+
 TEST(Forgery, AHeadThatSaysTheStreamIsClosed) {
   Wire wire;
   wire.ForgeHead([](head_t& forged) { forged.state = head_t::STATE_CLOSED; });

@@ -12,6 +12,7 @@
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/election.h"
+#include "dmslam/messaging/forger.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
@@ -107,66 +108,6 @@ struct Conditions {
   bool overlapping;
   bool wrong_clocks;  // hosts are up to two hours apart
   bool forgeries;     // single messages that are changed and sealed again
-};
-
-// Changes what it has heard, one message at a time, and seals it again: what would end, hang or deafen
-// somebody who believed it.
-class Forger {
- public:
-  void Hear(const Outgoing& message) {
-    if (const auto head = DecodeHead(message.channel, *message.bytes))
-      head_ = *head, head_channel_ = message.channel;
-    if (const auto ack = DecodeAck(message.channel, *message.bytes))
-      ack_ = *ack, ack_channel_ = message.channel;
-  }
-
-  std::optional<Outgoing> Make(Random* random) {
-    if (!head_ || !ack_) return std::nullopt;
-    head_t head = *head_;
-    ack_t ack = *ack_;
-    const int64_t far = kSecond + static_cast<int64_t>(random->Next() >> 16);
-    switch (random->Below(8)) {
-      case 0:
-        head.header.epoch += far;
-        break;
-      case 1:
-        head.state = head_t::STATE_CLOSED;
-        break;
-      case 2:
-        head.header.seq += far;
-        break;
-      case 3:
-        head.utime += far;
-        break;
-      case 4:
-        ack.header.epoch += far;
-        return SealedMessage(ack_channel_, ack);
-      case 5:
-        ack.header.seq += far;
-        return SealedMessage(ack_channel_, ack);
-      case 6:
-        ack.utime += far;
-        return SealedMessage(ack_channel_, ack);
-      default:
-        return TakeOver(head, far);
-    }
-    ++head.utime;  // no copy
-    return SealedMessage(head_channel_, head);
-  }
-
- private:
-  static Outgoing TakeOver(const head_t& head, int64_t successor) {
-    take_over_t request{};
-    request.header = head.header;
-    request.header.seq = 0;
-    request.successor = successor;
-    request.name = "nobody";
-    return SealedMessage(TakeOverChannel("OWNER"), request);
-  }
-
-  std::optional<head_t> head_;
-  std::optional<ack_t> ack_;
-  std::string head_channel_, ack_channel_;
 };
 
 // Messages on their way between nodes; a node that has a side hears only that side.

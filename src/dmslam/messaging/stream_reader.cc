@@ -62,7 +62,7 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
   }
   if (!IsWanted(*head)) return;
   const Term term{head->header.epoch, head->header.writer};
-  if (term == term_ && (head->utime < last_head_utime_ || !IsPlausible(*head, now_ns))) return;
+  if (term == term_ && !IsPlausible(*head, now_ns)) return;
   if (!SpeaksOurLanguage(*head)) return;
   last_head_utime_ = head->utime;
   last_head_ns_ = now_ns;
@@ -91,11 +91,13 @@ bool StreamReader::IsWanted(const head_t& head) {
 /// beacon says so too.
 bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
   const int64_t elapsed_ns = now_ns - last_head_ns_;
-  const bool in_time = head.utime <= last_head_utime_ + elapsed_ns / 1000 + kTimeToleranceUs;
+  const bool in_time = head.utime <= last_head_utime_ + elapsed_ns / 1000 + kTimeToleranceUs &&
+                       head.utime >= last_head_utime_ - kTimeToleranceUs;
   const bool in_number = head.header.seq <= head_seq_ + kMaxBurst + elapsed_ns / kMinNsPerRecord;
   const bool same_language = state_ == State::kRefusedVersion || (head.protocol_version == kProtocolVersion &&
                                                                   head.schema_hash == options_.schema_hash);
   if (in_time && in_number && same_language) {
+    if (head.utime < last_head_utime_) return false;  // late
     leaps_.Clear();
     return true;
   }
@@ -103,8 +105,10 @@ bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
   return same_language && leaps_.SaidAgain(term_, head.utime);
 }
 
+/// A stream that is handed over goes on in the next term.
 void StreamReader::NoteEnd(const head_t& head) {
-  closed_beacons_ = head.state == head_t::STATE_CLOSED ? closed_beacons_ + 1 : 0;
+  const bool ends = head.state == head_t::STATE_CLOSED && (head.offers & head_t::OFFERS_SUCCESSOR) == 0;
+  closed_beacons_ = ends ? closed_beacons_ + 1 : 0;
   writer_closed_ = closed_beacons_ >= kBelieved;
 }
 

@@ -455,6 +455,32 @@ TEST(Stream, ClosingWaitsForTheReadersAndTellsThem) {
   EXPECT_TRUE(pair.reader.AtEnd());
 }
 
+/// Asked by somebody who goes on with the stream, a writer closes it, and no reader takes that for the end.
+TEST(Stream, WhatIsHandedOverGoesOn) {
+  Pair pair;
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+  pair.Run(200 * kMs);
+  EXPECT_EQ(pair.TakeAll().size(), 1u);
+  pair.reader.AcceptTaken();
+  for (int64_t utime : {1, 2}) {
+    take_over_t request{};
+    request.utime = utime;
+    request.header.session = kSession;
+    request.header.stream = static_cast<int32_t>(StreamId::kTest);
+    request.header.epoch = pair.writer.term().epoch;
+    request.header.writer = pair.writer.term().writer;
+    request.successor = 77;
+    request.name = "successor";
+    const Outgoing message = SealedMessage(TakeOverChannel("TEST"), request);
+    pair.writer.Receive(message.channel, *message.bytes, pair.now_ns);
+  }
+  ASSERT_TRUE(pair.writer.close_requested_by());
+  pair.writer.Close(pair.now_ns);
+  pair.Run(500 * kMs);
+  EXPECT_TRUE(pair.writer.closed());
+  EXPECT_FALSE(pair.reader.AtEnd());
+}
+
 // What keyframes of 20 to 60 KB cost on a LAN, and how late they come.
 struct LinkCost {
   double ratio = 0;  // bytes of all messages in both directions / bytes of the records

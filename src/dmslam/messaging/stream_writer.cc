@@ -74,7 +74,10 @@ int64_t StreamWriter::deadline_ns() const {
 std::vector<Outgoing> StreamWriter::TakeOutgoing() { return std::exchange(outgoing_, {}); }
 
 void StreamWriter::Close(int64_t now_ns) {
-  if (state_ == State::kLive) state_ = State::kClosing;
+  if (state_ == State::kLive) {
+    state_ = State::kClosing;
+    hands_over_ = close_requested_by_.has_value();
+  }
   lingers_ = false;
   close_deadline_ns_ = std::min(close_deadline_ns_, now_ns + options_.close_timeout_ns);
   beacon_due_ = !closed();
@@ -338,6 +341,7 @@ void StreamWriter::Beacon(int64_t now_ns) {
     head.snapshot_last = snapshot_->window.sent();
   }
   head.offers = source_ != nullptr ? head_t::OFFERS_SNAPSHOT : 0;
+  if (hands_over_) head.offers |= head_t::OFFERS_SUCCESSOR;
   head.name = options_.name;
   outgoing_.push_back(SealedMessage(HeadChannel(options_.owner), head));
   statistics_.sent_bytes += static_cast<int64_t>(outgoing_.back().bytes->size());

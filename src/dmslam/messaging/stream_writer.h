@@ -205,9 +205,10 @@ class StreamWriter : public StateMachine {
   int64_t next_beacon_ns_ = INT64_MIN;
   int64_t next_burst_ns_ = INT64_MIN / 2;
   int64_t close_deadline_ns_ = INT64_MAX;
-  bool lingers_ = false;   // complete, and not yet told to close
-  int early_beacons_ = 3;  // of a new term: one alone is not believed
-  int farewells_ = 6;      // beacons that still say goodbye: two of them are needed
+  bool lingers_ = false;     // complete, and not yet told to close
+  bool hands_over_ = false;  // closes for a successor who asked
+  int early_beacons_ = 3;    // of a new term: one alone is not believed
+  int farewells_ = 6;        // beacons that still say goodbye: two of them are needed
   int burst_left_ = 0;
   int snapshot_left_ = 0;  ///< of burst_left_, for a snapshot
   bool beacon_due_ = true;

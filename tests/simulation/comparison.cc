@@ -1,0 +1,82 @@
+#include "comparison.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <vector>
+
+#include "dmslam/dataset/trajectory.h"
+#include "dmslam/evaluation/ate.h"
+
+namespace dmslam::simulation {
+namespace {
+
+/// Of the text of a trajectory's file; none where it has no pose.
+std::vector<StampedPose> Poses(const std::string& text, const std::string& folder) {
+  if (std::ranges::count(text, '\n') < 2) return {};
+  const std::string path = folder + "/poses.txt";
+  std::ofstream(path) << text;
+  return ReadTrajectory(path);
+}
+
+std::set<int64_t> Stamps(const std::vector<StampedPose>& poses) {
+  std::set<int64_t> stamps;
+  for (const StampedPose& pose : poses) stamps.insert(pose.stamp_ns);
+  return stamps;
+}
+
+/// Of the summary; -1 where it has none.
+double Number(const Outcome& outcome, const std::string& key) {
+  const size_t at = outcome.summary.find("\"" + key + "\":");
+  return at == std::string::npos ? -1 : std::atof(outcome.summary.c_str() + at + key.size() + 3);
+}
+
+}  // namespace
+
+Distance Measure(const Outcome& outcome, const Outcome& other, const std::string& folder) {
+  Distance distance;
+  const auto poses = Poses(outcome.trajectory, folder), others = Poses(other.trajectory, folder);
+  distance.placed = static_cast<int64_t>(poses.size());
+  distance.tracked = static_cast<int64_t>(Poses(outcome.online, folder).size());
+  if (poses.empty() || others.empty()) return distance;
+  const AteReport report = EvaluateAte(others, poses);
+  if (report.usable()) distance.rmse = report.rmse();
+  std::vector<int64_t> differing;
+  std::ranges::set_symmetric_difference(Stamps(Poses(outcome.keyframes, folder)),
+                                        Stamps(Poses(other.keyframes, folder)),
+                                        std::back_inserter(differing));
+  distance.other_keyframes = static_cast<int64_t>(differing.size());
+  return distance;
+}
+
+std::string Difference(const Outcome& outcome, const Outcome& undisturbed) {
+  if (!outcome.failure.empty()) return outcome.failure;
+  std::string difference;
+  if (outcome.trajectory != undisturbed.trajectory) difference += " another trajectory,";
+  if (outcome.online != undisturbed.online) difference += " other poses while it went on,";
+  if (outcome.keyframes != undisturbed.keyframes) difference += " other keyframes,";
+  if (outcome.map != undisturbed.map) difference += " another map,";
+  return difference;
+}
+
+std::string Loss(const Outcome& outcome, const Outcome& undisturbed, double most_apart, int64_t frames_lost,
+                 const std::string& folder) {
+  if (!outcome.failure.empty()) return outcome.failure;
+  std::string loss;
+  if (Number(outcome, "keyframes_missing") != 0) loss += " keyframes are missing,";
+  if (Number(outcome, "records_lost") != 0) loss += " records are lost,";
+  if (Number(outcome, "resumed") != 0) loss += " it began again from a checkpoint,";
+  const Distance distance = Measure(outcome, undisturbed, folder);
+  if (distance.rmse > most_apart) loss += " poses are off by " + std::to_string(distance.rmse) + ",";
+  const size_t tracked = Poses(undisturbed.online, folder).size();
+  if (distance.tracked + frames_lost < static_cast<int64_t>(tracked))
+    loss += " only " + std::to_string(distance.tracked) + " frames were tracked,";
+  const auto placed = Stamps(Poses(outcome.trajectory, folder));
+  const auto told = Stamps(Poses(outcome.online, folder));
+  if (!std::ranges::includes(placed, told)) loss += " a pose that was told is missing,";
+  return loss;
+}
+
+}  // namespace dmslam::simulation

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dmslam/camera/camera.h"
+#include "dmslam/dataset/frame_source.h"
+#include "dmslam/settings/settings.h"
+#include "schedule.h"
+
+namespace dmslam {
+class Vocabulary;
+}
+
+namespace dmslam::simulation {
+
+/// A sequence in memory.
+struct StoredFrame {
+  int64_t stamp_ns = 0;
+  EncodedImage image;
+};
+
+/// Plays it. The frames must stay where they are.
+class StoredFrames : public FrameSource {
+ public:
+  explicit StoredFrames(const std::vector<StoredFrame>* frames) : frames_(frames) {}
+  size_t size() const override { return frames_->size(); }
+  int64_t StampNs(size_t index) const override { return (*frames_)[index].stamp_ns; }
+  std::string Name(size_t index) const override { return "frame " + std::to_string(index); }
+  EncodedImage Read(size_t index) override { return (*frames_)[index].image; }
+
+ private:
+  const std::vector<StoredFrame>* frames_;
+};
+
+/// What the simulated system works on.
+struct Workload {
+  Camera camera;
+  std::vector<StoredFrame> frames;
+  std::shared_ptr<const Vocabulary> vocabulary;
+  Settings settings;
+};
+
+/// What a run leaves.
+struct Outcome {
+  std::string failure;                                      ///< empty: all processes have ended well
+  std::string trajectory, online, keyframes, map, summary;  ///< the collector's files
+  std::string story;                                        ///< what happened when, a line each
+  double virtual_s = 0;
+  int64_t turns = 0, faults = 0;
+  SimulatedNetwork::Statistics network;
+};
+
+/// Reads what a collector has left in a folder.
+void ReadResults(const std::string& folder, Outcome* outcome);
+
+/// All processes of a run as they are, but for their sockets, clocks, threads and deaths: nodes on a
+/// simulated network, in one thread and virtual time, supervised as dmslam-run does. The same schedule gives
+/// the same run. `folder` is made anew: the collector's.
+Outcome RunSchedule(const Workload& workload, const Schedule& schedule, const std::string& folder);
+
+}  // namespace dmslam::simulation

@@ -1,0 +1,176 @@
+// The whole system on a simulated network: the nodes of all processes as they are, in one thread and virtual
+// time, and schedules of what goes wrong, each drawn from a seed.
+//
+// DMSLAM_FIRST_SCHEDULE and DMSLAM_SCHEDULES choose which seeds; DMSLAM_TELL=1 tells what happened in each.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "comparison.h"
+#include "dmslam/console/log.h"
+#include "simulated_system.h"
+#include "small_workload.h"
+
+namespace dmslam::simulation {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kFramesLost = 3;  // while something moves
+constexpr int64_t kFramesLostByFrontend = 12;
+constexpr uint32_t kFirstMapFrame =
+    15;                           // a frontend that dies before it loses all that it had for the first map
+constexpr double kMostApart = 2;  // of the spread of undisturbed runs
+
+int64_t FromEnvironment(const char* name, int64_t otherwise) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? otherwise : std::atoll(value);
+}
+
+double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// In memory where there is such a place: journals are synced once a virtual second.
+fs::path ScratchFolder() {
+  const std::string name = "dmslam_simulation_" + std::to_string(getpid());
+  return (fs::is_directory("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path()) / name;
+}
+
+/// Made once: a sequence, and what becomes of it where nothing goes wrong.
+class SystemSimulation : public ::testing::Test {
+ protected:
+  struct Common {
+    explicit Common(bool all_is_told) : tells(all_is_told), folder(ScratchFolder()) {
+      workload = MakeSmallWorkload((folder / "sequence").string());
+      undisturbed = Undisturbed(workload.settings);
+    }
+    ~Common() { fs::remove_all(folder); }
+    Common(const Common&) = delete;
+    Common& operator=(const Common&) = delete;
+
+    Outcome Undisturbed(const Settings& settings, size_t start = 0) const {
+      return RunUndisturbed(workload, settings, (folder / "undisturbed").string(), start);
+    }
+    bool tells;
+    fs::path folder;
+    Workload workload;
+    Outcome undisturbed;
+  };
+
+  static void SetUpTestSuite() {
+    const bool tells = FromEnvironment("DMSLAM_TELL", 0) > 0;
+    SetUpLog("system_simulation", !tells);
+    common_ = std::make_unique<Common>(tells);
+  }
+  static void TearDownTestSuite() { common_.reset(); }
+
+  static Outcome Run(const Schedule& schedule) {
+    return RunSchedule(common_->workload, schedule, (common_->folder / "run").string());
+  }
+  static uint32_t NumFrames() { return static_cast<uint32_t>(common_->workload.frames.size()); }
+
+  /// How far runs are apart in which nothing went wrong: a few features more or fewer, begun a few frames
+  /// later.
+  static double Spread() {
+    static const double spread = [] {
+      double most = 0;
+      for (const int features : {480, 490, 510, 520})
+        most = std::max(most, Apart(common_->Undisturbed(SmallSettings(1, features))));
+      for (const size_t start : {3u, 6u, 9u})
+        most = std::max(most, Apart(common_->Undisturbed(SmallSettings(1), start)));
+      return most;
+    }();
+    return spread;
+  }
+  static double Apart(const Outcome& outcome) {
+    const Distance distance = Measure(outcome, common_->undisturbed, common_->folder.string());
+    if (common_->tells)
+      std::printf("undisturbed: %.5f apart, %ld tracked, %ld other keyframes\n", distance.rmse,
+                  static_cast<long>(distance.tracked), static_cast<long>(distance.other_keyframes));
+    return distance.rmse;
+  }
+
+  /// Why the promises are not kept; empty: they are.
+  static std::string Broken(const Schedule& schedule, const Outcome& outcome) {
+    if (!schedule.meets_writers) return Difference(outcome, common_->undisturbed);
+    int64_t frames_lost = 0;
+    for (const Fault& fault : schedule.faults) {
+      if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) continue;
+      const bool frontend = fault.process == "frontend";
+      if (frontend && fault.at_frame < kFirstMapFrame) frames_lost += NumFrames();
+      frames_lost += frontend ? kFramesLostByFrontend : kFramesLost;
+    }
+    return Loss(outcome, common_->undisturbed, kMostApart * Spread(), frames_lost, common_->folder.string());
+  }
+
+  static void Tell(const Schedule& schedule, const Outcome& outcome) {
+    const Distance distance = Measure(outcome, common_->undisturbed, common_->folder.string());
+    std::printf(
+        "schedule %ld: %s\n%s%.1f s, %ld turns, %ld sent, %ld delivered, %ld lost; apart %.5f, %ld "
+        "tracked, %ld placed, %ld other keyframes\n",
+        static_cast<long>(schedule.seed), schedule.ToText().c_str(), outcome.story.c_str(), outcome.virtual_s,
+        static_cast<long>(outcome.turns), static_cast<long>(outcome.network.sent),
+        static_cast<long>(outcome.network.delivered), static_cast<long>(outcome.network.lost), distance.rmse,
+        static_cast<long>(distance.tracked), static_cast<long>(distance.placed),
+        static_cast<long>(distance.other_keyframes));
+  }
+
+  static std::unique_ptr<Common> common_;
+};
+
+std::unique_ptr<SystemSimulation::Common> SystemSimulation::common_;
+
+TEST_F(SystemSimulation, WhereNothingGoesWrongItIsTheRunInOneProcess) {
+  ASSERT_EQ(common_->undisturbed.failure, "");
+  const Distance distance = Measure(common_->undisturbed, common_->undisturbed, common_->folder.string());
+  EXPECT_GE(distance.tracked, 40) << "too little happens in this sequence";
+  EXPECT_GE(std::ranges::count(common_->undisturbed.keyframes, '\n'), 7);
+  EXPECT_EQ(Difference(Run(CalmSchedule()), common_->undisturbed), "");
+}
+
+TEST_F(SystemSimulation, TheSameSeedGivesTheSameRun) {
+  const Schedule schedule = DrawSchedule(30, NumFrames());
+  const Outcome a = Run(schedule), b = Run(schedule);
+  EXPECT_EQ(a.story, b.story);
+  EXPECT_EQ(a.turns, b.turns);
+  EXPECT_EQ(a.network.delivered, b.network.delivered);
+  EXPECT_EQ(Difference(a, b), "");
+}
+
+TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {
+  const int64_t first = FromEnvironment("DMSLAM_FIRST_SCHEDULE", 1);
+  const int64_t count = FromEnvironment("DMSLAM_SCHEDULES", 100);
+  std::map<Fault::Kind, int64_t> faults;
+  int64_t lost = 0, broken = 0, of_writers = 0;
+  const double began_s = ProcessorSeconds();
+  for (int64_t seed = first; seed < first + count && broken < 20; ++seed) {
+    const Schedule schedule = DrawSchedule(static_cast<uint64_t>(seed), NumFrames());
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    for (const Fault& fault : schedule.faults) ++faults[fault.kind];
+    lost += outcome.network.lost;
+    of_writers += schedule.meets_writers;
+    const std::string why = Broken(schedule, outcome);
+    broken += !why.empty();
+    EXPECT_EQ(why, "") << "schedule " << seed << ": " << schedule.ToText() << "\n" << outcome.story;
+  }
+  std::printf(
+      "%ld schedules, %ld of them with deaths or moves of who makes the map; %ld not as promised; %ld "
+      "messages lost; %.2f s of processor time each\n",
+      static_cast<long>(count), static_cast<long>(of_writers), static_cast<long>(broken),
+      static_cast<long>(lost), (ProcessorSeconds() - began_s) / static_cast<double>(count));
+  if (count < 100) return;
+  for (const auto& [kind, times] : faults) EXPECT_GT(times, 5) << "of kind " << static_cast<int>(kind);
+  EXPECT_EQ(faults.size(), 8u) << "the schedules really try what they are for";
+}
+
+}  // namespace
+}  // namespace dmslam::simulation
