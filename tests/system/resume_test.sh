@@ -70,8 +70,9 @@ for name in trajectory trajectory_online; do
   lost=$(comm -23 <(stamps "$work/undisturbed/trajectory_online.txt" | awk -v last="$last" '$1 <= last + 1e-4') <(stamps "$work/out/$name.txt"))
   [[ -z $lost ]] || failed "$name.txt lacks $(wc -l <<<"$lost") poses that were written, as of $(head -n 1 <<<"$lost")"
 done
-holds "$(field "$work/out" ate_rmse_final) <= 1.5 * $(field "$work/undisturbed" ate_rmse_final)" ||
-  failed "the final error is $(field "$work/out" ate_rmse_final), undisturbed $(field "$work/undisturbed" ate_rmse_final)"
+# Frames of before the kill keep the poses with which they were told: their features went with the frontend.
+holds "$(field "$work/out" ate_rmse_final) <= 1.1 * $(field "$work/undisturbed" ate_rmse_online)" ||
+  failed "the final error is $(field "$work/out" ate_rmse_final), undisturbed $(field "$work/undisturbed" ate_rmse_online) online"
 
 # ---- The copy: the run as it was earlier
 check "a copy that was taken while it ran is resumed" run --resume "$work/snapshot" >"$work/snapshot.said" 2>&1
