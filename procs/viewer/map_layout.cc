@@ -9,8 +9,8 @@ namespace dmslam {
 namespace {
 
 // In units of a map, whose scene was about one unit deep when it began.
-constexpr double kAround = 2.0;  // what a keyframe sees lies within this of it, mostly
-constexpr double kStep = 4.0;    // a map that grows moves the others only now and then
+constexpr double kAround = 1.5;  // what a keyframe sees lies within this of it, mostly
+constexpr double kStep = 2.0;    // a map that grows moves the others only now and then
 
 struct Extent {
   double low = std::numeric_limits<double>::infinity(), high = -low;

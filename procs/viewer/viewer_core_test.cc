@@ -210,7 +210,7 @@ TEST_F(ViewerCoreTest, MapsThatAreApartLieBesideEachOtherInTheirColours) {
   EXPECT_EQ(second.colour, 1u);
   EXPECT_NEAR((Vector(first.center) - PoseAt(1).Center()).norm(), 0, 1e-6) << "it lies as it is";
   const Eigen::Vector3d offset = Vector(second.center) - PoseAt(1).Center();
-  EXPECT_GT(offset.x(), 4) << "no keyframe of one lies among those of the other";
+  EXPECT_GT(offset.x(), 3) << "no keyframe of one lies among those of the other";
   EXPECT_NEAR(offset.tail<2>().norm(), 0, 1e-6);
   const auto point = Drawn(scene_.points(), kOtherLandmark);
   EXPECT_EQ(point.colour, 1u);
@@ -269,7 +269,7 @@ TEST_F(ViewerCoreTest, TheMapThatWasShownStaysWhereItIsWhileACameraIsInIt) {
   EXPECT_EQ(core_.shown_map(), kOtherMap) << "both have left it";
   core_.Draw(&scene_);
   EXPECT_NEAR((PathAt(13, 1) - PoseAt(2).Center()).norm(), 0, 1e-6);
-  EXPECT_GT((PathAt(11) - PoseAt(1).Center()).x(), 4) << "now the first one lies beside it";
+  EXPECT_GT((PathAt(11) - PoseAt(1).Center()).x(), 3) << "now the first one lies beside it";
   EXPECT_EQ(Drawn(scene_.keyframes(), OtherKf(2)).colour, 1u) << "colours stay";
 }
 
