@@ -163,7 +163,10 @@ bool ViewerNode::TakeMapRecord() {
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
   core_->OnMapDelta(*delta);
-  for (const JoinedMaps& joined : core_->TakeJoined()) Note(BoardEvent::Level::kGood, Describe(joined));
+  for (const JoinedMaps& joined : core_->TakeJoined()) {
+    Note(BoardEvent::Level::kGood, Describe(joined));
+    next_align_ns_ = 0;  // what the ground truth was laid on has moved
+  }
   NoteMapEvent(*delta);
   map_reader_->AcceptTaken();
   return true;

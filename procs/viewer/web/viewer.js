@@ -107,14 +107,15 @@ function showLegend(status) {
   const entry = (kind, name, label) => `<span><i class="${kind} c-${name}"></i>${label}</span>`;
   const aged = scene.pointMaterial.uniforms.ages.value > 0.5;
   const several = status.maps.length > 1, colourOf = (map) => map.colour % kColours;
-  const still = several || (status.maps.length === 1 && colourOf(status.maps[0]) !== 0)
+  const only = status.maps.length === 1 ? colourOf(status.maps[0]) : 0;
+  const still = several || only !== 0
       ? status.maps.map((map) => `<span class="m-${colourOf(map)}"><i class="dot"></i>${map.name}</span>`).join('') : entry('dot', 'static', 'still');
   const points = aged ? '<span>old <i class="ramp"></i> new landmarks</span>'
                       : still + entry('dot', 'unsure', 'unsure') + entry('dot', 'dynamic', 'moving');
   const path = status.cameras.length > 1
       ? status.cameras.map((_, i) => `<span class="p-${i % kColours}"><i></i>camera ${i}</span>`).join('') : entry('', 'path', 'path');
   const html = points + path + (status.truth ? entry('', 'truth', 'ground truth') : '') +
-      entry('', 'keyframe', 'keyframe') + entry('', 'edge', 'sees the same') + (status.map.loops > 0 ? entry('', 'loop', 'loop') : '');
+      (only === 0 ? entry('', 'keyframe', 'keyframe') : `<span class="m-${only}"><i></i>keyframe</span>`) + entry('', 'edge', 'sees the same') + (status.map.loops > 0 ? entry('', 'loop', 'loop') : '');
   if (byId('legend').dataset.html === html) return;
   byId('legend').dataset.html = html;
   byId('legend').innerHTML = html;
