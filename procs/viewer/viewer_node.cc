@@ -212,10 +212,11 @@ bool ViewerNode::TakeFrontendRecord() {
 bool ViewerNode::TakeFrontendRecord(CameraState* camera) {
   const std::optional<Record> record = camera->reader->Take();
   if (!record) return false;
-  if (record->channel == channels::kFramePose) {
+  const std::string channel = SplitCamera(record->channel).channel;
+  if (channel == channels::kFramePose) {
     const auto pose = Read<FramePose>(*record->bytes);
     if (pose && FindCamera(pose->camera_id) != nullptr) core_->OnFramePose(*pose);
-  } else if (record->channel == channels::kMapReset) {
+  } else if (channel == channels::kMapReset) {
     const auto reset = Read<MapReset>(*record->bytes);
     if (reset) {
       Note(BoardEvent::Level::kBad, NameOf(reset->map_id) + " is left: " + reset->reason);
