@@ -46,11 +46,11 @@ int64_t EventHub::Listener::skipped() const {
   return skipped_;
 }
 
-void EventHub::Put(Listener* listener, size_t kind, const std::shared_ptr<const std::string>& text) {
+void EventHub::Put(Listener* listener, size_t slot, const std::shared_ptr<const std::string>& text) {
   {
     const std::lock_guard lock(listener->mutex_);
-    if (listener->waiting_[kind]) ++listener->skipped_;
-    listener->waiting_[kind] = text;
+    if (listener->waiting_[slot]) ++listener->skipped_;
+    listener->waiting_[slot] = text;
   }
   listener->changed_.notify_one();
 }
@@ -59,7 +59,7 @@ std::shared_ptr<EventHub::Listener> EventHub::Join() {
   const std::lock_guard lock(mutex_);
   if (closed_ || listeners_.size() >= kMostListeners) return nullptr;
   auto listener = std::make_shared<Listener>();
-  for (size_t kind = 0; kind < kNumEventKinds; ++kind) listener->waiting_[kind] = newest_[kind];
+  listener->waiting_ = newest_;
   listeners_.push_back(listener);
   joined_or_left_.notify_all();
   return listener;
@@ -74,13 +74,14 @@ void EventHub::Leave(const std::shared_ptr<Listener>& listener) {
   joined_or_left_.notify_all();
 }
 
-void EventHub::Send(EventKind kind, const std::string& json) {
+void EventHub::Send(EventKind kind, const std::string& json, CameraId camera) {
   const auto index = static_cast<size_t>(kind);
   const auto text = std::make_shared<const std::string>("event: " + std::string(kNames[index]) +
                                                         "\ndata: " + json + "\n\n");
+  const size_t slot = std::min(camera, kMaxCameras - 1) * kNumEventKinds + index;
   const std::lock_guard lock(mutex_);
-  newest_[index] = text;
-  for (const auto& listener : listeners_) Put(listener.get(), index, text);
+  newest_[slot] = text;
+  for (const auto& listener : listeners_) Put(listener.get(), slot, text);
   eventfd_write(fd_, 1);
 }
 

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/util/ids.h"
+
 namespace dmslam {
 
 /// Kinds of events that browsers are told of.
@@ -16,8 +18,12 @@ enum class EventKind : uint8_t { kStatus = 0, kPose = 1, kFeatures = 2, kMap = 3
 inline constexpr size_t kNumEventKinds = 5;
 
 /// Hands events to any number of listeners, each of which may be slow: a listener holds at most one event of
-/// each kind, and a newer one takes the place of one that was not yet fetched. Who sends never waits.
+/// each kind and camera, and a newer one takes the place of one that was not yet fetched. Who sends never
+/// waits.
 class EventHub {
+  /// By camera, then by kind.
+  using Slots = std::array<std::shared_ptr<const std::string>, kNumEventKinds * kMaxCameras>;
+
  public:
   class Listener {
    public:
@@ -31,7 +37,7 @@ class EventHub {
     friend class EventHub;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
-    std::array<std::shared_ptr<const std::string>, kNumEventKinds> waiting_;
+    Slots waiting_;
     int64_t skipped_ = 0;
     bool closed_ = false;
   };
@@ -45,12 +51,12 @@ class EventHub {
   int fd() const { return fd_; }
   void ClearFd();
 
-  /// A new listener, who first gets the newest event of each kind. None when closed or when there are
-  /// `kMostListeners`.
+  /// A new listener, who first gets the newest event of each kind and camera. None when closed or when there
+  /// are `kMostListeners`.
   std::shared_ptr<Listener> Join();
   void Leave(const std::shared_ptr<Listener>& listener);
   /// `json` in one line.
-  void Send(EventKind kind, const std::string& json);
+  void Send(EventKind kind, const std::string& json, CameraId camera = 0);
   void Close();
   size_t num_listeners() const;
   /// Whether there are so many listeners, or will be within `patience`.
@@ -60,12 +66,12 @@ class EventHub {
   static constexpr size_t kMostListeners = 64;
 
  private:
-  static void Put(Listener* listener, size_t kind, const std::shared_ptr<const std::string>& text);
+  static void Put(Listener* listener, size_t slot, const std::shared_ptr<const std::string>& text);
 
   mutable std::mutex mutex_;
   mutable std::condition_variable joined_or_left_;
   std::vector<std::shared_ptr<Listener>> listeners_;
-  std::array<std::shared_ptr<const std::string>, kNumEventKinds> newest_;
+  Slots newest_;
   int fd_;
   int64_t skipped_by_former_ = 0;
   bool closed_ = false;

@@ -6,7 +6,7 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kImagesKept = 12;
+constexpr size_t kImagesKept = 12;  // of each camera
 constexpr int kJpegQuality = 85;
 
 std::vector<uint8_t> Raw(const Frame& frame, ImageEncoding encoding) {
@@ -47,9 +47,10 @@ const std::vector<uint8_t>& ServedImage::Jpeg() {
 void Exchange::AddImage(Frame frame) {
   auto image = std::make_shared<ServedImage>(std::move(frame));
   const std::lock_guard lock(mutex_);
-  if (!images_.empty() && images_.back()->frame_index() == image->frame_index()) return;  // a repeat
-  images_.push_back(std::move(image));
-  if (images_.size() > kImagesKept) images_.pop_front();
+  auto& images = images_[image->camera()];
+  if (!images.empty() && images.back()->frame_index() == image->frame_index()) return;  // a repeat
+  images.push_back(std::move(image));
+  if (images.size() > kImagesKept) images.pop_front();
 }
 
 std::vector<uint8_t> Exchange::EncodeScene(uint32_t generation, uint64_t since) const {
@@ -57,17 +58,20 @@ std::vector<uint8_t> Exchange::EncodeScene(uint32_t generation, uint64_t since) 
   return scene_.Encode(generation, since);
 }
 
-std::string Exchange::SeriesJson(int64_t since, int64_t most) const {
+std::string Exchange::SeriesJson(int64_t since, int64_t most, CameraId camera) const {
   const std::lock_guard lock(mutex_);
-  return series_.Json(since, most);
+  return series_.Json(camera, since, most);
 }
 
-std::shared_ptr<ServedImage> Exchange::FindImage(std::optional<uint32_t> frame_index) const {
+std::shared_ptr<ServedImage> Exchange::FindImage(std::optional<uint32_t> frame_index, CameraId camera) const {
   const std::lock_guard lock(mutex_);
-  for (auto it = images_.rbegin(); frame_index && it != images_.rend(); ++it) {
+  const auto found = images_.find(camera);
+  if (found == images_.end()) return nullptr;
+  const auto& images = found->second;
+  for (auto it = images.rbegin(); frame_index && it != images.rend(); ++it) {
     if ((*it)->frame_index() == *frame_index) return *it;
   }
-  return images_.empty() ? nullptr : images_.back();
+  return images.back();
 }
 
 void Exchange::SetHealth(HealthText health) {

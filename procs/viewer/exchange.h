@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,6 +23,7 @@ class ServedImage {
  public:
   explicit ServedImage(Frame frame) : frame_(std::move(frame)) {}
   uint32_t frame_index() const { return frame_.frame_index; }
+  CameraId camera() const { return frame_.camera_id; }
   /// Empty where the bytes are no image.
   const std::vector<uint8_t>& Jpeg();
 
@@ -44,9 +46,9 @@ class Exchange {
   void AddImage(Frame frame);
 
   std::vector<uint8_t> EncodeScene(uint32_t generation, uint64_t since) const;
-  std::string SeriesJson(int64_t since, int64_t most) const;
-  /// The image of that frame; the newest one where it is not (or no longer) there. Null: none yet.
-  std::shared_ptr<ServedImage> FindImage(std::optional<uint32_t> frame_index) const;
+  std::string SeriesJson(int64_t since, int64_t most, CameraId camera = 0) const;
+  /// The image of that frame; the camera's newest one where it is not (or no longer) there. Null: none yet.
+  std::shared_ptr<ServedImage> FindImage(std::optional<uint32_t> frame_index, CameraId camera = 0) const;
 
   /// How the system fares, for machines.
   void SetHealth(HealthText health);
@@ -57,9 +59,9 @@ class Exchange {
  private:
   mutable std::mutex mutex_;
   Scene scene_;
-  FrameSeries series_;
+  CameraSeries series_;
   HealthText health_;
-  std::deque<std::shared_ptr<ServedImage>> images_;
+  std::map<CameraId, std::deque<std::shared_ptr<ServedImage>>> images_;
   EventHub hub_;
 };
 

@@ -27,6 +27,16 @@ TEST(EventHubTest, AListenerWhoIsSlowGetsTheNewestOfEachKind) {
   EXPECT_EQ(hub.skipped(), 99) << "those of listeners that have left count";
 }
 
+TEST(EventHubTest, ACameraTakesNoOthersPlace) {
+  EventHub hub;
+  const auto listener = hub.Join();
+  for (int i = 0; i < 3; ++i) {
+    hub.Send(EventKind::kPose, "first" + std::to_string(i), 0);
+    hub.Send(EventKind::kPose, "second" + std::to_string(i), 1);
+  }
+  EXPECT_EQ(listener->Next(milliseconds(0)), "event: pose\ndata: first2\n\nevent: pose\ndata: second2\n\n");
+}
+
 TEST(EventHubTest, WhoJoinsGetsTheNewestAtOnce) {
   EventHub hub;
   hub.Send(EventKind::kStatus, "old");
@@ -158,12 +168,24 @@ TEST(ExchangeTest, GivesTheImageAskedForOrTheNewest) {
   ASSERT_GT(jpeg.size(), 4u);
   EXPECT_EQ(jpeg[0], 0xff);
   EXPECT_EQ(jpeg[1], 0xd8);
+  Frame other;
+  other.camera_id = 1;
+  other.frame_index = 38;
+  exchange.AddImage(other);
+  EXPECT_EQ(exchange.FindImage(38, 1)->camera(), 1u);
+  EXPECT_EQ(exchange.FindImage(38)->camera(), 0u) << "frames of two cameras do not collide";
+  EXPECT_EQ(exchange.FindImage(38, 2), nullptr);
   Frame broken;
   broken.frame_index = 50;
   broken.encoding = FrameEncoding::kPng;
   broken.data = {1, 2, 3};
   exchange.AddImage(broken);
   EXPECT_TRUE(exchange.FindImage(50)->Jpeg().empty());
+}
+
+TEST(ViewerJsonTest, MapsAreNamedByTheCameraThatBeganThem) {
+  EXPECT_EQ(Describe({2, 1}), "maps 1 and 2 are joined");
+  EXPECT_EQ(Describe({kMapsPerCamera + 1, 1}), "map 1 and map 1 of camera 1 are joined");
 }
 
 TEST(ViewerJsonTest, Base64AndFeatures) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/former_types.h"
@@ -32,6 +33,7 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
     if (WithoutPrefix(event->channel).empty()) continue;
     if (const auto protocol = OtherProtocol(*event))
       throw InputError(path + ": " + wire::ToldOfFormer(*protocol));
+    AddCamera(SplitCamera(WithoutPrefix(event->channel)).camera);
     if (events++ == 0) begin_us_ = end_us_ = event->utime_us;
     end_us_ = std::max(end_us_, event->utime_us);
   }
@@ -40,6 +42,12 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
   if (const std::string gaps = reader.DescribeGaps(); !gaps.empty()) LogWarning("{}", gaps);
   LogInfo("{}: {} messages, {:.1f} s", path, events, duration_s());
   BeginAnew();
+}
+
+/// It is in the log: the node listens to it, too.
+void LogPlayback::AddCamera(CameraId camera) {
+  const std::string frontend = OfCamera("frontend", std::min(camera, kMaxCameras - 1));
+  if (camera > 0 && !options_.HasPeer(frontend)) options_.peers.push_back(frontend);
 }
 
 void LogPlayback::BeginAnew() {
@@ -56,7 +64,7 @@ void LogPlayback::BeginAnew() {
   context.random_id = 1;
   context.name = "viewer of " + path_;
   node_ = std::make_unique<ViewerNode>(std::move(context), options_, viewer_, exchange_);
-  exchange_->Change([](Scene* scene, FrameSeries* series) {
+  exchange_->Change([](Scene* scene, CameraSeries* series) {
     scene->Clear();
     series->Clear();
   });

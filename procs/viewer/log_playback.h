@@ -44,6 +44,7 @@ class LogPlayback {
   bool playing() const { return playing_; }
 
  private:
+  void AddCamera(CameraId camera);
   void BeginAnew();
   void PlayTo(int64_t utime_us, bool in_haste);
   void Say() const;

@@ -78,6 +78,42 @@ TEST_F(LogPlaybackTest, GoesForwardAndBack) {
   EXPECT_NEAR(playback.position_s(), 0, 1e-6) << "play at the end begins anew";
 }
 
+TEST(LogOfTwoCamerasTest, BothAreFoundAndShown) {
+  const std::string path = testing::TempDir() + "log_of_two_cameras_test.lcmlog";
+  EventLogWriter log(path);
+  for (int i = 0; i <= 20; ++i) {
+    for (const CameraId camera : {0U, 1U}) {
+      CameraInfo info;
+      info.session = 5;
+      info.camera_id = camera;
+      info.camera.width_px = 640;
+      info.camera.height_px = 480;
+      info.camera.fx_px = info.camera.fy_px = 500;
+      PoseView view;
+      view.session = 5;
+      view.camera_id = camera;
+      view.frame_index = static_cast<uint32_t>(i);
+      const auto write = [&](const auto& message) {
+        using Message = std::decay_t<decltype(message)>;
+        log.Write(kBeginUs + i * 100'000, ChannelOfCamera(wire::Info<Message>().channel, camera),
+                  wire::Encode(message));
+      };
+      write(info);
+      if (camera == 0 || i >= 10) write(view);
+    }
+  }
+  log.Close();
+  Exchange exchange;
+  LogPlayback playback(path, {}, {}, &exchange);
+  playback.Fulfil({2.0, false, std::nullopt}, 1);
+  const auto poses = [&](CameraId camera) {
+    return nlohmann::json::parse(exchange.SeriesJson(0, 1000, camera))["end"].get<int>();
+  };
+  EXPECT_EQ(poses(0), 21);
+  EXPECT_EQ(poses(1), 11);
+  std::remove(path.c_str());
+}
+
 TEST_F(LogPlaybackTest, RefusesWhatIsNoLog) {
   EXPECT_THROW(LogPlayback("/nonexistent.lcmlog", {}, {}, &exchange_), InputError);
   const std::string empty = testing::TempDir() + "log_playback_foreign.lcmlog";

@@ -9,7 +9,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "browsers are told little-endian words");
 
 constexpr uint32_t kMagic = 0x56534d44;  // "DMSV"
-constexpr uint32_t kLayout = 1;
+constexpr uint32_t kLayout = 2;
 constexpr uint32_t kEverything = 1;
 constexpr uint32_t kGone = 0xffffffff;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -50,6 +50,7 @@ void AddPoints(const Scene::Points& table, const std::vector<uint32_t>& changed,
   for (const uint32_t i : changed) words->Add(slots[i].value.position);
   for (const uint32_t i : changed) words->Add(slots[i].alive ? slots[i].value.belief : kNaN);
   for (const uint32_t i : changed) words->Add(slots[i].value.first_frame);
+  for (const uint32_t i : changed) words->Add(slots[i].value.colour);
 }
 
 void AddKeyframes(const Scene::Keyframes& table, const std::vector<uint32_t>& changed, Words* words) {
@@ -58,6 +59,8 @@ void AddKeyframes(const Scene::Keyframes& table, const std::vector<uint32_t>& ch
   for (const uint32_t i : changed) words->Add(slots[i].alive ? slots[i].key.frame_index() : kGone);
   for (const uint32_t i : changed) words->Add(slots[i].value.center);
   for (const uint32_t i : changed) words->Add(slots[i].value.rotation);
+  for (const uint32_t i : changed) words->Add(slots[i].key.camera());
+  for (const uint32_t i : changed) words->Add(slots[i].value.colour);
   uint32_t links = 0;
   for (const uint32_t i : changed) words->Add(links += static_cast<uint32_t>(slots[i].value.links.size()));
   for (const uint32_t i : changed) {
@@ -66,6 +69,23 @@ void AddKeyframes(const Scene::Keyframes& table, const std::vector<uint32_t>& ch
   for (const uint32_t i : changed) {
     for (const auto& link : slots[i].value.links) words->Add(static_cast<uint32_t>(link.kind));
   }
+}
+
+void AddPath(const Scene::Path& table, const std::vector<uint32_t>& changed, Words* words) {
+  const auto& slots = table.slots();
+  for (const uint32_t i : changed) words->Add(slots[i].key.index);
+  for (const uint32_t i : changed) words->Add(slots[i].key.camera);
+  for (const uint32_t i : changed)
+    words->Add(slots[i].alive ? slots[i].value.position : Float3{kNaN, kNaN, kNaN});
+  for (const uint32_t i : changed) words->Add(slots[i].value.later ? 1U : 0U);
+  for (const uint32_t i : changed) words->Add(slots[i].value.colour);
+}
+
+void AddTruth(const Scene::Truth& table, const std::vector<uint32_t>& changed, Words* words) {
+  const auto& slots = table.slots();
+  for (const uint32_t i : changed) words->Add(slots[i].key.index);
+  for (const uint32_t i : changed) words->Add(slots[i].key.camera);
+  for (const uint32_t i : changed) words->Add(slots[i].value);
 }
 
 }  // namespace
@@ -89,8 +109,8 @@ std::vector<uint8_t> Scene::Encode(uint32_t generation, uint64_t since) const {
   size_t links = 0;
   for (const uint32_t i : keyframes) links += keyframes_.slots()[i].value.links.size();
   Words words;
-  words.Reserve(10 + 8 * points.size() + 10 * keyframes.size() + 2 * links + 5 * path.size() +
-                4 * truth.size());
+  words.Reserve(10 + 9 * points.size() + 12 * keyframes.size() + 2 * links + 7 * path.size() +
+                5 * truth.size());
   for (const uint32_t word : {kMagic, kLayout, generation_, everything ? kEverything : 0U}) words.Add(word);
   for (const size_t count :
        {static_cast<size_t>(version_), points.size(), keyframes.size(), links, path.size(), truth.size()}) {
@@ -98,12 +118,8 @@ std::vector<uint8_t> Scene::Encode(uint32_t generation, uint64_t since) const {
   }
   AddPoints(points_, points, &words);
   AddKeyframes(keyframes_, keyframes, &words);
-  for (const uint32_t i : path) words.Add(path_.slots()[i].key);
-  for (const uint32_t i : path)
-    words.Add(path_.slots()[i].alive ? path_.slots()[i].value.position : Float3{kNaN, kNaN, kNaN});
-  for (const uint32_t i : path) words.Add(path_.slots()[i].value.later ? 1U : 0U);
-  for (const uint32_t i : truth) words.Add(truth_.slots()[i].key);
-  for (const uint32_t i : truth) words.Add(truth_.slots()[i].value);
+  AddPath(path_, path, &words);
+  AddTruth(truth_, truth, &words);
   return words.Bytes();
 }
 

@@ -11,11 +11,19 @@ namespace dmslam {
 
 using Float3 = std::array<float, 3>;
 
+/// A frame of one of the cameras.
+struct SceneFrame {
+  CameraId camera = 0;
+  uint32_t index = 0;
+  auto operator<=>(const SceneFrame&) const = default;
+};
+
 /// A landmark as it is drawn.
 struct ScenePoint {
   Float3 position{};         ///< [map units]
   float belief = 0;          ///< log odds that it moves, in steps of 1/8
   uint32_t first_frame = 0;  ///< index of the newest frame when it was made
+  uint32_t colour = 0;       ///< number of its map's
   bool operator==(const ScenePoint&) const = default;
 };
 
@@ -30,17 +38,19 @@ struct SceneKeyframe {
   Float3 center{};                  ///< [map units]
   std::array<float, 4> rotation{};  ///< unit quaternion x, y, z, w: world from camera
   std::vector<Link> links;
+  uint32_t colour = 0;  ///< number of its map's
   bool operator==(const SceneKeyframe&) const = default;
 };
 
-/// Where the camera was at a frame.
+/// Where a camera was at a frame.
 struct ScenePathPoint {
-  Float3 position{};   ///< [map units]
-  bool later = false;  ///< placed after the fact
+  Float3 position{};    ///< [map units]
+  bool later = false;   ///< placed after the fact
+  uint32_t colour = 0;  ///< number of its map's
   bool operator==(const ScenePathPoint&) const = default;
 };
 
-/// What browsers draw of a map: tables that they mirror. A browser says which version it has and gets what
+/// What browsers draw of all maps: tables that they mirror. A browser says which version it has and gets what
 /// changed.
 class Scene {
  public:
@@ -55,37 +65,39 @@ class Scene {
   void RemovePoint(LandmarkId id) { points_.Remove(id, version_); }
   void SetKeyframe(KeyframeId id, const SceneKeyframe& keyframe) { keyframes_.Set(id, keyframe, version_); }
   void RemoveKeyframe(KeyframeId id) { keyframes_.Remove(id, version_); }
-  void SetPath(uint32_t frame_index, const ScenePathPoint& point) { path_.Set(frame_index, point, version_); }
-  void RemovePath(uint32_t frame_index) { path_.Remove(frame_index, version_); }
-  /// `position` in the ground truth's own world [m].
-  void SetTruth(uint32_t number, const Float3& position) { truth_.Set(number, position, version_); }
+  void SetPath(const SceneFrame& frame, const ScenePathPoint& point) { path_.Set(frame, point, version_); }
+  void RemovePath(const SceneFrame& frame) { path_.Remove(frame, version_); }
+  /// `position` in the ground truth's own world [m]; those of a camera are numbered in order of time.
+  void SetTruth(const SceneFrame& number, const Float3& position) { truth_.Set(number, position, version_); }
 
   using Points = SlotTable<LandmarkId, ScenePoint>;
   using Keyframes = SlotTable<KeyframeId, SceneKeyframe>;
   const Points& points() const { return points_; }
   const Keyframes& keyframes() const { return keyframes_; }
-  const SlotTable<uint32_t, ScenePathPoint>& path() const { return path_; }
-  const SlotTable<uint32_t, Float3>& truth() const { return truth_; }
+  using Path = SlotTable<SceneFrame, ScenePathPoint>;
+  using Truth = SlotTable<SceneFrame, Float3>;
+  const Path& path() const { return path_; }
+  const Truth& truth() const { return truth_; }
   uint64_t version() const { return version_; }
   /// Changes when everything was void: what a browser holds of another generation counts for nothing.
   uint32_t generation() const { return generation_; }
 
   /// What changed after version `since` of `generation`, or everything where that is of another generation
   /// (flag 1), in little-endian words of 32 bits:
-  ///   "DMSV", layout 1, generation, flags, version, points, keyframes, links, path, truth  (ten words), then
-  ///   points     slot[n], id low[n], id high[n], x y z [3n] float, belief[n] float (NaN: removed), first
-  ///   frame[n] keyframes  slot[m], frame[m] (all ones: removed), x y z [3m], quaternion x y z w [4m] world
-  ///   from camera,
-  ///              end of its links[m], then of all links: slot[l], kind[l]
-  ///   path       frame[p], x y z [3p] (NaN: removed), placed later[p]
-  ///   truth      number[t], x y z [3t]
+  ///   "DMSV", layout 2, generation, flags, version, points, keyframes, links, path, truth  (ten words), then
+  ///   points     slot[n], id low[n], id high[n], x y z [3n] float, belief[n] float (NaN: removed),
+  ///              first frame[n], colour[n]
+  ///   keyframes  slot[m], frame[m] (all ones: removed), x y z [3m], quaternion x y z w [4m] world from
+  ///              camera, camera[m], colour[m], end of its links[m], then of all links: slot[l], kind[l]
+  ///   path       frame[p], camera[p], x y z [3p] (NaN: removed), placed later[p], colour[p]
+  ///   truth      number[t], camera[t], x y z [3t]
   std::vector<uint8_t> Encode(uint32_t generation, uint64_t since) const;
 
  private:
   Points points_;
   Keyframes keyframes_;
-  SlotTable<uint32_t, ScenePathPoint> path_;
-  SlotTable<uint32_t, Float3> truth_;
+  Path path_;
+  Truth truth_;
   uint64_t version_ = 1;
   uint32_t generation_ = 1;
 };

@@ -28,11 +28,11 @@ struct Decoded {
     return value;
   }
   size_t ExpectedWords() const {
-    return 10 + 8 * points() + 10 * keyframes() + 2 * links() + 5 * path() + 4 * truth();
+    return 10 + 9 * points() + 12 * keyframes() + 2 * links() + 7 * path() + 5 * truth();
   }
 };
 
-ScenePoint PointAt(float x) { return {{x, 2, 3}, -1.5F, 7}; }
+ScenePoint PointAt(float x) { return {{x, 2, 3}, -1.5F, 7, 4}; }
 
 TEST(SceneTest, TellsEverythingFirstAndThenWhatChanged) {
   Scene scene;
@@ -54,6 +54,7 @@ TEST(SceneTest, TellsEverythingFirstAndThenWhatChanged) {
   EXPECT_EQ(second.Real(13), 9.0F);
   EXPECT_EQ(second.Real(16), -1.5F);
   EXPECT_EQ(second.words[17], 7u);
+  EXPECT_EQ(second.words[18], 4u) << "the colour";
 }
 
 TEST(SceneTest, TellsOfRemovalsOnceAndReusesSlotsOfLandmarks) {
@@ -88,18 +89,41 @@ TEST(SceneTest, KeyframesKeepTheirSlotsAndCarryLinks) {
   ASSERT_EQ(all.keyframes(), 2u);
   ASSERT_EQ(all.links(), 3u);
   EXPECT_EQ(all.words.size(), all.ExpectedWords());
-  const size_t links = 10 + 10 * 2;
+  const size_t links = 10 + 12 * 2;
   EXPECT_EQ(all.words[12], 20u) << "its frame";
   EXPECT_EQ(all.words[links - 2], 1u) << "where the links of the first end";
   EXPECT_EQ(all.words[links - 1], 3u);
   EXPECT_EQ(all.words[links + 5], 2u) << "kind of the last link";
 }
 
+TEST(SceneTest, FramesOfTwoCamerasDoNotCollide) {
+  Scene scene;
+  scene.SetPath({0, 3}, {{1, 1, 1}, false, 0});
+  scene.SetPath({1, 3}, {{2, 2, 2}, true, 5});
+  scene.SetKeyframe(KeyframeId::Make(1, 3, 1), {{7, 8, 9}, {0, 0, 0, 1}, {}, 5});
+  const Decoded all(scene.Encode(0, 0));
+  ASSERT_EQ(all.path(), 2u);
+  ASSERT_EQ(all.words.size(), all.ExpectedWords());
+  EXPECT_EQ(all.words[11], 3u) << "the keyframe's frame";
+  EXPECT_EQ(all.words[19], 1u) << "its camera";
+  EXPECT_EQ(all.words[20], 5u) << "its colour";
+  const size_t path = 10 + 12;
+  const auto at = all.words.begin() + path;
+  EXPECT_EQ(std::vector<uint32_t>(at, at + 4), (std::vector<uint32_t>{3, 3, 0, 1})) << "frames, cameras";
+  EXPECT_EQ(all.Real(path + 4), 1.0F);
+  EXPECT_EQ(all.Real(path + 7), 2.0F);
+  EXPECT_EQ(std::vector<uint32_t>(at + 10, at + 14), (std::vector<uint32_t>{0, 1, 0, 5})) << "later, colours";
+  scene.Advance();
+  scene.RemovePath({0, 3});
+  EXPECT_EQ(scene.path().Find({0, 3}), -1);
+  EXPECT_GE(scene.path().Find({1, 3}), 0);
+}
+
 TEST(SceneTest, AfterClearingNothingOfBeforeCounts) {
   Scene scene;
   scene.SetPoint(LandmarkId{1}, PointAt(1));
-  scene.SetPath(3, {{1, 1, 1}, false});
-  scene.SetTruth(3, {1, 1, 1});
+  scene.SetPath({0, 3}, {{1, 1, 1}, false});
+  scene.SetTruth({0, 3}, {1, 1, 1});
   const Decoded before(scene.Encode(0, 0));
   EXPECT_EQ(before.path() + before.truth(), 2u);
   scene.Clear();

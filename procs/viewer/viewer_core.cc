@@ -16,6 +16,8 @@ constexpr size_t kMostPairs = 3000;
 constexpr int64_t kTruthStepNs = 30'000'000;  // of a ground truth from a file
 constexpr int64_t kTruthNearNs = 20'000'000;
 
+SceneFrame FrameOf(const FramePose& pose) { return {pose.camera_id, pose.frame_index}; }
+
 Float3 ToFloats(const Eigen::Vector3d& p) {
   return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
 }
@@ -31,6 +33,7 @@ float Step(float belief) { return std::round(std::clamp(belief, -8.0F, 8.0F) * 8
 }  // namespace
 
 void ViewerCore::OnMapDelta(const MapDelta& delta) {
+  NoteJoined(delta);
   map_.Apply(delta);
   if (!delta.dropped_maps.empty()) {
     ++resets_;
@@ -40,6 +43,18 @@ void ViewerCore::OnMapDelta(const MapDelta& delta) {
   HandFramesOn(delta);
   ChooseMap();
   dirty_ = true;
+}
+
+/// A keyframe that is in another map now takes its whole map with it.
+void ViewerCore::NoteJoined(const MapDelta& delta) {
+  for (const KeyframeState& state : delta.keyframes) {
+    const Keyframe* before = map_.FindKeyframe(state.id);
+    if (before == nullptr || before->map_id == state.map_id) continue;
+    const bool known = std::ranges::any_of(joined_, [&](const JoinedMaps& joined) {
+      return joined.from == before->map_id && joined.into == state.map_id;
+    });
+    if (!known) joined_.push_back({before->map_id, state.map_id});
+  }
 }
 
 void ViewerCore::Mark(const MapDelta& delta) {
@@ -69,7 +84,7 @@ void ViewerCore::HandFramesOn(const MapDelta& delta) {
     const auto it = frames_of_.find(tombstone.id);
     const std::optional<KeyframeId> heir = map_.ResolveKeyframe(tombstone.id);
     if (it == frames_of_.end() || !heir) continue;
-    const std::vector<uint32_t> frames = std::move(it->second);
+    const std::vector<SceneFrame> frames = std::move(it->second);
     frames_of_.erase(it);
     frames_of_[*heir].insert(frames_of_[*heir].end(), frames.begin(), frames.end());
     dirty_frames_.insert(frames.begin(), frames.end());
@@ -86,9 +101,9 @@ void ViewerCore::OnFramePose(const FramePose& pose) {
   newest_ns_ = std::max(newest_ns_, pose.stamp_ns);
   dirty_ = true;
   if (!pose.HasPose()) return;
-  frames_[pose.frame_index] = pose;
-  frames_of_[map_.ResolveKeyframe(pose.reference).value_or(pose.reference)].push_back(pose.frame_index);
-  dirty_frames_.insert(pose.frame_index);
+  frames_[FrameOf(pose)] = pose;
+  frames_of_[map_.ResolveKeyframe(pose.reference).value_or(pose.reference)].push_back(FrameOf(pose));
+  dirty_frames_.insert(FrameOf(pose));
   if (pose.state != TrackingState::kLocalizedLater && pose.map_id != shown_map_) ChooseMap();
 }
 
@@ -106,30 +121,67 @@ void ViewerCore::MarkAll() {
       if (landmark.valid()) dirty_points_.insert(landmark);
     }
   }
-  for (const auto& [index, frame] : frames_) dirty_frames_.insert(index);
+  MarkFrames();
 }
 
-/// The map the camera was in last, as long as it is there; else the one with most keyframes.
+void ViewerCore::MarkFrames() {
+  for (const auto& [frame, pose] : frames_) dirty_frames_.insert(frame);
+}
+
+/// It is drawn somewhere else, or in another colour.
+void ViewerCore::MarkMap(MapId map_id) {
+  for (const Keyframe* keyframe : map_.KeyframesOf(map_id)) dirty_keyframes_.insert(keyframe->id);
+  for (const Landmark* landmark : map_.LandmarksOf(map_id)) dirty_points_.insert(landmark->id);
+}
+
+/// What it was told from may have become part of another map.
+MapId ViewerCore::MapOf(const FramePose& pose) const {
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
+  return reference ? reference->map_id : pose.map_id.value_or(0);
+}
+
+/// By camera: the map of its newest frame that has a pose.
+std::vector<MapId> ViewerCore::WhereCamerasAre() const {
+  std::vector<MapId> maps;
+  for (auto it = frames_.begin(); it != frames_.end();) {
+    it = frames_.lower_bound({it->first.camera + 1, 0});
+    maps.push_back(MapOf(std::prev(it)->second));
+  }
+  return maps;
+}
+
+/// The one that is shown, as long as a camera is in it; else the one in which the first camera was last, as
+/// long as it is there; else the one with most keyframes.
 void ViewerCore::ChooseMap() {
   std::map<MapId, size_t> keyframes_in;
   for (const auto& [id, keyframe] : map_.keyframes()) ++keyframes_in[keyframe.map_id];
   MapId chosen = 0;
-  if (!frames_.empty()) chosen = frames_.rbegin()->second.map_id.value_or(0);
-  if (!keyframes_in.contains(chosen)) {
-    chosen = 0;
+  for (const MapId map_id : WhereCamerasAre()) {
+    if (!keyframes_in.contains(map_id)) continue;
+    if (map_id == shown_map_) return;
+    if (chosen == 0) chosen = map_id;
+  }
+  if (chosen == 0) {
     for (const auto& [map_id, count] : keyframes_in) {
       if (chosen == 0 || count > keyframes_in.at(chosen)) chosen = map_id;
     }
   }
   if (chosen == shown_map_ || chosen == 0) return;
   shown_map_ = chosen;
-  MarkAll();
+  MarkFrames();
 }
 
-void ViewerCore::OnTruth(uint32_t frame_index, const Rigid3d& T_world_cam) {
-  if (!truth_file_.empty()) return;
-  truth_.try_emplace(frame_index, Truth{T_world_cam.translation});
+void ViewerCore::OnTruth(const SceneFrame& frame, const Rigid3d& T_world_cam) {
+  if (!truth_file_.empty() && frame.camera == 0) return;
+  truth_[frame.camera].try_emplace(frame.index, Truth{T_world_cam.translation});
   dirty_ = true;
+}
+
+std::optional<Rigid3d> ViewerCore::Drawn(const Rigid3d& T_world_cam, std::optional<MapId> map_id) const {
+  if (!map_id || layout_.places().empty()) return T_world_cam;
+  const MapLayout::Place* place = layout_.Find(*map_id);
+  if (place == nullptr) return std::nullopt;
+  return Rigid3d(T_world_cam.rotation, T_world_cam.translation + place->offset);
 }
 
 void ViewerCore::Draw(Scene* scene) {
@@ -137,9 +189,14 @@ void ViewerCore::Draw(Scene* scene) {
     scene->Clear();
     positions_.clear();
     truth_file_next_ = 0;
-    for (auto& [index, truth] : truth_) truth.drawn = false;
+    for (auto& [camera, truths] : truth_) {
+      for (auto& [index, truth] : truths) truth.drawn = false;
+    }
   }
   scene->Advance();
+  const std::set<MapId> rearranged = layout_.Arrange(map_, shown_map_);
+  for (const MapId map_id : rearranged) MarkMap(map_id);
+  if (!rearranged.empty()) MarkFrames();
   for (const LandmarkId id : dirty_points_) DrawPoint(id, scene);
   if (scene->points().size() > map_.num_landmarks()) SweepPoints(scene);
   for (const KeyframeId id : dirty_keyframes_) DrawKeyframe(id, scene);
@@ -147,7 +204,7 @@ void ViewerCore::Draw(Scene* scene) {
     const Keyframe* keyframe = map_.FindKeyframe(id);
     if (keyframe != nullptr && keyframe->parent > id) DrawKeyframe(id, scene);
   }
-  for (const uint32_t index : dirty_frames_) DrawFrame(index, scene);
+  for (const SceneFrame& frame : dirty_frames_) DrawFrame(frame, scene);
   DrawTruth(scene);
   if (!dirty_points_.empty()) {
     num_moving_ = 0;
@@ -162,12 +219,13 @@ void ViewerCore::Draw(Scene* scene) {
 
 void ViewerCore::DrawPoint(LandmarkId id, Scene* scene) {
   const Landmark* landmark = map_.FindLandmark(id);
-  if (landmark == nullptr || landmark->map_id != shown_map_) {
+  const MapLayout::Place* place = landmark == nullptr ? nullptr : layout_.Find(landmark->map_id);
+  if (place == nullptr) {
     scene->RemovePoint(id);
     return;
   }
-  scene->SetPoint(id, {ToFloats(landmark->p_world), Step(landmark->evidence.motion_belief),
-                       landmark->first_keyframe.frame_index()});
+  scene->SetPoint(id, {ToFloats(landmark->p_world + place->offset), Step(landmark->evidence.motion_belief),
+                       landmark->first_keyframe.frame_index(), place->colour});
 }
 
 /// Takes out what is no longer in the map although nobody said so (landmarks that went with their last
@@ -182,12 +240,14 @@ void ViewerCore::SweepPoints(Scene* scene) {
 
 void ViewerCore::DrawKeyframe(KeyframeId id, Scene* scene) {
   const Keyframe* keyframe = map_.FindKeyframe(id);
-  if (keyframe == nullptr || keyframe->map_id != shown_map_) {
+  const MapLayout::Place* place = keyframe == nullptr ? nullptr : layout_.Find(keyframe->map_id);
+  if (place == nullptr) {
     scene->RemoveKeyframe(id);
     return;
   }
   SceneKeyframe drawn;
-  drawn.center = ToFloats(keyframe->T_cam_world.Center());
+  drawn.colour = place->colour;
+  drawn.center = ToFloats(keyframe->T_cam_world.Center() + place->offset);
   drawn.rotation = ToFloats(keyframe->T_cam_world.rotation.conjugate());
   const auto link = [&](KeyframeId other, SceneKeyframe::LinkKind kind) {
     const int64_t slot = scene->keyframes().Find(other);
@@ -203,20 +263,22 @@ void ViewerCore::DrawKeyframe(KeyframeId id, Scene* scene) {
   scene->SetKeyframe(id, drawn);
 }
 
-void ViewerCore::DrawFrame(uint32_t frame_index, Scene* scene) {
-  const FramePose& pose = frames_.at(frame_index);
+void ViewerCore::DrawFrame(const SceneFrame& frame, Scene* scene) {
+  const FramePose& pose = frames_.at(frame);
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
-  if (!reference || reference->map_id != shown_map_) {
-    scene->RemovePath(frame_index);
-    positions_.erase(frame_index);
+  const MapLayout::Place* place = reference ? layout_.Find(reference->map_id) : nullptr;
+  positions_.erase(frame);
+  if (place == nullptr) {
+    scene->RemovePath(frame);
     return;
   }
   const Eigen::Vector3d position = reference->Compose(pose.T_cam_reference, pose.reference_scale).Center();
-  positions_[frame_index] = position;
-  scene->SetPath(frame_index, {ToFloats(position), pose.state == TrackingState::kLocalizedLater});
+  if (reference->map_id == shown_map_) positions_[frame] = position;
+  scene->SetPath(frame, {ToFloats(position + place->offset), pose.state == TrackingState::kLocalizedLater,
+                         place->colour});
 }
 
-void ViewerCore::DrawTruth(Scene* scene) {
+void ViewerCore::DrawTruthFile(Scene* scene) {
   int64_t last_ns = truth_file_next_ > 0 ? truth_file_[truth_file_next_ - 1].stamp_ns : INT64_MIN / 2;
   for (; truth_file_next_ < truth_file_.size(); ++truth_file_next_) {
     const StampedPose& pose = truth_file_[truth_file_next_];
@@ -224,32 +286,50 @@ void ViewerCore::DrawTruth(Scene* scene) {
     if (frames_.empty() || pose.stamp_ns < frames_.begin()->second.stamp_ns - kTruthStepNs) continue;
     if (pose.stamp_ns - last_ns < kTruthStepNs) continue;
     last_ns = pose.stamp_ns;
-    scene->SetTruth(static_cast<uint32_t>(truth_file_next_), ToFloats(pose.T_world_cam.translation));
+    scene->SetTruth({0, static_cast<uint32_t>(truth_file_next_)}, ToFloats(pose.T_world_cam.translation));
   }
-  for (auto it = truth_.rbegin(); it != truth_.rend() && !it->second.drawn; ++it) {
-    it->second.drawn = true;
-    scene->SetTruth(it->first, ToFloats(it->second.position));
+}
+
+bool ViewerCore::IsInShownMap(CameraId camera) const {
+  const auto first = positions_.lower_bound({camera, 0});
+  return first != positions_.end() && first->first.camera == camera;
+}
+
+/// Of cameras that have a part in the map on which it is laid: the others may be in another world.
+void ViewerCore::DrawTruth(Scene* scene) {
+  DrawTruthFile(scene);
+  for (auto& [camera, truths] : truth_) {
+    if (!IsInShownMap(camera)) continue;
+    for (auto it = truths.rbegin(); it != truths.rend() && !it->second.drawn; ++it) {
+      it->second.drawn = true;
+      scene->SetTruth({camera, it->first}, ToFloats(it->second.position));
+    }
   }
+}
+
+std::optional<Eigen::Vector3d> ViewerCore::TruthAt(const SceneFrame& frame) const {
+  if (const auto truths = truth_.find(frame.camera); truths != truth_.end()) {
+    const auto it = truths->second.find(frame.index);
+    if (it != truths->second.end()) return it->second.position;
+  }
+  if (frame.camera != 0) return std::nullopt;
+  const int64_t stamp_ns = frames_.at(frame).stamp_ns;
+  const auto near = std::lower_bound(truth_file_.begin(), truth_file_.end(), stamp_ns - kTruthNearNs,
+                                     [](const StampedPose& pose, int64_t ns) { return pose.stamp_ns < ns; });
+  if (near == truth_file_.end() || near->stamp_ns > stamp_ns + kTruthNearNs) return std::nullopt;
+  return near->T_world_cam.translation;
 }
 
 std::optional<TruthAlignment> ViewerCore::AlignTruth() const {
   std::vector<Eigen::Vector3d> on_map, on_truth;
   const size_t step = positions_.size() / kMostPairs + 1;
   size_t number = 0;
-  for (const auto& [index, position] : positions_) {
+  for (const auto& [frame, position] : positions_) {
     if (number++ % step != 0) continue;
-    if (const auto it = truth_.find(index); it != truth_.end()) {
-      on_map.push_back(position);
-      on_truth.push_back(it->second.position);
-      continue;
-    }
-    const int64_t stamp_ns = frames_.at(index).stamp_ns;
-    const auto near =
-        std::lower_bound(truth_file_.begin(), truth_file_.end(), stamp_ns - kTruthNearNs,
-                         [](const StampedPose& pose, int64_t ns) { return pose.stamp_ns < ns; });
-    if (near == truth_file_.end() || near->stamp_ns > stamp_ns + kTruthNearNs) continue;
+    const std::optional<Eigen::Vector3d> truth = TruthAt(frame);
+    if (!truth) continue;
     on_map.push_back(position);
-    on_truth.push_back(near->T_world_cam.translation);
+    on_truth.push_back(*truth);
   }
   if (on_map.size() < kMinPairs) return std::nullopt;
   const std::optional<Sim3d> truth_from_map = AlignPoints(on_map, on_truth, Alignment::kSim3);

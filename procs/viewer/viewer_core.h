@@ -5,12 +5,14 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/map/replica.h"
+#include "viewer/map_layout.h"
 #include "viewer/scene.h"
 
 namespace dmslam {
@@ -22,8 +24,14 @@ struct TruthAlignment {
   size_t pairs = 0;
 };
 
-/// A replica of the map with the camera's path, and what of it is drawn. Of several maps the one is drawn in
-/// which the camera was last.
+/// Two maps became one.
+struct JoinedMaps {
+  MapId from = 0;  ///< is no more
+  MapId into = 0;
+};
+
+/// A replica of the map with the cameras' paths, and how it is drawn. Of several maps the one in which a
+/// camera was last lies as it is, the others beside it.
 class ViewerCore {
  public:
   ViewerCore(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
@@ -34,9 +42,9 @@ class ViewerCore {
   /// there.
   void ForgetMap();
 
-  /// Where the camera truly was at a frame.
-  void OnTruth(uint32_t frame_index, const Rigid3d& T_world_cam);
-  /// The whole ground truth; it is shown up to the newest frame.
+  /// Where a camera truly was at a frame.
+  void OnTruth(const SceneFrame& frame, const Rigid3d& T_world_cam);
+  /// The whole ground truth of camera 0; it is shown up to the newest frame.
   void SetTruth(std::vector<StampedPose> poses) { truth_file_ = std::move(poses); }
 
   /// Whether anything that is drawn has changed since the last Draw.
@@ -53,19 +61,33 @@ class ViewerCore {
 
   const Map& map() const { return map_; }
   MapId shown_map() const { return shown_map_; }
+  /// Where the maps are drawn, as of the last Draw.
+  const MapLayout& layout() const { return layout_; }
+  /// A pose in a map, where that is drawn; none where it cannot be told where that is.
+  std::optional<Rigid3d> Drawn(const Rigid3d& T_world_cam, std::optional<MapId> map_id) const;
+  /// Maps that were joined since this was asked last.
+  std::vector<JoinedMaps> TakeJoined() { return std::exchange(joined_, {}); }
   size_t num_moving() const { return num_moving_; }
   uint32_t resets() const { return resets_; }
 
  private:
   void ChooseMap();
+  std::vector<MapId> WhereCamerasAre() const;
+  MapId MapOf(const FramePose& pose) const;
+  void NoteJoined(const MapDelta& delta);
   void MarkAll();
+  void MarkMap(MapId map_id);
+  void MarkFrames();
   void Mark(const MapDelta& delta);
   void MarkMoved(const std::vector<ReferenceMove>& moves);
   void HandFramesOn(const MapDelta& delta);
   void DrawPoint(LandmarkId id, Scene* scene);
   void DrawKeyframe(KeyframeId id, Scene* scene);
-  void DrawFrame(uint32_t frame_index, Scene* scene);
+  void DrawFrame(const SceneFrame& frame, Scene* scene);
   void DrawTruth(Scene* scene);
+  void DrawTruthFile(Scene* scene);
+  bool IsInShownMap(CameraId camera) const;
+  std::optional<Eigen::Vector3d> TruthAt(const SceneFrame& frame) const;
   void SweepPoints(Scene* scene);
 
   struct Truth {
@@ -75,11 +97,13 @@ class ViewerCore {
 
   Replica map_;
   MapId shown_map_ = 0;
-  std::map<uint32_t, FramePose> frames_;
-  std::map<KeyframeId, std::vector<uint32_t>>
-      frames_of_;                                  ///< told from this keyframe, or from one it stands for
-  std::map<uint32_t, Eigen::Vector3d> positions_;  ///< of the frames, as drawn
-  std::map<uint32_t, Truth> truth_;
+  MapLayout layout_;
+  std::vector<JoinedMaps> joined_;
+  std::map<SceneFrame, FramePose> frames_;
+  std::map<KeyframeId, std::vector<SceneFrame>>
+      frames_of_;                                    ///< told from this keyframe, or from one it stands for
+  std::map<SceneFrame, Eigen::Vector3d> positions_;  ///< of the frames in the shown map
+  std::map<CameraId, std::map<uint32_t, Truth>> truth_;
   std::vector<StampedPose> truth_file_;
   size_t truth_file_next_ = 0;
   int64_t newest_ns_ = 0;
@@ -88,7 +112,7 @@ class ViewerCore {
   bool void_ = false;
   std::set<LandmarkId> dirty_points_;
   std::set<KeyframeId> dirty_keyframes_;
-  std::set<uint32_t> dirty_frames_;
+  std::set<SceneFrame> dirty_frames_;
   size_t num_moving_ = 0;
   uint32_t resets_ = 0;
 };

@@ -23,6 +23,9 @@ class ViewerCoreTest : public testing::Test {
     return Rigid3d(ExpSo3({0, angle, 0}), {2 * std::cos(angle), 0.1 * i, 2 * std::sin(angle)}).Inverse();
   }
   void AddKeyframe(int i, size_t features = 40) {
+    AddKeyframeOf(kMapId, Kf(i), i, i > 0 ? Kf(i - 1) : KeyframeId(), features);
+  }
+  void AddKeyframeOf(MapId map_id, KeyframeId id, int i, KeyframeId parent = {}, size_t features = 40) {
     FeatureSet set;
     Random random(static_cast<uint64_t>(i));
     for (size_t k = 0; k < features; ++k) {
@@ -31,10 +34,10 @@ class ViewerCoreTest : public testing::Test {
       set.descriptors.push_back({{random.Next(), random.Next(), random.Next(), random.Next()}});
     }
     Keyframe keyframe;
-    keyframe.id = Kf(i);
-    keyframe.map_id = kMapId;
+    keyframe.id = id;
+    keyframe.map_id = map_id;
     keyframe.T_cam_world = PoseAt(i);
-    if (i > 0) keyframe.parent = Kf(i - 1);
+    keyframe.parent = parent;
     keyframe.features = MakeFrameFeatures(set, map_.camera(), map_.pyramid());
     map_.AddKeyframe(keyframe);
   }
@@ -53,21 +56,46 @@ class ViewerCoreTest : public testing::Test {
     core_.Draw(&scene_);
   }
   void SayFrame(uint32_t index, int reference, const Rigid3d& T_cam_reference = {}) {
+    SayFrameOf(0, index, kMapId, Kf(reference), T_cam_reference);
+  }
+  void SayFrameOf(CameraId camera, uint32_t index, MapId map_id, KeyframeId reference,
+                  const Rigid3d& T_cam_reference = {}) {
     FramePose pose;
+    pose.camera_id = camera;
     pose.frame_index = index;
     pose.stamp_ns = static_cast<int64_t>(index) * 33'000'000;
     pose.state = TrackingState::kTracking;
-    pose.map_id = kMapId;
-    pose.reference = Kf(reference);
+    pose.map_id = map_id;
+    pose.reference = reference;
     pose.T_cam_reference = T_cam_reference;
     core_.OnFramePose(pose);
   }
-  Eigen::Vector3d PathAt(uint32_t frame) {
-    const int64_t slot = scene_.path().Find(frame);
+  /// As it is drawn.
+  template <typename Table, typename Key>
+  static auto Drawn(const Table& table, const Key& key) {
+    const int64_t slot = table.Find(key);
     EXPECT_GE(slot, 0);
-    const Float3 p = scene_.path().slots()[static_cast<size_t>(slot)].value.position;
-    return {p[0], p[1], p[2]};
+    return table.slots().at(static_cast<size_t>(slot)).value;
   }
+  static Eigen::Vector3d Vector(const Float3& p) { return {p[0], p[1], p[2]}; }
+  Eigen::Vector3d PathAt(uint32_t frame, CameraId camera = 0) {
+    return Vector(Drawn(scene_.path(), SceneFrame{camera, frame}).position);
+  }
+  /// A second map of camera 1, with three keyframes where the first map has its own, and a landmark.
+  static constexpr MapId kOtherMap = kMapsPerCamera + 1;
+  static KeyframeId OtherKf(int i) { return KeyframeId::Make(1, static_cast<uint32_t>(10 * i), 1); }
+  void AddOtherMap() {
+    for (int i = 0; i < 3; ++i)
+      AddKeyframeOf(kOtherMap, OtherKf(i), i, i > 0 ? OtherKf(i - 1) : KeyframeId());
+    Landmark landmark;
+    landmark.id = kOtherLandmark;
+    landmark.map_id = kOtherMap;
+    landmark.p_world = {1, 2, 3};
+    landmark.reference = landmark.first_keyframe = OtherKf(0);
+    map_.AddLandmark(landmark);
+    map_.SetObservation(map_.At(OtherKf(0)), 0, map_.At(landmark.id));
+  }
+  static constexpr LandmarkId kOtherLandmark{(uint64_t{1} << 48) | 900};
 
   MapEditor map_;
   ViewerCore core_;
@@ -135,7 +163,7 @@ TEST_F(ViewerCoreTest, TruthIsAlignedByASimilarity) {
   const Sim3d truth_from_map(ExpSo3({0.1, -0.4, 0.2}), {3, 1, -2}, 2.5);
   for (int i = 0; i < 20; ++i) {
     SayFrame(static_cast<uint32_t>(10 * i), i);
-    core_.OnTruth(static_cast<uint32_t>(10 * i),
+    core_.OnTruth({0, static_cast<uint32_t>(10 * i)},
                   Rigid3d(Eigen::Quaterniond::Identity(), truth_from_map * PoseAt(i).Center()));
   }
   Say();
@@ -164,6 +192,109 @@ TEST_F(ViewerCoreTest, AVoidMapIsTakenOffAndASnapshotBringsTheFramesBack) {
   EXPECT_EQ(scene_.points().size(), 20u);
   EXPECT_EQ(scene_.keyframes().size(), 3u);
   EXPECT_EQ(scene_.path().size(), 1u);
+}
+
+TEST_F(ViewerCoreTest, MapsThatAreApartLieBesideEachOtherInTheirColours) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  for (uint64_t i = 1; i <= 20; ++i) AddLandmark(i, 0, static_cast<uint16_t>(i));
+  SayFrame(11, 1);
+  Say();
+  AddOtherMap();
+  SayFrameOf(1, 12, kOtherMap, OtherKf(1));
+  Say();
+  EXPECT_EQ(core_.shown_map(), kMapId) << "another camera's first frame moves nothing";
+  EXPECT_EQ(scene_.keyframes().size(), 6u);
+  EXPECT_EQ(scene_.points().size(), 21u);
+  const auto first = Drawn(scene_.keyframes(), Kf(1)), second = Drawn(scene_.keyframes(), OtherKf(1));
+  EXPECT_EQ(first.colour, 0u);
+  EXPECT_EQ(second.colour, 1u);
+  EXPECT_NEAR((Vector(first.center) - PoseAt(1).Center()).norm(), 0, 1e-6) << "it lies as it is";
+  const Eigen::Vector3d offset = Vector(second.center) - PoseAt(1).Center();
+  EXPECT_GT(offset.x(), 3) << "no keyframe of one lies among those of the other";
+  EXPECT_NEAR(offset.tail<2>().norm(), 0, 1e-6);
+  const auto point = Drawn(scene_.points(), kOtherLandmark);
+  EXPECT_EQ(point.colour, 1u);
+  EXPECT_NEAR((Vector(point.position) - Eigen::Vector3d(1, 2, 3) - offset).norm(), 0, 1e-5);
+  EXPECT_NEAR((PathAt(12, 1) - PathAt(11) - offset).norm(), 0, 1e-5);
+  EXPECT_EQ(Drawn(scene_.path(), SceneFrame{1, 12}).colour, 1u);
+  const auto drawn = core_.Drawn(PoseAt(1).Inverse(), kOtherMap);
+  ASSERT_TRUE(drawn);
+  EXPECT_NEAR((drawn->translation - Vector(second.center)).norm(), 0, 1e-5) << "so does the camera";
+  EXPECT_FALSE(core_.Drawn({}, MapId{77})) << "nobody knows where that map lies";
+}
+
+TEST_F(ViewerCoreTest, MapsThatAreJoinedBecomeOnePlaceAndOneColour) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  AddOtherMap();
+  SayFrame(11, 1);
+  SayFrameOf(1, 11, kOtherMap, OtherKf(1));
+  Say();
+  EXPECT_TRUE(core_.TakeJoined().empty());
+  const uint32_t generation = scene_.generation();
+  const Rigid3d T_first_other(ExpSo3({0, 0.5, 0}), {0.3, 0.2, 0.1});
+  for (int i = 0; i < 3; ++i) {
+    const Keyframe& keyframe = map_.At(OtherKf(i));
+    map_.SetPose(keyframe, keyframe.T_cam_world * T_first_other.Inverse());
+    map_.SetMapId(keyframe, kMapId);
+  }
+  map_.SetMapId(map_.At(kOtherLandmark), kMapId);
+  map_.SetPosition(map_.At(kOtherLandmark), T_first_other * Eigen::Vector3d(1, 2, 3));
+  Say(MapEvent::kCorrected);
+  const std::vector<JoinedMaps> joined = core_.TakeJoined();
+  ASSERT_EQ(joined.size(), 1u);
+  EXPECT_EQ(joined[0].from, kOtherMap);
+  EXPECT_EQ(joined[0].into, kMapId);
+  EXPECT_EQ(core_.layout().places().size(), 1u);
+  EXPECT_EQ(scene_.generation(), generation) << "nothing has to be fetched anew";
+  const auto moved = Drawn(scene_.keyframes(), OtherKf(1));
+  EXPECT_EQ(moved.colour, 0u);
+  EXPECT_NEAR((Vector(moved.center) - T_first_other * PoseAt(1).Center()).norm(), 0, 1e-5);
+  const auto point = Drawn(scene_.points(), kOtherLandmark);
+  EXPECT_EQ(point.colour, 0u);
+  EXPECT_NEAR((Vector(point.position) - T_first_other * Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-5);
+  EXPECT_NEAR((PathAt(11, 1) - T_first_other * PoseAt(1).Center()).norm(), 0, 1e-5) << "its frames follow";
+  EXPECT_EQ(Drawn(scene_.path(), SceneFrame{1, 11}).colour, 0u);
+}
+
+TEST_F(ViewerCoreTest, TheMapThatWasShownStaysWhereItIsWhileACameraIsInIt) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  AddOtherMap();
+  SayFrame(11, 1);
+  SayFrameOf(1, 11, kOtherMap, OtherKf(1));
+  Say();
+  SayFrameOf(1, 12, kMapId, Kf(2));
+  SayFrameOf(0, 12, kOtherMap, OtherKf(2));
+  EXPECT_EQ(core_.shown_map(), kMapId);
+  SayFrameOf(1, 13, kOtherMap, OtherKf(2));
+  EXPECT_EQ(core_.shown_map(), kOtherMap) << "both have left it";
+  core_.Draw(&scene_);
+  EXPECT_NEAR((PathAt(13, 1) - PoseAt(2).Center()).norm(), 0, 1e-6);
+  EXPECT_GT((PathAt(11) - PoseAt(1).Center()).x(), 3) << "now the first one lies beside it";
+  EXPECT_EQ(Drawn(scene_.keyframes(), OtherKf(2)).colour, 1u) << "colours stay";
+}
+
+TEST_F(ViewerCoreTest, TheSameFrameOfTwoCamerasIsTwoFrames) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  SayFrameOf(0, 15, kMapId, Kf(1));
+  SayFrameOf(1, 15, kMapId, Kf(2));
+  Say();
+  EXPECT_EQ(scene_.path().size(), 2u);
+  EXPECT_NEAR((PathAt(15, 0) - PoseAt(1).Center()).norm(), 0, 1e-6);
+  EXPECT_NEAR((PathAt(15, 1) - PoseAt(2).Center()).norm(), 0, 1e-6);
+}
+
+TEST_F(ViewerCoreTest, TruthOfACameraInAnotherMapIsNotDrawnUntilItIsInTheShownOne) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  AddOtherMap();
+  SayFrame(11, 1);
+  SayFrameOf(1, 11, kOtherMap, OtherKf(1));
+  core_.OnTruth({0, 11}, {});
+  core_.OnTruth({1, 11}, {});
+  Say();
+  EXPECT_EQ(scene_.truth().size(), 1u);
+  SayFrameOf(1, 12, kMapId, Kf(1));
+  core_.Draw(&scene_);
+  EXPECT_EQ(scene_.truth().size(), 2u);
 }
 
 TEST_F(ViewerCoreTest, UpIsWhereTheCamerasHeadsAre) {

@@ -1,5 +1,6 @@
 #include "viewer/viewer_json.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -69,7 +70,47 @@ Json TruthJson(const TruthAlignment* alignment) {
           {"pairs", alignment->pairs}};
 }
 
+Json MapsJson(const StatusView& view) {
+  Json maps = Json::array();
+  if (view.layout == nullptr) return maps;
+  for (const auto& [map_id, place] : view.layout->places()) {
+    maps.push_back({{"id", map_id},
+                    {"name", NameOf(map_id)},
+                    {"colour", place.colour},
+                    {"keyframes", place.keyframes},
+                    {"offset", ToJson(place.offset)}});
+  }
+  return maps;
+}
+
+Json CamerasJson(const std::vector<CameraView>& views) {
+  Json cameras = Json::array();
+  for (const CameraView& view : views) {
+    Json camera{{"id", cameras.size()}, {"map", view.map_id ? NameOf(*view.map_id) : ""}};
+    if (view.info != nullptr) {
+      camera["sequence"] = view.info->sequence;
+      camera["frames"] = view.info->num_frames;
+      camera["first_frame"] = view.info->first_frame;
+    }
+    cameras.push_back(std::move(camera));
+  }
+  return cameras;
+}
+
 }  // namespace
+
+std::string NameOf(MapId map_id) {
+  const std::string name = "map " + std::to_string(map_id % kMapsPerCamera);
+  const MapId camera = map_id / kMapsPerCamera;
+  return camera == 0 ? name : name + " of camera " + std::to_string(camera);
+}
+
+std::string Describe(const JoinedMaps& joined) {
+  const auto [first, second] = std::minmax(joined.from, joined.into);
+  if (second < kMapsPerCamera)
+    return "maps " + std::to_string(first) + " and " + std::to_string(second) + " are joined";
+  return NameOf(first) + " and " + NameOf(second) + " are joined";
+}
 
 std::string StateWord(PlayerStatus::State state) {
   switch (state) {
@@ -154,6 +195,8 @@ std::string ToJson(const StatusView& view) {
   json["map"] = {{"id", view.map_id},           {"version", view.map_version}, {"keyframes", view.keyframes},
                  {"landmarks", view.landmarks}, {"moving", view.moving},       {"resets", view.resets},
                  {"loops", view.loops}};
+  json["maps"] = MapsJson(view);
+  json["cameras"] = CamerasJson(view.cameras);
   const FrontendStatus& f = *view.frontend;
   json["frontend"] = {{"fps", f.fps},
                       {"features", f.features},
@@ -180,8 +223,9 @@ std::string ToJson(const StatusView& view) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string PoseJson(const PoseView& view) {
+std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn) {
   Json json{{"frame", view.frame_index},
+            {"camera", view.camera_id},
             {"t", static_cast<double>(view.stamp_ns) * 1e-9},
             {"state", static_cast<int>(view.state)},
             {"word", StateWord(view.state)},
@@ -191,9 +235,9 @@ std::string PoseJson(const PoseView& view) {
             {"unknown", view.unknown},
             {"share", Round(view.moving_share, 4)},
             {"latency", Round(view.latency_ms, 2)}};
-  if (view.has_pose) {
-    json["p"] = ToJson(view.T_world_cam.translation);
-    json["q"] = ToJson(view.T_world_cam.rotation);
+  if (drawn) {
+    json["p"] = ToJson(drawn->translation);
+    json["q"] = ToJson(drawn->rotation);
   }
   return json.dump();
 }
@@ -210,11 +254,8 @@ std::string FeaturesJson(const FeatureView& view, int width_px, int height_px) {
     }
     bytes.push_back(static_cast<uint8_t>(item.kind));
   }
-  return Json{{"frame", view.frame_index},
-              {"width", width_px},
-              {"height", height_px},
-              {"counts", counts},
-              {"data", Base64(bytes)}}
+  return Json{{"frame", view.frame_index}, {"camera", view.camera_id}, {"width", width_px},
+              {"height", height_px},       {"counts", counts},         {"data", Base64(bytes)}}
       .dump();
 }
 

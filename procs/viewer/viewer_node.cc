@@ -13,8 +13,12 @@ constexpr int64_t kDrawEveryNs = 120'000'000;
 constexpr int64_t kReportEveryNs = 250'000'000;
 constexpr int64_t kAlignEveryNs = 1'000'000'000;
 
-const std::vector<std::string>& Shown() {
-  static const std::vector<std::string> names = {"player", "frontend", "mapper", "loopcloser", "viewer"};
+std::vector<std::string> Shown(CameraId num_cameras) {
+  std::vector<std::string> names;
+  for (const char* role : {"player", "frontend"}) {
+    for (CameraId camera = 0; camera < num_cameras; ++camera) names.push_back(OfCamera(role, camera));
+  }
+  names.insert(names.end(), {"mapper", "loopcloser", "viewer"});
   return names;
 }
 
@@ -24,24 +28,43 @@ ViewerNode::ViewerNode(NodeContext context, NodeOptions options, ViewerOptions v
     : StreamNode(std::move(context), std::move(options), "viewer"),
       viewer_(std::move(viewer)),
       exchange_(exchange),
-      board_(Shown()) {
-  Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kPoseView,
-          channels::kFeatureView, channels::kPlayerStatus, channels::kFrontendStatus, channels::kMapperStatus,
-          channels::kLoopcloserStatus});
+      board_(Shown(options_.NumCameras())),
+      seen_cameras_(options_.NumCameras()) {
+  Listen({channels::kMapperStatus, channels::kLoopcloserStatus});
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kPoseView,
+            channels::kFeatureView, channels::kPlayerStatus, channels::kFrontendStatus},
+           camera);
+  }
+}
+
+ViewerNode::CameraState* ViewerNode::FindCamera(CameraId camera) {
+  return camera < seen_cameras_.size() ? &seen_cameras_[camera] : nullptr;
+}
+
+std::string ViewerNode::Who(CameraId camera) const {
+  return seen_cameras_.size() == 1 ? "the camera" : "camera " + std::to_string(camera);
+}
+
+void ViewerNode::OnCamera(const CameraInfo& info) {
+  if (CameraState* camera = FindCamera(info.camera_id)) camera->info = info;
 }
 
 void ViewerNode::Begin(const CameraInfo& info) {
   core_ = std::make_unique<ViewerCore>(info.camera, options_.settings.Read<Pyramid>());
   if (!viewer_.ground_truth.empty()) core_->SetTruth(ReadGroundTruth(viewer_.ground_truth).poses);
-  exchange_->Change([](Scene* scene, FrameSeries* series) {
+  exchange_->Change([](Scene* scene, CameraSeries* series) {
     scene->Clear();
     series->Clear();
   });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  frontend_reader_ =
-      MakeReader(StreamId::kFrontend, "FRONTEND",
-                 {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-                  channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest});
+  for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera) {
+    seen_cameras_[camera].reader =
+        MakeReader(StreamId::kFrontend, "FRONTEND",
+                   {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+                    channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
+                   {}, camera);
+  }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked});
 }
 
@@ -50,7 +73,7 @@ void ViewerNode::SetInHaste(bool in_haste) {
   in_haste_ = in_haste;
   if (!over) return;
   next_draw_ns_ = next_report_ns_ = next_align_ns_ = 0;
-  for (const auto& [channel, bytes] : std::exchange(passed_over_, {})) OnMessage(channel, bytes);
+  for (const auto& [what, bytes] : std::exchange(passed_over_, {})) OnMessage(what.first, bytes);
 }
 
 void ViewerNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -58,14 +81,24 @@ void ViewerNode::OnMessage(const std::string& channel, std::span<const uint8_t> 
   if (core_) OnLoose(channel, bytes);
 }
 
-void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> bytes) {
-  const bool is_picture = channel == channels::kFrame || channel == channels::kFeatureView;
-  if (in_haste_ && is_picture) {
-    passed_over_[channel].assign(bytes.begin(), bytes.end());
-    return;
+/// In haste pictures are kept, each camera's newest, until it is over.
+bool ViewerNode::PassOver(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (!in_haste_ || (channel != channels::kFrame && channel != channels::kFeatureView)) return false;
+  CameraId camera = 0;
+  if (seen_cameras_.size() > 1 && channel == channels::kFrame) {
+    if (const auto frame = Read<Frame>(bytes)) camera = frame->camera_id;
+  } else if (seen_cameras_.size() > 1) {
+    if (const auto view = Read<FeatureView>(bytes)) camera = view->camera_id;
   }
+  passed_over_[{channel, camera}].assign(bytes.begin(), bytes.end());
+  return true;
+}
+
+void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (PassOver(channel, bytes)) return;
   if (channel == channels::kFrame) {
-    if (auto frame = Read<Frame>(bytes); frame && !IsForeignFrame(frame->session))
+    if (auto frame = Read<Frame>(bytes);
+        frame && !IsForeignFrame(frame->session) && FindCamera(frame->camera_id) != nullptr)
       exchange_->AddImage(std::move(*frame));
   } else if (channel == channels::kPoseView) {
     if (const auto view = Read<PoseView>(bytes); view && !IsForeign(view->session)) ShowPose(*view);
@@ -73,14 +106,21 @@ void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> by
     if (const auto view = Read<FeatureView>(bytes); view && !IsForeign(view->session)) ShowFeatures(*view);
   } else if (channel == channels::kGroundTruthPose) {
     const auto pose = Read<GroundTruthPose>(bytes);
-    if (pose && !IsForeignFrame(pose->session)) core_->OnTruth(pose->frame_index, pose->T_world_cam);
+    if (pose && !IsForeignFrame(pose->session) && FindCamera(pose->camera_id) != nullptr)
+      core_->OnTruth({pose->camera_id, pose->frame_index}, pose->T_world_cam);
   } else if (channel == channels::kEndOfSequence) {
     const auto end = Read<EndOfSequence>(bytes);
-    if (!end || IsForeignFrame(end->session) || std::exchange(ended_, true)) return;
-    board_.Expect("player");
-    Note(BoardEvent::Level::kInfo,
-         "the sequence has ended: " + std::to_string(end->frames_published) + " frames");
+    if (end && !IsForeignFrame(end->session)) OnEnd(*end);
   }
+}
+
+void ViewerNode::OnEnd(const EndOfSequence& end) {
+  CameraState* camera = FindCamera(end.camera_id);
+  if (camera == nullptr || std::exchange(camera->ended, true)) return;
+  board_.Expect(OfCamera("player", end.camera_id));
+  const std::string whose = seen_cameras_.size() == 1 ? "" : " of camera " + std::to_string(end.camera_id);
+  Note(BoardEvent::Level::kInfo,
+       "the sequence" + whose + " has ended: " + std::to_string(end.frames_published) + " frames");
 }
 
 template <typename Status>
@@ -91,12 +131,15 @@ void ViewerNode::Board(const std::string& name, const Status& status, const std:
 
 void ViewerNode::OnStatusMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kPlayerStatus) {
-    if (auto status = Read<PlayerStatus>(bytes))
-      Board("player", player_ = std::move(*status), StateWord(player_.state));
+    if (const auto status = Read<PlayerStatus>(bytes))
+      Board(OfCamera("player", status->camera_id), *status, StateWord(status->state));
   } else if (channel == channels::kFrontendStatus) {
-    if (auto status = Read<FrontendStatus>(bytes)) {
-      Board("frontend", frontend_ = std::move(*status), StateWord(frontend_.state));
-    }
+    auto status = Read<FrontendStatus>(bytes);
+    CameraState* camera = status ? FindCamera(status->camera_id) : nullptr;
+    if (camera == nullptr) return;
+    camera->frontend = std::move(*status);
+    Board(OfCamera("frontend", camera->frontend.camera_id), camera->frontend,
+          StateWord(camera->frontend.state));
   } else if (channel == channels::kMapperStatus) {
     if (auto status = Read<MapperStatus>(bytes))
       Board("mapper", mapper_ = std::move(*status), StateWord(mapper_.state));
@@ -120,6 +163,10 @@ bool ViewerNode::TakeMapRecord() {
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
   core_->OnMapDelta(*delta);
+  for (const JoinedMaps& joined : core_->TakeJoined()) {
+    Note(BoardEvent::Level::kGood, Describe(joined));
+    next_align_ns_ = 0;  // what the ground truth was laid on has moved
+  }
   NoteMapEvent(*delta);
   map_reader_->AcceptTaken();
   return true;
@@ -127,7 +174,7 @@ bool ViewerNode::TakeMapRecord() {
 
 void ViewerNode::NoteMapEvent(const MapDelta& delta) {
   const std::string about = std::to_string(delta.about.value_or(KeyframeId()).frame_index());
-  const std::string map = "map " + std::to_string(delta.map_id.value_or(0));
+  const std::string map = NameOf(delta.map_id.value_or(0));
   switch (delta.event) {
     case MapEvent::kMapStarted:
       Note(BoardEvent::Level::kGood, map + " begins");
@@ -150,7 +197,7 @@ void ViewerNode::NoteMapEvent(const MapDelta& delta) {
       break;
     case MapEvent::kEnded:
       map_ended_ = true;
-      for (const std::string& name : Shown()) board_.Expect(name);
+      for (const std::string& name : Shown(options_.NumCameras())) board_.Expect(name);
       break;
     default:
       break;
@@ -158,17 +205,24 @@ void ViewerNode::NoteMapEvent(const MapDelta& delta) {
 }
 
 bool ViewerNode::TakeFrontendRecord() {
-  const std::optional<Record> record = frontend_reader_->Take();
+  return std::ranges::any_of(seen_cameras_,
+                             [this](CameraState& camera) { return TakeFrontendRecord(&camera); });
+}
+
+bool ViewerNode::TakeFrontendRecord(CameraState* camera) {
+  const std::optional<Record> record = camera->reader->Take();
   if (!record) return false;
-  if (record->channel == channels::kFramePose) {
-    if (const auto pose = Read<FramePose>(*record->bytes)) core_->OnFramePose(*pose);
-  } else if (record->channel == channels::kMapReset) {
+  const std::string channel = SplitCamera(record->channel).channel;
+  if (channel == channels::kFramePose) {
+    const auto pose = Read<FramePose>(*record->bytes);
+    if (pose && FindCamera(pose->camera_id) != nullptr) core_->OnFramePose(*pose);
+  } else if (channel == channels::kMapReset) {
     const auto reset = Read<MapReset>(*record->bytes);
     if (reset) {
-      Note(BoardEvent::Level::kBad, "map " + std::to_string(reset->map_id) + " is left: " + reset->reason);
+      Note(BoardEvent::Level::kBad, NameOf(reset->map_id) + " is left: " + reset->reason);
     }
   }
-  frontend_reader_->AcceptTaken();
+  camera->reader->AcceptTaken();
   return true;
 }
 
@@ -196,7 +250,7 @@ void ViewerNode::DrawIfDue() {
   next_draw_ns_ = now + kDrawEveryNs;
   uint64_t version = 0;
   uint32_t generation = 0;
-  exchange_->Change([&](Scene* scene, FrameSeries*) {
+  exchange_->Change([&](Scene* scene, CameraSeries*) {
     core_->Draw(scene);
     version = scene->version();
     generation = scene->generation();
@@ -210,21 +264,30 @@ void ViewerNode::DrawIfDue() {
 }
 
 void ViewerNode::ShowPose(const PoseView& view) {
-  exchange_->Change([&](Scene*, FrameSeries* series) { series->Add(view); });
-  if (in_haste_) passed_over_[channels::kPoseView] = wire::Encode(view);
-  if (!in_haste_) exchange_->hub().Send(EventKind::kPose, PoseJson(view));
-  if (shown_state_ != view.state) {
-    const bool was_tracking = shown_state_ == TrackingState::kTracking;
-    if (view.state == TrackingState::kLost) Note(BoardEvent::Level::kBad, "the camera is lost");
-    if (view.state == TrackingState::kTracking && !was_tracking)
-      Note(BoardEvent::Level::kGood, "the camera is tracked");
-    shown_state_ = view.state;
-  }
+  CameraState* camera = FindCamera(view.camera_id);
+  if (camera == nullptr) return;
+  exchange_->Change([&](Scene*, CameraSeries* series) { series->Add(view); });
+  camera->map_id = view.map_id;
+  const auto drawn = view.has_pose ? core_->Drawn(view.T_world_cam, view.map_id) : std::nullopt;
+  if (in_haste_) passed_over_[{channels::kPoseView, view.camera_id}] = wire::Encode(view);
+  if (!in_haste_) exchange_->hub().Send(EventKind::kPose, PoseJson(view, drawn), view.camera_id);
+  NoteState(view);
+}
+
+void ViewerNode::NoteState(const PoseView& view) {
+  const std::optional<TrackingState> before =
+      std::exchange(FindCamera(view.camera_id)->shown_state, view.state);
+  if (before == view.state) return;
+  if (view.state == TrackingState::kLost) Note(BoardEvent::Level::kBad, Who(view.camera_id) + " is lost");
+  if (view.state == TrackingState::kTracking)
+    Note(BoardEvent::Level::kGood, Who(view.camera_id) + " is tracked");
 }
 
 void ViewerNode::ShowFeatures(const FeatureView& view) {
+  if (FindCamera(view.camera_id) == nullptr) return;
   exchange_->hub().Send(EventKind::kFeatures,
-                        FeaturesJson(view, camera_info_->camera.width_px, camera_info_->camera.height_px));
+                        FeaturesJson(view, camera_info_->camera.width_px, camera_info_->camera.height_px),
+                        view.camera_id);
 }
 
 /// Heartbeats are told of even when nothing else happens.
@@ -233,17 +296,20 @@ void ViewerNode::ReportIfDue() {
   if (in_haste_ || now < next_report_ns_) return;
   next_report_ns_ = now + kReportEveryNs;
   if (map_reader_ && map_reader_->writer_present(now)) board_.OnSign("mapper", now);
-  if (frontend_reader_ && frontend_reader_->writer_present(now)) board_.OnSign("frontend", now);
+  for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera) {
+    const StreamReader* reader = seen_cameras_[camera].reader.get();
+    if (reader != nullptr && reader->writer_present(now)) board_.OnSign(OfCamera("frontend", camera), now);
+  }
   if (loop_reader_ && loop_reader_->writer_present(now)) board_.OnSign("loopcloser", now);
   board_.OnSign("viewer", now);
   board_.Advance(now, context_.wall_us());
   exchange_->hub().Send(EventKind::kStatus, StatusJson());
-  exchange_->SetHealth(WriteHealth(board_, frontend_, mapper_));
+  exchange_->SetHealth(WriteHealth(board_, seen_cameras_[0].frontend, mapper_));
 }
 
 void ViewerNode::PublishStatus() {
-  const std::vector<const StreamReader*> readers = {map_reader_.get(), frontend_reader_.get(),
-                                                    loop_reader_.get()};
+  std::vector<const StreamReader*> readers = {map_reader_.get(), loop_reader_.get()};
+  for (const CameraState& camera : seen_cameras_) readers.push_back(camera.reader.get());
   const StatusHead head = MakeStatusHead(core_ ? "" : "waiting for a camera", readers);
   board_.OnStatus("viewer", head, core_ ? "watching" : "waiting", context_.now_ns(), context_.wall_us());
   ReportIfDue();
@@ -255,20 +321,21 @@ std::string ViewerNode::StatusJson() const {
   view.wall_us = context_.wall_us();
   view.session = session_;
   view.camera = camera_info_ ? &*camera_info_ : nullptr;
-  view.player = &player_;
-  view.frontend = &frontend_;
+  view.frontend = &seen_cameras_[0].frontend;
   view.mapper = &mapper_;
   view.loopcloser = &loopcloser_;
   view.board = &board_;
-  view.ended = ended_ || map_ended_;
+  view.ended = map_ended_ || std::ranges::all_of(seen_cameras_, &CameraState::ended);
+  for (const CameraState& camera : seen_cameras_)
+    view.cameras.push_back({camera.info ? &*camera.info : nullptr, camera.map_id});
   view.loops = loops_;
   view.browsers = exchange_->hub().num_listeners();
   view.skipped = exchange_->hub().skipped();
   view.alignment = alignment_ ? &*alignment_ : nullptr;
   view.up = up_;
   if (core_) {
-    for (const auto& [id, keyframe] : core_->map().keyframes())
-      view.keyframes += keyframe.map_id == core_->shown_map() ? 1 : 0;
+    view.layout = &core_->layout();
+    view.keyframes = core_->map().keyframes().size();
     view.map_id = core_->shown_map();
     view.landmarks = core_->map().num_landmarks();
     view.moving = core_->num_moving();

@@ -4,6 +4,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/runtime/stream_node.h"
@@ -29,18 +30,35 @@ class ViewerNode : public StreamNode {
 
  protected:
   void Begin(const CameraInfo& info) override;
+  void OnCamera(const CameraInfo& info) override;
   bool WorkOnce() override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
   int64_t WorkDeadline() const override;
 
  private:
+  /// What is known of one camera.
+  struct CameraState {
+    std::optional<CameraInfo> info;
+    std::unique_ptr<StreamReader> reader;  ///< of its frontend's stream
+    FrontendStatus frontend;
+    std::optional<TrackingState> shown_state;
+    std::optional<MapId> map_id;  ///< of its newest frame
+    bool ended = false;
+  };
+
   void OnLoose(const std::string& channel, std::span<const uint8_t> bytes);
+  bool PassOver(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnEnd(const EndOfSequence& end);
   void OnStatusMessage(const std::string& channel, std::span<const uint8_t> bytes);
   template <typename Status>
   void Board(const std::string& name, const Status& status, const std::string& state);
   bool TakeMapRecord();
   bool TakeFrontendRecord();
+  bool TakeFrontendRecord(CameraState* camera);
+  void NoteState(const PoseView& view);
+  std::string Who(CameraId camera) const;
+  CameraState* FindCamera(CameraId camera);
   bool TakeLoopRecord();
   void NoteMapEvent(const MapDelta& delta);
   void ShowPose(const PoseView& view);
@@ -55,19 +73,18 @@ class ViewerNode : public StreamNode {
   ViewerOptions viewer_;
   Exchange* exchange_;
   std::unique_ptr<ViewerCore> core_;
-  std::unique_ptr<StreamReader> map_reader_, frontend_reader_, loop_reader_;
+  std::unique_ptr<StreamReader> map_reader_, loop_reader_;
   ProcessBoard board_;
-  PlayerStatus player_;
-  FrontendStatus frontend_;
+  std::vector<CameraState> seen_cameras_;  ///< by number
   MapperStatus mapper_;
   LoopcloserStatus loopcloser_;
-  std::optional<TrackingState> shown_state_;
   std::optional<TruthAlignment> alignment_;
   Eigen::Vector3d up_{0, -1, 0};
   bool map_ended_ = false;
-  bool ended_ = false;
   bool in_haste_ = false;
-  std::map<std::string, Bytes> passed_over_;  ///< in haste: the newest of what is shown at its end
+  /// By channel and camera.
+  std::map<std::pair<std::string, CameraId>, Bytes>
+      passed_over_;  ///< in haste: the newest of what is shown at its end
   int64_t loops_ = 0;
   int64_t map_records_ = 0;
   int64_t next_draw_ns_ = 0;

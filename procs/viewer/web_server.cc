@@ -151,7 +151,8 @@ HttpResponse WebServer::Impl::Serve(const HttpRequest& request) const {
   if (request.path == "/api/frame.jpg") return ServeImage(request);
   if (request.path == "/api/series") {
     const int64_t since = Query<int64_t>(request, "since").value_or(0);
-    return Content("application/json", exchange->SeriesJson(since, kMostSeries));
+    const CameraId camera = Query<CameraId>(request, "camera").value_or(0);
+    return Content("application/json", exchange->SeriesJson(since, kMostSeries, camera));
   }
   if (request.path == "/metrics")
     return Content("text/plain; version=0.0.4; charset=utf-8", exchange->Health().prometheus);
@@ -183,7 +184,8 @@ HttpResponse WebServer::Impl::ServeScene(const HttpRequest& request) const {
 }
 
 HttpResponse WebServer::Impl::ServeImage(const HttpRequest& request) const {
-  const std::shared_ptr<ServedImage> image = exchange->FindImage(Query<uint32_t>(request, "frame"));
+  const std::shared_ptr<ServedImage> image =
+      exchange->FindImage(Query<uint32_t>(request, "frame"), Query<CameraId>(request, "camera").value_or(0));
   if (!image || image->Jpeg().empty()) return Status(204);
   const std::vector<uint8_t>& jpeg = image->Jpeg();
   HttpResponse response = Content("image/jpeg", std::string(jpeg.begin(), jpeg.end()));

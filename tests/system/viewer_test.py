@@ -212,6 +212,40 @@ def show_log(options, system, log):
         check(not errors, f"no error on the console with a log: {errors}")
 
 
+def show_cameras(options, system):
+    """Two cameras, each with a player and a frontend: both are drawn, and either can be looked at."""
+    cameras = ("--cameras", "2")
+    peers = (*cameras, "--peers", "frontend,mapper,loopcloser")
+    system.start("two_viewer", "--http", "127.0.0.1:0", *cameras, role="viewer")
+    address = system.address("two_viewer")
+    with Browser() as page:
+        page.open(address + "?theme=dark")
+        page.wait("dmslam.seen.connected", 20)
+        for name in ("mapper", "loopcloser"):
+            system.start(name, *peers)
+        for camera, start in (("0", "0"), ("1", "100")):
+            system.start("frontend" + camera, *peers, "--camera-id", camera, role="frontend")
+            system.start("player" + camera, *cameras, "--camera-id", camera, "--sequence", options.sequence, "--camera",
+                         options.camera, "--start", start, "--speed", options.speed, "--lead", "4", role="player")
+        of = "[...dmslam.store.path.values()].filter((point) => point.camera === {0}).length"
+        both = page.wait(f"{of.format(0)} >= 10 && {of.format(1)} >= 10", 150)
+        check(both, f"frames of both cameras have their places: {page.eval(of.format(0))}, {page.eval(of.format(1))}")
+        check(page.eval("dmslam.scene.labels.size") == 2, "both cameras are drawn where they are, with their numbers")
+        legend = page.eval("document.getElementById('legend').textContent")
+        check("camera 0" in legend and "camera 1" in legend, f"the legend names them: {legend}")
+        for name in ("frontend", "frontend1", "player1"):
+            check(page.wait(f"{life(name)} === 'up'", 10), f"{name} is listed, and up")
+        page.eval("document.querySelector('#cameras [data-camera=\"1\"]').click()")
+        newest = "dmslam.series.data.frame.slice(-1)[0]"
+        check(page.wait("dmslam.series.data.frame[0] >= 100 && dmslam.series.data.frame.length > 10", 20),
+              f"the curves of camera 1 are shown: up to frame {page.eval(newest)}")
+        shown = page.eval("dmslam.frame.shown")
+        check(page.wait(f"dmslam.frame.shown > {shown}", 20), "and its image")
+        page.screenshot(os.path.join(options.pictures, "two_cameras.png"))
+        errors = page.errors()
+        check(not errors, f"no error on the console with two cameras: {errors}")
+
+
 def main():
     parser = argparse.ArgumentParser()
     for name in ("bin", "logs", "pictures", "sequence", "camera"):
@@ -226,9 +260,11 @@ def main():
         run(options, system)
         system.stop()
         show_log(options, system, log)
+        system.stop()
+        show_cameras(options, system)
     finally:
         system.stop()
-    for name in ("viewer", "late_viewer", "log_viewer"):
+    for name in ("viewer", "late_viewer", "log_viewer", "two_viewer"):
         check(system.processes[name].returncode == 0, f"{name} ends with {system.processes[name].returncode}")
     return 1 if FAILURES else 0
 

@@ -3,13 +3,17 @@
 const kTileSlots = 2048;
 const kMagic = 0x56534d44;
 const kGone = 0xffffffff;
+const kFramesOfCamera = 2 ** 32;
+
+/// Maps beyond so many, and cameras, have a colour that another one has.
+export const kColours = 6;
 
 /// Landmarks whose slots are neighbours were made one after the other, so they lie together: a tile is a place. Within a
 /// tile they are kept in random order, so that the first n of them are a fair sample.
 class Tile {
   constructor() {
     this.positions = new Float32Array(3 * kTileSlots);
-    this.values = new Float32Array(2 * kTileSlots);  // belief, first frame
+    this.values = new Float32Array(3 * kTileSlots);  // belief, first frame, colour
     this.slotAt = new Int32Array(kTileSlots);        // by place in the arrays
     this.placeOf = new Int32Array(kTileSlots).fill(-1);
     this.count = 0;
@@ -18,7 +22,7 @@ class Tile {
     this.radius = 0;
   }
 
-  set(slot, x, y, z, belief, first) {
+  set(slot, x, y, z, belief, first, colour) {
     let place = this.placeOf[slot];
     if (place < 0) {
       place = Math.floor(Math.random() * (this.count + 1));
@@ -30,8 +34,9 @@ class Tile {
     this.positions[3 * place] = x;
     this.positions[3 * place + 1] = y;
     this.positions[3 * place + 2] = z;
-    this.values[2 * place] = belief;
-    this.values[2 * place + 1] = first;
+    this.values[3 * place] = belief;
+    this.values[3 * place + 1] = first;
+    this.values[3 * place + 2] = colour;
     this.dirty = true;
   }
 
@@ -46,7 +51,7 @@ class Tile {
 
   move(from, to) {
     this.positions.copyWithin(3 * to, 3 * from, 3 * from + 3);
-    this.values.copyWithin(2 * to, 2 * from, 2 * from + 2);
+    this.values.copyWithin(3 * to, 3 * from, 3 * from + 3);
     this.slotAt[to] = this.slotAt[from];
     this.placeOf[this.slotAt[to]] = to;
   }
@@ -72,10 +77,10 @@ export class MapStore {
     this.version = 0;
     this.tiles = [];
     this.numPoints = 0;
-    this.keyframes = [];  // by slot: null or {frame, centre, rotation, links}
+    this.keyframes = [];  // by slot: null or {frame, camera, colour, centre, rotation, links}
     this.numKeyframes = 0;
-    this.path = new Map();   // by frame: [x, y, z, later]
-    this.truth = new Map();  // by number: [x, y, z]
+    this.path = new Map();   // by camera and frame: {camera, frame, colour, place: [x, y, z], later}
+    this.truth = new Map();  // by camera and number: {camera, place: [x, y, z]}
     this.newestFrame = 1;
     this.pathDirty = this.keyframesDirty = this.truthDirty = true;
   }
@@ -84,7 +89,7 @@ export class MapStore {
   apply(buffer) {
     const u32 = new Uint32Array(buffer);
     const f32 = new Float32Array(buffer);
-    if (u32[0] !== kMagic || u32[1] !== 1) throw new Error('this page and the viewer do not belong together; reload');
+    if (u32[0] !== kMagic || u32[1] !== 2) throw new Error('this page and the viewer do not belong together; reload');
     const [generation, flags, version, points, keyframes, links, path, truth] = u32.slice(2, 10);
     const anew = (flags & 1) !== 0;
     if (anew) this.clear();
@@ -99,7 +104,7 @@ export class MapStore {
   }
 
   applyPoints(u32, f32, at, n) {
-    const xyz = at + 3 * n, belief = at + 6 * n, first = at + 7 * n;
+    const xyz = at + 3 * n, belief = at + 6 * n, first = at + 7 * n, colour = at + 8 * n;
     for (let i = 0; i < n; ++i) {
       const slot = u32[at + i];
       const number = Math.floor(slot / kTileSlots);
@@ -111,16 +116,17 @@ export class MapStore {
         tile.remove(slot % kTileSlots);
       } else {
         const p = xyz + 3 * i;
-        tile.set(slot % kTileSlots, f32[p], f32[p + 1], f32[p + 2], b, u32[first + i]);
+        tile.set(slot % kTileSlots, f32[p], f32[p + 1], f32[p + 2], b, u32[first + i], u32[colour + i] % kColours);
         if (u32[first + i] > this.newestFrame) this.newestFrame = u32[first + i];
       }
       this.numPoints += tile.count - before;
     }
-    return at + 8 * n;
+    return at + 9 * n;
   }
 
   applyKeyframes(u32, f32, at, n, links) {
-    const xyz = at + 2 * n, quaternion = at + 5 * n, ends = at + 9 * n, to = at + 10 * n, kind = to + links;
+    const xyz = at + 2 * n, quaternion = at + 5 * n, camera = at + 9 * n, colour = at + 10 * n;
+    const ends = at + 11 * n, to = at + 12 * n, kind = to + links;
     let begin = 0;
     for (let i = 0; i < n; ++i) {
       const slot = u32[at + i], end = u32[ends + i];
@@ -130,6 +136,8 @@ export class MapStore {
       if (u32[at + n + i] !== kGone) {
         this.keyframes[slot] = {
           frame: u32[at + n + i],
+          camera: u32[camera + i],
+          colour: u32[colour + i] % kColours,
           centre: f32.slice(xyz + 3 * i, xyz + 3 * i + 3),
           rotation: f32.slice(quaternion + 4 * i, quaternion + 4 * i + 4),
           links: u32.slice(to + begin, to + end),
@@ -140,36 +148,40 @@ export class MapStore {
       begin = end;
     }
     if (n > 0) this.keyframesDirty = true;
-    return at + 10 * n + 2 * links;
+    return at + 12 * n + 2 * links;
   }
 
   applyPath(u32, f32, at, n) {
     for (let i = 0; i < n; ++i) {
-      const p = at + n + 3 * i;
+      const frame = u32[at + i], camera = u32[at + n + i], p = at + 2 * n + 3 * i;
+      const key = camera * kFramesOfCamera + frame;
       if (Number.isNaN(f32[p])) {
-        this.path.delete(u32[at + i]);
+        this.path.delete(key);
       } else {
-        this.path.set(u32[at + i], [f32[p], f32[p + 1], f32[p + 2], u32[at + 4 * n + i]]);
+        const place = [f32[p], f32[p + 1], f32[p + 2]];
+        this.path.set(key, {camera, frame, colour: u32[at + 6 * n + i] % kColours, place, later: u32[at + 5 * n + i]});
       }
     }
     if (n > 0) this.pathDirty = true;
-    return at + 5 * n;
+    return at + 7 * n;
   }
 
   applyTruth(u32, f32, at, n) {
     for (let i = 0; i < n; ++i) {
-      const p = at + n + 3 * i;
-      this.truth.set(u32[at + i], [f32[p], f32[p + 1], f32[p + 2]]);
+      const camera = u32[at + n + i], p = at + 2 * n + 3 * i;
+      this.truth.set(camera * kFramesOfCamera + u32[at + i], {camera, place: [f32[p], f32[p + 1], f32[p + 2]]});
     }
     if (n > 0) this.truthDirty = true;
   }
 
-  /// Where the camera was, in order of frames: what is known of frames, and keyframes where nothing is (a viewer that came
-  /// late). [[frame, x, y, z], ...]
+  /// Where the cameras were, one after the other, in order of frames: what is known of frames, and keyframes where nothing is
+  /// (a viewer that came late). [{camera, frame, colour, place: [x, y, z]}, ...]
   trajectory() {
     const places = new Map();
-    for (const keyframe of this.keyframes) if (keyframe) places.set(keyframe.frame, keyframe.centre);
-    for (const [frame, p] of this.path) places.set(frame, p);
-    return [...places].map(([frame, p]) => [frame, p[0], p[1], p[2]]).sort((a, b) => a[0] - b[0]);
+    for (const keyframe of this.keyframes) {
+      if (keyframe) places.set(keyframe.camera * kFramesOfCamera + keyframe.frame, {...keyframe, place: keyframe.centre});
+    }
+    for (const [key, point] of this.path) places.set(key, point);
+    return [...places].sort((a, b) => a[0] - b[0]).map(([, point]) => point);
   }
 }

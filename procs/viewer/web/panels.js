@@ -11,11 +11,13 @@ const colour = (name) => getComputedStyle(document.documentElement).getPropertyV
 const text = (id, value) => { if (byId(id).textContent !== value) byId(id).textContent = value; };
 
 export class Header {
-  onStatus(status) {
-    text('sequence', status.sequence || 'waiting for a camera');
+  /// `camera`: the one that is shown, where there are several.
+  onStatus(status, camera) {
+    const shown = {sequence: status.sequence, frames: status.frames, first_frame: status.first_frame, ...camera};
+    text('sequence', shown.sequence || 'waiting for a camera');
     text('mode', status.sequence ? [status.lockstep ? 'lock-step' : 'real time', status.ended ? 'ended' : ''].filter((s) => s).join(', ') : '');
-    this.frames = status.frames > 0 ? status.frames : 0;
-    this.firstFrame = status.first_frame || 0;
+    this.frames = shown.frames > 0 ? shown.frames : 0;
+    this.firstFrame = shown.first_frame || 0;
     if (!status.map) return;
     text('count-keyframes', thousands(status.map.keyframes));
     text('count-landmarks', thousands(status.map.landmarks));
@@ -47,9 +49,21 @@ export class FramePanel {
     this.context = this.canvas.getContext('2d');
     this.colours = {1: '#2ee66b', 2: '#ffd83d', 3: '#ff3b30'};
     this.shown = 0;
+    this.newest = new Map();  // by camera
+    this.chosen = 0;
+  }
+
+  choose(camera) {
+    this.chosen = camera;
+    if (this.newest.has(camera)) this.show(this.newest.get(camera));
   }
 
   onFeatures(features) {
+    this.newest.set(features.camera, features);
+    if (features.camera === this.chosen) this.show(features);
+  }
+
+  show(features) {
     this.next = features;
     if (!this.busy) this.fetchNext();
   }
@@ -59,7 +73,7 @@ export class FramePanel {
     this.next = null;
     this.busy = true;
     try {
-      const answer = await fetch(`/api/frame.jpg?frame=${features.frame}`);
+      const answer = await fetch(`/api/frame.jpg?frame=${features.frame}&camera=${features.camera}`);
       if (answer.status === 200) await this.draw(features, await createImageBitmap(await answer.blob()));
     } catch (error) {
       if (!(error instanceof TypeError)) throw error;  // no connection: it comes again
@@ -115,6 +129,7 @@ export class FramePanel {
 /// What is plotted over time; asks for what is new twice a second.
 export class SeriesPanel {
   constructor() {
+    this.camera = 0;
     this.clear(0);
     this.charts = [
       this.makeChart('chart-inliers', 'inliers', 'inliers', '--good', (v) => String(Math.round(v))),
@@ -122,6 +137,11 @@ export class SeriesPanel {
       this.makeChart('chart-latency', 'latency', 'latency', '--accent', (v) => (v < 1000 ? v.toFixed(0) + ' ms' : v / 1000 + ' s')),
     ];
     this.applyTheme();
+  }
+
+  choose(camera) {
+    this.camera = camera;
+    this.clear(0);
   }
 
   clear(run) {
@@ -165,8 +185,10 @@ export class SeriesPanel {
   }
 
   async poll() {
-    const answer = await fetch(`/api/series?since=${this.end}`);
+    const {camera, end} = this;
+    const answer = await fetch(`/api/series?since=${end}&camera=${camera}`);
     const series = await answer.json();
+    if (camera !== this.camera || end !== this.end) return undefined;  // another was chosen meanwhile
     if (series.run !== this.run || series.end < this.end) {
       const anew = this.run !== 0 && this.end !== 0;
       this.clear(series.run);
@@ -268,6 +290,14 @@ export class ProcessPanel {
     set(6, known ? thousands(process.dropped) : '–', process.dropped > 0);
     set(7, known ? thousands(process.repaired) : '–');
     set(8, known ? thousands(process.lost) : '–', process.lost > 0);
+  }
+
+  /// Text of a weld that happened since this was asked last; none where nothing did.
+  newWeld(events) {
+    const welds = events.filter((event) => event.n > (this.lastEvent || 0) && event.text.endsWith(' are joined'));
+    const isFirst = this.lastEvent === undefined;
+    if (events.length) this.lastEvent = events[events.length - 1].n;
+    return welds.length && !isFirst ? welds[welds.length - 1].text : undefined;
   }
 
   showEvents(events) {

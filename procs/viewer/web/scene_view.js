@@ -1,6 +1,7 @@
 // The map in three dimensions. Draws only when something has changed, and only as much as this machine can draw smoothly.
 import * as THREE from '/three/build/three.module.js';
 import {OrbitControls} from '/three/examples/jsm/controls/OrbitControls.js';
+import {kColours} from '/map_store.js';
 import {WideLines} from '/wide_lines.js';
 
 const kMinBudget = 6000, kMaxBudget = 400000, kRestBudget = 110000;
@@ -10,18 +11,20 @@ const kSlowMs = 46, kFastMs = 38, kTooSlowMs = 55;  // of a picture
 const kMinSharpness = 0.625;  // of the screen's resolution, in motion, where even the fewest landmarks are too slow
 
 const pointVertex = `
-  attribute vec2 value;  // belief, first frame
+  attribute vec3 value;  // belief, first frame, colour of the map
   uniform mediump float size;
   uniform float ages, newest, floorAt, roofAt;
-  uniform vec3 up, low, still, unsure, moving, age0, age1, age2, age3;
+  uniform vec3 low[6], still[6];
+  uniform vec3 up, unsure, moving, age0, age1, age2, age3;
   varying vec3 vColour;
   void main() {
     vec4 p = modelViewMatrix * vec4(position, 1.0);
     gl_Position = projectionMatrix * p;
     float belief = value.x;
+    int map = int(value.z + 0.5);
     float height = clamp((dot(up, position) - floorAt) / max(roofAt - floorAt, 1e-6), 0.0, 1.0);
     vec3 motion = belief > 0.0 ? mix(unsure, moving, clamp(belief * 0.7 + 0.3, 0.0, 1.0))
-                               : mix(unsure, mix(low, still, height), clamp(-belief * 1.5 + 0.5, 0.0, 1.0));
+                               : mix(unsure, mix(low[map], still[map], height), clamp(-belief * 1.5 + 0.5, 0.0, 1.0));
     float a = clamp(value.y / max(newest, 1.0), 0.0, 1.0) * 3.0;
     vec3 age = a < 1.0 ? mix(age0, age1, a) : a < 2.0 ? mix(age1, age2, a - 1.0) : mix(age2, age3, a - 2.0);
     vColour = ages > 0.5 ? age : motion;
@@ -79,6 +82,27 @@ function frustumEdges(aspect, size) {
   return [[o, c[0]], [o, c[1]], [o, c[2]], [o, c[3]], [c[0], c[1]], [c[1], c[2]], [c[2], c[3]], [c[3], c[0]]];
 }
 
+/// A text in a disc that faces who looks, of the same size from everywhere.
+function makeLabel(text, colour, ink) {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 64;
+  const context = canvas.getContext('2d');
+  context.fillStyle = colour.getStyle();
+  context.beginPath();
+  context.arc(32, 32, 30, 0, 2 * Math.PI);
+  context.fill();
+  context.fillStyle = ink.getStyle();
+  context.font = 'bold 42px sans-serif';
+  context.textAlign = 'center';
+  context.textBaseline = 'middle';
+  context.fillText(text, 32, 35);
+  const material = new THREE.SpriteMaterial({map: new THREE.CanvasTexture(canvas), sizeAttenuation: false, depthTest: false});
+  const label = new THREE.Sprite(material);
+  label.scale.set(0.026, 0.026, 1);
+  label.renderOrder = 7;
+  return label;
+}
+
 export class SceneView {
   constructor(canvas, store) {
     this.canvas = canvas;
@@ -100,7 +124,10 @@ export class SceneView {
     this.aspect = 4 / 3;
     this.radius = 1;
     this.depth = 1;
-    this.pose = null;
+    this.poses = new Map();  // by camera: where it is now
+    this.numCameras = 1;
+    this.chosen = 0;         // the camera that is followed
+    this.labels = new Map();
     this.budget = isSoftware() ? 20000 : 200000;
     this.adapted = 0;
     this.sharpness = this.drawnSharpness = 1;
@@ -117,11 +144,12 @@ export class SceneView {
   makeObjects() {
     const uniforms = {size: {value: 2.5}, ages: {value: 0}, newest: {value: 1}, up: {value: new THREE.Vector3(0, -1, 0)},
                       floorAt: {value: -1}, roofAt: {value: 1}};
-    for (const name of ['low', 'still', 'unsure', 'moving', 'age0', 'age1', 'age2', 'age3']) uniforms[name] = {value: new THREE.Color()};
+    for (const name of ['low', 'still']) uniforms[name] = {value: Array.from({length: kColours}, () => new THREE.Color())};
+    for (const name of ['unsure', 'moving', 'age0', 'age1', 'age2', 'age3']) uniforms[name] = {value: new THREE.Color()};
     this.pointMaterial = new THREE.ShaderMaterial({vertexShader: pointVertex, fragmentShader: pointFragment, uniforms});
     this.points = new THREE.Group();
     this.tileObjects = [];
-    this.dots = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 5, sizeAttenuation: false}));
+    this.dots = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 5, sizeAttenuation: false, vertexColors: THREE.VertexColors || true}));
     this.dots.frustumCulled = false;
     this.lines = {
       edges: new WideLines({width: 1.2, opacity: 0.5, order: 1}),
@@ -143,12 +171,37 @@ export class SceneView {
   applyTheme() {
     this.scene.background = css('--scene');
     const u = this.pointMaterial.uniforms;
-    const names = {low: '--static-low', still: '--static', unsure: '--unsure', moving: '--dynamic', age0: '--age-0', age1: '--age-1', age2: '--age-2', age3: '--age-3'};
+    const names = {unsure: '--unsure', moving: '--dynamic', age0: '--age-0', age1: '--age-1', age2: '--age-2', age3: '--age-3'};
     for (const [uniform, name] of Object.entries(names)) u[uniform].value = css(name);
-    const lines = {edges: '--edge', loops: '--loop', frusta: '--keyframe', path: '--path', truth: '--truth', camera: '--camera'};
-    for (const [line, name] of Object.entries(lines)) this.lines[line].material.uniforms.colour.value = css(name);
-    this.dots.material.color = css('--keyframe');
+    const maps = Array.from({length: kColours}, (_, i) => css(i === 0 ? '--static' : `--map-${i}`));
+    u.still.value = maps;
+    u.low.value = maps.map((colour, i) => (i === 0 ? css('--static-low') : colour.clone().multiplyScalar(0.42)));
+    for (const [line, name] of Object.entries({edges: '--edge', loops: '--loop', truth: '--truth'})) this.lines[line].setColours([css(name)]);
+    this.keyframeColours = [css('--keyframe'), ...maps.slice(1)];
+    this.lines.frusta.setColours(this.keyframeColours);
+    this.updateKeyframes();
+    this.colourCameras();
     this.gridRadius = 0;
+    this.touch();
+  }
+
+  /// Of one camera the path has the colour of the map it is in, of several that of the camera.
+  colourCameras() {
+    const cameras = Array.from({length: kColours}, (_, i) => css(i === 0 ? '--path' : `--camera-${i}`));
+    const several = this.numCameras > 1;
+    this.lines.path.setColours(several ? cameras : [css('--path'), ...this.keyframeColours.slice(1)]);
+    this.lines.camera.setColours(several ? cameras : [css('--camera')]);
+    for (const label of this.labels.values()) this.root.remove(label);
+    this.labels.clear();
+    this.cameraColours = cameras;
+    this.showPoses();
+  }
+
+  setNumCameras(count) {
+    if (count === this.numCameras) return;
+    this.numCameras = count;
+    this.colourCameras();
+    this.updatePath();
     this.touch();
   }
 
@@ -212,7 +265,7 @@ export class SceneView {
       tile.bound();
       const {positions, values} = this.tileObjects[i];
       positions.updateRange = {offset: 0, count: 3 * tile.count};
-      values.updateRange = {offset: 0, count: 2 * tile.count};
+      values.updateRange = {offset: 0, count: 3 * tile.count};
       positions.needsUpdate = values.needsUpdate = true;
     });
   }
@@ -223,7 +276,7 @@ export class SceneView {
       this.tileObjects[i].object.geometry.dispose();
     }
     const geometry = new THREE.BufferGeometry();
-    const positions = new THREE.BufferAttribute(tile.positions, 3), values = new THREE.BufferAttribute(tile.values, 2);
+    const positions = new THREE.BufferAttribute(tile.positions, 3), values = new THREE.BufferAttribute(tile.values, 3);
     geometry.setAttribute('position', positions);
     geometry.setAttribute('value', values);
     const object = new THREE.Points(geometry, this.pointMaterial);
@@ -241,11 +294,15 @@ export class SceneView {
 
   updateKeyframes() {
     const alive = this.store.keyframes.filter((keyframe) => keyframe);
-    const centres = new Float32Array(3 * alive.length);
-    alive.forEach((keyframe, i) => centres.set(keyframe.centre, 3 * i));
+    const centres = new Float32Array(3 * alive.length), colours = new Float32Array(3 * alive.length);
+    alive.forEach((keyframe, i) => {
+      centres.set(keyframe.centre, 3 * i);
+      this.keyframeColours[keyframe.colour].toArray(colours, 3 * i);
+    });
     this.dots.geometry.dispose();
     this.dots.geometry = new THREE.BufferGeometry();
     this.dots.geometry.setAttribute('position', new THREE.BufferAttribute(centres, 3));
+    this.dots.geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3));
     this.frustaDirty = true;
   }
 
@@ -253,26 +310,34 @@ export class SceneView {
   updatePath() {
     const places = this.store.trajectory();
     const path = this.lines.path;
-    const pieces = [];
-    places.forEach((place, i) => {
-      if (i === 0 || place[0] - places[i - 1][0] > 90) pieces.push([]);
-      pieces[pieces.length - 1].push(place.slice(1));
+    const pieces = [], tones = [];
+    places.forEach((point, i) => {
+      const before = places[i - 1];
+      if (!before || point.camera !== before.camera || point.colour !== before.colour || point.frame - before.frame > 90) {
+        pieces.push([]);
+        tones.push(this.numCameras > 1 ? point.camera % kColours : point.colour);
+      }
+      pieces[pieces.length - 1].push([...point.place]);
     });
     let drawn = pieces;
     for (let tolerance = 5e-4; drawn.reduce((sum, piece) => sum + piece.length, 0) > kMostPathPoints && tolerance < 0.02; tolerance *= 2) {
       drawn = pieces.map((piece) => simplify(piece, tolerance * this.radius));
     }
     path.start(drawn.reduce((sum, piece) => sum + piece.length, 0));
-    for (const piece of drawn) for (let i = 1; i < piece.length; ++i) path.add(piece[i - 1], piece[i]);
+    drawn.forEach((piece, number) => {
+      for (let i = 1; i < piece.length; ++i) path.add(piece[i - 1], piece[i], tones[number]);
+    });
     path.finish();
     path.show(this.layers.path);
   }
 
   updateTruth() {
-    const places = [...this.store.truth].sort((a, b) => a[0] - b[0]);
+    const places = [...this.store.truth].sort((a, b) => a[0] - b[0]).map(([, point]) => point);
     const truth = this.lines.truth;
     truth.start(places.length);
-    for (let i = 1; i < places.length; ++i) truth.add(places[i - 1][1], places[i][1]);
+    for (let i = 1; i < places.length; ++i) {
+      if (places[i].camera === places[i - 1].camera) truth.add(places[i - 1].place, places[i].place);
+    }
     truth.finish();
     this.showLayers();
   }
@@ -292,7 +357,7 @@ export class SceneView {
     if (!this.frustumSize || Math.abs(size / this.frustumSize - 1) > 0.15) {
       this.frustumSize = size;
       this.frustaDirty = true;
-      if (this.pose) this.setPose(this.pose);
+      this.showPoses();
     }
     this.controls.minDistance = this.radius * 0.01;
     this.controls.maxDistance = this.radius * 30;
@@ -326,7 +391,10 @@ export class SceneView {
       const keyframe = frames[Math.min(frames.length - 1, Math.floor((i + 0.5) / tiles.length * frames.length))];
       if (!keyframe) return;
       w.fromArray(keyframe.centre);
-      for (let k = 0; k < Math.min(15, tile.count); ++k) depths.push(v.fromArray(tile.positions, 3 * k).distanceTo(w));
+      for (let k = 0; k < Math.min(15, tile.count); ++k) {
+        if (tile.values[3 * k + 2] !== keyframe.colour) continue;  // of another map
+        depths.push(v.fromArray(tile.positions, 3 * k).distanceTo(w));
+      }
     });
     depths.sort((a, b) => a - b);
     return depths.length ? depths[Math.floor(depths.length / 2)] : this.radius;
@@ -378,14 +446,12 @@ export class SceneView {
     this.touch();
   }
 
-  /// Where the camera is now: {p, q} world from camera, or null.
-  setPose(pose) {
-    const moved = pose && this.pose ? new THREE.Vector3(...pose.p).sub(new THREE.Vector3(...this.pose.p)) : null;
-    this.pose = pose;
-    const lines = this.lines.camera;
-    lines.start(8);
-    if (pose) this.addFrustum(lines, pose.p, pose.q, 2.4 * (this.frustumSize || 0.05));
-    lines.finish();
+  /// Where a camera is now: {p, q} world from camera, or null.
+  setPose(camera, pose) {
+    const before = camera === this.chosen ? this.pose : null;
+    const moved = pose && before ? new THREE.Vector3(...pose.p).sub(new THREE.Vector3(...before.p)) : null;
+    this.poses.set(camera, pose);
+    this.showPoses();
     if (moved && this.mode === 'follow') {
       moved.applyQuaternion(this.root.quaternion);
       this.camera.position.add(moved);
@@ -395,12 +461,37 @@ export class SceneView {
     this.touch();
   }
 
-  addFrustum(lines, centre, rotation, size) {
+  /// Where the followed camera is.
+  get pose() { return this.poses.get(this.chosen) || null; }
+
+  showPoses() {
+    const lines = this.lines.camera, size = 2.4 * (this.frustumSize || 0.05);
+    lines.start(8 * Math.max(1, this.poses.size));
+    for (const [camera, pose] of this.poses) {
+      if (pose) this.addFrustum(lines, pose.p, pose.q, size, this.numCameras > 1 ? camera % kColours : 0);
+      if (this.numCameras > 1) this.showLabel(camera, pose, size);
+    }
+    lines.finish();
+  }
+
+  /// The camera's number above it: colours alone do not tell cameras apart for everybody.
+  showLabel(camera, pose, size) {
+    if (!this.labels.has(camera)) {
+      const label = makeLabel(String(camera), this.cameraColours[camera % kColours], this.scene.background);
+      this.labels.set(camera, label);
+      this.root.add(label);
+    }
+    const label = this.labels.get(camera);
+    label.visible = Boolean(pose);
+    if (pose) label.position.set(0, -1.1 * size, 0).applyQuaternion(new THREE.Quaternion(...pose.q)).add(new THREE.Vector3(...pose.p));
+  }
+
+  addFrustum(lines, centre, rotation, size, tone) {
     const q = new THREE.Quaternion(...rotation), p = new THREE.Vector3(...centre), a = new THREE.Vector3(), b = new THREE.Vector3();
     for (const [begin, end] of frustumEdges(this.aspect, size)) {
       a.set(...begin).applyQuaternion(q).add(p);
       b.set(...end).applyQuaternion(q).add(p);
-      lines.add([a.x, a.y, a.z], [b.x, b.y, b.z]);
+      lines.add([a.x, a.y, a.z], [b.x, b.y, b.z], tone);
     }
   }
 
@@ -592,7 +683,7 @@ export class SceneView {
     const chosen = many ? this.nearest(all, kNearKeyframes) : all;
     const {frusta, edges, loops} = this.lines;
     frusta.start(8 * chosen.length);
-    for (const keyframe of chosen) this.addFrustum(frusta, keyframe.centre, keyframe.rotation, this.frustumSize || 0.05);
+    for (const keyframe of chosen) this.addFrustum(frusta, keyframe.centre, keyframe.rotation, this.frustumSize || 0.05, keyframe.colour);
     this.addLinks(edges, chosen, (kind) => kind !== 2);
     this.addLinks(loops, all, (kind) => kind === 2);
     for (const lines of [frusta, edges, loops]) lines.finish();

@@ -1,5 +1,5 @@
 // Connects the page to the viewer: events tell what is new, and what is large is fetched when there is time for it.
-import {MapStore} from '/map_store.js';
+import {kColours, MapStore} from '/map_store.js';
 import {SceneView} from '/scene_view.js';
 import {FramePanel, Header, PlaybackPanel, ProcessPanel, SeriesPanel} from '/panels.js';
 
@@ -51,10 +51,24 @@ const wakeMap = paced(kMapEveryMs, async () => {
 });
 const wakeSeries = paced(kSeriesEveryMs, () => series.poll());
 
+let chosen = 0;  // the camera whose frame, curves and numbers are shown
+
+function chooseCamera(camera) {
+  chosen = scene.chosen = camera;
+  frame.choose(camera);
+  press('cameras', String(camera), 'camera');
+  if (scene.mode === 'follow') scene.goBehind();
+  series.choose(camera);
+  wakeSeries();
+}
+
 function onStatus(status) {
   seen.statuses++;
-  header.onStatus(status);
+  header.onStatus(status, status.cameras.length > 1 ? status.cameras[chosen] : {});
   processes.onStatus(status);
+  scene.setNumCameras(status.cameras.length);
+  showCameras(status.cameras);
+  showWeld(processes.newWeld(status.events));
   if (status.camera) {
     scene.aspect = status.camera.width / status.camera.height;
     scene.setUp(status.up);
@@ -64,6 +78,22 @@ function onStatus(status) {
   if (seen.connected) say(waits);
   showDrawn(status);
   showLegend(status);
+}
+
+/// Which of several cameras is to be shown.
+function showCameras(cameras) {
+  const group = byId('cameras');
+  group.hidden = cameras.length < 2;
+  if (group.hidden || group.children.length === cameras.length) return;
+  group.innerHTML = cameras.map((_, i) => `<button data-camera="${i}" class="p-${i % kColours}" title="show camera ${i}"><i></i>${i}</button>`).join('');
+  press('cameras', String(chosen), 'camera');
+}
+
+let weldUntil = 0;
+function showWeld(what) {
+  if (what) weldUntil = performance.now() + 5000;
+  if (what) byId('weld').textContent = what;
+  byId('weld').hidden = performance.now() > weldUntil;
 }
 
 function showDrawn(status) {
@@ -76,10 +106,16 @@ function showDrawn(status) {
 function showLegend(status) {
   const entry = (kind, name, label) => `<span><i class="${kind} c-${name}"></i>${label}</span>`;
   const aged = scene.pointMaterial.uniforms.ages.value > 0.5;
+  const several = status.maps.length > 1, colourOf = (map) => map.colour % kColours;
+  const only = status.maps.length === 1 ? colourOf(status.maps[0]) : 0;
+  const still = several || only !== 0
+      ? status.maps.map((map) => `<span class="m-${colourOf(map)}"><i class="dot"></i>${map.name}</span>`).join('') : entry('dot', 'static', 'still');
   const points = aged ? '<span>old <i class="ramp"></i> new landmarks</span>'
-                      : entry('dot', 'static', 'still') + entry('dot', 'unsure', 'unsure') + entry('dot', 'dynamic', 'moving');
-  const html = points + entry('', 'path', 'path') + (status.truth ? entry('', 'truth', 'ground truth') : '') +
-      entry('', 'keyframe', 'keyframe') + entry('', 'edge', 'sees the same') + (status.map.loops > 0 ? entry('', 'loop', 'loop') : '');
+                      : still + entry('dot', 'unsure', 'unsure') + entry('dot', 'dynamic', 'moving');
+  const path = status.cameras.length > 1
+      ? status.cameras.map((_, i) => `<span class="p-${i % kColours}"><i></i>camera ${i}</span>`).join('') : entry('', 'path', 'path');
+  const html = points + path + (status.truth ? entry('', 'truth', 'ground truth') : '') +
+      (only === 0 ? entry('', 'keyframe', 'keyframe') : `<span class="m-${only}"><i></i>keyframe</span>`) + entry('', 'edge', 'sees the same') + (status.map.loops > 0 ? entry('', 'loop', 'loop') : '');
   if (byId('legend').dataset.html === html) return;
   byId('legend').dataset.html = html;
   byId('legend').innerHTML = html;
@@ -103,8 +139,8 @@ function connect() {
   on('features', (features) => { seen.features++; frame.onFeatures(features); });
   on('pose', (pose) => {
     seen.poses++;
-    header.onPose(pose);
-    scene.setPose(pose.p ? pose : null);
+    if (pose.camera === chosen) header.onPose(pose);
+    scene.setPose(pose.camera, pose.p ? pose : null);
   });
 }
 
@@ -143,6 +179,10 @@ function setText(size) {
 byId('camera-mode').addEventListener('click', (event) => event.target.dataset.mode && setMode(event.target.dataset.mode));
 byId('colour-mode').addEventListener('click', (event) => event.target.dataset.colour && setColours(event.target.dataset.colour));
 byId('layers').addEventListener('click', (event) => event.target.dataset.layer && toggleLayer(event.target.dataset.layer));
+byId('cameras').addEventListener('click', (event) => {
+  const button = event.target.closest('button');
+  if (button) chooseCamera(Number(button.dataset.camera));
+});
 const otherTheme = () => setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark');
 const otherText = () => setText(document.documentElement.dataset.text === 'large' ? 'normal' : 'large');
 byId('theme').addEventListener('click', otherTheme);
@@ -165,4 +205,4 @@ say('connecting');
 connect();
 
 /// For tests and measurements.
-window.dmslam = {store, scene, series, frame, playback, seen, setMode, setColours, setTheme, setText, toggleLayer};
+window.dmslam = {store, scene, series, frame, playback, seen, setMode, setColours, setTheme, setText, toggleLayer, chooseCamera};

@@ -4,11 +4,15 @@ import * as THREE from '/three/build/three.module.js';
 const vertex = `
   attribute vec3 begin, end;
   attribute vec2 corner;  // which end: 0 or 1, which side: -1 or 1
+  attribute float tone;   // number of a colour
+  uniform vec3 colours[6];
   uniform vec2 viewport;
   uniform mediump float width;
   uniform float near;
   varying float vAcross;
+  varying vec3 vColour;
   void main() {
+    vColour = colours[int(tone + 0.5)];
     vec4 a = modelViewMatrix * vec4(begin, 1.0);
     vec4 b = modelViewMatrix * vec4(end, 1.0);
     float limit = -near;
@@ -30,11 +34,11 @@ const vertex = `
 
 const fragment = `
   precision mediump float;
-  uniform vec3 colour;
+  varying vec3 vColour;
   uniform float opacity;
   uniform mediump float width;
   varying float vAcross;
-  void main() { gl_FragColor = vec4(colour, opacity * clamp(0.5 * (width + 1.0 - abs(vAcross)), 0.0, 1.0)); }`;
+  void main() { gl_FragColor = vec4(vColour, opacity * clamp(0.5 * (width + 1.0 - abs(vAcross)), 0.0, 1.0)); }`;
 
 const kMostSegments = 16000;  // what 16 bits can number
 
@@ -45,7 +49,7 @@ export class WideLines {
     this.material = new THREE.ShaderMaterial({
       vertexShader: vertex, fragmentShader: fragment, transparent: true, depthWrite: false, side: THREE.DoubleSide,
       uniforms: {
-        colour: {value: new THREE.Color()}, opacity: {value: opacity}, viewport: {value: new THREE.Vector2(1, 1)},
+        colours: {value: Array.from({length: 6}, () => new THREE.Color())}, opacity: {value: opacity}, viewport: {value: new THREE.Vector2(1, 1)},
         width: {value: width}, near: {value: 0.01},
       },
     });
@@ -72,20 +76,23 @@ export class WideLines {
     geometry.setAttribute('position', this.begin);
     geometry.setAttribute('begin', this.begin);
     geometry.setAttribute('end', this.end);
+    this.tones = new THREE.BufferAttribute(new Float32Array(4 * this.capacity), 1);
+    geometry.setAttribute('tone', this.tones);
     geometry.setAttribute('corner', new THREE.BufferAttribute(corners, 2));
     geometry.setIndex(new THREE.BufferAttribute(index, 1));
     this.object.geometry.dispose();
     this.object.geometry = geometry;
   }
 
-  /// Begins anew; then `add` each segment, then `finish`.
+  /// Begins anew; then `add` each segment, in the colour of its tone, then `finish`.
   start(capacity) {
     if (capacity > this.capacity) this.grow(Math.ceil(capacity * 1.5));
     this.count = 0;
   }
 
-  add(a, b) {
+  add(a, b, tone = 0) {
     if (this.count === this.capacity) return;
+    this.tones.array.fill(tone, 4 * this.count, 4 * this.count + 4);
     const at = 12 * this.count++;
     for (let i = at; i < at + 12; i += 3) {
       for (let k = 0; k < 3; ++k) {
@@ -100,8 +107,15 @@ export class WideLines {
       attribute.updateRange = {offset: 0, count: 12 * this.count};
       attribute.needsUpdate = true;
     }
+    this.tones.updateRange = {offset: 0, count: 4 * this.count};
+    this.tones.needsUpdate = true;
     this.object.geometry.setDrawRange(0, 6 * this.count);
     this.show(this.shown);
+  }
+
+  /// One for each tone; a single one is that of all.
+  setColours(colours) {
+    this.material.uniforms.colours.value = Array.from({length: 6}, (_, i) => colours[i] || colours[0]);
   }
 
   show(shown) {

@@ -88,13 +88,13 @@ int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
   }
 }
 
-/// Where the first frontend is waited for, so are the others.
+/// Where the first frontend is waited for, so are the others. A viewer waits for nobody, but hears them all.
 void ProcessMain::AddCameras() {
   if (options_.camera_id >= cameras_) {
     throw InputError("--camera-id " + std::to_string(options_.camera_id) + ": there are --cameras " +
                      std::to_string(cameras_) + ", numbered from 0");
   }
-  if (!options_.HasPeer("frontend")) return;
+  if (role_ != "viewer" && !options_.HasPeer("frontend")) return;
   for (CameraId camera = 1; camera < cameras_; ++camera)
     options_.peers.push_back(OfCamera("frontend", camera));
 }
