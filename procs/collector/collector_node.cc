@@ -179,6 +179,15 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
   return true;
 }
 
+/// What this process has heard and lost itself. A loss is noted at once: whoever comes next does not know it.
+void CollectorNode::CountOwn() {
+  std::vector<const StreamReader*> readers = {map_reader_.get()};
+  for (const auto& reader : frontend_readers_) readers.push_back(reader.get());
+  const int64_t lost_before = run_.health["collector"].records_lost;
+  OnHealth("collector", MakeStatusHead("", readers));
+  if (run_.health["collector"].records_lost != lost_before) NoteCounters();
+}
+
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
   const CameraId camera = status.camera_id;
   if (camera >= options_.NumCameras() || !OnHealth(OfCamera("frontend", camera), status.head)) return;
@@ -320,7 +329,8 @@ void CollectorNode::OpenJournal() {
   } else {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
-  OnProcess("collector", MeasureProcess().pid, {});
+  former_["collector"] = run_.health["collector"];
+  OnProcess("collector", MeasureProcess().pid, run_.health["collector"]);
   if (context_.resumed) newest.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(
@@ -412,6 +422,10 @@ bool CollectorNode::TakeMapRecord() {
     if (dropped_maps_.insert(dropped).second) journal_->AppendNote("dropped " + std::to_string(dropped));
   }
   map_reader_->AcceptTaken();
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    const StreamPosition mapped = builder_->map().progress(camera).frontend;
+    frontend_readers_[camera]->NoteWritten({mapped.epoch, mapped.seq});
+  }
   return true;
 }
 
@@ -467,6 +481,7 @@ void CollectorNode::Write(bool ended) {
     if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
   });
   TakeEnds();
+  CountOwn();
   builder_->BridgeLostKeyframes();
   CountMissingKeyframes();
   if (journal_->lost() > 0)
@@ -504,6 +519,7 @@ void CollectorNode::PublishStatus() {
     next_sync_ns_ = context_.now_ns() + kSyncEveryNs;
     checkpointer_->SyncJournal();
   }
+  if (journal_ && !written_) CountOwn();
   if (journal_ && !written_ && context_.now_ns() >= next_counters_ns_) {
     next_counters_ns_ = context_.now_ns() + kCountersEveryNs;
     NoteCounters();

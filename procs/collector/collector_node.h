@@ -54,6 +54,7 @@ class CollectorNode : public StreamNode {
   void ReadNote(const std::string& text);
   bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);
+  void CountOwn();
   void OnProposal(KeyframeId id, MapId map_id);
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);

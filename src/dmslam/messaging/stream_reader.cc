@@ -32,7 +32,8 @@ StreamReader::StreamReader(Options options)
       held_(options_.start),
       accepted_(options_.start),
       taken_(options_.start),
-      window_(options_.limits) {
+      window_(options_.limits),
+      first_epoch_(options_.start.epoch) {
   DMSLAM_CHECK(options_.id != 0, "a reader needs an id");
 }
 
@@ -148,7 +149,11 @@ void StreamReader::BeginTerm(const head_t& head) {
   const bool same_epoch = held_.epoch == head.header.epoch && term_.epoch < head.header.epoch;  // as we start
   const Version parent = ParentOf(head);
   const Version end = same_epoch ? held_ : DrainFormerTerm(parent, fresh);
+  const bool nobody_has_it = fresh && (head.offers & head_t::OFFERS_SNAPSHOT) == 0;
+  if (nobody_has_it && !same_epoch) DrainBeyondGaps();
   term_ = {head.header.epoch, head.header.writer};
+  if (first_epoch_ == 0) first_epoch_ = term_.epoch;
+  if (nobody_has_it) CountLostOfFormerTerms();
   parent_ = parent;
   window_.Reset(same_epoch ? held_.seq + 1 : 1);
   terms_.Clear();
@@ -181,6 +186,45 @@ Version StreamReader::DrainFormerTerm(const Version& parent, bool fresh) {
     while (!former_.empty() && former_.back().version() > parent) former_.pop_back();
   }
   return former_.empty() ? held_ : former_.back().version();
+}
+
+/// A fresh term that offers no snapshot continues nothing: what of the former one is here is still handed out,
+/// gaps or not, since nobody repairs it any more; what is missing is lost.
+void StreamReader::DrainBeyondGaps() {
+  const Version end = former_.empty() ? held_ : former_.back().version();
+  if (state_ == State::kFollowing) {
+    const int64_t newest = std::max(head_seq_, window_.newest());
+    const int64_t lost = window_.GiveUpBefore(newest + 1);
+    statistics_.lost += lost;
+    statistics_.lost_with_writer += lost;
+    while (window_.CanTake()) former_.push_back(*window_.Take());
+    Settle({term_.epoch, newest});
+  }
+  if (!end.empty()) Settle(end);
+}
+
+/// Records up to this one are accounted for.
+void StreamReader::Settle(const Version& version) {
+  int64_t& settled = written_[version.epoch].settled;
+  settled = std::max(settled, version.seq);
+}
+
+/// What others have told of terms that are over, and is not here.
+void StreamReader::CountLostOfFormerTerms() {
+  for (auto& [epoch, written] : written_) {
+    if (epoch >= term_.epoch) break;
+    const int64_t lost = std::max<int64_t>(0, written.known - written.settled);
+    statistics_.lost += lost;
+    statistics_.lost_with_writer += lost;
+    written.settled += lost;
+  }
+}
+
+void StreamReader::NoteWritten(const Version& version) {
+  if (first_epoch_ == 0 || version.epoch < first_epoch_) return;
+  int64_t& known = written_[version.epoch].known;
+  known = std::max(known, version.seq);
+  CountLostOfFormerTerms();
 }
 
 void StreamReader::NeedSnapshot() {

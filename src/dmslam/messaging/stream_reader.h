@@ -25,7 +25,8 @@ struct ReaderStatistics {
   int64_t repaired = 0;       ///< records that came late or in pieces, after they had been named as missing
   int64_t lost = 0;       ///< records given up: no longer kept, and the writer offers no snapshot; those that
                           ///< were gone before a reader that held nothing came are not counted
-  int64_t snapshots = 0;  ///< received whole
+  int64_t lost_with_writer = 0;  ///< of them: those of a writer that is gone and has no successor who has them
+  int64_t snapshots = 0;         ///< received whole
   int64_t dropped_bad = 0;       ///< messages with wrong bytes
   int64_t dropped_foreign = 0;   ///< of other sessions
   int64_t dropped_stale = 0;     ///< of other terms, or before any beacon was heard
@@ -90,6 +91,10 @@ class StreamReader : public StateMachine {
   /// Gives up what is held, so that a snapshot of the present writer is taken.
   void Forget();
 
+  /// Another reader of the stream has had it up to `version`: what of that is not here when its writer is
+  /// gone is lost, even where no beacon told of it. Terms that were over before this reader came do not count.
+  void NoteWritten(const Version& version);
+
   void Advance(int64_t now_ns) override;
   std::vector<Outgoing> TakeOutgoing() override;
   int64_t deadline_ns() const override;
@@ -139,6 +144,9 @@ class StreamReader : public StateMachine {
   bool SpeaksOurLanguage(const head_t& head);
   void BeginTerm(const head_t& head);
   Version DrainFormerTerm(const Version& parent, bool fresh);
+  void DrainBeyondGaps();
+  void Settle(const Version& version);
+  void CountLostOfFormerTerms();
   void Follow(const head_t& head);
   void FollowSnapshot(const head_t& head);
   void NeedSnapshot();
@@ -154,7 +162,13 @@ class StreamReader : public StateMachine {
   Version taken_;        // the record taken last, be it of what is not whole yet
   Version held_before_;  // what was held before that
   ReceiveWindow window_;
-  std::deque<Record> former_;  // of the former term: complete, in order, not yet taken
+  std::deque<Record> former_;  // of former terms, in order, not yet taken
+  struct Written {
+    int64_t known = 0;    // how far a term is known to have been written
+    int64_t settled = 0;  // how far its records have been handed out or counted as lost
+  };
+  std::map<int64_t, Written> written_;  // by epoch: terms that are over, and those that others have told of
+  int64_t first_epoch_ = 0;             // of what this reader has held or followed; 0: nothing yet
   std::optional<Snapshot> snapshot_;
   std::map<int64_t, int64_t> missing_since_ns_;  // by seq: when it was first named as missing
   std::deque<double> recovery_ms_;               // of the newest records that were

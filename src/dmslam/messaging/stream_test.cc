@@ -440,6 +440,61 @@ TEST(Stream, ASuccessorThatKnowsLessIsRefusedAndHearsIt) {
   EXPECT_EQ(pair.reader.held(), (Version{2000, 1}));
 }
 
+TEST(Stream, OfAWriterThatIsGoneWhatCameIsHandedOutAndTheRestIsCounted) {
+  Pair pair;
+  for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll().size(), 5u);
+  pair.drop = [](const Outgoing& out) {
+    const bool comes = out.channel == HeadChannel("TEST") ||
+                       (out.channel == "DMSLAM_TEST_X" && ParseHeader(*out.bytes)->seq == 9);
+    return !comes;
+  };
+  for (int i = 6; i <= 10; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), pair.now_ns);
+  pair.Run(300 * kMs);
+  pair.drop = [](const Outgoing&) { return false; };
+  pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{});
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(11), pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{9, 11}));
+  EXPECT_EQ(pair.reader.held(), (Version{2000, 1}));
+  EXPECT_EQ(pair.reader.statistics().lost, 4);
+  EXPECT_EQ(pair.reader.statistics().lost_with_writer, 4);
+}
+
+TEST(Stream, OfAWriterThatIsGoneWhatOthersHadIsCountedOnce) {
+  Pair pair;
+  pair.reader.NoteWritten({900, 7});  // before it came
+  for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  pair.reader.NoteWritten({900, 8});
+  pair.reader.NoteWritten({1000, 7});  // while it is away
+  EXPECT_EQ(pair.reader.statistics().lost, 0) << "its writer lives: they may come";
+  pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{});
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(6), pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.reader.statistics().lost, 2);
+  for (const int64_t seq : {6, 7, 9, 9}) pair.reader.NoteWritten({1000, seq});
+  EXPECT_EQ(pair.reader.statistics().lost, 4) << "6 to 9, each once";
+  pair.reader.NoteWritten({1500, 3});
+  EXPECT_EQ(pair.reader.statistics().lost, 7) << "a term of which nothing came";
+  pair.reader.NoteWritten({2000, 1});
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(pair.reader.statistics().lost_with_writer, 7);
+}
+
+TEST(Stream, AReaderThatStartsFromAVersionMissesWhatItsWriterWroteBehindIt) {
+  Pair pair;
+  StreamReader::Options options = ReaderOptions();
+  options.start = {900, 3};
+  pair.reader = StreamReader(options);
+  pair.reader.NoteWritten({900, 5});
+  pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(6), pair.now_ns);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), std::vector<int64_t>{6});
+  EXPECT_EQ(pair.reader.statistics().lost, 2);
+}
+
 TEST(Stream, ClosingWaitsForTheReadersAndTellsThem) {
   Pair pair;
   pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);

@@ -196,7 +196,7 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   for (const std::string& channel : record_channels)
     record_channels_of_camera.push_back(ChannelOfCamera(channel, camera));
   endpoint_.AddReader(reader.get(), options.owner, record_channels_of_camera);
-  readers_.push_back({reader.get(), {}});
+  readers_.push_back({reader.get(), options.owner, {}});
   return reader;
 }
 
@@ -339,7 +339,11 @@ void StreamNode::WatchReaders() {
     RefuseOtherTypes(&watched);
     const ReaderStatistics s = watched.reader->statistics();
     if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
-    if (s.lost > 0) WarnOnce("lost", "was away for longer than its writer keeps records: some are lost");
+    if (s.lost_with_writer > 0)
+      WarnOnce("lost with " + watched.owner,
+               "a writer of " + watched.owner + "'s stream is gone before all its records had come, and " +
+                   std::to_string(s.lost_with_writer) + " of them are lost");
+    if (s.lost > s.lost_with_writer) WarnOnce("lost", "was away for longer than its writer keeps records: some are lost");
     if (watched.reader->problem() == watched.problem) continue;
     watched.problem = watched.reader->problem();
     if (!watched.problem.empty()) LogWarning("{}: {}", role_, watched.problem);

@@ -183,6 +183,7 @@ class StreamNode : public Node {
   bool map_in_parts_ = false;
   struct Watched {
     const StreamReader* reader;
+    std::string owner;             ///< of the stream
     std::string problem;           ///< last one logged
     int64_t misfit_since_ns = -1;  ///< its writer has other message types; -1: it has not
   };
