@@ -69,7 +69,7 @@ int64_t Checkpointer::deadline_ns() const {
 
 void Checkpointer::Finish() { thread_->Finish(); }
 
-void Checkpointer::WriteLast(const Map& map, bool whole, const std::optional<SessionStart>& session) {
+bool Checkpointer::WriteLast(const Map& map, bool whole, const std::optional<SessionStart>& session) {
   thread_->Finish();
   if (whole && session && !map.keyframes().empty() && schedule_.HasUnsaved()) {
     Begin(map, *session);
@@ -77,6 +77,7 @@ void Checkpointer::WriteLast(const Map& map, bool whole, const std::optional<Ses
     SyncJournal();
   }
   thread_->Finish();
+  return !schedule_.HasUnsaved();
 }
 
 std::string Checkpointer::TakeProblem() { return std::exchange(problem_, ""); }

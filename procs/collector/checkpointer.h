@@ -35,11 +35,12 @@ class Checkpointer {
   int64_t deadline_ns() const;
   /// Waits for what is being written.
   void Finish();
-  /// The run is interrupted: writes what is not on the disk yet, and waits for it.
-  void WriteLast(const Map& map, bool whole, const std::optional<SessionStart>& session);
+  /// Writes what is not on the disk yet, and waits for it. Whether all of the map is there.
+  bool WriteLast(const Map& map, bool whole, const std::optional<SessionStart>& session);
   /// Why one could not be written, once; empty when there is nothing new to say.
   std::string TakeProblem();
   int64_t written() const { return written_; }
+  bool enabled() const { return options_.every_s > 0; }
 
  private:
   void Begin(const Map& map, const SessionStart& session);

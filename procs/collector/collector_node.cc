@@ -28,6 +28,11 @@ constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
 constexpr int64_t kSyncEveryNs = 1'000'000'000;
 constexpr int64_t kCountersEveryNs = 5'000'000'000;
 constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
+constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
+constexpr int64_t kNobodyNs = 60'000'000'000;      // after the player's end: no frontend comes any more
+constexpr int64_t kRoomOnDiskNs = 30'000'000'000;  // after the end: no room comes any more
+constexpr int64_t kSayAgainNs = 30'000'000'000;    // how much waits for the disk
+constexpr int64_t kTryAgainNs = 1'000'000'000;
 
 }  // namespace
 
@@ -47,6 +52,22 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
   collector_.ground_truth.resize(options_.NumCameras());
   run_.others.resize(options_.NumCameras() - 1);
   for (std::string& path : collector_.ground_truth) path = path == "-" ? "" : path;
+  RecallEndedMap();
+}
+
+/// Where the map on the disk is the last one, nobody is needed any more, and nobody may be left.
+void CollectorNode::RecallEndedMap() {
+  if (context_.fresh_system && !context_.resumed) return;
+  FoundCheckpoint found = FindCheckpoint(CheckpointPath(collector_.out_dir), session_);
+  if (!found.map || !found.map->map.progress().ended) return;
+  LogInfo("{}: the map is complete; what is left to do is to write the results", found.path);
+  CameraInfo info;
+  info.session = session_;
+  info.camera = found.map->session.camera;
+  info.sequence = found.map->session.sequence;
+  info.mode = found.map->session.mode;
+  ended_map_ = std::move(found.map->map);
+  KnowCamera(info);
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
@@ -60,6 +81,11 @@ void CollectorNode::OnCamera(const CameraInfo& info) {
 
 void CollectorNode::Begin(const CameraInfo& info) {
   builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.Read<Pyramid>());
+  if (ended_map_) {
+    safe_version_ = ended_map_->version();
+    builder_->SetMap(*std::exchange(ended_map_, std::nullopt));
+  }
+  begun_ns_ = context_.now_ns();
   run_.mode = info.mode == PlaybackMode::kLockstep ? "lockstep" : "realtime";
   run_.profile = options_.settings.profile();
   run_.seed = options_.settings.Read<RunOptions>().seed;
@@ -96,7 +122,17 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
   }
 }
 
-void CollectorNode::OnEnd(const EndOfSequence& end) { ends_[end.camera_id] = end; }
+/// Noted: a collector after this one may come when the player has left.
+void CollectorNode::OnEnd(const EndOfSequence& end) {
+  if (end.camera_id >= options_.NumCameras()) return;
+  ends_[end.camera_id] = end;
+  if (!journal_ || noted_ends_.contains(end.camera_id)) return;
+  noted_ends_.insert(end.camera_id);
+  std::ostringstream note;
+  note << "end " << end.camera_id << ' ' << end.frames_published << ' '
+       << end.frames_missing << ' ' << end.frames_blacked << ' ' << end.frames_jumped;
+  journal_->AppendNote(note.str());
+}
 
 void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   if (pose.camera_id >= options_.NumCameras() || !collector_.ground_truth[pose.camera_id].empty()) return;
@@ -148,6 +184,11 @@ void CollectorNode::ReadNote(const std::string& text) {
   if (kind == "keyframe" && note >> keyframe >> map_id) proposed_[KeyframeId{keyframe}] = map_id;
   if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "resumed") OnResume();
+  if (CameraId camera = 0; kind == "end" && note >> camera && camera < options_.NumCameras()) {
+    EndOfSequence& end = ends_[camera];
+    end.camera_id = camera;
+    note >> end.frames_published >> end.frames_missing >> end.frames_blacked >> end.frames_jumped;
+  }
   if (kind == "counters" && note >> process >> pid) {
     ProcessHealth& health = run_.health[process];
     health.pid = pid;
@@ -240,14 +281,35 @@ void CollectorNode::CountReset(const MapReset& reset) {
   if (reset.drop) dropped_maps_.insert(reset.map_id);
 }
 
-/// A disk that is full ends no run: what it does not take waits in memory.
+/// A disk that is full ends no run: what it does not take waits in memory, and is not acknowledged, so that
+/// the frontend keeps it too.
 void CollectorNode::KeepOnDisk(const Bytes& record) {
   journal_->Append(record);
-  if (journal_->problem().empty() || disk_warned_) return;
-  disk_warned_ = true;
-  run_.disk_problems.push_back(journal_->problem());
-  LogError("{}; the run goes on, and frame poses are kept in memory until there is room",
+  if (journal_->complete() || disk_refuses_) return;
+  disk_refuses_ = true;
+  say_again_ns_ = context_.now_ns() + kSayAgainNs;
+  if (run_.disk_problems.empty()) run_.disk_problems.push_back(journal_->problem());
+  LogError("{}; the run goes on, and frame poses wait in memory, not acknowledged, until there is room",
            journal_->problem());
+}
+
+void CollectorNode::RetryDisk() {
+  if (!disk_refuses_) return;
+  const int64_t waiting = journal_->pending();
+  if (journal_->Flush()) {
+    disk_refuses_ = false;
+    LogInfo("the disk takes frame poses again: all that waited are written");
+  } else if (context_.now_ns() >= say_again_ns_) {
+    say_again_ns_ = context_.now_ns() + kSayAgainNs;
+    LogWarning("{} frame poses wait for room on the disk", waiting);
+  }
+  AcceptWhatIsSafe();
+}
+
+/// What is in the journal, with all that came before it.
+void CollectorNode::AcceptWhatIsSafe() {
+  if (!journal_->complete()) return;
+  for (const auto& reader : frontend_readers_) reader->AcceptTaken();
 }
 
 /// Those that were placed later have been seen before.
@@ -285,7 +347,7 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   } else if (record->channel == channels::kMapReset) {
     OnMapReset(*record);
   }
-  frontend_readers_[camera]->AcceptTaken();
+  AcceptWhatIsSafe();
   return true;
 }
 
@@ -360,7 +422,8 @@ void CollectorNode::BeginCheckpoints() {
 /// It is whole, and no newer than the poses in the journal.
 bool CollectorNode::MapMayBeKept() const {
   const Map& map = builder_->map();
-  if (map.keyframes().empty() || MapHeld(*map_reader_).empty()) return false;
+  if (map.keyframes().empty() || MapHeld(*map_reader_).empty() || !journal_->complete()) return false;
+  if (map.progress().ended) return true;  // no pose comes any more
   return std::ranges::all_of(frames_.newest, [&](const auto& item) {
     const Keyframe* newest = map.NewestKeyframeOf(item.first);
     return newest == nullptr || newest->id.session() != session_ || newest->id.frame_index() <= item.second;
@@ -421,12 +484,33 @@ bool CollectorNode::TakeMapRecord() {
   for (const MapId dropped : delta->dropped_maps) {
     if (dropped_maps_.insert(dropped).second) journal_->AppendNote("dropped " + std::to_string(dropped));
   }
-  map_reader_->AcceptTaken();
+  AcceptMap();
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     const StreamPosition mapped = builder_->map().progress(camera).frontend;
     frontend_readers_[camera]->NoteWritten({mapped.epoch, mapped.seq});
   }
   return true;
+}
+
+/// The last map is acknowledged when it is on the disk: then whoever holds it may go, and this process may
+/// still die before the results are written.
+void CollectorNode::AcceptMap() {
+  if (builder_->map().progress().ended && !EndedMapIsSafe()) return;
+  map_reader_->AcceptTaken();
+}
+
+bool CollectorNode::EndedMapIsSafe() {
+  const Map& map = builder_->map();
+  if (written_ || map.keyframes().empty() || !checkpointer_->enabled()) return true;
+  if (safe_version_ == map.version()) return true;
+  if (context_.now_ns() < try_again_ns_ || MapHeld(*map_reader_).empty()) return false;
+  try_again_ns_ = context_.now_ns() + kTryAgainNs;
+  checkpointer_->OnMap(map, false, frames_.newest_stamp_ns, session_start_);
+  const bool kept = MapMayBeKept() && checkpointer_->WriteLast(map, true, session_start_);
+  if (ended_ns_ == 0) ended_ns_ = context_.now_ns();
+  const bool too_late = context_.now_ns() - ended_ns_ > kRoomOnDiskNs;
+  if (kept || too_late || !session_start_) safe_version_ = map.version();
+  return safe_version_ == map.version();
 }
 
 bool CollectorNode::WorkOnce() {
@@ -436,20 +520,73 @@ bool CollectorNode::WorkOnce() {
   return any ? true : EndIfDone();
 }
 
+/// For how long a writer was not heard, as far as this process can know.
+int64_t CollectorNode::SilentNs(const StreamReader& reader) const {
+  return std::min(reader.silent_ns(context_.now_ns()), context_.now_ns() - begun_ns_);
+}
+
+/// They have said so; or the map says that they have, and they are gone; or the player has said it, and none
+/// has been heard for long: then the results are made of what there is.
+bool CollectorNode::FrontendsHaveEnded() {
+  const auto all_silent = [this](int64_t ns) {
+    return std::ranges::all_of(frontend_readers_, [&](const auto& r) { return SilentNs(*r) > ns; });
+  };
+  if (std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AtEnd(); })) return true;
+  if (builder_->map().progress().ended && all_silent(kSilentAfterEndNs)) return true;
+  if (ends_.size() < options_.NumCameras() || !all_silent(kNobodyNs)) return false;
+  run_.end_problem = "the sequence had ended, and no frontend was heard for " +
+                     std::to_string(kNobodyNs / 1'000'000'000) + " s: the map may lack its last changes";
+  LogWarning("{}", run_.end_problem);
+  return true;
+}
+
 bool CollectorNode::EndIfDone() {
-  frontends_ended_ = frontends_ended_ || std::ranges::all_of(frontend_readers_, [](const auto& reader) {
-                       return reader->AtEnd();
-                     });
-  if (!frontends_ended_ || !MapIsOver(builder_->map(), *map_reader_)) return false;
+  if (GiveUpOnDisk()) return false;
+  frontends_ended_ = frontends_ended_ || FrontendsHaveEnded();
+  if (!frontends_ended_) return false;
+  if (builder_->map().progress().ended) AcceptMap();
+  const bool as_it_is = !run_.end_problem.empty();
+  if (!as_it_is && !MapIsOver(builder_->map(), *map_reader_, kSilentAfterEndNs)) return false;
   if (drained_ns_ == 0) drained_ns_ = context_.now_ns();
   if (context_.now_ns() - drained_ns_ < kLastStatusesNs) return false;
-  Write(true);
+  WriteAtEnd();
+  return false;
+}
+
+/// The sequence has ended, all poses are here, and the disk does not take them.
+bool CollectorNode::GiveUpOnDisk() {
+  const bool all_here =
+      std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AllTaken(); });
+  if (journal_->complete() || !all_here) {
+    refused_since_ns_.reset();
+    return false;
+  }
+  if (!refused_since_ns_) refused_since_ns_ = context_.now_ns();
+  if (context_.now_ns() - *refused_since_ns_ < kRoomOnDiskNs) return true;
+  const std::string lacks = std::to_string(journal_->pending()) + " frame poses could not be written";
+  run_.disk_problems.push_back(lacks);
+  const std::string problem = WriteResultFiles(false);
+  Exit(kExitInput,
+       (problem.empty() ? journal_->problem() : problem) + "; " + lacks + "; make room, then resume the run");
+  return true;
+}
+
+/// Where there is no room for the results, there may be soon.
+void CollectorNode::WriteAtEnd() {
+  if (context_.now_ns() < try_again_ns_) return;
+  const std::string problem = WriteResultFiles(true);
+  if (problem.empty()) return ExitAtEnd();
+  try_again_ns_ = context_.now_ns() + kTryAgainNs;
+  if (context_.now_ns() - drained_ns_ > kRoomOnDiskNs) return Exit(kExitInput, problem);
+  if (!std::exchange(results_wait_, true)) LogError("{}; tries again", problem);
+}
+
+void CollectorNode::ExitAtEnd() {
   const bool any_pose = std::any_of(builder_->frame_poses().begin(), builder_->frame_poses().end(),
                                     [](const auto& item) { return item.second.HasPose(); });
   std::string why = run_.frontend.head.reason;
   Exit(any_pose ? kExitDone : kExitNoFrame,
        any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
-  return false;
 }
 
 /// How many frames there were, as the players said it at the end, or else as far as is known.
@@ -470,10 +607,10 @@ void CollectorNode::TakeEnds() {
   }
 }
 
-/// `ended`: the sequence has come to its end. One that is interrupted can be resumed.
-void CollectorNode::Write(bool ended) {
-  if (written_ || !builder_) return;
-  written_ = true;
+/// All that the results are made of, once. `ended`: the sequence has come to its end. One that is interrupted
+/// can be resumed.
+void CollectorNode::Gather(bool ended) {
+  if (std::exchange(gathered_, true)) return;
   if (ended) checkpointer_->Finish();
   if (!ended) checkpointer_->WriteLast(builder_->map(), MapMayBeKept(), session_start_);
   journal_->ForEach([this](std::span<const uint8_t> record) {
@@ -486,18 +623,32 @@ void CollectorNode::Write(bool ended) {
   CountMissingKeyframes();
   if (journal_->lost() > 0)
     run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
+}
+
+/// Why not all of them could be written; empty: they are there.
+std::string CollectorNode::WriteResultFiles(bool ended) {
+  Gather(ended);
   const WrittenResults results = WriteResults(collector_.out_dir, run_, *builder_, collector_.for_people);
+  if (!results.problem.empty() && ended) return results.problem;
+  written_ = true;
   if (collector_.progress) std::fputs("\n", stderr);
   if (collector_.for_people) std::fputs(results.table.c_str(), stdout);
   std::fflush(stdout);
-  if (!results.problem.empty()) return Exit(kExitInput, results.problem);
-  if (!ended) return;
+  if (!ended || !results.problem.empty()) return results.problem;
   journal_->Remove();
   if (collector_.checkpoints) RemoveCheckpoints(CheckpointPath(collector_.out_dir));
+  return "";
+}
+
+/// The run is interrupted.
+void CollectorNode::Write() {
+  if (written_ || !builder_) return;
+  const std::string problem = WriteResultFiles(false);
+  if (!problem.empty()) Exit(kExitInput, problem);
 }
 
 void CollectorNode::Stop() {
-  Write(false);
+  Write();
   Exit(0);
 }
 
@@ -515,6 +666,7 @@ void CollectorNode::SayProgress() {
 }
 
 void CollectorNode::PublishStatus() {
+  if (journal_ && !written_) RetryDisk();
   if (journal_ && !written_ && context_.now_ns() >= next_sync_ns_) {
     next_sync_ns_ = context_.now_ns() + kSyncEveryNs;
     checkpointer_->SyncJournal();

@@ -66,13 +66,25 @@ class CollectorNode : public StreamNode {
   bool MapMayBeKept() const;
   void KeepCheckpoint();
   void KeepOnDisk(const Bytes& record);
+  void RetryDisk();
+  void AcceptWhatIsSafe();
+  void AcceptMap();
+  bool EndedMapIsSafe();
+  void RecallEndedMap();
   void CountFrame(const FramePose& pose);
   void CountMissingKeyframes();
   void OpenJournal();
   std::string OfTotal() const;
   void SayProgress();
+  int64_t SilentNs(const StreamReader& reader) const;
+  bool FrontendsHaveEnded();
   bool EndIfDone();
-  void Write(bool ended);
+  bool GiveUpOnDisk();
+  void WriteAtEnd();
+  void ExitAtEnd();
+  void Gather(bool ended);
+  std::string WriteResultFiles(bool ended);
+  void Write();
 
   CollectorOptions collector_;
   RunRecord run_;
@@ -90,10 +102,20 @@ class CollectorNode : public StreamNode {
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
   std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal
   std::optional<SessionStart> session_start_;   ///< as the frontend said it
-  bool disk_warned_ = false;
+  std::optional<Replica> ended_map_;            ///< found on the disk, not yet taken over
+  bool disk_refuses_ = false;                   ///< frame poses wait for it
+  std::optional<int64_t> refused_since_ns_;     ///< ... and nothing else is to come
+  int64_t say_again_ns_ = 0;
+  int64_t try_again_ns_ = 0;              ///< to write the last map, or the results
+  int64_t ended_ns_ = 0;                  ///< when the last map was here
+  std::optional<uint64_t> safe_version_;  ///< of the last map: need not be written again
+  bool gathered_ = false;                 ///< the results are to be written
+  bool results_wait_ = false;             ///< ... and the disk had no room for them
+  int64_t begun_ns_ = 0;
   int64_t next_sync_ns_ = 0, next_counters_ns_ = 0;
   int64_t next_progress_ = 0;
   std::map<CameraId, EndOfSequence> ends_;
+  std::set<CameraId> noted_ends_;
   FrameCount frames_;
   int64_t drained_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map stream has begun that continues none

@@ -363,6 +363,7 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["restarts"] = run.restarts;
   json["resumed"] = run.resumes;
   json["disk_problems"] = run.disk_problems;
+  if (!run.end_problem.empty()) json["end_problem"] = run.end_problem;
   json["keyframes_proposed"] = run.keyframes_proposed;
   json["keyframes_missing"] = run.keyframes_missing;
   json["keyframes_lost_in_crash"] = run.keyframes_lost_in_crash;

@@ -65,6 +65,7 @@ struct RunRecord {
   };
   std::map<std::string, std::vector<MemorySample>> memory;  ///< of each process, about once a second
   std::vector<std::string> disk_problems;  ///< why something could not be written while it ran
+  std::string end_problem;                 ///< why the end is not what it should have been; empty: it is
   int resumes = 0;                         ///< how often all processes had died
   size_t keyframes_lost_in_crash = 0;      ///< made after the last checkpoint before that, and not made again
   size_t keyframes_missing = 0;  ///< proposed for a map that stands, and neither in it nor culled from it

@@ -237,7 +237,7 @@ bool FrontendNode::WorkOnce() {
     if (!work_->Idle()) return false;
   }
   if (end_.Is(SequenceEnd::Phase::kDone)) {
-    if (!options_.HasPeer("mapper") || MapIsOver(core_->map(), *map_reader_)) Stop();
+    if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;

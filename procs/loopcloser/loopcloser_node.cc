@@ -103,7 +103,7 @@ bool LoopcloserNode::EndIfDone() {
     PublishStatus();
     writer_->Complete(context_.now_ns());
   }
-  if (MapIsOver(core_->map(), *map_reader_)) Stop();
+  if (NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
   return false;
 }
 

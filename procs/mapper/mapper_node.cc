@@ -144,9 +144,15 @@ bool MapperNode::TakeCheckpoint() {
   if (!found.problem.empty()) LogWarning("{}", found.problem);
   if (!found.map) return false;
   CheckFits(found.path, *found.map, camera_info_->camera, options_.settings.Read<Pyramid>());
-  LogInfo("{}: continues with {} keyframes and {} landmarks", found.path, found.map->map.keyframes().size(),
-          found.map->map.num_landmarks());
+  const bool ended = found.map->map.progress().ended;
+  LogInfo("{}: {} with {} keyframes and {} landmarks", found.path, ended ? "is complete" : "continues",
+          found.map->map.keyframes().size(), found.map->map.num_landmarks());
   core_->ContinueSaved(std::move(found.map->map), static_cast<uint64_t>(context_.random_id));
+  if (ended) {  // the sequence is over, and the collector has this map
+    session_start_ = found.map->session;
+    Save();
+    Exit(kExitDone);
+  }
   PutInParts();
   return true;
 }
@@ -180,9 +186,9 @@ void MapperNode::OnWriterOpen() {
   }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
                             {progress.loopcloser.epoch, progress.loopcloser.seq});
-  if (progress.ended) {  // the one before could not say goodbye
-    ending_ = Ending::kCompleting;
-    Stop();
+  if (progress.ended) {  // the one before could not say goodbye: whoever has died since may lack the map
+    give_up_ns_ = context_.now_ns() + kBackAfterDeathNs;
+    Run([this] { core_->End(true); }, [this] { Complete(); });
   } else {
     Run([this] { SettleAgain(); });
   }
@@ -546,10 +552,14 @@ bool MapperNode::EndIfDone() {
     Run([this] { core_->End(run_.localize_only); });
     return work_->Idle();
   }
+  Complete();
+  return true;
+}
+
+void MapperNode::Complete() {
   writer_->Complete(context_.now_ns());
   ending_ = Ending::kCompleting;
   PublishStatus();
-  return true;
 }
 
 /// All readers take the last record before this process leaves. What still comes in changes nothing any more.
@@ -558,7 +568,11 @@ void MapperNode::DrainAfterEnd() {
     while (frontend.reader->Take()) frontend.reader->AcceptTaken();
   }
   while (loop_reader_->Take()) loop_reader_->AcceptTaken();
-  if (writer_->completed()) Stop();
+  if (writer_->completed()) return Stop();
+  if (!give_up_ns_ || context_.now_ns() < *give_up_ns_) return;
+  LogInfo("mapper: ends, since the map is complete and not all who lack it have come back within {} s",
+          kBackAfterDeathNs / 1'000'000'000);
+  Stop();
 }
 
 void MapperNode::Save() {

@@ -114,6 +114,7 @@ class MapperNode : public StreamNode {
   void RefuseBrokenCorrections();
   void SettleAgain();
   void ApplyFirstAnswer();
+  void Complete();
   void DrainAfterEnd();
   bool HandleFirstRecord();
   void NoteTurnRequest(CameraId camera, const Record& record);
@@ -148,9 +149,10 @@ class MapperNode : public StreamNode {
   bool lockstep_ = false;
   const CameraId num_cameras_;
   Ending ending_ = Ending::kNo;
-  std::deque<Arrived> arrived_;          ///< records of the frontend that came while it worked
-  std::deque<Arrived> taken_;            ///< the same, to be handled next
-  std::deque<Pending> pending_;          ///< records of the frontend: handled, not yet safe
+  std::optional<int64_t> give_up_ns_;  ///< until then who lacks a map that was complete already is waited for
+  std::deque<Arrived> arrived_;        ///< records of the frontend that came while it worked
+  std::deque<Arrived> taken_;          ///< the same, to be handled next
+  std::deque<Pending> pending_;        ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
   std::deque<PendingAnswer> answers_;
   wire::RecordGroups<LoopAnswer> answer_groups_;

@@ -74,7 +74,7 @@ bool RecordsNode::WorkOnce() {
   if (context_.now_ns() >= next_info_ns_) PublishCameraInfo();
   TakeMapRecords();
   if (finished_) {
-    if (!options_.HasPeer("mapper") || MapIsOver(live_, *map_reader_)) Stop();
+    if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(live_, *map_reader_)) Stop();
     return false;
   }
   if (awaited_.valid()) return false;

@@ -27,13 +27,12 @@ std::set<int64_t> Stamps(const std::vector<StampedPose>& poses) {
   return stamps;
 }
 
-/// Of the summary; -1 where it has none.
+}  // namespace
+
 double Number(const Outcome& outcome, const std::string& key) {
   const size_t at = outcome.summary.find("\"" + key + "\":");
   return at == std::string::npos ? -1 : std::atof(outcome.summary.c_str() + at + key.size() + 3);
 }
-
-}  // namespace
 
 Distance Measure(const Outcome& outcome, const Outcome& other, const std::string& folder) {
   Distance distance;

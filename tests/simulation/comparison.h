@@ -17,6 +17,9 @@ struct Distance {
 /// `folder`: for what is written on the way.
 Distance Measure(const Outcome& outcome, const Outcome& other, const std::string& folder);
 
+/// Of the summary; -1 where it has none.
+double Number(const Outcome& outcome, const std::string& key);
+
 /// What of the collector's files differs; empty: nothing.
 std::string Difference(const Outcome& outcome, const Outcome& undisturbed);
 

@@ -44,6 +44,7 @@ struct Schedule {
   int64_t latest_start_ns = 0;         ///< processes begin within this time
   bool fresh_system = true;            ///< they are told that nobody else can be writing
   bool meets_writers = false;          ///< processes that make the map die or move
+  bool at_once = false;                ///< faults do not wait for each other: several may be away
   std::vector<Fault> faults;           ///< in the order of their frames
 
   std::string ToText() const;

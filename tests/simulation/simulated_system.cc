@@ -151,10 +151,7 @@ class SimulatedSystem {
     std::optional<int> code;
     std::string problem;
     std::optional<FullDisk> full_disk;
-    if (process->role == "collector" && now_ns_ < disk_full_until_ns_ &&
-        frames_played_ < workload_.frames.size()) {  // where there is no room in the end the results are lost
-      full_disk.emplace();
-    }
+    if (process->role == "collector" && now_ns_ < disk_full_until_ns_) full_disk.emplace();
     try {
       process->node->Advance();
       code = process->node->exit_code();
@@ -314,11 +311,10 @@ class SimulatedSystem {
   /// Who dies next does so when the one before is there again: where several holders of something die at
   /// once, it is lost.
   bool MayHappen(const Fault& fault) const {
+    if (schedule_.at_once) return true;
     if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) return true;
     const auto is_away = [](const Process& process) { return process.begins_ns || process.paused_until_ns; };
     if (std::ranges::any_of(processes_, is_away) || now_ns_ < caught_up_ns_) return false;
-    if (fault.process == "collector" && now_ns_ < disk_full_until_ns_)
-      return false;  // it holds what the disk does not
     return now_ns_ >= begun_ns_ + kBackNs || frames_played_ >= begun_frame_ + 3;
   }
 

@@ -30,6 +30,36 @@ constexpr int64_t kFramesLostByFrontend = 12;
 constexpr uint32_t kFirstMapFrame =
     15;                           // a frontend that dies before it loses all that it had for the first map
 constexpr double kMostApart = 2;  // of the spread of undisturbed runs
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kSecond = 1000 * kMs;
+
+Fault Kill(const std::string& process, uint32_t at_frame, int64_t lasts_ns, int64_t after_ns = 0) {
+  Fault fault;
+  fault.kind = Fault::Kind::kKill;
+  fault.process = process;
+  fault.at_frame = at_frame;
+  fault.after_ns = after_ns;
+  fault.lasts_ns = lasts_ns;
+  return fault;
+}
+
+Fault Full(uint32_t at_frame, int64_t lasts_ns) {
+  Fault fault;
+  fault.kind = Fault::Kind::kFullDisk;
+  fault.process = "collector";
+  fault.at_frame = at_frame;
+  fault.lasts_ns = lasts_ns;
+  return fault;
+}
+
+Fault Cut(int host, uint32_t at_frame, int64_t lasts_ns) {
+  Fault fault;
+  fault.kind = Fault::Kind::kPartition;
+  fault.host = host;
+  fault.at_frame = at_frame;
+  fault.lasts_ns = lasts_ns;
+  return fault;
+}
 
 int64_t FromEnvironment(const char* name, int64_t otherwise) {
   const char* value = std::getenv(name);
@@ -143,6 +173,84 @@ TEST_F(SystemSimulation, TheSameSeedGivesTheSameRun) {
   EXPECT_EQ(a.turns, b.turns);
   EXPECT_EQ(a.network.delivered, b.network.delivered);
   EXPECT_EQ(Difference(a, b), "");
+}
+
+/// What only a frontend has that dies is lost; that is counted.
+TEST_F(SystemSimulation, WhatADeadFrontendHadNotDeliveredIsCounted) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  schedule.num_hosts = 2;
+  schedule.host_of["collector"] = 1;
+  schedule.faults = {Cut(1, 30, 3 * kSecond), Kill("frontend", 40, kSecond / 2)};
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  ASSERT_EQ(outcome.failure, "") << outcome.story;
+  EXPECT_GE(Number(outcome, "records_lost"), 5) << outcome.summary;
+}
+
+/// The mapper, and the collector half a second later, at the very end: whatever they had told whom until
+/// then.
+TEST_F(SystemSimulation, MapperAndCollectorMayDieTogetherAtTheEnd) {
+  for (const int64_t after_ms : {0, 5, 20, 60, 100, 150, 200, 250, 300, 350, 500, 700}) {
+    Schedule schedule = CalmSchedule();
+    schedule.at_once = true;
+    schedule.seed = static_cast<uint64_t>(after_ms);
+    schedule.faults = {Kill("mapper", NumFrames(), 4 * kSecond, after_ms * kMs),
+                       Kill("collector", NumFrames(), 4 * kSecond, kSecond / 20)};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    EXPECT_EQ(
+        Loss(outcome, common_->undisturbed, kMostApart * Spread(), kFramesLost, common_->folder.string()), "")
+        << after_ms << " ms\n"
+        << outcome.story;
+  }
+}
+
+/// ... or the collector alone, when all others may have gone.
+TEST_F(SystemSimulation, TheCollectorMayDieWhenAllOthersHaveEnded) {
+  for (const int64_t after_ms : {0, 5, 20, 60, 100, 150, 200, 250, 300, 350, 400, 500}) {
+    Schedule schedule = CalmSchedule();
+    schedule.at_once = true;
+    schedule.seed = static_cast<uint64_t>(after_ms);
+    schedule.faults = {Kill("collector", NumFrames(), 40 * kSecond, after_ms * kMs)};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    EXPECT_EQ(Difference(outcome, common_->undisturbed), "") << after_ms << " ms\n" << outcome.story;
+  }
+}
+
+/// What the disk does not take is not acknowledged: the frontend still has it.
+TEST_F(SystemSimulation, ACollectorMayDieWhileItsDiskIsFull) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  schedule.faults = {Full(20, 5 * kSecond), Kill("collector", 50, kSecond / 2)};
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  EXPECT_EQ(Difference(outcome, common_->undisturbed), "") << outcome.story;
+}
+
+TEST_F(SystemSimulation, TheEndWaitsForRoomOnTheDisk) {
+  for (const bool dies : {false, true}) {
+    Schedule schedule = CalmSchedule();
+    schedule.at_once = true;
+    schedule.faults = {Full(50, 15 * kSecond)};
+    if (dies) schedule.faults.push_back(Kill("collector", NumFrames(), kSecond / 2, 2 * kSecond));
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    EXPECT_EQ(Difference(outcome, common_->undisturbed), "") << outcome.story;
+    EXPECT_GT(outcome.virtual_s, 10) << "the disk was not full at the end";
+  }
+}
+
+TEST_F(SystemSimulation, WhereNoRoomComesTheRunEndsAndSaysWhy) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  schedule.faults = {Full(50, 600 * kSecond)};
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  EXPECT_NE(outcome.failure.find("collector has ended with 1"), std::string::npos) << outcome.failure;
+  EXPECT_NE(outcome.failure.find("frame poses"), std::string::npos) << outcome.failure;
+  EXPECT_LT(outcome.virtual_s, 120);
 }
 
 TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {

@@ -108,8 +108,10 @@ bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
 
 /// A stream that is handed over goes on in the next term.
 void StreamReader::NoteEnd(const head_t& head) {
-  const bool ends = head.state == head_t::STATE_CLOSED && (head.offers & head_t::OFFERS_SUCCESSOR) == 0;
+  const bool hands_over = (head.offers & head_t::OFFERS_SUCCESSOR) != 0;
+  const bool ends = head.state == head_t::STATE_CLOSED && !hands_over;
   closed_beacons_ = ends ? closed_beacons_ + 1 : 0;
+  last_beacons_ = head.state != head_t::STATE_LIVE && !hands_over ? last_beacons_ + 1 : 0;
   writer_closed_ = closed_beacons_ >= kBelieved;
 }
 
@@ -159,7 +161,7 @@ void StreamReader::BeginTerm(const head_t& head) {
   terms_.Clear();
   leaps_.Clear();
   gap_seen_ = false;
-  closed_beacons_ = 0;
+  closed_beacons_ = last_beacons_ = 0;
   snapshot_.reset();
   missing_since_ns_.clear();
   problem_.clear();
@@ -188,8 +190,8 @@ Version StreamReader::DrainFormerTerm(const Version& parent, bool fresh) {
   return former_.empty() ? held_ : former_.back().version();
 }
 
-/// A fresh term that offers no snapshot continues nothing: what of the former one is here is still handed out,
-/// gaps or not, since nobody repairs it any more; what is missing is lost.
+/// A fresh term that offers no snapshot continues nothing: what of the former one is here is still handed
+/// out, gaps or not, since nobody repairs it any more; what is missing is lost.
 void StreamReader::DrainBeyondGaps() {
   const Version end = former_.empty() ? held_ : former_.back().version();
   if (state_ == State::kFollowing) {
@@ -430,6 +432,11 @@ void StreamReader::Accept(const Version& version) {
 bool StreamReader::AtEnd() const {
   return writer_closed_ && state_ == State::kFollowing && former_.empty() &&
          window_.next() > window_.newest();
+}
+
+bool StreamReader::AllTaken() const {
+  return last_beacons_ >= kBelieved && state_ == State::kFollowing && former_.empty() &&
+         window_.next() > std::max(window_.newest(), head_seq_);
 }
 
 // ---- acknowledgements

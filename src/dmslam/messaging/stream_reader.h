@@ -23,13 +23,14 @@ struct ReaderStatistics {
   int64_t duplicates = 0;     ///< records and parts that were here already
   int64_t requested = 0;      ///< ranges of bytes or records named as missing
   int64_t repaired = 0;       ///< records that came late or in pieces, after they had been named as missing
-  int64_t lost = 0;       ///< records given up: no longer kept, and the writer offers no snapshot; those that
-                          ///< were gone before a reader that held nothing came are not counted
-  int64_t lost_with_writer = 0;  ///< of them: those of a writer that is gone and has no successor who has them
-  int64_t snapshots = 0;         ///< received whole
-  int64_t dropped_bad = 0;       ///< messages with wrong bytes
-  int64_t dropped_foreign = 0;   ///< of other sessions
-  int64_t dropped_stale = 0;     ///< of other terms, or before any beacon was heard
+  int64_t lost = 0;  ///< records given up: no longer kept, and the writer offers no snapshot; those that
+                     ///< were gone before a reader that held nothing came are not counted
+  int64_t lost_with_writer =
+      0;                        ///< of them: those of a writer that is gone and has no successor who has them
+  int64_t snapshots = 0;        ///< received whole
+  int64_t dropped_bad = 0;      ///< messages with wrong bytes
+  int64_t dropped_foreign = 0;  ///< of other sessions
+  int64_t dropped_stale = 0;    ///< of other terms, or before any beacon was heard
   int64_t dropped_doubtful = 0;  ///< that say what cannot be, or what must be said again to be believed
   int64_t dropped_no_room = 0;   ///< beyond what is kept ahead; they come again
   double recovery_p50_ms =
@@ -92,7 +93,8 @@ class StreamReader : public StateMachine {
   void Forget();
 
   /// Another reader of the stream has had it up to `version`: what of that is not here when its writer is
-  /// gone is lost, even where no beacon told of it. Terms that were over before this reader came do not count.
+  /// gone is lost, even where no beacon told of it. Terms that were over before this reader came do not
+  /// count.
   void NoteWritten(const Version& version);
 
   void Advance(int64_t now_ns) override;
@@ -106,6 +108,9 @@ class StreamReader : public StateMachine {
   int64_t silent_ns(int64_t now_ns) const { return now_ns - last_head_ns_; }
   /// The writer said that its stream is complete, and all of it was taken.
   bool AtEnd() const;
+  /// The writer said that nothing follows, and all of it was taken: its stream is complete as soon as all
+  /// readers have accepted it.
+  bool AllTaken() const;
   /// What keeps this reader from following; empty when nothing does. Names the writer and the cure.
   const std::string& problem() const { return problem_; }
   /// All records up to here were taken (KeepHeld: and are whole); empty inside a snapshot.
@@ -177,6 +182,7 @@ class StreamReader : public StateMachine {
   Claims<Term> leaps_;            // of the beacons of the term that is followed
   bool gap_seen_ = false;         // the last beacon said that records are gone that are not here
   int closed_beacons_ = 0;        // of the newest ones, how many said that the stream is closed
+  int last_beacons_ = 0;          // ... that nothing follows
   int64_t head_seq_ = 0;          // of the last beacon
   int beacons_below_ = 0;         // of the newest ones, how many knew less records than are known here
   int64_t beacons_below_of_ = 0;  // ... than these

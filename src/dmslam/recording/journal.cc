@@ -31,6 +31,8 @@ std::optional<std::span<const uint8_t>> Verified(std::span<const uint8_t> bytes)
   return payload;
 }
 
+bool IsNote(std::span<const uint8_t> framed) { return (GetInt<uint32_t>(framed, 0) & kNoteBit) != 0; }
+
 }  // namespace
 
 std::vector<uint8_t> Journal::ReadAt(int64_t offset, size_t size) const {
@@ -106,9 +108,8 @@ void Journal::ForEach(const Handler& handle) {
     if (!entry->is_note) handle(entry->bytes);
   }
   for (const std::vector<uint8_t>& framed : kept_) {
-    const bool is_note = (GetInt<uint32_t>(framed, 0) & kNoteBit) != 0;
     const size_t length = framed.size() - kLengthBytes - kChecksumBytes;
-    if (!is_note) handle(std::span(framed).subspan(kLengthBytes, length));
+    if (!IsNote(framed)) handle(std::span(framed).subspan(kLengthBytes, length));
   }
 }
 
@@ -132,19 +133,23 @@ void Journal::AppendEntry(const Entry& entry) {
   PutInt(Crc32c(entry.bytes), kLengthBytes + entry.bytes.size(), framed);
   kept_bytes_ += framed.size();
   kept_.push_back(std::move(framed));
-  WriteKept();
+  pending_ += entry.is_note ? 0 : 1;
+  Flush();
   while (kept_bytes_ > kMostKept) {
-    kept_bytes_ -= kept_.front().size();
-    kept_.pop_front();
-    ++lost_;
+    lost_ += IsNote(kept_.front()) ? 0 : 1;
+    DropFirstKept();
   }
 }
 
-void Journal::WriteKept() {
-  while (!kept_.empty() && WriteFramed(kept_.front())) {
-    kept_bytes_ -= kept_.front().size();
-    kept_.pop_front();
-  }
+bool Journal::Flush() {
+  while (!kept_.empty() && WriteFramed(kept_.front())) DropFirstKept();
+  return kept_.empty();
+}
+
+void Journal::DropFirstKept() {
+  pending_ -= IsNote(kept_.front()) ? 0 : 1;
+  kept_bytes_ -= kept_.front().size();
+  kept_.pop_front();
 }
 
 /// All of it or nothing.

@@ -41,6 +41,12 @@ class Journal {
   void Append(std::span<const uint8_t> record);
   /// A note of its owner's, between the records.
   void AppendNote(const std::string& note);
+  /// Tries again to write what is kept in memory. Whether all of it is on the disk now.
+  bool Flush();
+  /// Whether all that was appended is on the disk.
+  bool complete() const { return kept_.empty(); }
+  /// How many records are kept in memory because the disk takes none: whoever dies now loses them.
+  int64_t pending() const { return pending_; }
   /// Why the disk took no more when it first did not; empty where it always did.
   const std::string& problem() const { return problem_; }
   /// How many records were given up, because the disk took none for too long.
@@ -66,7 +72,7 @@ class Journal {
   static bool IsOf(int64_t session, const Entry& entry);
   void AppendEntry(const Entry& entry);
   bool WriteFramed(const std::vector<uint8_t>& framed);
-  void WriteKept();
+  void DropFirstKept();
 
   std::string path_;
   int64_t session_ = 0;
@@ -74,6 +80,7 @@ class Journal {
   int64_t size_ = 0;                       ///< of the whole records on the disk
   std::deque<std::vector<uint8_t>> kept_;  ///< with their lengths, not on the disk yet
   size_t kept_bytes_ = 0;
+  int64_t pending_ = 0;  ///< records among them
   std::string problem_;
   int64_t lost_ = 0;
 };

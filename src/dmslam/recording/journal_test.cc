@@ -76,9 +76,13 @@ TEST_F(JournalTest, AFullDiskLosesNothingAndLeavesNoHalfRecord) {
     LimitFiles(fs::file_size(path_) + 10);
     for (int64_t i = 4; i <= 20; ++i) journal.Append(RecordOf(7, i));
     EXPECT_NE(journal.problem().find("cannot be written"), std::string::npos);
+    EXPECT_EQ(journal.pending(), 17) << "who dies now loses them";
+    EXPECT_FALSE(journal.Flush());
     EXPECT_EQ(Numbers(journal), UpTo(20)) << "what the disk did not take is in memory";
     EXPECT_EQ(Resumed(7), UpTo(3)) << "what is on the disk is whole";
     LimitFiles(RLIM_INFINITY);
+    EXPECT_TRUE(journal.Flush());
+    EXPECT_EQ(journal.pending(), 0);
     journal.Append(RecordOf(7, 21));
     EXPECT_EQ(Numbers(journal), UpTo(21));
     EXPECT_EQ(journal.lost(), 0);

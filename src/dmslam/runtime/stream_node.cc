@@ -16,7 +16,6 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kMisfitNs = 2'000'000'000;
-constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kCameraSilentNs = 1'500'000'000;
 constexpr int64_t kTidyEveryNs = 60'000'000'000;
 
@@ -106,6 +105,13 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   if (recorded_session_) info->mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
   if (!camera_info_) camera_info_ = *info;
   OnCamera(*info);
+}
+
+void StreamNode::KnowCamera(const CameraInfo& info) {
+  if (camera_info_) return;
+  session_ = info.session;
+  camera_info_ = info;
+  OnCamera(info);
 }
 
 /// What all see is projected by one model: the camera that comes later, by its number, leaves.
@@ -225,9 +231,9 @@ void StreamNode::LetSnapshotBegin() {
   if (replica_snapshots_ && replica_snapshots_->wanted()) endpoint_.Advance();
 }
 
-bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader) const {
+bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader, int64_t silent_ns) const {
   if (!map.progress().ended) return false;
-  return map_reader.AtEnd() || map_reader.silent_ns(context_.now_ns()) > kSilentAfterEndNs;
+  return map_reader.AtEnd() || map_reader.silent_ns(context_.now_ns()) > silent_ns;
 }
 
 void StreamNode::StartElection() {
@@ -340,10 +346,11 @@ void StreamNode::WatchReaders() {
     const ReaderStatistics s = watched.reader->statistics();
     if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);
     if (s.lost_with_writer > 0)
-      WarnOnce("lost with " + watched.owner,
-               "a writer of " + watched.owner + "'s stream is gone before all its records had come, and " +
-                   std::to_string(s.lost_with_writer) + " of them are lost");
-    if (s.lost > s.lost_with_writer) WarnOnce("lost", "was away for longer than its writer keeps records: some are lost");
+      WarnOnce("lost with " + watched.owner, "a writer of " + watched.owner +
+                                                 "'s stream is gone before all its records had come, and " +
+                                                 std::to_string(s.lost_with_writer) + " of them are lost");
+    if (s.lost > s.lost_with_writer)
+      WarnOnce("lost", "was away for longer than its writer keeps records: some are lost");
     if (watched.reader->problem() == watched.problem) continue;
     watched.problem = watched.reader->problem();
     if (!watched.problem.empty()) LogWarning("{}: {}", role_, watched.problem);

@@ -81,8 +81,18 @@ class StreamNode : public Node {
   /// Where a core's jobs run: on a thread of its own in real time, at once in lock-step and wherever nothing
   /// can wake this node.
   std::unique_ptr<CoreThread> MakeCoreThread(PlaybackMode mode);
-  /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence.
-  bool MapIsOver(const Map& map, const StreamReader& map_reader) const;
+  /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence, for so
+  /// long.
+  bool MapIsOver(const Map& map, const StreamReader& map_reader, int64_t silent_ns) const;
+  /// The same for who holds the map, and stays as long as a mapper or a collector that has died may come back
+  /// for it.
+  bool NobodyNeedsTheMap(const Map& map, const StreamReader& map_reader) const {
+    return MapIsOver(map, map_reader, kBackAfterDeathNs);
+  }
+  /// Who has died is there again within this time, as far as others wait for it at the end.
+  static constexpr int64_t kBackAfterDeathNs = 30'000'000'000;
+  /// What a run rests on is known from the disk, where nobody may be left who says it.
+  void KnowCamera(const CameraInfo& info);
 
   void WantWriter(WriterPlan plan) { plan_ = std::move(plan); }
   WriterPlan& writer_plan() { return *plan_; }
