@@ -1,0 +1,146 @@
+#include "mapper/mapper_node.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/settings/settings.h"
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr uint32_t kSession = 4;
+
+/// A mapper on a bus with a loop closer's stream, and whoever reads the map.
+class LoopAnswersTest : public testing::Test {
+ protected:
+  LoopAnswersTest() : other_(&bus_.AddPort(), [this] { return now_ns_; }) {
+    StreamWriter::Options writer;
+    writer.session = kSession;
+    writer.stream = StreamId::kLoopCloser;
+    writer.owner = "LOOPCLOSER";
+    writer.name = "loopcloser";
+    writer.schema_hash = SchemaHash();
+    writer.roles = {{"mapper", true}};
+    answers_ = std::make_unique<StreamWriter>(writer, Term{10, 3}, Version{});
+    other_.AddWriter(answers_.get(), "LOOPCLOSER", {"MAPPER"});
+    StreamReader::Options reader;
+    reader.session = kSession;
+    reader.stream = StreamId::kMap;
+    reader.owner = "MAPPER";
+    reader.reader = "LOOPCLOSER";
+    reader.role = reader.name = "loopcloser";
+    reader.id = 3;
+    reader.schema_hash = SchemaHash();
+    map_ = std::make_unique<StreamReader>(reader);
+    other_.AddReader(map_.get(), "MAPPER", {channels::kMap});
+
+    NodeContext context;
+    context.bus = &bus_.AddPort();
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    context.random_id = 7;
+    context.name = "mapper";
+    context.fresh_system = true;
+    NodeOptions options;
+    options.session = kSession;
+    options.settings = LoadSettings("", {});
+    mapper_ = std::make_unique<MapperNode>(context, options);
+    CameraInfo info;
+    info.session = kSession;
+    info.camera = TestCamera();
+    other_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+    Run();
+  }
+
+  void Run() {
+    for (int i = 0; i < 200; ++i) {
+      other_.Advance();
+      mapper_->Advance();
+      while (bus_.DeliverOne()) {
+      }
+      now_ns_ += 5 * kMs;
+    }
+  }
+
+  /// A correction as a group of three records, of keyframes that nobody knows.
+  static std::vector<LoopAnswer> Correction(uint64_t id) {
+    LoopAnswer answer;
+    answer.keyframe = KeyframeId::Make(kSession, 9);
+    answer.correction_id = id;
+    answer.kind = LoopAnswer::Kind::kGlobalAdjustment;
+    for (uint32_t frame : {1, 2, 3}) answer.corrections.push_back({KeyframeId::Make(kSession, frame), {}});
+    std::vector<LoopAnswer> records = wire::Split(answer, 1);
+    EXPECT_EQ(records.size(), 3U);
+    return records;
+  }
+  void Publish(const LoopAnswer& answer) {
+    answers_->Publish(channels::kChecked, wire::Encode(answer), now_ns_);
+  }
+  /// What the mapper has said of corrections since it was last asked.
+  std::vector<MapDelta> Refusals() {
+    Run();
+    std::vector<MapDelta> refusals;
+    while (std::optional<Record> record = map_->Take()) {
+      std::optional<MapDelta> delta = wire::Decode<MapDelta>(*record->bytes);
+      if (delta && delta->event == MapEvent::kRefused) refusals.push_back(std::move(*delta));
+      map_->AcceptTaken();
+    }
+    return refusals;
+  }
+  void ExpectNotWhole(uint64_t id) {
+    const std::vector<MapDelta> refusals = Refusals();
+    ASSERT_EQ(refusals.size(), 1U);
+    EXPECT_EQ(refusals[0].correction_id, id);
+    EXPECT_NE(refusals[0].note.find("did not come whole"), std::string::npos) << refusals[0].note;
+  }
+
+  int64_t now_ns_ = kMs;
+  MemoryBus bus_;
+  Endpoint other_;
+  std::unique_ptr<StreamWriter> answers_;
+  std::unique_ptr<StreamReader> map_;
+  std::unique_ptr<MapperNode> mapper_;
+};
+
+TEST_F(LoopAnswersTest, ACorrectionThatComesWholeIsJudgedByWhatItSays) {
+  for (const LoopAnswer& record : Correction(5)) Publish(record);
+  const std::vector<MapDelta> refusals = Refusals();
+  ASSERT_EQ(refusals.size(), 1U) << "its keyframes are not there";
+  EXPECT_EQ(refusals[0].correction_id, 5U);
+  EXPECT_EQ(refusals[0].note.find("did not come whole"), std::string::npos) << refusals[0].note;
+}
+
+TEST_F(LoopAnswersTest, OneThatLacksARecordIsRefusedByNameAndTheNextOneIsHeard) {
+  const std::vector<LoopAnswer> records = Correction(6);
+  Publish(records[0]);
+  Publish(records[2]);
+  ExpectNotWhole(6);
+  for (const LoopAnswer& record : Correction(7)) Publish(record);
+  const std::vector<MapDelta> refusals = Refusals();
+  ASSERT_EQ(refusals.size(), 1U);
+  EXPECT_EQ(refusals[0].correction_id, 7U);
+  EXPECT_EQ(refusals[0].note.find("did not come whole"), std::string::npos) << refusals[0].note;
+}
+
+TEST_F(LoopAnswersTest, OneWithARecordTwiceIsRefusedByName) {
+  const std::vector<LoopAnswer> records = Correction(8);
+  for (const size_t i : {0, 1, 1}) Publish(records[i]);
+  ExpectNotWhole(8);
+}
+
+TEST_F(LoopAnswersTest, OneWhoseRecordsTellOfDifferentThingsIsRefusedByName) {
+  std::vector<LoopAnswer> records = Correction(9);
+  ++records[1].base_version;
+  Publish(records[0]);
+  Publish(records[1]);
+  ExpectNotWhole(9);
+}
+
+}  // namespace
+}  // namespace dmslam
