@@ -129,8 +129,8 @@ void CollectorNode::OnEnd(const EndOfSequence& end) {
   if (!journal_ || noted_ends_.contains(end.camera_id)) return;
   noted_ends_.insert(end.camera_id);
   std::ostringstream note;
-  note << "end " << end.camera_id << ' ' << end.frames_published << ' '
-       << end.frames_missing << ' ' << end.frames_blacked << ' ' << end.frames_jumped;
+  note << "end " << end.camera_id << ' ' << end.frames_published << ' ' << end.frames_missing << ' '
+       << end.frames_blacked << ' ' << end.frames_jumped;
   journal_->AppendNote(note.str());
 }
 
@@ -184,6 +184,8 @@ void CollectorNode::ReadNote(const std::string& text) {
   if (kind == "keyframe" && note >> keyframe >> map_id) proposed_[KeyframeId{keyframe}] = map_id;
   if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "resumed") OnResume();
+  if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
+    note >> safe_[camera].epoch >> safe_[camera].seq;
   if (CameraId camera = 0; kind == "end" && note >> camera && camera < options_.NumCameras()) {
     EndOfSequence& end = ends_[camera];
     end.camera_id = camera;
@@ -257,7 +259,7 @@ void CollectorNode::OnFramePose(const Record& record) {
   const auto pose = Read<FramePose>(*record.bytes);
   if (!pose) return;
   CountFrame(*pose);
-  KeepOnDisk(*record.bytes);
+  KeepOnDisk(record);
 }
 
 /// Kept too: a collector that is started again does not hear it a second time.
@@ -266,14 +268,14 @@ void CollectorNode::OnSessionStart(const Record& record) {
   if (!start) return;
   JoinsSession(*start);
   if (start->camera_id == 0) session_start_ = std::move(start);
-  KeepOnDisk(*record.bytes);
+  KeepOnDisk(record);
 }
 
 void CollectorNode::OnMapReset(const Record& record) {
   const auto reset = Read<MapReset>(*record.bytes);
   if (!reset) return;
   CountReset(*reset);
-  KeepOnDisk(*record.bytes);
+  KeepOnDisk(record);
 }
 
 void CollectorNode::CountReset(const MapReset& reset) {
@@ -283,8 +285,8 @@ void CollectorNode::CountReset(const MapReset& reset) {
 
 /// A disk that is full ends no run: what it does not take waits in memory, and is not acknowledged, so that
 /// the frontend keeps it too.
-void CollectorNode::KeepOnDisk(const Bytes& record) {
-  journal_->Append(record);
+void CollectorNode::KeepOnDisk(const Record& record) {
+  journal_->Append(*record.bytes);
   if (journal_->complete() || disk_refuses_) return;
   disk_refuses_ = true;
   say_again_ns_ = context_.now_ns() + kSayAgainNs;
@@ -306,10 +308,28 @@ void CollectorNode::RetryDisk() {
   AcceptWhatIsSafe();
 }
 
-/// What is in the journal, with all that came before it.
+/// What is in the journal, with all that came before it: a collector after this one goes on behind it.
 void CollectorNode::AcceptWhatIsSafe() {
   if (!journal_->complete()) return;
-  for (const auto& reader : frontend_readers_) reader->AcceptTaken();
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    frontend_readers_[camera]->Accept(safe_[camera]);
+}
+
+/// Behind the last frame pose there may be what is kept nowhere: that it was here is noted.
+void CollectorNode::NotePositions() {
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    const Version held = frontend_readers_[camera]->held();
+    if (held == safe_[camera]) continue;
+    std::ostringstream note;
+    note << "taken " << camera << ' ' << held.epoch << ' ' << held.seq;
+    journal_->AppendNote(note.str());
+    safe_[camera] = held;
+  }
+  AcceptWhatIsSafe();
+}
+
+bool CollectorNode::AllTaken() const {
+  return std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AllTaken(); });
 }
 
 /// Those that were placed later have been seen before.
@@ -347,6 +367,9 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   } else if (record->channel == channels::kMapReset) {
     OnMapReset(*record);
   }
+  const bool kept = record->channel == channels::kSession || record->channel == channels::kFramePose ||
+                    record->channel == channels::kMapReset;
+  if (kept) safe_[camera] = record->version();
   AcceptWhatIsSafe();
   return true;
 }
@@ -370,7 +393,6 @@ void CollectorNode::OpenJournal() {
   std::filesystem::create_directories(collector_.out_dir, error);
   if (error) throw InputError(collector_.out_dir + ": cannot be made (" + error.message() + "); check --out");
   journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
-  std::map<CameraId, Version> newest;
   const auto take = [&](std::span<const uint8_t> record) {
     CameraId camera = 0;
     if (const auto pose = wire::Decode<FramePose>(record)) {
@@ -384,7 +406,7 @@ void CollectorNode::OpenJournal() {
       if (camera == 0) session_start_ = std::move(start);
     }
     const std::optional<RecordHeader> header = ParseHeader(record);
-    newest[camera] = {header->epoch, header->seq};
+    safe_[camera] = {header->epoch, header->seq};
   };
   if (context_.fresh_system && !context_.resumed) {
     journal_->Begin(session_);
@@ -393,13 +415,13 @@ void CollectorNode::OpenJournal() {
   }
   former_["collector"] = run_.health["collector"];
   OnProcess("collector", MeasureProcess().pid, run_.health["collector"]);
-  if (context_.resumed) newest.clear();  // the frontend that wrote it is gone, too
+  if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(
         StreamId::kFrontend, "FRONTEND",
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
          channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        newest[camera], camera));
+        safe_[camera], camera));
   }
 }
 
@@ -541,6 +563,7 @@ bool CollectorNode::FrontendsHaveEnded() {
 }
 
 bool CollectorNode::EndIfDone() {
+  if (AllTaken()) NotePositions();
   if (GiveUpOnDisk()) return false;
   frontends_ended_ = frontends_ended_ || FrontendsHaveEnded();
   if (!frontends_ended_) return false;
@@ -555,9 +578,7 @@ bool CollectorNode::EndIfDone() {
 
 /// The sequence has ended, all poses are here, and the disk does not take them.
 bool CollectorNode::GiveUpOnDisk() {
-  const bool all_here =
-      std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AllTaken(); });
-  if (journal_->complete() || !all_here) {
+  if (journal_->complete() || !AllTaken()) {
     refused_since_ns_.reset();
     return false;
   }
@@ -666,6 +687,7 @@ void CollectorNode::SayProgress() {
 }
 
 void CollectorNode::PublishStatus() {
+  if (journal_ && !written_) NotePositions();
   if (journal_ && !written_) RetryDisk();
   if (journal_ && !written_ && context_.now_ns() >= next_sync_ns_) {
     next_sync_ns_ = context_.now_ns() + kSyncEveryNs;

@@ -65,9 +65,11 @@ class CollectorNode : public StreamNode {
   void OnResume();
   bool MapMayBeKept() const;
   void KeepCheckpoint();
-  void KeepOnDisk(const Bytes& record);
+  void KeepOnDisk(const Record& record);
   void RetryDisk();
   void AcceptWhatIsSafe();
+  void NotePositions();
+  bool AllTaken() const;
   void AcceptMap();
   bool EndedMapIsSafe();
   void RecallEndedMap();
@@ -90,6 +92,7 @@ class CollectorNode : public StreamNode {
   RunRecord run_;
   std::unique_ptr<TrajectoryBuilder> builder_;
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
+  std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
   std::map<std::string, std::set<int32_t>> process_ids_;
   std::map<std::string, ProcessHealth>

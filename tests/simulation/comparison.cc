@@ -61,11 +61,11 @@ std::string Difference(const Outcome& outcome, const Outcome& undisturbed) {
 }
 
 std::string Loss(const Outcome& outcome, const Outcome& undisturbed, double most_apart, int64_t frames_lost,
-                 const std::string& folder) {
+                 int64_t records_lost, const std::string& folder) {
   if (!outcome.failure.empty()) return outcome.failure;
   std::string loss;
   if (Number(outcome, "keyframes_missing") != 0) loss += " keyframes are missing,";
-  if (Number(outcome, "records_lost") != 0) loss += " records are lost,";
+  if (Number(outcome, "records_lost") > static_cast<double>(records_lost)) loss += " records are lost,";
   if (Number(outcome, "resumed") != 0) loss += " it began again from a checkpoint,";
   const Distance distance = Measure(outcome, undisturbed, folder);
   if (distance.rmse > most_apart) loss += " poses are off by " + std::to_string(distance.rmse) + ",";

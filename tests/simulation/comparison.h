@@ -25,8 +25,8 @@ std::string Difference(const Outcome& outcome, const Outcome& undisturbed);
 
 /// What a run has lost in which processes that make the map died or moved; empty: nothing. `most_apart`: how
 /// far poses may be from those of the undisturbed run. `frames_lost`: how many frames may not have been
-/// tracked.
+/// tracked. `records_lost`: how many records may have been lost with who wrote them.
 std::string Loss(const Outcome& outcome, const Outcome& undisturbed, double most_apart, int64_t frames_lost,
-                 const std::string& folder);
+                 int64_t records_lost, const std::string& folder);
 
 }  // namespace dmslam::simulation

@@ -27,6 +27,8 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kFramesLost = 3;  // while something moves
 constexpr int64_t kFramesLostByFrontend = 12;
+constexpr int64_t kRecordsLost =
+    10;  // that were on their way when their writer died, by each of their readers
 constexpr uint32_t kFirstMapFrame =
     15;                           // a frontend that dies before it loses all that it had for the first map
 constexpr double kMostApart = 2;  // of the spread of undisturbed runs
@@ -131,14 +133,17 @@ class SystemSimulation : public ::testing::Test {
   /// Why the promises are not kept; empty: they are.
   static std::string Broken(const Schedule& schedule, const Outcome& outcome) {
     if (!schedule.meets_writers) return Difference(outcome, common_->undisturbed);
-    int64_t frames_lost = 0;
+    int64_t frames_lost = 0, records_lost = 0;
     for (const Fault& fault : schedule.faults) {
       if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) continue;
       const bool frontend = fault.process == "frontend";
+      const bool dies = fault.kind == Fault::Kind::kKill && (frontend || fault.process == "loopcloser");
+      if (dies) records_lost += kRecordsLost;
       if (frontend && fault.at_frame < kFirstMapFrame) frames_lost += NumFrames();
       frames_lost += frontend ? kFramesLostByFrontend : kFramesLost;
     }
-    return Loss(outcome, common_->undisturbed, kMostApart * Spread(), frames_lost, common_->folder.string());
+    return Loss(outcome, common_->undisturbed, kMostApart * Spread(), frames_lost, records_lost,
+                common_->folder.string());
   }
 
   static void Tell(const Schedule& schedule, const Outcome& outcome) {
@@ -191,7 +196,7 @@ TEST_F(SystemSimulation, WhatADeadFrontendHadNotDeliveredIsCounted) {
 /// The mapper, and the collector half a second later, at the very end: whatever they had told whom until
 /// then.
 TEST_F(SystemSimulation, MapperAndCollectorMayDieTogetherAtTheEnd) {
-  for (const int64_t after_ms : {0, 5, 20, 60, 100, 150, 200, 250, 300, 350, 500, 700}) {
+  for (const int64_t after_ms : {0, 60, 150, 250, 350, 700}) {
     Schedule schedule = CalmSchedule();
     schedule.at_once = true;
     schedule.seed = static_cast<uint64_t>(after_ms);
@@ -200,7 +205,8 @@ TEST_F(SystemSimulation, MapperAndCollectorMayDieTogetherAtTheEnd) {
     const Outcome outcome = Run(schedule);
     if (common_->tells) Tell(schedule, outcome);
     EXPECT_EQ(
-        Loss(outcome, common_->undisturbed, kMostApart * Spread(), kFramesLost, common_->folder.string()), "")
+        Loss(outcome, common_->undisturbed, kMostApart * Spread(), kFramesLost, 0, common_->folder.string()),
+        "")
         << after_ms << " ms\n"
         << outcome.story;
   }
@@ -208,7 +214,7 @@ TEST_F(SystemSimulation, MapperAndCollectorMayDieTogetherAtTheEnd) {
 
 /// ... or the collector alone, when all others may have gone.
 TEST_F(SystemSimulation, TheCollectorMayDieWhenAllOthersHaveEnded) {
-  for (const int64_t after_ms : {0, 5, 20, 60, 100, 150, 200, 250, 300, 350, 400, 500}) {
+  for (const int64_t after_ms : {0, 60, 150, 250, 350, 500}) {
     Schedule schedule = CalmSchedule();
     schedule.at_once = true;
     schedule.seed = static_cast<uint64_t>(after_ms);
