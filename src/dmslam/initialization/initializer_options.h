@@ -42,8 +42,10 @@ struct InitializerOptions {
 
   int min_features = 100;         ///< a frame with fewer takes no part
   double frame_step_s = 0.045;    ///< frames nearer to the last one looked at are left out
-  int max_references = 3;         ///< reference frames that are kept side by side
-  double reference_step_s = 0.3;  ///< a new one is taken so long after the last
+  /// Reference frames that are kept side by side. Behind people a moment in which enough of the room is seen
+  /// is short, and a window that begins in it finds a map.
+  int max_references = 8;
+  double reference_step_s = 0.1;  ///< a new one is taken so long after the last
   int num_pairs = 3;              ///< pairs with the reference frame that must agree
   double min_pair_step_s = 0.1;   ///< the frames of two such pairs are apart by so much at least
   double sure_age_s = 0.4;        ///< a map of views that are nearer in time must be found by the next, too

@@ -44,7 +44,7 @@ struct TrackingOptions {
 /// When a frame becomes a keyframe.
 struct KeyframeOptions {
   double min_interval_s = 0.1;  ///< never closer, unless tracking is weak
-  double tracked_ratio = 0.9;   ///< of the reference keyframe's landmarks: fewer tracked asks for a keyframe
+  double tracked_ratio = 1.0;   ///< of the reference keyframe's landmarks: fewer tracked asks for a keyframe
   int min_inliers = 15;
 
   template <typename Visitor>
