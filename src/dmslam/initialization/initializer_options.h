@@ -40,8 +40,8 @@ struct InitializerOptions {
   ReconstructionOptions reconstruction;
   MatchingOptions matching;
 
-  int min_features = 100;         ///< a frame with fewer takes no part
-  double frame_step_s = 0.045;    ///< frames nearer to the last one looked at are left out
+  int min_features = 100;       ///< a frame with fewer takes no part
+  double frame_step_s = 0.045;  ///< frames nearer to the last one looked at are left out
   /// Reference frames that are kept side by side. Behind people a moment in which enough of the room is seen
   /// is short, and a window that begins in it finds a map.
   int max_references = 8;
