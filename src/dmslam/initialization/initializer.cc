@@ -489,12 +489,13 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
   return false;
 }
 
-/// Where motions were hard to tell apart before, where another one explains the views nearly as well, or the
-/// views are near each other in time: whether the map found last says the same of the camera's. What holds
-/// for one view by chance seldom holds for the next.
+/// Where motions were hard to tell apart before, or the views are near each other in time, or another motion
+/// explains them nearly as well and the direction is hardly known: whether the map found last says the same
+/// of the camera's. What holds for one view by chance seldom holds for the next.
 bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
-  const bool sure =
-      !window->doubtful && candidate.alone && candidate.last().since_reference_s >= options_.sure_age_s;
+  const bool clear =
+      candidate.alone || builder_.DirectionSigma(candidate) <= options_.clear_direction_sigma_rad;
+  const bool sure = !window->doubtful && clear && candidate.last().since_reference_s >= options_.sure_age_s;
   if (sure) return true;
   const auto before = window->found;
   window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};

@@ -68,6 +68,9 @@ struct InitializerOptions {
   double min_parallax_rad = 0.015;    ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad =
       0.1;  ///< standard deviation of the direction of translation, from the residuals: later views mend it
+  /// A map beside whose motion another one comes near (alone_runner_up_cost) must be found by the next view,
+  /// too, unless its direction is known to so much.
+  double clear_direction_sigma_rad = 0.05;
   double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
   int min_points = 80;                 ///< points that all views agree on
