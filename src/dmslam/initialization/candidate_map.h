@@ -34,6 +34,7 @@ struct CandidateMap {
   std::vector<uint8_t> use;             ///< points that stand
   std::vector<Placed> placed;           ///< the last view first
   double cost = 1;                      ///< mean truncated squared error over all views
+  bool alone = false;                   ///< no other motion explains the views nearly as well
 
   const ReferenceView& last() const { return *placed.front().view; }
   const Rigid3d& T_last_0() const { return placed.front().T_k_0; }

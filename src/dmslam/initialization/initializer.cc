@@ -452,8 +452,8 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
     return std::nullopt;
   }
-  const bool alone = runner_up >= options_.alone_runner_up_cost * best->cost;
-  if (best->cost > (alone ? options_.max_cost_alone : options_.max_cost)) {
+  best->alone = runner_up >= options_.alone_runner_up_cost * best->cost;
+  if (best->cost > (best->alone ? options_.max_cost_alone : options_.max_cost)) {
     *refused = {WaitReason::kInconsistent, "no motion explains all views well"};
     return std::nullopt;
   }
@@ -489,10 +489,13 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
   return false;
 }
 
-/// Where motions were hard to tell apart before, or the views are near each other in time: whether the map
-/// found last says the same of the camera's. What holds for one view by chance seldom holds for the next.
+/// Where motions were hard to tell apart before, or the views are near each other in time, or another motion
+/// explains them nearly as well and the direction is hardly known: whether the map found last says the same
+/// of the camera's. What holds for one view by chance seldom holds for the next.
 bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
-  const bool sure = !window->doubtful && candidate.last().since_reference_s >= options_.sure_age_s;
+  const bool clear =
+      candidate.alone || builder_.DirectionSigma(candidate) <= options_.clear_direction_sigma_rad;
+  const bool sure = !window->doubtful && clear && candidate.last().since_reference_s >= options_.sure_age_s;
   if (sure) return true;
   const auto before = window->found;
   window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};

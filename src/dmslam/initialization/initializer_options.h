@@ -40,10 +40,12 @@ struct InitializerOptions {
   ReconstructionOptions reconstruction;
   MatchingOptions matching;
 
-  int min_features = 100;         ///< a frame with fewer takes no part
-  double frame_step_s = 0.045;    ///< frames nearer to the last one looked at are left out
-  int max_references = 3;         ///< reference frames that are kept side by side
-  double reference_step_s = 0.3;  ///< a new one is taken so long after the last
+  int min_features = 100;       ///< a frame with fewer takes no part
+  double frame_step_s = 0.045;  ///< frames nearer to the last one looked at are left out
+  /// Reference frames that are kept side by side. Behind people a moment in which enough of the room is seen
+  /// is short, and a window that begins in it finds a map.
+  int max_references = 8;
+  double reference_step_s = 0.1;  ///< a new one is taken so long after the last
   int num_pairs = 3;              ///< pairs with the reference frame that must agree
   double min_pair_step_s = 0.1;   ///< the frames of two such pairs are apart by so much at least
   double sure_age_s = 0.4;        ///< a map of views that are nearer in time must be found by the next, too
@@ -66,6 +68,9 @@ struct InitializerOptions {
   double min_parallax_rad = 0.015;    ///< median over the points; below it the direction is chance
   double max_direction_sigma_rad =
       0.1;  ///< standard deviation of the direction of translation, from the residuals: later views mend it
+  /// A map beside whose motion another one comes near (alone_runner_up_cost) must be found by the next view,
+  /// too, unless its direction is known to so much.
+  double clear_direction_sigma_rad = 0.05;
   double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
   int min_points = 80;                 ///< points that all views agree on

@@ -228,6 +228,21 @@ TEST(Initializer, AMapOfViewsNearInTimeMustBeFoundTwice) {
   EXPECT_GT(twice->frame1.index, once->frame1.index);
 }
 
+TEST(Initializer, AMapThatAnotherMotionComesNearMustBeFoundTwice) {
+  SyntheticRoom room(600, 100);
+  room.SetSpeed(0.03);
+  InitializerOptions options;
+  options.sure_age_s = 0;
+  const auto alone = MapFrom(room, options, 0);
+  options.alone_runner_up_cost = 1e30;  // whatever comes near is near enough
+  const auto clear = MapFrom(room, options, 0);
+  options.clear_direction_sigma_rad = 0;
+  const auto contended = MapFrom(room, options, 0);
+  ASSERT_TRUE(alone.has_value() && clear.has_value() && contended.has_value());
+  EXPECT_EQ(clear->frame1.index, alone->frame1.index) << "the direction is well known";
+  EXPECT_GT(contended->frame1.index, alone->frame1.index);
+}
+
 TEST(Initializer, StartsAtAnySize) {
   for (const double scale : {0.5, 2.0}) {
     const SyntheticRoom room(600, 100, 7, Scaled(SyntheticCamera(), scale));

@@ -40,6 +40,13 @@ struct LoopcloserOptions {
   // that hangs in two places shows a quarter of it.
   int min_joining_proven = 50;
   double min_joining_proven_share = 0.7;
+  // Between two maps that are both too young to have anything proven: cells of the image in which a good part
+  // of the place is seen, and those of them at the image's rim. Of all cells that should show several of its
+  // landmarks, and of those at the rim, they must be this share. Somebody who stood in both maps is a figure
+  // in the image; what should be around him is not there.
+  int min_filled_cells = 24;
+  int min_filled_rim_cells = 10;
+  double min_filled_share = 0.5;
   // Maps are joined where keyframes around see the place as well, or where so many others, each for itself,
   // were found where the joined maps would have them, over so much time.
   int joining_sightings = 2;

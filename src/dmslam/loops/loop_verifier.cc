@@ -1,6 +1,7 @@
 #include "dmslam/loops/loop_verifier.h"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cmath>
 #include <cstdio>
@@ -33,6 +34,27 @@ size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
   const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
   return static_cast<size_t>(row * kCellColumns + column);
 }
+
+/// What should be seen in each cell of the image, and is.
+struct CellCounts {
+  std::array<int, kCellColumns * kCellRows> expected{}, found{};
+
+  void Tell(PlaceSupport* support) const {
+    constexpr int kSeveral = 3;
+    constexpr double kGoodPart = 0.2;
+    for (int cell = 0; cell < kCellColumns * kCellRows; ++cell) {
+      const auto i = static_cast<size_t>(cell);
+      if (expected[i] < kSeveral) continue;
+      const int column = cell % kCellColumns, row = cell / kCellColumns;
+      const int agrees = found[i] >= kGoodPart * expected[i] ? 1 : 0;
+      ++support->anywhere.told;
+      support->anywhere.agreeing += agrees;
+      if (column > 0 && column + 1 < kCellColumns && row > 0 && row + 1 < kCellRows) continue;
+      ++support->at_rim.told;
+      support->at_rim.agreeing += agrees;
+    }
+  }
+};
 
 /// A landmark of each keyframe that should be the same one.
 Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const Keyframe& b,
@@ -104,17 +126,19 @@ std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, con
 
 template <typename... Values>
 std::string Text(const char* format, Values... values) {
-  char text[160];
+  char text[240];
   std::snprintf(text, sizeof(text), format, values...);
   return text;
 }
 
 /// The numbers, as a sentence.
 std::string Describe(const VerifiedLoop& loop) {
-  std::string text =
-      Text("%d of %d landmarks found in %d cells, share %.2f; proven %d of %d in %d, share %.2f",
-           loop.support.found, loop.support.expected, loop.support.cells, loop.share, loop.proven.found,
-           loop.proven.expected, loop.proven.cells, loop.proven_share);
+  std::string text = Text(
+      "%d of %d landmarks found in %d cells (%d of %d, rim %d of %d), share %.2f; proven %d of %d in %d, "
+      "share %.2f",
+      loop.support.found, loop.support.expected, loop.support.cells, loop.support.anywhere.agreeing,
+      loop.support.anywhere.told, loop.support.at_rim.agreeing, loop.support.at_rim.told, loop.share,
+      loop.proven.found, loop.proven.expected, loop.proven.cells, loop.proven_share);
   if (loop.counter_share)
     text += Text("; seen from there %d of %d, share %.2f", loop.counter.found, loop.counter.expected,
                  *loop.counter_share);
@@ -259,11 +283,14 @@ PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const 
   PlaceSupport support;
   std::vector<uint8_t> taken(keyframe.features->size(), 0);
   std::bitset<kCellColumns * kCellRows> cells;
+  CellCounts counts;
   for (const LandmarkId id : landmarks) {
     const Landmark& landmark = *map.FindLandmark(id);
     const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world, kSurelySeen);
     if (!view) continue;
     ++support.expected;
+    const size_t cell = CellOf(map.camera(), view->uv_px);
+    ++counts.expected[cell];
     const FeatureHit hit =
         FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
                     std::max(0, view->octave - 1), view->octave + 1, landmark.descriptor, taken);
@@ -272,7 +299,9 @@ PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const 
     taken[feature] = 1;
     support.matches.push_back({static_cast<uint16_t>(feature), id});
     cells.set(CellOf(map.camera(), keyframe.features->uv_px[feature]));
+    ++counts.found[cell];
   }
+  counts.Tell(&support);
   std::sort(support.matches.begin(), support.matches.end(),
             [](const LandmarkMatch& a, const LandmarkMatch& b) { return a.feature < b.feature; });
   support.found = static_cast<int>(support.matches.size());
@@ -333,15 +362,27 @@ void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks
                 [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), options_.proven); });
 }
 
+/// Seen all over the image and around whoever may stand in it, and nothing that outlasts people says
+/// otherwise.
+bool LoopVerifier::FillsTheImage(const VerifiedLoop& loop) const {
+  const PlaceSupport& seen = loop.support;
+  const bool contradicted =
+      loop.proven.expected >= options_.min_told / 2 && loop.proven_share < options_.min_share;
+  return !contradicted && seen.anywhere.Hold(options_.min_filled_cells, options_.min_filled_share) &&
+         seen.at_rim.Hold(options_.min_filled_rim_cells, options_.min_filled_share);
+}
+
 /// Within one map only what is proven around the place says so. Between two either side may: one of them may
-/// be too young to have anything proven. At the same time somebody who stands there is as good as a wall.
+/// be too young to have anything proven. Where both are, the place must fill the image. At the same time
+/// somebody who stands there is as good as a wall.
 bool LoopVerifier::IsNoPerson(const VerifiedLoop& loop, double min_share) const {
   const auto says_so = [&](const PlaceSupport& proven, double share) {
     return proven.found >= options_.min_proven && proven.cells >= options_.min_proven_cells &&
            share >= min_share;
   };
   if (options_.min_proven == 0 || says_so(loop.proven, loop.proven_share)) return true;
-  return loop.joins && (loop.at_same_time || says_so(loop.counter, loop.counter_share.value_or(0.0)));
+  return loop.joins && (loop.at_same_time || says_so(loop.counter, loop.counter_share.value_or(0.0)) ||
+                        FillsTheImage(loop));
 }
 
 bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
@@ -358,6 +399,10 @@ bool LoopVerifier::HoldsBetweenMaps(const VerifiedLoop& loop) const {
                               loop.proven.cells >= options_.min_cells &&
                               loop.proven_share >= options_.min_joining_proven_share;
   return Holds(loop, options_.min_joining_share) || (much_is_proven && Holds(loop, options_.min_share));
+}
+
+bool LoopVerifier::HoldsAmongOthers(const VerifiedLoop& loop) const {
+  return HoldsBetweenMaps(loop) || (FillsTheImage(loop) && Holds(loop, options_.min_confirmed_share));
 }
 
 std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,

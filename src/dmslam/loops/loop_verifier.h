@@ -14,9 +14,15 @@ namespace dmslam {
 
 /// How well a camera at some pose sees a place.
 struct PlaceSupport {
-  int expected = 0;                    ///< landmarks of the place that it should see
-  int found = 0;                       ///< and does
-  int cells = 0;                       ///< cells of the image (8 x 6) in which it finds some
+  int expected = 0;  ///< landmarks of the place that it should see
+  int found = 0;     ///< and does
+  int cells = 0;     ///< cells of the image (8 x 6) in which it finds some
+  struct Cells {
+    int told = 0;      ///< cells in which it should see several
+    int agreeing = 0;  ///< of these, cells in which it does see a good part of them
+    bool Hold(int least, double min_share) const { return agreeing >= least && agreeing >= min_share * told; }
+  };
+  Cells anywhere, at_rim;              ///< of the whole image, and of its outermost cells alone
   std::vector<LandmarkMatch> matches;  ///< sorted by feature
   double Share() const { return expected == 0 ? 0.0 : static_cast<double>(found) / expected; }
   /// How much of what this should show it does, over the same share of what stands there for certain: 1 where
@@ -66,6 +72,8 @@ class LoopVerifier {
 
   /// Whether a place of another map is seen so well that the maps may be welded, once others confirm it.
   bool HoldsBetweenMaps(const VerifiedLoop& loop) const;
+  /// The same where others found the place, each for itself: less of it is enough.
+  bool HoldsAmongOthers(const VerifiedLoop& loop) const;
 
   /// Which of `landmarks` a camera at `T_cam_world` finds among the features of `keyframe`.
   PlaceSupport Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
@@ -89,6 +97,7 @@ class LoopVerifier {
                      VerifiedLoop* loop) const;
   void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
   bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
+  bool FillsTheImage(const VerifiedLoop& loop) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
 
   LoopcloserOptions options_;

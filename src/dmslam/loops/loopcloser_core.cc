@@ -167,8 +167,9 @@ std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyfram
 }
 
 bool LoopcloserCore::MayJoin(const VerifiedLoop& loop) const {
-  if (!loop.joins || !verifier_.HoldsBetweenMaps(loop)) return false;
-  return IsConfirmedAround(loop) || sightings_.BearOut(map_, loop, options_);
+  if (!loop.joins || !verifier_.HoldsAmongOthers(loop)) return false;
+  return (verifier_.HoldsBetweenMaps(loop) && IsConfirmedAround(loop)) ||
+         sightings_.BearOut(map_, loop, options_);
 }
 
 /// In turn, by their ids.

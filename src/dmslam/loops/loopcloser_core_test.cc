@@ -328,6 +328,45 @@ TEST(LoopcloserCoreTest, SomebodyWhoStoodInTwoMapsDoesNotWeldThem) {
   EXPECT_TRUE(Play(room, core).loops.empty());
 }
 
+/// As where the camera was soon lost in both: nothing outlasts people in either.
+LoopcloserOptions WithNothingProven() {
+  LoopcloserOptions options;
+  options.proven.standing_s = 1000;
+  return options;
+}
+
+TEST(LoopcloserCoreTest, TwoYoungMapsAreWeldedByAPlaceThatFillsTheImage) {
+  for (const int cells : {LoopcloserOptions().min_filled_cells, 49}) {
+    Room room({.points = 3 * kPoints, .second_map_at = kPerRound - 2});
+    LoopcloserOptions options = WithNothingProven();
+    options.min_filled_cells = cells;
+    LoopcloserCore core = MakeCore(options);
+    const Answers answers = Play(room, core);
+    ASSERT_EQ(answers.loops.empty(), cells == 49);
+    if (!answers.loops.empty()) ExpectWelds(room, answers.loops.front());
+  }
+}
+
+/// His surroundings are others.
+TEST(LoopcloserCoreTest, SomebodyWhoStoodInTwoYoungMapsDoesNotWeldThem) {
+  const WorldOptions world{.points = 3 * kPoints,
+                           .second_visit_elsewhere = true,
+                           .person_at = {20, 100},
+                           .person_half_width_rad = 0.3,
+                           .second_map_at = 97};
+  LoopcloserOptions trusting = WithNothingProven();
+  trusting.min_filled_cells = trusting.min_filled_rim_cells = 0;
+  trusting.min_filled_share = 0;
+  {
+    Room room(world);
+    LoopcloserCore core = MakeCore(trusting);
+    ASSERT_GE(Play(room, core).loops.size(), 1u) << "the scene is no trap";
+  }
+  Room room(world);
+  LoopcloserCore core = MakeCore(WithNothingProven());
+  EXPECT_TRUE(Play(room, core).loops.empty());
+}
+
 TEST(LoopcloserCoreTest, OnePictureThatHangsInTwoMapsDoesNotWeldThem) {
   Room room({.second_visit_elsewhere = true, .picture_rad = 0.25, .second_map_at = kPerRound / 4});
   LoopcloserCore core = MakeCore();

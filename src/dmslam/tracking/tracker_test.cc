@@ -30,7 +30,7 @@ double ErrorAt(const Rigid3d& T_cam_world, double x) {
 TEST(KeyframePolicy, AsksWhereTheMapShouldGrow) {
   const KeyframeOptions options;
   const int64_t long_ago = 2'000'000'000, just_now = 10'000'000;
-  EXPECT_FALSE(WantsKeyframe(options, {190, 200, long_ago})) << "the map suffices";
+  EXPECT_FALSE(WantsKeyframe(options, {200, 200, long_ago})) << "the map suffices";
   EXPECT_TRUE(WantsKeyframe(options, {170, 200, long_ago}));
   EXPECT_FALSE(WantsKeyframe(options, {170, 200, just_now})) << "not yet";
   EXPECT_TRUE(WantsKeyframe(options, {90, 200, just_now})) << "tracking becomes weak";

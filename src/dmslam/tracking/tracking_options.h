@@ -44,7 +44,9 @@ struct TrackingOptions {
 /// When a frame becomes a keyframe.
 struct KeyframeOptions {
   double min_interval_s = 0.1;  ///< never closer, unless tracking is weak
-  double tracked_ratio = 0.9;   ///< of the reference keyframe's landmarks: fewer tracked asks for a keyframe
+  /// Of the landmarks that the reference keyframe sees: fewer tracked asks for a keyframe. Keyframes that turn
+  /// out to say nothing new are removed again (mapping.redundant_share).
+  double tracked_ratio = 1.0;
   int min_inliers = 15;
 
   template <typename Visitor>
@@ -53,6 +55,8 @@ struct KeyframeOptions {
              "no two keyframes within this time, unless tracking is weak");
     v.Number("keyframe.tracked_ratio", tracked_ratio, 0, 1, "",
              "of the reference's landmarks; fewer tracked asks for a keyframe");
+    v.InBaseline("0.9");
+    v.InPaper("0.9");
   }
 };
 

@@ -56,6 +56,7 @@ inline Sim3d Drift(int k) {
 }
 
 struct WorldOptions {
+  int points = kPoints;                 ///< on the walls
   bool second_visit_elsewhere = false;  ///< after one round the camera sees another wall...
   double picture_rad = 0;               ///< a patch of the wall, so wide, hangs on the other side, too
   bool first_wall_moves = false;        ///< its landmarks are believed to move
@@ -64,7 +65,8 @@ struct WorldOptions {
   /// Keyframes before which somebody stands, near enough to hide most of the wall; he stands for
   /// kPersonStands keyframes each, and looks the same.
   std::vector<int> person_at = {};
-  int second_map_at = 1'000'000;  ///< from this keyframe on the camera is in a map of its own
+  double person_half_width_rad = 0.45;  ///< how much he hides, and half of his height
+  int second_map_at = 1'000'000;        ///< from this keyframe on the camera is in a map of its own
 };
 
 /// What the second map believes of the world: it lies turned, elsewhere, and is half as large.
@@ -78,7 +80,7 @@ class Room {
   explicit Room(const WorldOptions& options)
       : options_(options), map_(TestCamera(525, 319.5, 239.5), Pyramid()) {
     Random random(7);
-    for (int i = 0; i < kPoints; ++i) {
+    for (int i = 0; i < options.points; ++i) {
       const double angle = random.Uniform(0, 2 * std::numbers::pi);
       const double radius = kWallRadius + random.Uniform(-0.6, 0.6);
       points_.push_back({radius * std::cos(angle), radius * std::sin(angle), random.Uniform(-2.0, 2.0)});
@@ -147,7 +149,8 @@ class Room {
     std::vector<Eigen::Vector3d> body;
     std::vector<Descriptor> looks;
     for (int i = 0; i < kPersonPoints; ++i) {
-      body.push_back({random.Uniform(-0.45, 0.45), random.Uniform(-0.45, 0.45), random.Uniform(0.9, 1.1)});
+      const double half = options_.person_half_width_rad;
+      body.push_back({random.Uniform(-half, half), random.Uniform(-half, half), random.Uniform(0.9, 1.1)});
       looks.push_back(RandomDescriptor(random));
     }
     for (const int at : options_.person_at) {
@@ -170,7 +173,9 @@ class Room {
     if (at < 0) return false;
     const auto middle =
         map_.camera().Project(TruePose(k) * (TruePose(at).Inverse() * Eigen::Vector3d(0, 0, 1)));
-    return middle && std::abs(uv_px.x() - middle->x()) < 240 && std::abs(uv_px.y() - middle->y()) < 240;
+    const double half_px = 533 * options_.person_half_width_rad;
+    return middle && std::abs(uv_px.x() - middle->x()) < half_px &&
+           std::abs(uv_px.y() - middle->y()) < half_px;
   }
 
   void AddKeyframe(int k, KeyframeId id, FeatureSet features) {
