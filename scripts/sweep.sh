@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Moving people from none to 70 % of the image, 'dm' against 'baseline', and each switch off alone. See --help.
+# Moving people from none to 80 % of the image, 'dm' against 'baseline', and each switch off alone. See --help.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly root me=sweep
 # shellcheck source-path=SCRIPTDIR source=lib/resumable.sh
 source "$root/scripts/lib/resumable.sh"
-readonly SHARES=(0 10 20 30 40 50 60 70) KINDS=(walk stop-and-go) MAX_FAILURES_IN_A_ROW=5
+readonly SHARES=(0 10 20 30 40 50 60 70 80) KINDS=(walk stop-and-go) MAX_FAILURES_IN_A_ROW=5
 # The ablation's variants, and what each gives dmslam-inprocess.
 readonly VARIANTS=(dm no_exclusion no_belief no_seen_through arsac ransac baseline)
 declare -rA SWITCHES=([dm]="" [no_exclusion]="--set mapping.mutual_exclusion=off"
@@ -19,7 +19,7 @@ usage() {
   cat <<END
 Usage: sweep.sh [--out DIR] [--seeds 5] [options]
 
-Sweep: renders people who walk, and people who walk and stop, over 0, 10, ..., 70 % of the image, and runs 'dm' and then
+Sweep: renders people who walk, and people who walk and stop, over 0, 10, ..., 80 % of the image, and runs 'dm' and then
 'baseline' on each, every seed once. Ablation: runs kitchen_walk1 and kitchen_walk2 with each switch off alone, and counts
 how many landmarks of the final map are seen on walkers. Everything runs in one process, in lock-step. Writes
 DIR/dynamic-scenes.md and the sweep's picture. Stopped at any time, the same command continues.

@@ -39,7 +39,7 @@ void AddOptions(dmslam::CommandLine& app, Arguments& args) {
   app.AddOption("--fps", args.fps, "Frames per second").ShowDefault();
   app.AddOption("--seed", args.seed, "Seed of everything: scene, path, people, noise").ShowDefault();
   app.AddOption("--moving-share", args.moving_share,
-                "Mean share of the image covered by people and other things that move, 0..0.7");
+                "Mean share of the image covered by people and other things that move, 0..0.8");
   app.AddOption("--actors", args.actors, "How many people (default: as many as the moving share takes)");
   app.AddOption("--behaviour", args.behaviour, "walk | stop-and-go | sit").ShowDefault();
   app.AddFlag("--carry", args.sequence.world.props.carried_box, "The first person carries a box");

@@ -23,8 +23,8 @@ Camera Thumbnail(const Camera& camera, int divisor) {
 }
 
 void CheckOptions(const WorldOptions& options) {
-  if (!(options.moving_share >= 0 && options.moving_share <= 0.7)) {
-    throw InputError("--moving-share: must lie in 0..0.7");
+  if (!(options.moving_share >= 0 && options.moving_share <= 0.8)) {
+    throw InputError("--moving-share: must lie in 0..0.8");
   }
   if (options.actors < 0 || options.actors > 12) throw InputError("--actors: must lie in 0..12");
   if (!(options.duration_s > 0 && options.duration_s < 1e5))

@@ -22,7 +22,7 @@ struct WorldOptions {
   PropOptions props;  ///< What moves beside people. `props.door` needs `scene.doorway`.
   int actors = 0;     ///< How many people. With a moving share and 0 here, as many as it takes.
   double moving_share =
-      0;  ///< Mean share of the image that people and props cover, 0..0.7; 0 leaves ActorOptions' distances.
+      0;  ///< Mean share of the image that people and props cover, 0..0.8; 0 leaves ActorOptions' distances.
   double duration_s = 10;  ///< For so long the people's doings are simulated.
 };
 
