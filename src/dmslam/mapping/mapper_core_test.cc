@@ -328,7 +328,9 @@ TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
 /// A map of three keyframes that the mapper goes on from with the fourth.
 class FourthKeyframe : public KeyframeStep {
  protected:
-  static constexpr uint16_t kFew = 10;
+  static constexpr uint16_t kFirst = 60, kFew = 10;  // some points that all four see
+
+  static bool IsOneOfFew(uint16_t i) { return i >= kFirst && i < kFirst + kFew; }
 
   FourthKeyframe() { AddKeyframes({0, 1}); }
   void AddKeyframes(const std::vector<uint32_t>& frames) {
@@ -347,15 +349,14 @@ class FourthKeyframe : public KeyframeStep {
 
 TEST_F(FourthKeyframe, RemovesWhoStandsWhereTheWallWasSeen) {
   for (const uint16_t i : scene_.All()) Add(100U + i, i, {0, 1});
-  const uint16_t first = 60;
-  for (uint16_t i = first; i < first + kFew; ++i) {  // half as far as what he hides
+  for (const uint16_t i : WallScene::Range(kFirst, kFirst + kFew)) {  // half as far as what he hides
     const Rigid3d T_cam_world = WallScene::At(PlaceOf(2));
     scene_.Replace(i, T_cam_world.Inverse() * (0.5 * (T_cam_world * scene_.point(i))));
   }
   AddKeyframes({2});
   std::vector<LandmarkId> person;
   for (const uint16_t i : scene_.All()) {
-    if (i >= first && i < first + kFew) {
+    if (IsOneOfFew(i)) {
       person.push_back(Add(300U + i, i, {2}));
     } else {
       map_.SetObservation(map_.At(Id(2)), i, map_.At(LandmarkId::Make(1, 100U + i)));
@@ -369,15 +370,18 @@ TEST_F(FourthKeyframe, RemovesWhoStandsWhereTheWallWasSeen) {
 
 TEST_F(FourthKeyframe, JoinsLandmarksOfOnePoint) {
   AddKeyframes({2});
-  for (const uint16_t i : WallScene::Range(kFew, scene_.size())) Add(100U + i, i, {0, 1, 2});
-  for (const uint16_t i : WallScene::Range(0, kFew)) {
-    Add(100U + i, i, {0, 1});
-    Add(300U + i, i, {2});
+  for (const uint16_t i : scene_.All()) {
+    if (IsOneOfFew(i)) {
+      Add(100U + i, i, {0, 1});
+      Add(300U + i, i, {2});
+    } else {
+      Add(100U + i, i, {0, 1, 2});
+    }
   }
   Continue();
   ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
   EXPECT_GE(core_.counters().fusions, kFew);
-  for (const uint16_t i : WallScene::Range(0, kFew)) {
+  for (const uint16_t i : WallScene::Range(kFirst, kFirst + kFew)) {
     EXPECT_EQ(core_.map().At(Id(3)).landmarks[i], LandmarkId::Make(1, 100U + i)) << i;
     EXPECT_EQ(core_.map().FindLandmark(LandmarkId::Make(1, 300U + i)), nullptr) << i;
   }

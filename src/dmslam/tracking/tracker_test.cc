@@ -265,7 +265,7 @@ TEST_F(Tracking, AWeakPoseIsNotToldButLeadsTheSearchOn) {
     const TrackingResult result = Track(frame_at(frame, 12));
     EXPECT_FALSE(result.pose);
     EXPECT_STRNE(result.report.reason, "");
-    EXPECT_LT(ErrorAt(result.frame.T_cam_world, camera_at(frame)), 0.02) << frame;
+    EXPECT_LT(ErrorAt(result.frame.T_cam_world, camera_at(frame)), 0.05) << frame;
   }
   const TrackingResult again = Track(frame_at(18, kWall));
   ASSERT_TRUE(again.pose) << again.report.reason;
@@ -293,7 +293,7 @@ TEST_F(Tracking, WhoTurnedAwayTooFastIsFoundWhereItWas) {
   FeatureSet features = scene_.See(9, 0, turned).features->set;
   Random random(4);
   for (Descriptor& descriptor : features.descriptors) {
-    for (int flips = 0; flips < 70; ++flips)
+    for (int flips = 0; flips < 100; ++flips)
       descriptor.words[random.Below(4)] ^= uint64_t{1} << random.Below(64);
   }
   const MapEditor& map = scene_.map();
