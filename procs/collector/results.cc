@@ -262,7 +262,7 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
   }
   Json others = Json::array();
   for (const auto& [map_id, frames] : t.other_maps) others.push_back({{"map", map_id}, {"frames", frames}});
-  json["map"] = t.map_id;
+  json["map"] = t.map_id ? Json(*t.map_id) : Json();
   json["other_maps"] = others;
   return json;
 }
@@ -277,7 +277,7 @@ Json CameraJson(CameraId camera, const std::string& sequence, int64_t frames, in
   json["tracked_online_percent"] = Percent(t.online.size(), frames);
   json["tracked_percent"] = Percent(t.final.size(), frames);
   json["keyframes"] = t.keyframes.size();
-  json["map"] = t.map_id;
+  json["map"] = t.map_id ? Json(*t.map_id) : Json();
   Json others = Json::array();
   for (const auto& [map_id, count] : t.other_maps) others.push_back({{"map", map_id}, {"frames", count}});
   json["other_maps"] = others;

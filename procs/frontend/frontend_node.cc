@@ -69,8 +69,8 @@ bool FrontendNode::ReadyToWrite() {
   }
   core_->Resume();
   if (map.keyframes().empty()) return true;
-  if (const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id))
-    last_index_ = static_cast<int64_t>(newest->id.frame_index()) - 1;
+  const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id);
+  if (newest != nullptr && newest->id.frame_index() > 0) last_index_ = newest->id.frame_index() - 1;
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }
@@ -114,11 +114,10 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   if (!frame || IsForeignFrame(frame->session)) return;
   if (frame->frame_index >= kTheEnd)
     return CountMalformed(channels::kFrame, "its number is beyond what a session can hold; begin a new one");
-  const int64_t index = frame->frame_index;
   const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && frame->stamp_ns <= last_stamp_ns_;
-  if (index <= last_index_ || (goes_back && last_index_ >= 0)) {
+  if (last_index_ && (frame->frame_index <= *last_index_ || goes_back)) {
     // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
-    if (!frame_open_) PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
+    if (!frame_open_) PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
     return;
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return;
@@ -422,7 +421,7 @@ FeatureView FrontendNode::ViewOfFeatures() const {
 /// On the core.
 void FrontendNode::DrawPicture(const FrontendOutput& output) {
   const TrackedFrame& frame = core_->frame();
-  if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
+  if (extras_.picture_every <= 0 || *last_index_ % static_cast<uint32_t>(extras_.picture_every) != 0) return;
   for (auto event = output.events.rbegin(); event != output.events.rend(); ++event) {
     const auto* pose = std::get_if<FramePose>(&*event);
     if (pose) return WritePicture(extras_.picture_dir, image_, frame, *pose);
@@ -437,12 +436,12 @@ void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
     }
     if (const auto* pose = std::get_if<FramePose>(&event)) {
       last_pose_ = *pose;
-      if (first_map_.after_s < 0 && pose->HasPose()) {
+      if (!first_map_.after_s && pose->HasPose()) {
         first_map_.after_s = static_cast<double>(pose->stamp_ns - first_map_.since_ns) * 1e-9;
       }
     }
     if (std::holds_alternative<MapReset>(event)) {
-      first_map_.after_s = -1;
+      first_map_.after_s.reset();
       error_.Reset();
     }
   }
@@ -513,7 +512,7 @@ void FrontendNode::PublishView(const FrameTrace& trace) {
 
 void FrontendNode::FinishFrame() {
   frame_open_ = false;
-  PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
+  PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
 }
 
 // ---- Status ----
@@ -529,7 +528,7 @@ void FrontendNode::PublishStatus() {
   status.frames_skipped = counts_.skipped;
   status.fps =
       static_cast<double>(counts_.processed - std::exchange(counts_.processed_at_status, counts_.processed));
-  status.frame_index = static_cast<int32_t>(last_index_);
+  status.frame_index = last_index_ ? static_cast<int32_t>(*last_index_) : -1;
   status.latency_p50_ms = times_.latency.Quantile(0.5);
   status.latency_p95_ms = times_.latency.Quantile(0.95);
   status.latency_p99_ms = times_.latency.Quantile(0.99);
@@ -538,7 +537,7 @@ void FrontendNode::PublishStatus() {
   status.step_ms = times_.step.Quantile(0.5);
   status.step_p95_ms = times_.step.Quantile(0.95);
   status.track_ms = status.step_ms - status.decode_ms - status.extract_ms;
-  status.first_map_s = first_map_.after_s;
+  status.first_map_s = first_map_.after_s.value_or(-1);
   if (core_) FillPoseStatus(&status);
   PublishLoose(status);
 }

@@ -50,8 +50,8 @@ class FrontendNode : public StreamNode {
     int64_t processed_at_status = 0;  ///< when the last status was published
   };
   struct FirstMap {
-    int64_t since_ns = 0;  ///< stamp of the first frame
-    double after_s = -1;   ///< below zero: none yet
+    int64_t since_ns = 0;           ///< stamp of the first frame
+    std::optional<double> after_s;  ///< from then to the first pose; none: there is none yet
   };
   struct FrameTimes {
     LatencyWindow latency, decode, extract, step;
@@ -136,7 +136,7 @@ class FrontendNode : public StreamNode {
   bool hurries_ = false;  ///< catches up before it takes another image
   bool frame_open_ =
       false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
-  int64_t last_index_ = -1;
+  std::optional<uint32_t> last_index_;  ///< of the newest frame that was taken; none: none was
   int64_t last_stamp_ns_ = 0;
   GrayDecoder decoder_;
   GrayImage image_;

@@ -214,9 +214,9 @@ int Run(const Arguments& a) {
                        a.log, missing);
   }
   dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build();
-  const dmslam::MapId map_id =
-      trajectories.map_id != 0 ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);
-  if (trajectories.map_id == 0) {
+  const std::optional<dmslam::MapId> map_id =
+      trajectories.map_id ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);
+  if (!trajectories.map_id) {
     for (const auto& [id, keyframe] : rebuilt.map.keyframes()) {
       if (keyframe.map_id == map_id)
         trajectories.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});

@@ -9,6 +9,7 @@
 
 #include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -268,7 +269,8 @@ void FinalPoses::SmoothNextMap(const Map& map) {
   const auto end = std::find_if(begin, poses_.end(),
                                 [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
   SmoothingOptions options;
-  const MapId map_id = begin->pose.map_id.value_or(0);  // a final pose lies in a map
+  DMSLAM_CHECK(begin->pose.map_id.has_value(), "a final pose without a map");
+  const MapId map_id = *begin->pose.map_id;
   const auto known = noise_.find(map_id);
   if (known != noise_.end()) options.noise = known->second;
   const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, {begin, end}), options);
