@@ -83,6 +83,14 @@ class FrontendNode : public StreamNode {
     Term asked_of;  ///< the mapper
   };
 
+  /// When the next frame may come.
+  struct Pace {
+    bool lockstep = false;
+    bool takes_turns = false;  ///< with other cameras
+    Turn turn;
+    bool frame_open = false;  ///< processed, but its keyframe has not settled: frame_done is due later
+  };
+
   using Job = std::function<void()>;
   bool Run(Job job);
   bool HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns);
@@ -130,12 +138,8 @@ class FrontendNode : public StreamNode {
   std::optional<Waiting> waiting_;
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far
-  bool lockstep_ = false;
-  bool takes_turns_ = false;
-  Turn turn_;
-  bool hurries_ = false;  ///< catches up before it takes another image
-  bool frame_open_ =
-      false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
+  Pace pace_;
+  bool hurries_ = false;                ///< catches up before it takes another image
   std::optional<uint32_t> last_index_;  ///< of the newest frame that was taken; none: none was
   int64_t last_stamp_ns_ = 0;
   GrayDecoder decoder_;
