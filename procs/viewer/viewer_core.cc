@@ -28,13 +28,13 @@ std::array<float, 4> ToFloats(const Eigen::Quaterniond& q) {
           static_cast<float>(q.w())};
 }
 
-/// In steps, so that what nobody sees changes nothing.
-/// See ScenePoint: in steps, of which none hides on which side of the threshold it is.
+/// See ScenePoint. In steps, so that what nobody sees changes nothing; which side of the threshold it is on
+/// shows always.
 float StepOverThreshold(const Landmark& landmark) {
-  constexpr float kStep = 1.0F / 8, kMost = 8.0F;
+  constexpr float kStepOfBelief = 1.0F / 8, kMost = 8.0F;
   const float over = std::clamp(landmark.evidence.motion_belief - kBelievedToMove, -kMost, kMost);
-  const float step = std::round(over / kStep) * kStep;
-  return IsStatic(&landmark) ? std::min(step, 0.0F) : std::max(step, kStep);
+  const float step = std::round(over / kStepOfBelief) * kStepOfBelief;
+  return IsStatic(&landmark) ? std::min(step, 0.0F) : std::max(step, kStepOfBelief);
 }
 
 }  // namespace

@@ -146,7 +146,6 @@ TEST(SettingsTest, WhatIsWrongIsNamedWithFileLineAndCure) {
             "FILE:1: 'mapping' is a section and has no value; write its settings below it, or as "
             "'section.key' (docs/configuration.md lists all)");
   EXPECT_EQ(Refusal("'': 3\n"), "FILE:1: the name of a setting is missing; write 'key: value'");
-  EXPECT_EQ(Refusal("{=3}\n"), "");
   EXPECT_EQ(
       Refusal("seed: 1\n\ntracking:\n  min_inliers: 3\n"),
       "FILE:4: setting 'tracking.min_inliers': '3' is not allowed; write a whole number from 6 to 10000");
