@@ -9,7 +9,7 @@
 
 namespace dmslam {
 
-void WriteMapPly(const std::string& path, const Map& map, MapId map_id) {
+void WriteMapPly(const std::string& path, const Map& map, std::optional<MapId> map_id) {
   std::ostringstream file;
   std::vector<const Landmark*> landmarks;
   for (const LandmarkId id : map.LandmarkIdsSorted()) {

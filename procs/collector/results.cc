@@ -262,7 +262,7 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
   }
   Json others = Json::array();
   for (const auto& [map_id, frames] : t.other_maps) others.push_back({{"map", map_id}, {"frames", frames}});
-  json["map"] = t.map_id;
+  json["map"] = t.map_id ? Json(*t.map_id) : Json();
   json["other_maps"] = others;
   return json;
 }
@@ -277,7 +277,7 @@ Json CameraJson(CameraId camera, const std::string& sequence, int64_t frames, in
   json["tracked_online_percent"] = Percent(t.online.size(), frames);
   json["tracked_percent"] = Percent(t.final.size(), frames);
   json["keyframes"] = t.keyframes.size();
-  json["map"] = t.map_id;
+  json["map"] = t.map_id ? Json(*t.map_id) : Json();
   Json others = Json::array();
   for (const auto& [map_id, count] : t.other_maps) others.push_back({{"map", map_id}, {"frames", count}});
   json["other_maps"] = others;
@@ -321,11 +321,9 @@ Json TimingJson(const RunRecord& run) {
 
 Json MachineJson(const Machine& machine) { return {{"cpu", machine.processor}, {"cores", machine.cores}}; }
 
-Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
-                 const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
+/// What was played, and what of it reached the frontend.
+Json PlayedJson(const RunRecord& run) {
   Json json;
-  json["version"] = BuildVersion();
-  json["machine"] = MachineJson(ThisMachine());
   json["sequence"] = run.sequence;
   json["seed"] = run.seed;
   json["mode"] = run.mode;
@@ -340,7 +338,12 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   const bool counted = run.end_heard && run.restarts == 0;  // counts since the last status die with a process
   const int64_t lost = run.frames_published - run.frontend.frames_received;
   json["frames_lost"] = counted ? Json(std::max<int64_t>(0, lost)) : Json(nullptr);
-  json.update(TrackingJson(run, builder, t));
+  return json;
+}
+
+Json MapJson(const RunRecord& run, const TrajectoryBuilder& builder, const TrajectoryBuilder::Trajectories& t,
+             const Errors& errors) {
+  Json json;
   json["resets"] = run.resets;
   json["relocalisations"] = run.frontend.relocalisations;
   json["keyframes"] = t.keyframes.size();
@@ -350,16 +353,12 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["ate_rmse_final"] = errors.final ? Json(errors.final->rmse()) : Json(nullptr);
   json["ate_rmse_online"] = errors.online ? Json(errors.online->rmse()) : Json(nullptr);
   json["scale_final"] = errors.final ? Json(errors.final->scale()) : Json(nullptr);
-  json.update(TimingJson(run));
-  int64_t records_lost = 0, repaired = 0, foreign = 0;
-  for (const auto& [process, health] : run.health) {
-    records_lost += health.records_lost;
-    repaired += health.records_repaired;
-    foreign += health.dropped_foreign;
-  }
-  json["records_lost"] = records_lost;
-  json["records_repaired"] = repaired;
-  json["dropped_of_other_sessions"] = foreign;
+  return json;
+}
+
+/// What died, came back and was lost.
+Json FailuresJson(const RunRecord& run) {
+  Json json;
   json["restarts"] = run.restarts;
   json["resumed"] = run.resumes;
   json["disk_problems"] = run.disk_problems;
@@ -367,18 +366,44 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   json["keyframes_proposed"] = run.keyframes_proposed;
   json["keyframes_missing"] = run.keyframes_missing;
   json["keyframes_lost_in_crash"] = run.keyframes_lost_in_crash;
+  return json;
+}
+
+/// The streams between the processes, over all of them.
+Json StreamsJson(const RunRecord& run) {
+  ProcessHealth sum;
   int64_t dropped = 0;
   for (const auto& [process, health] : run.health) {
+    sum.records_lost += health.records_lost;
+    sum.records_repaired += health.records_repaired;
+    sum.dropped_foreign += health.dropped_foreign;
     dropped += health.dropped_malformed + health.dropped_checksum + health.dropped_foreign;
+    sum.written_bytes += health.written_bytes;
+    sum.resent_bytes += health.resent_bytes;
   }
+  Json json;
+  json["records_lost"] = sum.records_lost;
+  json["records_repaired"] = sum.records_repaired;
+  json["dropped_of_other_sessions"] = sum.dropped_foreign;
   json["messages_dropped"] = dropped;
   json["recovery_p50_ms"] = HealthJson(run, &ProcessHealth::recovery_p50_ms);
   json["recovery_p99_ms"] = HealthJson(run, &ProcessHealth::recovery_p99_ms);
-  int64_t payload = 0, resent = 0;
-  for (const auto& [process, health] : run.health)
-    payload += health.written_bytes, resent += health.resent_bytes;
-  json["payload_bytes"] = payload;
-  json["resent_bytes"] = resent;
+  json["payload_bytes"] = sum.written_bytes;
+  json["resent_bytes"] = sum.resent_bytes;
+  return json;
+}
+
+Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
+                 const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
+  Json json;
+  json["version"] = BuildVersion();
+  json["machine"] = MachineJson(ThisMachine());
+  json.update(PlayedJson(run));
+  json.update(TrackingJson(run, builder, t));
+  json.update(MapJson(run, builder, t, errors));
+  json.update(TimingJson(run));
+  json.update(FailuresJson(run));
+  json.update(StreamsJson(run));
   json["max_rss_mb"] = HealthJson(run, &ProcessHealth::rss_mb);
   json["rss_growth_mb_per_keyframe"] = MemoryGrowthJson(run);
   return json;

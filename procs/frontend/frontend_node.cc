@@ -32,15 +32,15 @@ FrontendNode::FrontendNode(NodeContext context, NodeOptions options, FrontendExt
 }
 
 void FrontendNode::Begin(const CameraInfo& info) {
-  lockstep_ = info.mode == PlaybackMode::kLockstep;
-  takes_turns_ = lockstep_ && options_.NumCameras() > 1;
+  pace_.lockstep = info.mode == PlaybackMode::kLockstep;
+  pace_.takes_turns = pace_.lockstep && options_.NumCameras() > 1;
   FrontendCore::Setup setup = FrontendSetup(options_.settings, info.camera, extras_.vocabulary);
   setup.session = session_;
   setup.camera_id = options_.camera_id;
   setup.in_saved_map = run_.saved_map;
   setup.localize_only = run_.localize_only;
-  if (!lockstep_) setup.run_search = InBackground;
-  setup.catch_up_in_portions = !lockstep_;
+  if (!pace_.lockstep) setup.run_search = InBackground;
+  setup.catch_up_in_portions = !pace_.lockstep;
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
@@ -69,8 +69,8 @@ bool FrontendNode::ReadyToWrite() {
   }
   core_->Resume();
   if (map.keyframes().empty()) return true;
-  if (const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id))
-    last_index_ = static_cast<int64_t>(newest->id.frame_index()) - 1;
+  const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id);
+  if (newest != nullptr && newest->id.frame_index() > 0) last_index_ = newest->id.frame_index() - 1;
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }
@@ -114,11 +114,10 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   if (!frame || IsForeignFrame(frame->session)) return;
   if (frame->frame_index >= kTheEnd)
     return CountMalformed(channels::kFrame, "its number is beyond what a session can hold; begin a new one");
-  const int64_t index = frame->frame_index;
   const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && frame->stamp_ns <= last_stamp_ns_;
-  if (index <= last_index_ || (goes_back && last_index_ >= 0)) {
+  if (last_index_ && (frame->frame_index <= *last_index_ || goes_back)) {
     // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
-    if (!frame_open_) PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
+    if (!pace_.frame_open) PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
     return;
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return;
@@ -159,7 +158,7 @@ size_t FrontendNode::NumReadyRecords(bool all) const {
   const auto is_ready = [&](const HeldRecord& held) {
     if (held.in_snapshot) return held.ends_snapshot;
     const MapEvent event = held.delta.event;
-    return all || !lockstep_ || event == MapEvent::kSettled || event == MapEvent::kTurn;
+    return all || !pace_.lockstep || event == MapEvent::kSettled || event == MapEvent::kTurn;
   };
   while (ready > 0 && !is_ready(held_[ready - 1])) --ready;
   return ready;
@@ -187,7 +186,7 @@ void FrontendNode::OnApplied(size_t count) {
     const HeldRecord& held = held_.front();
     if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer();
     const bool ours = held.delta.event == MapEvent::kTurn && held.delta.about->camera() == options_.camera_id;
-    if (ours && turn_.asked == held.delta.about->frame_index()) turn_.given = turn_.asked;
+    if (ours && pace_.turn.asked == held.delta.about->frame_index()) pace_.turn.given = pace_.turn.asked;
     applied_ = held.version;
     held_.pop_front();
   }
@@ -201,7 +200,7 @@ int FrontendNode::UnacceptedKeyframes() {
   return static_cast<int>(keyframe_seqs_.size());
 }
 
-bool FrontendNode::HoldsBack() const { return lockstep_ && core_->awaited().valid(); }
+bool FrontendNode::HoldsBack() const { return pace_.lockstep && core_->awaited().valid(); }
 
 /// Nothing can be done before a saved map has come.
 bool FrontendNode::AwaitsSavedMap() const { return run_.saved_map && core_->map().keyframes().empty(); }
@@ -209,10 +208,10 @@ bool FrontendNode::AwaitsSavedMap() const { return run_.saved_map && core_->map(
 /// Where several cameras go in lock-step, a frame waits until the mapper has all that comes before it. A
 /// mapper that was started again is asked again.
 bool FrontendNode::HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns) {
-  if (!takes_turns_ || turn_.given == frame_index) return true;
+  if (!pace_.takes_turns || pace_.turn.given == frame_index) return true;
   if (!map_reader_->term().valid()) return false;
-  if (turn_.asked == frame_index && turn_.asked_of == map_reader_->term()) return false;
-  turn_ = {frame_index, std::nullopt, map_reader_->term()};
+  if (pace_.turn.asked == frame_index && pace_.turn.asked_of == map_reader_->term()) return false;
+  pace_.turn = {frame_index, std::nullopt, map_reader_->term()};
   PublishRecord(TurnRequest{frame_index, stamp_ns, options_.camera_id});
   return false;
 }
@@ -241,7 +240,7 @@ bool FrontendNode::WorkOnce() {
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
-  if (frame_open_) FinishFrame();
+  if (pace_.frame_open) FinishFrame();
   if (waiting_ && !FallsBehind())
     return HasTurn(waiting_->frame.frame_index, waiting_->frame.stamp_ns) && TrackWaiting();
   if (core_->IsBehind()) return CatchUp();
@@ -253,7 +252,8 @@ int64_t FrontendNode::WorkDeadline() const {
   if (!core_ || !work_->Idle()) return INT64_MAX;
   if (core_->IsRefining()) return 0;
   if (end_.Is(Phase::kTelling)) return end_.next_portion_ns();
-  if (stopping_ || AwaitsSavedMap() || (takes_turns_ && turn_.asked != turn_.given)) return INT64_MAX;
+  if (stopping_ || AwaitsSavedMap() || (pace_.takes_turns && pace_.turn.asked != pace_.turn.given))
+    return INT64_MAX;
   const bool grows = end_.Is(Phase::kGrowingBack) && !core_->awaited().valid();
   return grows || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
 }
@@ -356,7 +356,7 @@ bool FrontendNode::TrackWaiting() {
   last_index_ = waiting->frame.frame_index;
   last_stamp_ns_ = waiting->frame.stamp_ns;
   if (first_map_.since_ns == 0) first_map_.since_ns = last_stamp_ns_;
-  frame_open_ = true;
+  pace_.frame_open = true;
   const bool withheld = UnacceptedKeyframes() >= kMaxUnacceptedKeyframes;
   return Run([this, waiting, withheld] { Track(*waiting, withheld); });
 }
@@ -422,7 +422,7 @@ FeatureView FrontendNode::ViewOfFeatures() const {
 /// On the core.
 void FrontendNode::DrawPicture(const FrontendOutput& output) {
   const TrackedFrame& frame = core_->frame();
-  if (extras_.picture_every <= 0 || last_index_ % extras_.picture_every != 0) return;
+  if (extras_.picture_every <= 0 || *last_index_ % static_cast<uint32_t>(extras_.picture_every) != 0) return;
   for (auto event = output.events.rbegin(); event != output.events.rend(); ++event) {
     const auto* pose = std::get_if<FramePose>(&*event);
     if (pose) return WritePicture(extras_.picture_dir, image_, frame, *pose);
@@ -437,12 +437,12 @@ void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
     }
     if (const auto* pose = std::get_if<FramePose>(&event)) {
       last_pose_ = *pose;
-      if (first_map_.after_s < 0 && pose->HasPose()) {
+      if (!first_map_.after_s && pose->HasPose()) {
         first_map_.after_s = static_cast<double>(pose->stamp_ns - first_map_.since_ns) * 1e-9;
       }
     }
     if (std::holds_alternative<MapReset>(event)) {
-      first_map_.after_s = -1;
+      first_map_.after_s.reset();
       error_.Reset();
     }
   }
@@ -512,8 +512,8 @@ void FrontendNode::PublishView(const FrameTrace& trace) {
 }
 
 void FrontendNode::FinishFrame() {
-  frame_open_ = false;
-  PublishLoose(FrameDone{session_, static_cast<uint32_t>(last_index_), last_stamp_ns_});
+  pace_.frame_open = false;
+  PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
 }
 
 // ---- Status ----
@@ -529,7 +529,7 @@ void FrontendNode::PublishStatus() {
   status.frames_skipped = counts_.skipped;
   status.fps =
       static_cast<double>(counts_.processed - std::exchange(counts_.processed_at_status, counts_.processed));
-  status.frame_index = static_cast<int32_t>(last_index_);
+  status.frame_index = last_index_ ? static_cast<int32_t>(*last_index_) : -1;
   status.latency_p50_ms = times_.latency.Quantile(0.5);
   status.latency_p95_ms = times_.latency.Quantile(0.95);
   status.latency_p99_ms = times_.latency.Quantile(0.99);
@@ -538,7 +538,7 @@ void FrontendNode::PublishStatus() {
   status.step_ms = times_.step.Quantile(0.5);
   status.step_p95_ms = times_.step.Quantile(0.95);
   status.track_ms = status.step_ms - status.decode_ms - status.extract_ms;
-  status.first_map_s = first_map_.after_s;
+  status.first_map_s = first_map_.after_s.value_or(-1);
   if (core_) FillPoseStatus(&status);
   PublishLoose(status);
 }

@@ -50,8 +50,8 @@ class FrontendNode : public StreamNode {
     int64_t processed_at_status = 0;  ///< when the last status was published
   };
   struct FirstMap {
-    int64_t since_ns = 0;  ///< stamp of the first frame
-    double after_s = -1;   ///< below zero: none yet
+    int64_t since_ns = 0;           ///< stamp of the first frame
+    std::optional<double> after_s;  ///< from then to the first pose; none: there is none yet
   };
   struct FrameTimes {
     LatencyWindow latency, decode, extract, step;
@@ -81,6 +81,14 @@ class FrontendNode : public StreamNode {
   struct Turn {
     std::optional<uint32_t> asked, given;
     Term asked_of;  ///< the mapper
+  };
+
+  /// When the next frame may come.
+  struct Pace {
+    bool lockstep = false;
+    bool takes_turns = false;  ///< with other cameras
+    Turn turn;
+    bool frame_open = false;  ///< processed, but its keyframe has not settled: frame_done is due later
   };
 
   using Job = std::function<void()>;
@@ -130,13 +138,9 @@ class FrontendNode : public StreamNode {
   std::optional<Waiting> waiting_;
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far
-  bool lockstep_ = false;
-  bool takes_turns_ = false;
-  Turn turn_;
-  bool hurries_ = false;  ///< catches up before it takes another image
-  bool frame_open_ =
-      false;  ///< processed, but its keyframe has not settled: frame_done is due later (lock-step)
-  int64_t last_index_ = -1;
+  Pace pace_;
+  bool hurries_ = false;                ///< catches up before it takes another image
+  std::optional<uint32_t> last_index_;  ///< of the newest frame that was taken; none: none was
   int64_t last_stamp_ns_ = 0;
   GrayDecoder decoder_;
   GrayImage image_;

@@ -261,25 +261,26 @@ void MapperNode::NoteArrivals() {
 void MapperNode::TakeLoopAnswers() {
   while (std::optional<Record> record = loop_reader_->Take()) {
     auto answer = Read<LoopAnswer>(*record->bytes);
-    answer_broken_ = answer_broken_ || !answer;
+    loop_answers_.any_broken = loop_answers_.any_broken || !answer;
     if (!answer) continue;
     const std::optional<uint64_t> correction_id = answer->correction_id;
-    answer = answer_groups_.Add(std::move(*answer), record->term());
-    if (!answer_groups_.abandoned().empty()) CountMalformed(record->channel, answer_groups_.abandoned());
-    if (!answer_groups_.fault().empty()) {
-      CountMalformed(record->channel, answer_groups_.fault());
-      answer_broken_ = true;
-      if (correction_id) broken_corrections_.push_back(*correction_id);
+    answer = loop_answers_.groups.Add(std::move(*answer), record->term());
+    if (!loop_answers_.groups.abandoned().empty())
+      CountMalformed(record->channel, loop_answers_.groups.abandoned());
+    if (!loop_answers_.groups.fault().empty()) {
+      CountMalformed(record->channel, loop_answers_.groups.fault());
+      loop_answers_.any_broken = true;
+      if (correction_id) loop_answers_.broken.push_back(*correction_id);
     }
-    if (answer) answers_.push_back({std::move(*answer), record->version()});
+    if (answer) loop_answers_.whole.push_back({std::move(*answer), record->version()});
   }
   RefuseBrokenCorrections();
 }
 
 /// Whoever proposed a correction that did not come whole hears so, and may propose it again.
 void MapperNode::RefuseBrokenCorrections() {
-  if (broken_corrections_.empty()) return;
-  Run([this, ids = std::exchange(broken_corrections_, {})] {
+  if (loop_answers_.broken.empty()) return;
+  Run([this, ids = std::exchange(loop_answers_.broken, {})] {
     for (const uint64_t id : ids) core_->RefuseCorrection(id, "its records did not come whole");
   });
 }
@@ -299,8 +300,8 @@ bool MapperNode::PublishSavedMap() {
 }
 
 void MapperNode::ApplyFirstAnswer() {
-  const PendingAnswer pending = std::move(answers_.front());
-  answers_.pop_front();
+  const PendingAnswer pending = std::move(loop_answers_.whole.front());
+  loop_answers_.whole.pop_front();
   const auto apply = [this, pending] {
     MapProgress progress = core_->map().progress();
     progress.loopcloser = {pending.version.epoch, pending.version.seq};
@@ -351,7 +352,7 @@ bool MapperNode::WorkOnce() {
     SettleAwaited();
     return !awaited_;
   }
-  if (!lockstep_ && !answers_.empty()) {
+  if (!lockstep_ && !loop_answers_.whole.empty()) {
     ApplyFirstAnswer();
     return work_->Idle();
   }
@@ -459,9 +460,9 @@ void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend)
 /// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
 /// due.
 void MapperNode::SettleAwaited() {
-  bool ask_again = std::exchange(answer_broken_, false);
-  while (!answers_.empty() && awaited_) {
-    const KeyframeId answered = answers_.front().answer.keyframe;
+  bool ask_again = std::exchange(loop_answers_.any_broken, false);
+  while (!loop_answers_.whole.empty() && awaited_) {
+    const KeyframeId answered = loop_answers_.whole.front().answer.keyframe;
     ApplyFirstAnswer();
     if (answered != awaited_->id) {
       ask_again = true;  // it has just come, and answers what is newest
@@ -543,7 +544,7 @@ bool MapperNode::EndIfDone() {
   const bool all_ended = AllFrontends([](const Frontend& frontend) { return frontend.reader->AtEnd(); });
   if (ending_ == Ending::kNo && all_ended) ending_ = Ending::kFrontendEnded;
   if (ending_ == Ending::kNo) return false;
-  if (!answers_.empty() && ending_ == Ending::kFrontendEnded) {
+  if (!loop_answers_.whole.empty() && ending_ == Ending::kFrontendEnded) {
     ApplyFirstAnswer();
     return work_->Idle();
   }

@@ -66,6 +66,13 @@ class MapperNode : public StreamNode {
     LoopAnswer answer;
     Version version;
   };
+  /// What the loop closer has said.
+  struct LoopAnswers {
+    std::deque<PendingAnswer> whole;  ///< to be applied
+    wire::RecordGroups<LoopAnswer> groups;
+    bool any_broken = false;       ///< one was lost: who awaits it asks again
+    std::vector<uint64_t> broken;  ///< corrections whose records did not come whole: to be refused
+  };
   /// The map to begin with.
   struct SavedMap {
     std::optional<RebuiltMap> loaded;  ///< not yet taken over
@@ -154,10 +161,7 @@ class MapperNode : public StreamNode {
   std::deque<Arrived> taken_;          ///< the same, to be handled next
   std::deque<Pending> pending_;        ///< records of the frontend: handled, not yet safe
   std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
-  std::deque<PendingAnswer> answers_;
-  wire::RecordGroups<LoopAnswer> answer_groups_;
-  bool answer_broken_ = false;                ///< one was lost: who awaits it asks again
-  std::vector<uint64_t> broken_corrections_;  ///< whose records did not come whole: to be refused
+  LoopAnswers loop_answers_;
   std::optional<Awaited> awaited_;
   std::optional<KeyframeId> last_settled_;
   Timing timing_;

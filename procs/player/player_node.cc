@@ -78,7 +78,7 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
       source_(std::move(source)),
       endpoint_(context_.bus, context_.now_ns),
       office_(context_, {options_.session, options_.camera_id}, options_.take_over, &endpoint_) {
-  order_ = OrderOfPlay(options_, source_->size(), &jumped_);
+  order_ = OrderOfPlay(options_, source_->size(), &counts_.jumped);
   if (order_.empty()) {
     throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
                      " leaves no frame of " + std::to_string(source_->size()));
@@ -125,7 +125,7 @@ void PlayerNode::OnSequenceDone(const SequenceDone& done) {
 
 void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session) return;
-  if ((published_ > 0 || !playing_) && done.frame_index >= frame_.frame_index + (playing_ ? 1 : 0)) {
+  if ((counts_.published > 0 || !playing_) && done.frame_index >= frame_.frame_index + (playing_ ? 1 : 0)) {
     SkipBehind(done.frame_index);
   } else if (awaiting_done_ && done.frame_index == frame_.frame_index) {
     awaiting_done_ = false;
@@ -141,7 +141,7 @@ void PlayerNode::SkipBehind(uint32_t frame_index) {
   if (next - order_.begin() <= static_cast<std::ptrdiff_t>(position_)) return;
   if (playing_) LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
   position_ = static_cast<size_t>(next - order_.begin());
-  published_ = static_cast<int64_t>(position_);
+  counts_.published = static_cast<int64_t>(position_);
   awaiting_done_ = false;
   if (position_ < order_.size()) start_ns_ += (playing_ ? context_.now_ns() : 0) - DueNs(position_);
 }
@@ -188,7 +188,7 @@ bool PlayerNode::MakeFrame(size_t index) {
   frame_.capture_us = context_.wall_us();
   try {
     if (IsBlack(index)) {
-      ++black_;
+      ++counts_.black;
       frame_.data = EncodePng(GrayImage(options_.camera.width_px, options_.camera.height_px));
       frame_.encoding = FrameEncoding::kPng;
     } else {
@@ -197,11 +197,11 @@ bool PlayerNode::MakeFrame(size_t index) {
       EncodeFrame(image, source_->Name(index), options_.encoding, source_->AsPublished(), &frame_);
     }
   } catch (const InputError& error) {
-    if (unreadable_++ == 0) {
+    if (counts_.unreadable++ == 0) {
       first_unreadable_ = error.what();
       LogWarning("{} (left out; further ones are only counted)", error.what());
     }
-    if (unreadable_ == order_.size()) problem_ = first_unreadable_ + "; no frame could be read";
+    if (counts_.unreadable == order_.size()) problem_ = first_unreadable_ + "; no frame could be read";
     return false;
   }
   return true;
@@ -219,7 +219,7 @@ void PlayerNode::PublishFrame() {
   frame_bytes_ = std::make_shared<const Bytes>(wire::Encode(frame_));
   context_.bus->Publish(
       {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
-  ++published_;
+  ++counts_.published;
   PublishGroundTruth(index);
   awaiting_done_ = options_.mode == PlaybackMode::kLockstep;
   next_repeat_ns_ = context_.now_ns() + kRepeatEveryNs;
@@ -240,11 +240,11 @@ void PlayerNode::PublishEnd() {
   EndOfSequence end;
   end.utime = context_.wall_us();
   end.session = options_.session;
-  end.frames_published = published_;
+  end.frames_published = counts_.published;
   end.frames_listed = static_cast<int64_t>(source_->size() + source_->missing());
-  end.frames_missing = static_cast<int64_t>(source_->missing() + unreadable_);
-  end.frames_blacked = static_cast<int64_t>(black_);
-  end.frames_jumped = static_cast<int64_t>(jumped_);
+  end.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
+  end.frames_blacked = static_cast<int64_t>(counts_.black);
+  end.frames_jumped = static_cast<int64_t>(counts_.jumped);
   const size_t last = order_[std::max<size_t>(position_, 1) - 1];
   end.last_frame_index = static_cast<int32_t>(source_->FrameIndex(last));
   end.last_stamp_ns = source_->StampNs(last);
@@ -259,11 +259,11 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.head.health.dropped_foreign = context_.refused();
   if (awaiting_done_) status.head.health.waiting_for = "frontend";
   status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
-  status.frames_published = published_;
+  status.frames_published = counts_.published;
   status.frames_total = static_cast<int64_t>(order_.size());
-  status.frames_missing = static_cast<int64_t>(source_->missing() + unreadable_);
-  status.repeats = repeats_;
-  status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  status.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
+  status.repeats = counts_.repeats;
+  status.frame_index = counts_.published > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
   status.late_ms = late_ms_;
   PublishLoose(context_.bus, status, false, options_.camera_id);
 }
@@ -282,7 +282,7 @@ void PlayerNode::Advance() {
   if (FrameIsDue()) PublishFrame();
   if (awaiting_done_ && now >= next_repeat_ns_) {
     next_repeat_ns_ = now + kRepeatEveryNs;
-    ++repeats_;
+    ++counts_.repeats;
     context_.bus->Publish(
         {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
   }

@@ -62,10 +62,16 @@ class PlayerNode : public Node {
   std::optional<int> exit_code() const override { return exit_code_; }
   std::string problem() const override { return problem_; }
 
-  int64_t published() const { return published_; }
+  int64_t published() const { return counts_.published; }
   size_t total() const { return order_.size(); }
 
  private:
+  /// Of frames.
+  struct Counts {
+    int64_t published = 0, repeats = 0;
+    size_t jumped = 0, black = 0, unreadable = 0;
+  };
+
   bool MayPlay();
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnFrameDone(const FrameDone& done);
@@ -88,7 +94,7 @@ class PlayerNode : public Node {
   PlayerOffice office_;
   std::vector<StampedPose> ground_truth_;
   std::vector<size_t> order_;  ///< indices into the source, in order of play
-  size_t jumped_ = 0, black_ = 0, unreadable_ = 0;
+  Counts counts_;
   size_t position_ = 0;  ///< next of `order_`
   Frame frame_;          ///< the newest one published
   SharedBytes frame_bytes_;
@@ -97,7 +103,6 @@ class PlayerNode : public Node {
   bool playing_ = false;  ///< the office is held: nobody else plays this session
   int64_t start_ns_ = 0;  ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
-  int64_t published_ = 0, repeats_ = 0;
   double late_ms_ = 0;
   std::optional<int> exit_code_;
   std::string problem_, first_unreadable_;

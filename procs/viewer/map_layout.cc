@@ -52,11 +52,11 @@ uint32_t MapLayout::ColourFor(MapId map_id) {
   return last_colour_[map_id] = colour;
 }
 
-std::set<MapId> MapLayout::Arrange(const Map& map, MapId first) {
+std::set<MapId> MapLayout::Arrange(const Map& map, std::optional<MapId> first) {
   const std::map<MapId, Extent> extents = Extents(map);
   std::set<MapId> changed;
   std::erase_if(places_, [&](const auto& item) { return !extents.contains(item.first); });
-  const auto shown = extents.find(first);
+  const auto shown = first ? extents.find(*first) : extents.end();
   double next = shown == extents.end() ? 0 : shown->second.high;
   for (const auto& [map_id, extent] : extents) {
     const bool is_new = !places_.contains(map_id);

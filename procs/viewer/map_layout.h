@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "dmslam/map/map.h"
@@ -20,9 +21,9 @@ class MapLayout {
     size_t keyframes = 0;
   };
 
-  /// Brings it up to date with `map`; `first` lies as it is. Returns the maps whose place or colour has
-  /// changed.
-  std::set<MapId> Arrange(const Map& map, MapId first);
+  /// Brings it up to date with `map`; `first`, if any, lies as it is. Returns the maps whose place or colour
+  /// has changed.
+  std::set<MapId> Arrange(const Map& map, std::optional<MapId> first);
 
   /// Null: there is no such map.
   const Place* Find(MapId map_id) const;

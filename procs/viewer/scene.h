@@ -20,11 +20,12 @@ struct SceneFrame {
 
 /// A landmark as it is drawn.
 struct ScenePoint {
-  Float3 position{};         ///< [map units]
-  float belief = 0;          ///< log odds that it moves, in steps of 1/8
+  Float3 position{};  ///< [map units]
+  float belief = 0;   ///< log odds of motion over those at which it is believed to move, in steps of 1/8
   uint32_t first_frame = 0;  ///< index of the newest frame when it was made
   uint32_t colour = 0;       ///< number of its map's
   bool operator==(const ScenePoint&) const = default;
+  bool moves() const { return belief > 0; }
 };
 
 /// A keyframe as it is drawn.
@@ -85,7 +86,8 @@ class Scene {
   /// What changed after version `since` of `generation`, or everything where that is of another generation
   /// (flag 1), in little-endian words of 32 bits:
   ///   "DMSV", layout 2, generation, flags, version, points, keyframes, links, path, truth  (ten words), then
-  ///   points     slot[n], id low[n], id high[n], x y z [3n] float, belief[n] float (NaN: removed),
+  ///   points     slot[n], id low[n], id high[n], x y z [3n] float, belief[n] float (above zero: believed to
+  ///              move; NaN: removed),
   ///              first frame[n], colour[n]
   ///   keyframes  slot[m], frame[m] (all ones: removed), x y z [3m], quaternion x y z w [4m] world from
   ///              camera, camera[m], colour[m], end of its links[m], then of all links: slot[l], kind[l]

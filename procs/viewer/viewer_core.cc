@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/evaluation/alignment.h"
 
 namespace dmslam {
@@ -27,8 +28,14 @@ std::array<float, 4> ToFloats(const Eigen::Quaterniond& q) {
           static_cast<float>(q.w())};
 }
 
-/// In steps, so that what nobody sees changes nothing.
-float Step(float belief) { return std::round(std::clamp(belief, -8.0F, 8.0F) * 8.0F) / 8.0F; }
+/// See ScenePoint. In steps, so that what nobody sees changes nothing; which side of the threshold it is on
+/// shows always.
+float StepOverThreshold(const Landmark& landmark) {
+  constexpr float kStepOfBelief = 1.0F / 8, kMost = 8.0F;
+  const float over = std::clamp(landmark.evidence.motion_belief - kBelievedToMove, -kMost, kMost);
+  const float step = std::round(over / kStepOfBelief) * kStepOfBelief;
+  return IsStatic(&landmark) ? std::min(step, 0.0F) : std::max(step, kStepOfBelief);
+}
 
 }  // namespace
 
@@ -104,7 +111,8 @@ void ViewerCore::OnFramePose(const FramePose& pose) {
   frames_[FrameOf(pose)] = pose;
   frames_of_[map_.ResolveKeyframe(pose.reference).value_or(pose.reference)].push_back(FrameOf(pose));
   dirty_frames_.insert(FrameOf(pose));
-  if (pose.state != TrackingState::kLocalizedLater && pose.map_id != shown_map_) ChooseMap();
+  const bool is_shown = shown_map_ && pose.map_id == shown_map_;
+  if (pose.state != TrackingState::kLocalizedLater && !is_shown) ChooseMap();
 }
 
 void ViewerCore::ForgetMap() {
@@ -135,14 +143,14 @@ void ViewerCore::MarkMap(MapId map_id) {
 }
 
 /// What it was told from may have become part of another map.
-MapId ViewerCore::MapOf(const FramePose& pose) const {
+std::optional<MapId> ViewerCore::MapOf(const FramePose& pose) const {
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
-  return reference ? reference->map_id : pose.map_id.value_or(0);
+  return reference ? std::optional(reference->map_id) : pose.map_id;
 }
 
 /// By camera: the map of its newest frame that has a pose.
-std::vector<MapId> ViewerCore::WhereCamerasAre() const {
-  std::vector<MapId> maps;
+std::vector<std::optional<MapId>> ViewerCore::WhereCamerasAre() const {
+  std::vector<std::optional<MapId>> maps;
   for (auto it = frames_.begin(); it != frames_.end();) {
     it = frames_.lower_bound({it->first.camera + 1, 0});
     maps.push_back(MapOf(std::prev(it)->second));
@@ -155,18 +163,18 @@ std::vector<MapId> ViewerCore::WhereCamerasAre() const {
 void ViewerCore::ChooseMap() {
   std::map<MapId, size_t> keyframes_in;
   for (const auto& [id, keyframe] : map_.keyframes()) ++keyframes_in[keyframe.map_id];
-  MapId chosen = 0;
-  for (const MapId map_id : WhereCamerasAre()) {
-    if (!keyframes_in.contains(map_id)) continue;
+  std::optional<MapId> chosen;
+  for (const std::optional<MapId> map_id : WhereCamerasAre()) {
+    if (!map_id || !keyframes_in.contains(*map_id)) continue;
     if (map_id == shown_map_) return;
-    if (chosen == 0) chosen = map_id;
+    if (!chosen) chosen = map_id;
   }
-  if (chosen == 0) {
+  if (!chosen) {
     for (const auto& [map_id, count] : keyframes_in) {
-      if (chosen == 0 || count > keyframes_in.at(chosen)) chosen = map_id;
+      if (!chosen || count > keyframes_in.at(*chosen)) chosen = map_id;
     }
   }
-  if (chosen == shown_map_ || chosen == 0) return;
+  if (!chosen || chosen == shown_map_) return;
   shown_map_ = chosen;
   MarkFrames();
 }
@@ -208,8 +216,7 @@ void ViewerCore::Draw(Scene* scene) {
   DrawTruth(scene);
   if (!dirty_points_.empty()) {
     num_moving_ = 0;
-    for (const auto& slot : scene->points().slots())
-      num_moving_ += slot.alive && slot.value.belief > 0 ? 1 : 0;
+    for (const auto& slot : scene->points().slots()) num_moving_ += slot.alive && slot.value.moves() ? 1 : 0;
   }
   dirty_points_.clear();
   dirty_keyframes_.clear();
@@ -224,7 +231,7 @@ void ViewerCore::DrawPoint(LandmarkId id, Scene* scene) {
     scene->RemovePoint(id);
     return;
   }
-  scene->SetPoint(id, {ToFloats(landmark->p_world + place->offset), Step(landmark->evidence.motion_belief),
+  scene->SetPoint(id, {ToFloats(landmark->p_world + place->offset), StepOverThreshold(*landmark),
                        landmark->first_keyframe.frame_index(), place->colour});
 }
 

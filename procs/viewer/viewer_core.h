@@ -60,7 +60,8 @@ class ViewerCore {
   Eigen::Vector3d Up(const std::optional<TruthAlignment>& alignment) const;
 
   const Map& map() const { return map_; }
-  MapId shown_map() const { return shown_map_; }
+  /// None: there is no map.
+  std::optional<MapId> shown_map() const { return shown_map_; }
   /// Where the maps are drawn, as of the last Draw.
   const MapLayout& layout() const { return layout_; }
   /// A pose in a map, where that is drawn; none where it cannot be told where that is.
@@ -72,8 +73,8 @@ class ViewerCore {
 
  private:
   void ChooseMap();
-  std::vector<MapId> WhereCamerasAre() const;
-  MapId MapOf(const FramePose& pose) const;
+  std::vector<std::optional<MapId>> WhereCamerasAre() const;
+  std::optional<MapId> MapOf(const FramePose& pose) const;
   void NoteJoined(const MapDelta& delta);
   void MarkAll();
   void MarkMap(MapId map_id);
@@ -96,7 +97,7 @@ class ViewerCore {
   };
 
   Replica map_;
-  MapId shown_map_ = 0;
+  std::optional<MapId> shown_map_;
   MapLayout layout_;
   std::vector<JoinedMaps> joined_;
   std::map<SceneFrame, FramePose> frames_;

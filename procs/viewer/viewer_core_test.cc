@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/util/random.h"
@@ -222,6 +223,20 @@ TEST_F(ViewerCoreTest, MapsThatAreApartLieBesideEachOtherInTheirColours) {
   EXPECT_NEAR((drawn->translation - Vector(second.center)).norm(), 0, 1e-5) << "so does the camera";
   EXPECT_FALSE(core_.Drawn({}, MapId{77})) << "nobody knows where that map lies";
 }
+
+TEST_F(ViewerCoreTest, WhatIsBelievedToMoveIsSoHoweverLittle) {
+  AddKeyframe(0);
+  AddLandmark(1, 0, 1, kBelievedToMove + 0.01F);
+  AddLandmark(2, 0, 2, kBelievedToMove);
+  AddLandmark(3, 0, 3, kBelievedToMove - 0.01F);
+  Say();
+  EXPECT_EQ(core_.num_moving(), 1u);
+  EXPECT_GT(Drawn(scene_.points(), LandmarkId::Make(1, 1)).belief, 0);
+  EXPECT_LE(Drawn(scene_.points(), LandmarkId::Make(1, 2)).belief, 0);
+  EXPECT_LE(Drawn(scene_.points(), LandmarkId::Make(1, 3)).belief, 0);
+}
+
+TEST_F(ViewerCoreTest, WithoutAMapNoneIsShown) { EXPECT_FALSE(core_.shown_map().has_value()); }
 
 TEST_F(ViewerCoreTest, MapsThatAreJoinedBecomeOnePlaceAndOneColour) {
   for (int i = 0; i < 3; ++i) AddKeyframe(i);

@@ -192,8 +192,12 @@ std::string ToJson(const StatusView& view) {
     json["camera"] = {{"width", camera.width_px}, {"height", camera.height_px}, {"fx", camera.fx_px},
                       {"fy", camera.fy_px},       {"cx", camera.cx_px},         {"cy", camera.cy_px}};
   }
-  json["map"] = {{"id", view.map_id},           {"version", view.map_version}, {"keyframes", view.keyframes},
-                 {"landmarks", view.landmarks}, {"moving", view.moving},       {"resets", view.resets},
+  json["map"] = {{"id", view.map_id ? Json(*view.map_id) : Json()},
+                 {"version", view.map_version},
+                 {"keyframes", view.keyframes},
+                 {"landmarks", view.landmarks},
+                 {"moving", view.moving},
+                 {"resets", view.resets},
                  {"loops", view.loops}};
   json["maps"] = MapsJson(view);
   json["cameras"] = CamerasJson(view.cameras);
@@ -229,7 +233,7 @@ std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn) 
             {"t", static_cast<double>(view.stamp_ns) * 1e-9},
             {"state", static_cast<int>(view.state)},
             {"word", StateWord(view.state)},
-            {"map", view.map_id.value_or(0)},
+            {"map", view.map_id ? Json(*view.map_id) : Json()},
             {"inliers", view.inliers},
             {"moving", view.moving},
             {"unknown", view.unknown},

@@ -33,7 +33,7 @@ struct StatusView {
   Eigen::Vector3d up{0, -1, 0};
   bool ended = false;
   int64_t loops = 0;
-  MapId map_id = 0;
+  std::optional<MapId> map_id;        ///< that is shown; none: there is none
   const MapLayout* layout = nullptr;  ///< null: there is no map
   std::vector<CameraView> cameras;    ///< by number
   size_t keyframes = 0, landmarks = 0, moving = 0;

@@ -174,7 +174,7 @@ bool ViewerNode::TakeMapRecord() {
 
 void ViewerNode::NoteMapEvent(const MapDelta& delta) {
   const std::string about = std::to_string(delta.about.value_or(KeyframeId()).frame_index());
-  const std::string map = NameOf(delta.map_id.value_or(0));
+  const std::string map = delta.map_id ? NameOf(*delta.map_id) : "a map";
   switch (delta.event) {
     case MapEvent::kMapStarted:
       Note(BoardEvent::Level::kGood, map + " begins");

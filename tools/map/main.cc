@@ -163,12 +163,13 @@ int64_t AddFramePoses(const dmslam::LogIndex& log, const dmslam::RecordedSession
 
 void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
            const dmslam::RebuiltMap& rebuilt, const dmslam::TrajectoryBuilder::Trajectories& trajectories,
-           dmslam::MapId map_id) {
+           std::optional<dmslam::MapId> map_id) {
   const double seconds = static_cast<double>(log.end_us() - log.begin_us()) * 1e-6;
   std::printf("log         %lld messages, %.1f s, session %u, sequence %s\n",
               static_cast<long long>(log.num_messages()), seconds, session.id,
               rebuilt.session.sequence.c_str());
-  std::printf("map         number %u, version %llu, %zu keyframes, %zu landmarks%s\n", map_id,
+  const std::string number = map_id ? "number " + std::to_string(*map_id) : "none";
+  std::printf("map         %s, version %llu, %zu keyframes, %zu landmarks%s\n", number.c_str(),
               static_cast<unsigned long long>(rebuilt.map.version()), rebuilt.map.keyframes().size(),
               rebuilt.map.num_landmarks(), rebuilt.ended ? ", complete" : "");
   std::printf("records     %lld applied, %lld missing\n", static_cast<long long>(rebuilt.records),
@@ -177,8 +178,9 @@ void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
 }
 
 /// Says how many landmarks lie on people, by the masks of the keyframes' images.
-void Judge(const Arguments& a, const dmslam::Map& map, dmslam::MapId map_id) {
-  const dmslam::MapPurity purity = dmslam::JudgeMap(map, map_id, dmslam::MasksIn(a.masks));
+void Judge(const Arguments& a, const dmslam::Map& map, std::optional<dmslam::MapId> map_id) {
+  if (!map_id) throw dmslam::InputError(a.log + ": holds no map to judge; was a camera tracked?");
+  const dmslam::MapPurity purity = dmslam::JudgeMap(map, *map_id, dmslam::MasksIn(a.masks));
   if (purity.landmarks == 0)
     throw dmslam::InputError(a.masks + ": no mask belongs to a keyframe of " + a.log +
                              "; is it this sequence?");
@@ -214,9 +216,9 @@ int Run(const Arguments& a) {
                        a.log, missing);
   }
   dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build();
-  const dmslam::MapId map_id =
-      trajectories.map_id != 0 ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);
-  if (trajectories.map_id == 0) {
+  const std::optional<dmslam::MapId> map_id =
+      trajectories.map_id ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);
+  if (!trajectories.map_id) {
     for (const auto& [id, keyframe] : rebuilt.map.keyframes()) {
       if (keyframe.map_id == map_id)
         trajectories.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});

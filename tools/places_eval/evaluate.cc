@@ -16,6 +16,7 @@
 #include "dmslam/robust/pose_from_matches.h"
 #include "dmslam/robust/two_view_ransac.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/chi_squared.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -91,7 +92,6 @@ bool FarInTime(const View& a, const View& b, const PlacesOptions& options) {
 /// Gives the features of `view` points by its matches with `other`.
 void TriangulateWith(const View& other, const PlacesOptions& options, View& view) {
   constexpr double kMinParallaxRad = 0.02;
-  constexpr double kMaxErrorSquared = 5.991;
   const Pyramid pyramid;
   const Rigid3d T_view_world = view.T_world_cam.Inverse();
   const Rigid3d T_other_world = other.T_world_cam.Inverse();
@@ -107,7 +107,7 @@ void TriangulateWith(const View& other, const PlacesOptions& options, View& view
       return ReprojectionErrorSquared(options.camera, T_cam_world, *point, PixelOf(keypoint)) /
              pyramid.SigmaSquared(keypoint.octave);
     };
-    if (error(T_view_world, first) > kMaxErrorSquared || error(T_other_world, second) > kMaxErrorSquared)
+    if (error(T_view_world, first) > kChiSquared2Dof || error(T_other_world, second) > kChiSquared2Dof)
       continue;
     if (ParallaxAngle(view.T_world_cam.translation, other.T_world_cam.translation, *point) <
         kMinParallaxRad) {

@@ -15,7 +15,7 @@ Written by `dmslam-settings --out docs/configuration.md`. A setting is described
 `Describe` of its options struct (for example `src/dmslam/tracking/tracking_options.h`); change that instead of this page.
 
 A setting comes from a YAML file (`--config FILE`: sections of keys, as `tracking:` with `motion_belief: off` below it) or
-from the command line (`--set tracking.motion_belief=off`, which goes before the file). The order within a file does not
+from the command line (`--set tracking.motion_belief=off`, which takes precedence over the file). The order within a file does not
 matter. `profile` comes before everything else, wherever it stands: `profile=baseline` is the same system with a plain
 RANSAC two-view start and with the values of the column "baseline"; `profile=paper` is the system of the DM-SLAM paper alone:
 DLRSAC as published, Algorithm 1 with a bound that bites, and the values of the column "paper".

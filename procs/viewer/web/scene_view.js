@@ -11,7 +11,7 @@ const kSlowMs = 46, kFastMs = 38, kTooSlowMs = 55;  // of a picture
 const kMinSharpness = 0.625;  // of the screen's resolution, in motion, where even the fewest landmarks are too slow
 
 const pointVertex = `
-  attribute vec3 value;  // belief, first frame, colour of the map
+  attribute vec3 value;  // belief (above zero: believed to move), first frame, colour of the map
   uniform mediump float size;
   uniform float ages, newest, floorAt, roofAt;
   uniform vec3 low[6], still[6];

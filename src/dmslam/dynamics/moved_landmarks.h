@@ -6,11 +6,12 @@
 
 #include "dmslam/dynamics/frame_expectation.h"
 #include "dmslam/map/map.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
 struct MovedOptions {
-  double chi2 = 4.0 * 5.991;  ///< a strong match farther off than this speaks for motion
+  double chi2 = 4.0 * kChiSquared2Dof;  ///< a strong match farther off than this speaks for motion
   double near_chi2 = 16.0;    ///< a match near its place that is rejected by so much speaks for motion too...
   int near_distance = 60;     ///< ...where it looks like the landmark [bits]
   double radius_rad = 0.057;  ///< how far a landmark that is missed in its place is looked for

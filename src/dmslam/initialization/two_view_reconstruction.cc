@@ -6,6 +6,7 @@
 
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/robust/ransac.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 namespace {
@@ -75,7 +76,7 @@ struct Scored {
   double score = -1;
 };
 
-constexpr double kScoreBound = 5.991;  // the same for both models, so that their scores compare
+constexpr double kScoreBound = kChiSquared2Dof;  // the same for both models, so that their scores compare
 
 double ScoreHomography(const Eigen::Matrix3d& H, const MatchColumns& columns,
                        const HomographyOrFundamentalOptions& options, std::vector<char>* inliers) {

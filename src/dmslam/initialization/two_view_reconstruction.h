@@ -11,6 +11,7 @@
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/motion_segmentation/match.h"
 #include "dmslam/motion_segmentation/static_selector.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -56,8 +57,8 @@ TwoViewReconstruction ReconstructFromStatic(std::span<const Match> matches, cons
 struct HomographyOrFundamentalOptions {
   int iterations = 200;  ///< samples of eight; each gives a homography and a fundamental matrix
   double sigma_px = 1.0;
-  double chi2_fundamental = 3.841;
-  double chi2_homography = 5.991;
+  double chi2_fundamental = kChiSquared1Dof;
+  double chi2_homography = kChiSquared2Dof;
   double homography_share = 0.40;  ///< H is taken when its share of the score S_H / (S_H + S_F) exceeds this
   double max_runner_up_homography = 0.75;
   ReconstructionOptions reconstruction;

@@ -100,8 +100,7 @@ class LoopcloserCore {
   Sightings sightings_;              ///< of one map in another
   int keyframes_since_loop_;
   bool adjustment_due_ = false;
-  std::optional<uint64_t>
-      awaited_correction_;  ///< proposed; the mapper's word on it has not been heard. 0: none
+  std::optional<uint64_t> awaited_correction_;  ///< proposed; the mapper's word on it has not been heard
   std::vector<Verdict> verdicts_;
   LoopcloserCounters counters_;
 };

@@ -325,6 +325,79 @@ TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
   EXPECT_GE(core_.counters().landmarks_culled, 1u);
 }
 
+/// A map of three keyframes that the mapper goes on from with the fourth.
+class FourthKeyframe : public KeyframeStep {
+ protected:
+  static constexpr uint16_t kFirst = 60, kFew = 10;  // some points that all four see
+
+  static bool IsOneOfFew(uint16_t i) { return i >= kFirst && i < kFirst + kFew; }
+
+  FourthKeyframe() { AddKeyframes({0, 1}); }
+  void AddKeyframes(const std::vector<uint32_t>& frames) {
+    for (const uint32_t frame : frames) scene_.AddKeyframe(map_, frame, PlaceOf(frame), frame);
+  }
+  LandmarkId Add(uint64_t number, uint16_t at, const std::vector<uint32_t>& frames) {
+    return scene_.AddLandmark(map_, number, at, frames);
+  }
+  void Continue() {
+    map_.TakeDelta(MapEvent::kMapStarted, Id(2), 1);
+    core_.Continue(std::move(map_));
+  }
+
+  MapEditor map_{TestCamera(), Pyramid()};
+};
+
+TEST_F(FourthKeyframe, RemovesWhoStandsWhereTheWallWasSeen) {
+  for (const uint16_t i : scene_.All()) Add(100U + i, i, {0, 1});
+  for (const uint16_t i : WallScene::Range(kFirst, kFirst + kFew)) {  // half as far as what he hides
+    const Rigid3d T_cam_world = WallScene::At(PlaceOf(2));
+    scene_.Replace(i, T_cam_world.Inverse() * (0.5 * (T_cam_world * scene_.point(i))));
+  }
+  AddKeyframes({2});
+  std::vector<LandmarkId> person;
+  for (const uint16_t i : scene_.All()) {
+    if (IsOneOfFew(i)) {
+      person.push_back(Add(300U + i, i, {2}));
+    } else {
+      map_.SetObservation(map_.At(Id(2)), i, map_.At(LandmarkId::Make(1, 100U + i)));
+    }
+  }
+  Continue();
+  ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
+  EXPECT_EQ(core_.counters().landmarks_seen_through, kFew);
+  for (const LandmarkId id : person) EXPECT_EQ(core_.map().FindLandmark(id), nullptr);
+}
+
+TEST_F(FourthKeyframe, JoinsLandmarksOfOnePoint) {
+  AddKeyframes({2});
+  for (const uint16_t i : scene_.All()) {
+    if (IsOneOfFew(i)) {
+      Add(100U + i, i, {0, 1});
+      Add(300U + i, i, {2});
+    } else {
+      Add(100U + i, i, {0, 1, 2});
+    }
+  }
+  Continue();
+  ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
+  EXPECT_GE(core_.counters().fusions, kFew);
+  for (const uint16_t i : WallScene::Range(kFirst, kFirst + kFew)) {
+    EXPECT_EQ(core_.map().At(Id(3)).landmarks[i], LandmarkId::Make(1, 100U + i)) << i;
+    EXPECT_EQ(core_.map().FindLandmark(LandmarkId::Make(1, 300U + i)), nullptr) << i;
+  }
+}
+
+TEST_F(FourthKeyframe, AtTheEndWhatLiesAtTheLensGoes) {
+  AddKeyframes({2});
+  for (const uint16_t i : scene_.All()) Add(100U + i, i, {0, 1, 2});
+  const LandmarkId at_lens = LandmarkId::Make(1, 105);
+  map_.SetPosition(map_.At(at_lens), 0.02 * scene_.point(5));  // as keyframe 0 sees it
+  Continue();
+  core_.End();
+  EXPECT_EQ(core_.map().FindLandmark(at_lens), nullptr);
+  EXPECT_EQ(core_.counters().landmarks_culled, 1U);
+}
+
 TEST_F(KeyframeStep, RemovesWhatIsSeenToMove) {
   ASSERT_TRUE(Start());
   FrameEvidence evidence;

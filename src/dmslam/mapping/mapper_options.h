@@ -3,6 +3,7 @@
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/seen_through.h"
 #include "dmslam/map/conventions.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -19,9 +20,9 @@ struct LandmarkCreationOptions {
   double min_baseline_over_depth = 0.01;
   int max_descriptor_distance = 50;  ///< bits
   double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line; 1 = not asked
-  double epipolar_sigmas_squared = 3.84;
+  double epipolar_sigmas_squared = kRoundedChiSquared1Dof;
   double max_parallax_cos = 0.9998;
-  double reprojection_sigmas_squared = 5.991;
+  double reprojection_sigmas_squared = kChiSquared2Dof;
   double scale_ratio_slack = 1.5;  ///< times the pyramid's factor
 
   template <typename Visitor>

@@ -14,6 +14,7 @@
 #include "dmslam/motion_segmentation/neighbor_vote.h"
 #include "dmslam/motion_segmentation/sampling.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 namespace {
@@ -228,7 +229,7 @@ bool Segmentation::ExplainedByPlane(std::span<const int> own) const {
   int explained = 0;
   for (const int index : own) {
     const auto i = static_cast<size_t>(index);
-    const double bound = (5.99 / 3.84) * (arrays_.bound0[i] + arrays_.bound1[i]);
+    const double bound = kTwoResidualsForOne * (arrays_.bound0[i] + arrays_.bound1[i]);
     if (TransferErrorSquared(*H, arrays_.p0[i], arrays_.p1[i]) <= bound) ++explained;
   }
   return explained >= options_.degenerate_share * static_cast<double>(own.size());

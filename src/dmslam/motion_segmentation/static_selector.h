@@ -12,6 +12,7 @@
 #include "dmslam/camera/camera.h"
 #include "dmslam/features/types.h"
 #include "dmslam/motion_segmentation/match.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -100,8 +101,8 @@ struct InputOptions {
 
 /// When a matched pair of points agrees with a model.
 struct InlierOptions {
-  double chi2 = 3.84;     ///< bound on the squared Sampson distance in units of its variance
-  double sigma_px = 1.0;  ///< standard deviation of a keypoint of octave 0
+  double chi2 = kRoundedChiSquared1Dof;  ///< bound on the squared Sampson distance in units of its variance
+  double sigma_px = 1.0;                 ///< standard deviation of a keypoint of octave 0
   /// Standard deviation grows with the octave's scale (Pyramid). Off: every keypoint counts as octave 0 (the
   /// paper).
   bool scale_by_octave = true;

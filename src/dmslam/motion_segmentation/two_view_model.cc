@@ -11,6 +11,7 @@
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/epipolar_sums.h"
 #include "dmslam/robust/ransac.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 namespace {
@@ -204,8 +205,7 @@ int CountRotationInliers(const Eigen::Matrix3d& R, const MatchArrays& arrays, Ra
     const Eigen::Vector3d moved = R * arrays.ray0[i];
     if (moved.z() <= 0) continue;
     const double dx = moved.x() / moved.z() - arrays.x1[i], dy = moved.y() / moved.z() - arrays.y1[i];
-    // Two residuals instead of one: 5.99 takes the place of 3.84.
-    if (dx * dx + dy * dy <= (5.99 / 3.84) * (arrays.bound0[i] + arrays.bound1[i])) ++count;
+    if (dx * dx + dy * dy <= kTwoResidualsForOne * (arrays.bound0[i] + arrays.bound1[i])) ++count;
   }
   return count;
 }

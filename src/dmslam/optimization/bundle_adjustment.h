@@ -7,6 +7,7 @@
 
 #include "dmslam/geometry/pinhole.h"
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -32,8 +33,9 @@ struct BundleOptions {
   /// without it. Zero for the second: one stage only, robust to the end.
   int first_iterations = 5;
   int second_iterations = 10;
-  double max_chi2 = 5.991;  ///< Outlier: squared error * inv_sigma_squared above this, or behind the camera.
-  double huber_delta = 2.447651936;  ///< sqrt(5.991), on the error in sigmas.
+  double max_chi2 =
+      kChiSquared2Dof;  ///< Outlier: squared error * inv_sigma_squared above this, or behind the camera.
+  double huber_delta = kChi2Dof;     ///< On the error in sigmas.
   bool second_stage_robust = false;  ///< Keep Huber's loss in the second stage.
   /// A stage ends when a step gains less than this share of the cost (ten times it in the first of two
   /// stages).

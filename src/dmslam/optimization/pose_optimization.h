@@ -8,6 +8,7 @@
 #include "dmslam/geometry/pinhole.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/geometry/similarity.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -26,10 +27,11 @@ struct PosePrior {
 };
 
 struct PoseOptimizationOptions {
-  int rounds = 4;            ///< After each round every observation is tested again.
-  int iterations = 10;       ///< Steps per round at most; a round ends early when the step is tiny.
-  int robust_rounds = 2;     ///< Rounds with Huber's loss; later ones trust the inlier test alone.
-  double max_chi2 = 5.991;   ///< Inlier: squared error * inv_sigma_squared at most this (95 %, 2 dof).
+  int rounds = 4;         ///< After each round every observation is tested again.
+  int iterations = 10;    ///< Steps per round at most; a round ends early when the step is tiny.
+  int robust_rounds = 2;  ///< Rounds with Huber's loss; later ones trust the inlier test alone.
+  double max_chi2 =
+      kChiSquared2Dof;       ///< Inlier: squared error * inv_sigma_squared at most this (95 %, 2 dof).
   double min_step = 1e-7;    ///< A step shorter than this (rad and map units) ends the round.
   int min_observations = 3;  ///< Fewer: the report is not usable and the pose is the initial one.
   std::optional<PosePrior> prior;

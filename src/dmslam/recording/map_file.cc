@@ -178,13 +178,8 @@ uint16_t NewestOrdinal(const Map& map) {
   return newest;
 }
 
-MapId NewestMap(const Map& map) {
-  const std::map<MapId, size_t> sizes = KeyframesOfMaps(map);
-  return sizes.empty() ? 0 : sizes.rbegin()->first;
-}
-
-MapId LargestMap(const Map& map) {
-  MapId largest = 0;
+std::optional<MapId> LargestMap(const Map& map) {
+  std::optional<MapId> largest;
   size_t most = 0;
   for (const auto& [id, size] : KeyframesOfMaps(map)) {
     if (size > most) largest = id, most = size;

@@ -57,8 +57,7 @@ std::string WhyOtherVocabulary(const std::string& path, const SessionStart& made
 /// The highest session and the highest epoch's ordinal that the map's ids name: new ids must lie above.
 uint32_t NewestSession(const Map& map);
 uint16_t NewestOrdinal(const Map& map);
-/// The highest number of a map, and the one that holds most keyframes (0: none).
-MapId NewestMap(const Map& map);
-MapId LargestMap(const Map& map);
+/// The map that holds most keyframes; none: there is no keyframe.
+std::optional<MapId> LargestMap(const Map& map);
 
 }  // namespace dmslam

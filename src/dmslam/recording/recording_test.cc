@@ -289,6 +289,7 @@ TEST_F(Recording, ASavedMapIsTheMap) {
   EXPECT_EQ(NewestSession(loaded.map), kSession);
   EXPECT_EQ(NewestOrdinal(loaded.map), 1);
   EXPECT_EQ(LargestMap(loaded.map), 1u);
+  EXPECT_FALSE(LargestMap(Map(TestCamera(), Pyramid())).has_value());
   CheckFits("map", loaded, TestCamera(), Pyramid());
   Camera other = TestCamera();
   other.fx_px = 501;

@@ -9,6 +9,8 @@
 
 #include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
+#include "dmslam/util/check.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 namespace {
@@ -18,7 +20,6 @@ constexpr double kMinInlierShare = 0.7;
 constexpr double kMaxLeverage = 1.0 / 3.0;  // of one sight: half of what all others say
 constexpr int kMinFrames = 5;               // that see a landmark, to place it by them
 constexpr int kLandmarkSteps = 2;           // of Gauss and Newton
-constexpr double kHuberChi2 = 5.991;
 // Landmarks go beyond where the frames want them: turns are slow where both must move (over-relaxation).
 constexpr double kOverstep = 1.7;
 constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and their errors are their own
@@ -42,7 +43,8 @@ struct LandmarkEquations {
     const Eigen::Vector2d error = camera.Project(p_cam) - uv_px;
     const double inv_sigma_squared = 1.0 / map.pyramid().SigmaSquared(octave);
     const double chi2 = error.squaredNorm() * inv_sigma_squared;
-    const double weight = inv_sigma_squared * (chi2 > kHuberChi2 ? std::sqrt(kHuberChi2 / chi2) : 1.0);
+    const double weight =
+        inv_sigma_squared * (chi2 > kChiSquared2Dof ? std::sqrt(kChiSquared2Dof / chi2) : 1.0);
     const Matrix23 J = ProjectionJacobian(camera, p_cam) * T_cam_world.rotation.toRotationMatrix();
     information += weight * J.transpose() * J;
     gradient += weight * J.transpose() * error;
@@ -253,7 +255,7 @@ std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const 
       if (is_new || frames_ago == 0 || frames_ago > kSharedFrames || p_cam.z() <= 0.0) continue;
       const double variance = map.pyramid().SigmaSquared(sight.octave);
       const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
-      if (error.squaredNorm() > kHuberChi2 * variance) continue;  // the pose was told without it
+      if (error.squaredNorm() > kChiSquared2Dof * variance) continue;  // the pose was told without it
       const Matrix26 J = PoseJacobian(camera, p_cam);
       shared += J.transpose() * J / variance;
     }
@@ -268,7 +270,8 @@ void FinalPoses::SmoothNextMap(const Map& map) {
   const auto end = std::find_if(begin, poses_.end(),
                                 [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
   SmoothingOptions options;
-  const MapId map_id = begin->pose.map_id.value_or(0);  // a final pose lies in a map
+  DMSLAM_CHECK(begin->pose.map_id.has_value(), "a final pose without a map");
+  const MapId map_id = *begin->pose.map_id;
   const auto known = noise_.find(map_id);
   if (known != noise_.end()) options.noise = known->second;
   const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, {begin, end}), options);

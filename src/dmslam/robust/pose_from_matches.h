@@ -6,6 +6,7 @@
 #include "dmslam/geometry/pinhole.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/robust/ransac.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -13,7 +14,7 @@ struct PoseRansacOptions {
   int max_iterations = 300;
   int min_iterations = 10;
   double confidence = 0.99;
-  double max_chi2 = 5.991;  ///< Inlier: squared reprojection error * inv_sigma_squared below this.
+  double max_chi2 = kChiSquared2Dof;  ///< Inlier: squared reprojection error * inv_sigma_squared below this.
   int min_inliers = 10;
   uint64_t seed = 0;
 };

@@ -10,6 +10,7 @@
 #include "dmslam/robust/pose_from_matches.h"
 #include "dmslam/robust/ransac.h"
 #include "dmslam/robust/two_view_ransac.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 namespace {
@@ -101,7 +102,7 @@ TEST(TwoViewRansac, EssentialFindsInliersAndPose) {
 TEST(TwoViewRansac, HomographyFindsTheInliersOfAPlane) {
   const OutlierPair data = PairWithOutliers(3, 0.0);
   const auto report = HomographyFromMatches(data.pair.x1_px, data.pair.x2_px, {},
-                                            {.ransac = {.seed = 3}, .max_error_squared_px = 5.991});
+                                            {.ransac = {.seed = 3}, .max_error_squared_px = kChiSquared2Dof});
   ASSERT_TRUE(report.success);
   EXPECT_GT(ShareFound(data, report.inliers), 0.95);
 }

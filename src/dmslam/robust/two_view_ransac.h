@@ -5,13 +5,14 @@
 
 #include "dmslam/geometry/pinhole.h"
 #include "dmslam/robust/ransac.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
 struct TwoViewRansacOptions {
   RansacOptions ransac;
   double max_error_squared_px =
-      3.841;  ///< Sampson (F, E) or each transfer error (H), times sigma squared where given.
+      kChiSquared1Dof;  ///< Sampson (F, E) or each transfer error (H), times sigma squared where given.
 };
 
 /// Robust two-view models over matches in undistorted pixels (x1[i] with x2[i]). `sigma_squared` is parallel

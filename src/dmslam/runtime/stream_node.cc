@@ -413,6 +413,42 @@ void StreamNode::Exit(int code, std::string problem) {
   problem_ = std::move(problem);
 }
 
+namespace {
+
+void AddReader(const ReaderStatistics& s, ProcessHealth* health) {
+  health->queue_depth += static_cast<int32_t>(s.backlog);
+  health->received += s.records;
+  health->received_bytes += s.payload_bytes;
+  health->dropped_foreign += s.dropped_foreign;
+  health->dropped_checksum += s.dropped_bad;
+  health->dropped_malformed += s.dropped_doubtful;
+  health->dropped_overflow += s.dropped_no_room;
+  health->dropped_duplicate += s.duplicates;
+  health->records_repaired += s.repaired;
+  health->recovery_p50_ms = std::max(health->recovery_p50_ms, s.recovery_p50_ms);
+  health->recovery_p99_ms = std::max(health->recovery_p99_ms, s.recovery_p99_ms);
+  health->repairs_requested += s.requested;
+  health->records_lost += s.lost;
+}
+
+void AddWriter(const StreamWriter& writer, ProcessHealth* health) {
+  const WriterStatistics s = writer.statistics();
+  health->epoch = writer.term().epoch;
+  health->written = s.records;
+  health->written_bytes = s.payload_bytes;
+  health->dropped_checksum += s.dropped_bad;
+  health->dropped_malformed += s.dropped_doubtful;
+  health->dropped_foreign += s.dropped_foreign;
+  health->resent = s.parts_repaired;
+  health->resent_bytes = s.repaired_bytes;
+  health->kept_bytes = static_cast<int64_t>(s.kept_bytes);
+  health->readers = static_cast<int32_t>(writer.num_readers());
+  health->snapshots = static_cast<int32_t>(s.snapshots);
+  health->refused_peers = s.refused;
+}
+
+}  // namespace
+
 StatusHead StreamNode::MakeStatusHead(const std::string& reason,
                                       const std::vector<const StreamReader*>& readers) const {
   StatusHead head;
@@ -427,36 +463,10 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   health.dropped_foreign = dropped_foreign_ + context_.refused();
   health.dropped_malformed = dropped_malformed_;
   for (const StreamReader* reader : readers) {
-    if (reader == nullptr) continue;
-    const ReaderStatistics s = reader->statistics();
-    health.queue_depth += static_cast<int32_t>(s.backlog);
-    health.received += s.records;
-    health.received_bytes += s.payload_bytes;
-    health.dropped_foreign += s.dropped_foreign;
-    health.dropped_checksum += s.dropped_bad;
-    health.dropped_malformed += s.dropped_doubtful;
-    health.dropped_overflow += s.dropped_no_room;
-    health.dropped_duplicate += s.duplicates;
-    health.records_repaired += s.repaired;
-    health.recovery_p50_ms = std::max(health.recovery_p50_ms, s.recovery_p50_ms);
-    health.recovery_p99_ms = std::max(health.recovery_p99_ms, s.recovery_p99_ms);
-    health.repairs_requested += s.requested;
-    health.records_lost += s.lost;
+    if (reader != nullptr) AddReader(reader->statistics(), &health);
   }
   if (!writer_) return head;
-  const WriterStatistics s = writer_->statistics();
-  health.epoch = writer_->term().epoch;
-  health.written = s.records;
-  health.written_bytes = s.payload_bytes;
-  health.dropped_checksum += s.dropped_bad;
-  health.dropped_malformed += s.dropped_doubtful;
-  health.dropped_foreign += s.dropped_foreign;
-  health.resent = s.parts_repaired;
-  health.resent_bytes = s.repaired_bytes;
-  health.kept_bytes = static_cast<int64_t>(s.kept_bytes);
-  health.readers = static_cast<int32_t>(writer_->num_readers());
-  health.snapshots = static_cast<int32_t>(s.snapshots);
-  health.refused_peers = s.refused;
+  AddWriter(*writer_, &health);
   for (const std::string& role : plan_->readers) {
     health.unacknowledged = std::max(health.unacknowledged, static_cast<int32_t>(writer_->Backlog(role)));
     if (options_.HasPeer(role) && !writer_->AcknowledgedBy(role)) {

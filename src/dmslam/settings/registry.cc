@@ -183,10 +183,18 @@ const SettingInfo* FindSetting(std::string_view key) {
   return setting != AllSettings().end() ? &*setting : nullptr;
 }
 
-std::string NearestSetting(std::string_view key) {
-  return std::ranges::min_element(AllSettings(), {},
-                                  [&](const SettingInfo& setting) { return EditDistance(setting.key, key); })
-      ->key;
+std::optional<std::string> NearestSetting(std::string_view key) {
+  constexpr size_t kMostSlips = 3;
+  const auto distance = [&](const SettingInfo& setting) { return EditDistance(setting.key, key); };
+  const SettingInfo& nearest = *std::ranges::min_element(AllSettings(), {}, distance);
+  const bool is_near = distance(nearest) <= std::min(kMostSlips, key.size() / 2);
+  return is_near ? std::optional(nearest.key) : std::nullopt;
+}
+
+bool IsSection(std::string_view name) {
+  const std::string prefix = std::string(name) + ".";
+  return std::ranges::any_of(AllSettings(),
+                             [&](const SettingInfo& setting) { return setting.key.starts_with(prefix); });
 }
 
 std::string WhyRemoved(std::string_view key) {

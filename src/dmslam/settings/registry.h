@@ -33,8 +33,11 @@ const std::vector<SettingInfo>& AllSettings();
 /// The setting of this name, or none.
 const SettingInfo* FindSetting(std::string_view key);
 
-/// The name that is most like `key`.
-std::string NearestSetting(std::string_view key);
+/// The name that `key` is a slip of: one that differs in a few letters. None where none is so near.
+std::optional<std::string> NearestSetting(std::string_view key);
+
+/// Whether settings stand below this name, as "mapping".
+bool IsSection(std::string_view name);
 
 /// Why a setting that once was is no more, and what to do; empty where there never was one.
 std::string WhyRemoved(std::string_view key);

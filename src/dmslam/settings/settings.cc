@@ -21,8 +21,14 @@ struct Given {
 [[noreturn]] void ThrowUnknown(std::string_view key) {
   const std::string name = "setting '" + std::string(key) + "' ";
   if (const std::string why = WhyRemoved(key); !why.empty()) throw InputError(name + "was removed: " + why);
-  throw InputError(name + "does not exist; did you mean '" + NearestSetting(key) +
-                   "'? (docs/configuration.md lists all)");
+  if (IsSection(key))
+    throw InputError("'" + std::string(key) +
+                     "' is a section and has no value; write its settings below it, or as 'section.key' "
+                     "(docs/configuration.md lists all)");
+  const std::optional<std::string> nearest = NearestSetting(key);
+  throw InputError(name + "does not exist; " +
+                   (nearest ? "did you mean '" + *nearest + "'? (docs/configuration.md lists all)"
+                            : "docs/configuration.md lists all"));
 }
 
 /// The value as it is kept.
@@ -50,7 +56,9 @@ void CollectYaml(const YAML::Node& node, const std::string& prefix, const std::s
     const std::string place = PlaceOf(path, item.first.Mark());
     if (!item.first.IsScalar())
       throw InputError(place + ": is not the name of a setting; write 'key: value'");
-    const std::string key = prefix + item.first.as<std::string>();
+    const std::string name = item.first.as<std::string>();
+    if (name.empty()) throw InputError(place + ": the name of a setting is missing; write 'key: value'");
+    const std::string key = prefix + name;
     if (item.second.IsMap()) {
       CollectYaml(item.second, key + ".", path, all);
     } else if (item.second.IsScalar()) {
@@ -92,7 +100,7 @@ std::vector<Given> ReadOverrides(const std::vector<std::string>& overrides) {
   std::vector<Given> all;
   for (const std::string& text : overrides) {
     const size_t equals = text.find('=');
-    if (equals == std::string::npos) throw InputError("--set " + text + ": write key=value");
+    if (equals == std::string::npos || equals == 0) throw InputError("--set " + text + ": write key=value");
     all.push_back({text.substr(0, equals), text.substr(equals + 1), "--set " + text});
   }
   return all;

@@ -27,7 +27,7 @@ class Settings {
   /// Of a profile. Throws InputError for one that does not exist.
   explicit Settings(std::string_view profile);
 
-  /// Sets one value. Throws InputError that names the key (and the nearest one that exists) and what is
+  /// Sets one value. Throws InputError that names the key (and the one that it may be a slip of) and what is
   /// allowed. A profile is chosen before everything else, so it cannot be set here.
   void Set(std::string_view key, std::string_view value);
   /// A value as text: "2000", "on". Throws InvariantError for a key that does not exist.

@@ -138,6 +138,14 @@ TEST(SettingsTest, WhatIsWrongIsNamedWithFileLineAndCure) {
   EXPECT_EQ(Refusal("seed: 1\ntracking:\n  motion_believe: on\n"),
             "FILE:3: setting 'tracking.motion_believe' does not exist; did you mean "
             "'tracking.motion_belief'? (docs/configuration.md lists all)");
+  EXPECT_EQ(Refusal("foo.bar: 1\n"),
+            "FILE:1: setting 'foo.bar' does not exist; docs/configuration.md lists all")
+      << "nothing is like it";
+  EXPECT_EQ(Refusal("a: 1\n"), "FILE:1: setting 'a' does not exist; docs/configuration.md lists all");
+  EXPECT_EQ(Refusal("mapping: 3\n"),
+            "FILE:1: 'mapping' is a section and has no value; write its settings below it, or as "
+            "'section.key' (docs/configuration.md lists all)");
+  EXPECT_EQ(Refusal("'': 3\n"), "FILE:1: the name of a setting is missing; write 'key: value'");
   EXPECT_EQ(
       Refusal("seed: 1\n\ntracking:\n  min_inliers: 3\n"),
       "FILE:4: setting 'tracking.min_inliers': '3' is not allowed; write a whole number from 6 to 10000");
@@ -151,8 +159,9 @@ TEST(SettingsTest, WhatIsWrongIsNamedWithFileLineAndCure) {
       "FILE:2: setting 'features.count': '1000.5' is not allowed; write a whole number from 50 to 10000");
   EXPECT_EQ(Refusal("loop:\n  enabled: perhaps\n"),
             "FILE:2: setting 'loop.enabled': 'perhaps' is not allowed; write on or off");
-  EXPECT_EQ(Refusal("initializer:\n  method: magic\n"),
-            "FILE:2: setting 'initializer.method': 'magic' is not allowed; write dlrsac, arsac, ransac or paper");
+  EXPECT_EQ(
+      Refusal("initializer:\n  method: magic\n"),
+      "FILE:2: setting 'initializer.method': 'magic' is not allowed; write dlrsac, arsac, ransac or paper");
   EXPECT_EQ(Refusal("seed: 1\nprofile: fast\n"),
             "FILE:2: setting 'profile': 'fast' is not allowed; write dm, baseline or paper");
   EXPECT_EQ(Refusal("mapping:\n  alpha: [1, 2]\n"),
@@ -188,6 +197,8 @@ TEST(SettingsTest, AWrongOverrideIsNamedAsItWasTyped) {
             "--set tracking.min_inliers=3: setting 'tracking.min_inliers': '3' is not allowed; write a whole "
             "number from 6 to 10000");
   EXPECT_EQ(Refusal("", {"seed"}), "--set seed: write key=value");
+  EXPECT_EQ(Refusal("", {"=3"}), "--set =3: write key=value");
+  EXPECT_EQ(Refusal("", {"mapping=3"}).find("--set mapping=3: 'mapping' is a section"), 0u);
   EXPECT_THROW(LoadSettings("/nonexistent.yaml", {}), InputError);
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dmslam/tracking/keyframe_policy.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -106,7 +107,7 @@ FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
   if (drop) dropped_ = map_id_;
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
-  if (drop && options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(map_id_.value_or(0)));
+  if (drop && map_id_ && options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(*map_id_));
   map_id_ = NextMapId();
   tracker_.OnMapGivenUp();
   first_map_.Restart();
@@ -121,7 +122,7 @@ MapId FrontendCore::NextMapId() {
   const auto take = [this](MapId taken) {
     if (taken / kMapsPerCamera == camera_id_) newest_map_ = std::max(newest_map_, taken);
   };
-  take(map_id_.value_or(0));
+  if (map_id_) take(*map_id_);
   for (const auto& [id, keyframe] : map_.keyframes()) take(keyframe.map_id);
   return ++newest_map_;
 }
@@ -354,10 +355,11 @@ void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, Fronte
 }
 
 KeyframeProposal FrontendCore::ProposeKeyframe(const PlacedPose& pose) {
+  DMSLAM_CHECK(map_id_.has_value(), "a keyframe without a map");
   KeyframeProposal proposal;
   proposal.id = ThisFrame();
   proposal.camera_id = camera_id_;
-  proposal.map_id = map_id_.value_or(0);
+  proposal.map_id = *map_id_;
   proposal.stamp_ns = frame_.stamp_ns;
   proposal.reference = pose.reference;
   proposal.T_cam_reference = pose.T_cam_reference;

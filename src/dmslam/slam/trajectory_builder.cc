@@ -87,31 +87,31 @@ void TrajectoryBuilder::BridgeLostKeyframes() {
   for (bool any = true; any;) {
     any = false;
     for (auto& [index, pose] : poses_) {
-      if (pose.HasPose() && MapOfFrame(pose) == 0) any |= Bridge(&pose);
+      if (pose.HasPose() && !MapOfFrame(pose)) any |= Bridge(&pose);
     }
   }
   for (auto& [index, pose] : refined_) {
-    if (MapOfFrame(pose) == 0) Bridge(&pose);
+    if (!MapOfFrame(pose)) Bridge(&pose);
   }
 }
 
-MapId TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {
-  if (!pose.HasPose()) return 0;
+std::optional<MapId> TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {
+  if (!pose.HasPose()) return std::nullopt;
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
-  return reference ? reference->map_id : 0;
+  return reference ? std::optional(reference->map_id) : std::nullopt;
 }
 
 /// Of all cameras together; and how many frames of `camera` the others hold.
 void TrajectoryBuilder::ChooseMap(std::optional<CameraId> camera, Trajectories* result) const {
   std::map<MapId, size_t> frames_of, frames_of_camera;
   for (const auto& [frame, pose] : poses_) {
-    const MapId map_id = MapOfFrame(pose);
-    if (map_id == 0) continue;
-    ++frames_of[map_id];
-    if (!camera || frame.camera == *camera) ++frames_of_camera[map_id];
+    const std::optional<MapId> map_id = MapOfFrame(pose);
+    if (!map_id) continue;
+    ++frames_of[*map_id];
+    if (!camera || frame.camera == *camera) ++frames_of_camera[*map_id];
   }
   for (const auto& [map_id, count] : frames_of) {
-    if (result->map_id == 0 || count > frames_of.at(result->map_id)) result->map_id = map_id;
+    if (!result->map_id || count > frames_of.at(*result->map_id)) result->map_id = map_id;
   }
   for (const auto& [map_id, count] : frames_of_camera) {
     if (map_id != result->map_id) result->other_maps.emplace_back(map_id, count);
@@ -123,7 +123,7 @@ TrajectoryBuilder::Trajectories TrajectoryBuilder::Build(std::optional<CameraId>
   ChooseMap(camera, &result);
   for (const auto& [index, pose] : poses_) {
     if (camera && index.camera != *camera) continue;
-    if (MapOfFrame(pose) != result.map_id || result.map_id == 0) continue;
+    if (!result.map_id || MapOfFrame(pose) != result.map_id) continue;
     const auto later = refined_.find(index);
     const FramePose& best =
         later != refined_.end() && MapOfFrame(later->second) == result.map_id ? later->second : pose;

@@ -37,7 +37,7 @@ class TrajectoryBuilder {
   void BridgeLostKeyframes();
 
   struct Trajectories {
-    MapId map_id = 0;                 ///< the map that holds most frames
+    std::optional<MapId> map_id;      ///< the map that holds most frames; none: no frame is placed
     std::vector<StampedPose> final;   ///< every placed frame, by its reference keyframe's final pose
     std::vector<StampedPose> online;  ///< as tracked, frames of a map that survived
     std::vector<StampedPose> keyframes;
@@ -64,7 +64,7 @@ class TrajectoryBuilder {
   };
 
   bool Bridge(FramePose* pose) const;
-  MapId MapOfFrame(const FramePose& pose) const;
+  std::optional<MapId> MapOfFrame(const FramePose& pose) const;
   void ChooseMap(std::optional<CameraId> camera, Trajectories* result) const;
   std::map<MapId, Joined> JoinedBy(const MapDelta& delta) const;
   static void Carry(const Joined& joined, FramePose* pose);

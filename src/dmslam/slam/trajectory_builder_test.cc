@@ -44,6 +44,8 @@ TEST_F(TrajectoryOfTwoMaps, PosesOfADroppedMapDoNotComeBackWithAKeyframeOfTheSam
   const TrajectoryBuilder::Trajectories built = builder_.Build();
   EXPECT_TRUE(built.final.empty());
   EXPECT_TRUE(built.online.empty());
+  EXPECT_FALSE(built.map_id.has_value()) << "no frame lies in any";
+  EXPECT_TRUE(built.keyframes.empty());
   EXPECT_EQ(builder_.frame_poses().size(), 1U) << "the frame is counted all the same";
 }
 

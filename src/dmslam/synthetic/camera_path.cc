@@ -185,48 +185,62 @@ CameraPath::View CameraPath::ViewAt(double path_time_s) const {
   View view;
   view.position = home_;
   view.pitch_rad = -7.0 * kDegree;
-  const double t = path_time_s, phase = t / period_s_ - std::floor(t / period_s_);
   switch (options_.kind) {
     case PathKind::kXyz:
-      for (int k = 0; k < 3; ++k) {
-        view.position[k] += (k == 2 ? 0.20 : 0.27) * Share(phase, k) * std::sin(2.0 * kPi * t / 4.0);
-      }
+      ShiftAlongAxes(path_time_s, &view);
       break;
-    case PathKind::kRpy: {
-      const double swing = 17.0 * kDegree * std::sin(2.0 * kPi * t / 4.0);
-      view.roll_rad += Share(phase, 0) * swing;
-      view.pitch_rad += 0.75 * Share(phase, 1) * swing;
-      view.yaw_rad += 1.2 * Share(phase, 2) * swing;
-      // Wrists turn, arms follow: a camera that is turned by hand is never turned about its centre.
-      view.position.y() += 0.10 * (view.yaw_rad + 0.5 * view.roll_rad) + 0.05 * std::sin(0.9 * t);
-      view.position.z() += 0.12 * (view.pitch_rad + 7.0 * kDegree) + 0.02 * std::sin(1.3 * t + 1);
-      view.position.x() += 0.04 * std::sin(0.7 * t + 2);
+    case PathKind::kRpy:
+      SwingAboutAxes(path_time_s, &view);
       break;
-    }
-    case PathKind::kHalfsphere: {
-      const double azimuth = 70.0 * kDegree * std::sin(2.0 * kPi * t / 9.0);
-      const double elevation = (25.0 - 30.0 * std::cos(2.0 * kPi * t / 6.3)) * kDegree;
-      constexpr double kRadius = 0.5;
-      view.position +=
-          kRadius * Eigen::Vector3d(-std::cos(azimuth) * std::cos(elevation) + 0.5,
-                                    -std::sin(azimuth) * std::cos(elevation), std::sin(elevation) - 0.2);
-      view.yaw_rad = 0.42 * azimuth;
-      view.pitch_rad = -0.35 * elevation;
+    case PathKind::kHalfsphere:
+      GoOverHalfsphere(path_time_s, &view);
       break;
-    }
-    case PathKind::kTurn: {
-      constexpr double kReach = 0.35;  // From the body's axis to the camera.
-      view.yaw_rad = 100.0 * kDegree * std::sin(2.0 * kPi * t / 20.0);
-      view.pitch_rad += 5.0 * kDegree * std::sin(0.8 * t);
-      view.position += Eigen::Vector3d(kReach * (std::cos(view.yaw_rad) - 1.0),
-                                       kReach * std::sin(view.yaw_rad) + 0.05 * std::sin(1.1 * t),
-                                       0.03 * std::sin(1.7 * t));
+    case PathKind::kTurn:
+      TurnAboutBody(path_time_s, &view);
       break;
-    }
     default:
       break;
   }
   return view;
+}
+
+/// In the period in which one axis after the other has its turn.
+double CameraPath::PhaseAt(double t) const { return t / period_s_ - std::floor(t / period_s_); }
+
+void CameraPath::ShiftAlongAxes(double t, View* view) const {
+  for (int k = 0; k < 3; ++k)
+    view->position[k] += (k == 2 ? 0.20 : 0.27) * Share(PhaseAt(t), k) * std::sin(2.0 * kPi * t / 4.0);
+}
+
+void CameraPath::SwingAboutAxes(double t, View* view) const {
+  const double swing = 17.0 * kDegree * std::sin(2.0 * kPi * t / 4.0);
+  view->roll_rad += Share(PhaseAt(t), 0) * swing;
+  view->pitch_rad += 0.75 * Share(PhaseAt(t), 1) * swing;
+  view->yaw_rad += 1.2 * Share(PhaseAt(t), 2) * swing;
+  // Wrists turn, arms follow: a camera that is turned by hand is never turned about its centre.
+  view->position.y() += 0.10 * (view->yaw_rad + 0.5 * view->roll_rad) + 0.05 * std::sin(0.9 * t);
+  view->position.z() += 0.12 * (view->pitch_rad + 7.0 * kDegree) + 0.02 * std::sin(1.3 * t + 1);
+  view->position.x() += 0.04 * std::sin(0.7 * t + 2);
+}
+
+void CameraPath::GoOverHalfsphere(double t, View* view) {
+  constexpr double kRadius = 0.5;
+  const double azimuth = 70.0 * kDegree * std::sin(2.0 * kPi * t / 9.0);
+  const double elevation = (25.0 - 30.0 * std::cos(2.0 * kPi * t / 6.3)) * kDegree;
+  view->position +=
+      kRadius * Eigen::Vector3d(-std::cos(azimuth) * std::cos(elevation) + 0.5,
+                                -std::sin(azimuth) * std::cos(elevation), std::sin(elevation) - 0.2);
+  view->yaw_rad = 0.42 * azimuth;
+  view->pitch_rad = -0.35 * elevation;
+}
+
+void CameraPath::TurnAboutBody(double t, View* view) {
+  constexpr double kReach = 0.35;  // From the body's axis to the camera.
+  view->yaw_rad = 100.0 * kDegree * std::sin(2.0 * kPi * t / 20.0);
+  view->pitch_rad += 5.0 * kDegree * std::sin(0.8 * t);
+  view->position +=
+      Eigen::Vector3d(kReach * (std::cos(view->yaw_rad) - 1.0),
+                      kReach * std::sin(view->yaw_rad) + 0.05 * std::sin(1.1 * t), 0.03 * std::sin(1.7 * t));
 }
 
 Rigid3d CameraPath::ToPose(const View& view) {

@@ -73,6 +73,11 @@ class CameraPath {
   };
   View ViewAt(double path_time_s) const;
   View AlongLoop(double path_time_s) const;
+  double PhaseAt(double t) const;
+  void ShiftAlongAxes(double t, View* view) const;
+  void SwingAboutAxes(double t, View* view) const;
+  static void GoOverHalfsphere(double t, View* view);
+  static void TurnAboutBody(double t, View* view);
   double PathTime(double time_s) const;
   static Loop MakeLoop(const Scene& scene);
   static Rigid3d ToPose(const View& view);

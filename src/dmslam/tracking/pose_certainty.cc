@@ -5,23 +5,17 @@
 #include <cmath>
 #include <utility>
 
+#include "dmslam/tracking/image_cells.h"
+
 namespace dmslam {
 namespace {
 
 constexpr int64_t kLongestStepNs = 500'000'000;  // so long a step is still one motion
 constexpr double kMaxTurnOfMap = 0.02;           // [rad] the map may have turned under a step to be the same
 constexpr size_t kMostKnown = 20'000;            // landmarks whose covariances are kept
-constexpr size_t kMaxViews = 8;         // of a landmark, spread over all: what more say changes little
-constexpr int kColumns = 8, kRows = 6;  // cells of the image
-constexpr double kExpectedChi2 = 2.0;   // of a residual in two dimensions, in sigmas
+constexpr size_t kMaxViews = 8;        // of a landmark, spread over all: what more say changes little
+constexpr double kExpectedChi2 = 2.0;  // of a residual in two dimensions, in sigmas
 constexpr double kMinNoiseVariance = 0.05;
-
-int CellAt(const Camera& camera, const Eigen::Vector2d& uv_px) {
-  const auto at = [](double share, int count) {
-    return std::clamp(static_cast<int>(share * count), 0, count - 1);
-  };
-  return at(uv_px.y() / camera.height_px, kRows) * kColumns + at(uv_px.x() / camera.width_px, kColumns);
-}
 
 double MedianDepth(const Rigid3d& T_cam_world, const std::vector<PoseSight>& sights) {
   std::vector<double> depths;
@@ -82,7 +76,8 @@ std::vector<PoseSight> PoseCertaintyEstimator::SightsOf(const Map& map, const Po
     if (basis.inliers[i] == 0 || landmark == nullptr) continue;
     const PoseObservation& seen = basis.observations[i];
     sights.push_back({landmark->id, landmark->p_world, CovarianceOf(map, camera, *landmark),
-                      1.0 / seen.inv_sigma_squared, seen.weight, CellAt(map.camera(), seen.uv_px)});
+                      1.0 / seen.inv_sigma_squared, seen.weight,
+                      static_cast<int>(CellOf(map.camera(), seen.uv_px))});
   }
   std::ranges::sort(sights, {}, &PoseSight::landmark);
   return sights;

@@ -247,18 +247,30 @@ TEST_F(Tracking, WhatWalksIsReportedAsMoved) {
   EXPECT_LT(wall_moved, moved / 10);
 }
 
+/// The camera sets off while hardly anything of the room is seen: the motion before does not tell where it
+/// is.
 TEST_F(Tracking, AWeakPoseIsNotToldButLeadsTheSearchOn) {
   for (uint32_t frame = 1; frame < 6; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
-  const auto nearly_all = [](size_t i) { return IsPerson(i) || i >= 12; };  // 12 points of the wall are left
-  for (uint32_t frame = 6; frame < 12; ++frame) {
-    const TrackingResult result = Track(Frame(frame, 0.0, nearly_all));
+  const auto camera_at = [](uint32_t frame) { return CameraAt(frame) + 0.002 * (frame - 5) * (frame - 5); };
+  const auto frame_at = [&](uint32_t frame, size_t wall_points) {
+    const auto place = [&](size_t i) {
+      return i < wall_points ? std::optional(scene_.point(i)) : std::nullopt;
+    };
+    TrackedFrame seen =
+        scene_.See(frame, kStartNs + frame * kFrameNs, MapScene::PoseAt(camera_at(frame)), place);
+    seen.T_cam_world = Rigid3d();  // nobody tells the tracker
+    return seen;
+  };
+  for (uint32_t frame = 6; frame < 18; ++frame) {
+    const TrackingResult result = Track(frame_at(frame, 12));
     EXPECT_FALSE(result.pose);
     EXPECT_STRNE(result.report.reason, "");
+    EXPECT_LT(ErrorAt(result.frame.T_cam_world, camera_at(frame)), 0.05) << frame;
   }
-  const TrackingResult again = Track(Frame(12, 0.0));
+  const TrackingResult again = Track(frame_at(18, kWall));
   ASSERT_TRUE(again.pose) << again.report.reason;
   EXPECT_FALSE(again.relocalized);
-  EXPECT_LT(ErrorAt(again.frame.T_cam_world, CameraAt(12)), 2e-3);
+  EXPECT_LT(ErrorAt(again.frame.T_cam_world, camera_at(18)), 5e-3);
 }
 
 TEST_F(Tracking, InlierThatLieInOneCornerAreNotBelieved) {
@@ -273,16 +285,23 @@ TEST_F(Tracking, LostForLongItIsNotLedByAnOldPose) {
   EXPECT_FALSE(Track(Frame(200, 0.0)).pose) << "without a vocabulary nothing else finds it";
 }
 
+/// The picture is blurred by the turn: no descriptor says by itself which landmark it shows.
 TEST_F(Tracking, WhoTurnedAwayTooFastIsFoundWhereItWas) {
   for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
-  const auto turned = [&](uint32_t frame) {
-    const Rigid3d T_cam_world =
-        Rigid3d(ExpSo3({0, 0.12, 0}), Eigen::Vector3d::Zero()) * MapScene::PoseAt(CameraAt(frame));
-    return scene_.See(frame, kStartNs + frame * kFrameNs, T_cam_world);
-  };
-  const TrackingResult result = Track(turned(9));
+  const Rigid3d turned =
+      Rigid3d(ExpSo3({0, 0.1, 0}), Eigen::Vector3d::Zero()) * MapScene::PoseAt(CameraAt(9));
+  FeatureSet features = scene_.See(9, 0, turned).features->set;
+  Random random(4);
+  for (Descriptor& descriptor : features.descriptors) {
+    for (int flips = 0; flips < 100; ++flips)
+      descriptor.words[random.Below(4)] ^= uint64_t{1} << random.Below(64);
+  }
+  const MapEditor& map = scene_.map();
+  const TrackingResult result = Track(TrackedFrame(
+      9, kStartNs + 9 * kFrameNs, MakeFrameFeatures(std::move(features), map.camera(), map.pyramid())));
   ASSERT_TRUE(result.pose) << result.report.reason;
   EXPECT_LT(ErrorAt(result.frame.T_cam_world, CameraAt(9)), 5e-3);
+  EXPECT_LT(AngleBetween(result.frame.T_cam_world.rotation, turned.rotation), 2e-3);
 }
 
 TEST_F(Tracking, WhoHidesTheRoomIsNotTheRoom) {
@@ -292,6 +311,19 @@ TEST_F(Tracking, WhoHidesTheRoomIsNotTheRoom) {
   EXPECT_FALSE(result.pose) << "hundreds of landmarks agree, and none of those that have stood for long";
   EXPECT_GT(result.report.num_static, 300);
   EXPECT_TRUE(Track(Frame(5, 0.0)).pose) << "it was followed meanwhile";
+}
+
+TEST_F(Tracking, WhoHidesTheRoomForLongIsFollowedNoFarther) {
+  for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  const int64_t believed_ns = tracker_->last_tracked_ns();
+  const auto wall = [](size_t i) { return !IsPerson(i); };
+  for (uint32_t frame = 4; frame < 33; ++frame) {
+    EXPECT_FALSE(Track(Frame(frame, 0.0, wall)).pose);
+    EXPECT_TRUE(tracker_->IsUndecided()) << "within a second the room may be seen again";
+  }
+  for (uint32_t frame = 33; frame < 36; ++frame) EXPECT_FALSE(Track(Frame(frame, 0.0, wall)).pose);
+  EXPECT_FALSE(tracker_->IsUndecided());
+  EXPECT_EQ(tracker_->last_tracked_ns(), believed_ns) << "it is lost, from where it was believed last";
 }
 
 TEST_F(Tracking, FewMatchesThatLieAnywhereAreChance) {
@@ -353,7 +385,8 @@ class Recovering : public ::testing::Test {
  protected:
   static constexpr uint32_t kLost = 5, kFound = 35;
 
-  void Start(double map_s) {
+  /// `until`: the first frame that is not shown.
+  void Start(double map_s, uint32_t until = kFound) {
     scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
     const auto keyframes = static_cast<uint32_t>(map_s * 1e9 / MapScene::kStepNs) + 1;
     scene_.MapAll(keyframes, 0.2 / keyframes);
@@ -366,7 +399,7 @@ class Recovering : public ::testing::Test {
     tracker_.emplace(setup);
     tracker_->OnMapChanged(replica_);
     tracker_->BeginAt(*replica_.FindKeyframe(KeyframeId::Make(MapScene::kSession, 0)));
-    for (uint32_t frame = 1; frame < kFound; ++frame) Track(frame, frame >= kLost);
+    for (uint32_t frame = 1; frame < until; ++frame) Track(frame, frame >= kLost);
   }
   TrackingResult Track(uint32_t frame, bool blind = false) {
     const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
@@ -410,6 +443,32 @@ TEST_F(Recovering, WhoBeginsInAMapLooksAtOnce) {
   Start(1.0);
   tracker_->BeginLost({kFound, kFound * kFrameNs});
   EXPECT_TRUE(Track(kFound).pose);
+}
+
+/// Nobody comes half the depth of the room in a quarter of a second.
+class FarAway : public Recovering {
+ protected:
+  static constexpr uint32_t kSoon = kLost + 8;
+
+  TrackingResult TrackFarAway() {
+    return tracker_->Track(replica_, {.map_id = MapScene::kMap},
+                           scene_.See(kSoon, kSoon * kFrameNs, MapScene::PoseAt(2.0)));
+  }
+};
+
+TEST_F(FarAway, WhatIsNotProvenIsNoPlace) {
+  Start(1.0, kSoon);
+  const TrackingResult result = TrackFarAway();
+  EXPECT_FALSE(result.relocalized);
+  EXPECT_FALSE(tracker_->IsUndecided());
+}
+
+TEST_F(FarAway, WhatIsProvenIs) {
+  Start(10.0, kSoon);
+  const TrackingResult result = TrackFarAway();
+  ASSERT_TRUE(result.pose) << result.report.reason;
+  EXPECT_TRUE(result.relocalized);
+  EXPECT_LT(ErrorAt(result.frame.T_cam_world, 2.0), 0.02);
 }
 
 TEST_F(Recovering, ManyProvenLandmarksAreBelievedAtOnce) {

@@ -2,6 +2,7 @@
 
 #include "dmslam/dynamics/motion_judge.h"
 #include "dmslam/tracking/motion_model.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -20,7 +21,7 @@ struct TrackingOptions {
   int min_local_inliers = 20;         ///< fewer: the frame is not tracked
   int min_coasting_inliers = 8;       ///< so many still lead the search in the next frames
   int min_inliers_after_relocalization = 30;
-  double chi2 = 5.991;
+  double chi2 = kChiSquared2Dof;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
   bool doubt = true;  ///< poses that may rest on what is no part of the room are followed, but not told
   int min_cells = 6;  ///< inliers must lie in at least so many cells of an 8 x 6 grid

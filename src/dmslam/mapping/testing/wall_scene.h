@@ -39,6 +39,13 @@ class WallScene {
     return points;
   }
 
+  /// Something else is seen in place of a point from now on.
+  void Replace(uint16_t i, const Eigen::Vector3d& p_world) {
+    Random random(DeriveSeed(2, i, "replaced"));
+    points_[i] = p_world;
+    descriptors_[i] = {{random.Next(), random.Next(), random.Next(), random.Next()}};
+  }
+
   static KeyframeId Id(uint32_t frame) { return KeyframeId::Make(1, frame); }
   /// A camera `x` to the right of the first.
   static Rigid3d At(double x) { return Rigid3d(Eigen::Quaterniond::Identity(), {-x, 0, 0}); }
