@@ -64,7 +64,8 @@ bool FrontendNode::ReadyToWrite() {
   if (!caught_up) return false;
   const Map& map = core_->map();
   if (map.progress().ended) {
-    Exit(0);
+    // Not before the mapper knows that all of it has come: it would wait for who has left.
+    if (NobodyNeedsTheMap(map, *map_reader_)) Exit(0);
     return false;
   }
   core_->Resume();

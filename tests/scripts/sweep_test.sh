@@ -44,11 +44,11 @@ expect 1 '--seeds needs a value' "$sweep" --seeds
 expect 1 '--seeds none' "$sweep" --seeds none --out "$work/o"
 expect 1 '--only all: choose' "$sweep" --only all --out "$work/o"
 
-# 15 sequences (nobody is in one of them), 2 profiles, 2 seeds; and nothing is run twice.
+# 17 sequences (nobody is in one of them), 2 profiles, 2 seeds; and nothing is run twice.
 expect 0 'dynamic-scenes.md' "$sweep" --out "$work/a" --seeds 2 --only sweep --data "$work/none"
-check "15 sequences" test "$(grep -c ^synth "$CALLS")" -eq 15
-check "60 runs" test "$(grep -c ^run "$CALLS")" -eq 60
-check "half of them baseline" test "$(grep -c 'profile baseline' "$CALLS")" -eq 30
+check "17 sequences" test "$(grep -c ^synth "$CALLS")" -eq 17
+check "68 runs" test "$(grep -c ^run "$CALLS")" -eq 68
+check "half of them baseline" test "$(grep -c 'profile baseline' "$CALLS")" -eq 34
 check "the table has 70 %" grep -qE '^\| 70 \| 70\.0 / 70\.0 \| 2/2 \|' "$work/a/dynamic-scenes.md"
 check "a picture" test -s "$work/a/dynamic-scenes.png"
 check "quiet in a pipe" test -z "$(grep -F '[1/' <<<"$output")"
