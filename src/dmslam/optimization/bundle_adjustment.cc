@@ -42,7 +42,10 @@ class RefreshPoses : public ceres::EvaluationCallback {
 class Adjustment {
  public:
   Adjustment(const BundleOptions& options, BundleProblem& problem)
-      : options_(options), problem_(problem), loss_(options.huber_delta), refresh_(shared_) {
+      : options_(options),
+        problem_(problem),
+        loss_(options.huber_delta, options.cauchy_width),
+        refresh_(shared_) {
     shared_.camera = problem.camera;
     CheckIndices();
     HoldPoses();
@@ -60,11 +63,11 @@ class Adjustment {
       const bool two_stages = options_.second_iterations > 0;
       const double tolerance = options_.relative_tolerance;
       // The first of two stages only has to tell the outliers.
-      bool sound =
-          SolveStage(options_.first_iterations, two_stages ? 10.0 * tolerance : tolerance, true, report);
+      bool sound = SolveStage(options_.first_iterations, two_stages ? 10.0 * tolerance : tolerance,
+                              BundleLoss::Kind::kHuber, report);
       if (sound && !report.interrupted && two_stages) {
         SetAsideOutliers();
-        sound = SolveStage(options_.second_iterations, tolerance, options_.second_stage_robust, report);
+        sound = SolveStage(options_.second_iterations, tolerance, BundleLoss::Kind::kCauchy, report);
       }
       report.usable = sound && AllFinite();
     }
@@ -129,7 +132,7 @@ class Adjustment {
     double cost = 0.0;
     for (const BundleObservation& o : problem_.observations) {
       double rho[3];
-      loss_.EvaluateRobust(std::min(Chi2(o), kErrorBehind * kErrorBehind), rho);
+      loss_.EvaluateHuber(std::min(Chi2(o), kErrorBehind * kErrorBehind), rho);
       cost += 0.5 * rho[0];
     }
     return cost;
@@ -175,8 +178,8 @@ class Adjustment {
     if (!PoseHeld(o.pose)) ordering_->AddElementToGroup(pose.step.data(), 1);
   }
 
-  bool SolveStage(int iterations, double tolerance, bool robust, BundleReport& report) {
-    loss_.robust = robust;
+  bool SolveStage(int iterations, double tolerance, BundleLoss::Kind loss, BundleReport& report) {
+    loss_.kind = loss;
     ceres::Solver::Options options = QuietSolverOptions();
     options.max_num_iterations = iterations;
     options.function_tolerance = tolerance;
@@ -264,7 +267,7 @@ class Adjustment {
   const BundleOptions& options_;
   BundleProblem& problem_;
   Shared shared_;
-  SwitchedHuberLoss loss_;
+  BundleLoss loss_;
   RefreshPoses refresh_;
   std::vector<char> pose_held_;
   int num_held_ = 0;

@@ -136,6 +136,23 @@ TEST(AdjustBundle, OutliersAreSetAside) {
   }
 }
 
+/// Somebody who moves slowly: every fifth point of the last camera lies two sigmas aside, all in the
+/// same direction. None of them is an outlier.
+TEST(AdjustBundle, WhatMovesSlowlyCountsLessThanWhatStands) {
+  const auto error_with = [](double cauchy_width) {
+    BundleData data = DataOf(4, 0.0);
+    for (BundleObservation& o : data.problem.observations) {
+      if (o.pose == 5 && o.point % 5 == 0) o.uv_px.x() += 2.2;
+    }
+    BundleOptions options = Thorough();
+    options.cauchy_width = cauchy_width;
+    EXPECT_TRUE(AdjustBundle(options, data.problem).usable);
+    return (data.problem.T_cam_world[5].Center() - data.truth.T_cam_world[5].Center()).norm() +
+           AngleBetween(data.problem.T_cam_world[5].rotation, data.truth.T_cam_world[5].rotation);
+  };
+  EXPECT_LT(error_with(0.5), 0.5 * error_with(1e3));
+}
+
 TEST(AdjustBundle, HeldPosesAndPointsStayBitwise) {
   BundleData data = DataOf(3, 0.5);
   data.problem.point_fixed.assign(data.problem.points.size(), 0);

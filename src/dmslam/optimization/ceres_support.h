@@ -21,14 +21,16 @@ inline Eigen::Matrix3d LeftJacobianSo3(const Eigen::Vector3d& w) {
   return Eigen::Matrix3d::Identity() + first * hat + second * hat * hat;
 }
 
-/// Huber's loss that can be switched off between two solves of the same problem.
-class SwitchedHuberLoss : public ceres::LossFunction {
+/// Huber's loss or Cauchy's: which one may change between two solves of the same problem.
+class BundleLoss : public ceres::LossFunction {
  public:
-  explicit SwitchedHuberLoss(double delta) : delta_(delta), delta_squared_(delta * delta) {}
+  enum class Kind { kHuber, kCauchy };
+  BundleLoss(double huber_delta, double cauchy_width)
+      : delta_(huber_delta), delta_squared_(delta_ * delta_), width_squared_(cauchy_width * cauchy_width) {}
 
-  bool robust = true;
+  Kind kind = Kind::kHuber;
 
-  void EvaluateRobust(double squared, double rho[3]) const {
+  void EvaluateHuber(double squared, double rho[3]) const {
     if (squared <= delta_squared_) {
       rho[0] = squared, rho[1] = 1.0, rho[2] = 0.0;
       return;
@@ -39,15 +41,17 @@ class SwitchedHuberLoss : public ceres::LossFunction {
     rho[2] = -rho[1] / (2.0 * squared);
   }
   void Evaluate(double squared, double rho[3]) const override {
-    if (robust) {
-      EvaluateRobust(squared, rho);
-    } else {
-      rho[0] = squared, rho[1] = 1.0, rho[2] = 0.0;
-    }
+    kind == Kind::kHuber ? EvaluateHuber(squared, rho) : EvaluateCauchy(squared, rho);
   }
 
  private:
-  double delta_, delta_squared_;
+  void EvaluateCauchy(double squared, double rho[3]) const {
+    const double sum = 1.0 + squared / width_squared_;
+    rho[0] = width_squared_ * std::log(sum), rho[1] = 1.0 / sum;
+    rho[2] = -rho[1] * rho[1] / width_squared_;
+  }
+
+  double delta_, delta_squared_, width_squared_;
 };
 
 /// Ends a solve when the caller asks for it; the best state so far is kept.

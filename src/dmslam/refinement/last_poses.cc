@@ -24,8 +24,8 @@ LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const Trac
 void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
   refiner_.Keep(frame, pose);
   if (pose.state == TrackingState::kLocalizedLater) return;
-  tracked_ns_.push_back(pose.stamp_ns);
-  if (tracked_ns_.size() > max_frames_) tracked_ns_.pop_front();
+  tracked_.push_back({pose.stamp_ns, pose.reference});
+  if (tracked_.size() > max_frames_) tracked_.pop_front();
 }
 
 void LastPoses::RefineNext(const Map& map) {
@@ -52,8 +52,13 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Keyfr
   final_.Add(map, std::move(later));
 }
 
-std::vector<FramePose> LastPoses::Take() {
-  final_.Drop(StandAlone(final_.poses(), std::vector<int64_t>(tracked_ns_.begin(), tracked_ns_.end())));
+/// Frames of a map that was dropped vouch for nothing.
+std::vector<FramePose> LastPoses::Take(const Map& map) {
+  std::vector<TrackedAt> tracked;
+  for (const auto& [stamp_ns, reference] : tracked_) {
+    if (const auto resolved = map.ResolvePose(reference)) tracked.push_back({stamp_ns, resolved->map_id});
+  }
+  final_.Drop(StandAlone(final_.poses(), tracked));
   return final_.Take();
 }
 

@@ -38,7 +38,7 @@ class LastPoses {
   /// Whether a round of that is under way: the map that is handed in must stay as it is.
   bool NeedsMapUnchanged() const { return final_.IsMidRound(); }
   /// Gives the poses, but those that stand alone, and forgets them.
-  std::vector<FramePose> Take();
+  std::vector<FramePose> Take(const Map& map);
 
  private:
   FrameRefiner refiner_;
@@ -46,7 +46,11 @@ class LastPoses {
   PoseSearch search_;  ///< what refined frames see is not news of the map
   bool smooth_;
   size_t max_frames_;
-  std::deque<int64_t> tracked_ns_;  ///< stamps of the newest frames that were tracked as they came
+  struct Tracked {
+    int64_t stamp_ns;
+    KeyframeId reference;
+  };
+  std::deque<Tracked> tracked_;  ///< the newest frames that were tracked as they came
 };
 
 }  // namespace dmslam

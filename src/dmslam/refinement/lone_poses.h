@@ -8,10 +8,17 @@
 
 namespace dmslam {
 
+/// A frame that was tracked as it came, and the map that it is in now.
+struct TrackedAt {
+  int64_t stamp_ns = 0;
+  MapId map_id = 0;
+};
+
 /// Which of the poses stand alone (1) and are not to be told: of frames that were not tracked when they came,
-/// farther in time than anything tracked can vouch for, and too few in a row to vouch for each other. A frame
-/// that is looked for without a motion to go by can be found on somebody who stood elsewhere; a longer way
-/// that fits together cannot. `tracked_ns`: stamps of the frames that were tracked as they came, in order.
-std::vector<uint8_t> StandAlone(std::span<const FinalPose> poses, std::span<const int64_t> tracked_ns);
+/// farther in time than any tracked frame of their map can vouch for, and in too short a row to vouch for
+/// each other. In a row each pose bounds where the next one may be. A frame that is looked for without a
+/// motion to go by can be found on somebody who stood elsewhere; a longer way that fits together cannot.
+/// `tracked`: in order of their stamps.
+std::vector<uint8_t> StandAlone(std::span<const FinalPose> poses, std::span<const TrackedAt> tracked);
 
 }  // namespace dmslam

@@ -24,23 +24,41 @@ std::vector<int64_t> Every33Ms(int64_t from_ms, int64_t to_ms) {
   return stamps;
 }
 
+/// Of the first map.
+std::vector<TrackedAt> TrackedAtMs(std::vector<int64_t> stamps_ms) {
+  std::vector<TrackedAt> tracked;
+  for (const int64_t stamp_ms : stamps_ms) tracked.push_back({stamp_ms * kMs, 1});
+  return tracked;
+}
+
 int NumAlone(const std::vector<uint8_t>& alone) { return std::accumulate(alone.begin(), alone.end(), 0); }
 
 TEST(LonePoses, AShortRowFarFromTheTrackedFramesStandsAlone) {
-  const std::vector<int64_t> tracked = {3000 * kMs, 3033 * kMs};
+  const std::vector<TrackedAt> tracked = TrackedAtMs({3000, 3033});
   EXPECT_EQ(NumAlone(StandAlone(PosesAt({100, 133, 166}), tracked)), 3);
   EXPECT_EQ(NumAlone(StandAlone(PosesAt({100, 133, 166}), {})), 3);
 }
 
 TEST(LonePoses, ARowThatReachesATrackedFrameDoesNot) {
-  const std::vector<int64_t> tracked = {3000 * kMs};
+  const std::vector<TrackedAt> tracked = TrackedAtMs({3000});
   EXPECT_EQ(NumAlone(StandAlone(PosesAt(Every33Ms(2100, 2900)), tracked)), 0);
   EXPECT_EQ(NumAlone(StandAlone(PosesAt({2600, 3200}), tracked)), 0);
 }
 
 TEST(LonePoses, ALongRowVouchesForItself) {
-  const std::vector<int64_t> tracked = {9000 * kMs};
+  const std::vector<TrackedAt> tracked = TrackedAtMs({9000});
   EXPECT_EQ(NumAlone(StandAlone(PosesAt(Every33Ms(0, 1000)), tracked)), 0);
+}
+
+TEST(LonePoses, AFewFarApartAreNoRow) {
+  const std::vector<TrackedAt> tracked = TrackedAtMs({9000});
+  EXPECT_EQ(NumAlone(StandAlone(PosesAt({166, 566, 666}), tracked)), 3) << "they only span half a second";
+}
+
+TEST(LonePoses, TrackedFramesOfAnotherMapVouchForNothing) {
+  const std::vector<TrackedAt> tracked = TrackedAtMs({200});
+  EXPECT_EQ(NumAlone(StandAlone(PosesAt({233, 266}, 1), tracked)), 0);
+  EXPECT_EQ(NumAlone(StandAlone(PosesAt({233, 266}, 2), tracked)), 2);
 }
 
 TEST(LonePoses, RowsOfTwoMapsDoNotVouchForEachOther) {

@@ -434,7 +434,7 @@ FrontendOutput FrontendCore::Finish() {
   while (IsRefining()) RefineNext();
   while (WorkAtEnd()) {
   }
-  for (FramePose& pose : last_poses_.Take()) output.Add(std::move(pose));
+  for (FramePose& pose : last_poses_.Take(map_)) output.Add(std::move(pose));
   late_.Forget();
   return output;
 }
