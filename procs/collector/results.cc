@@ -153,6 +153,11 @@ std::vector<CameraResults> ResultsOfCameras(const RunRecord& run, const Trajecto
   return cameras;
 }
 
+/// "DIR/NAME.txt", and of camera 1 "DIR/NAME_1.txt".
+std::string CameraFile(const std::string& dir, const std::string& name, size_t camera) {
+  return dir + "/" + name + (camera == 0 ? "" : "_" + std::to_string(camera)) + ".txt";
+}
+
 constexpr int64_t kBetweenCamerasNs = int64_t{1} << 55;  // a year: what is between no two stamps of one
 
 /// So that the stamps of several cameras, which go at the same time, can be told apart.
@@ -466,11 +471,10 @@ WrittenResults WriteResults(const std::string& dir, RunRecord run, const Traject
   attempt([&] { std::filesystem::create_directories(dir); });
   std::vector<CameraResults> cameras = ResultsOfCameras(run, builder);
   for (size_t i = 0; i < cameras.size(); ++i) {
-    const std::string ending = (i == 0 ? "" : "_" + std::to_string(i)) + ".txt";
     const TrajectoryBuilder::Trajectories& of_camera = cameras[i].trajectories;
-    attempt([&] { WriteTrajectory(dir + "/trajectory" + ending, of_camera.final); });
-    attempt([&] { WriteTrajectory(dir + "/trajectory_online" + ending, of_camera.online); });
-    attempt([&] { WriteTrajectory(dir + "/keyframes" + ending, of_camera.keyframes); });
+    attempt([&] { WriteTrajectory(CameraFile(dir, "trajectory", i), of_camera.final); });
+    attempt([&] { WriteTrajectory(CameraFile(dir, "trajectory_online", i), of_camera.online); });
+    attempt([&] { WriteTrajectory(CameraFile(dir, "keyframes", i), of_camera.keyframes); });
   }
   const CameraResults& first = cameras.front();
   attempt([&] { WriteToldPoses(dir + "/poses_online.csv", ToldPoses(builder)); });
