@@ -50,7 +50,7 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
     frames_.newest[camera] = -1;
   }
   collector_.ground_truth.resize(options_.NumCameras());
-  run_.others.resize(options_.NumCameras() - 1);
+  run_.cameras.resize(options_.NumCameras());
   for (std::string& path : collector_.ground_truth) path = path == "-" ? "" : path;
   RecallEndedMap();
 }
@@ -66,32 +66,27 @@ void CollectorNode::RecallEndedMap() {
   info.camera = found.map->session.camera;
   info.sequence = found.map->session.sequence;
   info.mode = found.map->session.mode;
-  ended_map_ = std::move(found.map->map);
+  ended_map_.found = std::move(found.map->map);
   KnowCamera(info);
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
   frames_.total += info.num_frames;
-  if (info.camera_id == 0) {
-    run_.sequence = info.sequence;
-  } else {
-    run_.others[info.camera_id - 1].sequence = info.sequence;
-  }
+  run_.cameras[info.camera_id].sequence = info.sequence;
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
   builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.Read<Pyramid>());
-  if (ended_map_) {
-    safe_version_ = ended_map_->version();
-    builder_->SetMap(*std::exchange(ended_map_, std::nullopt));
+  if (ended_map_.found) {
+    ended_map_.safe_version = ended_map_.found->version();
+    builder_->SetMap(*std::exchange(ended_map_.found, std::nullopt));
   }
   begun_ns_ = context_.now_ns();
   run_.mode = info.mode == PlaybackMode::kLockstep ? "lockstep" : "realtime";
   run_.profile = options_.settings.profile();
   run_.seed = options_.settings.Read<RunOptions>().seed;
-  run_.ground_truth = collector_.ground_truth[0];
-  for (CameraId camera = 1; camera < options_.NumCameras(); ++camera)
-    run_.others[camera - 1].ground_truth = collector_.ground_truth[camera];
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    run_.cameras[camera].ground_truth = collector_.ground_truth[camera];
   OpenJournal();
   BeginCheckpoints();
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
@@ -125,9 +120,8 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
 /// Noted: a collector after this one may come when the player has left.
 void CollectorNode::OnEnd(const EndOfSequence& end) {
   if (end.camera_id >= options_.NumCameras()) return;
-  ends_[end.camera_id] = end;
-  if (!journal_ || noted_ends_.contains(end.camera_id)) return;
-  noted_ends_.insert(end.camera_id);
+  ends_.heard[end.camera_id] = end;
+  if (!journal_ || !ends_.noted.insert(end.camera_id).second) return;
   std::ostringstream note;
   note << "end " << end.camera_id << ' ' << end.frames_published << ' ' << end.frames_missing << ' '
        << end.frames_blacked << ' ' << end.frames_jumped;
@@ -136,8 +130,7 @@ void CollectorNode::OnEnd(const EndOfSequence& end) {
 
 void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   if (pose.camera_id >= options_.NumCameras() || !collector_.ground_truth[pose.camera_id].empty()) return;
-  std::vector<StampedPose>& heard =
-      pose.camera_id == 0 ? run_.heard_ground_truth : run_.others[pose.camera_id - 1].heard_ground_truth;
+  std::vector<StampedPose>& heard = run_.cameras[pose.camera_id].heard_ground_truth;
   if (!heard.empty() && pose.stamp_ns <= heard.back().stamp_ns) return;
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
@@ -145,18 +138,19 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
 /// A process is heard; where another one of its name was before it, that one's counters are kept. What a
 /// collector after this one must know of it goes into the journal.
 void CollectorNode::OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
-  std::set<int32_t>& known = process_ids_[process];
-  if (known.contains(pid) || !journal_) return;
-  known.insert(pid);
+  Followed& known = processes_[process];
+  if (known.ids.contains(pid) || !journal_) return;
+  known.ids.insert(pid);
   std::ostringstream note;
   note << "process " << process << ' ' << pid;
-  if (known.size() > 1) {
+  if (known.ids.size() > 1) {
     ++run_.restarts;
-    former_[process] = so_far;
-    if (process == "frontend") former_frontends_[0] = run_.frontend;
+    known.former = so_far;
+    if (process == "frontend") known.former_frontend = run_.cameras[0].frontend;
     for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << so_far.*counter;
     if (process == "frontend")
-      for (int64_t FrontendStatus::*counter : kFrontendCounters) note << ' ' << run_.frontend.*counter;
+      for (int64_t FrontendStatus::*counter : kFrontendCounters)
+        note << ' ' << run_.cameras[0].frontend.*counter;
   }
   journal_->AppendNote(note.str());
 }
@@ -168,7 +162,8 @@ void CollectorNode::NoteCounters() {
     note << "counters " << process << ' ' << health.pid;
     for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << health.*counter;
     if (process == "frontend")
-      for (int64_t FrontendStatus::*counter : kFrontendCounters) note << ' ' << run_.frontend.*counter;
+      for (int64_t FrontendStatus::*counter : kFrontendCounters)
+        note << ' ' << run_.cameras[0].frontend.*counter;
     journal_->AppendNote(note.str());
   }
 }
@@ -181,13 +176,13 @@ void CollectorNode::ReadNote(const std::string& text) {
   uint64_t keyframe = 0;
   MapId map_id = 0;
   int32_t pid = 0;
-  if (kind == "keyframe" && note >> keyframe >> map_id) proposed_[KeyframeId{keyframe}] = map_id;
+  if (kind == "keyframe" && note >> keyframe >> map_id) proposals_.maps[KeyframeId{keyframe}] = map_id;
   if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "resumed") OnResume();
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;
   if (CameraId camera = 0; kind == "end" && note >> camera && camera < options_.NumCameras()) {
-    EndOfSequence& end = ends_[camera];
+    EndOfSequence& end = ends_.heard[camera];
     end.camera_id = camera;
     note >> end.frames_published >> end.frames_missing >> end.frames_blacked >> end.frames_jumped;
   }
@@ -196,13 +191,14 @@ void CollectorNode::ReadNote(const std::string& text) {
     health.pid = pid;
     for (int64_t ProcessHealth::*counter : kHealthCounters) note >> health.*counter;
     if (process != "frontend") return;
-    for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> run_.frontend.*counter;
+    for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> run_.cameras[0].frontend.*counter;
   }
   if (kind != "process" || !(note >> process >> pid)) return;
-  if (process_ids_[process].insert(pid).second && process_ids_[process].size() > 1) ++run_.restarts;
-  for (int64_t ProcessHealth::*counter : kHealthCounters) note >> former_[process].*counter;
+  Followed& known = processes_[process];
+  if (known.ids.insert(pid).second && known.ids.size() > 1) ++run_.restarts;
+  for (int64_t ProcessHealth::*counter : kHealthCounters) note >> known.former.*counter;
   if (process != "frontend") return;
-  for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> former_frontends_[0].*counter;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> known.former_frontend.*counter;
 }
 
 /// Counters begin at zero in a process that was started again: those of the ones before it are added. False
@@ -213,7 +209,7 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
   if (!ours) return false;
   ProcessHealth& health = run_.health[process];
   OnProcess(process, head.health.pid, health);
-  const ProcessHealth& former = former_[process];
+  const ProcessHealth& former = processes_[process].former;
   const double largest = std::max(health.rss_mb, head.health.rss_mb);
   run_.memory[process].push_back({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
   health = head.health;
@@ -233,26 +229,28 @@ void CollectorNode::CountOwn() {
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
   const CameraId camera = status.camera_id;
-  if (camera >= options_.NumCameras() || !OnHealth(OfCamera("frontend", camera), status.head)) return;
+  const std::string process = OfCamera("frontend", camera);
+  if (camera >= options_.NumCameras() || !OnHealth(process, status.head)) return;
   for (int64_t FrontendStatus::*counter : kFrontendCounters)
-    status.*counter += former_frontends_[camera].*counter;
-  (camera == 0 ? run_.frontend : run_.others[camera - 1].frontend) = std::move(status);
+    status.*counter += processes_[process].former_frontend.*counter;
+  run_.cameras[camera].frontend = std::move(status);
 }
 
 void CollectorNode::OnProposal(KeyframeId id, MapId map_id) {
-  if (!proposed_.contains(id))
+  if (!proposals_.maps.contains(id))
     journal_->AppendNote("keyframe " + std::to_string(id.value) + " " + std::to_string(map_id));
-  proposed_[id] = map_id;
-  heard_ns_.emplace(id, context_.now_ns());
+  proposals_.maps[id] = map_id;
+  proposals_.heard_ns.emplace(id, context_.now_ns());
 }
 
 /// As all who listen see it: the streams' own time is in it, and whatever the mapper did before.
 void CollectorNode::TimeKeyframe(const MapDelta& delta) {
-  const auto heard = delta.about ? heard_ns_.find(*delta.about) : heard_ns_.end();
-  if (heard == heard_ns_.end()) return;
+  const auto& heard_ns = proposals_.heard_ns;
+  const auto heard = delta.about ? heard_ns.find(*delta.about) : heard_ns.end();
+  if (heard == heard_ns.end()) return;
   const double elapsed_ms = static_cast<double>(context_.now_ns() - heard->second) * 1e-6;
-  if (delta.event == MapEvent::kLandmarksCreated) run_.keyframe_to_landmarks_ms.push_back(elapsed_ms);
-  if (delta.event == MapEvent::kAdjusted) run_.keyframe_to_adjusted_ms.push_back(elapsed_ms);
+  if (delta.event == MapEvent::kLandmarksCreated) run_.keyframes.to_landmarks_ms.push_back(elapsed_ms);
+  if (delta.event == MapEvent::kAdjusted) run_.keyframes.to_adjusted_ms.push_back(elapsed_ms);
 }
 
 void CollectorNode::OnFramePose(const Record& record) {
@@ -287,22 +285,22 @@ void CollectorNode::CountReset(const MapReset& reset) {
 /// the frontend keeps it too.
 void CollectorNode::KeepOnDisk(const Record& record) {
   journal_->Append(*record.bytes);
-  if (journal_->complete() || disk_refuses_) return;
-  disk_refuses_ = true;
-  say_again_ns_ = context_.now_ns() + kSayAgainNs;
+  if (journal_->complete() || disk_.refuses) return;
+  disk_.refuses = true;
+  disk_.say_again_ns = context_.now_ns() + kSayAgainNs;
   if (run_.disk_problems.empty()) run_.disk_problems.push_back(journal_->problem());
   LogError("{}; the run goes on, and frame poses wait in memory, not acknowledged, until there is room",
            journal_->problem());
 }
 
 void CollectorNode::RetryDisk() {
-  if (!disk_refuses_) return;
+  if (!disk_.refuses) return;
   const int64_t waiting = journal_->pending();
   if (journal_->Flush()) {
-    disk_refuses_ = false;
+    disk_.refuses = false;
     LogInfo("the disk takes frame poses again: all that waited are written");
-  } else if (context_.now_ns() >= say_again_ns_) {
-    say_again_ns_ = context_.now_ns() + kSayAgainNs;
+  } else if (context_.now_ns() >= disk_.say_again_ns) {
+    disk_.say_again_ns = context_.now_ns() + kSayAgainNs;
     LogWarning("{} frame poses wait for room on the disk", waiting);
   }
   AcceptWhatIsSafe();
@@ -377,12 +375,12 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
 /// What was proposed in a map that still stands must be in it, or have left it by being culled.
 void CollectorNode::CountMissingKeyframes() {
   const Map& map = builder_->map();
-  run_.keyframes_proposed = proposed_.size();
-  for (const auto& [id, map_id] : proposed_) {
+  run_.keyframes.proposed = proposals_.maps.size();
+  for (const auto& [id, map_id] : proposals_.maps) {
     const bool known = map.FindKeyframe(id) != nullptr || map.keyframe_tombstones().contains(id);
     if (known || dropped_maps_.contains(map_id)) continue;
-    const bool before_crash = proposed_before_crash_.contains(id);
-    ++(before_crash ? run_.keyframes_lost_in_crash : run_.keyframes_missing);
+    const bool before_crash = proposals_.before_crash.contains(id);
+    ++(before_crash ? run_.keyframes.lost_in_crash : run_.keyframes.missing);
     if (!before_crash) LogWarning("the keyframe of frame {} is missing in map {}", id.frame_index(), map_id);
   }
 }
@@ -413,7 +411,7 @@ void CollectorNode::OpenJournal() {
   } else {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
-  former_["collector"] = run_.health["collector"];
+  processes_["collector"].former = run_.health["collector"];
   OnProcess("collector", MeasureProcess().pid, run_.health["collector"]);
   if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
@@ -428,7 +426,7 @@ void CollectorNode::OpenJournal() {
 /// All who held the map had died, and a mapper begins with the last checkpoint: what came after it is gone.
 void CollectorNode::OnResume() {
   ++run_.resumes;
-  for (const auto& [id, map_id] : proposed_) proposed_before_crash_.insert(id);
+  for (const auto& [id, map_id] : proposals_.maps) proposals_.before_crash.insert(id);
 }
 
 void CollectorNode::BeginCheckpoints() {
@@ -453,7 +451,7 @@ bool CollectorNode::MapMayBeKept() const {
 }
 
 void CollectorNode::KeepCheckpoint() {
-  if (written_) return;
+  if (IsWritten()) return;
   checkpointer_->OnMap(builder_->map(), MapMayBeKept(), frames_.newest_stamp_ns, session_start_);
   const std::string problem = checkpointer_->TakeProblem();
   if (problem.empty()) return;
@@ -462,7 +460,7 @@ void CollectorNode::KeepCheckpoint() {
 }
 
 int64_t CollectorNode::WorkDeadline() const {
-  return checkpointer_ && !written_ ? checkpointer_->deadline_ns() : INT64_MAX;
+  return checkpointer_ && !IsWritten() ? checkpointer_->deadline_ns() : INT64_MAX;
 }
 
 std::vector<KeyframeId> CollectorNode::LoopsOf(std::optional<KeyframeId> id) const {
@@ -495,7 +493,8 @@ bool CollectorNode::TakeMapRecord() {
   }
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
-  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot && !proposed_.empty()) {
+  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot &&
+      !proposals_.maps.empty()) {
     OnResume();
     journal_->AppendNote("resumed");
   }
@@ -523,16 +522,16 @@ void CollectorNode::AcceptMap() {
 
 bool CollectorNode::EndedMapIsSafe() {
   const Map& map = builder_->map();
-  if (written_ || map.keyframes().empty() || !checkpointer_->enabled()) return true;
-  if (safe_version_ == map.version()) return true;
-  if (context_.now_ns() < try_again_ns_ || MapHeld(*map_reader_).empty()) return false;
-  try_again_ns_ = context_.now_ns() + kTryAgainNs;
+  if (IsWritten() || map.keyframes().empty() || !checkpointer_->enabled()) return true;
+  if (ended_map_.safe_version == map.version()) return true;
+  if (context_.now_ns() < disk_.try_again_ns || MapHeld(*map_reader_).empty()) return false;
+  disk_.try_again_ns = context_.now_ns() + kTryAgainNs;
   checkpointer_->OnMap(map, false, frames_.newest_stamp_ns, session_start_);
   const bool kept = MapMayBeKept() && checkpointer_->WriteLast(map, true, session_start_);
-  if (ended_ns_ == 0) ended_ns_ = context_.now_ns();
-  const bool too_late = context_.now_ns() - ended_ns_ > kRoomOnDiskNs;
-  if (kept || too_late || !session_start_) safe_version_ = map.version();
-  return safe_version_ == map.version();
+  if (!ended_map_.here_ns) ended_map_.here_ns = context_.now_ns();
+  const bool too_late = context_.now_ns() - *ended_map_.here_ns > kRoomOnDiskNs;
+  if (kept || too_late || !session_start_) ended_map_.safe_version = map.version();
+  return ended_map_.safe_version == map.version();
 }
 
 bool CollectorNode::WorkOnce() {
@@ -555,7 +554,7 @@ bool CollectorNode::FrontendsHaveEnded() {
   };
   if (std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AtEnd(); })) return true;
   if (builder_->map().progress().ended && all_silent(kSilentAfterEndNs)) return true;
-  if (ends_.size() < options_.NumCameras() || !all_silent(kNobodyNs)) return false;
+  if (ends_.heard.size() < options_.NumCameras() || !all_silent(kNobodyNs)) return false;
   run_.end_problem = "the sequence had ended, and no frontend was heard for " +
                      std::to_string(kNobodyNs / 1'000'000'000) + " s: the map may lack its last changes";
   LogWarning("{}", run_.end_problem);
@@ -565,13 +564,13 @@ bool CollectorNode::FrontendsHaveEnded() {
 bool CollectorNode::EndIfDone() {
   if (AllTaken()) NotePositions();
   if (GiveUpOnDisk()) return false;
-  frontends_ended_ = frontends_ended_ || FrontendsHaveEnded();
-  if (!frontends_ended_) return false;
+  ends_.of_frontends = ends_.of_frontends || FrontendsHaveEnded();
+  if (!ends_.of_frontends) return false;
   if (builder_->map().progress().ended) AcceptMap();
   const bool as_it_is = !run_.end_problem.empty();
   if (!as_it_is && !MapIsOver(builder_->map(), *map_reader_, kSilentAfterEndNs)) return false;
-  if (drained_ns_ == 0) drained_ns_ = context_.now_ns();
-  if (context_.now_ns() - drained_ns_ < kLastStatusesNs) return false;
+  if (!ends_.drained_ns) ends_.drained_ns = context_.now_ns();
+  if (context_.now_ns() - *ends_.drained_ns < kLastStatusesNs) return false;
   WriteAtEnd();
   return false;
 }
@@ -579,11 +578,11 @@ bool CollectorNode::EndIfDone() {
 /// The sequence has ended, all poses are here, and the disk does not take them.
 bool CollectorNode::GiveUpOnDisk() {
   if (journal_->complete() || !AllTaken()) {
-    refused_since_ns_.reset();
+    disk_.refused_since_ns.reset();
     return false;
   }
-  if (!refused_since_ns_) refused_since_ns_ = context_.now_ns();
-  if (context_.now_ns() - *refused_since_ns_ < kRoomOnDiskNs) return true;
+  if (!disk_.refused_since_ns) disk_.refused_since_ns = context_.now_ns();
+  if (context_.now_ns() - *disk_.refused_since_ns < kRoomOnDiskNs) return true;
   const std::string lacks = std::to_string(journal_->pending()) + " frame poses could not be written";
   run_.disk_problems.push_back(lacks);
   const std::string problem = WriteResultFiles(false);
@@ -594,44 +593,36 @@ bool CollectorNode::GiveUpOnDisk() {
 
 /// Where there is no room for the results, there may be soon.
 void CollectorNode::WriteAtEnd() {
-  if (context_.now_ns() < try_again_ns_) return;
+  if (context_.now_ns() < disk_.try_again_ns) return;
   const std::string problem = WriteResultFiles(true);
   if (problem.empty()) return ExitAtEnd();
-  try_again_ns_ = context_.now_ns() + kTryAgainNs;
-  if (context_.now_ns() - drained_ns_ > kRoomOnDiskNs) return Exit(kExitInput, problem);
-  if (!std::exchange(results_wait_, true)) LogError("{}; tries again", problem);
+  disk_.try_again_ns = context_.now_ns() + kTryAgainNs;
+  if (context_.now_ns() - *ends_.drained_ns > kRoomOnDiskNs) return Exit(kExitInput, problem);
+  if (std::exchange(results_, Results::kDelayed) != Results::kDelayed) LogError("{}; tries again", problem);
 }
 
 void CollectorNode::ExitAtEnd() {
   const bool any_pose = std::any_of(builder_->frame_poses().begin(), builder_->frame_poses().end(),
                                     [](const auto& item) { return item.second.HasPose(); });
-  std::string why = run_.frontend.head.reason;
+  std::string why = run_.cameras[0].frontend.head.reason;
   Exit(any_pose ? kExitDone : kExitNoFrame,
        any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
 }
 
 /// How many frames there were, as the players said it at the end, or else as far as is known.
 void CollectorNode::TakeEnds() {
-  for (const auto& [frame, pose] : builder_->frame_poses())
-    ++(frame.camera == 0 ? run_.frames_published : run_.others[frame.camera - 1].frames_published);
-  for (const auto& [camera, end] : ends_) {
-    if (camera > 0 && camera <= run_.others.size()) {
-      run_.others[camera - 1].frames_published = end.frames_published;
-      run_.others[camera - 1].frames_missing = end.frames_missing;
-    }
-    if (camera != 0) continue;
-    run_.end_heard = true;
-    run_.frames_published = end.frames_published;
-    run_.frames_missing = end.frames_missing;
-    run_.frames_blacked = end.frames_blacked;
-    run_.frames_jumped = end.frames_jumped;
-  }
+  for (const auto& [frame, pose] : builder_->frame_poses()) ++run_.cameras[frame.camera].frames.published;
+  for (const auto& [camera, end] : ends_.heard)
+    run_.cameras[camera].frames = {end.frames_published, end.frames_missing, end.frames_blacked,
+                                   end.frames_jumped};
+  run_.end_heard = ends_.heard.contains(0);
 }
 
 /// All that the results are made of, once. `ended`: the sequence has come to its end. One that is interrupted
 /// can be resumed.
 void CollectorNode::Gather(bool ended) {
-  if (std::exchange(gathered_, true)) return;
+  if (results_ != Results::kNone) return;
+  results_ = Results::kGathered;
   if (ended) checkpointer_->Finish();
   if (!ended) checkpointer_->WriteLast(builder_->map(), MapMayBeKept(), session_start_);
   journal_->ForEach([this](std::span<const uint8_t> record) {
@@ -651,7 +642,7 @@ std::string CollectorNode::WriteResultFiles(bool ended) {
   Gather(ended);
   const WrittenResults results = WriteResults(collector_.out_dir, run_, *builder_, collector_.for_people);
   if (!results.problem.empty() && ended) return results.problem;
-  written_ = true;
+  results_ = Results::kWritten;
   if (collector_.progress) std::fputs("\n", stderr);
   if (collector_.for_people) std::fputs(results.table.c_str(), stdout);
   std::fflush(stdout);
@@ -663,7 +654,7 @@ std::string CollectorNode::WriteResultFiles(bool ended) {
 
 /// The run is interrupted.
 void CollectorNode::Write() {
-  if (written_ || !builder_) return;
+  if (IsWritten() || !builder_) return;
   const std::string problem = WriteResultFiles(false);
   if (!problem.empty()) Exit(kExitInput, problem);
 }
@@ -681,28 +672,30 @@ std::string CollectorNode::OfTotal() const {
 /// Into the log: where a first map stands, and every so many frames.
 void CollectorNode::SayProgress() {
   constexpr int64_t kEveryFrames = 20;
-  if (frames_.seen < next_progress_ || builder_->map().keyframes().empty()) return;
-  next_progress_ = frames_.seen + kEveryFrames;
+  if (frames_.seen < due_.progress_frames || builder_->map().keyframes().empty()) return;
+  due_.progress_frames = frames_.seen + kEveryFrames;
   LogInfo("frame {}{}, {} keyframes", frames_.seen, OfTotal(), builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {
-  if (journal_ && !written_) NotePositions();
-  if (journal_ && !written_) RetryDisk();
-  if (journal_ && !written_ && context_.now_ns() >= next_sync_ns_) {
-    next_sync_ns_ = context_.now_ns() + kSyncEveryNs;
+  if (!journal_ || IsWritten()) return;
+  NotePositions();
+  RetryDisk();
+  if (context_.now_ns() >= due_.sync_ns) {
+    due_.sync_ns = context_.now_ns() + kSyncEveryNs;
     checkpointer_->SyncJournal();
   }
-  if (journal_ && !written_) CountOwn();
-  if (journal_ && !written_ && context_.now_ns() >= next_counters_ns_) {
-    next_counters_ns_ = context_.now_ns() + kCountersEveryNs;
+  CountOwn();
+  if (context_.now_ns() >= due_.counters_ns) {
+    due_.counters_ns = context_.now_ns() + kCountersEveryNs;
     NoteCounters();
   }
-  if (!collector_.progress || !builder_ || written_) return;
+  if (!collector_.progress) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",
-               run_.sequence.c_str(), static_cast<long long>(frames_.seen), OfTotal().c_str(),
-               run_.frontend.inliers > 0 ? "tracking" : "waiting", run_.frontend.inliers,
-               builder_->map().keyframes().size(), builder_->map().num_landmarks());
+               run_.cameras[0].sequence.c_str(), static_cast<long long>(frames_.seen), OfTotal().c_str(),
+               run_.cameras[0].frontend.inliers > 0 ? "tracking" : "waiting",
+               run_.cameras[0].frontend.inliers, builder_->map().keyframes().size(),
+               builder_->map().num_landmarks());
   std::fflush(stderr);
 }
 

@@ -40,6 +40,48 @@ class CollectorNode : public StreamNode {
     int64_t newest_stamp_ns = 0;         ///< time of the newest
     std::map<CameraId, int64_t> newest;  ///< of every camera, its index; -1: none has come
   };
+  /// Processes of one name that followed one another.
+  struct Followed {
+    std::set<int32_t> ids;  ///< of them all
+    ProcessHealth former;   ///< counters of those before the present one, together
+    FrontendStatus former_frontend;
+  };
+  /// Keyframes that the frontend said should be.
+  struct Proposals {
+    std::map<KeyframeId, MapId> maps;
+    std::map<KeyframeId, int64_t> heard_ns;  ///< when each was said to be one
+    std::set<KeyframeId> before_crash;       ///< those of before all processes died
+  };
+  /// What waits for room on the disk.
+  struct Disk {
+    bool refuses = false;                     ///< frame poses wait
+    std::optional<int64_t> refused_since_ns;  ///< ... and nothing else is to come
+    int64_t say_again_ns = 0;
+    int64_t try_again_ns = 0;  ///< to write the last map, or the results
+  };
+  /// The map with which the run has ended.
+  struct EndedMap {
+    std::optional<Replica> found;          ///< on the disk, not yet taken over
+    std::optional<uint64_t> safe_version;  ///< need not be written again
+    std::optional<int64_t> here_ns;        ///< since when it is here
+  };
+  /// How the run ends.
+  struct Ends {
+    std::map<CameraId, EndOfSequence> heard;
+    std::set<CameraId> noted;  ///< of those heard, in the journal
+    bool of_frontends = false;
+    std::optional<int64_t> drained_ns;  ///< since when all streams have been read to their end
+  };
+  enum class Results : uint8_t {
+    kNone,
+    kGathered,  ///< to be written
+    kDelayed,   ///< the disk had no room for them
+    kWritten,
+  };
+  struct Due {
+    int64_t sync_ns = 0, counters_ns = 0;
+    int64_t progress_frames = 0;
+  };
 
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
@@ -84,6 +126,7 @@ class CollectorNode : public StreamNode {
   bool GiveUpOnDisk();
   void WriteAtEnd();
   void ExitAtEnd();
+  bool IsWritten() const { return results_ == Results::kWritten; }
   void Gather(bool ended);
   std::string WriteResultFiles(bool ended);
   void Write();
@@ -94,36 +137,20 @@ class CollectorNode : public StreamNode {
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
   std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
-  std::map<std::string, std::set<int32_t>> process_ids_;
-  std::map<std::string, ProcessHealth>
-      former_;  ///< counters of processes that another has followed, together
-  std::map<CameraId, FrontendStatus> former_frontends_;
-  std::map<KeyframeId, MapId> proposed_;        ///< keyframes that the frontend said should be
-  std::map<KeyframeId, int64_t> heard_ns_;      ///< when each was said to be one
-  std::set<KeyframeId> proposed_before_crash_;  ///< of them, those of before all processes died
+  std::map<std::string, Followed> processes_;  ///< by name
+  Proposals proposals_;
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
   std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal
   std::optional<SessionStart> session_start_;   ///< as the frontend said it
-  std::optional<Replica> ended_map_;            ///< found on the disk, not yet taken over
-  bool disk_refuses_ = false;                   ///< frame poses wait for it
-  std::optional<int64_t> refused_since_ns_;     ///< ... and nothing else is to come
-  int64_t say_again_ns_ = 0;
-  int64_t try_again_ns_ = 0;              ///< to write the last map, or the results
-  int64_t ended_ns_ = 0;                  ///< when the last map was here
-  std::optional<uint64_t> safe_version_;  ///< of the last map: need not be written again
-  bool gathered_ = false;                 ///< the results are to be written
-  bool results_wait_ = false;             ///< ... and the disk had no room for them
+  EndedMap ended_map_;
+  Disk disk_;
+  Ends ends_;
+  Results results_ = Results::kNone;
+  Due due_;
   int64_t begun_ns_ = 0;
-  int64_t next_sync_ns_ = 0, next_counters_ns_ = 0;
-  int64_t next_progress_ = 0;
-  std::map<CameraId, EndOfSequence> ends_;
-  std::set<CameraId> noted_ends_;
   FrameCount frames_;
-  int64_t drained_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
-  bool frontends_ended_ = false;
-  bool written_ = false;
 };
 
 }  // namespace dmslam

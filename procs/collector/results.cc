@@ -124,8 +124,8 @@ struct Errors {
 };
 
 /// From the file, or as it was heard; none: empty.
-std::vector<StampedPose> GroundTruthOf(const std::string& path, const std::vector<StampedPose>& heard) {
-  return path.empty() ? heard : ReadGroundTruth(path).poses;
+std::vector<StampedPose> GroundTruthOf(const CameraRecord& camera) {
+  return camera.ground_truth.empty() ? camera.heard_ground_truth : ReadGroundTruth(camera.ground_truth).poses;
 }
 
 Errors Evaluate(std::vector<StampedPose> ground_truth, const TrajectoryBuilder::Trajectories& trajectories) {
@@ -139,23 +139,23 @@ Errors Evaluate(std::vector<StampedPose> ground_truth, const TrajectoryBuilder::
   return errors;
 }
 
-/// Several cameras beside one another.
 struct CameraResults {
   const CameraRecord* run = nullptr;
   TrajectoryBuilder::Trajectories trajectories;
   Errors errors;
 };
 
-/// Cameras from 1 on.
-std::vector<CameraResults> ResultsOfOthers(const RunRecord& run, const TrajectoryBuilder& builder) {
-  std::vector<CameraResults> others;
-  for (const CameraRecord& other : run.others) {
-    CameraResults results{&other, builder.Build(static_cast<CameraId>(others.size() + 1)), {}};
-    results.errors =
-        Evaluate(GroundTruthOf(other.ground_truth, other.heard_ground_truth), results.trajectories);
-    others.push_back(std::move(results));
-  }
-  return others;
+/// Not evaluated yet.
+std::vector<CameraResults> ResultsOfCameras(const RunRecord& run, const TrajectoryBuilder& builder) {
+  std::vector<CameraResults> cameras;
+  for (const CameraRecord& camera : run.cameras)
+    cameras.push_back({&camera, builder.Build(static_cast<CameraId>(cameras.size())), {}});
+  return cameras;
+}
+
+/// "DIR/NAME.txt", and of camera 1 "DIR/NAME_1.txt".
+std::string CameraFile(const std::string& dir, const std::string& name, size_t camera) {
+  return dir + "/" + name + (camera == 0 ? "" : "_" + std::to_string(camera)) + ".txt";
 }
 
 constexpr int64_t kBetweenCamerasNs = int64_t{1} << 55;  // a year: what is between no two stamps of one
@@ -169,15 +169,12 @@ void AppendShifted(const std::vector<StampedPose>& poses, size_t camera, std::ve
 }
 
 /// Of all cameras, with one similarity for all: the world is one.
-std::optional<AteReport> EvaluateJointly(const TrajectoryBuilder::Trajectories& first,
-                                         const Errors& first_errors, const std::vector<CameraResults>& others,
+std::optional<AteReport> EvaluateJointly(const std::vector<CameraResults>& cameras,
                                          std::vector<StampedPose> TrajectoryBuilder::Trajectories::*which) {
   std::vector<StampedPose> truth, poses;
-  AppendShifted(first_errors.ground_truth, 0, &truth);
-  AppendShifted(first.*which, 0, &poses);
-  for (size_t i = 0; i < others.size(); ++i) {
-    AppendShifted(others[i].errors.ground_truth, i + 1, &truth);
-    AppendShifted(others[i].trajectories.*which, i + 1, &poses);
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    AppendShifted(cameras[i].errors.ground_truth, i, &truth);
+    AppendShifted(cameras[i].trajectories.*which, i, &poses);
   }
   if (truth.empty()) return std::nullopt;
   AteReport report = EvaluateAte(truth, poses);
@@ -188,14 +185,14 @@ Json NumberOrNull(const std::optional<AteReport>& report) {
   return report ? Json(report->rmse()) : Json(nullptr);
 }
 
-PlotFigure FigureOf(const RunRecord& run, const TrajectoryBuilder::Trajectories& trajectories,
-                    const Errors& errors) {
-  const std::string title = run.sequence + ", " + run.mode + ", seed " + std::to_string(run.seed);
+PlotFigure FigureOf(const RunRecord& run, const CameraResults& results) {
+  const auto& [camera, trajectories, errors] = results;
+  const std::string title = camera->sequence + ", " + run.mode + ", seed " + std::to_string(run.seed);
   if (errors.final) {
     char subtitle[120];
     std::snprintf(subtitle, sizeof(subtitle), "ATE RMSE %.4f m, %.1f %% of %lld frames placed",
-                  errors.final->rmse(), Percent(trajectories.final.size(), run.frames_published),
-                  static_cast<long long>(run.frames_published));
+                  errors.final->rmse(), Percent(trajectories.final.size(), camera->frames.published),
+                  static_cast<long long>(camera->frames.published));
     return TrajectoryFigure(errors.ground_truth, trajectories.final, *errors.final, title, subtitle);
   }
   PlotFigure figure;
@@ -240,6 +237,12 @@ Json MemoryGrowthJson(const RunRecord& run) {
   return json;
 }
 
+Json OtherMapsJson(const TrajectoryBuilder::Trajectories& t) {
+  Json others = Json::array();
+  for (const auto& [map_id, frames] : t.other_maps) others.push_back({{"map", map_id}, {"frames", frames}});
+  return others;
+}
+
 Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
                   const TrajectoryBuilder::Trajectories& t) {
   Json json;
@@ -250,58 +253,48 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
       return item.first.camera == 0 && item.second.stamp_ns >= t.online.front().stamp_ns;
     }));
   }
-  json["tracked_online_percent"] = Percent(t.online.size(), run.frames_published);
+  json["tracked_online_percent"] = Percent(t.online.size(), run.first().frames.published);
   json["tracked_online_after_first_map_percent"] =
       Percent(t.online.size(), static_cast<int64_t>(after_first));
-  json["tracked_percent"] = Percent(t.final.size(), run.frames_published);
+  json["tracked_percent"] = Percent(t.final.size(), run.first().frames.published);
   if (!t.online.empty() && !poses.empty()) {
     json["first_init_s"] =
         static_cast<double>(t.online.front().stamp_ns - poses.begin()->second.stamp_ns) * 1e-9;
   } else {
     json["first_init_s"] = nullptr;
   }
-  Json others = Json::array();
-  for (const auto& [map_id, frames] : t.other_maps) others.push_back({{"map", map_id}, {"frames", frames}});
   json["map"] = t.map_id ? Json(*t.map_id) : Json();
-  json["other_maps"] = others;
+  json["other_maps"] = OtherMapsJson(t);
   return json;
 }
 
-Json CameraJson(CameraId camera, const std::string& sequence, int64_t frames, int64_t skipped,
-                const TrajectoryBuilder::Trajectories& t, const Errors& errors) {
+Json CameraJson(CameraId number, const CameraResults& results) {
+  const auto& [camera, t, errors] = results;
   Json json;
-  json["camera"] = camera;
-  json["sequence"] = sequence;
-  json["frames"] = frames;
-  json["frames_skipped"] = skipped;
-  json["tracked_online_percent"] = Percent(t.online.size(), frames);
-  json["tracked_percent"] = Percent(t.final.size(), frames);
+  json["camera"] = number;
+  json["sequence"] = camera->sequence;
+  json["frames"] = camera->frames.published;
+  json["frames_skipped"] = camera->frontend.frames_skipped;
+  json["tracked_online_percent"] = Percent(t.online.size(), camera->frames.published);
+  json["tracked_percent"] = Percent(t.final.size(), camera->frames.published);
   json["keyframes"] = t.keyframes.size();
   json["map"] = t.map_id ? Json(*t.map_id) : Json();
-  Json others = Json::array();
-  for (const auto& [map_id, count] : t.other_maps) others.push_back({{"map", map_id}, {"frames", count}});
-  json["other_maps"] = others;
+  json["other_maps"] = OtherMapsJson(t);
   json["ate_rmse_final"] = NumberOrNull(errors.final);
   json["ate_rmse_online"] = NumberOrNull(errors.online);
   return json;
 }
 
 /// Of several cameras: each, and all together.
-Json CamerasJson(const RunRecord& run, const TrajectoryBuilder::Trajectories& first, const Errors& errors,
-                 const std::vector<CameraResults>& others) {
+Json CamerasJson(const std::vector<CameraResults>& results) {
   using Trajectories = TrajectoryBuilder::Trajectories;
   Json json;
   Json cameras = Json::array();
-  cameras.push_back(
-      CameraJson(0, run.sequence, run.frames_published, run.frontend.frames_skipped, first, errors));
-  for (size_t i = 0; i < others.size(); ++i) {
-    const CameraRecord& record = *others[i].run;
-    cameras.push_back(CameraJson(static_cast<CameraId>(i + 1), record.sequence, record.frames_published,
-                                 record.frontend.frames_skipped, others[i].trajectories, others[i].errors));
-  }
+  for (size_t i = 0; i < results.size(); ++i)
+    cameras.push_back(CameraJson(static_cast<CameraId>(i), results[i]));
   json["cameras"] = cameras;
-  json["ate_rmse_joint"] = NumberOrNull(EvaluateJointly(first, errors, others, &Trajectories::final));
-  json["ate_rmse_joint_online"] = NumberOrNull(EvaluateJointly(first, errors, others, &Trajectories::online));
+  json["ate_rmse_joint"] = NumberOrNull(EvaluateJointly(results, &Trajectories::final));
+  json["ate_rmse_joint_online"] = NumberOrNull(EvaluateJointly(results, &Trajectories::online));
   return json;
 }
 
@@ -314,8 +307,8 @@ Json TimingJson(const RunRecord& run) {
   json["decode_ms"] = Quantiles(Doubles(durations.decode));
   json["extract_ms"] = Quantiles(Doubles(durations.extract));
   json["image_to_pose_ms"] = Quantiles(Doubles(durations.image_to_pose));
-  json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframe_to_landmarks_ms);
-  json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframe_to_adjusted_ms);
+  json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframes.to_landmarks_ms);
+  json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframes.to_adjusted_ms);
   return json;
 }
 
@@ -323,20 +316,22 @@ Json MachineJson(const Machine& machine) { return {{"cpu", machine.processor}, {
 
 /// What was played, and what of it reached the frontend.
 Json PlayedJson(const RunRecord& run) {
+  const PlayedFrames& frames = run.first().frames;
+  const FrontendStatus& frontend = run.first().frontend;
   Json json;
-  json["sequence"] = run.sequence;
+  json["sequence"] = run.first().sequence;
   json["seed"] = run.seed;
   json["mode"] = run.mode;
   json["profile"] = run.profile;
-  json["frames"] = run.frames_published;
-  json["frames_missing"] = run.frames_missing;
-  json["frames_blacked_out"] = run.frames_blacked;
-  json["frames_jumped"] = run.frames_jumped;
-  json["frames_processed"] = run.frontend.frames_processed;
-  json["frames_skipped"] = run.frontend.frames_skipped;
-  json["frames_received"] = run.frontend.frames_received;
+  json["frames"] = frames.published;
+  json["frames_missing"] = frames.missing;
+  json["frames_blacked_out"] = frames.blacked;
+  json["frames_jumped"] = frames.jumped;
+  json["frames_processed"] = frontend.frames_processed;
+  json["frames_skipped"] = frontend.frames_skipped;
+  json["frames_received"] = frontend.frames_received;
   const bool counted = run.end_heard && run.restarts == 0;  // counts since the last status die with a process
-  const int64_t lost = run.frames_published - run.frontend.frames_received;
+  const int64_t lost = frames.published - frontend.frames_received;
   json["frames_lost"] = counted ? Json(std::max<int64_t>(0, lost)) : Json(nullptr);
   return json;
 }
@@ -345,13 +340,13 @@ Json MapJson(const RunRecord& run, const TrajectoryBuilder& builder, const Traje
              const Errors& errors) {
   Json json;
   json["resets"] = run.resets;
-  json["relocalisations"] = run.frontend.relocalisations;
+  json["relocalisations"] = run.first().frontend.relocalisations;
   json["keyframes"] = t.keyframes.size();
   json["landmarks"] = builder.map().num_landmarks();
   json["loops"] = run.loopcloser.loops_closed;
   json["loop_closing"] = LoopJson(run);
-  json["ate_rmse_final"] = errors.final ? Json(errors.final->rmse()) : Json(nullptr);
-  json["ate_rmse_online"] = errors.online ? Json(errors.online->rmse()) : Json(nullptr);
+  json["ate_rmse_final"] = NumberOrNull(errors.final);
+  json["ate_rmse_online"] = NumberOrNull(errors.online);
   json["scale_final"] = errors.final ? Json(errors.final->scale()) : Json(nullptr);
   return json;
 }
@@ -363,9 +358,9 @@ Json FailuresJson(const RunRecord& run) {
   json["resumed"] = run.resumes;
   json["disk_problems"] = run.disk_problems;
   if (!run.end_problem.empty()) json["end_problem"] = run.end_problem;
-  json["keyframes_proposed"] = run.keyframes_proposed;
-  json["keyframes_missing"] = run.keyframes_missing;
-  json["keyframes_lost_in_crash"] = run.keyframes_lost_in_crash;
+  json["keyframes_proposed"] = run.keyframes.proposed;
+  json["keyframes_missing"] = run.keyframes.missing;
+  json["keyframes_lost_in_crash"] = run.keyframes.lost_in_crash;
   return json;
 }
 
@@ -474,27 +469,24 @@ WrittenResults WriteResults(const std::string& dir, RunRecord run, const Traject
     }
   };
   attempt([&] { std::filesystem::create_directories(dir); });
-  const TrajectoryBuilder::Trajectories trajectories = builder.Build(0);
-  attempt([&] { WriteTrajectory(dir + "/trajectory.txt", trajectories.final); });
-  attempt([&] { WriteTrajectory(dir + "/trajectory_online.txt", trajectories.online); });
-  attempt([&] { WriteToldPoses(dir + "/poses_online.csv", ToldPoses(builder)); });
-  attempt([&] { WriteTrajectory(dir + "/keyframes.txt", trajectories.keyframes); });
-  attempt([&] { WriteMapPly(dir + "/map.ply", builder.map(), trajectories.map_id); });
-  attempt([&] { WriteGraph(dir + "/graph.txt", builder.map()); });
-  const Errors errors = Evaluate(GroundTruthOf(run.ground_truth, run.heard_ground_truth), trajectories);
-  const std::vector<CameraResults> others = ResultsOfOthers(run, builder);
-  for (size_t i = 0; i < others.size(); ++i) {
-    const std::string number = "_" + std::to_string(i + 1) + ".txt";
-    const TrajectoryBuilder::Trajectories& of_camera = others[i].trajectories;
-    attempt([&] { WriteTrajectory(dir + "/trajectory" + number, of_camera.final); });
-    attempt([&] { WriteTrajectory(dir + "/trajectory_online" + number, of_camera.online); });
-    attempt([&] { WriteTrajectory(dir + "/keyframes" + number, of_camera.keyframes); });
+  std::vector<CameraResults> cameras = ResultsOfCameras(run, builder);
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    const TrajectoryBuilder::Trajectories& of_camera = cameras[i].trajectories;
+    attempt([&] { WriteTrajectory(CameraFile(dir, "trajectory", i), of_camera.final); });
+    attempt([&] { WriteTrajectory(CameraFile(dir, "trajectory_online", i), of_camera.online); });
+    attempt([&] { WriteTrajectory(CameraFile(dir, "keyframes", i), of_camera.keyframes); });
   }
-  if (figure && !trajectories.final.empty())
-    attempt([&] { WritePng(FigureOf(run, trajectories, errors), dir + "/trajectory.png"); });
+  const CameraResults& first = cameras.front();
+  attempt([&] { WriteToldPoses(dir + "/poses_online.csv", ToldPoses(builder)); });
+  attempt([&] { WriteMapPly(dir + "/map.ply", builder.map(), first.trajectories.map_id); });
+  attempt([&] { WriteGraph(dir + "/graph.txt", builder.map()); });
+  for (CameraResults& camera : cameras)
+    camera.errors = Evaluate(GroundTruthOf(*camera.run), camera.trajectories);
+  if (figure && !first.trajectories.final.empty())
+    attempt([&] { WritePng(FigureOf(run, first), dir + "/trajectory.png"); });
   if (!written.problem.empty()) run.disk_problems.push_back(written.problem);
-  Json summary = SummaryJson(run, builder, trajectories, errors);
-  if (!others.empty()) summary.update(CamerasJson(run, trajectories, errors, others));
+  Json summary = SummaryJson(run, builder, first.trajectories, first.errors);
+  if (cameras.size() > 1) summary.update(CamerasJson(cameras));
   attempt([&] { WriteFile(dir + "/summary.json", summary.dump(2) + "\n"); });
   written.table = Table(summary);
   return written;

@@ -31,44 +31,51 @@ struct FrameDurations {
   void Add(const FrameTrace& trace);
 };
 
-/// Of a camera beside the first one.
+/// As the player said it at the end, or else as far as is known.
+struct PlayedFrames {
+  int64_t published = 0, missing = 0, blacked = 0, jumped = 0;
+};
+
 struct CameraRecord {
   std::string sequence, ground_truth;
-  std::vector<StampedPose> heard_ground_truth;
-  int64_t frames_published = 0, frames_missing = 0;
+  std::vector<StampedPose> heard_ground_truth;  ///< as the player told it: kept where there is no file
+  PlayedFrames frames;
   FrontendStatus frontend;
+};
+
+struct KeyframeRecord {
+  size_t proposed = 0;
+  size_t missing = 0;        ///< proposed for a map that stands, and neither in it nor culled from it
+  size_t lost_in_crash = 0;  ///< made after the last checkpoint before all died, and not made again
+  /// From when each was heard to when its landmarks and its adjustment were [ms].
+  std::vector<double> to_landmarks_ms, to_adjusted_ms;
+};
+
+struct MemorySample {
+  size_t keyframes = 0;
+  double rss_mb = 0;
 };
 
 /// All that the summary of a run is made of.
 struct RunRecord {
-  std::string sequence, mode, profile, ground_truth;
-  std::vector<StampedPose> heard_ground_truth;  ///< as the player told it: kept where there is no file
+  std::string mode, profile;
   uint64_t seed = 0;
-  bool end_heard = false;  ///< of the sequence: how many frames there were is known
-  int64_t frames_published = 0, frames_missing = 0, frames_blacked = 0, frames_jumped = 0;
-  FrontendStatus frontend;
-  std::vector<CameraRecord> others;  ///< cameras from 1 on
+  std::vector<CameraRecord> cameras;  ///< by number; one at least
+  bool end_heard = false;             ///< of the first camera's sequence: how many frames it has is known
   MapperStatus mapper;
   LoopcloserStatus loopcloser;
   std::map<std::string, ProcessHealth> health;
-  FrameDurations durations;
+  std::map<std::string, std::vector<MemorySample>> memory;  ///< of each process, about once a second
+  FrameDurations durations;                                 ///< of the first camera
+  KeyframeRecord keyframes;
   std::vector<CorrectionRecord> corrections;
   uint64_t resets = 0;
   int restarts = 0;
-  size_t keyframes_proposed = 0;
-  /// From when a keyframe was heard to when its landmarks and its adjustment were, one for each keyframe
-  /// [ms].
-  std::vector<double> keyframe_to_landmarks_ms, keyframe_to_adjusted_ms;
-  struct MemorySample {
-    size_t keyframes = 0;
-    double rss_mb = 0;
-  };
-  std::map<std::string, std::vector<MemorySample>> memory;  ///< of each process, about once a second
+  int resumes = 0;                         ///< how often all processes had died
   std::vector<std::string> disk_problems;  ///< why something could not be written while it ran
   std::string end_problem;                 ///< why the end is not what it should have been; empty: it is
-  int resumes = 0;                         ///< how often all processes had died
-  size_t keyframes_lost_in_crash = 0;      ///< made after the last checkpoint before that, and not made again
-  size_t keyframes_missing = 0;  ///< proposed for a map that stands, and neither in it nor culled from it
+
+  const CameraRecord& first() const { return cameras.front(); }
 };
 
 struct WrittenResults {

@@ -325,7 +325,7 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
 
 std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
                                    const FrameSpan& span, uint64_t seed, std::map<std::string, int>* waited) {
-  options.past_first = static_cast<int>(span.first - span.past);
+  options.past.first = static_cast<int>(span.first - span.past);
   Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
   for (size_t frame = span.past; frame < std::min(span.end, sequence.size()); ++frame) {
     InitializerReport report = initializer.AddFrame(

@@ -49,7 +49,7 @@ int CandidateMap::NumPoints() const { return std::accumulate(use.begin(), use.en
 bool CandidateBuilder::Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, const Match& match) const {
   const double variance = options_.selector.inlier.pyramid.SigmaSquared(match.octave1);
   return ReprojectionErrorSquared(camera_.Ideal(), T_k_0, point, match.uv1_px) <=
-         options_.max_view_chi2 * variance;
+         options_.geometry.max_view_chi2 * variance;
 }
 
 bool CandidateBuilder::SameMotion(const Rigid3d& a, const Rigid3d& b) {
@@ -90,7 +90,7 @@ std::optional<CandidateMap> CandidateBuilder::Build(const ReferenceView& last,
   if (!candidate) return std::nullopt;
   for (const ReferenceView* view : between) PlaceView(*view, &*candidate);
   for (const CandidateMap::Placed& placed : candidate->placed) {
-    if (placed.consistent_share >= options_.min_consistent_share) continue;
+    if (placed.consistent_share >= options_.geometry.min_consistent_share) continue;
     *refused = {WaitReason::kInconsistent, "frame " + std::to_string(placed.view->frame.index) + " sees " +
                                                std::to_string(placed.consistent_share) +
                                                " of the points where they should be"};
@@ -122,7 +122,7 @@ double CandidateBuilder::Cost(const CandidateMap& candidate, std::span<const uin
       const double variance = options_.selector.inlier.pyramid.SigmaSquared(seen.octave1);
       const double error =
           ReprojectionErrorSquared(camera_.Ideal(), placed.T_k_0, candidate.points[k], seen.uv1_px);
-      sum[k] += std::min(1.0, error / (variance * options_.max_view_chi2));
+      sum[k] += std::min(1.0, error / (variance * options_.geometry.max_view_chi2));
       count[k] += 1.0;
     });
   }
@@ -205,11 +205,11 @@ void CandidateBuilder::PlaceView(const ReferenceView& view, CandidateMap* candid
   const double fraction = view.since_reference_s / last.since_reference_s;
   const Rigid3d between(Eigen::Quaterniond::Identity().slerp(fraction, T_last.rotation),
                         fraction * T_last.translation);
-  FittedPose best = PlaceFrom(camera_.Ideal(), between, seen, options_.max_view_chi2);
+  FittedPose best = PlaceFrom(camera_.Ideal(), between, seen, options_.geometry.max_view_chi2);
   // A hand does not move evenly.
   if (static_cast<double>(best.inliers.size()) < kEnough * static_cast<double>(seen.size())) {
     const Rigid3d nearest = NearestPose(*candidate, view.since_reference_s);
-    FittedPose other = PlaceFrom(camera_.Ideal(), nearest, seen, options_.max_view_chi2);
+    FittedPose other = PlaceFrom(camera_.Ideal(), nearest, seen, options_.geometry.max_view_chi2);
     if (other.inliers.size() > best.inliers.size()) best = std::move(other);
   }
   candidate->placed.push_back(

@@ -198,7 +198,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
     return Wait(WaitReason::kTooFewFeatures,
                 std::to_string(frame.features->size()) + " of " + std::to_string(options_.min_features));
   }
-  if (only_testified_ < options_.past_first) {
+  if (only_testified_ < options_.past.first) {
     ++only_testified_;
     KeepRecent(frame);
     return Wait(WaitReason::kTooFewFrames, "this one only testifies");
@@ -211,7 +211,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   last_looked_ns_ = frame.stamp_ns;
   DropOld(frame);
   InitializerReport report = TryWindows(frame);
-  if (!report.result && (windows_.empty() || windows_.back().AgeAt(frame) >= options_.reference_step_s)) {
+  if (!report.result && (windows_.empty() || windows_.back().AgeAt(frame) >= options_.references.step_s)) {
     BeginWindow(frame);
   }
   KeepRecent(frame);
@@ -241,18 +241,19 @@ InitializerReport Initializer::Impl::TryWindows(const InitializerFrame& frame) {
 
 void Initializer::Impl::KeepRecent(const InitializerFrame& frame) {
   recent_.push_back(frame);
-  while (SecondsBetween(recent_.front(), frame) > options_.past_s) recent_.pop_front();
+  while (SecondsBetween(recent_.front(), frame) > options_.past.seconds) recent_.pop_front();
 }
 
 void Initializer::Impl::DropOld(const InitializerFrame& frame) {
   std::erase_if(windows_, [&](const ReferenceWindow& window) {
-    return window.AgeAt(frame) > (window.promising ? options_.max_promising_age_s : options_.max_age_s);
+    return window.AgeAt(frame) >
+           (window.promising ? options_.references.max_promising_age_s : options_.references.max_age_s);
   });
 }
 
 /// Of more windows than there may be, with the one that begins, the oldest that promises nothing goes.
 void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
-  while (static_cast<int>(windows_.size()) >= options_.max_references) {
+  while (static_cast<int>(windows_.size()) >= options_.references.most) {
     const auto idle = std::find_if(windows_.begin(), windows_.end(), [](const ReferenceWindow& window) {
       return !window.promising && !window.lead;
     });
@@ -261,9 +262,10 @@ void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
   }
   std::vector<InitializerFrame> before, past;
   for (const InitializerFrame& each : recent_) {
-    if (SecondsBetween(each, frame) <= options_.past_s && each.index != frame.index) before.push_back(each);
+    if (SecondsBetween(each, frame) <= options_.past.seconds && each.index != frame.index)
+      before.push_back(each);
   }
-  const size_t asked = std::min(before.size(), static_cast<size_t>(std::max(0, options_.past_views)));
+  const size_t asked = std::min(before.size(), static_cast<size_t>(std::max(0, options_.past.views)));
   for (size_t k = 0; k < asked; ++k) past.push_back(before[k * before.size() / asked]);
   windows_.emplace_back(frame, std::move(past));
   last_looked_ns_ = frame.stamp_ns;
@@ -429,13 +431,13 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
   std::vector<uint32_t> order(last.pair.matches.size());
   std::iota(order.begin(), order.end(), 0U);
   const MatchArrays arrays = MakeArrays(last.pair.matches, order, camera_, options_.selector.inlier);
-  const std::vector<EssentialMinimum> minima =
-      FindEssentialMinima(arrays, is_static, options_.minima, DeriveSeed(seed_, last.frame.index, "minima"));
+  const std::vector<EssentialMinimum> minima = FindEssentialMinima(
+      arrays, is_static, options_.motion.minima, DeriveSeed(seed_, last.frame.index, "minima"));
   std::optional<CandidateMap> best;
   double runner_up = 1e9;
   *refused = {WaitReason::kNoReconstruction, "the static matches determine no motion"};
   for (const EssentialMinimum& minimum : minima) {
-    if (minimum.cost > options_.minima_slack * minima.front().cost) break;
+    if (minimum.cost > options_.motion.minima_slack * minima.front().cost) break;
     Refused own;
     std::optional<CandidateMap> candidate =
         builder_.Build(last, between, is_static, minimum.model, best ? &own : refused);
@@ -448,12 +450,12 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
     if (!best || candidate->cost < best->cost) best = std::move(candidate);
   }
   if (!best) return std::nullopt;
-  if (runner_up < options_.min_runner_up_cost * best->cost) {
+  if (runner_up < options_.motion.min_runner_up_cost * best->cost) {
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
     return std::nullopt;
   }
-  best->alone = runner_up >= options_.alone_runner_up_cost * best->cost;
-  if (best->cost > (best->alone ? options_.max_cost_alone : options_.max_cost)) {
+  best->alone = runner_up >= options_.motion.alone_runner_up_cost * best->cost;
+  if (best->cost > (best->alone ? options_.motion.max_cost_alone : options_.motion.max_cost)) {
     *refused = {WaitReason::kInconsistent, "no motion explains all views well"};
     return std::nullopt;
   }
@@ -462,12 +464,12 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
 
 bool Initializer::Impl::Passes(const CandidateMap& candidate, Refused* refused) const {
   const int points = candidate.NumPoints();
-  if (points < options_.min_points) {
+  if (points < options_.geometry.min_points) {
     *refused = {WaitReason::kTooFewStatic, std::to_string(points) + " points are seen consistently"};
     return false;
   }
   const double parallax = builder_.Parallax(candidate), sigma = builder_.DirectionSigma(candidate);
-  if (parallax < options_.min_parallax_rad || sigma > options_.max_direction_sigma_rad) {
+  if (parallax < options_.geometry.min_parallax_rad || sigma > options_.geometry.max_direction_sigma_rad) {
     *refused = {WaitReason::kParallaxTooSmall,
                 "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma)};
     return false;
@@ -494,7 +496,7 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
 /// of the camera's. What holds for one view by chance seldom holds for the next.
 bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
   const bool clear =
-      candidate.alone || builder_.DirectionSigma(candidate) <= options_.clear_direction_sigma_rad;
+      candidate.alone || builder_.DirectionSigma(candidate) <= options_.geometry.clear_direction_sigma_rad;
   const bool sure = !window->doubtful && clear && candidate.last().since_reference_s >= options_.sure_age_s;
   if (sure) return true;
   const auto before = window->found;
@@ -514,7 +516,7 @@ bool Initializer::Impl::AgreesWithPast(ReferenceWindow* window, CandidateMap* ca
   for (const ReferenceView& view : window->Past(match)) builder_.PlaceView(view, &longer);
   builder_.KeepConsistent(&longer);
   const int points = candidate->NumPoints(), left = longer.NumPoints();
-  if (points - left > options_.max_past_conflict * points) {
+  if (points - left > options_.past.max_conflict * points) {
     *refused = {WaitReason::kInconsistent, std::to_string(points - left) + " of " + std::to_string(points) +
                                                " points were elsewhere just before"};
     return false;

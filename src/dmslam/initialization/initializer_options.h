@@ -22,6 +22,54 @@ struct ContestOptions {
   double min_overlap = 0.6;      ///< ...with this share of the smaller support in common from view to view
 };
 
+/// Reference frames that are kept side by side. Behind people a moment in which enough of the room is seen is
+/// short, and a window that begins in it finds a map.
+struct ReferenceOptions {
+  int most = 8;
+  double step_s = 0.1;               ///< a new one is taken so long after the last
+  double max_age_s = 2.0;            ///< an older one is given up...
+  double max_promising_age_s = 4.0;  ///< ...or one as old as this, where only parallax is missing
+};
+
+/// How the motion of a pair is searched, and when it is the only one.
+struct PairMotionOptions {
+  MinimaOptions minima;
+  double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
+  double min_runner_up_cost = 1.5;  ///< another motion must cost all views this many times as much
+  /// Mean squared error over all views, as a share of the bound: more is no one motion...
+  double max_cost = 0.1;
+  double max_cost_alone = 0.2;        ///< ...but up to this where nothing else comes near...
+  double alone_runner_up_cost = 3.0;  ///< ...which is to say that another motion costs so many times as much
+};
+
+/// What the geometry of a first map must be.
+struct GeometryOptions {
+  double min_parallax_rad = 0.015;  ///< median over the points; below it the direction is chance
+  /// Standard deviation of the direction of translation, from the residuals: later views mend it.
+  double max_direction_sigma_rad = 0.1;
+  /// A map beside whose motion another one comes near (alone_runner_up_cost) must be found by the next view,
+  /// too, unless its direction is known to so much.
+  double clear_direction_sigma_rad = 0.05;
+  double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
+  double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
+  int min_points = 80;                 ///< points that all views agree on
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("initializer.min_parallax_rad", min_parallax_rad, 0, 1, "rad",
+             "median parallax of the first map's points");
+  }
+};
+
+/// Frames before the reference frame testify: who has just stopped is in his place in all views, but not in
+/// them.
+struct PastOptions {
+  double seconds = 0.45;       ///< they are older than the reference frame by up to so much
+  int views = 6;               ///< so many of them at most; 0: none
+  double max_conflict = 0.08;  ///< of the points, that one of them sees elsewhere; more: wait
+  int first = 0;               ///< so many frames come before the first reference frame: they testify only
+};
+
 /// Times are of the frames' stamps.
 struct InitializerOptions {
   /// Fewer samples than the selector's own default, stricter agreement.
@@ -40,46 +88,21 @@ struct InitializerOptions {
   ReconstructionOptions reconstruction;
   MatchingOptions matching;
 
-  int min_features = 100;       ///< a frame with fewer takes no part
-  double frame_step_s = 0.045;  ///< frames nearer to the last one looked at are left out
-  /// Reference frames that are kept side by side. Behind people a moment in which enough of the room is seen
-  /// is short, and a window that begins in it finds a map.
-  int max_references = 8;
-  double reference_step_s = 0.1;  ///< a new one is taken so long after the last
-  int num_pairs = 3;              ///< pairs with the reference frame that must agree
-  double min_pair_step_s = 0.1;   ///< the frames of two such pairs are apart by so much at least
-  double sure_age_s = 0.4;        ///< a map of views that are nearer in time must be found by the next, too
-  double max_age_s = 2.0;         ///< an older reference frame is given up...
-  double max_promising_age_s =
-      4.0;                 ///< ...or one as old as this, where the pairs agree and only parallax is missing
-  int max_views = 8;       ///< frames after the reference frame that a map is made of, at most
-  int max_adjusted = 300;  ///< points that rival motions are adjusted with; the winner takes all
-  int min_matches = 120;   ///< of a frame with the reference frame; fewer: it is given up
-  double min_displacement_rad =
-      0.015;  ///< median displacement of the matches before a pair is worth its cost
+  ReferenceOptions references;
+  PairMotionOptions motion;
+  GeometryOptions geometry;
+  PastOptions past;
 
-  MinimaOptions minima;             ///< how the motion of the pair is searched
-  double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
-  double min_runner_up_cost = 1.5;  ///< another motion must cost all views this many times as much
-  double max_cost =
-      0.1;  ///< mean squared error over all views, as a share of the bound: more is no one motion...
-  double max_cost_alone = 0.2;        ///< ...but up to this where nothing else comes near...
-  double alone_runner_up_cost = 3.0;  ///< ...which is to say that another motion costs so many times as much
-  double min_parallax_rad = 0.015;    ///< median over the points; below it the direction is chance
-  double max_direction_sigma_rad =
-      0.1;  ///< standard deviation of the direction of translation, from the residuals: later views mend it
-  /// A map beside whose motion another one comes near (alone_runner_up_cost) must be found by the next view,
-  /// too, unless its direction is known to so much.
-  double clear_direction_sigma_rad = 0.05;
-  double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
-  double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
-  int min_points = 80;                 ///< points that all views agree on
-
-  double past_s = 0.45;  ///< frames that are older than the reference frame by up to so much testify:
-                         ///< who has just stopped is in his place in all views, but not in them
-  int past_views = 6;    ///< so many of them at most; 0: none
-  double max_past_conflict = 0.08;  ///< of the points, that one of them sees elsewhere; more: wait
-  int past_first = 0;  ///< so many frames come before the first reference frame: they testify only
+  int min_features = 100;        ///< a frame with fewer takes no part
+  double frame_step_s = 0.045;   ///< frames nearer to the last one looked at are left out
+  int min_matches = 120;         ///< of a frame with the reference frame; fewer: it is given up
+  int num_pairs = 3;             ///< pairs with the reference frame that must agree
+  double min_pair_step_s = 0.1;  ///< the frames of two such pairs are apart by so much at least
+  /// Median displacement of the matches before a pair is worth its cost.
+  double min_displacement_rad = 0.015;
+  int max_views = 8;        ///< frames after the reference frame that a map is made of, at most
+  int max_adjusted = 300;   ///< points that rival motions are adjusted with; the winner takes all
+  double sure_age_s = 0.4;  ///< a map of views that are nearer in time must be found by the next, too
 
   template <typename Visitor>
   void Describe(Visitor& v) {
@@ -87,8 +110,7 @@ struct InitializerOptions {
              "matches a frame must have with the reference frame");
     v.Number("initializer.num_pairs", num_pairs, 1, 5, "", "pairs of frames that must agree");
     agreement.Describe(v);
-    v.Number("initializer.min_parallax_rad", min_parallax_rad, 0, 1, "rad",
-             "median parallax of the first map's points");
+    geometry.Describe(v);
     selector.Describe(v);
   }
 };

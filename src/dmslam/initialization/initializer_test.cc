@@ -165,12 +165,12 @@ TEST(Initializer, FramesBeforeTellWhoHasJustStopped) {
   SyntheticRoom room(600, 150);
   room.StopWalkerAt(12);
   InitializerOptions blind;
-  blind.past_views = 0;
+  blind.past.views = 0;
   const auto taken_in = MapFrom(room, blind, 12);
   ASSERT_TRUE(taken_in.has_value());
   EXPECT_GT(ShareOfWalker(room, *taken_in), 0.1);
   InitializerOptions options;
-  options.past_first = 12;
+  options.past.first = 12;
   Initializer initializer(options, room.camera(), 1);
   bool waited = false;
   for (uint32_t frame = 0; frame < 45; ++frame) {
@@ -187,7 +187,7 @@ TEST(Initializer, ThePastOfARoomDoesNotDelayItsMap) {
   const SyntheticRoom room(600, 0);
   InitializerOptions options;
   const auto without = MapFrom(room, options, 12);
-  options.past_first = 12;
+  options.past.first = 12;
   const auto with = MapFrom(room, options, 0);
   ASSERT_TRUE(without.has_value() && with.has_value());
   EXPECT_EQ(with->frame0.index, without->frame0.index);
@@ -234,9 +234,9 @@ TEST(Initializer, AMapThatAnotherMotionComesNearMustBeFoundTwice) {
   InitializerOptions options;
   options.sure_age_s = 0;
   const auto alone = MapFrom(room, options, 0);
-  options.alone_runner_up_cost = 1e30;  // whatever comes near is near enough
+  options.motion.alone_runner_up_cost = 1e30;  // whatever comes near is near enough
   const auto clear = MapFrom(room, options, 0);
-  options.clear_direction_sigma_rad = 0;
+  options.geometry.clear_direction_sigma_rad = 0;
   const auto contended = MapFrom(room, options, 0);
   ASSERT_TRUE(alone.has_value() && clear.has_value() && contended.has_value());
   EXPECT_EQ(clear->frame1.index, alone->frame1.index) << "the direction is well known";

@@ -146,7 +146,7 @@ std::vector<LoopAnswer::KeyframeCorrection> CarryMap(const Map& map, const Verif
 
 std::vector<LoopAnswer::KeyframeCorrection> SpreadOverGraph(const Map& map, const VerifiedLoop& loop,
                                                             const GroupPoses& group, const Fusions& fusions,
-                                                            const LoopcloserOptions& options,
+                                                            const LoopCorrectionOptions& options,
                                                             const std::function<bool()>& interrupt) {
   const MapId map_id = map.FindKeyframe(loop.keyframe)->map_id;
   EssentialGraph graph(map, map_id, group);
@@ -198,8 +198,8 @@ LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerif
   Fusions fusions = FindFusions(map, loop, verifier, group);
   const bool one_map = map.FindKeyframe(loop.keyframe)->map_id == map.FindKeyframe(loop.place)->map_id;
   LoopAnswer answer;
-  answer.corrections =
-      one_map ? SpreadOverGraph(map, loop, group, fusions, options, interrupt) : CarryMap(map, loop);
+  answer.corrections = one_map ? SpreadOverGraph(map, loop, group, fusions, options.correction, interrupt)
+                               : CarryMap(map, loop);
   if (answer.corrections.empty()) return {};
   answer.kind = LoopAnswer::Kind::kLoop;
   answer.seen_from = loop.keyframe;
@@ -210,7 +210,7 @@ LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerif
   return answer;
 }
 
-LoopAnswer AdjustGlobally(const Map& map, KeyframeId keyframe, const LoopcloserOptions& options,
+LoopAnswer AdjustGlobally(const Map& map, KeyframeId keyframe, const LoopCorrectionOptions& options,
                           const std::function<bool()>& interrupt) {
   const MapId map_id = map.FindKeyframe(keyframe)->map_id;
   MapEditor adjusted(map);

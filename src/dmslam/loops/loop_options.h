@@ -6,6 +6,54 @@
 
 namespace dmslam {
 
+/// What makes a place the same between two maps, where no chain tells what drift can be, and where the place
+/// is seen from elsewhere or behind people.
+struct JoiningOptions {
+  int min_pose_inliers = 15;  ///< by chance 3 to 10 agree; what follows asks for much more
+  double min_share = 0.7;     ///< of all that should be seen
+  // Behind people little of all that should be seen is. Then much of what outlasts them must be: a picture
+  // that hangs in two places shows a quarter of it.
+  int min_proven = 50;
+  double min_proven_share = 0.7;
+  // Between two maps that are both too young to have anything proven: cells of the image in which a good part
+  // of the place is seen, and those of them at the image's rim. Of all cells that should show several of its
+  // landmarks, and of those at the rim, they must be this share. Somebody who stood in both maps is a figure
+  // in the image; what should be around him is not there.
+  int min_filled_cells = 24;
+  int min_filled_rim_cells = 10;
+  double min_filled_share = 0.5;
+  // Maps are joined where keyframes around see the place as well, or where so many others, each for itself,
+  // were found where the joined maps would have them, over so much time.
+  int sightings = 2;
+  double sightings_s = 0.5;
+};
+
+/// A loop is closed when later keyframes have said so over some time.
+struct ConfirmationOptions {
+  int times = 2;
+  double for_s = 1.0;     ///< from the proposal to the last of them, at least
+  double within_s = 4.0;  ///< a proposal not confirmed for so long is given up
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Number("loop.confirmations", times, 1, 100, "", "later keyframes that must see the place again");
+  }
+};
+
+/// What is done about a loop.
+struct LoopCorrectionOptions {
+  int essential_covisibility = 100;  ///< landmarks in common that make an edge of the essential graph
+  int essential_iterations = 20;
+  bool global_adjustment = true;  ///< after a loop, bundle adjustment of the whole map
+  int global_iterations = 10;
+  double keypoint_sigma_px = kKeypointSigmaPx;
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("loop.global_adjustment", global_adjustment, "adjust the whole map after a loop");
+  }
+};
+
 /// Loop closing. Where a number is not explained, it is ORB-SLAM2's.
 struct LoopcloserOptions {
   bool enabled = true;
@@ -23,9 +71,6 @@ struct LoopcloserOptions {
   int min_sim3_inliers = 20;  ///< of them, that agree with one similarity
   int min_pose_inliers =
       30;  ///< without such pairs: landmarks of the place that agree with one pose of the keyframe
-  /// The same between two maps, where the place is seen from elsewhere or behind people: by chance 3 to 10
-  /// agree. What follows asks for much more there: min_joining_share of all that should be seen.
-  int min_joining_pose_inliers = 15;
   double search_radius_rad = 0.0143;  ///< of the guided search, times the scale of the predicted octave
   int max_descriptor_distance = 60;   ///< of the guided search [bits]
   int min_matches = 40;               ///< landmarks of the place found in the keyframe
@@ -35,23 +80,7 @@ struct LoopcloserOptions {
   // and grow as the camera goes on.
   double min_share = 0.22;            ///< enough to be believed if the next keyframes agree
   double min_confirmed_share = 0.35;  ///< of a keyframe that sees the place where an earlier one said it is
-  double min_joining_share = 0.7;     ///< the same between two maps, where no chain tells what drift can be
-  // Behind people little of all that should be seen is. Then much of what outlasts them must be: a picture
-  // that hangs in two places shows a quarter of it.
-  int min_joining_proven = 50;
-  double min_joining_proven_share = 0.7;
-  // Between two maps that are both too young to have anything proven: cells of the image in which a good part
-  // of the place is seen, and those of them at the image's rim. Of all cells that should show several of its
-  // landmarks, and of those at the rim, they must be this share. Somebody who stood in both maps is a figure
-  // in the image; what should be around him is not there.
-  int min_filled_cells = 24;
-  int min_filled_rim_cells = 10;
-  double min_filled_share = 0.5;
-  // Maps are joined where keyframes around see the place as well, or where so many others, each for itself,
-  // were found where the joined maps would have them, over so much time.
-  int joining_sightings = 2;
-  double joining_sightings_s = 0.5;
-  int min_told = 20;  ///< landmarks that should be seen; of fewer the share seen says nothing
+  int min_told = 20;                  ///< landmarks that should be seen; of fewer the share seen says nothing
 
   // Somebody who stood in two places is matched as well as a room is. What he cannot be is there for long.
   ProvenOptions proven;
@@ -62,17 +91,9 @@ struct LoopcloserOptions {
   ChainDriftOptions drift;
   double max_drift_sigmas = 3.0;
 
-  // A loop is closed when later keyframes have said so over some time.
-  int confirmations = 2;
-  double confirm_for_s = 1.0;     ///< from the proposal to the last of them, at least
-  double confirm_within_s = 4.0;  ///< a proposal not confirmed for so long is given up
-
-  // What is done about it.
-  int essential_covisibility = 100;  ///< landmarks in common that make an edge of the essential graph
-  int essential_iterations = 20;
-  bool global_adjustment = true;  ///< after a loop, bundle adjustment of the whole map
-  int global_iterations = 10;
-  double keypoint_sigma_px = kKeypointSigmaPx;
+  JoiningOptions joining;
+  ConfirmationOptions confirmation;
+  LoopCorrectionOptions correction;
 
   template <typename Visitor>
   void Describe(Visitor& v) {
@@ -93,9 +114,8 @@ struct LoopcloserOptions {
     v.Number("loop.max_drift_sigmas", max_drift_sigmas, 0, 1e9, "",
              "a loop that moves more than the keyframes can have drifted is refused");
     v.InPaper("1e+09");
-    v.Number("loop.confirmations", confirmations, 1, 100, "",
-             "later keyframes that must see the place again");
-    v.Switch("loop.global_adjustment", global_adjustment, "adjust the whole map after a loop");
+    confirmation.Describe(v);
+    correction.Describe(v);
   }
 };
 

@@ -175,7 +175,7 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const 
   const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
   const bool one_map = keyframe.map_id == place.map_id;
   if (one_map) return SimilarityFromPose(map, keyframe, place, matches, 1.0, options_.min_pose_inliers, why);
-  return SimilarityFromPose(map, keyframe, place, matches, {}, options_.min_joining_pose_inliers, why);
+  return SimilarityFromPose(map, keyframe, place, matches, {}, options_.joining.min_pose_inliers, why);
 }
 
 /// Landmarks of the place on features of the keyframe give its pose; features that show landmarks of both
@@ -271,7 +271,7 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
     *why = pairs;
     return std::nullopt;
   }
-  const int enough = joins ? options_.min_joining_pose_inliers : options_.min_pose_inliers;
+  const int enough = joins ? options_.joining.min_pose_inliers : options_.min_pose_inliers;
   const auto similarity =
       SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, enough, why);
   if (!similarity) *why = pairs + "; " + *why;
@@ -368,8 +368,9 @@ bool LoopVerifier::FillsTheImage(const VerifiedLoop& loop) const {
   const PlaceSupport& seen = loop.support;
   const bool contradicted =
       loop.proven.expected >= options_.min_told / 2 && loop.proven_share < options_.min_share;
-  return !contradicted && seen.anywhere.Hold(options_.min_filled_cells, options_.min_filled_share) &&
-         seen.at_rim.Hold(options_.min_filled_rim_cells, options_.min_filled_share);
+  return !contradicted &&
+         seen.anywhere.Hold(options_.joining.min_filled_cells, options_.joining.min_filled_share) &&
+         seen.at_rim.Hold(options_.joining.min_filled_rim_cells, options_.joining.min_filled_share);
 }
 
 /// Within one map only what is proven around the place says so. Between two either side may: one of them may
@@ -395,10 +396,10 @@ bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
 
 /// Most of what should be seen is, or, where people hide the rest, much of what is proven.
 bool LoopVerifier::HoldsBetweenMaps(const VerifiedLoop& loop) const {
-  const bool much_is_proven = loop.proven.found >= options_.min_joining_proven &&
+  const bool much_is_proven = loop.proven.found >= options_.joining.min_proven &&
                               loop.proven.cells >= options_.min_cells &&
-                              loop.proven_share >= options_.min_joining_proven_share;
-  return Holds(loop, options_.min_joining_share) || (much_is_proven && Holds(loop, options_.min_share));
+                              loop.proven_share >= options_.joining.min_proven_share;
+  return Holds(loop, options_.joining.min_share) || (much_is_proven && Holds(loop, options_.min_share));
 }
 
 bool LoopVerifier::HoldsAmongOthers(const VerifiedLoop& loop) const {

@@ -107,7 +107,7 @@ std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
 /// Proposals that nothing has confirmed for long.
 void LoopcloserCore::ForgetUnconfirmed(int64_t now_ns) {
   std::erase_if(proposals_, [&](const Proposal& proposal) {
-    return SecondsBetween(now_ns, proposal.last_ns) > options_.confirm_within_s;
+    return SecondsBetween(now_ns, proposal.last_ns) > options_.confirmation.within_s;
   });
 }
 
@@ -125,8 +125,8 @@ std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyf
     if (!loop) continue;
     proposal.loop = std::move(*loop);
     proposal.last_ns = keyframe.stamp_ns;
-    const bool enough = ++proposal.confirmations >= options_.confirmations &&
-                        SecondsBetween(keyframe.stamp_ns, proposal.first_ns) >= options_.confirm_for_s;
+    const bool enough = ++proposal.confirmations >= options_.confirmation.times &&
+                        SecondsBetween(keyframe.stamp_ns, proposal.first_ns) >= options_.confirmation.for_s;
     if (enough && (!best || proposal.loop.share > best->share)) best = proposal.loop;
   }
   return best;
@@ -143,7 +143,7 @@ bool LoopcloserCore::IsConfirmedAround(const VerifiedLoop& loop) const {
     ++confirmations;
     longest_s = std::max(longest_s, SecondsBetween(other->stamp_ns, keyframe.stamp_ns));
   }
-  return confirmations >= options_.confirmations && longest_s >= options_.confirm_for_s;
+  return confirmations >= options_.confirmation.times && longest_s >= options_.confirmation.for_s;
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyframe,
@@ -169,7 +169,7 @@ std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyfram
 bool LoopcloserCore::MayJoin(const VerifiedLoop& loop) const {
   if (!loop.joins || !verifier_.HoldsAmongOthers(loop)) return false;
   return (verifier_.HoldsBetweenMaps(loop) && IsConfirmedAround(loop)) ||
-         sightings_.BearOut(map_, loop, options_);
+         sightings_.BearOut(map_, loop, options_.joining);
 }
 
 /// In turn, by their ids.
@@ -212,7 +212,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
   ++counters_.loops;
   counters_.last_loop_keyframe = loop.keyframe;
   keyframes_since_loop_ = 0;
-  adjustment_due_ = options_.global_adjustment;
+  adjustment_due_ = options_.correction.global_adjustment;
   awaited_correction_ = answer.correction_id;
   detector_.Reset();
   proposals_.clear();
@@ -221,7 +221,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
 
 LoopAnswer LoopcloserCore::AdjustAfterLoop(KeyframeId keyframe) {
   adjustment_due_ = false;
-  LoopAnswer answer = AdjustGlobally(map_, keyframe, options_, interrupt_);
+  LoopAnswer answer = AdjustGlobally(map_, keyframe, options_.correction, interrupt_);
   if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) ++counters_.global_adjustments;
   return answer;
 }

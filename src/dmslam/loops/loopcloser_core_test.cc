@@ -163,8 +163,8 @@ LoopcloserOptions Trusting() {
   options.min_proven = 0;
   options.min_told = 1'000'000;
   options.max_drift_sigmas = 1e9;
-  options.confirmations = 1;
-  options.confirm_for_s = 0;
+  options.confirmation.times = 1;
+  options.confirmation.for_s = 0;
   return options;
 }
 
@@ -204,10 +204,10 @@ TEST(LoopcloserCoreTest, EachOfTheTestsAloneKnowsAPersonFromAPlace) {
 
 TEST(LoopcloserCoreTest, ALoopIsClosedOnlyWhenLaterKeyframesSawItOverSomeTime) {
   LoopcloserOptions at_once;
-  at_once.confirmations = 1;
-  at_once.confirm_for_s = 0;
+  at_once.confirmation.times = 1;
+  at_once.confirmation.for_s = 0;
   LoopcloserOptions patient = at_once;
-  patient.confirm_for_s = 3.0;
+  patient.confirmation.for_s = 3.0;
   const auto first_loop = [](const LoopcloserOptions& options) {
     Room room({});
     LoopcloserCore core = MakeCore(options);
@@ -288,8 +288,8 @@ TEST(LoopcloserCoreTest, KeyframesThatAgreeJoinTwoMaps) {
   for (const int sightings : {2, 1000}) {
     Room room({.second_map_at = kPerRound - 2});
     LoopcloserOptions options;
-    options.confirm_for_s = 1000;
-    options.joining_sightings = sightings;
+    options.confirmation.for_s = 1000;
+    options.joining.sightings = sightings;
     LoopcloserCore core = MakeCore(options);
     const Answers answers = Play(room, core);
     ASSERT_EQ(answers.loops.empty(), sightings == 1000);
@@ -317,7 +317,7 @@ TEST(LoopcloserCoreTest, MapsAreWeldedBehindPeopleByWhatOutlastsThem) {
 TEST(LoopcloserCoreTest, SomebodyWhoStoodInTwoMapsDoesNotWeldThem) {
   const WorldOptions world{.second_visit_elsewhere = true, .person_at = {20, 100}, .second_map_at = 97};
   LoopcloserOptions trusting = Trusting();
-  trusting.min_joining_share = trusting.min_share;
+  trusting.joining.min_share = trusting.min_share;
   {
     Room room(world);
     LoopcloserCore core = MakeCore(trusting);
@@ -336,10 +336,10 @@ LoopcloserOptions WithNothingProven() {
 }
 
 TEST(LoopcloserCoreTest, TwoYoungMapsAreWeldedByAPlaceThatFillsTheImage) {
-  for (const int cells : {LoopcloserOptions().min_filled_cells, 49}) {
+  for (const int cells : {LoopcloserOptions().joining.min_filled_cells, 49}) {
     Room room({.points = 3 * kPoints, .second_map_at = kPerRound - 2});
     LoopcloserOptions options = WithNothingProven();
-    options.min_filled_cells = cells;
+    options.joining.min_filled_cells = cells;
     LoopcloserCore core = MakeCore(options);
     const Answers answers = Play(room, core);
     ASSERT_EQ(answers.loops.empty(), cells == 49);
@@ -355,8 +355,8 @@ TEST(LoopcloserCoreTest, SomebodyWhoStoodInTwoYoungMapsDoesNotWeldThem) {
                            .person_half_width_rad = 0.3,
                            .second_map_at = 97};
   LoopcloserOptions trusting = WithNothingProven();
-  trusting.min_filled_cells = trusting.min_filled_rim_cells = 0;
-  trusting.min_filled_share = 0;
+  trusting.joining.min_filled_cells = trusting.joining.min_filled_rim_cells = 0;
+  trusting.joining.min_filled_share = 0;
   {
     Room room(world);
     LoopcloserCore core = MakeCore(trusting);

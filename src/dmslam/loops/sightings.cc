@@ -45,7 +45,7 @@ void Sightings::Add(const VerifiedLoop& loop) {
   if (loops_.size() > kMostKept) loops_.pop_front();
 }
 
-bool Sightings::BearOut(const Map& map, const VerifiedLoop& loop, const LoopcloserOptions& options) const {
+bool Sightings::BearOut(const Map& map, const VerifiedLoop& loop, const JoiningOptions& options) const {
   const std::optional<Tie> tie = TieOf(map, loop);
   if (!tie) return false;
   const Keyframe& keyframe = map.At(loop.keyframe);
@@ -62,8 +62,7 @@ bool Sightings::BearOut(const Map& map, const VerifiedLoop& loop, const Loopclos
     first_ns = std::min(first_ns, map.At(other.keyframe).stamp_ns);
     last_ns = std::max(last_ns, map.At(other.keyframe).stamp_ns);
   }
-  return others >= options.joining_sightings &&
-         static_cast<double>(last_ns - first_ns) * 1e-9 >= options.joining_sightings_s;
+  return others >= options.sightings && static_cast<double>(last_ns - first_ns) * 1e-9 >= options.sightings_s;
 }
 
 }  // namespace dmslam

@@ -20,7 +20,7 @@ class Sightings {
 
   /// Whether enough other keyframes, over enough time, say the same of the two maps as `loop` does. The
   /// keyframes may have moved since they were found.
-  bool BearOut(const Map& map, const VerifiedLoop& loop, const LoopcloserOptions& options) const;
+  bool BearOut(const Map& map, const VerifiedLoop& loop, const JoiningOptions& options) const;
 
  private:
   std::deque<VerifiedLoop> loops_;  ///< oldest first

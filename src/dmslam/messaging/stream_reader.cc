@@ -65,11 +65,11 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
   const Term term{head->header.epoch, head->header.writer};
   if (term == term_ && !IsPlausible(*head, now_ns)) return;
   if (!SpeaksOurLanguage(*head)) return;
-  last_head_utime_ = head->utime;
-  last_head_ns_ = now_ns;
+  beacons_.last_utime = head->utime;
+  beacons_.last_ns = now_ns;
   if (term == term_ && state_ == State::kRefusedVersion) term_ = {};
   if (term > term_) BeginTerm(*head);
-  head_seq_ = head->header.seq;
+  beacons_.last_seq = head->header.seq;
   NoteEnd(*head);
   Follow(*head);
 }
@@ -91,14 +91,14 @@ bool StreamReader::IsWanted(const head_t& head) {
 /// A beacon's time and number follow from those of the one before; where they have leapt in earnest, the next
 /// beacon says so too.
 bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
-  const int64_t elapsed_ns = now_ns - last_head_ns_;
-  const bool in_time = head.utime <= last_head_utime_ + elapsed_ns / 1000 + kTimeToleranceUs &&
-                       head.utime >= last_head_utime_ - kTimeToleranceUs;
-  const bool in_number = head.header.seq <= head_seq_ + kMaxBurst + elapsed_ns / kMinNsPerRecord;
+  const int64_t elapsed_ns = now_ns - beacons_.last_ns;
+  const bool in_time = head.utime <= beacons_.last_utime + elapsed_ns / 1000 + kTimeToleranceUs &&
+                       head.utime >= beacons_.last_utime - kTimeToleranceUs;
+  const bool in_number = head.header.seq <= beacons_.last_seq + kMaxBurst + elapsed_ns / kMinNsPerRecord;
   const bool same_language = state_ == State::kRefusedVersion || (head.protocol_version == kProtocolVersion &&
                                                                   head.schema_hash == options_.schema_hash);
   if (in_time && in_number && same_language) {
-    if (head.utime < last_head_utime_) return false;  // late
+    if (head.utime < beacons_.last_utime) return false;  // late
     leaps_.Clear();
     return true;
   }
@@ -110,29 +110,29 @@ bool StreamReader::IsPlausible(const head_t& head, int64_t now_ns) {
 void StreamReader::NoteEnd(const head_t& head) {
   const bool hands_over = (head.offers & head_t::OFFERS_SUCCESSOR) != 0;
   const bool ends = head.state == head_t::STATE_CLOSED && !hands_over;
-  closed_beacons_ = ends ? closed_beacons_ + 1 : 0;
-  last_beacons_ = head.state != head_t::STATE_LIVE && !hands_over ? last_beacons_ + 1 : 0;
-  writer_closed_ = closed_beacons_ >= kBelieved;
+  beacons_.closed = ends ? beacons_.closed + 1 : 0;
+  beacons_.complete = head.state != head_t::STATE_LIVE && !hands_over ? beacons_.complete + 1 : 0;
+  writer_closed_ = beacons_.closed >= kBelieved;
 }
 
 /// The writer knows best how far it is: what is behind that, beacon after beacon, was never written.
 void StreamReader::RetractWhatIsNot() {
   const int64_t newest = std::max(window_.newest(), window_.next() - 1);
-  if (newest <= head_seq_ || newest != beacons_below_of_) beacons_below_ = 0;
-  beacons_below_of_ = newest;
-  if (newest <= head_seq_ || ++beacons_below_ < kBelieved + 1) return;
+  if (newest <= beacons_.last_seq || newest != beacons_.below_of) beacons_.below = 0;
+  beacons_.below_of = newest;
+  if (newest <= beacons_.last_seq || ++beacons_.below < kBelieved + 1) return;
   ++statistics_.dropped_doubtful;
-  beacons_below_ = 0;
-  window_.Retract(head_seq_);
+  beacons_.below = 0;
+  window_.Retract(beacons_.last_seq);
   const bool holds_of_it = taken_.epoch == term_.epoch;
   const int64_t next = holds_of_it ? taken_.seq + 1 : 1;
-  if (state_ == State::kFollowing && window_.next() > head_seq_ + 1 && next <= head_seq_ + 1)
+  if (state_ == State::kFollowing && window_.next() > beacons_.last_seq + 1 && next <= beacons_.last_seq + 1)
     window_.Reset(next);
 }
 
 bool StreamReader::SpeaksOurLanguage(const head_t& head) {
   if (head.protocol_version == kProtocolVersion && head.schema_hash == options_.schema_hash) return true;
-  if (state_ != State::kRefusedVersion) ack_due_ = true;
+  if (state_ != State::kRefusedVersion) acknowledged_.due = true;
   state_ = State::kRefusedVersion;
   term_ = {head.header.epoch, head.header.writer};
   problem_ =
@@ -160,12 +160,12 @@ void StreamReader::BeginTerm(const head_t& head) {
   window_.Reset(same_epoch ? held_.seq + 1 : 1);
   terms_.Clear();
   leaps_.Clear();
-  gap_seen_ = false;
-  closed_beacons_ = last_beacons_ = 0;
+  beacons_.gap_seen = false;
+  beacons_.closed = beacons_.complete = 0;
   snapshot_.reset();
-  missing_since_ns_.clear();
+  recovery_.missing_since_ns.clear();
   problem_.clear();
-  ack_due_ = true;
+  acknowledged_.due = true;
   state_ = State::kFollowing;
   if (same_epoch || fresh || parent == end) return;
   if (end > parent) {
@@ -195,7 +195,7 @@ Version StreamReader::DrainFormerTerm(const Version& parent, bool fresh) {
 void StreamReader::DrainBeyondGaps() {
   const Version end = former_.empty() ? held_ : former_.back().version();
   if (state_ == State::kFollowing) {
-    const int64_t newest = std::max(head_seq_, window_.newest());
+    const int64_t newest = std::max(beacons_.last_seq, window_.newest());
     const int64_t lost = window_.GiveUpBefore(newest + 1);
     statistics_.lost += lost;
     statistics_.lost_with_writer += lost;
@@ -232,7 +232,7 @@ void StreamReader::NoteWritten(const Version& version) {
 void StreamReader::NeedSnapshot() {
   state_ = State::kSnapshot;
   snapshot_.emplace(Snapshot{0, 0, 0, ReceiveWindow(options_.limits)});
-  ack_due_ = true;
+  acknowledged_.due = true;
 }
 
 void StreamReader::Forget() {
@@ -253,9 +253,9 @@ void StreamReader::Follow(const head_t& head) {
   RetractWhatIsNot();
   window_.Expose(head.header.seq);
   const bool gap = head.first_seq > window_.received() + 1;
-  if (gap && !std::exchange(gap_seen_, true)) return;
+  if (gap && !std::exchange(beacons_.gap_seen, true)) return;
   const bool joins = !std::exchange(joined_, true) && held_.empty();  // what was before it came is another's
-  gap_seen_ = false;
+  beacons_.gap_seen = false;
   if (!gap) return;
   if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
     NeedSnapshot();
@@ -281,7 +281,7 @@ void StreamReader::FollowSnapshot(const head_t& head) {
   snapshot_->window.Reset(1);
   snapshot_->window.Expose(head.snapshot_last);
   window_.Reset(snapshot_->cut + 1);
-  ack_due_ = true;
+  acknowledged_.due = true;
 }
 
 // ---- records
@@ -351,7 +351,8 @@ ReceiveWindow* StreamReader::WindowOf(const RecordHeader& header) {
 
 /// Further than a writer can be beyond its last beacon.
 bool StreamReader::LeapsAhead(const ReceiveWindow& window, int64_t seq) {
-  const int64_t known = &window == &window_ ? std::max(window.received(), head_seq_) : window.received();
+  const int64_t known =
+      &window == &window_ ? std::max(window.received(), beacons_.last_seq) : window.received();
   if (seq <= known + kMaxBurst) return false;
   ++statistics_.dropped_doubtful;
   return true;
@@ -366,7 +367,7 @@ void StreamReader::Add(ReceiveWindow* window, const std::string& channel, Bytes 
   if (result == ReceiveWindow::Result::kNoRoom) ++statistics_.dropped_no_room;
   if (result != ReceiveWindow::Result::kNew) return;
   if (record.in_snapshot()) {
-    ack_due_ = true;
+    acknowledged_.due = true;
     if (record.ends_snapshot()) snapshot_->last = header.seq;
     return;
   }
@@ -375,20 +376,20 @@ void StreamReader::Add(ReceiveWindow* window, const std::string& channel, Bytes 
 
 void StreamReader::NoteMissing(const std::vector<MissingRange>& missing, int64_t now_ns) {
   for (const MissingRange& range : missing) {
-    for (int64_t seq = range.first_seq; seq <= range.last_seq && missing_since_ns_.size() < kMaxTimed;
-         ++seq) {
-      missing_since_ns_.emplace(seq, now_ns);
+    for (int64_t seq = range.first_seq;
+         seq <= range.last_seq && recovery_.missing_since_ns.size() < kMaxTimed; ++seq) {
+      recovery_.missing_since_ns.emplace(seq, now_ns);
     }
   }
 }
 
 void StreamReader::NoteArrival(int64_t seq, int64_t now_ns) {
-  const auto missing = missing_since_ns_.find(seq);
-  if (missing == missing_since_ns_.end()) return;
+  const auto missing = recovery_.missing_since_ns.find(seq);
+  if (missing == recovery_.missing_since_ns.end()) return;
   ++statistics_.repaired;
-  recovery_ms_.push_back(static_cast<double>(now_ns - missing->second) * 1e-6);
-  if (recovery_ms_.size() > kMaxTimed) recovery_ms_.pop_front();
-  missing_since_ns_.erase(missing);
+  recovery_.took_ms.push_back(static_cast<double>(now_ns - missing->second) * 1e-6);
+  if (recovery_.took_ms.size() > kMaxTimed) recovery_.took_ms.pop_front();
+  recovery_.missing_since_ns.erase(missing);
 }
 
 // ---- what the owner does
@@ -419,7 +420,7 @@ std::optional<Record> StreamReader::TakeFromSnapshot() {
     ++statistics_.snapshots;
     snapshot_.reset();
     state_ = State::kFollowing;
-    ack_due_ = true;
+    acknowledged_.due = true;
   }
   return record;
 }
@@ -435,8 +436,8 @@ bool StreamReader::AtEnd() const {
 }
 
 bool StreamReader::AllTaken() const {
-  return last_beacons_ >= kBelieved && state_ == State::kFollowing && former_.empty() &&
-         window_.next() > std::max(window_.newest(), head_seq_);
+  return beacons_.complete >= kBelieved && state_ == State::kFollowing && former_.empty() &&
+         window_.next() > std::max(window_.newest(), beacons_.last_seq);
 }
 
 // ---- acknowledgements
@@ -444,8 +445,9 @@ bool StreamReader::AllTaken() const {
 bool StreamReader::AckIsUrgent() const {
   if (!term_.valid()) return false;
   const int64_t accepted = accepted_.epoch == term_.epoch ? accepted_.seq : 0;
-  if (ack_due_ || accepted != acked_ || window_.received() != acked_received_) return true;
-  const bool writer_silent = last_ack_ns_ - last_head_ns_ > options_.writer_timeout_ns;
+  if (acknowledged_.due || accepted != acknowledged_.accepted || window_.received() != acknowledged_.received)
+    return true;
+  const bool writer_silent = acknowledged_.last_ns - beacons_.last_ns > options_.writer_timeout_ns;
   if (writer_silent) return false;
   return (state_ == State::kFollowing && window_.AnyMissing()) ||
          (snapshot_ && (snapshot_->number == 0 || snapshot_->window.AnyMissing()));
@@ -453,16 +455,16 @@ bool StreamReader::AckIsUrgent() const {
 
 int64_t StreamReader::deadline_ns() const {
   if (!term_.valid()) return INT64_MAX;
-  if (AckIsUrgent()) return last_ack_ns_ + options_.ack_ns;
-  return last_ack_ns_ + (state_ == State::kRefusedBehind ? kRefusedAckNs : options_.idle_ack_ns);
+  if (AckIsUrgent()) return acknowledged_.last_ns + options_.ack_ns;
+  return acknowledged_.last_ns + (state_ == State::kRefusedBehind ? kRefusedAckNs : options_.idle_ack_ns);
 }
 
 void StreamReader::Advance(int64_t now_ns) {
   if (now_ns < deadline_ns()) return;
   if (snapshot_ && snapshot_->number != 0) SendAck(true, now_ns);
   SendAck(false, now_ns);
-  last_ack_ns_ = now_ns;
-  ack_due_ = false;
+  acknowledged_.last_ns = now_ns;
+  acknowledged_.due = false;
 }
 
 void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
@@ -485,8 +487,8 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
     ack.header.seq = accepted_.epoch == term_.epoch ? accepted_.seq : 0;
     ack.header.parent_epoch = held_.epoch;
     ack.header.parent_seq = held_.seq;
-    acked_ = ack.header.seq;
-    acked_received_ = ack.received;
+    acknowledged_.accepted = ack.header.seq;
+    acknowledged_.received = ack.received;
   }
   ack.protocol_version = kProtocolVersion;
   ack.schema_hash = options_.schema_hash;
@@ -519,8 +521,8 @@ int64_t StreamReader::backlog() const {
 
 ReaderStatistics StreamReader::statistics() const {
   ReaderStatistics result = statistics_;
-  if (!recovery_ms_.empty()) {
-    std::vector<double> sorted(recovery_ms_.begin(), recovery_ms_.end());
+  if (!recovery_.took_ms.empty()) {
+    std::vector<double> sorted(recovery_.took_ms.begin(), recovery_.took_ms.end());
     std::sort(sorted.begin(), sorted.end());
     result.recovery_p50_ms = sorted[sorted.size() / 2];
     result.recovery_p99_ms = sorted[sorted.size() * 99 / 100];

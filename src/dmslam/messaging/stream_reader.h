@@ -103,9 +103,11 @@ class StreamReader : public StateMachine {
 
   State state() const { return state_; }
   /// The writer's beacon was heard lately.
-  bool writer_present(int64_t now_ns) const { return now_ns - last_head_ns_ <= options_.writer_timeout_ns; }
+  bool writer_present(int64_t now_ns) const {
+    return now_ns - beacons_.last_ns <= options_.writer_timeout_ns;
+  }
   /// For how long no writer was heard.
-  int64_t silent_ns(int64_t now_ns) const { return now_ns - last_head_ns_; }
+  int64_t silent_ns(int64_t now_ns) const { return now_ns - beacons_.last_ns; }
   /// The writer said that its stream is complete, and all of it was taken.
   bool AtEnd() const;
   /// The writer said that nothing follows, and all of it was taken: its stream is complete as soon as all
@@ -131,6 +133,32 @@ class StreamReader : public StateMachine {
     int64_t last = 0;  // its last piece, once known
     ReceiveWindow window;
     bool complete() const { return last > 0 && window.received() >= last; }
+  };
+  /// How far a term is known to have been written.
+  struct Written {
+    int64_t known = 0;
+    int64_t settled = 0;  // how far its records have been handed out or counted as lost
+  };
+  /// What the writer's beacons say, the newest ones last.
+  struct Beacons {
+    int64_t last_ns = INT64_MIN / 2;  // when the last one was heard
+    int64_t last_utime = INT64_MIN;   // ... and when it was said
+    int64_t last_seq = 0;             // of the last one
+    bool gap_seen = false;            // it said that records are gone that are not here
+    int closed = 0;                   // how many said that the stream is closed
+    int complete = 0;                 // ... that nothing follows
+    int below = 0;                    // ... knew less records than are known here
+    int64_t below_of = 0;             // ... than these
+  };
+  /// What was said to the writer.
+  struct Acknowledged {
+    int64_t last_ns = INT64_MIN / 2;
+    int64_t accepted = -1, received = -1;
+    bool due = false;  // what is new must be said at once
+  };
+  struct Recovery {
+    std::map<int64_t, int64_t> missing_since_ns;  // by seq: when it was first named as missing
+    std::deque<double> took_ms;                   // the newest of those that were
   };
 
   void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
@@ -167,31 +195,17 @@ class StreamReader : public StateMachine {
   Version taken_;        // the record taken last, be it of what is not whole yet
   Version held_before_;  // what was held before that
   ReceiveWindow window_;
-  std::deque<Record> former_;  // of former terms, in order, not yet taken
-  struct Written {
-    int64_t known = 0;    // how far a term is known to have been written
-    int64_t settled = 0;  // how far its records have been handed out or counted as lost
-  };
+  std::deque<Record> former_;           // of former terms, in order, not yet taken
   std::map<int64_t, Written> written_;  // by epoch: terms that are over, and those that others have told of
   int64_t first_epoch_ = 0;             // of what this reader has held or followed; 0: nothing yet
   std::optional<Snapshot> snapshot_;
-  std::map<int64_t, int64_t> missing_since_ns_;  // by seq: when it was first named as missing
-  std::deque<double> recovery_ms_;               // of the newest records that were
+  Recovery recovery_;
   bool writer_closed_ = false;
-  Claims<Term> terms_;            // that are not followed, yet
-  Claims<Term> leaps_;            // of the beacons of the term that is followed
-  bool gap_seen_ = false;         // the last beacon said that records are gone that are not here
-  int closed_beacons_ = 0;        // of the newest ones, how many said that the stream is closed
-  int last_beacons_ = 0;          // ... that nothing follows
-  int64_t head_seq_ = 0;          // of the last beacon
-  int beacons_below_ = 0;         // of the newest ones, how many knew less records than are known here
-  int64_t beacons_below_of_ = 0;  // ... than these
-  bool joined_ = false;           // has followed a writer
-  int64_t last_head_ns_ = INT64_MIN / 2;
-  int64_t last_head_utime_ = INT64_MIN;
-  int64_t last_ack_ns_ = INT64_MIN / 2;
-  int64_t acked_ = -1, acked_received_ = -1;
-  bool ack_due_ = false;
+  Claims<Term> terms_;  // that are not followed, yet
+  Claims<Term> leaps_;  // of the beacons of the term that is followed
+  Beacons beacons_;
+  Acknowledged acknowledged_;
+  bool joined_ = false;  // has followed a writer
   std::string problem_;
   std::vector<Outgoing> outgoing_;
   ReaderStatistics statistics_;

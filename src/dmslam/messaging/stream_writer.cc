@@ -56,16 +56,16 @@ void StreamWriter::Advance(int64_t now_ns) {
   AdvanceClosing(now_ns);
   AdvanceSnapshot(now_ns);
   SendPaced(now_ns);
-  if (beacon_due_ || now_ns >= next_beacon_ns_) Beacon(now_ns);
+  if (beacons_.due || now_ns >= beacons_.next_ns) Beacon(now_ns);
 }
 
 int64_t StreamWriter::deadline_ns() const {
   if (IsSilent()) return INT64_MAX;
-  int64_t deadline = beacon_due_ ? INT64_MIN : next_beacon_ns_;
-  if (!window_.idle()) deadline = std::min(deadline, burst_left_ > 0 ? INT64_MIN : next_burst_ns_);
+  int64_t deadline = beacons_.due ? INT64_MIN : beacons_.next_ns;
+  if (!window_.idle()) deadline = std::min(deadline, burst_.left > 0 ? INT64_MIN : burst_.next_ns);
   if (snapshot_ && !snapshot_->window.idle()) {
-    const bool now = burst_left_ > 0 && snapshot_left_ > 0;
-    deadline = std::min(deadline, now ? INT64_MIN : next_burst_ns_);
+    const bool now = burst_.left > 0 && burst_.for_snapshot > 0;
+    deadline = std::min(deadline, now ? INT64_MIN : burst_.next_ns);
   }
   if (state_ == State::kClosing) deadline = std::min(deadline, close_deadline_ns_);
   return deadline;
@@ -80,20 +80,20 @@ void StreamWriter::Close(int64_t now_ns) {
   }
   lingers_ = false;
   close_deadline_ns_ = std::min(close_deadline_ns_, now_ns + options_.close_timeout_ns);
-  beacon_due_ = !closed();
+  beacons_.due = !closed();
 }
 
 void StreamWriter::Complete(int64_t) {
   if (state_ != State::kLive) return;
   state_ = State::kClosing;
   lingers_ = true;
-  beacon_due_ = true;
+  beacons_.due = true;
 }
 
 void StreamWriter::AdvanceClosing(int64_t now_ns) {
   if (state_ != State::kClosing || (!AllAccepted() && now_ns < close_deadline_ns_)) return;
   state_ = State::kClosed;
-  beacon_due_ = true;
+  beacons_.due = true;
 }
 
 // ---- what comes in
@@ -274,7 +274,7 @@ void StreamWriter::BeginSnapshot() {
   snapshot_.emplace(Snapshot{number, window_.last(), 0, SendWindow(WindowOptions(options_), key), {}});
   source_->BeginSnapshot(snapshot_->cut);
   ++statistics_.snapshots;
-  beacon_due_ = true;
+  beacons_.due = true;
 }
 
 void StreamWriter::EndSnapshot() {
@@ -284,7 +284,7 @@ void StreamWriter::EndSnapshot() {
   statistics_.repaired_bytes += snapshot_->window.bytes_repaired;
   statistics_.sent_bytes += snapshot_->window.bytes_sent;
   snapshot_.reset();
-  beacon_due_ = true;
+  beacons_.due = true;
 }
 
 void StreamWriter::MakePieces() {
@@ -299,7 +299,7 @@ void StreamWriter::MakePieces() {
     window.Append(std::move(piece.channel), std::make_shared<const Bytes>(std::move(piece.message)));
     if (piece.last) {
       snapshot_->total = window.last();
-      beacon_due_ = true;
+      beacons_.due = true;
     }
   }
 }
@@ -307,20 +307,21 @@ void StreamWriter::MakePieces() {
 // ---- what goes out
 
 void StreamWriter::SendPaced(int64_t now_ns) {
-  if (now_ns >= next_burst_ns_) {
-    const int64_t bursts = 1 + std::min<int64_t>(99, (now_ns - next_burst_ns_) / options_.burst_ns);
-    snapshot_left_ = std::min(options_.snapshot_per_burst,
-                              snapshot_left_ + static_cast<int>(bursts) * options_.snapshot_per_burst);
-    burst_left_ = options_.parts_per_burst;
-    next_burst_ns_ = now_ns + options_.burst_ns;
+  if (now_ns >= burst_.next_ns) {
+    const int64_t bursts = 1 + std::min<int64_t>(99, (now_ns - burst_.next_ns) / options_.burst_ns);
+    burst_.for_snapshot =
+        std::min(options_.snapshot_per_burst,
+                 burst_.for_snapshot + static_cast<int>(bursts) * options_.snapshot_per_burst);
+    burst_.left = options_.parts_per_burst;
+    burst_.next_ns = now_ns + options_.burst_ns;
   }
-  burst_left_ = std::max(0, window_.Send(burst_left_, now_ns, &outgoing_));
+  burst_.left = std::max(0, window_.Send(burst_.left, now_ns, &outgoing_));
   if (!snapshot_) return;
-  const int share = std::min(burst_left_, snapshot_left_);
+  const int share = std::min(burst_.left, burst_.for_snapshot);
   if (share <= 0) return;
   const int sent = share - snapshot_->window.Send(share, now_ns, &outgoing_);
-  burst_left_ = std::max(0, burst_left_ - sent);
-  snapshot_left_ -= sent;  // what a piece takes beyond its share is missing in the next bursts
+  burst_.left = std::max(0, burst_.left - sent);
+  burst_.for_snapshot -= sent;  // what a piece takes beyond its share is missing in the next bursts
 }
 
 void StreamWriter::Beacon(int64_t now_ns) {
@@ -345,12 +346,12 @@ void StreamWriter::Beacon(int64_t now_ns) {
   head.name = options_.name;
   outgoing_.push_back(SealedMessage(HeadChannel(options_.owner), head));
   statistics_.sent_bytes += static_cast<int64_t>(outgoing_.back().bytes->size());
-  beacon_due_ = false;
-  const bool early = early_beacons_ > 0 && early_beacons_-- > 0;
-  next_beacon_ns_ = now_ns + (early ? options_.beacon_ns / 10 : options_.beacon_ns);
+  beacons_.due = false;
+  const bool early = beacons_.early > 0 && beacons_.early-- > 0;
+  beacons_.next_ns = now_ns + (early ? options_.beacon_ns / 10 : options_.beacon_ns);
   if (state_ == State::kClosed && !lingers_) {
-    --farewells_;
-    next_beacon_ns_ = now_ns + options_.beacon_ns / kFarewells;
+    --beacons_.farewells;
+    beacons_.next_ns = now_ns + options_.beacon_ns / kFarewells;
   }
 }
 

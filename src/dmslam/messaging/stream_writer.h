@@ -110,7 +110,7 @@ class StreamWriter : public StateMachine {
   void Complete(int64_t now_ns);
   /// The lossless readers have accepted all of a stream that is complete.
   bool completed() const { return state_ == State::kClosed; }
-  bool closed() const { return state_ == State::kClosed && farewells_ == 0; }
+  bool closed() const { return state_ == State::kClosed && beacons_.farewells == 0; }
 
   /// Set when another writer has a higher term, and has said so twice: this one is silent from then on, and
   /// its owner must stop. Names the other.
@@ -163,6 +163,18 @@ class StreamWriter : public StateMachine {
     };
     std::map<int64_t, Taker> takers;  // by reader
   };
+  struct Beacons {
+    int64_t next_ns = INT64_MIN;
+    bool due = true;
+    int early = 3;      // of a new term: one alone is not believed
+    int farewells = 6;  // that still say goodbye: two of them are needed
+  };
+  /// Who sends much at once sends in bursts.
+  struct Burst {
+    int64_t next_ns = INT64_MIN / 2;
+    int left = 0;
+    int for_snapshot = 0;  // of what is left
+  };
 
   void ReceiveAck(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
   void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes);
@@ -202,16 +214,11 @@ class StreamWriter : public StateMachine {
   std::optional<Version> newer_replica_;
   std::string refusal_;
   std::vector<Outgoing> outgoing_;
-  int64_t next_beacon_ns_ = INT64_MIN;
-  int64_t next_burst_ns_ = INT64_MIN / 2;
   int64_t close_deadline_ns_ = INT64_MAX;
   bool lingers_ = false;     // complete, and not yet told to close
   bool hands_over_ = false;  // closes for a successor who asked
-  int early_beacons_ = 3;    // of a new term: one alone is not believed
-  int farewells_ = 6;        // beacons that still say goodbye: two of them are needed
-  int burst_left_ = 0;
-  int snapshot_left_ = 0;  ///< of burst_left_, for a snapshot
-  bool beacon_due_ = true;
+  Beacons beacons_;
+  Burst burst_;
   WriterStatistics statistics_;
 };
 

@@ -75,8 +75,8 @@ void StreamNode::Listen(const std::vector<std::string>& channels, CameraId camer
 }
 
 void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
-  ++received_;
-  received_bytes_ += static_cast<int64_t>(bytes.size());
+  ++traffic_.received;
+  traffic_.received_bytes += static_cast<int64_t>(bytes.size());
   if (std::find(other_channels_.begin(), other_channels_.end(), channel) == other_channels_.end()) return;
   const CameraChannel of_camera = SplitCamera(channel);
   if (of_camera.channel == channels::kCameraInfo) {
@@ -141,13 +141,13 @@ bool StreamNode::IsForeignFrame(uint32_t session) {
 
 bool StreamNode::IsForeign(uint32_t session) {
   if (session == session_) return false;
-  if (dropped_foreign_++ == 0)
+  if (traffic_.dropped_foreign++ == 0)
     LogWarning("{}: dropped a message of session {}; ours is {}", role_, session, session_);
   return true;
 }
 
 void StreamNode::CountMalformed(const std::string& channel, const std::string& reason) {
-  ++dropped_malformed_;
+  ++traffic_.dropped_malformed;
   if (std::find(logged_.begin(), logged_.end(), channel) != logged_.end()) return;
   logged_.push_back(channel);
   LogWarning("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
@@ -202,7 +202,7 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   for (const std::string& channel : record_channels)
     record_channels_of_camera.push_back(ChannelOfCamera(channel, camera));
   endpoint_.AddReader(reader.get(), options.owner, record_channels_of_camera);
-  readers_.push_back({reader.get(), options.owner, {}});
+  readers_.push_back({reader.get(), options.owner, {}, {}});
   return reader;
 }
 
@@ -214,7 +214,7 @@ std::unique_ptr<CoreThread> StreamNode::MakeCoreThread(PlaybackMode mode) {
 }
 
 void StreamNode::ServeReplica(const Map* map, std::function<Version()> held, std::function<bool()> may_read) {
-  replica_snapshots_ = std::make_unique<MapSnapshots>(map, std::move(may_read));
+  replica_.snapshots = std::make_unique<MapSnapshots>(map, std::move(may_read));
   ReplicaServer::Options options;
   options.holder.session = session_;
   options.holder.holder = UpperCase(role_);
@@ -223,12 +223,12 @@ void StreamNode::ServeReplica(const Map* map, std::function<Version()> held, std
   options.name = context_.name;
   options.schema_hash = SchemaHash();
   options.link = options_.link;
-  replica_server_ = std::make_unique<ReplicaServer>(options, std::move(held), replica_snapshots_.get());
-  endpoint_.AddServer(replica_server_.get(), "MAPPER");
+  replica_.server = std::make_unique<ReplicaServer>(options, std::move(held), replica_.snapshots.get());
+  endpoint_.AddServer(replica_.server.get(), "MAPPER");
 }
 
 void StreamNode::LetSnapshotBegin() {
-  if (replica_snapshots_ && replica_snapshots_->wanted()) endpoint_.Advance();
+  if (replica_.snapshots && replica_.snapshots->wanted()) endpoint_.Advance();
 }
 
 bool StreamNode::MapIsOver(const Map& map, const StreamReader& map_reader, int64_t silent_ns) const {
@@ -316,10 +316,10 @@ void StreamNode::RefuseOtherTypes(Watched* watched) {
   const bool misfit = reader.state() == StreamReader::State::kRefusedVersion && reader.held() == Version{} &&
                       reader.writer_present(context_.now_ns());
   if (!misfit) {
-    watched->misfit_since_ns = -1;
-  } else if (watched->misfit_since_ns < 0) {
+    watched->misfit_since_ns.reset();
+  } else if (!watched->misfit_since_ns) {
     watched->misfit_since_ns = context_.now_ns();
-  } else if (context_.now_ns() - watched->misfit_since_ns > kMisfitNs) {
+  } else if (context_.now_ns() - *watched->misfit_since_ns > kMisfitNs) {
     Exit(kExitMisfit, reader.problem());
   }
 }
@@ -458,10 +458,10 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   ProcessHealth& health = head.health;
   health = MeasureProcess();
   health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;
-  health.received = received_;
-  health.received_bytes = received_bytes_;
-  health.dropped_foreign = dropped_foreign_ + context_.refused();
-  health.dropped_malformed = dropped_malformed_;
+  health.received = traffic_.received;
+  health.received_bytes = traffic_.received_bytes;
+  health.dropped_foreign = traffic_.dropped_foreign + context_.refused();
+  health.dropped_malformed = traffic_.dropped_malformed;
   for (const StreamReader* reader : readers) {
     if (reader != nullptr) AddReader(reader->statistics(), &health);
   }

@@ -173,11 +173,26 @@ class StreamNode : public Node {
   void RefuseOtherTypes(Watched* watched);
   void WarnOnce(const std::string& matter, const std::string& text);
 
-  bool begun_ = false;
   struct KnownCamera {
     Bytes message;       ///< as the player sent it; empty: of a recorded session, and not repeated
     int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
   };
+  struct Traffic {
+    int64_t received = 0, received_bytes = 0, dropped_foreign = 0, dropped_malformed = 0;
+  };
+  struct Watched {
+    const StreamReader* reader;
+    std::string owner;                       ///< of the stream
+    std::string problem;                     ///< last one logged
+    std::optional<int64_t> misfit_since_ns;  ///< its writer has other message types
+  };
+  /// The map as it is here, for a mapper that begins.
+  struct ServedReplica {
+    std::unique_ptr<MapSnapshots> snapshots;
+    std::unique_ptr<ReplicaServer> server;
+  };
+
+  bool begun_ = false;
   std::map<CameraId, KnownCamera> cameras_;
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterElection> election_;
@@ -187,19 +202,12 @@ class StreamNode : public Node {
   int64_t next_status_ns_ = 0;
   int64_t next_tidy_ns_ = 0;
   int64_t started_ns_ = 0;
-  int64_t received_ = 0, received_bytes_ = 0, dropped_foreign_ = 0, dropped_malformed_ = 0;
+  Traffic traffic_;
   std::vector<std::string> logged_;
   wire::RecordGroups<MapDelta> map_groups_;
   bool map_in_parts_ = false;
-  struct Watched {
-    const StreamReader* reader;
-    std::string owner;             ///< of the stream
-    std::string problem;           ///< last one logged
-    int64_t misfit_since_ns = -1;  ///< its writer has other message types; -1: it has not
-  };
   std::vector<Watched> readers_;
-  std::unique_ptr<MapSnapshots> replica_snapshots_;
-  std::unique_ptr<ReplicaServer> replica_server_;
+  ServedReplica replica_;
 };
 
 }  // namespace dmslam
