@@ -68,6 +68,7 @@ storm() { # until all have been killed that are to be, or the run is over
     ! strike "$victim" || echo "$SECONDS $victim" >>"$out/kills"
   done < <(moments)
 }
+count() { if [[ $1 == undisturbed ]]; then echo 0; else wc -l <"$out/kills"; fi; } # NAME: of kills
 verdict() { # STATUS of the disturbed run
   local wrong="" error died
   [[ $1 == 0 ]] || wrong+="it ended with $1; "
@@ -100,7 +101,7 @@ wrong=$(verdict "$status")
   echo "|---|---|---|---|---|---|---|---|---|---|---|"
   for name in undisturbed storm; do
     printf '| %s | %s | %s | %s | %.1f / %.1f | %.4f / %.4f | %s | %s | %s | %s | %s |\n' "$name" \
-      "$([[ $name == undisturbed ]] && echo 0 || wc -l <"$out/kills")" "$(value "$name" restarts)" "$(value "$name" frames)" \
+      "$(count "$name")" "$(value "$name" restarts)" "$(value "$name" frames)" \
       "$(value "$name" tracked_online_percent)" "$(value "$name" tracked_percent)" "$(value "$name" ate_rmse_online)" \
       "$(value "$name" ate_rmse_final)" "$(value "$name" keyframes)" "$(value "$name" keyframes_missing)" \
       "$(value "$name" records_lost)" "$(value "$name" resumed)" "$([[ $name == undisturbed ]] || echo "${wrong:-good}")"
