@@ -88,6 +88,12 @@ step_kills() { # FOLDER SEQUENCE: processes die, and the run goes on
   [[ $2 == kitchen ]] || tracked=85
   "$top/scripts/kill_test.sh" --sequence "$data/$2" --camera "$top/config/kitchen.yaml" --min-tracked "$tracked" --out "$1"
 }
+step_killsets() { # every two and three of the five at once, and all of them
+  "$top/scripts/kill_test.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml" --victims pairs,triples,all --out "$1"
+}
+step_killstorm() { # 200 deaths in ten minutes
+  "$top/scripts/kill_storm.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml" --out "$1"
+}
 step_twohosts() { # a link that drops 0, 5 and 20 % of the packets, and a mapper that moves to the other host
   local play=("$top/scripts/two_hosts.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml")
   "${play[@]}" --out "$1/drops" && "${play[@]}" --lockstep --drop 5 --move-mapper 15 --out "$1/moved"
@@ -122,7 +128,7 @@ done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
 for ((first = 1; first <= SYSTEM_SCHEDULES; first += SYSTEM_SCHEDULES_PER_STEP)); do steps+=("system_$first $first"); done
 steps+=("lost" "loops")
-steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "noise" "localize" "sessions" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
+steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "killsets" "killstorm" "noise" "localize" "sessions" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
 ((EUID != 0)) || steps+=("twohosts") # it makes network namespaces
 ((soak == 0)) || steps+=("soak")
 if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi

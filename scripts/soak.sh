@@ -3,6 +3,7 @@
 set -euo pipefail
 
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+source "$top/scripts/lib/to_and_fro.sh"
 usage() {
   cat <<'EOF'
 Usage: scripts/soak.sh --sequence DIR --out DIR [options]
@@ -33,15 +34,8 @@ while (($#)); do
   esac
 done
 [[ -f $sequence/rgb.txt ]] || fail "$sequence has no rgb.txt: give a TUM RGB-D folder with --sequence"
-mkdir -p "$out/sequence"
-ln -sfn "$(cd "$sequence" && pwd)/rgb" "$out/sequence/rgb"
-# To and fro at the mean rate of the recording, as one list with ascending stamps.
-awk -v seconds="$seconds" -v speed="$speed" 'BEGIN { n = 0 } !/^#/ && NF >= 2 { stamp[n] = $1; file[n++] = $2 }
-  END { period = (stamp[n - 1] - stamp[0]) / (n - 1); at = 0; step = 1
-    for (i = 0; i * period < seconds * speed; ++i) {
-      printf "%.6f %s\n", 1 + i * period, file[at]
-      if (at + step < 0 || at + step >= n) step = -step
-      at += step } }' "$sequence/rgb.txt" >"$out/sequence/rgb.txt"
+mkdir -p "$out"
+to_and_fro "$sequence" "$(awk "BEGIN { print $seconds * $speed }")" "$out/sequence"
 
 "$top/scripts/run.sh" --build-dir "$build" --sequence "$out/sequence" "${camera[@]}" --speed "$speed" \
   --out "$out/run" >"$out/said.txt" 2>&1 &

@@ -117,21 +117,33 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
     return CountMalformed(channels::kFrame, "its number is beyond what a session can hold; begin a new one");
   const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && frame->stamp_ns <= last_stamp_ns_;
   if (last_index_ && (frame->frame_index <= *last_index_ || goes_back)) {
+    order_.OnRepeat();
     // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
     if (!pace_.frame_open) PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
     return;
   }
-  if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return;
+  if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return order_.OnRepeat();
+  if (end_.Is(SequenceEnd::Phase::kDone)) return PublishSequenceDone();
+  if (!order_.Takes({frame->frame_index, frame->stamp_ns}, NewestFrame(), context_.now_ns()))
+    return CountMalformed(channels::kFrame,
+                          "it is far ahead of those that came; taken when others go on there");
   ++counts_.received;
   if (waiting_) ++counts_.skipped;
   waiting_ = Waiting{std::move(*frame), context_.wall_us()};
+}
+
+/// That was taken in; none: none was, or it is known from the map alone, which knows no stamp.
+std::optional<PlayOrder::Place> FrontendNode::NewestFrame() const {
+  if (waiting_) return PlayOrder::Place{waiting_->frame.frame_index, waiting_->frame.stamp_ns};
+  if (!last_index_ || last_stamp_ns_ == 0) return std::nullopt;
+  return PlayOrder::Place{*last_index_, last_stamp_ns_};
 }
 
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   const std::optional<EndOfSequence> end = Read<EndOfSequence>(bytes);
   if (!end || !camera_info_ || IsForeignFrame(end->session)) return;
   if (end_.Is(SequenceEnd::Phase::kDone)) PublishSequenceDone();
-  end_.OnEndHeard();
+  order_.OnEnd(*end, context_.now_ns());
 }
 
 // ---- The map ----
@@ -228,6 +240,7 @@ bool FrontendNode::Run(Job job) {
 }
 
 bool FrontendNode::WorkOnce() {
+  if (order_.IsOver(context_.now_ns())) end_.OnEndHeard();
   if (!work_->Idle()) return false;
   LetSnapshotBegin();
   if (core_->IsRefining()) return Refine();

@@ -17,6 +17,7 @@
 #include "dmslam/slam/frontend_core.h"
 #include "frontend/make_frontend.h"
 #include "frontend/online_error.h"
+#include "frontend/play_order.h"
 #include "frontend/sequence_end.h"
 
 namespace dmslam {
@@ -67,6 +68,7 @@ class FrontendNode : public StreamNode {
   };
 
   void OnFrame(std::span<const uint8_t> bytes);
+  std::optional<PlayOrder::Place> NewestFrame() const;
   void OnEndOfSequence(std::span<const uint8_t> bytes);
   /// A map record that is here but not yet applied.
   struct HeldRecord {
@@ -136,6 +138,7 @@ class FrontendNode : public StreamNode {
   Version applied_;               ///< of the replica
   Version promised_;              ///< the same, when all that is ready is applied
   std::optional<Waiting> waiting_;
+  PlayOrder order_;
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far
   Pace pace_;

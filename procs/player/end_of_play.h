@@ -9,10 +9,14 @@
 
 namespace dmslam {
 
+/// One message may be forged: what contradicts what a player knows is believed when it is said for so long.
+inline constexpr int64_t kSaidForNs = 100'000'000;
+
 /// The end of what a player plays: it is told again and again until the frontend has heard it. The player
 /// then stays until the map is done, since a frontend that is started again at the end needs camera and end.
 class EndOfPlay {
  public:
+  bool WasSaid() const { return since_ns_ != 0; }
   void OnFrontendHeard() { heard_ = true; }
   /// A message on any channel. The statuses of this session's mapper and frontend say that these are alive: a
   /// frontend may still be tracking, adjusting or telling its last poses. All others are left alone.

@@ -32,6 +32,7 @@ class LiveNode : public Node {
 
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnSequenceDone();
   void OnFrameDone(const FrameDone& done);
   int64_t InSessionTime(int64_t stamp_ns);
   void SayWhetherAway();
@@ -53,6 +54,8 @@ class LiveNode : public Node {
   Frame frame_;                 ///< the newest one published
   int64_t published_ = 0;
   bool ending_ = false, stopped_ = false;
+  bool in_step_ = false;  ///< the frontend has done a frame of ours: it cannot be further than we are
+  std::optional<int64_t> done_since_ns_;  ///< somebody says that all is done
   EndOfPlay end_;
   int64_t next_info_ns_ = 0, next_status_ns_ = 0;
   std::optional<int> exit_code_;

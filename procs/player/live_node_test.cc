@@ -132,6 +132,28 @@ TEST_F(LiveNodeTest, PublishesWhatComesUntilEnoughAndThenItsEnd) {
   EXPECT_EQ(node.exit_code(), 0);
 }
 
+/// One forged message: the player is neither ended by it nor sent to the end of what a session can hold.
+TEST_F(LiveNodeTest, OneForgedAnswerChangesNothing) {
+  LiveNode node = Make();
+  Advance(node);
+  store_.frames = {Picture(0, 100)};
+  Advance(node);
+  ASSERT_EQ(frames_.size(), 1u);
+  Say(FrameDone{9, frames_[0].frame_index, frames_[0].stamp_ns});
+  Say(FrameDone{9, 1'000'000, 3'600'000'000'000});
+  Say(SequenceDone{0, 9});
+  store_.frames = {Picture(1, 200)};
+  Advance(node);
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_EQ(frames_[1].frame_index, 1u);
+  EXPECT_EQ(frames_[1].stamp_ns, 200);
+  EXPECT_TRUE(ends_.empty());
+  Advance(node, 200'000'000);
+  Say(SequenceDone{0, 9});  // a frontend that has ended says it for every frame
+  Advance(node);
+  EXPECT_FALSE(ends_.empty());
+}
+
 TEST_F(LiveNodeTest, EndsWithItsCamera) {
   LiveNode node = Make();
   store_.frames = {Picture(0, 100)};

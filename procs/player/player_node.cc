@@ -116,15 +116,31 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
   }
 }
 
+/// The answer to the end that was said, by us or by a player before us. Else it is nobody's.
 void PlayerNode::OnSequenceDone(const SequenceDone& done) {
-  if (done.session != options_.session) return;
+  if (done.session != options_.session || (playing_ && !end_.WasSaid())) return;
   end_.OnFrontendHeard();
   position_ = order_.size();
   awaiting_done_ = false;
 }
 
+/// Once the frontend has done a frame of ours it is hardly further than we are: that is believed when it is
+/// said for a tenth of a second (it answers each repeat), and no frame of ours is done meanwhile.
+bool PlayerNode::MayBeDone(uint32_t frame_index) {
+  if (counts_.published == 0 || frame_index < frame_.frame_index) return true;
+  if (frame_index == frame_.frame_index) {
+    in_step_ = true;
+    ahead_since_ns_.reset();
+    return true;
+  }
+  if (!in_step_) return true;
+  if (!ahead_since_ns_) ahead_since_ns_ = context_.now_ns();
+  return context_.now_ns() - *ahead_since_ns_ >= kSaidForNs;
+}
+
 void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session) return;
+  if (playing_ && !MayBeDone(done.frame_index)) return;
   if ((counts_.published > 0 || !playing_) && done.frame_index >= frame_.frame_index + (playing_ ? 1 : 0)) {
     SkipBehind(done.frame_index);
   } else if (awaiting_done_ && done.frame_index == frame_.frame_index) {

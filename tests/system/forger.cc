@@ -1,6 +1,6 @@
 // Who can send on the segment and knows the protocol: listens to a running system and forges one kind of
-// message again and again, with every checksum right. Without a key of its own its messages carry the tag of
-// what it heard, or none; with --key they carry tags of that key.
+// message again and again, or so many times, with every checksum right. Without a key of its own its messages
+// carry the tag of what it heard, or none; with --key they carry tags of that key.
 #include <cstdio>
 #include <functional>
 #include <map>
@@ -49,17 +49,30 @@ class Forger {
   }
 
   bool Forge(const std::string& kind) {
-    static const std::map<std::string, void (Forger::*)()> kKinds = {
-        {"frame", &Forger::Frames},        {"end", &Forger::End},    {"camera", &Forger::AnotherCamera},
-        {"take-over", &Forger::TakeOvers}, {"head", &Forger::Heads}, {"record", &Forger::Records},
-        {"reset", &Forger::Reset},         {"ack", &Forger::Acks},   {"done", &Forger::Done},
-        {"replay", &Forger::Replay}};
+    static const std::map<std::string, void (Forger::*)()> kKinds = {{"frame", &Forger::Frames},
+                                                                     {"far-frame", &Forger::FarFrame},
+                                                                     {"end", &Forger::End},
+                                                                     {"camera", &Forger::AnotherCamera},
+                                                                     {"take-over", &Forger::TakeOvers},
+                                                                     {"head", &Forger::Heads},
+                                                                     {"record", &Forger::Records},
+                                                                     {"reset", &Forger::Reset},
+                                                                     {"ack", &Forger::Acks},
+                                                                     {"done", &Forger::Done},
+                                                                     {"far-done", &Forger::FarDone},
+                                                                     {"sequence-done", &Forger::AllDone},
+                                                                     {"replay", &Forger::Replay}};
     const auto found = kKinds.find(kind);
     if (found == kKinds.end()) return false;
     (this->*found->second)();
     return true;
   }
   int64_t sent() const { return sent_; }
+  /// The newest frame that was played.
+  int64_t frame() const {
+    const std::optional<Frame> frame = Last<Frame>();
+    return frame ? static_cast<int64_t>(frame->frame_index) : -1;
+  }
 
  private:
   void Hear(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -109,6 +122,13 @@ class Forger {
       SendMessage(*frame);
     }
   }
+  void FarFrame() {
+    std::optional<Frame> frame = Last<Frame>();
+    if (!frame) return;
+    frame->frame_index = kMaxFrames - 10 + static_cast<uint32_t>(sent_);
+    frame->stamp_ns += 3'600'000'000'000;
+    SendMessage(*frame);
+  }
   void End() {
     const std::optional<Frame> frame = Last<Frame>();
     if (!frame) return;
@@ -136,6 +156,17 @@ class Forger {
       done.stamp_ns = frame->stamp_ns;
       SendMessage(done);
     }
+  }
+  void FarDone() {
+    const std::optional<Frame> frame = Last<Frame>();
+    if (frame) SendMessage(FrameDone{frame->session, frame->frame_index + 1000, frame->stamp_ns});
+  }
+  void AllDone() {
+    const std::optional<Frame> frame = Last<Frame>();
+    if (!frame) return;
+    SequenceDone done;
+    done.session = frame->session;
+    SendMessage(done);
   }
   void ForEachHead(const std::function<void(const std::string& owner, const head_t&)>& action) {
     for (const std::string owner : {"PLAYER", "FRONTEND", "MAPPER", "LOOPCLOSER"}) {
@@ -222,11 +253,16 @@ int main(int argc, char** argv) {
   std::string url, key;
   std::vector<std::string> kinds;
   bool keeps_tag = false;
+  int64_t times = INT64_MAX, from_frame = 0;
   app.AddOption("--lcm-url", url).Required();
   app.AddOption("--key", key, "of another system");
   app.AddFlag("--keep-tag", keeps_tag, "put the tag of what was heard behind what is forged");
-  app.AddOption("--kind", kinds, "frame, end, camera, take-over, head, record, reset, ack, done, replay")
+  app.AddOption("--kind", kinds,
+                "frame, far-frame, end, camera, take-over, head, record, reset, ack, done, far-done, "
+                "sequence-done, replay")
       .Required();
+  app.AddOption("--times", times, "end after so many forgeries of each kind; default: a signal ends it");
+  app.AddOption("--from-frame", from_frame, "begin when this frame has been played");
   if (const auto code = app.Parse(argc, argv)) return *code;
   try {
     dmslam::EventLoop loop;
@@ -235,13 +271,16 @@ int main(int argc, char** argv) {
     if (!key.empty()) own = dmslam::BusKey::Load(key);
     dmslam::Forger forger(&bus, own, keeps_tag);
     loop.Watch(bus.fd(), [&bus] { bus.Deliver(); });
-    while (loop.stop_signal() == 0) {
+    for (int64_t forged = 0; loop.stop_signal() == 0 && forged < times;) {
       const int64_t next_ns = loop.now_ns() + 20'000'000;
       while (loop.now_ns() < next_ns && loop.PumpOnce(next_ns)) {
       }
+      if (forger.frame() < from_frame) continue;
+      const int64_t sent = forger.sent();
       for (const std::string& kind : kinds) {
         if (!forger.Forge(kind)) throw dmslam::InputError("no such kind: " + kind);
       }
+      forged += forger.sent() > sent;
     }
     std::printf("%lld forged messages\n", static_cast<long long>(forger.sent()));
   } catch (const dmslam::InputError& error) {
