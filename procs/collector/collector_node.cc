@@ -58,7 +58,7 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
 /// Where the map on the disk is the last one, nobody is needed any more, and nobody may be left.
 void CollectorNode::RecallEndedMap() {
   if (context_.fresh_system && !context_.resumed) return;
-  FoundCheckpoint found = FindCheckpoint(CheckpointPath(collector_.out_dir), session_);
+  FoundCheckpoint found = FindCheckpoint(CheckpointPath(collector_.out_dir), session_, feature_store_);
   if (!found.map || !found.map->map.progress().ended) return;
   LogInfo("{}: the map is complete; what is left to do is to write the results", found.path);
   CameraInfo info;
@@ -77,6 +77,7 @@ void CollectorNode::OnCamera(const CameraInfo& info) {
 
 void CollectorNode::Begin(const CameraInfo& info) {
   builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.Read<Pyramid>());
+  builder_->KeepFeaturesIn(feature_store_);
   if (ended_map_.found) {
     ended_map_.safe_version = ended_map_.found->version();
     builder_->SetMap(*std::exchange(ended_map_.found, std::nullopt));

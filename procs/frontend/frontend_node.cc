@@ -35,6 +35,7 @@ void FrontendNode::Begin(const CameraInfo& info) {
   pace_.lockstep = info.mode == PlaybackMode::kLockstep;
   pace_.takes_turns = pace_.lockstep && options_.NumCameras() > 1;
   FrontendCore::Setup setup = FrontendSetup(options_.settings, info.camera, extras_.vocabulary);
+  setup.feature_store = feature_store_;
   setup.session = session_;
   setup.camera_id = options_.camera_id;
   setup.in_saved_map = run_.saved_map;

@@ -42,6 +42,7 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
   core_ = std::make_unique<LoopcloserCore>(settings.Read<LoopcloserOptions>(), info.camera,
                                            settings.Read<Pyramid>(), settings.Read<RunOptions>().seed,
                                            vocabulary_);
+  core_->KeepFeaturesIn(feature_store_);
   if (info.mode == PlaybackMode::kRealtime) core_->SetInterrupt([this] { return stop_.load(); });
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(

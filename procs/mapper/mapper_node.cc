@@ -35,7 +35,7 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
   if (files_.load.empty()) return;
-  saved_.loaded = LoadMap(files_.load);
+  saved_.loaded = LoadMap(files_.load, std::nullopt, feature_store_);
   saved_.made = saved_.loaded->session;
 }
 
@@ -74,6 +74,7 @@ void MapperNode::Begin(const CameraInfo& info) {
   };
   core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera,
                                        options_.settings.Read<Pyramid>(), ordinal, publish);
+  core_->KeepFeaturesIn(feature_store_);
   if (saved_.loaded) {
     core_->ContinueSaved(std::exchange(saved_.loaded, std::nullopt)->map);
     PutInParts();
@@ -112,6 +113,7 @@ bool MapperNode::FetchReplica() {
   while (std::optional<Record> record = left_.fetch->Take()) {
     if (record->begins_anew()) {
       left_.replica.emplace(core_->map().camera(), core_->map().pyramid());
+      left_.replica->KeepFeaturesIn(feature_store_);
       left_.groups.Clear();
     }
     auto delta = Read<MapDelta>(*record->bytes);
@@ -140,7 +142,7 @@ bool MapperNode::FetchReplica() {
 /// Whoever held the map has died with the mapper: what is on the disk is all there is. False: nothing is.
 bool MapperNode::TakeCheckpoint() {
   if (files_.checkpoint.empty()) return false;
-  FoundCheckpoint found = FindCheckpoint(files_.checkpoint, session_);
+  FoundCheckpoint found = FindCheckpoint(files_.checkpoint, session_, feature_store_);
   if (!found.problem.empty()) LogWarning("{}", found.problem);
   if (!found.map) return false;
   CheckFits(found.path, *found.map, camera_info_->camera, options_.settings.Read<Pyramid>());

@@ -27,6 +27,7 @@ RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_p
     LogWarning("{}: {} records of the frontend are missing in it", log_->path(), records_.missing);
   }
   recorded_ = Replica(start->camera, start->pyramid);
+  recorded_.KeepFeaturesIn(feature_store_);
   live_ = recorded_;
   if (session_ == 0) session_ = recorded.id + 1;
   CameraInfo info;

@@ -34,7 +34,11 @@ struct JoinedMaps {
 /// camera was last lies as it is, the others beside it.
 class ViewerCore {
  public:
-  ViewerCore(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
+  /// `features`: where the map keeps them; null: in memory.
+  ViewerCore(const Camera& camera, const Pyramid& pyramid, std::shared_ptr<FeatureStore> features = nullptr)
+      : map_(camera, pyramid) {
+    map_.KeepFeaturesIn(std::move(features));
+  }
 
   void OnMapDelta(const MapDelta& delta);
   void OnFramePose(const FramePose& pose);

@@ -51,7 +51,7 @@ void ViewerNode::OnCamera(const CameraInfo& info) {
 }
 
 void ViewerNode::Begin(const CameraInfo& info) {
-  core_ = std::make_unique<ViewerCore>(info.camera, options_.settings.Read<Pyramid>());
+  core_ = std::make_unique<ViewerCore>(info.camera, options_.settings.Read<Pyramid>(), feature_store_);
   if (!viewer_.ground_truth.empty()) core_->SetTruth(ReadGroundTruth(viewer_.ground_truth).poses);
   exchange_->Change([](Scene* scene, CameraSeries* series) {
     scene->Clear();

@@ -9,9 +9,12 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "dmslam/map/feature_store.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/mapping/correction.h"
@@ -62,7 +65,9 @@ struct Traffic {
 /// A replica on the other side of the wire.
 class Reader {
  public:
-  Reader() : map_(TourMap::TourCamera(), Pyramid()) {}
+  explicit Reader(std::shared_ptr<FeatureStore> features) : map_(TourMap::TourCamera(), Pyramid()) {
+    map_.KeepFeaturesIn(std::move(features));
+  }
 
   /// Writes and reads a change record by record.
   void Take(MapDelta change, Traffic* traffic) {
@@ -103,6 +108,8 @@ bool Same(const Map& a, const Map& b) {
     const Keyframe* other = b.FindKeyframe(id);
     if (other == nullptr || !SamePose(keyframe, *other) || keyframe.landmarks != other->landmarks)
       return false;
+    const FeatureSet &features = keyframe.features->set, &others = other->features->set;
+    if (features.keypoints != others.keypoints || features.descriptors != others.descriptors) return false;
   }
   return std::ranges::all_of(a.LandmarkIdsSorted(), [&](LandmarkId id) {
     const Landmark* other = b.FindLandmark(id);
@@ -179,9 +186,12 @@ LoopAnswer ThroughRecords(LoopAnswer answer, Traffic* traffic) {
   return std::move(*whole);
 }
 
-int Run(const TourOptions& options, const std::string& path) {
+int Run(const TourOptions& options, const FeatureStoreOptions& memory, const std::string& path) {
   const double empty_mb = ResidentMegabytes();
+  const auto writers_features = std::make_shared<FeatureStore>(memory);
+  const auto readers_features = std::make_shared<FeatureStore>(memory);
   TourMap tour(options, 1);
+  tour.KeepFeaturesIn(writers_features);
   Table table;
   Traffic building;
   double replica_mb = 0, writer_mb = 0;
@@ -193,11 +203,12 @@ int Run(const TourOptions& options, const std::string& path) {
       building.write_s += Seconds() - begin;
       building.Add(bytes);
     }
+    writers_features->LetGo();
     writer_mb = ResidentMegabytes() - empty_mb;
   }
   table.Add("built, a record per keyframe", building);
 
-  Reader replica;
+  Reader replica(readers_features);
   const auto hand_over = [&](Reader* reader, Traffic* traffic) {
     MapSnapshots snapshots(&tour.map());
     const double begin = Seconds();
@@ -213,6 +224,8 @@ int Run(const TourOptions& options, const std::string& path) {
   };
   Traffic first_snapshot;
   hand_over(&replica, &first_snapshot);
+  writers_features->LetGo();
+  readers_features->LetGo();
   replica_mb = ResidentMegabytes() - empty_mb - writer_mb;
   table.Add("snapshot for a replica", first_snapshot);
   bool same = Same(tour.map(), replica.map());
@@ -238,7 +251,7 @@ int Run(const TourOptions& options, const std::string& path) {
   const double save_s = Seconds() - begin;
   {
     begin = Seconds();
-    const RebuiltMap loaded = LoadMap(path);
+    const RebuiltMap loaded = LoadMap(path, std::nullopt, std::make_shared<FeatureStore>(memory));
     const double load_s = Seconds() - begin;
     same = same && loaded.missing == 0 && Same(tour.map(), loaded.map);
     std::printf("\nsaved in %.1f s of CPU (%.1f MB), loaded in %.1f s\n", save_s,
@@ -251,6 +264,12 @@ int Run(const TourOptions& options, const std::string& path) {
       tour.map().keyframes().size(), tour.map().num_landmarks(),
       tour.map().keyframes().rbegin()->second.features->size(), writer_mb, replica_mb,
       MostResidentMegabytes());
+  std::printf(
+      "features of the writer's map: %.0f MB in memory, %.0f MB in the file; of the replica's %.0f, %.0f\n",
+      static_cast<double>(writers_features->bytes_in_memory()) / kMegabyte,
+      static_cast<double>(writers_features->bytes_in_file()) / kMegabyte,
+      static_cast<double>(readers_features->bytes_in_memory()) / kMegabyte,
+      static_cast<double>(readers_features->bytes_in_file()) / kMegabyte);
   std::printf("largest record %zu bytes, bound %zu; replica and loaded map %s\n", table.largest(),
               wire::kMaxRecordBytes, same ? "are the writer's, bit for bit" : "DIFFER from the writer's");
   return same && table.largest() <= wire::kMaxRecordBytes ? 0 : 1;
@@ -262,11 +281,14 @@ int Run(const TourOptions& options, const std::string& path) {
 int main(int argc, char** argv) {
   CLI::App app("Records, times and memory of a large made-up map");
   dmslam::TourOptions options;
+  dmslam::FeatureStoreOptions memory;
   std::string path = "map_size.log";
   app.add_option("--keyframes", options.keyframes)->capture_default_str();
   app.add_option("--landmarks", options.landmarks)->capture_default_str();
   app.add_option("--features", options.features, "of a keyframe, at least")->capture_default_str();
+  app.add_option("--features-mb", memory.memory_mb, "of features in the memory of each map (map.features_mb)")
+      ->capture_default_str();
   app.add_option("--file", path, "where the map is saved, and removed again")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  return dmslam::bench::Run(options, path);
+  return dmslam::bench::Run(options, memory, path);
 }

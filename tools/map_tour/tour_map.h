@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "dmslam/map/map_editor.h"
@@ -23,6 +25,8 @@ struct TourOptions {
 class TourMap {
  public:
   TourMap(const TourOptions& options, uint32_t session);
+  /// See Map; to be said first.
+  void KeepFeaturesIn(std::shared_ptr<FeatureStore> store) { map_.KeepFeaturesIn(std::move(store)); }
 
   bool done() const { return next_ >= options_.keyframes; }
   /// Adds the next keyframe with its landmarks and returns the change.

@@ -13,6 +13,7 @@ TourNode::TourNode(NodeContext context, NodeOptions options, const TourNodeOptio
 
 void TourNode::Begin(const CameraInfo&) {
   tour_ = std::make_unique<TourMap>(tour_options_.tour, session_);
+  tour_->KeepFeaturesIn(feature_store_);
   snapshots_ = std::make_unique<MapSnapshots>(&tour_->map());
   WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,14 @@ namespace dmslam {
 /// found all the same.
 class FeatureGrid {
  public:
+  FeatureGrid() = default;
+  /// The same with its lists in other memory, which must outlive it.
+  FeatureGrid(std::pmr::memory_resource* memory, const FeatureGrid& other)
+      : columns_(other.columns_),
+        rows_(other.rows_),
+        starts_(other.starts_, memory),
+        entries_(other.entries_, memory) {}
+
   /// Indexes features at `uv_px` (undistorted pixels, finite) with the octaves of `keypoints`, same order and
   /// length. Throws InvariantError when the lengths differ or the image has no pixels. Reuses its memory.
   void Build(std::span<const Eigen::Vector2d> uv_px, std::span<const Keypoint> keypoints, int width_px,
@@ -51,6 +60,11 @@ class FeatureGrid {
                          uint32_t* features) const;
 
   size_t size() const { return entries_.size(); }
+  /// What its lists take in memory, with what their beginnings must be aligned to.
+  size_t Bytes() const {
+    return starts_.size() * sizeof(uint32_t) + entries_.size() * sizeof(Entry) + alignof(uint32_t) +
+           alignof(Entry);
+  }
 
  private:
   struct Entry {
@@ -75,8 +89,8 @@ class FeatureGrid {
 
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<uint32_t> starts_;  ///< first entry of each cell, and the end of the last
-  std::vector<Entry> entries_;    ///< sorted by cell, then by feature
+  std::pmr::vector<uint32_t> starts_;  ///< first entry of each cell, and the end of the last
+  std::pmr::vector<Entry> entries_;    ///< sorted by cell, then by feature
 };
 
 }  // namespace dmslam

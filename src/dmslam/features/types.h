@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory_resource>
 #include <vector>
 
 namespace dmslam {
@@ -45,13 +46,13 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
 }
 
 /// Keypoints of one image and their descriptors, same order and length. The other lists are as long, or empty
-/// where nothing of the kind was measured.
+/// where nothing of the kind was measured. A copy lies on the heap, wherever the original lies.
 struct FeatureSet {
-  std::vector<Keypoint> keypoints;
-  std::vector<Descriptor> descriptors;
-  std::vector<float> depths_m;        ///< along the optical axis [m]; -1: not measured
-  std::vector<float> depth_sigmas_m;  ///< standard deviations of the depths [m]; -1: not measured
-  std::vector<float> sigmas_px;       ///< of the positions; empty: Pyramid::Scale says it
+  std::pmr::vector<Keypoint> keypoints;
+  std::pmr::vector<Descriptor> descriptors;
+  std::pmr::vector<float> depths_m;        ///< along the optical axis [m]; -1: not measured
+  std::pmr::vector<float> depth_sigmas_m;  ///< standard deviations of the depths [m]; -1: not measured
+  std::pmr::vector<float> sigmas_px;       ///< of the positions; empty: Pyramid::Scale says it
 
   size_t size() const { return keypoints.size(); }
 };

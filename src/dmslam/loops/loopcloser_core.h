@@ -46,6 +46,8 @@ class LoopcloserCore {
   /// mapper refused may be found again.
   LoopAnswer Check(KeyframeId keyframe);
 
+  /// See Map; to be said before the first record.
+  void KeepFeaturesIn(std::shared_ptr<FeatureStore> store) { map_.KeepFeaturesIn(std::move(store)); }
   const Map& map() const { return map_; }
   const LoopcloserCounters& counters() const { return counters_; }
   /// A place that words named consistently, or that an earlier keyframe proposed, and what geometry said of

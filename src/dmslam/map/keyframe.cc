@@ -26,7 +26,7 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Cam
   FeatureSet kept;
   kept.keypoints.reserve(set.size());
   kept.descriptors.reserve(set.size());
-  const auto keep = [](const std::vector<float>& from, size_t i, std::vector<float>& to) {
+  const auto keep = [](const auto& from, size_t i, auto& to) {
     if (!from.empty()) to.push_back(from[i]);
   };
   features->uv_px.reserve(set.size());

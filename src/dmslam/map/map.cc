@@ -18,6 +18,18 @@ auto WhereObserved(std::vector<Observation>& observations, KeyframeId keyframe) 
 
 Map::Map(const Camera& camera, const Pyramid& pyramid) : camera_(camera), pyramid_(pyramid) {}
 
+void Map::KeepFeaturesIn(std::shared_ptr<FeatureStore> store) {
+  if (feature_store_ == store) return;
+  feature_store_ = std::move(store);
+  if (feature_store_ == nullptr) return;
+  for (auto& [id, keyframe] : keyframes_)
+    keyframe.features = feature_store_->Keep(std::move(keyframe.features));
+}
+
+void Map::TidyFeatures() {
+  if (feature_store_ != nullptr) feature_store_->OnChange();
+}
+
 const Keyframe* Map::FindKeyframe(KeyframeId id) const {
   const auto it = keyframes_.find(id);
   return it == keyframes_.end() ? nullptr : &it->second;
@@ -262,6 +274,7 @@ Keyframe& Map::Insert(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   DMSLAM_CHECK(id.valid() && !keyframes_.contains(id), "keyframe added twice");
   DMSLAM_CHECK(keyframe.features != nullptr, "keyframe without features");
+  if (feature_store_ != nullptr) keyframe.features = feature_store_->Keep(std::move(keyframe.features));
   keyframe.landmarks.assign(keyframe.features->size(), LandmarkId{});
   keyframe.covisible.clear();
   Attach(id, keyframe.parent);

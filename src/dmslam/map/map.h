@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "dmslam/camera/camera.h"
+#include "dmslam/map/feature_store.h"
 #include "dmslam/map/keyframe.h"
 #include "dmslam/map/landmark.h"
 #include "dmslam/map/map_delta.h"
@@ -29,6 +31,12 @@ namespace dmslam {
 class Map {
  public:
   Map(const Camera& camera, const Pyramid& pyramid);
+
+  /// Where features lie that are too many for the memory, those of the keyframes that are there included;
+  /// null: they are never too many. Copies of the map share it. Features that were found before lie elsewhere
+  /// now.
+  void KeepFeaturesIn(std::shared_ptr<FeatureStore> store);
+  const std::shared_ptr<FeatureStore>& feature_store() const { return feature_store_; }
 
   const Camera& camera() const { return camera_; }
   const Pyramid& pyramid() const { return pyramid_; }
@@ -139,6 +147,8 @@ class Map {
   };
   Forgotten Forget(MapId map_id);
   void SetVersion(uint64_t version) { version_ = version; }
+  /// A change is complete.
+  void TidyFeatures();
   /// Of one camera; none at all (a default one): of all.
   void SetProgressTo(const MapProgress& progress);
 
@@ -159,6 +169,7 @@ class Map {
 
   Camera camera_;
   Pyramid pyramid_;
+  std::shared_ptr<FeatureStore> feature_store_;
   uint64_t version_ = 0;
   MapProgress progress_;                         ///< as told last
   std::map<CameraId, MapProgress> progress_of_;  ///< by camera

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,8 +47,7 @@ struct KeyframeState {
   double scale = 1.0;
   KeyframeId parent;
   std::vector<KeyframeId> loop_edges;
-  bool has_features = false;
-  FeatureSet features;
+  std::shared_ptr<const FeatureSet> features;  ///< those of the keyframe, not copied; null: they are known
   CameraId camera_id = 0;
 };
 

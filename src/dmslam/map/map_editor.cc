@@ -229,6 +229,7 @@ MapDelta MapEditor::TakeDelta(MapEvent event, std::optional<KeyframeId> about, s
   journal_.Write(*this, &delta);
   journal_ = {};
   ForgetOldTombstones();
+  TidyFeatures();
   return delta;
 }
 

@@ -47,7 +47,7 @@ class Editor : public testing::Test {
 
 TEST_F(Editor, FirstDeltaHoldsEverythingAndTheNextNothing) {
   EXPECT_EQ(first_.keyframes.size(), 3u);
-  EXPECT_TRUE(first_.keyframes.front().has_features);
+  EXPECT_NE(first_.keyframes.front().features, nullptr);
   EXPECT_EQ(first_.landmarks.size(), 4u);
   EXPECT_EQ(first_.observations.size(), 12u);
   EXPECT_EQ(first_.version, 1u);
@@ -79,7 +79,7 @@ TEST_F(Editor, AStateIncludesPoseAndPosition) {
   map_.SetMapId(map_.At(Lm(2)), 5);
   const MapDelta delta = Take();
   ASSERT_EQ(delta.keyframes.size(), 1u);
-  EXPECT_FALSE(delta.keyframes.front().has_features) << "they are known";
+  EXPECT_EQ(delta.keyframes.front().features, nullptr) << "they are known";
   EXPECT_TRUE(delta.keyframe_poses.empty());
   ASSERT_EQ(delta.landmarks.size(), 1u);
   EXPECT_TRUE(delta.landmark_positions.empty());

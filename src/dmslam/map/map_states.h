@@ -10,9 +10,8 @@ namespace dmslam {
 inline KeyframeState StateOf(const Keyframe& keyframe, bool with_features) {
   KeyframeState state{keyframe.id,          keyframe.map_id, keyframe.stamp_ns,
                       keyframe.T_cam_world, keyframe.scale,  keyframe.parent,
-                      keyframe.loop_edges,  with_features,   {},
-                      keyframe.camera_id};
-  if (with_features) state.features = keyframe.features->set;
+                      keyframe.loop_edges,  nullptr,         keyframe.camera_id};
+  if (with_features) state.features = {keyframe.features, &keyframe.features->set};
   return state;
 }
 

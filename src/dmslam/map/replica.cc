@@ -21,14 +21,21 @@ void Replica::Apply(const MapDelta& delta) {
   SetVersion(std::max(version(), delta.version));
   SetProgressTo(delta.progress);
   ForgetOldTombstones();
+  TidyFeatures();
+}
+
+void Replica::Clear() {
+  Replica empty(camera(), pyramid());
+  empty.KeepFeaturesIn(feature_store());
+  *this = std::move(empty);
 }
 
 Keyframe* Replica::FindOrInsert(const KeyframeState& state) {
   if (Keyframe* keyframe = Find(state.id)) return keyframe;
-  if (!state.has_features || keyframe_tombstones().contains(state.id)) return nullptr;
+  if (state.features == nullptr || keyframe_tombstones().contains(state.id)) return nullptr;
   Keyframe keyframe;
   keyframe.id = state.id;
-  keyframe.features = MakeFrameFeatures(state.features, camera(), pyramid());
+  keyframe.features = MakeFrameFeatures(*state.features, camera(), pyramid());
   applied_new_keyframes_.push_back(state.id);
   return &Insert(std::move(keyframe));
 }

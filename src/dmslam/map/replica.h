@@ -19,7 +19,7 @@ class Replica : public Map {
   /// Applies a delta of the writer's map. Twice is once. What refers to unknown ids is skipped and counted.
   void Apply(const MapDelta& delta);
   /// Forgets all: another map, or a snapshot, begins.
-  void Clear() { *this = Replica(camera(), pyramid()); }
+  void Clear();
 
   /// Keyframes that the last Apply brought and took, for readers with indices.
   const std::vector<KeyframeId>& applied_new_keyframes() const { return applied_new_keyframes_; }

@@ -31,6 +31,7 @@ void MapperCore::ContinueSaved(Map map, uint64_t successor) {
 }
 
 void MapperCore::Continue(Map map, uint64_t successor) {
+  map.KeepFeaturesIn(map_.feature_store());
   map_ = MapEditor(std::move(map));
   maker_.Continue(map_, successor);
   order_.Assume(map_);

@@ -53,6 +53,8 @@ class MapperCore {
   /// far as it has come. May be empty.
   void SetStop(std::function<bool()> stop) { stop_ = std::move(stop); }
 
+  /// See Map; to be said first.
+  void KeepFeaturesIn(std::shared_ptr<FeatureStore> store) { map_.KeepFeaturesIn(std::move(store)); }
   /// Continues a map that others kept (after a restart) or that was saved: new landmarks get ids of an
   /// ordinal that the map does not know, and the local mapping of the keyframe that is proposed first is done
   /// again where the map has it: what was done of it is not known.

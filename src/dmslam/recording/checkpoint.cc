@@ -93,12 +93,13 @@ void WriteCheckpoint(const std::string& path, const CutMap& map, const SessionSt
     throw InputError(path + ": cannot be written (" + std::strerror(errno) + "); check the folder");
 }
 
-FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session) {
+FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session,
+                               const std::shared_ptr<FeatureStore>& features) {
   FoundCheckpoint found;
   for (const std::string& candidate : {path, FormerCheckpointPath(path)}) {
     if (!fs::exists(candidate)) continue;
     try {
-      RebuiltMap map = LoadMap(candidate);
+      RebuiltMap map = LoadMap(candidate, std::nullopt, features);
       if (map.session.session != session) continue;
       found.map = std::move(map);
       found.path = candidate;

@@ -63,8 +63,10 @@ struct FoundCheckpoint {
   std::string path;     ///< of the one that was read
   std::string problem;  ///< why it was not the newest one, or why there is none
 };
-/// The newest checkpoint of `session` that is whole; of another session's there is none.
-FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session);
+/// The newest checkpoint of `session` that is whole; of another session's there is none. `features`: see
+/// RebuildMap.
+FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session,
+                               const std::shared_ptr<FeatureStore>& features = nullptr);
 
 /// The run has ended, or another one begins.
 void RemoveCheckpoints(const std::string& path);

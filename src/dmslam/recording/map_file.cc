@@ -68,7 +68,8 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
   return start;
 }
 
-RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us) {
+RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us,
+                      std::shared_ptr<FeatureStore> features) {
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
   const std::optional<SessionStart> start = FindSessionStart(log, session);
   const int64_t absent = session.saved_records - RecordsOf(session.Stream(StreamId::kMap));
@@ -83,6 +84,7 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
   }
   if (!start) throw InputError(log.path() + ": does not say which camera the map was made with");
   RebuiltMap rebuilt{Replica(start->camera, start->pyramid), *start};
+  rebuilt.map.KeepFeaturesIn(std::move(features));
   rebuilt.missing = replay.missing;
   wire::RecordGroups<MapDelta> groups;
   for (const ReplayStep& step : replay.steps) {
@@ -133,9 +135,10 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
   if (!RenameDurably(partial, path)) throw InputError(path + ": cannot be written; check the path");
 }
 
-RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key) {
+RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key,
+                   std::shared_ptr<FeatureStore> features) {
   const LogIndex log(path, key);
-  RebuiltMap map = RebuildMap(log, log.Session());
+  RebuiltMap map = RebuildMap(log, log.Session(), INT64_MAX, std::move(features));
   if (map.map.keyframes().empty()) throw InputError(path + ": holds a map without keyframes");
   return map;
 }

@@ -27,8 +27,9 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
 
 /// Builds the map of a session from its recorded map records, up to `until_us` of wall time. With all records
 /// in the log it is the mapper's own map at that time. Throws InputError when the log holds no map of the
-/// session.
-RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us = INT64_MAX);
+/// session. `features`: where the map keeps them; null: in memory.
+RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us = INT64_MAX,
+                      std::shared_ptr<FeatureStore> features = nullptr);
 
 /// A map as it will be written: taken from a map at one time, whoever writes it when and where.
 struct CutMap {
@@ -45,7 +46,8 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
 
 /// Reads what SaveMap has written, or rebuilds the map of any other log of a run. `key`: as for LogIndex.
 /// Throws InputError.
-RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key = std::nullopt);
+RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key = std::nullopt,
+                   std::shared_ptr<FeatureStore> features = nullptr);
 
 /// Throws InputError unless `map` can be continued with this camera and pyramid.
 void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid);

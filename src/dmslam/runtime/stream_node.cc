@@ -50,6 +50,7 @@ int64_t SchemaHash() { return HashOf(static_cast<const wire::Messages*>(nullptr)
 StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string role)
     : context_(std::move(context)),
       options_(std::move(options)),
+      feature_store_(std::make_shared<FeatureStore>(options_.settings.Read<FeatureStoreOptions>())),
       role_(std::move(role)),
       endpoint_(context_.bus, context_.now_ns),
       session_(options_.session),
@@ -383,8 +384,14 @@ void StreamNode::PublishStatusIfDue() {
   next_status_ns_ = context_.now_ns() + kStatusEveryNs;
   KeepCameraKnown();
   PublishStatus();
+  const std::string no_room = feature_store_->TakeProblem();
+  if (!no_room.empty())
+    LogWarning("{}: features of the map stay in memory, as no file can take them: {}", role_, no_room);
   if (context_.now_ns() < next_tidy_ns_) return;
-  if (next_tidy_ns_ > 0) ReturnFreeMemory();
+  if (next_tidy_ns_ > 0) {
+    ReturnFreeMemory();
+    feature_store_->LetGo();
+  }
   next_tidy_ns_ = context_.now_ns() + kTidyEveryNs;
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dmslam/map/feature_store.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/endpoint.h"
 #include "dmslam/runtime/core_thread.h"
@@ -145,6 +146,7 @@ class StreamNode : public Node {
 
   NodeContext context_;
   NodeOptions options_;
+  std::shared_ptr<FeatureStore> feature_store_;  ///< of whatever maps this process holds
   std::string role_;
   Endpoint endpoint_;
   uint32_t session_ = 0;

@@ -9,6 +9,7 @@
 #include "dmslam/features/orb_extractor.h"
 #include "dmslam/initialization/initializer_options.h"
 #include "dmslam/loops/loop_options.h"
+#include "dmslam/map/feature_store.h"
 #include "dmslam/mapping/mapper_options.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/settings/setting_value.h"
@@ -117,6 +118,7 @@ std::vector<SettingInfo> CollectAll() {
   extractor.num_features = 2000;  // of the system; the extractor by itself asks for fewer
   Collector collector;
   Collect(collector, RunOptions());
+  Collect(collector, FeatureStoreOptions());
   Collect(collector, extractor);
   Collect(collector, InitializerOptions());
   Collect(collector, FrontendOptions());

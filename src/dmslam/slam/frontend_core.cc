@@ -61,6 +61,7 @@ FrontendCore::FrontendCore(const Setup& setup)
       late_(setup.session, setup.camera_id, setup.seed, setup.options.tracking.motion),
       last_poses_(setup.options.refiner, setup.options.smooth_at_end, setup.options.tracking, setup.camera),
       unplaced_(setup.options.max_kept_frames) {
+  map_.KeepFeaturesIn(setup.feature_store);
   if (!setup.in_saved_map) return;
   phase_.BeginLost();
   map_id_.reset();

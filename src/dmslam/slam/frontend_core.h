@@ -44,6 +44,7 @@ class FrontendCore {
         run_search;  ///< how the search for a first map is run, as in the background; empty: at once
     std::shared_ptr<const Vocabulary>
         vocabulary;  ///< for relocalisation; without one only the newest places are tried
+    std::shared_ptr<FeatureStore> feature_store;  ///< of the map; null: all of it stays in memory
   };
   explicit FrontendCore(const Setup& setup);
 

@@ -19,6 +19,9 @@ class TrajectoryBuilder {
  public:
   TrajectoryBuilder(const Camera& camera, const Pyramid& pyramid) : map_(camera, pyramid) {}
 
+  /// See Map; to be said first.
+  void KeepFeaturesIn(std::shared_ptr<FeatureStore> store) { map_.KeepFeaturesIn(std::move(store)); }
+
   void OnFramePose(const FramePose& pose);
   /// Poses told in a map that was wrong from the beginning count for nothing: a later map may have its
   /// keyframes again, of the same frames and so of the same names.
@@ -27,7 +30,10 @@ class TrajectoryBuilder {
   void OnMapDelta(const MapDelta& delta);
 
   /// The map as it is known from elsewhere.
-  void SetMap(Replica map) { map_ = std::move(map); }
+  void SetMap(Replica map) {
+    map.KeepFeaturesIn(map_.feature_store());
+    map_ = std::move(map);
+  }
   /// The map is void: a fresh stream, or a snapshot, begins.
   void ForgetMap() { map_.Clear(); }
 

@@ -45,7 +45,7 @@ void Checker::Features(const FeatureSet& features) {
   Require(none_or_all(features.depths_m) && features.depths_m.size() == features.depth_sigmas_m.size(),
           "as many depths and sigmas of depths as keypoints are needed, or none");
   Require(none_or_all(features.sigmas_px), "as many sigmas as keypoints are needed, or none");
-  for (const std::vector<float>* list : {&features.depths_m, &features.depth_sigmas_m}) {
+  for (const auto* list : {&features.depths_m, &features.depth_sigmas_m}) {
     for (const float value : *list)
       Require(std::isfinite(value) && (value >= 0 || value == -1), "depth of a keypoint below zero");
   }

@@ -96,21 +96,21 @@ class Put {
   }
   void Utime(std::optional<int64_t> stamp_ns, int64_t& wire) { wire = UtimeOf(stamp_ns.value_or(0)); }
 
-  template <typename Item>
-  void Count(const std::vector<Item>& items, int32_t& wire,
+  template <typename Item, typename Memory>
+  void Count(const std::vector<Item, Memory>& items, int32_t& wire,
              size_t most = std::numeric_limits<int32_t>::max()) {
     check_.Require(items.size() <= most, "a list is longer than may travel");
     wire = static_cast<int32_t>(items.size());
   }
   /// One value of each item as an array; `part(item)` names the value.
-  template <typename Item, typename WireValue, typename Part>
-  void Column(const std::vector<Item>& items, std::vector<WireValue>& wire, Part part) {
+  template <typename Item, typename Memory, typename WireValue, typename Part>
+  void Column(const std::vector<Item, Memory>& items, std::vector<WireValue>& wire, Part part) {
     wire.resize(items.size());
     for (size_t i = 0; i < items.size(); ++i) (*this)(std::invoke(part, items[i]), wire[i]);
   }
   void Bytes(const std::vector<uint8_t>& bytes, std::vector<uint8_t>& wire) { wire = bytes; }
-  template <typename Item, typename Part>
-  void Descriptors(const std::vector<Item>& items, int32_t& num_bytes, std::vector<uint8_t>& wire,
+  template <typename Item, typename Memory, typename Part>
+  void Descriptors(const std::vector<Item, Memory>& items, int32_t& num_bytes, std::vector<uint8_t>& wire,
                    Part part) {
     wire.resize(32 * items.size());
     num_bytes = static_cast<int32_t>(wire.size());
@@ -175,21 +175,22 @@ class Get {
   }
   void Utime(std::optional<int64_t>, const int64_t&) {}
 
-  template <typename Item>
-  void Count(std::vector<Item>& items, const int32_t& wire,
+  template <typename Item, typename Memory>
+  void Count(std::vector<Item, Memory>& items, const int32_t& wire,
              size_t most = std::numeric_limits<int32_t>::max()) {
     const bool sound = wire >= 0 && std::cmp_less_equal(wire, most);
     check_.Require(sound, "a list is longer than may travel");
     items.resize(sound ? static_cast<size_t>(wire) : 0);
   }
-  template <typename Item, typename WireValue, typename Part>
-  void Column(std::vector<Item>& items, const std::vector<WireValue>& wire, Part part) {
+  template <typename Item, typename Memory, typename WireValue, typename Part>
+  void Column(std::vector<Item, Memory>& items, const std::vector<WireValue>& wire, Part part) {
     for (size_t i = 0; i < std::min(items.size(), wire.size()); ++i)
       (*this)(std::invoke(part, items[i]), wire[i]);
   }
   void Bytes(std::vector<uint8_t>& bytes, const std::vector<uint8_t>& wire) { bytes = wire; }
-  template <typename Item, typename Part>
-  void Descriptors(std::vector<Item>& items, const int32_t&, const std::vector<uint8_t>& wire, Part part) {
+  template <typename Item, typename Memory, typename Part>
+  void Descriptors(std::vector<Item, Memory>& items, const int32_t&, const std::vector<uint8_t>& wire,
+                   Part part) {
     const bool sound = wire.size() == 32 * items.size();
     check_.Require(sound, "not 32 bytes per descriptor");
     for (size_t i = 0; sound && i < items.size(); ++i) {

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <memory>
 #include <unordered_map>
+#include <utility>
 
 #include "dmslam/map_record_t.hpp"
 #include "dmslam/wire/codec_impl.h"
@@ -46,15 +48,16 @@ Flat Flatten(const MapDelta& m) {
     Flat::KeyframeLists& lists = flat.keyframes.emplace_back();
     lists.num_loop_edges = static_cast<int32_t>(keyframe.loop_edges.size());
     Append(flat.loop_edges, keyframe.loop_edges);
-    if (!keyframe.has_features) continue;
-    lists.num_features = static_cast<int32_t>(keyframe.features.size());
-    lists.num_depths = static_cast<int32_t>(keyframe.features.depths_m.size());
-    lists.num_sigmas = static_cast<int32_t>(keyframe.features.sigmas_px.size());
-    Append(flat.features.keypoints, keyframe.features.keypoints);
-    Append(flat.features.descriptors, keyframe.features.descriptors);
-    Append(flat.features.depths_m, keyframe.features.depths_m);
-    Append(flat.features.depth_sigmas_m, keyframe.features.depth_sigmas_m);
-    Append(flat.features.sigmas_px, keyframe.features.sigmas_px);
+    if (keyframe.features == nullptr) continue;
+    const FeatureSet& features = *keyframe.features;
+    lists.num_features = static_cast<int32_t>(features.size());
+    lists.num_depths = static_cast<int32_t>(features.depths_m.size());
+    lists.num_sigmas = static_cast<int32_t>(features.sigmas_px.size());
+    Append(flat.features.keypoints, features.keypoints);
+    Append(flat.features.descriptors, features.descriptors);
+    Append(flat.features.depths_m, features.depths_m);
+    Append(flat.features.depth_sigmas_m, features.depth_sigmas_m);
+    Append(flat.features.sigmas_px, features.sigmas_px);
   }
   std::unordered_map<KeyframeId, int32_t> index_of;
   const auto index = [&](KeyframeId id) {
@@ -76,8 +79,8 @@ Flat Flatten(const MapDelta& m) {
 }
 
 /// Cuts the next `count` items off `all`; false when there are not so many left.
-template <typename Item>
-bool TakeNext(const std::vector<Item>& all, size_t& at, int32_t count, std::vector<Item>& items) {
+template <typename Items>
+bool TakeNext(const Items& all, size_t& at, int32_t count, Items& items) {
   if (count < 0 || static_cast<size_t>(count) > all.size() - at) return false;
   const auto begin = all.begin() + static_cast<ptrdiff_t>(at);
   items.assign(begin, begin + count);
@@ -91,15 +94,17 @@ void UnflattenKeyframes(const Flat& flat, MapDelta& m, Checker& check) {
   for (size_t i = 0; sound && i < m.keyframes.size(); ++i) {
     const Flat::KeyframeLists& lists = flat.keyframes[i];
     KeyframeState& keyframe = m.keyframes[i];
-    keyframe.has_features = lists.num_features != -1;
-    const int32_t num_features = keyframe.has_features ? lists.num_features : 0;
-    FeatureSet& features = keyframe.features;
+    const bool has_features = lists.num_features != -1;
+    const int32_t num_features = has_features ? lists.num_features : 0;
+    FeatureSet features;
     sound = TakeNext(flat.loop_edges, edge, lists.num_loop_edges, keyframe.loop_edges) &&
             TakeNext(flat.features.keypoints, keypoint, num_features, features.keypoints) &&
             TakeNext(flat.features.descriptors, descriptor, num_features, features.descriptors) &&
             TakeNext(flat.features.depths_m, depth, lists.num_depths, features.depths_m) &&
             TakeNext(flat.features.depth_sigmas_m, depth_sigma, lists.num_depths, features.depth_sigmas_m) &&
             TakeNext(flat.features.sigmas_px, sigma, lists.num_sigmas, features.sigmas_px);
+    sound = sound && (has_features || (lists.num_depths == 0 && lists.num_sigmas == 0));
+    if (has_features) keyframe.features = std::make_shared<const FeatureSet>(std::move(features));
   }
   check.Require(sound && edge == flat.loop_edges.size() && keypoint == flat.features.size() &&
                     depth == flat.features.depths_m.size() && sigma == flat.features.sigmas_px.size(),
@@ -304,9 +309,7 @@ void ValidateKeyframes(const MapDelta& m, Checker& check) {
     check.Stamp(keyframe.stamp_ns);
     check.Pose(keyframe.T_cam_world, "a keyframe without a pose");
     check.Scale(keyframe.scale, "scale of a keyframe out of range");
-    check.Features(keyframe.features);
-    check.Require(keyframe.has_features || keyframe.features.size() == 0,
-                  "features of a keyframe that has none");
+    if (keyframe.features != nullptr) check.Features(*keyframe.features);
     for (const KeyframeId id : keyframe.loop_edges) check.Id(id, "a loop edge to an impossible keyframe");
     check.Require(std::is_sorted(keyframe.loop_edges.begin(), keyframe.loop_edges.end()),
                   "loop edges are not ascending");
@@ -405,7 +408,7 @@ void FrontendSeq(Copy&, Progress& progress, int64_t& wire) {
 void ValidateObservedFeatures(const MapDelta& m, Checker& check) {
   std::unordered_map<KeyframeId, size_t> num_features;
   for (const KeyframeState& keyframe : m.keyframes) {
-    if (keyframe.has_features) num_features[keyframe.id] = keyframe.features.size();
+    if (keyframe.features != nullptr) num_features[keyframe.id] = keyframe.features->size();
   }
   if (num_features.empty()) return;
   for (const ObservationState& observation : m.observations) {

@@ -14,9 +14,11 @@ constexpr size_t kRecordBytes = 512, kPoseBytes = 72, kMoveBytes = 72, kLandmark
                  kOffsetBytes = 32;
 
 size_t BytesOf(const KeyframeState& keyframe) {
-  const FeatureSet& features = keyframe.features;
-  return 128 + 8 * keyframe.loop_edges.size() + 38 * features.size() + 4 * features.depths_m.size() +
-         4 * features.depth_sigmas_m.size() + 4 * features.sigmas_px.size();
+  const size_t bytes = 128 + 8 * keyframe.loop_edges.size();
+  if (keyframe.features == nullptr) return bytes;
+  const FeatureSet& features = *keyframe.features;
+  return bytes + 38 * features.size() + 4 * features.depths_m.size() + 4 * features.depth_sigmas_m.size() +
+         4 * features.sigmas_px.size();
 }
 
 auto Each(size_t bytes) {

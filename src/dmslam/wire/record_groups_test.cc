@@ -171,9 +171,10 @@ TEST(RecordGroupsTest, AKeyframeIsNotCut) {
   KeyframeState keyframe;
   keyframe.id = KeyframeId::Make(1, 1);
   keyframe.map_id = 1;
-  keyframe.has_features = true;
-  keyframe.features.keypoints.resize(10'000);
-  keyframe.features.descriptors.resize(10'000);
+  FeatureSet features;
+  features.keypoints.resize(10'000);
+  features.descriptors.resize(10'000);
+  keyframe.features = std::make_shared<const FeatureSet>(std::move(features));
   for (int i = 0; i < 3; ++i) change.keyframes.push_back(keyframe);
   EXPECT_EQ(Split(change).size(), 2U) << "10000 features, the most that can be set, take 380 kB";
   EXPECT_EQ(Split(change, 1000).size(), 3U) << "one each";

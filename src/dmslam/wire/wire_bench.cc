@@ -66,8 +66,7 @@ MapDelta Typical<MapDelta>() {
   KeyframeState& keyframe = delta.keyframes.emplace_back();
   keyframe.id = id;
   keyframe.map_id = 1;
-  keyframe.has_features = true;
-  keyframe.features = ThousandFeatures();
+  keyframe.features = std::make_shared<const FeatureSet>(ThousandFeatures());
   for (uint16_t i = 0; i < 400; ++i) delta.observations.push_back({id, i, LandmarkId::Make(1, i)});
   for (uint64_t i = 0; i < 100; ++i) {
     LandmarkState& landmark = delta.landmarks.emplace_back();

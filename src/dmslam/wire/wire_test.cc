@@ -34,6 +34,8 @@ bool AllFinite(const T& value) {
     return value.rotation.coeffs().allFinite() && value.translation.allFinite() && std::isfinite(value.scale);
   } else if constexpr (testing::kIsOptional<T>) {
     return !value.has_value() || AllFinite(*value);
+  } else if constexpr (testing::kIsShared<T>) {
+    return value == nullptr || AllFinite(*value);
   } else if constexpr (testing::kIsVector<T> || testing::kIsArray<T>) {
     return std::all_of(value.begin(), value.end(), [](const auto& item) { return AllFinite(item); });
   } else {
@@ -357,8 +359,7 @@ TEST(WireTest, AFeatureTakesAtMost45Bytes) {
   KeyframeState& state = delta.keyframes.emplace_back();
   state.id = keyframe.id;
   state.map_id = 1;
-  state.has_features = true;
-  state.features = keyframe.features;
+  state.features = std::make_shared<const FeatureSet>(keyframe.features);
   for (const auto& match : keyframe.matches)
     delta.observations.push_back({state.id, match.feature, match.landmark});
   EXPECT_LE(Encode(delta).size(), 45 * 1000U);

@@ -27,7 +27,7 @@ void MakeSound(Camera& camera, Random& random) {
   }
 }
 
-void MakeSound(std::vector<float>& list, size_t size, Random& random) {
+void MakeSound(std::pmr::vector<float>& list, size_t size, Random& random) {
   list.resize(size);
   for (float& value : list) value = static_cast<float>(random.Uniform(0.01, 10));
 }
@@ -238,8 +238,9 @@ void MakeSound(MapDelta& m, Random& random) {
     MakeSound(keyframe.map_id);
     keyframe.scale = random.Uniform(0.1, 10);
     std::sort(keyframe.loop_edges.begin(), keyframe.loop_edges.end());
-    if (!keyframe.has_features) keyframe.features = {};
-    MakeSound(keyframe.features, random);
+    FeatureSet features = keyframe.features != nullptr ? *keyframe.features : FeatureSet();
+    MakeSound(features, random);
+    if (keyframe.features != nullptr) keyframe.features = std::make_shared<const FeatureSet>(features);
   }
   for (KeyframePose& pose : m.keyframe_poses) pose.scale = random.Uniform(0.1, 10);
   for (ReferenceMove& move : m.reference_moves) move.after_from_before.scale = random.Uniform(0.1, 10);

@@ -6,8 +6,11 @@
 #include <concepts>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dmslam/util/random.h"
@@ -21,8 +24,12 @@ namespace dmslam::wire::testing {
 using internal::kIsOptional;
 template <typename T>
 inline constexpr bool kIsVector = false;
+template <typename Item, typename Memory>
+inline constexpr bool kIsVector<std::vector<Item, Memory>> = true;
+template <typename T>
+inline constexpr bool kIsShared = false;
 template <typename Item>
-inline constexpr bool kIsVector<std::vector<Item>> = true;
+inline constexpr bool kIsShared<std::shared_ptr<Item>> = true;
 template <typename T>
 inline constexpr bool kIsArray = false;
 template <typename Item, size_t kSize>
@@ -88,6 +95,12 @@ class Filler {
       (*this)(value.emplace());
       if constexpr (std::is_unsigned_v<typename T::value_type>)
         value = std::max<typename T::value_type>(*value, 1);
+    } else if constexpr (kIsShared<T>) {
+      bool there = false;
+      (*this)(there);
+      std::remove_const_t<typename T::element_type> content;
+      (*this)(content);
+      value = there ? std::make_shared<typename T::element_type>(std::move(content)) : nullptr;
     } else if constexpr (kIsVector<T>) {
       value.resize(random_.Below(max_items_ + 1));
       for (auto& item : value) (*this)(item);
@@ -165,6 +178,8 @@ bool Identical(const T& a, const T& b) {
            Identical(a.scale, b.scale);
   } else if constexpr (kIsOptional<T>) {
     return a.has_value() == b.has_value() && (!a.has_value() || Identical(*a, *b));
+  } else if constexpr (kIsShared<T>) {
+    return (a == nullptr) == (b == nullptr) && (a == nullptr || Identical(*a, *b));
   } else if constexpr (kIsVector<T> || kIsArray<T>) {
     bool same = a.size() == b.size();
     for (size_t i = 0; same && i < a.size(); ++i) same = Identical(a[i], b[i]);
