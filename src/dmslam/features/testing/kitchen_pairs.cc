@@ -87,7 +87,7 @@ std::vector<TrueFrame> LoadFrames(const std::string& folder, int first, int step
 
 Features FromSet(const FeatureSet& set, const Pyramid& pyramid) {
   Features features;
-  features.descriptors = set.descriptors;
+  features.descriptors.assign(set.descriptors.begin(), set.descriptors.end());
   for (const Keypoint& keypoint : set.keypoints) {
     features.uv_px.emplace_back(keypoint.x_px(), keypoint.y_px());
     features.size.push_back(pyramid.Scale(keypoint.octave));
