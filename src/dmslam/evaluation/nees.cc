@@ -19,8 +19,10 @@ struct Known {
   const ToldPose* told = nullptr;
   Rigid3d T_true_cam;
   double coverage = 0;
-  double gone = 0;         ///< view changes since the first frame, summed up...
-  double since_first = 0;  ///< ...and from the first frame of its map to this one
+  double gone = 0;               ///< view changes since the first frame, summed up...
+  double entered = 0;            ///< ...times the variance of the rotation at each of them...
+  double since_first = 0;        ///< ...and the change from the first frame of its map to this one
+  const Known* first = nullptr;  ///< of its map
 };
 
 std::vector<Known> Associate(std::span<const StampedPose> truth, std::span<const ToldPose> told,
@@ -39,17 +41,32 @@ std::vector<Known> Associate(std::span<const StampedPose> truth, std::span<const
   return known;
 }
 
+double RotationVariance(const ToldPose& told) {
+  return told.covariance ? told.covariance->bottomRightCorner<3, 3>().trace() / 3.0 : 0.0;
+}
+
+/// What was entered from a to b, as far as b's view is not a's again.
+double Entered(const Known& a, const Known& b, double change) {
+  const double gone = b.gone - a.gone;
+  return gone > change ? (b.entered - a.entered) * change / gone : b.entered - a.entered;
+}
+
 /// Fills in what changed in the view since the first frame of each map, of which the scale is.
 void FindChanges(std::vector<Known>* known) {
-  const ToldPose* first = nullptr;
+  const Known* first = nullptr;
   for (size_t k = 0; k < known->size(); ++k) {
     const ToldPose& now = *(*known)[k].told;
     const auto change_from = [&now](const ToldPose& before) {
       return ViewChange(now.pose.T_world_cam.Inverse() * before.pose.T_world_cam, now.depth);
     };
-    if (first == nullptr || first->map != now.map) first = &now;
-    (*known)[k].since_first = change_from(*first);
-    if (k > 0) (*known)[k].gone = (*known)[k - 1].gone + change_from(*(*known)[k - 1].told);
+    if (first == nullptr || first->told->map != now.map) first = &(*known)[k];
+    (*known)[k].first = first;
+    (*known)[k].since_first = change_from(*first->told);
+    if (k == 0) continue;
+    const Known& before = (*known)[k - 1];
+    const double change = change_from(*before.told);
+    (*known)[k].gone = before.gone + change;
+    (*known)[k].entered = before.entered + change * RotationVariance(now);
   }
 }
 
@@ -81,7 +98,9 @@ std::optional<NeesPair> Judge(const Known& a, const Known& b, double units, cons
   const auto pose_a = a.told->InMap(), pose_b = b.told->InMap();
   if (!pose_a || !pose_b) return std::nullopt;
   const Rigid3d told = pose_a->T_world_cam.Inverse() * pose_b->T_world_cam;
-  const ViewsBetween between{ViewChange(told.Inverse(), b.told->depth), b.gone - a.gone, a.since_first};
+  const double change = ViewChange(told.Inverse(), b.told->depth);
+  const ViewsBetween between{change, b.gone - a.gone, a.since_first, Entered(a, b, change),
+                             Entered(*a.first, a, a.since_first)};
   const Matrix6d covariance = RelativeCovariance(*pose_a, *pose_b, between, b.told->depth, options.model);
   const Rigid3d truth = a.T_true_cam.Inverse() * b.T_true_cam;
   const Eigen::Vector3d position = told.translation - units * truth.translation;

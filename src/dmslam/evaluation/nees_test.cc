@@ -60,7 +60,7 @@ Told TellAll(double times) {
 
 NeesOptions WithoutDrift() {
   NeesOptions options;
-  options.model.model_error = options.model.drift = 0;
+  options.model.model_error = options.model.drift = options.model.inherited = 0;
   options.gauge_s = 30;
   return options;
 }

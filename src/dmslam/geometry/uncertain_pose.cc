@@ -11,7 +11,7 @@ double ViewChange(const Rigid3d& T_b_a, double depth) {
 
 Matrix6d SharedErrors(const PoseErrorModel& model, const ViewsBetween& between, double depth) {
   const double variance = model.model_error * model.model_error * std::min(1.0, between.gone) +
-                          model.drift * model.drift * between.change;
+                          model.drift * model.drift * between.change + model.inherited * between.entered;
   Matrix6d covariance = Matrix6d::Zero();
   covariance.diagonal() << Eigen::Vector3d::Constant(variance),
       Eigen::Vector3d::Constant(variance * depth * depth);
@@ -61,11 +61,12 @@ Matrix6d RelativeCovariance(const UncertainPose& a, const UncertainPose& b, cons
   covariance.topLeftCorner<3, 3>() += bent.bottomRightCorner<3, 3>();
   covariance.bottomRightCorner<3, 3>() += bent.topLeftCorner<3, 3>();
   // What the map turns and grows by on the way moves its end.
-  const double turned = model.drift * model.drift * between.change;
+  const double turned = model.drift * model.drift * between.change + model.inherited * between.entered;
   covariance.topLeftCorner<3, 3>().diagonal().array() += turned * way.squaredNorm();
   const Eigen::Vector3d way_in_a = R_a_world * way;
   covariance.topLeftCorner<3, 3>() +=
-      model.drift * model.drift * between.since_scale * way_in_a * way_in_a.transpose();
+      (model.drift * model.drift * between.since_scale + model.inherited * between.entered_since_scale) *
+      way_in_a * way_in_a.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 

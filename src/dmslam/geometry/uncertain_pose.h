@@ -20,6 +20,8 @@ struct PoseErrorModel {
   /// Growth of the shared errors from one view to another that has nothing in common with it: as an angle
   /// [rad], as a share of the depth, and as a share of the scale.
   double drift = 0.001;
+  /// Share of a pose's variance that a view has which is new and was mapped from it.
+  double inherited = 1.0;
 };
 
 /// What two views have not in common, from 0 on: how far what is in the middle of a's view, at the depth of
@@ -32,6 +34,10 @@ struct ViewsBetween {
   double change = 0;       ///< what they have not in common
   double gone = 0;         ///< the same, summed up over the way between them
   double since_scale = 0;  ///< the first one's change since the scale was fixed, where that was elsewhere
+  /// Variances of the rotations [rad^2] by which new views were entered on the way, a view each (a sum of
+  /// variance times change): what is mapped there errs as the pose from which it was. The same since the
+  /// scale was fixed.
+  double entered = 0, entered_since_scale = 0;
 };
 
 /// Covariance of what the errors that a view's landmarks share differ by in another view: as far as the views

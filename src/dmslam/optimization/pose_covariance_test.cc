@@ -269,6 +269,32 @@ TEST(UncertainPoseTest, RelativePoses) {
   EXPECT_NEAR(of_scale.trace(), along.dot(of_scale.topLeftCorner<3, 3>() * along), 1e-12);
 }
 
+/// A camera goes on, view after view, through what is mapped from where it is: each view errs as the pose
+/// from which it was entered, on top of the one before. Both ends see their own view without an error.
+TEST(UncertainPoseTest, ViewsErrAsThePosesFromWhichTheyWereEntered) {
+  constexpr int kViews = 8;
+  constexpr double kTurn = 0.01, kWay = 1.0, kDepth = 1.0;  // [rad] of each pose; between views; of the scene
+  Random random(6);
+  const UncertainPose a, b{Rigid3d({1, 0, 0, 0}, {kViews * kWay, 0, 0}), Matrix6d::Zero()};
+  const auto told = [&](double entered) {
+    return RelativeCovariance(a, b, {kViews * kWay / kDepth, kViews * kWay / kDepth, 0, entered}, kDepth);
+  };
+  const Matrix6d covariance = told(kViews * kTurn * kTurn), without = told(0);
+  double position = 0, rotation = 0, rotation_without = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Rigid3d T;  // of the last view in the first one's frame, as it was mapped
+    for (int view = 0; view < kViews; ++view) T = T * Rigid3d(ExpSo3(kTurn * Normal3(random)), {kWay, 0, 0});
+    const Eigen::Vector3d shift = T.translation - b.T_world_cam.translation, turn = LogSo3(T.rotation);
+    position += shift.dot(covariance.topLeftCorner<3, 3>().ldlt().solve(shift)) / 3 / kTrials;
+    rotation += turn.dot(covariance.bottomRightCorner<3, 3>().ldlt().solve(turn)) / 3 / kTrials;
+    rotation_without += turn.dot(without.bottomRightCorner<3, 3>().ldlt().solve(turn)) / 3 / kTrials;
+  }
+  EXPECT_NEAR(rotation, 1.0, 0.15);
+  EXPECT_GT(rotation_without, 10.0) << "they would make no difference";
+  EXPECT_LT(position, 1.2) << "the lever is shorter than the whole way: too careful rather than too sure";
+  EXPECT_GT(position, 0.1);
+}
+
 TEST(UncertainPoseTest, SharedErrorsGrowWithWhatIsNewInTheView) {
   const PoseErrorModel model;
   const Matrix6d near = SharedErrors(model, {0.1, 0.1}, 2.0), far = SharedErrors(model, {3.0, 3.0}, 2.0);

@@ -37,6 +37,7 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
 
 void PoseCertaintyEstimator::Forget() {
   last_.reset();
+  jitter_ = PoseJitter();
   known_.clear();
 }
 
@@ -83,13 +84,18 @@ std::vector<PoseSight> PoseCertaintyEstimator::SightsOf(const Map& map, const Po
   return sights;
 }
 
+/// Since the frame before was told, by more than what is worked on from frame to frame.
+bool PoseCertaintyEstimator::HasMapMoved(const Map& map) const {
+  if (!last_) return false;
+  const std::optional<Rigid3d> T_last_world = last_->pose.In(map);
+  return !T_last_world || AngleBetween(T_last_world->rotation, last_->T_cam_world.rotation) > kMaxTurnOfMap;
+}
+
 /// None where the frames are far apart, or where the map has turned meanwhile.
 std::optional<PoseCertainty::Step> PoseCertaintyEstimator::StepTo(const Map& map, const Told& now,
                                                                   double depth) const {
-  if (!last_ || now.stamp_ns - last_->stamp_ns > kLongestStepNs) return std::nullopt;
+  if (!last_ || now.stamp_ns - last_->stamp_ns > kLongestStepNs || HasMapMoved(map)) return std::nullopt;
   const std::optional<Rigid3d> T_last_world = last_->pose.In(map);
-  if (!T_last_world || AngleBetween(T_last_world->rotation, last_->T_cam_world.rotation) > kMaxTurnOfMap)
-    return std::nullopt;
   const Rigid3d T_now_last = now.T_cam_world * T_last_world->Inverse();
   Matrix6d covariance = StepUncertainty({*T_last_world, last_->sights, &last_->uncertainty},
                                         {now.T_cam_world, now.sights, &now.uncertainty}, model_);
@@ -119,6 +125,9 @@ std::optional<PoseCertainty> PoseCertaintyEstimator::Estimate(const Map& map, co
   result.position_share = LargestSigma(result.covariance.topLeftCorner<3, 3>()) / result.depth;
   result.rotation_rad = LargestSigma(result.covariance.bottomRightCorner<3, 3>());
   result.step = StepTo(map, now, result.depth);
+  if (HasMapMoved(map)) jitter_.OnMapMoved();
+  jitter_.OnPose(frame.stamp_ns, map.FindKeyframe(pose.reference)->map_id, frame.T_cam_world, result.depth);
+  result.covariance += ToPoseInReference(jitter_.Covariance(result.depth), pose.T_cam_reference);
   last_ = std::move(now);
   return result;
 }

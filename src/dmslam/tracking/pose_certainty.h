@@ -9,6 +9,7 @@
 #include "dmslam/map/tracked_frame.h"
 #include "dmslam/optimization/pose_covariance.h"
 #include "dmslam/tracking/motion_model.h"
+#include "dmslam/tracking/pose_jitter.h"
 #include "dmslam/tracking/pose_solver.h"
 
 namespace dmslam {
@@ -25,7 +26,8 @@ struct PoseCertainty {
   };
   std::optional<Step> step;
   double depth = 1.0;  ///< median of the landmarks used [map units]
-  /// Largest standard deviations: of the position, as a share of the depth, and of the rotation [rad].
+  /// Largest standard deviations, as the landmarks fix the pose (without PoseJitter's): of the position, as a
+  /// share of the depth, and of the rotation [rad].
   double position_share = 0, rotation_rad = 0;
 };
 
@@ -64,7 +66,10 @@ class PoseCertaintyEstimator {
   Eigen::Matrix3d WorkOutCovariance(const Map& map, const Pinhole& camera, const Landmark& landmark);
   std::optional<PoseCertainty::Step> StepTo(const Map& map, const Told& now, double depth) const;
 
+  bool HasMapMoved(const Map& map) const;
+
   PoseErrorModel model_;
+  PoseJitter jitter_;
   std::optional<Told> last_;
   std::unordered_map<LandmarkId, Known> known_;
   std::vector<LandmarkRay> views_;  ///< workspace
