@@ -65,8 +65,12 @@ class MatchByNodesTest : public testing::Test {
 
   MatchByNodesTest() {
     SyntheticWorld world(400, 7);
-    a_.descriptors = world.Image(20, kCorners, 0);
-    b_.descriptors = world.Image(20, kCorners, 6);
+    const auto seen_in = [&](int disturbance) {
+      const std::vector<Descriptor> image = world.Image(20, kCorners, disturbance);
+      return std::pmr::vector<Descriptor>(image.begin(), image.end());
+    };
+    a_.descriptors = seen_in(0);
+    b_.descriptors = seen_in(6);
     std::reverse(b_.descriptors.begin(), b_.descriptors.end());
     Random random(4);
     for (size_t i = 0; i < kCorners; ++i)
