@@ -32,7 +32,7 @@ struct BundleOptions {
   /// Steps of the first stage, with Huber's loss, after which outliers are set aside, and of the second, with
   /// Cauchy's. Zero for the second: one stage only, with Huber's loss to the end.
   int first_iterations = 5;
-  int second_iterations = 20;
+  int second_iterations = 10;
   double max_chi2 =
       kChiSquared2Dof;  ///< Outlier: squared error * inv_sigma_squared above this, or behind the camera.
   double huber_delta = kChi2Dof;  ///< On the error in sigmas.
@@ -41,7 +41,7 @@ struct BundleOptions {
   double cauchy_width = 1.0;
   /// A stage ends when a step gains less than this share of the cost (ten times it in the first of two
   /// stages).
-  double relative_tolerance = 1e-5;
+  double relative_tolerance = 1e-4;
   /// Without a fixed pose, pose 0 is held. With exactly one pose held the scale is free as well; then, if
   /// this is set, poses and points are rescaled about the held camera at the end, so that the farthest camera
   /// keeps its distance.
