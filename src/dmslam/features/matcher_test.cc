@@ -100,6 +100,15 @@ TEST(FeatureGrid, QueriesThatAskForNothing) {
   EXPECT_EQ(found.size(), 1U);
 }
 
+TEST(Hamming, CountsFromNoneToAll) {
+  Descriptor a, b;
+  EXPECT_EQ(HammingDistance(a, b), 0);
+  for (int bit = 0; bit < 256; ++bit) {
+    b.words[static_cast<size_t>(bit / 64)] |= uint64_t{1} << (bit % 64);
+    EXPECT_EQ(HammingDistance(a, b), bit + 1);
+  }
+}
+
 TEST(Hamming, PathsAgree) {
   Random random(4);
   std::vector<Descriptor> descriptors;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/features/hamming.h"
 #include "dmslam/geometry/triangulation.h"
 #include "dmslam/map/projection.h"
 
@@ -30,10 +31,13 @@ struct Pencil {
 };
 
 struct PlaneEntry {
-  double angle;      ///< of the epipolar plane [rad]
-  double along;      ///< angle between ray and baseline [rad]
-  double tolerance;  ///< angle that one standard deviation of the feature spans [rad]
-  uint16_t feature;
+  double angle = 0;      ///< of the epipolar plane [rad]
+  double across = 0;     ///< of the ray's direction, across the baseline...
+  double along = 0;      ///< ...and along it
+  double slope = 0;      ///< along / across
+  double tolerance = 0;  ///< angle that one standard deviation of the feature spans [rad]
+  uint16_t feature = 0;
+  uint8_t octave = 0;
 };
 
 std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector<uint8_t>& use,
@@ -48,9 +52,11 @@ std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector
     const double x = ray.dot(pencil.u), y = ray.dot(pencil.v);
     const double across = std::hypot(x, y);
     if (across < 0.02) continue;  // nearly along the baseline: any plane would do
-    const double sigma_px = map.pyramid().Scale(keyframe.features->set.keypoints[i].octave);
-    entries.push_back({std::atan2(y, x), std::atan2(across, ray.dot(pencil.axis)),
-                       sigma_px / (camera.fx_px * across), static_cast<uint16_t>(i)});
+    const uint8_t octave = keyframe.features->set.keypoints[i].octave;
+    const double sigma_px = map.pyramid().Scale(octave);
+    const double along = ray.dot(pencil.axis);
+    entries.push_back({std::atan2(y, x), across, along, along / across, sigma_px / (camera.fx_px * across),
+                       static_cast<uint16_t>(i), octave});
   }
   return entries;
 }
@@ -83,45 +89,97 @@ struct PairGeometry {
   const LandmarkCreationOptions& options;
 };
 
-/// Whether the two planes differ by no more than `sigmas` of both tolerances together. What is clear by
-/// squares is not asked of the much slower hypot.
+constexpr double kClear = 1e-9;  // what differs by so much does so for the exact functions, too
+constexpr int kMaxOctavesApart = 3;
+
+/// Whether the two planes differ by no more than `sigmas` of both tolerances together.
 bool SamePlane(const PlaneEntry& a, const PlaneEntry& b, double sigmas) {
   const double apart = std::abs(a.angle - b.angle);
   const double apart_squared = apart * apart;
   const double bound_squared = sigmas * sigmas * (a.tolerance * a.tolerance + b.tolerance * b.tolerance);
-  if (apart_squared < bound_squared * (1 - 1e-9)) return true;
-  if (apart_squared > bound_squared * (1 + 1e-9)) return false;
+  if (apart_squared < bound_squared * (1 - kClear)) return true;
   return apart <= sigmas * std::hypot(a.tolerance, b.tolerance);
 }
 
-/// The best partner of one feature of a among b's entries in its window; -1: none.
-int BestPartner(const PlaneEntry& entry, const std::vector<PlaneEntry>& sorted_b, const PairGeometry& pair) {
-  const Descriptor& descriptor = pair.a.features->set.descriptors[entry.feature];
-  const int octave = pair.a.features->set.keypoints[entry.feature].octave;
-  const double sigmas = std::sqrt(pair.options.epipolar_sigmas_squared);
-  const double reach = 6.0 * entry.tolerance + 0.02;
-  auto it =
-      std::lower_bound(sorted_b.begin(), sorted_b.end(), PlaneEntry{entry.angle - reach, 0, 0, 0}, ByAngle);
-  int best = 257, second = 257, best_feature = -1;
-  for (; it != sorted_b.end() && it->angle <= entry.angle + reach; ++it) {
-    // The error lies in the other image as in ORB-SLAM2, with this feature's own error added.
-    if (!SamePlane(*it, entry, sigmas)) continue;
-    if (it->along <= entry.along) continue;  // rays from a to b must converge in front of both
-    const auto& keypoint = pair.b.features->set.keypoints[it->feature];
-    if (std::abs(keypoint.octave - octave) > 3) continue;
-    const int distance = HammingDistance(descriptor, pair.b.features->set.descriptors[it->feature]);
-    if (distance < best) {
-      second = best;
-      best = distance;
-      best_feature = it->feature;
-    } else if (distance < second) {
-      second = distance;
-    }
-  }
-  const bool unambiguous =
-      pair.options.descriptor_ratio >= 1.0 || best < pair.options.descriptor_ratio * second;
-  return best <= pair.options.max_descriptor_distance && unambiguous ? best_feature : -1;
+/// Whether the ray of b makes a wider angle with the baseline, so that both converge in front of the cameras.
+bool Converge(const PlaneEntry& a, const PlaneEntry& b) {
+  if (b.slope < a.slope - kClear) return true;
+  return std::atan2(b.across, b.along) > std::atan2(a.across, a.along);
 }
+
+/// Finds the best partner of one feature of a after the other among the entries of b. What is clear is
+/// decided without branches and without the much slower hypot and atan2.
+class PartnerSearch {
+ public:
+  PartnerSearch(const PairGeometry& pair, std::vector<PlaneEntry> sorted_b)
+      : pair_(pair),
+        sorted_b_(std::move(sorted_b)),
+        sigmas_(std::sqrt(pair.options.epipolar_sigmas_squared)),
+        near_(sorted_b_.size()),
+        distances_(sorted_b_.size()) {}
+
+  /// The feature of b; -1: none.
+  int Best(const PlaneEntry& entry) {
+    const size_t count = KeepFitting(entry, CollectNear(entry));
+    const auto& set_b = pair_.b.features->set;
+    hamming_.to_indexed(pair_.a.features->set.descriptors[entry.feature], set_b.descriptors.data(),
+                        near_.data(), static_cast<int>(count), distances_.data());
+    int best = 257, second = 257, best_feature = -1;
+    for (size_t k = 0; k < count; ++k) {
+      const int distance = distances_[k];
+      if (distance < best) {
+        second = best;
+        best = distance;
+        best_feature = static_cast<int>(near_[k]);
+      } else if (distance < second) {
+        second = distance;
+      }
+    }
+    const bool unambiguous =
+        pair_.options.descriptor_ratio >= 1.0 || best < pair_.options.descriptor_ratio * second;
+    return best <= pair_.options.max_descriptor_distance && unambiguous ? best_feature : -1;
+  }
+
+ private:
+  /// Positions in b's entries of those in the window that are not clearly unfit, into near_.
+  size_t CollectNear(const PlaneEntry& entry) {
+    const double reach = 6.0 * entry.tolerance + 0.02;
+    const double tolerance_squared = entry.tolerance * entry.tolerance;
+    const double factor = sigmas_ * sigmas_ * (1 + kClear), steepest = entry.slope + kClear;
+    PlaneEntry first;
+    first.angle = entry.angle - reach;
+    const auto begin = std::lower_bound(sorted_b_.begin(), sorted_b_.end(), first, ByAngle);
+    size_t count = 0;
+    for (size_t i = static_cast<size_t>(begin - sorted_b_.begin()); i < sorted_b_.size(); ++i) {
+      const PlaneEntry& other = sorted_b_[i];
+      if (other.angle > entry.angle + reach) break;
+      const double apart = other.angle - entry.angle;
+      const bool same = apart * apart <= factor * (tolerance_squared + other.tolerance * other.tolerance);
+      const bool fits = std::abs(other.octave - entry.octave) <= kMaxOctavesApart;
+      near_[count] = static_cast<uint32_t>(i);
+      count += static_cast<size_t>(same & (other.slope <= steepest) & fits);
+    }
+    return count;
+  }
+
+  /// Leaves of the first `count` of near_ those that fit indeed, now by their features. Returns how many.
+  /// The error lies in the other image as in ORB-SLAM2, with this feature's own error added.
+  size_t KeepFitting(const PlaneEntry& entry, size_t count) {
+    size_t kept = 0;
+    for (size_t k = 0; k < count; ++k) {
+      const PlaneEntry& other = sorted_b_[near_[k]];
+      if (SamePlane(other, entry, sigmas_) && Converge(entry, other)) near_[kept++] = other.feature;
+    }
+    return kept;
+  }
+
+  const PairGeometry& pair_;
+  std::vector<PlaneEntry> sorted_b_;
+  double sigmas_;
+  const HammingKernels& hamming_ = BestHammingKernels();
+  std::vector<uint32_t> near_;       ///< workspace
+  std::vector<uint16_t> distances_;  ///< workspace
+};
 
 /// Tests one candidate: parallax, depth, reprojection and scale (paper 2.2; ORB-SLAM2's constants).
 std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t feature_a, uint16_t feature_b,
@@ -225,13 +283,13 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
     const Keyframe& a, const std::vector<uint8_t>& use_a, const Keyframe& b,
     const std::vector<uint8_t>& use_b, const Map& map, const LandmarkCreationOptions& options) {
   const Pencil pencil = Pencil::Through(a.T_cam_world.Center(), b.T_cam_world.Center());
-  std::vector<PlaneEntry> entries_a = PlaneEntries(a, use_a, pencil, map);
-  const std::vector<PlaneEntry> sorted_b = SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5);
+  const std::vector<PlaneEntry> entries_a = PlaneEntries(a, use_a, pencil, map);
   const PairGeometry pair{a, b, map, options};
+  PartnerSearch search(pair, SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5));
   std::vector<int> partner_of_b(b.features->size(), -1);
   std::vector<int> distance_of_b(b.features->size(), 257);
   for (const PlaneEntry& entry : entries_a) {
-    const int partner = BestPartner(entry, sorted_b, pair);
+    const int partner = search.Best(entry);
     if (partner < 0) continue;
     const size_t index = static_cast<size_t>(partner);
     const int distance =
