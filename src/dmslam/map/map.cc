@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <unordered_map>
 
 #include "dmslam/util/check.h"
 #include "dmslam/util/sorted.h"
@@ -35,15 +36,10 @@ const Keyframe* Map::FindKeyframe(KeyframeId id) const {
   return it == keyframes_.end() ? nullptr : &it->second;
 }
 
-const Landmark* Map::FindLandmark(LandmarkId id) const {
-  const auto it = landmarks_.find(id);
-  return it == landmarks_.end() ? nullptr : &it->second;
-}
-
 std::vector<LandmarkId> Map::LandmarkIdsSorted() const {
   std::vector<LandmarkId> ids;
   ids.reserve(landmarks_.size());
-  for (const auto& [id, landmark] : landmarks_) ids.push_back(id);
+  landmarks_.ForEach([&](const Landmark& landmark) { ids.push_back(landmark.id); });
   std::sort(ids.begin(), ids.end());
   return ids;
 }
@@ -78,7 +74,7 @@ bool Map::HasKnown(KeyframeId id) const {
 
 std::optional<LandmarkId> Map::Resolve(LandmarkId id) const {
   for (int steps = 0; steps < 1000; ++steps) {
-    if (landmarks_.contains(id)) return id;
+    if (FindLandmark(id) != nullptr) return id;
     const auto it = landmark_tombstones_.find(id);
     if (it == landmark_tombstones_.end() || !it->second.valid()) return std::nullopt;
     id = it->second;
@@ -160,9 +156,9 @@ std::vector<const Keyframe*> Map::KeyframesOf(MapId map_id) const {
 
 std::vector<const Landmark*> Map::LandmarksOf(MapId map_id) const {
   std::vector<const Landmark*> landmarks;
-  for (const auto& [id, landmark] : landmarks_) {
+  landmarks_.ForEach([&](const Landmark& landmark) {
     if (landmark.map_id == map_id) landmarks.push_back(&landmark);
-  }
+  });
   std::ranges::sort(landmarks, {}, &Landmark::id);
   return landmarks;
 }
@@ -234,10 +230,7 @@ Keyframe* Map::Find(KeyframeId id) {
   return it == keyframes_.end() ? nullptr : &it->second;
 }
 
-Landmark* Map::Find(LandmarkId id) {
-  const auto it = landmarks_.find(id);
-  return it == landmarks_.end() ? nullptr : &it->second;
-}
+Landmark* Map::Find(LandmarkId id) { return landmarks_.Find(id); }
 
 Keyframe& Map::Mutable(const Keyframe& keyframe) {
   assert(FindKeyframe(keyframe.id) == &keyframe);  // no copy, nor one of another map
@@ -285,10 +278,10 @@ Keyframe& Map::Insert(Keyframe keyframe) {
 
 Landmark& Map::Insert(Landmark landmark) {
   const LandmarkId id = landmark.id;
-  DMSLAM_CHECK(id.valid() && !landmarks_.contains(id), "landmark added twice");
+  DMSLAM_CHECK(id.valid() && FindLandmark(id) == nullptr, "landmark added twice");
   landmark.observations.clear();
   landmark.viewing_stale_ = true;
-  return landmarks_.emplace(id, std::move(landmark)).first->second;
+  return landmarks_.Insert(std::move(landmark));
 }
 
 void Map::Place(Keyframe& keyframe, const Rigid3d& T_cam_world, double scale, MapId map_id) {
@@ -308,10 +301,10 @@ void Map::MoveLandmarks(const std::vector<ReferenceMove>& moves) {
   if (moves.empty()) return;
   std::unordered_map<KeyframeId, const Sim3d*> move_of;
   for (const ReferenceMove& move : moves) move_of[move.reference] = &move.after_from_before;
-  for (auto& [id, landmark] : landmarks_) {
+  landmarks_.ForEach([&](Landmark& landmark) {
     const auto move = move_of.find(landmark.reference);
     if (move != move_of.end()) Place(landmark, *move->second * landmark.p_world);
-  }
+  });
 }
 
 void Map::Hang(Keyframe& keyframe, KeyframeId parent) {
@@ -369,7 +362,7 @@ void Map::EraseKeyframe(KeyframeId id) {
   standpoints_.erase(std::ranges::lower_bound(standpoints_, id, {}, &Standpoint::id));
 }
 
-void Map::EraseLandmark(LandmarkId id) { landmarks_.erase(id); }
+void Map::EraseLandmark(LandmarkId id) { landmarks_.Erase(id); }
 
 void Map::Bury(LandmarkId id, LandmarkId replaced_by) {
   if (landmark_tombstones_.insert_or_assign(id, replaced_by).second) burials_.push_back(id);

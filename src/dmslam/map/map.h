@@ -5,7 +5,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "dmslam/map/feature_store.h"
 #include "dmslam/map/keyframe.h"
 #include "dmslam/map/landmark.h"
+#include "dmslam/map/landmark_table.h"
 #include "dmslam/map/map_delta.h"
 
 namespace dmslam {
@@ -56,7 +56,7 @@ class Map {
   /// The newest keyframe of a camera, of the newest session in which it has any; null: none.
   const Keyframe* NewestKeyframeOf(CameraId camera) const;
   size_t num_landmarks() const { return landmarks_.size(); }
-  const Landmark* FindLandmark(LandmarkId id) const;
+  const Landmark* FindLandmark(LandmarkId id) const { return landmarks_.Find(id); }
   /// A landmark that is known to be there.
   const Landmark& At(LandmarkId id) const;
   std::vector<LandmarkId> LandmarkIdsSorted() const;
@@ -175,7 +175,7 @@ class Map {
   std::map<CameraId, MapProgress> progress_of_;  ///< by camera
   std::map<KeyframeId, Keyframe> keyframes_;
   std::vector<Standpoint> standpoints_;  ///< of all keyframes, by id
-  std::unordered_map<LandmarkId, Landmark> landmarks_;
+  LandmarkTable landmarks_;
   std::map<KeyframeId, std::vector<KeyframeId>>
       children_;  ///< by parent, whether the parent is known yet or not
   std::map<KeyframeId, KeyframeTombstone> keyframe_tombstones_;
