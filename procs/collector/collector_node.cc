@@ -47,7 +47,7 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
     Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
             channels::kPlayerStatus, channels::kFrontendStatus},
            camera);
-    frames_.newest[camera] = -1;
+    frames_.newest[camera].reset();
   }
   collector_.ground_truth.resize(options_.NumCameras());
   run_.cameras.resize(options_.NumCameras());
@@ -333,8 +333,8 @@ bool CollectorNode::AllTaken() const {
 
 /// Those that were placed later have been seen before.
 void CollectorNode::CountFrame(const FramePose& pose) {
-  int64_t& newest = frames_.newest[pose.camera_id];
-  if (pose.state == TrackingState::kLocalizedLater || pose.frame_index <= newest) return;
+  std::optional<uint32_t>& newest = frames_.newest[pose.camera_id];
+  if (pose.state == TrackingState::kLocalizedLater || (newest && pose.frame_index <= *newest)) return;
   newest = pose.frame_index;
   frames_.newest_stamp_ns = pose.stamp_ns;
   ++frames_.seen;
@@ -447,7 +447,8 @@ bool CollectorNode::MapMayBeKept() const {
   if (map.progress().ended) return true;  // no pose comes any more
   return std::ranges::all_of(frames_.newest, [&](const auto& item) {
     const Keyframe* newest = map.NewestKeyframeOf(item.first);
-    return newest == nullptr || newest->id.session() != session_ || newest->id.frame_index() <= item.second;
+    return newest == nullptr || newest->id.session() != session_ ||
+           (item.second && newest->id.frame_index() <= *item.second);
   });
 }
 

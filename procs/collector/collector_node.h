@@ -35,10 +35,11 @@ class CollectorNode : public StreamNode {
 
  private:
   struct FrameCount {
-    int64_t total = 0;                   ///< of the sequence, as far as the player said; 0: it did not
-    int64_t seen = 0;                    ///< whose poses were heard
-    int64_t newest_stamp_ns = 0;         ///< time of the newest
-    std::map<CameraId, int64_t> newest;  ///< of every camera, its index; -1: none has come
+    int64_t total = 0;            ///< of the sequence, as far as the player said; 0: it did not
+    int64_t seen = 0;             ///< whose poses were heard
+    int64_t newest_stamp_ns = 0;  ///< time of the newest
+    /// Of every camera, its index; none: none has come.
+    std::map<CameraId, std::optional<uint32_t>> newest;
   };
   /// Processes of one name that followed one another.
   struct Followed {
