@@ -24,7 +24,7 @@ std::unique_ptr<Node> MakeFrontend(NodeContext context, NodeOptions options, Fro
   return std::make_unique<FrontendNode>(std::move(context), std::move(options), std::move(extras));
 }
 
-FrontendNode::FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras)
+FrontendNode::FrontendNode(NodeContext context, const NodeOptions& options, FrontendExtras extras)
     : StreamNode(std::move(context), options, OfCamera("frontend", options.camera_id)),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)) {

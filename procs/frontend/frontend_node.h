@@ -27,7 +27,7 @@ namespace dmslam {
 /// core is done in a job, or while there is none.
 class FrontendNode : public StreamNode {
  public:
-  FrontendNode(NodeContext context, NodeOptions options, FrontendExtras extras);
+  FrontendNode(NodeContext context, const NodeOptions& options, FrontendExtras extras);
 
   void Stop() override;
 

@@ -167,7 +167,7 @@ int main(int argc, char** argv) {
   });
   return process.Run(
       argc, argv,
-      [&](dmslam::NodeContext context, dmslam::NodeOptions node) -> std::unique_ptr<dmslam::Node> {
+      [&](dmslam::NodeContext context, const dmslam::NodeOptions& node) -> std::unique_ptr<dmslam::Node> {
         if (arguments.channels == "records") return EnterRecords(arguments, std::move(context), node);
         if (dmslam::IsLive(arguments.options.sequence))
           return WatchCamera(arguments, std::move(context), node);

@@ -35,7 +35,8 @@ bool InPath(const std::string& program) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "/usr/bin" : path);
   for (std::string folder; std::getline(folders, folder, ':');) {
-    if (access((folder + "/" + program).c_str(), X_OK) == 0) return true;
+    folder.append("/").append(program);
+    if (access(folder.c_str(), X_OK) == 0) return true;
   }
   return false;
 }
@@ -98,7 +99,7 @@ std::string Quoted(const std::string& word) {
 std::string LogToReplay(const RunArguments& a, const RunPlace& place) {
   const Words changes = FrameArguments(a);
   if (changes.empty() && PrefixOfCamera(a.source.replay) == a.bus.prefix) return a.source.replay;
-  const std::string copy = place.out + "/log/replayed.lcmlog";
+  std::string copy = place.out + "/log/replayed.lcmlog";
   std::string command = Quoted(place.programs + "/dmslam-player");
   Words words = changes;
   Append(&words, {"--prefix", a.bus.prefix, "--log", a.source.replay, "--to-log", copy});

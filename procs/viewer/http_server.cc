@@ -209,7 +209,8 @@ void HttpServer::Respond(Connection* c, const HttpRequest& request, HttpResponse
     if (!c->listener) response = HttpResponse{503, "", "", {}, false};
   }
   if (response.status >= 400) c->close_after = true;
-  std::string head = "HTTP/1.1 " + std::to_string(response.status) + " " + ReasonOf(response.status) + "\r\n";
+  std::string head = "HTTP/1.1 ";
+  head.append(std::to_string(response.status)).append(" ").append(ReasonOf(response.status)).append("\r\n");
   for (const auto& [name, value] : response.headers) head += name + ": " + value + "\r\n";
   if (!response.type.empty()) head += "Content-Type: " + response.type + "\r\n";
   if (c->listener) {

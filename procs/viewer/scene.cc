@@ -18,8 +18,8 @@ class Words {
  public:
   void Add(uint32_t word) { words_.push_back(word); }
   void Add(float value) { words_.push_back(std::bit_cast<uint32_t>(value)); }
-  template <size_t n>
-  void Add(const std::array<float, n>& values) {
+  template <size_t kSize>
+  void Add(const std::array<float, kSize>& values) {
     for (const float value : values) Add(value);
   }
   void Reserve(size_t words) { words_.reserve(words); }

@@ -155,10 +155,12 @@ void RefuseUnknownFields(const YAML::Node& node, const std::string& path) {
   for (const auto& entry : node) {
     const std::string name = entry.first.as<std::string>("");
     if (std::find(kKnown.begin(), kKnown.end(), name) != kKnown.end()) continue;
+    std::string field = path;
+    field.append(": field '").append(name).append("' ");
     if (name.starts_with("Camera") || name == "camera_matrix" || name == "intrinsics") {
-      throw InputError(path + ": field '" + name + "' is that of another program's camera file; " + kConvert);
+      throw InputError(field.append("is that of another program's camera file; ").append(kConvert));
     }
-    throw InputError(path + ": field '" + name + "' is not known; correct or remove it (see docs/camera.md)");
+    throw InputError(field.append("is not known; correct or remove it (see docs/camera.md)"));
   }
 }
 

@@ -47,7 +47,9 @@ class WitnessGrid {
 
   int Column(double x) const;
   int Row(double y) const;
-  static size_t Index(int column, int row) { return static_cast<size_t>(row * kColumns + column); }
+  static size_t Index(int column, int row) {
+    return static_cast<size_t>(row) * kColumns + static_cast<size_t>(column);
+  }
 
   double cell_width_px_, cell_height_px_;
   std::array<std::vector<Witness>, kColumns * kRows> cells_;

@@ -12,10 +12,17 @@ namespace dmslam {
 /// frontend say which camera's they are.
 template <typename Message>
 void PublishLoose(Bus* bus, const Message& message, bool local = false, CameraId camera = 0) {
-  Message said = message;
-  if constexpr (requires { said.camera_id; }) said.camera_id = camera;
-  bus->Publish({ChannelOfCamera(wire::Info<Message>().channel, camera),
-                std::make_shared<const Bytes>(wire::Encode(said)), local});
+  const auto publish = [&](const Message& said) {
+    bus->Publish({ChannelOfCamera(wire::Info<Message>().channel, camera),
+                  std::make_shared<const Bytes>(wire::Encode(said)), local});
+  };
+  if constexpr (requires { message.camera_id; }) {
+    Message said = message;
+    said.camera_id = camera;
+    publish(said);
+  } else {
+    publish(message);
+  }
 }
 
 }  // namespace dmslam
