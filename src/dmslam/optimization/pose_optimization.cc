@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
@@ -82,22 +83,26 @@ class PoseProblem {
     return result;
   }
 
-  /// Tests all observations against the pose.
-  void Classify(const Rigid3d& T, PoseOptimizationReport& report) const {
+  /// Tests all observations against the pose. Says whether others are inliers than before.
+  bool Classify(const Rigid3d& T, PoseOptimizationReport& report) const {
     const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
     report.num_inliers = 0;
     double sum = 0.0;
+    bool changed = false;
     for (size_t i = 0; i < observations_.size(); ++i) {
       const PoseObservation& o = observations_[i];
       const Eigen::Vector3d p = R * o.p_world + T.translation;
       const double chi2 = p.z() > kMinDepth ? Chi2(o, p) : std::numeric_limits<double>::infinity();
       report.chi2[i] = chi2;
-      report.inliers[i] = chi2 <= options_.max_chi2;
+      const char inlier = chi2 <= options_.max_chi2;
+      changed |= report.inliers[i] != inlier;
+      report.inliers[i] = inlier;
       if (!report.inliers[i]) continue;
       ++report.num_inliers;
       sum += chi2;
     }
     report.mean_chi2 = report.num_inliers > 0 ? sum / report.num_inliers : 0.0;
+    return changed;
   }
 
  private:
@@ -135,10 +140,11 @@ class PoseProblem {
   const std::vector<char>& inliers_;
 };
 
-/// Levenberg-Marquardt until the step is tiny or the iterations are spent. Returns how many were made.
-int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options, bool robust, Rigid3d& T) {
+/// Levenberg-Marquardt until the step is tiny or the iterations are spent. `now` is what the problem looks
+/// like at T, before and after. Returns how many were made.
+int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options, bool robust, Rigid3d& T,
+             Linearization& now) {
   double damping = 1e-6;
-  Linearization now = problem.Linearize(T, robust);
   for (int k = 0; k < options.iterations; ++k) {
     Matrix6d damped = now.hessian;
     damped.diagonal() += damping * now.hessian.diagonal();
@@ -185,17 +191,25 @@ void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
   report.iterations = 0;
   const PoseProblem problem(camera, observations, options, report.inliers);
   report.num_inliers = static_cast<int>(count);
+  // Where a round left the inliers as they were, the next begins with what is known.
+  std::optional<Linearization> known;
+  bool known_robust = false;
   for (int round = 0; round < options.rounds && report.num_inliers >= options.min_observations; ++round) {
-    report.iterations += Minimize(problem, options, round < options.robust_rounds, report.T_cam_world);
-    problem.Classify(report.T_cam_world, report);
+    const bool robust = round < options.robust_rounds;
+    if (!known || robust != known_robust) known = problem.Linearize(report.T_cam_world, robust);
+    known_robust = robust;
+    report.iterations += Minimize(problem, options, robust, report.T_cam_world, *known);
+    if (problem.Classify(report.T_cam_world, report)) known.reset();
   }
   report.usable = report.iterations > 0 && report.num_inliers >= options.min_observations &&
                   report.T_cam_world.AllFinite();
   if (!report.usable) {
     report.T_cam_world = T_cam_world_init;
     problem.Classify(T_cam_world_init, report);
+    known.reset();
   }
-  report.information = problem.Linearize(report.T_cam_world, false).hessian;
+  if (!known || known_robust) known = problem.Linearize(report.T_cam_world, false);
+  report.information = known->hessian;
 }
 
 PoseOptimizationReport OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
