@@ -88,7 +88,7 @@ std::vector<double> ReadList(const YAML::Node& node, const std::string& path, co
 /// What a field that names a model says: one of these, the first where it is left out.
 std::string ReadModel(const YAML::Node& node, const std::string& path, const std::string& field,
                       std::initializer_list<std::string> supported) {
-  const std::string model = node[field] ? node[field].as<std::string>("") : *supported.begin();
+  std::string model = node[field] ? node[field].as<std::string>("") : *supported.begin();
   if (std::find(supported.begin(), supported.end(), model) != supported.end()) return model;
   throw InputError(path + ": field '" + field + "' is '" + model +
                    "', which is not supported; undistort to a pinhole camera first (see docs/camera.md)");

@@ -48,7 +48,9 @@ class FoundShare {
   int Row(const Eigen::Vector2d& uv_px) const {
     return std::clamp(static_cast<int>(uv_px.y() / cell_height_px_), 0, kRows - 1);
   }
-  static size_t Index(int column, int row) { return static_cast<size_t>(row * kColumns + column); }
+  static size_t Index(int column, int row) {
+    return static_cast<size_t>(row) * kColumns + static_cast<size_t>(column);
+  }
 
   double cell_width_px_, cell_height_px_;
   std::array<Cell, kColumns * kRows> cells_{};

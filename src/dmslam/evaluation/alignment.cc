@@ -66,7 +66,7 @@ std::optional<Sim3d> AlignPoints(std::span<const Eigen::Vector3d> source,
   if (source.size() < 3) return std::nullopt;
   const Moments moments = ComputeMoments(source, target);
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moments.covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d singular = svd.singularValues();
+  const Eigen::Vector3d& singular = svd.singularValues();
   if (!(singular(1) > kRankTolerance * singular(0)) || !(moments.source_variance > 0)) return std::nullopt;
 
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();
