@@ -14,7 +14,7 @@ void CornerDetector::Detect(const PaddedImage& image, int threshold, int border_
   const int x_begin = border_px, x_end = image.width() - border_px;
   const int y_begin = border_px, y_end = image.height() - border_px;
   if (x_begin >= x_end || y_begin >= y_end) return;
-  const size_t row_size = static_cast<size_t>(image.width() + kRowPadding);
+  const size_t row_size = static_cast<size_t>(image.width()) + kRowPadding;
   scores_.assign(3 * row_size, 0);
   row_corners_.resize(static_cast<size_t>(x_end - x_begin) / 2 + 1);
   uint8_t* rows[3] = {scores_.data(), scores_.data() + row_size, scores_.data() + 2 * row_size};
@@ -67,7 +67,8 @@ void CornerSelector::SortIntoCells(std::span<const Corner> corners, int width, i
   const int columns = (width + cell_size_px - 1) / cell_size_px;
   const int rows = (height + cell_size_px - 1) / cell_size_px;
   const auto cell_of = [&](const Corner& corner) {
-    return static_cast<size_t>(corner.y / cell_size_px * columns + corner.x / cell_size_px);
+    return static_cast<size_t>(corner.y / cell_size_px) * static_cast<size_t>(columns) +
+           static_cast<size_t>(corner.x / cell_size_px);
   };
   cell_starts_.assign(static_cast<size_t>(columns * rows) + 1, 0);
   for (const Corner& corner : corners) ++cell_starts_[cell_of(corner)];
