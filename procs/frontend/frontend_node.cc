@@ -40,7 +40,7 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.camera_id = options_.camera_id;
   setup.in_saved_map = run_.saved_map;
   setup.localize_only = run_.localize_only;
-  if (!pace_.lockstep) setup.run_search = InBackground;
+  if (!pace_.lockstep && context_.watch) setup.run_search = InBackground;
   setup.catch_up_in_portions = !pace_.lockstep;
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
