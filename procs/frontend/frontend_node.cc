@@ -73,6 +73,8 @@ bool FrontendNode::ReadyToWrite() {
   if (map.keyframes().empty()) return true;
   const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id);
   if (newest != nullptr && newest->id.frame_index() > 0) last_index_ = newest->id.frame_index() - 1;
+  // A player that was started again, too, begins from the front until it hears how far we are.
+  if (waiting_ && last_index_ && waiting_->frame.frame_index <= *last_index_) waiting_.reset();
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }

@@ -318,6 +318,22 @@ TEST_F(SystemSimulation, AKeyframeThatWaitsForAMapperOutlivesItsFrontendOrIsName
   }
 }
 
+/// The player begins from the front, and no frontend is there yet that could say how far the run is.
+TEST_F(SystemSimulation, PlayerAndFrontendThatDieTogetherDoNotGoBack) {
+  for (const bool realtime : {false, true}) {
+    Schedule schedule = CalmSchedule();
+    schedule.at_once = true;
+    schedule.realtime = realtime;
+    schedule.faults = {Kill("frontend", 40, 3 * kSecond / 2), Kill("player", 40, kSecond / 10)};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    ASSERT_EQ(outcome.failure, "") << outcome.story;
+    EXPECT_EQ(Number(outcome, "keyframes_missing"), 0) << outcome.story;
+    EXPECT_EQ(Number(outcome, "frames"), NumFrames());
+    EXPECT_LE(Number(outcome, "frames_processed"), NumFrames() - 40 + kFramesLost) << outcome.story;
+  }
+}
+
 TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {
   const int64_t first = FromEnvironment("DMSLAM_FIRST_SCHEDULE", 1);
   const int64_t count = FromEnvironment("DMSLAM_SCHEDULES", 100);
