@@ -687,13 +687,19 @@ void CollectorNode::Gather(bool ended) {
   results_ = Results::kGathered;
   if (ended) checkpointer_->Finish();
   if (!ended) checkpointer_->WriteLast(builder_->map(), MapMayBeKept(), session_start_);
-  journal_->ForEach([this](std::span<const uint8_t> record) {
-    if (const auto pose = wire::Decode<FramePose>(record)) builder_->OnFramePose(*pose);
+  std::set<TrajectoryBuilder::FrameName> of_the_dead;
+  journal_->ForEach([&](std::span<const uint8_t> record) {
+    if (const auto pose = wire::Decode<FramePose>(record)) {
+      builder_->OnFramePose(*pose);
+      const bool its_frontend_lives = ParseHeader(record)->epoch == safe_[pose->camera_id].epoch;
+      if (!its_frontend_lives) of_the_dead.insert({pose->camera_id, pose->frame_index});
+    }
     if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
   });
   TakeEnds(ended);
   CountOwn();
   builder_->BridgeLostKeyframes();
+  builder_->JoinPosesOf(of_the_dead);
   CountMissingKeyframes();
   if (journal_->lost() > 0)
     run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
