@@ -225,13 +225,15 @@ TEST_F(SystemSimulation, TheCollectorMayDieWhenAllOthersHaveEnded) {
   }
 }
 
-/// ... and who comes then has not heard how many frames there were, some of which never came to the frontend.
+/// ... and who comes when the player is gone, too, has not heard how many frames there were, some of which
+/// never came to the frontend.
 TEST_F(SystemSimulation, ACollectorThatComesAfterTheEndCountsTheFramesThatNobodyTracked) {
   Schedule schedule = CalmSchedule();
   schedule.at_once = true;
   schedule.realtime = true;
   schedule.network.loss = 0.1;
-  schedule.faults = {Kill("collector", NumFrames() - 2, 40 * kSecond)};
+  schedule.faults = {Kill("collector", NumFrames() - 2, 40 * kSecond),
+                     Kill("player", NumFrames(), 600 * kSecond, kSecond)};
   const Outcome outcome = Run(schedule);
   if (common_->tells) Tell(schedule, outcome);
   ASSERT_EQ(outcome.failure, "") << outcome.story;
