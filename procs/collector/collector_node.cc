@@ -71,8 +71,16 @@ void CollectorNode::RecallEndedMap() {
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
-  frames_.total += info.num_frames;
+  Announce(info.camera_id, info.num_frames);
   run_.cameras[info.camera_id].sequence = info.sequence;
+}
+
+/// Noted: a collector after this one may come when the player has left.
+void CollectorNode::Announce(CameraId camera, int64_t num_frames) {
+  if (num_frames <= 0) return;
+  const bool is_new = frames_.announced.emplace(camera, num_frames).second;
+  if (is_new && journal_)
+    journal_->AppendNote("frames " + std::to_string(camera) + " " + std::to_string(num_frames));
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
@@ -177,11 +185,16 @@ void CollectorNode::ReadNote(const std::string& text) {
   uint64_t keyframe = 0;
   MapId map_id = 0;
   int32_t pid = 0;
-  if (kind == "keyframe" && note >> keyframe >> map_id) proposals_.maps[KeyframeId{keyframe}] = map_id;
+  if (kind == "keyframe" && note >> keyframe >> map_id) {
+    proposals_.maps[KeyframeId{keyframe}] = map_id;
+    if (Version said; note >> said.epoch >> said.seq) proposals_.not_taken[KeyframeId{keyframe}] = said;
+  }
+  if (kind == "mapped" && note >> keyframe) proposals_.not_taken.erase(KeyframeId{keyframe});
   if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "resumed") OnResume();
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;
+  if (CameraId camera = 0; kind == "frames" && note >> camera) note >> frames_.announced[camera];
   if (CameraId camera = 0; kind == "end" && note >> camera && camera < options_.NumCameras()) {
     EndOfSequence& end = ends_.heard[camera];
     end.camera_id = camera;
@@ -237,11 +250,32 @@ void CollectorNode::OnFrontendStatus(FrontendStatus status) {
   run_.cameras[camera].frontend = std::move(status);
 }
 
-void CollectorNode::OnProposal(KeyframeId id, MapId map_id) {
-  if (!proposals_.maps.contains(id))
-    journal_->AppendNote("keyframe " + std::to_string(id.value) + " " + std::to_string(map_id));
+void CollectorNode::OnProposal(KeyframeId id, MapId map_id, const Version& said) {
+  if (!proposals_.maps.contains(id)) {
+    journal_->AppendNote("keyframe " + std::to_string(id.value) + " " + std::to_string(map_id) + " " +
+                         std::to_string(said.epoch) + " " + std::to_string(said.seq));
+    proposals_.not_taken[id] = said;
+  }
   proposals_.maps[id] = map_id;
   proposals_.heard_ns.emplace(id, context_.now_ns());
+}
+
+/// What was done with the proposals up to there is in the map: whoever holds that holds them.
+void CollectorNode::NoteTaken(CameraId camera) {
+  const StreamPosition mapped = builder_->map().progress(camera).frontend;
+  std::erase_if(proposals_.not_taken, [&](const auto& item) {
+    const auto& [id, said] = item;
+    const bool taken = id.camera() == camera && said.epoch == mapped.epoch && said.seq <= mapped.seq;
+    if (taken) journal_->AppendNote("mapped " + std::to_string(id.value));
+    return taken;
+  });
+}
+
+/// No mapper had taken it when the frontend died that had said it, and the map goes on with another one.
+bool CollectorNode::WentWithFrontend(KeyframeId id) const {
+  const auto said = proposals_.not_taken.find(id);
+  return said != proposals_.not_taken.end() &&
+         builder_->map().progress(id.camera()).frontend.epoch > said->second.epoch;
 }
 
 /// As all who listen see it: the streams' own time is in it, and whatever the mapper did before.
@@ -357,11 +391,11 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
     OnFramePose(*record);
   } else if (record->channel == channels::kKeyframe) {
     if (const auto proposal = Read<KeyframeProposal>(*record->bytes))
-      OnProposal(proposal->id, proposal->map_id);
+      OnProposal(proposal->id, proposal->map_id, record->version());
   } else if (record->channel == channels::kInitialMap) {
     if (const auto proposal = Read<InitialMap>(*record->bytes)) {
-      OnProposal(proposal->first.id, proposal->map_id);
-      OnProposal(proposal->second.id, proposal->map_id);
+      OnProposal(proposal->first.id, proposal->map_id, record->version());
+      OnProposal(proposal->second.id, proposal->map_id, record->version());
     }
   } else if (record->channel == channels::kMapReset) {
     OnMapReset(*record);
@@ -380,9 +414,16 @@ void CollectorNode::CountMissingKeyframes() {
   for (const auto& [id, map_id] : proposals_.maps) {
     const bool known = map.FindKeyframe(id) != nullptr || map.keyframe_tombstones().contains(id);
     if (known || dropped_maps_.contains(map_id)) continue;
-    const bool before_crash = proposals_.before_crash.contains(id);
-    ++(before_crash ? run_.keyframes.lost_in_crash : run_.keyframes.missing);
-    if (!before_crash) LogWarning("the keyframe of frame {} is missing in map {}", id.frame_index(), map_id);
+    if (proposals_.before_crash.contains(id)) {
+      ++run_.keyframes.lost_in_crash;
+    } else if (WentWithFrontend(id)) {
+      ++run_.keyframes.lost_with_frontend;
+      LogWarning("the keyframe of frame {} is lost: its frontend died before a mapper had it",
+                 id.frame_index());
+    } else {
+      ++run_.keyframes.missing;
+      LogWarning("the keyframe of frame {} is missing in map {}", id.frame_index(), map_id);
+    }
   }
 }
 
@@ -392,6 +433,8 @@ void CollectorNode::OpenJournal() {
   std::filesystem::create_directories(collector_.out_dir, error);
   if (error) throw InputError(collector_.out_dir + ": cannot be made (" + error.message() + "); check --out");
   journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
+  const auto announced_before =
+      std::exchange(frames_.announced, {});  // by the players, before there was a journal
   const auto take = [&](std::span<const uint8_t> record) {
     CameraId camera = 0;
     if (const auto pose = wire::Decode<FramePose>(record)) {
@@ -412,6 +455,7 @@ void CollectorNode::OpenJournal() {
   } else {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
+  for (const auto& [camera, frames] : announced_before) Announce(camera, frames);
   processes_["collector"].former = run_.health["collector"];
   OnProcess("collector", MeasureProcess().pid, run_.health["collector"]);
   if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
@@ -511,6 +555,7 @@ bool CollectorNode::TakeMapRecord() {
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     const StreamPosition mapped = builder_->map().progress(camera).frontend;
     frontend_readers_[camera]->NoteWritten({mapped.epoch, mapped.seq});
+    NoteTaken(camera);
   }
   return true;
 }
@@ -611,9 +656,25 @@ void CollectorNode::ExitAtEnd() {
        any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
 }
 
+/// Where the player's last word was not heard. A frame that never came to the frontend has no pose that could
+/// be counted, but a number. `ended`: the sequence has come to its end.
+int64_t CollectorNode::PublishedAsFarAsKnown(CameraId camera, bool ended) const {
+  const auto announced = frames_.announced.find(camera);
+  if (ended && announced != frames_.announced.end()) return announced->second;
+  std::optional<uint32_t> first, last;
+  for (const auto& [frame, pose] : builder_->frame_poses()) {
+    if (frame.camera != camera) continue;
+    if (!first) first = frame.index;
+    last = frame.index;
+  }
+  const int64_t span = first ? int64_t{*last} - *first + 1 : 0;
+  return announced == frames_.announced.end() ? span : std::min(span, announced->second);
+}
+
 /// How many frames there were, as the players said it at the end, or else as far as is known.
-void CollectorNode::TakeEnds() {
-  for (const auto& [frame, pose] : builder_->frame_poses()) ++run_.cameras[frame.camera].frames.published;
+void CollectorNode::TakeEnds(bool ended) {
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    run_.cameras[camera].frames.published = PublishedAsFarAsKnown(camera, ended);
   for (const auto& [camera, end] : ends_.heard)
     run_.cameras[camera].frames = {end.frames_published, end.frames_missing, end.frames_blacked,
                                    end.frames_jumped};
@@ -627,13 +688,19 @@ void CollectorNode::Gather(bool ended) {
   results_ = Results::kGathered;
   if (ended) checkpointer_->Finish();
   if (!ended) checkpointer_->WriteLast(builder_->map(), MapMayBeKept(), session_start_);
-  journal_->ForEach([this](std::span<const uint8_t> record) {
-    if (const auto pose = wire::Decode<FramePose>(record)) builder_->OnFramePose(*pose);
+  std::set<TrajectoryBuilder::FrameName> of_the_dead;
+  journal_->ForEach([&](std::span<const uint8_t> record) {
+    if (const auto pose = wire::Decode<FramePose>(record)) {
+      builder_->OnFramePose(*pose);
+      const bool its_frontend_lives = ParseHeader(record)->epoch == safe_[pose->camera_id].epoch;
+      if (!its_frontend_lives) of_the_dead.insert({pose->camera_id, pose->frame_index});
+    }
     if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
   });
-  TakeEnds();
+  TakeEnds(ended);
   CountOwn();
   builder_->BridgeLostKeyframes();
+  builder_->JoinPosesOf(of_the_dead);
   CountMissingKeyframes();
   if (journal_->lost() > 0)
     run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
@@ -668,7 +735,9 @@ void CollectorNode::Stop() {
 
 /// A camera has no end that is known.
 std::string CollectorNode::OfTotal() const {
-  return frames_.total > 0 ? " of " + std::to_string(frames_.total) : "";
+  int64_t total = 0;
+  for (const auto& [camera, frames] : frames_.announced) total += frames;
+  return total > 0 ? " of " + std::to_string(total) : "";
 }
 
 /// Into the log: where a first map stands, and every so many frames.

@@ -35,9 +35,9 @@ class CollectorNode : public StreamNode {
 
  private:
   struct FrameCount {
-    int64_t total = 0;            ///< of the sequence, as far as the player said; 0: it did not
-    int64_t seen = 0;             ///< whose poses were heard
-    int64_t newest_stamp_ns = 0;  ///< time of the newest
+    std::map<CameraId, int64_t> announced;  ///< of a sequence, by its player; a live camera announces none
+    int64_t seen = 0;                       ///< whose poses were heard
+    int64_t newest_stamp_ns = 0;            ///< time of the newest
     /// Of every camera, its index; none: none has come.
     std::map<CameraId, std::optional<uint32_t>> newest;
   };
@@ -50,8 +50,9 @@ class CollectorNode : public StreamNode {
   /// Keyframes that the frontend said should be.
   struct Proposals {
     std::map<KeyframeId, MapId> maps;
-    std::map<KeyframeId, int64_t> heard_ns;  ///< when each was said to be one
-    std::set<KeyframeId> before_crash;       ///< those of before all processes died
+    std::map<KeyframeId, int64_t> heard_ns;   ///< when each was said to be one
+    std::set<KeyframeId> before_crash;        ///< those of before all processes died
+    std::map<KeyframeId, Version> not_taken;  ///< by a mapper, as the map says; and where they were said
   };
   /// What waits for room on the disk.
   struct Disk {
@@ -87,7 +88,9 @@ class CollectorNode : public StreamNode {
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
   void OnEnd(const EndOfSequence& end);
-  void TakeEnds();
+  void Announce(CameraId camera, int64_t num_frames);
+  int64_t PublishedAsFarAsKnown(CameraId camera, bool ended) const;
+  void TakeEnds(bool ended);
   bool TakeMapRecord();
   std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
@@ -98,7 +101,9 @@ class CollectorNode : public StreamNode {
   bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);
   void CountOwn();
-  void OnProposal(KeyframeId id, MapId map_id);
+  void OnProposal(KeyframeId id, MapId map_id, const Version& said);
+  void NoteTaken(CameraId camera);
+  bool WentWithFrontend(KeyframeId id) const;
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
   void OnMapReset(const Record& record);

@@ -361,6 +361,7 @@ Json FailuresJson(const RunRecord& run) {
   json["keyframes_proposed"] = run.keyframes.proposed;
   json["keyframes_missing"] = run.keyframes.missing;
   json["keyframes_lost_in_crash"] = run.keyframes.lost_in_crash;
+  json["keyframes_lost_with_frontend"] = run.keyframes.lost_with_frontend;
   return json;
 }
 

@@ -45,8 +45,9 @@ struct CameraRecord {
 
 struct KeyframeRecord {
   size_t proposed = 0;
-  size_t missing = 0;        ///< proposed for a map that stands, and neither in it nor culled from it
-  size_t lost_in_crash = 0;  ///< made after the last checkpoint before all died, and not made again
+  size_t missing = 0;             ///< proposed for a map that stands, and neither in it nor culled from it
+  size_t lost_in_crash = 0;       ///< made after the last checkpoint before all died, and not made again
+  size_t lost_with_frontend = 0;  ///< their frontend died while no mapper was there to take them
   /// From when each was heard to when its landmarks and its adjustment were [ms].
   std::vector<double> to_landmarks_ms, to_adjusted_ms;
 };

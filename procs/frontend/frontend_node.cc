@@ -40,7 +40,7 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.camera_id = options_.camera_id;
   setup.in_saved_map = run_.saved_map;
   setup.localize_only = run_.localize_only;
-  if (!pace_.lockstep) setup.run_search = InBackground;
+  if (!pace_.lockstep && context_.watch) setup.run_search = InBackground;
   setup.catch_up_in_portions = !pace_.lockstep;
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
@@ -73,6 +73,8 @@ bool FrontendNode::ReadyToWrite() {
   if (map.keyframes().empty()) return true;
   const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id);
   if (newest != nullptr && newest->id.frame_index() > 0) last_index_ = newest->id.frame_index() - 1;
+  // A player that was started again, too, begins from the front until it hears how far we are.
+  if (waiting_ && last_index_ && waiting_->frame.frame_index <= *last_index_) waiting_.reset();
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }

@@ -86,6 +86,20 @@ void MapperNode::Begin(const CameraInfo& info) {
   for (CameraId camera = 0; camera < num_cameras_; ++camera) readers.push_back(OfCamera("frontend", camera));
   readers.insert(readers.end(), {"loopcloser", "collector"});
   WantWriter({StreamId::kMap, readers, {}, snapshots_.get()});
+  ListenToFrontends();
+}
+
+/// From the beginning, not only when the map is here: a frontend that dies meanwhile has left behind what it
+/// had to say.
+void MapperNode::ListenToFrontends() {
+  frontends_.resize(num_cameras_);
+  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+    frontends_[camera].reader = MakeReader(
+        StreamId::kFrontend, "FRONTEND",
+        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
+        std::nullopt, camera);
+  }
 }
 
 // ---- Continuing what another mapper began ----
@@ -177,17 +191,12 @@ void MapperNode::OnWriterOpen() {
   left_.fetch.reset();
   left_.replica.reset();
   const MapProgress progress = core_->map().progress();
-  frontends_.resize(num_cameras_);
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
-    const StreamPosition from = core_->map().progress(camera).frontend;
-    frontends_[camera].reader = MakeReader(
-        StreamId::kFrontend, "FRONTEND",
-        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        {from.epoch, from.seq}, camera);
+    const StreamPosition mapped = core_->map().progress(camera).frontend;
+    frontends_[camera].mapped = {mapped.epoch, mapped.seq};
   }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
-                            {progress.loopcloser.epoch, progress.loopcloser.seq});
+                            Version{progress.loopcloser.epoch, progress.loopcloser.seq});
   if (progress.ended) {  // the one before could not say goodbye: whoever has died since may lack the map
     give_up_ns_ = context_.now_ns() + kBackAfterDeathNs;
     Run([this] { core_->End(true); }, [this] { Complete(); });
@@ -249,11 +258,17 @@ bool MapperNode::AllFrontends(const std::function<bool(const Frontend&)>& is_so)
   return std::ranges::all_of(frontends_, is_so);
 }
 
-/// Latencies count from when a record came, not from when there was time for it.
+/// Latencies count from when a record came, not from when there was time for it. What is in the map that
+/// another mapper left is not done again.
 void MapperNode::NoteArrivals() {
   const int64_t now_ns = context_.now_ns();
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
-    while (std::optional<Record> record = frontends_[camera].reader->Take()) {
+    Frontend& frontend = frontends_[camera];
+    while (std::optional<Record> record = frontend.reader->Take()) {
+      if (record->version() <= frontend.mapped) {
+        frontend.reader->Accept(record->version());
+        continue;
+      }
       record->channel = SplitCamera(record->channel).channel;
       arrived_.push_back({camera, std::move(*record), now_ns});
     }

@@ -49,6 +49,7 @@ class MapperNode : public StreamNode {
   /// A camera's frontend.
   struct Frontend {
     std::unique_ptr<StreamReader> reader;
+    Version mapped;                   ///< what the map holds already when this mapper begins with it
     std::optional<TurnRequest> turn;  ///< several cameras in lock-step: its next frame, which waits
     Version given;                    ///< the request that was answered last: its term and frame
     std::optional<uint32_t> request;  ///< of several cameras: to adjust the maps, not answered yet
@@ -110,6 +111,7 @@ class MapperNode : public StreamNode {
   };
 
   uint16_t ContinueSavedMap(const CameraInfo& info);
+  void ListenToFrontends();
   bool PublishSavedMap();
   void JoinFrontend(CameraId camera, const SessionStart& start);
   void Save();

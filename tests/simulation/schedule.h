@@ -29,6 +29,7 @@ struct Fault {
   int64_t lasts_ns = 0;   ///< until it is over; of a kill: until the next one begins
   int host = 0;           ///< that is cut off or whose clock is set; where the next process begins
   int64_t step_us = 0;    ///< by which the clock is set
+  int records = 0;        ///< who is killed dies in the middle of its work, when it has sent so many more
 };
 
 std::string ToText(const Fault& fault);
@@ -45,6 +46,7 @@ struct Schedule {
   bool fresh_system = true;            ///< they are told that nobody else can be writing
   bool meets_writers = false;          ///< processes that make the map die or move
   bool at_once = false;                ///< faults do not wait for each other: several may be away
+  bool realtime = false;               ///< frames come at their rate, and nobody waits for the mapper
   std::vector<Fault> faults;           ///< in the order of their frames
 
   std::string ToText() const;

@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <queue>
 #include <set>
 #include <string>
@@ -35,7 +36,10 @@ class SimulatedNetwork {
    public:
     void Subscribe(const std::string& channel) override { channels_.insert(channel); }
     void SetHandler(Handler handler) override { handler_ = std::move(handler); }
-    void Publish(const Outgoing& message) override { network_->Send(*this, message); }
+    void Publish(const Outgoing& message) override;
+    /// Its process dies when it has sent so many more records: what it says after them nobody hears.
+    void DieAfter(int records) { records_left_ = records; }
+    bool has_died() const { return records_left_ == 0; }
 
    private:
     friend class SimulatedNetwork;
@@ -43,6 +47,7 @@ class SimulatedNetwork {
     SimulatedNetwork* network_;
     int host_;
     bool closed_ = false;
+    std::optional<int> records_left_;
     bool paused_ = false;
     std::set<std::string> channels_;
     Handler handler_;

@@ -55,7 +55,8 @@ struct Process {
   int64_t due_ns = 0;         ///< when it looks again, at the latest
   int64_t busy_until_ns = 0;  ///< before that it does not look
   std::optional<int64_t> paused_until_ns;
-  bool takes_over = false;  ///< from one that is there
+  std::optional<Fault> dies;  ///< in the middle of its work
+  bool takes_over = false;    ///< from one that is there
   int last_code = 0;
   bool done = false;
 };
@@ -115,6 +116,7 @@ class SimulatedSystem {
         if (process.begins_ns && *process.begins_ns <= now_ns_) Begin(&process);
         if (heard.contains(process.port)) process.due_ns = now_ns_;
         if (MayWork(process) && process.due_ns <= now_ns_) TakeTurn(&process);
+        if (process.dies && process.port != nullptr && process.port->has_died()) Die(&process);
       }
     }
     outcome_.virtual_s = static_cast<double>(now_ns_ - kBeginNs) * 1e-9;
@@ -271,7 +273,7 @@ class SimulatedSystem {
     player.camera = workload_.camera;
     player.session = kSession;
     player.take_over = options.take_over;
-    player.mode = PlaybackMode::kLockstep;
+    player.mode = schedule_.realtime ? PlaybackMode::kRealtime : PlaybackMode::kLockstep;
     auto node =
         std::make_unique<PlayerNode>(context, player, std::make_unique<StoredFrames>(&workload_.frames));
     process->player = node.get();
@@ -360,9 +362,9 @@ class SimulatedSystem {
       network_.Pause(process->port);
       process->paused_until_ns = now_ns_ + fault.lasts_ns;
     } else if (fault.kind == Fault::Kind::kKill) {
-      Remove(process);
-      process->host = fault.host;
-      process->begins_ns = now_ns_ + fault.lasts_ns;
+      process->dies = fault;
+      if (fault.records == 0) return Die(process);
+      process->port->DieAfter(fault.records);
     } else {
       Process successor;
       successor.role = process->role;
@@ -377,6 +379,14 @@ class SimulatedSystem {
       }
       processes_.push_back(std::move(successor));
     }
+  }
+
+  void Die(Process* process) {
+    const Fault fault = *std::exchange(process->dies, std::nullopt);
+    if (fault.records > 0) Tell(process->role, "is dead");
+    Remove(process);
+    process->host = fault.host;
+    process->begins_ns = now_ns_ + fault.lasts_ns;
   }
 
   /// The newest of its role that is there.

@@ -18,14 +18,31 @@ Matrix6d SharedErrors(const PoseErrorModel& model, const ViewsBetween& between, 
   return covariance;
 }
 
-Matrix6d ToPoseInReference(const Matrix6d& covariance, const Rigid3d& T_b_a) {
-  // A step (w, v) on the left of T_b_a moves b's centre by -R_a_b v and turns it by -R_a_b w.
+namespace {
+
+/// Between a step (w, v) on the left of T_b_a and b's centre and turn in a's frame, but for the sign: it
+/// moves the centre by -R_a_b v and turns b by -R_a_b w.
+Matrix6d TurnIntoReference(const Rigid3d& T_b_a) {
   const Eigen::Matrix3d R_a_b = T_b_a.rotation.conjugate().toRotationMatrix();
   Matrix6d turn = Matrix6d::Zero();
   turn.topRightCorner<3, 3>() = R_a_b;
   turn.bottomLeftCorner<3, 3>() = R_a_b;
+  return turn;
+}
+
+Matrix6d Turned(const Matrix6d& turn, const Matrix6d& covariance) {
   const Matrix6d turned = turn * covariance * turn.transpose();
   return 0.5 * (turned + turned.transpose());
+}
+
+}  // namespace
+
+Matrix6d ToPoseInReference(const Matrix6d& covariance, const Rigid3d& T_b_a) {
+  return Turned(TurnIntoReference(T_b_a), covariance);
+}
+
+Matrix6d FromPoseInReference(const Matrix6d& told, const Rigid3d& T_b_a) {
+  return Turned(TurnIntoReference(T_b_a).transpose(), told);
 }
 
 std::vector<double> UpperTriangle(const Matrix6d& symmetric) {

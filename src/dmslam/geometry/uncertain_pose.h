@@ -47,6 +47,8 @@ Matrix6d SharedErrors(const PoseErrorModel& model, const ViewsBetween& between, 
 /// The covariance of a pose T_b_a with tangent (w, v) on its left, as a message tells it: of b's camera in
 /// a's frame, position first and then the rotation vector, both along a's axes.
 Matrix6d ToPoseInReference(const Matrix6d& covariance, const Rigid3d& T_b_a);
+/// And back.
+Matrix6d FromPoseInReference(const Matrix6d& told, const Rigid3d& T_b_a);
 
 /// The 21 numbers of a symmetric matrix that travel: its upper triangle, row by row; and back.
 std::vector<double> UpperTriangle(const Matrix6d& symmetric);

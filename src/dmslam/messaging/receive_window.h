@@ -69,6 +69,10 @@ class ReceiveWindow {
   int64_t next() const { return next_; }
   /// All records up to here have arrived.
   int64_t received() const { return received_; }
+  /// The oldest record that is here and was not handed out; none: there is none.
+  std::optional<int64_t> oldest() const {
+    return whole_.empty() ? std::nullopt : std::optional(whole_.begin()->first);
+  }
   /// The newest record known to exist.
   int64_t newest() const { return newest_; }
   size_t bytes() const { return bytes_; }

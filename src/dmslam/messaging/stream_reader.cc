@@ -29,11 +29,11 @@ std::string ToText(const Version& version) {
 
 StreamReader::StreamReader(Options options)
     : options_(std::move(options)),
-      held_(options_.start),
-      accepted_(options_.start),
-      taken_(options_.start),
+      held_(options_.start.value_or(Version())),
+      accepted_(held_),
+      taken_(held_),
       window_(options_.limits),
-      first_epoch_(options_.start.epoch) {
+      first_epoch_(held_.epoch) {
   DMSLAM_CHECK(options_.id != 0, "a reader needs an id");
 }
 
@@ -196,13 +196,19 @@ void StreamReader::DrainBeyondGaps() {
   const Version end = former_.empty() ? held_ : former_.back().version();
   if (state_ == State::kFollowing) {
     const int64_t newest = std::max(beacons_.last_seq, window_.newest());
-    const int64_t lost = window_.GiveUpBefore(newest + 1);
+    const int64_t lost = GiveUpAll(newest);
     statistics_.lost += lost;
     statistics_.lost_with_writer += lost;
     while (window_.CanTake()) former_.push_back(*window_.Take());
     Settle({term_.epoch, newest});
   }
   if (!end.empty()) Settle(end);
+}
+
+/// How many records of the former term up to `newest` are missing here, and come no more.
+int64_t StreamReader::GiveUpAll(int64_t newest) {
+  if (!options_.start && held_.empty()) window_.GiveUpBefore(window_.oldest().value_or(newest + 1));
+  return window_.GiveUpBefore(newest + 1);
 }
 
 /// Records up to this one are accounted for.

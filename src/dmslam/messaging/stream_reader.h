@@ -57,7 +57,9 @@ class StreamReader : public StateMachine {
     std::string name;         ///< for messages to people: process, host and process id
     int64_t id = 0;           ///< random, not zero
     int64_t schema_hash = 0;  ///< over all message types; writers with another one are refused
-    Version start;            ///< what the owner holds already
+    /// What the owner holds already; none: that will turn out, and what it has not received of a writer that
+    /// is gone may be what it holds.
+    std::optional<Version> start = Version();
     int64_t only_writer = 0;  ///< follows terms of this writer id alone (a hand-over); 0: of any
     ReceiveWindow::Limits limits;
     int64_t ack_ns = 30'000'000;          ///< between acknowledgements while something is new or missing
@@ -177,6 +179,7 @@ class StreamReader : public StateMachine {
   bool SpeaksOurLanguage(const head_t& head);
   void BeginTerm(const head_t& head);
   Version DrainFormerTerm(const Version& parent, bool fresh);
+  int64_t GiveUpAll(int64_t newest);
   void DrainBeyondGaps();
   void Settle(const Version& version);
   void CountLostOfFormerTerms();

@@ -462,6 +462,34 @@ TEST(Stream, OfAWriterThatIsGoneWhatCameIsHandedOutAndTheRestIsCounted) {
   EXPECT_EQ(pair.reader.statistics().lost_with_writer, 4);
 }
 
+/// What came before the first record that is here may be what its owner turns out to hold.
+TEST(Stream, WhoDoesNotKnowYetWhatItHoldsCountsOnlyGaps) {
+  for (const bool any_comes : {false, true}) {
+    Pair pair;
+    StreamReader::Options options = ReaderOptions();
+    options.start = std::nullopt;
+    pair.reader = StreamReader(options);
+    pair.drop = [any_comes](const Outgoing& out) {
+      if (out.channel == HeadChannel("TEST")) return false;
+      const std::optional<RecordHeader> header = ParseHeader(*out.bytes);
+      return !any_comes || out.channel != "DMSLAM_TEST_X" || (header->seq != 3 && header->seq != 5);
+    };
+    for (int i = 1; i <= 5; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+    pair.writer.Advance(0);
+    const std::vector<Outgoing> records = pair.writer.TakeOutgoing();
+    pair.Run(300 * kMs);
+    for (const Outgoing& out : records) {
+      if (!pair.drop(out)) pair.reader.Receive(out.channel, *out.bytes, pair.now_ns);
+    }
+    pair.drop = [](const Outgoing&) { return false; };
+    pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{});
+    pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(6), pair.now_ns);
+    pair.Run(300 * kMs);
+    EXPECT_EQ(pair.TakeAll(), any_comes ? (std::vector<int64_t>{3, 5, 6}) : std::vector<int64_t>{6});
+    EXPECT_EQ(pair.reader.statistics().lost, any_comes ? 1 : 0);
+  }
+}
+
 TEST(Stream, OfAWriterThatIsGoneWhatOthersHadIsCountedOnce) {
   Pair pair;
   pair.reader.NoteWritten({900, 7});  // before it came

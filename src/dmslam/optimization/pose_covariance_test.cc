@@ -232,6 +232,7 @@ TEST(UncertainPoseTest, ToldInItsReferencesFrame) {
     measured += error * error.transpose() / kMany;
   }
   const Matrix6d told = ToPoseInReference(root * root.transpose(), T);
+  EXPECT_LT((FromPoseInReference(told, T) - root * root.transpose()).norm(), 1e-9);
   EXPECT_LT((told - measured).norm(), 0.05 * measured.norm());
   EXPECT_EQ(FromUpperTriangle(UpperTriangle(told)), told);
 }

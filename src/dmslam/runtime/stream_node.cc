@@ -187,7 +187,7 @@ int64_t StreamNode::PublishBytes(const std::string& channel, Bytes bytes) {
 
 std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
                                                      const std::vector<std::string>& record_channels,
-                                                     Version start, CameraId camera) {
+                                                     std::optional<Version> start, CameraId camera) {
   StreamReader::Options options;
   options.session = session_;
   options.stream = StreamOfCamera(stream, camera);

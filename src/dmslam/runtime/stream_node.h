@@ -64,7 +64,7 @@ class StreamNode : public Node {
   void Listen(const std::vector<std::string>& channels, CameraId camera);
   std::unique_ptr<StreamReader> MakeReader(StreamId stream, const std::string& owner,
                                            const std::vector<std::string>& record_channels,
-                                           Version start = {}, CameraId camera = 0);
+                                           std::optional<Version> start = Version(), CameraId camera = 0);
   struct WriterPlan {
     StreamId stream = StreamId::kTest;
     std::vector<std::string> readers;  ///< roles of the lossless readers

@@ -1,8 +1,30 @@
 #include "dmslam/slam/trajectory_builder.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "dmslam/geometry/uncertain_pose.h"
+
 namespace dmslam {
+namespace {
+
+constexpr int64_t kJoinedNs = 20'000'000'000;  // of a path at a time
+
+/// Where a pose that was told lies now, and how well it was known then.
+PoseEstimate EstimateOf(const FramePose& told, const Map::ResolvedPose& reference, int64_t since_ns) {
+  Vector6d scale = Vector6d::Ones();  // position first
+  scale.head<3>().setConstant(reference.scale / told.reference_scale);
+  const Matrix6d covariance = scale.asDiagonal() * FromUpperTriangle(told.covariance) * scale.asDiagonal();
+  PoseEstimate estimate;
+  estimate.time_s = 1e-9 * static_cast<double>(told.stamp_ns - since_ns);
+  estimate.T_cam_world = reference.Compose(told.T_cam_reference, told.reference_scale);
+  const Eigen::LDLT<Matrix6d> known(FromPoseInReference(covariance, told.T_cam_reference));
+  if (known.info() == Eigen::Success && known.isPositive())
+    estimate.information = known.solve(Matrix6d::Identity());
+  return estimate;
+}
+
+}  // namespace
 
 namespace {
 
@@ -92,6 +114,45 @@ void TrajectoryBuilder::BridgeLostKeyframes() {
   }
   for (auto& [index, pose] : refined_) {
     if (!MapOfFrame(pose)) Bridge(&pose);
+  }
+}
+
+void TrajectoryBuilder::JoinPosesOf(const std::set<FrameName>& frames) {
+  std::map<std::pair<CameraId, MapId>, std::vector<const FramePose*>> paths;
+  for (const FrameName& frame : frames) {
+    const auto told = poses_.find(frame);
+    if (told == poses_.end() || refined_.contains(frame) || told->second.covariance.empty()) continue;
+    if (const auto map_id = MapOfFrame(told->second)) paths[{frame.camera, *map_id}].push_back(&told->second);
+  }
+  for (const auto& [name, path] : paths) {
+    std::optional<MotionNoise> noise;
+    size_t begin = path.size() - std::min(path.size(), kMostJoined);
+    for (size_t end = begin; end < path.size(); begin = end) {
+      const auto together = [&](const FramePose* pose) {
+        return pose->stamp_ns - path[begin]->stamp_ns < kJoinedNs;
+      };
+      while (end < path.size() && together(path[end])) ++end;
+      Join(std::span(path).subspan(begin, end - begin), &noise);
+    }
+  }
+}
+
+/// Poses of one map, in order of time; the noise is found in the first of its paths.
+void TrajectoryBuilder::Join(std::span<const FramePose* const> path, std::optional<MotionNoise>* noise) {
+  std::vector<PoseEstimate> estimates;
+  for (const FramePose* told : path)
+    estimates.push_back(EstimateOf(*told, *map_.ResolvePose(told->reference), path.front()->stamp_ns));
+  SmoothingOptions options;
+  options.noise = *noise;
+  const SmoothedTrajectory joined = SmoothTrajectory(estimates, options);
+  if (joined.noise) *noise = joined.noise;
+  for (size_t i = 0; i < path.size(); ++i) {
+    FramePose pose = *path[i];
+    const Map::ResolvedPose reference = *map_.ResolvePose(pose.reference);
+    pose.T_cam_reference = joined.T_cam_world[i] * reference.T_cam_world.Inverse();
+    pose.reference_scale = reference.scale;
+    pose.state = TrackingState::kLocalizedLater;
+    refined_[{pose.camera_id, pose.frame_index}] = pose;
   }
 }
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "dmslam/geometry/similarity.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/map/replica.h"
+#include "dmslam/optimization/trajectory_smoothing.h"
 
 namespace dmslam {
 
@@ -42,6 +45,19 @@ class TrajectoryBuilder {
   /// in.
   void BridgeLostKeyframes();
 
+  /// Which frame of which camera.
+  struct FrameName {
+    CameraId camera = 0;
+    uint32_t index = 0;
+    auto operator<=>(const FrameName&) const = default;
+  };
+  /// Frames whose features went with their frontend: nobody looks for them again in the finished map, as is
+  /// done for all others. Where they were not placed better in another way, their poses are joined with how a
+  /// carried camera moves (SmoothTrajectory()), as well as each was known when it was told: the newest
+  /// kMostJoined of each camera and map, as many as a frontend would remember. To be called when all is in.
+  void JoinPosesOf(const std::set<FrameName>& frames);
+  static constexpr size_t kMostJoined = 3000;
+
   struct Trajectories {
     std::optional<MapId> map_id;      ///< the map that holds most frames; none: no frame is placed
     std::vector<StampedPose> final;   ///< every placed frame, by its reference keyframe's final pose
@@ -54,12 +70,6 @@ class TrajectoryBuilder {
   Trajectories Build(std::optional<CameraId> camera = std::nullopt) const;
 
   const Map& map() const { return map_; }
-  /// Which frame of which camera.
-  struct FrameName {
-    CameraId camera = 0;
-    uint32_t index = 0;
-    auto operator<=>(const FrameName&) const = default;
-  };
   const std::map<FrameName, FramePose>& frame_poses() const { return poses_; }
 
  private:
@@ -69,6 +79,7 @@ class TrajectoryBuilder {
     Sim3d S_into_from;
   };
 
+  void Join(std::span<const FramePose* const> path, std::optional<MotionNoise>* noise);
   bool Bridge(FramePose* pose) const;
   std::optional<MapId> MapOfFrame(const FramePose& pose) const;
   void ChooseMap(std::optional<CameraId> camera, Trajectories* result) const;

@@ -2,9 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <set>
+
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/geometry/uncertain_pose.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/replica.h"
+#include "dmslam/util/random.h"
 
 namespace dmslam {
 namespace {
@@ -165,6 +170,71 @@ TEST(TrajectoryOfJoinedMaps, PosesToldInAMapGoWithIt) {
     const Eigen::Vector3d difference =
         built.online[i].T_world_cam.translation - built.final[i].T_world_cam.translation;
     EXPECT_LT(difference.norm(), 1e-12) << i;
+  }
+}
+
+/// A camera that was carried along the x axis of map 2, told by frames that see it badly along y: their
+/// features went with their frontend.
+class PosesOfADeadFrontend : public TrajectoryOfTwoMaps {
+ protected:
+  static constexpr uint32_t kFrames = 90;
+  static double TrueX(uint32_t frame) { return std::sin(0.05 * frame); }
+
+  static FramePose Told(uint32_t frame, double error_y) {
+    FramePose pose = PoseIn(2, TrackingState::kTracking, TrueX(frame));
+    pose.frame_index = frame;
+    pose.stamp_ns = 33'333'333 * int64_t{frame};
+    pose.T_cam_reference.translation.y() = error_y;
+    Vector6d sigma = Vector6d::Constant(1e-3);
+    sigma(1) = 0.02;
+    pose.covariance = UpperTriangle(sigma.cwiseAbs2().asDiagonal().toDenseMatrix());
+    return pose;
+  }
+  void TellAll() {
+    Random random(1);
+    for (uint32_t frame = 0; frame < kFrames; ++frame)
+      builder_.OnFramePose(Told(frame, random.Uniform(-0.03, 0.03)));
+  }
+  /// Root mean square of y in the end.
+  double ErrorAlongY() const {
+    double sum = 0;
+    for (const StampedPose& pose : builder_.Build().final)
+      sum += std::pow(pose.T_world_cam.translation.y(), 2);
+    return std::sqrt(sum / kFrames);
+  }
+};
+
+TEST_F(PosesOfADeadFrontend, AreJoinedWithTheMotionOfTheCamera) {
+  TellAll();
+  const TrajectoryBuilder::Trajectories told = builder_.Build();
+  const double before = ErrorAlongY();
+  std::set<TrajectoryBuilder::FrameName> all;
+  for (uint32_t frame = 0; frame < kFrames; ++frame) all.insert({0, frame});
+  builder_.JoinPosesOf(all);
+  const TrajectoryBuilder::Trajectories joined = builder_.Build();
+  ASSERT_EQ(joined.final.size(), kFrames);
+  EXPECT_GT(before, 0.015);
+  EXPECT_LT(ErrorAlongY(), 0.6 * before);
+  for (uint32_t frame = 0; frame < kFrames; ++frame) {
+    EXPECT_NEAR(joined.final[frame].T_world_cam.translation.x(), -7.0 - TrueX(frame), 5e-3) << frame;
+    EXPECT_EQ(joined.online[frame].T_world_cam.translation, told.online[frame].T_world_cam.translation);
+  }
+}
+
+TEST_F(PosesOfADeadFrontend, OthersAndThoseThatWerePlacedBetterStayAsTheyAre) {
+  TellAll();
+  FramePose better = Told(20, 0.001);
+  better.state = TrackingState::kLocalizedLater;
+  builder_.OnFramePose(better);
+  const TrajectoryBuilder::Trajectories before = builder_.Build();
+  std::set<TrajectoryBuilder::FrameName> some;
+  for (uint32_t frame = 0; frame < 40; ++frame) some.insert({0, frame});
+  builder_.JoinPosesOf(some);
+  const TrajectoryBuilder::Trajectories after = builder_.Build();
+  for (uint32_t frame = 0; frame < kFrames; ++frame) {
+    const bool same =
+        after.final[frame].T_world_cam.translation == before.final[frame].T_world_cam.translation;
+    EXPECT_EQ(same, frame >= 40 || frame == 20) << frame;
   }
 }
 
