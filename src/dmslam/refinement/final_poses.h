@@ -61,6 +61,9 @@ PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_w
 /// with it, and no more is improved.
 class FinalPoses {
  public:
+  /// `threads`: that work at a time; the poses do not depend on it.
+  explicit FinalPoses(int threads = 1) : threads_(threads) {}
+
   /// The frame's landmarks must be in the map now; they may leave it later.
   void Add(const Map& map, FinalPose pose);
   /// One portion of a round: landmarks and frames are placed (not in the first), then the poses of each map
@@ -92,18 +95,23 @@ class FinalPoses {
   void BeginRound(const Map& map);
   void GoTo(Step step);
   bool HasMoved(const Map& map) const;
-  std::vector<PoseEstimate> Estimates(const Map& map, std::span<const FinalPose> poses) const;
+  Matrix6d SharedInformation(const Map& map, size_t frame) const;
+  std::vector<PoseEstimate> Estimates(const Map& map, size_t begin, size_t end) const;
   void SmoothNextMap(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
   void SortViews();
+  void NoteWhoSawBefore();
   void PlaceLandmark(const Map& map, std::span<const View> views);
   void PlaceSomeLandmarks(const Map& map);
   void PlaceFrame(const Map& map, FinalPose* frame) const;
   void PlaceSomeFrames(const Map& map);
 
+  int threads_;
   std::vector<FinalPose> poses_;
   std::vector<View> views_;  ///< all, by landmark; empty: to be listed
+  /// Of each frame's sights: whether a frame shortly before saw the same landmark; as old as the views.
+  std::vector<std::vector<uint8_t>> seen_before_;
   int rounds_ = 0;
   bool map_has_moved_ = false;
   Step step_ = Step::kBetweenRounds;

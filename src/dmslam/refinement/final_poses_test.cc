@@ -132,9 +132,9 @@ class PosesAtTheEnd : public testing::Test {
     return std::sqrt(sum / count);
   }
 
-  std::vector<FramePose> Told(int begin, int end, bool improved) {
+  std::vector<FramePose> Told(int begin, int end, bool improved, int threads = 1) {
     random_ = Random(5);
-    FinalPoses poses;
+    FinalPoses poses(threads);
     for (int frame = end - 1; frame >= begin; --frame) poses.Add(map_, PoseOf(frame));
     while (improved && !poses.IsSettled()) poses.Improve(map_);
     return poses.Take();
@@ -186,6 +186,18 @@ TEST_F(PosesAtTheEnd, FramesThatSawACornerFollowTheirNeighbours) {
 TEST_F(PosesAtTheEnd, FewFramesDoNotCarryTheirLandmarksAway) {
   const auto before = Told(20, 32, false), after = Told(20, 32, true);
   EXPECT_LT(RmsError(after, 20, 32), RmsError(before, 20, 32));
+}
+
+TEST_F(PosesAtTheEnd, AreTheSameWhateverTheNumberOfThreads) {
+  const auto alone = Told(0, kFrames, true);
+  for (const int threads : {2, 3}) {
+    const auto together = Told(0, kFrames, true, threads);
+    ASSERT_EQ(together.size(), alone.size());
+    for (size_t k = 0; k < alone.size(); ++k) {
+      EXPECT_EQ(together[k].T_cam_world.translation, alone[k].T_cam_world.translation);
+      EXPECT_EQ(together[k].T_cam_world.rotation.coeffs(), alone[k].T_cam_world.rotation.coeffs());
+    }
+  }
 }
 
 TEST_F(PosesAtTheEnd, PosesComeInOrderOfTimeAndRelativeToTheirKeyframe) {
