@@ -16,7 +16,8 @@
 namespace dmslam {
 namespace {
 
-constexpr int kRounds = 20;
+constexpr int kMaxRounds = 20;
+constexpr double kStill = 0.06;  // a round that moves the poses by less is the last [standard deviations]
 constexpr double kMinInlierShare = 0.7;
 constexpr double kMaxLeverage = 1.0 / 3.0;  // of one sight: half of what all others say
 constexpr int kMinFrames = 5;               // that see a landmark, to place it by them
@@ -193,6 +194,7 @@ void FinalPoses::BeginRound(const Map& map) {
     return std::tie(a.pose.map_id, a.pose.stamp_ns) < std::tie(b.pose.map_id, b.pose.stamp_ns);
   });
   if (views_.empty()) SortViews();
+  moves_ = {};
   GoTo(rounds_++ > 0 ? Step::kLandmarks : Step::kSmoothing);
 }
 
@@ -221,7 +223,11 @@ void FinalPoses::Improve(const Map& map) {
 }
 
 bool FinalPoses::IsSettled() const {
-  return !IsMidRound() && (poses_.empty() || map_has_moved_ || rounds_ >= kRounds);
+  return !IsMidRound() && (poses_.empty() || map_has_moved_ || rounds_ >= kMaxRounds || IsStill());
+}
+
+bool FinalPoses::IsStill() const {
+  return rounds_ > 1 && moves_.sum_squared <= kStill * kStill * moves_.count;
 }
 
 void FinalPoses::Drop(std::span<const uint8_t> drop) {
@@ -284,8 +290,17 @@ void FinalPoses::SmoothNextMap(const Map& map) {
   const size_t next = static_cast<size_t>(end - poses_.begin());
   const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, next_, next), options);
   if (smoothed.noise) noise_.emplace(map_id, *smoothed.noise);
-  for (auto it = begin; it != end; ++it) it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
+  for (auto it = begin; it != end; ++it) Move(smoothed.T_cam_world[static_cast<size_t>(it - begin)], &*it);
   next_ = next;
+}
+
+void FinalPoses::Move(const Rigid3d& T_cam_world, FinalPose* pose) {
+  const Rigid3d move = T_cam_world * pose->pose.T_cam_world.Inverse();
+  Vector6d step;
+  step << LogSo3(move.rotation), move.translation;
+  moves_.sum_squared += step.dot(pose->information * step) / static_cast<double>(step.size());
+  moves_.count += pose->information.isZero(0.0) ? 0 : 1;
+  pose->SetPose(T_cam_world);
 }
 
 bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const {
