@@ -3,8 +3,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "dmslam/util/parallel.h"
 
 namespace dmslam {
 namespace {
@@ -14,8 +17,9 @@ namespace {
 constexpr int kPose = 6, kMotion = 3 * kPose, kState = kMotion + kPose;
 constexpr double kLeastInformation = 1e-12;  // keeps determined what nothing is known of
 constexpr double kMinInterval = 0.05;        // of two frames, in usual intervals
-constexpr double kMinLogVariance = -37.0, kMaxLogVariance = 14.0;  // of a standing camera; of any
-constexpr double kMaxCarried = 0.9999;                             // of a common error to the next frame
+constexpr double kMinLogVariance = -37.0, kMaxLogVariance = 14.0;       // of a standing camera; of any
+constexpr double kMaxCarried = 0.9999;                                  // of a common error to the next frame
+constexpr double kFirstStep = 2.0, kLaterStep = 0.5, kLeastStep = 0.1;  // of a logarithm
 constexpr double kMinSpread = 1e-9;  // of an information's eigenvalue to the largest: less says nothing
 using MotionMatrix = Eigen::Matrix<double, kMotion, kMotion>;
 using MotionVector = Eigen::Matrix<double, kMotion, 1>;
@@ -133,7 +137,7 @@ class Smoother {
 
   SmoothedTrajectory Run() {
     for (int round = 0; round < options_.rounds; ++round) {
-      if (!options_.noise) FindVariances();
+      if (!options_.noise) FindVariances(round == 0 ? kFirstStep : kLaterStep);
       for (int k = 0; k < 2; ++k) Update();
       Weigh();
     }
@@ -308,31 +312,34 @@ class Smoother {
   }
 
   /// One logarithm after the other, by steps that become smaller.
-  void FindVariances() {
+  void FindVariances(double step) {
     double best = Unlikelihood(variances_);
-    for (double step = 2.0; step > 0.1; step *= 0.5) {
-      for (int i = 0; i < 3; ++i) {
-        for (const double direction : {step, -step}) {
-          bool better = false;
-          while (TryStep(i, direction, &best)) better = true;
-          if (better) break;
-        }
-      }
+    for (; step > kLeastStep; step *= 0.5) {
+      for (int i = 0; i < 3; ++i) FindVariance(i, step, &best);
     }
   }
 
-  bool TryStep(int i, double by, double* best) {
+  /// Up if that is better, else down, as far as it goes. Both ways are tried at the same time, as most often
+  /// neither is better.
+  void FindVariance(int i, double step, double* best) {
+    const std::array<double, 2> ways = {step, -step};
+    std::array<double, 2> after{};
+    ForEachInParallel(2, options_.threads, [&](size_t way) { after[way] = UnlikelihoodAfter(i, ways[way]); });
+    const size_t way = after[0] < *best ? 0 : 1;
+    for (double now = after[way]; now < *best; now = UnlikelihoodAfter(i, ways[way])) {
+      *best = now;
+      variances_[i] += ways[way];
+    }
+  }
+
+  double UnlikelihoodAfter(int i, double by) const {
     Variances tried = variances_;
     tried[i] += by;
     if (tried.pose < std::log(options_.min_variance) || tried.pose > std::log(options_.max_variance) ||
         tried[i] < kMinLogVariance || tried[i] > kMaxLogVariance) {
-      return false;
+      return std::numeric_limits<double>::infinity();
     }
-    const double now = Unlikelihood(tried);
-    if (!(now < *best)) return false;
-    *best = now;
-    variances_ = tried;
-    return true;
+    return Unlikelihood(tried);
   }
 
   void Update() {

@@ -36,6 +36,7 @@ struct SmoothingOptions {
   double max_variance = 1.0;         ///< ...what is more must be motion
   double common_variance = 0.1;      ///< of the errors that frames have in common, besides; relative likewise
   std::optional<MotionNoise> noise;  ///< as found before, in the same map; none: it is found from the data
+  int threads = 1;                   ///< that work at a time; the result does not depend on it
 };
 
 struct SmoothedTrajectory {

@@ -11,11 +11,13 @@
 #include "dmslam/optimization/reprojection.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/chi_squared.h"
+#include "dmslam/util/parallel.h"
 
 namespace dmslam {
 namespace {
 
-constexpr int kRounds = 20;
+constexpr int kMaxRounds = 20;
+constexpr double kStill = 0.06;  // a round that moves the poses by less is the last [standard deviations]
 constexpr double kMinInlierShare = 0.7;
 constexpr double kMaxLeverage = 1.0 / 3.0;  // of one sight: half of what all others say
 constexpr int kMinFrames = 5;               // that see a landmark, to place it by them
@@ -191,13 +193,14 @@ void FinalPoses::BeginRound(const Map& map) {
   std::sort(poses_.begin(), poses_.end(), [](const FinalPose& a, const FinalPose& b) {
     return std::tie(a.pose.map_id, a.pose.stamp_ns) < std::tie(b.pose.map_id, b.pose.stamp_ns);
   });
+  if (views_.empty()) SortViews();
+  moves_ = {};
   GoTo(rounds_++ > 0 ? Step::kLandmarks : Step::kSmoothing);
 }
 
 void FinalPoses::GoTo(Step step) {
   step_ = step;
   next_ = 0;
-  if (step == Step::kLandmarks && views_.empty()) SortViews();
 }
 
 void FinalPoses::Improve(const Map& map) {
@@ -220,7 +223,11 @@ void FinalPoses::Improve(const Map& map) {
 }
 
 bool FinalPoses::IsSettled() const {
-  return !IsMidRound() && (poses_.empty() || map_has_moved_ || rounds_ >= kRounds);
+  return !IsMidRound() && (poses_.empty() || map_has_moved_ || rounds_ >= kMaxRounds || IsStill());
+}
+
+bool FinalPoses::IsStill() const {
+  return rounds_ > 1 && moves_.sum_squared <= kStill * kStill * moves_.count;
 }
 
 void FinalPoses::Drop(std::span<const uint8_t> drop) {
@@ -237,31 +244,36 @@ void FinalPoses::Drop(std::span<const uint8_t> drop) {
 std::vector<FramePose> FinalPoses::Take() {
   std::vector<FramePose> told;
   for (FinalPose& last : poses_) told.push_back(std::move(last.pose));
-  *this = FinalPoses();
+  *this = FinalPoses(threads_);
   return told;
 }
 
-std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, std::span<const FinalPose> poses) const {
+/// The part of what is measured of a frame that frames shortly before say too.
+Matrix6d FinalPoses::SharedInformation(const Map& map, size_t frame) const {
   const Pinhole camera = map.camera().Ideal();
-  std::unordered_map<LandmarkId, size_t> seen;  // in which of them last
-  std::vector<PoseEstimate> estimates;
-  for (size_t k = 0; k < poses.size(); ++k) {
-    const FinalPose& frame = poses[k];
-    Matrix6d shared = Matrix6d::Zero();
-    for (const Sight& sight : frame.sights) {
-      const auto [last, is_new] = seen.try_emplace(sight.landmark, k);
-      const size_t frames_ago = k - std::exchange(last->second, k);
-      const Eigen::Vector3d p_cam = frame.measured * landmarks_.at(sight.landmark).p_world;
-      if (is_new || frames_ago == 0 || frames_ago > kSharedFrames || p_cam.z() <= 0.0) continue;
-      const double variance = map.pyramid().SigmaSquared(sight.octave);
-      const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
-      if (error.squaredNorm() > kChiSquared2Dof * variance) continue;  // the pose was told without it
-      const Matrix26 J = PoseJacobian(camera, p_cam);
-      shared += J.transpose() * J / variance;
-    }
-    const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses.front().pose.stamp_ns);
-    estimates.push_back({time_s, frame.measured, frame.information, shared});
+  const FinalPose& pose = poses_[frame];
+  Matrix6d shared = Matrix6d::Zero();
+  for (size_t i = 0; i < pose.sights.size(); ++i) {
+    if (seen_before_[frame][i] == 0) continue;
+    const Sight& sight = pose.sights[i];
+    const Eigen::Vector3d p_cam = pose.measured * landmarks_.at(sight.landmark).p_world;
+    if (p_cam.z() <= 0.0) continue;
+    const double variance = map.pyramid().SigmaSquared(sight.octave);
+    const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
+    if (error.squaredNorm() > kChiSquared2Dof * variance) continue;  // the pose was told without it
+    const Matrix26 J = PoseJacobian(camera, p_cam);
+    shared += J.transpose() * J / variance;
   }
+  return shared;
+}
+
+std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, size_t begin, size_t end) const {
+  std::vector<PoseEstimate> estimates(end - begin);
+  ForEachInParallel(estimates.size(), threads_, [&](size_t k) {
+    const FinalPose& frame = poses_[begin + k];
+    const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses_[begin].pose.stamp_ns);
+    estimates[k] = {time_s, frame.measured, frame.information, SharedInformation(map, begin + k)};
+  });
   return estimates;
 }
 
@@ -269,17 +281,26 @@ void FinalPoses::SmoothNextMap(const Map& map) {
   const auto begin = poses_.begin() + static_cast<ptrdiff_t>(next_);
   const auto end = std::find_if(begin, poses_.end(),
                                 [begin](const FinalPose& p) { return p.pose.map_id != begin->pose.map_id; });
-  SmoothingOptions options;
   DMSLAM_CHECK(begin->pose.map_id.has_value(), "a final pose without a map");
   const MapId map_id = *begin->pose.map_id;
+  SmoothingOptions options;
+  options.threads = threads_;
   const auto known = noise_.find(map_id);
   if (known != noise_.end()) options.noise = known->second;
-  const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, {begin, end}), options);
+  const size_t next = static_cast<size_t>(end - poses_.begin());
+  const SmoothedTrajectory smoothed = SmoothTrajectory(Estimates(map, next_, next), options);
   if (smoothed.noise) noise_.emplace(map_id, *smoothed.noise);
-  for (auto it = begin; it != end; ++it) {
-    it->SetPose(smoothed.T_cam_world[static_cast<size_t>(it - begin)]);
-  }
-  next_ = static_cast<size_t>(end - poses_.begin());
+  for (auto it = begin; it != end; ++it) Move(smoothed.T_cam_world[static_cast<size_t>(it - begin)], &*it);
+  next_ = next;
+}
+
+void FinalPoses::Move(const Rigid3d& T_cam_world, FinalPose* pose) {
+  const Rigid3d move = T_cam_world * pose->pose.T_cam_world.Inverse();
+  Vector6d step;
+  step << LogSo3(move.rotation), move.translation;
+  moves_.sum_squared += step.dot(pose->information * step) / static_cast<double>(step.size());
+  moves_.count += pose->information.isZero(0.0) ? 0 : 1;
+  pose->SetPose(T_cam_world);
 }
 
 bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const {
@@ -329,16 +350,30 @@ void FinalPoses::SortViews() {
   std::sort(views_.begin(), views_.end(), [](const View& a, const View& b) {
     return std::tie(a.landmark, a.frame, a.sight) < std::tie(b.landmark, b.frame, b.sight);
   });
+  NoteWhoSawBefore();
+}
+
+void FinalPoses::NoteWhoSawBefore() {
+  seen_before_.assign(poses_.size(), {});
+  for (size_t k = 0; k < poses_.size(); ++k) seen_before_[k].assign(poses_[k].sights.size(), 0);
+  for (size_t i = 1; i < views_.size(); ++i) {
+    const View &before = views_[i - 1], &view = views_[i];
+    const bool same = before.landmark == view.landmark && before.frame != view.frame &&
+                      poses_[before.frame].pose.map_id == poses_[view.frame].pose.map_id;
+    seen_before_[view.frame][view.sight] = same && view.frame - before.frame <= kSharedFrames ? 1 : 0;
+  }
 }
 
 void FinalPoses::PlaceSomeLandmarks(const Map& map) {
+  std::vector<std::span<const View>> landmarks;
   auto begin = views_.cbegin() + static_cast<ptrdiff_t>(next_);
   for (size_t n = 0; n < kPortion && begin != views_.cend(); ++n) {
     const auto end =
         std::find_if(begin, views_.cend(), [begin](const View& v) { return v.landmark != begin->landmark; });
-    if (end - begin >= kMinFrames) PlaceLandmark(map, {begin, end});
+    if (end - begin >= kMinFrames) landmarks.emplace_back(begin, end);
     begin = end;
   }
+  ForEachInParallel(landmarks.size(), threads_, [&](size_t i) { PlaceLandmark(map, landmarks[i]); });
   next_ = static_cast<size_t>(begin - views_.cbegin());
 }
 
@@ -359,7 +394,9 @@ void FinalPoses::PlaceFrame(const Map& map, FinalPose* frame) const {
 }
 
 void FinalPoses::PlaceSomeFrames(const Map& map) {
-  for (size_t n = 0; n < kPortion && next_ < poses_.size(); ++n) PlaceFrame(map, &poses_[next_++]);
+  const size_t count = std::min(kPortion, poses_.size() - next_);
+  ForEachInParallel(count, threads_, [&](size_t i) { PlaceFrame(map, &poses_[next_ + i]); });
+  next_ += count;
 }
 
 }  // namespace dmslam

@@ -61,13 +61,16 @@ PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_w
 /// with it, and no more is improved.
 class FinalPoses {
  public:
+  /// `threads`: that work at a time; the poses do not depend on it.
+  explicit FinalPoses(int threads = 1) : threads_(threads) {}
+
   /// The frame's landmarks must be in the map now; they may leave it later.
   void Add(const Map& map, FinalPose pose);
   /// One portion of a round: landmarks and frames are placed (not in the first), then the poses of each map
   /// smoothed. After a round they are in order of map and time. The map must not change within one.
   void Improve(const Map& map);
   bool IsMidRound() const { return step_ != Step::kBetweenRounds; }
-  /// Whether all rounds are made, or none can be made any more.
+  /// Whether rounds change hardly anything, as many are made as may be, or none can be made any more.
   bool IsSettled() const;
   /// Forgets those that `drop` marks, by their present order.
   void Drop(std::span<const uint8_t> drop);
@@ -89,22 +92,36 @@ class FinalPoses {
 
   enum class Step { kBetweenRounds, kLandmarks, kFrames, kSmoothing };
 
+  /// Of the poses in a round, in standard deviations of what was measured, over the degrees of freedom.
+  struct Moves {
+    double sum_squared = 0.0;
+    int count = 0;
+  };
+
   void BeginRound(const Map& map);
   void GoTo(Step step);
   bool HasMoved(const Map& map) const;
-  std::vector<PoseEstimate> Estimates(const Map& map, std::span<const FinalPose> poses) const;
+  Matrix6d SharedInformation(const Map& map, size_t frame) const;
+  std::vector<PoseEstimate> Estimates(const Map& map, size_t begin, size_t end) const;
+  void Move(const Rigid3d& T_cam_world, FinalPose* pose);
+  bool IsStill() const;
   void SmoothNextMap(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
   void SortViews();
+  void NoteWhoSawBefore();
   void PlaceLandmark(const Map& map, std::span<const View> views);
   void PlaceSomeLandmarks(const Map& map);
   void PlaceFrame(const Map& map, FinalPose* frame) const;
   void PlaceSomeFrames(const Map& map);
 
+  int threads_;
   std::vector<FinalPose> poses_;
   std::vector<View> views_;  ///< all, by landmark; empty: to be listed
+  /// Of each frame's sights: whether a frame shortly before saw the same landmark; as old as the views.
+  std::vector<std::vector<uint8_t>> seen_before_;
   int rounds_ = 0;
+  Moves moves_;  ///< in the last round
   bool map_has_moved_ = false;
   Step step_ = Step::kBetweenRounds;
   size_t next_ = 0;                     ///< in this step: the first view, frame or pose to be worked on

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/util/parallel.h"
+
 namespace dmslam {
 namespace {
 
 constexpr int kMinSights = 30;
 constexpr double kSeesLess = 0.8;  // of what the frame before saw
+constexpr size_t kAhead = 4;       // frames for each search that are looked for at once
 constexpr double kSeesMore = 1.3;  // from its motion, than from where it was told to be
 
 /// What became of a landmark of map `map_id`; null where it is gone.
@@ -15,6 +18,11 @@ const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
   const std::optional<LandmarkId> now = map.Resolve(id);
   const Landmark* landmark = now ? map.FindLandmark(*now) : nullptr;
   return landmark != nullptr && landmark->map_id == map_id ? landmark : nullptr;
+}
+
+/// Computes those that are stale: reading the map changes nothing then, and several threads may.
+void FillViewingRanges(const Map& map) {
+  for (const LandmarkId id : map.LandmarkIdsSorted()) map.Viewing(map.At(id));
 }
 
 }  // namespace
@@ -42,6 +50,7 @@ void FrameRefiner::Bound() {
 
 void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
   std::deque<Kept> others;
+  ahead_.clear();  // others may come first now
   for (Kept& kept : std::exchange(frames_, {})) {
     const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
     if (!reference) continue;
@@ -132,17 +141,36 @@ void FrameRefiner::LookFromMotion(const Map& map, MapId map_id, const Kept& kept
   if (more) *refined = std::move(other);
 }
 
+std::optional<FrameRefiner::Looked> FrameRefiner::Look(const Map& map, const Kept& kept,
+                                                       const Search& search) const {
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
+  if (!reference) return std::nullopt;
+  const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
+  Looked looked{SightsNow(map, reference->map_id, kept), std::nullopt};
+  const auto found = SearchAgain(map, kept, told, looked.known, search);
+  looked.refined = Measured(map, kept, told, found.value_or(looked.known));
+  return looked;
+}
+
+void FrameRefiner::LookAhead(const Map& map, std::span<const Search> searches) {
+  FillViewingRanges(map);
+  ahead_.resize(std::min(due_.size(), kAhead * searches.size()));
+  ForEachInParallel(searches.size(), static_cast<int>(searches.size()), [&](size_t k) {
+    for (size_t i = k; i < ahead_.size(); i += searches.size()) ahead_[i] = Look(map, due_[i], searches[k]);
+  });
+}
+
 std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& search) {
   const Kept kept = std::move(due_.front());
   due_.pop_front();
+  std::optional<Looked> looked = IsAhead() ? std::move(ahead_.front()) : Look(map, kept, search);
+  if (IsAhead()) ahead_.pop_front();
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
   const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(kept.pose.reference);
-  if (!reference || !keyframe_id) return std::nullopt;
+  if (!looked || !reference || !keyframe_id) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
-  const std::vector<Sight> known = SightsNow(map, reference->map_id, kept);
-  std::optional<FinalPose> refined =
-      Measured(map, kept, told, SearchAgain(map, kept, told, known, search).value_or(known));
-  if (options_.for_smoothing) LookFromMotion(map, reference->map_id, kept, known, search, &refined);
+  std::optional<FinalPose> refined = std::move(looked->refined);
+  if (options_.for_smoothing) LookFromMotion(map, reference->map_id, kept, looked->known, search, &refined);
   before_ = std::exchange(last_, std::nullopt);
   if (refined) last_ = {reference->map_id, kept.pose.stamp_ns, refined->measured, refined->sights.size()};
   if (!refined && kept.pose.state == TrackingState::kLocalizedLater) {

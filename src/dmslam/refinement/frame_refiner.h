@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "dmslam/features/types.h"
@@ -45,6 +46,11 @@ class FrameRefiner {
   /// Takes the frames of map `map_id` (none given: of all) for RefineNext(); they are told once.
   void Begin(const Map& map, std::optional<MapId> map_id = std::nullopt);
   bool IsBusy() const { return !due_.empty(); }
+  /// Looks for the oldest frames that are due, for as many at a time as there are searches: RefineNext() does
+  /// less then, with the same result, and the map must not change until IsAhead() is false. A search finds
+  /// the same whatever it was used for before.
+  void LookAhead(const Map& map, std::span<const Search> searches);
+  bool IsAhead() const { return !ahead_.empty(); }
   /// The pose of the oldest frame that is due, relative to its reference keyframe as that is now (state:
   /// localised later). Where its observations do not agree with the map any more: none, as it was told
   /// before; of a frame that was placed late, and never told, where it was, with nothing measured.
@@ -63,8 +69,14 @@ class FrameRefiner {
     Rigid3d T_cam_world;
     size_t num_sights = 0;
   };
+  /// A frame that was looked for from where it was told to be.
+  struct Looked {
+    std::vector<Sight> known;          ///< what it saw when it was tracked, and is in the map now
+    std::optional<FinalPose> refined;  ///< none: it does not agree with the map
+  };
   void Bound();
   void CountFeatures();
+  std::optional<Looked> Look(const Map& map, const Kept& kept, const Search& search) const;
   static std::vector<Sight> SightsNow(const Map& map, MapId map_id, const Kept& kept);
   std::optional<FinalPose> Measured(const Map& map, const Kept& kept, const Rigid3d& told,
                                     const std::vector<Sight>& sights) const;
@@ -77,9 +89,10 @@ class FrameRefiner {
   FrameRefinerOptions options_;
   std::deque<Kept> frames_;
   std::deque<Kept> due_;
-  std::optional<Found> before_, last_;  ///< the last but one, and the last
-  size_t num_features_ = 0;             ///< of all frames kept
-  size_t num_without_features_ = 0;     ///< oldest frames whose features are forgotten
+  std::deque<std::optional<Looked>> ahead_;  ///< of the first that are due; none: their keyframe is gone
+  std::optional<Found> before_, last_;       ///< the last but one, and the last
+  size_t num_features_ = 0;                  ///< of all frames kept
+  size_t num_without_features_ = 0;          ///< oldest frames whose features are forgotten
 };
 
 }  // namespace dmslam

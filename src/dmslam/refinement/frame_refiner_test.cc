@@ -153,6 +153,51 @@ TEST_F(Refining, WhereAFrameSeesLessThanTheOneBeforeItIsLookedForFromTheMotion) 
   EXPECT_EQ(SeenByTheThird(map_, frame_, told_, truth_, true), static_cast<size_t>(kLandmarks));
 }
 
+/// What is refined of nine frames of a moving camera, each of which was told with an error of its own, by so
+/// many threads; 0: without looking ahead.
+std::vector<FramePose> RefinedBy(size_t threads, const Map& map, const TrackedFrame& frame, FramePose told) {
+  FrameRefiner refiner({.for_smoothing = true});
+  for (int i = 0; i < 9; ++i) {
+    told.stamp_ns += 1000;
+    told.T_cam_reference.translation.x() += 0.002 * i;
+    refiner.Keep(frame, told);
+  }
+  const std::vector<FrameRefiner::Search> searches(std::max<size_t>(threads, 1), [&](TrackedFrame* searched) {
+    return FindAll(frame.landmarks, searched);
+  });
+  refiner.Begin(map);
+  std::vector<FramePose> refined;
+  while (refiner.IsBusy()) {
+    if (threads > 0 && !refiner.IsAhead()) refiner.LookAhead(map, searches);
+    if (auto pose = refiner.RefineNext(map, searches.front())) refined.push_back(pose->pose);
+  }
+  EXPECT_FALSE(refiner.IsAhead());
+  return refined;
+}
+
+TEST_F(Refining, FramesThatAreLookedForTogetherAreWhereTheyWouldBeAlone) {
+  const auto alone = RefinedBy(0, map_, frame_, told_);
+  ASSERT_EQ(alone.size(), 9U);
+  for (const size_t threads : {1U, 2U, 3U}) {
+    const auto together = RefinedBy(threads, map_, frame_, told_);
+    ASSERT_EQ(together.size(), alone.size());
+    for (size_t k = 0; k < alone.size(); ++k) {
+      EXPECT_EQ(together[k].stamp_ns, alone[k].stamp_ns);
+      EXPECT_EQ(together[k].T_cam_world.translation, alone[k].T_cam_world.translation);
+    }
+  }
+}
+
+TEST_F(Refining, WhatWasLookedForAheadIsLeftWhereTheMapIsGone) {
+  FrameRefiner refiner;
+  for (int i = 0; i < 2; ++i) refiner.Keep(frame_, told_);
+  refiner.Begin(map_);
+  const std::vector<FrameRefiner::Search> searches(2);
+  refiner.LookAhead(map_, searches);
+  const MapEditor emptied(TestCamera(), Pyramid());
+  while (refiner.IsBusy()) EXPECT_FALSE(refiner.RefineNext(emptied, {}));
+}
+
 TEST_F(Refining, FramesOfAMapThatWasWrongAreGivenBackWithTheirFeatures) {
   FrameRefiner refiner;
   refiner.Keep(frame_, told_);

@@ -1,11 +1,17 @@
 #include "dmslam/refinement/last_poses.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "dmslam/refinement/lone_poses.h"
+#include "dmslam/util/machine.h"
 
 namespace dmslam {
 namespace {
+
+constexpr int kMaxThreads = 4;
+
+int NumThreads() { return std::clamp(ThisMachine().cores, 1, kMaxThreads); }
 
 FrameRefinerOptions ForSmoothing(FrameRefinerOptions options, bool smooth) {
   options.for_smoothing = options.for_smoothing || smooth;
@@ -17,9 +23,12 @@ FrameRefinerOptions ForSmoothing(FrameRefinerOptions options, bool smooth) {
 LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
                      const Camera& camera)
     : refiner_(ForSmoothing(refiner, smooth)),
-      search_(tracking, camera),
+      final_(NumThreads()),
       smooth_(smooth),
-      max_frames_(refiner.max_frames) {}
+      max_frames_(refiner.max_frames) {
+  const int threads = NumThreads();
+  for (int i = 0; i < threads; ++i) searches_.emplace_back(tracking, camera);
+}
 
 void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
   refiner_.Keep(frame, pose);
@@ -29,11 +38,15 @@ void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
 }
 
 void LastPoses::RefineNext(const Map& map) {
-  const auto search = [&](TrackedFrame* frame) {
-    search_.Reset();  // what the frame before saw move may lie still in this one
-    return search_.InLocalMap(map, false, std::nullopt, frame).ok;
-  };
-  if (auto pose = refiner_.RefineNext(map, search)) final_.Add(map, std::move(*pose));
+  std::vector<FrameRefiner::Search> searches;
+  for (PoseSearch& search : searches_) {
+    searches.emplace_back([&map, &search](TrackedFrame* frame) {
+      search.Reset();  // what the frame before saw move may lie still in this one
+      return search.InLocalMap(map, false, std::nullopt, frame).ok;
+    });
+  }
+  if (!refiner_.IsAhead()) refiner_.LookAhead(map, searches);
+  if (auto pose = refiner_.RefineNext(map, searches.front())) final_.Add(map, std::move(*pose));
 }
 
 /// To be smoothed: by what it sees alone, without what was expected of it; nothing is known where that does

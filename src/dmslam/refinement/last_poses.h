@@ -13,7 +13,8 @@ namespace dmslam {
 
 /// The poses that are told when the sequence has ended: every tracked frame is looked for once more in the
 /// adjusted map, then all poses are joined with the camera's motion. Works in portions; what is called in
-/// what order does not depend on how they are cut.
+/// what order does not depend on how they are cut. As many threads work as the machine has processors, up to
+/// four; the poses do not depend on it.
 class LastPoses {
  public:
   /// `smooth`: joins the poses; else each stays as it was found.
@@ -43,7 +44,7 @@ class LastPoses {
  private:
   FrameRefiner refiner_;
   FinalPoses final_;
-  PoseSearch search_;  ///< what refined frames see is not news of the map
+  std::deque<PoseSearch> searches_;  ///< one for each thread; what refined frames see is not news of the map
   bool smooth_;
   size_t max_frames_;
   struct Tracked {
