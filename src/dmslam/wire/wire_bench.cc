@@ -46,7 +46,7 @@ InitialMap Typical<InitialMap>() {
 template <>
 FrameEvidence Typical<FrameEvidence>() {
   FrameEvidence evidence = testing::RandomMessage<FrameEvidence>(1, 0);
-  for (uint64_t i = 0; i < 500; ++i) evidence.items.push_back({LandmarkId::Make(1, i), 3, 2, 1, 1.0F});
+  for (uint64_t i = 0; i < 500; ++i) evidence.items.push_back({LandmarkId::Make(1, i), 3, 2, 1});
   return evidence;
 }
 
