@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/geometry/two_view.h"
 #include "dmslam/initialization/motion_contest.h"
+#include "dmslam/initialization/plane_motions.h"
 #include "dmslam/initialization/reference_window.h"
 #include "dmslam/motion_segmentation/turn.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
@@ -126,6 +128,29 @@ InitializerReport Wait(const Refused& refused) { return Wait(refused.wait, refus
 bool MayHideSeveralMotions(WaitReason wait) {
   return wait == WaitReason::kDisagreement || wait == WaitReason::kTooFewStatic ||
          wait == WaitReason::kSelectionRefused || wait == WaitReason::kDistributionTooSmall;
+}
+
+/// Maps under different motions: the one that explains the views best, and what the next best costs.
+struct MotionRace {
+  std::optional<CandidateMap> best;
+  double runner_up = 1e9;
+
+  std::vector<Rigid3d> entered;
+
+  bool HasRun(const Rigid3d& T_last_0) const {
+    return std::any_of(entered.begin(), entered.end(),
+                       [&](const Rigid3d& other) { return CandidateBuilder::SameMotion(other, T_last_0); });
+  }
+  void Enter(CandidateMap candidate) {
+    entered.push_back(candidate.T_last_0());
+    const bool same = best && CandidateBuilder::SameMotion(best->T_last_0(), candidate.T_last_0());
+    if (best && !same) runner_up = std::min(runner_up, std::max(best->cost, candidate.cost));
+    if (!best || candidate.cost < best->cost) best = std::move(candidate);
+  }
+};
+
+TwoViewModel ModelOf(const Rigid3d& T_1_0) {
+  return {EssentialFromPose(T_1_0), T_1_0.rotation.toRotationMatrix(), T_1_0.translation};
 }
 
 /// That with a map, or of two that wait, that which came farther.
@@ -309,7 +334,9 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   if (views.empty()) return Wait(WaitReason::kTooFewFrames, "too few pairs yet");
   std::vector<const PairView*> pairs;
   for (const ReferenceView* view : views) pairs.push_back(&view->pair);
-  const Agreement agreement = Agree(pairs, camera_, options_.agreement);
+  AgreementOptions asked = options_.agreement;
+  if (views.back()->since_reference_s < options_.sure_age_s) asked.dominance.reset();
+  const Agreement agreement = Agree(pairs, camera_, asked);
   InitializerReport report;
   Refused refused;
   if (!agreement.IsUsable()) {
@@ -433,22 +460,22 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
   const MatchArrays arrays = MakeArrays(last.pair.matches, order, camera_, options_.selector.inlier);
   const std::vector<EssentialMinimum> minima = FindEssentialMinima(
       arrays, is_static, options_.motion.minima, DeriveSeed(seed_, last.frame.index, "minima"));
-  std::optional<CandidateMap> best;
-  double runner_up = 1e9;
+  MotionRace race;
   *refused = {WaitReason::kNoReconstruction, "the static matches determine no motion"};
+  const auto enter = [&](const TwoViewModel& model) {
+    Refused own;
+    auto candidate = builder_.Build(last, between, is_static, model, race.best ? &own : refused);
+    if (candidate) race.Enter(*std::move(candidate));
+  };
   for (const EssentialMinimum& minimum : minima) {
     if (minimum.cost > options_.motion.minima_slack * minima.front().cost) break;
-    Refused own;
-    std::optional<CandidateMap> candidate =
-        builder_.Build(last, between, is_static, minimum.model, best ? &own : refused);
-    if (!candidate) continue;
-    if (best && CandidateBuilder::SameMotion(best->T_last_0(), candidate->T_last_0())) {
-      if (candidate->cost < best->cost) best = std::move(candidate);
-      continue;
-    }
-    runner_up = std::min(runner_up, best ? std::max(best->cost, candidate->cost) : 1e9);
-    if (!best || candidate->cost < best->cost) best = std::move(candidate);
+    enter(minimum.model);
   }
+  for (const Rigid3d& motion : PlaneMotions(arrays, is_static)) {
+    if (!race.HasRun(motion)) enter(ModelOf(motion));
+  }
+  std::optional<CandidateMap>& best = race.best;
+  const double runner_up = race.runner_up;
   if (!best) return std::nullopt;
   if (runner_up < options_.motion.min_runner_up_cost * best->cost) {
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};

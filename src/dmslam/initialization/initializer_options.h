@@ -79,6 +79,7 @@ struct InitializerOptions {
     selector.max_rival_share = 0;
     agreement.min_agreement = 0.87;
     agreement.min_distribution_share = 0.175;
+    agreement.dominance = DominanceOptions{};
   }
 
   std::string method = "dlrsac";  ///< which matches are static, per pair of frames: dlrsac, arsac or ransac
@@ -100,9 +101,10 @@ struct InitializerOptions {
   double min_pair_step_s = 0.1;  ///< the frames of two such pairs are apart by so much at least
   /// Median displacement of the matches before a pair is worth its cost.
   double min_displacement_rad = 0.015;
-  int max_views = 8;        ///< frames after the reference frame that a map is made of, at most
-  int max_adjusted = 300;   ///< points that rival motions are adjusted with; the winner takes all
-  double sure_age_s = 0.4;  ///< a map of views that are nearer in time must be found by the next, too
+  int max_views = 8;       ///< frames after the reference frame that a map is made of, at most
+  int max_adjusted = 300;  ///< points that rival motions are adjusted with; the winner takes all
+  /// A map of views that are nearer in time must be found by the next, too, and may not be compact.
+  double sure_age_s = 0.4;
 
   template <typename Visitor>
   void Describe(Visitor& v) {

@@ -46,6 +46,13 @@ void SetRefusal(AgreementRefusal refusal, std::string explanation, Agreement* ag
   agreement->explanation = std::move(explanation);
 }
 
+/// Of the image's diagonal, for the root of D, where the static matches are `share` of all.
+double MinDistributionShare(double share, const AgreementOptions& options) {
+  const bool dominates = options.dominance && share >= options.dominance->min_share;
+  return dominates ? std::min(options.dominance->min_distribution_share, options.min_distribution_share)
+                   : options.min_distribution_share;
+}
+
 void CompareAll(std::span<const PairView* const> pairs, const AgreementOptions& options,
                 Agreement* agreement) {
   for (size_t a = 0; a < pairs.size(); ++a) {
@@ -113,7 +120,7 @@ Agreement Agree(std::span<const PairView* const> pairs, const Camera& camera,
     SetRefusal(AgreementRefusal::kTooFewStatic,
                std::to_string(agreement.num_static) + " matches are static in all pairs", &agreement);
   }
-  if (agreement.distribution_px < options.min_distribution_share * DiagonalPx(camera)) {
+  if (agreement.distribution_px < MinDistributionShare(share, options) * DiagonalPx(camera)) {
     SetRefusal(AgreementRefusal::kDistributionTooSmall,
                "the static matches spread over " + std::to_string(agreement.distribution_px) + " px",
                &agreement);

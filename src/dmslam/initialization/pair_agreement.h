@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,12 +19,20 @@ struct PairView {
   StaticSelection selection;
 };
 
+/// Where nearly everything that is matched moves as one, it may be more compact: behind people the room shows
+/// in a patch, and they themselves, whose limbs do not move as one, have no such share.
+struct DominanceOptions {
+  double min_share = 0.9;  ///< of the last pair's matches
+  double min_distribution_share = 0.14;
+};
+
 struct AgreementOptions {
   double min_agreement = 0.8;  ///< Jaccard index of two pairs' static sets, over features matched in both
   int min_common = 30;         ///< features matched in both pairs, for the index to mean anything
-  double min_distribution_share = 0.15;  ///< root of D over the static matches, by the image's diagonal
-  int min_static = 100;                  ///< matches static in all pairs
-  double min_static_share = 0.0;         ///< share of the last pair's matches that must be static
+  double min_distribution_share = 0.15;       ///< root of D over the static matches, by the image's diagonal
+  std::optional<DominanceOptions> dominance;  ///< absent: whatever its share, a compact set is refused
+  int min_static = 100;                       ///< matches static in all pairs
+  double min_static_share = 0.0;              ///< share of the last pair's matches that must be static
 
   template <typename Visitor>
   void Describe(Visitor& v) {

@@ -29,5 +29,33 @@ TEST(Agree, KeepsWhatAllPairsCallStatic) {
   EXPECT_EQ(Agree(pairs, SyntheticCamera(), {}).refusal, AgreementRefusal::kDisagreement);
 }
 
+/// `num_static` matches in a patch that is compact for the whole image, and others all over it.
+PairView PatchAmongOthers(uint32_t num_static, uint32_t num_others) {
+  PairView pair;
+  for (uint32_t i = 0; i < num_static + num_others; ++i) {
+    const bool is_static = i < num_static;
+    Match match;
+    match.index0 = i;
+    match.uv0_px = is_static ? Eigen::Vector2d(200.0 + i % 20 * 15.0, 150.0 + i / 20 % 20 * 10.0)
+                             : Eigen::Vector2d(i * 37 % 640, i * 53 % 480);
+    pair.matches.push_back(match);
+    pair.selection.is_static.push_back(is_static);
+  }
+  return pair;
+}
+
+TEST(Agree, APatchIsEnoughWhereNothingElseMovesOtherwise) {
+  AgreementOptions options;
+  const auto refusal = [&](const PairView& pair) {
+    const PairView* pairs[] = {&pair, &pair};
+    return Agree(pairs, SyntheticCamera(), options).refusal;
+  };
+  const PairView alone = PatchAmongOthers(400, 20), among_others = PatchAmongOthers(400, 100);
+  EXPECT_EQ(refusal(alone), AgreementRefusal::kDistributionTooSmall);
+  options.dominance = DominanceOptions{};
+  EXPECT_EQ(refusal(alone), AgreementRefusal::kNone);
+  EXPECT_EQ(refusal(among_others), AgreementRefusal::kDistributionTooSmall);
+}
+
 }  // namespace
 }  // namespace dmslam
