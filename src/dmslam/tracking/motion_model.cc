@@ -9,11 +9,17 @@ namespace {
 // Times are compared half a step beside those at which frames come at 30 Hz. The frame that comes next is
 // near enough at any rate.
 constexpr int64_t kStepNs = 1'000'000'000 / 30;
-constexpr int64_t kRecentNs = 500'000'000;            // so long a tracked frame's pose leads anywhere
-constexpr int64_t kKnownNs = kStepNs * 11 / 2;        // so long the newest pose's motion says something
-constexpr int64_t kSuccessiveNs = kStepNs * 5 / 2;    // a step no longer than this is a motion...
-constexpr int64_t kCoastingStepNs = kStepNs * 3 / 2;  // ...and this, with a weak pose at its end
-constexpr double kJitter = 0.1;                       // share of a step by which stamps may be uneven
+constexpr int64_t kRecentNs = 500'000'000;          // so long a tracked frame's pose leads anywhere
+constexpr int64_t kKnownNs = kStepNs * 11 / 2;      // so long the newest pose's motion says something
+constexpr int64_t kSuccessiveNs = kStepNs * 5 / 2;  // a step no longer than this is a motion...
+constexpr double kFloor = 0.0005;                   // no pose is known better than this [rad], [depths]
+
+Vector6d Difference(const Rigid3d& T, const Rigid3d& T_from) {
+  const Rigid3d step = T * T_from.Inverse();
+  Vector6d difference;
+  difference << LogSo3(step.rotation), step.translation;
+  return difference;
+}
 
 }  // namespace
 
@@ -48,23 +54,45 @@ void MotionModel::Begin(const PlacedPose& pose, const FrameTime& time) {
 void MotionModel::Stop() {
   motion_.reset();
   coasting_.reset();
+  covariance_.reset();
 }
 
-MotionModel::Motion MotionModel::MotionTo(const Rigid3d& T_cam_world, const Rigid3d& T_last_world,
-                                          const FrameTime& time) const {
-  return {T_cam_world * T_last_world.Inverse(), time.stamp_ns - Newest().time.stamp_ns};
+/// The motion goes on evenly, for no longer than it says something.
+MotionFilter::Since MotionModel::Since(const Map& map, const FrameTime& time) const {
+  const Pose& newest = Newest();
+  int64_t since_ns = time.stamp_ns - newest.time.stamp_ns;
+  if (time.index - newest.time.index != 1) since_ns = std::min(since_ns, kKnownNs);
+  const auto reference = map.ResolvePose(newest.pose.reference);
+  return {static_cast<double>(since_ns) * 1e-9, Depth(map),
+          reference ? reference->scale / newest.pose.scale : 1.0};
 }
 
-/// The motion goes on evenly, for no longer than it says something. Stamps that jitter make no difference. A
-/// frame that was tracked twice, as the one that made the first map is, has corrected its pose and not moved.
-Rigid3d MotionModel::StepUntil(const FrameTime& time) const {
-  const Rigid3d& motion = motion_->T_cam_lastcam;
-  if (motion_->duration_ns <= 0) return motion;
-  const int64_t since_ns =
-      std::min(time.stamp_ns - Newest().time.stamp_ns, std::max(kKnownNs, motion_->duration_ns));
-  const double steps = static_cast<double>(since_ns) / static_cast<double>(motion_->duration_ns);
-  if (std::abs(steps - 1.0) < kJitter) return motion;
-  return {ExpSo3(steps * LogSo3(motion.rotation)), steps * motion.translation};
+Matrix6d MotionModel::Floored(const Map& map, const Matrix6d& covariance) const {
+  Matrix6d floored = covariance;
+  const double v = kFloor * Depth(map);
+  floored.diagonal() +=
+      (Vector6d() << Eigen::Vector3d::Constant(kFloor * kFloor), Eigen::Vector3d::Constant(v * v)).finished();
+  return floored;
+}
+
+/// What is known of the motion with this pose: none where too long has passed since the one before. A frame
+/// that was tracked twice, as the one that made the first map is, has corrected its pose and not moved.
+std::optional<MotionFilter> MotionModel::MotionTo(const Map& map, const FoundPose& found,
+                                                  const FrameTime& time) const {
+  const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
+  if (!T_last_world) return std::nullopt;
+  const MotionFilter::Since since = Since(map, time);
+  if (since.duration_s <= 0) return motion_;
+  if (motion_ && IsWithin(time, kKnownNs)) {
+    const Prediction prediction = Predict(map, time);
+    MotionFilter motion = *motion_;
+    motion.Update(since, Difference(found.T_cam_world, *prediction.T_cam_world),
+                  Floored(map, found.covariance));
+    return motion;
+  }
+  if (!IsWithin(time, kSuccessiveNs)) return std::nullopt;
+  return MotionFilter(options_.evenness, since, Difference(found.T_cam_world, *T_last_world),
+                      Floored(map, covariance_.value_or(Matrix6d::Zero())), Floored(map, found.covariance));
 }
 
 bool MotionModel::IsWithin(const FrameTime& time, int64_t limit_ns) const {
@@ -78,22 +106,16 @@ double MotionModel::Depth(const Map& map) const {
   return reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
 }
 
-PosePrior MotionModel::MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const {
-  return MotionPrior(options_, T_cam_world, Depth(map),
-                     std::max(1.0, std::round(static_cast<double>(since_ns) / kStepNs)));
-}
-
 MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time) const {
   Prediction prediction;
   prediction.recent = time.stamp_ns - last_.time.stamp_ns < kRecentNs;
   prediction.T_cam_world = Newest().pose.In(map);
   if (!prediction.T_cam_world || !motion_) return prediction;
-  // The map may have been scaled since the motion was measured.
-  const double growth = map.ResolvePose(Newest().pose.reference)->scale / Newest().pose.scale;
-  const Rigid3d step = StepUntil(time);
-  prediction.T_cam_world = Rigid3d(step.rotation, step.translation * growth) * *prediction.T_cam_world;
+  const MotionFilter::Expected expected = motion_->Predict(Since(map, time));
+  prediction.T_cam_world =
+      Rigid3d(ExpSo3(expected.step.head<3>()), expected.step.tail<3>()) * *prediction.T_cam_world;
   if (!IsWithin(time, kKnownNs)) return prediction;
-  prediction.prior = MakePrior(map, *prediction.T_cam_world, time.stamp_ns - Newest().time.stamp_ns);
+  prediction.prior = PosePrior{*prediction.T_cam_world, expected.covariance.inverse()};
   return prediction;
 }
 
@@ -115,21 +137,21 @@ bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const 
          moved <= options_.speed_slack + options_.max_speed * since_s;
 }
 
-void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world,
+void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const FoundPose& found,
                             const FrameTime& time, bool jumped) {
-  const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
-  const bool successive = IsWithin(time, kSuccessiveNs) && !jumped;
-  const Motion motion = MotionTo(T_cam_world, T_last_world.value_or(T_cam_world), time);
+  std::optional<MotionFilter> motion;
+  if (!jumped) motion = MotionTo(map, found, time);
   Begin(pose, time);
-  if (successive && T_last_world) motion_ = motion;
+  motion_ = std::move(motion);
+  covariance_ = found.covariance;
 }
 
-void MotionModel::Coast(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) {
-  const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
-  const std::optional<PlacedPose> pose = PlacedPose::Of(map, T_cam_world, last_.pose.reference);
-  if (!pose || !T_last_world || !IsWithin(time, kKnownNs)) return;
-  if (IsWithin(time, kCoastingStepNs)) motion_ = MotionTo(T_cam_world, *T_last_world, time);
+void MotionModel::Coast(const Map& map, const FoundPose& found, const FrameTime& time) {
+  const std::optional<PlacedPose> pose = PlacedPose::Of(map, found.T_cam_world, last_.pose.reference);
+  if (!pose || !IsWithin(time, kKnownNs)) return;
+  motion_ = MotionTo(map, found, time);
   coasting_ = Pose{*pose, time};
+  covariance_ = found.covariance;
 }
 
 }  // namespace dmslam

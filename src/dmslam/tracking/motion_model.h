@@ -5,6 +5,7 @@
 
 #include "dmslam/map/map.h"
 #include "dmslam/optimization/pose_optimization.h"
+#include "dmslam/tracking/motion_filter.h"
 
 namespace dmslam {
 
@@ -20,6 +21,12 @@ struct PlacedPose {
   std::optional<Rigid3d> In(const Map& map) const;
 };
 
+/// A pose that was found, and its covariance as its matches and what was known before leave it.
+struct FoundPose {
+  Rigid3d T_cam_world;
+  Matrix6d covariance = Matrix6d::Zero();  ///< tangent (w, v) on the left
+};
+
 /// Which frame of the stream, and when.
 struct FrameTime {
   uint32_t index = 0;
@@ -27,6 +34,7 @@ struct FrameTime {
 };
 
 struct MotionModelOptions {
+  EvennessOptions evenness;
   double prior_rotation_rad = 0.01;  ///< how well a step of 1/30 s is known beforehand...
   double prior_translation = 0.01;   ///< ...and its translation, as a share of the scene's depth
   double max_surprise = 4.0;  ///< a pose that lies more standard deviations of the prior off contradicts it
@@ -61,10 +69,10 @@ class MotionModel {
   /// leads, and where that is not known, no faster than hands and cars are.
   bool IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
   /// A frame was tracked. `jumped`: not from the frame before (relocalised), so the step is no motion.
-  void OnTracked(const Map& map, const PlacedPose& pose, const Rigid3d& T_cam_world, const FrameTime& time,
+  void OnTracked(const Map& map, const PlacedPose& pose, const FoundPose& found, const FrameTime& time,
                  bool jumped);
   /// A frame was not tracked, but has a weak pose.
-  void Coast(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time);
+  void Coast(const Map& map, const FoundPose& found, const FrameTime& time);
   /// The motion is not known any more.
   void Stop();
 
@@ -78,21 +86,18 @@ class MotionModel {
     PlacedPose pose;
     FrameTime time;
   };
-  struct Motion {
-    Rigid3d T_cam_lastcam;
-    int64_t duration_ns = 0;
-  };
   const Pose& Newest() const { return coasting_ ? *coasting_ : last_; }
-  Motion MotionTo(const Rigid3d& T_cam_world, const Rigid3d& T_last_world, const FrameTime& time) const;
-  Rigid3d StepUntil(const FrameTime& time) const;
+  MotionFilter::Since Since(const Map& map, const FrameTime& time) const;
+  std::optional<MotionFilter> MotionTo(const Map& map, const FoundPose& found, const FrameTime& time) const;
+  Matrix6d Floored(const Map& map, const Matrix6d& covariance) const;
   bool IsWithin(const FrameTime& time, int64_t limit_ns) const;
   double Depth(const Map& map) const;
-  PosePrior MakePrior(const Map& map, const Rigid3d& T_cam_world, int64_t since_ns) const;
 
   MotionModelOptions options_;
   Pose last_;
   std::optional<Pose> coasting_;
-  std::optional<Motion> motion_;  ///< to the newest pose, coasted ones included
+  std::optional<Matrix6d> covariance_;  ///< of the newest pose, coasted ones included; none: it was given
+  std::optional<MotionFilter> motion_;  ///< to the newest pose; none: it is not known
 };
 
 }  // namespace dmslam

@@ -52,8 +52,8 @@ PoseSearch::FromFrameResult PoseSearch::FromFrame(const Map& map, const TrackedF
   if (matches->size() < needed) return FromFrameResult::kNotSeen;
   SetMatches(*matches, T_predicted, frame);
   const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
-  return fit.inliers >= options_.min_motion_inliers ? FromFrameResult::kFound
-                                                    : FromFrameResult::kContradicted;
+  if (fit.inliers < options_.min_motion_inliers) return FromFrameResult::kContradicted;
+  return fit.by_rival ? FromFrameResult::kFoundRival : FromFrameResult::kFound;
 }
 
 int PoseSearch::FromPrediction(const Map& map, const Rigid3d& T_predicted, const Prior& prior,
@@ -96,13 +96,16 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   auto expected = MatchAround(map, wider, frame);
   PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
   judge_.Judge(map, expected, fit.rejected, frame);
+  bool by_rival = fit.by_rival;
   if (!fit.by_trusted_elders && solver_.FollowWiderMotion(map, prior, judge_, frame)) {
+    by_rival = true;
     expected = MatchAround(map, wider, frame);
-    fit = solver_.Solve(map, prior, &judge_, frame, Elderhood::kIgnored);
+    fit = solver_.Solve(map, std::nullopt, &judge_, frame, Elderhood::kIgnored);
     judge_.Judge(map, expected, fit.rejected, frame);
   }
   TrackingReport report = CountClasses(camera_, *frame);
   CountExpected(map, expected, *frame, &report);
+  report.by_rival = by_rival;
   report.contradicts = static_cast<int>(fit.rejected.size()) > fit.inliers;
   Decide(fit, careful, &report);
   if (report.ok && !report.doubtful) judge_.Believe(map, expected, *frame);
@@ -113,6 +116,10 @@ std::span<const ExpectedLandmark> PoseSearch::MatchAround(const Map& map, double
   const auto expected = search_.MatchLandmarks(map, judge_.votes(), local_map_.landmarks(), wider, frame);
   judge_.DropMatchesOfHiddenPlaces(map, expected, frame);
   return expected;
+}
+
+FoundPose PoseSearch::found(const TrackedFrame& frame) const {
+  return {frame.T_cam_world, basis().information.inverse()};
 }
 
 void PoseSearch::CountExpected(const Map& map, std::span<const ExpectedLandmark> expected,

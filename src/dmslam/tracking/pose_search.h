@@ -26,6 +26,7 @@ class PoseSearch {
 
   enum class FromFrameResult : uint8_t {
     kFound,
+    kFoundRival,    ///< by a wider motion than that of the frames before
     kNotSeen,       ///< too little of what the last frame saw is near its place
     kContradicted,  ///< enough is, but not in its place
   };
@@ -49,6 +50,8 @@ class PoseSearch {
 
   /// The keyframe that shares most landmarks with the frame searched for last.
   KeyframeId reference() const { return local_map_.reference(); }
+  /// What was found last, with the covariance that its matches and the prior leave.
+  FoundPose found(const TrackedFrame& frame) const;
   /// What the pose of the frame searched for last rests on.
   PoseBasis basis() const { return solver_.basis(); }
   MotionJudge& judge() { return judge_; }

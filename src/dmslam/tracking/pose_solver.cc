@@ -102,7 +102,9 @@ std::optional<Rigid3d> PoseSolver::FindWiderMotion(const Pinhole& camera, const 
   }
   const int contradicting = static_cast<int>(contradicting_.size());
   if (!rivals.IsWorthALook(contradicting)) return std::nullopt;
-  OptimizePose(camera, T_cam_world, contradicting_, options, rival_);
+  PoseOptimizationOptions own = options;
+  own.prior.reset();  // it speaks of the motion that is contradicted
+  OptimizePose(camera, T_cam_world, contradicting_, own, rival_);
   if (!rival_.usable) return std::nullopt;
   SupportWidth first, rival;
   for (const PoseObservation& o : all_.observations) {
@@ -155,14 +157,14 @@ PoseFit PoseSolver::Solve(const Map& map, const std::optional<PosePrior>& prior,
   const bool by_elders = judge->enabled() && elderhood == Elderhood::kCounts &&
                          LetEldersDecide(camera, frame->T_cam_world, options, &judge->elders());
   OptimizePose(camera, frame->T_cam_world, current_.observations, options, optimized_);
-  if (judge->enabled() && !by_elders && optimized_.usable) {
-    const auto wider = FindWiderMotion(camera, optimized_.T_cam_world, options, judge->rivals());
-    if (wider) GoOnFrom(camera, *wider, options);
-  }
+  std::optional<Rigid3d> wider;
+  if (judge->enabled() && !by_elders && optimized_.usable)
+    wider = FindWiderMotion(camera, optimized_.T_cam_world, options, judge->rivals());
+  if (wider) GoOnFrom(camera, *wider, Options(std::nullopt));
   if (!optimized_.usable) return {0, optimized_.mean_chi2, rejected_, by_elders};
   frame->T_cam_world = optimized_.T_cam_world;
   SetClasses(frame);
-  return {optimized_.num_inliers, optimized_.mean_chi2, rejected_, by_elders};
+  return {optimized_.num_inliers, optimized_.mean_chi2, rejected_, by_elders, wider.has_value()};
 }
 
 bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior>& prior,
@@ -176,7 +178,7 @@ bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior
   const Pinhole camera = map.camera().Ideal();
   const auto wider = FindWiderMotion(camera, frame->T_cam_world, options, judge.rivals());
   if (!wider) return false;
-  GoOnFrom(camera, *wider, options);
+  GoOnFrom(camera, *wider, Options(std::nullopt));
   frame->ClearMatches();
   for (const LandmarkMatch& match : current_.matches) frame->landmarks[match.feature] = match.landmark;
   frame->T_cam_world = *wider;

@@ -19,6 +19,7 @@ struct PoseFit {
   double mean_chi2 = 0;
   std::span<const RejectedMatch> rejected;  ///< valid until the next call
   bool by_trusted_elders = false;           ///< landmarks that are older than people stand have decided
+  bool by_rival = false;                    ///< a wider motion than that which most landmarks follow has
 };
 
 /// What the pose found last rests on; valid until the next call.

@@ -90,7 +90,8 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   } else if (attempt.report.doubtful && !unbelieved_) {
     unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, motion_.last_stamp_ns(), motion_, last_};
   }
-  motion_.OnTracked(map, pose, frame.T_cam_world, {frame.index, frame.stamp_ns}, attempt.relocalized);
+  motion_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns},
+                    attempt.relocalized || attempt.by_rival);
   last_ = frame;
   if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
 }
@@ -137,12 +138,15 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
   const MotionModel::Prediction prediction = motion_.Predict(map, {frame->index, frame->stamp_ns});
   if (!prediction.T_cam_world || !prediction.recent) return attempt;
   if (!FindByMotion(map, prediction, frame, &attempt)) return attempt;
-  attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns), prediction.prior, frame);
+  attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns),
+                                      attempt.by_rival ? std::nullopt : prediction.prior, frame);
+  attempt.by_rival |= attempt.report.by_rival;
+  if (attempt.by_rival) motion_.Stop();
   if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
     Refuse("the pose contradicts the camera's motion", &attempt.report);
     attempt.report.contradicts = true;
   } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
-    attempt.weak_pose = frame->T_cam_world;
+    attempt.weak_pose = search_.found(*frame);
   }
   return attempt;
 }
@@ -152,12 +156,13 @@ bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& predic
                            Attempt* attempt) {
   using Result = PoseSearch::FromFrameResult;
   const Result last = search_.FromFrame(map, last_, *prediction.T_cam_world, prediction.prior, frame);
-  if (last == Result::kFound) return true;
+  attempt->by_rival = last == Result::kFoundRival;
+  if (last == Result::kFound || last == Result::kFoundRival) return true;
   attempt->report.contradicts = last == Result::kContradicted;
   if (prediction.prior) {
     const int inliers = search_.FromPrediction(map, *prediction.T_cam_world, prediction.prior, frame);
     if (inliers >= options_.min_local_inliers) return true;
-    if (inliers >= options_.min_coasting_inliers) attempt->weak_pose = frame->T_cam_world;
+    if (inliers >= options_.min_coasting_inliers) attempt->weak_pose = search_.found(*frame);
   }
   const uint64_t seed = DeriveSeed(seed_, frame->index, "track_keyframe");
   return search_.FromKeyframe(map, motion_.last().reference, seed, prediction.prior, frame);

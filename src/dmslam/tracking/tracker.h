@@ -69,8 +69,9 @@ class Tracker {
  private:
   struct Attempt {
     TrackingReport report;
-    std::optional<Rigid3d> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
+    std::optional<FoundPose> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
     bool relocalized = false;
+    bool by_rival = false;  ///< what the frames before followed was not the room
   };
 
   bool FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,

@@ -45,8 +45,8 @@ struct TrackingOptions {
 /// When a frame becomes a keyframe.
 struct KeyframeOptions {
   double min_interval_s = 0.1;  ///< never closer, unless tracking is weak
-  /// Of the landmarks that the reference keyframe sees: fewer tracked asks for a keyframe. Keyframes that turn
-  /// out to say nothing new are removed again (mapping.redundant_share).
+  /// Of the landmarks that the reference keyframe sees: fewer tracked asks for a keyframe. Keyframes that
+  /// turn out to say nothing new are removed again (mapping.redundant_share).
   double tracked_ratio = 1.0;
   int min_inliers = 15;
 
