@@ -51,7 +51,9 @@ struct PoseSums {
   sums->cost += weight * (t.error_u * t.error_u + t.error_v * t.error_v);
 }
 
-PoseNormal Unpack(const PoseSums& sums) {
+/// Inline, or GCC 12 takes the call for the end of the AVX2 code and leaves the upper halves of the registers
+/// in use, which slows down the SSE code of others from then on.
+[[gnu::always_inline]] inline PoseNormal Unpack(const PoseSums& sums) {
   constexpr std::array<int, 4> kAt{0, 1, 2, 5};
   PoseNormal normal;
   for (int c = 0; c < 4; ++c) {
