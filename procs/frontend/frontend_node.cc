@@ -20,8 +20,8 @@ constexpr uint32_t kTheEnd = kMaxFrames - 1;  // in the place of a frame: what i
 
 }  // namespace
 
-std::unique_ptr<Node> MakeFrontend(NodeContext context, NodeOptions options, FrontendExtras extras) {
-  return std::make_unique<FrontendNode>(std::move(context), std::move(options), std::move(extras));
+std::unique_ptr<Node> MakeFrontend(NodeContext context, const NodeOptions& options, FrontendExtras extras) {
+  return std::make_unique<FrontendNode>(std::move(context), options, std::move(extras));
 }
 
 FrontendNode::FrontendNode(NodeContext context, const NodeOptions& options, FrontendExtras extras)

@@ -9,8 +9,8 @@ int main(int argc, char** argv) {
   process.app().AddOption("--vocabulary", vocabulary, "bag-of-words vocabulary; default: the one that ships");
   process.app().AddOption("--picture-dir", extras.picture_dir, "folder for pictures of the features");
   process.app().AddOption("--picture-every", extras.picture_every, "draw every Nth frame");
-  return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
+  return process.Run(argc, argv, [&](dmslam::NodeContext context, const dmslam::NodeOptions& options) {
     extras.vocabulary = dmslam::LoadVocabulary(vocabulary);
-    return dmslam::MakeFrontend(std::move(context), std::move(options), extras);
+    return dmslam::MakeFrontend(std::move(context), options, extras);
   });
 }

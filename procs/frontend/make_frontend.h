@@ -18,6 +18,6 @@ struct FrontendExtras {
 };
 
 /// A `FrontendNode`, for those who only run one: its own header is much to compile.
-std::unique_ptr<Node> MakeFrontend(NodeContext context, NodeOptions options, FrontendExtras extras);
+std::unique_ptr<Node> MakeFrontend(NodeContext context, const NodeOptions& options, FrontendExtras extras);
 
 }  // namespace dmslam

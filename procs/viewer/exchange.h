@@ -58,7 +58,7 @@ class Exchange {
 
  private:
   mutable std::mutex mutex_;
-  Scene scene_;
+  ViewerScene scene_;
   CameraSeries series_;
   HealthText health_;
   std::map<CameraId, std::deque<std::shared_ptr<ServedImage>>> images_;

@@ -64,7 +64,7 @@ void LogPlayback::BeginAnew() {
   context.random_id = 1;
   context.name = "viewer of " + path_;
   node_ = std::make_unique<ViewerNode>(std::move(context), options_, viewer_, exchange_);
-  exchange_->Change([](Scene* scene, CameraSeries* series) {
+  exchange_->Change([](ViewerScene* scene, CameraSeries* series) {
     scene->Clear();
     series->Clear();
   });

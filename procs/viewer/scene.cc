@@ -42,7 +42,7 @@ std::vector<uint32_t> Changed(const Slots& slots, uint64_t since) {
   return changed;
 }
 
-void AddPoints(const Scene::Points& table, const std::vector<uint32_t>& changed, Words* words) {
+void AddPoints(const ViewerScene::Points& table, const std::vector<uint32_t>& changed, Words* words) {
   const auto& slots = table.slots();
   for (const uint32_t i : changed) words->Add(i);
   for (const uint32_t i : changed) words->Add(static_cast<uint32_t>(slots[i].key.value));
@@ -53,7 +53,7 @@ void AddPoints(const Scene::Points& table, const std::vector<uint32_t>& changed,
   for (const uint32_t i : changed) words->Add(slots[i].value.colour);
 }
 
-void AddKeyframes(const Scene::Keyframes& table, const std::vector<uint32_t>& changed, Words* words) {
+void AddKeyframes(const ViewerScene::Keyframes& table, const std::vector<uint32_t>& changed, Words* words) {
   const auto& slots = table.slots();
   for (const uint32_t i : changed) words->Add(i);
   for (const uint32_t i : changed) words->Add(slots[i].alive ? slots[i].key.frame_index() : kGone);
@@ -71,7 +71,7 @@ void AddKeyframes(const Scene::Keyframes& table, const std::vector<uint32_t>& ch
   }
 }
 
-void AddPath(const Scene::Path& table, const std::vector<uint32_t>& changed, Words* words) {
+void AddPath(const ViewerScene::Path& table, const std::vector<uint32_t>& changed, Words* words) {
   const auto& slots = table.slots();
   for (const uint32_t i : changed) words->Add(slots[i].key.index);
   for (const uint32_t i : changed) words->Add(slots[i].key.camera);
@@ -81,7 +81,7 @@ void AddPath(const Scene::Path& table, const std::vector<uint32_t>& changed, Wor
   for (const uint32_t i : changed) words->Add(slots[i].value.colour);
 }
 
-void AddTruth(const Scene::Truth& table, const std::vector<uint32_t>& changed, Words* words) {
+void AddTruth(const ViewerScene::Truth& table, const std::vector<uint32_t>& changed, Words* words) {
   const auto& slots = table.slots();
   for (const uint32_t i : changed) words->Add(slots[i].key.index);
   for (const uint32_t i : changed) words->Add(slots[i].key.camera);
@@ -90,7 +90,7 @@ void AddTruth(const Scene::Truth& table, const std::vector<uint32_t>& changed, W
 
 }  // namespace
 
-void Scene::Clear() {
+void ViewerScene::Clear() {
   points_.Clear();
   keyframes_.Clear();
   path_.Clear();
@@ -99,7 +99,7 @@ void Scene::Clear() {
   ++version_;
 }
 
-std::vector<uint8_t> Scene::Encode(uint32_t generation, uint64_t since) const {
+std::vector<uint8_t> ViewerScene::Encode(uint32_t generation, uint64_t since) const {
   const bool everything = generation != generation_ || since == 0 || since > version_;
   if (everything) since = 0;
   const std::vector<uint32_t> points = Changed(points_.slots(), since);

@@ -53,9 +53,9 @@ struct ScenePathPoint {
 
 /// What browsers draw of all maps: tables that they mirror. A browser says which version it has and gets what
 /// changed.
-class Scene {
+class ViewerScene {
  public:
-  Scene() : points_(true), keyframes_(false), path_(false), truth_(false) {}
+  ViewerScene() : points_(true), keyframes_(false), path_(false), truth_(false) {}
 
   /// A new version begins; what is set from here on belongs to it.
   void Advance() { ++version_; }

@@ -35,7 +35,7 @@ struct Decoded {
 ScenePoint PointAt(float x) { return {{x, 2, 3}, -1.5F, 7, 4}; }
 
 TEST(SceneTest, TellsEverythingFirstAndThenWhatChanged) {
-  Scene scene;
+  ViewerScene scene;
   for (uint64_t i = 1; i <= 5; ++i) scene.SetPoint(LandmarkId{i}, PointAt(static_cast<float>(i)));
   const Decoded first(scene.Encode(0, 0));
   EXPECT_TRUE(first.everything());
@@ -58,7 +58,7 @@ TEST(SceneTest, TellsEverythingFirstAndThenWhatChanged) {
 }
 
 TEST(SceneTest, TellsOfRemovalsOnceAndReusesSlotsOfLandmarks) {
-  Scene scene;
+  ViewerScene scene;
   scene.SetPoint(LandmarkId{1}, PointAt(1));
   scene.SetPoint(LandmarkId{2}, PointAt(2));
   const Decoded first(scene.Encode(0, 0));
@@ -76,7 +76,7 @@ TEST(SceneTest, TellsOfRemovalsOnceAndReusesSlotsOfLandmarks) {
 }
 
 TEST(SceneTest, KeyframesKeepTheirSlotsAndCarryLinks) {
-  Scene scene;
+  ViewerScene scene;
   const KeyframeId a = KeyframeId::Make(1, 10), b = KeyframeId::Make(1, 20), c = KeyframeId::Make(1, 30);
   scene.SetKeyframe(a, {{1, 2, 3}, {0, 0, 0, 1}, {}});
   scene.SetKeyframe(b, {{4, 5, 6}, {0, 0, 0, 1}, {{0, SceneKeyframe::LinkKind::kParent}}});
@@ -97,7 +97,7 @@ TEST(SceneTest, KeyframesKeepTheirSlotsAndCarryLinks) {
 }
 
 TEST(SceneTest, FramesOfTwoCamerasDoNotCollide) {
-  Scene scene;
+  ViewerScene scene;
   scene.SetPath({0, 3}, {{1, 1, 1}, false, 0});
   scene.SetPath({1, 3}, {{2, 2, 2}, true, 5});
   scene.SetKeyframe(KeyframeId::Make(1, 3, 1), {{7, 8, 9}, {0, 0, 0, 1}, {}, 5});
@@ -120,7 +120,7 @@ TEST(SceneTest, FramesOfTwoCamerasDoNotCollide) {
 }
 
 TEST(SceneTest, AfterClearingNothingOfBeforeCounts) {
-  Scene scene;
+  ViewerScene scene;
   scene.SetPoint(LandmarkId{1}, PointAt(1));
   scene.SetPath({0, 3}, {{1, 1, 1}, false});
   scene.SetTruth({0, 3}, {1, 1, 1});

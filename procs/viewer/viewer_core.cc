@@ -192,7 +192,7 @@ std::optional<Rigid3d> ViewerCore::Drawn(const Rigid3d& T_world_cam, std::option
   return Rigid3d(T_world_cam.rotation, T_world_cam.translation + place->offset);
 }
 
-void ViewerCore::Draw(Scene* scene) {
+void ViewerCore::Draw(ViewerScene* scene) {
   if (void_) {
     scene->Clear();
     positions_.clear();
@@ -224,7 +224,7 @@ void ViewerCore::Draw(Scene* scene) {
   void_ = dirty_ = false;
 }
 
-void ViewerCore::DrawPoint(LandmarkId id, Scene* scene) {
+void ViewerCore::DrawPoint(LandmarkId id, ViewerScene* scene) {
   const Landmark* landmark = map_.FindLandmark(id);
   const MapLayout::Place* place = landmark == nullptr ? nullptr : layout_.Find(landmark->map_id);
   if (place == nullptr) {
@@ -237,7 +237,7 @@ void ViewerCore::DrawPoint(LandmarkId id, Scene* scene) {
 
 /// Takes out what is no longer in the map although nobody said so (landmarks that went with their last
 /// keyframe).
-void ViewerCore::SweepPoints(Scene* scene) {
+void ViewerCore::SweepPoints(ViewerScene* scene) {
   std::vector<LandmarkId> gone;
   for (const auto& [id, slot] : scene->points().index()) {
     if (map_.FindLandmark(id) == nullptr) gone.push_back(id);
@@ -245,7 +245,7 @@ void ViewerCore::SweepPoints(Scene* scene) {
   for (const LandmarkId id : gone) scene->RemovePoint(id);
 }
 
-void ViewerCore::DrawKeyframe(KeyframeId id, Scene* scene) {
+void ViewerCore::DrawKeyframe(KeyframeId id, ViewerScene* scene) {
   const Keyframe* keyframe = map_.FindKeyframe(id);
   const MapLayout::Place* place = keyframe == nullptr ? nullptr : layout_.Find(keyframe->map_id);
   if (place == nullptr) {
@@ -270,7 +270,7 @@ void ViewerCore::DrawKeyframe(KeyframeId id, Scene* scene) {
   scene->SetKeyframe(id, drawn);
 }
 
-void ViewerCore::DrawFrame(const SceneFrame& frame, Scene* scene) {
+void ViewerCore::DrawFrame(const SceneFrame& frame, ViewerScene* scene) {
   const FramePose& pose = frames_.at(frame);
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
   const MapLayout::Place* place = reference ? layout_.Find(reference->map_id) : nullptr;
@@ -285,7 +285,7 @@ void ViewerCore::DrawFrame(const SceneFrame& frame, Scene* scene) {
                          place->colour});
 }
 
-void ViewerCore::DrawTruthFile(Scene* scene) {
+void ViewerCore::DrawTruthFile(ViewerScene* scene) {
   int64_t last_ns = truth_file_next_ > 0 ? truth_file_[truth_file_next_ - 1].stamp_ns : INT64_MIN / 2;
   for (; truth_file_next_ < truth_file_.size(); ++truth_file_next_) {
     const StampedPose& pose = truth_file_[truth_file_next_];
@@ -303,7 +303,7 @@ bool ViewerCore::IsInShownMap(CameraId camera) const {
 }
 
 /// Of cameras that have a part in the map on which it is laid: the others may be in another world.
-void ViewerCore::DrawTruth(Scene* scene) {
+void ViewerCore::DrawTruth(ViewerScene* scene) {
   DrawTruthFile(scene);
   for (auto& [camera, truths] : truth_) {
     if (!IsInShownMap(camera)) continue;

@@ -54,7 +54,7 @@ class ViewerCore {
   /// Whether anything that is drawn has changed since the last Draw.
   bool dirty() const { return dirty_; }
   /// Brings the scene up to date.
-  void Draw(Scene* scene);
+  void Draw(ViewerScene* scene);
 
   /// Lays the ground truth onto the path; costs a pass over the path. None with fewer than ten pairs, or on a
   /// line.
@@ -86,14 +86,14 @@ class ViewerCore {
   void Mark(const MapDelta& delta);
   void MarkMoved(const std::vector<ReferenceMove>& moves);
   void HandFramesOn(const MapDelta& delta);
-  void DrawPoint(LandmarkId id, Scene* scene);
-  void DrawKeyframe(KeyframeId id, Scene* scene);
-  void DrawFrame(const SceneFrame& frame, Scene* scene);
-  void DrawTruth(Scene* scene);
-  void DrawTruthFile(Scene* scene);
+  void DrawPoint(LandmarkId id, ViewerScene* scene);
+  void DrawKeyframe(KeyframeId id, ViewerScene* scene);
+  void DrawFrame(const SceneFrame& frame, ViewerScene* scene);
+  void DrawTruth(ViewerScene* scene);
+  void DrawTruthFile(ViewerScene* scene);
   bool IsInShownMap(CameraId camera) const;
   std::optional<Eigen::Vector3d> TruthAt(const SceneFrame& frame) const;
-  void SweepPoints(Scene* scene);
+  void SweepPoints(ViewerScene* scene);
 
   struct Truth {
     Eigen::Vector3d position;

@@ -100,7 +100,7 @@ class ViewerCoreTest : public testing::Test {
 
   MapEditor map_;
   ViewerCore core_;
-  Scene scene_;
+  ViewerScene scene_;
 };
 
 TEST_F(ViewerCoreTest, DrawsWhatTheMapHolds) {

@@ -53,7 +53,7 @@ void ViewerNode::OnCamera(const CameraInfo& info) {
 void ViewerNode::Begin(const CameraInfo& info) {
   core_ = std::make_unique<ViewerCore>(info.camera, options_.settings.Read<Pyramid>(), feature_store_);
   if (!viewer_.ground_truth.empty()) core_->SetTruth(ReadGroundTruth(viewer_.ground_truth).poses);
-  exchange_->Change([](Scene* scene, CameraSeries* series) {
+  exchange_->Change([](ViewerScene* scene, CameraSeries* series) {
     scene->Clear();
     series->Clear();
   });
@@ -250,7 +250,7 @@ void ViewerNode::DrawIfDue() {
   next_draw_ns_ = now + kDrawEveryNs;
   uint64_t version = 0;
   uint32_t generation = 0;
-  exchange_->Change([&](Scene* scene, CameraSeries*) {
+  exchange_->Change([&](ViewerScene* scene, CameraSeries*) {
     core_->Draw(scene);
     version = scene->version();
     generation = scene->generation();
@@ -266,7 +266,7 @@ void ViewerNode::DrawIfDue() {
 void ViewerNode::ShowPose(const PoseView& view) {
   CameraState* camera = FindCamera(view.camera_id);
   if (camera == nullptr) return;
-  exchange_->Change([&](Scene*, CameraSeries* series) { series->Add(view); });
+  exchange_->Change([&](ViewerScene*, CameraSeries* series) { series->Add(view); });
   camera->map_id = view.map_id;
   const auto drawn = view.has_pose ? core_->Drawn(view.T_world_cam, view.map_id) : std::nullopt;
   if (in_haste_) passed_over_[{channels::kPoseView, view.camera_id}] = wire::Encode(view);

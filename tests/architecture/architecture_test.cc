@@ -83,17 +83,39 @@ std::vector<Include> ReadIncludes(const std::string& text, const std::string& fi
   return includes;
 }
 
-std::vector<Include> ReadFolder(const std::string& folder) {
-  std::vector<Include> all;
-  if (!fs::is_directory(SourceDir() / folder)) return all;
+/// Sources and headers below a folder, by their paths relative to the project.
+std::map<std::string, std::string> TextsOf(const std::string& folder) {
+  std::map<std::string, std::string> texts;
+  if (!fs::is_directory(SourceDir() / folder)) return texts;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(SourceDir() / folder)) {
     if (!entry.is_regular_file() || !IsSource(entry.path())) continue;
     std::ifstream stream(entry.path());
-    const std::string text(std::istreambuf_iterator<char>(stream), {});
-    const std::vector<Include> found = ReadIncludes(text, fs::relative(entry.path(), SourceDir()).string());
+    texts[fs::relative(entry.path(), SourceDir()).string()] = {std::istreambuf_iterator<char>(stream), {}};
+  }
+  return texts;
+}
+
+std::vector<Include> ReadFolder(const std::string& folder) {
+  std::vector<Include> all;
+  for (const auto& [file, text] : TextsOf(folder)) {
+    const std::vector<Include> found = ReadIncludes(text, file);
     all.insert(all.end(), found.begin(), found.end());
   }
   return all;
+}
+
+/// The types that a header defines in namespace dmslam itself; clang-format leaves them in the first column.
+Names TypesOf(const std::string& header) {
+  static const std::regex type(R"(^(?:struct|class|enum|enum class) (\w+)(?: final)?(?: :.*)? \{.*)");
+  Names types;
+  bool own = false;
+  std::istringstream lines(header);
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch match;
+    if (line.rfind("namespace ", 0) == 0) own = line == "namespace dmslam {";
+    if (own && std::regex_match(line, match, type)) types.insert(match[1]);
+  }
+  return types;
 }
 
 bool StartsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
@@ -200,6 +222,21 @@ TEST(ArchitectureTest, CoresKnowNoBusAndNoThreads) {
 
 TEST(ArchitectureTest, ProcessesDoNotUseEachOther) { ExpectNone(ReadFolder("procs"), &Neighbour); }
 
+// Two types of one name in one program are undefined behaviour, which neither compiler nor linker reports.
+TEST(ArchitectureTest, EachTypeHasANameOfItsOwn) {
+  std::map<std::string, std::string> definer;
+  for (const char* folder : {"src", "procs", "tools"}) {
+    for (const auto& [file, text] : TextsOf(folder)) {
+      if (!EndsWith(file, ".h")) continue;
+      for (const std::string& type : TypesOf(text)) {
+        const auto [known, is_new] = definer.emplace(type, file);
+        EXPECT_TRUE(is_new) << type << " is defined in " << known->second << " and in " << file;
+      }
+    }
+  }
+  EXPECT_GT(definer.size(), 300u);
+}
+
 TEST(ArchitectureTest, RulesSeeWhatIsWrong) {
   const auto one = [](const std::string& file, const std::string& target) {
     const std::vector<Include> found = ReadIncludes("// text\n  # include \"" + target + "\"\n", file);
@@ -207,6 +244,9 @@ TEST(ArchitectureTest, RulesSeeWhatIsWrong) {
     EXPECT_EQ(found.at(0).line, 2);
     return found.at(0);
   };
+  EXPECT_EQ(TypesOf("namespace dmslam {\nstruct A {\n  struct Within {};\n};\nclass B final : public A {\n"),
+            (Names{"A", "B"}));
+  EXPECT_EQ(TypesOf("namespace dmslam::testing {\nstruct A {\n"), Names());
   EXPECT_NE(Upward(one("src/dmslam/geometry/x.cc", "dmslam/map/map.h")), "");
   EXPECT_NE(Upward(one("src/dmslam/messaging/x.cc", "dmslam/wire/codec.h")), "");
   EXPECT_NE(Upward(one("src/dmslam/unheard/x.cc", "dmslam/util/check.h")), "");

@@ -19,7 +19,7 @@ namespace {
 using Path = std::function<void(int times)>;
 
 void Extract(int times) {
-  const GrayImage image = testing::RandomRectangles(640, 480, 600, 1);
+  const GrayPixels image = testing::RandomRectangles(640, 480, 600, 1);
   OrbExtractor extractor{OrbExtractorOptions()};
   FeatureSet features;
   for (int i = 0; i < times; ++i) extractor.Extract(image.View(), &features);
@@ -27,7 +27,7 @@ void Extract(int times) {
 
 /// A picture with itself turned a little.
 void Match(int times) {
-  const GrayImage image = testing::RandomRectangles(640, 480, 600, 1);
+  const GrayPixels image = testing::RandomRectangles(640, 480, 600, 1);
   OrbExtractor extractor{OrbExtractorOptions()};
   FeatureSet sets[2];
   extractor.Extract(image.View(), &sets[0]);

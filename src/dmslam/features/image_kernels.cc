@@ -6,23 +6,13 @@
 namespace dmslam {
 
 bool HasSimdPath(SimdPath path) {
-  switch (path) {
-    case SimdPath::kBest:
-    case SimdPath::kPortable:
-      return true;
+  if (path == SimdPath::kBest || path == SimdPath::kPortable) return true;
 #if defined(__x86_64__)
-    case SimdPath::kSse2:
-      return true;
-    case SimdPath::kAvx2:
-      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("popcnt") &&
-             __builtin_cpu_supports("bmi");
+  return path == SimdPath::kSse2 || (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("popcnt") &&
+                                     __builtin_cpu_supports("bmi"));
 #else
-    case SimdPath::kSse2:
-    case SimdPath::kAvx2:
-      return false;
-#endif
-  }
   return false;
+#endif
 }
 
 const ImageKernels& KernelsOn(SimdPath path) {

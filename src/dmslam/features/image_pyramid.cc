@@ -28,7 +28,7 @@ ImageShrinker::ImageShrinker(int from_width, int from_height, int width, int hei
   DMSLAM_CHECK(width <= from_width && from_width <= 2 * width, "shrinks to between half and the whole width");
   DMSLAM_CHECK(height <= from_height && from_height <= 2 * height,
                "shrinks to between half and the whole height");
-  blended_.resize(static_cast<size_t>(from_width + kRowPadding));
+  blended_.resize(static_cast<size_t>(from_width) + kRowPadding);
   blocks_.resize(static_cast<size_t>(width + 7) / 8);
   for (size_t b = 0; b < blocks_.size(); ++b) {
     ResizeBlock& block = blocks_[b];
@@ -101,7 +101,7 @@ void ImagePyramid::ShrinkInto(size_t index, const ImageKernels& kernels) {
 void ImageSmoother::Smooth(const PaddedImage& image, const ImageKernels& kernels, PaddedImage* smooth) {
   const int width = image.width(), height = image.height();
   smooth->Resize(width, height);
-  row_.resize(static_cast<size_t>(width + 2 * kRowPadding));
+  row_.resize(static_cast<size_t>(width) + 2 * kRowPadding);
   uint8_t* padded = row_.data() + kRowPadding;
   for (int y = 0; y < height; ++y) {
     const uint8_t* rows[7];

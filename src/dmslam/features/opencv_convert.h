@@ -2,7 +2,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "dmslam/features/gray_image.h"
+#include "dmslam/features/gray_pixels.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -14,9 +14,9 @@ inline GrayView ViewOf(const cv::Mat& image) {
 }
 
 /// A copy of the pixels of an 8-bit single-channel matrix.
-inline GrayImage GrayImageOf(const cv::Mat& image) {
+inline GrayPixels GrayPixelsOf(const cv::Mat& image) {
   const GrayView view = ViewOf(image);
-  GrayImage copy(view.width, view.height);
+  GrayPixels copy(view.width, view.height);
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) copy.at(x, y) = view.row(y)[x];
   }

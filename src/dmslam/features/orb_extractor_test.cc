@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "dmslam/features/gray_image.h"
+#include "dmslam/features/gray_pixels.h"
 #include "dmslam/features/subpixel.h"
 #include "dmslam/features/testing/allocation_counter.h"
 #include "dmslam/features/testing/synthetic_images.h"
@@ -19,14 +19,14 @@ namespace {
 using testing::RandomRectangles;
 using testing::Turned;
 
-FeatureSet Extract(const GrayImage& image, const OrbExtractorOptions& options = {}) {
+FeatureSet Extract(const GrayPixels& image, const OrbExtractorOptions& options = {}) {
   FeatureSet features;
   OrbExtractor(options).Extract(image.View(), &features);
   return features;
 }
 
 TEST(OrbExtractor, FindsTheCornersOfASquare) {
-  GrayImage image(200, 160, 60);
+  GrayPixels image(200, 160, 60);
   for (int y = 50; y < 110; ++y) {
     for (int x = 60; x < 140; ++x) image.at(x, y) = 200;
   }
@@ -48,7 +48,7 @@ TEST(OrbExtractor, FindsTheCornersOfASquare) {
 }
 
 TEST(OrbExtractor, OrientationPointsToTheBrightSide) {
-  GrayImage image(120, 120, 40);
+  GrayPixels image(120, 120, 40);
   for (int y = 60; y < 120; ++y) {
     for (int x = 60; x < 120; ++x) image.at(x, y) = 220;  // bright towards +x +y: an eighth of a turn
   }
@@ -75,7 +75,7 @@ TEST(OrbExtractor, GivesTheNumberAskedAndUniqueKeypoints) {
 }
 
 TEST(OrbExtractor, DescriptorsTurnWithTheImage) {
-  const GrayImage image = RandomRectangles(400, 400, 250, 2);
+  const GrayPixels image = RandomRectangles(400, 400, 250, 2);
   const FeatureSet upright = Extract(image);
   for (const double degrees : {20.0, 90.0, 145.0}) {
     const double radians = degrees * std::numbers::pi / 180.0;
@@ -105,7 +105,7 @@ TEST(OrbExtractor, DescriptorsTurnWithTheImage) {
 
 TEST(OrbExtractor, KeypointsSpreadOverTheImage) {
   // Strong corners on the left, weak ones on the right: with rank_decay the right side gets its share.
-  GrayImage image = RandomRectangles(640, 480, 900, 3);
+  GrayPixels image = RandomRectangles(640, 480, 900, 3);
   for (int y = 0; y < 480; ++y) {
     for (int x = 320; x < 640; ++x) image.at(x, y) = static_cast<uint8_t>(96 + image.at(x, y) / 4);
   }
@@ -123,7 +123,7 @@ TEST(OrbExtractor, KeypointsSpreadOverTheImage) {
 }
 
 TEST(OrbExtractor, WeakCornersServeOnlyWhereThereAreNoStrongOnes) {
-  GrayImage image(300, 200, 100);
+  GrayPixels image(300, 200, 100);
   const auto square = [&](int x0, int y0, int value) {
     for (int y = y0; y < y0 + 12; ++y) {
       for (int x = x0; x < x0 + 12; ++x) image.at(x, y) = static_cast<uint8_t>(value);
@@ -149,7 +149,7 @@ TEST(OrbExtractor, WeakCornersServeOnlyWhereThereAreNoStrongOnes) {
 
 TEST(OrbExtractor, IsTheSameOnEveryPathAndEveryTime) {
   for (const auto& [width, height] : {std::pair(640, 480), std::pair(333, 251), std::pair(97, 61)}) {
-    const GrayImage image = RandomRectangles(width, height, width, 4);
+    const GrayPixels image = RandomRectangles(width, height, width, 4);
     OrbExtractorOptions options;
     options.simd_path = SimdPath::kPortable;
     const FeatureSet portable = Extract(image, options);
@@ -169,7 +169,7 @@ TEST(OrbExtractor, IsTheSameOnEveryPathAndEveryTime) {
 }
 
 TEST(OrbExtractor, DoesNotDependOnWhatItSawBefore) {
-  const GrayImage image = RandomRectangles(320, 240, 200, 5), other = RandomRectangles(500, 300, 300, 6);
+  const GrayPixels image = RandomRectangles(320, 240, 200, 5), other = RandomRectangles(500, 300, 300, 6);
   OrbExtractor extractor;
   FeatureSet features;
   extractor.Extract(other.View(), &features);
@@ -181,8 +181,8 @@ TEST(OrbExtractor, DoesNotDependOnWhatItSawBefore) {
 
 TEST(OrbExtractor, ReadsNothingBesideTheView) {
   // The same pixels inside a larger picture with another surrounding.
-  const GrayImage image = RandomRectangles(200, 150, 120, 7);
-  GrayImage larger = RandomRectangles(260, 170, 200, 8);
+  const GrayPixels image = RandomRectangles(200, 150, 120, 7);
+  GrayPixels larger = RandomRectangles(260, 170, 200, 8);
   for (int y = 0; y < 150; ++y) {
     for (int x = 0; x < 200; ++x) larger.at(x + 30, y + 10) = image.at(x, y);
   }
@@ -193,7 +193,7 @@ TEST(OrbExtractor, ReadsNothingBesideTheView) {
 }
 
 TEST(OrbExtractor, AllocatesNothingOnceItKnowsTheSize) {
-  const GrayImage plain = RandomRectangles(640, 480, 20, 9), rich = RandomRectangles(640, 480, 2000, 10);
+  const GrayPixels plain = RandomRectangles(640, 480, 20, 9), rich = RandomRectangles(640, 480, 2000, 10);
   OrbExtractor extractor;
   FeatureSet features;
   extractor.Extract(plain.View(), &features);
@@ -211,24 +211,24 @@ TEST(OrbExtractor, SmallAndBlankImagesGiveNothing) {
   OrbExtractor extractor;
   for (const auto& [width, height] :
        {std::pair(0, 0), std::pair(1, 1), std::pair(32, 32), std::pair(500, 7)}) {
-    const GrayImage image(width, height, 7);
+    const GrayPixels image(width, height, 7);
     extractor.Extract(image.View(), &features);
     EXPECT_EQ(features.size(), 0U) << width << "x" << height;
   }
   for (const auto& [width, height] : {std::pair(33, 33), std::pair(640, 480), std::pair(641, 479)}) {
-    extractor.Extract(GrayImage(width, height, 200).View(), &features);
+    extractor.Extract(GrayPixels(width, height, 200).View(), &features);
     EXPECT_EQ(features.size(), 0U) << width << "x" << height;
   }
 }
 
 TEST(OrbExtractor, WideImagesUseEverySixteenth) {
-  const GrayImage image = RandomRectangles(4095, 64, 400, 11);
+  const GrayPixels image = RandomRectangles(4095, 64, 400, 11);
   const FeatureSet features = Extract(image);
   ASSERT_GT(features.size(), 100U);
   double rightmost = 0.0;
   for (const Keypoint& k : features.keypoints) rightmost = std::max(rightmost, k.x_px());
   EXPECT_GT(rightmost, 3800.0);
-  EXPECT_THROW(Extract(GrayImage(4096, 64)), InvariantError);
+  EXPECT_THROW(Extract(GrayPixels(4096, 64)), InvariantError);
 }
 
 TEST(OrbExtractor, ScaleFactorTwoAndOddSizes) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "dmslam/geometry/polynomial.h"
+#include "dmslam/geometry/pose_normal.h"
 #include "dmslam/geometry/similarity.h"
 #include "dmslam/geometry/solve_symmetric.h"
 
@@ -145,57 +146,17 @@ int SolveP3p(std::span<const Eigen::Vector3d, 3> rays, std::span<const Eigen::Ve
   return count;
 }
 
-namespace {
-
-struct NormalEquations {
-  Matrix6d hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  double cost = 0.0;
-};
-
-/// Sums over the matches, tangent (w, v); infinite cost if a point is behind the camera.
-NormalEquations BuildNormalEquations(const Pinhole& camera, const Rigid3d& T,
-                                     std::span<const Eigen::Vector3d> points,
-                                     std::span<const Eigen::Vector2d> uv_px,
-                                     std::span<const double> inv_sigma_squared,
-                                     std::span<const int> indices) {
-  NormalEquations n;
-  const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
-  for (const int index : indices) {
-    const auto i = static_cast<size_t>(index);
-    const Eigen::Vector3d p = R * points[i] + T.translation;
-    if (!(p.z() > 1e-9)) {
-      n.cost = std::numeric_limits<double>::infinity();
-      return n;
-    }
-    const double weight = inv_sigma_squared.empty() ? 1.0 : inv_sigma_squared[i];
-    const Eigen::Vector2d error = camera.Project(p) - uv_px[i];
-    const double u = p.x() / p.z(), v = p.y() / p.z(), inverse_z = 1.0 / p.z();
-    Eigen::Matrix<double, 2, 6> J;
-    J << -camera.fx_px * u * v, camera.fx_px * (1 + u * u), -camera.fx_px * v, camera.fx_px * inverse_z, 0,
-        -camera.fx_px * u * inverse_z, -camera.fy_px * (1 + v * v), camera.fy_px * u * v, camera.fy_px * u, 0,
-        camera.fy_px * inverse_z, -camera.fy_px * v * inverse_z;
-    n.hessian.noalias() += weight * J.transpose() * J;
-    n.gradient.noalias() += weight * J.transpose() * error;
-    n.cost += weight * error.squaredNorm();
-  }
-  return n;
-}
-
-}  // namespace
-
 Rigid3d RefinePose(const Pinhole& camera, const Rigid3d& T_cam_world,
                    std::span<const Eigen::Vector3d> points_world, std::span<const Eigen::Vector2d> uv_px,
                    std::span<const double> inv_sigma_squared, std::span<const int> indices, int iterations) {
   Rigid3d T = T_cam_world;
-  NormalEquations now = BuildNormalEquations(camera, T, points_world, uv_px, inv_sigma_squared, indices);
+  PoseNormal now = SumPoseNormal(camera, T, points_world, uv_px, inv_sigma_squared, indices);
   for (int k = 0; k < iterations; ++k) {
     if (!std::isfinite(now.cost)) return T;
-    const Vector6d step = -SolveSymmetric(now.hessian, now.gradient);
+    const Vector6d step = -SolveSymmetric(now.matrix, now.gradient);
     if (!step.allFinite()) return T;
     const Rigid3d candidate = StepPose(T, step);
-    NormalEquations next =
-        BuildNormalEquations(camera, candidate, points_world, uv_px, inv_sigma_squared, indices);
+    const PoseNormal next = SumPoseNormal(camera, candidate, points_world, uv_px, inv_sigma_squared, indices);
     if (!(next.cost < now.cost)) return T;
     const bool settled = next.cost > now.cost * (1.0 - 1e-6);
     T = candidate;

@@ -28,7 +28,7 @@ struct TangentF {
     F = left * hat * right;
     for (int k = 0; k < 3; ++k)
       slope[static_cast<size_t>(k)] = left * hat * Hat(Eigen::Vector3d::Unit(k)) * right;
-    for (int k = 0; k < 2; ++k) slope[static_cast<size_t>(3 + k)] = left * Hat(across.col(k)) * right;
+    for (int k = 0; k < 2; ++k) slope[3 + static_cast<size_t>(k)] = left * Hat(across.col(k)) * right;
   }
 };
 

@@ -86,15 +86,15 @@ inline SyntheticScene MakeSyntheticScene(const SyntheticSceneOptions& options) {
 }
 
 /// The points that both of two cameras see, as parallel arrays.
-struct SyntheticPair {
+struct SyntheticViews {
   Rigid3d T_cam2_cam1;
   std::vector<int> points;  ///< Index into the scene's points.
   std::vector<Eigen::Vector2d> x1_px, x2_px;
   std::vector<Eigen::Vector3d> rays1, rays2;  ///< z = 1.
 };
 
-inline SyntheticPair MakeSyntheticPair(const SyntheticScene& scene, int camera1 = 0, int camera2 = 1) {
-  SyntheticPair pair;
+inline SyntheticViews MakeSyntheticViews(const SyntheticScene& scene, int camera1 = 0, int camera2 = 1) {
+  SyntheticViews pair;
   pair.T_cam2_cam1 = scene.T_cam_world[static_cast<size_t>(camera2)] *
                      scene.T_cam_world[static_cast<size_t>(camera1)].Inverse();
   std::vector<const SyntheticObservation*> seen(scene.points.size(), nullptr);

@@ -15,8 +15,8 @@
 namespace dmslam {
 namespace {
 
-SyntheticPair PairOf(uint64_t seed, double noise_px = 0.0, double thickness = 4.0) {
-  return MakeSyntheticPair(MakeSyntheticScene(
+SyntheticViews PairOf(uint64_t seed, double noise_px = 0.0, double thickness = 4.0) {
+  return MakeSyntheticViews(MakeSyntheticScene(
       {.seed = seed, .num_points = 120, .noise_px = noise_px, .step = 0.5, .thickness = thickness}));
 }
 
@@ -27,7 +27,7 @@ double ProjectiveDistance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return std::min((a.normalized() - b.normalized()).norm(), (a.normalized() + b.normalized()).norm());
 }
 
-Eigen::Matrix3d TrueF(const SyntheticPair& pair) {
+Eigen::Matrix3d TrueF(const SyntheticViews& pair) {
   return FundamentalFromEssential(EssentialFromPose(pair.T_cam2_cam1), kCamera, kCamera);
 }
 
@@ -87,7 +87,7 @@ TEST(Polynomial, SturmFindsAllRealRootsOfDegreeTen) {
 
 TEST(Fundamental, MinimalEightPointIsExact) {
   for (uint64_t seed = 1; seed <= 100; ++seed) {
-    const SyntheticPair pair = PairOf(seed);
+    const SyntheticViews pair = PairOf(seed);
     const auto F = FundamentalEightPointMinimal(pair.x1_px, pair.x2_px, FirstIndices<8>(3));
     ASSERT_TRUE(F.has_value());
     EXPECT_NEAR(F->determinant(), 0.0, 1e-15);
@@ -101,7 +101,7 @@ TEST(Fundamental, MinimalEightPointIsExact) {
 
 TEST(Fundamental, LeastSquaresStaysNearTheTruthUnderNoise) {
   for (uint64_t seed = 1; seed <= 30; ++seed) {
-    const SyntheticPair pair = PairOf(seed, 0.5), clean = PairOf(seed);
+    const SyntheticViews pair = PairOf(seed, 0.5), clean = PairOf(seed);
     const auto F = FundamentalEightPoint(pair.x1_px, pair.x2_px);
     ASSERT_TRUE(F.has_value());
     double sum = 0.0;
@@ -113,7 +113,7 @@ TEST(Fundamental, LeastSquaresStaysNearTheTruthUnderNoise) {
 }
 
 TEST(Fundamental, WeightsRemoveOutliers) {
-  SyntheticPair pair = PairOf(5);
+  SyntheticViews pair = PairOf(5);
   std::vector<double> weights(pair.x1_px.size(), 1.0);
   for (size_t i = 0; i < 20; ++i) pair.x2_px[i].x() += 40.0, weights[i] = 0.0;
   const auto F = FundamentalEightPoint(pair.x1_px, pair.x2_px, {}, weights);
@@ -122,7 +122,7 @@ TEST(Fundamental, WeightsRemoveOutliers) {
 }
 
 TEST(Fundamental, DegenerateSamplesGiveNothing) {
-  SyntheticPair pair = PairOf(7);
+  SyntheticViews pair = PairOf(7);
   for (size_t i = 1; i < 8; ++i) pair.x1_px[i] = pair.x1_px[0], pair.x2_px[i] = pair.x2_px[0];
   EXPECT_FALSE(FundamentalEightPointMinimal(pair.x1_px, pair.x2_px, FirstIndices<8>()).has_value());
   EXPECT_FALSE(FundamentalEightPoint(pair.x1_px, pair.x2_px, FirstIndices<7>()).has_value());
@@ -130,7 +130,7 @@ TEST(Fundamental, DegenerateSamplesGiveNothing) {
 
 TEST(Fundamental, OneOfTheSevenPointSolutionsIsTrue) {
   for (uint64_t seed = 1; seed <= 100; ++seed) {
-    const SyntheticPair pair = PairOf(seed);
+    const SyntheticViews pair = PairOf(seed);
     std::array<Eigen::Matrix3d, 3> models;
     const int count = FundamentalSevenPoint(pair.x1_px, pair.x2_px, FirstIndices<7>(), models);
     double best = 1.0;
@@ -143,7 +143,7 @@ TEST(Fundamental, OneOfTheSevenPointSolutionsIsTrue) {
 TEST(Essential, OneOfTheFivePointSolutionsIsTrueAndAllAreEssential) {
   int failures = 0;
   for (uint64_t seed = 1; seed <= 300; ++seed) {
-    const SyntheticPair pair = PairOf(seed, 0.0, seed % 3 == 0 ? 0.0 : 4.0);
+    const SyntheticViews pair = PairOf(seed, 0.0, seed % 3 == 0 ? 0.0 : 4.0);
     std::array<Eigen::Matrix3d, 10> models;
     const int count = EssentialFivePoint(pair.rays1, pair.rays2, FirstIndices<5>(), models);
     double best = 1.0;
@@ -162,7 +162,7 @@ TEST(Essential, OneOfTheFivePointSolutionsIsTrueAndAllAreEssential) {
 
 TEST(Essential, DecompositionHoldsTheTruePose) {
   for (uint64_t seed = 1; seed <= 50; ++seed) {
-    const SyntheticPair pair = PairOf(seed);
+    const SyntheticViews pair = PairOf(seed);
     const Eigen::Matrix3d F = TrueF(pair);
     const Eigen::Matrix3d E = EssentialFromFundamental(F, kCamera, kCamera);
     EXPECT_LT(ProjectiveDistance(E, EssentialFromPose(pair.T_cam2_cam1)), 1e-9);
@@ -176,7 +176,7 @@ TEST(Essential, DecompositionHoldsTheTruePose) {
 }
 
 TEST(Essential, ChoosePoseCountsAndTriangulates) {
-  const SyntheticPair pair = PairOf(11, 0.3);
+  const SyntheticViews pair = PairOf(11, 0.3);
   const auto candidates = DecomposeEssential(EssentialFromPose(pair.T_cam2_cam1));
   const auto choice = ChoosePose(candidates, kCamera, pair.x1_px, pair.x2_px);
   ASSERT_TRUE(choice.has_value());
@@ -194,7 +194,7 @@ TEST(Essential, ChoosePoseCountsAndTriangulates) {
 }
 
 TEST(Essential, ChoosePoseObeysTheMask) {
-  const SyntheticPair pair = PairOf(12);
+  const SyntheticViews pair = PairOf(12);
   std::vector<char> mask(pair.x1_px.size(), 0);
   mask[3] = mask[7] = 1;
   const auto candidates = DecomposeEssential(EssentialFromPose(pair.T_cam2_cam1));
@@ -206,7 +206,7 @@ TEST(Essential, ChoosePoseObeysTheMask) {
 }
 
 TEST(Essential, EightPointOnRaysIsExact) {
-  const SyntheticPair pair = PairOf(13);
+  const SyntheticViews pair = PairOf(13);
   const auto E = EssentialEightPoint(pair.rays1, pair.rays2);
   ASSERT_TRUE(E.has_value());
   EXPECT_LT(ProjectiveDistance(*E, EssentialFromPose(pair.T_cam2_cam1)), 1e-8);
@@ -215,7 +215,7 @@ TEST(Essential, EightPointOnRaysIsExact) {
 TEST(RelativePose, RefinementReachesTheTruthAlsoOnPlanes) {
   Random random(31);
   for (uint64_t seed = 1; seed <= 40; ++seed) {
-    const SyntheticPair pair = PairOf(seed, 0.0, seed % 2 ? 4.0 : 0.0);
+    const SyntheticViews pair = PairOf(seed, 0.0, seed % 2 ? 4.0 : 0.0);
     std::vector<int> all(pair.x1_px.size());
     std::iota(all.begin(), all.end(), 0);
     Rigid3d start = pair.T_cam2_cam1;
@@ -231,7 +231,7 @@ TEST(RelativePose, RefinementReachesTheTruthAlsoOnPlanes) {
 TEST(RelativePose, RefinementBeatsTheLinearFitUnderNoise) {
   double linear = 0.0, refined = 0.0;
   for (uint64_t seed = 1; seed <= 30; ++seed) {
-    const SyntheticPair pair = PairOf(seed, 0.7);
+    const SyntheticViews pair = PairOf(seed, 0.7);
     std::vector<int> all(pair.x1_px.size());
     std::iota(all.begin(), all.end(), 0);
     const auto E = EssentialEightPoint(pair.rays1, pair.rays2);
@@ -247,7 +247,7 @@ TEST(RelativePose, RefinementBeatsTheLinearFitUnderNoise) {
 
 TEST(Homography, FourPointsAndLeastSquaresAreExactOnAPlane) {
   for (uint64_t seed = 1; seed <= 50; ++seed) {
-    const SyntheticPair pair = PairOf(seed, 0.0, 0.0);
+    const SyntheticViews pair = PairOf(seed, 0.0, 0.0);
     const auto linear = HomographyLinear(pair.x1_px, pair.x2_px);
     ASSERT_TRUE(linear.has_value());
     const Eigen::Matrix3d inverse = linear->inverse();
@@ -262,14 +262,14 @@ TEST(Homography, FourPointsAndLeastSquaresAreExactOnAPlane) {
 }
 
 TEST(Homography, CollinearSampleGivesNothing) {
-  SyntheticPair pair = PairOf(3, 0.0, 0.0);
+  SyntheticViews pair = PairOf(3, 0.0, 0.0);
   pair.x1_px[2] = 0.5 * (pair.x1_px[0] + pair.x1_px[1]);
   EXPECT_FALSE(HomographyFourPoint(pair.x1_px, pair.x2_px, FirstIndices<4>()).has_value());
 }
 
 TEST(Homography, DecompositionHoldsTheTruePose) {
   for (uint64_t seed = 1; seed <= 50; ++seed) {
-    const SyntheticPair pair = PairOf(seed, 0.0, 0.0);
+    const SyntheticViews pair = PairOf(seed, 0.0, 0.0);
     const auto H = HomographyLinear(pair.x1_px, pair.x2_px);
     ASSERT_TRUE(H.has_value());
     const auto motions = DecomposeHomography(seed % 2 ? *H : Eigen::Matrix3d(-*H), kCamera, kCamera);
@@ -294,7 +294,7 @@ TEST(Homography, PureRotationIsRecognised) {
 }
 
 TEST(Residuals, SampsonIsTheDistanceForSmallErrors) {
-  const SyntheticPair pair = PairOf(21);
+  const SyntheticViews pair = PairOf(21);
   const Eigen::Matrix3d F = TrueF(pair);
   // Against the smallest move of both points that meets the constraint, by a few steps of linearisation.
   for (size_t i = 0; i < 20; ++i) {
@@ -317,7 +317,7 @@ TEST(Residuals, SampsonIsTheDistanceForSmallErrors) {
 TEST(Triangulation, ExactWithoutNoiseAndNoneBehind) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     const SyntheticScene scene = MakeSyntheticScene({.seed = seed});
-    const SyntheticPair pair = MakeSyntheticPair(scene);
+    const SyntheticViews pair = MakeSyntheticViews(scene);
     for (size_t i = 0; i < pair.points.size(); ++i) {
       const auto p =
           TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[1], pair.rays1[i], pair.rays2[i]);

@@ -16,7 +16,8 @@ class Buckets {
     }
     items_.resize(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
     for (size_t i = 0; i < matches.size(); ++i) {
-      At(Column(matches[i].uv0_px.x()), Column(matches[i].uv0_px.y())).push_back(static_cast<uint32_t>(i));
+      const size_t item = Index(Column(matches[i].uv0_px.x()), Column(matches[i].uv0_px.y()));
+      items_[item].push_back(static_cast<uint32_t>(i));
     }
   }
   template <typename Visit>
@@ -24,15 +25,15 @@ class Buckets {
     const int column = Column(uv.x()), row = Column(uv.y());
     for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r) {
       for (int c = std::max(0, column - 1); c <= std::min(columns_ - 1, column + 1); ++c) {
-        for (const uint32_t i : items_[static_cast<size_t>(r * columns_ + c)]) visit(i);
+        for (const uint32_t i : items_[Index(c, r)]) visit(i);
       }
     }
   }
 
  private:
   int Column(double px) const { return std::clamp(static_cast<int>(px / side_px_), 0, 1023); }
-  std::vector<uint32_t>& At(int column, int row) {
-    return items_[static_cast<size_t>(row * columns_ + column)];
+  size_t Index(int column, int row) const {
+    return static_cast<size_t>(row) * static_cast<size_t>(columns_) + static_cast<size_t>(column);
   }
 
   double side_px_;

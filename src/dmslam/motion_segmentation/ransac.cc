@@ -26,7 +26,8 @@ struct EvennessGrid {
     const double width = static_cast<double>(camera.width_px) / columns;
     const double height = static_cast<double>(camera.height_px) / rows;
     for (int cell = 0; cell < columns * rows; ++cell) {
-      center[static_cast<size_t>(cell)] = {(cell % columns + 0.5) * width, (cell / columns + 0.5) * height};
+      const int column = cell % columns, row = cell / columns;
+      center[static_cast<size_t>(cell)] = {(column + 0.5) * width, (row + 0.5) * height};
     }
     for (const Match& match : matches) {
       const int column = std::clamp(static_cast<int>(match.uv0_px.x() / width), 0, columns - 1);

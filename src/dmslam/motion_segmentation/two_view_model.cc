@@ -169,20 +169,6 @@ __attribute__((target("avx2"))) int FlagAvx2(const Eigen::Matrix3d& M, const Mat
 
 }  // namespace
 
-bool HasAvx2() {
-#if defined(__x86_64__)
-  return __builtin_cpu_supports("avx2");
-#else
-  return false;
-#endif
-}
-
-std::vector<VectorPath> VectorPaths() {
-  std::vector<VectorPath> paths{VectorPath::kBaseline};
-  if (HasAvx2()) paths.push_back(VectorPath::kAvx2);
-  return paths;
-}
-
 int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, int more_than,
                  [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)

@@ -11,6 +11,7 @@
 #include "dmslam/motion_segmentation/match.h"
 #include "dmslam/motion_segmentation/static_selector.h"
 #include "dmslam/util/random.h"
+#include "dmslam/util/vector_path.h"
 
 namespace dmslam {
 
@@ -48,13 +49,6 @@ struct TwoViewModel {
 /// Squared Sampson distance divided by its bound: at most 1 for an inlier (Hartley and Zisserman, Multiple
 /// View Geometry, 2nd ed., Eq. 11.9, with each image's error weighted by its variance).
 double NormalizedSampson(const Eigen::Matrix3d& M, const MatchArrays& arrays, size_t i);
-
-/// Instructions that an inner loop may use; where a machine has not got them, the baseline is taken. The
-/// results are the same.
-enum class VectorPath : uint8_t { kBaseline, kAvx2 };
-bool HasAvx2();  ///< of this machine
-/// Those that this machine has.
-std::vector<VectorPath> VectorPaths();
 
 /// How many of `range` are inliers, where these are more than `more_than`; else some number up to it.
 int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, int more_than = -1,

@@ -13,7 +13,7 @@ namespace dmslam {
 
 Vector7d EssentialGraphResidual(const Sim3d& S_j_i, const Sim3d& S_i_world, const Sim3d& S_j_world,
                                 Matrix7d* jacobian_i, Matrix7d* jacobian_j) {
-  const Vector7d residual = LogSim3(S_j_i * S_i_world * S_j_world.Inverse());
+  Vector7d residual = LogSim3(S_j_i * S_i_world * S_j_world.Inverse());
   // Log(S_j_i Exp(d) S_i S_j^-1) = Log(Exp(Ad d) E), and Log(E Exp(-d)) turns with the right Jacobian.
   if (jacobian_i != nullptr) *jacobian_i = LeftJacobianInverseSim3(residual) * AdjointSim3(S_j_i);
   if (jacobian_j != nullptr) *jacobian_j = -LeftJacobianInverseSim3(-residual);

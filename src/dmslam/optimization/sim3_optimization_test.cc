@@ -21,7 +21,7 @@ struct Sim3Data {
 /// Camera 2 has its own scale: a drifted map.
 Sim3Data DataOf(uint64_t seed, double noise_px, double point_noise, int outlier_every = 0) {
   const SyntheticScene scene = MakeSyntheticScene({.seed = seed, .num_points = 150, .noise_px = noise_px});
-  const SyntheticPair pair = MakeSyntheticPair(scene);
+  const SyntheticViews pair = MakeSyntheticViews(scene);
   Random random(seed + 20);
   const double scale = random.Uniform(0.5, 2.0);
   Sim3Data data;

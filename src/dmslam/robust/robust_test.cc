@@ -18,14 +18,14 @@ namespace {
 const Pinhole kCamera = SyntheticScene().camera;
 
 struct OutlierPair {
-  SyntheticPair pair;
+  SyntheticViews pair;
   std::vector<char> is_outlier;
 };
 
 /// Every third match leads to a random place.
 OutlierPair PairWithOutliers(uint64_t seed, double thickness = 4.0) {
   OutlierPair data;
-  data.pair = MakeSyntheticPair(MakeSyntheticScene(
+  data.pair = MakeSyntheticViews(MakeSyntheticScene(
       {.seed = seed, .num_points = 240, .noise_px = 0.5, .step = 0.5, .thickness = thickness}));
   Random random(seed + 1000);
   for (size_t i = 0; i < data.pair.x2_px.size(); ++i) {

@@ -77,7 +77,7 @@ std::vector<TrueFrame> LoadFrames(const std::string& folder, int first, int step
     Eigen::Quaterniond q;
     values >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
     TrueFrame frame;
-    frame.grey = cv::imread(folder + "/" + file, cv::IMREAD_GRAYSCALE);
+    frame.grey = cv::imread(std::string(folder).append("/").append(file), cv::IMREAD_GRAYSCALE);
     frame.R_cam_world = q.normalized().toRotationMatrix().transpose();
     frame.t_cam_world = -(frame.R_cam_world * t);
     frames.push_back(frame);

@@ -7,9 +7,9 @@
 
 namespace dmslam::testing {
 
-GrayImage RandomRectangles(int width, int height, int count, uint64_t seed) {
+GrayPixels RandomRectangles(int width, int height, int count, uint64_t seed) {
   Random random(DeriveSeed(seed, 0, "rectangles"));
-  GrayImage image(width, height, 128);
+  GrayPixels image(width, height, 128);
   for (int i = 0; i < count; ++i) {
     const int x0 = static_cast<int>(random.Below(static_cast<uint32_t>(width)));
     const int y0 = static_cast<int>(random.Below(static_cast<uint32_t>(height)));
@@ -27,8 +27,8 @@ GrayImage RandomRectangles(int width, int height, int count, uint64_t seed) {
   return image;
 }
 
-GrayImage Turned(const GrayImage& image, double radians) {
-  GrayImage turned(image.width, image.height, 128);
+GrayPixels Turned(const GrayPixels& image, double radians) {
+  GrayPixels turned(image.width, image.height, 128);
   const double cosine = std::cos(radians), sine = std::sin(radians);
   const double middle_x = (image.width - 1) / 2.0, middle_y = (image.height - 1) / 2.0;
   for (int y = 0; y < image.height; ++y) {

@@ -10,13 +10,13 @@ namespace dmslam {
 
 /// An 8-bit grey image that owns its pixels. Row-major without padding: pixel (x, y) is pixels[y * width +
 /// x].
-struct GrayImage {
+struct GrayPixels {
   std::vector<uint8_t> pixels;
   int width = 0;
   int height = 0;
 
-  GrayImage() = default;
-  GrayImage(int width_px, int height_px, uint8_t value = 0)
+  GrayPixels() = default;
+  GrayPixels(int width_px, int height_px, uint8_t value = 0)
       : pixels(static_cast<size_t>(width_px) * static_cast<size_t>(height_px), value),
         width(width_px),
         height(height_px) {}
