@@ -8,8 +8,8 @@ usage() {
   cat <<EOF
 Usage: scripts/welds.sh [--out DIR] [--cache DIR] [--seeds N] [--only PATTERN]
 
-Renders a tour of a room and one of two rooms with the same things (aliased), each with and without walkers, seeds 1..N.
-Each tour is split among cameras that set out together, and played in lock-step on one map:
+Renders a tour of a room and one of two rooms with the same things (aliased), each with and without walkers, seeds 1..N, at
+15 Hz. Each tour is split among cameras that set out together, and played in lock-step on one map:
 
   two         two cameras, of whose ways a fifth is the same
   twoagainst  the same, and the second goes its way backwards
@@ -45,8 +45,8 @@ work_in "$folder"
 mkdir -p -- "${cache:=$out/sequences}" || die "$cache cannot be made"
 
 render() { # NAME SEED KIND
-  local options=(--path tour)
-  [[ $3 != aliased* ]] || options+=(--scene aliased)
+  local options=(--path tour --fps 15 --speed 0.7 --frames 600)
+  [[ $3 != aliased* ]] || options=(--path tour --fps 15 --speed 0.7 --frames 810 --scene aliased)
   [[ $3 != *w ]] || options+=(--moving-share 0.15)
   [[ ! -e $cache/$1/done ]] || return 0
   say "rendering $1"

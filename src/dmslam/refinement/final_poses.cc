@@ -105,6 +105,15 @@ void SetMeasured(const PoseOptimizationReport& report, const std::vector<Sight>&
   }
 }
 
+/// Standard deviation of the rotation [rad] and of the position over the depth, whichever is more.
+std::optional<double> SpreadOf(const Matrix6d& information, double depth) {
+  const Eigen::LLT<Matrix6d> factor(information);
+  if (information.isZero(0.0) || factor.info() != Eigen::Success) return std::nullopt;
+  const Matrix6d covariance = factor.solve(Matrix6d::Identity());
+  return std::sqrt(std::max(covariance.topLeftCorner<3, 3>().trace(),
+                            covariance.bottomRightCorner<3, 3>().trace() / (depth * depth)));
+}
+
 /// How sure its keyframes are of a landmark's place.
 Eigen::Matrix3d InformationOf(const Map& map, const Landmark& landmark) {
   LandmarkEquations equations;
@@ -277,7 +286,8 @@ std::vector<uint8_t> FinalPoses::Leaps(const Map& map, size_t begin, size_t end)
     const auto [depth, is_new] = depths.try_emplace(frame.pose.reference, 1.0);
     const Keyframe* reference = is_new ? map.FindKeyframe(frame.pose.reference) : nullptr;
     if (reference != nullptr) depth->second = map.MedianDepth(*reference).value_or(1.0);
-    frames.push_back({frame.pose.stamp_ns, frame.measured, !frame.information.isZero(0.0), depth->second});
+    frames.push_back(
+        {frame.pose.stamp_ns, frame.measured, depth->second, SpreadOf(frame.information, depth->second)});
   }
   return FindLeaps(frames, motion_);
 }

@@ -14,7 +14,7 @@ std::vector<SeenFrom> Walk(int count) {
   std::vector<SeenFrom> frames;
   for (int k = 0; k < count; ++k) {
     const Eigen::Vector3d center(0.02 * k, 0, 0);
-    frames.push_back({k * kFrameNs, Rigid3d(Eigen::Quaterniond::Identity(), center).Inverse(), true, 2.0});
+    frames.push_back({k * kFrameNs, Rigid3d(Eigen::Quaterniond::Identity(), center).Inverse(), 2.0, 0.002});
   }
   return frames;
 }
@@ -40,6 +40,14 @@ TEST(Leaps, ACameraThatIsPutElsewhereLeaps) {
   std::vector<SeenFrom> frames = Walk(20);
   for (size_t k = 12; k < 20; ++k) Shift(&frames[k], 1.0);
   EXPECT_EQ(LeapsIn(frames), std::vector<int>{12});
+}
+
+TEST(Leaps, AShortOneIsSeenWherePosesAreKnownWell) {
+  std::vector<SeenFrom> frames = Walk(20);
+  for (size_t k = 12; k < 20; ++k) Shift(&frames[k], 0.25);
+  EXPECT_EQ(LeapsIn(frames), std::vector<int>{12});
+  for (SeenFrom& frame : frames) frame.spread = 0.03;
+  EXPECT_TRUE(LeapsIn(frames).empty());
 }
 
 TEST(Leaps, ATurnThatNoHandMakesIsOne) {
@@ -69,7 +77,7 @@ TEST(Leaps, OneFrameInAWrongPlaceIsNone) {
 TEST(Leaps, FramesOfWhichNothingIsKnownBelongToTheNearerSide) {
   std::vector<SeenFrom> frames = Walk(20);
   for (size_t k = 12; k < 20; ++k) Shift(&frames[k], 2.0);
-  for (size_t k = 10; k < 14; ++k) frames[k].known = false;
+  for (size_t k = 10; k < 14; ++k) frames[k].spread.reset();
   EXPECT_EQ(LeapsIn(frames), std::vector<int>{12});
 }
 
