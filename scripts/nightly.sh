@@ -113,6 +113,9 @@ step_loops() { # keeps what was played beside the step's folder, so that it cont
   "$top/scripts/loops.sh" --out "$out/loops_played" --seeds "$SEEDS"
   ! grep -qE 'missed|not tracked|/ [1-9]' "$out/loops_played/table.md"
 }
+step_welds() { # keeps what was played, as loops; a false weld fails it
+  "$top/scripts/welds.sh" --out "$out/welds_played" --seeds 3
+}
 step_lost() {
   "$top/scripts/lost.sh" --out "$1" --data "$data"
   ! grep -q missed "$1/table.md"
@@ -127,7 +130,7 @@ for name in walk1 walk2; do
 done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
 for ((first = 1; first <= SYSTEM_SCHEDULES; first += SYSTEM_SCHEDULES_PER_STEP)); do steps+=("system_$first $first"); done
-steps+=("lost" "loops")
+steps+=("lost" "loops" "welds")
 steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "killsets" "killstorm" "noise" "localize" "sessions" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
 ((EUID != 0)) || steps+=("twohosts") # it makes network namespaces
 ((soak == 0)) || steps+=("soak")

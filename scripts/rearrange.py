@@ -2,7 +2,7 @@
 """Plays a sequence in another order: rearrange.py SEQUENCE OUT PIECE...
 
 Writes OUT, a TUM RGB-D folder with frames of SEQUENCE, restamped evenly from the first stamp on. A PIECE is
-  A-B      frames A to B
+  A-B      frames A to B; backwards where B is the smaller one
   A*S      frame A for S seconds: a camera that stands still
   dark*S   S seconds of darkness, in which the camera stays where the frame before was taken
   A-B/dark the same as A-B, in darkness
@@ -52,9 +52,10 @@ def order_of(pieces, period_s, count):
             added = [(frame, kind == "dark")] * number
         else:
             first, last = (int(x) for x in what.split("-"))
-            if not 0 <= first <= last < count:
+            if not (0 <= first < count and 0 <= last < count):
                 raise SystemExit(f"rearrange.py: {piece}: the sequence has frames 0 to {count - 1}")
-            added = [(frame, dark == "dark") for frame in range(first, last + 1)]
+            step = 1 if first <= last else -1
+            added = [(frame, dark == "dark") for frame in range(first, last + step, step)]
         order += [(frame, is_dark, now + i) for i, (frame, is_dark) in enumerate(added) if frame is not None]
         now += len(added)
     return order

@@ -102,13 +102,16 @@ Json LoopJson(const RunRecord& run) {
   json["refused_geometry"] = status.refused_geometry;
   json["global_adjustments"] = status.global_adjustments;
   Json corrections = Json::array();
+  const bool several = run.cameras.size() > 1;
   for (const CorrectionRecord& correction : run.corrections) {
     const char* kind = correction.event == MapEvent::kCorrected          ? "loop"
                        : correction.event == MapEvent::kGloballyAdjusted ? "global adjustment"
                                                                          : "refused";
     corrections.push_back(
         {{"frame", correction.keyframe.frame_index()}, {"kind", kind}, {"note", correction.note}});
+    if (several) corrections.back()["camera"] = correction.keyframe.camera();
     if (!correction.matched.valid()) continue;
+    if (several) corrections.back()["matched_camera"] = correction.matched.camera();
     const Eigen::Vector3d& t = correction.T_matched_keyframe.translation;
     const Eigen::Quaterniond& q = correction.T_matched_keyframe.rotation;
     corrections.back()["matched_frame"] = correction.matched.frame_index();

@@ -18,7 +18,7 @@ namespace {
 /// What the command line says.
 struct Arguments {
   dmslam::PlayerOptions options;
-  std::string camera_file, encoding = "jpeg", channels = "camera", log, to_log;
+  std::string camera_file, as_camera_file, encoding = "jpeg", channels = "camera", log, to_log;
   double fps = 0;
   uint32_t log_session = 0;
   bool lockstep = false, remote_frontend = false;
@@ -65,7 +65,10 @@ void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::Pla
 std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::NodeOptions& node,
                                           dmslam::PlayerOptions* options) {
   SetOptions(a, node, options);
-  return a.log.empty() ? dmslam::OpenSequence(a.camera_file, a.fps, options) : OpenLog(a, node, options);
+  auto source =
+      a.log.empty() ? dmslam::OpenSequence(a.camera_file, a.fps, options) : OpenLog(a, node, options);
+  if (a.as_camera_file.empty()) return source;
+  return dmslam::TellBy(dmslam::LoadCamera(a.as_camera_file), std::move(source), options);
 }
 
 std::unique_ptr<dmslam::Node> WatchCamera(const Arguments& a, dmslam::NodeContext context,
@@ -75,6 +78,8 @@ std::unique_ptr<dmslam::Node> WatchCamera(const Arguments& a, dmslam::NodeContex
   if (a.lockstep) {
     throw dmslam::InputError(options.sequence + ": a camera waits for nobody; leave --lockstep out");
   }
+  if (!a.as_camera_file.empty())
+    throw dmslam::InputError("--as-camera is for recordings; " + options.sequence + " is a camera");
   options.camera = dmslam::ChooseCamera(a.camera_file, options.sequence);
   if (a.fps > 0) options.camera.fps = a.fps;
   auto source = dmslam::OpenLive(options.sequence, options.camera);
@@ -133,6 +138,9 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddOption("--to-log", a.to_log, "write camera and frames into this log instead of publishing them");
   app.AddOption("--camera", a.camera_file,
                 "camera file (YAML); found by itself for TUM freiburg1/2/3 and logs");
+  app.AddOption("--as-camera", a.as_camera_file,
+                "another camera file: frames are published as that camera would have taken them, for a map "
+                "that is of its model");
   app.AddFlag("--lockstep", a.lockstep, "wait for the frontend after each frame");
   app.AddOption("--speed", a.options.speed, "factor on the recorded rate; 0: as fast as possible")
       .ShowDefault();

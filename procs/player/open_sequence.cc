@@ -1,5 +1,8 @@
 #include "player/open_sequence.h"
 
+#include <utility>
+
+#include "dmslam/dataset/seen_as.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 
@@ -19,6 +22,14 @@ std::unique_ptr<FrameSource> OpenSequence(const std::string& camera_file, double
   auto source = OpenFrameSource(options->sequence, source_options);
   options->camera = ChooseCamera(camera_file, options->sequence);
   return source;
+}
+
+std::unique_ptr<FrameSource> TellBy(const Camera& as, std::unique_ptr<FrameSource> source,
+                                    PlayerOptions* options) {
+  auto seen = SeenAs(std::move(source), options->camera, as, options->sequence);
+  const double fps = std::exchange(options->camera, as).fps;
+  options->camera.fps = fps;
+  return seen;
 }
 
 }  // namespace dmslam

@@ -17,4 +17,9 @@ Camera ChooseCamera(const std::string& camera_file, const std::string& sequence)
 /// file's. Throws InputError.
 std::unique_ptr<FrameSource> OpenSequence(const std::string& camera_file, double fps, PlayerOptions* options);
 
+/// The frames as camera `as` would have taken them, which options->camera is from now on. Throws InputError
+/// where the camera that took them does not see the same.
+std::unique_ptr<FrameSource> TellBy(const Camera& as, std::unique_ptr<FrameSource> source,
+                                    PlayerOptions* options);
+
 }  // namespace dmslam

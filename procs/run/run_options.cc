@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "dmslam/messaging/bus_key.h"
+#include "dmslam/runtime/session_check.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/ids.h"
 
@@ -51,6 +52,13 @@ void CheckSource(const RunArguments::Source& source, const RunArguments::Pace& p
   }
 }
 
+void CheckOtherCameras(const RunArguments& a) {
+  const std::string problem =
+      WhyNotTheseCameras(a.camera.file, a.source.others.size(), a.source.other_cameras.size());
+  if (!problem.empty()) throw InputError(problem);
+  for (const std::string& file : a.source.other_cameras) CheckFile("--also-camera", file);
+}
+
 void CheckKey(const RunArguments::Bus& bus, const RunArguments::Source& source) {
   const bool keyed = BusKey::LoadIfWanted(bus.key).has_value();
   if (keyed && !source.replay.empty()) {
@@ -76,8 +84,10 @@ void DeclareSource(CommandLine& line, RunArguments::Source& source) {
                  "TUM RGB-D folder, EuRoC folder, numbered images, a video, a camera (/dev/videoN), or the "
                  "address of a camera's stream");
   line.AddOption("--also", source.others,
-                 "sequence of another camera, of the same model, that goes at the same time and works on the "
-                 "same map; may be repeated (docs/many-cameras.md)");
+                 "sequence of another camera that goes at the same time and works on the same map; may be "
+                 "repeated (docs/many-cameras.md)");
+  line.AddOption("--also-camera", source.other_cameras,
+                 "camera file of an --also, one for each, where they are not of the model of --camera");
   line.AddOption("--log", source.log,
                  "instead of --sequence: the frames of a log of lcm-logger, by our player (any mode)");
   line.AddOption("--replay", source.replay,
@@ -179,6 +189,7 @@ void DeclareRunArguments(CommandLine& line, RunArguments& a) {
 
 void CheckRunArguments(const RunArguments& a) {
   CheckSource(a.source, a.pace);
+  CheckOtherCameras(a);
   if (a.output.folder.empty()) throw InputError("--out is missing (see --help)");
   CheckNumber("--seed", a.settings.seed);
   CheckNumber("--pictures", a.output.pictures);

@@ -14,7 +14,8 @@ struct RunArguments {
   /// Where the frames come from (one of three), and which of them are played.
   struct Source {
     std::string sequence, log, replay;
-    std::vector<std::string> others;  ///< sequences of further cameras
+    std::vector<std::string> others;         ///< sequences of further cameras...
+    std::vector<std::string> other_cameras;  ///< ...and their camera files, where they are of other models
     std::string start, frames;
     std::vector<std::string> black_outs, jumps;
   };

@@ -133,6 +133,12 @@ void GoOnBehind(const ResumePoint& point, bool camera, ChildSpec* player) {
   Append(&player->first, {"--lead", std::to_string(point.lead_s)});
 }
 
+/// What is said of the first camera, of the i-th other one.
+RunArguments OfOther(RunArguments a, size_t i) {
+  if (!a.source.other_cameras.empty()) a.camera.file = a.source.other_cameras[i];
+  return a;
+}
+
 /// Player and frontend of each further camera.
 std::vector<ChildSpec> MakeOtherCameras(const RunArguments& a, const RunPlace& place, const Words& common) {
   if (place.resume && !a.source.others.empty())
@@ -142,7 +148,8 @@ std::vector<ChildSpec> MakeOtherCameras(const RunArguments& a, const RunPlace& p
     const CameraId camera = static_cast<CameraId>(i + 1);
     children.push_back(MakeChild("frontend", a, place, common, camera));
     Words words = common;
-    Append(&words, PlayerArguments(a));
+    Append(&words, PlayerArguments(OfOther(a, i)));
+    if (!a.source.other_cameras.empty()) Append(&words, {"--as-camera", a.camera.file});
     Append(&words, {"--sequence", a.source.others[i]});
     children.push_back(MakeChild("player", a, place, std::move(words), camera));
   }

@@ -138,6 +138,24 @@ TEST_F(RunPlanTest, EachFurtherCameraHasAFrontendAndAPlayer) {
   EXPECT_NE(Refusal().find("at most 16"), std::string::npos);
 }
 
+TEST_F(RunPlanTest, CamerasOfOtherModelsAreToldByTheFirst) {
+  arguments_.source.others = {folder_ + "/second", folder_ + "/third"};
+  for (const std::string& other : arguments_.source.others) fs::create_directories(other);
+  for (const char* name : {"first.yaml", "second.yaml", "third.yaml"}) std::ofstream(folder_ + "/" + name);
+  arguments_.source.other_cameras = {folder_ + "/second.yaml"};
+  arguments_.camera.file = folder_ + "/first.yaml";
+  EXPECT_NE(Refusal().find("one for each --also"), std::string::npos);
+  arguments_.source.other_cameras.push_back(folder_ + "/fourth.yaml");
+  EXPECT_NE(Refusal().find("/fourth.yaml: no such file; check --also-camera"), std::string::npos);
+  arguments_.source.other_cameras.back() = folder_ + "/third.yaml";
+  EXPECT_EQ(Refusal(), "");
+  for (const auto& [player, file] : {std::pair("player1", "/second.yaml"), {"player2", "/third.yaml"}}) {
+    EXPECT_NE(Line(player).find("--camera " + folder_ + file + " "), std::string::npos);
+    EXPECT_NE(Line(player).find("--as-camera " + folder_ + "/first.yaml "), std::string::npos);
+  }
+  EXPECT_EQ(Line("player").find("--as-camera"), std::string::npos);
+}
+
 TEST_F(RunPlanTest, SeesWhetherAPortIsTaken) {
   std::ofstream(folder_ + "/udp")
       << "   sl  local_address rem_address\n"

@@ -41,6 +41,30 @@ for file in $RESULTS; do
   check "$file of one process has the same bytes" cmp "$work/first/$file" "$work/one/$file"
 done
 
+# The second camera has half as many pixels, a lens, a wider view and half the rate.
+cat >"$work/half.yaml" <<'EOF'
+width: 320
+height: 240
+fx: 245
+fy: 247
+cx: 158
+cy: 121
+distortion: [-0.12, 0.02, 0.001, -0.001, 0]
+fps: 15
+EOF
+check "its pictures are rendered" "$build/bin/dmslam-synth" --quiet --out "$work/half" --path halfsphere --frames 75 --fps 15 \
+  --moving-share 0.15 --seed 1 --camera "$work/half.yaml"
+models=(--sequence "$synthetic" --also "$work/half" --camera "$root/config/synthetic.yaml" --also-camera "$work/half.yaml" --seed 3)
+check "two models: the run ends with 0" run "${models[@]}" --lockstep --out "$work/models"
+no_orphans "the run with two models"
+check "two models: both cameras are in one map in the end" one_map "$work/models"
+expect "two models: the cameras lie right to one another" "$work/models" ate_rmse_joint "<= 0.02"
+expect_camera "two models: nearly all have a pose in the end" "$work/models" 1 tracked_percent ">= 90"
+check "two models, in one process: it ends with 0" "$build/bin/dmslam-inprocess" "${models[@]}" --out "$work/models_one"
+for file in trajectory.txt trajectory_1.txt map.ply; do
+  check "$file of two models has the same bytes in one process" cmp "$work/models/$file" "$work/models_one/$file"
+done
+
 # Real time: a frontend dies. The other one goes on, and nobody else notices.
 run "${sequences[@]}" --speed 0.4 --out "$work/killed" >"$work/killed.txt" 2>&1 &
 pid=$!
@@ -64,6 +88,11 @@ expect_camera "it has found itself again" "$work/killed" 1 tracked_online_percen
 # What does not fit is refused by name.
 refused "camera-id 2: there are --cameras 2" "$build/bin/dmslam-frontend" --cameras 2 --camera-id 2
 refused "nowhere: no such folder" run --sequence "$synthetic" --also /nowhere --camera "$root/config/synthetic.yaml" --out "$work/none"
+sed -E 's/^( *f[xy][^:]*: *).*/\1400.0/' "$work/half.yaml" >"$work/narrow.yaml"
+refused "half: its camera sees [0-9]+ % of what the one sees" "$build/bin/dmslam-inprocess" --sequence "$synthetic" \
+  --also "$work/half" --camera "$root/config/synthetic.yaml" --also-camera "$work/narrow.yaml" --out "$work/none"
+refused "also-camera: give one for each --also" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --also "$second" \
+  --camera "$root/config/synthetic.yaml" --also-camera "$work/half.yaml" --also-camera "$work/half.yaml" --out "$work/none"
 bus=(--lcm-url "udpm://239.255.76.67:7679?ttl=0" --session 9 --cameras 2 --peers frontend)
 sed -E 's/^( *fx[^:]*: *).*/\1400.0/' "$root/config/synthetic.yaml" >"$work/other.yaml"
 "$build/bin/dmslam-player" "${bus[@]}" --sequence "$synthetic" --camera "$root/config/synthetic.yaml" >/dev/null 2>&1 &

@@ -9,6 +9,7 @@
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
+#include "dmslam/runtime/session_check.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "in_process.h"
@@ -20,7 +21,7 @@ struct Arguments {
   std::string sequence, log, records, record, out, camera, config, vocabulary, profile, encoding = "jpeg";
   double fps = 0;
   uint32_t log_session = 0;
-  std::vector<std::string> overrides, black_outs, jumps, others;
+  std::vector<std::string> overrides, black_outs, jumps, others, other_cameras;
   size_t start = 0, frames = SIZE_MAX;
   uint64_t seed = 1;
   int pictures = 0;
@@ -33,10 +34,10 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.SetVersion(dmslam::BuildVersion());
   app.AddOption("--sequence,--video", a.sequence,
                 "TUM RGB-D folder, EuRoC folder, numbered images, or a video");
-  app.AddOption(
-      "--also", a.others,
-      "sequence of another camera, of the same model, that goes at the same time by its stamps; may "
-      "be repeated");
+  app.AddOption("--also", a.others,
+                "sequence of another camera that goes at the same time by its stamps; may be repeated");
+  app.AddOption("--also-camera", a.other_cameras,
+                "camera file of an --also, one for each, where they are not of the model of --camera");
   app.AddOption("--fps", a.fps,
                 "frames per second of numbered images and of videos that do not state it; default: as the "
                 "camera file says")
@@ -86,12 +87,17 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOpti
 
 std::vector<dmslam::AnotherCamera> OpenOthers(const Arguments& a, dmslam::PlayerOptions player,
                                               std::vector<std::string>* ground_truth) {
+  const std::string problem = dmslam::WhyNotTheseCameras(a.camera, a.others.size(), a.other_cameras.size());
+  if (!problem.empty()) throw dmslam::InputError(problem);
   std::vector<dmslam::AnotherCamera> others;
-  for (const std::string& sequence : a.others) {
-    player.sequence = sequence;
+  for (size_t i = 0; i < a.others.size(); ++i) {
+    player.sequence = a.others[i];
     dmslam::AnotherCamera& other = others.emplace_back();
     other.player = player;
-    other.source = dmslam::OpenSequence(a.camera, a.fps, &other.player);
+    const bool own = !a.other_cameras.empty();
+    other.source = dmslam::OpenSequence(own ? a.other_cameras[i] : a.camera, a.fps, &other.player);
+    if (own)
+      other.source = dmslam::TellBy(dmslam::LoadCamera(a.camera), std::move(other.source), &other.player);
     ground_truth->push_back(other.source->GroundTruthPath().value_or(""));
   }
   return others;

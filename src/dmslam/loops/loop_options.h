@@ -60,7 +60,7 @@ struct LoopcloserOptions {
 
   // Which places are looked at.
   int min_covisibility = kMinCovisibility;
-  int min_keyframes_between = 10;  ///< keyframes after a loop before the next one is looked for
+  int min_keyframes_between = 10;  ///< keyframes after a loop before the next one in its map is looked for
   int consistency = 3;             ///< so many keyframes in a row must point at places that belong together
   bool within_maps = true;         ///< off: only places of other maps are looked for
   double same_time_s = 0.5;        ///< between keyframes of two maps: nothing has moved far meanwhile

@@ -68,9 +68,11 @@ LoopAnswer LoopcloserCore::FindCorrection(KeyframeId id) {
   const Keyframe* keyframe = Index(id);
   if (keyframe == nullptr || awaited_correction_) return {};
   if (adjustment_due_) return AdjustAfterLoop(id);
-  const std::vector<KeyframeId> candidates = NamePlaces(*keyframe);
+  std::vector<KeyframeId> candidates = NamePlaces(*keyframe);
   ForgetUnconfirmed(keyframe->stamp_ns);
-  if (keyframes_since_loop_ <= options_.min_keyframes_between) return {};
+  // The same place is seen for a while after a loop, and would be one again; another map is another matter.
+  if (keyframes_since_loop_ <= options_.min_keyframes_between)
+    std::erase_if(candidates, [&](KeyframeId place) { return map_.At(place).map_id == keyframe->map_id; });
   if (const std::optional<VerifiedLoop> loop = ConfirmProposed(*keyframe)) return Close(*loop);
   if (const std::optional<VerifiedLoop> loop = ProposePlace(*keyframe, candidates)) return Close(*loop);
   if (const std::optional<VerifiedLoop> loop = AskAgain(*keyframe)) return Close(*loop);

@@ -259,6 +259,16 @@ TEST(LoopcloserCoreTest, AMapBegunMeanwhileIsWeldedToTheOldOne) {
   ExpectWelds(room, weld);
 }
 
+/// (The mapper of these tests leaves the maps as they are.)
+TEST(LoopcloserCoreTest, AfterAWeldTheNextOneNeedNotWait) {
+  Room room({.second_map_at = kPerRound - 2});
+  LoopcloserCore core = MakeCore();
+  const Answers answers = Play(room, core);
+  ASSERT_GE(answers.loops.size(), 2u);
+  const uint32_t first = answers.loops[0].keyframe.frame_index();
+  EXPECT_LE(answers.loops[1].keyframe.frame_index(), first + 4);
+}
+
 /// The camera goes on to where the old map shows nothing. What that one has seen is there again in the new
 /// map.
 TEST(LoopcloserCoreTest, KeyframesOfAMapThatWasLeftAreAskedAgain) {

@@ -189,7 +189,7 @@ class Smoother {
     return std::max((estimates_[k + 1].time_s - estimates_[k].time_s) / interval_s_, kMinInterval);
   }
   bool Joined(size_t k) const {
-    return estimates_[k + 1].time_s - estimates_[k].time_s <= options_.max_gap_s;
+    return !estimates_[k + 1].leaps && estimates_[k + 1].time_s - estimates_[k].time_s <= options_.max_gap_s;
   }
 
   void FirstGuess() {

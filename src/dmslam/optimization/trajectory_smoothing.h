@@ -18,6 +18,7 @@ struct PoseEstimate {
   Matrix6d information = Matrix6d::Zero();
   /// The part of the information that comes from what the frames before saw too: their errors are alike.
   Matrix6d shared = Matrix6d::Zero();
+  bool leaps = false;  ///< no motion leads here from the pose before
 };
 
 /// How sure poses and motion are.

@@ -9,6 +9,7 @@
 
 #include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
+#include "dmslam/refinement/leaps.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/chi_squared.h"
 #include "dmslam/util/parallel.h"
@@ -102,6 +103,15 @@ void SetMeasured(const PoseOptimizationReport& report, const std::vector<Sight>&
   for (size_t i = 0; i < sights.size(); ++i) {
     if (report.inliers[i] != 0) pose->sights.push_back(sights[i]);
   }
+}
+
+/// Standard deviation of the rotation [rad] and of the position over the depth, whichever is more.
+std::optional<double> SpreadOf(const Matrix6d& information, double depth) {
+  const Eigen::LLT<Matrix6d> factor(information);
+  if (information.isZero(0.0) || factor.info() != Eigen::Success) return std::nullopt;
+  const Matrix6d covariance = factor.solve(Matrix6d::Identity());
+  return std::sqrt(std::max(covariance.topLeftCorner<3, 3>().trace(),
+                            covariance.bottomRightCorner<3, 3>().trace() / (depth * depth)));
 }
 
 /// How sure its keyframes are of a landmark's place.
@@ -244,7 +254,7 @@ void FinalPoses::Drop(std::span<const uint8_t> drop) {
 std::vector<FramePose> FinalPoses::Take() {
   std::vector<FramePose> told;
   for (FinalPose& last : poses_) told.push_back(std::move(last.pose));
-  *this = FinalPoses(threads_);
+  *this = FinalPoses(threads_, motion_);
   return told;
 }
 
@@ -267,12 +277,29 @@ Matrix6d FinalPoses::SharedInformation(const Map& map, size_t frame) const {
   return shared;
 }
 
+/// Of those of one map, by what they saw.
+std::vector<uint8_t> FinalPoses::Leaps(const Map& map, size_t begin, size_t end) const {
+  std::map<KeyframeId, double> depths;
+  std::vector<SeenFrom> frames;
+  for (size_t i = begin; i < end; ++i) {
+    const FinalPose& frame = poses_[i];
+    const auto [depth, is_new] = depths.try_emplace(frame.pose.reference, 1.0);
+    const Keyframe* reference = is_new ? map.FindKeyframe(frame.pose.reference) : nullptr;
+    if (reference != nullptr) depth->second = map.MedianDepth(*reference).value_or(1.0);
+    frames.push_back(
+        {frame.pose.stamp_ns, frame.measured, depth->second, SpreadOf(frame.information, depth->second)});
+  }
+  return FindLeaps(frames, motion_);
+}
+
 std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, size_t begin, size_t end) const {
   std::vector<PoseEstimate> estimates(end - begin);
+  const std::vector<uint8_t> leaps = Leaps(map, begin, end);
   ForEachInParallel(estimates.size(), threads_, [&](size_t k) {
     const FinalPose& frame = poses_[begin + k];
     const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses_[begin].pose.stamp_ns);
-    estimates[k] = {time_s, frame.measured, frame.information, SharedInformation(map, begin + k)};
+    estimates[k] = {time_s, frame.measured, frame.information, SharedInformation(map, begin + k),
+                    leaps[k] != 0};
   });
   return estimates;
 }

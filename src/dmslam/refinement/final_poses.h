@@ -10,6 +10,7 @@
 #include "dmslam/map/tracked_frame.h"
 #include "dmslam/optimization/pose_optimization.h"
 #include "dmslam/optimization/trajectory_smoothing.h"
+#include "dmslam/tracking/motion_model.h"
 
 namespace dmslam {
 
@@ -54,15 +55,16 @@ PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_w
 ///
 /// Two things are left when every frame has been matched with the finished map. In a frame of which walkers
 /// hide most, a few landmarks in a corner leave the pose open along some direction: poses are joined with the
-/// motion of a carried camera (SmoothTrajectory()). And the map knows a landmark from a few keyframes only,
-/// which is the more of an error the fewer landmarks a frame sees: each is placed again by all the frames
-/// that saw it, and the frames by the landmarks. The map itself stays as it is.
-/// Poses stay relative to their keyframes: where a keyframe moves meanwhile (a loop closed late), they go
-/// with it, and no more is improved.
+/// motion of a carried camera (SmoothTrajectory()), but for where it was put elsewhere (FindLeaps()). And the
+/// map knows a landmark from a few keyframes only, which is the more of an error the fewer landmarks a frame
+/// sees: each is placed again by all the frames that saw it, and the frames by the landmarks. The map itself
+/// stays as it is. Poses stay relative to their keyframes: where a keyframe moves meanwhile (a loop closed
+/// late), they go with it, and no more is improved.
 class FinalPoses {
  public:
-  /// `threads`: that work at a time; the poses do not depend on it.
-  explicit FinalPoses(int threads = 1) : threads_(threads) {}
+  /// `threads`: that work at a time; the poses do not depend on it. `motion`: how far a camera gets.
+  explicit FinalPoses(int threads = 1, const MotionModelOptions& motion = {})
+      : threads_(threads), motion_(motion) {}
 
   /// The frame's landmarks must be in the map now; they may leave it later.
   void Add(const Map& map, FinalPose pose);
@@ -102,6 +104,7 @@ class FinalPoses {
   void GoTo(Step step);
   bool HasMoved(const Map& map) const;
   Matrix6d SharedInformation(const Map& map, size_t frame) const;
+  std::vector<uint8_t> Leaps(const Map& map, size_t begin, size_t end) const;
   std::vector<PoseEstimate> Estimates(const Map& map, size_t begin, size_t end) const;
   void Move(const Rigid3d& T_cam_world, FinalPose* pose);
   bool IsStill() const;
@@ -116,6 +119,7 @@ class FinalPoses {
   void PlaceSomeFrames(const Map& map);
 
   int threads_;
+  MotionModelOptions motion_;
   std::vector<FinalPose> poses_;
   std::vector<View> views_;  ///< all, by landmark; empty: to be listed
   /// Of each frame's sights: whether a frame shortly before saw the same landmark; as old as the views.

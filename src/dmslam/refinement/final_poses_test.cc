@@ -18,8 +18,9 @@ constexpr int kLandmarks = 200, kKeyframes = 8, kFrames = 240;
 constexpr int kWeakBegin = 100, kWeakEnd = 112;  // frames that see a corner of the scene only
 
 /// A hand-held camera that sways in front of a wall with furniture.
-Rigid3d TruthAt(double t) {
-  const Eigen::Vector3d center(0.4 * std::sin(0.9 * t), 0.1 * std::sin(1.7 * t), 0.15 * std::cos(1.1 * t));
+Rigid3d TruthAt(double t, double aside = 0.0) {
+  const Eigen::Vector3d center(aside + 0.4 * std::sin(0.9 * t), 0.1 * std::sin(1.7 * t),
+                               0.15 * std::cos(1.1 * t));
   const Eigen::Vector3d turn(0.05 * std::sin(1.3 * t), 0.08 * std::sin(0.8 * t), 0.02 * std::cos(1.5 * t));
   return Rigid3d(ExpSo3(turn), center).Inverse();
 }
@@ -60,8 +61,10 @@ class PosesAtTheEnd : public testing::Test {
     map_.SetPosition(map_.At(id), landmark.p_world - information.ldlt().solve(gradient));
   }
 
+  Rigid3d TruthOf(int frame) const { return TruthAt(TimeOf(frame), frame < aside_from_ ? 0.0 : 0.7); }
+
   std::optional<Eigen::Vector2d> See(int landmark, int frame) {
-    const Eigen::Vector3d p_cam = TruthAt(TimeOf(frame)) * truth_[static_cast<size_t>(landmark)];
+    const Eigen::Vector3d p_cam = TruthOf(frame) * truth_[static_cast<size_t>(landmark)];
     const auto uv_px = map_.camera().Project(p_cam);
     if (!uv_px) return std::nullopt;
     const double du = random_.Gaussian(), dv = random_.Gaussian();
@@ -110,18 +113,18 @@ class PosesAtTheEnd : public testing::Test {
     FinalPose pose;
     pose.pose.frame_index = static_cast<uint32_t>(frame);
     pose.pose.stamp_ns = static_cast<int64_t>(1e9 * TimeOf(frame));
-    const PoseOptimizationReport report = MeasureCheckedPose(map_, TruthAt(TimeOf(frame)), sights, &pose);
+    const PoseOptimizationReport report = MeasureCheckedPose(map_, TruthOf(frame), sights, &pose);
     EXPECT_TRUE(Agrees(report));
     pose.SetPose(*map_.FindKeyframe(KeyframeId::Make(1, 0)), report.T_cam_world);
     return pose;
   }
 
-  static double Error(const FramePose& pose) {
-    const Rigid3d truth = TruthAt(TimeOf(static_cast<int>(pose.frame_index)));
+  double Error(const FramePose& pose) const {
+    const Rigid3d truth = TruthOf(static_cast<int>(pose.frame_index));
     return (pose.T_cam_world.Center() - truth.Center()).norm();
   }
 
-  static double RmsError(const std::vector<FramePose>& poses, uint32_t begin, uint32_t end) {
+  double RmsError(const std::vector<FramePose>& poses, uint32_t begin, uint32_t end) const {
     double sum = 0.0;
     int count = 0;
     for (const FramePose& pose : poses) {
@@ -132,14 +135,16 @@ class PosesAtTheEnd : public testing::Test {
     return std::sqrt(sum / count);
   }
 
-  std::vector<FramePose> Told(int begin, int end, bool improved, int threads = 1) {
+  std::vector<FramePose> Told(int begin, int end, bool improved, int threads = 1,
+                              const MotionModelOptions& motion = {}) {
     random_ = Random(5);
-    FinalPoses poses(threads);
+    FinalPoses poses(threads, motion);
     for (int frame = end - 1; frame >= begin; --frame) poses.Add(map_, PoseOf(frame));
     while (improved && !poses.IsSettled()) poses.Improve(map_);
     return poses.Take();
   }
 
+  int aside_from_ = kFrames;  ///< frames that are taken from somewhere else
   Random random_{3};
   MapEditor map_;
   std::vector<Eigen::Vector3d> truth_;
@@ -181,6 +186,17 @@ TEST_F(PosesAtTheEnd, FramesThatSawACornerFollowTheirNeighbours) {
   const auto before = Told(0, kFrames, false), after = Told(0, kFrames, true);
   EXPECT_GT(RmsError(before, kWeakBegin, kWeakEnd), 0.008);
   EXPECT_LT(RmsError(after, kWeakBegin, kWeakEnd), 0.15 * RmsError(before, kWeakBegin, kWeakEnd));
+}
+
+TEST_F(PosesAtTheEnd, WhereTheCameraIsPutElsewhereFramesThatSawACornerAreNotDrawnThere) {
+  aside_from_ = kWeakEnd;
+  MotionModelOptions anywhere;
+  anywhere.speed_slack = 1e9;
+  anywhere.turn_slack_rad = 1e9;
+  const auto seen = Told(0, kFrames, false), drawn = Told(0, kFrames, true, 1, anywhere);
+  const auto after = Told(0, kFrames, true);
+  EXPECT_GT(RmsError(drawn, kWeakBegin, kWeakEnd), 2.0 * RmsError(seen, kWeakBegin, kWeakEnd));
+  EXPECT_LT(RmsError(after, kWeakBegin, kWeakEnd), RmsError(seen, kWeakBegin, kWeakEnd));
 }
 
 TEST_F(PosesAtTheEnd, FewFramesDoNotCarryTheirLandmarksAway) {

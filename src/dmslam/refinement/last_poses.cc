@@ -23,7 +23,7 @@ FrameRefinerOptions ForSmoothing(FrameRefinerOptions options, bool smooth) {
 LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
                      const Camera& camera)
     : refiner_(ForSmoothing(refiner, smooth)),
-      final_(NumThreads()),
+      final_(NumThreads(), tracking.motion),
       smooth_(smooth),
       max_frames_(refiner.max_frames) {
   const int threads = NumThreads();

@@ -35,4 +35,13 @@ std::string WhyMisfit(const SessionStart& start, const Settings& settings,
   return "";
 }
 
+std::string WhyNotTheseCameras(const std::string& first_file, size_t others, size_t files_of_others) {
+  if (files_of_others == 0) return "";
+  if (files_of_others != others) {
+    return "--also-camera: give one for each --also, or none (" + std::to_string(files_of_others) + " for " +
+           std::to_string(others) + ")";
+  }
+  return first_file.empty() ? "--also-camera goes with --camera, by whose model all frames are told" : "";
+}
+
 }  // namespace dmslam

@@ -42,5 +42,12 @@ TEST(SessionCheckTest, AnotherVocabularyIsNamedWithTheCure) {
       << why;
 }
 
+TEST(SessionCheckTest, CameraFilesOfAllOtherCamerasOrOfNone) {
+  EXPECT_EQ(WhyNotTheseCameras("", 2, 0), "");
+  EXPECT_EQ(WhyNotTheseCameras("first.yaml", 2, 2), "");
+  EXPECT_NE(WhyNotTheseCameras("first.yaml", 2, 1).find("one for each --also"), std::string::npos);
+  EXPECT_NE(WhyNotTheseCameras("", 1, 1).find("goes with --camera"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace dmslam

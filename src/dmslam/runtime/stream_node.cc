@@ -118,11 +118,13 @@ void StreamNode::KnowCamera(const CameraInfo& info) {
 /// What all see is projected by one model: the camera that comes later, by its number, leaves.
 void StreamNode::OnOtherCamera(const CameraInfo& info) {
   const bool ours = session_ == 0 || info.session == session_;
-  if (!ours || !camera_info_ || info.camera_id > options_.camera_id || info.camera == camera_info_->camera)
+  if (!ours || !camera_info_ || info.camera_id > options_.camera_id ||
+      info.camera.SeesAs(camera_info_->camera))
     return;
   Exit(kExitMisfit, "camera " + std::to_string(options_.camera_id) + " is another model than camera " +
                         std::to_string(info.camera_id) +
-                        "; all cameras of a session need the same calibration (--camera)");
+                        "; all cameras of a session need the same calibration (--camera), or to be told by "
+                        "it (dmslam-player --as-camera)");
 }
 
 /// A process that starts after the player has left still learns the camera, from those who write: one of them

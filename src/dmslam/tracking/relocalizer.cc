@@ -111,22 +111,23 @@ bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& mat
 /// Against the local map, and again from there as long as each round finds more
 /// of it: the matches with one keyframe alone may put the camera a little
 /// beside its place, where the first search misses much.
-bool Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame) {
+std::optional<TrackingReport> Relocalizer::Refine(const Map& map, PoseSearch* search, TrackedFrame* frame) {
   int found = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
     const TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
-    if (report.ok && !report.doubtful) return true;
-    if (report.num_static <= found) return false;
+    if (report.ok && !report.doubtful) return report;
+    if (report.num_static <= found) return std::nullopt;
     found = report.num_static;
   }
-  return false;
+  return std::nullopt;
 }
 
 bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch* search,
                              TrackedFrame* frame) const {
   if (!places_.usable()) return false;
   const auto fits = [&] {
-    return Refine(map, search, frame) && (!request.credible || request.credible(*frame));
+    const std::optional<TrackingReport> report = Refine(map, search, frame);
+    return report && (!request.credible || request.credible(*frame, *report));
   };
   const BowImage image = places_.Transform(frame->features->set);
   const std::vector<KeyframeId> candidates = Candidates(map, request.last_seen, image);

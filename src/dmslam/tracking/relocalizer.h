@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dmslam/map/replica.h"
@@ -24,8 +25,9 @@ class Relocalizer {
   void Clear();
   /// The camera is looked for in all maps.
   struct Request {
-    KeyframeId last_seen{};                               ///< invalid: not known
-    std::function<bool(const TrackedFrame&)> credible{};  ///< asked of a frame with its pose; empty: all are
+    KeyframeId last_seen{};  ///< invalid: not known
+    /// Asked of a frame with its pose and what it sees there; empty: all are.
+    std::function<bool(const TrackedFrame&, const TrackingReport&)> credible{};
     uint64_t seed = 0;
   };
   /// A pose of `frame` with its matches; none when no keyframe fits. Keyframes that look alike are tried
@@ -42,7 +44,7 @@ class Relocalizer {
                    TrackedFrame* frame) const;
   bool FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
                 TrackedFrame* frame) const;
-  static bool Refine(const Map& map, PoseSearch* search, TrackedFrame* frame);
+  static std::optional<TrackingReport> Refine(const Map& map, PoseSearch* search, TrackedFrame* frame);
 
   MapPlaces places_;
 };

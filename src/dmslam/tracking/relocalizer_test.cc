@@ -156,7 +156,8 @@ class Lost {
       relocalizer_.Update(replica_);
     }
   }
-  bool Find(TrackedFrame* frame, std::function<bool(const TrackedFrame&)> credible = {}) {
+  bool Find(TrackedFrame* frame,
+            std::function<bool(const TrackedFrame&, const TrackingReport&)> credible = {}) {
     return relocalizer_.Relocalize(replica_, {{}, std::move(credible), 1}, &search_, frame);
   }
   void Clear() { relocalizer_.Clear(); }
@@ -226,7 +227,7 @@ TEST(RelocalizerTest, APlaceThatIsNotCredibleIsRefused) {
   Lost lost(wall);
   TrackedFrame frame = wall.Frame(4.4);
   const auto near = [](double x) {
-    return [x](const TrackedFrame& found) {
+    return [x](const TrackedFrame& found, const TrackingReport&) {
       return (found.T_cam_world.Center() - PoseAt(x).Center()).norm() < 0.6;
     };
   };

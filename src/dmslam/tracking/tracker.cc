@@ -23,6 +23,11 @@ constexpr double kWholeShare = 0.3;            // ...and it is so much of what t
 constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
 constexpr int kSomeProven = 8;                 // ...and that must be among them when it is confirmed by time
 
+/// All over the image, which a person is not.
+bool IsSeenAsAWhole(const TrackingReport& report) {
+  return report.cells >= kWideCells && report.num_static >= kWholeShare * report.num_expected;
+}
+
 void Refuse(const char* reason, TrackingReport* report) {
   report->ok = false;
   report->reason = reason;
@@ -86,9 +91,10 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
 void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame,
                      const Attempt& attempt) {
   if (attempt.relocalized) {
-    unbelieved_ = Unbelieved{Unbelieved::Why::kFoundAnew, frame.stamp_ns, motion_, last_};
+    unbelieved_ =
+        Unbelieved{Unbelieved::Why::kFoundAnew, attempt.in_another_map, frame.stamp_ns, motion_, last_};
   } else if (attempt.report.doubtful && !unbelieved_) {
-    unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, motion_.last_stamp_ns(), motion_, last_};
+    unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, false, motion_.last_stamp_ns(), motion_, last_};
   }
   motion_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns},
                     attempt.relocalized || attempt.by_rival);
@@ -99,16 +105,22 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
 /// over the image and as a whole, which a person is not, or if much of what is seen is proven to be no
 /// person; else when the place goes on to predict what is seen, and, in a map that is old enough to have
-/// them, proven landmarks are among it.
+/// them, proven landmarks are among it. In another map that is not, it must both be seen as a whole and
+/// predict.
 bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
   if (report.doubtful) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
-  if (report.cells >= kWideCells && report.num_static >= kWholeShare * report.num_expected) return true;
   const int proven = CountProven(map, frame.landmarks, {});
-  if (proven >= kManyProven) return true;
+  const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
+  if (at_once || proven >= kManyProven) return true;
   if (frame.stamp_ns - unbelieved_->since_ns < kConfirmNs) return false;
+  return proven >= kSomeProven || !IsOldEnoughToProve(map);
+}
+
+/// The map that the frame was placed in.
+bool Tracker::IsOldEnoughToProve(const Map& map) const {
   const Keyframe* reference = map.FindKeyframe(search_.reference());
-  return proven >= kSomeProven || reference == nullptr || !CanBeProven(map, reference->map_id, {});
+  return reference != nullptr && CanBeProven(map, reference->map_id, {});
 }
 
 bool Tracker::IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const {
@@ -192,22 +204,28 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
   const FrameTime time{frame->index, frame->stamp_ns};
-  // Far away, and in another map, only what is proven to be no person is believed.
-  const auto credible = [&](const TrackedFrame& at) {
+  const auto is_here = [&] {
     const Keyframe* reference = map.FindKeyframe(search_.reference());
-    const bool here = reference != nullptr && reference->map_id == map_id;
+    return reference != nullptr && reference->map_id == map_id;
+  };
+  // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too
+  // young to have anything proven, what is seen as a whole.
+  const auto credible = [&](const TrackedFrame& at, const TrackingReport& report) {
+    const bool here = is_here();
     return (here && motion_.IsReachable(map, at.T_cam_world, time)) ||
-           CountProven(map, at.landmarks, {}) >= kManyProven;
+           CountProven(map, at.landmarks, {}) >= kManyProven ||
+           (!here && !IsOldEnoughToProve(map) && IsSeenAsAWhole(report));
   };
   Relocalizer::Request request{.last_seen = motion_.last().reference, .seed = seed};
   if (map_id) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
-  if (request.credible && !credible(*frame))
+  if (request.credible && !credible(*frame, attempt->report))
     Refuse("the place that was recognised is out of reach", &attempt->report);
   if (attempt->report.doubtful) attempt->report.ok = false;
   attempt->relocalized = attempt->report.ok;
+  attempt->in_another_map = map_id && !is_here();
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 

@@ -72,6 +72,7 @@ class Tracker {
     std::optional<FoundPose> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
     bool relocalized = false;
     bool by_rival = false;  ///< what the frames before followed was not the room
+    bool in_another_map = false;  ///< than it was lost in
   };
 
   bool FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
@@ -83,6 +84,7 @@ class Tracker {
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
   bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
+  bool IsOldEnoughToProve(const Map& map) const;
   bool IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const;
   void GoBack();
 
@@ -101,6 +103,7 @@ class Tracker {
       kDoubtful,   ///< what it sees may be no part of the room
     };
     Why why = Why::kFoundAnew;
+    bool in_another_map = false;  ///< than it was lost in
     int64_t since_ns = 0;
     MotionModel motion;  ///< and the last frame, as they were when it was believed last
     TrackedFrame last;

@@ -407,7 +407,7 @@ class Recovering : public ::testing::Test {
       const bool hidden = blind || (partly_hidden_ && i % 4 != 0);
       return hidden ? std::nullopt : std::optional(scene_.point(i));
     };
-    return tracker_->Track(replica_, {},
+    return tracker_->Track(replica_, {.map_id = lost_in_},
                            scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(kStep * frame), place));
   }
   /// The first frame from `begin` on that has a pose.
@@ -418,7 +418,8 @@ class Recovering : public ::testing::Test {
     return 0;
   }
 
-  bool partly_hidden_ = false;  ///< three of four points are not seen
+  bool partly_hidden_ = false;      ///< three of four points are not seen
+  std::optional<MapId> lost_in_{};  ///< none: nowhere
   MapScene scene_;
   Replica replica_{TestCamera(), Pyramid()};
   std::optional<Tracker> tracker_;
@@ -438,6 +439,25 @@ TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
   EXPECT_TRUE(tracker_->TakeEvidence(0, 1).items.empty());
   const uint32_t found = FirstFound(kFound + 1);
   EXPECT_NEAR((found - kFound) / 30.0, 0.5, 0.05);
+}
+
+TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict) {
+  Start(1.0);
+  tracker_->BeginLost({kFound - 1, (kFound - 1) * kFrameNs});
+  lost_in_ = MapScene::kMap + 1;
+  const TrackingResult first = Track(kFound);
+  EXPECT_TRUE(first.relocalized) << first.report.reason;
+  EXPECT_FALSE(first.pose);
+  const uint32_t found = FirstFound(kFound + 1);
+  EXPECT_NEAR((found - kFound) / 30.0, 0.5, 0.05);
+}
+
+TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
+  Start(1.0);
+  tracker_->BeginLost({kFound - 1, (kFound - 1) * kFrameNs});
+  lost_in_ = MapScene::kMap + 1;
+  partly_hidden_ = true;
+  for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized);
 }
 
 TEST_F(Recovering, WhoBeginsInAMapLooksAtOnce) {
