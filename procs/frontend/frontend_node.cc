@@ -132,6 +132,7 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return order_.OnRepeat();
   if (end_.Is(SequenceEnd::Phase::kDone)) return PublishSequenceDone();
+  if (pace_.lockstep && pace_.frame_open) order_.OnPlayerWaits();
   if (!order_.Takes({frame->frame_index, frame->stamp_ns}, NewestFrame(), context_.now_ns()))
     return CountMalformed(channels::kFrame,
                           "it is far ahead of those that came; taken when others go on there");
