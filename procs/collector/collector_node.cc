@@ -29,9 +29,10 @@ constexpr int64_t kSyncEveryNs = 1'000'000'000;
 constexpr int64_t kCountersEveryNs = 5'000'000'000;
 constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
-constexpr int64_t kNobodyNs = 60'000'000'000;      // after the player's end: no frontend comes any more
-constexpr int64_t kRoomOnDiskNs = 30'000'000'000;  // after the end: no room comes any more
-constexpr int64_t kSayAgainNs = 30'000'000'000;    // how much waits for the disk
+constexpr int64_t kSilentFrontendNs = 1'000'000'000;  // it says ten times a second that it is there
+constexpr int64_t kNobodyNs = 60'000'000'000;         // after the player's end: no frontend comes any more
+constexpr int64_t kRoomOnDiskNs = 30'000'000'000;     // after the end: no room comes any more
+constexpr int64_t kSayAgainNs = 30'000'000'000;       // how much waits for the disk
 constexpr int64_t kTryAgainNs = 1'000'000'000;
 
 }  // namespace
@@ -71,16 +72,17 @@ void CollectorNode::RecallEndedMap() {
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
-  Announce(info.camera_id, info.num_frames);
+  Announce(info.camera_id, info.num_frames, info.first_frame);
   run_.cameras[info.camera_id].sequence = info.sequence;
 }
 
 /// Noted: a collector after this one may come when the player has left.
-void CollectorNode::Announce(CameraId camera, int64_t num_frames) {
+void CollectorNode::Announce(CameraId camera, int64_t num_frames, uint32_t first_frame) {
   if (num_frames <= 0) return;
-  const bool is_new = frames_.announced.emplace(camera, num_frames).second;
+  const bool is_new = frames_.announced.emplace(camera, std::pair(num_frames, first_frame)).second;
   if (is_new && journal_)
-    journal_->AppendNote("frames " + std::to_string(camera) + " " + std::to_string(num_frames));
+    journal_->AppendNote("frames " + std::to_string(camera) + " " + std::to_string(num_frames) + " " +
+                         std::to_string(first_frame));
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
@@ -147,8 +149,13 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
 /// A process is heard; where another one of its name was before it, that one's counters are kept. What a
 /// collector after this one must know of it goes into the journal.
 void CollectorNode::OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
+  if (!journal_) {
+    const std::pair early(process, pid);
+    if (heard_early_.empty() || heard_early_.back() != early) heard_early_.push_back(early);
+    return;
+  }
   Followed& known = processes_[process];
-  if (known.ids.contains(pid) || !journal_) return;
+  if (known.ids.contains(pid)) return;
   known.ids.insert(pid);
   std::ostringstream note;
   note << "process " << process << ' ' << pid;
@@ -194,7 +201,8 @@ void CollectorNode::ReadNote(const std::string& text) {
   if (kind == "resumed") OnResume();
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;
-  if (CameraId camera = 0; kind == "frames" && note >> camera) note >> frames_.announced[camera];
+  if (CameraId camera = 0; kind == "frames" && note >> camera)
+    note >> frames_.announced[camera].first >> frames_.announced[camera].second;
   if (CameraId camera = 0; kind == "end" && note >> camera && camera < options_.NumCameras()) {
     EndOfSequence& end = ends_.heard[camera];
     end.camera_id = camera;
@@ -251,7 +259,9 @@ void CollectorNode::OnFrontendStatus(FrontendStatus status) {
 }
 
 void CollectorNode::OnProposal(KeyframeId id, MapId map_id, const Version& said) {
-  if (!proposals_.maps.contains(id)) {
+  const auto before = proposals_.not_taken.find(id);
+  const bool said_again = before != proposals_.not_taken.end() && before->second.epoch < said.epoch;
+  if (said_again || !proposals_.maps.contains(id)) {
     journal_->AppendNote("keyframe " + std::to_string(id.value) + " " + std::to_string(map_id) + " " +
                          std::to_string(said.epoch) + " " + std::to_string(said.seq));
     proposals_.not_taken[id] = said;
@@ -267,8 +277,37 @@ void CollectorNode::NoteTaken(CameraId camera) {
     const auto& [id, said] = item;
     const bool taken = id.camera() == camera && said.epoch == mapped.epoch && said.seq <= mapped.seq;
     if (taken) journal_->AppendNote("mapped " + std::to_string(id.value));
+    if (taken) proposals_.in_flight.erase(id);
     return taken;
   });
+}
+
+void CollectorNode::NoteInFlight(KeyframeId id, const SharedBytes& record) {
+  constexpr size_t kMost = 64;  // a frontend makes no more until some are taken
+  auto& in_flight = proposals_.in_flight;
+  if (!proposals_.not_taken.contains(id)) return;
+  in_flight[id] = {record, 0};
+  if (in_flight.size() > kMost) in_flight.erase(in_flight.begin());
+}
+
+/// A frontend that is silent, or another one by now, does not say again what it had proposed. Whoever comes
+/// after it hears it from here.
+void CollectorNode::RepeatWhatIsLeft() {
+  constexpr int kMostOften = 30;  // once a second
+  for (auto& [id, in_flight] : proposals_.in_flight) {
+    const StreamReader& reader = *frontend_readers_[id.camera()];
+    const bool its_frontend_lives =
+        reader.term().epoch == proposals_.not_taken.at(id).epoch && SilentNs(reader) < kSilentFrontendNs;
+    if (its_frontend_lives || in_flight.repeated >= kMostOften || IsKnown(id, proposals_.maps.at(id)))
+      continue;
+    ++in_flight.repeated;
+    context_.bus->Publish({ChannelOfCamera(channels::kKeyframe, id.camera()), in_flight.record, false});
+  }
+}
+
+/// Whether it is in the map, or was, or its map was dropped.
+bool CollectorNode::IsKnown(KeyframeId id, MapId map_id) const {
+  return builder_->map().HasKnown(id) || dropped_maps_.contains(map_id);
 }
 
 /// No mapper had taken it when the frontend died that had said it, and the map goes on with another one.
@@ -390,8 +429,10 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   } else if (record->channel == channels::kFramePose) {
     OnFramePose(*record);
   } else if (record->channel == channels::kKeyframe) {
-    if (const auto proposal = Read<KeyframeProposal>(*record->bytes))
+    if (const auto proposal = Read<KeyframeProposal>(*record->bytes)) {
       OnProposal(proposal->id, proposal->map_id, record->version());
+      if (proposal->id.camera() == camera) NoteInFlight(proposal->id, record->bytes);
+    }
   } else if (record->channel == channels::kInitialMap) {
     if (const auto proposal = Read<InitialMap>(*record->bytes)) {
       OnProposal(proposal->first.id, proposal->map_id, record->version());
@@ -409,11 +450,9 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
 
 /// What was proposed in a map that still stands must be in it, or have left it by being culled.
 void CollectorNode::CountMissingKeyframes() {
-  const Map& map = builder_->map();
   run_.keyframes.proposed = proposals_.maps.size();
   for (const auto& [id, map_id] : proposals_.maps) {
-    const bool known = map.FindKeyframe(id) != nullptr || map.keyframe_tombstones().contains(id);
-    if (known || dropped_maps_.contains(map_id)) continue;
+    if (IsKnown(id, map_id)) continue;
     if (proposals_.before_crash.contains(id)) {
       ++run_.keyframes.lost_in_crash;
     } else if (WentWithFrontend(id)) {
@@ -455,9 +494,11 @@ void CollectorNode::OpenJournal() {
   } else {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
-  for (const auto& [camera, frames] : announced_before) Announce(camera, frames);
+  for (const auto& [camera, frames] : announced_before) Announce(camera, frames.first, frames.second);
   processes_["collector"].former = run_.health["collector"];
-  OnProcess("collector", MeasureProcess().pid, run_.health["collector"]);
+  OnProcess("collector", MeasureProcess(context_.pid).pid, run_.health["collector"]);
+  for (const auto& [process, pid] : std::exchange(heard_early_, {}))
+    OnProcess(process, pid, run_.health[process]);
   if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(
@@ -660,7 +701,7 @@ void CollectorNode::ExitAtEnd() {
 /// be counted, but a number. `ended`: the sequence has come to its end.
 int64_t CollectorNode::PublishedAsFarAsKnown(CameraId camera, bool ended) const {
   const auto announced = frames_.announced.find(camera);
-  if (ended && announced != frames_.announced.end()) return announced->second;
+  if (ended && announced != frames_.announced.end()) return announced->second.first;
   std::optional<uint32_t> first, last;
   for (const auto& [frame, pose] : builder_->frame_poses()) {
     if (frame.camera != camera) continue;
@@ -668,7 +709,7 @@ int64_t CollectorNode::PublishedAsFarAsKnown(CameraId camera, bool ended) const 
     last = frame.index;
   }
   const int64_t span = first ? int64_t{*last} - *first + 1 : 0;
-  return announced == frames_.announced.end() ? span : std::min(span, announced->second);
+  return announced == frames_.announced.end() ? span : std::min(span, announced->second.first);
 }
 
 /// How many frames there were, as the players said it at the end, or else as far as is known.
@@ -678,6 +719,8 @@ void CollectorNode::TakeEnds(bool ended) {
   for (const auto& [camera, end] : ends_.heard)
     run_.cameras[camera].frames = {end.frames_published, end.frames_missing, end.frames_blacked,
                                    end.frames_jumped};
+  for (const auto& [camera, announced] : frames_.announced)
+    if (camera < options_.NumCameras()) run_.cameras[camera].frames.first_index = announced.second;
   run_.end_heard = ends_.heard.contains(0);
 }
 
@@ -736,7 +779,7 @@ void CollectorNode::Stop() {
 /// A camera has no end that is known.
 std::string CollectorNode::OfTotal() const {
   int64_t total = 0;
-  for (const auto& [camera, frames] : frames_.announced) total += frames;
+  for (const auto& [camera, frames] : frames_.announced) total += frames.first;
   return total > 0 ? " of " + std::to_string(total) : "";
 }
 
@@ -752,6 +795,7 @@ void CollectorNode::PublishStatus() {
   if (!journal_ || IsWritten()) return;
   NotePositions();
   RetryDisk();
+  RepeatWhatIsLeft();
   if (context_.now_ns() >= due_.sync_ns) {
     due_.sync_ns = context_.now_ns() + kSyncEveryNs;
     checkpointer_->SyncJournal();

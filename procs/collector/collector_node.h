@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "collector/checkpointer.h"
@@ -35,9 +36,10 @@ class CollectorNode : public StreamNode {
 
  private:
   struct FrameCount {
-    std::map<CameraId, int64_t> announced;  ///< of a sequence, by its player; a live camera announces none
-    int64_t seen = 0;                       ///< whose poses were heard
-    int64_t newest_stamp_ns = 0;            ///< time of the newest
+    /// Of a sequence, by its player: how many, and the index of the first. A live camera announces none.
+    std::map<CameraId, std::pair<int64_t, uint32_t>> announced;
+    int64_t seen = 0;             ///< whose poses were heard
+    int64_t newest_stamp_ns = 0;  ///< time of the newest
     /// Of every camera, its index; none: none has come.
     std::map<CameraId, std::optional<uint32_t>> newest;
   };
@@ -47,12 +49,18 @@ class CollectorNode : public StreamNode {
     ProcessHealth former;   ///< counters of those before the present one, together
     FrontendStatus former_frontend;
   };
+  /// A keyframe that no mapper has taken yet, as its frontend said it.
+  struct InFlight {
+    SharedBytes record;
+    int repeated = 0;
+  };
   /// Keyframes that the frontend said should be.
   struct Proposals {
     std::map<KeyframeId, MapId> maps;
-    std::map<KeyframeId, int64_t> heard_ns;   ///< when each was said to be one
-    std::set<KeyframeId> before_crash;        ///< those of before all processes died
-    std::map<KeyframeId, Version> not_taken;  ///< by a mapper, as the map says; and where they were said
+    std::map<KeyframeId, int64_t> heard_ns;    ///< when each was said to be one
+    std::set<KeyframeId> before_crash;         ///< those of before all processes died
+    std::map<KeyframeId, Version> not_taken;   ///< by a mapper, as the map says; and where they were said
+    std::map<KeyframeId, InFlight> in_flight;  ///< of those, as far as they were heard by this process
   };
   /// What waits for room on the disk.
   struct Disk {
@@ -88,7 +96,7 @@ class CollectorNode : public StreamNode {
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
   void OnEnd(const EndOfSequence& end);
-  void Announce(CameraId camera, int64_t num_frames);
+  void Announce(CameraId camera, int64_t num_frames, uint32_t first_frame);
   int64_t PublishedAsFarAsKnown(CameraId camera, bool ended) const;
   void TakeEnds(bool ended);
   bool TakeMapRecord();
@@ -102,7 +110,10 @@ class CollectorNode : public StreamNode {
   void OnFrontendStatus(FrontendStatus status);
   void CountOwn();
   void OnProposal(KeyframeId id, MapId map_id, const Version& said);
+  void NoteInFlight(KeyframeId id, const SharedBytes& record);
   void NoteTaken(CameraId camera);
+  void RepeatWhatIsLeft();
+  bool IsKnown(KeyframeId id, MapId map_id) const;
   bool WentWithFrontend(KeyframeId id) const;
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
@@ -143,7 +154,8 @@ class CollectorNode : public StreamNode {
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
   std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
-  std::map<std::string, Followed> processes_;  ///< by name
+  std::map<std::string, Followed> processes_;                 ///< by name
+  std::vector<std::pair<std::string, int32_t>> heard_early_;  ///< process and id, before there was a journal
   Proposals proposals_;
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end

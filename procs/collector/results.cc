@@ -246,19 +246,34 @@ Json OtherMapsJson(const TrajectoryBuilder::Trajectories& t) {
   return others;
 }
 
+/// How many frames were played from the one on that was tracked first: also those that left no record, since
+/// they never came to the frontend. Before that one there are as many of them as indices are missing.
+int64_t FramesSinceFirstMap(const RunRecord& run, const TrajectoryBuilder& builder, int64_t first_stamp_ns) {
+  const PlayedFrames& frames = run.first().frames;
+  int64_t recorded = 0, before = 0;
+  std::optional<uint32_t> first;
+  for (const auto& [frame, pose] : builder.frame_poses()) {
+    if (frame.camera != 0) continue;
+    ++recorded;
+    if (pose.stamp_ns < first_stamp_ns) {
+      ++before;
+    } else if (!first) {
+      first = frame.index;
+    }
+  }
+  const int64_t unrecorded = std::max<int64_t>(0, frames.published - recorded);
+  const int64_t gaps = std::max<int64_t>(0, int64_t{first.value_or(0)} - frames.first_index - before);
+  return frames.published - before - std::min(gaps, unrecorded);
+}
+
 Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
                   const TrajectoryBuilder::Trajectories& t) {
   Json json;
-  size_t after_first = 0;
   const auto& poses = builder.frame_poses();
-  if (!t.online.empty()) {
-    after_first = static_cast<size_t>(std::count_if(poses.begin(), poses.end(), [&](const auto& item) {
-      return item.first.camera == 0 && item.second.stamp_ns >= t.online.front().stamp_ns;
-    }));
-  }
+  const int64_t after_first =
+      t.online.empty() ? 0 : FramesSinceFirstMap(run, builder, t.online.front().stamp_ns);
   json["tracked_online_percent"] = Percent(t.online.size(), run.first().frames.published);
-  json["tracked_online_after_first_map_percent"] =
-      Percent(t.online.size(), static_cast<int64_t>(after_first));
+  json["tracked_online_after_first_map_percent"] = Percent(t.online.size(), after_first);
   json["tracked_percent"] = Percent(t.final.size(), run.first().frames.published);
   if (!t.online.empty() && !poses.empty()) {
     json["first_init_s"] =

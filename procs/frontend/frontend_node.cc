@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/codec.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/session_check.h"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr int kMaxUnacceptedKeyframes = 64;
 constexpr double kMaxBehindS = 0.5;
+constexpr int64_t kMostOfOtherSize = 3;       // frames, before the first one that fits
 constexpr uint32_t kTheEnd = kMaxFrames - 1;  // in the place of a frame: what is done when none follows
 
 }  // namespace
@@ -28,7 +30,7 @@ FrontendNode::FrontendNode(NodeContext context, const NodeOptions& options, Fron
     : StreamNode(std::move(context), options, OfCamera("frontend", options.camera_id)),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)) {
-  Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose});
+  Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kKeyframe});
 }
 
 void FrontendNode::Begin(const CameraInfo& info) {
@@ -44,6 +46,7 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.catch_up_in_portions = !pace_.lockstep;
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
+  left_.emplace(session_, options_.camera_id);
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(
       &core_->map(), [this] { return HandOverVersion(); },
@@ -88,6 +91,7 @@ Version FrontendNode::HandOverVersion() {
 }
 
 void FrontendNode::OnWriterOpen() {
+  left_until_ns_ = context_.now_ns() + kBackAfterDeathNs;
   SessionStart start;
   start.session = session_;
   start.camera_id = options_.camera_id;
@@ -106,6 +110,7 @@ void FrontendNode::OnWriterOpen() {
 void FrontendNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kFrame) OnFrame(bytes);
   if (channel == channels::kEndOfSequence) OnEndOfSequence(bytes);
+  if (channel == channels::kKeyframe) OnKeyframe(bytes);
   if (channel != channels::kGroundTruthPose) return;
   const std::optional<GroundTruthPose> truth = Read<GroundTruthPose>(bytes);
   if (truth && !IsForeignFrame(truth->session))
@@ -127,6 +132,7 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return order_.OnRepeat();
   if (end_.Is(SequenceEnd::Phase::kDone)) return PublishSequenceDone();
+  if (pace_.lockstep && pace_.frame_open) order_.OnPlayerWaits();
   if (!order_.Takes({frame->frame_index, frame->stamp_ns}, NewestFrame(), context_.now_ns()))
     return CountMalformed(channels::kFrame,
                           "it is far ahead of those that came; taken when others go on there");
@@ -147,6 +153,26 @@ void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
   if (!end || !camera_info_ || IsForeignFrame(end->session)) return;
   if (end_.Is(SequenceEnd::Phase::kDone)) PublishSequenceDone();
   order_.OnEnd(*end, context_.now_ns());
+}
+
+/// Our own, or what a frontend before this one has left.
+void FrontendNode::OnKeyframe(std::span<const uint8_t> bytes) {
+  const bool in_time = !left_until_ns_ || context_.now_ns() < *left_until_ns_;
+  const std::optional<RecordHeader> header = ParseHeader(bytes);
+  const bool ours = writer_ && header && Term{header->epoch, header->writer} == writer_->term();
+  if (left_ && in_time && !ours) left_->Hear(bytes);
+}
+
+/// Before this frontend proposes anything itself.
+bool FrontendNode::ProposeWhatWasLeft() {
+  using Phase = SequenceEnd::Phase;
+  if (!end_.Is(Phase::kPlaying) && !end_.Is(Phase::kGrowingBack)) return false;
+  const auto proposal = left_->Next(core_->map(), writer_->term());
+  if (!proposal) return false;
+  LogInfo("frontend: the one before it left behind the keyframe of frame {}; it is proposed again",
+          proposal->id.frame_index());
+  keyframe_seqs_.push_back(PublishRecord(*proposal));
+  return true;
 }
 
 // ---- The map ----
@@ -257,6 +283,7 @@ bool FrontendNode::WorkOnce() {
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
+  if (ProposeWhatWasLeft()) return true;
   if (pace_.frame_open) FinishFrame();
   if (waiting_ && !FallsBehind())
     return HasTurn(waiting_->frame.frame_index, waiting_->frame.stamp_ns) && TrackWaiting();
@@ -415,9 +442,17 @@ bool FrontendNode::DecodeImage(const Frame& frame) {
                                  std::to_string(image_.height) + " pixels, but the camera file says " +
                                  std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px) +
                                  "; give the camera file that belongs to the sequence (--camera)"] {
-    Exit(kExitMisfit, problem);
+    OnImageOfOtherSize(problem);
   });
   return false;
+}
+
+/// Where no frame has fitted before, the camera is another one than was said. Later a frame is somebody
+/// else's, and costs its place alone.
+void FrontendNode::OnImageOfOtherSize(const std::string& problem) {
+  ++counts_.of_other_size;
+  if (counts_.processed == 0 && counts_.of_other_size >= kMostOfOtherSize) return Exit(kExitMisfit, problem);
+  OnBadImage(problem);
 }
 
 void FrontendNode::OnBadImage(const std::string& problem) {

@@ -15,6 +15,7 @@
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
+#include "frontend/left_keyframes.h"
 #include "frontend/make_frontend.h"
 #include "frontend/online_error.h"
 #include "frontend/play_order.h"
@@ -47,7 +48,7 @@ class FrontendNode : public StreamNode {
   };
 
   struct FrameCounts {
-    int64_t received = 0, processed = 0, skipped = 0, bad = 0;
+    int64_t received = 0, processed = 0, skipped = 0, bad = 0, of_other_size = 0;
     int64_t processed_at_status = 0;  ///< when the last status was published
   };
   struct FirstMap {
@@ -70,6 +71,8 @@ class FrontendNode : public StreamNode {
   void OnFrame(std::span<const uint8_t> bytes);
   std::optional<PlayOrder::Place> NewestFrame() const;
   void OnEndOfSequence(std::span<const uint8_t> bytes);
+  void OnKeyframe(std::span<const uint8_t> bytes);
+  bool ProposeWhatWasLeft();
   /// A map record that is here but not yet applied.
   struct HeldRecord {
     MapDelta delta;
@@ -107,6 +110,7 @@ class FrontendNode : public StreamNode {
   void Track(const Waiting& waiting, bool withheld);
   bool DecodeImage(const Frame& frame);
   void OnBadImage(const std::string& problem);
+  void OnImageOfOtherSize(const std::string& problem);
   FeatureView ViewOfFeatures() const;
   void DrawPicture(const FrontendOutput& output);
   bool FallsBehind();
@@ -147,7 +151,9 @@ class FrontendNode : public StreamNode {
   int64_t last_stamp_ns_ = 0;
   GrayDecoder decoder_;
   GrayImage image_;
-  std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
+  std::optional<LeftKeyframes> left_;     ///< by a frontend before this one
+  std::optional<int64_t> left_until_ns_;  ///< then all of it was heard; none: not yet known
+  std::deque<int64_t> keyframe_seqs_;     ///< of records not yet accepted by the mapper
   FramePose last_pose_;
   OnlineError error_;
   FrameCounts counts_;

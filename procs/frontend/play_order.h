@@ -20,6 +20,9 @@ class PlayOrder {
 
   /// Whether a frame that is newer than `newest`, the newest that was taken, is to be taken.
   bool Takes(const Place& frame, const std::optional<Place>& newest, int64_t now_ns);
+  /// The newest frame is in work, and who plays waits for it: until that is done nothing can contradict a
+  /// leap.
+  void OnPlayerWaits() { leap_.reset(); }
   /// A frame that was taken before has come again: it is still being played.
   void OnRepeat() { end_.reset(); }
   void OnEnd(const EndOfSequence& end, int64_t now_ns);

@@ -45,6 +45,18 @@ TEST(PlayOrderTest, AFrameFarAheadDeafensNobody) {
   }
 }
 
+/// In lock-step a slow frontend hears nothing else while it works.
+TEST(PlayOrderTest, WhatIsSaidWhileThePlayerWaitsIsNoLeapInEarnest) {
+  Play play;
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(play.Next());
+  for (uint32_t copy = 0; copy < 5; ++copy) {
+    play.order.OnPlayerWaits();
+    EXPECT_FALSE(play.Hear(5000 + copy, kSecond));
+    play.now_ns += 200 * kMs;
+  }
+  EXPECT_TRUE(play.Next()) << "the player's own are taken";
+}
+
 TEST(PlayOrderTest, ALeapInEarnestIsBelieved) {
   Play play;
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(play.Next());

@@ -143,6 +143,10 @@ bool MapperNode::FetchReplica() {
     if (delta) left_.replica->Apply(*delta);
   }
   if (left_.fetch->state() == ReplicaFetch::State::kNone) return true;
+  if (left_.fetch->KeepsGrowing(context_.now_ns()))
+    Exit(kExitPresent,
+         "the map that the others hold grows while it is fetched: another mapper writes it, which is not "
+         "heard here; check the network, or stop that one");
   if (left_.fetch->state() != ReplicaFetch::State::kDone) return false;
   const Version version = left_.fetch->version();
   LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,

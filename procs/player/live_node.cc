@@ -129,7 +129,7 @@ void LiveNode::PublishStatus() {
   PlayerStatus status;
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
-  status.head.health = MeasureProcess();
+  status.head.health = MeasureProcess(context_.pid);
   status.head.health.dropped_foreign = context_.refused();
   if (!away_.empty()) status.head.reason = "the camera is away";
   status.state = ending_ ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying;
@@ -184,7 +184,7 @@ void LiveNode::Stop() {
 }
 
 int64_t LiveNode::deadline_ns() const {
-  if (!office_.held()) return endpoint_.deadline_ns();
+  if (!office_.held()) return std::min(endpoint_.deadline_ns(), office_.deadline_ns());
   const int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
   return ending_ ? std::min(deadline, end_.due_ns()) : deadline;
 }

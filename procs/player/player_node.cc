@@ -104,7 +104,7 @@ bool PlayerNode::MayPlay() {
     if (position_ > 0) LogInfo("player: others have {} frames already; goes on behind them", position_);
     start_ns_ += context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
   }
-  return playing_;
+  return playing_ && office_.held();
 }
 
 void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -271,7 +271,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   PlayerStatus status;
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
-  status.head.health = MeasureProcess();
+  status.head.health = MeasureProcess(context_.pid);
   status.head.health.dropped_foreign = context_.refused();
   if (awaiting_done_) status.head.health.waiting_for = "frontend";
   status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
@@ -309,7 +309,7 @@ void PlayerNode::Advance() {
 }
 
 int64_t PlayerNode::deadline_ns() const {
-  if (!playing_) return endpoint_.deadline_ns();
+  if (!playing_ || !office_.held()) return std::min(endpoint_.deadline_ns(), office_.deadline_ns());
   int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
   if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
   if (position_ < order_.size()) return std::min(deadline, DueNs(position_));

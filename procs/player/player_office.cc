@@ -54,15 +54,23 @@ void PlayerOffice::Advance() {
     exit_code_ = kExitPresent;
     problem_ = "session " + std::to_string(part_.session) + ": " + election_.refusal();
   }
-  if (!writer_) return;
-  if (writer_->close_requested_by()) {
-    LogInfo("player: hands session {} over to {}", part_.session, *writer_->close_requested_by());
-    exit_code_ = kExitDone;
-  }
+  if (writer_) WatchWriter();
+}
+
+/// Who asks to go on in this one's place may be nobody: then this one is to be started again.
+void PlayerOffice::WatchWriter() {
   if (writer_->superseded_by()) {
+    exit_code_ = hands_over_until_ns_ ? kExitDone : kExitSuperseded;
+    problem_ = hands_over_until_ns_ ? ""
+                                    : "another player has taken over session " +
+                                          std::to_string(part_.session) + ": " + *writer_->superseded_by();
+  } else if (writer_->close_requested_by() && !hands_over_until_ns_) {
+    LogInfo("player: hands session {} over to {}", part_.session, *writer_->close_requested_by());
+    hands_over_until_ns_ = context_.now_ns() + kGoesOnWithinNs;
+    writer_->Close(context_.now_ns());
+  } else if (hands_over_until_ns_ && context_.now_ns() >= *hands_over_until_ns_) {
     exit_code_ = kExitSuperseded;
-    problem_ = "another player has taken over session " + std::to_string(part_.session) + ": " +
-               *writer_->superseded_by();
+    problem_ = NobodyWentOn(*writer_->close_requested_by());
   }
 }
 

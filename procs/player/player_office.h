@@ -32,21 +32,25 @@ class PlayerOffice {
 
   /// To be called before each turn.
   void Advance();
-  /// The election is won.
-  bool held() const { return writer_ != nullptr; }
-  /// Set when it may not play (any more): the process's exit code, and why. 0: another player asked to go on
-  /// in this one's place.
+  /// The election is won, and no other player has asked to go on in this one's place.
+  bool held() const { return writer_ != nullptr && !hands_over_until_ns_; }
+  /// Set when it may not play (any more): the process's exit code, and why. 0: another player goes on in this
+  /// one's place.
   std::optional<int> exit_code() const { return exit_code_; }
   const std::string& problem() const { return problem_; }
+  /// When Advance has something to do that no message brings.
+  int64_t deadline_ns() const { return hands_over_until_ns_.value_or(INT64_MAX); }
 
  private:
   void Open();
+  void WatchWriter();
 
   NodeContext context_;
   Part part_;
   Endpoint* endpoint_;
   WriterElection election_;
   std::unique_ptr<StreamWriter> writer_;
+  std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for it must have gone on
   std::optional<int> exit_code_;
   std::string problem_;
 };

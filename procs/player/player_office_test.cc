@@ -89,7 +89,26 @@ TEST_F(PlayerOfficeTest, WhoIsAskedToLeaveLeaves) {
   Player& second = Add(7, true);
   Pass(6);
   EXPECT_EQ(first.office.exit_code(), kExitDone);
+  EXPECT_EQ(first.office.problem(), "");
   EXPECT_TRUE(second.office.held());
+}
+
+/// Who asks for its place and is not there afterwards, as somebody who forges.
+TEST_F(PlayerOfficeTest, WhereNobodyGoesOnItIsToBeStartedAgain) {
+  Player& first = Add();
+  Pass(3);
+  Player& second = Add(7, true);
+  for (int i = 0; i < 200 && first.office.held(); ++i) Pass(0.02);
+  ASSERT_FALSE(first.office.held()) << "it was asked to leave";
+  EXPECT_EQ(first.office.exit_code(), std::nullopt) << "it waits for who has asked";
+  ASSERT_FALSE(second.office.held());
+  const std::unique_ptr<Player> gone = std::move(players_.back());  // says nothing any more
+  players_.pop_back();
+  Pass(9);
+  EXPECT_EQ(first.office.exit_code(), std::nullopt);
+  Pass(2);
+  EXPECT_EQ(first.office.exit_code(), kExitSuperseded);
+  EXPECT_NE(first.office.problem().find("pid 18"), std::string::npos) << first.office.problem();
 }
 
 TEST_F(PlayerOfficeTest, OfTwoThatBeginTogetherOneStops) {

@@ -225,7 +225,8 @@ void Supervisor::OnDeath(Child* child, int code) {
 std::optional<int64_t> Supervisor::DelayBeforeRestart(Child* child, int code) {
   if (!restarting_ || !child->spec.restart || !WorthRestarting(code)) return std::nullopt;
   const int64_t now = now_ns();
-  const bool short_life = now - child->began_ns < options_.short_life_ns;
+  const int64_t short_ns = code == kExitSuperseded ? options_.short_office_ns : options_.short_life_ns;
+  const bool short_life = now - child->began_ns < short_ns;
   if (!short_life) {
     child->lived = true;
     child->short_lives = 0;

@@ -54,8 +54,11 @@ class Supervisor {
  public:
   struct Options {
     int64_t short_life_ns = 3'000'000'000;  ///< who lives for less has made no progress
-    int most_short_lives = 8;               ///< in a row; then it is past help
-    int64_t first_delay_ns = 200'000'000;   ///< before the second start in a row; doubles with each
+    /// Nor has who is superseded within this time: it listens for others first, and waits for who asks for
+    /// its place.
+    int64_t short_office_ns = 60'000'000'000;
+    int most_short_lives = 8;              ///< in a row; then it is past help
+    int64_t first_delay_ns = 200'000'000;  ///< before the second start in a row; doubles with each
     int64_t longest_delay_ns = 5'000'000'000;
     int64_t patience_ns =
         60'000'000'000;                   ///< bus or camera may be gone for so long; never at the first start

@@ -158,6 +158,22 @@ TEST(SupervisorTest, GivesUpOnWhoDiesAsSoonAsItLives) {
   EXPECT_EQ(delays, (std::vector<int64_t>{0, 20'000'000, 40'000'000}));
 }
 
+/// As where somebody forges who asks for its place again and again.
+TEST(SupervisorTest, GivesUpOnWhoIsSupersededAgainAndAgain) {
+  Supervisor::Options options = Eager();
+  options.most_short_lives = 3;
+  options.short_life_ns = 1;
+  Supervisor supervisor(options);
+  supervisor.Start(Shell("child", "exit 4"));
+  int restarts = 0;
+  ChildEvent event;
+  while ((event = supervisor.Wait()).kind == Kind::kRestarted && restarts < 10) ++restarts;
+  EXPECT_EQ(restarts, 3);
+  EXPECT_EQ(event.kind, Kind::kEnded);
+  EXPECT_EQ(event.code, kExitSuperseded);
+  EXPECT_FALSE(event.yields);
+}
+
 TEST(SupervisorTest, WhoWasSupersededAndThenFindsAnotherYields) {
   Supervisor supervisor(Eager());
   const std::string first = testing::TempDir() + "/dmslam_yields_" + std::to_string(getpid());

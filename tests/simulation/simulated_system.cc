@@ -229,6 +229,7 @@ class SimulatedSystem {
     context.random_id = static_cast<int64_t>(random_.Next() >> 2) + 1;
     context.name = process.role + " on host " + std::to_string(process.host) + " (life " +
                    std::to_string(process.lives) + ")";
+    context.pid = ++pids_;
     context.fresh_system = schedule_.fresh_system && process.lives == 1 && !process.takes_over;
     return context;
   }
@@ -430,6 +431,7 @@ class SimulatedSystem {
   std::optional<int64_t> cut_until_ns_;
   int64_t disk_full_until_ns_ = 0;
   std::optional<int64_t> farewell_ns_;  ///< who is there then is told to end
+  int32_t pids_ = 0;                    ///< given so far
   bool moving_ = false;                 ///< who ends now begins elsewhere
   Outcome outcome_;
 };

@@ -50,6 +50,7 @@ class Forger {
 
   bool Forge(const std::string& kind) {
     static const std::map<std::string, void (Forger::*)()> kKinds = {{"frame", &Forger::Frames},
+                                                                     {"small-frame", &Forger::SmallFrames},
                                                                      {"far-frame", &Forger::FarFrame},
                                                                      {"end", &Forger::End},
                                                                      {"camera", &Forger::AnotherCamera},
@@ -109,12 +110,16 @@ class Forger {
   }
 
   void Frames() {
-    std::optional<Frame> frame = Last<Frame>();
     const std::optional<CameraInfo> info = Last<CameraInfo>();
-    if (!frame || !info) return;
+    if (info) NextFrames(info->camera.width_px, info->camera.height_px);
+  }
+  void SmallFrames() { NextFrames(32, 32); }
+  void NextFrames(int width_px, int height_px) {
+    std::optional<Frame> frame = Last<Frame>();
+    if (!frame) return;
     frame->encoding = FrameEncoding::kGray8;
-    frame->width_px = info->camera.width_px;
-    frame->height_px = info->camera.height_px;
+    frame->width_px = width_px;
+    frame->height_px = height_px;
     frame->data.assign(static_cast<size_t>(frame->width_px) * static_cast<size_t>(frame->height_px), 100);
     for (int ahead = 1; ahead < 3; ++ahead) {
       ++frame->frame_index;
@@ -257,9 +262,10 @@ int main(int argc, char** argv) {
   app.AddOption("--lcm-url", url).Required();
   app.AddOption("--key", key, "of another system");
   app.AddFlag("--keep-tag", keeps_tag, "put the tag of what was heard behind what is forged");
-  app.AddOption("--kind", kinds,
-                "frame, far-frame, end, camera, take-over, head, record, reset, ack, done, far-done, "
-                "sequence-done, replay")
+  app.AddOption(
+         "--kind", kinds,
+         "frame, small-frame, far-frame, end, camera, take-over, head, record, reset, ack, done, far-done, "
+         "sequence-done, replay")
       .Required();
   app.AddOption("--times", times, "end after so many forgeries of each kind; default: a signal ends it");
   app.AddOption("--from-frame", from_frame, "begin when this frame has been played");

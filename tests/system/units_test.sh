@@ -2,7 +2,6 @@
 # of a signal is started again as Restart=on-failure does, and the others go on.
 source "$(dirname "$0")/lib.sh"
 need_synthetic
-multicast
 
 declare -A setting=([DMSLAM_LCM_URL]="udpm://239.255.76.67:23421?ttl=0&recv_buf_size=4194304"
   [DMSLAM_OUT]=$work/out [DMSLAM_SEQUENCE]=$synthetic
@@ -32,6 +31,12 @@ for process in mapper loopcloser frontend collector player; do
   supervise "$process" &
   [[ $process != collector ]] || collector=$!
 done
+# There is no network yet: everybody is started again until there is.
+for process in mapper loopcloser frontend collector player; do
+  for ((i = 0; i < 400; ++i)); do grep -qs "ended with 7" "$work/$process.restarts" && break; sleep 0.05; done
+  check "$process waits for the network: $(tail -n 1 "$work/$process.log")" grep -qs "ended with 7" "$work/$process.restarts"
+done
+multicast
 until grep -qs 'frame [0-9]* of' "$work/collector.log"; do
   kill -0 "$collector" 2>/dev/null || break
   sleep 0.05

@@ -2,13 +2,31 @@
 
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <ctime>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 #include <string>
 
 #include "dmslam/dataset/joined_clock.h"
 #include "dmslam/util/check.h"
+
+namespace {
+
+/// While this is on somebody sets the wall clock back by a minute whenever it was read.
+std::atomic<bool> g_clock_is_set{false};
+std::atomic<int> g_times_read{0};
+
+}  // namespace
+
+extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const int result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
+  if (result == 0 && clock == CLOCK_REALTIME && g_clock_is_set) time->tv_sec -= 60 * g_times_read++;
+  return result;
+}
 
 namespace dmslam {
 namespace {
@@ -67,6 +85,28 @@ TEST(LiveSource, GivesTheNewestFrameAndCountsTheOthers) {
   EXPECT_EQ(last_index, 3);
   EXPECT_EQ(taken + source->dropped(), 4);
   EXPECT_FALSE(source->Take().has_value());
+}
+
+TEST(LiveSource, AWallClockThatIsSetBackMovesNoStamp) {
+  const std::string path = WriteVideo();
+  if (path.empty()) GTEST_SKIP() << "OpenCV writes no videos here";
+  g_clock_is_set = true;
+  const auto source = OpenLive(path, SmallCamera());
+  std::vector<int64_t> stamps;
+  while (!source->ended()) {
+    pollfd waiting{source->fd(), POLLIN, 0};
+    ASSERT_EQ(poll(&waiting, 1, 10'000), 1) << "the source says nothing more and has not ended";
+    if (const auto frame = source->Take()) stamps.push_back(frame->stamp_ns);
+  }
+  g_clock_is_set = false;
+  ASSERT_FALSE(stamps.empty());
+  EXPECT_GT(g_times_read, 0) << "stamps are joined to the wall clock once";
+  const int64_t wall_ns = static_cast<int64_t>(std::time(nullptr)) * 1'000'000'000;
+  EXPECT_LT(std::abs(wall_ns - stamps.front()), 50'000'000'000) << "by its first reading";
+  for (size_t i = 1; i < stamps.size(); ++i) {
+    EXPECT_GT(stamps[i] - stamps[i - 1], 1) << "not pressed behind the one before";
+    EXPECT_LT(stamps[i] - stamps[i - 1], 50'000'000'000);
+  }
 }
 
 TEST(LiveSource, RefusesWhatIsNoCameraOfThatSize) {

@@ -53,4 +53,40 @@ class Claims {
   int64_t order_ = 0;
 };
 
+/// Tells who goes on asking from who has asked a few times in a row, as somebody does who forges: a request
+/// counts when its sender has made it for half a second, and was never silent for a second meanwhile. A copy
+/// of a message is not a second one. Keeps a few senders: the one that was heard longest ago makes room.
+class Insistence {
+ public:
+  /// Whether `who` has asked for long enough. `utime`: of the message, its sender's clock.
+  bool Asks(int64_t who, int64_t utime, int64_t now_ns) {
+    const auto [found, is_new] = asked_.try_emplace(who, Asked{now_ns, now_ns, utime});
+    Asked& asked = found->second;
+    if (!is_new && utime <= asked.utime) return false;
+    if (now_ns - asked.last_ns > kSilentNs) asked.since_ns = now_ns;
+    asked.last_ns = now_ns;
+    asked.utime = utime;
+    const bool insists = now_ns - asked.since_ns >= kLongEnoughNs;
+    if (asked_.size() > kMost) Forget();
+    return insists;
+  }
+
+ private:
+  static constexpr size_t kMost = 16;
+  static constexpr int64_t kLongEnoughNs = 500'000'000;
+  static constexpr int64_t kSilentNs = 1'000'000'000;
+  struct Asked {
+    int64_t since_ns = 0, last_ns = 0;
+    int64_t utime = 0;  // of the newest one
+  };
+
+  void Forget() {
+    asked_.erase(std::min_element(asked_.begin(), asked_.end(), [](const auto& a, const auto& b) {
+      return a.second.last_ns < b.second.last_ns;
+    }));
+  }
+
+  std::map<int64_t, Asked> asked_;  // by who asks
+};
+
 }  // namespace dmslam

@@ -197,6 +197,24 @@ TEST(Forgery, ARequestToTakeOver) {
   wire.ExpectUnharmed();
 }
 
+/// Five within a tenth of a second, and again every two seconds.
+TEST(Forgery, RequestsToTakeOverInARow) {
+  Wire wire;
+  take_over_t forged{};
+  forged.header = wire.head->header;
+  forged.successor = 99;
+  forged.name = "nobody";
+  for (int row = 0; row < 3; ++row) {
+    for (int i = 0; i < 5; ++i) {
+      forged.utime = wire.now_ns / 1000;
+      wire.Deliver(SealedMessage(TakeOverChannel("TEST"), forged));
+      wire.Run(20);
+    }
+    wire.Run(1900);
+  }
+  wire.ExpectUnharmed();
+}
+
 TEST(Forgery, AnAckFromTheFuture) {
   Wire wire;
   wire.ForgeAck([](ack_t& forged) { forged.utime += kHourUs; });

@@ -545,9 +545,11 @@ TEST(Stream, WhatIsHandedOverGoesOn) {
   pair.Run(200 * kMs);
   EXPECT_EQ(pair.TakeAll().size(), 1u);
   pair.reader.AcceptTaken();
-  for (int64_t utime : {1, 2}) {
+  for (int64_t asked = 0; asked < 4; ++asked) {
+    EXPECT_FALSE(pair.writer.close_requested_by()) << "asked " << asked << " times";
+    pair.Run(200 * kMs);
     take_over_t request{};
-    request.utime = utime;
+    request.utime = pair.now_ns / 1000;
     request.header.session = kSession;
     request.header.stream = static_cast<int32_t>(StreamId::kTest);
     request.header.epoch = pair.writer.term().epoch;
@@ -675,6 +677,29 @@ TEST(Codec, CountsAndLengthsThatDoNotFitAreRefused) {
     Seal(*ParseHeader(bytes), "A", bytes);
     EXPECT_FALSE(DecodeAck("A", bytes)) << count;
   }
+}
+
+/// Of a record's and of every message of the protocol: it is a checksum like any other.
+TEST(Codec, AChecksumOfZeroIsRefused) {
+  const auto without_checksum = [](Bytes bytes) {
+    Seal(*ParseHeader(bytes), "A", bytes);
+    EXPECT_TRUE(IsIntact("A", bytes));
+    PutInt(int32_t{0}, kHeaderOffset + kHeaderBytes - 4, bytes);
+    EXPECT_EQ(ParseHeader(bytes)->crc32c, 0);
+    return bytes;
+  };
+  ack_t ack{};
+  ack.role = "r";
+  head_t head{};
+  head.name = "w";
+  take_over_t request{};
+  request.name = "n";
+  const Bytes record = MakeRecord(1), of_ack = *SealedMessage("A", ack).bytes;
+  EXPECT_FALSE(IsIntact("A", without_checksum(record)));
+  EXPECT_FALSE(DecodeAck("A", without_checksum(of_ack)));
+  EXPECT_FALSE(DecodeHead("A", without_checksum(*SealedMessage("A", head).bytes)));
+  EXPECT_FALSE(DecodeTakeOver("A", without_checksum(*SealedMessage("A", request).bytes)));
+  ASSERT_TRUE(DecodeAck("A", of_ack)) << "with one it is sound";
 }
 
 TEST(Codec, NoBytesWhateverMakeTheDecodersThrowOrAccept) {

@@ -105,7 +105,7 @@ void StreamWriter::Receive(const std::string& channel, std::span<const uint8_t> 
   } else if (type == head_t::getHash() && channel == HeadChannel(options_.owner)) {
     ReceiveHead(channel, bytes);
   } else if (type == take_over_t::getHash()) {
-    ReceiveTakeOver(channel, bytes);
+    ReceiveTakeOver(channel, bytes, now_ns);
   } else {
     ++statistics_.dropped_bad;
   }
@@ -133,7 +133,8 @@ bool StreamWriter::SaidAgain(const Term& term, int64_t utime) {
   return again;
 }
 
-void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes) {
+void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes,
+                                   int64_t now_ns) {
   const std::optional<take_over_t> request = DecodeTakeOver(channel, bytes);
   if (!request) {
     ++statistics_.dropped_bad;
@@ -142,10 +143,10 @@ void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const u
   if (request->header.stream != static_cast<int32_t>(options_.stream)) return;
   if (request->header.session != options_.session) {
     ++statistics_.dropped_foreign;
-  } else if (Term{request->header.epoch, request->header.writer} == term_) {
-    if (successors_.SaidAgain(request->successor, request->utime)) close_requested_by_ = request->name;
-  } else {
+  } else if (Term{request->header.epoch, request->header.writer} != term_) {
     ++statistics_.dropped_stale;
+  } else if (successors_.Asks(request->successor, request->utime, now_ns)) {
+    close_requested_by_ = request->name;
   }
 }
 

@@ -115,7 +115,7 @@ class StreamWriter : public StateMachine {
   /// Set when another writer has a higher term, and has said so twice: this one is silent from then on, and
   /// its owner must stop. Names the other.
   const std::optional<std::string>& superseded_by() const { return superseded_by_; }
-  /// Set when a newcomer asked for the stream, and asked again: finish what is pending, then Close.
+  /// Set when a newcomer has asked for the stream for half a second: finish what is pending, then Close.
   const std::optional<std::string>& close_requested_by() const { return close_requested_by_; }
   /// Names the last reader that was refused because of its protocol version or schema; empty when there was
   /// none.
@@ -178,7 +178,7 @@ class StreamWriter : public StateMachine {
 
   void ReceiveAck(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
   void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes);
-  void ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes);
+  void ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
   Reader* Meet(const ack_t& ack, int64_t now_ns);
   bool IsInTime(const ack_t& ack, int64_t now_ns, Reader* reader);
   bool SaidAgain(const Term& term, int64_t utime);
@@ -208,7 +208,7 @@ class StreamWriter : public StateMachine {
   std::map<int64_t, Reader> readers_;          // by reader id
   std::map<std::string, int64_t> role_floor_;  // of required roles: what they last accepted
   Claims<Term> terms_;                         // higher than ours
-  Claims<int64_t> successors_;                 // who asked for the stream
+  Insistence successors_;                      // who asks for the stream
   Claims<Version> newer_;                      // than what this term continues
   std::optional<std::string> superseded_by_, close_requested_by_;
   std::optional<Version> newer_replica_;

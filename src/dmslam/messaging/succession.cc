@@ -42,11 +42,19 @@ void ReplicaFetch::Advance(int64_t now_ns) {
   reader_->Advance(now_ns);
   Append(reader_->TakeOutgoing(), &outgoing_);
   if (state_ != State::kReceiving) return;
+  CountBegun(now_ns);
   if (std::exchange(taken_before_, taken_) != taken_) advanced_ns_ = now_ns;
   if (now_ns - advanced_ns_ < options_.stalled_ns) return;
   reader_.reset();
   search_.TryAgain(now_ns);
   state_ = State::kSearching;
+}
+
+/// The holder begins again in another term when what it hands over has grown.
+void ReplicaFetch::CountBegun(int64_t now_ns) {
+  if (reader_->term() == handed_over_in_) return;
+  handed_over_in_ = reader_->term();
+  if (begun_++ == 0) first_begun_ns_ = now_ns;
 }
 
 void ReplicaFetch::OpenReader(int64_t now_ns) {
@@ -69,6 +77,8 @@ void ReplicaFetch::OpenReader(int64_t now_ns) {
   options.only_writer = search_.asker();
   options.limits = options_.limits;
   reader_ = std::make_unique<StreamReader>(options);
+  handed_over_in_ = {};
+  begun_ = 0;
   advanced_ns_ = now_ns;
   state_ = State::kReceiving;
 }
@@ -109,7 +119,9 @@ void ReplicaServer::Receive(const std::string& channel, std::span<const uint8_t>
 void ReplicaServer::Advance(int64_t now_ns) {
   Append(holder_.TakeOutgoing(), &outgoing_);
   const bool chosen_anew = holder_.chosen_by() && holder_.chosen_by() != served_;
+  if (chosen_anew) idle_since_ns_ = now_ns;
   // A replica that grew while it is handed over is begun again: parent and content must be of one version.
+  // Not for ever: who took it writes the stream now, and makes the replica grow.
   if (chosen_anew || (writer_ && held_() != offered_)) Open(now_ns);
   if (!writer_) return;
   writer_->Advance(now_ns);
@@ -122,7 +134,6 @@ void ReplicaServer::Open(int64_t now_ns) {
   writer_.reset();
   served_ = holder_.chosen_by();
   offered_ = held_();
-  idle_since_ns_ = now_ns;
   if (offered_.empty()) return;
   epoch_ = std::max(now_ns / 1000, epoch_ + 1);
   StreamWriter::Options options;

@@ -57,9 +57,17 @@ class ReplicaFetch : public StateMachine {
   /// What was fetched: the parent of the term to come; empty when nothing was.
   const Version& version() const { return version_; }
   const std::vector<Holder>& holders() const { return options_.holders; }
+  /// What is handed over grows again and again, so that it never comes to its end: somebody writes the stream
+  /// whom the holder hears, and this process does not.
+  bool KeepsGrowing(int64_t now_ns) const {
+    return state_ == State::kReceiving && begun_ > kMostBegun && now_ns - first_begun_ns_ > kMostGrowingNs;
+  }
 
  private:
+  static constexpr int kMostBegun = 20;
+  static constexpr int64_t kMostGrowingNs = 10'000'000'000;
   void OpenReader(int64_t now_ns);
+  void CountBegun(int64_t now_ns);
 
   Options options_;
   State state_ = State::kSearching;
@@ -68,6 +76,9 @@ class ReplicaFetch : public StateMachine {
   Version version_;
   int64_t advanced_ns_ = 0;  // when the transfer last advanced
   int64_t taken_ = 0, taken_before_ = 0;
+  Term handed_over_in_;  // the present transfer
+  int begun_ = 0;        // of the chosen holder's
+  int64_t first_begun_ns_ = 0;
   std::vector<Outgoing> outgoing_;
 };
 

@@ -12,6 +12,7 @@
 #include "dmslam/messaging/codec.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/crc32c.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 namespace {
@@ -82,8 +83,12 @@ bool Journal::ReadAll(const Handler& handle, const NoteHandler& read) {
 void Journal::Resume(int64_t session, const Handler& handle, const NoteHandler& read) {
   session_ = session;
   Open(O_RDWR | O_CREAT);
-  if (!ReadAll(handle, read)) return SetAside();
-  if (ftruncate(fd_, size_) != 0) throw InputError(path_ + ": cannot be written; check its rights");
+  if (!ReadAll(handle, read)) {
+    SetAside();
+  } else if (ftruncate(fd_, size_) != 0) {
+    throw InputError(path_ + ": cannot be written; check its rights");
+  }
+  SyncFolderOf(path_);
 }
 
 bool Journal::Read(const std::string& path, int64_t session, const Handler& handle, const NoteHandler& read) {
@@ -98,6 +103,7 @@ void Journal::Begin(int64_t session) {
   session_ = session;
   Open(O_RDWR | O_CREAT);
   if (!ReadAt(0, 1).empty()) SetAside();
+  SyncFolderOf(path_);
 }
 
 void Journal::ForEach(const Handler& handle) {
@@ -178,10 +184,8 @@ void Journal::Remove() {
 /// What another session has left is none of ours, and not ours to remove.
 void Journal::SetAside() {
   Close();
-  const std::string aside = path_ + ".former";
-  std::error_code error;
-  std::filesystem::rename(path_, aside, error);
-  if (error) throw InputError(path_ + ": is of another session, and cannot be renamed; check its rights");
+  if (!RenameDurably(path_, path_ + ".former"))
+    throw InputError(path_ + ": is of another session, and cannot be renamed; check its rights");
   Open(O_RDWR | O_CREAT);
 }
 

@@ -19,9 +19,10 @@ struct NodeContext {
   std::function<int64_t()> wall_us;  ///< for utime and terms of office; reaches no result
   std::function<void()> pump;        ///< delivers what has arrived, between steps of work; may do nothing
   std::function<void(int fd, std::function<void()> on_readable)>
-      watch;              ///< of descriptors of its own; may be none
-  int64_t random_id = 1;  ///< of this process: reader and writer id
-  std::string name;       ///< "mapper on host (pid 17)"
+      watch;                   ///< of descriptors of its own; may be none
+  int64_t random_id = 1;       ///< of this process: reader and writer id
+  std::string name;            ///< "mapper on host (pid 17)"
+  std::optional<int32_t> pid;  ///< as it is told in statuses; none: that of the system's process
   /// Messages that the bus kept from the node, since it has a key and they had no tag that fits.
   std::function<int64_t()> refused = [] { return int64_t{0}; };
   bool fresh_system = false;  ///< nobody else can be writing: no listening before a stream begins

@@ -24,9 +24,9 @@ double ResidentMegabytes() {
 
 }  // namespace
 
-ProcessHealth MeasureProcess() {
+ProcessHealth MeasureProcess(std::optional<int32_t> pid) {
   ProcessHealth health;
-  health.pid = getpid();
+  health.pid = pid.value_or(getpid());
   health.host = HostName();
   health.rss_mb = ResidentMegabytes();
   return health;

@@ -1,13 +1,16 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "dmslam/wire/status.h"
 
 namespace dmslam {
 
-/// Process id, host, resident memory and processor share of this process, as the system tells them.
-ProcessHealth MeasureProcess();
+/// Process id, host, resident memory and processor share of this process, as the system tells them; `pid`:
+/// under which it goes instead, where several are simulated in one.
+ProcessHealth MeasureProcess(std::optional<int32_t> pid = std::nullopt);
 
 /// "mapper on host (pid 17)".
 std::string ProcessName(const std::string& role);

@@ -292,6 +292,7 @@ void StreamNode::OpenWriter() {
 
 void StreamNode::WatchWriter() {
   if (!writer_) return;
+  if (hands_over_until_ns_) return WatchHandOver();
   if (writer_->superseded_by())
     Exit(kExitSuperseded, "another writer has taken over the stream: " + *writer_->superseded_by());
   if (const std::optional<Version>& newer = writer_->newer_replica()) {
@@ -302,8 +303,17 @@ void StreamNode::WatchWriter() {
   if (writer_->close_requested_by() && !stopping_) {
     LogInfo("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
     Stop();
+    hands_over_until_ns_ = context_.now_ns() + kGoesOnWithinNs;
   }
   if (stopping_ && writer_->closed() && !exit_code_) Exit(kExitDone);
+}
+
+/// The stream is closed, and goes on with who asked for it. That may be nobody: then this process is to be
+/// started again.
+void StreamNode::WatchHandOver() {
+  if (writer_->superseded_by()) return Exit(kExitDone);
+  if (context_.now_ns() >= *hands_over_until_ns_)
+    Exit(kExitSuperseded, NobodyWentOn(*writer_->close_requested_by()));
 }
 
 bool StreamNode::JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum) {
@@ -407,6 +417,7 @@ int64_t StreamNode::deadline_ns() const {
 }
 
 void StreamNode::Stop() {
+  hands_over_until_ns_.reset();  // who is asked to end as well waits for nobody
   if (stopping_) return;
   stopping_ = true;
   if (writer_) {
@@ -420,6 +431,11 @@ void StreamNode::Exit(int code, std::string problem) {
   if (exit_code_) return;
   exit_code_ = code;
   problem_ = std::move(problem);
+}
+
+std::string NobodyWentOn(const std::string& who_asked) {
+  return who_asked + " asked for the stream, and nobody has gone on with it for " +
+         std::to_string(kGoesOnWithinNs / 1'000'000'000) + " s";
 }
 
 namespace {
@@ -465,7 +481,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   head.session = session_;
   head.reason = reason;
   ProcessHealth& health = head.health;
-  health = MeasureProcess();
+  health = MeasureProcess(context_.pid);
   health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;
   health.received = traffic_.received;
   health.received_bytes = traffic_.received_bytes;

@@ -25,6 +25,10 @@ namespace dmslam {
 /// Hash over the fingerprints of all message types: processes with another one are refused by name.
 int64_t SchemaHash();
 
+/// Who asked for a stream has gone on with it so long after that, or does not mean it.
+inline constexpr int64_t kGoesOnWithinNs = 10'000'000'000;
+std::string NobodyWentOn(const std::string& who_asked);
+
 /// Why a process without a key understands nothing of those that have one.
 inline constexpr char kHasTag[] = "its sender has a key; give every process the same --key";
 
@@ -167,6 +171,7 @@ class StreamNode : public Node {
   void OpenWriter();
   std::vector<std::string> ReaderNames() const;
   void WatchWriter();
+  void WatchHandOver();
   void WatchReaders();
   /// Keeps the protocol alive while one step of work follows the other.
   void PumpBetweenSteps();
@@ -195,6 +200,7 @@ class StreamNode : public Node {
   };
 
   bool begun_ = false;
+  std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for the stream must have gone on with it
   std::map<CameraId, KnownCamera> cameras_;
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterElection> election_;

@@ -5,6 +5,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/replica.h"
+#include "dmslam/runtime/exit_codes.h"
 
 namespace dmslam {
 namespace {
@@ -275,29 +276,89 @@ class Publisher : public StreamNode {
   bool WorkOnce() override { return false; }
 };
 
-TEST(RecordBoundTest, ARecordAboveTheBoundIsRefusedAndAChangeIsSplit) {
-  MemoryBus bus;
-  int64_t now_ns = kMs;
-  NodeContext context;
-  context.bus = &bus.AddPort();
-  Bus* other = &bus.AddPort();
-  context.now_ns = [&] { return now_ns; };
-  context.wall_us = [&] { return now_ns / 1000; };
-  context.random_id = 7;
-  context.fresh_system = true;
-  NodeOptions options;
-  options.session = kSession;
-  Publisher publisher(context, options);
-  CameraInfo info;
-  info.session = kSession;
-  info.camera = TestCamera();
-  other->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
-  for (int i = 0; i < 10; ++i) {
-    while (bus.DeliverOne()) {
-    }
-    publisher.Advance();
-    now_ns += 10 * kMs;
+/// Nodes that publish, on a bus with somebody else.
+class PublisherTest : public testing::Test {
+ protected:
+  Publisher& Add(int64_t id, bool take_over = false) {
+    NodeContext context;
+    context.bus = &bus_.AddPort();
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    context.random_id = id;
+    context.name = "mapper " + std::to_string(id);
+    context.fresh_system = !take_over;
+    NodeOptions options;
+    options.session = kSession;
+    options.take_over = take_over;
+    options.peers = {"mapper"};
+    nodes_.push_back(std::make_unique<Publisher>(context, options));
+    return *nodes_.back();
   }
+  void Pass(double seconds) {
+    CameraInfo info;
+    info.session = kSession;
+    info.camera = TestCamera();
+    other_->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+    for (const int64_t end = now_ns_ + static_cast<int64_t>(seconds * 1e9); now_ns_ < end;
+         now_ns_ += 10 * kMs) {
+      while (bus_.DeliverOne()) {
+      }
+      for (const auto& node : nodes_) node->Advance();
+    }
+  }
+
+  /// The newest one says nothing any more.
+  void LoseLast() {
+    gone_ = std::move(nodes_.back());
+    nodes_.pop_back();
+  }
+
+  MemoryBus bus_;
+  Bus* other_ = &bus_.AddPort();
+  int64_t now_ns_ = kMs;
+  std::vector<std::unique_ptr<Publisher>> nodes_;
+  std::unique_ptr<Publisher> gone_;
+};
+
+TEST_F(PublisherTest, WhoIsAskedToLeaveEndsWellOnceTheOtherGoesOn) {
+  Publisher& first = Add(7);
+  Pass(1);
+  Publisher& second = Add(8, true);
+  Pass(10);
+  EXPECT_EQ(first.exit_code(), kExitDone) << first.problem();
+  ASSERT_NE(second.writer(), nullptr);
+  EXPECT_EQ(second.exit_code(), std::nullopt);
+}
+
+/// Who asks and is not there afterwards may be somebody who forges: else nobody would write this stream.
+TEST_F(PublisherTest, WhereNobodyGoesOnWithAStreamItsWriterIsToBeStartedAgain) {
+  Publisher& first = Add(7);
+  Pass(1);
+  Add(8, true);
+  for (int i = 0; i < 500 && !first.writer()->close_requested_by(); ++i) Pass(0.01);
+  ASSERT_TRUE(first.writer()->close_requested_by());
+  LoseLast();
+  Pass(5);
+  EXPECT_EQ(first.exit_code(), std::nullopt) << "it waits for who has asked";
+  Pass(6);
+  EXPECT_EQ(first.exit_code(), kExitSuperseded);
+  EXPECT_NE(first.problem().find("mapper 8 asked for the stream"), std::string::npos) << first.problem();
+}
+
+TEST_F(PublisherTest, WhoIsAskedToEndAsWellWaitsForNobody) {
+  Publisher& first = Add(7);
+  Pass(1);
+  Add(8, true);
+  for (int i = 0; i < 500 && !first.writer()->close_requested_by(); ++i) Pass(0.01);
+  LoseLast();
+  first.Stop();
+  Pass(0.5);
+  EXPECT_EQ(first.exit_code(), kExitDone);
+}
+
+TEST_F(PublisherTest, ARecordAboveTheBoundIsRefusedAndAChangeIsSplit) {
+  Publisher& publisher = Add(7);
+  Pass(0.1);
   ASSERT_NE(publisher.writer(), nullptr);
   MapDelta change;
   change.event = MapEvent::kGloballyAdjusted;

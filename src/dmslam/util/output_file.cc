@@ -61,8 +61,11 @@ void WriteFile(const std::filesystem::path& path, std::string_view text) {
 }
 
 bool RenameDurably(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (!Sync(from, O_RDONLY) || std::rename(from.c_str(), to.c_str()) != 0) return false;
-  const std::filesystem::path folder = to.parent_path().empty() ? "." : to.parent_path();
+  return Sync(from, O_RDONLY) && std::rename(from.c_str(), to.c_str()) == 0 && SyncFolderOf(to);
+}
+
+bool SyncFolderOf(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
   return Sync(folder, O_RDONLY | O_DIRECTORY);
 }
 

@@ -37,4 +37,8 @@ void WriteFile(const std::filesystem::path& path, std::string_view text);
 /// content is synced first, and then the folder. False where that fails; errno says why.
 bool RenameDurably(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Makes sure that a power cut does not take the file's name, as of one that was just made. False where that
+/// fails.
+bool SyncFolderOf(const std::filesystem::path& path);
+
 }  // namespace dmslam

@@ -140,6 +140,16 @@ TYPED_TEST(WireTest, NumbersThatAreNoneAreRefused) {
   }
 }
 
+/// Zero is a checksum like any other: a message that has none is refused.
+TYPED_TEST(WireTest, AChecksumOfZeroIsRefused) {
+  if (Info<TypeParam>().is_record) return;  // sealed by its stream: stream_test
+  std::vector<uint8_t> bytes = Encode(RandomMessage<TypeParam>(3));
+  std::fill(bytes.begin() + 16, bytes.begin() + 20, uint8_t{0});
+  std::string reason;
+  EXPECT_FALSE(Decode<TypeParam>(bytes, &reason).has_value());
+  EXPECT_NE(reason.find("its checksum does not fit"), std::string::npos) << reason;
+}
+
 TYPED_TEST(WireTest, RefusesOtherTypes) {
   const std::vector<uint8_t> bytes = Encode(RandomMessage<TypeParam>(1));
   testing::ForEachMessage([&]<typename Other>() {
