@@ -36,7 +36,7 @@ PairView PatchAmongOthers(uint32_t num_static, uint32_t num_others) {
     const bool is_static = i < num_static;
     Match match;
     match.index0 = i;
-    match.uv0_px = is_static ? Eigen::Vector2d(200.0 + i % 20 * 15.0, 150.0 + i / 20 % 20 * 10.0)
+    match.uv0_px = is_static ? Eigen::Vector2d(180.0 + i % 20 * 17.0, 130.0 + i / 20 % 20 * 12.0)
                              : Eigen::Vector2d(i * 37 % 640, i * 53 % 480);
     pair.matches.push_back(match);
     pair.selection.is_static.push_back(is_static);
