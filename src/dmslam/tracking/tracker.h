@@ -71,7 +71,7 @@ class Tracker {
     TrackingReport report;
     std::optional<FoundPose> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
     bool relocalized = false;
-    bool by_rival = false;  ///< what the frames before followed was not the room
+    bool by_rival = false;        ///< what the frames before followed was not the room
     bool in_another_map = false;  ///< than it was lost in
   };
 
