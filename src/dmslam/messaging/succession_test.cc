@@ -12,6 +12,17 @@
 namespace dmslam {
 namespace {
 
+ReplicaServer::Options ServerOptions() {
+  ReplicaServer::Options options;
+  options.holder.session = 7;
+  options.holder.stream = StreamId::kMap;
+  options.holder.owner = "MAPPER";
+  options.holder.holder = "FRONTEND";
+  options.holder.role = "frontend";
+  options.holder.id = 5;
+  return options;
+}
+
 class OnePiece : public SnapshotSource {
  public:
   void BeginSnapshot(int64_t) override {}
@@ -23,17 +34,7 @@ class ReplicaServerTest : public testing::Test {
  protected:
   ReplicaServerTest()
       : server_(
-            OptionsOf(), [this] { return held_; }, &source_) {}
-  static ReplicaServer::Options OptionsOf() {
-    ReplicaServer::Options options;
-    options.holder.session = 7;
-    options.holder.stream = StreamId::kMap;
-    options.holder.owner = "MAPPER";
-    options.holder.holder = "FRONTEND";
-    options.holder.role = "frontend";
-    options.holder.id = 5;
-    return options;
-  }
+            ServerOptions(), [this] { return held_; }, &source_) {}
   void Choose(int64_t asker) {
     hand_over_t question{};
     question.utime = ++utime_;
@@ -110,16 +111,6 @@ class ReplicaFetchTest : public testing::Test {
       : server_(
             ServerOptions(), [this] { return held_; }, &source_),
         fetch_(FetchOptions(), 0) {}
-  static ReplicaServer::Options ServerOptions() {
-    ReplicaServer::Options options;
-    options.holder.session = 7;
-    options.holder.stream = StreamId::kMap;
-    options.holder.owner = "MAPPER";
-    options.holder.holder = "FRONTEND";
-    options.holder.role = "frontend";
-    options.holder.id = 5;
-    return options;
-  }
   static ReplicaFetch::Options FetchOptions() {
     ReplicaFetch::Options options;
     options.session = 7;
