@@ -113,7 +113,7 @@ step_loops() { # keeps what was played beside the step's folder, so that it cont
   "$top/scripts/loops.sh" --out "$out/loops_played" --seeds "$SEEDS"
   ! grep -qE 'missed|not tracked|/ [1-9]' "$out/loops_played/table.md"
 }
-step_welds() { # keeps what was played, as loops; a false weld fails it
+step_welds() { # keeps what was played, as loops; a run that is not good fails it
   "$top/scripts/welds.sh" --out "$out/welds_played" --seeds 3
 }
 step_lost() {

@@ -51,17 +51,15 @@ void LastPoses::RefineNext(const Map& map) {
 
 /// To be smoothed: by what it sees alone, without what was expected of it; nothing is known where that does
 /// not agree.
-void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Keyframe& reference) {
+void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const FramePose& pose) {
   FinalPose later;
-  later.pose.frame_index = frame.index;
-  later.pose.stamp_ns = frame.stamp_ns;
-  later.pose.state = TrackingState::kLocalizedLater;
+  later.pose = pose;
   const PoseOptimizationReport report = MeasureCheckedPose(map, frame.T_cam_world, SightsOf(frame), &later);
   if (!Agrees(report)) {
     later.measured = frame.T_cam_world;
     later.information.setZero();
   }
-  later.SetPose(reference, smooth_ ? later.measured : frame.T_cam_world);
+  later.SetPose(map.At(pose.reference), smooth_ ? later.measured : frame.T_cam_world);
   final_.Add(map, std::move(later));
 }
 

@@ -31,8 +31,8 @@ class LastPoses {
   bool IsRefining() const { return refiner_.IsBusy(); }
   /// Finds the pose of the oldest frame that is due.
   void RefineNext(const Map& map);
-  /// A frame that was placed just now, relative to keyframe `reference`.
-  void AddPlaced(const Map& map, const TrackedFrame& frame, const Keyframe& reference);
+  /// A frame that was placed just now, and what was told of it, in the map and by a keyframe that there is.
+  void AddPlaced(const Map& map, const TrackedFrame& frame, const FramePose& pose);
 
   /// A portion of joining the poses. False: nothing is left to do.
   bool Improve(const Map& map);

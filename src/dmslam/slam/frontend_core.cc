@@ -420,10 +420,10 @@ FrontendOutput FrontendCore::KeepPlacedLater(const TrackingReport& report) {
 
 bool FrontendCore::WorkAtEnd() {
   if (unplaced_.empty()) return last_poses_.Improve(map_);
-  if (PlaceNewestUnplaced()) {
-    const KeyframeId reference = tracker_.search().reference();
-    last_poses_.AddPlaced(map_, frame_, *map_.FindKeyframe(reference));
-    late_.GoOnFrom(frame_, *PlacedPose::Of(map_, frame_.T_cam_world, reference));
+  if (const std::optional<TrackingReport> report = PlaceNewestUnplaced()) {
+    const PlacedPose pose = *PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
+    last_poses_.AddPlaced(map_, frame_, MakePose(TrackingState::kLocalizedLater, *report, pose));
+    late_.GoOnFrom(frame_, pose);
   }
   return true;
 }

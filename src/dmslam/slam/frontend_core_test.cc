@@ -411,5 +411,25 @@ TEST_F(SecondCamera, AFirstMapOfAnotherDoesNotAnswerItsOwn) {
   EXPECT_EQ(core_->state(), TrackingState::kWaitingForMap);
 }
 
+/// Else they are taken for frames of camera 0, that were elsewhere.
+TEST_F(SecondCamera, TellsTheFramesThatArePlacedAtTheEndAsItsOwn) {
+  for (uint32_t frame = 0; frame < 20; ++frame) Frame(frame);
+  MapScene mapped(3, 1);
+  mapped.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
+  mapped.MapAll(20);
+  core_->ApplyMapDelta(mapped.map().TakeDelta(MapEvent::kMapped, KeyframeId::Make(1, 19, 1), 1));
+  core_->RefineRest();
+  while (core_->WorkAtEnd()) {
+  }
+  const FrontendOutput output = core_->Finish();
+  EXPECT_EQ(output.events.size(), 20u);
+  for (const FrontendEvent& event : output.events) {
+    const auto& pose = std::get<FramePose>(event);
+    EXPECT_EQ(pose.camera_id, 1u) << pose.frame_index;
+    EXPECT_EQ(pose.state, TrackingState::kLocalizedLater);
+    EXPECT_LT((pose.T_cam_world.Center() - Eigen::Vector3d(0.05 * pose.frame_index, 0, 0)).norm(), 0.01);
+  }
+}
+
 }  // namespace
 }  // namespace dmslam

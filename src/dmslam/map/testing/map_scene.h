@@ -23,7 +23,8 @@ class MapScene {
   static constexpr int64_t kStepNs = 33'333'333;                              ///< between keyframes
   using Place = std::function<std::optional<Eigen::Vector3d>(size_t point)>;  ///< none: hidden
 
-  explicit MapScene(uint64_t seed = 3) : map_(TestCamera(), Pyramid()), random_(seed) {}
+  explicit MapScene(uint64_t seed = 3, CameraId camera = 0)
+      : map_(TestCamera(), Pyramid()), random_(seed), camera_(camera) {}
 
   static Rigid3d PoseAt(double x) {
     return Rigid3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-x, 0, 0));
@@ -48,11 +49,12 @@ class MapScene {
   void MapAll(uint32_t num_keyframes = 4, double step = 0.05, uint32_t first = 0, int64_t first_ns = 0) {
     for (uint32_t k = 0; k < num_keyframes; ++k) {
       Keyframe keyframe;
-      keyframe.id = KeyframeId::Make(kSession, first + k);
+      keyframe.id = Named(first + k);
+      keyframe.camera_id = camera_;
       keyframe.map_id = kMap;
       keyframe.stamp_ns = first_ns + k * kStepNs;
       keyframe.T_cam_world = PoseAt(step * k);
-      if (k > 0) keyframe.parent = KeyframeId::Make(kSession, first + k - 1);
+      if (k > 0) keyframe.parent = Named(first + k - 1);
       keyframe.features = See(k, 0, PoseAt(step * k)).features;
       map_.AddKeyframe(std::move(keyframe));
     }
@@ -62,11 +64,11 @@ class MapScene {
       landmark.map_id = kMap;
       landmark.p_world = points_[i];
       landmark.descriptor = descriptors_[i];
-      landmark.reference = landmark.first_keyframe = KeyframeId::Make(kSession, first);
+      landmark.reference = landmark.first_keyframe = Named(first);
       landmark.first_ns = first_ns_[i];
       map_.AddLandmark(landmark);
       for (uint32_t k = 0; k < num_keyframes; ++k)
-        map_.SetObservation(map_.At(KeyframeId::Make(kSession, first + k)), static_cast<uint16_t>(i),
+        map_.SetObservation(map_.At(Named(first + k)), static_cast<uint16_t>(i),
                             map_.At(landmark.id));
     }
   }
@@ -100,8 +102,11 @@ class MapScene {
   size_t size() const { return points_.size(); }
 
  private:
+  KeyframeId Named(uint32_t frame) const { return KeyframeId::Make(kSession, frame, camera_); }
+
   MapEditor map_;
   Random random_;
+  CameraId camera_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> descriptors_;
   std::vector<int64_t> first_ns_;
