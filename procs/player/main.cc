@@ -30,7 +30,7 @@ std::unique_ptr<dmslam::FrameSource> OpenLog(const Arguments& a, const dmslam::N
                                              dmslam::PlayerOptions* options) {
   auto log = std::make_shared<const dmslam::LogIndex>(a.log, node.key);
   if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
-  auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
+  auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session, node.camera_id);
   options->sequence = frames->camera_info().sequence;
   options->camera = a.camera_file.empty() ? frames->camera_info().camera : dmslam::LoadCamera(a.camera_file);
   return frames;
@@ -127,8 +127,10 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
                 "frames per second of numbered images and of videos that do not state it; asked of a "
                 "camera; default: as the camera file says")
       .InRange(0.01, 1000.0);
-  app.AddOption("--log", a.log,
-                "log of lcm-logger: its frames are played, with their indices, stamps and bytes");
+  app.AddOption(
+      "--log", a.log,
+      "log of lcm-logger: its frames are played, with their indices, stamps and bytes; of several cameras "
+      "those of --camera-id");
   app.AddOption("--log-session", a.log_session, "which of the log's sessions, where it holds several");
   app.AddOption("--channels", a.channels,
                 "of a log: camera, or records: the frontend's keyframes are entered as a writer of a new "

@@ -36,10 +36,18 @@ for camera in 0 1; do
 done
 expect "nothing is lost" "$work/first" records_lost "== 0"
 expect "no keyframe is missing" "$work/first" keyframes_missing "== 0"
-check "in one process it ends with 0" "$build/bin/dmslam-inprocess" "${sequences[@]}" --out "$work/one"
+check "in one process it ends with 0" "$build/bin/dmslam-inprocess" "${sequences[@]}" --record "$work/one.lcmlog" --out "$work/one"
 for file in $RESULTS; do
   check "$file of one process has the same bytes" cmp "$work/first/$file" "$work/one/$file"
 done
+for camera in 0 1; do
+  check "the log has the poses of camera $camera" "$build/bin/dmslam-map" --log "$work/one.lcmlog" --camera-id "$camera" \
+    --trajectory "$work/rebuilt.txt"
+  suffix=_$camera
+  check "of camera $camera they are those of the run" cmp "$work/one/trajectory${suffix#_0}.txt" "$work/rebuilt.txt"
+done
+refused "holds no frames of camera 2 but of 0, 1" "$build/bin/dmslam-player" --cameras 3 --camera-id 2 --log "$work/one.lcmlog" \
+  --to-log "$work/none.lcmlog"
 
 # The second camera has half as many pixels, a lens, a wider view and half the rate.
 cat >"$work/half.yaml" <<'EOF'

@@ -11,6 +11,7 @@
 #include "collector/map_ply.h"
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/keyed_bus.h"
 #include "dmslam/messaging/protocol_messages.h"
@@ -28,6 +29,7 @@ namespace {
 struct Arguments {
   std::string log, key, ply, trajectory, online, keyframes, save, masks, json;
   uint32_t session = 0;
+  dmslam::CameraId camera = 0;
   double at_s = -1;
   bool channels = false;
 };
@@ -49,6 +51,9 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddOption("--at", a.at_s, "seconds after the log's beginning: the map as it was then").NonNegative();
   app.AddFlag("--channels", a.channels, "list what the log holds: channel, type, messages, bytes");
   app.AddOption("--ply", a.ply, "write the map as coloured points");
+  app.AddOption("--camera-id", a.camera, "of several cameras: whose trajectory and keyframes are written")
+      .InRange(0, static_cast<int>(dmslam::kMaxCameras) - 1)
+      .ShowDefault();
   app.AddOption("--trajectory", a.trajectory, "write where the camera was, by the map (TUM format)");
   app.AddOption("--trajectory-online", a.online, "write where the camera was, as told frame by frame");
   app.AddOption("--keyframes", a.keyframes, "write the keyframes' poses (TUM format)");
@@ -144,21 +149,27 @@ int ListChannels(const std::string& path, const std::optional<dmslam::BusKey>& k
   return 0;
 }
 
-/// The poses of the frames, as the frontend told them up to then. Returns how many of its records are
-/// missing.
+/// The poses of the frames, as the frontends of all cameras told them up to then. Returns how many of their
+/// records are missing.
 int64_t AddFramePoses(const dmslam::LogIndex& log, const dmslam::RecordedSession& session, int64_t until_us,
                       dmslam::TrajectoryBuilder* builder) {
-  const dmslam::Replay replay = dmslam::PlanReplay(session.Stream(dmslam::StreamId::kFrontend), until_us);
-  for (const dmslam::ReplayStep& step : replay.steps) {
-    if (step.message->channel == dmslam::channels::kFramePose) {
-      if (const auto pose = dmslam::wire::Decode<dmslam::FramePose>(log.Read(*step.message)))
-        builder->OnFramePose(*pose);
-    } else if (step.message->channel == dmslam::channels::kMapReset) {
-      if (const auto reset = dmslam::wire::Decode<dmslam::MapReset>(log.Read(*step.message)))
-        builder->OnMapReset(*reset);
+  int64_t missing = 0;
+  for (const dmslam::CameraId camera : session.CamerasWithFrontend()) {
+    const dmslam::StreamId stream = dmslam::StreamOfCamera(dmslam::StreamId::kFrontend, camera);
+    const dmslam::Replay replay = dmslam::PlanReplay(session.Stream(stream), until_us);
+    missing += replay.missing;
+    for (const dmslam::ReplayStep& step : replay.steps) {
+      const std::string channel = dmslam::SplitCamera(step.message->channel).channel;
+      if (channel == dmslam::channels::kFramePose) {
+        if (const auto pose = dmslam::wire::Decode<dmslam::FramePose>(log.Read(*step.message)))
+          builder->OnFramePose(*pose);
+      } else if (channel == dmslam::channels::kMapReset) {
+        if (const auto reset = dmslam::wire::Decode<dmslam::MapReset>(log.Read(*step.message)))
+          builder->OnMapReset(*reset);
+      }
     }
   }
-  return replay.missing;
+  return missing;
 }
 
 void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
@@ -215,12 +226,12 @@ int Run(const Arguments& a) {
     dmslam::LogWarning("{}: {} records of the frontend are missing; some frames' poses are not the last word",
                        a.log, missing);
   }
-  dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build();
+  dmslam::TrajectoryBuilder::Trajectories trajectories = builder.Build(a.camera);
   const std::optional<dmslam::MapId> map_id =
       trajectories.map_id ? trajectories.map_id : dmslam::LargestMap(rebuilt.map);
   if (!trajectories.map_id) {
     for (const auto& [id, keyframe] : rebuilt.map.keyframes()) {
-      if (keyframe.map_id == map_id)
+      if (keyframe.map_id == map_id && keyframe.camera_id == a.camera)
         trajectories.keyframes.push_back({keyframe.stamp_ns, keyframe.T_cam_world.Inverse()});
     }
     std::ranges::stable_sort(trajectories.keyframes, {}, &dmslam::StampedPose::stamp_ns);

@@ -4,6 +4,7 @@
 #include <tuple>
 #include <utility>
 
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/receive_window.h"
@@ -31,7 +32,7 @@ std::optional<wire::MessageInfo> RecordOf(const std::string& channel, const std:
 }
 
 std::optional<wire::MessageInfo> RecordOf(const std::string& channel) {
-  return RecordOf(channel, static_cast<const wire::Messages*>(nullptr));
+  return RecordOf(SplitCamera(channel).channel, static_cast<const wire::Messages*>(nullptr));
 }
 
 bool IsRecordChannel(const std::string& channel) { return RecordOf(channel).has_value(); }
@@ -44,6 +45,14 @@ const RecordedStream& RecordedSession::Stream(StreamId stream) const {
   static const RecordedStream kNone;
   const auto it = streams.find(stream);
   return it == streams.end() ? kNone : it->second;
+}
+
+std::vector<CameraId> RecordedSession::CamerasWithFrontend() const {
+  std::vector<CameraId> found;
+  for (CameraId camera = 0; camera < kMaxCameras; ++camera) {
+    if (streams.contains(StreamOfCamera(StreamId::kFrontend, camera))) found.push_back(camera);
+  }
+  return found;
 }
 
 /// Records in pieces, by the key of their numbering.
@@ -92,30 +101,44 @@ void LogIndex::Add(const LogEvent& event, Parts* parts) {
   message.order = num_messages_;
   message.offset = event.offset;
   message.channel = WithoutPrefix(event.channel);
-  if (message.channel == channels::kFrame) {
-    AddFrame(event, std::move(message));
-  } else if (message.channel == channels::kCameraInfo) {
-    const auto info = Decode<CameraInfo>(event.bytes);
-    if (info && !sessions_[info->session].camera_info) sessions_[info->session].camera_info = info;
-  } else if (message.channel == channels::kGroundTruthPose) {
-    if (const auto pose = Decode<GroundTruthPose>(event.bytes)) {
-      sessions_[pose->session].ground_truth.emplace(pose->stamp_ns, *pose);
-    }
-  } else if (message.channel == channels::kEndOfSequence) {
-    if (const auto end = Decode<EndOfSequence>(event.bytes)) sessions_[end->session].end = end;
-  } else if (IsRecordChannel(message.channel)) {
+  if (AddOfPlayer(event, message)) return;
+  if (IsRecordChannel(message.channel)) {
     AddRecord(std::move(message), event.bytes);
   } else if (EndsWith(message.channel, "_PART")) {
     AddPart(event, std::move(message), parts);
   }
 }
 
+template <typename Message>
+RecordedCamera& LogIndex::CameraOf(const Message& message) {
+  return sessions_[message.session].cameras[message.camera_id];
+}
+
+/// Whether it is a message of a camera's player, and not a record.
+bool LogIndex::AddOfPlayer(const LogEvent& event, const RecordedMessage& message) {
+  const std::string channel = SplitCamera(message.channel).channel;
+  if (channel == channels::kFrame) {
+    AddFrame(event, message);
+  } else if (channel == channels::kCameraInfo) {
+    const auto info = Decode<CameraInfo>(event.bytes);
+    if (info && !CameraOf(*info).info) CameraOf(*info).info = info;
+  } else if (channel == channels::kGroundTruthPose) {
+    if (const auto pose = Decode<GroundTruthPose>(event.bytes))
+      CameraOf(*pose).ground_truth.emplace(pose->stamp_ns, *pose);
+  } else if (channel == channels::kEndOfSequence) {
+    if (const auto end = Decode<EndOfSequence>(event.bytes)) CameraOf(*end).end = end;
+  } else {
+    return false;
+  }
+  return true;
+}
+
 void LogIndex::AddFrame(const LogEvent& event, RecordedMessage message) {
   const auto frame = Decode<Frame>(event.bytes);
   if (!frame) return;
-  RecordedSession& session = sessions_[frame->session];
-  session.frames.emplace(frame->frame_index, std::move(message));
-  session.stamps_ns.emplace(frame->frame_index, frame->stamp_ns);
+  RecordedCamera& camera = CameraOf(*frame);
+  camera.frames.emplace(frame->frame_index, std::move(message));
+  camera.stamps_ns.emplace(frame->frame_index, frame->stamp_ns);
 }
 
 void LogIndex::AddRecord(RecordedMessage message, std::span<const uint8_t> bytes) {

@@ -39,18 +39,25 @@ struct RecordedTerm {
 /// A stream as recorded: its terms of office in their order.
 using RecordedStream = std::map<Term, RecordedTerm>;
 
-/// What a log holds of one session.
-struct RecordedSession {
-  uint32_t id = 0;
-  std::optional<CameraInfo> camera_info;            ///< the first one
+/// What a log holds of one camera's player.
+struct RecordedCamera {
+  std::optional<CameraInfo> info;                   ///< the first one
   std::map<uint32_t, RecordedMessage> frames;       ///< by index; the first of those that were repeated
   std::map<uint32_t, int64_t> stamps_ns;            ///< of the frames
   std::map<int64_t, GroundTruthPose> ground_truth;  ///< by stamp
   std::optional<EndOfSequence> end;
+};
+
+/// What a log holds of one session.
+struct RecordedSession {
+  uint32_t id = 0;
+  std::map<CameraId, RecordedCamera> cameras;  ///< whose players were recorded
   std::map<StreamId, RecordedStream> streams;
   int64_t saved_records = 0;  ///< of a saved map: how many map records it was written with; else 0
 
   const RecordedStream& Stream(StreamId id) const;
+  /// The cameras whose frontends were recorded, in order.
+  std::vector<CameraId> CamerasWithFrontend() const;
 };
 
 /// Reads a log of lcm-logger once and knows where everything in it stands. Records may have travelled whole
@@ -79,11 +86,14 @@ class LogIndex {
  private:
   struct Parts;
   void Add(const LogEvent& event, Parts* parts);
+  bool AddOfPlayer(const LogEvent& event, const RecordedMessage& message);
   void AddFrame(const LogEvent& event, RecordedMessage message);
   void AddRecord(RecordedMessage message, std::span<const uint8_t> bytes);
   void AddPart(const LogEvent& event, RecordedMessage message, Parts* parts);
   template <typename Message>
   std::optional<Message> Decode(std::span<const uint8_t> bytes);
+  template <typename Message>
+  RecordedCamera& CameraOf(const Message& message);
 
   mutable EventLogReader reader_;
   std::map<uint32_t, RecordedSession> sessions_;

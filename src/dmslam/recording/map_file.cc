@@ -59,13 +59,16 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
       if (auto start = wire::Decode<SessionStart>(log.Read(message))) return start;
     }
   }
-  if (!session.camera_info) return std::nullopt;
-  SessionStart start;
-  start.session = session.id;
-  start.camera = session.camera_info->camera;
-  start.sequence = session.camera_info->sequence;
-  start.mode = session.camera_info->mode;
-  return start;
+  for (const auto& [camera, recorded] : session.cameras) {
+    if (!recorded.info) continue;
+    SessionStart start;
+    start.session = session.id;
+    start.camera = recorded.info->camera;
+    start.sequence = recorded.info->sequence;
+    start.mode = recorded.info->mode;
+    return start;
+  }
+  return std::nullopt;
 }
 
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us,

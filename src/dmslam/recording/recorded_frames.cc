@@ -20,17 +20,37 @@ ImageEncoding ToImageEncoding(FrameEncoding encoding) {
   return ImageEncoding::kFile;
 }
 
-RecordedFrames::RecordedFrames(std::shared_ptr<const LogIndex> log, uint32_t session)
-    : log_(std::move(log)), session_(&log_->Session(session)) {
-  if (session_->frames.empty())
-    throw InputError(log_->path() + ": holds no frames; was the player recorded too?");
-  if (!session_->camera_info) {
-    throw InputError(log_->path() +
+namespace {
+
+const RecordedCamera& ChooseCamera(const LogIndex& log, uint32_t session, CameraId wanted) {
+  const RecordedCamera *chosen = nullptr, *last = nullptr;
+  std::string numbers;
+  int count = 0;
+  for (const auto& [camera, recorded] : log.Session(session).cameras) {
+    if (recorded.frames.empty()) continue;
+    if (camera == wanted) chosen = &recorded;
+    last = &recorded;
+    numbers += (count++ == 0 ? "" : ", ") + std::to_string(camera);
+  }
+  if (count == 1) chosen = last;
+  if (count == 0) throw InputError(log.path() + ": holds no frames; was the player recorded too?");
+  if (chosen == nullptr)
+    throw InputError(log.path() + ": holds no frames of camera " + std::to_string(wanted) + " but of " +
+                     numbers);
+  if (!chosen->info) {
+    throw InputError(log.path() +
                      ": does not say which camera took its frames; record from before the player starts");
   }
+  return *chosen;
+}
+
+}  // namespace
+
+RecordedFrames::RecordedFrames(std::shared_ptr<const LogIndex> log, uint32_t session, CameraId camera)
+    : log_(std::move(log)), camera_(&ChooseCamera(*log_, session, camera)) {
   int64_t newest_ns = INT64_MIN;  // stamps increase strictly, or it is no sequence
-  for (const auto& [index, message] : session_->frames) {
-    const int64_t stamp_ns = session_->stamps_ns.at(index);
+  for (const auto& [index, message] : camera_->frames) {
+    const int64_t stamp_ns = camera_->stamps_ns.at(index);
     if (stamp_ns <= newest_ns) continue;
     newest_ns = stamp_ns;
     frames_.emplace_back(index, &message);
@@ -48,12 +68,12 @@ EncodedImage RecordedFrames::Read(size_t index) {
 }
 
 size_t RecordedFrames::missing() const {
-  return session_->end ? static_cast<size_t>(session_->end->frames_missing) : 0;
+  return camera_->end ? static_cast<size_t>(camera_->end->frames_missing) : 0;
 }
 
 std::vector<StampedPose> RecordedFrames::GroundTruth() const {
   std::vector<StampedPose> poses;
-  for (const auto& [stamp_ns, pose] : session_->ground_truth) poses.push_back({stamp_ns, pose.T_world_cam});
+  for (const auto& [stamp_ns, pose] : camera_->ground_truth) poses.push_back({stamp_ns, pose.T_world_cam});
   return poses;
 }
 

@@ -8,6 +8,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/snapshot.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_index.h"
@@ -347,24 +348,32 @@ TEST_F(Recording, HalfASavedMapIsRefusedByName) {
   EXPECT_NE(WhyNotLoaded(part).find("is not whole"), std::string::npos) << WhyNotLoaded(part);
 }
 
-TEST_F(Recording, FramesKeepTheirIndicesAndBytes) {
-  EventLogWriter log(path_);
+/// What a camera's player publishes of itself, and of a frame of 2 x 1 pixels.
+void WriteCameraInfo(EventLogWriter& log, const std::string& sequence, CameraId camera = 0) {
   CameraInfo info;
   info.session = kSession;
+  info.camera_id = camera;
   info.camera = TestCamera();
-  info.sequence = "test";
-  log.Write(1, channels::kCameraInfo, wire::Encode(info));
-  for (const uint32_t index : {5u, 6u, 6u, 9u}) {
-    Frame frame;
-    frame.session = kSession;
-    frame.frame_index = index;
-    frame.stamp_ns = 1000 * index;
-    frame.encoding = FrameEncoding::kGray8;
-    frame.width_px = 2;
-    frame.height_px = 1;
-    frame.data = {static_cast<uint8_t>(index), 7};
-    log.Write(index, channels::kFrame, wire::Encode(frame));
-  }
+  info.sequence = sequence;
+  log.Write(1, ChannelOfCamera(channels::kCameraInfo, camera), wire::Encode(info));
+}
+void WriteFrame(EventLogWriter& log, uint32_t index, CameraId camera = 0) {
+  Frame frame;
+  frame.session = kSession;
+  frame.camera_id = camera;
+  frame.frame_index = index;
+  frame.stamp_ns = 1000 * index;
+  frame.encoding = FrameEncoding::kGray8;
+  frame.width_px = 2;
+  frame.height_px = 1;
+  frame.data = {static_cast<uint8_t>(index), static_cast<uint8_t>(7 + camera)};
+  log.Write(index, ChannelOfCamera(channels::kFrame, camera), wire::Encode(frame));
+}
+
+TEST_F(Recording, FramesKeepTheirIndicesAndBytes) {
+  EventLogWriter log(path_);
+  WriteCameraInfo(log, "test");
+  for (const uint32_t index : {5u, 6u, 6u, 9u}) WriteFrame(log, index);
   log.Write(10, channels::kGroundTruthPose, wire::Encode(GroundTruthPose{kSession, 6, 6000, Rigid3d()}));
   log.Close();
   RecordedFrames frames(std::make_shared<const LogIndex>(path_), 0);
@@ -376,6 +385,51 @@ TEST_F(Recording, FramesKeepTheirIndicesAndBytes) {
   EXPECT_EQ(image.bytes, (std::vector<uint8_t>{9, 7}));
   EXPECT_EQ(frames.GroundTruth().size(), 1u);
   EXPECT_EQ(frames.camera_info().sequence, "test");
+  EXPECT_EQ(RecordedFrames(std::make_shared<const LogIndex>(path_), 0, 1).size(), 3u) << "the only ones";
+}
+
+TEST_F(Recording, EachOfSeveralCamerasHasItsFrames) {
+  EventLogWriter log(path_);
+  WriteCameraInfo(log, "first");
+  WriteCameraInfo(log, "second", 1);
+  for (const uint32_t index : {0u, 1u, 2u}) WriteFrame(log, index);
+  for (const uint32_t index : {0u, 1u}) WriteFrame(log, index, 1);
+  log.Close();
+  const auto index = std::make_shared<const LogIndex>(path_);
+  EXPECT_EQ(RecordedFrames(index, 0).size(), 3u);
+  RecordedFrames second(index, 0, 1);
+  ASSERT_EQ(second.size(), 2u);
+  EXPECT_EQ(second.camera_info().sequence, "second");
+  EXPECT_EQ(second.Read(1).bytes, (std::vector<uint8_t>{1, 8}));
+  try {
+    const RecordedFrames third(index, 0, 2);
+    FAIL() << "a camera that is not in it";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("no frames of camera 2 but of 0, 1"), std::string::npos);
+  }
+}
+
+TEST_F(Recording, TheRecordsOfEachCamerasFrontendAreAStreamOfTheirOwn) {
+  EventLogWriter log(path_);
+  WriteSession(log);
+  for (const CameraId camera : {0u, 2u}) {
+    FramePose pose;
+    pose.frame_index = 4;
+    pose.camera_id = camera;
+    const std::string channel = ChannelOfCamera(channels::kFramePose, camera);
+    Bytes bytes = wire::Encode(pose);
+    Seal(Header(StreamOfCamera(StreamId::kFrontend, camera), 2), channel, bytes);
+    log.Write(2, channel, bytes);
+  }
+  log.Close();
+  const LogIndex index(path_);
+  EXPECT_EQ(index.bad_messages(), 0);
+  const RecordedSession& session = index.Session();
+  EXPECT_EQ(session.CamerasWithFrontend(), (std::vector<CameraId>{0, 2}));
+  const RecordedStream& stream = session.Stream(StreamOfCamera(StreamId::kFrontend, 2));
+  ASSERT_EQ(stream.size(), 1u);
+  const RecordedMessage& record = stream.begin()->second.records.at(2);
+  EXPECT_EQ(wire::Decode<FramePose>(index.Read(record))->camera_id, 2u);
 }
 
 TEST_F(Recording, OtherLogsAreRefused) {

@@ -168,7 +168,8 @@ FrontendOutput FrontendCore::ProcessFrame() {
 /// recognised goes on there.
 std::optional<FrontendOutput> FrontendCore::FindAgain() {
   if (map_.keyframes().empty() || (dropped_ && !map_.KeyframesOf(*dropped_).empty())) return std::nullopt;
-  TrackingResult result = tracker_.Track(map_, {std::nullopt, true}, std::move(frame_));
+  TrackingResult result =
+      tracker_.Track(map_, {.map_id = std::nullopt, .may_be_nowhere = true}, std::move(frame_));
   frame_ = std::move(result.frame);
   if (!result.pose) return std::nullopt;
   ++counters_.relocalizations;

@@ -65,7 +65,7 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   if (!attempt.report.ok && unbelieved_) GoBack();
   if (!attempt.report.ok) FindTurned(map, &frame, &attempt);
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
-    Relocalize(map, request.map_id, &frame, &attempt);
+    Relocalize(map, request, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
   if (attempt.report.ok) result.pose = PlacedPose::Of(map, frame.T_cam_world, search_.reference());
   if (result.pose) {
@@ -200,13 +200,13 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
 }
 
 /// The frame stays as it was where no place in the map fits.
-void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt) {
+void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* frame, Attempt* attempt) {
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
   const FrameTime time{frame->index, frame->stamp_ns};
   const auto is_here = [&] {
     const Keyframe* reference = map.FindKeyframe(search_.reference());
-    return reference != nullptr && reference->map_id == map_id;
+    return reference != nullptr && reference->map_id == asked.map_id;
   };
   // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too
   // young to have anything proven, what is seen as a whole.
@@ -217,7 +217,8 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
            (!here && !IsOldEnoughToProve(map) && IsSeenAsAWhole(report));
   };
   Relocalizer::Request request{.last_seen = motion_.last().reference, .seed = seed};
-  if (map_id) request.credible = credible;
+  const bool may_be_elsewhere = asked.map_id || asked.may_be_nowhere;
+  if (may_be_elsewhere) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
@@ -225,7 +226,7 @@ void Tracker::Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFra
     Refuse("the place that was recognised is out of reach", &attempt->report);
   if (attempt->report.doubtful) attempt->report.ok = false;
   attempt->relocalized = attempt->report.ok;
-  attempt->in_another_map = map_id && !is_here();
+  attempt->in_another_map = may_be_elsewhere && !is_here();
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 

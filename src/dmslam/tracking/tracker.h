@@ -42,6 +42,8 @@ class Tracker {
     /// reach. None: it was nowhere yet.
     std::optional<MapId> map_id;
     bool may_relocalize = true;
+    /// The camera may be in none of the maps: in each of them a place must show what it must in another map.
+    bool may_be_nowhere = false;
   };
   /// The next frame of the stream. The map may have changed since the last one.
   TrackingResult Track(const Map& map, const Request& request, TrackedFrame frame);
@@ -80,7 +82,7 @@ class Tracker {
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
   void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
-  void Relocalize(const Map& map, std::optional<MapId> map_id, TrackedFrame* frame, Attempt* attempt);
+  void Relocalize(const Map& map, const Request& request, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
   bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;

@@ -408,7 +408,7 @@ class Recovering : public ::testing::Test {
       const bool hidden = blind || (partly_hidden_ && i % 4 != 0);
       return hidden ? std::nullopt : std::optional(scene_.point(i));
     };
-    return tracker_->Track(replica_, {.map_id = lost_in_},
+    return tracker_->Track(replica_, {.map_id = lost_in_, .may_be_nowhere = may_be_nowhere_},
                            scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(kStep * frame), place));
   }
   /// The first frame from `begin` on that has a pose.
@@ -421,6 +421,7 @@ class Recovering : public ::testing::Test {
 
   bool partly_hidden_ = false;      ///< three of four points are not seen
   std::optional<MapId> lost_in_{};  ///< none: nowhere
+  bool may_be_nowhere_ = false;     ///< in none of the maps
   MapScene scene_;
   Replica replica_{TestCamera(), Pyramid()};
   std::optional<Tracker> tracker_;
@@ -459,6 +460,18 @@ TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
   lost_in_ = MapScene::kMap + 1;
   partly_hidden_ = true;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized);
+}
+
+/// As one that looks for a first map of its own, beside that of another camera.
+TEST_F(Recovering, WhoMayBeInNoMapBelievesNoPartOfAYoungOne) {
+  Start(1.0);
+  tracker_->BeginLost({kFound - 1, (kFound - 1) * kFrameNs});
+  may_be_nowhere_ = true;
+  partly_hidden_ = true;
+  for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized) << frame;
+  partly_hidden_ = false;
+  const uint32_t found = FirstFound(kFound + 30);
+  EXPECT_NEAR((found - kFound - 30) / 30.0, 0.5, 0.05) << "seen as a whole it must predict";
 }
 
 TEST_F(Recovering, WhoBeginsInAMapLooksAtOnce) {
