@@ -46,6 +46,8 @@ for camera in 0 1; do
   suffix=_$camera
   check "of camera $camera they are those of the run" cmp "$work/one/trajectory${suffix#_0}.txt" "$work/rebuilt.txt"
 done
+check "the log plays in one process" "$build/bin/dmslam-inprocess" --log "$work/one.lcmlog" --seed 3 --out "$work/again"
+for file in $RESULTS; do check "$file of the log has the same bytes" cmp "$work/one/$file" "$work/again/$file"; done
 refused "holds no frames of camera 2 but of 0, 1" "$build/bin/dmslam-player" --cameras 3 --camera-id 2 --log "$work/one.lcmlog" \
   --to-log "$work/none.lcmlog"
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dmslam/messaging/bus.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/event_log.h"
 #include "dmslam/wire/codec.h"
 #include "frontend/make_frontend.h"
@@ -18,9 +19,11 @@ namespace {
 
 constexpr int64_t kClockStartNs = 1'000'000'000;
 
+/// Of every camera that there may be.
 template <typename... Message>
 void SubscribeToAll(Bus* bus, const std::tuple<Message...>*) {
-  (bus->Subscribe(wire::Info<Message>().channel), ...);
+  for (CameraId camera = 0; camera < kMaxCameras; ++camera)
+    (bus->Subscribe(ChannelOfCamera(wire::Info<Message>().channel, camera)), ...);
 }
 
 /// Keeps all typed messages in a log, as lcm-logger does beside processes.

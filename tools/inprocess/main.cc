@@ -44,7 +44,8 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
       .InRange(0.01, 1000.0);
   app.AddOption("--encoding", a.encoding, "of frames that are neither JPEG nor PNG: jpeg, png, raw")
       .OneOf({"jpeg", "png", "raw"});
-  app.AddOption("--log", a.log, "log of lcm-logger: its frames are played");
+  app.AddOption("--log", a.log,
+                "log of lcm-logger: its frames are played; without --also those of all its cameras");
   app.AddOption("--records", a.records,
                 "such a log: its keyframes are entered, without images and without a frontend");
   app.AddOption("--log-session", a.log_session, "which of the log's sessions, where it holds several");
@@ -69,20 +70,46 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddFlag("--no-loop", a.no_loop, "do not close loops");
 }
 
-std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, dmslam::PlayerOptions* player) {
-  if (!a.records.empty()) return nullptr;
-  if (a.sequence.empty() == a.log.empty())
-    throw dmslam::InputError("give one of --sequence, --log and --records");
-  if (a.log.empty()) {
-    player->sequence = a.sequence;
-    return dmslam::OpenSequence(a.camera, a.fps, player);
-  }
+using Log = std::shared_ptr<const dmslam::LogIndex>;
+
+/// The log whose frames are played; null: there is none.
+Log OpenLog(const Arguments& a) {
+  if (a.log.empty()) return nullptr;
   auto log = std::make_shared<const dmslam::LogIndex>(a.log);
   if (!log->DescribeDamage().empty()) dmslam::LogWarning("{}", log->DescribeDamage());
-  auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session);
+  return log;
+}
+
+std::unique_ptr<dmslam::FrameSource> FramesOf(const Arguments& a, const Log& log, dmslam::CameraId camera,
+                                              dmslam::PlayerOptions* player) {
+  auto frames = std::make_unique<dmslam::RecordedFrames>(log, a.log_session, camera);
   player->sequence = frames->camera_info().sequence;
   player->camera = a.camera.empty() ? frames->camera_info().camera : dmslam::LoadCamera(a.camera);
   return frames;
+}
+
+std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const Log& log, dmslam::PlayerOptions* player) {
+  if (!a.records.empty()) return nullptr;
+  if (a.sequence.empty() == a.log.empty())
+    throw dmslam::InputError("give one of --sequence, --log and --records");
+  if (log) return FramesOf(a, log, 0, player);
+  player->sequence = a.sequence;
+  return dmslam::OpenSequence(a.camera, a.fps, player);
+}
+
+/// Of a log all that it has but the first one.
+std::vector<dmslam::AnotherCamera> OthersOf(const Arguments& a, const Log& log,
+                                            const dmslam::PlayerOptions& player,
+                                            std::vector<std::string>* ground_truth) {
+  std::vector<dmslam::AnotherCamera> others;
+  const std::vector<dmslam::CameraId> cameras = log->Session(a.log_session).CamerasWithFrames();
+  for (size_t i = 1; i < cameras.size(); ++i) {
+    dmslam::AnotherCamera& other = others.emplace_back();
+    other.player = player;
+    other.source = FramesOf(a, log, cameras[i], &other.player);
+    ground_truth->emplace_back();
+  }
+  return others;
 }
 
 std::vector<dmslam::AnotherCamera> OpenOthers(const Arguments& a, dmslam::PlayerOptions player,
@@ -132,7 +159,8 @@ int Run(const Arguments& a) {
   if (a.no_loop) overrides.push_back("loop.enabled=off");
   overrides.insert(overrides.end(), a.overrides.begin(), a.overrides.end());
   options.node.settings = dmslam::LoadSettings(a.config, overrides);
-  auto source = Open(a, &options.player);
+  const Log log = OpenLog(a);
+  auto source = Open(a, log, &options.player);
   options.record = a.record;
   options.map_files = a.map_files;
   options.player.session = a.session;
@@ -150,7 +178,9 @@ int Run(const Arguments& a) {
   options.collector.ground_truth = {source ? source->GroundTruthPath().value_or("") : ""};
   if (!source && !a.others.empty())
     throw dmslam::InputError("--also goes with --sequence, not with --records");
-  auto others = OpenOthers(a, options.player, &options.collector.ground_truth);
+  const bool all_of_log = log && a.others.empty();
+  auto others = all_of_log ? OthersOf(a, log, options.player, &options.collector.ground_truth)
+                           : OpenOthers(a, options.player, &options.collector.ground_truth);
   options.vocabulary = dmslam::LoadVocabulary(a.vocabulary);
   options.picture_every = a.pictures;
   options.picture_dir = a.out + "/pictures";

@@ -47,6 +47,14 @@ const RecordedStream& RecordedSession::Stream(StreamId stream) const {
   return it == streams.end() ? kNone : it->second;
 }
 
+std::vector<CameraId> RecordedSession::CamerasWithFrames() const {
+  std::vector<CameraId> found;
+  for (const auto& [camera, recorded] : cameras) {
+    if (!recorded.frames.empty()) found.push_back(camera);
+  }
+  return found;
+}
+
 std::vector<CameraId> RecordedSession::CamerasWithFrontend() const {
   std::vector<CameraId> found;
   for (CameraId camera = 0; camera < kMaxCameras; ++camera) {

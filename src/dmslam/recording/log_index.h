@@ -56,6 +56,8 @@ struct RecordedSession {
   int64_t saved_records = 0;  ///< of a saved map: how many map records it was written with; else 0
 
   const RecordedStream& Stream(StreamId id) const;
+  /// The cameras of which frames were recorded, in order.
+  std::vector<CameraId> CamerasWithFrames() const;
   /// The cameras whose frontends were recorded, in order.
   std::vector<CameraId> CamerasWithFrontend() const;
 };

@@ -1,5 +1,7 @@
 #include "dmslam/recording/recorded_frames.h"
 
+#include <algorithm>
+
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 
@@ -22,26 +24,27 @@ ImageEncoding ToImageEncoding(FrameEncoding encoding) {
 
 namespace {
 
-const RecordedCamera& ChooseCamera(const LogIndex& log, uint32_t session, CameraId wanted) {
-  const RecordedCamera *chosen = nullptr, *last = nullptr;
+std::string Listed(const std::vector<CameraId>& cameras) {
   std::string numbers;
-  int count = 0;
-  for (const auto& [camera, recorded] : log.Session(session).cameras) {
-    if (recorded.frames.empty()) continue;
-    if (camera == wanted) chosen = &recorded;
-    last = &recorded;
-    numbers += (count++ == 0 ? "" : ", ") + std::to_string(camera);
-  }
-  if (count == 1) chosen = last;
-  if (count == 0) throw InputError(log.path() + ": holds no frames; was the player recorded too?");
-  if (chosen == nullptr)
+  for (const CameraId camera : cameras) numbers += (numbers.empty() ? "" : ", ") + std::to_string(camera);
+  return numbers;
+}
+
+const RecordedCamera& ChooseCamera(const LogIndex& log, uint32_t session_id, CameraId wanted) {
+  const RecordedSession& session = log.Session(session_id);
+  const std::vector<CameraId> there = session.CamerasWithFrames();
+  if (there.empty()) throw InputError(log.path() + ": holds no frames; was the player recorded too?");
+  const CameraId chosen = there.size() == 1 ? there.front() : wanted;
+  if (std::ranges::find(there, chosen) == there.end()) {
     throw InputError(log.path() + ": holds no frames of camera " + std::to_string(wanted) + " but of " +
-                     numbers);
-  if (!chosen->info) {
+                     Listed(there));
+  }
+  const RecordedCamera& camera = session.cameras.at(chosen);
+  if (!camera.info) {
     throw InputError(log.path() +
                      ": does not say which camera took its frames; record from before the player starts");
   }
-  return *chosen;
+  return camera;
 }
 
 }  // namespace
