@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <variant>
 
 #include "dmslam/map/testing/map_scene.h"
@@ -88,12 +92,14 @@ class Phases : public ::testing::Test {
  protected:
   static constexpr size_t kPoints = 300;
 
-  explicit Phases(bool in_portions = false, CameraId camera_id = 0) {
+  explicit Phases(bool in_portions = false, CameraId camera_id = 0,
+                  std::shared_ptr<const Vocabulary> vocabulary = nullptr) {
     scene_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     strange_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
     setup.camera_id = camera_id;
+    setup.vocabulary = std::move(vocabulary);
     setup.options.keyframes_at_end = true;
     setup.run_search = [this](const FirstMapSearch&) {
       return [this](const InitializerFrame& frame) { return Search(frame); };
@@ -409,6 +415,42 @@ TEST_F(SecondCamera, AFirstMapOfAnotherDoesNotAnswerItsOwn) {
   MapArrives();  // of camera 0, settled and all
   EXPECT_TRUE(core_->awaited().valid());
   EXPECT_EQ(core_->state(), TrackingState::kWaitingForMap);
+}
+
+/// The same, and it would find itself in the map of another by what it looks like.
+class BesideAnother : public Phases {
+ protected:
+  BesideAnother() : Phases(false, 1, ShippedVocabulary()) {}
+
+  static std::shared_ptr<const Vocabulary> ShippedVocabulary() {
+    const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+    return std::make_shared<const Vocabulary>(
+        LoadOrbVocabulary((source != nullptr ? std::string(source) : ".") + "/data/vocabulary.dmv"));
+  }
+  /// Of keyframes within a second.
+  void AnothersMapArrives() {
+    scene_.MapAll(31, 0.01);
+    core_->ApplyMapDelta(scene_.map().TakeDelta(MapEvent::kMapped, KeyframeId::Make(1, 30), 1));
+  }
+  /// Whether a frame has a pose that shows one of `every` points.
+  bool IsFound(uint32_t index, size_t every) {
+    const FrontendOutput output = Frame(index, index * kFrameNs, [&](size_t point) {
+      return point % every == 0 ? std::optional(scene_.point(point)) : std::nullopt;
+    });
+    return Find<FramePose>(output)->HasPose();
+  }
+};
+
+TEST_F(BesideAnother, APartOfAYoungMapIsNoPlaceWhileAFirstMapIsLookedFor) {
+  AnothersMapArrives();
+  for (uint32_t frame = 0; frame < 25; ++frame) EXPECT_FALSE(IsFound(frame, 4)) << frame;
+}
+
+TEST_F(BesideAnother, SeenAsAWholeItIsWhenItHasPredicted) {
+  AnothersMapArrives();
+  uint32_t frame = 0;
+  while (frame < 25 && !IsFound(frame, 1)) ++frame;
+  EXPECT_NEAR(frame / 30.0, 0.5, 0.1);
 }
 
 /// Else they are taken for frames of camera 0, that were elsewhere.
