@@ -68,8 +68,7 @@ class MapScene {
       landmark.first_ns = first_ns_[i];
       map_.AddLandmark(landmark);
       for (uint32_t k = 0; k < num_keyframes; ++k)
-        map_.SetObservation(map_.At(Named(first + k)), static_cast<uint16_t>(i),
-                            map_.At(landmark.id));
+        map_.SetObservation(map_.At(Named(first + k)), static_cast<uint16_t>(i), map_.At(landmark.id));
     }
   }
 
