@@ -45,9 +45,16 @@ TEST(LonePoses, ARowThatReachesATrackedFrameDoesNot) {
   EXPECT_EQ(NumAlone(StandAlone(PosesAt({2600, 3200}), tracked)), 0);
 }
 
-TEST(LonePoses, ALongRowVouchesForItself) {
-  const std::vector<TrackedAt> tracked = TrackedAtMs({9000});
-  EXPECT_EQ(NumAlone(StandAlone(PosesAt(Every33Ms(0, 1000)), tracked)), 0);
+TEST(LonePoses, ALongRowBetweenTrackedFramesVouchesForItself) {
+  const std::vector<TrackedAt> tracked = TrackedAtMs({0, 9000});
+  EXPECT_EQ(NumAlone(StandAlone(PosesAt(Every33Ms(3000, 4000)), tracked)), 0);
+}
+
+TEST(LonePoses, ALongRowBeforeOrAfterAllTrackedFramesDoesNot) {
+  const std::vector<FinalPose> row = PosesAt(Every33Ms(3000, 4000));
+  const int all = static_cast<int>(row.size());
+  EXPECT_EQ(NumAlone(StandAlone(row, TrackedAtMs({9000, 9033}))), all);
+  EXPECT_EQ(NumAlone(StandAlone(row, TrackedAtMs({0, 33}))), all);
 }
 
 TEST(LonePoses, AFewFarApartAreNoRow) {
@@ -64,7 +71,8 @@ TEST(LonePoses, TrackedFramesOfAnotherMapVouchForNothing) {
 TEST(LonePoses, RowsOfTwoMapsDoNotVouchForEachOther) {
   std::vector<FinalPose> poses = PosesAt({0, 33, 66});
   for (FinalPose& pose : PosesAt(Every33Ms(99, 1099), 2)) poses.push_back(pose);
-  const std::vector<uint8_t> alone = StandAlone(poses, {});
+  const std::vector<TrackedAt> tracked{{-2000 * kMs, 1}, {-2000 * kMs, 2}, {4000 * kMs, 1}, {4000 * kMs, 2}};
+  const std::vector<uint8_t> alone = StandAlone(poses, tracked);
   EXPECT_EQ(NumAlone(alone), 3);
   EXPECT_EQ(alone[0] + alone[1] + alone[2], 3);
 }
