@@ -87,6 +87,7 @@ struct PairGeometry {
   const Keyframe& b;
   const Map& map;
   const LandmarkCreationOptions& options;
+  double max_parallax_cos = 1;
 };
 
 constexpr double kClear = 1e-9;  // what differs by so much does so for the exact functions, too
@@ -191,7 +192,7 @@ std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t fe
   const Eigen::Vector3d world_a = pair.a.T_cam_world.rotation.conjugate() * ray_a;
   const Eigen::Vector3d world_b = pair.b.T_cam_world.rotation.conjugate() * ray_b;
   const double parallax_cos = world_a.dot(world_b) / (world_a.norm() * world_b.norm());
-  if (!(parallax_cos > 0 && parallax_cos < pair.options.max_parallax_cos)) {
+  if (!(parallax_cos > 0 && parallax_cos < pair.max_parallax_cos)) {
     ++diagnostics->refused_parallax;
     return std::nullopt;
   }
@@ -322,18 +323,27 @@ struct Candidate {
   bool confirmed = false;  ///< in enough views, over enough time
 };
 
+/// A camera that turns more than it moves sees nothing under a large angle for long, and is lost where
+/// people hide what it knows: a point whose depth is hardly known still holds its rotation, and the next
+/// keyframes mend it. Where the map grows into the past nothing hurries.
+double MinParallaxRad(const Map& map, const Keyframe& keyframe, const LandmarkCreationOptions& options) {
+  const bool newest = map.NewestKeyframeOf(keyframe.id.camera()) == &keyframe;
+  return newest ? options.min_parallax_rad : options.min_past_parallax_rad;
+}
+
 /// All pairs of every free feature of a keyframe, by feature.
 std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, const Keyframe& keyframe,
                                                         const std::vector<uint16_t>& moving,
                                                         const LandmarkCreationOptions& options,
                                                         CreationDiagnostics* diagnostics) {
   const std::vector<uint8_t> use = FreeFeatures(keyframe, moving);
+  const double max_parallax_cos = std::cos(MinParallaxRad(map, keyframe, options));
   std::vector<std::vector<PairCandidate>> pairs(keyframe.features->size());
   for (const Keyframe* neighbour : map.BestCovisible(keyframe, options.neighbours, 1)) {
     const double baseline = (keyframe.T_cam_world.Center() - neighbour->T_cam_world.Center()).norm();
     const std::optional<double> depth = map.MedianDepth(*neighbour);
     if (!depth || baseline < options.min_baseline_over_depth * *depth) continue;
-    const PairGeometry pair{keyframe, *neighbour, map, options};
+    const PairGeometry pair{keyframe, *neighbour, map, options, max_parallax_cos};
     for (const auto& [feature, other] :
          MatchAlongEpipolarPlanes(keyframe, use, *neighbour, FreeFeatures(*neighbour, {}), map, options)) {
       ++diagnostics->matched;

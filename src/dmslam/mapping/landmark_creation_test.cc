@@ -12,15 +12,15 @@ namespace {
 
 constexpr auto Id = WallScene::Id;
 
-/// Keyframes in a row, 0.4 apart and one second apart in time. All see the first `shared` points already, and
-/// have the rest of the wall free.
+/// Keyframes in a row, `step` apart and one second apart in time. All see the first `shared` points already,
+/// and have the rest of the wall free.
 class Creation : public testing::Test {
  protected:
-  void Build(const WallScene& scene, uint32_t keyframes, uint16_t shared) {
+  void Build(const WallScene& scene, uint32_t keyframes, uint16_t shared, double step = 0.4) {
     scene_ = scene;
     std::vector<uint32_t> frames;
     for (uint32_t frame = 1; frame <= keyframes; ++frame) {
-      newest_ = &scene_.AddKeyframe(map_, frame, 0.4 * (frame - 1.0), frame - 1.0);
+      newest_ = &scene_.AddKeyframe(map_, frame, step * (frame - 1.0), frame - 1.0);
       frames.push_back(frame);
     }
     for (uint16_t i = 0; i < shared; ++i) scene_.AddLandmark(map_, 1000U + i, i, frames);
@@ -77,6 +77,26 @@ TEST_F(Creation, NeedsABaseline) {
   map_.SetPose(map_.At(Id(1)), WallScene::At(0.4 - 0.02));  // 0.005 of the depth
   EXPECT_TRUE(Propose().empty());
   EXPECT_EQ(diagnostics_.matched, 0u);
+}
+
+/// Two keyframes that see the wall under about 0.7 degrees, as those of a camera do that turns more than it
+/// moves.
+class LittleParallax : public Creation {
+ protected:
+  LittleParallax() { Build(WallScene(), 2, 20, 0.052); }
+};
+
+TEST_F(LittleParallax, IsEnoughForTheNewestKeyframe) {
+  EXPECT_GT(Propose().size(), 60u);
+  options_.min_parallax_rad = 0.02;
+  EXPECT_TRUE(Propose().empty());
+  EXPECT_GT(diagnostics_.refused_parallax, 60u);
+}
+
+TEST_F(LittleParallax, IsTooLittleWhereTheMapGrowsIntoThePast) {
+  scene_.AddKeyframe(map_, 3, 0.4, 2.0);
+  EXPECT_TRUE(Propose().empty()) << "others follow the keyframe";
+  EXPECT_GT(diagnostics_.refused_parallax, 60u);
 }
 
 TEST_F(Creation, APointThatOneOfThemWouldSeeElsewhereIsRefused) {

@@ -21,7 +21,8 @@ struct LandmarkCreationOptions {
   int max_descriptor_distance = 50;  ///< bits
   double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line; 1 = not asked
   double epipolar_sigmas_squared = kRoundedChiSquared1Dof;
-  double max_parallax_cos = 0.9998;
+  double min_parallax_rad = 0.0087;     ///< between the rays of a point, in the newest keyframe...
+  double min_past_parallax_rad = 0.02;  ///< ...and in one that is placed after those that follow it
   double reprojection_sigmas_squared = kChiSquared2Dof;
   double scale_ratio_slack = 1.5;  ///< times the pyramid's factor
 
@@ -41,6 +42,10 @@ struct LandmarkCreationOptions {
              "points seen in so many views for a second are free of the bound and the neighbourhood; 0: "
              "none");
     v.InPaper("0");
+    v.Number("mapping.min_parallax_rad", min_parallax_rad, 0.0005, 0.2, "rad",
+             "between the rays by which the newest keyframe makes a landmark");
+    v.InBaseline("0.02");
+    v.InPaper("0.02");
   }
 };
 
