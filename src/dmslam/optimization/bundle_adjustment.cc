@@ -19,11 +19,6 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxPosesDense = 60;  ///< Above, the reduced camera system is factorised as a sparse matrix.
-/// Damping begins at the inverse of this, times the diagonal of the normal equations, and falls to a third
-/// with each good step. With Ceres' 1e4 the few steps of an adjustment get nowhere along what is hardly
-/// determined, as whether a camera turned or moved aside before a wall: the map keeps the error, and grows
-/// from it.
-constexpr double kFirstTrustRegion = 1e8;
 
 /// What the cost functions of one problem share.
 struct Shared {
@@ -188,7 +183,6 @@ class Adjustment {
     ceres::Solver::Options options = QuietSolverOptions();
     options.max_num_iterations = iterations;
     options.function_tolerance = tolerance;
-    options.initial_trust_region_radius = kFirstTrustRegion;
     const int free_poses = static_cast<int>(problem_.T_cam_world.size()) - num_held_;
     options.linear_solver_type = free_poses <= kMaxPosesDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>(*ordering_);

@@ -100,6 +100,14 @@ TEST(EssentialGraph, ClosingTheRingRemovesTheDrift) {
   EXPECT_EQ(ring.drifted.S_cam_world[0].translation, ring.truth[0].translation);
 }
 
+TEST(EssentialGraph, FewStepsCloseALongRing) {
+  Ring ring = MakeRing(1000, true);
+  const EssentialGraphReport report = OptimizeEssentialGraph({}, ring.drifted);
+  ASSERT_TRUE(report.usable) << report.message;
+  EXPECT_LT(report.final_cost, 1e-6 * report.initial_cost);
+  EXPECT_LE(report.iterations, 6);
+}
+
 TEST(EssentialGraph, ScaleCanBeFixed) {
   Ring ring = MakeRing(50, false);
   EssentialGraphOptions options;
