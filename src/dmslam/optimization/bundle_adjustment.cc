@@ -19,6 +19,9 @@ namespace dmslam {
 namespace {
 
 constexpr int kMaxPosesDense = 60;  ///< Above, the reduced camera system is factorised as a sparse matrix.
+/// Whether a camera turned or moved aside before a wall is determined a hundred thousand times worse than the
+/// diagonal says. Much more, and a young map bends for what is left of people.
+constexpr double kBundleTrustRegion = 1e6;
 
 /// What the cost functions of one problem share.
 struct Shared {
@@ -180,7 +183,7 @@ class Adjustment {
 
   bool SolveStage(int iterations, double tolerance, BundleLoss::Kind loss, BundleReport& report) {
     loss_.kind = loss;
-    ceres::Solver::Options options = QuietSolverOptions();
+    ceres::Solver::Options options = QuietSolverOptions(kBundleTrustRegion);
     options.max_num_iterations = iterations;
     options.function_tolerance = tolerance;
     const int free_poses = static_cast<int>(problem_.T_cam_world.size()) - num_held_;

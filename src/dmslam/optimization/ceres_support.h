@@ -70,21 +70,17 @@ class InterruptCallback : public ceres::IterationCallback {
   bool interrupted_ = false;
 };
 
-/// Damping begins at the inverse of this, times the diagonal of the normal equations, and falls to a third
-/// with each good step. With Ceres' 1e4 the few steps of an adjustment get nowhere along what is hardly
-/// determined, such as whether a camera turned or moved aside before a wall, or where a long chain of
-/// keyframes ends.
-inline constexpr double kFirstTrustRegion = 1e8;
-
-/// One thread, no output, the same result every time.
-inline ceres::Solver::Options QuietSolverOptions() {
+/// One thread, no output, the same result every time. `first_trust_region`: damping begins at its inverse,
+/// times the diagonal of the normal equations, and falls to a third with each good step. With Ceres' 1e4 few
+/// steps get nowhere along what is hardly determined.
+inline ceres::Solver::Options QuietSolverOptions(double first_trust_region) {
   ceres::Solver::Options options;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
   options.minimizer_progress_to_stdout = false;
   options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
   options.dense_linear_algebra_library_type = ceres::EIGEN;
-  options.initial_trust_region_radius = kFirstTrustRegion;
+  options.initial_trust_region_radius = first_trust_region;
   return options;
 }
 

@@ -102,6 +102,9 @@ void CheckGraph(const EssentialGraphProblem& problem) {
   }
 }
 
+/// Where a long chain ends is determined the worse the longer it is.
+constexpr double kGraphTrustRegion = 1e8;
+
 class GraphSolver {
  public:
   GraphSolver(const EssentialGraphOptions& options, const EssentialGraphProblem& problem)
@@ -117,7 +120,7 @@ class GraphSolver {
 
   EssentialGraphReport Run(std::vector<Sim3d>& S_cam_world) {
     EssentialGraphReport report;
-    ceres::Solver::Options options = QuietSolverOptions();
+    ceres::Solver::Options options = QuietSolverOptions(kGraphTrustRegion);
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     options.max_num_iterations = options_.max_iterations;
     options.function_tolerance = options_.relative_tolerance;
