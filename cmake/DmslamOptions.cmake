@@ -9,8 +9,15 @@ if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
 endif()
 
+# Who switches the compile cache off when a folder is configured (CCACHE_DISABLE, as ccache itself reads it) builds there
+# as if it were not installed.
 find_program(CCACHE_PROGRAM ccache)
-if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+set(compile_cache ON)
+if(NOT CCACHE_PROGRAM OR NOT "$ENV{CCACHE_DISABLE}" STREQUAL "")
+  set(compile_cache OFF)
+endif()
+option(DMSLAM_COMPILE_CACHE "Compile through ccache" ${compile_cache})
+if(DMSLAM_COMPILE_CACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
 endif()
 
@@ -23,6 +30,10 @@ target_compile_options(dmslam_options INTERFACE
   $<BUILD_INTERFACE:-Wall> $<BUILD_INTERFACE:-Wextra> $<BUILD_INTERFACE:-Wconversion> $<BUILD_INTERFACE:-Wshadow>
   $<BUILD_INTERFACE:-Werror> $<BUILD_INTERFACE:-ffp-contract=off>
   $<BUILD_INTERFACE:-fno-semantic-interposition>)
+# GCC looks for memory that it can give back each time it has asked for some more, and in Eigen's templates it finds a
+# sixth: it begins with that at a gigabyte only.
+target_compile_options(dmslam_options INTERFACE
+  $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1048576>>)
 target_compile_features(dmslam_options INTERFACE cxx_std_20)
 if(DMSLAM_SANITIZE)
   target_compile_options(dmslam_options INTERFACE

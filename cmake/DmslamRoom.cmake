@@ -6,7 +6,7 @@ option(DMSLAM_TOGETHER "Compile the files of a room together" ON)
 # The headers that nearly all rooms read (Eigen, the standard library) are then compiled once, which saves a second in
 # every room. Where there is a compile cache it is off: the cache does not know what to make of such files.
 set(precompile OFF)
-if(DMSLAM_TOGETHER AND NOT CCACHE_PROGRAM AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+if(DMSLAM_TOGETHER AND NOT DMSLAM_COMPILE_CACHE AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   set(precompile ON)
 endif()
 option(DMSLAM_PRECOMPILE "Compile the headers of Eigen and of the standard library once" ${precompile})
