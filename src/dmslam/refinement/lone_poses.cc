@@ -16,11 +16,12 @@ bool IsNear(int64_t stamp_ns, MapId map_id, std::span<const TrackedAt> tracked) 
   return std::any_of(begin, end, [map_id](const TrackedAt& at) { return at.map_id == map_id; });
 }
 
-/// Whether the map had tracked frames before and after.
-bool IsBetween(int64_t stamp_ns, MapId map_id, std::span<const TrackedAt> tracked) {
+/// Whether the map had tracked frames either before or after, and not both. It may have had none: a camera
+/// that others mapped for.
+bool IsOutside(int64_t stamp_ns, MapId map_id, std::span<const TrackedAt> tracked) {
   const auto after = std::ranges::upper_bound(tracked, stamp_ns, {}, &TrackedAt::stamp_ns);
   const auto is_there = [map_id](const TrackedAt& at) { return at.map_id == map_id; };
-  return std::any_of(tracked.begin(), after, is_there) && std::any_of(after, tracked.end(), is_there);
+  return std::any_of(tracked.begin(), after, is_there) != std::any_of(after, tracked.end(), is_there);
 }
 
 }  // namespace
@@ -41,7 +42,7 @@ std::vector<uint8_t> StandAlone(std::span<const FinalPose> poses, std::span<cons
       const auto behind = end == row.end() ? end : std::next(end);
       const bool is_long = stamp(*std::prev(behind)) - stamp(*begin) >= kSpanNs;
       const bool vouched =
-          (is_long && IsBetween(stamp(*begin), map_id, tracked)) ||
+          (is_long && !IsOutside(stamp(*begin), map_id, tracked)) ||
           std::any_of(begin, behind, [&](size_t i) { return IsNear(stamp(i), map_id, tracked); });
       if (!vouched) std::for_each(begin, behind, [&](size_t i) { alone[i] = 1; });
       begin = behind;

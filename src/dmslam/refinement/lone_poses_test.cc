@@ -57,6 +57,10 @@ TEST(LonePoses, ALongRowBeforeOrAfterAllTrackedFramesDoesNot) {
   EXPECT_EQ(NumAlone(StandAlone(row, TrackedAtMs({0, 33}))), all);
 }
 
+TEST(LonePoses, ALongRowOfACameraThatTrackedNothingVouchesForItself) {
+  EXPECT_EQ(NumAlone(StandAlone(PosesAt(Every33Ms(3000, 4000)), {})), 0);
+}
+
 TEST(LonePoses, AFewFarApartAreNoRow) {
   const std::vector<TrackedAt> tracked = TrackedAtMs({9000});
   EXPECT_EQ(NumAlone(StandAlone(PosesAt({166, 566, 666}), tracked)), 3) << "they only span half a second";
@@ -71,8 +75,7 @@ TEST(LonePoses, TrackedFramesOfAnotherMapVouchForNothing) {
 TEST(LonePoses, RowsOfTwoMapsDoNotVouchForEachOther) {
   std::vector<FinalPose> poses = PosesAt({0, 33, 66});
   for (FinalPose& pose : PosesAt(Every33Ms(99, 1099), 2)) poses.push_back(pose);
-  const std::vector<TrackedAt> tracked{{-2000 * kMs, 1}, {-2000 * kMs, 2}, {4000 * kMs, 1}, {4000 * kMs, 2}};
-  const std::vector<uint8_t> alone = StandAlone(poses, tracked);
+  const std::vector<uint8_t> alone = StandAlone(poses, {});
   EXPECT_EQ(NumAlone(alone), 3);
   EXPECT_EQ(alone[0] + alone[1] + alone[2], 3);
 }
