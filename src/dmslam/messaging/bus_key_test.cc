@@ -151,7 +151,9 @@ TEST_F(KeyFile, IsRefusedWithTheCureWhereItIsNone) {
   EXPECT_NE(Refusal(Write("too short", 0600)).find("has 9 bytes; wanted are 32 to 4096: `(umask 077;"),
             std::string::npos);
   EXPECT_NE(Refusal(Write(std::string(4097, 'x'), 0600)).find("wanted are"), std::string::npos);
-  EXPECT_EQ(Refusal(Write(std::string(4096, 'x') + "\n", 0600)), "");
+  std::string long_key(4096, 'x');
+  long_key.push_back('\n');
+  EXPECT_EQ(Refusal(Write(long_key, 0600)), "");
   EXPECT_NE(Refusal(folder_ + "/none").find("No such file"), std::string::npos);
   EXPECT_NE(Refusal(folder_).find("is no file"), std::string::npos);
   const std::string pipe = folder_ + "/pipe";
