@@ -21,7 +21,7 @@ namespace {
 constexpr int kMaxPosesDense = 60;  ///< Above, the reduced camera system is factorised as a sparse matrix.
 /// Whether a camera turned or moved aside before a wall is determined a hundred thousand times worse than the
 /// diagonal says. Much more, and a young map bends for what is left of people.
-constexpr double kBundleTrustRegion = 1e6;
+constexpr double kBundleTrustRegion = 1e7;
 
 /// What the cost functions of one problem share.
 struct Shared {
