@@ -35,7 +35,7 @@ struct ReferenceOptions {
 struct PairMotionOptions {
   MinimaOptions minima;
   double minima_slack = 5.0;        ///< a minimum with up to so many times the lowest cost is looked at, too
-  double min_runner_up_cost = 1.5;  ///< another motion must cost all views this many times as much
+  double min_runner_up_cost = 1.3;  ///< another motion must cost all views this many times as much
   /// Mean squared error over all views, as a share of the bound: more is no one motion...
   double max_cost = 0.1;
   double max_cost_alone = 0.2;        ///< ...but up to this where nothing else comes near...
