@@ -123,6 +123,13 @@ class SystemSimulation : public ::testing::Test {
     }();
     return spread;
   }
+  /// How far poses as they were told are from what they are refined to: a frontend that dies takes along what
+  /// it would have refined them with.
+  static double UnrefinedApart() {
+    Outcome as_told = common_->undisturbed;
+    as_told.trajectory = as_told.online;
+    return Apart(as_told);
+  }
   static double Apart(const Outcome& outcome) {
     const Distance distance = Measure(outcome, common_->undisturbed, common_->folder.string());
     if (common_->tells)
@@ -135,15 +142,17 @@ class SystemSimulation : public ::testing::Test {
   static std::string Broken(const Schedule& schedule, const Outcome& outcome) {
     if (!schedule.meets_writers) return Difference(outcome, common_->undisturbed);
     int64_t frames_lost = 0, records_lost = 0;
+    double most_apart = kMostApart * Spread();
     for (const Fault& fault : schedule.faults) {
       if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) continue;
       const bool frontend = fault.process == "frontend";
+      if (frontend) most_apart = std::max(most_apart, UnrefinedApart());
       const bool dies = fault.kind == Fault::Kind::kKill && (frontend || fault.process == "loopcloser");
       if (dies) records_lost += kRecordsLost;
       if (frontend && fault.at_frame < kFirstMapFrame) frames_lost += NumFrames();
       frames_lost += frontend ? kFramesLostByFrontend : kFramesLost;
     }
-    return Loss(outcome, common_->undisturbed, kMostApart * Spread(), frames_lost, records_lost,
+    return Loss(outcome, common_->undisturbed, most_apart, frames_lost, records_lost,
                 common_->folder.string());
   }
 
