@@ -146,9 +146,9 @@ class SystemSimulation : public ::testing::Test {
     for (const Fault& fault : schedule.faults) {
       if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) continue;
       const bool frontend = fault.process == "frontend";
-      if (frontend) most_apart = std::max(most_apart, UnrefinedApart());
       const bool dies = fault.kind == Fault::Kind::kKill && (frontend || fault.process == "loopcloser");
       if (dies) records_lost += kRecordsLost;
+      if (dies && frontend) most_apart = std::max(most_apart, UnrefinedApart());
       if (frontend && fault.at_frame < kFirstMapFrame) frames_lost += NumFrames();
       frames_lost += frontend ? kFramesLostByFrontend : kFramesLost;
     }
