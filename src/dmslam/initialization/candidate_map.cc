@@ -216,6 +216,19 @@ void CandidateBuilder::PlaceView(const ReferenceView& view, CandidateMap* candid
       {&view, best.T, static_cast<double>(best.inliers.size()) / static_cast<double>(seen.size())});
 }
 
+std::optional<Rigid3d> CandidateBuilder::PoseOf(const ReferenceView& view,
+                                                const CandidateMap& candidate) const {
+  for (const CandidateMap::Placed& placed : candidate.placed) {
+    if (placed.view == &view) return placed.T_k_0;
+  }
+  CandidateMap longer = candidate;
+  PlaceView(view, &longer);
+  const CandidateMap::Placed& placed = longer.placed.back();
+  const bool shows_enough =
+      placed.view == &view && placed.consistent_share >= options_.geometry.min_consistent_share;
+  return shows_enough ? std::optional(placed.T_k_0) : std::nullopt;
+}
+
 void CandidateBuilder::KeepConsistent(CandidateMap* candidate) const {
   const auto& matches = candidate->last().pair.matches;
   for (size_t k = 0; k < matches.size(); ++k) {

@@ -34,7 +34,7 @@ struct CandidateMap {
   std::vector<uint8_t> use;             ///< points that stand
   std::vector<Placed> placed;           ///< the last view first
   double cost = 1;                      ///< mean truncated squared error over all views
-  bool alone = false;                   ///< no other motion explains the views nearly as well
+  double rival_ratio = 1e9;             ///< what the next best motion costs, in units of this one's cost
 
   const ReferenceView& last() const { return *placed.front().view; }
   const Rigid3d& T_last_0() const { return placed.front().T_k_0; }
@@ -61,6 +61,8 @@ class CandidateBuilder {
   /// Finds the pose of a view from the points, and how many it sees where they should be; a view that shows
   /// too few of them says nothing and is left out.
   void PlaceView(const ReferenceView& view, CandidateMap* candidate) const;
+  /// The view's pose by the points; none where it shows too few of them where they should be.
+  std::optional<Rigid3d> PoseOf(const ReferenceView& view, const CandidateMap& candidate) const;
   /// Drops points that some view does not see where they should be.
   void KeepConsistent(CandidateMap* candidate) const;
   /// Matches flagged that have no point get one under the poses as they are, where all views agree with it.

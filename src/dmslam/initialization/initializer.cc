@@ -11,6 +11,7 @@
 #include "dmslam/initialization/motion_contest.h"
 #include "dmslam/initialization/plane_motions.h"
 #include "dmslam/initialization/reference_window.h"
+#include "dmslam/initialization/testimony.h"
 #include "dmslam/motion_segmentation/turn.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
 #include "dmslam/util/check.h"
@@ -130,11 +131,9 @@ bool MayHideSeveralMotions(WaitReason wait) {
          wait == WaitReason::kSelectionRefused || wait == WaitReason::kDistributionTooSmall;
 }
 
-/// Maps under different motions: the one that explains the views best, and what the next best costs.
+/// Maps under different motions: the one that explains the views best, and the next best.
 struct MotionRace {
-  std::optional<CandidateMap> best;
-  double runner_up = 1e9;
-
+  std::optional<CandidateMap> best, runner_up;
   std::vector<Rigid3d> entered;
 
   bool HasRun(const Rigid3d& T_last_0) const {
@@ -143,9 +142,12 @@ struct MotionRace {
   }
   void Enter(CandidateMap candidate) {
     entered.push_back(candidate.T_last_0());
-    const bool same = best && CandidateBuilder::SameMotion(best->T_last_0(), candidate.T_last_0());
-    if (best && !same) runner_up = std::min(runner_up, std::max(best->cost, candidate.cost));
-    if (!best || candidate.cost < best->cost) best = std::move(candidate);
+    const bool wins = !best || candidate.cost < best->cost;
+    if (best && !CandidateBuilder::SameMotion(best->T_last_0(), candidate.T_last_0())) {
+      CandidateMap& loser = wins ? *best : candidate;
+      if (!runner_up || loser.cost < runner_up->cost) runner_up = std::move(loser);
+    }
+    if (wins) best = std::move(candidate);
   }
 };
 
@@ -195,11 +197,17 @@ class Initializer::Impl {
   InitializerReport TryContest(ReferenceWindow* window);
   std::vector<std::vector<uint8_t>> MotionsOf(const InitializerFrame& reference,
                                               const ReferenceView& view) const;
-  std::optional<CandidateMap> Reconstruct(const ReferenceWindow& window, std::span<const uint8_t> is_static,
+  MotionRace RunRace(const ReferenceWindow& window, std::span<const uint8_t> is_static,
+                     Refused* refused) const;
+  std::optional<CandidateMap> WinnerOf(const MotionRace& race, Refused* refused) const;
+  std::optional<CandidateMap> Reconstruct(ReferenceWindow* window, std::span<const uint8_t> is_static,
                                           Refused* refused) const;
+  bool IsAlone(const CandidateMap& candidate) const;
   bool Passes(const CandidateMap& candidate, Refused* refused) const;
   bool AgreesWithPast(ReferenceWindow* window, CandidateMap* candidate, Refused* refused);
   bool Finish(ReferenceWindow* window, CandidateMap* candidate, Refused* refused);
+  bool IsBelieved(const CandidateMap& candidate, ReferenceWindow* window, Refused* refused) const;
+  bool IsSure(const CandidateMap& candidate, const ReferenceWindow& window) const;
   bool FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const;
   bool Leads(const InitializerFrame& now, const Contender& winner, ReferenceWindow* window) const;
 
@@ -341,7 +349,7 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   Refused refused;
   if (!agreement.IsUsable()) {
     report = Wait(FromAgreement(agreement.refusal), agreement.explanation);
-  } else if (auto candidate = Reconstruct(*window, agreement.is_static, &refused);
+  } else if (auto candidate = Reconstruct(window, agreement.is_static, &refused);
              candidate && Finish(window, &*candidate, &refused)) {
     report.wait = WaitReason::kNone;
     report.reason = "first map";
@@ -369,7 +377,7 @@ InitializerReport Initializer::Impl::TryContest(ReferenceWindow* window) {
   std::vector<Contender> contenders;
   Refused refused;
   for (const std::vector<uint8_t>& motion : MotionsOf(window->reference(), last)) {
-    std::optional<CandidateMap> candidate = Reconstruct(*window, motion, &refused);
+    std::optional<CandidateMap> candidate = WinnerOf(RunRace(*window, motion, &refused), &refused);
     if (!candidate) continue;
     const std::vector<uint8_t> all(last.pair.matches.size(), 1);
     builder_.AddMissing(all, &*candidate);
@@ -383,6 +391,7 @@ InitializerReport Initializer::Impl::TryContest(ReferenceWindow* window) {
     return Wait(result.refused);
   }
   CandidateMap& candidate = result.winner->candidate;
+  window->hypotheses = {candidate};
   if (!Leads(last.frame, *result.winner, window)) {
     return Wait(WaitReason::kOnTrial, "the widest motion must win for some more frames");
   }
@@ -448,11 +457,10 @@ std::vector<std::vector<uint8_t>> Initializer::Impl::MotionsOf(const Initializer
   return motions;
 }
 
-/// Every minimum of the pair's epipolar cost that is about as low as the lowest is carried through all views;
-/// what they say decides. Two different motions that explain them about equally well: none.
-std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow& window,
-                                                           std::span<const uint8_t> is_static,
-                                                           Refused* refused) const {
+/// Every minimum of the pair's epipolar cost that is about as low as the lowest is carried through all views,
+/// and so is what this and older reference frames found before; what the views say decides.
+MotionRace Initializer::Impl::RunRace(const ReferenceWindow& window, std::span<const uint8_t> is_static,
+                                      Refused* refused) const {
   const ReferenceView& last = window.views().back();
   const std::vector<const ReferenceView*> between = window.ViewsBetween(last, options_.max_views - 1);
   std::vector<uint32_t> order(last.pair.matches.size());
@@ -471,22 +479,48 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(const ReferenceWindow
     if (minimum.cost > options_.motion.minima_slack * minima.front().cost) break;
     enter(minimum.model);
   }
-  for (const Rigid3d& motion : PlaneMotions(arrays, is_static)) {
+  const auto enter_new = [&](const Rigid3d& motion) {
     if (!race.HasRun(motion)) enter(ModelOf(motion));
-  }
-  std::optional<CandidateMap>& best = race.best;
-  const double runner_up = race.runner_up;
+  };
+  std::ranges::for_each(PlaneMotions(arrays, is_static), enter_new);
+  std::ranges::for_each(MotionsToTry(builder_, windows_, window, options_.testimony), enter_new);
+  if (race.best && race.runner_up) race.best->rival_ratio = race.runner_up->cost / race.best->cost;
+  return race;
+}
+
+bool Initializer::Impl::IsAlone(const CandidateMap& candidate) const {
+  return candidate.rival_ratio >= options_.motion.alone_runner_up_cost;
+}
+
+/// Two different motions that explain the views about equally well: none.
+std::optional<CandidateMap> Initializer::Impl::WinnerOf(const MotionRace& race, Refused* refused) const {
+  const std::optional<CandidateMap>& best = race.best;
   if (!best) return std::nullopt;
-  if (runner_up < options_.motion.min_runner_up_cost * best->cost) {
+  if (best->rival_ratio < options_.motion.min_runner_up_cost) {
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
     return std::nullopt;
   }
-  best->alone = runner_up >= options_.motion.alone_runner_up_cost * best->cost;
-  if (best->cost > (best->alone ? options_.motion.max_cost_alone : options_.motion.max_cost)) {
+  if (best->cost > (IsAlone(*best) ? options_.motion.max_cost_alone : options_.motion.max_cost)) {
     *refused = {WaitReason::kInconsistent, "no motion explains all views well"};
     return std::nullopt;
   }
   return best;
+}
+
+/// The winner, if it may become a map; what was found is remembered in any case.
+std::optional<CandidateMap> Initializer::Impl::Reconstruct(ReferenceWindow* window,
+                                                           std::span<const uint8_t> is_static,
+                                                           Refused* refused) const {
+  const MotionRace race = RunRace(*window, is_static, refused);
+  if (!race.best) return std::nullopt;
+  const CandidateMap& best = *race.best;
+  window->hypotheses = {best};
+  if (race.runner_up) window->hypotheses.push_back(*race.runner_up);
+  if (best.rival_ratio >= options_.testimony.min_rival_ratio && best.cost <= options_.motion.max_cost_alone &&
+      builder_.DirectionSigma(best) <= options_.geometry.max_direction_sigma_rad) {
+    window->claims.push_back({&best.last(), best.T_last_0()});
+  }
+  return WinnerOf(race, refused);
 }
 
 bool Initializer::Impl::Passes(const CandidateMap& candidate, Refused* refused) const {
@@ -513,19 +547,38 @@ bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate,
   }
   builder_.KeepConsistent(candidate);
   if (!AgreesWithPast(window, candidate, refused) || !Passes(*candidate, refused)) return false;
-  if (FoundAgain(*candidate, window)) return true;
-  *refused = {WaitReason::kOnTrial, "the same motion must be found with another view"};
+  return IsBelieved(*candidate, window, refused);
+}
+
+/// Other reference frames decide. Where none has a say, the motion must be a clear one, or be found again.
+bool Initializer::Impl::IsBelieved(const CandidateMap& candidate, ReferenceWindow* window,
+                                   Refused* refused) const {
+  const bool again = FoundAgain(candidate, window);
+  switch (Hear(builder_, windows_, *window, candidate, options_.testimony)) {
+    case Verdict::kConfirmed:
+      return true;
+    case Verdict::kContradicted:
+      *refused = {WaitReason::kOnTrial, "other reference frames say another motion"};
+      return false;
+    case Verdict::kUnheard:
+      break;
+  }
+  if (IsSure(candidate, *window) || (again && IsAlone(candidate))) return true;
+  *refused = {WaitReason::kOnTrial, "the same motion must be found again"};
   return false;
 }
 
-/// Where motions were hard to tell apart before, or the views are near each other in time, or another motion
-/// explains them nearly as well and the direction is hardly known: whether the map found last says the same
-/// of the camera's. What holds for one view by chance seldom holds for the next.
-bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
+/// Not where motions were hard to tell apart before, or the views are near each other in time, or another motion
+/// explains them nearly as well and the direction is hardly known.
+bool Initializer::Impl::IsSure(const CandidateMap& candidate, const ReferenceWindow& window) const {
   const bool clear =
-      candidate.alone || builder_.DirectionSigma(candidate) <= options_.geometry.clear_direction_sigma_rad;
-  const bool sure = !window->doubtful && clear && candidate.last().since_reference_s >= options_.sure_age_s;
-  if (sure) return true;
+      IsAlone(candidate) || builder_.DirectionSigma(candidate) <= options_.geometry.clear_direction_sigma_rad;
+  return !window.doubtful && clear && candidate.last().since_reference_s >= options_.sure_age_s;
+}
+
+/// Whether the map found last says the same of the camera's motion. What holds for one view by chance seldom
+/// holds for the next.
+bool Initializer::Impl::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
   const auto before = window->found;
   window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};
   if (!before) return false;

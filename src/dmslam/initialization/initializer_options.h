@@ -70,6 +70,15 @@ struct PastOptions {
   int first = 0;               ///< so many frames come before the first reference frame: they testify only
 };
 
+/// What reference frames say of each other's motions.
+struct TestimonyOptions {
+  double max_turn_rad = 0.02;       ///< two say the same: their rotations differ by so much at most...
+  double max_direction_rad = 0.35;  ///< ...and their directions of translation by so much
+  double min_rival_ratio = 1.1;     ///< who knows a rival that costs less than this many times as much is silent
+  double memory_s = 1.0;            ///< what was found longer ago does not count
+  double share_s = 0.5;             ///< what was found within so much is tried at younger reference frames
+};
+
 /// Times are of the frames' stamps.
 struct InitializerOptions {
   /// Fewer samples than the selector's own default, stricter agreement.
@@ -93,6 +102,7 @@ struct InitializerOptions {
   PairMotionOptions motion;
   GeometryOptions geometry;
   PastOptions past;
+  TestimonyOptions testimony;
 
   int min_features = 100;        ///< a frame with fewer takes no part
   double frame_step_s = 0.045;   ///< frames nearer to the last one looked at are left out

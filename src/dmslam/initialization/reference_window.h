@@ -44,6 +44,14 @@ class ReferenceWindow {
     std::vector<uint32_t> features;  ///< of the reference frame, sorted
   };
   std::optional<Lead> lead;
+  /// The motions that explained the newest view best, the best first: they are tried at the next one, too.
+  std::vector<CandidateMap> hypotheses;
+  /// A motion that was clearly better than its rivals, and whose direction was known.
+  struct Claim {
+    const ReferenceView* view = nullptr;
+    Rigid3d T_view_0;
+  };
+  std::vector<Claim> claims;  ///< in order of time
   /// The motion of the map that was found last, to the view that it was found with.
   struct Found {
     const ReferenceView* view = nullptr;
