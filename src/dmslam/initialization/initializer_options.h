@@ -74,9 +74,9 @@ struct PastOptions {
 struct TestimonyOptions {
   double max_turn_rad = 0.02;       ///< two say the same: their rotations differ by so much at most...
   double max_direction_rad = 0.35;  ///< ...and their directions of translation by so much
-  double min_rival_ratio = 1.1;     ///< who knows a rival that costs less than this many times as much is silent
-  double memory_s = 1.0;            ///< what was found longer ago does not count
-  double share_s = 0.5;             ///< what was found within so much is tried at younger reference frames
+  double min_rival_ratio = 1.1;  ///< who knows a rival that costs less than this many times as much is silent
+  double memory_s = 1.0;         ///< what was found longer ago does not count
+  double share_s = 0.5;          ///< what was found within so much is tried at younger reference frames
 };
 
 /// Times are of the frames' stamps.

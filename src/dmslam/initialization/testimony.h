@@ -10,10 +10,10 @@
 
 namespace dmslam {
 
-/// Reference frames that are kept side by side see the same camera move: what one of them found is worth a try
-/// at the others, and has a say in what they find. A wrong motion may explain the views of one reference frame
-/// better than the true one does, but seldom those of several, and seldom for long.
-/// All indices are of frames; motions take points of the first frame into the second, up to scale.
+/// Reference frames that are kept side by side see the same camera move: what one of them found is worth a
+/// try at the others, and has a say in what they find. A wrong motion may explain the views of one reference
+/// frame better than the true one does, but seldom those of several, and seldom for long. All indices are of
+/// frames; motions take points of the first frame into the second, up to scale.
 
 /// How the camera moved between two frames, if the candidate's motion is its. None: one of the two is no view
 /// of the window, or shows too few of the candidate's points where they should be.
@@ -31,8 +31,8 @@ enum class Verdict {
   kContradicted,  ///< otherwise; or the window itself found another motion for most of the last second
 };
 
-/// What all windows, with what they found within the last second, say of the candidate's motion. Each one counts
-/// by how long it has watched.
+/// What all windows, with what they found within the last second, say of the candidate's motion. Each one
+/// counts by how long it has watched.
 Verdict Hear(const CandidateBuilder& builder, const std::deque<ReferenceWindow>& windows,
              const ReferenceWindow& window, const CandidateMap& candidate, const TestimonyOptions& options);
 

@@ -123,7 +123,8 @@ TEST_F(TestimonyTest, EachCountsByHowLongItHasWatched) {
 // The motion that wins now is not believed where another one won at the views before.
 TEST_F(TestimonyTest, AWindowThatHasChangedItsMindIsNotBelieved) {
   ReferenceWindow& window = Watch(0, {4, 8, 12});
-  for (const ReferenceView& view : window.views()) window.claims.push_back({&view, Motion(0, view.frame.index)});
+  for (const ReferenceView& view : window.views())
+    window.claims.push_back({&view, Motion(0, view.frame.index)});
   EXPECT_EQ(HearOf(window, RoomOf(window)), Verdict::kUnheard) << "nobody confirms himself";
   EXPECT_EQ(HearOf(window, WrongMapOf(window)), Verdict::kContradicted);
 }
@@ -147,7 +148,8 @@ TEST_F(TestimonyTest, WhatOlderReferenceFramesFoundIsTriedAtTheYounger) {
     EXPECT_TRUE(CandidateBuilder::SameMotion(motions[0], Motion(each->reference().index, 12)));
   }
   Watch(8, {12, 40});
-  EXPECT_TRUE(MotionsToTry(builder_, windows_, windows_[2], TestimonyOptions()).empty()) << "found long before";
+  EXPECT_TRUE(MotionsToTry(builder_, windows_, windows_[2], TestimonyOptions()).empty())
+      << "found long before";
 }
 
 TEST_F(TestimonyTest, FramesThatTheWindowDoesNotShowHaveNoMotion) {
