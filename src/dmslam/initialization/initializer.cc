@@ -134,7 +134,7 @@ bool MayHideSeveralMotions(WaitReason wait) {
 /// Maps under different motions: the one that explains the views best, and the next best.
 struct MotionRace {
   std::optional<CandidateMap> best, runner_up;
-  std::vector<Rigid3d> entered;
+  std::vector<Rigid3d> entered;  ///< as they came out, and those that were tried besides
 
   bool HasRun(const Rigid3d& T_last_0) const {
     return std::any_of(entered.begin(), entered.end(),
@@ -480,7 +480,9 @@ MotionRace Initializer::Impl::RunRace(const ReferenceWindow& window, std::span<c
     enter(minimum.model);
   }
   const auto enter_new = [&](const Rigid3d& motion) {
-    if (!race.HasRun(motion)) enter(ModelOf(motion));
+    if (race.HasRun(motion)) return;
+    enter(ModelOf(motion));
+    race.entered.push_back(motion);
   };
   std::ranges::for_each(PlaneMotions(arrays, is_static), enter_new);
   std::ranges::for_each(MotionsToTry(builder_, windows_, window, options_.testimony), enter_new);
@@ -558,7 +560,7 @@ bool Initializer::Impl::IsBelieved(const CandidateMap& candidate, ReferenceWindo
     case Verdict::kConfirmed:
       return true;
     case Verdict::kContradicted:
-      *refused = {WaitReason::kOnTrial, "other reference frames say another motion"};
+      *refused = {WaitReason::kInconsistent, "other reference frames say another motion"};
       return false;
     case Verdict::kUnheard:
       break;

@@ -75,6 +75,7 @@ struct TestimonyOptions {
   double max_turn_rad = 0.02;       ///< two say the same: their rotations differ by so much at most...
   double max_direction_rad = 0.35;  ///< ...and their directions of translation by so much
   double min_rival_ratio = 1.1;  ///< who knows a rival that costs less than this many times as much is silent
+  double min_moved_share = 0.2;  ///< of an older one's motion, that the frames compared must be apart
   double memory_s = 1.0;         ///< what was found longer ago does not count
   double share_s = 0.5;          ///< what was found within so much is tried at younger reference frames
 };

@@ -20,7 +20,8 @@ bool SayTheSame(const Rigid3d& a, const Rigid3d& b, const TestimonyOptions& opti
          a.translation.normalized().dot(b.translation.normalized()) > std::cos(options.max_direction_rad);
 }
 
-/// One more of those that say the same than of those that do not is +1, one fewer -1.
+/// +1 for each comparison that agrees, -1 for each that does not; nothing where one of the motions is
+/// unknown.
 class Tally {
  public:
   explicit Tally(const TestimonyOptions& options) : options_(options) {}
@@ -38,10 +39,13 @@ class Tally {
 void CompareClaims(const CandidateBuilder& builder, const ReferenceWindow& other,
                    const ReferenceWindow& window, const CandidateMap& candidate,
                    const TestimonyOptions& options, Tally* tally) {
+  const auto T_from_0 = PoseAt(builder, window, candidate, other.reference().index);
+  if (!T_from_0) return;
   for (const ReferenceWindow::Claim& claim : other.claims) {
+    if (claim.view == &candidate.last()) continue;  // the candidate itself
     if (SecondsBetween(claim.view->frame, candidate.last().frame) > options.memory_s) continue;
-    const uint32_t to = claim.view->frame.index;
-    tally->Compare(MotionBetween(builder, window, candidate, other.reference().index, to), claim.T_view_0);
+    const auto T_to_0 = PoseAt(builder, window, candidate, claim.view->frame.index);
+    if (T_to_0) tally->Compare(*T_to_0 * T_from_0->Inverse(), claim.T_view_0);
   }
 }
 
@@ -51,13 +55,18 @@ void ComparePrediction(const CandidateBuilder& builder, const ReferenceWindow& o
                        const TestimonyOptions& options, Tally* tally) {
   if (older.claims.empty() || older.hypotheses.empty()) return;
   const CandidateMap& found = older.hypotheses.front();
-  if (&found.last() != older.claims.back().view) return;
+  const ReferenceWindow::Claim& claim = older.claims.back();
+  const bool claimed =
+      claim.view == &found.last() && CandidateBuilder::SameMotion(claim.T_view_0, found.T_last_0());
+  if (!claimed) return;
   if (SecondsBetween(found.last().frame, candidate.last().frame) > options.memory_s) return;
   const uint32_t from = window.reference().index;
   const uint32_t to = std::min(candidate.last().frame.index, found.last().frame.index);
   if (from >= to) return;
-  tally->Compare(MotionBetween(builder, window, candidate, from, to),
-                 MotionBetween(builder, older, found, from, to));
+  const std::optional<Rigid3d> its = MotionBetween(builder, older, found, from, to);
+  // A camera that hardly moved between the two frames has no direction to compare.
+  if (!its || its->translation.norm() < options.min_moved_share * found.T_last_0().translation.norm()) return;
+  tally->Compare(MotionBetween(builder, window, candidate, from, to), its);
 }
 
 }  // namespace
