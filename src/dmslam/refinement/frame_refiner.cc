@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/refinement/late_placement.h"
 #include "dmslam/util/parallel.h"
 
 namespace dmslam {
@@ -23,6 +24,19 @@ const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
 /// Computes those that are stale: reading the map changes nothing then, and several threads may.
 void FillViewingRanges(const Map& map) {
   for (const LandmarkId id : map.LandmarkIdsSorted()) map.Viewing(map.At(id));
+}
+
+/// Whether the keyframes before and after rule out that the camera was there. Behind people a few wrong
+/// sights may agree with a pose far aside.
+bool IsAside(const Map& map, KeyframeId reference, const FramePose& pose, const Rigid3d& T_cam_world) {
+  TrackedFrame frame;
+  frame.index = pose.frame_index;
+  frame.stamp_ns = pose.stamp_ns;
+  frame.T_cam_world = T_cam_world;
+  const Keyframe& keyframe = map.At(reference);
+  const double depth = map.MedianDepth(keyframe).value_or(1.0);
+  return !AgreesWithKeyframesAside(map, keyframe.map_id, frame, reference.session(), depth,
+                                   reference.camera());
 }
 
 }  // namespace
@@ -171,6 +185,9 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
   std::optional<FinalPose> refined = std::move(looked->refined);
   if (options_.for_smoothing) LookFromMotion(map, reference->map_id, kept, looked->known, search, &refined);
+  const bool is_moved_aside = refined && IsAside(map, *keyframe_id, kept.pose, refined->measured) &&
+                              !IsAside(map, *keyframe_id, kept.pose, told);
+  if (is_moved_aside) refined.reset();
   before_ = std::exchange(last_, std::nullopt);
   if (refined) last_ = {reference->map_id, kept.pose.stamp_ns, refined->measured, refined->sights.size()};
   if (!refined && kept.pose.state == TrackingState::kLocalizedLater) {

@@ -52,8 +52,9 @@ class FrameRefiner {
   void LookAhead(const Map& map, std::span<const Search> searches);
   bool IsAhead() const { return !ahead_.empty(); }
   /// The pose of the oldest frame that is due, relative to its reference keyframe as that is now (state:
-  /// localised later). Where its observations do not agree with the map any more: none, as it was told
-  /// before; of a frame that was placed late, and never told, where it was, with nothing measured.
+  /// localised later). Where its observations do not agree with the map any more, or put it where the
+  /// keyframes before and after rule it out (AgreesWithKeyframesAside()) and it was not before: none, as it
+  /// was told before; of a frame that was placed late, and never told, where it was, with nothing measured.
   std::optional<FinalPose> RefineNext(const Map& map, const Search& search);
 
  private:

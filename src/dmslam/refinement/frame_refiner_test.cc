@@ -89,6 +89,27 @@ TEST_F(Refining, FrameThatTheMapContradictsIsLeftOut) {
   EXPECT_TRUE(Refine(refiner).empty());
 }
 
+/// What the frame sees puts it 0.23 from the keyframe at the origin, where it was told to be.
+TEST_F(Refining, AFrameStaysWhereItWasToldWhereTheCameraCannotHaveGoneAsideInTheTime) {
+  told_.T_cam_reference = Rigid3d();
+  told_.stamp_ns = 200'000'000;
+  FrameRefiner still;
+  still.Keep(frame_, told_);
+  EXPECT_TRUE(Refine(still).empty());
+  Keyframe far;
+  far.id = KeyframeId::Make(1, 10);
+  far.map_id = 1;
+  far.stamp_ns = 400'000'000;
+  far.T_cam_world.translation.x() = -0.4;
+  far.features = MakeFrameFeatures(FeatureSet(), map_.camera(), map_.pyramid());
+  map_.AddKeyframe(std::move(far));
+  FrameRefiner moving;
+  moving.Keep(frame_, told_);
+  const std::vector<FramePose> refined = Refine(moving);
+  ASSERT_EQ(refined.size(), 1U) << "a camera that moves so fast can";
+  EXPECT_LT((refined[0].T_cam_reference.translation - truth_.translation).norm(), 1e-3);
+}
+
 TEST_F(Refining, FrameThatWasNeverToldKeepsItsPlaceWithNothingMeasured) {
   FrameRefiner refiner;
   told_.state = TrackingState::kLocalizedLater;
