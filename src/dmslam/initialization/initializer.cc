@@ -284,7 +284,7 @@ void Initializer::Impl::DropOld(const InitializerFrame& frame) {
   });
 }
 
-/// Of more windows than there may be, with the one that begins, the oldest that promises nothing goes.
+/// Makes room first: the oldest window that is neither promising nor leads a contest is dropped.
 void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
   while (static_cast<int>(windows_.size()) >= options_.references.most) {
     const auto idle = std::find_if(windows_.begin(), windows_.end(), [](const ReferenceWindow& window) {
@@ -566,12 +566,12 @@ bool Initializer::Impl::IsBelieved(const CandidateMap& candidate, ReferenceWindo
       break;
   }
   if (IsSure(candidate, *window) || (again && IsAlone(candidate))) return true;
-  *refused = {WaitReason::kOnTrial, "the same motion must be found again"};
+  *refused = {WaitReason::kOnTrial, "another view or reference frame must find the same motion"};
   return false;
 }
 
-/// Not where motions were hard to tell apart before, or the views are near each other in time, or another
-/// motion explains them nearly as well and the direction is hardly known.
+/// True unless motions were hard to tell apart before, the views are near each other in time, or another motion
+/// explains them nearly as well and the direction is hardly known.
 bool Initializer::Impl::IsSure(const CandidateMap& candidate, const ReferenceWindow& window) const {
   const bool clear =
       IsAlone(candidate) || builder_.DirectionSigma(candidate) <= options_.geometry.clear_direction_sigma_rad;

@@ -28,7 +28,7 @@ struct ReferenceOptions {
   int most = 8;
   double step_s = 0.1;               ///< a new one is taken so long after the last
   double max_age_s = 2.0;            ///< an older one is given up...
-  double max_promising_age_s = 4.0;  ///< ...or one as old as this, where only parallax is missing
+  double max_promising_age_s = 4.0;  ///< ...or as old as this, where it is promising
 };
 
 /// How the motion of a pair is searched, and when it is the only one.
@@ -47,8 +47,8 @@ struct GeometryOptions {
   double min_parallax_rad = 0.015;  ///< median over the points; below it the direction is chance
   /// Standard deviation of the direction of translation, from the residuals: later views mend it.
   double max_direction_sigma_rad = 0.1;
-  /// A map beside whose motion another one comes near (alone_runner_up_cost) must be found by the next view,
-  /// too, unless its direction is known to so much.
+  /// Where no other reference frame has a say, a map beside whose motion another one comes near
+  /// (alone_runner_up_cost) must know its direction to so much.
   double clear_direction_sigma_rad = 0.05;
   double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
@@ -114,7 +114,8 @@ struct InitializerOptions {
   double min_displacement_rad = 0.015;
   int max_views = 8;       ///< frames after the reference frame that a map is made of, at most
   int max_adjusted = 300;  ///< points that rival motions are adjusted with; the winner takes all
-  /// A map of views that are nearer in time must be found by the next, too, and may not be compact.
+  /// A map of views that are nearer in time must be confirmed by another reference frame or found again, and
+  /// may not be compact.
   double sure_age_s = 0.4;
 
   template <typename Visitor>

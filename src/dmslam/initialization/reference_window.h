@@ -14,6 +14,11 @@ class ReferenceWindow {
  public:
   explicit ReferenceWindow(InitializerFrame reference, std::vector<InitializerFrame> past = {})
       : reference_(std::move(reference)), past_frames_(std::move(past)) {}
+  // Candidates point to views, which stay where they are when the window is moved.
+  ReferenceWindow(const ReferenceWindow&) = delete;
+  ReferenceWindow& operator=(const ReferenceWindow&) = delete;
+  ReferenceWindow(ReferenceWindow&&) = default;
+  ReferenceWindow& operator=(ReferenceWindow&&) = default;
 
   const InitializerFrame& reference() const { return reference_; }
   double AgeAt(const InitializerFrame& frame) const { return SecondsBetween(reference_, frame); }
@@ -44,9 +49,9 @@ class ReferenceWindow {
     std::vector<uint32_t> features;  ///< of the reference frame, sorted
   };
   std::optional<Lead> lead;
-  /// The motions that explained the newest view best, the best first: they are tried at the next one, too.
+  /// The two motions that explained the views best when one was found last, the better first.
   std::vector<CandidateMap> hypotheses;
-  /// A motion that was clearly better than its rivals, and whose direction was known.
+  /// A motion that was better than its rivals, and whose direction was known.
   struct Claim {
     const ReferenceView* view = nullptr;
     Rigid3d T_view_0;
@@ -58,8 +63,8 @@ class ReferenceWindow {
     Rigid3d T_view_0;
   };
   std::optional<Found> found;
-  bool doubtful = false;   ///< two motions explained the views about equally well, at some view
-  bool promising = false;  ///< the pairs agreed the last time; only their parallax did not suffice
+  bool doubtful = false;   ///< the views did not determine one motion, at some view
+  bool promising = false;  ///< the pairs agreed the last time, and more views or parallax may suffice
 
  private:
   InitializerFrame reference_;
