@@ -570,8 +570,8 @@ bool Initializer::Impl::IsBelieved(const CandidateMap& candidate, ReferenceWindo
   return false;
 }
 
-/// True unless motions were hard to tell apart before, the views are near each other in time, or another motion
-/// explains them nearly as well and the direction is hardly known.
+/// True unless motions were hard to tell apart before, the views are near each other in time, or another
+/// motion explains them nearly as well and the direction is hardly known.
 bool Initializer::Impl::IsSure(const CandidateMap& candidate, const ReferenceWindow& window) const {
   const bool clear =
       IsAlone(candidate) || builder_.DirectionSigma(candidate) <= options_.geometry.clear_direction_sigma_rad;
