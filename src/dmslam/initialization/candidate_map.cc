@@ -112,16 +112,21 @@ std::optional<CandidateMap> CandidateBuilder::Build(const ReferenceView& last,
 }
 
 /// Mean over the static matches of the squared errors in all views that see them, truncated at the bound and
-/// in units of it; a match without a point counts as the bound.
+/// in units of it. A match without a point lies at infinity: under little parallax the noise puts what is far
+/// behind the cameras, and a motion that invents parallax must not win for that.
 double CandidateBuilder::Cost(const CandidateMap& candidate, std::span<const uint8_t> is_static) const {
   const auto& matches = candidate.last().pair.matches;
   std::vector<double> sum(matches.size(), 0.0), count(matches.size(), 0.0);
   for (const CandidateMap::Placed& placed : candidate.placed) {
+    const Rigid3d turned(placed.T_k_0.rotation, Eigen::Vector3d::Zero());
     ForEachSeen(placed, matches, [&](size_t k, const Match& seen) {
-      if (!candidate.use[k]) return;
+      if (!is_static[k]) return;
       const double variance = options_.selector.inlier.pyramid.SigmaSquared(seen.octave1);
       const double error =
-          ReprojectionErrorSquared(camera_.Ideal(), placed.T_k_0, candidate.points[k], seen.uv1_px);
+          candidate.use[k]
+              ? ReprojectionErrorSquared(camera_.Ideal(), placed.T_k_0, candidate.points[k], seen.uv1_px)
+              : ReprojectionErrorSquared(camera_.Ideal(), turned, camera_.Ray(matches[k].uv0_px),
+                                         seen.uv1_px);
       sum[k] += std::min(1.0, error / (variance * options_.geometry.max_view_chi2));
       count[k] += 1.0;
     });

@@ -4,6 +4,7 @@
 
 #include <deque>
 
+#include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 
 namespace dmslam {
@@ -69,6 +70,35 @@ TEST_F(CandidateBuilderTest, AViewThatShowsOtherPlacesAgreesWithFewPoints) {
   builder_.PlaceView(there, &candidate);
   ASSERT_EQ(candidate.placed.size(), 2U);
   EXPECT_LT(candidate.placed.back().consistent_share, 0.5);
+}
+
+/// A wall with a picture before it, under hardly any parallax: noise puts half of the wall behind the
+/// cameras. Nothing that a motion leaves there counts against it more than how far from infinity it is seen.
+TEST(CandidateCost, WhatNoiseBringsBehindTheCamerasLiesAtInfinity) {
+  const Camera camera = SyntheticCamera();
+  const Rigid3d T_last(ExpSo3({0, 0.01, 0}), {-0.02, 0, 0});
+  Random random(3);
+  ReferenceView view;
+  view.since_reference_s = 0.5;
+  for (int k = 0; k < 400; ++k) {
+    const double depth = k % 4 == 0 ? 2.0 : 60.0;
+    const Eigen::Vector3d point = depth * camera.Ray({random.Uniform(150, 490), random.Uniform(100, 380)});
+    Match match;
+    match.index0 = match.index1 = static_cast<uint32_t>(k);
+    match.uv0_px = *camera.Project(point);
+    const double dx = 0.5 * random.Gaussian(), dy = 0.5 * random.Gaussian();
+    match.uv1_px = *camera.Project(T_last * point) + Eigen::Vector2d(dx, dy);
+    view.pair.matches.push_back(match);
+  }
+  const std::vector<uint8_t> all(view.pair.matches.size(), 1);
+  const CandidateBuilder builder({}, camera, {});
+  Refused refused;
+  const TwoViewModel truth{EssentialFromPose(T_last), T_last.rotation.toRotationMatrix(), T_last.translation};
+  const auto candidate = builder.Build(view, {}, all, truth, &refused);
+  ASSERT_TRUE(candidate) << refused.text;
+  EXPECT_LT(candidate->NumPoints(), 350)
+      << "the noise puts nothing behind the cameras: the test shows nothing";
+  EXPECT_LT(candidate->cost, 0.1);
 }
 
 }  // namespace

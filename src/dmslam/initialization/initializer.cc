@@ -203,7 +203,8 @@ class Initializer::Impl {
   std::optional<CandidateMap> Reconstruct(ReferenceWindow* window, std::span<const uint8_t> is_static,
                                           Refused* refused) const;
   bool IsAlone(const CandidateMap& candidate) const;
-  bool Passes(const CandidateMap& candidate, Refused* refused) const;
+  bool Passes(const CandidateMap& candidate, const ReferenceWindow& window, Refused* refused) const;
+  bool HasParallax(const CandidateMap& candidate, const ReferenceWindow& window, Refused* refused) const;
   bool AgreesWithPast(ReferenceWindow* window, CandidateMap* candidate, Refused* refused);
   bool Finish(ReferenceWindow* window, CandidateMap* candidate, Refused* refused);
   bool IsBelieved(const CandidateMap& candidate, ReferenceWindow* window, Refused* refused) const;
@@ -525,30 +526,42 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(ReferenceWindow* wind
   return WinnerOf(race, refused);
 }
 
-bool Initializer::Impl::Passes(const CandidateMap& candidate, Refused* refused) const {
+bool Initializer::Impl::Passes(const CandidateMap& candidate, const ReferenceWindow& window,
+                               Refused* refused) const {
   const int points = candidate.NumPoints();
   if (points < options_.geometry.min_points) {
     *refused = {WaitReason::kTooFewStatic, std::to_string(points) + " points are seen consistently"};
     return false;
   }
+  return HasParallax(candidate, window, refused);
+}
+
+/// Less of it is asked where waiting brings no more.
+bool Initializer::Impl::HasParallax(const CandidateMap& candidate, const ReferenceWindow& window,
+                                    Refused* refused) const {
+  const GeometryOptions& asked = options_.geometry;
   const double parallax = builder_.Parallax(candidate), sigma = builder_.DirectionSigma(candidate);
-  if (parallax < options_.geometry.min_parallax_rad || sigma > options_.geometry.max_direction_sigma_rad) {
-    *refused = {WaitReason::kParallaxTooSmall,
-                "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma)};
-    return false;
+  if (parallax >= asked.min_parallax_rad && sigma <= asked.max_direction_sigma_rad) return true;
+  const auto left = static_cast<double>(candidate.last().pair.matches.size());
+  const auto shown = static_cast<double>(window.views().front().pair.matches.size());
+  if (left <= asked.losing_share * shown && parallax >= asked.losing_parallax_rad &&
+      sigma <= asked.clear_direction_sigma_rad) {
+    return true;
   }
-  return true;
+  *refused = {WaitReason::kParallaxTooSmall,
+              "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma)};
+  return false;
 }
 
 /// The last adjustment, with all points, and the gates.
 bool Initializer::Impl::Finish(ReferenceWindow* window, CandidateMap* candidate, Refused* refused) {
-  if (!Passes(*candidate, refused)) return false;
+  if (!Passes(*candidate, *window, refused)) return false;
   if (!builder_.Adjust(candidate)) {
     *refused = {WaitReason::kInconsistent, "the adjustment failed"};
     return false;
   }
   builder_.KeepConsistent(candidate);
-  if (!AgreesWithPast(window, candidate, refused) || !Passes(*candidate, refused)) return false;
+  if (!AgreesWithPast(window, candidate, refused) || !Passes(*candidate, *window, refused)) return false;
   return IsBelieved(*candidate, window, refused);
 }
 

@@ -50,6 +50,10 @@ struct GeometryOptions {
   /// Where no other reference frame has a say, a map beside whose motion another one comes near
   /// (alone_runner_up_cost) must know its direction to so much.
   double clear_direction_sigma_rad = 0.05;
+  /// The camera turns away from what the reference frame shows: with so little of its first view's matches
+  /// left, parallax that has not come will not come.
+  double losing_share = 0.5;
+  double losing_parallax_rad = 0.006;  ///< so much is enough then, with clear_direction_sigma_rad
   double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance
   double min_consistent_share = 0.75;  ///< of the points that a view between shows, where they should be
   int min_points = 80;                 ///< points that all views agree on

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "dmslam/initialization/initial_map.h"
 #include "dmslam/initialization/two_frame_initializer.h"
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 #include "dmslam/util/check.h"
@@ -269,6 +270,33 @@ TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
   for (uint32_t frame = 0; frame < 40; ++frame) {
     EXPECT_FALSE(initializer.AddFrame(room.Frame(frame)).result.has_value()) << frame;
   }
+}
+
+// It moves so little that the room is out of sight before the parallax is what a camera that stays would wait
+// for.
+TEST(Initializer, StartsBeforeTheCameraHasTurnedAway) {
+  SyntheticRoom room(700, 0);
+  room.SetSpeed(0.001);
+  room.SetTurn(-0.015);
+  const auto map_with = [&](const InitializerOptions& options) -> std::optional<FirstMap> {
+    Initializer initializer(options, room.camera(), 1, AdjustInitialMap(room.camera().Ideal()));
+    for (uint32_t frame = 0; frame < 45; ++frame) {
+      InitializerReport report = initializer.AddFrame(room.Frame(frame));
+      if (report.result) return std::move(*report.result);
+    }
+    return std::nullopt;
+  };
+  InitializerOptions options;
+  options.motion.min_runner_up_cost = 1.0;
+  options.references.step_s = 0.4;
+  options.geometry.losing_share = 0.7;
+  options.geometry.clear_direction_sigma_rad = 0.1;
+  const std::optional<FirstMap> map = map_with(options);
+  ASSERT_TRUE(map.has_value());
+  EXPECT_LT(map->median_parallax_rad, options.geometry.min_parallax_rad);
+  EXPECT_LT(DirectionError(room, 1, *map), 0.1);
+  options.geometry.losing_share = 0;
+  EXPECT_FALSE(map_with(options).has_value());
 }
 
 TEST(Initializer, TakesOtherSelectorsBehindTheSameGates) {
