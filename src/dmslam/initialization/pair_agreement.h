@@ -23,7 +23,7 @@ struct PairView {
 /// in a patch, and they themselves, whose limbs do not move as one, have no such share.
 struct DominanceOptions {
   double min_share = 0.9;  ///< of the last pair's matches
-  double min_distribution_share = 0.14;
+  double min_distribution_share = 0.10;
 };
 
 struct AgreementOptions {
