@@ -272,8 +272,8 @@ TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
   }
 }
 
-// It moves so little that the room is out of sight before the parallax is what a camera that stays would wait
-// for.
+// The camera moves so little that the room is out of sight before there is as much parallax as is usually
+// asked for.
 TEST(Initializer, StartsBeforeTheCameraHasTurnedAway) {
   SyntheticRoom room(700, 0);
   room.SetSpeed(0.001);
