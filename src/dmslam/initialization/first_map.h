@@ -54,7 +54,18 @@ struct FirstMap {
     uint32_t feature1 = 0;
     Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< in camera 0
   };
-  std::vector<Point> points;       ///< sorted by feature0; seen consistently in all views
+  std::vector<Point> points;  ///< sorted by feature0; seen consistently in all views
+  /// A frame between the two that shows some of the points.
+  struct View {
+    InitializerFrame frame;
+    Rigid3d T_k_0;
+    struct Sight {
+      uint32_t point = 0;  ///< index into `points`
+      uint32_t feature = 0;
+    };
+    std::vector<Sight> sights;  ///< sorted by point
+  };
+  std::vector<View> between;       ///< by time
   std::vector<Match> matches;      ///< of the pair, as indices and pixels
   std::vector<uint8_t> is_static;  ///< parallel to matches
   double median_parallax_rad = 0;

@@ -1,11 +1,16 @@
 #include "dmslam/initialization/initial_map.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "dmslam/optimization/bundle_adjustment.h"
 
 namespace dmslam {
 namespace {
 
 constexpr int kIterations = 15;
+constexpr size_t kViewsBetween = 2;
+constexpr size_t kMostFeatures = 20'000;  // of all keyframes: what fits into a record beside the points
 
 KeyframeProposal ProposalOf(const InitializerFrame& frame, uint32_t session, CameraId camera_id,
                             MapId map_id) {
@@ -16,6 +21,14 @@ KeyframeProposal ProposalOf(const InitializerFrame& frame, uint32_t session, Cam
   proposal.stamp_ns = frame.stamp_ns;
   proposal.features = frame.features->set;
   return proposal;
+}
+
+InitialMap::View ViewOf(const FirstMap::View& view, KeyframeProposal keyframe) {
+  InitialMap::View told{std::move(keyframe), {}};
+  told.keyframe.T_cam_reference = view.T_k_0;
+  for (const FirstMap::View::Sight& sight : view.sights)
+    told.sights.push_back({static_cast<uint16_t>(sight.point), static_cast<uint16_t>(sight.feature)});
+  return told;
 }
 
 }  // namespace
@@ -50,6 +63,15 @@ InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, CameraId 
   for (const FirstMap::Point& point : first_map.points) {
     proposal.points.push_back(
         {static_cast<uint16_t>(point.feature0), static_cast<uint16_t>(point.feature1), point.p_world});
+  }
+  const size_t asked = std::min(kViewsBetween, first_map.between.size());
+  size_t features = proposal.first.features.size() + proposal.second.features.size();
+  for (size_t k = 1; k <= asked; ++k) {
+    const FirstMap::View& view = first_map.between[k * first_map.between.size() / (asked + 1)];
+    features += view.frame.features->size();
+    if (features > kMostFeatures) break;
+    proposal.between.push_back(ViewOf(view, ProposalOf(view.frame, session, camera_id, map_id)));
+    proposal.between.back().keyframe.reference = proposal.first.id;
   }
   return proposal;
 }

@@ -46,6 +46,45 @@ TEST(MakeInitialMap, TellsBothKeyframesAndWhatEachSees) {
   EXPECT_EQ(told.points[1].p_world, Eigen::Vector3d(0.3, 0.4, 2.0));
 }
 
+/// A map of frames 4 and 19, of so many features each, and views between that see its two points.
+FirstMap MapWithViews(size_t num_features, uint32_t num_views) {
+  FirstMap map;
+  map.frame0 = Frame(4, num_features);
+  map.frame1 = Frame(19, num_features);
+  map.points = {{7, 9, {0.1, 0.2, 1.0}}, {8, 3, {0.3, 0.4, 2.0}}};
+  for (uint32_t k = 0; k < num_views; ++k) {
+    const Rigid3d T_k_0(Eigen::Quaterniond::Identity(), {0.1 * k, 0, 0});
+    map.between.push_back({Frame(5 + k, num_features), T_k_0, {{0, 12}, {1, 5}}});
+  }
+  return map;
+}
+
+TEST(MakeInitialMap, TellsOfTwoViewsBetweenAtAThirdAndTwo) {
+  const FirstMap map = MapWithViews(30, 6);
+  const InitialMap told = MakeInitialMap(map, 5, 0, 2);
+  ASSERT_EQ(told.between.size(), 2u);
+  EXPECT_EQ(told.between[0].keyframe.id, KeyframeId::Make(5, 7));
+  EXPECT_EQ(told.between[1].keyframe.id, KeyframeId::Make(5, 9));
+  const InitialMap::View& view = told.between[1];
+  EXPECT_EQ(view.keyframe.reference, told.first.id);
+  EXPECT_EQ(view.keyframe.T_cam_reference.translation, map.between[4].T_k_0.translation);
+  EXPECT_EQ(view.keyframe.features.descriptors, map.between[4].frame.features->set.descriptors);
+  ASSERT_EQ(view.sights.size(), 2u);
+  EXPECT_EQ(view.sights[1].point, 1);
+  EXPECT_EQ(view.sights[1].feature, 5);
+}
+
+TEST(MakeInitialMap, LeavesViewsOutRatherThanBeingTooLong) {
+  EXPECT_EQ(MakeInitialMap(MapWithViews(6000, 2), 5, 0, 2).between.size(), 1u);
+  EXPECT_EQ(MakeInitialMap(MapWithViews(10'000, 2), 5, 0, 2).between.size(), 0u);
+}
+
+TEST(MakeInitialMap, OfASingleViewBetweenTellsThatOne) {
+  const InitialMap told = MakeInitialMap(MapWithViews(30, 1), 5, 0, 2);
+  ASSERT_EQ(told.between.size(), 1u);
+  EXPECT_EQ(told.between[0].keyframe.id, KeyframeId::Make(5, 5));
+}
+
 /// Three cameras side by side see a cloud; what is known of the others' places and of the points is wrong.
 class InitialAdjustment : public ::testing::Test {
  protected:

@@ -162,6 +162,31 @@ TEST(Initializer, MapsTheRoomAndNotTheWalker) {
   }
 }
 
+TEST(Initializer, TellsTheViewsBetweenTheTwo) {
+  const SyntheticRoom room(600, 150);
+  const std::optional<FirstMap> map = MapFrom(room, {}, 0);
+  ASSERT_TRUE(map.has_value());
+  ASSERT_GE(map->between.size(), 2U);
+  EXPECT_EQ(map->between.size() + 2, static_cast<size_t>(map->num_views));
+  const double unit =
+      map->T_1_0.Center().norm() /
+      (room.TruePose(map->frame1.index).Center() - room.TruePose(map->frame0.index).Center()).norm();
+  uint32_t before = map->frame0.index;
+  for (const FirstMap::View& view : map->between) {
+    EXPECT_GT(view.frame.index, before);
+    EXPECT_LT(view.frame.index, map->frame1.index);
+    before = view.frame.index;
+    const Rigid3d truth = room.TruePose(view.frame.index) * room.TruePose(map->frame0.index).Inverse();
+    EXPECT_LT((view.T_k_0.Center() - unit * truth.Center()).norm(), 0.1 * map->T_1_0.Center().norm());
+    EXPECT_GE(view.sights.size(), map->points.size() / 2);
+    for (const FirstMap::View::Sight& sight : view.sights) {
+      const auto uv = room.camera().Project(view.T_k_0 * map->points[sight.point].p_world);
+      ASSERT_TRUE(uv.has_value());
+      EXPECT_LT((*uv - view.frame.features->uv_px[sight.feature]).norm(), 4.0);
+    }
+  }
+}
+
 TEST(Initializer, FramesBeforeTellWhoHasJustStopped) {
   SyntheticRoom room(600, 150);
   room.StopWalkerAt(12);

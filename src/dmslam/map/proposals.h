@@ -33,7 +33,8 @@ struct KeyframeProposal {
   CameraId camera_id = 0;
 };
 
-/// A first map, as the frontend sees it: two frames and the points seen by both.
+/// A first map, as the frontend sees it: two frames, the points seen by both, and what frames between them
+/// saw of these.
 struct InitialMap {
   MapId map_id = 0;
   KeyframeProposal first;   ///< its camera is the world's origin
@@ -44,6 +45,16 @@ struct InitialMap {
     Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
   };
   std::vector<Point> points;
+  /// A frame between the two.
+  struct View {
+    KeyframeProposal keyframe;  ///< T_cam_reference is its pose from `first`
+    struct Sight {
+      uint16_t point = 0;  ///< index into `points`
+      uint16_t feature = 0;
+    };
+    std::vector<Sight> sights;
+  };
+  std::vector<View> between;  ///< by time
 };
 
 /// What frames said about landmarks since the last record.

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "dmslam/mapping/keyframe_insertion.h"
 #include "dmslam/optimization/map_adjustment.h"
@@ -23,21 +24,50 @@ void ScaleToUnitDepth(MapEditor& map, const Keyframe& first) {
     map.SetPosition(*landmark, landmark->p_world / *depth);
 }
 
-}  // namespace
+const Keyframe& AddAfter(MapEditor& map, const Keyframe& first, const KeyframeProposal& proposal) {
+  Keyframe keyframe = MakeKeyframe(map, proposal, proposal.T_cam_reference);
+  keyframe.map_id = first.map_id;
+  keyframe.parent = first.id;
+  return map.AddKeyframe(std::move(keyframe));
+}
 
-bool BuildFirstMap(MapEditor& map, const InitialMap& proposal, LandmarkMaker& maker) {
-  const Keyframe& first = map.AddKeyframe(MakeKeyframe(map, proposal.first, Rigid3d()));
-  Keyframe other = MakeKeyframe(map, proposal.second, proposal.second.T_cam_reference);
-  other.parent = first.id;
-  const Keyframe& second = map.AddKeyframe(std::move(other));
+/// The landmarks of the points, in their order; null where a point names a feature that is not there.
+std::vector<const Landmark*> AddLandmarks(MapEditor& map, const InitialMap& proposal, const Keyframe& first,
+                                          const Keyframe& second, LandmarkMaker& maker) {
+  std::vector<const Landmark*> landmarks;
   for (const InitialMap::Point& point : proposal.points) {
+    landmarks.push_back(nullptr);
     const bool known =
         point.feature_first < first.landmarks.size() && point.feature_second < second.landmarks.size();
     if (!known) continue;
     const Landmark& landmark = maker.Add(map, first, second, point.p_world);
     map.SetObservation(first, point.feature_first, landmark);
     map.SetObservation(second, point.feature_second, landmark);
-    map.UpdateDescriptor(landmark);
+    landmarks.back() = &landmark;
+  }
+  return landmarks;
+}
+
+void AddViewBetween(MapEditor& map, const InitialMap::View& view, const Keyframe& first,
+                    const std::vector<const Landmark*>& landmarks) {
+  if (map.HasKnown(view.keyframe.id)) return;
+  const Keyframe& keyframe = AddAfter(map, first, view.keyframe);
+  for (const InitialMap::View::Sight& sight : view.sights) {
+    const bool known = sight.point < landmarks.size() && landmarks[sight.point] != nullptr &&
+                       sight.feature < keyframe.landmarks.size();
+    if (known) map.SetObservation(keyframe, sight.feature, *landmarks[sight.point]);
+  }
+}
+
+}  // namespace
+
+bool BuildFirstMap(MapEditor& map, const InitialMap& proposal, LandmarkMaker& maker) {
+  const Keyframe& first = map.AddKeyframe(MakeKeyframe(map, proposal.first, Rigid3d()));
+  const Keyframe& second = AddAfter(map, first, proposal.second);
+  const std::vector<const Landmark*> landmarks = AddLandmarks(map, proposal, first, second, maker);
+  for (const InitialMap::View& view : proposal.between) AddViewBetween(map, view, first, landmarks);
+  for (const Landmark* landmark : landmarks) {
+    if (landmark != nullptr) map.UpdateDescriptor(*landmark);
   }
   AdjustWholeMap(map, proposal.map_id, kIterations, 1.0, nullptr);
   if (map.CountTracked(second, 2) < kMinLandmarks) return false;

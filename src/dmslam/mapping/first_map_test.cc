@@ -49,6 +49,59 @@ TEST_F(FirstMapBuilding, AdjustsAndScalesToUnitDepth) {
   }
 }
 
+/// Two noisy views 0.1 apart hardly know how far away the points are. What two between them say is not
+/// forgotten.
+TEST_F(FirstMapBuilding, TheViewsBetweenHaveTheirSay) {
+  const auto shake = [](FeatureSet* features, Random* random) {
+    for (Keypoint& keypoint : features->keypoints) {
+      keypoint.x_q4 = static_cast<uint16_t>(keypoint.x_q4 + random->Below(33) - 16);
+      keypoint.y_q4 = static_cast<uint16_t>(keypoint.y_q4 + random->Below(33) - 16);
+    }
+  };
+  const auto depth_error = [&](uint64_t noise, uint32_t views) {
+    Random random(DeriveSeed(1, noise, "noise"));
+    InitialMap proposal = Proposal(100);
+    proposal.second = scene_.Propose(2, 0.1, 1, 0.0, 0.5);
+    shake(&proposal.second.features, &random);
+    for (uint32_t k = 0; k < views; ++k) {
+      InitialMap::View& view = proposal.between.emplace_back();
+      view.keyframe = scene_.Propose(10 + k, 0.09 + 0.005 * k, 1, 0.0, 0.25);
+      shake(&view.keyframe.features, &random);
+      for (uint16_t i = 0; i < 100; ++i) view.sights.push_back({i, i});
+    }
+    MapEditor map(TestCamera(), Pyramid());
+    LandmarkMaker maker(1);
+    EXPECT_TRUE(BuildFirstMap(map, proposal, maker));
+    EXPECT_EQ(map.KeyframesOf(1).size(), views + 2);
+    double squared = 0;
+    for (const Landmark* landmark : map.LandmarksOf(1)) {
+      const double truth = scene_.point(landmark->observations.front().feature).z() / 4.25;
+      squared += std::pow(landmark->p_world.z() - truth, 2);
+    }
+    return std::sqrt(squared / static_cast<double>(map.num_landmarks()));
+  };
+  double alone = 0, together = 0;
+  for (uint64_t noise = 0; noise < 10; ++noise) {
+    alone += depth_error(noise, 0);
+    together += depth_error(noise, 2);
+  }
+  EXPECT_LT(together, 0.9 * alone);
+}
+
+TEST_F(FirstMapBuilding, AViewBetweenIsAKeyframeThatSeesWhatItWasToldToShow) {
+  InitialMap proposal = Proposal(100);
+  InitialMap::View& view = proposal.between.emplace_back();
+  view.keyframe = scene_.Propose(10, 0.2, 1, 0.0, 0.25);
+  for (uint16_t i = 0; i < 60; ++i) view.sights.push_back({i, i});
+  view.sights.push_back({60000, 60});
+  view.sights.push_back({60, 60000});
+  proposal.between.push_back(view);
+  ASSERT_TRUE(BuildFirstMap(map_, proposal, maker_));
+  EXPECT_EQ(map_.KeyframesOf(1).size(), 3u) << "the same frame again is left out";
+  EXPECT_EQ(map_.At(Id(10)).parent, Id(1));
+  EXPECT_EQ(map_.CountTracked(map_.At(Id(10)), 3), 60);
+}
+
 TEST_F(FirstMapBuilding, TooFewLandmarksAreNoMap) { EXPECT_FALSE(BuildFirstMap(map_, Proposal(39), maker_)); }
 
 TEST_F(FirstMapBuilding, PointsThatDoNotFitDoNotCount) {

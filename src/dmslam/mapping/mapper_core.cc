@@ -70,6 +70,7 @@ bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   bool built = false;
   if (!map_.HasKnown(proposal.first.id)) {
     order_.Add(proposal.first.id);
+    for (const InitialMap::View& view : proposal.between) order_.Add(view.keyframe.id);
     order_.Add(proposal.second.id);
     built = BuildFirstMap(map_, proposal, maker_);
   }

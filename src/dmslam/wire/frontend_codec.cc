@@ -117,6 +117,19 @@ struct Codec<KeyframeProposal> {
   static void Validate(const KeyframeProposal& m, Checker& check) { ValidateKeyframe(m, check); }
 };
 
+namespace {
+
+constexpr size_t kMostViewsBetween = 8;
+
+void ViewFields(auto& s, auto& m, auto& w) {
+  KeyframeFields(s, m.keyframe, w.keyframe);
+  s.Count(m.sights, w.num_sights, kMaxFeatures);
+  s.Column(m.sights, w.point, &InitialMap::View::Sight::point);
+  s.Column(m.sights, w.feature, &InitialMap::View::Sight::feature);
+}
+
+}  // namespace
+
 template <>
 struct Codec<InitialMap> {
   using Wire = initial_map_t;
@@ -134,6 +147,10 @@ struct Codec<InitialMap> {
     s.Column(m.points, w.x_world, Coordinate<0, &Point::p_world>());
     s.Column(m.points, w.y_world, Coordinate<1, &Point::p_world>());
     s.Column(m.points, w.z_world, Coordinate<2, &Point::p_world>());
+    s.Count(m.between, w.num_between, kMostViewsBetween);
+    if constexpr (std::remove_cvref_t<decltype(s)>::kToWire) w.between.resize(m.between.size());
+    for (size_t i = 0; i < std::min(m.between.size(), w.between.size()); ++i)
+      ViewFields(s, m.between[i], w.between[i]);
   }
   static void Validate(const InitialMap& m, Checker& check) {
     check.Require(m.map_id >= 1, "no map id");
@@ -144,6 +161,14 @@ struct Codec<InitialMap> {
           point.feature_first < m.first.features.size() && point.feature_second < m.second.features.size(),
           "a point names a feature that is not there");
       check.Position(point.p_world, "position of a point is not finite");
+    }
+    for (const InitialMap::View& view : m.between) {
+      ValidateKeyframe(view.keyframe, check);
+      for (const InitialMap::View::Sight& sight : view.sights) {
+        check.Require(sight.point < m.points.size(), "a sight names a point that is not there");
+        check.Require(sight.feature < view.keyframe.features.size(),
+                      "a sight names a feature that is not there");
+      }
     }
   }
 };

@@ -213,6 +213,23 @@ TEST(RecordGroupsTest, AnInitialMapOfTheMostFeaturesThatCanBeSetIsOneRecord) {
   EXPECT_LE(Encode(map).size(), kMaxRecordBytes);
 }
 
+TEST(RecordGroupsTest, SoIsOneOfFourKeyframesOfFiveThousandFeatures) {
+  InitialMap map;
+  map.map_id = 1;
+  map.between.resize(2);
+  uint32_t frame = 0;
+  for (KeyframeProposal* keyframe :
+       {&map.first, &map.between[0].keyframe, &map.between[1].keyframe, &map.second}) {
+    keyframe->id = KeyframeId::Make(1, ++frame);
+    keyframe->map_id = 1;
+    keyframe->features.keypoints.resize(5000);
+    keyframe->features.descriptors.resize(5000);
+  }
+  map.points.resize(5000);
+  for (InitialMap::View& view : map.between) view.sights.resize(5000);
+  EXPECT_LE(Encode(map).size(), kMaxRecordBytes);
+}
+
 TEST(RecordGroupsTest, AnswersOfTheLoopCloserToo) {
   LoopAnswer first;
   first.keyframe = KeyframeId::Make(1, 7);

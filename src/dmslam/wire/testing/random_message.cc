@@ -139,6 +139,12 @@ void MakeSound(InitialMap& m, Random& random) {
     point.feature_first = Index(m.first.features.size(), random);
     point.feature_second = Index(m.second.features.size(), random);
   }
+  for (InitialMap::View& view : m.between) {
+    MakeSound(view.keyframe, random);
+    if (m.points.empty() || view.keyframe.features.size() == 0) view.sights.clear();
+    for (InitialMap::View::Sight& sight : view.sights)
+      sight = {Index(m.points.size(), random), Index(view.keyframe.features.size(), random)};
+  }
 }
 
 void MakeSound(FramePose& m, Random& random) {
