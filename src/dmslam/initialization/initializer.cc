@@ -123,7 +123,11 @@ InitializerReport Wait(WaitReason reason, const std::string& text) {
   report.reason = std::string(ToString(reason)) + (text.empty() ? "" : ": " + text);
   return report;
 }
-InitializerReport Wait(const Refused& refused) { return Wait(refused.wait, refused.text); }
+InitializerReport Wait(const Refused& refused) {
+  InitializerReport report = Wait(refused.wait, refused.text);
+  report.parallax_rad = refused.parallax_rad;
+  return report;
+}
 
 /// No single motion could be told from the pairs of a reference frame; there may be more than one.
 bool MayHideSeveralMotions(WaitReason wait) {
@@ -157,7 +161,8 @@ TwoViewModel ModelOf(const Rigid3d& T_1_0) {
 
 /// That with a map, or of two that wait, that which came farther.
 InitializerReport Farther(InitializerReport a, InitializerReport b) {
-  const bool first = a.result || (!b.result && a.wait > b.wait);
+  const bool farther = a.wait > b.wait || (a.wait == b.wait && a.parallax_rad > b.parallax_rad);
+  const bool first = a.result || (!b.result && farther);
   return first ? std::move(a) : std::move(b);
 }
 
@@ -187,6 +192,7 @@ class Initializer::Impl {
 
  private:
   InitializerReport Consider(const InitializerFrame& frame);
+  bool IsNearlyThere() const;
   InitializerReport TryWindows(const InitializerFrame& frame);
   void KeepRecent(const InitializerFrame& frame);
   void DropOld(const InitializerFrame& frame);
@@ -241,7 +247,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
     BeginWindow(frame);
     return Wait(WaitReason::kTooFewFrames, "this is the first");
   }
-  if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s) return last_wait_;
+  if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s && !IsNearlyThere()) return last_wait_;
   last_looked_ns_ = frame.stamp_ns;
   DropOld(frame);
   InitializerReport report = TryWindows(frame);
@@ -250,6 +256,12 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   }
   KeepRecent(frame);
   return report;
+}
+
+/// The parallax was almost enough: the next frame may have it.
+bool Initializer::Impl::IsNearlyThere() const {
+  return last_wait_.wait == WaitReason::kParallaxTooSmall &&
+         last_wait_.parallax_rad >= options_.nearly_parallax * options_.geometry.min_parallax_rad;
 }
 
 /// What the reference frames make of this one, the oldest first, until one has a map. At most one of them may
@@ -549,7 +561,7 @@ bool Initializer::Impl::HasParallax(const CandidateMap& candidate, const Referen
     return true;
   }
   *refused = {WaitReason::kParallaxTooSmall,
-              "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma)};
+              "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma), parallax};
   return false;
 }
 

@@ -187,6 +187,20 @@ TEST(Initializer, TellsTheViewsBetweenTheTwo) {
   }
 }
 
+/// Every other frame is looked at, until little is missing.
+TEST(Initializer, TakesTheFirstFrameWithEnoughParallax) {
+  InitializerOptions options;
+  options.geometry.min_parallax_rad = 0.03;  // late, so that nothing else is missing
+  int odd = 0;
+  for (int k = 0; k < 10; ++k) {
+    SyntheticRoom room(600, 0);
+    room.SetSpeed(0.005 + 0.0003 * k);
+    const std::optional<FirstMap> map = MapFrom(room, options, 0);
+    if (map) odd += static_cast<int>((map->frame1.index - map->frame0.index) % 2);
+  }
+  EXPECT_GE(odd, 2);
+}
+
 TEST(Initializer, FramesBeforeTellWhoHasJustStopped) {
   SyntheticRoom room(600, 150);
   room.StopWalkerAt(12);
