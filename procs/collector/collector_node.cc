@@ -436,6 +436,8 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   } else if (record->channel == channels::kInitialMap) {
     if (const auto proposal = Read<InitialMap>(*record->bytes)) {
       OnProposal(proposal->first.id, proposal->map_id, record->version());
+      for (const InitialMap::View& view : proposal->between)
+        OnProposal(view.keyframe.id, proposal->map_id, record->version());
       OnProposal(proposal->second.id, proposal->map_id, record->version());
     }
   } else if (record->channel == channels::kMapReset) {

@@ -100,11 +100,27 @@ struct Size {
   std::vector<std::pair<std::string, int64_t>> per_count;  ///< in the order of the counts
 };
 
+void AddSize(const StructType& type, const std::string& prefix, Size& size);
+
+/// Of a counted array of structs the fixed part counts as often as there are elements.
+void AddStructSize(const StructType& type, const Field& field, const std::string& prefix, Size& size) {
+  Size inner;
+  AddSize(TypeOf(field.type), prefix + field.name + ".", inner);
+  int counted_by = -1;
+  for (const Field::Dimension& dimension : field.dimensions) counted_by = dimension.counted_by;
+  if (counted_by < 0) {
+    size.fixed += inner.fixed;
+  } else {
+    size.per_count.emplace_back(prefix + type.fields[static_cast<size_t>(counted_by)].name, inner.fixed);
+  }
+  size.per_count.insert(size.per_count.end(), inner.per_count.begin(), inner.per_count.end());
+}
+
 void AddSize(const StructType& type, const std::string& prefix, Size& size) {
   std::map<int, int64_t> per_count;
   for (const Field& field : type.fields) {
     if (field.kind == Field::Kind::kStruct) {
-      AddSize(TypeOf(field.type), prefix + field.name + ".", size);
+      AddStructSize(type, field, prefix, size);
       continue;
     }
     int64_t bytes = field.kind == Field::Kind::kString ? 5 : field.size_bytes;  // length and closing zero

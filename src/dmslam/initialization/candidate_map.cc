@@ -315,6 +315,27 @@ double CandidateBuilder::DirectionSigma(const CandidateMap& candidate) const {
   return dmslam::DirectionSigma(arrays, candidate.use, options_.selector.inlier.chi2, model);
 }
 
+namespace {
+
+/// What the views before the last one see of the points, by time. `point_of`: of each match that has one.
+std::vector<FirstMap::View> ViewsBetween(const CandidateMap& candidate, std::span<const uint32_t> point_of,
+                                         double unit) {
+  std::vector<FirstMap::View> views;
+  for (const CandidateMap::Placed& placed : candidate.placed) {
+    if (placed.view == &candidate.last()) continue;
+    FirstMap::View view{placed.view->frame, placed.T_k_0, {}};
+    view.T_k_0.translation /= unit;
+    ForEachSeen(placed, candidate.last().pair.matches, [&](size_t k, const Match& seen) {
+      if (candidate.use[k]) view.sights.push_back({point_of[k], seen.index1});
+    });
+    views.push_back(std::move(view));
+  }
+  std::ranges::sort(views, {}, [](const FirstMap::View& view) { return view.frame.stamp_ns; });
+  return views;
+}
+
+}  // namespace
+
 FirstMap CandidateBuilder::MakeMap(const InitializerFrame& reference, const CandidateMap& candidate,
                                    std::span<const uint8_t> is_static) const {
   const ReferenceView& last = candidate.last();
@@ -332,23 +353,14 @@ FirstMap CandidateBuilder::MakeMap(const InitializerFrame& reference, const Cand
   const double unit = Median(std::move(depths));
   map.T_1_0 = candidate.T_last_0();
   map.T_1_0.translation /= unit;
-  std::vector<uint32_t> point_of(candidate.use.size(), 0);
+  std::vector<uint32_t> point_of(candidate.use.size(), 0);  // of a match
   for (size_t k = 0; k < candidate.use.size(); ++k) {
     if (!candidate.use[k]) continue;
     const Match& match = last.pair.matches[k];
     point_of[k] = static_cast<uint32_t>(map.points.size());
     map.points.push_back({match.index0, match.index1, candidate.points[k] / unit});
   }
-  for (const CandidateMap::Placed& placed : candidate.placed) {
-    if (placed.view == &last) continue;
-    FirstMap::View view{placed.view->frame, placed.T_k_0, {}};
-    view.T_k_0.translation /= unit;
-    ForEachSeen(placed, last.pair.matches, [&](size_t k, const Match& seen) {
-      if (candidate.use[k]) view.sights.push_back({point_of[k], seen.index1});
-    });
-    map.between.push_back(std::move(view));
-  }
-  std::ranges::sort(map.between, {}, [](const FirstMap::View& view) { return view.frame.stamp_ns; });
+  map.between = ViewsBetween(candidate, point_of, unit);
   return map;
 }
 

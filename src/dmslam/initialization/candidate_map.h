@@ -45,7 +45,7 @@ struct CandidateMap {
 struct Refused {
   WaitReason wait = WaitReason::kNone;
   std::string text;
-  double parallax_rad = 0;  ///< median, where it was too small
+  double parallax_rad = 0;  ///< median, where it or the direction was not good enough
 };
 
 /// Makes candidates under a given motion and measures them. Holds no state but its options.

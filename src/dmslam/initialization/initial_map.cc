@@ -23,8 +23,9 @@ KeyframeProposal ProposalOf(const InitializerFrame& frame, uint32_t session, Cam
   return proposal;
 }
 
-InitialMap::View ViewOf(const FirstMap::View& view, KeyframeProposal keyframe) {
+InitialMap::View ViewOf(const FirstMap::View& view, KeyframeProposal keyframe, KeyframeId first) {
   InitialMap::View told{std::move(keyframe), {}};
+  told.keyframe.reference = first;
   told.keyframe.T_cam_reference = view.T_k_0;
   for (const FirstMap::View::Sight& sight : view.sights)
     told.sights.push_back({static_cast<uint16_t>(sight.point), static_cast<uint16_t>(sight.feature)});
@@ -70,8 +71,8 @@ InitialMap MakeInitialMap(const FirstMap& first_map, uint32_t session, CameraId 
     const FirstMap::View& view = first_map.between[k * first_map.between.size() / (asked + 1)];
     features += view.frame.features->size();
     if (features > kMostFeatures) break;
-    proposal.between.push_back(ViewOf(view, ProposalOf(view.frame, session, camera_id, map_id)));
-    proposal.between.back().keyframe.reference = proposal.first.id;
+    KeyframeProposal told = ProposalOf(view.frame, session, camera_id, map_id);
+    proposal.between.push_back(ViewOf(view, std::move(told), proposal.first.id));
   }
   return proposal;
 }

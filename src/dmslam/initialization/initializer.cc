@@ -260,8 +260,9 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
 
 /// The parallax was almost enough: the next frame may have it.
 bool Initializer::Impl::IsNearlyThere() const {
-  return last_wait_.wait == WaitReason::kParallaxTooSmall &&
-         last_wait_.parallax_rad >= options_.nearly_parallax * options_.geometry.min_parallax_rad;
+  const double asked = options_.geometry.min_parallax_rad;
+  return last_wait_.wait == WaitReason::kParallaxTooSmall && last_wait_.parallax_rad < asked &&
+         last_wait_.parallax_rad >= options_.nearly_parallax_share * asked;
 }
 
 /// What the reference frames make of this one, the oldest first, until one has a map. At most one of them may

@@ -19,7 +19,7 @@ struct InitializerReport {
   int num_static = 0;
   double distribution_px = 0;
   double agreement = 0;     ///< smallest Jaccard index between the pairs' static sets
-  double parallax_rad = 0;  ///< median, of the map or where it was too small for one
+  double parallax_rad = 0;  ///< median, of the map or of one that had too little
 };
 
 /// Makes the first map out of a stream of frames. Several reference frames are kept side by side. Of each,

@@ -187,8 +187,8 @@ TEST(Initializer, TellsTheViewsBetweenTheTwo) {
   }
 }
 
-/// Every other frame is looked at, until little is missing.
-TEST(Initializer, TakesTheFirstFrameWithEnoughParallax) {
+/// Every other frame is looked at. Where little is missing the one left out is, too: maps end at it.
+TEST(Initializer, LooksAtEveryFrameWhereLittleParallaxIsMissing) {
   InitializerOptions options;
   options.geometry.min_parallax_rad = 0.03;  // late, so that nothing else is missing
   int odd = 0;

@@ -26,7 +26,7 @@ enum class MapEvent : uint8_t {
   kEvidence = 6,          ///< what frames said of landmarks
   kCorrected = 7,         ///< `correction_id`, a loop of keyframe `about`, was applied
   kGloballyAdjusted = 8,  ///< `correction_id`, a global adjustment after a loop, was applied
-  kMapStarted = 9,        ///< `map_id`, of a first map; `about` is its second keyframe
+  kMapStarted = 9,        ///< `map_id`, of a first map; `about` is the `second` proposed
   kMapDropped = 10,       ///< `map_id`, as the frontend said
   kSettled = 11,          ///< the answer to a keyframe: all work that `about` caused is done
   kSnapshot = 12,         ///< part of a snapshot
@@ -34,7 +34,7 @@ enum class MapEvent : uint8_t {
   kEnded = 14,            ///< the end of the session: nothing follows
   kMapAdjusted = 15,      ///< `map_id` as a whole, after the last frame
   kRequestDone = 16,      ///< the answer to an AdjustRequest, `request`: all maps are adjusted
-  kFirstMapRefused = 17,  ///< of `map_id`, with second keyframe `about`; `note` says why
+  kFirstMapRefused = 17,  ///< of `map_id`, with `about` as the `second` proposed; `note` says why
   kTurn = 18,             ///< the answer to a TurnRequest: all that comes before frame `about` is in the map
 };
 

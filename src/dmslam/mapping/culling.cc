@@ -42,7 +42,8 @@ bool IsRedundant(const Map& map, const Keyframe& keyframe, double share) {
   return redundant > share * total;
 }
 
-/// Removes a keyframe, and of its landmarks those that no two others see.
+}  // namespace
+
 void RemoveWithLonelyLandmarks(MapEditor& map, const Keyframe& keyframe) {
   const std::vector<LandmarkId> seen = keyframe.landmarks;
   map.RemoveKeyframe(keyframe);
@@ -51,8 +52,6 @@ void RemoveWithLonelyLandmarks(MapEditor& map, const Keyframe& keyframe) {
     if (left != nullptr && left->observations.size() < 2) map.RemoveLandmark(*left);
   }
 }
-
-}  // namespace
 
 int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order,
                        const MapperOptions& options) {

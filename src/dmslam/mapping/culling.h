@@ -16,6 +16,9 @@ int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order
 int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, KeyframeId keep,
                            const MapperOptions& options);
 
+/// Removes a keyframe, and of its landmarks those that no two others see.
+void RemoveWithLonelyLandmarks(MapEditor& map, const Keyframe& keyframe);
+
 /// Removes landmarks that lie just before the lens of a keyframe that sees them: nearer than `share` of what
 /// the keyframe sees in the median. A mismatch beside the epipole makes them, and one pulls at the poses
 /// harder than all others together. Returns how many.

@@ -1,9 +1,11 @@
 #include "dmslam/mapping/first_map.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "dmslam/mapping/culling.h"
 #include "dmslam/mapping/keyframe_insertion.h"
 #include "dmslam/optimization/map_adjustment.h"
 
@@ -12,6 +14,7 @@ namespace {
 
 constexpr int kIterations = 20;
 constexpr int kMinLandmarks = 40;
+constexpr int kMinSights = 20;  // of a view between: fewer do not fix its pose
 
 void ScaleToUnitDepth(MapEditor& map, const Keyframe& first) {
   const std::optional<double> depth = map.MedianDepth(first);
@@ -24,7 +27,8 @@ void ScaleToUnitDepth(MapEditor& map, const Keyframe& first) {
     map.SetPosition(*landmark, landmark->p_world / *depth);
 }
 
-const Keyframe& AddAfter(MapEditor& map, const Keyframe& first, const KeyframeProposal& proposal) {
+/// In the map of `first`, where the proposal puts it from there.
+const Keyframe& AddBeside(MapEditor& map, const Keyframe& first, const KeyframeProposal& proposal) {
   Keyframe keyframe = MakeKeyframe(map, proposal, proposal.T_cam_reference);
   keyframe.map_id = first.map_id;
   keyframe.parent = first.id;
@@ -48,29 +52,37 @@ std::vector<const Landmark*> AddLandmarks(MapEditor& map, const InitialMap& prop
   return landmarks;
 }
 
-void AddViewBetween(MapEditor& map, const InitialMap::View& view, const Keyframe& first,
-                    const std::vector<const Landmark*>& landmarks) {
-  if (map.HasKnown(view.keyframe.id)) return;
-  const Keyframe& keyframe = AddAfter(map, first, view.keyframe);
+/// Null where the frame is known.
+const Keyframe* AddViewBetween(MapEditor& map, const InitialMap::View& view, const Keyframe& first,
+                               const std::vector<const Landmark*>& landmarks) {
+  if (map.HasKnown(view.keyframe.id)) return nullptr;
+  const Keyframe& keyframe = AddBeside(map, first, view.keyframe);
   for (const InitialMap::View::Sight& sight : view.sights) {
     const bool known = sight.point < landmarks.size() && landmarks[sight.point] != nullptr &&
                        sight.feature < keyframe.landmarks.size();
     if (known) map.SetObservation(keyframe, sight.feature, *landmarks[sight.point]);
   }
+  return &keyframe;
 }
 
 }  // namespace
 
 bool BuildFirstMap(MapEditor& map, const InitialMap& proposal, LandmarkMaker& maker) {
   const Keyframe& first = map.AddKeyframe(MakeKeyframe(map, proposal.first, Rigid3d()));
-  const Keyframe& second = AddAfter(map, first, proposal.second);
+  const Keyframe& second = AddBeside(map, first, proposal.second);
   const std::vector<const Landmark*> landmarks = AddLandmarks(map, proposal, first, second, maker);
-  for (const InitialMap::View& view : proposal.between) AddViewBetween(map, view, first, landmarks);
+  std::vector<const Keyframe*> between;
+  for (const InitialMap::View& view : proposal.between)
+    between.push_back(AddViewBetween(map, view, first, landmarks));
   for (const Landmark* landmark : landmarks) {
     if (landmark != nullptr) map.UpdateDescriptor(*landmark);
   }
   AdjustWholeMap(map, proposal.map_id, kIterations, 1.0, nullptr);
-  if (map.CountTracked(second, 2) < kMinLandmarks) return false;
+  // Before it is scaled: one that nothing holds may be anywhere.
+  for (const Keyframe* view : between) {
+    if (view != nullptr && map.CountTracked(*view, 2) < kMinSights) RemoveWithLonelyLandmarks(map, *view);
+  }
+  if (std::min(map.CountTracked(first, 2), map.CountTracked(second, 2)) < kMinLandmarks) return false;
   ScaleToUnitDepth(map, first);
   return true;
 }

@@ -102,6 +102,19 @@ TEST_F(FirstMapBuilding, AViewBetweenIsAKeyframeThatSeesWhatItWasToldToShow) {
   EXPECT_EQ(map_.CountTracked(map_.At(Id(10)), 3), 60);
 }
 
+/// Nothing would hold its pose, wherever it claims to be.
+TEST_F(FirstMapBuilding, AViewThatSeesTooLittleIsLeftOut) {
+  InitialMap proposal = Proposal(100);
+  proposal.between.resize(2);
+  proposal.between[0].keyframe = scene_.Propose(10, 1e12, 1, 0.0, 0.25);
+  proposal.between[1].keyframe = scene_.Propose(11, 0.2, 1, 0.0, 0.25);
+  for (uint16_t i = 0; i < 60; ++i)  // each of them elsewhere
+    proposal.between[1].sights.push_back({i, static_cast<uint16_t>(139 - i)});
+  ASSERT_TRUE(BuildFirstMap(map_, proposal, maker_));
+  EXPECT_EQ(map_.KeyframesOf(1).size(), 2u);
+  for (const Landmark* landmark : map_.LandmarksOf(1)) EXPECT_EQ(landmark->observations.size(), 2u);
+}
+
 TEST_F(FirstMapBuilding, TooFewLandmarksAreNoMap) { EXPECT_FALSE(BuildFirstMap(map_, Proposal(39), maker_)); }
 
 TEST_F(FirstMapBuilding, PointsThatDoNotFitDoNotCount) {

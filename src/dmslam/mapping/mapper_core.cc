@@ -63,27 +63,31 @@ bool MapperCore::Interrupted() {
 // ---- A first map ----
 
 bool MapperCore::OnInitialMap(const InitialMap& proposal) {
-  if (map_.FindKeyframe(proposal.second.id) != nullptr) {
+  if (map_.HasKnown(proposal.second.id)) {
     ++counters_.keyframes_repeated;
     return false;
   }
-  bool built = false;
-  if (!map_.HasKnown(proposal.first.id)) {
-    order_.Add(proposal.first.id);
-    for (const InitialMap::View& view : proposal.between) order_.Add(view.keyframe.id);
-    order_.Add(proposal.second.id);
-    built = BuildFirstMap(map_, proposal, maker_);
-  }
-  if (built) {
+  const bool is_new = !map_.HasKnown(proposal.first.id) && map_.KeyframesOf(proposal.map_id).empty();
+  if (is_new && StartMap(proposal)) {
     ++counters_.maps_started;
     Publish(MapEvent::kMapStarted, proposal.second.id, proposal.map_id);
     return true;
   }
   ++counters_.maps_refused;
-  map_.DropMap(proposal.map_id);
+  if (is_new) map_.DropMap(proposal.map_id);
   Publish(MapEvent::kFirstMapRefused, proposal.second.id, proposal.map_id, {},
-          "too few landmarks after bundle adjustment");
+          is_new ? "too few landmarks after bundle adjustment" : "the map or its first keyframe is known");
   return false;
+}
+
+/// False where it does not hold: what was built is then still there.
+bool MapperCore::StartMap(const InitialMap& proposal) {
+  order_.Add(proposal.first.id);
+  for (const InitialMap::View& view : proposal.between) {
+    if (!map_.HasKnown(view.keyframe.id)) order_.Add(view.keyframe.id);
+  }
+  order_.Add(proposal.second.id);
+  return BuildFirstMap(map_, proposal, maker_);
 }
 
 // ---- A keyframe ----

@@ -501,6 +501,21 @@ TEST_F(KeyframeStep, AFirstMapThatDoesNotHoldIsDroppedWithARecord) {
   EXPECT_EQ(core_.counters().maps_refused, 1u);
 }
 
+TEST_F(KeyframeStep, AFirstMapOfANumberThatIsTakenChangesNothing) {
+  ASSERT_TRUE(Start());
+  const size_t landmarks = core_.map().num_landmarks();
+  InitialMap other = FirstMap();
+  other.first = scene_.Propose(5, PlaceOf(5), 5, PlaceOf(5), 5);
+  other.second = scene_.Propose(6, PlaceOf(6), 5, PlaceOf(5), 6);
+  EXPECT_FALSE(core_.OnInitialMap(other));
+  InitialMap again = FirstMap();
+  again.second = scene_.Propose(6, PlaceOf(6), 0, PlaceOf(0), 6);
+  EXPECT_FALSE(core_.OnInitialMap(again)) << "its first keyframe is known";
+  EXPECT_EQ(core_.counters().maps_refused, 2u);
+  EXPECT_EQ(core_.map().KeyframesOf(1).size(), 2u);
+  EXPECT_EQ(core_.map().num_landmarks(), landmarks);
+}
+
 TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   ASSERT_TRUE(Start());
   ASSERT_TRUE(core_.OnKeyframe(Frame(2)));

@@ -69,7 +69,7 @@ struct BundleReport {
 /// indices out of range.
 BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem);
 
-/// Options for the adjustment of a whole map or of the first two keyframes: one robust stage of so many
+/// Options for the adjustment of a whole map or of a first one: one robust stage of so many
 /// steps.
 BundleOptions GlobalBundleOptions(int iterations);
 

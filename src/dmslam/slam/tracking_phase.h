@@ -23,7 +23,7 @@ class TrackingPhase {
   bool IsTrial() const { return Is<Trial>(); }
   /// Whether there is a map to track in.
   bool HasMap() const { return !IsSearching() && !IsWaiting(); }
-  /// The second keyframe of the first map that was proposed; only while waiting for it.
+  /// `second` of the first map that was proposed; only while waiting for it.
   KeyframeId awaited_second() const;
 
   /// A first map was proposed.

@@ -155,7 +155,17 @@ struct Codec<InitialMap> {
   static void Validate(const InitialMap& m, Checker& check) {
     check.Require(m.map_id >= 1, "no map id");
     ValidateKeyframe(m.first, check);
-    ValidateKeyframe(m.second, check);
+    const KeyframeProposal* before = &m.first;
+    const auto follows = [&](const KeyframeProposal& keyframe) {
+      ValidateKeyframe(keyframe, check);
+      const bool same = keyframe.map_id == m.map_id && keyframe.camera_id == m.first.camera_id &&
+                        keyframe.id.session() == m.first.id.session();
+      check.Require(same && before->id < keyframe.id, "keyframes of a first map that do not belong together");
+      before = &keyframe;
+    };
+    for (const InitialMap::View& view : m.between) follows(view.keyframe);
+    follows(m.second);
+    check.Require(m.first.map_id == m.map_id, "keyframes of a first map that do not belong together");
     for (const InitialMap::Point& point : m.points) {
       check.Require(
           point.feature_first < m.first.features.size() && point.feature_second < m.second.features.size(),
@@ -163,7 +173,6 @@ struct Codec<InitialMap> {
       check.Position(point.p_world, "position of a point is not finite");
     }
     for (const InitialMap::View& view : m.between) {
-      ValidateKeyframe(view.keyframe, check);
       for (const InitialMap::View::Sight& sight : view.sights) {
         check.Require(sight.point < m.points.size(), "a sight names a point that is not there");
         check.Require(sight.feature < view.keyframe.features.size(),

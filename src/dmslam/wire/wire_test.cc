@@ -212,6 +212,23 @@ TEST(WireTest, ReasonNamesTheField) {
   EXPECT_EQ(reason, "keyframe_t: keyframe.x_q4: too short");
 }
 
+TEST(WireTest, KeyframesOfAFirstMapBelongTogether) {
+  InitialMap sound;
+  for (uint32_t i = 0; sound.between.size() < 2; ++i) sound = testing::RandomMessage<InitialMap>(1 + i);
+  ASSERT_NO_THROW(Encode(sound));
+  const auto refused = [&](const std::function<void(InitialMap&)>& spoil) {
+    InitialMap broken = sound;
+    spoil(broken);
+    EXPECT_THROW(Encode(broken), InvariantError);
+  };
+  refused([](InitialMap& m) { m.second.id = m.first.id; });
+  refused([](InitialMap& m) { std::swap(m.between[0].keyframe.id, m.between[1].keyframe.id); });
+  refused([](InitialMap& m) { m.between[0].keyframe.id = m.second.id; });
+  refused([](InitialMap& m) { m.between[0].keyframe.map_id = m.map_id + 1; });
+  refused([](InitialMap& m) { m.first.map_id = m.map_id + 1; });
+  refused([](InitialMap& m) { m.second.camera_id = static_cast<CameraId>(m.first.camera_id ^ 1); });
+}
+
 TEST(WireTest, BrokenMessagesAreNotEncoded) {
   KeyframeProposal keyframe = RandomMessage<KeyframeProposal>(1);
   keyframe.T_cam_reference.translation.x() = std::nan("");

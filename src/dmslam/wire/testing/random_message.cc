@@ -145,6 +145,15 @@ void MakeSound(InitialMap& m, Random& random) {
     for (InitialMap::View::Sight& sight : view.sights)
       sight = {Index(m.points.size(), random), Index(view.keyframe.features.size(), random)};
   }
+  uint32_t frame = random.Below(1000);
+  const auto number = [&](KeyframeProposal& keyframe) {
+    keyframe.id = KeyframeId::Make(m.first.id.session(), ++frame, m.first.camera_id % kMaxCameras);
+    keyframe.camera_id = m.first.camera_id;
+    keyframe.map_id = m.map_id;
+  };
+  number(m.first);
+  for (InitialMap::View& view : m.between) number(view.keyframe);
+  number(m.second);
 }
 
 void MakeSound(FramePose& m, Random& random) {
