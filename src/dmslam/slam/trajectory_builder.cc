@@ -93,7 +93,7 @@ void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
 /// Where its reference is no longer known: over the frame that became it, which was placed in the same map.
 bool TrajectoryBuilder::Bridge(FramePose* pose) const {
   const auto frame = poses_.find({pose->reference.camera(), pose->reference.frame_index()});
-  if (frame == poses_.end() || MapOfFrame(frame->second) == 0) return false;
+  if (frame == poses_.end() || !MapOfFrame(frame->second)) return false;
   const FramePose& reference = frame->second;
   if (reference.map_id != pose->map_id) return false;  // its units are others
   Rigid3d T_cam_lost = pose->T_cam_reference;

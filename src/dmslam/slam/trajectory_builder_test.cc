@@ -115,6 +115,17 @@ TEST_F(TrajectoryOfTwoMaps, FramesOfLostKeyframesAreToldOverTheFramesThatBecameT
   EXPECT_NEAR(built.final[2].T_world_cam.translation.x(), -9.5, 1e-12);
 }
 
+TEST_F(TrajectoryOfTwoMaps, FramesToldOverOneAnotherStayWithoutAPlace) {
+  for (const uint32_t frame : {10U, 11U}) {
+    FramePose pose = PoseIn(2, TrackingState::kTracking, 1.0);
+    pose.frame_index = frame;
+    pose.reference = KeyframeId::Make(1, 21 - frame);
+    builder_.OnFramePose(pose);
+  }
+  builder_.BridgeLostKeyframes();
+  EXPECT_TRUE(builder_.Build().final.empty());
+}
+
 TEST_F(TrajectoryOfTwoMaps, AFrameIsNotToldOverOneOfAnotherMap) {
   FramePose lost = PoseIn(2, TrackingState::kTracking, 1.0);
   lost.frame_index = 10;
