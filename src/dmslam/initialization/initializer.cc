@@ -258,11 +258,10 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   return report;
 }
 
-/// The parallax was almost enough: the next frame may have it.
+/// The parallax was almost enough, or it was and the direction not known well enough: the next frame may do.
 bool Initializer::Impl::IsNearlyThere() const {
-  const double asked = options_.geometry.min_parallax_rad;
-  return last_wait_.wait == WaitReason::kParallaxTooSmall && last_wait_.parallax_rad < asked &&
-         last_wait_.parallax_rad >= options_.nearly_parallax_share * asked;
+  return last_wait_.wait == WaitReason::kParallaxTooSmall &&
+         last_wait_.parallax_rad >= options_.nearly_parallax_share * options_.geometry.min_parallax_rad;
 }
 
 /// What the reference frames make of this one, the oldest first, until one has a map. At most one of them may
