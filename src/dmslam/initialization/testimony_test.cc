@@ -120,6 +120,16 @@ TEST_F(TestimonyTest, EachCountsByHowLongItHasWatched) {
   EXPECT_EQ(HearOf(younger, WrongMapOf(younger)), Verdict::kContradicted);
 }
 
+// Between two frames that are close together noise decides which way the camera went.
+TEST_F(TestimonyTest, ACameraThatHardlyMovedHasNoDirectionToCompare) {
+  ReferenceWindow& older = Watch(0, {8, 16, 22, 24});
+  Watch(16, {24, 30});
+  Watch(22, {24, 30});
+  Claim(RoomOf(older), &older);
+  EXPECT_EQ(HearOf(windows_[1], WrongMapOf(windows_[1])), Verdict::kContradicted);
+  EXPECT_EQ(HearOf(windows_[2], WrongMapOf(windows_[2])), Verdict::kUnheard);
+}
+
 // The motion that wins now is not believed where another one won at the views before.
 TEST_F(TestimonyTest, AWindowThatHasChangedItsMindIsNotBelieved) {
   ReferenceWindow& window = Watch(0, {4, 8, 12});
