@@ -196,6 +196,9 @@ class Initializer::Impl {
   InitializerReport TryWindows(const InitializerFrame& frame);
   void KeepRecent(const InitializerFrame& frame);
   void DropOld(const InitializerFrame& frame);
+  void BeginWindowIfDue(const InitializerFrame& frame);
+  bool BriefOnesHelp(const InitializerFrame& frame) const;
+  bool MakeRoom();
   void BeginWindow(const InitializerFrame& frame);
   ReferenceView MakeView(const ReferenceWindow& window, const InitializerFrame& frame);
   bool AddView(const InitializerFrame& frame, ReferenceWindow* window, InitializerReport* report);
@@ -230,6 +233,7 @@ class Initializer::Impl {
   int only_testified_ = 0;
   int64_t last_looked_ns_ = 0;
   int64_t last_contest_ns_ = 0;
+  std::optional<int64_t> lost_soon_ns_;  ///< when a reference frame was lost sight of soon, the last time
   InitializerReport last_wait_;
 };
 
@@ -251,9 +255,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   last_looked_ns_ = frame.stamp_ns;
   DropOld(frame);
   InitializerReport report = TryWindows(frame);
-  if (!report.result && (windows_.empty() || windows_.back().AgeAt(frame) >= options_.references.step_s)) {
-    BeginWindow(frame);
-  }
+  if (!report.result) BeginWindowIfDue(frame);
   KeepRecent(frame);
   return report;
 }
@@ -279,6 +281,7 @@ InitializerReport Initializer::Impl::TryWindows(const InitializerFrame& frame) {
       last_contest_ns_ = frame.stamp_ns;
       own = TryContest(&*window);
     }
+    if (!seen && window->AgeAt(frame) <= options_.references.max_brief_age_s) lost_soon_ns_ = frame.stamp_ns;
     report = Farther(std::move(report), std::move(own));
     window = seen ? std::next(window) : windows_.erase(window);
   }
@@ -292,20 +295,46 @@ void Initializer::Impl::KeepRecent(const InitializerFrame& frame) {
 
 void Initializer::Impl::DropOld(const InitializerFrame& frame) {
   std::erase_if(windows_, [&](const ReferenceWindow& window) {
-    return window.AgeAt(frame) >
-           (window.promising ? options_.references.max_promising_age_s : options_.references.max_age_s);
+    const ReferenceOptions& most = options_.references;
+    if (window.brief) return window.AgeAt(frame) > most.max_brief_age_s;
+    return window.AgeAt(frame) > (window.promising ? most.max_promising_age_s : most.max_age_s);
   });
 }
 
-/// Makes room first: the oldest window that is neither promising nor leads a contest is dropped.
-void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
-  while (static_cast<int>(windows_.size()) >= options_.references.most) {
-    const auto idle = std::find_if(windows_.begin(), windows_.end(), [](const ReferenceWindow& window) {
-      return !window.promising && !window.lead;
+/// Between the reference frames that are kept there are brief ones, where reference frames last no longer.
+void Initializer::Impl::BeginWindowIfDue(const InitializerFrame& frame) {
+  const auto age = [&](const auto& last) { return last == windows_.rend() ? 1e9 : last->AgeAt(frame); };
+  const auto newest = windows_.rbegin();
+  const auto newest_kept =
+      std::find_if(newest, windows_.rend(), [](const ReferenceWindow& window) { return !window.brief; });
+  if (age(newest_kept) >= options_.references.step_s && MakeRoom()) {
+    BeginWindow(frame);
+  } else if (BriefOnesHelp(frame) && age(newest) >= options_.references.brief_step_s) {
+    BeginWindow(frame);
+    windows_.back().brief = true;
+  }
+}
+
+/// What a reference frame showed was lost sight of soon, a moment ago. Elsewhere they would cost time and
+/// find nothing that the others do not find.
+bool Initializer::Impl::BriefOnesHelp(const InitializerFrame& frame) const {
+  return lost_soon_ns_ && SecondsSince(*lost_soon_ns_, frame) <= options_.references.max_age_s;
+}
+
+/// False where there is none. The oldest window that is neither promising nor leads a contest goes.
+bool Initializer::Impl::MakeRoom() {
+  const auto kept = [](const ReferenceWindow& window) { return !window.brief; };
+  while (std::count_if(windows_.begin(), windows_.end(), kept) >= options_.references.most) {
+    const auto idle = std::find_if(windows_.begin(), windows_.end(), [&](const ReferenceWindow& window) {
+      return kept(window) && !window.promising && !window.lead;
     });
-    if (idle == windows_.end()) return;
+    if (idle == windows_.end()) return false;
     windows_.erase(idle);
   }
+  return true;
+}
+
+void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
   std::vector<InitializerFrame> before, past;
   for (const InitializerFrame& each : recent_) {
     if (SecondsBetween(each, frame) <= options_.past.seconds && each.index != frame.index)

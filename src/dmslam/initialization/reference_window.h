@@ -63,6 +63,7 @@ class ReferenceWindow {
     Rigid3d T_view_0;
   };
   std::optional<Found> found;
+  bool brief = false;      ///< one of those that are kept only while they are young
   bool doubtful = false;   ///< the views did not determine one motion, at some view
   bool promising = false;  ///< the pairs agreed the last time, and more views or parallax may suffice
 
