@@ -198,6 +198,7 @@ class Initializer::Impl {
   void DropOld(const InitializerFrame& frame);
   void BeginWindowIfDue(const InitializerFrame& frame);
   bool BriefOnesHelp(const InitializerFrame& frame) const;
+  double PairStepAt(const InitializerFrame& frame) const;
   bool MakeRoom();
   void BeginWindow(const InitializerFrame& frame);
   ReferenceView MakeView(const ReferenceWindow& window, const InitializerFrame& frame);
@@ -321,6 +322,11 @@ bool Initializer::Impl::BriefOnesHelp(const InitializerFrame& frame) const {
   return lost_soon_ns_ && SecondsSince(*lost_soon_ns_, frame) <= options_.references.max_age_s;
 }
 
+/// Frames that are farther apart say more; where the room shows in moments there is no time for that.
+double Initializer::Impl::PairStepAt(const InitializerFrame& frame) const {
+  return BriefOnesHelp(frame) ? options_.references.brief_pair_step_s : options_.min_pair_step_s;
+}
+
 /// False where there is none. The oldest window that is neither promising nor leads a contest goes.
 bool Initializer::Impl::MakeRoom() {
   const auto kept = [](const ReferenceWindow& window) { return !window.brief; };
@@ -380,7 +386,8 @@ bool Initializer::Impl::AddView(const InitializerFrame& frame, ReferenceWindow* 
 
 /// The map of what several pairs call static.
 InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
-  const std::vector<const ReferenceView*> views = window->PairsToAgree(options_);
+  const double step_s = PairStepAt(window->views().back().frame);
+  const std::vector<const ReferenceView*> views = window->PairsToAgree(options_.num_pairs, step_s);
   if (views.empty()) return Wait(WaitReason::kTooFewFrames, "too few pairs yet");
   std::vector<const PairView*> pairs;
   for (const ReferenceView* view : views) pairs.push_back(&view->pair);

@@ -33,6 +33,8 @@ struct ReferenceOptions {
   /// behind people who walk beside a camera that turns, the room is seen for a third of a second.
   double brief_step_s = 0.05;    ///< one is taken so long after the last of either kind...
   double max_brief_age_s = 0.4;  ///< ...and kept for so long
+  /// While they are taken, the frames of two pairs that must agree are apart by so much in the mean.
+  double brief_pair_step_s = 0.05;
 };
 
 /// How the motion of a pair is searched, and when it is the only one.
@@ -118,7 +120,7 @@ struct InitializerOptions {
   double nearly_parallax_share = 0.9;  ///< ...unless that had this share of the parallax asked for
   int min_matches = 120;               ///< of a frame with the reference frame; fewer: it is given up
   int num_pairs = 3;                   ///< pairs with the reference frame that must agree
-  double min_pair_step_s = 0.05;       ///< the frames of two such pairs are apart by so much at least
+  double min_pair_step_s = 0.1;        ///< the frames of two such pairs are apart by so much in the mean
   /// Median displacement of the matches before a pair is worth its cost.
   double min_displacement_rad = 0.015;
   int max_views = 8;       ///< frames after the reference frame that a map is made of, at most

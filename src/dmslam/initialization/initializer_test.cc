@@ -201,7 +201,6 @@ TEST(Initializer, TellsTheViewsBetweenTheTwo) {
 TEST(Initializer, LooksAtEveryFrameWhereLittleParallaxIsMissing) {
   InitializerOptions options;
   options.geometry.min_parallax_rad = 0.03;  // late, so that nothing else is missing
-  options.min_pair_step_s = 0.1;
   int odd = 0;
   for (int k = 0; k < 10; ++k) {
     SyntheticRoom room(600, 0);
@@ -313,6 +312,9 @@ TEST(Initializer, BehindPeopleTheRoomIsSeenInMoments) {
 
   InitializerOptions without;
   without.references.max_brief_age_s = 0;
+  EXPECT_FALSE(MapFrom(room, without, 0).has_value());
+  without = {};
+  without.references.brief_pair_step_s = without.min_pair_step_s;
   EXPECT_FALSE(MapFrom(room, without, 0).has_value());
 }
 

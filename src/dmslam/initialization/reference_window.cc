@@ -6,15 +6,15 @@
 
 namespace dmslam {
 
-std::vector<const ReferenceView*> ReferenceWindow::PairsToAgree(const InitializerOptions& options) const {
+std::vector<const ReferenceView*> ReferenceWindow::PairsToAgree(int num_pairs, double min_step_s) const {
   std::vector<const ReferenceView*> moved, chosen;
   for (const ReferenceView& view : views_) {
     if (view.moved) moved.push_back(&view);
   }
-  const auto asked = static_cast<size_t>(options.num_pairs);
-  if (asked < 1 || moved.size() < asked) return chosen;
+  const auto asked = static_cast<size_t>(num_pairs);
+  if (num_pairs < 1 || moved.size() < asked) return chosen;
   const double span_s = SecondsBetween(moved.front()->frame, moved.back()->frame);
-  if (span_s < options.min_pair_step_s * static_cast<double>(asked - 1)) return chosen;
+  if (span_s < min_step_s * static_cast<double>(asked - 1)) return chosen;
   if (asked == 1) return {moved.back()};
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);
   return chosen;

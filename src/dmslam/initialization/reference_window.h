@@ -30,9 +30,9 @@ class ReferenceWindow {
   /// the nearest views; before the reference frame, as just after it.
   Eigen::Quaterniond TurnAt(double since_reference_s) const;
 
-  /// The newest view last, and as many before it as must agree, spread evenly over those that moved; empty
-  /// while there are too few, or all within too short a time.
-  std::vector<const ReferenceView*> PairsToAgree(const InitializerOptions& options) const;
+  /// The newest view last, and as many before it as make `num_pairs`, spread evenly over those that moved;
+  /// empty while there are too few, or they are nearer to each other than `min_step_s` in the mean.
+  std::vector<const ReferenceView*> PairsToAgree(int num_pairs, double min_step_s) const;
   /// The views that a map is made of besides `last`: of more than there may be an even choice.
   std::vector<const ReferenceView*> ViewsBetween(const ReferenceView& last, int most) const;
   /// Frames before the reference frame as views of it; they are matched with match(frame) the first time.
