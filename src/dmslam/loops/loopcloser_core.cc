@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dmslam/loops/loop_correction.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
@@ -13,9 +14,7 @@ namespace {
 constexpr int kMostWitnesses = 15;  // keyframes around one that are asked whether they see what it sees
 
 /// Between two keyframes; time runs backwards where the map grows back.
-double SecondsBetween(int64_t a_ns, int64_t b_ns) {
-  return std::abs(static_cast<double>(a_ns - b_ns)) * 1e-9;
-}
+double SecondsBetween(int64_t a_ns, int64_t b_ns) { return std::abs(SecondsFromTo(a_ns, b_ns)); }
 
 }  // namespace
 

@@ -81,7 +81,7 @@ enum class TrackingState : uint8_t {
   kUncertain = 4,       ///< the landmarks fix the pose badly, as its covariance says; or too few: none
   kLost = 5,
   kLocalizedLater = 6,  ///< a frame placed in the map, or placed better, after the fact
-  kRotationOnly = 7,    ///< the rotation is measured, the position is a prediction
+  kRotationOnly = 7,    ///< how the camera turns is measured, where it is is not
 };
 
 /// How many numbers the covariance of a pose takes: position x, y, z [map units], then the rotation vector

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dmslam/util/random.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
@@ -18,9 +19,7 @@ constexpr double kApartS = 0.3;         // ...apart, so that it is motion and no
 constexpr double kFasterThanAside = 2;  // ...which may be so many times as fast...
 constexpr double kSlack = 0.05;         // ...and this beside [depths of the scene]
 
-double SecondsBetween(int64_t a_ns, int64_t b_ns) {
-  return std::abs(static_cast<double>(a_ns - b_ns)) * 1e-9;
-}
+double SecondsBetween(int64_t a_ns, int64_t b_ns) { return std::abs(SecondsFromTo(a_ns, b_ns)); }
 
 double DistanceBetween(const Rigid3d& a, const Rigid3d& b) { return (a.Center() - b.Center()).norm(); }
 

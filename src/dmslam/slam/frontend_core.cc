@@ -58,6 +58,7 @@ FrontendCore::FrontendCore(const Setup& setup)
       features_(setup.extractor, setup.options.initializer_feature_factor),
       first_map_(SearchMaker(setup)),
       tracker_({setup.options.tracking, setup.camera, setup.vocabulary, setup.seed}),
+      turns_(setup.camera),
       late_(setup.session, setup.camera_id, setup.seed, setup.options.tracking.motion),
       last_poses_(setup.options.refiner, setup.options.smooth_at_end, setup.options.tracking, setup.camera),
       unplaced_(setup.options.max_kept_frames) {
@@ -136,6 +137,7 @@ void FrontendCore::FollowJoinedMap() {
 }
 
 TrackingState FrontendCore::state() const {
+  if (turns_.IsMeasured() && !phase_.IsWaiting()) return TrackingState::kRotationOnly;
   return phase_.IsSearching() && !map_.keyframes().empty() ? TrackingState::kLost : phase_.state();
 }
 
@@ -182,6 +184,7 @@ std::optional<FrontendOutput> FrontendCore::FindAgain() {
 FrontendOutput FrontendCore::Initialize() {
   if (std::optional<FrontendOutput> found = FindAgain()) return std::move(*found);
   FrontendOutput output;
+  FollowTurn();
   unplaced_.Keep(WaitingFrame(frame_));
   FirstMapPhase::Answer answer = first_map_.AddFrame(frame_, session_, camera_id_, *map_id_);
   if (answer.proposal) {
@@ -258,6 +261,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
   const TrackingReport& report = result.report;
   const PlacedPose& pose = *result.pose;
   ++counters_.tracked;
+  turns_.Begin(frame_);
   lit_since_ns_.reset();
   phase_.OnTracked(frame_.stamp_ns);
   odometry_.OnTracked(map_, {frame_.index, frame_.stamp_ns}, pose, frame_.T_cam_world, result.certainty,
@@ -271,8 +275,15 @@ FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
   return output;
 }
 
+/// Where no position is known, the way the camera looks may be.
+void FrontendCore::FollowTurn() {
+  turns_.Follow(frame_);
+  if (turns_.IsMeasured()) odometry_.OnTurned(turns_.begun_ns(), turns_.R_now_begun());
+}
+
 FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
   FrontendOutput output;
+  FollowTurn();
   unplaced_.Keep(WaitingFrame(frame_));
   if (phase_.IsTrial() && report.contradicts) {
     output = GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason);
@@ -283,7 +294,7 @@ FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
     if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsUndecided())
       output = GiveUpMap(false, "lost for too long");
   }
-  output.Add(MakePose(phase_.state(), report, std::nullopt));
+  output.Add(MakePose(phase_.IsSearching() ? phase_.state() : state(), report, std::nullopt));
   return output;
 }
 

@@ -19,6 +19,7 @@
 #include "dmslam/slam/tracking_phase.h"
 #include "dmslam/tracking/odometry.h"
 #include "dmslam/tracking/tracker.h"
+#include "dmslam/tracking/turn_follower.h"
 
 namespace dmslam {
 
@@ -90,7 +91,7 @@ class FrontendCore {
   /// 4. Does all that is left and tells the last poses.
   FrontendOutput Finish();
 
-  /// While a first map is looked for and there are others, the camera is lost in those.
+  /// Of the newest frame. While a first map is looked for and there are others, the camera is lost in those.
   TrackingState state() const;
   const TrackedFrame& frame() const { return frame_; }
   /// As of the newest frame.
@@ -109,6 +110,7 @@ class FrontendCore {
   FrontendOutput Track();
   FrontendOutput OnTracked(const TrackingResult& result);
   FrontendOutput OnNotTracked(const TrackingReport& report);
+  void FollowTurn();
   bool IsLostInTheLight(int64_t missing_ns);
   FrontendOutput GiveUpMap(bool drop, const std::string& reason);
   bool IsSharedMap(MapId map_id) const;
@@ -146,6 +148,7 @@ class FrontendCore {
   FirstMapPhase first_map_;
   Tracker tracker_;
   Odometer odometry_;
+  TurnFollower turns_;  ///< of a camera that is not tracked
   KeyframeGate gate_;
   LatePlacement late_;
   LastPoses last_poses_;

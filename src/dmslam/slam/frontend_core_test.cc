@@ -125,11 +125,12 @@ class Phases : public ::testing::Test {
     const auto nothing = [](size_t) { return std::optional<Eigen::Vector3d>(); };
     return Frame(index, index * kFrameNs, blind ? MapScene::Place(nothing) : MapScene::Place());
   }
-  /// The camera looks at something that nobody has seen.
+  /// The camera sways before something that nobody has seen.
   FrontendOutput Strange(uint32_t index) {
     const int64_t stamp_ns = index * kFrameNs;
+    const double x = index % 2 == 0 ? 0.0 : 0.3;
     return core_->ProcessFeatures(index, stamp_ns,
-                                  strange_.See(index, stamp_ns, MapScene::PoseAt(0)).features->set);
+                                  strange_.See(index, stamp_ns, MapScene::PoseAt(x)).features->set);
   }
   FrontendOutput Frame(uint32_t index, int64_t stamp_ns, const MapScene::Place& place) {
     const double x = 0.05 * static_cast<double>(stamp_ns) / kFrameNs;
@@ -183,6 +184,21 @@ TEST_F(Phases, AFirstMapIsProposedAndAwaited) {
   EXPECT_EQ(core_->awaited(), proposal->second.id);
   EXPECT_FALSE(Find<FramePose>(Frame(2))->HasPose());
   EXPECT_EQ(core_->state(), TrackingState::kWaitingForMap);
+}
+
+TEST_F(Phases, ACameraThatTurnsWithoutAMapHasARotationAndNoPose) {
+  const auto turned = [](uint32_t frame) { return ExpSo3({0, 0.01 * frame, 0}); };
+  for (uint32_t frame = 0; frame < 15; ++frame) {
+    const TrackedFrame seen =
+        scene_.See(frame, frame * kFrameNs, Rigid3d(turned(frame), Eigen::Vector3d::Zero()),
+                   [this](size_t point) { return std::optional<Eigen::Vector3d>(scene_.point(point)); });
+    const FrontendOutput output = core_->ProcessFeatures(frame, frame * kFrameNs, seen.features->set);
+    EXPECT_FALSE(Find<FramePose>(output)->HasPose());
+    const TrackingState expected = frame < 7 ? TrackingState::kNotInitialized : TrackingState::kRotationOnly;
+    EXPECT_EQ(Find<FramePose>(output)->state, expected) << frame;
+  }
+  EXPECT_FALSE(core_->odometry().measured);
+  EXPECT_LT(AngleBetween(core_->odometry().T_odom_cam.rotation, turned(14).conjugate()), 0.002);
 }
 
 TEST_F(Phases, ARefusedProposalIsGivenUp) {

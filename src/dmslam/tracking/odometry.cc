@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dmslam/util/time.h"
+
 namespace dmslam {
 namespace {
 
 constexpr double kCarryS = 0.5;            // so long a motion goes on that is not seen
 constexpr double kVelocityMemoryS = 0.05;  // time constant of the velocity's mean over the steps
 constexpr double kLeastIntervalS = 1e-6;   // of two frames, to have a motion between them
-
-double Seconds(int64_t from_ns, int64_t to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; }
 
 }  // namespace
 
@@ -32,8 +32,8 @@ bool Odometer::Continue(const Map& map, const FrameTime& time, const Rigid3d& T_
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(last_->pose.reference);
   if (!T_last_world || !reference || reference->map_id != state_.map_id) return false;
   units_ *= reference->scale / last_->pose.scale;
-  const double since_s = Seconds(last_->time.stamp_ns, time.stamp_ns);
-  if (!follows || since_s > kCarryS) return false;
+  const double since_s = SecondsFromTo(last_->time.stamp_ns, time.stamp_ns);
+  if (!follows || since_s > kCarryS || last_->segment != state_.segment) return false;
   Rigid3d T_last_now = *T_last_world * T_cam_world.Inverse();
   T_last_now.translation /= units_;
   state_.T_odom_cam = last_->T_odom_cam * T_last_now;
@@ -70,14 +70,25 @@ void Odometer::OnTracked(const Map& map, const FrameTime& time, const PlacedPose
     units.head<3>() /= units_;
     state_.step->covariance = units.asDiagonal() * state_.step->covariance * units.asDiagonal();
   }
-  last_ = Last{pose, time, state_.T_odom_cam};
+  last_ = Last{pose, time, state_.T_odom_cam, state_.segment};
+}
+
+/// Turns that are counted from the frame tracked last continue its segment; before others something is
+/// missing.
+void Odometer::OnTurned(int64_t since_ns, const Eigen::Quaterniond& R_now_since) {
+  if (!turned_from_ || turned_from_->stamp_ns != since_ns) {
+    const bool continues = last_ && last_->time.stamp_ns == since_ns && last_->segment == state_.segment;
+    if (!continues) BeginSegment(true);
+    turned_from_ = TurnedFrom{since_ns, (continues ? last_->T_odom_cam : state_.T_odom_cam).rotation};
+  }
+  state_.T_odom_cam.rotation = turned_from_->R_odom_cam * R_now_since.conjugate();
 }
 
 void Odometer::Predict(const FrameTime& time) {
   state_.measured = false;
   state_.step.reset();
   if (!last_ || !state_.velocity) return;
-  const double since_s = Seconds(last_->time.stamp_ns, time.stamp_ns);
+  const double since_s = SecondsFromTo(last_->time.stamp_ns, time.stamp_ns);
   state_.T_odom_cam = Carry(last_->T_odom_cam, *state_.velocity, std::clamp(since_s, 0.0, kCarryS));
   if (since_s > kCarryS) state_.velocity.reset();
 }

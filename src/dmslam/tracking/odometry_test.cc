@@ -118,5 +118,35 @@ TEST_F(OdometerTest, WhatIsNotSeenIsCarriedOnAndThenHeld) {
   EXPECT_LT(Mismatch(60), 1e-7);
 }
 
+TEST_F(OdometerTest, ATurnThatIsMeasuredGoesOn) {
+  for (uint32_t frame = 0; frame < 10; ++frame) Track(frame);
+  const Rigid3d before = state().T_odom_cam;
+  Eigen::Quaterniond R_now_9;
+  for (uint32_t frame = 10; frame < 60; ++frame) {
+    odometer_.Predict(Time(frame));
+    R_now_9 = ExpSo3({0, 0.02 * (frame - 9), 0});
+    odometer_.OnTurned(Time(9).stamp_ns, R_now_9);
+  }
+  EXPECT_FALSE(state().measured);
+  EXPECT_EQ(state().segment, 1u);
+  EXPECT_LT(AngleBetween(state().T_odom_cam.rotation, before.rotation * R_now_9.conjugate()), 1e-9);
+}
+
+TEST_F(OdometerTest, ATurnThatBeginsWhereNothingIsKnownIsASegmentOfItsOwn) {
+  odometer_.Predict(Time(0));
+  EXPECT_EQ(state().segment, 0u);
+  odometer_.OnTurned(Time(0).stamp_ns, ExpSo3({0, 0.1, 0}));
+  EXPECT_EQ(state().segment, 1u);
+  odometer_.OnTurned(Time(0).stamp_ns, ExpSo3({0, 0.2, 0}));
+  EXPECT_EQ(state().segment, 1u);
+  EXPECT_NEAR(AngleBetween(state().T_odom_cam.rotation, Eigen::Quaterniond::Identity()), 0.2, 1e-9);
+  odometer_.OnTurned(Time(5).stamp_ns, ExpSo3({0, 0.1, 0}));
+  EXPECT_EQ(state().segment, 2u);
+  EXPECT_NEAR(AngleBetween(state().T_odom_cam.rotation, Eigen::Quaterniond::Identity()), 0.3, 1e-9);
+  Track(6, false);
+  EXPECT_EQ(state().segment, 3u);
+  EXPECT_LT(Mismatch(6), 1e-7);
+}
+
 }  // namespace
 }  // namespace dmslam

@@ -7,6 +7,11 @@
 
 namespace dmslam {
 
+/// Negative where `to_ns` is the earlier.
+inline double SecondsFromTo(int64_t from_ns, int64_t to_ns) {
+  return static_cast<double>(to_ns - from_ns) * 1e-9;
+}
+
 /// Parses decimal seconds ("1305031102.175304") into nanoseconds exactly, never through floating point. Up to
 /// nine decimals; more are refused unless they are zeros. No sign but a leading '-', no exponent, no white
 /// space.
