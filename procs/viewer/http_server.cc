@@ -211,7 +211,8 @@ void HttpServer::Respond(Connection* c, const HttpRequest& request, HttpResponse
   if (response.status >= 400) c->close_after = true;
   std::string head = "HTTP/1.1 ";
   head.append(std::to_string(response.status)).append(" ").append(ReasonOf(response.status)).append("\r\n");
-  for (const auto& [name, value] : response.headers) head += name + ": " + value + "\r\n";
+  for (const auto& [name, value] : response.headers)
+    head.append(name).append(": ").append(value).append("\r\n");
   if (!response.type.empty()) head += "Content-Type: " + response.type + "\r\n";
   if (c->listener) {
     c->close_after = true;
