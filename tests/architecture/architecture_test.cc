@@ -36,8 +36,8 @@ const std::map<std::string, Names>& AllowedRooms() {
       below.insert(more.begin(), more.end());
       return below;
     };
-    a["tracking"] = a["mapping"] = a["loops"] = heart;
-    a["initialization"] = above(heart, {"motion_segmentation"});
+    a["mapping"] = a["loops"] = heart;
+    a["tracking"] = a["initialization"] = above(heart, {"motion_segmentation"});
     a["refinement"] = above(heart, {"tracking"});
     a["slam"] = above(heart, {"motion_segmentation", "initialization", "tracking", "refinement", "mapping",
                               "loops", "dataset"});

@@ -59,7 +59,7 @@ std::vector<Series> Measure(const std::vector<testing::TrueFrame>& frames, int n
     const StepTimes times = loop.StepImage(static_cast<uint32_t>(i), static_cast<int64_t>(i) * kFrameNs + 1,
                                            ViewOf(frames[i].grey));
     const TrackingState state = loop.frontend().state();
-    if (state == TrackingState::kNotInitialized) search.values_ms.push_back(times.frontend);
+    if (loop.frontend().IsSearching()) search.values_ms.push_back(times.frontend);
     if (state != TrackingState::kTracking && state != TrackingState::kTrial) continue;
     orb_times.values_ms.push_back(orb_ms);
     frontend.values_ms.push_back(times.frontend);

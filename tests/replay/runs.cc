@@ -133,7 +133,7 @@ Outcome RunOnImages(const Slam::Setup& setup, FrameSource& frames, size_t first,
     const EncodedImage file = frames.Read(i);
     decoder.Decode(file.encoding, file.width, file.height, file.bytes, frames.Name(i), image);
     const GrayView view = {image.data.data(), image.width, image.height, image.width};
-    const bool searches = slam.frontend().state() == TrackingState::kNotInitialized;
+    const bool searches = slam.frontend().IsSearching();
     if (recording)
       recording->push_back({frames.FrameIndex(i), frames.StampNs(i), stage.Extract(view, searches)});
     slam.Process(frames.FrameIndex(i), frames.StampNs(i), view);

@@ -93,6 +93,8 @@ class FrontendCore {
 
   /// Of the newest frame. While a first map is looked for and there are others, the camera is lost in those.
   TrackingState state() const;
+  /// Whether the next frame is one that a first map is looked for in, with more features than others.
+  bool IsSearching() const { return phase_.IsSearching(); }
   const TrackedFrame& frame() const { return frame_; }
   /// As of the newest frame.
   const OdometryState& odometry() const { return odometry_.state(); }
