@@ -71,6 +71,7 @@ void Odometer::OnTracked(const Map& map, const FrameTime& time, const PlacedPose
     state_.step->covariance = units.asDiagonal() * state_.step->covariance * units.asDiagonal();
   }
   last_ = Last{pose, time, state_.T_odom_cam, state_.segment};
+  turned_from_.reset();
 }
 
 /// Turns that are counted from the frame tracked last continue its segment; before others something is

@@ -148,5 +148,15 @@ TEST_F(OdometerTest, ATurnThatBeginsWhereNothingIsKnownIsASegmentOfItsOwn) {
   EXPECT_LT(Mismatch(6), 1e-7);
 }
 
+TEST_F(OdometerTest, AFrameThatIsTrackedAfterAllIsWhereTurnsBegin) {
+  odometer_.OnTurned(Time(5).stamp_ns, ExpSo3({0, 0.1, 0}));
+  Track(5, false);
+  const Rigid3d tracked = state().T_odom_cam;
+  odometer_.Predict(Time(6));
+  odometer_.OnTurned(Time(5).stamp_ns, ExpSo3({0, 0.02, 0}));
+  EXPECT_EQ(state().segment, 2u);
+  EXPECT_NEAR(AngleBetween(state().T_odom_cam.rotation, tracked.rotation), 0.02, 1e-9);
+}
+
 }  // namespace
 }  // namespace dmslam
