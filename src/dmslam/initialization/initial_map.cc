@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "dmslam/optimization/bundle_adjustment.h"
+#include "dmslam/optimization/few_views_adjustment.h"
 
 namespace dmslam {
 namespace {
@@ -40,14 +40,11 @@ AdjustFunction AdjustInitialMap(const Pinhole& camera) {
     BundleProblem problem;
     problem.camera = camera;
     problem.T_cam_world = *T_cam_world;
-    problem.pose_fixed.assign(T_cam_world->size(), 0);
-    problem.pose_fixed.front() = 1;
     problem.points = *points;
     for (const InitialObservation& o : observations) {
       problem.observations.push_back({o.pose, o.point, o.uv_px, o.inv_sigma_squared});
     }
-    const BundleReport report = AdjustBundle(GlobalBundleOptions(kIterations), problem);
-    if (!report.usable) return false;
+    if (!AdjustFewViews(GlobalBundleOptions(kIterations), &problem)) return false;
     *T_cam_world = problem.T_cam_world;
     *points = problem.points;
     return true;
