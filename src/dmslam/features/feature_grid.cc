@@ -1,6 +1,7 @@
 #include "dmslam/features/feature_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "dmslam/util/check.h"
@@ -23,7 +24,11 @@ void FeatureGrid::Build(std::span<const Eigen::Vector2d> uv_px, std::span<const 
   columns_ = static_cast<int>(std::ceil(width_px / kCellSizePx));
   rows_ = static_cast<int>(std::ceil(height_px / kCellSizePx));
   starts_.assign(CellIndex(0, rows_) + 1, 0);
-  entries_.resize(uv_px.size());
+  const size_t slots = uv_px.empty() ? 0 : uv_px.size() + kSlack;
+  x_px_.resize(slots);
+  y_px_.resize(slots);
+  octaves_.resize(slots);
+  features_.resize(slots);
   // Counting sort: count per cell, running sum, then place in order of features.
   for (const Eigen::Vector2d& uv : uv_px) ++starts_[CellOf(uv)];
   uint32_t end = 0;
@@ -33,7 +38,11 @@ void FeatureGrid::Build(std::span<const Eigen::Vector2d> uv_px, std::span<const 
   }
   for (size_t i = uv_px.size(); i-- > 0;) {
     uint32_t& slot = starts_[CellOf(uv_px[i])];
-    entries_[--slot] = {uv_px[i].x(), uv_px[i].y(), static_cast<uint32_t>(i), keypoints[i].octave};
+    --slot;
+    x_px_[slot] = static_cast<float>(uv_px[i].x());
+    y_px_[slot] = static_cast<float>(uv_px[i].y());
+    octaves_[slot] = keypoints[i].octave;
+    features_[slot] = static_cast<uint32_t>(i);
   }
 }
 
@@ -46,32 +55,51 @@ void FeatureGrid::FindInRadius(const Eigen::Vector2d& center_px, double radius_p
 
 size_t FeatureGrid::CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave,
                                     int max_octave, uint32_t* features) const {
-  const CellRange range = CellsOf(center_px, radius_px);
-  const double radius_squared = radius_px * radius_px, center_x = center_px.x(), center_y = center_px.y();
+  const Circle circle(center_px, radius_px);
+  const Rows rows = RowsOf(circle);
+  const int32_t octaves = max_octave - min_octave;
   size_t count = 0;
-  for (int row = range.row_begin; row < range.row_end; ++row) {
-    const Entry* end = entries_.data() + starts_[CellIndex(range.column_end - 1, row) + 1];
-    for (const Entry* entry = entries_.data() + starts_[CellIndex(range.column_begin, row)]; entry < end;
-         ++entry) {
-      const double dx = entry->x_px - center_x, dy = entry->y_px - center_y;
-      const bool wanted = static_cast<int>(entry->octave >= min_octave) &
-                          static_cast<int>(entry->octave <= max_octave) &
-                          static_cast<int>(dx * dx + dy * dy <= radius_squared);
-      features[count] = entry->feature;
-      count += static_cast<size_t>(wanted);
+  for (int row = rows.begin; row < rows.end; ++row) {
+    const Run run = RunOf(circle, row);
+    for (uint32_t i = run.begin; i < run.end; i += kSlack) {
+      std::array<int32_t, kSlack> wanted{};
+      const float* x = x_px_.data() + i;
+      const float* y = y_px_.data() + i;
+      const int32_t* octave = octaves_.data() + i;
+      for (size_t k = 0; k < kSlack; ++k) {
+        wanted[k] = static_cast<int32_t>(circle.Holds(x[k], y[k])) &
+                    static_cast<int32_t>(octave[k] - min_octave >= 0) &
+                    static_cast<int32_t>(octave[k] - min_octave <= octaves);
+      }
+      const size_t in_run = std::min<size_t>(kSlack, run.end - i);
+      for (size_t k = 0; k < in_run; ++k) {
+        features[count] = features_[i + k];
+        count += static_cast<size_t>(wanted[k]);
+      }
     }
   }
   return count;
 }
 
-FeatureGrid::CellRange FeatureGrid::CellsOf(const Eigen::Vector2d& center_px, double radius_px) const {
-  if (entries_.empty() || !(radius_px >= 0.0) || !center_px.allFinite()) return {};
-  CellRange range;
-  range.column_begin = ClampedCell(center_px.x() - radius_px, kCellSizePx, columns_);
-  range.column_end = ClampedCell(center_px.x() + radius_px, kCellSizePx, columns_) + 1;
-  range.row_begin = ClampedCell(center_px.y() - radius_px, kCellSizePx, rows_);
-  range.row_end = ClampedCell(center_px.y() + radius_px, kCellSizePx, rows_) + 1;
-  return range;
+FeatureGrid::Rows FeatureGrid::RowsOf(const Circle& circle) const {
+  if (features_.empty() || !(circle.radius_px >= 0.0F) || !std::isfinite(circle.x_px) ||
+      !std::isfinite(circle.y_px)) {
+    return {};
+  }
+  return {ClampedCell(circle.y_px - circle.radius_px, kCellSizePx, rows_),
+          ClampedCell(circle.y_px + circle.radius_px, kCellSizePx, rows_) + 1};
+}
+
+/// The part of the row that the circle reaches; the outermost rows go on beyond the image.
+FeatureGrid::Run FeatureGrid::RunOf(const Circle& circle, int row) const {
+  const double top = row * kCellSizePx, bottom = top + kCellSizePx;
+  double away = 0;
+  if (circle.y_px < top && row > 0) away = top - circle.y_px;
+  if (circle.y_px > bottom && row + 1 < rows_) away = circle.y_px - bottom;
+  const double radius = circle.radius_px;
+  const double half = std::sqrt(std::max(0.0, radius * radius - away * away)) + 1e-3;
+  return {starts_[CellIndex(ClampedCell(circle.x_px - half, kCellSizePx, columns_), row)],
+          starts_[CellIndex(ClampedCell(circle.x_px + half, kCellSizePx, columns_), row) + 1]};
 }
 
 size_t FeatureGrid::CellOf(const Eigen::Vector2d& uv_px) const {

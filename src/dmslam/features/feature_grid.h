@@ -22,7 +22,10 @@ class FeatureGrid {
       : columns_(other.columns_),
         rows_(other.rows_),
         starts_(other.starts_, memory),
-        entries_(other.entries_, memory) {}
+        x_px_(other.x_px_, memory),
+        y_px_(other.y_px_, memory),
+        octaves_(other.octaves_, memory),
+        features_(other.features_, memory) {}
 
   /// Indexes features at `uv_px` (undistorted pixels, finite) with the octaves of `keypoints`, same order and
   /// length. Throws InvariantError when the lengths differ or the image has no pixels. Reuses its memory.
@@ -35,17 +38,13 @@ class FeatureGrid {
   template <typename Visit>
   void ForEachInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                        Visit&& visit) const {
-    const CellRange range = CellsOf(center_px, radius_px);
-    const double radius_squared = radius_px * radius_px;
-    for (int row = range.row_begin; row < range.row_end; ++row) {
-      const uint32_t begin = starts_[CellIndex(range.column_begin, row)];
-      const uint32_t end = starts_[CellIndex(range.column_end - 1, row) + 1];
-      for (uint32_t i = begin; i < end; ++i) {
-        const Entry& entry = entries_[i];
-        if (entry.octave < min_octave || entry.octave > max_octave) continue;
-        const double dx = entry.x_px - center_px.x();
-        const double dy = entry.y_px - center_px.y();
-        if (dx * dx + dy * dy <= radius_squared) visit(entry.feature);
+    const Circle circle(center_px, radius_px);
+    const Rows rows = RowsOf(circle);
+    for (int row = rows.begin; row < rows.end; ++row) {
+      const Run run = RunOf(circle, row);
+      for (uint32_t i = run.begin; i < run.end; ++i) {
+        if (octaves_[i] < min_octave || octaves_[i] > max_octave) continue;
+        if (circle.Holds(x_px_[i], y_px_[i])) visit(features_[i]);
       }
     }
   }
@@ -54,34 +53,43 @@ class FeatureGrid {
   void FindInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                     std::vector<uint32_t>* features) const;
 
-  /// The same into `features`, which has room for size() of them; returns how many there are. Faster where
-  /// most features of the cells are wanted or refused without pattern, as it takes no branches.
+  /// The same into `features`, which has room for size() + kSlack of them; returns how many there are. Faster
+  /// where most features of the cells are wanted or refused without pattern, as it takes no branches.
+  static constexpr size_t kSlack = 8;
   size_t CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                          uint32_t* features) const;
 
-  size_t size() const { return entries_.size(); }
+  size_t size() const { return features_.empty() ? 0 : features_.size() - kSlack; }
   /// What its lists take in memory, with what their beginnings must be aligned to.
   size_t Bytes() const {
-    return starts_.size() * sizeof(uint32_t) + entries_.size() * sizeof(Entry) + alignof(uint32_t) +
-           alignof(Entry);
+    return (starts_.size() + 4 * features_.size()) * sizeof(uint32_t) + 5 * alignof(uint32_t);
   }
 
  private:
-  struct Entry {
-    double x_px;
-    double y_px;
-    uint32_t feature;
-    int octave;
+  struct Circle {
+    Circle(const Eigen::Vector2d& center_px, double radius)
+        : x_px(static_cast<float>(center_px.x())),
+          y_px(static_cast<float>(center_px.y())),
+          radius_px(static_cast<float>(radius)) {}
+    bool Holds(float x, float y) const {
+      const float dx = x - x_px, dy = y - y_px;
+      return dx * dx + dy * dy <= radius_px * radius_px;
+    }
+    float x_px, y_px, radius_px;
   };
   /// Half-open; empty when the circle is (not a number, or a negative radius).
-  struct CellRange {
-    int column_begin = 0, column_end = 1;
-    int row_begin = 0, row_end = 0;
+  struct Rows {
+    int begin = 0, end = 0;
+  };
+  /// Entries of a row of cells that may lie in the circle, half-open.
+  struct Run {
+    uint32_t begin, end;
   };
 
   static constexpr double kCellSizePx = 20.0;
 
-  CellRange CellsOf(const Eigen::Vector2d& center_px, double radius_px) const;
+  Rows RowsOf(const Circle& circle) const;
+  Run RunOf(const Circle& circle, int row) const;
   size_t CellIndex(int column, int row) const {
     return static_cast<size_t>(row) * static_cast<size_t>(columns_) + static_cast<size_t>(column);
   }
@@ -90,7 +98,11 @@ class FeatureGrid {
   int columns_ = 0;
   int rows_ = 0;
   std::pmr::vector<uint32_t> starts_;  ///< first entry of each cell, and the end of the last
-  std::pmr::vector<Entry> entries_;    ///< sorted by cell, then by feature
+  // The entries, sorted by cell, then by feature; kSlack more at the end, which nobody finds.
+  std::pmr::vector<float> x_px_;
+  std::pmr::vector<float> y_px_;
+  std::pmr::vector<int32_t> octaves_;
+  std::pmr::vector<uint32_t> features_;
 };
 
 }  // namespace dmslam

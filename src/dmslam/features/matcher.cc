@@ -185,7 +185,7 @@ void FeatureMatcher::Finish(const MatchSide& a, const MatchSide& b, const MatchO
 void FeatureMatcher::CompareInArea(const Descriptor& descriptor, const SearchArea& area,
                                    const MatchSide& side, const FeatureGrid& grid) {
   DMSLAM_CHECK(grid.size() == side.size(), "the grid must index the features of the side");
-  if (in_area_.size() < side.size()) in_area_.resize(side.size());
+  if (in_area_.size() < side.size() + FeatureGrid::kSlack) in_area_.resize(side.size() + FeatureGrid::kSlack);
   const size_t count =
       grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave, area.max_octave, in_area_.data());
   candidates_.assign(in_area_.data(), in_area_.data() + count);
