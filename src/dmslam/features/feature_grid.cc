@@ -1,18 +1,33 @@
 #include "dmslam/features/feature_grid.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstring>
 
 #include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
 
+constexpr uint32_t kLanes = 4;
+// Vectors of the compiler: of all machines, and no wider than any of them has.
+using Floats [[gnu::vector_size(4 * kLanes)]] = float;
+using Ints [[gnu::vector_size(4 * kLanes)]] = int32_t;
+
+template <typename Vector, typename Value>
+Vector Repeat(Value value) {
+  return Vector{} + value;
+}
+template <typename Vector, typename Value>
+Vector Load(const Value* from) {
+  Vector vector;
+  std::memcpy(&vector, from, sizeof(vector));
+  return vector;
+}
+
 /// Cell of a coordinate, the nearest one for coordinates outside the image.
 int ClampedCell(double coordinate_px, double cell_size_px, int count) {
-  const double cell = std::floor(coordinate_px / cell_size_px);
-  return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(count - 1)));
+  return static_cast<int>(std::clamp(coordinate_px * (1.0 / cell_size_px), 0.0, count - 1.0));
 }
 
 }  // namespace
@@ -57,24 +72,20 @@ size_t FeatureGrid::CollectInRadius(const Eigen::Vector2d& center_px, double rad
                                     int max_octave, uint32_t* features) const {
   const Circle circle(center_px, radius_px);
   const Rows rows = RowsOf(circle);
-  const int32_t octaves = max_octave - min_octave;
+  const Floats x = Repeat<Floats>(circle.x_px), y = Repeat<Floats>(circle.y_px);
+  const Floats radius_squared = Repeat<Floats>(circle.radius_px * circle.radius_px);
+  const Ints least = Repeat<Ints>(min_octave), most = Repeat<Ints>(max_octave);
   size_t count = 0;
   for (int row = rows.begin; row < rows.end; ++row) {
     const Run run = RunOf(circle, row);
-    for (uint32_t i = run.begin; i < run.end; i += kSlack) {
-      std::array<int32_t, kSlack> wanted{};
-      const float* x = x_px_.data() + i;
-      const float* y = y_px_.data() + i;
-      const int32_t* octave = octaves_.data() + i;
-      for (size_t k = 0; k < kSlack; ++k) {
-        wanted[k] = static_cast<int32_t>(circle.Holds(x[k], y[k])) &
-                    static_cast<int32_t>(octave[k] - min_octave >= 0) &
-                    static_cast<int32_t>(octave[k] - min_octave <= octaves);
-      }
-      const size_t in_run = std::min<size_t>(kSlack, run.end - i);
-      for (size_t k = 0; k < in_run; ++k) {
+    for (uint32_t i = run.begin; i < run.end; i += kLanes) {
+      const Floats dx = Load<Floats>(&x_px_[i]) - x, dy = Load<Floats>(&y_px_[i]) - y;
+      const Ints octave = Load<Ints>(&octaves_[i]);
+      const Ints wanted = (dx * dx + dy * dy <= radius_squared) & (octave >= least) & (octave <= most);
+      const uint32_t in_run = std::min<uint32_t>(kLanes, run.end - i);
+      for (uint32_t k = 0; k < in_run; ++k) {
         features[count] = features_[i + k];
-        count += static_cast<size_t>(wanted[k]);
+        count += static_cast<size_t>(wanted[k] & 1);
       }
     }
   }

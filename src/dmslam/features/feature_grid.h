@@ -55,7 +55,7 @@ class FeatureGrid {
 
   /// The same into `features`, which has room for size() + kSlack of them; returns how many there are. Faster
   /// where most features of the cells are wanted or refused without pattern, as it takes no branches.
-  static constexpr size_t kSlack = 8;
+  static constexpr size_t kSlack = 4;
   size_t CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                          uint32_t* features) const;
 

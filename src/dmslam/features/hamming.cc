@@ -15,7 +15,19 @@ void ToRangePortable(const Descriptor& query, const Descriptor* descriptors, int
     distances[i] = static_cast<uint16_t>(HammingDistance(query, descriptors[i]));
 }
 
-constexpr HammingKernels kPortable = {ToIndexedPortable, ToRangePortable};
+int KeepNearPortable(const Descriptor& query, const Descriptor* descriptors, uint32_t* indices, int count,
+                     int limit, uint16_t* distances) {
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    const int distance = HammingDistance(query, descriptors[indices[i]]);
+    indices[kept] = indices[i];
+    distances[kept] = static_cast<uint16_t>(distance);
+    kept += static_cast<int>(distance <= limit);
+  }
+  return kept;
+}
+
+constexpr HammingKernels kPortable = {ToIndexedPortable, ToRangePortable, KeepNearPortable};
 
 #if defined(__x86_64__)
 __attribute__((target("popcnt"))) inline uint16_t DistancePopcnt(const uint64_t* query,
@@ -40,7 +52,22 @@ __attribute__((target("popcnt"))) void ToRangePopcnt(const Descriptor& query, co
   }
 }
 
-constexpr HammingKernels kPopcnt = {ToIndexedPopcnt, ToRangePopcnt};
+/// Without a branch: which ones are near has no pattern.
+__attribute__((target("popcnt"))) int KeepNearPopcnt(const Descriptor& query, const Descriptor* descriptors,
+                                                     uint32_t* indices, int count, int limit,
+                                                     uint16_t* distances) {
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    const uint32_t index = indices[i];
+    const uint16_t distance = DistancePopcnt(query.words.data(), descriptors[index].words.data());
+    indices[kept] = index;
+    distances[kept] = distance;
+    kept += static_cast<int>(distance <= limit);
+  }
+  return kept;
+}
+
+constexpr HammingKernels kPopcnt = {ToIndexedPopcnt, ToRangePopcnt, KeepNearPopcnt};
 #endif
 
 }  // namespace

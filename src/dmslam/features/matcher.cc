@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 #include "dmslam/util/check.h"
@@ -18,6 +19,12 @@ uint32_t IndexOf(uint64_t key) { return static_cast<uint32_t>(key); }
 
 bool ClearlyBetter(int distance, int second_distance, double max_ratio) {
   return max_ratio >= 1.0 || distance < max_ratio * second_distance;
+}
+
+/// A candidate farther away [bits] is no match, takes none from another, and is no second best to one.
+int FarthestThatCounts(const MatchOptions& options) {
+  const double ratio = std::clamp(options.max_ratio, 0.01, 1.0);
+  return std::min(kNoDistance - 1, static_cast<int>(std::ceil(std::max(0, options.max_distance) / ratio)));
 }
 
 int TurnBin(const Keypoint& from, const Keypoint& to) {
@@ -63,12 +70,17 @@ void FeatureMatcher::MatchWindow(const MatchSide& a, const MatchSide& b, const F
   if (predicted_px.empty()) predicted_px = a.uv_px;
   DMSLAM_CHECK(predicted_px.size() == a.size(), "every feature of the first image needs a position");
   Start(a, b, matches);
+  const int limit = FarthestThatCounts(options.match);
   for (uint32_t i = 0; i < a.size(); ++i) {
     const int octave = a.keypoints[i].octave;
     if (!a.Usable(i) || octave < options.min_octave0 || octave > options.max_octave0) continue;
     const SearchArea area = {predicted_px[i], options.window_px, octave - options.octave_slack,
                              octave + options.octave_slack};
-    CompareInArea(a.descriptors[i], area, b, grid_b);
+    const size_t found = FindInArea(area, b, grid_b);
+    distances_.resize(std::max(distances_.size(), found));
+    const int near = kernels_.keep_near(a.descriptors[i], b.descriptors.data(), in_area_.data(),
+                                        static_cast<int>(found), limit, distances_.data());
+    candidates_.assign(in_area_.data(), in_area_.data() + near);
     Propose(i, options.match, matches);
   }
   Finish(a, b, options.match, matches);
@@ -182,15 +194,22 @@ void FeatureMatcher::Finish(const MatchSide& a, const MatchSide& b, const MatchO
   std::sort(matches->begin(), matches->end());
 }
 
+size_t FeatureMatcher::FindInArea(const SearchArea& area, const MatchSide& side, const FeatureGrid& grid) {
+  DMSLAM_CHECK(grid.size() == side.size(), "the grid must index the features of the side");
+  const size_t room = side.size() + FeatureGrid::kSlack;
+  if (in_area_.size() < room) in_area_.resize(room);
+  uint32_t* const found = in_area_.data();
+  uint32_t* const end = found + grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave,
+                                                     area.max_octave, found);
+  if (side.usable.empty()) return static_cast<size_t>(end - found);
+  return static_cast<size_t>(
+      std::remove_if(found, end, [&](uint32_t feature) { return !side.Usable(feature); }) - found);
+}
+
 void FeatureMatcher::CompareInArea(const Descriptor& descriptor, const SearchArea& area,
                                    const MatchSide& side, const FeatureGrid& grid) {
-  DMSLAM_CHECK(grid.size() == side.size(), "the grid must index the features of the side");
-  if (in_area_.size() < side.size() + FeatureGrid::kSlack) in_area_.resize(side.size() + FeatureGrid::kSlack);
-  const size_t count =
-      grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave, area.max_octave, in_area_.data());
-  candidates_.assign(in_area_.data(), in_area_.data() + count);
-  if (!side.usable.empty())
-    std::erase_if(candidates_, [&](uint32_t feature) { return !side.Usable(feature); });
+  const size_t found = FindInArea(area, side, grid);
+  candidates_.assign(in_area_.data(), in_area_.data() + found);
   CompareWithCandidates(descriptor, side);
 }
 

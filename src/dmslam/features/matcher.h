@@ -119,13 +119,16 @@ class FeatureMatcher {
   };
 
   void Start(const MatchSide& a, const MatchSide& b, std::vector<FeatureMatch>* matches);
-  /// Compares feature `index0` with `candidates_` of b, whose distances are in `distances_`.
+  /// Compares feature `index0` with `candidates_` of b, whose distances are in `distances_`. Those that are
+  /// too far to matter may be missing.
   void Propose(uint32_t index0, const MatchOptions& options, std::vector<FeatureMatch>* matches);
   BestTwo BestTwoOfCandidates() const;
   void NoteForSecondImage(uint32_t index1, int distance, uint32_t index0);
   /// Leaves each feature of b its nearest, checks turns, sorts.
   void Finish(const MatchSide& a, const MatchSide& b, const MatchOptions& options,
               std::vector<FeatureMatch>* matches);
+  /// Usable features of the area into in_area_; returns how many.
+  size_t FindInArea(const SearchArea& area, const MatchSide& side, const FeatureGrid& grid);
   /// Fills candidates_ and distances_.
   void CompareInArea(const Descriptor& descriptor, const SearchArea& area, const MatchSide& side,
                      const FeatureGrid& grid);

@@ -128,6 +128,20 @@ TEST(Hamming, PathsAgree) {
   BestHammingKernels().to_range(descriptors[7], descriptors.data(), 100, best.data());
   EXPECT_EQ(portable, best);
   EXPECT_EQ(best[7], 0);
+  for (const HammingKernels* kernels : {&PortableHammingKernels(), &BestHammingKernels()}) {
+    for (const int limit : {0, 60, 120, 128, 135, 256}) {
+      std::vector<uint32_t> near = indices, expected;
+      const int kept =
+          kernels->keep_near(descriptors[7], descriptors.data(), near.data(), 100, limit, best.data());
+      for (const uint32_t index : indices) {
+        if (HammingDistance(descriptors[7], descriptors[index]) <= limit) expected.push_back(index);
+      }
+      near.resize(static_cast<size_t>(kept));
+      EXPECT_EQ(near, expected) << limit;
+      for (size_t i = 0; i < near.size(); ++i)
+        EXPECT_EQ(best[i], HammingDistance(descriptors[7], descriptors[near[i]]));
+    }
+  }
 }
 
 TEST(FeatureMatcher, FindsTrueMatchesInAWindow) {

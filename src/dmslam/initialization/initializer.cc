@@ -192,7 +192,8 @@ class Initializer::Impl {
 
  private:
   InitializerReport Consider(const InitializerFrame& frame);
-  bool IsNearlyThere() const;
+  bool IsNearlyThere(const InitializerReport& report) const;
+  bool MayRest(const InitializerReport& report) const;
   InitializerReport TryWindows(const InitializerFrame& frame);
   void KeepRecent(const InitializerFrame& frame);
   void DropOld(const InitializerFrame& frame);
@@ -252,7 +253,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
     BeginWindow(frame);
     return Wait(WaitReason::kTooFewFrames, "this is the first");
   }
-  if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s && !IsNearlyThere()) return last_wait_;
+  if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s && !IsNearlyThere(last_wait_)) return last_wait_;
   last_looked_ns_ = frame.stamp_ns;
   DropOld(frame);
   InitializerReport report = TryWindows(frame);
@@ -261,10 +262,16 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   return report;
 }
 
+/// The views said no, and those of the next frames will hardly say anything else.
+bool Initializer::Impl::MayRest(const InitializerReport& report) const {
+  return report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kInconsistent ||
+         (report.wait == WaitReason::kParallaxTooSmall && !IsNearlyThere(report));
+}
+
 /// The parallax was almost enough, or it was and the direction not known well enough: the next frame may do.
-bool Initializer::Impl::IsNearlyThere() const {
-  return last_wait_.wait == WaitReason::kParallaxTooSmall &&
-         last_wait_.parallax_rad >= options_.nearly_parallax_share * options_.geometry.min_parallax_rad;
+bool Initializer::Impl::IsNearlyThere(const InitializerReport& report) const {
+  return report.wait == WaitReason::kParallaxTooSmall &&
+         report.parallax_rad >= options_.nearly_parallax_share * options_.geometry.min_parallax_rad;
 }
 
 /// What the reference frames make of this one, the oldest first, until one has a map. At most one of them may
@@ -394,6 +401,9 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   AgreementOptions asked = options_.agreement;
   if (views.back()->since_reference_s < options_.sure_age_s) asked.dominance.reset();
   const Agreement agreement = Agree(pairs, camera_, asked);
+  const double age_s = views.back()->since_reference_s;
+  if (agreement.IsUsable() && window->Rests(age_s, options_.again_after_share))
+    return Wait(window->refused->why);
   InitializerReport report;
   Refused refused;
   if (!agreement.IsUsable()) {
@@ -411,6 +421,8 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
     window->found.reset();
     window->doubtful = true;
   }
+  window->refused.reset();
+  if (MayRest(report)) window->refused = ReferenceWindow::RefusedAt{age_s, refused};
   window->promising = report.wait == WaitReason::kParallaxTooSmall ||
                       report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kOnTrial;
   report.num_matches = static_cast<int>(pairs.back()->matches.size());
