@@ -199,8 +199,8 @@ size_t FeatureMatcher::FindInArea(const SearchArea& area, const MatchSide& side,
   const size_t room = side.size() + FeatureGrid::kSlack;
   if (in_area_.size() < room) in_area_.resize(room);
   uint32_t* const found = in_area_.data();
-  uint32_t* const end = found + grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave,
-                                                     area.max_octave, found);
+  uint32_t* const end =
+      found + grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave, area.max_octave, found);
   if (side.usable.empty()) return static_cast<size_t>(end - found);
   return static_cast<size_t>(
       std::remove_if(found, end, [&](uint32_t feature) { return !side.Usable(feature); }) - found);

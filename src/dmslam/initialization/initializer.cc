@@ -15,6 +15,7 @@
 #include "dmslam/motion_segmentation/turn.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/parallel.h"
 
 namespace dmslam {
 namespace {
@@ -202,8 +203,10 @@ class Initializer::Impl {
   double PairStepAt(const InitializerFrame& frame) const;
   bool MakeRoom();
   void BeginWindow(const InitializerFrame& frame);
-  ReferenceView MakeView(const ReferenceWindow& window, const InitializerFrame& frame);
-  bool AddView(const InitializerFrame& frame, ReferenceWindow* window, InitializerReport* report);
+  ReferenceView MakeView(const ReferenceWindow& window, const InitializerFrame& frame) const;
+  std::vector<ReferenceView> MakeViews(const InitializerFrame& frame) const;
+  bool ShowsEnough(const ReferenceView& view) const;
+  bool AddView(ReferenceView view, ReferenceWindow* window, InitializerReport* report) const;
   InitializerReport TryAgreed(ReferenceWindow* window);
   InitializerReport TryContest(ReferenceWindow* window);
   std::vector<std::vector<uint8_t>> MotionsOf(const InitializerFrame& reference,
@@ -229,7 +232,6 @@ class Initializer::Impl {
   CandidateBuilder builder_;
   std::unique_ptr<StaticSelector> selector_;
   RansacSelector rest_selector_;
-  FeatureMatcher matcher_;
   std::deque<ReferenceWindow> windows_;  ///< the oldest first
   std::deque<InitializerFrame> recent_;  ///< what the next reference frame's past will be
   int only_testified_ = 0;
@@ -253,7 +255,8 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
     BeginWindow(frame);
     return Wait(WaitReason::kTooFewFrames, "this is the first");
   }
-  if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s && !IsNearlyThere(last_wait_)) return last_wait_;
+  if (SecondsSince(last_looked_ns_, frame) < options_.frame_step_s && !IsNearlyThere(last_wait_))
+    return last_wait_;
   last_looked_ns_ = frame.stamp_ns;
   DropOld(frame);
   InitializerReport report = TryWindows(frame);
@@ -280,9 +283,11 @@ InitializerReport Initializer::Impl::TryWindows(const InitializerFrame& frame) {
   InitializerReport report = Wait(WaitReason::kTooFewFrames, "a new reference frame");
   bool may_contend =
       options_.contest.enabled && SecondsSince(last_contest_ns_, frame) >= options_.contest.step_s;
+  std::vector<ReferenceView> views = MakeViews(frame);
+  auto view = views.begin();
   for (auto window = windows_.begin(); window != windows_.end() && !report.result;) {
     InitializerReport own;
-    const bool seen = AddView(frame, &*window, &own);
+    const bool seen = AddView(std::move(*view++), &*window, &own);
     if (seen && window->views().back().moved) own = TryAgreed(&*window);
     if (seen && may_contend && MayHideSeveralMotions(own.wait)) {
       may_contend = false;
@@ -359,32 +364,47 @@ void Initializer::Impl::BeginWindow(const InitializerFrame& frame) {
   last_looked_ns_ = frame.stamp_ns;
 }
 
-ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window, const InitializerFrame& frame) {
+ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
+                                          const InitializerFrame& frame) const {
+  FeatureMatcher matcher;
   const FrameFeatures& features0 = *window.reference().features;
   ReferenceView view;
   view.frame = frame;
   view.since_reference_s = SecondsBetween(window.reference(), frame);
   const Eigen::Quaterniond R_k_0 = window.TurnAt(view.since_reference_s);
-  view.pair.matches = MatchFrames(features0, *frame.features, camera_, options_.matching, &matcher_,
+  view.pair.matches = MatchFrames(features0, *frame.features, camera_, options_.matching, &matcher,
                                   Turned(features0.uv_px, camera_, R_k_0));
   view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;
 }
 
-/// False: the frame shows too little of what the reference frame showed.
-bool Initializer::Impl::AddView(const InitializerFrame& frame, ReferenceWindow* window,
-                                InitializerReport* report) {
-  ReferenceView view = MakeView(*window, frame);
-  const size_t matches = view.pair.matches.size();
-  if (static_cast<int>(matches) < options_.min_matches) {
-    *report = Wait(WaitReason::kTooFewMatches, std::to_string(matches) + " with the reference frame");
-    return false;
-  }
-  if (view.moved) {
-    const uint64_t frames = (uint64_t{window->reference().index} << 32) | frame.index;
+/// What each reference frame sees of the frame, and which of it the selector calls static: most of the
+/// search's time, and none of it depends on another window.
+std::vector<ReferenceView> Initializer::Impl::MakeViews(const InitializerFrame& frame) const {
+  std::vector<ReferenceView> views(windows_.size());
+  ForEachInParallel(views.size(), options_.threads, [&](size_t k) {
+    ReferenceView& view = views[k];
+    view = MakeView(windows_[k], frame);
+    if (!view.moved || !ShowsEnough(view)) return;
+    const uint64_t frames = (uint64_t{windows_[k].reference().index} << 32) | frame.index;
     view.pair.selection =
         selector_->Select(view.pair.matches, camera_, DeriveSeed(seed_, frames, "initializer"));
+  });
+  return views;
+}
+
+bool Initializer::Impl::ShowsEnough(const ReferenceView& view) const {
+  return static_cast<int>(view.pair.matches.size()) >= options_.min_matches;
+}
+
+/// False: the frame shows too little of what the reference frame showed.
+bool Initializer::Impl::AddView(ReferenceView view, ReferenceWindow* window,
+                                InitializerReport* report) const {
+  if (!ShowsEnough(view)) {
+    *report = Wait(WaitReason::kTooFewMatches,
+                   std::to_string(view.pair.matches.size()) + " with the reference frame");
+    return false;
   }
   *report = Wait(WaitReason::kTooLittleMotion, "");
   window->AddView(std::move(view));

@@ -70,9 +70,7 @@ class ReferenceWindow {
   };
   std::optional<RefusedAt> refused;
   /// Parallax grows with the window's age: until that has grown by the share, the answer would be the same.
-  bool Rests(double age_s, double share) const {
-    return refused && age_s < (1.0 + share) * refused->age_s;
-  }
+  bool Rests(double age_s, double share) const { return refused && age_s < (1.0 + share) * refused->age_s; }
   bool brief = false;      ///< one of those that are kept only while they are young
   bool doubtful = false;   ///< the views did not determine one motion, at some view
   bool promising = false;  ///< the pairs agreed the last time, and more views or parallax may suffice

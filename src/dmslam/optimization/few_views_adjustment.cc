@@ -128,10 +128,9 @@ class FewViews {
         const Sight& sight = sights_[k];
         if (!sight.counts) continue;
         const Eigen::Vector3d p = InCamera(state, sight, state.points[i]);
-        const double squared =
-            p.z() > kMinDepth
-                ? (camera_.Project(p) - sight.uv_px).squaredNorm() * sight.inv_sigma * sight.inv_sigma
-                : kErrorBehind * kErrorBehind;
+        const double squared = p.z() > kMinDepth ? (camera_.Project(p) - sight.uv_px).squaredNorm() *
+                                                       sight.inv_sigma * sight.inv_sigma
+                                                 : kErrorBehind * kErrorBehind;
         cost += 0.5 * Loss(squared, &slope);
       }
     }
@@ -185,8 +184,7 @@ class FewViews {
       const Eigen::Vector2d error = sight.inv_sigma * (camera_.Project(p) - sight.uv_px);
       double weight = 1;
       Loss(error.squaredNorm(), &weight);
-      const Matrix23 by_point =
-          sight.inv_sigma * ProjectionJacobian(camera_, p) * rotations_[At(sight.pose)];
+      const Matrix23 by_point = sight.inv_sigma * ProjectionJacobian(camera_, p) * rotations_[At(sight.pose)];
       own.noalias() += weight * by_point.transpose() * by_point;
       gradients_[i].noalias() += weight * by_point.transpose() * error;
       if (sight.pose == 0) continue;

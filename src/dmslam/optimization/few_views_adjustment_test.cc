@@ -41,9 +41,7 @@ BundleOptions Thorough() {
 }
 
 /// Half the sum of Huber's losses.
-double CostOf(BundleProblem problem) {
-  return AdjustBundle(GlobalBundleOptions(0), problem).initial_cost;
-}
+double CostOf(BundleProblem problem) { return AdjustBundle(GlobalBundleOptions(0), problem).initial_cost; }
 
 double FarthestApart(const BundleProblem& a, const BundleProblem& b) {
   double farthest = 0;
