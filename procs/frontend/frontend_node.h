@@ -114,6 +114,7 @@ class FrontendNode : public StreamNode {
   FeatureView ViewOfFeatures() const;
   void DrawPicture(const FrontendOutput& output);
   bool FallsBehind();
+  bool AwaitsMapper() const;
   bool CatchUp();
   void Publish(const std::vector<FrontendEvent>& events);
   void PublishTracked(const Tracked& tracked);
