@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "dmslam/optimization/few_views_adjustment.h"
+#include "dmslam/optimization/bundle_adjustment.h"
 
 namespace dmslam {
 namespace {
@@ -47,7 +47,7 @@ AdjustFunction AdjustInitialMap(const Pinhole& camera) {
     }
     BundleOptions options = GlobalBundleOptions(kIterations);
     options.relative_tolerance = kRelativeTolerance;
-    if (!AdjustFewViews(options, &problem)) return false;
+    if (!AdjustBundle(options, problem).usable) return false;
     *T_cam_world = problem.T_cam_world;
     *points = problem.points;
     return true;

@@ -1,291 +1,176 @@
 #include "dmslam/optimization/bundle_adjustment.h"
 
-#include <ceres/ceres.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <deque>
 #include <future>
 #include <limits>
 #include <memory>
+#include <utility>
 
-#include "dmslam/optimization/bundle_cost.h"
-#include "dmslam/optimization/ceres_support.h"
+#include "dmslam/optimization/dense_bundle.h"
+#include "dmslam/optimization/sparse_bundle.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
 
 constexpr int kMaxPosesDense = 60;  ///< Above, the reduced camera system is factorised as a sparse matrix.
-/// Whether a camera turned or moved aside before a wall is determined a hundred thousand times worse than the
-/// diagonal says. Much more, and a young map bends for what is left of people.
-constexpr double kBundleTrustRegion = 1e7;
 
-/// What the cost functions of one problem share.
-struct Shared {
-  Pinhole camera;
-  std::vector<PoseState> poses;
-};
-
-/// Refreshes the poses before Ceres evaluates.
-class RefreshPoses : public ceres::EvaluationCallback {
- public:
-  explicit RefreshPoses(Shared& shared) : shared_(shared) {}
-  void PrepareForEvaluation(bool, bool new_evaluation_point) override {
-    if (!new_evaluation_point) return;
-    for (PoseState& pose : shared_.poses) pose.Update();
+void CheckIndices(const BundleProblem& problem) {
+  DMSLAM_CHECK(problem.pose_fixed.empty() || problem.pose_fixed.size() == problem.T_cam_world.size(),
+               "one fixed flag per pose");
+  DMSLAM_CHECK(problem.point_fixed.empty() || problem.point_fixed.size() == problem.points.size(),
+               "one fixed flag per point");
+  for (const BundleObservation& o : problem.observations) {
+    DMSLAM_CHECK(o.pose >= 0 && At(o.pose) < problem.T_cam_world.size(), "observation names a pose");
+    DMSLAM_CHECK(o.point >= 0 && At(o.point) < problem.points.size(), "observation names a point");
   }
+}
 
- private:
-  Shared& shared_;
-};
+/// Without a fixed pose, pose 0 is held.
+std::vector<char> HeldPoses(const BundleProblem& problem) {
+  std::vector<char> held = problem.pose_fixed;
+  held.resize(problem.T_cam_world.size(), 0);
+  if (!held.empty() && std::ranges::count(held, 0) == static_cast<ptrdiff_t>(held.size())) held.front() = 1;
+  return held;
+}
+
+int NumFree(const std::vector<char>& held) { return static_cast<int>(std::ranges::count(held, 0)); }
 
 class Adjustment {
  public:
   Adjustment(const BundleOptions& options, BundleProblem& problem)
       : options_(options),
-        problem_(problem),
-        loss_(options.huber_delta, options.cauchy_width),
-        refresh_(shared_) {
-    shared_.camera = problem.camera;
-    CheckIndices();
-    HoldPoses();
-    active_.assign(problem.observations.size(), 1);
-  }
+        state_{problem, problem.T_cam_world, HeldPoses(problem),
+               std::vector<char>(problem.observations.size(), 1)} {}
 
   BundleReport Run() {
     BundleReport report;
-    const std::vector<Eigen::Vector3d> points_before = problem_.points;
+    const std::vector<Eigen::Vector3d> points_before = problem().points;
     report.initial_cost = RobustCost();
     SetAsideBehind();
-    if (BuildCeresProblem() == 0) {
+    const std::unique_ptr<BundleSolver> solver = MakeSolver();
+    if (solver->NumTerms() == 0) {
       report.message = "nothing to adjust";
     } else {
-      const bool two_stages = options_.second_iterations > 0;
-      const double tolerance = options_.relative_tolerance;
-      // The first of two stages only has to tell the outliers.
-      bool sound = SolveStage(options_.first_iterations, two_stages ? 10.0 * tolerance : tolerance,
-                              BundleLoss::Kind::kHuber, report);
-      if (sound && !report.interrupted && two_stages) {
-        SetAsideOutliers();
-        sound = SolveStage(options_.second_iterations, tolerance, BundleLoss::Kind::kCauchy, report);
-      }
-      report.usable = sound && AllFinite();
+      report.usable = SolveStages(solver.get(), &report) && AllFinite();
     }
-    if (report.usable) {
-      WritePoses();
-    } else {
-      problem_.points = points_before;
-      for (PoseState& pose : shared_.poses) {
-        pose.step.fill(0.0);
-        pose.Update();
-      }
+    if (!report.usable) {
+      problem().points = points_before;
+      state_.poses = problem().T_cam_world;
     }
     report.final_cost = RobustCost();
-    FlagOutliers(report);
-    if (report.usable && options_.keep_scale) KeepScale();
+    FlagOutliers(&report);
+    if (!report.usable) return report;
+    const std::vector<Rigid3d> poses_before = std::exchange(problem().T_cam_world, state_.poses);
+    if (options_.keep_scale) KeepScale(poses_before);
     return report;
   }
 
  private:
-  static size_t At(int index) { return static_cast<size_t>(index); }
-  bool PoseHeld(int pose) const { return pose_held_[At(pose)]; }
-  bool PointHeld(int point) const { return !problem_.point_fixed.empty() && problem_.point_fixed[At(point)]; }
+  BundleProblem& problem() const { return state_.problem; }
 
-  void CheckIndices() const {
-    DMSLAM_CHECK(problem_.pose_fixed.empty() || problem_.pose_fixed.size() == problem_.T_cam_world.size(),
-                 "one fixed flag per pose");
-    DMSLAM_CHECK(problem_.point_fixed.empty() || problem_.point_fixed.size() == problem_.points.size(),
-                 "one fixed flag per point");
-    for (const BundleObservation& o : problem_.observations) {
-      DMSLAM_CHECK(o.pose >= 0 && At(o.pose) < problem_.T_cam_world.size(), "observation names a pose");
-      DMSLAM_CHECK(o.point >= 0 && At(o.point) < problem_.points.size(), "observation names a point");
-    }
+  std::unique_ptr<BundleSolver> MakeSolver() {
+    if (NumFree(state_.pose_held) <= kMaxPosesDense) return MakeDenseBundle(options_, &state_);
+    return MakeSparseBundle(options_, &state_);
   }
 
-  void HoldPoses() {
-    const size_t count = problem_.T_cam_world.size();
-    pose_held_.assign(count, 0);
-    for (size_t i = 0; i < count; ++i) {
-      pose_held_[i] = !problem_.pose_fixed.empty() && problem_.pose_fixed[i];
-      num_held_ += pose_held_[i];
-    }
-    if (num_held_ == 0 && count > 0) pose_held_[0] = 1, num_held_ = 1;
-    shared_.poses.resize(count);
-    for (size_t i = 0; i < count; ++i) {
-      shared_.poses[i].start = problem_.T_cam_world[i];
-      shared_.poses[i].Update();
-    }
+  bool SolveStages(BundleSolver* solver, BundleReport* report) {
+    const bool two_stages = options_.second_iterations > 0;
+    const double tolerance = options_.relative_tolerance;
+    const auto solve = [&](const BundleStage& stage) {
+      const BundleStageResult result = solver->Solve(stage);
+      report->iterations += result.iterations;
+      report->interrupted = result.interrupted;
+      report->message = result.message;
+      return result.sound;
+    };
+    // The first of two stages only has to tell the outliers.
+    const double first_tolerance = two_stages ? 10.0 * tolerance : tolerance;
+    if (!solve({false, options_.first_iterations, first_tolerance})) return false;
+    if (report->interrupted || !two_stages) return true;
+    SetAsideOutliers(solver);
+    return solve({true, options_.second_iterations, tolerance});
   }
 
   Eigen::Vector3d InCamera(const BundleObservation& o) const {
-    const PoseState& pose = shared_.poses[At(o.pose)];
-    return pose.rotation * problem_.points[At(o.point)] + pose.translation;
+    return state_.poses[At(o.pose)] * problem().points[At(o.point)];
   }
 
   double Chi2(const BundleObservation& o) const {
     const Eigen::Vector3d p = InCamera(o);
     if (!(p.z() > kMinBundleDepth)) return std::numeric_limits<double>::infinity();
-    return (shared_.camera.Project(p) - o.uv_px).squaredNorm() * o.inv_sigma_squared;
+    return (problem().camera.Project(p) - o.uv_px).squaredNorm() * o.inv_sigma_squared;
   }
 
   double RobustCost() const {
+    const double delta = options_.huber_delta;
     double cost = 0.0;
-    for (const BundleObservation& o : problem_.observations) {
-      double rho[3];
-      loss_.EvaluateHuber(std::min(Chi2(o), kErrorBehind * kErrorBehind), rho);
-      cost += 0.5 * rho[0];
+    for (const BundleObservation& o : problem().observations) {
+      const double squared = std::min(Chi2(o), kErrorBehind * kErrorBehind);
+      cost += 0.5 * (squared <= delta * delta ? squared : 2.0 * delta * std::sqrt(squared) - delta * delta);
     }
     return cost;
   }
 
   void SetAsideBehind() {
-    for (size_t i = 0; i < active_.size(); ++i) {
-      active_[i] = InCamera(problem_.observations[i]).z() > kMinBundleDepth;
+    for (size_t i = 0; i < state_.active.size(); ++i) {
+      state_.active[i] = InCamera(problem().observations[i]).z() > kMinBundleDepth;
     }
   }
 
-  /// Residual blocks in the order of the observations. Returns how many.
-  int BuildCeresProblem() {
-    const size_t count = problem_.observations.size();
-    ceres::Problem::Options options;
-    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.disable_all_safety_checks = true;
-    options.evaluation_callback = &refresh_;
-    ceres_problem_ = std::make_unique<ceres::Problem>(options);
-    ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
-    block_of_.assign(count, {nullptr, nullptr, nullptr});
-    for (size_t i = 0; i < count; ++i) AddObservation(i);
-    return ceres_problem_->NumResidualBlocks();
-  }
-
-  void AddObservation(size_t i) {
-    const BundleObservation& o = problem_.observations[i];
-    if (!active_[i] || (PoseHeld(o.pose) && PointHeld(o.point))) return;
-    PoseState& pose = shared_.poses[At(o.pose)];
-    Eigen::Vector3d& point = problem_.points[At(o.point)];
-    if (PointHeld(o.point)) {
-      block_of_[i].pose_only = &pose_only_.emplace_back(shared_.camera, pose, point, o);
-      ceres_problem_->AddResidualBlock(block_of_[i].pose_only, &loss_, pose.step.data());
-    } else if (PoseHeld(o.pose)) {
-      block_of_[i].point_only = &point_only_.emplace_back(shared_.camera, pose, point, o);
-      ceres_problem_->AddResidualBlock(block_of_[i].point_only, &loss_, point.data());
-    } else {
-      block_of_[i].both = &both_.emplace_back(shared_.camera, pose, point, o);
-      ceres_problem_->AddResidualBlock(block_of_[i].both, &loss_, pose.step.data(), point.data());
-    }
-    if (!PointHeld(o.point)) ordering_->AddElementToGroup(point.data(), 0);
-    if (!PoseHeld(o.pose)) ordering_->AddElementToGroup(pose.step.data(), 1);
-  }
-
-  bool SolveStage(int iterations, double tolerance, BundleLoss::Kind loss, BundleReport& report) {
-    loss_.kind = loss;
-    ceres::Solver::Options options = QuietSolverOptions(kBundleTrustRegion);
-    options.max_num_iterations = iterations;
-    options.function_tolerance = tolerance;
-    const int free_poses = static_cast<int>(problem_.T_cam_world.size()) - num_held_;
-    options.linear_solver_type = free_poses <= kMaxPosesDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-    options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>(*ordering_);
-    InterruptCallback interrupt(options_.interrupt);
-    if (options_.interrupt) options.callbacks.push_back(&interrupt);
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, ceres_problem_.get(), &summary);
-    for (PoseState& pose : shared_.poses) pose.Update();
-    report.interrupted = interrupt.interrupted();
-    report.iterations += std::max(0, static_cast<int>(summary.iterations.size()) - 1);
-    if (!summary.IsSolutionUsable()) report.message = summary.message;
-    return summary.IsSolutionUsable();
-  }
-
-  void SetAsideOutliers() {
-    for (size_t i = 0; i < active_.size(); ++i) {
-      if (!active_[i] || Chi2(problem_.observations[i]) <= options_.max_chi2) continue;
-      active_[i] = 0;
-      if (block_of_[i].both) block_of_[i].both->Disable();
-      if (block_of_[i].pose_only) block_of_[i].pose_only->Disable();
-      if (block_of_[i].point_only) block_of_[i].point_only->Disable();
+  void SetAsideOutliers(BundleSolver* solver) {
+    for (size_t i = 0; i < state_.active.size(); ++i) {
+      if (!state_.active[i] || Chi2(problem().observations[i]) <= options_.max_chi2) continue;
+      state_.active[i] = 0;
+      solver->Disable(i);
     }
   }
 
   bool AllFinite() const {
-    for (const PoseState& pose : shared_.poses) {
-      if (!pose.Current().AllFinite()) return false;
-    }
-    for (const Eigen::Vector3d& point : problem_.points) {
-      if (!point.allFinite()) return false;
-    }
-    return true;
+    return std::ranges::all_of(state_.poses, [](const Rigid3d& T) { return T.AllFinite(); }) &&
+           std::ranges::all_of(problem().points, [](const Eigen::Vector3d& p) { return p.allFinite(); });
   }
 
-  void WritePoses() {
-    for (size_t i = 0; i < shared_.poses.size(); ++i) {
-      if (!pose_held_[i]) problem_.T_cam_world[i] = shared_.poses[i].Current();
-    }
-  }
-
-  void FlagOutliers(BundleReport& report) const {
-    report.outliers.assign(problem_.observations.size(), 0);
-    for (size_t i = 0; i < report.outliers.size(); ++i) {
-      report.outliers[i] = !(Chi2(problem_.observations[i]) <= options_.max_chi2);
-      report.num_outliers += report.outliers[i];
+  void FlagOutliers(BundleReport* report) const {
+    report->outliers.assign(problem().observations.size(), 0);
+    for (size_t i = 0; i < report->outliers.size(); ++i) {
+      report->outliers[i] = !(Chi2(problem().observations[i]) <= options_.max_chi2);
+      report->num_outliers += report->outliers[i];
     }
   }
 
   /// With one pose held and no point, the scale is free: the farthest camera gets its old distance back.
-  void KeepScale() {
-    if (num_held_ != 1) return;
-    for (const char fixed : problem_.point_fixed) {
-      if (fixed) return;
-    }
-    const size_t held =
-        At(static_cast<int>(std::find(pose_held_.begin(), pose_held_.end(), 1) - pose_held_.begin()));
-    const Eigen::Vector3d center = problem_.T_cam_world[held].Center();
-    size_t farthest = held;
-    double distance = 0.0;
-    for (size_t i = 0; i < shared_.poses.size(); ++i) {
-      const double d = (shared_.poses[i].start.Center() - center).norm();
-      if (d > distance) distance = d, farthest = i;
-    }
-    const double now = (problem_.T_cam_world[farthest].Center() - center).norm();
-    if (!(distance > 0.0) || !(now > 0.0)) return;
-    const double scale = distance / now;
-    for (Eigen::Vector3d& point : problem_.points) point = center + scale * (point - center);
-    for (size_t i = 0; i < shared_.poses.size(); ++i) {
+  void KeepScale(const std::vector<Rigid3d>& before) {
+    const std::vector<char>& points = problem().point_fixed;
+    const bool scale_is_free = NumFree(state_.pose_held) + 1 == static_cast<int>(before.size());
+    if (!scale_is_free || std::ranges::find(points, 1) != points.end()) return;
+    const auto held = static_cast<size_t>(std::ranges::find(state_.pose_held, 1) - state_.pose_held.begin());
+    const Eigen::Vector3d center = before[held].Center();
+    const auto distance = [&](const Rigid3d& T) { return (T.Center() - center).norm(); };
+    const auto farthest = std::ranges::max_element(before, {}, distance) - before.begin();
+    const double was = distance(before[static_cast<size_t>(farthest)]);
+    const double is = distance(problem().T_cam_world[static_cast<size_t>(farthest)]);
+    if (!(was > 0.0) || !(is > 0.0)) return;
+    const double scale = was / is;
+    for (Eigen::Vector3d& point : problem().points) point = center + scale * (point - center);
+    for (size_t i = 0; i < before.size(); ++i) {
       if (i == held) continue;
-      Rigid3d& T = problem_.T_cam_world[i];
+      Rigid3d& T = problem().T_cam_world[i];
       const Eigen::Vector3d moved = center + scale * (T.Center() - center);
       T.translation = T.rotation * -moved;
     }
   }
 
-  struct Block {
-    BothCost* both;
-    PoseCost* pose_only;
-    PointCost* point_only;
-  };
-
   const BundleOptions& options_;
-  BundleProblem& problem_;
-  Shared shared_;
-  BundleLoss loss_;
-  RefreshPoses refresh_;
-  std::vector<char> pose_held_;
-  int num_held_ = 0;
-  std::vector<char> active_;
-  std::deque<BothCost> both_;
-  std::deque<PoseCost> pose_only_;
-  std::deque<PointCost> point_only_;
-  std::vector<Block> block_of_;
-  std::unique_ptr<ceres::Problem> ceres_problem_;
-  std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;
+  BundleState state_;
 };
 
 }  // namespace
 
 BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem) {
+  CheckIndices(problem);
+  if (NumFree(HeldPoses(problem)) <= kMaxPosesDense) return Adjustment(options, problem).Run();
   // Ceres makes some hundred thousand small allocations, all of which end with the adjustment. On the heap of
   // a long run they would lie in the gaps between landmarks all over it, and with a large map the adjustment
   // would spend two thirds of its time waiting for memory. A thread has a heap of its own (an arena of

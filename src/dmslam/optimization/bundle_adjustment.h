@@ -63,10 +63,10 @@ struct BundleReport {
   std::string message;         ///< Why it is not usable.
 };
 
-/// Bundle adjustment over poses and points, deterministic (same input, same bytes). Uses Ceres with a Schur
-/// complement; dense for few poses, sparse for many. Runs on one thread, for whose end the caller waits (its
-/// memory is apart from the caller's, see there); `interrupt` is asked on it. Throws InvariantError for
-/// indices out of range.
+/// Bundle adjustment over poses and points, deterministic (same input, same bytes). Points are eliminated
+/// first; up to 60 free poses are solved for with a dense matrix, more with Ceres and a sparse one, on a
+/// thread of its own, for whose end the caller waits. A view sees a point once at most. `interrupt` is asked
+/// on the thread that works. Throws InvariantError for indices out of range.
 BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem);
 
 /// Options for the adjustment of a whole map or of a first one: one robust stage of so many

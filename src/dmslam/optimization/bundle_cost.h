@@ -8,15 +8,11 @@
 #include <cmath>
 
 #include "dmslam/geometry/pinhole.h"
-#include "dmslam/optimization/bundle_adjustment.h"
+#include "dmslam/optimization/bundle_solver.h"
 #include "dmslam/optimization/ceres_support.h"
 #include "dmslam/optimization/reprojection.h"
 
 namespace dmslam {
-
-/// Observations nearer to the camera's plane than this, or behind it, have a constant error instead.
-inline constexpr double kMinBundleDepth = 1e-6;
-inline constexpr double kErrorBehind = 100.0;  ///< [sigma]
 
 /// A pose during the adjustment: the parameters are the step (w, v) from where it started, so that Ceres
 /// needs no manifold. What all its observations share is computed once per evaluation.
