@@ -287,7 +287,7 @@ bool FrontendNode::WorkOnce() {
   if (pace_.frame_open) FinishFrame();
   if (waiting_ && !FallsBehind())
     return HasTurn(waiting_->frame.frame_index, waiting_->frame.stamp_ns) && TrackWaiting();
-  if (core_->IsBehind()) return !AwaitsMapper() && CatchUp();
+  if (core_->IsBehind()) return (hurries_ || core_->MayCatchUp()) && CatchUp();
   return WorkAtEnd();
 }
 
@@ -382,10 +382,6 @@ void FrontendNode::PublishSequenceDone() {
 }
 
 // ---- While it goes on ----
-
-/// Frames that are late anyway are tracked as in lock-step, each in the map that the keyframes before it made:
-/// a young map that does not grow with them is soon lost sight of.
-bool FrontendNode::AwaitsMapper() const { return !hurries_ && core_->awaited().valid(); }
 
 /// Catching up has the time between two images. Where that is not enough it comes first until all is done,
 /// and images are skipped.

@@ -114,7 +114,6 @@ class FrontendNode : public StreamNode {
   FeatureView ViewOfFeatures() const;
   void DrawPicture(const FrontendOutput& output);
   bool FallsBehind();
-  bool AwaitsMapper() const;
   bool CatchUp();
   void Publish(const std::vector<FrontendEvent>& events);
   void PublishTracked(const Tracked& tracked);

@@ -115,8 +115,7 @@ struct InitializerOptions {
   PastOptions past;
   TestimonyOptions testimony;
 
-  int threads =
-      2;  ///< that match a frame with the reference frames; the results are the same with any number
+  int threads = 2;  ///< that match a frame with the reference frames; with any number to the same result
   int min_features = 100;              ///< a frame with fewer takes no part
   double frame_step_s = 0.045;         ///< frames nearer to the last one looked at are left out...
   double nearly_parallax_share = 0.9;  ///< ...unless that had this share of the parallax asked for

@@ -56,6 +56,10 @@ class FrontendCore {
   FrontendOutput ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features);
   /// Whether frames wait to be tracked, and tracks the oldest of them (there must be one).
   bool IsBehind() const { return !behind_.empty(); }
+  /// Whether the oldest of them may be tracked now. Frames that are late anyway are tracked as in lock-step,
+  /// each in the map that the keyframes before it made: a young map that does not grow with them is soon lost
+  /// sight of.
+  bool MayCatchUp() const { return IsBehind() && (!gate_.awaited().valid() || map_.keyframes().empty()); }
   /// From the oldest frame that waits to the newest.
   double seconds_behind() const;
   FrontendOutput CatchUp();

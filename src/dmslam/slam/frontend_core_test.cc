@@ -376,6 +376,29 @@ TEST_F(InPortions, FramesThatWaitedForTheMapAreTrackedOneByOne) {
   EXPECT_TRUE(Find<FramePose>(Frame(11))->HasPose());
 }
 
+TEST_F(InPortions, FramesThatWaitAreTrackedWhenTheMapHasGrownWithThoseBefore) {
+  Frame(0);
+  finds_map_ = true;
+  Frame(1);
+  finds_map_ = false;
+  for (uint32_t frame = 2; frame < 40; ++frame) HalfHidden(frame);
+  MapArrives();
+  HalfHidden(40);
+  KeyframeId proposed;
+  while (core_->IsBehind() && !proposed.valid()) {
+    EXPECT_TRUE(core_->MayCatchUp());
+    const FrontendOutput output = core_->CatchUp();
+    if (const auto* keyframe = Find<KeyframeProposal>(output)) proposed = keyframe->id;
+  }
+  ASSERT_TRUE(proposed.valid());
+  ASSERT_TRUE(core_->IsBehind());
+  EXPECT_FALSE(core_->MayCatchUp());
+  MapDelta settled;
+  settled.progress.settled = proposed;
+  core_->ApplyMapDelta(settled);
+  EXPECT_TRUE(core_->MayCatchUp());
+}
+
 TEST_F(Phases, AMapThatVanishesIsGivenUp) {
   Start();
   Frame(2);
