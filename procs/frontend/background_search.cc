@@ -6,7 +6,7 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kMostWaiting = 12;
+constexpr double kLongestWaitS = 1.0;
 
 }  // namespace
 
@@ -25,7 +25,7 @@ InitializerReport BackgroundSearch::AddFrame(const InitializerFrame& frame) {
     return std::exchange(last_, InitializerReport());
   }
   waiting_.push_back(frame);
-  if (waiting_.size() > kMostWaiting) waiting_.pop_front();
+  while (SecondsBetween(waiting_.front(), frame) > kLongestWaitS) waiting_.pop_front();
   changed_.notify_one();
   return last_;
 }

@@ -12,8 +12,8 @@ namespace dmslam {
 
 /// Runs a search for the first map on a thread of its own: a search may take longer than frames are apart,
 /// and nothing else waits for it. What it finds is told with the next frame; its frames are then earlier
-/// ones. Where it is too slow for all frames the oldest that wait are left out, as the frontend does with
-/// images. For real time only: which frames it sees depends on the machine.
+/// ones. Where it is too slow for all frames, those that have waited for a second are left out. For real time
+/// only: which frames it sees depends on the machine.
 class BackgroundSearch {
  public:
   explicit BackgroundSearch(FirstMapSearch search);
