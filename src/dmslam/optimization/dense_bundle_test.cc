@@ -62,7 +62,7 @@ TEST(DenseBundle, EndsWhereCeresEnds) {
     for (const int outlier_every : {0, 7}) {
       for (uint64_t seed = 1; seed <= 5; ++seed) {
         BundleProblem dense = Disturbed(seed, 0.7, outlier_every), sparse = dense;
-        const BundleStage stage{cauchy, 60, 1e-12};
+        const BundleStage stage{cauchy, 200, 1e-14};
         const std::vector<Rigid3d> a = PosesAfter(MakeDenseBundle, stage, &dense);
         const std::vector<Rigid3d> b = PosesAfter(MakeSparseBundle, stage, &sparse);
         EXPECT_LT(FarthestApart(a, b), 5e-4) << "seed " << seed << (cauchy ? ", Cauchy" : ", Huber");
