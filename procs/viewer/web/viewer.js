@@ -140,7 +140,8 @@ function connect() {
   on('pose', (pose) => {
     seen.poses++;
     if (pose.camera === chosen) header.onPose(pose);
-    scene.setPose(pose.camera, pose.p ? pose : null);
+    // A frame that waits its turn behind the first map says nothing of where the camera is.
+    if (pose.p || pose.word !== 'waiting for map') scene.setPose(pose.camera, pose.p ? pose : null);
   });
 }
 
