@@ -35,6 +35,12 @@ struct Step {
   double predicted_gain = 0;  ///< of the cost, if it were quadratic
 };
 
+/// A step that was taken.
+struct Taken {
+  double cost = 0;
+  double gain_ratio = 0;  ///< of what it gained and what it had promised
+};
+
 class DenseBundle : public BundleSolver {
  public:
   DenseBundle(const BundleOptions& options, BundleState* state)
@@ -64,16 +70,17 @@ class DenseBundle : public BundleSolver {
       result.interrupted = options_.interrupt && options_.interrupt();
       if (result.interrupted) break;
       ++result.iterations;
-      const std::optional<double> lower = TryStep(damping, cost);
-      if (!lower) {
+      const std::optional<Taken> taken = TryStep(damping, cost);
+      if (!taken) {
         damping *= growth;
         growth *= 2.0;
         continue;
       }
-      damping = std::max(kLeastDamping, damping * std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * ratio_ - 1.0, 3)));
+      const double eased = std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * taken->gain_ratio - 1.0, 3));
+      damping = std::max(kLeastDamping, damping * eased);
       growth = 2.0;
-      const double gained = cost - *lower;
-      cost = *lower;
+      const double gained = cost - taken->cost;
+      cost = taken->cost;
       if (gained <= stage.relative_tolerance * cost) break;
     }
     return result;
@@ -148,8 +155,8 @@ class DenseBundle : public BundleSolver {
     for (size_t k = 0; k < poses.size(); ++k) rotations_[k] = poses[k].rotation.toRotationMatrix();
   }
 
-  /// Takes the step if it helps; returns the cost then.
-  std::optional<double> TryStep(double damping, double cost) {
+  /// Takes the step if it helps.
+  std::optional<Taken> TryStep(double damping, double cost) {
     const std::optional<Step> step = FindStep(damping);
     if (!step) return std::nullopt;
     std::vector<Rigid3d> poses = state_.poses;
@@ -162,11 +169,11 @@ class DenseBundle : public BundleSolver {
     }
     for (size_t i = 0; i < points.size(); ++i) points[i] += step->points[i];
     const double moved_cost = Cost(poses, points);
-    ratio_ = (cost - moved_cost) / step->predicted_gain;
-    if (!(ratio_ > kLeastGainRatio) || !std::isfinite(moved_cost)) return std::nullopt;
+    const double gain_ratio = (cost - moved_cost) / step->predicted_gain;
+    if (!(gain_ratio > kLeastGainRatio) || !std::isfinite(moved_cost)) return std::nullopt;
     state_.poses = std::move(poses);
     state_.problem.points = std::move(points);
-    return moved_cost;
+    return Taken{moved_cost, gain_ratio};
   }
 
   /// The step that minimises the quadratic model with that damping, a share of the diagonal.
@@ -258,7 +265,6 @@ class DenseBundle : public BundleSolver {
   BundleState& state_;
   Pinhole camera_;
   bool cauchy_ = false;
-  double ratio_ = 0;              ///< of what the step tried last gained and what it had promised
   Eigen::Index size_ = 0;         ///< of the poses' equations
   std::vector<Sight> sights_;     ///< by point, then by pose; the held ones first
   std::vector<size_t> first_;     ///< of each point
