@@ -9,7 +9,6 @@ namespace dmslam {
 namespace {
 
 constexpr int kIterations = 15;
-constexpr double kRelativeTolerance = 1e-4;  // of the cost: rival motions differ by more
 constexpr size_t kViewsBetween = 2;
 constexpr size_t kMostFeatures = 20'000;  // of all keyframes: what fits into a record beside the points
 
@@ -45,9 +44,7 @@ AdjustFunction AdjustInitialMap(const Pinhole& camera) {
     for (const InitialObservation& o : observations) {
       problem.observations.push_back({o.pose, o.point, o.uv_px, o.inv_sigma_squared});
     }
-    BundleOptions options = GlobalBundleOptions(kIterations);
-    options.relative_tolerance = kRelativeTolerance;
-    if (!AdjustBundle(options, problem).usable) return false;
+    if (!AdjustBundle(GlobalBundleOptions(kIterations), problem).usable) return false;
     *T_cam_world = problem.T_cam_world;
     *points = problem.points;
     return true;

@@ -194,7 +194,6 @@ class Initializer::Impl {
  private:
   InitializerReport Consider(const InitializerFrame& frame);
   bool IsNearlyThere(const InitializerReport& report) const;
-  bool MayRest(const InitializerReport& report) const;
   InitializerReport TryWindows(const InitializerFrame& frame);
   void KeepRecent(const InitializerFrame& frame);
   void DropOld(const InitializerFrame& frame);
@@ -263,12 +262,6 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
   if (!report.result) BeginWindowIfDue(frame);
   KeepRecent(frame);
   return report;
-}
-
-/// The views said no, and those of the next frames will hardly say anything else.
-bool Initializer::Impl::MayRest(const InitializerReport& report) const {
-  return report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kInconsistent ||
-         (report.wait == WaitReason::kParallaxTooSmall && !IsNearlyThere(report));
 }
 
 /// The parallax was almost enough, or it was and the direction not known well enough: the next frame may do.
@@ -421,9 +414,6 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   AgreementOptions asked = options_.agreement;
   if (views.back()->since_reference_s < options_.sure_age_s) asked.dominance.reset();
   const Agreement agreement = Agree(pairs, camera_, asked);
-  const double age_s = views.back()->since_reference_s;
-  if (agreement.IsUsable() && window->Rests(age_s, options_.again_after_share))
-    return Wait(window->refused->why);
   InitializerReport report;
   Refused refused;
   if (!agreement.IsUsable()) {
@@ -441,8 +431,6 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
     window->found.reset();
     window->doubtful = true;
   }
-  window->refused.reset();
-  if (MayRest(report)) window->refused = ReferenceWindow::RefusedAt{age_s, refused};
   window->promising = report.wait == WaitReason::kParallaxTooSmall ||
                       report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kOnTrial;
   report.num_matches = static_cast<int>(pairs.back()->matches.size());

@@ -119,7 +119,6 @@ struct InitializerOptions {
   int min_features = 100;              ///< a frame with fewer takes no part
   double frame_step_s = 0.045;         ///< frames nearer to the last one looked at are left out...
   double nearly_parallax_share = 0.9;  ///< ...unless that had this share of the parallax asked for
-  double again_after_share = 0.1;      ///< a refused map is tried again when its window is older by so much
   int min_matches = 120;               ///< of a frame with the reference frame; fewer: it is given up
   int num_pairs = 3;                   ///< pairs with the reference frame that must agree
   double min_pair_step_s = 0.1;        ///< the frames of two such pairs are apart by so much in the mean

@@ -346,25 +346,6 @@ TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
   }
 }
 
-// Where parallax is far too small, a frame later it is, too.
-TEST(Initializer, ARefusedMapIsTriedAgainWhenItsWindowHasAged) {
-  SyntheticRoom room(600, 0);
-  room.SetSpeed(0.0005);
-  const auto adjustments = [&](double again_after_share) {
-    int asked = 0;
-    InitializerOptions options;
-    options.again_after_share = again_after_share;
-    options.min_displacement_rad = 0;
-    Initializer initializer(options, room.camera(), 1, [&](auto...) { return ++asked > 0; });
-    for (uint32_t frame = 0; frame < 90; ++frame)
-      EXPECT_FALSE(initializer.AddFrame(room.Frame(frame)).result.has_value()) << frame;
-    return asked;
-  };
-  const int each_time = adjustments(0), when_older = adjustments(0.1);
-  EXPECT_GT(when_older, 0);
-  EXPECT_LT(when_older, 0.8 * each_time);
-}
-
 // The camera moves so little that the room is out of sight before there is as much parallax as is usually
 // asked for.
 TEST(Initializer, StartsBeforeTheCameraHasTurnedAway) {

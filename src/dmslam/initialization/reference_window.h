@@ -63,14 +63,6 @@ class ReferenceWindow {
     Rigid3d T_view_0;
   };
   std::optional<Found> found;
-  /// What the motion of the map was refused for the last time, where the next frames change little.
-  struct RefusedAt {
-    double age_s = 0;
-    Refused why;
-  };
-  std::optional<RefusedAt> refused;
-  /// Parallax grows with the window's age: until that has grown by the share, the answer would be the same.
-  bool Rests(double age_s, double share) const { return refused && age_s < (1.0 + share) * refused->age_s; }
   bool brief = false;      ///< one of those that are kept only while they are young
   bool doubtful = false;   ///< the views did not determine one motion, at some view
   bool promising = false;  ///< the pairs agreed the last time, and more views or parallax may suffice
