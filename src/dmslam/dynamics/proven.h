@@ -13,6 +13,9 @@ struct ProvenOptions {
   int outer_observations = 2;  ///< ...so a landmark with so many observations outside such a time is proven
 };
 
+/// So many proven landmarks in view confirm a place.
+inline constexpr int kManyProven = 50;
+
 /// Whether some of these sorted stamps lie outside any window as long as people stand.
 bool OutlastsStanding(const std::vector<int64_t>& stamps_ns, const ProvenOptions& options);
 

@@ -1,6 +1,7 @@
 #include "dmslam/refinement/last_poses.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "dmslam/refinement/lone_poses.h"
@@ -30,11 +31,28 @@ LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const Trac
   for (int i = 0; i < threads; ++i) searches_.emplace_back(tracking, camera);
 }
 
-void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
+LastPoses::Tracked LastPoses::PlaceOf(const FramePose& pose) {
+  return {pose.frame_index, pose.stamp_ns, {pose.reference, pose.T_cam_reference, pose.reference_scale}};
+}
+
+void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose, bool vouches) {
   refiner_.Keep(frame, pose);
-  if (pose.state == TrackingState::kLocalizedLater) return;
-  tracked_.push_back({pose.stamp_ns, pose.reference});
+  if (pose.state == TrackingState::kLocalizedLater) {
+    if (vouches) placed_.push_back(PlaceOf(pose));
+    return;
+  }
+  tracked_.push_back(PlaceOf(pose));
   if (tracked_.size() > max_frames_) tracked_.pop_front();
+}
+
+std::optional<LatePlacement::Before> LastPoses::TrackedBefore(const Map& map, MapId map_id,
+                                                              uint32_t index) const {
+  const auto next = std::ranges::lower_bound(tracked_, index, {}, &Tracked::index);
+  if (next == tracked_.begin()) return std::nullopt;
+  const Tracked& before = *std::prev(next);
+  const auto reference = map.ResolvePose(before.pose.reference);
+  if (before.index + 1 != index || !reference || reference->map_id != map_id) return std::nullopt;
+  return LatePlacement::Before{before.index, before.stamp_ns, *before.pose.In(map)};
 }
 
 void LastPoses::RefineNext(const Map& map) {
@@ -51,7 +69,8 @@ void LastPoses::RefineNext(const Map& map) {
 
 /// To be smoothed: by what it sees alone, without what was expected of it; nothing is known where that does
 /// not agree.
-void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const FramePose& pose) {
+void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const FramePose& pose, bool vouches) {
+  if (vouches) placed_.push_back(PlaceOf(pose));
   FinalPose later;
   later.pose = pose;
   const PoseOptimizationReport report = MeasureCheckedPose(map, frame.T_cam_world, SightsOf(frame), &later);
@@ -66,9 +85,13 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Frame
 /// Frames of a map that was dropped vouch for nothing.
 std::vector<FramePose> LastPoses::Take(const Map& map) {
   std::vector<TrackedAt> tracked;
-  for (const auto& [stamp_ns, reference] : tracked_) {
-    if (const auto resolved = map.ResolvePose(reference)) tracked.push_back({stamp_ns, resolved->map_id});
-  }
+  const auto add = [&](const Tracked& frame) {
+    if (const auto resolved = map.ResolvePose(frame.pose.reference))
+      tracked.push_back({frame.stamp_ns, resolved->map_id});
+  };
+  std::ranges::for_each(tracked_, add);
+  std::ranges::for_each(placed_, add);
+  std::ranges::sort(tracked, {}, &TrackedAt::stamp_ns);
   final_.Drop(StandAlone(final_.poses(), tracked));
   return final_.Take();
 }

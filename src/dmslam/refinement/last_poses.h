@@ -6,6 +6,7 @@
 
 #include "dmslam/refinement/final_poses.h"
 #include "dmslam/refinement/frame_refiner.h"
+#include "dmslam/refinement/late_placement.h"
 #include "dmslam/refinement/unplaced_frames.h"
 #include "dmslam/tracking/pose_search.h"
 
@@ -21,8 +22,10 @@ class LastPoses {
   LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
             const Camera& camera);
 
-  /// Keeps a tracked frame and the pose that was told of it.
-  void Keep(const TrackedFrame& frame, const FramePose& pose);
+  /// Keeps a tracked frame and the pose that was told of it. `vouches`: also for those near it in time.
+  void Keep(const TrackedFrame& frame, const FramePose& pose, bool vouches);
+  /// Where the camera was in the frame just before `index`, if that was tracked in that map as it came.
+  std::optional<LatePlacement::Before> TrackedBefore(const Map& map, MapId map_id, uint32_t index) const;
   /// Gives back the frames of a map that was wrong.
   std::vector<WaitingFrame> TakeFramesOf(MapId map_id) { return refiner_.TakeFramesOf(map_id); }
 
@@ -32,7 +35,7 @@ class LastPoses {
   /// Finds the pose of the oldest frame that is due.
   void RefineNext(const Map& map);
   /// A frame that was placed just now, and what was told of it, in the map and by a keyframe that there is.
-  void AddPlaced(const Map& map, const TrackedFrame& frame, const FramePose& pose);
+  void AddPlaced(const Map& map, const TrackedFrame& frame, const FramePose& pose, bool vouches);
 
   /// A portion of joining the poses. False: nothing is left to do.
   bool Improve(const Map& map);
@@ -48,10 +51,13 @@ class LastPoses {
   bool smooth_;
   size_t max_frames_;
   struct Tracked {
+    uint32_t index;
     int64_t stamp_ns;
-    KeyframeId reference;
+    PlacedPose pose;
   };
+  static Tracked PlaceOf(const FramePose& pose);
   std::deque<Tracked> tracked_;  ///< the newest frames that were tracked as they came
+  std::vector<Tracked> placed_;  ///< frames that were placed later and vouch
 };
 
 }  // namespace dmslam

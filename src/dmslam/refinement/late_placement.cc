@@ -5,13 +5,16 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/util/random.h"
 #include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
 
-constexpr int64_t kNearNs = 350'000'000;  // a placed frame so near in time bounds where a frame may be
+constexpr int64_t kNearNs = 500'000'000;  // a placed frame so near in time bounds where a frame may be
+constexpr int kWellSeen = 50;             // static features...
+constexpr int kWellSeenCells = 8;         // ...and the cells of an 8 x 6 grid that hold them
 constexpr double kMaxSpeed = 1.5;         // depths of the scene per second
 constexpr double kMaxTurn_rad_per_s = 3.0;
 constexpr size_t kKeyframesAside = 3;   // whose motion bounds that of the frames between them...
@@ -21,9 +24,16 @@ constexpr double kSlack = 0.05;         // ...and this beside [depths of the sce
 
 double SecondsBetween(int64_t a_ns, int64_t b_ns) { return std::abs(SecondsFromTo(a_ns, b_ns)); }
 
+/// The same moment of time that runs backwards.
+FrameTime Backwards(uint32_t index, int64_t stamp_ns) { return {~index, -stamp_ns}; }
+
 double DistanceBetween(const Rigid3d& a, const Rigid3d& b) { return (a.Center() - b.Center()).norm(); }
 
 }  // namespace
+
+bool IsWellSeen(const TrackingReport& report) {
+  return report.num_static >= kWellSeen && report.cells >= kWellSeenCells;
+}
 
 bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, double depth) {
   const Rigid3d motion = a * b.Inverse();
@@ -59,85 +69,106 @@ bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& 
 }
 
 void LatePlacement::Forget() {
-  next_.reset();
+  LeaveNeighbour();
   last_.reset();
 }
 
+void LatePlacement::LeaveNeighbour() {
+  follower_.reset();
+  weak_.clear();
+}
+
 void LatePlacement::OnMapChanged(const Map& map) {
-  if (!next_) return;
-  const bool is_keyframe = map.FindKeyframe(KeyframeId::Make(session_, next_->index, camera_id_)) != nullptr;
-  const bool follows = growing_ && last_ && last_->index == next_->index && !is_keyframe;
+  if (!follower_) return;
+  const bool follows = growing_ && last_ && last_->index == follower_->last().index;
   const std::optional<Rigid3d> T_cam_world = follows ? last_->pose.In(map) : std::nullopt;
-  if (T_cam_world) {
-    next_->T_cam_world = *T_cam_world;
-  } else {
-    next_.reset();
-  }
+  if (!T_cam_world) return LeaveNeighbour();
+  const Keyframe* keyframe = map.FindKeyframe(KeyframeId::Make(session_, last_->index, camera_id_));
+  TrackedFrame moved = keyframe != nullptr ? TrackedFrame::Of(*keyframe) : follower_->last();
+  if (keyframe == nullptr) moved.T_cam_world = *T_cam_world;
+  follower_->SetLast(std::move(moved));
 }
 
 /// Where the frame placed last is too far: the next keyframe.
 void LatePlacement::FindNeighbour(const Map& map, const TrackedFrame& frame) {
-  const int64_t after_ns = next_ ? next_->stamp_ns - frame.stamp_ns : -1;
+  const int64_t after_ns = follower_ ? follower_->last().stamp_ns - frame.stamp_ns : -1;
   if (after_ns >= 0 && after_ns <= kNearNs) return;
-  next_.reset();
+  LeaveNeighbour();
   const uint32_t from = growing_ ? frame.index + 1 : frame.index;
   const auto next = map.keyframes().lower_bound(KeyframeId::Make(session_, from, camera_id_));
-  if (next != map.keyframes().end() && next->first.camera() == camera_id_)
-    next_ = TrackedFrame::Of(next->second);
+  if (next == map.keyframes().end() || next->first.camera() != camera_id_) return;
+  follower_.emplace(options_);
+  follower_->BeginAt(next->second, Backwards(next->first.frame_index(), next->second.stamp_ns));
 }
 
-/// By constant velocity backwards, where the three frames are consecutive.
-std::optional<Rigid3d> LatePlacement::Predict(const TrackedFrame& frame) const {
-  const bool moves = last_ && last_->T_this_next && last_->index == next_->index;
-  if (!moves || next_->index - frame.index != 1) return std::nullopt;
-  return *last_->T_this_next * next_->T_cam_world;
-}
-
-bool LatePlacement::IsPlausible(const TrackedFrame& frame, double depth) const {
-  const double seconds = static_cast<double>(next_->stamp_ns - frame.stamp_ns) * 1e-9;
-  return IsPlausibleMotion(frame.T_cam_world, next_->T_cam_world, seconds, depth);
+/// Whether the camera gets there from its neighbour and from the keyframes aside.
+bool LatePlacement::IsPlausible(const Map& map, KeyframeId reference_id, const TrackedFrame& frame) const {
+  const Keyframe* reference = map.FindKeyframe(reference_id);
+  if (reference == nullptr) return false;
+  const double depth = map.MedianDepth(*reference).value_or(1.0);
+  if (follower_) {
+    const TrackedFrame& next = follower_->last();
+    const double seconds = static_cast<double>(next.stamp_ns - frame.stamp_ns) * 1e-9;
+    if (!IsPlausibleMotion(frame.T_cam_world, next.T_cam_world, seconds, depth)) return false;
+  }
+  return AgreesWithKeyframesAside(map, reference->map_id, frame, session_, depth, camera_id_);
 }
 
 /// From the placed frame after it, and its motion.
-TrackingReport LatePlacement::TrackBackwards(const Map& map, double depth, PoseSearch* search,
-                                             TrackedFrame* frame) const {
-  if (!next_) return {};
-  const std::optional<Rigid3d> predicted = Predict(*frame);
-  PoseSearch::Prior prior;
-  if (predicted) prior = MotionPrior(motion_, *predicted, depth);
-  const Rigid3d guess = predicted.value_or(next_->T_cam_world);
-  if (search->FromFrame(map, *next_, guess, prior, frame) != PoseSearch::FromFrameResult::kFound) return {};
-  TrackingReport report = search->InLocalMap(map, true, prior, frame);  // nothing hurries
-  report.ok = report.ok && !report.doubtful && IsPlausible(*frame, depth);
+TrackingReport LatePlacement::TrackBackwards(const Map& map, PoseSearch* search, TrackedFrame* frame) {
+  if (!follower_) return {};
+  const FrameTime time = Backwards(frame->index, frame->stamp_ns);
+  const uint64_t seed = DeriveSeed(seed_, frame->index, "late_keyframe");
+  MotionFollower::Attempt attempt = follower_->Follow(map, time, false, seed, search, frame);
+  TrackingReport& report = attempt.report;
+  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
+  if (!report.ok && attempt.weak_pose) Coast(map, *attempt.weak_pose, report, *search, *frame);
   return report;
+}
+
+/// The frame's weak pose leads the search on, and may come to be believed.
+void LatePlacement::Coast(const Map& map, const FoundPose& weak_pose, const TrackingReport& report,
+                          const PoseSearch& search, const TrackedFrame& frame) {
+  follower_->Coast(map, weak_pose, Backwards(frame.index, frame.stamp_ns));
+  const auto pose = PlacedPose::Of(map, weak_pose.T_cam_world, search.reference());
+  if (pose && report.num_static >= options_.min_coasting_inliers) weak_.push_back({frame, report, *pose});
 }
 
 TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer,
                                     TrackedFrame* frame) {
   FindNeighbour(map, *frame);
-  const Keyframe* reference = map.FindKeyframe(search->reference());
-  const double depth = reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
-  const auto agrees = [&] {
-    const Keyframe* there = map.FindKeyframe(search->reference());
-    return there != nullptr &&
-           AgreesWithKeyframesAside(map, there->map_id, *frame, session_, depth, camera_id_);
-  };
-  TrackingReport report = TrackBackwards(map, depth, search, frame);
-  if (report.ok && agrees()) return report;
+  jumped_ = false;
+  TrackingReport report = TrackBackwards(map, search, frame);
+  if (report.ok) return report;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
+  jumped_ = true;
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
   if (!relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   report = search->InLocalMap(map, true, std::nullopt, frame);
-  report.ok = report.ok && !report.doubtful && (!next_ || IsPlausible(*frame, depth)) && agrees();
+  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
   return report;
 }
 
-void LatePlacement::GoOnFrom(TrackedFrame frame, const PlacedPose& pose) {
-  last_ = Placed{frame.index, pose, {}};
-  if (next_ && next_->index - frame.index == 1)
-    last_->T_this_next = frame.T_cam_world * next_->T_cam_world.Inverse();
-  next_ = std::move(frame);
+/// Whether the motion of the frame placed last goes on to there.
+bool LatePlacement::LeadsTo(const Map& map, const std::optional<Before>& before) const {
+  return before && follower_->motion().IsReachable(map, before->T_cam_world,
+                                                   Backwards(before->index, before->stamp_ns));
+}
+
+std::vector<LatePlacement::Placed> LatePlacement::GoOnFrom(const Map& map, const PoseSearch& search,
+                                                           Placed placed,
+                                                           const std::optional<Before>& before) {
+  if (jumped_) weak_.clear();
+  if (!follower_) follower_.emplace(options_);
+  const FrameTime time = Backwards(placed.frame.index, placed.frame.stamp_ns);
+  follower_->OnTracked(map, placed.pose, search.found(placed.frame), time, placed.frame, jumped_);
+  last_ = Last{placed.frame.index, placed.pose};
+  const bool believed = jumped_ || IsWellSeen(placed.report) || LeadsTo(map, before);
+  placed.confirmed = CountProven(map, placed.frame.landmarks, {}) >= kManyProven;
+  weak_.push_back(std::move(placed));
+  if (!believed) return {};
+  return std::exchange(weak_, {});
 }
 
 }  // namespace dmslam

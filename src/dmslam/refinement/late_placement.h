@@ -2,10 +2,11 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "dmslam/map/map.h"
 #include "dmslam/refinement/unplaced_frames.h"
-#include "dmslam/tracking/motion_model.h"
+#include "dmslam/tracking/motion_follower.h"
 #include "dmslam/tracking/pose_search.h"
 #include "dmslam/tracking/relocalizer.h"
 
@@ -20,12 +21,16 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
                               double depth, CameraId camera_id = 0);
 
+/// Whether so much is seen, and so much of the image, that a frame that was placed when the sequence has
+/// ended may become a keyframe.
+bool IsWellSeen(const TrackingReport& report);
+
 /// Places frames when the sequence has ended, the newest first: each from the placed frame that follows it
 /// and its motion, or else like a lost camera. The map may grow meanwhile by frames that become keyframes.
 class LatePlacement {
  public:
-  LatePlacement(uint32_t session, CameraId camera_id, uint64_t seed, const MotionModelOptions& motion)
-      : session_(session), camera_id_(camera_id), seed_(seed), motion_(motion) {}
+  LatePlacement(uint32_t session, CameraId camera_id, uint64_t seed, const TrackingOptions& options)
+      : session_(session), camera_id_(camera_id), seed_(seed), options_(options) {}
 
   /// While the map grows the neighbour is a later frame, that may move with the map; afterwards it can also
   /// be the keyframe that was made of the frame itself.
@@ -35,8 +40,25 @@ class LatePlacement {
   /// Finds the frame's pose; not ok where it is not believed. `search` and `relocalizer`: of the frontend.
   TrackingReport Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer,
                        TrackedFrame* frame);
-  /// The frame was placed; the next one is looked for from here.
-  void GoOnFrom(TrackedFrame frame, const PlacedPose& pose);
+  /// A frame with its pose.
+  struct Placed {
+    TrackedFrame frame;
+    TrackingReport report;
+    PlacedPose pose;
+    bool confirmed = false;  ///< by landmarks in view that are proven to be no person
+  };
+  /// Where and when the camera was before.
+  struct Before {
+    uint32_t index = 0;
+    int64_t stamp_ns = 0;
+    Rigid3d T_cam_world;
+  };
+  /// The frame was placed; the next one is looked for from here. Gives what may be told now, newest first:
+  /// this frame, and those after it that see too little to be believed for themselves. They are when the
+  /// motion has led through them to a frame that is well seen, or to `before`, the frame just before this one
+  /// if that was tracked. Else it may drift away.
+  std::vector<Placed> GoOnFrom(const Map& map, const PoseSearch& search, Placed placed,
+                               const std::optional<Before>& before);
 
   /// The neighbour may lie elsewhere now; where it became a keyframe that knows more. Any but the frame
   /// placed last is forgotten.
@@ -44,25 +66,28 @@ class LatePlacement {
   void Forget();
 
  private:
-  /// The frame placed last.
-  struct Placed {
-    uint32_t index = 0;
-    PlacedPose pose;
-    std::optional<Rigid3d> T_this_next;  ///< its camera from that of the frame after it
-  };
-
+  void LeaveNeighbour();
   void FindNeighbour(const Map& map, const TrackedFrame& frame);
-  std::optional<Rigid3d> Predict(const TrackedFrame& frame) const;
-  bool IsPlausible(const TrackedFrame& frame, double depth) const;
-  TrackingReport TrackBackwards(const Map& map, double depth, PoseSearch* search, TrackedFrame* frame) const;
+  bool IsPlausible(const Map& map, KeyframeId reference, const TrackedFrame& frame) const;
+  bool LeadsTo(const Map& map, const std::optional<Before>& before) const;
+  TrackingReport TrackBackwards(const Map& map, PoseSearch* search, TrackedFrame* frame);
+  void Coast(const Map& map, const FoundPose& weak_pose, const TrackingReport& report,
+             const PoseSearch& search, const TrackedFrame& frame);
 
   uint32_t session_;
   CameraId camera_id_;
   uint64_t seed_;
-  MotionModelOptions motion_;
+  TrackingOptions options_;
   bool growing_ = false;
-  std::optional<TrackedFrame> next_;  ///< the placed frame or keyframe that follows those to be placed
-  std::optional<Placed> last_;
+  std::optional<MotionFollower> follower_;  ///< backwards, from the placed frame or keyframe that follows
+  /// Of the frame placed last.
+  struct Last {
+    uint32_t index = 0;
+    PlacedPose pose;
+  };
+  std::optional<Last> last_;
+  bool jumped_ = false;       ///< the present frame was recognised, and not followed from its neighbour
+  std::vector<Placed> weak_;  ///< since the frame that was believed last
 };
 
 }  // namespace dmslam

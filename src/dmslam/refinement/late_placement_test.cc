@@ -83,13 +83,45 @@ class GrowingBack : public ::testing::Test {
     placement_.SetGrowing(true);
   }
 
-  TrackedFrame Frame(uint32_t index, double x) const {
-    TrackedFrame frame = scene_.See(index, index * kFrameNs, MapScene::PoseAt(x));
+  TrackedFrame Frame(uint32_t index, double x, const MapScene::Place& place = {}) const {
+    TrackedFrame frame = scene_.See(index, index * kFrameNs, MapScene::PoseAt(x), place);
     frame.T_cam_world = Rigid3d();
     return frame;
   }
   TrackingReport Place(TrackedFrame* frame) {
     return placement_.Place(scene_.map(), &search_, relocalizer_, frame);
+  }
+  std::vector<LatePlacement::Placed> GoOnFrom(const TrackedFrame& frame, const TrackingReport& report,
+                                              const std::optional<LatePlacement::Before>& before = {}) {
+    const PlacedPose pose = *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference());
+    return placement_.GoOnFrom(scene_.map(), search_, {frame, report, pose}, before);
+  }
+  static LatePlacement::Before Tracked(uint32_t index, double x) {
+    return {index, index * kFrameNs, MapScene::PoseAt(x)};
+  }
+  /// Places the frame; the indices of those that may be told.
+  std::vector<uint32_t> Told(uint32_t index, double x, const MapScene::Place& place = {},
+                             const std::optional<LatePlacement::Before>& before = {}) {
+    TrackedFrame frame = Frame(index, x, place);
+    const TrackingReport report = Place(&frame);
+    EXPECT_TRUE(report.ok) << index << ": " << report.reason;
+    std::vector<uint32_t> told;
+    if (!report.ok) return told;
+    for (const LatePlacement::Placed& placed : GoOnFrom(frame, report, before)) {
+      told.push_back(placed.frame.index);
+      EXPECT_NEAR(placed.frame.T_cam_world.Center().x(), -0.02 * (kFirst - placed.frame.index), 5e-3);
+    }
+    return told;
+  }
+  /// What stands before the rest leaves a corner, or a few points all over the image.
+  MapScene::Place Corner() const {
+    return [this](size_t i) -> std::optional<Eigen::Vector3d> {
+      const Eigen::Vector3d& p = scene_.point(i);
+      return p.x() > 0.8 && p.y() > 0.4 ? std::optional(p) : std::nullopt;
+    };
+  }
+  MapScene::Place Few() const {
+    return [this](size_t i) { return i % 10 == 0 ? std::optional(scene_.point(i)) : std::nullopt; };
   }
 
   MapScene scene_;
@@ -105,14 +137,15 @@ TEST_F(GrowingBack, FramesArePlacedFromTheOneAfterThem) {
     const TrackingReport report = Place(&frame);
     ASSERT_TRUE(report.ok) << index << ": " << report.reason;
     EXPECT_LT((frame.T_cam_world.Center() - Eigen::Vector3d(x, 0, 0)).norm(), 2e-3);
-    placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
+    GoOnFrom(frame, report);
   }
 }
 
 TEST_F(GrowingBack, AFrameTooFarFromItsNeighbourIsNotBelieved) {
   TrackedFrame frame = Frame(kFirst - 1, -0.02);
-  ASSERT_TRUE(Place(&frame).ok);
-  placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
+  const TrackingReport report = Place(&frame);
+  ASSERT_TRUE(report.ok);
+  GoOnFrom(frame, report);
   TrackedFrame leap = Frame(kFirst - 2, -0.02);
   leap.stamp_ns = frame.stamp_ns - 1'000'000;  // the same place, but hardly any time between: as if it flew
   TrackedFrame near = Frame(kFirst - 2, -0.08);
@@ -123,8 +156,9 @@ TEST_F(GrowingBack, AFrameTooFarFromItsNeighbourIsNotBelieved) {
 
 TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
   TrackedFrame frame = Frame(kFirst - 1, -0.02);
-  ASSERT_TRUE(Place(&frame).ok);
-  placement_.GoOnFrom(frame, *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference()));
+  const TrackingReport report = Place(&frame);
+  ASSERT_TRUE(report.ok);
+  GoOnFrom(frame, report);
   const Rigid3d shift(Eigen::Quaterniond::Identity(), {-3.0, 0, 0});
   const KeyframeId id = KeyframeId::Make(MapScene::kSession, kFirst);
   scene_.map().SetPose(scene_.map().At(id), scene_.map().FindKeyframe(id)->T_cam_world * shift);
@@ -134,6 +168,61 @@ TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
   TrackedFrame next = Frame(kFirst - 2, -0.04);
   ASSERT_TRUE(Place(&next).ok);
   EXPECT_LT((next.T_cam_world.Center() - Eigen::Vector3d(2.96, 0, 0)).norm(), 3e-3);
+}
+
+TEST_F(GrowingBack, WhatIsSeenInACornerIsToldBetweenWhatIsWellSeen) {
+  EXPECT_EQ(Told(19, -0.02), std::vector<uint32_t>{19});
+  EXPECT_EQ(Told(18, -0.04), std::vector<uint32_t>{18});
+  TrackedFrame hidden = Frame(17, -0.06, Corner());
+  EXPECT_FALSE(Place(&hidden).ok);
+  EXPECT_EQ(Told(16, -0.08), (std::vector<uint32_t>{17, 16})) << "the motion led through it";
+  EXPECT_EQ(Told(15, -0.10), std::vector<uint32_t>{15}) << "each is told once";
+}
+
+TEST_F(GrowingBack, WhereNothingBoundsTheWayOnlyWhatIsWellSeenIsTold) {
+  EXPECT_EQ(Told(19, -0.02), std::vector<uint32_t>{19});
+  EXPECT_EQ(Told(18, -0.04), std::vector<uint32_t>{18});
+  EXPECT_EQ(Told(17, -0.06, Few()), std::vector<uint32_t>{}) << "as it might drift for ever";
+  EXPECT_EQ(Told(16, -0.08, Few()), std::vector<uint32_t>{});
+  EXPECT_EQ(Told(15, -0.10), (std::vector<uint32_t>{17, 16, 15}));
+}
+
+TEST_F(GrowingBack, AWayThatLeadsToATrackedFrameIsBelieved) {
+  EXPECT_EQ(Told(19, -0.02), std::vector<uint32_t>{19});
+  EXPECT_EQ(Told(18, -0.04), std::vector<uint32_t>{18});
+  EXPECT_EQ(Told(17, -0.06, Few(), Tracked(16, -1.5)), std::vector<uint32_t>{}) << "far from where it leads";
+  EXPECT_EQ(Told(16, -0.08, Few(), Tracked(15, -0.10)), (std::vector<uint32_t>{17, 16}));
+}
+
+/// A camera that moves as fast before the map's first keyframe as after it.
+TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
+  constexpr int64_t kFrameNs = MapScene::kStepNs;
+  MapScene scene;
+  scene.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
+  scene.MapAll(12, 0.1, 20, 20 * kFrameNs);
+  Relocalizer relocalizer(nullptr);
+  PoseSearch search({}, TestCamera());
+  LatePlacement placement(MapScene::kSession, 0, 0, {});
+  placement.SetGrowing(true);
+  const auto see = [&](uint32_t index) {
+    return scene.See(index, index * kFrameNs, MapScene::PoseAt(0.1 * (index - 20.0)));
+  };
+  for (const uint32_t index : {19u, 18u}) {
+    TrackedFrame frame = see(index);
+    const TrackingReport report = placement.Place(scene.map(), &search, relocalizer, &frame);
+    ASSERT_TRUE(report.ok) << index << ": " << report.reason;
+    const PlacedPose pose = *PlacedPose::Of(scene.map(), frame.T_cam_world, search.reference());
+    placement.GoOnFrom(scene.map(), search, {frame, report, pose}, std::nullopt);
+  }
+  for (const uint32_t index : {17u, 16u, 15u}) {
+    TrackedFrame dark(index, index * kFrameNs,
+                      MakeFrameFeatures({}, scene.map().camera(), scene.map().pyramid()));
+    EXPECT_FALSE(placement.Place(scene.map(), &search, relocalizer, &dark).ok);
+  }
+  TrackedFrame again = see(14);
+  const TrackingReport report = placement.Place(scene.map(), &search, relocalizer, &again);
+  ASSERT_TRUE(report.ok) << report.reason;
+  EXPECT_NEAR(again.T_cam_world.Center().x(), -0.6, 5e-3);
 }
 
 }  // namespace

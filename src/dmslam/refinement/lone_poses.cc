@@ -7,7 +7,7 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kVouchNs = 500'000'000;  // so near in time a tracked frame vouches
-constexpr int64_t kGapNs = 350'000'000;    // poses farther apart do not bound where each other may be
+constexpr int64_t kGapNs = 500'000'000;    // poses farther apart do not bound where each other may be
 constexpr int64_t kSpanNs = 500'000'000;   // so long a row of them vouches for itself
 
 bool IsNear(int64_t stamp_ns, MapId map_id, std::span<const TrackedAt> tracked) {

@@ -8,7 +8,7 @@
 
 namespace dmslam {
 
-/// A frame that was tracked as it came, and the map that it is in now.
+/// A frame that was tracked as it came, or confirmed when it was placed later, and the map that it is in now.
 struct TrackedAt {
   int64_t stamp_ns = 0;
   MapId map_id = 0;

@@ -44,6 +44,10 @@ class UnplacedFrames {
   /// set aside from the newest back.
   void SetAside(WaitingFrame frame) { set_aside_.push_front(std::move(frame)); }
   void ReturnSetAside();
+  /// One of them was found after all.
+  void ForgetSetAside(uint32_t index) {
+    std::erase_if(set_aside_, [index](const WaitingFrame& frame) { return frame.index == index; });
+  }
 
  private:
   void Bound();

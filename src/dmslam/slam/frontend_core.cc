@@ -10,9 +10,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int kWellSeen = 100;      // static features of a frame that becomes a keyframe at the end...
-constexpr int kWellSeenCells = 12;  // ...and the cells of an 8 x 6 grid that hold them
-
 constexpr double kUncertainPosition = 0.03;     // standard deviation over the depth of the scene, and...
 constexpr double kUncertainRotationRad = 0.03;  // ...of the rotation: beyond, a pose is called uncertain
 
@@ -59,7 +56,7 @@ FrontendCore::FrontendCore(const Setup& setup)
       first_map_(SearchMaker(setup)),
       tracker_({setup.options.tracking, setup.camera, setup.vocabulary, setup.seed}),
       turns_(setup.camera),
-      late_(setup.session, setup.camera_id, setup.seed, setup.options.tracking.motion),
+      late_(setup.session, setup.camera_id, setup.seed, setup.options.tracking),
       last_poses_(setup.options.refiner, setup.options.smooth_at_end, setup.options.tracking, setup.camera),
       unplaced_(setup.options.max_kept_frames) {
   map_.KeepFeaturesIn(setup.feature_store);
@@ -269,7 +266,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
   FrontendOutput output;
   ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &output);
   FramePose told = MakePose(phase_.state(), report, pose);
-  last_poses_.Keep(frame_, told);
+  last_poses_.Keep(frame_, told, true);
   if (result.certainty) TellCertainty(*result.certainty, &told);
   output.Add(std::move(told));
   return output;
@@ -398,7 +395,6 @@ std::optional<TrackingReport> FrontendCore::PlaceNewestUnplaced() {
   frame_ = unplaced_.TakeNewest().ToTracked(camera_, pyramid_);
   const TrackingReport report = late_.Place(map_, &tracker_.search(), tracker_.relocalizer(), &frame_);
   if (!report.ok || map_.FindKeyframe(tracker_.search().reference()) == nullptr) return std::nullopt;
-  ++counters_.localized_later;
   return report;
 }
 
@@ -410,32 +406,48 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
     unplaced_.ReturnSetAside();  // they are tried again in the adjusted map
     return std::nullopt;
   }
-  if (const std::optional<TrackingReport> report = PlaceNewestUnplaced()) return KeepPlacedLater(*report);
-  tracker_.search().judge().DropEvidence();
-  unplaced_.SetAside(WaitingFrame(frame_));
-  return FrontendOutput();
-}
-
-/// Its last pose comes with those of the frames that were tracked.
-FrontendOutput FrontendCore::KeepPlacedLater(const TrackingReport& report) {
+  const std::optional<TrackingReport> report = PlaceNewestUnplaced();
+  if (!report) {
+    tracker_.search().judge().DropEvidence();
+    unplaced_.SetAside(WaitingFrame(frame_));
+    return FrontendOutput();
+  }
   const PlacedPose pose = *PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
   map_id_ = map_.FindKeyframe(pose.reference)->map_id;
   // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
-  const bool well_seen = report.num_static >= kWellSeen && report.cells >= kWellSeenCells;
   const bool known = map_.ResolveKeyframe(ThisFrame()).has_value();
   FrontendOutput output;
-  ReportLandmarks(pose, well_seen && !known && WantsKeyframe(report, pose.reference), &output);
-  last_poses_.Keep(frame_, MakePose(TrackingState::kLocalizedLater, report, pose));
-  late_.GoOnFrom(frame_, pose);
+  ReportLandmarks(pose, IsWellSeen(*report) && !known && WantsKeyframe(*report, pose.reference), &output);
+  KeepBelieved({frame_, *report, pose});
   return output;
+}
+
+/// Their last poses come with those of the frames that were tracked.
+void FrontendCore::KeepBelieved(LatePlacement::Placed placed) {
+  unplaced_.SetAside(WaitingFrame(placed.frame));
+  const auto before = last_poses_.TrackedBefore(map_, *map_id_, frame_.index);
+  for (LatePlacement::Placed& told : late_.GoOnFrom(map_, tracker_.search(), std::move(placed), before)) {
+    unplaced_.ForgetSetAside(told.frame.index);
+    frame_ = std::move(told.frame);
+    ++counters_.localized_later;
+    last_poses_.Keep(frame_, MakePose(TrackingState::kLocalizedLater, told.report, told.pose),
+                     told.confirmed);
+  }
 }
 
 bool FrontendCore::WorkAtEnd() {
   if (unplaced_.empty()) return last_poses_.Improve(map_);
-  if (const std::optional<TrackingReport> report = PlaceNewestUnplaced()) {
-    const PlacedPose pose = *PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
-    last_poses_.AddPlaced(map_, frame_, MakePose(TrackingState::kLocalizedLater, *report, pose));
-    late_.GoOnFrom(frame_, pose);
+  const std::optional<TrackingReport> report = PlaceNewestUnplaced();
+  if (!report) return true;
+  const PlacedPose pose = *PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
+  const auto before =
+      last_poses_.TrackedBefore(map_, map_.FindKeyframe(pose.reference)->map_id, frame_.index);
+  for (LatePlacement::Placed& told :
+       late_.GoOnFrom(map_, tracker_.search(), {frame_, *report, pose}, before)) {
+    frame_ = std::move(told.frame);
+    ++counters_.localized_later;
+    last_poses_.AddPlaced(map_, frame_, MakePose(TrackingState::kLocalizedLater, told.report, told.pose),
+                          told.confirmed);
   }
   return true;
 }

@@ -131,7 +131,7 @@ class FrontendCore {
   FramePose MakePose(TrackingState state, const TrackingReport& report,
                      const std::optional<PlacedPose>& pose) const;
   std::optional<TrackingReport> PlaceNewestUnplaced();
-  FrontendOutput KeepPlacedLater(const TrackingReport& report);
+  void KeepBelieved(LatePlacement::Placed placed);
 
   // What is given
   FrontendOptions options_;

@@ -20,8 +20,7 @@ constexpr double kTurnRadPerS = 0.3;           // ...and more with time...
 constexpr double kMostTurnRad = 0.3;           // ...up to this
 constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
 constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
-constexpr int kManyProven = 50;                // landmarks in view that confirm a place at once...
-constexpr int kSomeProven = 8;                 // ...and that must be among them when it is confirmed by time
+constexpr int kSomeProven = 8;  // proven landmarks that must be seen where a place is confirmed by time
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
@@ -40,11 +39,10 @@ Tracker::Tracker(const Setup& setup)
       seed_(setup.seed),
       search_(setup.options, setup.camera),
       relocalizer_(setup.vocabulary),
-      motion_(setup.options.motion) {}
+      follower_(setup.options) {}
 
 void Tracker::BeginAt(const Keyframe& keyframe) {
-  last_ = TrackedFrame::Of(keyframe);
-  motion_.Begin({keyframe.id, Rigid3d(), keyframe.scale}, {last_.index, last_.stamp_ns});
+  follower_.BeginAt(keyframe, {keyframe.id.frame_index(), keyframe.stamp_ns});
 }
 
 void Tracker::OnMapForgotten() {
@@ -55,7 +53,7 @@ void Tracker::OnMapForgotten() {
 
 void Tracker::OnMapGivenUp() {
   search_.Reset();
-  motion_.Stop();
+  follower_.Stop();
   unbelieved_.reset();
 }
 
@@ -71,7 +69,7 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   if (result.pose) {
     Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
-    motion_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
+    follower_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
   }
   if (unbelieved_) {
     result.pose.reset();
@@ -91,14 +89,12 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
 void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame,
                      const Attempt& attempt) {
   if (attempt.relocalized) {
-    unbelieved_ =
-        Unbelieved{Unbelieved::Why::kFoundAnew, attempt.in_another_map, frame.stamp_ns, motion_, last_};
+    unbelieved_ = Unbelieved{Unbelieved::Why::kFoundAnew, attempt.in_another_map, frame.stamp_ns, follower_};
   } else if (attempt.report.doubtful && !unbelieved_) {
-    unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, false, motion_.last_stamp_ns(), motion_, last_};
+    unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, false, last_tracked_ns(), follower_};
   }
-  motion_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns},
-                    attempt.relocalized || attempt.by_rival);
-  last_ = frame;
+  follower_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns}, frame,
+                      attempt.relocalized || attempt.by_rival);
   if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
 }
 
@@ -129,8 +125,7 @@ bool Tracker::IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) 
 
 /// What was followed does not predict what is seen: the camera is where it was believed last, and lost.
 void Tracker::GoBack() {
-  motion_ = unbelieved_->motion;
-  last_ = std::move(unbelieved_->last);
+  follower_ = std::move(unbelieved_->follower);
   if (unbelieved_->why == Unbelieved::Why::kFoundAnew) relocalized_ns_.reset();
   unbelieved_.reset();
 }
@@ -138,64 +133,33 @@ void Tracker::GoBack() {
 /// While the motion still leads, a place that looks alike is no better guess: people are such places. Who was
 /// nowhere yet has no motion.
 bool Tracker::MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const {
-  if (!motion_.last().reference.valid()) return true;
-  const int64_t missing_ns = stamp_ns - motion_.last_stamp_ns();
+  if (!follower_.motion().last().reference.valid()) return true;
+  const int64_t missing_ns = stamp_ns - last_tracked_ns();
   return missing_ns > (attempt.weak_pose ? kCoastNs : kNoPlacesNs);
 }
 
-/// From where the motion model expects the camera, to what the map around says.
 Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
-  Attempt attempt;
-  attempt.report.reason = "too few features match the last frame";
-  const MotionModel::Prediction prediction = motion_.Predict(map, {frame->index, frame->stamp_ns});
-  if (!prediction.T_cam_world || !prediction.recent) return attempt;
-  if (!FindByMotion(map, prediction, frame, &attempt)) return attempt;
-  attempt.report = search_.InLocalMap(map, IsCareful(frame->stamp_ns),
-                                      attempt.by_rival ? std::nullopt : prediction.prior, frame);
-  attempt.by_rival |= attempt.report.by_rival;
-  if (attempt.by_rival) motion_.Stop();
-  if (!motion_.IsReachable(map, frame->T_cam_world, {frame->index, frame->stamp_ns})) {
-    Refuse("the pose contradicts the camera's motion", &attempt.report);
-    attempt.report.contradicts = true;
-  } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
-    attempt.weak_pose = search_.found(*frame);
-  }
-  return attempt;
-}
-
-/// A first pose: by the last frame's matches, by all that lies around it, or by its keyframe.
-bool Tracker::FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
-                           Attempt* attempt) {
-  using Result = PoseSearch::FromFrameResult;
-  const Result last = search_.FromFrame(map, last_, *prediction.T_cam_world, prediction.prior, frame);
-  attempt->by_rival = last == Result::kFoundRival;
-  if (last == Result::kFound || last == Result::kFoundRival) return true;
-  attempt->report.contradicts = last == Result::kContradicted;
-  if (prediction.prior) {
-    const int inliers = search_.FromPrediction(map, *prediction.T_cam_world, prediction.prior, frame);
-    if (inliers >= options_.min_local_inliers) return true;
-    if (inliers >= options_.min_coasting_inliers) attempt->weak_pose = search_.found(*frame);
-  }
   const uint64_t seed = DeriveSeed(seed_, frame->index, "track_keyframe");
-  return search_.FromKeyframe(map, motion_.last().reference, seed, prediction.prior, frame);
+  const bool careful = IsCareful(frame->stamp_ns);
+  return {follower_.Follow(map, {frame->index, frame->stamp_ns}, careful, seed, &search_, frame)};
 }
 
 /// A camera that was lost a moment ago is nearly where it was, and may look elsewhere. The frame stays as it
 /// was where nothing is found.
 void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) {
-  const std::optional<Rigid3d> T_last = motion_.last().In(map);
-  const double since_s = static_cast<double>(frame->stamp_ns - motion_.last_stamp_ns()) * 1e-9;
+  const std::optional<Rigid3d> T_last = follower_.motion().last().In(map);
+  const double since_s = static_cast<double>(frame->stamp_ns - last_tracked_ns()) * 1e-9;
   if (!T_last || since_s > kTurnKnownS) return;
   const double reach_rad = std::min(kTurnReachRad + kTurnRadPerS * since_s, kMostTurnRad);
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
-  if (!search_.FromTurn(map, last_, *T_last, reach_rad, &found)) return;
+  if (!search_.FromTurn(map, follower_.last(), *T_last, reach_rad, &found)) return;
   const TrackingReport report = search_.InLocalMap(map, true, std::nullopt, &found);
   if (!report.ok || report.doubtful ||
-      !motion_.IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}))
+      !follower_.motion().IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}))
     return;
   *frame = std::move(found);
   attempt->report = report;
-  attempt->relocalized = frame->stamp_ns - motion_.last_stamp_ns() > kCoastNs;
+  attempt->relocalized = frame->stamp_ns - last_tracked_ns() > kCoastNs;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 
@@ -212,11 +176,11 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
   // young to have anything proven, what is seen as a whole.
   const auto credible = [&](const TrackedFrame& at, const TrackingReport& report) {
     const bool here = is_here();
-    return (here && motion_.IsReachable(map, at.T_cam_world, time)) ||
+    return (here && follower_.motion().IsReachable(map, at.T_cam_world, time)) ||
            CountProven(map, at.landmarks, {}) >= kManyProven ||
            (!here && !IsOldEnoughToProve(map) && IsSeenAsAWhole(report));
   };
-  Relocalizer::Request request{.last_seen = motion_.last().reference, .seed = seed};
+  Relocalizer::Request request{.last_seen = follower_.motion().last().reference, .seed = seed};
   const bool may_be_elsewhere = asked.map_id || asked.may_be_nowhere;
   if (may_be_elsewhere) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;

@@ -5,9 +5,8 @@
 #include <optional>
 
 #include "dmslam/map/replica.h"
-#include "dmslam/tracking/motion_model.h"
+#include "dmslam/tracking/motion_follower.h"
 #include "dmslam/tracking/pose_certainty.h"
-#include "dmslam/tracking/pose_search.h"
 #include "dmslam/tracking/relocalizer.h"
 
 namespace dmslam {
@@ -35,7 +34,7 @@ class Tracker {
   /// Begins at a keyframe; nothing is known of the motion.
   void BeginAt(const Keyframe& keyframe);
   /// Begins lost.
-  void BeginLost(const FrameTime& time) { motion_.Begin({}, time); }
+  void BeginLost(const FrameTime& time) { follower_.BeginLost(time); }
 
   struct Request {
     /// The map that is tracked in: a lost camera is looked for in all maps, and there it must be within
@@ -55,11 +54,11 @@ class Tracker {
   void OnMapGivenUp();
 
   /// The keyframe that the frame tracked last was placed by.
-  KeyframeId last_reference() const { return motion_.last().reference; }
+  KeyframeId last_reference() const { return follower_.motion().last().reference; }
   /// Whether the camera is followed and not believed: that will show.
   bool IsUndecided() const { return unbelieved_.has_value(); }
   /// Stamp of the frame tracked last.
-  int64_t last_tracked_ns() const { return motion_.last_stamp_ns(); }
+  int64_t last_tracked_ns() const { return follower_.motion().last_stamp_ns(); }
   /// What frames said of landmarks since the last call.
   FrameEvidence TakeEvidence(int64_t stamp_ns, std::optional<MapId> map_id) {
     return search_.judge().TakeEvidence(stamp_ns, map_id);
@@ -69,16 +68,11 @@ class Tracker {
   const Relocalizer& relocalizer() const { return relocalizer_; }
 
  private:
-  struct Attempt {
-    TrackingReport report;
-    std::optional<FoundPose> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
+  struct Attempt : MotionFollower::Attempt {
     bool relocalized = false;
-    bool by_rival = false;        ///< what the frames before followed was not the room
     bool in_another_map = false;  ///< than it was lost in
   };
 
-  bool FindByMotion(const Map& map, const MotionModel::Prediction& prediction, TrackedFrame* frame,
-                    Attempt* attempt);
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
   void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
@@ -94,9 +88,8 @@ class Tracker {
   uint64_t seed_;
   PoseSearch search_;
   Relocalizer relocalizer_;
-  MotionModel motion_;
+  MotionFollower follower_;
   PoseCertaintyEstimator certainty_;
-  TrackedFrame last_;                      ///< the frame tracked last
   std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
   /// A camera that is followed and not believed.
   struct Unbelieved {
@@ -107,8 +100,7 @@ class Tracker {
     Why why = Why::kFoundAnew;
     bool in_another_map = false;  ///< than it was lost in
     int64_t since_ns = 0;
-    MotionModel motion;  ///< and the last frame, as they were when it was believed last
-    TrackedFrame last;
+    MotionFollower follower;  ///< as it was when the camera was believed last
   };
   std::optional<Unbelieved> unbelieved_;
 };
