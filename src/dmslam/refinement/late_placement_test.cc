@@ -194,6 +194,25 @@ TEST_F(GrowingBack, AWayThatLeadsToATrackedFrameIsBelieved) {
   EXPECT_EQ(Told(16, -0.08, Few(), Tracked(15, -0.10)), (std::vector<uint32_t>{17, 16}));
 }
 
+TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
+  for (const uint32_t keyframes : {2u, 280u}) {  // of the last moment, or of longer than people stand
+    MapScene scene;
+    scene.AddCloud(200, {0, 0, 4}, {1.6, 1.2, 0.5});
+    scene.MapAll(keyframes, 0.0, 20, 20 * MapScene::kStepNs);
+    Relocalizer relocalizer(nullptr);
+    PoseSearch search({}, TestCamera());
+    LatePlacement placement(MapScene::kSession, 0, 0, {});
+    placement.SetGrowing(true);
+    TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(0));
+    const TrackingReport report = placement.Place(scene.map(), &search, relocalizer, &frame);
+    ASSERT_TRUE(report.ok) << report.reason;
+    const PlacedPose pose = *PlacedPose::Of(scene.map(), frame.T_cam_world, search.reference());
+    const auto told = placement.GoOnFrom(scene.map(), search, {frame, report, pose}, std::nullopt);
+    ASSERT_EQ(told.size(), 1u);
+    EXPECT_EQ(told.front().confirmed, keyframes == 280u);
+  }
+}
+
 /// A camera that moves as fast before the map's first keyframe as after it.
 TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
   constexpr int64_t kFrameNs = MapScene::kStepNs;
