@@ -33,7 +33,7 @@ class PosesAtTheEnd : public testing::Test {
   PosesAtTheEnd() : map_(TestCamera(), Pyramid()) {
     for (int i = 0; i < kLandmarks; ++i) {
       Landmark landmark;
-      landmark.id = LandmarkId::Make(1, static_cast<uint64_t>(i + 1));
+      landmark.id = LandmarkId::Make(1, static_cast<uint64_t>(i) + 1);
       landmark.map_id = 1;
       const double x = random_.Uniform(-0.9, 0.9), y = random_.Uniform(-0.6, 0.6);
       truth_.emplace_back(x, y, random_.Uniform(1.5, 2.5));
@@ -42,7 +42,7 @@ class PosesAtTheEnd : public testing::Test {
       map_.AddLandmark(std::move(landmark));
     }
     for (int k = 0; k < kKeyframes; ++k) AddKeyframe(k);
-    for (int i = 0; i < kLandmarks; ++i) PlaceByKeyframes(LandmarkId::Make(1, static_cast<uint64_t>(i + 1)));
+    for (int i = 0; i < kLandmarks; ++i) PlaceByKeyframes(LandmarkId::Make(1, static_cast<uint64_t>(i) + 1));
   }
 
   /// One step of Gauss and Newton from the truth: the noise of its views, and no more.
@@ -87,7 +87,7 @@ class PosesAtTheEnd : public testing::Test {
       keypoint.y_q4 = static_cast<uint16_t>(std::lround(16 * uv_px->y()));
       features.keypoints.push_back(keypoint);
       features.descriptors.emplace_back();
-      seen.push_back(LandmarkId::Make(1, static_cast<uint64_t>(i + 1)));
+      seen.push_back(LandmarkId::Make(1, static_cast<uint64_t>(i) + 1));
     }
     keyframe.features = MakeFrameFeatures(features, map_.camera(), map_.pyramid());
     keyframe.landmarks.resize(seen.size());
@@ -103,7 +103,7 @@ class PosesAtTheEnd : public testing::Test {
       const auto uv_px = See(i, frame);
       const bool weak = frame >= kWeakBegin && frame < kWeakEnd;
       if (!uv_px || (weak && (uv_px->x() > 180 || uv_px->y() > 200))) continue;
-      sights.push_back({LandmarkId::Make(1, static_cast<uint64_t>(i + 1)), uv_px->cast<float>(), 0, 0});
+      sights.push_back({LandmarkId::Make(1, static_cast<uint64_t>(i) + 1), uv_px->cast<float>(), 0, 0});
     }
     return sights;
   }

@@ -16,7 +16,7 @@ constexpr int64_t kNearNs = 500'000'000;  // a placed frame so near in time boun
 constexpr int kWellSeen = 50;             // static features...
 constexpr int kWellSeenCells = 8;         // ...and the cells of an 8 x 6 grid that hold them
 constexpr double kMaxSpeed = 1.5;         // depths of the scene per second
-constexpr double kMaxTurn_rad_per_s = 3.0;
+constexpr double kMaxTurnRadPerS = 3.0;
 constexpr size_t kKeyframesAside = 3;   // whose motion bounds that of the frames between them...
 constexpr double kApartS = 0.3;         // ...apart, so that it is motion and not noise...
 constexpr double kFasterThanAside = 2;  // ...which may be so many times as fast...
@@ -38,7 +38,7 @@ bool IsWellSeen(const TrackingReport& report) {
 bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, double depth) {
   const Rigid3d motion = a * b.Inverse();
   return motion.translation.norm() <= kMaxSpeed * depth * seconds &&
-         AngleBetween(motion.rotation, Eigen::Quaterniond::Identity()) <= kMaxTurn_rad_per_s * seconds;
+         AngleBetween(motion.rotation, Eigen::Quaterniond::Identity()) <= kMaxTurnRadPerS * seconds;
 }
 
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,

@@ -25,8 +25,9 @@ std::vector<int64_t> Every33Ms(int64_t from_ms, int64_t to_ms) {
 }
 
 /// Of the first map.
-std::vector<TrackedAt> TrackedAtMs(std::vector<int64_t> stamps_ms) {
+std::vector<TrackedAt> TrackedAtMs(const std::vector<int64_t>& stamps_ms) {
   std::vector<TrackedAt> tracked;
+  tracked.reserve(stamps_ms.size());
   for (const int64_t stamp_ms : stamps_ms) tracked.push_back({stamp_ms * kMs, 1});
   return tracked;
 }
