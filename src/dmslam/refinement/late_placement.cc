@@ -114,9 +114,21 @@ bool LatePlacement::IsPlausible(const Map& map, KeyframeId reference_id, const T
   return AgreesWithKeyframesAside(map, reference->map_id, frame, session_, depth, camera_id_);
 }
 
+/// From a keyframe that is too far ahead for its motion to say anything: if the camera has hardly moved
+/// since.
+TrackingReport LatePlacement::FindBeside(const Map& map, PoseSearch* search, TrackedFrame* frame) const {
+  const TrackedFrame& next = follower_->last();
+  const auto found = search->FromFrame(map, next, next.T_cam_world, std::nullopt, frame);
+  if (found != PoseSearch::FromFrameResult::kFound) return {};
+  TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
+  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
+  return report;
+}
+
 /// From the placed frame after it, and its motion.
 TrackingReport LatePlacement::TrackBackwards(const Map& map, PoseSearch* search, TrackedFrame* frame) {
   if (!follower_) return {};
+  if (follower_->last().stamp_ns - frame->stamp_ns > kNearNs) return FindBeside(map, search, frame);
   const FrameTime time = Backwards(frame->index, frame->stamp_ns);
   const uint64_t seed = DeriveSeed(seed_, frame->index, "late_keyframe");
   MotionFollower::Attempt attempt = follower_->Follow(map, time, false, seed, search, frame);

@@ -70,6 +70,7 @@ class LatePlacement {
   void FindNeighbour(const Map& map, const TrackedFrame& frame);
   bool IsPlausible(const Map& map, KeyframeId reference, const TrackedFrame& frame) const;
   bool LeadsTo(const Map& map, const std::optional<Before>& before) const;
+  TrackingReport FindBeside(const Map& map, PoseSearch* search, TrackedFrame* frame) const;
   TrackingReport TrackBackwards(const Map& map, PoseSearch* search, TrackedFrame* frame);
   void Coast(const Map& map, const FoundPose& weak_pose, const TrackingReport& report,
              const PoseSearch& search, const TrackedFrame& frame);
