@@ -35,14 +35,15 @@ LastPoses::Tracked LastPoses::PlaceOf(const FramePose& pose) {
   return {pose.frame_index, pose.stamp_ns, {pose.reference, pose.T_cam_reference, pose.reference_scale}};
 }
 
-void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose, bool vouches) {
+void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
   refiner_.Keep(frame, pose);
-  if (pose.state == TrackingState::kLocalizedLater) {
-    if (vouches) placed_.push_back(PlaceOf(pose));
-    return;
-  }
   tracked_.push_back(PlaceOf(pose));
   if (tracked_.size() > max_frames_) tracked_.pop_front();
+}
+
+void LastPoses::KeepPlaced(const TrackedFrame& frame, const FramePose& pose, bool vouches) {
+  refiner_.Keep(frame, pose);
+  if (vouches) placed_.push_back(PlaceOf(pose));
 }
 
 std::optional<LatePlacement::Before> LastPoses::TrackedBefore(const Map& map, MapId map_id,

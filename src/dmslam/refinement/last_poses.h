@@ -22,8 +22,10 @@ class LastPoses {
   LastPoses(const FrameRefinerOptions& refiner, bool smooth, const TrackingOptions& tracking,
             const Camera& camera);
 
-  /// Keeps a tracked frame and the pose that was told of it. `vouches`: also for those near it in time.
-  void Keep(const TrackedFrame& frame, const FramePose& pose, bool vouches);
+  /// Keeps a tracked frame and the pose that was told of it. It vouches for frames near it in time.
+  void Keep(const TrackedFrame& frame, const FramePose& pose);
+  /// Keeps a frame that was placed when the sequence has ended. `vouches`: as a tracked one does.
+  void KeepPlaced(const TrackedFrame& frame, const FramePose& pose, bool vouches);
   /// Where the camera was in the frame just before `index`, if that was tracked in that map as it came.
   std::optional<LatePlacement::Before> TrackedBefore(const Map& map, MapId map_id, uint32_t index) const;
   /// Gives back the frames of a map that was wrong.

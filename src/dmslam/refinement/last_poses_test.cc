@@ -46,13 +46,13 @@ class LastPosesTest : public ::testing::Test {
 };
 
 TEST_F(LastPosesTest, AFrameFarFromAllThatWereTrackedIsNotTold) {
-  last_.Keep(Frame(kFirst), Pose(kFirst, TrackingState::kTracking), true);
+  last_.Keep(Frame(kFirst), Pose(kFirst, TrackingState::kTracking));
   last_.AddPlaced(scene_.map(), Frame(20), Pose(20, TrackingState::kLocalizedLater), false);
   EXPECT_EQ(NumTold(), 0u);
 }
 
 TEST_F(LastPosesTest, UnlessALandmarkThatIsProvenConfirmsIt) {
-  last_.Keep(Frame(kFirst), Pose(kFirst, TrackingState::kTracking), true);
+  last_.Keep(Frame(kFirst), Pose(kFirst, TrackingState::kTracking));
   last_.AddPlaced(scene_.map(), Frame(20), Pose(20, TrackingState::kLocalizedLater), true);
   last_.AddPlaced(scene_.map(), Frame(18), Pose(18, TrackingState::kLocalizedLater), false);
   last_.AddPlaced(scene_.map(), Frame(80), Pose(80, TrackingState::kLocalizedLater), false);
@@ -60,7 +60,7 @@ TEST_F(LastPosesTest, UnlessALandmarkThatIsProvenConfirmsIt) {
 }
 
 TEST_F(LastPosesTest, TellsWhereTheCameraWasInTheFrameBefore) {
-  last_.Keep(Frame(kFirst + 1), Pose(kFirst + 1, TrackingState::kTracking), true);
+  last_.Keep(Frame(kFirst + 1), Pose(kFirst + 1, TrackingState::kTracking));
   const auto before = last_.TrackedBefore(scene_.map(), MapScene::kMap, kFirst + 2);
   ASSERT_TRUE(before);
   EXPECT_EQ(before->index, kFirst + 1);

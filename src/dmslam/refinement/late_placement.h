@@ -21,8 +21,8 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
                               double depth, CameraId camera_id = 0);
 
-/// Whether so much is seen, and so much of the image, that a frame that was placed when the sequence has
-/// ended may become a keyframe.
+/// Whether so much is seen, and in so much of the image, that a frame that was placed when the sequence has
+/// ended is believed for itself, and may become a keyframe.
 bool IsWellSeen(const TrackingReport& report);
 
 /// Places frames when the sequence has ended, the newest first: each from the placed frame that follows it

@@ -266,7 +266,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
   FrontendOutput output;
   ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &output);
   FramePose told = MakePose(phase_.state(), report, pose);
-  last_poses_.Keep(frame_, told, true);
+  last_poses_.Keep(frame_, told);
   if (result.certainty) TellCertainty(*result.certainty, &told);
   output.Add(std::move(told));
   return output;
@@ -424,14 +424,15 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
 
 /// Their last poses come with those of the frames that were tracked.
 void FrontendCore::KeepBelieved(LatePlacement::Placed placed) {
-  unplaced_.SetAside(WaitingFrame(placed.frame));
   const auto before = last_poses_.TrackedBefore(map_, *map_id_, frame_.index);
-  for (LatePlacement::Placed& told : late_.GoOnFrom(map_, tracker_.search(), std::move(placed), before)) {
+  auto believed = late_.GoOnFrom(map_, tracker_.search(), std::move(placed), before);
+  if (believed.empty()) unplaced_.SetAside(WaitingFrame(frame_));
+  for (LatePlacement::Placed& told : believed) {
     unplaced_.ForgetSetAside(told.frame.index);
     frame_ = std::move(told.frame);
     ++counters_.localized_later;
-    last_poses_.Keep(frame_, MakePose(TrackingState::kLocalizedLater, told.report, told.pose),
-                     told.confirmed);
+    last_poses_.KeepPlaced(frame_, MakePose(TrackingState::kLocalizedLater, told.report, told.pose),
+                           told.confirmed);
   }
 }
 
