@@ -26,6 +26,10 @@ inline double SecondsBetween(const InitializerFrame& from, const InitializerFram
   return static_cast<double>(to.stamp_ns - from.stamp_ns) * 1e-9;
 }
 
+inline double SecondsBetween(int64_t from_ns, const InitializerFrame& to) {
+  return static_cast<double>(to.stamp_ns - from_ns) * 1e-9;
+}
+
 /// Why there is no first map yet.
 enum class WaitReason : uint8_t {
   kNone = 0,              ///< there is one
@@ -79,8 +83,8 @@ struct InitialObservation {
   Eigen::Vector2d uv_px = Eigen::Vector2d::Zero();
   double inv_sigma_squared = 1.0;
 };
-/// Poses and points adjusted together; T_cam_world[0] is held. The bundle adjustment lives in a room above
-/// this one, so the caller hands it in. Returns false when it has failed.
+/// Poses and points adjusted together; T_cam_world[0] is held (AdjustInitialMap; handed in, so that a test
+/// can do without). Returns false when it has failed.
 using AdjustFunction =
     std::function<bool(std::vector<Rigid3d>* T_cam_world, std::vector<Eigen::Vector3d>* points,
                        std::span<const InitialObservation> observations)>;

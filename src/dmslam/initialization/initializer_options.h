@@ -12,7 +12,6 @@ namespace dmslam {
 
 /// Several motions explain what several views show, and one of them shall be the camera's.
 struct ContestOptions {
-  bool enabled = true;                    ///< off: only pairs that agree make a map
   int max_motions = 3;                    ///< that are looked for, each in what the ones before leave
   int min_support = 40;                   ///< matches of one, in all views
   double min_distribution_share = 0.175;  ///< root of D over the winner's support, by the image's diagonal
