@@ -1,4 +1,4 @@
-// The whole SLAM over a folder of images, in one program: no LCM, no processes, no threads.
+// The whole SLAM over a folder of images, in one program: no LCM, no other processes.
 //   slam_folder SEQUENCE CAMERA.yaml VOCABULARY.dmv TRAJECTORY.txt [KEY=VALUE ...]
 // SEQUENCE is a folder of the TUM RGB-D benchmark (rgb.txt), of EuRoC, of numbered images, or a video. The
 // trajectory is written in TUM format, world from camera, in units of the map.

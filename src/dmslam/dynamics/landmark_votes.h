@@ -5,14 +5,15 @@
 #include <span>
 #include <unordered_map>
 
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/map/landmark.h"
 
 namespace dmslam {
 
 struct VoteOptions {
-  bool motion_belief = true;   ///< landmarks that are believed to move have no vote; off: all are equal
-  double young_trust = 0.3;    ///< weight of a landmark that was just made...
-  double trusted_age_s = 4.0;  ///< ...which grows to one when it stood still for so long
+  bool motion_belief = true;  ///< landmarks that are believed to move have no vote; off: all are equal
+  double young_trust = 0.3;   ///< weight of a landmark that was just made...
+  double trusted_age_s = kPeopleStandS;  ///< ...which grows to one when it stood still for so long
   int streak_without_vote =
       3;  ///< so many sightings elsewhere in a row cost the vote, before the mapper says so
 

@@ -5,8 +5,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kLeastAgeNs = 667'000'000;  // who is younger may be missed by chance
-
 LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item, int64_t stamp_ns,
                          const MotionBeliefOptions& options) {
   state.visible += item.visible;
@@ -47,9 +45,7 @@ EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
     const Landmark& landmark = map.At(*id);
     const LandmarkEvidence updated = Updated(landmark.evidence, item, evidence.stamp_ns, options);
     ++report.applied;
-    const bool gone = evidence.stamp_ns - landmark.first_ns >= kLeastAgeNs &&
-                      static_cast<double>(updated.found) < options.min_found_share * updated.visible;
-    if (options.enabled && (gone || updated.motion_belief > options.remove_above)) {
+    if (options.enabled && updated.motion_belief > options.remove_above) {
       map.RemoveLandmark(landmark);
       ++report.removed;
     } else {

@@ -16,8 +16,6 @@ struct MotionBeliefOptions {
   float floor = -4.0F;      ///< however long it stood still, it may start to move
   float ceiling = 4.0F;
   float remove_above = 2.5F;  ///< beyond this it leaves the map
-  double min_found_share =
-      0.0;  ///< a landmark found in fewer of the recent frames that should see it leaves the map too
 
   template <typename Visitor>
   void Describe(Visitor& v) {

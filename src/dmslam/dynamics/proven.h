@@ -7,10 +7,13 @@
 
 namespace dmslam {
 
+/// People stand still no longer than this [s]: what was longer in its place is trusted.
+inline constexpr double kPeopleStandS = 4.0;
+
 /// When a landmark is proven to be no part of somebody who stood still for a while.
 struct ProvenOptions {
-  double standing_s = 4.0;     ///< people stand no longer than this...
-  int outer_observations = 2;  ///< ...so a landmark with so many observations outside such a time is proven
+  double standing_s = kPeopleStandS;
+  int outer_observations = 2;  ///< a landmark with so many observations outside such a time is proven
 };
 
 /// So many proven landmarks in view confirm a place.

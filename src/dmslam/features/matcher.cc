@@ -73,7 +73,7 @@ void FeatureMatcher::MatchWindow(const MatchSide& a, const MatchSide& b, const F
   const int limit = FarthestThatCounts(options.match);
   for (uint32_t i = 0; i < a.size(); ++i) {
     const int octave = a.keypoints[i].octave;
-    if (!a.Usable(i) || octave < options.min_octave0 || octave > options.max_octave0) continue;
+    if (!a.Usable(i) || octave > options.max_octave0) continue;
     const SearchArea area = {predicted_px[i], options.window_px, octave - options.octave_slack,
                              octave + options.octave_slack};
     const size_t found = FindInArea(area, b, grid_b);

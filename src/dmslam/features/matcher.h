@@ -45,8 +45,7 @@ struct WindowMatchOptions {
   MatchOptions match;
   double window_px = 100.0;  ///< radius around the predicted position
   int octave_slack = 1;      ///< largest difference of octaves
-  int min_octave0 = 0;       ///< only features of the first image with octaves in [min_octave0, max_octave0]
-  int max_octave0 = 255;
+  int max_octave0 = 255;     ///< only features of the first image with octaves up to this
 };
 
 /// A feature and the group (node of a vocabulary, say) that it falls into.

@@ -10,11 +10,15 @@
 
 namespace dmslam {
 
+/// Root of D (paper, Eq. 3) of a static set, by the image's diagonal: one that is more compact may be
+/// somebody's.
+inline constexpr double kMinDistributionShare = 0.175;
+
 /// Several motions explain what several views show, and one of them shall be the camera's.
 struct ContestOptions {
-  int max_motions = 3;                    ///< that are looked for, each in what the ones before leave
-  int min_support = 40;                   ///< matches of one, in all views
-  double min_distribution_share = 0.175;  ///< root of D over the winner's support, by the image's diagonal
+  int max_motions = 3;   ///< that are looked for, each in what the ones before leave
+  int min_support = 40;  ///< matches of one, in all views
+  double min_distribution_share = kMinDistributionShare;  ///< of the winner's support
   double max_rival_share = 0.3;  ///< D times number of what another motion explains besides, by the winner's
   double step_s = 0.1;           ///< it is held so often at most: it is costly
   double lead_s = 0.35;          ///< it must have won for so long...
@@ -97,7 +101,7 @@ struct InitializerOptions {
     // Agreement over pairs and the comparison of motions over all views decide what one pair leaves open.
     selector.max_rival_share = 0;
     agreement.min_agreement = 0.87;
-    agreement.min_distribution_share = 0.175;
+    agreement.min_distribution_share = kMinDistributionShare;
     agreement.dominance = DominanceOptions{};
   }
 

@@ -116,7 +116,7 @@ Agreement Agree(std::span<const PairView* const> pairs, const Camera& camera,
   agreement.num_static = static_cast<int>(points.size());
   agreement.distribution_px = Spread(points);
   const double share = agreement.num_static / std::max(1.0, static_cast<double>(last.matches.size()));
-  if (agreement.num_static < options.min_static || share < options.min_static_share) {
+  if (agreement.num_static < options.min_static) {
     SetRefusal(AgreementRefusal::kTooFewStatic,
                std::to_string(agreement.num_static) + " matches are static in all pairs", &agreement);
   }

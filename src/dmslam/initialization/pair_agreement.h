@@ -32,7 +32,6 @@ struct AgreementOptions {
   double min_distribution_share = 0.15;       ///< root of D over the static matches, by the image's diagonal
   std::optional<DominanceOptions> dominance;  ///< absent: whatever its share, a compact set is refused
   int min_static = 100;                       ///< matches static in all pairs
-  double min_static_share = 0.0;              ///< share of the last pair's matches that must be static
 
   template <typename Visitor>
   void Describe(Visitor& v) {

@@ -10,8 +10,7 @@
 namespace dmslam {
 namespace {
 
-constexpr double kPaperDistributionShare = 0.175;  // root of D, by the image's diagonal
-constexpr double kPaperMeanParallaxRad = 0.0175;   // one degree
+constexpr double kPaperMeanParallaxRad = 0.0175;  // one degree
 
 double MeanParallax(const TwoViewReconstruction& reconstruction) {
   const Eigen::Vector3d centre1 = reconstruction.T_1_0.Inverse().translation;
@@ -33,18 +32,21 @@ InitializerReport Waiting(WaitReason wait, const char* reason) {
 
 }  // namespace
 
-ReconstructPair ReconstructByRansac(const Camera& camera) {
-  return [camera](std::span<const Match> matches, uint64_t seed) {
-    return ReconstructBaseline(matches, camera, HomographyOrFundamentalOptions(), seed);
+ReconstructPair ReconstructByRansac(const Camera& camera, const Pyramid& pyramid) {
+  HomographyOrFundamentalOptions options;
+  options.reconstruction.pyramid = pyramid;
+  return [camera, options](std::span<const Match> matches, uint64_t seed) {
+    return ReconstructBaseline(matches, camera, options, seed);
   };
 }
 
-ReconstructPair ReconstructByPaper(const Camera& camera) {
+ReconstructPair ReconstructByPaper(const Camera& camera, const Pyramid& pyramid) {
   DlrsacOptions options = DlrsacOptions::Paper();
-  options.min_distribution_share = kPaperDistributionShare;
-  return [camera, selector = Dlrsac(options)](std::span<const Match> matches, uint64_t seed) {
-    ReconstructionOptions gates;
-    gates.min_parallax_rad = 0;  // the paper's is on the mean
+  options.min_distribution_share = kMinDistributionShare;
+  ReconstructionOptions gates;
+  gates.min_parallax_rad = 0;  // the paper's is on the mean
+  gates.pyramid = pyramid;
+  return [camera, gates, selector = Dlrsac(options)](std::span<const Match> matches, uint64_t seed) {
     TwoViewReconstruction reconstruction =
         ReconstructFromStatic(matches, selector.Select(matches, camera, seed), camera, gates);
     if (reconstruction.IsUsable() && MeanParallax(reconstruction) < kPaperMeanParallaxRad) {

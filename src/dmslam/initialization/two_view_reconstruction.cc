@@ -53,9 +53,7 @@ TwoViewReconstruction Reconstruct(std::span<const Rigid3d> candidates, const Mat
   result.num_points = choice->num_good;
   result.parallax_rad = choice->parallax_rad;
   result.median_parallax_rad = choice->median_parallax_rad;
-  const auto asked =
-      static_cast<double>(std::count_if(mask.begin(), mask.end(), [](char c) { return c != 0; }));
-  if (choice->num_good < options.min_points || choice->num_good < options.min_good_share * asked) {
+  if (choice->num_good < options.min_points) {
     result.refusal = ReconstructionRefusal::kTooFewPoints;
     result.explanation = std::to_string(choice->num_good) + " points triangulate well";
   } else if (choice->num_good_second > max_runner_up * choice->num_good) {

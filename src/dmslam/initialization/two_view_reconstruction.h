@@ -30,7 +30,6 @@ struct ReconstructionOptions {
   double min_parallax_rad = 0.0175;  ///< of the points, by ORB-SLAM2's measure: the 50th largest
   double max_runner_up = 0.7;        ///< the second best pose may explain this share of what the best does
   double max_reprojection_squared_px = 4.0;  ///< in both views, times the octaves' variance
-  double min_good_share = 0.0;               ///< of the static matches that must triangulate well
   Pyramid pyramid;
 };
 

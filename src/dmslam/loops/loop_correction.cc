@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/optimization/essential_graph.h"
 #include "dmslam/optimization/map_adjustment.h"
@@ -14,8 +15,8 @@
 namespace dmslam {
 namespace {
 
-constexpr double kFuseRadiusPx = 4.0;  // times the scale of the predicted octave
-constexpr int kMinLoopEdge = 20;       // pairs of fused landmarks that make an edge between two keyframes
+constexpr double kFuseRadiusRad = 0.0075;  // times the scale of the predicted octave
+constexpr int kMinLoopEdge = 20;           // pairs of fused landmarks that make an edge between two keyframes
 
 /// Poses that the loop asks of the keyframe and its neighbours: S_cam_world (corrected).
 using GroupPoses = std::map<KeyframeId, Sim3d>;
@@ -63,9 +64,10 @@ Fusions FindFusions(const Map& map, const VerifiedLoop& loop, const LoopVerifier
       if (both) fusions.Add(map, mine, match.landmark, group);
     }
   };
+  const double fuse_radius_px = SearchRadiusPx(map.camera(), kFuseRadiusRad);
   for (const auto& [id, S_cam_world] : group) {
     const Keyframe& keyframe = *map.FindKeyframe(id);
-    add_all(keyframe, verifier.Look(map, keyframe, S_cam_world.ToRigid(), loop.landmarks, kFuseRadiusPx));
+    add_all(keyframe, verifier.Look(map, keyframe, S_cam_world.ToRigid(), loop.landmarks, fuse_radius_px));
   }
   return fusions;
 }

@@ -13,7 +13,7 @@ struct JoiningOptions {
   double min_share = 0.7;     ///< of all that should be seen
   // Behind people little of all that should be seen is. Then much of what outlasts them must be: a picture
   // that hangs in two places shows a quarter of it.
-  int min_proven = 50;
+  int min_proven = kManyProven;
   double min_proven_share = 0.7;
   // Between two maps that are both too young to have anything proven: cells of the image in which a good part
   // of the place is seen, and those of them at the image's rim. Of all cells that should show several of its

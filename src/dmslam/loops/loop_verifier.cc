@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <map>
 
+#include "dmslam/camera/image_cells.h"
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/proven.h"
@@ -20,7 +21,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int kCellColumns = 8, kCellRows = 6;
 constexpr int kPlaceNeighbours = 15;
 constexpr int kPlaceNeighboursMatched = 5;
 constexpr int kMaxPoseIterations = 1000;
@@ -28,16 +28,9 @@ constexpr size_t kMinDepthRatios = 5;
 constexpr double kMaxScaleError = 0.03;  // standard error of a scale to be taken, as a share of it
 constexpr ViewLimits kSurelySeen{.min_view_cos = 0.7, .distance_slack = 1.0, .border_px = 0};
 
-size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
-  const int column =
-      std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
-  const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
-  return static_cast<size_t>(row * kCellColumns + column);
-}
-
 /// What should be seen in each cell of the image, and is.
 struct CellCounts {
-  std::array<int, kCellColumns * kCellRows> expected{}, found{};
+  std::array<int, kNumCells> expected{}, found{};
 
   void Tell(PlaceSupport* support) const {
     constexpr int kSeveral = 3;

@@ -52,6 +52,7 @@ void LoopcloserCore::ForgetMap() {
   asked_again_ = {};
   sightings_.Clear();
   awaited_correction_.reset();
+  // An adjustment that is due stays so: the loop that asked for it may be in the snapshot.
 }
 
 LoopAnswer LoopcloserCore::Check(KeyframeId id) {

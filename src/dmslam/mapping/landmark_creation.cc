@@ -136,8 +136,7 @@ class PartnerSearch {
         second = distance;
       }
     }
-    const bool unambiguous =
-        pair_.options.descriptor_ratio >= 1.0 || best < pair_.options.descriptor_ratio * second;
+    const bool unambiguous = best < pair_.options.descriptor_ratio * second;
     return best <= pair_.options.max_descriptor_distance && unambiguous ? best_feature : -1;
   }
 

@@ -19,7 +19,7 @@ struct LandmarkCreationOptions {
   int neighbours = 20;            ///< covisible keyframes that are matched with the new one
   double min_baseline_over_depth = 0.01;
   int max_descriptor_distance = 50;  ///< bits
-  double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line; 1 = not asked
+  double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line
   double epipolar_sigmas_squared = kRoundedChiSquared1Dof;
   double min_parallax_rad = 0.0087;     ///< between the rays of a point, in the newest keyframe...
   double min_past_parallax_rad = 0.02;  ///< ...and in one that is placed after those that follow it

@@ -63,7 +63,7 @@ class Adjustment {
     FlagOutliers(&report);
     if (!report.usable) return report;
     const std::vector<Rigid3d> poses_before = std::exchange(problem().T_cam_world, state_.poses);
-    if (options_.keep_scale) KeepScale(poses_before);
+    KeepScale(poses_before);
     return report;
   }
 

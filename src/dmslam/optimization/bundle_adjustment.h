@@ -42,10 +42,6 @@ struct BundleOptions {
   /// A stage ends when a step gains less than this share of the cost (ten times it in the first of two
   /// stages).
   double relative_tolerance = 1e-4;
-  /// Without a fixed pose, pose 0 is held. With exactly one pose held the scale is free as well; then, if
-  /// this is set, poses and points are rescaled about the held camera at the end, so that the farthest camera
-  /// keeps its distance.
-  bool keep_scale = true;
   /// Asked before every step; true ends the adjustment early, with the best state so far (`interrupted` in
   /// the report). It reads a flag and does nothing else.
   std::function<bool()> interrupt;

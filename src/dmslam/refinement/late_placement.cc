@@ -14,7 +14,7 @@ namespace {
 
 constexpr int64_t kNearNs = 500'000'000;  // a placed frame so near in time bounds where a frame may be
 constexpr int kWellSeen = 50;             // static features...
-constexpr int kWellSeenCells = 8;         // ...and the cells of an 8 x 6 grid that hold them
+constexpr int kWellSeenCells = 8;         // ...and the cells of the image (kNumCells) that hold them
 constexpr double kMaxSpeed = 1.5;         // depths of the scene per second
 constexpr double kMaxTurnRadPerS = 3.0;
 constexpr size_t kKeyframesAside = 3;   // whose motion bounds that of the frames between them...
@@ -143,23 +143,23 @@ void LatePlacement::Coast(const Map& map, const FoundPose& weak_pose, const Trac
                           const PoseSearch& search, const TrackedFrame& frame) {
   follower_->Coast(map, weak_pose, Backwards(frame.index, frame.stamp_ns));
   const auto pose = PlacedPose::Of(map, weak_pose.T_cam_world, search.reference());
-  if (pose && report.num_static >= options_.min_coasting_inliers) weak_.push_back({frame, report, *pose});
+  if (pose && report.num_static >= options_.min_coasting_inliers)
+    weak_.push_back({.frame = frame, .report = report, .pose = *pose});
 }
 
-TrackingReport LatePlacement::Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer,
-                                    TrackedFrame* frame) {
+LatePlacement::Found LatePlacement::Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer,
+                                          TrackedFrame* frame) {
   FindNeighbour(map, *frame);
-  jumped_ = false;
-  TrackingReport report = TrackBackwards(map, search, frame);
-  if (report.ok) return report;
+  Found found{TrackBackwards(map, search, frame)};
+  if (found.report.ok) return found;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
-  jumped_ = true;
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
   if (!relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
-  report = search->InLocalMap(map, true, std::nullopt, frame);
+  found = {search->InLocalMap(map, true, std::nullopt, frame), true};
+  TrackingReport& report = found.report;
   report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
-  return report;
+  return found;
 }
 
 /// Whether the motion of the frame placed last goes on to there.
@@ -171,12 +171,12 @@ bool LatePlacement::LeadsTo(const Map& map, const std::optional<Before>& before)
 std::vector<LatePlacement::Placed> LatePlacement::GoOnFrom(const Map& map, const PoseSearch& search,
                                                            Placed placed,
                                                            const std::optional<Before>& before) {
-  if (jumped_) weak_.clear();
+  if (placed.jumped) weak_.clear();
   if (!follower_) follower_.emplace(options_);
   const FrameTime time = Backwards(placed.frame.index, placed.frame.stamp_ns);
-  follower_->OnTracked(map, placed.pose, search.found(placed.frame), time, placed.frame, jumped_);
+  follower_->OnTracked(map, placed.pose, search.found(placed.frame), time, placed.frame, placed.jumped);
   last_ = Last{placed.frame.index, placed.pose};
-  const bool believed = jumped_ || IsWellSeen(placed.report) || LeadsTo(map, before);
+  const bool believed = placed.jumped || IsWellSeen(placed.report) || LeadsTo(map, before);
   placed.confirmed = CountProven(map, placed.frame.landmarks, {}) >= kManyProven;
   weak_.push_back(std::move(placed));
   if (!believed) return {};

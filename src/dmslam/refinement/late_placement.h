@@ -37,14 +37,19 @@ class LatePlacement {
   void SetGrowing(bool growing) { growing_ = growing; }
   bool IsGrowing() const { return growing_; }
 
-  /// Finds the frame's pose; not ok where it is not believed. `search` and `relocalizer`: of the frontend.
-  TrackingReport Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer,
-                       TrackedFrame* frame);
+  struct Found {
+    TrackingReport report;
+    bool jumped = false;  ///< recognised like a lost camera, and not followed from its neighbour
+  };
+  /// Finds the frame's pose; the report is not ok where it is not believed. `search` and `relocalizer`: of
+  /// the frontend.
+  Found Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer, TrackedFrame* frame);
   /// A frame with its pose.
   struct Placed {
     TrackedFrame frame;
     TrackingReport report;
     PlacedPose pose;
+    bool jumped = false;     ///< as it was found
     bool confirmed = false;  ///< by landmarks in view that are proven to be no person
   };
   /// Where and when the camera was before.
@@ -87,7 +92,6 @@ class LatePlacement {
     PlacedPose pose;
   };
   std::optional<Last> last_;
-  bool jumped_ = false;       ///< the present frame was recognised, and not followed from its neighbour
   std::vector<Placed> weak_;  ///< since the frame that was believed last
 };
 

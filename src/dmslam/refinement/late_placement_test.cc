@@ -89,12 +89,14 @@ class GrowingBack : public ::testing::Test {
     return frame;
   }
   TrackingReport Place(TrackedFrame* frame) {
-    return placement_.Place(scene_.map(), &search_, relocalizer_, frame);
+    const LatePlacement::Found found = placement_.Place(scene_.map(), &search_, relocalizer_, frame);
+    jumped_ = found.jumped;
+    return found.report;
   }
   std::vector<LatePlacement::Placed> GoOnFrom(const TrackedFrame& frame, const TrackingReport& report,
                                               const std::optional<LatePlacement::Before>& before = {}) {
     const PlacedPose pose = *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference());
-    return placement_.GoOnFrom(scene_.map(), search_, {frame, report, pose}, before);
+    return placement_.GoOnFrom(scene_.map(), search_, {frame, report, pose, jumped_}, before);
   }
   static LatePlacement::Before Tracked(uint32_t index, double x) {
     return {index, index * kFrameNs, MapScene::PoseAt(x)};
@@ -128,6 +130,7 @@ class GrowingBack : public ::testing::Test {
   MapScene scene_;
   Relocalizer relocalizer_;
   PoseSearch search_;
+  bool jumped_ = false;  ///< the frame placed last was recognised
   LatePlacement placement_;
 };
 
@@ -209,10 +212,10 @@ TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
     LatePlacement placement(MapScene::kSession, 0, 0, {});
     placement.SetGrowing(true);
     TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(0));
-    const TrackingReport report = placement.Place(scene.map(), &search, relocalizer, &frame);
+    const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &frame);
     ASSERT_TRUE(report.ok) << report.reason;
     const PlacedPose pose = *PlacedPose::Of(scene.map(), frame.T_cam_world, search.reference());
-    const auto told = placement.GoOnFrom(scene.map(), search, {frame, report, pose}, std::nullopt);
+    const auto told = placement.GoOnFrom(scene.map(), search, {frame, report, pose, jumped}, std::nullopt);
     ASSERT_EQ(told.size(), 1u);
     EXPECT_EQ(told.front().confirmed, keyframes == 280u);
   }
@@ -233,18 +236,18 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
   };
   for (const uint32_t index : {19u, 18u}) {
     TrackedFrame frame = see(index);
-    const TrackingReport report = placement.Place(scene.map(), &search, relocalizer, &frame);
+    const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &frame);
     ASSERT_TRUE(report.ok) << index << ": " << report.reason;
     const PlacedPose pose = *PlacedPose::Of(scene.map(), frame.T_cam_world, search.reference());
-    placement.GoOnFrom(scene.map(), search, {frame, report, pose}, std::nullopt);
+    placement.GoOnFrom(scene.map(), search, {frame, report, pose, jumped}, std::nullopt);
   }
   for (const uint32_t index : {17u, 16u, 15u}) {
     TrackedFrame dark(index, index * kFrameNs,
                       MakeFrameFeatures({}, scene.map().camera(), scene.map().pyramid()));
-    EXPECT_FALSE(placement.Place(scene.map(), &search, relocalizer, &dark).ok);
+    EXPECT_FALSE(placement.Place(scene.map(), &search, relocalizer, &dark).report.ok);
   }
   TrackedFrame again = see(14);
-  const TrackingReport report = placement.Place(scene.map(), &search, relocalizer, &again);
+  const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &again);
   ASSERT_TRUE(report.ok) << report.reason;
   EXPECT_NEAR(again.T_cam_world.Center().x(), -0.6, 5e-3);
 }

@@ -18,7 +18,6 @@ struct RansacOptions {
   int min_iterations = 0;
   double confidence = 0.99;  ///< Probability that one sample was all inliers when the loop stops early.
   int min_inliers = 0;       ///< Fewer: no success.
-  bool refit = true;         ///< Refit a new best model to its inliers at once (where the problem can).
   uint64_t seed = 0;
 };
 
@@ -147,9 +146,7 @@ RansacReport<typename P::Model> Ransac(const P& problem, const RansacOptions& op
       better = true;
     }
     if (!better) continue;
-    if constexpr (RefittingProblem<P>) {
-      if (options.refit) RefitBest(problem, indices, report);
-    }
+    if constexpr (RefittingProblem<P>) RefitBest(problem, indices, report);
     const double share = static_cast<double>(report.num_inliers) / count;
     limit = std::max(options.min_iterations,
                      RansacIterations(share, P::kSampleSize, options.confidence, options.max_iterations));

@@ -19,15 +19,19 @@ FirstMapSearch Search(TwoFrameInitializer initializer) {
 }  // namespace
 
 FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
-                                  const Camera& camera, uint64_t seed) {
-  if (method == "ransac") return Search(TwoFrameInitializer({}, camera, ReconstructByRansac(camera), seed));
+                                  const Camera& camera, const Pyramid& pyramid, uint64_t seed) {
+  if (method == "ransac") {
+    return Search(TwoFrameInitializer({}, camera, ReconstructByRansac(camera, pyramid), seed));
+  }
   if (method == "paper") {
     TwoFrameOptions some_frames_apart;
     some_frames_apart.min_gap_s = kPaperGapS;
-    return Search(TwoFrameInitializer(some_frames_apart, camera, ReconstructByPaper(camera), seed));
+    return Search(TwoFrameInitializer(some_frames_apart, camera, ReconstructByPaper(camera, pyramid), seed));
   }
   InitializerOptions chosen = options;
   chosen.method = method;
+  chosen.selector.inlier.pyramid = pyramid;
+  chosen.reconstruction.pyramid = pyramid;
   auto initializer = std::make_shared<Initializer>(chosen, camera, seed, AdjustInitialMap(camera.Ideal()));
   return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
 }

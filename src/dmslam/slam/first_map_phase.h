@@ -13,9 +13,10 @@ namespace dmslam {
 /// Takes a frame of the stream in which a first map is looked for, and says what is known by now.
 using FirstMapSearch = std::function<InitializerReport(const InitializerFrame&)>;
 
-/// The search that `method` stands for: dlrsac, arsac, or of two frames alone: ransac, paper.
+/// The search that `method` stands for: dlrsac, arsac, or of two frames alone: ransac, paper. These two know
+/// nothing of `options`. `pyramid` is the features'.
 FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
-                                  const Camera& camera, uint64_t seed);
+                                  const Camera& camera, const Pyramid& pyramid, uint64_t seed);
 
 /// Looks for a first map in the frames of a stream; begins anew when a map was given up.
 class FirstMapPhase {

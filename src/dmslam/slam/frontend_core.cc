@@ -33,8 +33,8 @@ int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
 
 std::function<FirstMapSearch()> SearchMaker(const FrontendCore::Setup& setup) {
   return [method = setup.options.initializer_method, options = setup.initializer, camera = setup.camera,
-          seed = setup.seed, run = setup.run_search] {
-    FirstMapSearch search = MakeFirstMapSearch(method, options, camera, seed);
+          pyramid = setup.pyramid, seed = setup.seed, run = setup.run_search] {
+    FirstMapSearch search = MakeFirstMapSearch(method, options, camera, pyramid, seed);
     return run ? run(std::move(search)) : search;
   };
 }
@@ -390,12 +390,14 @@ KeyframeProposal FrontendCore::ProposeKeyframe(const PlacedPose& pose) {
 
 // ---- After the end ----
 
-/// The newest of the frames without a pose becomes the present one; its report if it was placed.
-std::optional<TrackingReport> FrontendCore::PlaceNewestUnplaced() {
+/// The newest of the frames without a pose becomes the present one; with its pose if it was placed.
+std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced() {
   frame_ = unplaced_.TakeNewest().ToTracked(camera_, pyramid_);
-  const TrackingReport report = late_.Place(map_, &tracker_.search(), tracker_.relocalizer(), &frame_);
-  if (!report.ok || map_.FindKeyframe(tracker_.search().reference()) == nullptr) return std::nullopt;
-  return report;
+  const LatePlacement::Found found = late_.Place(map_, &tracker_.search(), tracker_.relocalizer(), &frame_);
+  if (!found.report.ok) return std::nullopt;
+  const auto pose = PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
+  if (!pose) return std::nullopt;
+  return LatePlacement::Placed{frame_, found.report, *pose, found.jumped};
 }
 
 std::optional<FrontendOutput> FrontendCore::GrowBack() {
@@ -406,50 +408,47 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
     unplaced_.ReturnSetAside();  // they are tried again in the adjusted map
     return std::nullopt;
   }
-  const std::optional<TrackingReport> report = PlaceNewestUnplaced();
-  if (!report) {
+  std::optional<LatePlacement::Placed> placed = PlaceNewestUnplaced();
+  if (!placed) {
     tracker_.search().judge().DropEvidence();
     unplaced_.SetAside(WaitingFrame(frame_));
     return FrontendOutput();
   }
-  const PlacedPose pose = *PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
-  map_id_ = map_.FindKeyframe(pose.reference)->map_id;
+  const KeyframeId reference = placed->pose.reference;
+  map_id_ = map_.FindKeyframe(reference)->map_id;
   // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
   const bool known = map_.ResolveKeyframe(ThisFrame()).has_value();
+  const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(placed->report, reference);
   FrontendOutput output;
-  ReportLandmarks(pose, IsWellSeen(*report) && !known && WantsKeyframe(*report, pose.reference), &output);
-  KeepBelieved({frame_, *report, pose});
+  ReportLandmarks(placed->pose, wanted, &output);
+  KeepBelieved(*std::move(placed));
   return output;
 }
 
-/// Their last poses come with those of the frames that were tracked.
+/// While the map grows, last poses come with those of the frames that were tracked, and a frame that is not
+/// believed yet is set aside.
 void FrontendCore::KeepBelieved(LatePlacement::Placed placed) {
-  const auto before = last_poses_.TrackedBefore(map_, *map_id_, frame_.index);
+  const MapId map_id = map_.FindKeyframe(placed.pose.reference)->map_id;
+  const auto before = last_poses_.TrackedBefore(map_, map_id, frame_.index);
   auto believed = late_.GoOnFrom(map_, tracker_.search(), std::move(placed), before);
-  if (believed.empty()) unplaced_.SetAside(WaitingFrame(frame_));
+  const bool grows = late_.IsGrowing();
+  if (believed.empty() && grows) unplaced_.SetAside(WaitingFrame(frame_));
   for (LatePlacement::Placed& told : believed) {
-    unplaced_.ForgetSetAside(told.frame.index);
     frame_ = std::move(told.frame);
     ++counters_.localized_later;
-    last_poses_.KeepPlaced(frame_, MakePose(TrackingState::kLocalizedLater, told.report, told.pose),
-                           told.confirmed);
+    const FramePose pose = MakePose(TrackingState::kLocalizedLater, told.report, told.pose);
+    if (grows) {
+      unplaced_.ForgetSetAside(frame_.index);
+      last_poses_.KeepPlaced(frame_, pose, told.confirmed);
+    } else {
+      last_poses_.AddPlaced(map_, frame_, pose, told.confirmed);
+    }
   }
 }
 
 bool FrontendCore::WorkAtEnd() {
   if (unplaced_.empty()) return last_poses_.Improve(map_);
-  const std::optional<TrackingReport> report = PlaceNewestUnplaced();
-  if (!report) return true;
-  const PlacedPose pose = *PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
-  const auto before =
-      last_poses_.TrackedBefore(map_, map_.FindKeyframe(pose.reference)->map_id, frame_.index);
-  for (LatePlacement::Placed& told :
-       late_.GoOnFrom(map_, tracker_.search(), {frame_, *report, pose}, before)) {
-    frame_ = std::move(told.frame);
-    ++counters_.localized_later;
-    last_poses_.AddPlaced(map_, frame_, MakePose(TrackingState::kLocalizedLater, told.report, told.pose),
-                          told.confirmed);
-  }
+  if (std::optional<LatePlacement::Placed> placed = PlaceNewestUnplaced()) KeepBelieved(*std::move(placed));
   return true;
 }
 

@@ -130,7 +130,7 @@ class FrontendCore {
   FramePose NoPose(TrackingState state, std::string reason) const;
   FramePose MakePose(TrackingState state, const TrackingReport& report,
                      const std::optional<PlacedPose>& pose) const;
-  std::optional<TrackingReport> PlaceNewestUnplaced();
+  std::optional<LatePlacement::Placed> PlaceNewestUnplaced();
   void KeepBelieved(LatePlacement::Placed placed);
 
   // What is given

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "dmslam/tracking/image_cells.h"
+#include "dmslam/camera/image_cells.h"
 
 namespace dmslam {
 namespace {

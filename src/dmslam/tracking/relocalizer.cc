@@ -5,6 +5,7 @@
 
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/proven.h"
+#include "dmslam/map/conventions.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/util/random.h"
 
@@ -15,15 +16,13 @@ constexpr size_t kMaxCandidates = 8;
 constexpr size_t kMinMatches = 15;
 constexpr int kMinInliers = 12;
 constexpr int kMaxIterations = 1000;
-constexpr int kMinCovisibility = 15;
 constexpr int kNeighboursOfLast = 4;
 constexpr int kMaxRounds = 4;  // of the search in the local map
 // Where no single keyframe gives enough matches: what the first places and the
 // keyframe seen last show together with their neighbours.
 constexpr ptrdiff_t kPlacesTogether = 3;
 constexpr int kNeighboursTogether = 5;
-// Of a keyframe, or of places together: so many landmarks that are proven to be no person speak alone.
-constexpr ptrdiff_t kEnoughProven = 50;
+// Of places together: so many landmarks that are proven to be no person speak alone (of one: kManyProven).
 constexpr ptrdiff_t kEnoughProvenTogether = 150;
 
 /// One entry per feature of a keyframe: 1 where it sees a landmark that may say where the camera is.
@@ -33,7 +32,7 @@ std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) 
   for (size_t i = 0; i < proven.size(); ++i) {
     if (proven[i] != 0) proven[i] = IsProven(map, *map.FindLandmark(keyframe.landmarks[i]), {}) ? 1 : 0;
   }
-  return std::count(proven.begin(), proven.end(), 1) >= kEnoughProven ? proven : still;
+  return std::count(proven.begin(), proven.end(), 1) >= kManyProven ? proven : still;
 }
 
 }  // namespace

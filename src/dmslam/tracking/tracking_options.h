@@ -48,7 +48,6 @@ struct KeyframeOptions {
   /// Of the landmarks that the reference keyframe sees: fewer tracked asks for a keyframe. Keyframes that
   /// turn out to say nothing new are removed again (mapping.redundant_share).
   double tracked_ratio = 1.0;
-  int min_inliers = 15;
 
   template <typename Visitor>
   void Describe(Visitor& v) {

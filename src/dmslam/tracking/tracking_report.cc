@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "dmslam/tracking/image_cells.h"
+#include "dmslam/camera/image_cells.h"
 
 namespace dmslam {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 
+#include "dmslam/camera/image_cells.h"
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/motion_segmentation/match_frames.h"
 #include "dmslam/motion_segmentation/turn.h"
-#include "dmslam/tracking/image_cells.h"
 #include "dmslam/util/time.h"
 
 namespace dmslam {
