@@ -46,11 +46,11 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.catch_up_in_portions = !pace_.lockstep;
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
-  left_.emplace(session_, options_.camera_id);
+  left_ = LeftBehind{LeftKeyframes(session_, options_.camera_id), {}};
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(
       &core_->map(), [this] { return HandOverVersion(); },
-      [this] { return work_->Idle() && applied_ == promised_; });
+      [this] { return work_->Idle() && held_.IsUpToDate(); });
   WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
 }
 
@@ -60,7 +60,7 @@ bool FrontendNode::ReadyToWrite() {
   if (!map_reader_->term().valid()) return !options_.HasPeer("mapper");
   if (!work_->Idle()) return false;
   TakeMapRecords();
-  ApplyHeldRecords(NumReadyRecords(true), true);
+  ApplyHeldRecords(held_.NumReady(true), true);
   if (!work_->Idle()) return false;
   const bool caught_up = map_reader_->state() == StreamReader::State::kFollowing &&
                          map_reader_->backlog() == 0 && held_.empty() && !MapComesInParts() &&
@@ -75,23 +75,23 @@ bool FrontendNode::ReadyToWrite() {
   core_->Resume();
   if (map.keyframes().empty()) return true;
   const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id);
-  if (newest != nullptr && newest->id.frame_index() > 0) last_index_ = newest->id.frame_index() - 1;
+  if (newest != nullptr && newest->id.frame_index() > 0) newest_ = {newest->id.frame_index() - 1, {}};
   // A player that was started again, too, begins from the front until it hears how far we are.
-  if (waiting_ && last_index_ && waiting_->frame.frame_index <= *last_index_) waiting_.reset();
+  if (waiting_ && newest_ && waiting_->frame.frame_index <= newest_->index) waiting_.reset();
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
   return true;
 }
 
 /// Nothing that was taken is left behind: a mapper that continued without it would find this reader ahead.
 Version FrontendNode::HandOverVersion() {
-  if (!work_->Idle() || core_->NeedsMapUnchanged()) return promised_;
+  if (!work_->Idle() || core_->NeedsMapUnchanged()) return held_.promised();
   TakeMapRecords();
-  ApplyHeldRecords(NumReadyRecords(true), true);
-  return promised_;
+  ApplyHeldRecords(held_.NumReady(true), true);
+  return held_.promised();
 }
 
 void FrontendNode::OnWriterOpen() {
-  left_until_ns_ = context_.now_ns() + kBackAfterDeathNs;
+  left_->until_ns = context_.now_ns() + kBackAfterDeathNs;
   SessionStart start;
   start.session = session_;
   start.camera_id = options_.camera_id;
@@ -123,11 +123,12 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   if (!frame || IsForeignFrame(frame->session)) return;
   if (frame->frame_index >= kTheEnd)
     return CountMalformed(channels::kFrame, "its number is beyond what a session can hold; begin a new one");
-  const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && frame->stamp_ns <= last_stamp_ns_;
-  if (last_index_ && (frame->frame_index <= *last_index_ || goes_back)) {
+  const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && newest_ && newest_->stamp_ns &&
+                         frame->stamp_ns <= *newest_->stamp_ns;
+  if (newest_ && (frame->frame_index <= newest_->index || goes_back)) {
     order_.OnRepeat();
     // A repeat, or a player that was started again: say how far we are, unless that is still being worked on.
-    if (!pace_.frame_open) PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
+    if (!pace_.frame_open) PublishLoose(DoneWithNewest());
     return;
   }
   if (waiting_ && waiting_->frame.frame_index == frame->frame_index) return order_.OnRepeat();
@@ -141,11 +142,15 @@ void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
   waiting_ = Waiting{std::move(*frame), context_.wall_us()};
 }
 
-/// That was taken in; none: none was, or it is known from the map alone, which knows no stamp.
+/// That was taken in; none: none was, or its stamp is not known.
 std::optional<PlayOrder::Place> FrontendNode::NewestFrame() const {
   if (waiting_) return PlayOrder::Place{waiting_->frame.frame_index, waiting_->frame.stamp_ns};
-  if (!last_index_ || last_stamp_ns_ == 0) return std::nullopt;
-  return PlayOrder::Place{*last_index_, last_stamp_ns_};
+  if (!newest_ || !newest_->stamp_ns) return std::nullopt;
+  return PlayOrder::Place{newest_->index, *newest_->stamp_ns};
+}
+
+FrameDone FrontendNode::DoneWithNewest() const {
+  return {session_, newest_->index, newest_->stamp_ns.value_or(0)};
 }
 
 void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
@@ -157,17 +162,18 @@ void FrontendNode::OnEndOfSequence(std::span<const uint8_t> bytes) {
 
 /// Our own, or what a frontend before this one has left.
 void FrontendNode::OnKeyframe(std::span<const uint8_t> bytes) {
-  const bool in_time = !left_until_ns_ || context_.now_ns() < *left_until_ns_;
+  if (!left_) return;
+  const bool in_time = !left_->until_ns || context_.now_ns() < *left_->until_ns;
   const std::optional<RecordHeader> header = ParseHeader(bytes);
   const bool ours = writer_ && header && Term{header->epoch, header->writer} == writer_->term();
-  if (left_ && in_time && !ours) left_->Hear(bytes);
+  if (in_time && !ours) left_->keyframes.Hear(bytes);
 }
 
 /// Before this frontend proposes anything itself.
 bool FrontendNode::ProposeWhatWasLeft() {
   using Phase = SequenceEnd::Phase;
   if (!end_.Is(Phase::kPlaying) && !end_.Is(Phase::kGrowingBack)) return false;
-  const auto proposal = left_->Next(core_->map(), writer_->term());
+  const auto proposal = left_->keyframes.Next(core_->map(), writer_->term());
   if (!proposal) return false;
   LogInfo("frontend: the one before it left behind the keyframe of frame {}; it is proposed again",
           proposal->id.frame_index());
@@ -177,44 +183,24 @@ bool FrontendNode::ProposeWhatWasLeft() {
 
 // ---- The map ----
 
-/// A snapshot takes the place of the replica when all of it is here.
 void FrontendNode::TakeMapRecords() {
   while (std::optional<Record> record = map_reader_->Take()) {
-    if (record->begins_anew()) {
-      held_.clear();
-      promised_ = applied_;
-      map_begins_anew_ = true;
-    }
+    if (record->begins_anew()) held_.BeginAnew();
     auto delta = ReadMapRecord(*record, map_reader_.get());
-    if (!delta) continue;
-    held_.push_back({std::move(*delta), record->version(), std::exchange(map_begins_anew_, false),
-                     record->in_snapshot(), record->ends_snapshot()});
+    if (delta)
+      held_.Add(std::move(*delta), record->version(), record->in_snapshot(), record->ends_snapshot());
   }
-}
-
-/// In real time records are applied as they come. In lock-step they are applied up to a settled record, so
-/// that which frame sees what does not depend on how fast the mapper was with what nobody waits for
-/// (evidence). `all`: as in real time.
-size_t FrontendNode::NumReadyRecords(bool all) const {
-  size_t ready = held_.size();
-  const auto is_ready = [&](const HeldRecord& held) {
-    if (held.in_snapshot) return held.ends_snapshot;
-    const MapEvent event = held.delta.event;
-    return all || !pace_.lockstep || event == MapEvent::kSettled || event == MapEvent::kTurn;
-  };
-  while (ready > 0 && !is_ready(held_[ready - 1])) --ready;
-  return ready;
 }
 
 /// Where the maps have been adjusted, frames are refined before the next record; `at_once`: within this job,
 /// else one by one in jobs of their own.
 void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
   if (count == 0) return;
-  promised_ = held_[count - 1].version;
+  held_.Promise(count);
   work_->Post([this, count, at_once] {
     size_t applied = 0;
     for (; applied < count && (at_once || !core_->IsRefining()); ++applied) {
-      const HeldRecord& held = held_[applied];
+      const HeldRecords::Held& held = held_[applied];
       if (held.begins_anew) core_->ForgetMap();
       core_->ApplyMapDelta(held.delta);
     }
@@ -225,14 +211,12 @@ void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
 /// Only what is applied is accepted: what is held back could not be handed over.
 void FrontendNode::OnApplied(size_t count) {
   for (; count > 0; --count) {
-    const HeldRecord& held = held_.front();
+    const HeldRecords::Held held = held_.PopApplied();
     if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer();
     const bool ours = held.delta.event == MapEvent::kTurn && held.delta.about->camera() == options_.camera_id;
     if (ours && pace_.turn.asked == held.delta.about->frame_index()) pace_.turn.given = pace_.turn.asked;
-    applied_ = held.version;
-    held_.pop_front();
   }
-  map_reader_->Accept(applied_);
+  map_reader_->Accept(held_.applied());
 }
 
 int FrontendNode::UnacceptedKeyframes() {
@@ -275,7 +259,7 @@ bool FrontendNode::WorkOnce() {
   if (core_->IsRefining()) return Refine();
   if (!core_->NeedsMapUnchanged()) {
     TakeMapRecords();
-    ApplyHeldRecords(NumReadyRecords(end_.AppliesAllRecords()), false);
+    ApplyHeldRecords(held_.NumReady(!pace_.lockstep || end_.AppliesAllRecords()), false);
     if (!work_->Idle()) return false;
   }
   if (end_.Is(SequenceEnd::Phase::kDone)) {
@@ -364,7 +348,8 @@ bool FrontendNode::Join() {
 bool FrontendNode::MapsAreAdjusted() {
   if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
   if (end_.Asks(context_.now_ns()))
-    PublishRecord(AdjustRequest{++requests_, "the sequence has ended", last_stamp_ns_, options_.camera_id});
+    PublishRecord(AdjustRequest{++requests_, "the sequence has ended",
+                                newest_ ? DoneWithNewest().stamp_ns : 0, options_.camera_id});
   return end_.IsAnswered();
 }
 
@@ -397,9 +382,8 @@ bool FrontendNode::CatchUp() {
 bool FrontendNode::TrackWaiting() {
   const auto waiting = std::make_shared<const Waiting>(std::move(*waiting_));
   waiting_.reset();
-  last_index_ = waiting->frame.frame_index;
-  last_stamp_ns_ = waiting->frame.stamp_ns;
-  if (first_map_.since_ns == 0) first_map_.since_ns = last_stamp_ns_;
+  newest_ = {waiting->frame.frame_index, waiting->frame.stamp_ns};
+  if (!first_map_.since_ns) first_map_.since_ns = newest_->stamp_ns;
   pace_.frame_open = true;
   const bool withheld = UnacceptedKeyframes() >= kMaxUnacceptedKeyframes;
   return Run([this, waiting, withheld] { Track(*waiting, withheld); });
@@ -474,7 +458,7 @@ FeatureView FrontendNode::ViewOfFeatures() const {
 /// On the core.
 void FrontendNode::DrawPicture(const FrontendOutput& output) {
   const TrackedFrame& frame = core_->frame();
-  if (extras_.picture_every <= 0 || *last_index_ % static_cast<uint32_t>(extras_.picture_every) != 0) return;
+  if (extras_.picture_every <= 0 || frame.index % static_cast<uint32_t>(extras_.picture_every) != 0) return;
   for (auto event = output.events.rbegin(); event != output.events.rend(); ++event) {
     const auto* pose = std::get_if<FramePose>(&*event);
     if (pose) return WritePicture(extras_.picture_dir, image_, frame, *pose);
@@ -489,8 +473,8 @@ void FrontendNode::Publish(const std::vector<FrontendEvent>& events) {
     }
     if (const auto* pose = std::get_if<FramePose>(&event)) {
       last_pose_ = *pose;
-      if (!first_map_.after_s && pose->HasPose()) {
-        first_map_.after_s = static_cast<double>(pose->stamp_ns - first_map_.since_ns) * 1e-9;
+      if (!first_map_.after_s && first_map_.since_ns && pose->HasPose()) {
+        first_map_.after_s = static_cast<double>(pose->stamp_ns - *first_map_.since_ns) * 1e-9;
       }
     }
     if (std::holds_alternative<MapReset>(event)) {
@@ -565,7 +549,7 @@ void FrontendNode::PublishView(const FrameTrace& trace) {
 
 void FrontendNode::FinishFrame() {
   pace_.frame_open = false;
-  PublishLoose(FrameDone{session_, *last_index_, last_stamp_ns_});
+  PublishLoose(DoneWithNewest());
 }
 
 // ---- Status ----
@@ -581,7 +565,7 @@ void FrontendNode::PublishStatus() {
   status.frames_skipped = counts_.skipped;
   status.fps =
       static_cast<double>(counts_.processed - std::exchange(counts_.processed_at_status, counts_.processed));
-  status.frame_index = last_index_ ? static_cast<int32_t>(*last_index_) : -1;
+  status.frame_index = newest_ ? static_cast<int32_t>(newest_->index) : -1;
   status.latency_p50_ms = times_.latency.Quantile(0.5);
   status.latency_p95_ms = times_.latency.Quantile(0.95);
   status.latency_p99_ms = times_.latency.Quantile(0.99);

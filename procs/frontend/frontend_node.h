@@ -15,6 +15,7 @@
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
+#include "frontend/held_records.h"
 #include "frontend/left_keyframes.h"
 #include "frontend/make_frontend.h"
 #include "frontend/online_error.h"
@@ -51,9 +52,13 @@ class FrontendNode : public StreamNode {
     int64_t received = 0, processed = 0, skipped = 0, bad = 0, of_other_size = 0;
     int64_t processed_at_status = 0;  ///< when the last status was published
   };
+  struct NewestTaken {
+    uint32_t index = 0;
+    std::optional<int64_t> stamp_ns;  ///< none: it is known from the map alone, which knows no stamp
+  };
   struct FirstMap {
-    int64_t since_ns = 0;           ///< stamp of the first frame
-    std::optional<double> after_s;  ///< from then to the first pose; none: there is none yet
+    std::optional<int64_t> since_ns;  ///< stamp of the first frame
+    std::optional<double> after_s;    ///< from then to the first pose; none: there is none yet
   };
   struct FrameTimes {
     LatencyWindow latency, decode, extract, step;
@@ -70,18 +75,10 @@ class FrontendNode : public StreamNode {
 
   void OnFrame(std::span<const uint8_t> bytes);
   std::optional<PlayOrder::Place> NewestFrame() const;
+  FrameDone DoneWithNewest() const;
   void OnEndOfSequence(std::span<const uint8_t> bytes);
   void OnKeyframe(std::span<const uint8_t> bytes);
   bool ProposeWhatWasLeft();
-  /// A map record that is here but not yet applied.
-  struct HeldRecord {
-    MapDelta delta;
-    Version version;
-    bool begins_anew = false;
-    bool in_snapshot = false;
-    bool ends_snapshot = false;
-  };
-
   /// Several cameras in lock-step: the frame that waits for its turn.
   struct Turn {
     std::optional<uint32_t> asked, given;
@@ -100,7 +97,6 @@ class FrontendNode : public StreamNode {
   bool Run(Job job);
   bool HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns);
   void TakeMapRecords();
-  size_t NumReadyRecords(bool all) const;
   void ApplyHeldRecords(size_t count, bool at_once);
   void OnApplied(size_t count);
   Version HandOverVersion();
@@ -136,24 +132,22 @@ class FrontendNode : public StreamNode {
   FrontendExtras extras_;
   std::unique_ptr<FrontendCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
-  std::deque<HeldRecord>
-      held_;  ///< lock-step: not yet followed by a settled record; or an unfinished snapshot; or next
-  bool map_begins_anew_ = false;  ///< with the next change that is whole
-  Version applied_;               ///< of the replica
-  Version promised_;              ///< the same, when all that is ready is applied
+  HeldRecords held_;
   std::optional<Waiting> waiting_;
   PlayOrder order_;
   SequenceEnd end_;
   uint32_t requests_ = 0;  ///< to adjust the maps, so far
   Pace pace_;
-  bool hurries_ = false;                ///< catches up before it takes another image
-  std::optional<uint32_t> last_index_;  ///< of the newest frame that was taken; none: none was
-  int64_t last_stamp_ns_ = 0;
+  bool hurries_ = false;               ///< catches up before it takes another image
+  std::optional<NewestTaken> newest_;  ///< frame; none: none was taken
   GrayDecoder decoder_;
   GrayImage image_;
-  std::optional<LeftKeyframes> left_;     ///< by a frontend before this one
-  std::optional<int64_t> left_until_ns_;  ///< then all of it was heard; none: not yet known
-  std::deque<int64_t> keyframe_seqs_;     ///< of records not yet accepted by the mapper
+  struct LeftBehind {
+    LeftKeyframes keyframes;
+    std::optional<int64_t> until_ns;  ///< then all of it was heard; none: not yet known
+  };
+  std::optional<LeftBehind> left_;     ///< by a frontend before this one
+  std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
   FramePose last_pose_;
   OnlineError error_;
   FrameCounts counts_;
