@@ -48,6 +48,7 @@ struct KeyframeOptions {
   /// Of the landmarks that the reference keyframe sees: fewer tracked asks for a keyframe. Keyframes that
   /// turn out to say nothing new are removed again (mapping.redundant_share).
   double tracked_ratio = 1.0;
+  int min_inliers = 15;  ///< with no more it is no keyframe, however few a frame may be tracked with
 
   template <typename Visitor>
   void Describe(Visitor& v) {
