@@ -73,6 +73,7 @@ verdict() { # STATUS of the disturbed run
   local wrong="" error died
   [[ $1 == 0 ]] || wrong+="it ended with $1; "
   [[ -s $out/storm/summary.json ]] || { echo "${wrong}no results"; return; }
+  [[ $(count storm) == "$kills" ]] || wrong+="only $(count storm) of $kills were killed; "
   died=$(grep -cE 'frontend|loopcloser' "$out/kills" || true)
   awk -v lost="$(value storm records_lost)" -v died="$died" 'BEGIN { exit !(lost <= 10 * died) }' || wrong+="records lost; "
   [[ $(value storm keyframes_missing) == 0 ]] || wrong+="keyframes missing; "

@@ -150,8 +150,7 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
 /// collector after this one must know of it goes into the journal.
 void CollectorNode::OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
   if (!journal_) {
-    const std::pair early(process, pid);
-    if (heard_early_.empty() || heard_early_.back() != early) heard_early_.push_back(early);
+    heard_early_.insert({process, pid});
     return;
   }
   Followed& known = processes_[process];
@@ -233,7 +232,7 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
   OnProcess(process, head.health.pid, health);
   const ProcessHealth& former = processes_[process].former;
   const double largest = std::max(health.rss_mb, head.health.rss_mb);
-  run_.memory[process].push_back({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
+  run_.memory[process].Add({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
   health = head.health;
   health.rss_mb = largest;
   for (int64_t ProcessHealth::*counter : kHealthCounters) health.*counter += former.*counter;

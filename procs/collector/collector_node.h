@@ -154,8 +154,8 @@ class CollectorNode : public StreamNode {
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
   std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
-  std::map<std::string, Followed> processes_;                 ///< by name
-  std::vector<std::pair<std::string, int32_t>> heard_early_;  ///< process and id, before there was a journal
+  std::map<std::string, Followed> processes_;              ///< by name
+  std::set<std::pair<std::string, int32_t>> heard_early_;  ///< process and id, before there was a journal
   Proposals proposals_;
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end

@@ -227,15 +227,13 @@ Json HealthJson(const RunRecord& run, double ProcessHealth::*field) {
 /// the run was too short to tell.
 Json MemoryGrowthJson(const RunRecord& run) {
   Json json = Json::object();
-  for (const auto& [process, samples] : run.memory) {
-    const auto first =
-        std::find_if(samples.begin(), samples.end(), [](const auto& s) { return s.keyframes >= 10; });
-    if (first == samples.end() || samples.back().keyframes <= first->keyframes) {
+  for (const auto& [process, growth] : run.memory) {
+    if (!growth.first || growth.last.keyframes <= growth.first->keyframes) {
       json[process] = nullptr;
       continue;
     }
-    const double keyframes = static_cast<double>(samples.back().keyframes - first->keyframes);
-    json[process] = (samples.back().rss_mb - first->rss_mb) / keyframes;
+    const double keyframes = static_cast<double>(growth.last.keyframes - growth.first->keyframes);
+    json[process] = (growth.last.rss_mb - growth.first->rss_mb) / keyframes;
   }
   return json;
 }

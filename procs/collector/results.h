@@ -58,6 +58,17 @@ struct MemorySample {
   double rss_mb = 0;
 };
 
+/// What a process's memory was when the map was no longer tiny, and is now.
+struct MemoryGrowth {
+  std::optional<MemorySample> first;  ///< with ten keyframes or more
+  MemorySample last;
+
+  void Add(const MemorySample& sample) {
+    if (!first && sample.keyframes >= 10) first = sample;
+    last = sample;
+  }
+};
+
 /// All that the summary of a run is made of.
 struct RunRecord {
   std::string mode, profile;
@@ -67,8 +78,8 @@ struct RunRecord {
   MapperStatus mapper;
   LoopcloserStatus loopcloser;
   std::map<std::string, ProcessHealth> health;
-  std::map<std::string, std::vector<MemorySample>> memory;  ///< of each process, about once a second
-  FrameDurations durations;                                 ///< of the first camera
+  std::map<std::string, MemoryGrowth> memory;  ///< of each process
+  FrameDurations durations;                    ///< of the first camera
   KeyframeRecord keyframes;
   std::vector<CorrectionRecord> corrections;
   uint64_t resets = 0;

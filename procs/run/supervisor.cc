@@ -115,6 +115,7 @@ Supervisor::Supervisor(Options options) : options_(options) {
   signal_fd_ = signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC);
   DMSLAM_CHECK(signal_fd_ >= 0, "signalfd is part of every Linux");
   notice_fd_ = OpenNoticeSocket(&notice_address_);
+  former_pipe_ = std::signal(SIGPIPE, SIG_IGN);  // a log that nobody reads any more ends no run
 }
 
 Supervisor::~Supervisor() {
@@ -127,6 +128,7 @@ Supervisor::~Supervisor() {
   close(signal_fd_);
   if (notice_fd_ >= 0) close(notice_fd_);
   pthread_sigmask(SIG_SETMASK, &former_mask_, nullptr);
+  std::signal(SIGPIPE, former_pipe_);
 }
 
 void Supervisor::Start(ChildSpec spec) {
@@ -153,7 +155,7 @@ void Supervisor::Launch(Child* child) {
   const int output = OpenForChild(child->spec.output);
   const int errors = child->spec.errors_to_ours ? dup(STDERR_FILENO) : OpenForChild(child->spec.errors);
   const pid_t parent = getpid();
-  const pid_t pid = fork();
+  const pid_t pid = options_.fork();
   if (pid == 0) {
     prctl(PR_SET_PDEATHSIG, SIGTERM);  // whatever becomes of the supervisor
     if (getppid() != parent) _exit(kExitSignal + SIGTERM);
@@ -161,15 +163,22 @@ void Supervisor::Launch(Child* child) {
   }
   close(output);
   close(errors);
-  if (pid < 0) throw InputError(child->spec.name + " cannot be started: " + std::strerror(errno));
+  if (pid < 0) return OnNotStarted(child, std::strerror(errno));
   child->pid = pid;
   child->began_ns = now_ns();
   if (!child->spec.pid_file.empty()) std::ofstream(child->spec.pid_file) << pid << '\n';
 }
 
+/// A machine that has no memory or no processes left may have them again: who ran before is tried again.
+void Supervisor::OnNotStarted(Child* child, const std::string& reason) {
+  if (child->restarts == 0) throw InputError(child->spec.name + " cannot be started: " + reason);
+  child->due_ns = now_ns() + std::max(options_.first_delay_ns, options_.longest_delay_ns / 10);
+}
+
 void Supervisor::BecomeChild(const Child& child, int output, int errors) {
   std::signal(SIGINT, SIG_IGN);  // Ctrl-C is for the supervisor, who asks everybody to end
   std::signal(SIGQUIT, SIG_IGN);
+  std::signal(SIGPIPE, former_pipe_);
   pthread_sigmask(SIG_SETMASK, &former_mask_, nullptr);
   const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
   dup2(nothing, STDIN_FILENO);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <sys/types.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdint>
@@ -65,6 +66,7 @@ class Supervisor {
     bool wait_for_what_may_come = false;  ///< ... for ever, and at the first start too
     int64_t watchdog_ns = 0;              ///< who says nothing for so long hangs; 0: nobody is asked
     int64_t stop_ns = 10'000'000'000;     ///< who does not end when asked to is killed after so long
+    pid_t (*fork)() = ::fork;             ///< a test lets it fail
   };
 
   explicit Supervisor(Options options);
@@ -106,6 +108,7 @@ class Supervisor {
   };
   bool MayBegin(const Child& child) const;
   void Launch(Child* child);
+  void OnNotStarted(Child* child, const std::string& reason);
   [[noreturn]] void BecomeChild(const Child& child, int output, int errors);
   void Reap();
   void OnDeath(Child* child, int code);
@@ -125,6 +128,7 @@ class Supervisor {
   int signal_fd_ = -1, notice_fd_ = -1;
   std::string notice_address_;
   sigset_t former_mask_{};
+  void (*former_pipe_)(int) = SIG_DFL;  ///< what a broken pipe did before
 };
 
 }  // namespace dmslam

@@ -14,6 +14,7 @@
 #include <random>
 
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/util/check.h"
 
 namespace dmslam {
 namespace {
@@ -298,6 +299,42 @@ TEST(SupervisorTest, AFolderThatWasRemovedIsMadeAgain) {
 }
 
 /// The units start again what dmslam-run starts again.
+TEST(SupervisorTest, ALogThatNobodyReadsEndsNobodyButWhoWroteIt) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  close(ends[0]);
+  Supervisor supervisor(Eager());
+  EXPECT_EQ(write(ends[1], "text", 4), -1) << "and it is alive to say so";
+  close(ends[1]);
+  ChildSpec child = Shell("a", "kill -PIPE $$; exit 0");
+  child.restart = false;
+  supervisor.Start(child);
+  EXPECT_EQ(supervisor.Wait(Supervisor::now_ns() + 10 * kSecondNs).code, kExitSignal + SIGPIPE)
+      << "children are as they would be without it";
+}
+
+/// A machine without room for another process, for a while.
+int forks_left = 0;
+pid_t ForkWhileThereIsRoom() {
+  if (forks_left-- > 0) return fork();
+  if (forks_left < -3) forks_left = 1;
+  errno = EAGAIN;
+  return -1;
+}
+
+TEST(SupervisorTest, WhoCannotBeStartedAgainNowIsTriedAgain) {
+  Supervisor::Options options = Eager();
+  options.fork = ForkWhileThereIsRoom;
+  Supervisor supervisor(options);
+  forks_left = 0;
+  EXPECT_THROW(supervisor.Start(Sleeper("never")), InputError);
+  forks_left = 1;
+  supervisor.Start(Sleeper("a"));
+  KillTogether(supervisor, {"a"});
+  int deaths = 0;
+  EXPECT_TRUE(AllAlive(supervisor, {"a"}, &deaths));
+}
+
 TEST(ExitCodesTest, TheUnitsAgree) {
   const char* source = std::getenv("DMSLAM_SOURCE_DIR");
   if (source == nullptr) GTEST_SKIP() << "set DMSLAM_SOURCE_DIR";

@@ -1,6 +1,7 @@
 #include "dmslam/runtime/process_main.h"
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -74,6 +75,7 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
 int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
   if (const std::optional<int> code = app_.Parse(argc, argv)) return *code == 0 ? kExitDone : kExitUsage;
   SetUpLog(role_, quiet_);
+  std::signal(SIGPIPE, SIG_IGN);  // a log that nobody reads any more ends no process
   try {
     return RunNode(factory);
   } catch (const NotYetError& error) {
