@@ -79,8 +79,7 @@ std::string ErrorRow(const Cell& baseline, const Cell* paper, const Cell& dm, co
   const std::string mark = CoverageMark(baseline, dm);
   return "| " + baseline.sequence + " |" + SystemCells(baseline, table) +
          (paper != nullptr ? SystemCells(*paper, table) : " *not run* |" + std::string(6, '|')) +
-         SystemCells(dm, table) + " " +
-         Improvement(baseline.Rmse(metric), dm.Rmse(metric)) + mark + " | " +
+         SystemCells(dm, table) + " " + Improvement(baseline.Rmse(metric), dm.Rmse(metric)) + mark + " | " +
          Improvement(baseline.Mean(metric), dm.Mean(metric)) + mark + " | " +
          Improvement(baseline.Median(metric), dm.Median(metric)) + mark + " | " +
          Improvement(baseline.Std(metric), dm.Std(metric)) + mark + " |\n";
@@ -255,7 +254,8 @@ std::string Introduction(const Results& results) {
          "Sim3, as monocular ones must be. Lengths are metres, angles degrees. *Tracked* is the share of the "
          "sequence's frames that have a pose in the final trajectory (none for a run without one): an error "
          "without it is no result. *Runs* are those with a trajectory, of those that were run. *Better by %* "
-         "compares the medians of `baseline` and `dm` (in the paper's rows those of its two systems); † marks those of which one tracked over 1 % more of the frames than the "
+         "compares the medians of `baseline` and `dm` (in the paper's rows those of its two systems); † "
+         "marks those of which one tracked over 1 % more of the frames than the "
          "other.\n\n" +
          WhereRunsComeFrom(results) +
          "Of the paper's figures only the RMSE of ATE and its Table 1 are recorded here; its other columns "
