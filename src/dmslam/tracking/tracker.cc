@@ -20,9 +20,6 @@ constexpr double kTurnRadPerS = 0.3;           // ...and more with time...
 constexpr double kMostTurnRad = 0.3;           // ...up to this
 constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
 constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
-constexpr double kThinShare = 0.15;            // a pose that finds less of what it should see is thin...
-constexpr int64_t kAskPlacesNs = 200'000'000;  // ...and so often it is asked whether another place explains
-constexpr int kClearlyMore = 2;                // ...so many times as much
 constexpr int kSomeProven = 8;  // proven landmarks that must be seen where a place is confirmed by time
 
 /// All over the image, which a person is not.
@@ -41,7 +38,6 @@ Tracker::Tracker(const Setup& setup)
     : options_(setup.options),
       seed_(setup.seed),
       search_(setup.options, setup.camera),
-      second_search_(setup.options, setup.camera),
       relocalizer_(setup.vocabulary),
       follower_(setup.options) {}
 
@@ -52,13 +48,11 @@ void Tracker::BeginAt(const Keyframe& keyframe) {
 void Tracker::OnMapForgotten() {
   relocalizer_.Clear();
   search_.Reset();
-  second_search_.Reset();
   certainty_.Forget();
 }
 
 void Tracker::OnMapGivenUp() {
   search_.Reset();
-  second_search_.Reset();
   follower_.Stop();
   unbelieved_.reset();
 }
@@ -70,8 +64,6 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   if (!attempt.report.ok) FindTurned(map, &frame, &attempt);
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request, &frame, &attempt);
-  if (attempt.report.ok && !attempt.relocalized && request.may_relocalize)
-    FindBetterPlace(map, request, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
   if (attempt.report.ok) result.pose = PlacedPose::Of(map, frame.T_cam_world, search_.reference());
   if (result.pose) {
@@ -199,31 +191,6 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
   if (attempt->report.doubtful) attempt->report.ok = false;
   attempt->relocalized = attempt->report.ok;
   attempt->in_another_map = may_be_elsewhere && !is_here();
-  if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
-}
-
-/// A pose that finds next to nothing of what it should see is wrong, or people hide the room. Wrong it is
-/// where another place in this map explains much more.
-void Tracker::FindBetterPlace(const Map& map, const Request& asked, TrackedFrame* frame, Attempt* attempt) {
-  const TrackingReport& report = attempt->report;
-  if (report.num_static >= kThinShare * report.num_expected) return;
-  if (!IsOldEnoughToProve(map)) return;
-  if (asked_places_ns_ && frame->stamp_ns - *asked_places_ns_ < kAskPlacesNs) return;
-  asked_places_ns_ = frame->stamp_ns;
-  TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
-  Relocalizer::Request request{.last_seen = last_reference(),
-                               .seed = DeriveSeed(seed_, frame->index, "better_place")};
-  request.credible = [&](const TrackedFrame&, const TrackingReport& other) {
-    const Keyframe* reference = map.FindKeyframe(second_search_.reference());
-    const bool here = reference != nullptr && asked.map_id == reference->map_id;
-    return here && other.num_static >= kClearlyMore * report.num_static;
-  };
-  if (!relocalizer_.Relocalize(map, request, &second_search_, &found)) return;
-  search_.judge().DropEvidence();  // what the pose that was wrong said of landmarks
-  *frame = std::move(found);
-  attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
-  if (attempt->report.doubtful) attempt->report.ok = false;
-  attempt->relocalized = attempt->report.ok;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 

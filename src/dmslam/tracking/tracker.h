@@ -77,7 +77,6 @@ class Tracker {
   void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
   void Relocalize(const Map& map, const Request& request, TrackedFrame* frame, Attempt* attempt);
-  void FindBetterPlace(const Map& map, const Request& asked, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
   bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
@@ -88,12 +87,10 @@ class Tracker {
   TrackingOptions options_;
   uint64_t seed_;
   PoseSearch search_;
-  PoseSearch second_search_;  ///< for places beside that which the motion leads to
   Relocalizer relocalizer_;
   MotionFollower follower_;
   PoseCertaintyEstimator certainty_;
-  std::optional<int64_t> relocalized_ns_;   ///< when the camera was found last
-  std::optional<int64_t> asked_places_ns_;  ///< when another place was looked for last
+  std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
   /// A camera that is followed and not believed.
   struct Unbelieved {
     enum class Why : uint8_t {

@@ -521,33 +521,6 @@ TEST_F(Recovering, APlaceThatDoesNotPredictIsDropped) {
   EXPECT_GE(found, kFound + 10 + 14) << "the half second begins anew";
 }
 
-/// One in eight points walks off while all others are hidden, and takes the camera along. Then the others are
-/// seen again, in their places.
-TEST_F(Recovering, APoseThatFindsLittleGivesWayToAPlaceThatExplainsMuchMore) {
-  constexpr uint32_t kShown = 40;
-  Start(10.0, 1);
-  lost_in_ = MapScene::kMap;
-  const auto see = [&](uint32_t frame) {
-    return scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(0), [&](size_t i) {
-      const double walked = i % 8 == 0 ? 0.01 * std::min(frame, kShown) : 0.0;
-      const bool hidden = frame < kShown && i % 8 != 0;
-      return hidden ? std::nullopt
-                    : std::optional<Eigen::Vector3d>(scene_.point(i) + Eigen::Vector3d(walked, 0, 0));
-    });
-  };
-  const auto track = [&](uint32_t frame) {
-    return tracker_->Track(replica_, {.map_id = MapScene::kMap}, see(frame));
-  };
-  for (uint32_t frame = 1; frame < kShown; ++frame) track(frame);
-  ASSERT_GT(ErrorAt(track(kShown - 1).frame.T_cam_world, 0), 0.2) << "it was carried away";
-  uint32_t frame = kShown;
-  while (frame < kShown + 10 && !track(frame).relocalized) ++frame;
-  EXPECT_LE(frame - kShown, 6u) << "a fifth of a second";
-  const TrackingResult result = track(frame + 1);
-  ASSERT_TRUE(result.pose) << result.report.reason;
-  EXPECT_LT(ErrorAt(result.frame.T_cam_world, 0), 0.02);
-}
-
 // ---- Projection search ----
 
 TEST_F(Tracking, TheSearchLooksNearTheProjectionOnly) {
