@@ -21,7 +21,8 @@ class HeldRecords {
     bool ends_snapshot = false;
   };
 
-  /// A fresh stream or a snapshot begins: what is held is void, and so is the replica when it is applied.
+  /// A fresh stream or a snapshot begins: what is held is void. The replica stays until the next record is
+  /// applied.
   void BeginAnew();
   void Add(MapDelta delta, Version version, bool in_snapshot, bool ends_snapshot);
   bool empty() const { return held_.empty(); }

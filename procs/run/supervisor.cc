@@ -172,7 +172,7 @@ void Supervisor::Launch(Child* child) {
 /// A machine that has no memory or no processes left may have them again: who ran before is tried again.
 void Supervisor::OnNotStarted(Child* child, const std::string& reason) {
   if (child->restarts == 0) throw InputError(child->spec.name + " cannot be started: " + reason);
-  child->due_ns = now_ns() + std::max(options_.first_delay_ns, options_.longest_delay_ns / 10);
+  child->due_ns = now_ns() + options_.first_delay_ns;
 }
 
 void Supervisor::BecomeChild(const Child& child, int output, int errors) {

@@ -1,5 +1,6 @@
 #include "dmslam/initialization/motion_race.h"
 
+#include <algorithm>
 #include <numeric>
 #include <utility>
 

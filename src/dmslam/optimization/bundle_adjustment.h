@@ -62,7 +62,9 @@ struct BundleReport {
 /// Bundle adjustment over poses and points, deterministic (same input, same bytes). Points are eliminated
 /// first; up to 60 free poses are solved for with a dense matrix, more with Ceres and a sparse one, on a
 /// thread of its own, for whose end the caller waits. A view sees a point once at most. `interrupt` is asked
-/// on the thread that works. Throws InvariantError for indices out of range.
+/// on the thread that works. Without a fixed pose, pose 0 is held. With exactly one pose held the scale is
+/// free: poses and points are rescaled about the held camera at the end, so that the farthest camera keeps
+/// its distance. Throws InvariantError for indices out of range.
 BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem);
 
 /// Options for the adjustment of a whole map or of a first one: one robust stage of so many

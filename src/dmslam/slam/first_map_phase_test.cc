@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <memory>
-#include <optional>
+#include <string>
+#include <vector>
 
 #include "dmslam/motion_segmentation/synthetic_pair.h"
 #include "dmslam/util/random.h"

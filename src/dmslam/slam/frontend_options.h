@@ -16,8 +16,8 @@ struct FrontendOptions {
   TrackingOptions tracking;
   KeyframeOptions keyframe;
   double trial_s = 0.5;  ///< a first map must predict the frames of this time, else it is dropped
-  /// Lost for so long X@X: a first map of another one is looked for, while every frame goes on
-  /// asking all maps where it is. The old map is kept.
+  /// Lost for so long while there is something to see: a new first map is looked for, while every frame goes
+  /// on asking all maps where it is. The old map is kept.
   double new_map_after_s = 1.5;
   double evidence_every_s = 0.32;  ///< what frames said of landmarks is told so often, and before a keyframe
   int max_kept_frames = 900;       ///< unplaced frames kept for localisation at the end
