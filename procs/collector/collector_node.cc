@@ -335,7 +335,7 @@ void CollectorNode::OnFramePose(const Record& record) {
 
 /// Kept too: a collector that is started again does not hear it a second time.
 void CollectorNode::OnSessionStart(const Record& record) {
-  std::optional<SessionStart> start = Read<SessionStart>(*record.bytes);
+  std::optional<SessionStart> start = ReadSessionStart(record.header, *record.bytes);
   if (!start) return;
   JoinsSession(*start);
   if (start->camera_id == 0) session_start_ = std::move(start);

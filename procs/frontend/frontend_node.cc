@@ -118,9 +118,10 @@ void FrontendNode::OnMessage(const std::string& channel, std::span<const uint8_t
 }
 
 void FrontendNode::OnFrame(std::span<const uint8_t> bytes) {
-  if (!camera_info_) return;  // it comes again, or it is too early
   std::optional<Frame> frame = Read<Frame>(bytes);
-  if (!frame || IsForeignFrame(frame->session)) return;
+  if (!frame) return;
+  if (!camera_info_) return ConfirmCamera(frame->session);  // it comes again, or it is too early
+  if (IsForeignFrame(frame->session)) return;
   if (frame->frame_index >= kTheEnd)
     return CountMalformed(channels::kFrame, "its number is beyond what a session can hold; begin a new one");
   const bool goes_back = camera_info_->mode == PlaybackMode::kRealtime && newest_ && newest_->stamp_ns &&

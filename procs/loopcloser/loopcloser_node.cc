@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/settings/run_options.h"
 #include "loopcloser/make_loopcloser.h"
@@ -22,16 +23,22 @@ LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
 /// The frontend's word on its settings and its vocabulary. Its stream is not read here; who comes later has
 /// the same settings as the one before.
 void LoopcloserNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
-  bool intact = false;
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
-    intact = intact || IsIntact(ChannelOfCamera(channel, camera), bytes);
-  if (!intact) {
-    CountMalformed(channel, "its checksum does not fit");
+  const std::optional<RecordHeader> header = ParseHeader(bytes);
+  for (CameraId camera = 0; header && camera < options_.NumCameras(); ++camera) {
+    if (!IsIntact(ChannelOfCamera(channel, camera), bytes)) continue;
+    const std::optional<SessionStart> start = ReadSessionStart(*header, bytes);
+    if (start && !IsForeign(start->session)) sessions_.Hear(camera, header->epoch, *start);
     return;
   }
-  const std::optional<SessionStart> start = Read<SessionStart>(bytes);
-  if (!start || IsForeign(start->session)) return;
-  JoinsSession(*start, vocabulary_ ? std::optional(vocabulary_->checksum()) : std::nullopt);
+  CountMalformed(channel, "its checksum does not fit");
+}
+
+/// On the core's map, which rests.
+void LoopcloserNode::JoinMappedSessions() {
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    const auto start = sessions_.Mapped(camera, core_->map().progress(camera).frontend.epoch);
+    if (start) JoinsSession(*start, vocabulary_ ? std::optional(vocabulary_->checksum()) : std::nullopt);
+  }
 }
 
 LoopcloserNode::~LoopcloserNode() { stop_ = true; }
@@ -64,6 +71,7 @@ void LoopcloserNode::Answer(KeyframeId keyframe) {
 bool LoopcloserNode::WorkOnce() {
   if (!work_->Idle()) return false;
   LetSnapshotBegin();
+  JoinMappedSessions();
   const std::optional<Record> record = map_reader_->Take();
   if (!record) return EndIfDone();
   WorkOn(*record);

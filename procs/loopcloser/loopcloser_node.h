@@ -7,6 +7,7 @@
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/stream_node.h"
+#include "loopcloser/heard_sessions.h"
 
 namespace dmslam {
 
@@ -28,12 +29,14 @@ class LoopcloserNode : public StreamNode {
  private:
   void WorkOn(const Record& record);
   void Answer(KeyframeId keyframe);
+  void JoinMappedSessions();
   bool EndIfDone();
   LoopcloserStatus CoreStatus() const;
 
   std::shared_ptr<const Vocabulary> vocabulary_;
   std::unique_ptr<LoopcloserCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
+  HeardSessions sessions_;
   bool ended_ = false;
   LatencyWindow check_;
   LoopcloserStatus core_status_;      ///< what the core had to say of itself last

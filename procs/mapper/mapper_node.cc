@@ -404,7 +404,7 @@ bool MapperNode::HandleFirstRecord() {
   timing_.arrived_ns = taken_.front().at_ns;
   taken_.pop_front();
   if (record.channel == channels::kSession) {
-    if (const auto start = Read<SessionStart>(*record.bytes)) JoinFrontend(camera, *start);
+    if (const auto start = ReadSessionStart(record.header, *record.bytes)) JoinFrontend(camera, *start);
   }
   // A keyframe makes several map records: only the last one says that it is done.
   const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;

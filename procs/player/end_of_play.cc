@@ -28,6 +28,11 @@ void EndOfPlay::OnStatus(const std::string& channel, std::span<const uint8_t> by
   }
 }
 
+bool EndOfPlay::OnSequenceDone(int64_t now_ns) {
+  heard_ = heard_ || WasSaid() || all_done_.SaidAgain(now_ns);
+  return heard_;
+}
+
 bool EndOfPlay::IsDue(int64_t now_ns) {
   if (since_ns_ == 0) since_ns_ = now_ns;
   if (now_ns < due_ns_) return false;

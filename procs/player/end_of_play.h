@@ -6,18 +6,18 @@
 #include <string>
 
 #include "dmslam/wire/codec.h"
+#include "player/claimed_answer.h"
 
 namespace dmslam {
-
-/// One message may be forged: what contradicts what a player knows is believed when it is said for so long.
-inline constexpr int64_t kSaidForNs = 100'000'000;
 
 /// The end of what a player plays: it is told again and again until the frontend has heard it. The player
 /// then stays until the map is done, since a frontend that is started again at the end needs camera and end.
 class EndOfPlay {
  public:
   bool WasSaid() const { return since_ns_ != 0; }
-  void OnFrontendHeard() { heard_ = true; }
+  /// The frontend says that all is done, to us or to a player before us: whether that is so. Who has not said
+  /// the end believes it when it is said for a while: the frontend answers every frame with it then.
+  bool OnSequenceDone(int64_t now_ns);
   /// A message on any channel. The statuses of this session's mapper and frontend say that these are alive: a
   /// frontend may still be tracking, adjusting or telling its last poses. All others are left alone.
   void OnStatus(const std::string& channel, std::span<const uint8_t> bytes, uint32_t session, int64_t now_ns);
@@ -35,6 +35,7 @@ class EndOfPlay {
   int64_t due_ns() const { return due_ns_; }
 
  private:
+  ClaimedAnswer all_done_;
   bool heard_ = false, mapper_done_ = false;
   int64_t frontend_heard_ns_ = 0, mapper_heard_ns_ = 0, since_ns_ = 0, due_ns_ = 0;
 };

@@ -40,33 +40,26 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
   end_.OnStatus(channel, bytes, options_.session, context_.now_ns());
   if (channel == channels::kSequenceDone) {
     const auto done = wire::Decode<SequenceDone>(bytes);
-    if (done && done->session == options_.session) OnSequenceDone();
+    if (!done || done->session != options_.session) return;
+    ending_ = end_.OnSequenceDone(context_.now_ns()) || ending_;
     return;
   }
   const auto done = wire::Decode<FrameDone>(bytes);
   if (done && done->session == options_.session) OnFrameDone(*done);
 }
 
-/// The answer to the end that was said, by us or by a player before us. Who has not said it believes it when
-/// it is said for a tenth of a second: the frontend answers every frame with it then.
-void LiveNode::OnSequenceDone() {
-  const int64_t now_ns = context_.now_ns();
-  if (!done_since_ns_) done_since_ns_ = now_ns;
-  if (!end_.WasSaid() && now_ns - *done_since_ns_ < kSaidForNs) return;
-  end_.OnFrontendHeard();
-  ending_ = true;
-}
-
 /// A player before this one was further: its frames are followed by ours, and its time by ours, whatever the
-/// clock of this host says.
+/// clock of this host says. The frontend says so to each frame of ours that it refuses.
 void LiveNode::OnFrameDone(const FrameDone& done) {
-  if (published_ > 0 && done.frame_index <= frame_.frame_index) {
-    in_step_ = in_step_ || done.frame_index == frame_.frame_index;
+  if (published_ == 0 || in_step_) return;
+  if (done.frame_index <= frame_.frame_index) {
+    in_step_ = done.frame_index == frame_.frame_index;
     return;
   }
-  if (in_step_) return;
-  first_index_ = std::max(first_index_, done.frame_index + 1);
-  floor_stamp_ns_ = std::max(floor_stamp_ns_, done.stamp_ns);
+  const auto newest = further_.OnAnswer({done.frame_index, done.stamp_ns}, context_.now_ns());
+  if (!newest) return;
+  first_index_ = std::max(first_index_, newest->index + 1);
+  floor_stamp_ns_ = std::max(floor_stamp_ns_, newest->stamp_ns);
 }
 
 /// In the dataset's time: behind what a player before this one has said.
@@ -162,7 +155,7 @@ void LiveNode::Advance() {
   }
   if (exit_code_ || !office_.held()) return;
   if (now >= next_info_ns_) {
-    next_info_ns_ = now + kInfoEveryNs;
+    next_info_ns_ = now + InfoAgainNs(infos_said_++);
     PublishCameraInfo();
   }
   SayWhetherAway();

@@ -32,7 +32,6 @@ class LiveNode : public Node {
 
  private:
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
-  void OnSequenceDone();
   void OnFrameDone(const FrameDone& done);
   int64_t InSessionTime(int64_t stamp_ns);
   void SayWhetherAway();
@@ -55,9 +54,10 @@ class LiveNode : public Node {
   int64_t published_ = 0;
   bool ending_ = false, stopped_ = false;
   bool in_step_ = false;  ///< the frontend has done a frame of ours: it cannot be further than we are
-  std::optional<int64_t> done_since_ns_;  ///< somebody says that all is done
+  FurtherFrontend further_;
   EndOfPlay end_;
   int64_t next_info_ns_ = 0, next_status_ns_ = 0;
+  int64_t infos_said_ = 0;
   std::optional<int> exit_code_;
   std::string problem_;
 };

@@ -85,6 +85,15 @@ class LiveNodeTest : public testing::Test {
     }
   }
 
+  /// Frames .06 s apart, each of which the frontend answers with what it has done already.
+  void PlayRefused(LiveNode& node, const FrameDone& done, uint32_t count) {
+    for (uint32_t i = 0; i < count; ++i) {
+      store_.frames = {Picture(static_cast<uint32_t>(frames_.size()), 100 + 100 * static_cast<int64_t>(i))};
+      Advance(node, 60'000'000);
+      Say(done);
+    }
+  }
+
   MemoryBus bus_;
   MemoryBus::Port& player_port_;
   MemoryBus::Port& ear_;
@@ -197,29 +206,49 @@ TEST_F(LiveNodeTest, ToldToStopItSaysTheEndAndDoesNotWaitLong) {
   EXPECT_EQ(node.exit_code(), 0);
 }
 
+/// The frontend is further, and says so to each frame that it refuses.
 TEST_F(LiveNodeTest, StartedAgainItGoesOnBehindTheFramesBefore) {
   LiveNode node = Make();
   Advance(node);
+  PlayRefused(node, {9, 41, 0}, 4);
   Say(FrameDone{8, 500, 0});  // another session
-  Say(FrameDone{9, 41, 0});
-  store_.frames = {Picture(0, 100)};
+  store_.frames = {Picture(4, 500)};
   Advance(node);
-  ASSERT_EQ(frames_.size(), 1u);
-  EXPECT_EQ(frames_[0].frame_index, 42u);
+  ASSERT_EQ(frames_.size(), 5u);
+  EXPECT_EQ(frames_[4].frame_index, 46u) << "the number counts what the camera delivered";
 }
 
 TEST_F(LiveNodeTest, StartedAgainOnAClockThatIsBehindItDoesNotGoBackInTime) {
   LiveNode node = Make();
   Advance(node);
-  Say(FrameDone{9, 41, 60'000'000'000});
-  store_.frames = {Picture(0, 1'000'000'000), Picture(1, 1'100'000'000)};
+  PlayRefused(node, {9, 41, 60'000'000'000}, 4);
+  store_.frames = {Picture(4, 1'000'000'000), Picture(5, 1'100'000'000)};
   Advance(node);
   Advance(node);
-  ASSERT_EQ(frames_.size(), 2u);
-  EXPECT_GT(frames_[0].stamp_ns, 60'000'000'000);
-  EXPECT_LT(frames_[0].stamp_ns, 60'100'000'000);
-  EXPECT_EQ(frames_[1].stamp_ns - frames_[0].stamp_ns, 100'000'000)
+  ASSERT_EQ(frames_.size(), 6u);
+  EXPECT_GT(frames_[4].stamp_ns, 60'000'000'000);
+  EXPECT_LT(frames_[4].stamp_ns, 60'100'000'000);
+  EXPECT_EQ(frames_[5].stamp_ns - frames_[4].stamp_ns, 100'000'000)
       << "what passed between frames stays as it was";
+}
+
+/// What is said before it has played anything, or once, or among true answers, leads it nowhere.
+TEST_F(LiveNodeTest, OneForgedAnswerToAPlayerThatBeginsChangesNothing) {
+  LiveNode node = Make();
+  Advance(node);
+  Say(SequenceDone{0, 9});
+  Say(FrameDone{9, 1'000'000, 3'600'000'000'000});
+  store_.frames = {Picture(0, 100)};
+  Advance(node);
+  ASSERT_EQ(frames_.size(), 1u);
+  EXPECT_EQ(frames_[0].frame_index, 0u);
+  Say(FrameDone{9, 1'000'000, 3'600'000'000'000});
+  PlayRefused(node, {9, 41, 2'000'000}, 4);
+  store_.frames = {Picture(5, 3'000'000)};
+  Advance(node);
+  EXPECT_EQ(frames_.back().frame_index, 47u) << "behind what the frontend has said";
+  EXPECT_LT(frames_.back().stamp_ns, 1'000'000'000) << "not an hour ahead";
+  EXPECT_TRUE(ends_.empty());
 }
 
 TEST_F(LiveNodeTest, SaysThatTheCameraIsAwayAndWaits) {

@@ -116,35 +116,21 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
   }
 }
 
-/// The answer to the end that was said, by us or by a player before us. Else it is nobody's.
 void PlayerNode::OnSequenceDone(const SequenceDone& done) {
-  if (done.session != options_.session || (playing_ && !end_.WasSaid())) return;
-  end_.OnFrontendHeard();
+  if (done.session != options_.session || !end_.OnSequenceDone(context_.now_ns())) return;
   position_ = order_.size();
   awaiting_done_ = false;
 }
 
-/// Once the frontend has done a frame of ours it is hardly further than we are: that is believed when it is
-/// said for a tenth of a second (it answers each repeat), and no frame of ours is done meanwhile.
-bool PlayerNode::MayBeDone(uint32_t frame_index) {
-  if (counts_.published == 0 || frame_index < frame_.frame_index) return true;
-  if (frame_index == frame_.frame_index) {
-    in_step_ = true;
-    ahead_since_ns_.reset();
-    return true;
-  }
-  if (!in_step_) return true;
-  if (!ahead_since_ns_) ahead_since_ns_ = context_.now_ns();
-  return context_.now_ns() - *ahead_since_ns_ >= kSaidForNs;
-}
-
+/// What is said before a frame of ours was played is no answer to us. Once one is, the frontend says how far
+/// it is to each frame and each repeat.
 void PlayerNode::OnFrameDone(const FrameDone& done) {
-  if (done.session != options_.session) return;
-  if (playing_ && !MayBeDone(done.frame_index)) return;
-  if ((counts_.published > 0 || !playing_) && done.frame_index >= frame_.frame_index + (playing_ ? 1 : 0)) {
-    SkipBehind(done.frame_index);
-  } else if (awaiting_done_ && done.frame_index == frame_.frame_index) {
+  if (done.session != options_.session || !frame_bytes_ || done.frame_index < frame_.frame_index) return;
+  if (done.frame_index == frame_.frame_index) {
+    further_.Clear();
     awaiting_done_ = false;
+  } else if (const auto newest = further_.OnAnswer({done.frame_index, done.stamp_ns}, context_.now_ns())) {
+    SkipBehind(newest->index);
   }
 }
 
@@ -288,7 +274,7 @@ void PlayerNode::Advance() {
   const int64_t now = context_.now_ns();
   if (exit_code_ || !MayPlay()) return;
   if (now >= next_info_ns_) {
-    next_info_ns_ = now + kInfoEveryNs;
+    next_info_ns_ = now + InfoAgainNs(infos_said_++);
     PublishCameraInfo();
   }
   if (now >= next_status_ns_) {

@@ -74,7 +74,6 @@ class PlayerNode : public Node {
 
   bool MayPlay();
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
-  bool MayBeDone(uint32_t frame_index);
   void OnFrameDone(const FrameDone& done);
   void OnSequenceDone(const SequenceDone& done);
   void SkipBehind(uint32_t frame_index);
@@ -99,13 +98,13 @@ class PlayerNode : public Node {
   size_t position_ = 0;  ///< next of `order_`
   Frame frame_;          ///< the newest one published
   SharedBytes frame_bytes_;
-  bool awaiting_done_ = false;             ///< lock-step
-  bool in_step_ = false;                   ///< the frontend has done a frame of ours
-  std::optional<int64_t> ahead_since_ns_;  ///< it has been said that the frontend is ahead of us
+  bool awaiting_done_ = false;  ///< lock-step
+  FurtherFrontend further_;
   EndOfPlay end_;
   bool playing_ = false;  ///< the office is held: nobody else plays this session
   int64_t start_ns_ = 0;  ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
+  int64_t infos_said_ = 0;
   double late_ms_ = 0;
   std::optional<int> exit_code_;
   std::string problem_, first_unreadable_;

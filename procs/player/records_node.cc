@@ -41,7 +41,7 @@ RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_p
 void RecordsNode::PublishCameraInfo() {
   camera_info_->utime = context_.wall_us();
   PublishLoose(*camera_info_);
-  next_info_ns_ = context_.now_ns() + kInfoEveryNs;
+  next_info_ns_ = context_.now_ns() + InfoAgainNs(infos_said_++);
 }
 
 void RecordsNode::Begin(const CameraInfo&) {

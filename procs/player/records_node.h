@@ -49,6 +49,7 @@ class RecordsNode : public StreamNode {
   KeyframeId awaited_;  ///< proposed, not yet settled
   bool finished_ = false;
   int64_t next_info_ns_ = 0;
+  int64_t infos_said_ = 0;
   int64_t keyframes_ = 0, dropped_ = 0;
 };
 

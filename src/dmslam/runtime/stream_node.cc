@@ -92,20 +92,38 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   if (!info) return;
   info->camera_id = camera;
   if (IsOfCamera() && camera != options_.camera_id) return OnOtherCamera(*info);
-  if (session_ == 0) session_ = info->session;
-  if (options_.accept_recorded && !recorded_session_ && info->session != session_) {
-    recorded_session_ = info->session;
-    LogInfo("{}: takes the frames of recorded session {} for its own {}", role_, info->session, session_);
+  const auto known = cameras_.find(camera);
+  if (known == cameras_.end()) {
+    if (MayBeOurs(info->session) && camera_claims_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
+  } else if (!IsForeignFrame(info->session)) {
+    known->second.due_ns = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
   }
-  if (IsForeignFrame(info->session)) return;
-  const bool is_new = !cameras_.contains(camera);
-  KnownCamera& known = cameras_[camera];
+}
+
+/// What is said of a session that is not known yet, or of a recorded one that is to be taken for ours.
+bool StreamNode::MayBeOurs(uint32_t session) {
+  const bool adopted = session_ == 0 || (options_.accept_recorded && !recorded_session_);
+  return adopted || !IsForeignFrame(session);
+}
+
+void StreamNode::ConfirmCamera(uint32_t session) {
+  const std::optional<CameraInfo> info = camera_claims_.OfFrame(options_.camera_id, session);
+  if (info && !cameras_.contains(info->camera_id) && MayBeOurs(session)) BelieveCamera(*info);
+}
+
+void StreamNode::BelieveCamera(CameraInfo info) {
+  if (session_ == 0) session_ = info.session;
+  if (options_.accept_recorded && !recorded_session_ && info.session != session_) {
+    recorded_session_ = info.session;
+    LogInfo("{}: takes the frames of recorded session {} for its own {}", role_, info.session, session_);
+  }
+  camera_claims_.Forget(info.camera_id);
+  KnownCamera& known = cameras_[info.camera_id];
   known.due_ns = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
-  if (!is_new) return;
-  if (!recorded_session_) known.message.assign(bytes.begin(), bytes.end());
-  if (recorded_session_) info->mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
-  if (!camera_info_) camera_info_ = *info;
-  OnCamera(*info);
+  if (!recorded_session_) known.message = wire::Encode(info);
+  if (recorded_session_) info.mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
+  if (!camera_info_) camera_info_ = info;
+  OnCamera(info);
 }
 
 void StreamNode::KnowCamera(const CameraInfo& info) {
@@ -314,6 +332,13 @@ void StreamNode::WatchHandOver() {
   if (writer_->superseded_by()) return Exit(kExitDone);
   if (context_.now_ns() >= *hands_over_until_ns_)
     Exit(kExitSuperseded, NobodyWentOn(*writer_->close_requested_by()));
+}
+
+std::optional<SessionStart> StreamNode::ReadSessionStart(const RecordHeader& header,
+                                                         std::span<const uint8_t> bytes) {
+  if (header.seq == 1) return Read<SessionStart>(bytes);
+  CountMalformed(channels::kSession, "it is not the first record of its stream");
+  return std::nullopt;
 }
 
 bool StreamNode::JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum) {

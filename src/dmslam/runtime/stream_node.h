@@ -12,6 +12,7 @@
 #include "dmslam/map/feature_store.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/endpoint.h"
+#include "dmslam/runtime/camera_claims.h"
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
@@ -96,6 +97,8 @@ class StreamNode : public Node {
   }
   /// Who has died is there again within this time, as far as others wait for it at the end.
   static constexpr int64_t kBackAfterDeathNs = 30'000'000'000;
+  /// A frame of this process's camera came before its camera was believed: it confirms the one that was said.
+  void ConfirmCamera(uint32_t session);
   /// What a run rests on is known from the disk, where nobody may be left who says it.
   void KnowCamera(const CameraInfo& info);
 
@@ -141,8 +144,10 @@ class StreamNode : public Node {
   bool IsForeign(uint32_t session);
   /// The same for what the player says: a recorded session that was accepted is ours.
   bool IsForeignFrame(uint32_t session);
-  /// The frontend says on what its session rests. False where this process does not fit: it ends, and says
-  /// why.
+  /// On what the session of a frontend rests: the first record of its stream says so, and no other. None
+  /// where it does not, which is counted.
+  std::optional<SessionStart> ReadSessionStart(const RecordHeader& header, std::span<const uint8_t> bytes);
+  /// False where this process does not fit that: it ends, and says why.
   bool JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum = std::nullopt);
 
   void Exit(int code, std::string problem = {});
@@ -163,6 +168,8 @@ class StreamNode : public Node {
   int64_t PublishBytes(const std::string& channel, Bytes bytes);
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes);
+  bool MayBeOurs(uint32_t session);
+  void BelieveCamera(CameraInfo info);
   void OnOtherCamera(const CameraInfo& info);
   bool IsOfCamera() const;
   void KeepCameraKnown();
@@ -181,7 +188,7 @@ class StreamNode : public Node {
   void WarnOnce(const std::string& matter, const std::string& text);
 
   struct KnownCamera {
-    Bytes message;       ///< as the player sent it; empty: of a recorded session, and not repeated
+    Bytes message;       ///< what the player says; empty: of a recorded session, and not repeated
     int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
   };
   struct Traffic {
@@ -202,6 +209,7 @@ class StreamNode : public Node {
   bool begun_ = false;
   std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for the stream must have gone on with it
   std::map<CameraId, KnownCamera> cameras_;
+  CameraClaims camera_claims_;  ///< of those that are not known yet
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterElection> election_;
   std::optional<int> exit_code_;

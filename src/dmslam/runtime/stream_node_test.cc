@@ -22,6 +22,7 @@ class Holder : public StreamNode {
   const Map& map() const { return map_; }
   int applied() const { return applied_; }
   Version held() const { return MapHeld(*reader_); }
+  const std::optional<CameraInfo>& camera() const { return camera_info_; }
   int64_t malformed() const { return MakeStatusHead("", {}).health.dropped_malformed; }
 
  private:
@@ -79,8 +80,16 @@ class MapStreamTest : public testing::Test {
     CameraInfo info;
     info.session = kSession;
     info.camera = TestCamera();
-    mapper_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+    SayCamera(info);
+    SayCamera(info);
     Run();
+  }
+
+  void SayCamera(const CameraInfo& info) {
+    mapper_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+    while (bus_.DeliverOne()) {
+    }
+    now_ns_ += 100 * kMs;
   }
 
   void Run() {
@@ -107,6 +116,31 @@ class MapStreamTest : public testing::Test {
   std::unique_ptr<StreamWriter> writer_;
   std::unique_ptr<Holder> holder_;
 };
+
+TEST_F(MapStreamTest, OneForgedCameraBeforeItsOwnComesIsNotBelieved) {
+  NodeOptions options;
+  options.session = kSession;
+  NodeContext context;
+  context.bus = &bus_.AddPort();
+  context.now_ns = [this] { return now_ns_; };
+  context.wall_us = [this] { return now_ns_ / 1000; };
+  context.random_id = 8;
+  Holder late(context, options);
+  CameraInfo forged;
+  forged.session = kSession;
+  forged.camera = TestCamera();
+  forged.camera.width_px = 32;
+  SayCamera(forged);
+  late.Advance();
+  EXPECT_FALSE(late.camera());
+  CameraInfo own = forged;
+  own.camera = TestCamera();
+  SayCamera(own);
+  SayCamera(own);
+  late.Advance();
+  ASSERT_TRUE(late.camera());
+  EXPECT_EQ(late.camera()->camera.width_px, TestCamera().width_px);
+}
 
 TEST_F(MapStreamTest, AReplicaFollows) {
   const int64_t seq = Publish(AddKeyframe(1));

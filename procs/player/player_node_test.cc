@@ -1,0 +1,144 @@
+#include "player/player_node.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+constexpr uint32_t kSession = 9;
+
+/// Ten grey frames.
+class TenFrames : public FrameSource {
+ public:
+  size_t size() const override { return 10; }
+  int64_t StampNs(size_t index) const override { return static_cast<int64_t>(index) * 33'000'000; }
+  std::string Name(size_t index) const override { return "frame " + std::to_string(index); }
+  EncodedImage Read(size_t) override {
+    return {ImageEncoding::kGray8, 64, 48, std::vector<uint8_t>(size_t{64} * 48, 7)};
+  }
+};
+
+/// A player in lock-step, on a bus where somebody listens and answers; time stands still unless it is moved.
+class PlayerNodeTest : public testing::Test {
+ protected:
+  PlayerNodeTest() : player_port_(bus_.AddPort()), ear_(bus_.AddPort()) {
+    for (const char* channel : {channels::kFrame, channels::kEndOfSequence}) ear_.Subscribe(channel);
+    ear_.SetHandler([this](const std::string& channel, std::span<const uint8_t> bytes) {
+      if (channel == channels::kFrame) frames_.push_back(wire::Decode<Frame>(bytes)->frame_index);
+      if (channel == channels::kEndOfSequence) ++ends_;
+    });
+    NodeContext context;
+    context.bus = &player_port_;
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    PlayerOptions options;
+    options.sequence = "ten";
+    options.session = kSession;
+    options.camera = {.width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 32, .cy_px = 24};
+    options.mode = PlaybackMode::kLockstep;
+    options.encoding.encoding = FrameEncoding::kGray8;
+    player_ = std::make_unique<PlayerNode>(std::move(context), options, std::make_unique<TenFrames>());
+  }
+  void Advance(int64_t ms, int64_t every_ms = 10) {
+    for (; ms > 0; ms -= every_ms) {
+      now_ns_ += every_ms * 1'000'000;
+      player_->Advance();
+      Deliver();
+    }
+  }
+  /// Until it has played its first frame.
+  void Begin() {
+    for (int i = 0; i < 1000 && frames_.empty(); ++i) Advance(10);
+  }
+  void Deliver() {
+    while (bus_.DeliverOne()) {
+    }
+  }
+  template <typename Message>
+  void Say(const Message& message) {
+    ear_.Publish(
+        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
+    Deliver();
+  }
+  void SayDone(uint32_t frame) { Say(FrameDone{.session = kSession, .frame_index = frame}); }
+  void SayAllDone() { Say(SequenceDone{.session = kSession}); }
+
+  MemoryBus bus_;
+  MemoryBus::Port& player_port_;
+  MemoryBus::Port& ear_;
+  int64_t now_ns_ = 1'000'000'000;
+  std::vector<uint32_t> frames_;
+  int ends_ = 0;
+  std::unique_ptr<PlayerNode> player_;
+};
+
+TEST_F(PlayerNodeTest, PlaysFrameByFrameAndTellsTheEnd) {
+  Begin();
+  for (uint32_t frame = 0; frame < 10; ++frame) {
+    ASSERT_EQ(frames_.back(), frame);
+    SayDone(frame);
+    Advance(10);
+  }
+  Advance(300);
+  EXPECT_GE(ends_, 1);
+  SayAllDone();
+  Advance(6000);  // no mapper says anything
+  EXPECT_EQ(player_->exit_code(), 0);
+}
+
+TEST_F(PlayerNodeTest, OneForgedAnswerWhileItBeginsChangesNothing) {
+  Advance(10);
+  ASSERT_TRUE(frames_.empty()) << "it listens first";
+  SayAllDone();
+  SayDone(7);
+  Begin();
+  ASSERT_FALSE(frames_.empty());
+  EXPECT_EQ(frames_.front(), 0u);
+  EXPECT_EQ(ends_, 0);
+  SayDone(8);  // nothing of ours has been done yet
+  Advance(400);
+  EXPECT_EQ(frames_.back(), 0u) << "it waits";
+  SayDone(0);
+  Advance(10);
+  EXPECT_EQ(frames_.back(), 1u);
+}
+
+TEST_F(PlayerNodeTest, OneForgedAnswerInTheMiddleChangesNothing) {
+  Begin();
+  SayDone(0);
+  Advance(10);
+  SayDone(9);
+  SayAllDone();
+  Advance(400);
+  EXPECT_EQ(frames_.back(), 1u);
+  EXPECT_EQ(ends_, 0);
+}
+
+/// Started again, it begins from the front; the frontend answers each repeat with what it has done.
+TEST_F(PlayerNodeTest, GoesOnBehindAFrontendThatIsFurther) {
+  Begin();
+  SayDone(5);
+  Advance(300);
+  SayDone(9);  // forged
+  SayDone(5);
+  Advance(10);
+  EXPECT_EQ(frames_.back(), 6u) << "of what is said the least counts";
+}
+
+TEST_F(PlayerNodeTest, GoesToTheEndWhereAllIsDone) {
+  Begin();
+  SayAllDone();
+  Advance(300);
+  SayAllDone();
+  Advance(10);
+  EXPECT_GE(ends_, 1);
+}
+
+}  // namespace
+}  // namespace dmslam
