@@ -1,12 +1,26 @@
 #include "collector/checkpointer.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "dmslam/console/log.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
+namespace {
+
+/// Why it failed; empty: it did not.
+std::string ProblemOf(const std::function<void()>& write) {
+  try {
+    write();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
 
 Checkpointer::Checkpointer(Options options, std::unique_ptr<CoreThread> thread, Journal* journal)
     : options_(std::move(options)),
@@ -34,13 +48,10 @@ void Checkpointer::Begin(const Map& map, const SessionStart& session) {
   copied.landmarks = map.num_landmarks();
   schedule_.OnBegun();
   thread_->Post([this, copied, cut, session] {
-    std::string problem;
-    try {
+    const std::string problem = ProblemOf([&] {
       journal_->Sync();
       WriteCheckpoint(options_.path, *cut, session);
-    } catch (const InputError& error) {
-      problem = error.what();
-    }
+    });
     thread_->Report([this, copied, problem] { OnEnded(copied, problem); });
   });
 }
@@ -53,13 +64,22 @@ void Checkpointer::OnEnded(const Copied& copied, const std::string& problem) {
     LogInfo("checkpoint of {} keyframes and {} landmarks: copied in {:.1f} ms, on the disk {:.1f} ms later",
             copied.keyframes, copied.landmarks, static_cast<double>(copied.ended_ns - copied.begun_ns) * 1e-6,
             static_cast<double>(now_ns - copied.ended_ns) * 1e-6);
-  } else if (!std::exchange(warned_, true)) {
-    problem_ = problem;
+  } else {
+    Warn(problem);
   }
 }
 
+/// Once: the disk that refuses one refuses the next.
+void Checkpointer::Warn(const std::string& problem) {
+  if (!problem.empty() && !std::exchange(warned_, true)) problem_ = problem;
+}
+
 void Checkpointer::SyncJournal() {
-  if (thread_->Idle()) thread_->Post([this] { journal_->Sync(); });
+  if (!thread_->Idle()) return;
+  thread_->Post([this] {
+    const std::string problem = ProblemOf([&] { journal_->Sync(); });
+    thread_->Report([this, problem] { Warn(problem); });
+  });
 }
 
 int64_t Checkpointer::deadline_ns() const {

@@ -50,6 +50,7 @@ class Checkpointer {
     size_t keyframes = 0, landmarks = 0;
   };
   void OnEnded(const Copied& copied, const std::string& problem);
+  void Warn(const std::string& problem);
 
   static constexpr int64_t kLookAgainNs = 100'000'000;
   Options options_;

@@ -148,17 +148,20 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
 
 /// A process is heard; where another one of its name was before it, that one's counters are kept. What a
 /// collector after this one must know of it goes into the journal.
-void CollectorNode::OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
+void CollectorNode::OnProcess(const std::string& process, const ProcessHealth& heard,
+                              const ProcessHealth& so_far) {
   if (!journal_) {
-    heard_early_.insert({process, pid});
-    return;
+    heard_early_[{process, heard.pid}] = heard;
+  } else if (processes_[process].instances.IsNew(heard, context_.now_ns())) {
+    NoteProcess(process, heard.pid, so_far);
   }
+}
+
+void CollectorNode::NoteProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
   Followed& known = processes_[process];
-  if (known.ids.contains(pid)) return;
-  known.ids.insert(pid);
   std::ostringstream note;
   note << "process " << process << ' ' << pid;
-  if (known.ids.size() > 1) {
+  if (++known.count > 1) {
     ++run_.restarts;
     known.former = so_far;
     if (process == "frontend") known.former_frontend = run_.cameras[0].frontend;
@@ -216,7 +219,8 @@ void CollectorNode::ReadNote(const std::string& text) {
   }
   if (kind != "process" || !(note >> process >> pid)) return;
   Followed& known = processes_[process];
-  if (known.ids.insert(pid).second && known.ids.size() > 1) ++run_.restarts;
+  known.instances.Know(pid, context_.now_ns());
+  if (++known.count > 1) ++run_.restarts;
   for (int64_t ProcessHealth::*counter : kHealthCounters) note >> known.former.*counter;
   if (process != "frontend") return;
   for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> known.former_frontend.*counter;
@@ -229,7 +233,7 @@ bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head)
                                                                         : !IsForeign(head.session));
   if (!ours) return false;
   ProcessHealth& health = run_.health[process];
-  OnProcess(process, head.health.pid, health);
+  OnProcess(process, head.health, health);
   const ProcessHealth& former = processes_[process].former;
   const double largest = std::max(health.rss_mb, head.health.rss_mb);
   run_.memory[process].Add({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
@@ -497,9 +501,11 @@ void CollectorNode::OpenJournal() {
   }
   for (const auto& [camera, frames] : announced_before) Announce(camera, frames.first, frames.second);
   processes_["collector"].former = run_.health["collector"];
-  OnProcess("collector", MeasureProcess(context_.pid).pid, run_.health["collector"]);
-  for (const auto& [process, pid] : std::exchange(heard_early_, {}))
-    OnProcess(process, pid, run_.health[process]);
+  const ProcessHealth own = MeasureProcess(context_.pid);
+  processes_["collector"].instances.IsNew(own, context_.now_ns());
+  NoteProcess("collector", own.pid, run_.health["collector"]);  // whatever the id of the one before it was
+  for (const auto& [key, health] : std::exchange(heard_early_, {}))
+    OnProcess(key.first, health, run_.health[key.first]);
   if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(

@@ -12,6 +12,7 @@
 #include "collector/make_collector.h"
 #include "collector/results.h"
 #include "dmslam/recording/journal.h"
+#include "dmslam/runtime/instance_watch.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
@@ -45,8 +46,9 @@ class CollectorNode : public StreamNode {
   };
   /// Processes of one name that followed one another.
   struct Followed {
-    std::set<int32_t> ids;  ///< of them all
-    ProcessHealth former;   ///< counters of those before the present one, together
+    InstanceWatch instances;
+    int64_t count = 0;     ///< of them all
+    ProcessHealth former;  ///< counters of those before the present one, together
     FrontendStatus former_frontend;
   };
   /// A keyframe that no mapper has taken yet, as its frontend said it.
@@ -104,7 +106,8 @@ class CollectorNode : public StreamNode {
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
   void BeginCheckpoints();
-  void OnProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far);
+  void OnProcess(const std::string& process, const ProcessHealth& heard, const ProcessHealth& so_far);
+  void NoteProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far);
   void ReadNote(const std::string& text);
   bool OnHealth(const std::string& process, const StatusHead& head);
   void OnFrontendStatus(FrontendStatus status);
@@ -154,8 +157,9 @@ class CollectorNode : public StreamNode {
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
   std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
-  std::map<std::string, Followed> processes_;              ///< by name
-  std::set<std::pair<std::string, int32_t>> heard_early_;  ///< process and id, before there was a journal
+  std::map<std::string, Followed> processes_;  ///< by name
+  std::map<std::pair<std::string, int32_t>, ProcessHealth>
+      heard_early_;  ///< by process and id, before there was a journal
   Proposals proposals_;
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end

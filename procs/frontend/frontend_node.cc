@@ -232,6 +232,12 @@ bool FrontendNode::HoldsBack() const { return pace_.lockstep && core_->awaited()
 /// Nothing can be done before a saved map has come.
 bool FrontendNode::AwaitsSavedMap() const { return run_.saved_map && core_->map().keyframes().empty(); }
 
+/// In lock-step the first frame waits until all follow who are to keep what is told of it: it would die with
+/// this process.
+bool FrontendNode::AwaitsFirstReaders() const {
+  return pace_.lockstep && counts_.processed == 0 && !AwaitedReaders().empty();
+}
+
 /// Where several cameras go in lock-step, a frame waits until the mapper has all that comes before it. A
 /// mapper that was started again is asked again.
 bool FrontendNode::HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns) {
@@ -271,7 +277,8 @@ bool FrontendNode::WorkOnce() {
   if (ProposeWhatWasLeft()) return true;
   if (pace_.frame_open) FinishFrame();
   if (waiting_ && !FallsBehind())
-    return HasTurn(waiting_->frame.frame_index, waiting_->frame.stamp_ns) && TrackWaiting();
+    return !AwaitsFirstReaders() && HasTurn(waiting_->frame.frame_index, waiting_->frame.stamp_ns) &&
+           TrackWaiting();
   if (core_->IsBehind()) return (hurries_ || core_->MayCatchUp()) && CatchUp();
   return WorkAtEnd();
 }

@@ -102,6 +102,7 @@ class FrontendNode : public StreamNode {
   Version HandOverVersion();
   bool HoldsBack() const;
   bool AwaitsSavedMap() const;
+  bool AwaitsFirstReaders() const;
   bool TrackWaiting();
   void Track(const Waiting& waiting, bool withheld);
   bool DecodeImage(const Frame& frame);

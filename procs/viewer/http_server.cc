@@ -1,11 +1,13 @@
 #include "viewer/http_server.h"
 
 #include <fcntl.h>
+#include <linux/sockios.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -204,6 +206,7 @@ void HttpServer::Refuse(Connection* c, int status) {
 
 void HttpServer::Respond(Connection* c, const HttpRequest& request, HttpResponse response) {
   if (response.events) {
+    if (hub_->num_listeners() >= EventHub::kMostListeners) MakeRoomForStream();
     c->listener = hub_->Join();
     response.type = "text/event-stream";
     if (!c->listener) response = HttpResponse{503, "", "", {}, false};
@@ -228,7 +231,26 @@ void HttpServer::Respond(Connection* c, const HttpRequest& request, HttpResponse
   WriteTo(c);
 }
 
+/// Of those who listen goes who has left most unread, and then who came first: a browser that is still there
+/// joins again by itself.
+void HttpServer::MakeRoomForStream() {
+  Connection* least = nullptr;
+  std::pair<int, Clock::duration> most_left;
+  for (Connection& c : connections_) {
+    int unread = 0;
+    if (c.done || !c.listener || ioctl(c.fd, SIOCOUTQ, &unread) != 0) continue;
+    const std::pair left(unread, Clock::now() - c.joined);
+    if (least != nullptr && left <= most_left) continue;
+    least = &c;
+    most_left = left;
+  }
+  if (least == nullptr) return;
+  hub_->Leave(std::exchange(least->listener, nullptr));
+  least->done = true;
+}
+
 void HttpServer::BeginEvents(Connection* c) {
+  c->joined = Clock::now();
   Option(c->fd, SOL_SOCKET, SO_SNDBUF, kEventBuffer);
   c->spoke = Clock::now();
 }

@@ -58,6 +58,7 @@ class HttpServer {
     Clock::time_point since;     // of the request that is being read; of the end of the one before
     Clock::time_point progress;  // when it last took something
     Clock::time_point spoke;     // an event or a comment was last put into `out`
+    Clock::time_point joined;    // began to listen
     bool done = false;
     bool writing() const { return sent < out.size(); }
   };
@@ -70,6 +71,7 @@ class HttpServer {
   void Answer(Connection* connection);
   void Refuse(Connection* connection, int status);
   void Respond(Connection* connection, const HttpRequest& request, HttpResponse response);
+  void MakeRoomForStream();
   void BeginEvents(Connection* connection);
   void SpeakEvents(Connection* connection);
   void WriteTo(Connection* connection);

@@ -171,6 +171,30 @@ TEST_F(HttpServerTest, WhoDoesNotReadIsDroppedAndShutsNobodyOut) {
   EXPECT_LT(large.ReadAll(), kLargeBytes);
 }
 
+/// Little is said, so that those who do not read are not found out by their buffers.
+TEST_F(HttpServerTest, WhoListensWithoutReadingShutsNobodyOut) {
+  options_.connections = 256;
+  options_.stall_time = milliseconds(60'000);
+  Begin();
+  std::vector<std::unique_ptr<Client>> idle;
+  for (size_t i = 0; i < EventHub::kMostListeners; ++i) {
+    idle.push_back(std::make_unique<Client>(server_->port()));
+    idle.back()->Say("GET /events HTTP/1.1\r\nHost: a\r\n\r\n");
+    idle.back()->Hear("\r\n\r\n");
+  }
+  std::vector<std::unique_ptr<Client>> readers;
+  for (int i = 0; i < 3; ++i) {
+    readers.push_back(std::make_unique<Client>(server_->port()));
+    readers.back()->Say("GET /events HTTP/1.1\r\nHost: a\r\n\r\n");
+    EXPECT_NE(readers.back()->Hear("\r\n\r\n").find("200 OK"), std::string::npos);
+  }
+  EXPECT_EQ(hub_.num_listeners(), EventHub::kMostListeners);
+  EXPECT_TRUE(idle.front()->Closed()) << "who came first has left";
+  hub_.Send(EventKind::kPose, "1");
+  for (const auto& reader : readers)
+    EXPECT_NE(reader->Hear("event: pose").find("event: pose"), std::string::npos);
+}
+
 TEST_F(HttpServerTest, AStreamLastsAsLongAsItIsRead) {
   Begin();
   const Client reader(server_->port());

@@ -13,7 +13,7 @@ constexpr size_t kMostEvents = 200;
 
 ProcessBoard::ProcessBoard(const std::vector<std::string>& names) {
   for (const std::string& name : names)
-    processes_.push_back({.name = name, .state = {}, .reason = {}, .health = {}});
+    processes_.push_back({.name = name, .state = {}, .reason = {}, .health = {}, .instances = {}});
 }
 
 ProcessBoard::Process* ProcessBoard::Find(const std::string& name) {
@@ -32,7 +32,7 @@ void ProcessBoard::OnStatus(const std::string& name, const StatusHead& head, con
   Process* process = Find(name);
   if (process == nullptr) return;
   const bool first = process->life == Life::kAwaited;
-  const bool restarted = !first && process->health.pid != 0 && process->health.pid != head.health.pid;
+  const bool restarted = process->instances.IsNew(head.health, now_ns) && !first;
   const bool silent = process->life == Life::kDown;
   process->heard_ns = now_ns;
   if (restarted) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/runtime/instance_watch.h"
 #include "dmslam/wire/status.h"
 
 namespace dmslam {
@@ -19,8 +20,8 @@ struct BoardEvent {
   std::string text;
 };
 
-/// Who of the system is there: heard within a moment, silent, back after silence or with another process id,
-/// or gone at the end as it should. Time comes from outside.
+/// Who of the system is there: heard within a moment, silent, back after silence or as another process, or
+/// gone at the end as it should. Time comes from outside.
 class ProcessBoard {
  public:
   enum class Life : uint8_t { kAwaited, kUp, kDown, kBack, kEnded };
@@ -29,11 +30,12 @@ class ProcessBoard {
     Life life = Life::kAwaited;
     int64_t heard_ns = 0;  ///< last word, of whatever kind
     int64_t since_ns = 0;  ///< when `life` began
-    int restarts = 0;      ///< other process ids heard under this name
+    int restarts = 0;      ///< processes heard under this name after the first one
     int64_t restart_ns = 0;
     std::string state;  ///< what it does, in a word
     std::string reason;
     ProcessHealth health;
+    InstanceWatch instances;
   };
 
   /// `names`: in the order in which they are shown.

@@ -200,6 +200,24 @@ TEST_F(SystemSimulation, TheSameSeedGivesTheSameRun) {
   EXPECT_EQ(Difference(a, b), "");
 }
 
+/// In lock-step the first frame waits for who keeps what is told of it: a frontend that dies soon takes no
+/// more of it along than one that dies later.
+TEST_F(SystemSimulation, WhoBeginsLateMissesNothingOfAFrontendThatDies) {
+  for (const uint64_t seed : {1, 3}) {
+    Schedule schedule = CalmSchedule();
+    schedule.seed = seed;
+    schedule.at_once = true;
+    schedule.latest_start_ns = 4 * kSecond;
+    schedule.faults = {Kill("frontend", 30, kSecond / 10)};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    ASSERT_EQ(outcome.failure, "") << outcome.story;
+    const Distance distance = Measure(outcome, common_->undisturbed, common_->folder.string());
+    const Distance calm = Measure(common_->undisturbed, common_->undisturbed, common_->folder.string());
+    EXPECT_GE(distance.tracked, calm.tracked - kFramesLostByFrontend) << outcome.story;
+  }
+}
+
 /// What only a frontend has that dies is lost; that is counted.
 TEST_F(SystemSimulation, WhatADeadFrontendHadNotDeliveredIsCounted) {
   Schedule schedule = CalmSchedule();

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -17,9 +18,12 @@
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/recording/journal.h"
 #include "dmslam/recording/map_file.h"
+#include "dmslam/util/check.h"
 #include "dmslam/util/output_file.h"
 
 namespace {
+
+bool disk_refuses = false;
 
 std::vector<std::string>& Asked() {
   static std::vector<std::string> asked;
@@ -42,6 +46,10 @@ int fsync(int fd) {
   return static_cast<int>(syscall(SYS_fsync, fd));
 }
 int fdatasync(int fd) {
+  if (disk_refuses) {
+    errno = EIO;
+    return -1;
+  }
   NoteSync(fd);
   return static_cast<int>(syscall(SYS_fdatasync, fd));
 }
@@ -110,6 +118,21 @@ TEST_F(DurabilityTest, ACheckpointIsSyncedBeforeItIsNamed) {
   ExpectSyncedThenNamed({steps.begin(), steps.begin() + 3}, NameOf(path) + ".new");
   EXPECT_EQ(steps[4], "rename to " + NameOf(path)) << "what was synced takes the former one's place";
   EXPECT_EQ(steps[5], "sync " + NameOf(folder_));
+}
+
+TEST_F(DurabilityTest, AJournalThatTheDiskRefusesIsNamed) {
+  Journal journal(folder_ + "/collector.journal");
+  journal.Begin(7);
+  disk_refuses = true;
+  try {
+    journal.Sync();
+    ADD_FAILURE() << "what is not on the disk is not safe";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("collector.journal: is not safe from a power cut"),
+              std::string::npos);
+  }
+  disk_refuses = false;
+  EXPECT_NO_THROW(journal.Sync());
 }
 
 TEST_F(DurabilityTest, AJournalIsSyncedWithItsFolderAndAnotherSessionsIsSetAside) {

@@ -171,8 +171,9 @@ bool Journal::WriteFramed(const std::vector<uint8_t>& framed) {
   return false;
 }
 
-void Journal::Sync() {
-  if (fd_ >= 0) fdatasync(fd_);
+void Journal::Sync() const {
+  if (fd_ < 0 || fdatasync(fd_) == 0) return;
+  throw InputError(path_ + ": is not safe from a power cut (" + std::strerror(errno) + "); check its disk");
 }
 
 void Journal::Remove() {

@@ -51,8 +51,8 @@ class Journal {
   const std::string& problem() const { return problem_; }
   /// How many records were given up, because the disk took none for too long.
   int64_t lost() const { return lost_; }
-  /// On the disk, whatever becomes of this host.
-  void Sync();
+  /// On the disk, whatever becomes of this host. Throws InputError where the disk refuses.
+  void Sync() const;
   /// It is no longer needed.
   void Remove();
 

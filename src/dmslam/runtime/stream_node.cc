@@ -308,6 +308,15 @@ void StreamNode::OpenWriter() {
   OnWriterOpen();
 }
 
+std::string StreamNode::AwaitedReaders() const {
+  std::string awaited;
+  for (const std::string& role : plan_->readers) {
+    if (options_.HasPeer(role) && !writer_->AcknowledgedBy(role))
+      awaited += (awaited.empty() ? "" : ", ") + role;
+  }
+  return awaited;
+}
+
 void StreamNode::WatchWriter() {
   if (!writer_) return;
   if (hands_over_until_ns_) return WatchHandOver();
@@ -517,12 +526,9 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   }
   if (!writer_) return head;
   AddWriter(*writer_, &health);
-  for (const std::string& role : plan_->readers) {
+  for (const std::string& role : plan_->readers)
     health.unacknowledged = std::max(health.unacknowledged, static_cast<int32_t>(writer_->Backlog(role)));
-    if (options_.HasPeer(role) && !writer_->AcknowledgedBy(role)) {
-      health.waiting_for += (health.waiting_for.empty() ? "" : ", ") + role;
-    }
-  }
+  health.waiting_for = AwaitedReaders();
   return head;
 }
 

@@ -105,6 +105,10 @@ class StreamNode : public Node {
   void WantWriter(WriterPlan plan) { plan_ = std::move(plan); }
   WriterPlan& writer_plan() { return *plan_; }
 
+  /// Those who are to read this node's stream without loss, are expected on the bus, and do not follow it
+  /// yet; with commas.
+  std::string AwaitedReaders() const;
+
   /// Publishes a record of this node's stream; returns its sequence number.
   template <typename Message>
   int64_t PublishRecord(const Message& message) {
