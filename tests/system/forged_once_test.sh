@@ -12,7 +12,7 @@ forged() { # KIND TIMES: it does no harm
   expect "$name: nobody was started again" "$work/$name" restarts "== 0"
   expect "$name: what comes after it is tracked" "$work/$name" tracked_percent ">= 85"
 }
-for kind in head record reset ack; do forged "$kind" 1; done
+for kind in head record reset ack session; do forged "$kind" 1; done
 for kind in take-over frame small-frame far-frame end camera "done" far-done sequence-done; do
   forged "$kind" 1
   forged "$kind" 5

@@ -62,6 +62,7 @@ class Forger {
                                                                      {"done", &Forger::Done},
                                                                      {"far-done", &Forger::FarDone},
                                                                      {"sequence-done", &Forger::AllDone},
+                                                                     {"session", &Forger::Session},
                                                                      {"replay", &Forger::Replay}};
     const auto found = kKinds.find(kind);
     if (found == kKinds.end()) return false;
@@ -223,6 +224,24 @@ class Forger {
     reset.drop = true;
     SendRecord(channels::kMapReset, *header, wire::Encode(reset));
   }
+  /// What nobody's settings fit: as the first record of a stream of now, and as the next one of the
+  /// frontend's.
+  void Session() {
+    const auto heard = last_.find(channels::kSession);
+    const auto newest = last_.find(channels::kFramePose);
+    if (heard == last_.end() || newest == last_.end()) return;
+    const Bytes bytes = WithoutTag(heard->second);
+    auto session = wire::Decode<SessionStart>(bytes);
+    const auto header = ParseHeader(WithoutTag(newest->second));
+    if (!session || !header) return;
+    ++session->configuration_hash;
+    RecordHeader first = *header;
+    first.seq = 0;
+    SendRecord(channels::kSession, first, wire::Encode(*session));
+    first.epoch += 1'000'000;
+    SendRecord(channels::kSession, first, wire::Encode(*session));
+    SendRecord(channels::kSession, *header, wire::Encode(*session));
+  }
   void Acks() {
     for (const std::string reader : {"FRONTEND", "MAPPER", "LOOPCLOSER", "COLLECTOR"}) {
       const auto heard = last_.find(AckChannel(reader));
@@ -265,7 +284,7 @@ int main(int argc, char** argv) {
   app.AddOption(
          "--kind", kinds,
          "frame, small-frame, far-frame, end, camera, take-over, head, record, reset, ack, done, far-done, "
-         "sequence-done, replay")
+         "sequence-done, session, replay")
       .Required();
   app.AddOption("--times", times, "end after so many forgeries of each kind; default: a signal ends it");
   app.AddOption("--from-frame", from_frame, "begin when this frame has been played");
