@@ -230,7 +230,7 @@ class Forger {
     const auto heard = last_.find(channels::kSession);
     const auto newest = last_.find(channels::kFramePose);
     if (heard == last_.end() || newest == last_.end()) return;
-    const Bytes bytes = WithoutTag(heard->second);
+    const auto bytes = WithoutTag(heard->second);
     auto session = wire::Decode<SessionStart>(bytes);
     const auto header = ParseHeader(WithoutTag(newest->second));
     if (!session || !header) return;
