@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/loops/testing/indexed_room.h"
 #include "dmslam/loops/testing/ring_room.h"
 
 namespace dmslam {
@@ -155,17 +156,6 @@ TEST(LoopcloserCoreTest, OnePictureThatHangsInTwoPlacesIsNoLoop) {
   LoopcloserCore core = MakeCore();
   const Answers answers = Play(room, core);
   EXPECT_TRUE(answers.loops.empty());
-}
-
-/// Without what stops loops on people.
-LoopcloserOptions Trusting() {
-  LoopcloserOptions options;
-  options.min_proven = 0;
-  options.min_told = 1'000'000;
-  options.max_drift_sigmas = 1e9;
-  options.confirmation.times = 1;
-  options.confirmation.for_s = 0;
-  return options;
 }
 
 /// Loops long before the camera comes back.

@@ -99,7 +99,7 @@ class Room {
   /// The next keyframe with what it sees, as a delta.
   MapDelta Next() {
     const int k = next_++;
-    const KeyframeId id = KeyframeId::Make(1, static_cast<uint32_t>(k + 1));
+    const KeyframeId id = IdOf(k);
     Random random(DeriveSeed(3, static_cast<uint64_t>(k), "keyframe"));
     const Rigid3d T_cam_true = TruePose(k);
     FeatureSet features;
@@ -136,10 +136,18 @@ class Room {
 
   const Map& map() const { return map_; }
 
+  static KeyframeId IdOf(int k) { return KeyframeId::Make(1, static_cast<uint32_t>(k + 1)); }
+  /// Camera of keyframe `a` from camera of keyframe `b`, each in the unit that its map has there.
+  Sim3d TrueSimilarity(int a, int b) const { return InItsUnit(a) * InItsUnit(b).Inverse(); }
+
  private:
   int Round(int k) const { return k / kPerRound; }
   MapId MapOf(int k) const { return k < options_.second_map_at ? 1 : 2; }
   Sim3d Believed(int k) const { return MapOf(k) == 1 ? Drift(k) : SecondWorld(); }
+  Sim3d InItsUnit(int k) const {
+    const Sim3d unit(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), Believed(k).scale);
+    return unit * Sim3d(TruePose(k));
+  }
   const Descriptor& DescriptorOf(size_t point, int k) const {
     return Round(k) == 0 ? first_[point] : second_[point];
   }
@@ -184,7 +192,7 @@ class Room {
     keyframe.map_id = MapOf(k);
     keyframe.stamp_ns = k * kInterval_ns;
     keyframe.T_cam_world = (Sim3d(TruePose(k)) * Believed(k).Inverse()).ToRigid();
-    if (k > 0 && k != options_.second_map_at) keyframe.parent = KeyframeId::Make(1, static_cast<uint32_t>(k));
+    if (k > 0 && k != options_.second_map_at) keyframe.parent = IdOf(k - 1);
     keyframe.features = MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid());
     map_.AddKeyframe(std::move(keyframe));
   }
