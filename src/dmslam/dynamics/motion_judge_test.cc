@@ -4,64 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numeric>
+#include <functional>
 
-#include "dmslam/map/testing/map_scene.h"
+#include "dmslam/dynamics/testing/poster_scene.h"
 
 namespace dmslam {
 namespace {
 
 using testing::MapScene;
+using testing::PosterScene;
 
-constexpr int64_t kNow = 10'000'000'000;
-
-TEST(Votes, WhatIsBelievedToMoveHasNone) {
-  Landmark landmark;
-  landmark.id = MapScene::IdOf(0);
-  const LandmarkVotes votes({});
-  EXPECT_TRUE(votes.HasVote(landmark));
-  landmark.evidence.motion_belief = 0.1F;
-  EXPECT_FALSE(votes.HasVote(landmark));
-  EXPECT_TRUE(LandmarkVotes({.motion_belief = false}).HasVote(landmark));
-}
-
-TEST(Votes, AStreakElsewhereCostsTheVoteUntilItIsFound) {
-  Landmark landmark;
-  landmark.id = MapScene::IdOf(0);
-  LandmarkVotes votes({});
-  for (int sighting = 0; sighting < 3; ++sighting) {
-    EXPECT_TRUE(votes.HasVote(landmark)) << sighting;
-    votes.OnSeenElsewhere(landmark.id);
-  }
-  EXPECT_FALSE(votes.HasVote(landmark));
-  votes.OnFound(landmark.id);
-  EXPECT_TRUE(votes.HasVote(landmark));
-}
-
-TEST(Votes, TrustGrowsWithAge) {
-  Landmark landmark;
-  const LandmarkVotes votes({.young_trust = 0.3, .trusted_age_s = 4.0});
-  EXPECT_DOUBLE_EQ(votes.Trust(landmark, 0), 0.3);
-  EXPECT_DOUBLE_EQ(votes.Trust(landmark, 2'000'000'000), 0.65);
-  EXPECT_DOUBLE_EQ(votes.Trust(landmark, 9'000'000'000), 1.0);
-}
-
-TEST(EldersTest, TheOldestDecideAndTheYoungNeverOutweighThem) {
-  Elders elders({}, 4.0);
-  std::vector<double> ages_s(40, 1.0);
-  EXPECT_FALSE(elders.FromAge(ages_s)) << "too few to tell them apart";
-  ages_s.resize(100);
-  std::iota(ages_s.begin(), ages_s.end(), 0.0);
-  EXPECT_DOUBLE_EQ(*elders.FromAge(ages_s), 4.0) << "whoever is trusted is an elder";
-  for (double& age : ages_s) age *= 0.01;
-  EXPECT_NEAR(*elders.FromAge(ages_s), 0.59, 1e-9) << "the oldest 40 of 100";
-  EXPECT_FALSE(elders.Decide(23, 40));
-  EXPECT_TRUE(elders.Decide(24, 40));
-  EXPECT_TRUE(elders.Admit(7.8));
-  EXPECT_FALSE(elders.Admit(7.9));
-  EXPECT_DOUBLE_EQ(elders.YoungFactor(40, 200), 0.1);
-  EXPECT_DOUBLE_EQ(elders.YoungFactor(40, 10), 1.0);
-}
+constexpr int64_t kNow = PosterScene::kNow;
 
 TEST(EvidenceCounterTest, WhatIsFoundWasVisible) {
   EvidenceCounter counter;
@@ -78,41 +31,14 @@ TEST(EvidenceCounterTest, WhatIsFoundWasVisible) {
   EXPECT_TRUE(counter.Take(kNow, 1).items.empty());
 }
 
-/// A wall at depth 4 and a poster, say, of 5 x 5 points before it at depth 2.
 class Judgement : public ::testing::Test {
  protected:
-  static constexpr size_t kPoster = 300, kPosterPoints = 25;
+  static constexpr size_t kPoster = PosterScene::kPoster, kPosterPoints = PosterScene::kPosterPoints;
 
-  Judgement() {
-    scene_.AddCloud(kPoster, {0, 0, 4}, {1.6, 1.2, 0.01});
-    for (int x = -2; x <= 2; ++x) {
-      for (int y = -2; y <= 2; ++y) scene_.AddPoint({0.08 * x, 0.08 * y, 2.0});
-    }
-    scene_.MapAll();
-  }
-
-  static bool OfPoster(size_t point) { return point >= kPoster; }
-
-  std::vector<ExpectedLandmark> ExpectAll(const TrackedFrame& frame) const {
-    std::vector<ExpectedLandmark> expected;
-    for (size_t i = 0; i < scene_.size(); ++i) {
-      const Landmark& landmark = *scene_.map().FindLandmark(MapScene::IdOf(i));
-      if (const auto view = PredictView(scene_.map(), landmark, frame.T_cam_world))
-        expected.push_back({landmark.id, *view});
-    }
-    return expected;
-  }
-
-  /// What a frame sees where `place` says points are now; those for which `found` says so are matched.
+  static bool OfPoster(size_t point) { return PosterScene::OfPoster(point); }
+  std::vector<ExpectedLandmark> ExpectAll(const TrackedFrame& frame) const { return scene_.ExpectAll(frame); }
   TrackedFrame Frame(const MapScene::Place& place, const std::function<bool(size_t)>& found) const {
-    std::vector<size_t> shown;
-    TrackedFrame frame = scene_.See(100, kNow, MapScene::PoseAt(0.1), place, &shown);
-    for (size_t feature = 0; feature < shown.size(); ++feature) {
-      if (!found(shown[feature])) continue;
-      frame.landmarks[feature] = MapScene::IdOf(shown[feature]);
-      frame.classes[feature] = FeatureClass::kUsed;
-    }
-    return frame;
+    return scene_.Frame(place, found);
   }
 
   FrameEvidence JudgedAndBelieved(TrackedFrame frame, int times = 1) {
@@ -139,7 +65,7 @@ class Judgement : public ::testing::Test {
     return counts;
   }
 
-  MapScene scene_;
+  PosterScene scene_;
   MotionJudge judge_{{}, TestCamera()};
 };
 

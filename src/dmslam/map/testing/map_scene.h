@@ -29,7 +29,7 @@ class MapScene {
   static Rigid3d PoseAt(double x) {
     return Rigid3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-x, 0, 0));
   }
-  static LandmarkId IdOf(size_t point) { return LandmarkId::Make(1, point + 1); }
+  static constexpr LandmarkId IdOf(size_t point) { return LandmarkId::Make(1, point + 1); }
 
   /// A point that was mapped at `first_ns`; returns its number.
   size_t AddPoint(const Eigen::Vector3d& p_world, int64_t first_ns = 0) {
