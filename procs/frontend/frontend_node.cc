@@ -29,7 +29,8 @@ std::unique_ptr<Node> MakeFrontend(NodeContext context, const NodeOptions& optio
 FrontendNode::FrontendNode(NodeContext context, const NodeOptions& options, FrontendExtras extras)
     : StreamNode(std::move(context), options, OfCamera("frontend", options.camera_id)),
       run_(options_.settings.Read<RunOptions>()),
-      extras_(std::move(extras)) {
+      extras_(std::move(extras)),
+      end_(options_.HasPeer("mapper")) {
   Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kKeyframe});
 }
 
@@ -287,7 +288,7 @@ int64_t FrontendNode::WorkDeadline() const {
   using Phase = SequenceEnd::Phase;
   if (!core_ || !work_->Idle()) return INT64_MAX;
   if (core_->IsRefining()) return 0;
-  if (end_.Is(Phase::kTelling)) return end_.next_portion_ns();
+  if (end_.Is(Phase::kTelling)) return last_words_.next_portion_ns();
   if (stopping_ || AwaitsSavedMap() || (pace_.takes_turns && pace_.turn.asked != pace_.turn.given))
     return INT64_MAX;
   const bool grows = end_.Is(Phase::kGrowingBack) && !core_->awaited().valid();
@@ -299,71 +300,48 @@ int64_t FrontendNode::WorkDeadline() const {
 /// A portion in a turn: signals and elections are for between. True: the next can begin at once.
 bool FrontendNode::WorkAtEnd() {
   using Phase = SequenceEnd::Phase;
-  switch (end_.phase()) {
-    case Phase::kPlaying:
-      return false;
-    case Phase::kGrowingBack:
-      return HasTurn(kTheEnd, std::nullopt) && GrowBack();
-    case Phase::kAwaitingAdjustedMap:
-      if (!MapsAreAdjusted()) return false;
-      end_.OnAdjusted();
-      return Run([this] { core_->RefineRest(); });
-    case Phase::kRefining:
-      ReturnFreeMemory();  // the features that were kept are not needed now
-      end_.OnRefined();
-      return true;
-    case Phase::kJoining:
-      return Join();
-    case Phase::kTelling:
-    case Phase::kDone:
-      return TellLastPoses();
-  }
-  return false;
+  const Phase phase = end_.phase();
+  if (phase == Phase::kPlaying) return false;
+  if (phase >= Phase::kTelling) return TellLastPoses();
+  if (phase == Phase::kGrowingBack && !HasTurn(kTheEnd, std::nullopt)) return false;
+  AskForAdjustedMaps();
+  return !end_.Waits(*core_) && WorkOn(phase);
 }
 
-/// One keyframe at a time: the mapper has time for it.
-bool FrontendNode::GrowBack() {
-  if (!options_.HasPeer("mapper")) {
-    end_.OnGrown();
-    return true;
-  }
-  if (core_->awaited().valid() && !core_->map().keyframes().empty()) return false;
-  Run([this] {
-    core_->SetWithheld(false);
-    const std::optional<FrontendOutput> output = core_->GrowBack();
-    work_->Report([this, output] {
-      if (!output) return end_.OnGrown();
-      Publish(output->events);
-    });
+/// True: the phase is done.
+bool FrontendNode::WorkOn(SequenceEnd::Phase phase) {
+  Run([this, phase] {
+    const auto worked = std::make_shared<const SequenceEnd::Worked>(SequenceEnd::Work(phase, core_.get()));
+    work_->Report([this, phase, worked] { OnWorked(phase, *worked); });
   });
-  return work_->Idle() && !end_.Is(SequenceEnd::Phase::kGrowingBack);
+  return work_->Idle() && !end_.Is(phase) && !end_.Is(SequenceEnd::Phase::kTelling);
 }
 
-/// One frame: it takes a while.
+void FrontendNode::OnWorked(SequenceEnd::Phase phase, const SequenceEnd::Worked& worked) {
+  using Phase = SequenceEnd::Phase;
+  end_.OnWorked(worked.is_done);
+  if (phase == Phase::kGrowingBack) Publish(worked.output.events);
+  if (phase == Phase::kRefining && worked.is_done)
+    ReturnFreeMemory();  // the features that were kept are not needed now
+  if (phase == Phase::kJoining && worked.is_done) last_words_ = LastWords(worked.output);
+}
+
+/// One frame, as soon as its map is adjusted: it takes a while.
 bool FrontendNode::Refine() {
   return Run([this] { core_->RefineNext(); }) && !core_->IsRefining();
 }
 
-bool FrontendNode::Join() {
-  Run([this] {
-    if (core_->WorkAtEnd()) return;
-    work_->Report([this, last = core_->Finish()] { end_.Tell(last); });
-  });
-  return false;
-}
-
-/// The mapper is asked once to adjust its maps as a whole, so that the last poses are told in the best map.
-bool FrontendNode::MapsAreAdjusted() {
-  if (!options_.HasPeer("mapper") || core_->map().keyframes().empty()) return true;
-  if (end_.Asks(context_.now_ns()))
-    PublishRecord(AdjustRequest{++requests_, "the sequence has ended",
-                                newest_ ? DoneWithNewest().stamp_ns : 0, options_.camera_id});
-  return end_.IsAnswered();
+/// All of them as a whole, so that the last poses are told in the best map.
+void FrontendNode::AskForAdjustedMaps() {
+  const auto request =
+      end_.Ask(core_->map(), context_.now_ns(), newest_ ? DoneWithNewest().stamp_ns : 0, options_.camera_id);
+  if (request) PublishRecord(*request);
 }
 
 bool FrontendNode::TellLastPoses() {
-  Publish(end_.NextPortion(context_.now_ns()));
-  if (!end_.Is(SequenceEnd::Phase::kDone)) return false;
+  Publish(last_words_.NextPortion(context_.now_ns()));
+  if (!last_words_.AreTold()) return false;
+  end_.OnTold();
   PublishSequenceDone();
   PublishStatus();
   writer_->Complete(context_.now_ns());

@@ -15,12 +15,13 @@
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/slam/frontend_core.h"
+#include "dmslam/slam/sequence_end.h"
 #include "frontend/held_records.h"
+#include "frontend/last_words.h"
 #include "frontend/left_keyframes.h"
 #include "frontend/make_frontend.h"
 #include "frontend/online_error.h"
 #include "frontend/play_order.h"
-#include "frontend/sequence_end.h"
 
 namespace dmslam {
 
@@ -118,10 +119,10 @@ class FrontendNode : public StreamNode {
   void PublishView(const FrameTrace& trace);
   void FinishFrame();
   bool WorkAtEnd();
-  bool GrowBack();
+  bool WorkOn(SequenceEnd::Phase phase);
+  void OnWorked(SequenceEnd::Phase phase, const SequenceEnd::Worked& worked);
   bool Refine();
-  bool Join();
-  bool MapsAreAdjusted();
+  void AskForAdjustedMaps();
   void PublishSequenceDone();
   bool TellLastPoses();
   int UnacceptedKeyframes();
@@ -137,7 +138,7 @@ class FrontendNode : public StreamNode {
   std::optional<Waiting> waiting_;
   PlayOrder order_;
   SequenceEnd end_;
-  uint32_t requests_ = 0;  ///< to adjust the maps, so far
+  LastWords last_words_;
   Pace pace_;
   bool hurries_ = false;               ///< catches up before it takes another image
   std::optional<NewestTaken> newest_;  ///< frame; none: none was taken

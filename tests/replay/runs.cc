@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "dmslam/map/snapshot.h"
+#include "dmslam/slam/sequence_end.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 
@@ -60,16 +61,11 @@ class Cores {
   }
 
   Outcome Finish() {
-    while (const std::optional<FrontendOutput> output = frontend_.GrowBack()) Tell(*output);
-    if (!frontend_.map().keyframes().empty()) {
-      mapper_.OnAdjustRequest(OverTheWire(AdjustRequest{1, "the sequence has ended", 0}));
+    const auto adjust = [this](const AdjustRequest& request) {
+      mapper_.OnAdjustRequest(OverTheWire(request));
       TellFrontend(waiting_.size());
-    }
-    frontend_.RefineRest();
-    while (frontend_.IsRefining()) frontend_.RefineNext();
-    while (frontend_.WorkAtEnd()) {
-    }
-    Tell(frontend_.Finish());
+    };
+    FinishSequence(&frontend_, 0, {[this](const FrontendOutput& output) { Tell(output); }, adjust});
     mapper_.End();
     return ToOutcome(trajectory_.Build(), trajectory_.map());
   }

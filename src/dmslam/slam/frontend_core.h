@@ -102,6 +102,7 @@ class FrontendCore {
   const TrackedFrame& frame() const { return frame_; }
   /// As of the newest frame.
   const OdometryState& odometry() const { return odometry_.state(); }
+  CameraId camera_id() const { return camera_id_; }
   const Map& map() const { return map_; }
   const FrontendCounters& counters() const { return counters_; }
   double extract_ms() const { return features_.last_ms(); }

@@ -4,6 +4,8 @@
 #include <utility>
 #include <variant>
 
+#include "dmslam/slam/sequence_end.h"
+
 namespace dmslam {
 
 Slam::Slam(const Setup& setup)
@@ -27,17 +29,12 @@ FramePose Slam::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureS
 }
 
 TrajectoryBuilder::Trajectories Slam::Finish() {
-  while (const std::optional<FrontendOutput> output = frontend_.GrowBack()) Handle(*output);
-  if (!frontend_.map().keyframes().empty()) {
-    AdjustRequest request;
-    request.reason = "the sequence has ended";
+  const auto adjust = [this](const AdjustRequest& request) {
     mapper_.OnAdjustRequest(request);
     TellFrontend(true);
-  }
-  frontend_.RefineRest();
-  while (frontend_.WorkAtEnd()) {
-  }
-  Handle(frontend_.Finish());
+  };
+  FinishSequence(&frontend_, std::nullopt,
+                 {[this](const FrontendOutput& output) { Handle(output); }, adjust});
   mapper_.End();
   TellLoopcloser();
   return trajectory_.Build();

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
+#include "dmslam/slam/frontend_core.h"
+#include "dmslam/slam/frontend_output.h"
+
+namespace dmslam {
+
+/// How far a frontend is when the sequence has ended:
+///
+///   Playing --OnEndHeard--> GrowingBack --> AwaitingAdjustedMap --> Refining --> Joining --> Telling
+///     --OnTold--> Done
+///
+/// The arrows without a name are gone by OnWorked(), with what a portion of work has come to. Work is done on
+/// the core, where that has a thread of its own on that; everything else is for the caller's thread. Knows
+/// times as they are handed in, and no bus.
+class SequenceEnd {
+ public:
+  enum class Phase {
+    kPlaying,              ///< frames come
+    kGrowingBack,          ///< the map, to before its first keyframe
+    kAwaitingAdjustedMap,  ///< the mapper was asked to adjust all maps, so that the last poses are told in
+                           ///< the best one
+    kRefining,             ///< frames are looked for once more in that
+    kJoining,              ///< their poses are joined with the camera's motion
+    kTelling,              ///< the last poses
+    kDone,                 ///< everything is said; stays until the mapper has ended
+  };
+
+  /// `has_mapper`: there is one that maps what is proposed and adjusts what it has.
+  explicit SequenceEnd(bool has_mapper) : has_mapper_(has_mapper) {}
+
+  Phase phase() const { return phase_; }
+  bool Is(Phase phase) const { return phase_ == phase; }
+  /// Nothing waits for settled records any more: map records are applied as they come.
+  bool AppliesAllRecords() const { return asked_ns_ || Is(Phase::kDone); }
+
+  void OnEndHeard();
+
+  /// Whether the map must change before Work() can go on: a keyframe is awaited, or the mapper's answer.
+  bool Waits(const FrontendCore& core) const;
+  /// The question that is to be put to the mapper now; counts as put then. One that died before it answered
+  /// is asked again.
+  std::optional<AdjustRequest> Ask(const Map& map, int64_t now_ns, std::optional<int64_t> newest_stamp_ns,
+                                   CameraId camera_id);
+  /// The mapper's answer. Only what was asked for counts; it may come while frames are worked on that came
+  /// after the question.
+  void OnAnswer() { answered_ = answered_ || asked_ns_; }
+
+  /// What a portion of work has come to.
+  struct Worked {
+    FrontendOutput output;  ///< to be told; of the joining: the last poses
+    bool is_done = false;   ///< with the phase
+  };
+  /// Does a portion of a phase's work, from kGrowingBack to kJoining. Knows the core alone.
+  static Worked Work(Phase phase, FrontendCore* core);
+  /// Of Work() in this phase.
+  void OnWorked(bool is_done);
+  /// The last poses are told.
+  void OnTold();
+
+ private:
+  bool AwaitsAnswer(const Map& map) const;
+
+  bool has_mapper_;
+  Phase phase_ = Phase::kPlaying;
+  uint32_t requests_ = 0;            ///< to adjust the maps, so far
+  std::optional<int64_t> asked_ns_;  ///< when the mapper was asked last
+  bool answered_ = false;
+};
+
+/// Who listens to a frontend that is done with in one go.
+struct EndListeners {
+  std::function<void(const FrontendOutput&)> tell;
+  std::function<void(const AdjustRequest&)> adjust;  ///< afterwards the frontend has the adjusted maps
+};
+/// From the end of the sequence to its last words in one go, where keyframes are settled and requests
+/// answered when they are told.
+void FinishSequence(FrontendCore* core, std::optional<int64_t> newest_stamp_ns,
+                    const EndListeners& listeners);
+
+}  // namespace dmslam

@@ -1,0 +1,147 @@
+// What a frontend does when no frame follows, step by step and in one go.
+#include "dmslam/slam/sequence_end.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <variant>
+
+#include "dmslam/map/testing/map_scene.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+using Phase = SequenceEnd::Phase;
+using testing::MapScene;
+
+constexpr int64_t kSecond = 1'000'000'000;
+constexpr int64_t kFrameNs = 33'333'333;
+constexpr uint32_t kFrames = 20;
+
+/// A frontend that has seen a sequence without finding a first map, and may be given one.
+class SequenceEndTest : public ::testing::Test {
+ protected:
+  SequenceEndTest() : core_(CoreSetup()) {
+    scene_.AddCloud(700, {0, 0, 4}, {1.6, 1.2, 0.5});
+    const auto all = [this](size_t point) { return std::optional(scene_.point(point)); };
+    for (uint32_t frame = 0; frame < kFrames; ++frame) {
+      const TrackedFrame seen = scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(0.05 * frame), all);
+      core_.ProcessFeatures(frame, frame * kFrameNs, seen.features->set);
+    }
+  }
+
+  static FrontendCore::Setup CoreSetup() {
+    FrontendCore::Setup setup;
+    setup.camera = TestCamera();
+    setup.seed = 1;
+    setup.run_search = [](FirstMapSearch) {
+      return [](const InitializerFrame&) { return InitializerReport(); };
+    };
+    return setup;
+  }
+
+  void MapArrives() {
+    scene_.MapAll(kFrames);
+    core_.ApplyMapDelta(
+        scene_.map().TakeDelta(MapEvent::kMapped, KeyframeId::Make(MapScene::kSession, kFrames - 1), 1));
+  }
+
+  /// Until the phase is done.
+  SequenceEnd::Worked WorkOn(SequenceEnd* end) {
+    const Phase phase = end->phase();
+    SequenceEnd::Worked worked;
+    while (end->Is(phase)) {
+      worked = SequenceEnd::Work(phase, &core_);
+      end->OnWorked(worked.is_done);
+    }
+    return worked;
+  }
+
+  MapScene scene_;
+  FrontendCore core_;
+};
+
+TEST_F(SequenceEndTest, GoesStepByStep) {
+  SequenceEnd end(true);
+  EXPECT_THROW(end.OnWorked(true), InvariantError) << "frames may come";
+  EXPECT_THROW(SequenceEnd::Work(end.phase(), &core_), InvariantError);
+  end.OnEndHeard();
+  end.OnEndHeard();  // the player repeats it
+  EXPECT_TRUE(end.Is(Phase::kGrowingBack));
+  EXPECT_FALSE(end.AppliesAllRecords());
+  WorkOn(&end);
+  EXPECT_TRUE(end.Is(Phase::kAwaitingAdjustedMap));
+  EXPECT_FALSE(end.Ask(core_.map(), 0, std::nullopt, 0)) << "there is no map";
+  EXPECT_FALSE(end.Waits(core_));
+  WorkOn(&end);
+  EXPECT_TRUE(end.Is(Phase::kRefining));
+  EXPECT_THROW(end.OnTold(), InvariantError) << "nothing is known yet";
+  WorkOn(&end);
+  EXPECT_TRUE(end.Is(Phase::kJoining));
+  EXPECT_TRUE(WorkOn(&end).output.events.empty());
+  EXPECT_TRUE(end.Is(Phase::kTelling));
+  EXPECT_THROW(end.OnWorked(true), InvariantError);
+  end.OnTold();
+  EXPECT_TRUE(end.Is(Phase::kDone));
+  EXPECT_TRUE(end.AppliesAllRecords());
+}
+
+TEST_F(SequenceEndTest, AMapperThatDoesNotAnswerIsAskedAgain) {
+  MapArrives();
+  SequenceEnd end(true);
+  end.OnEndHeard();
+  end.OnAnswer();
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0)) << "the map may still grow";
+  end.OnWorked(true);
+  EXPECT_TRUE(end.Waits(core_)) << "nobody had asked";
+  const auto request = end.Ask(core_.map(), kSecond, 7, 3);
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->request, 1u);
+  EXPECT_EQ(request->newest_stamp_ns, 7);
+  EXPECT_EQ(request->camera_id, 3u);
+  EXPECT_TRUE(end.AppliesAllRecords());
+  EXPECT_FALSE(end.Ask(core_.map(), 2 * kSecond, 7, 3));
+  EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7, 3)->request, 2u);
+  end.OnAnswer();
+  EXPECT_FALSE(end.Waits(core_));
+  EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7, 3));
+}
+
+TEST_F(SequenceEndTest, WithoutAMapperNothingGrowsAndNobodyIsAsked) {
+  MapArrives();
+  SequenceEnd end(false);
+  end.OnEndHeard();
+  EXPECT_TRUE(end.Is(Phase::kAwaitingAdjustedMap));
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0));
+  EXPECT_FALSE(end.Waits(core_));
+}
+
+TEST_F(SequenceEndTest, InOneGoItTellsTheLastPosesInTheAdjustedMap) {
+  MapArrives();
+  int requests = 0;
+  size_t poses = 0, poses_before = 0;
+  const auto tell = [&](const FrontendOutput& output) {
+    for (const FrontendEvent& event : output.events) {
+      if (const auto* keyframe = std::get_if<KeyframeProposal>(&event)) {
+        MapDelta settled;
+        settled.progress.settled = keyframe->id;
+        core_.ApplyMapDelta(settled);
+      }
+      poses += std::holds_alternative<FramePose>(event) ? 1 : 0;
+    }
+  };
+  const auto adjust = [&](const AdjustRequest& request) {
+    EXPECT_EQ(request.newest_stamp_ns, (kFrames - 1) * kFrameNs);
+    ++requests;
+    poses_before = poses;
+  };
+  FinishSequence(&core_, (kFrames - 1) * kFrameNs, {tell, adjust});
+  EXPECT_EQ(requests, 1);
+  EXPECT_EQ(poses_before, 0u) << "last poses are told last";
+  EXPECT_GE(poses, 15u);
+  EXPECT_FALSE(core_.IsRefining());
+}
+
+}  // namespace
+}  // namespace dmslam
