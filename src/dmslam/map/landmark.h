@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dmslam/features/types.h"
+#include "dmslam/map/viewing_range.h"
 #include "dmslam/util/ids.h"
 
 namespace dmslam {
@@ -47,18 +48,11 @@ struct Landmark {
     return at != observations.end() && at->keyframe == keyframe ? &*at : nullptr;
   }
 
-  /// Seen from where, and from how far; follows from position and observations (`Map::Viewing`).
-  struct ViewingRange {
-    Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();  ///< unit, from the cameras to the point
-    double min_distance = 0;  ///< nearer, it would be coarser than the pyramid's coarsest level
-    double max_distance = 0;  ///< at this distance it is seen at octave 0
-  };
-
  private:
   friend class Map;
-  // The map computes the range when it is asked for, and marks it stale when it changes what it follows from.
-  mutable ViewingRange viewing_;
-  mutable bool viewing_stale_ = true;
+  // Follows from position and observations. The map computes it when it is asked for (`Map::Viewing`), and
+  // marks it stale when it changes what it follows from.
+  ViewingCache viewing_;
 };
 
 }  // namespace dmslam

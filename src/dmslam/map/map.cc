@@ -203,7 +203,8 @@ std::optional<double> Map::MedianDepth(const Keyframe& keyframe) const {
   return *middle;
 }
 
-void Map::RefreshViewing(const Landmark& landmark) const {
+/// None where no keyframe that is there sees it.
+std::optional<ViewingRange> Map::ComputeViewing(const Landmark& landmark) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   const Observation* scale_from = nullptr;  // the reference's, or the oldest where that sees it no more
   for (const Observation& observation : landmark.observations) {
@@ -212,15 +213,15 @@ void Map::RefreshViewing(const Landmark& landmark) const {
     sum += (landmark.p_world - keyframe->T_cam_world.Center()).normalized();
     if (scale_from == nullptr || observation.keyframe == landmark.reference) scale_from = &observation;
   }
-  landmark.viewing_stale_ = false;
-  if (scale_from == nullptr) return;
+  if (scale_from == nullptr) return std::nullopt;
   const Keyframe& keyframe = keyframes_.at(scale_from->keyframe);
   const double distance = (landmark.p_world - keyframe.T_cam_world.Center()).norm();
-  Landmark::ViewingRange& viewing = landmark.viewing_;
+  ViewingRange viewing;
   viewing.max_distance =
       distance * pyramid_.Scale(keyframe.features->set.keypoints[scale_from->feature].octave);
   viewing.min_distance = viewing.max_distance / pyramid_.Scale(pyramid_.levels - 1);
   viewing.mean_direction = sum.normalized();
+  return viewing;
 }
 
 // ---- For editor and replica ----
@@ -280,7 +281,7 @@ Landmark& Map::Insert(Landmark landmark) {
   const LandmarkId id = landmark.id;
   DMSLAM_CHECK(id.valid() && FindLandmark(id) == nullptr, "landmark added twice");
   landmark.observations.clear();
-  landmark.viewing_stale_ = true;
+  landmark.viewing_.MarkStale();
   return landmarks_.Insert(std::move(landmark));
 }
 
@@ -293,7 +294,7 @@ void Map::Place(Keyframe& keyframe, const Rigid3d& T_cam_world, double scale, Ma
 
 void Map::Place(Landmark& landmark, const Eigen::Vector3d& p_world) {
   landmark.p_world = p_world;
-  landmark.viewing_stale_ = true;
+  landmark.viewing_.MarkStale();
 }
 
 /// Each by itself: the order does not matter.
@@ -315,7 +316,7 @@ void Map::Hang(Keyframe& keyframe, KeyframeId parent) {
 
 void Map::SetReference(Landmark& landmark, KeyframeId reference) {
   landmark.reference = reference;
-  landmark.viewing_stale_ = true;
+  landmark.viewing_.MarkStale();
 }
 
 void Map::Link(const Landmark& landmark, Keyframe& keyframe, int sign) {
@@ -338,7 +339,7 @@ std::optional<uint16_t> Map::Observe(Keyframe& keyframe, uint16_t feature, Landm
   }
   keyframe.landmarks[feature] = landmark.id;
   landmark.observations.insert(WhereObserved(landmark.observations, keyframe.id), {keyframe.id, feature});
-  landmark.viewing_stale_ = true;
+  landmark.viewing_.MarkStale();
   Link(landmark, keyframe, +1);
   return released;
 }
@@ -351,7 +352,7 @@ void Map::Release(Keyframe& keyframe, uint16_t feature) {
   Link(*landmark, keyframe, -1);
   const auto at = WhereObserved(landmark->observations, keyframe.id);
   if (at != landmark->observations.end() && at->keyframe == keyframe.id) landmark->observations.erase(at);
-  landmark->viewing_stale_ = true;
+  landmark->viewing_.MarkStale();
 }
 
 void Map::EraseKeyframe(KeyframeId id) {

@@ -27,7 +27,8 @@ namespace dmslam {
 /// Order: keyframes iterate by id. Landmarks are stored by hash and are never iterated in that order; go
 /// through keyframes' features or `LandmarkIdsSorted`.
 ///
-/// One thread at a time: reading fills the landmarks' viewing ranges.
+/// Any number of threads may read it while nobody changes it. Reading writes one thing, the landmarks'
+/// viewing ranges, which are a cache that is made for that (ViewingCache).
 class Map {
  public:
   Map(const Camera& camera, const Pyramid& pyramid);
@@ -108,9 +109,8 @@ class Map {
   /// Median depth of a keyframe's landmarks in its camera; none without landmarks.
   std::optional<double> MedianDepth(const Keyframe& keyframe) const;
   /// Direction and distances from which a landmark of this map was seen (computed when stale).
-  const Landmark::ViewingRange& Viewing(const Landmark& landmark) const {
-    if (landmark.viewing_stale_) RefreshViewing(landmark);
-    return landmark.viewing_;
+  ViewingRange Viewing(const Landmark& landmark) const {
+    return landmark.viewing_.Get([&] { return ComputeViewing(landmark); });
   }
 
  protected:
@@ -165,7 +165,7 @@ class Map {
   void Link(const Landmark& landmark, Keyframe& keyframe, int sign);
   void Attach(KeyframeId child, KeyframeId parent);
   void Detach(KeyframeId child, KeyframeId parent);
-  void RefreshViewing(const Landmark& landmark) const;
+  std::optional<ViewingRange> ComputeViewing(const Landmark& landmark) const;
 
   Camera camera_;
   Pyramid pyramid_;

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
+#include <thread>
+#include <vector>
 
 #include "dmslam/map/projection.h"
 #include "dmslam/map/testing/random_editor.h"
@@ -152,7 +155,7 @@ class Viewing : public testing::Test {
     map_.AddLandmark(landmark);
     map_.SetObservation(map_.At(KeyframeId::Make(1, 1)), 0, map_.At(id_));
   }
-  const Landmark::ViewingRange& Range() const { return map_.Viewing(map_.At(id_)); }
+  ViewingRange Range() const { return map_.Viewing(map_.At(id_)); }
 
   MapEditor map_;
   const LandmarkId id_ = LandmarkId::Make(1, 1);
@@ -172,6 +175,22 @@ TEST_F(Viewing, IsComputedAnewWhenTheLandmarkMoves) {
   EXPECT_NEAR(Range().max_distance, std::sqrt(17.0), 1e-12);
   map_.SetPosition(map_.At(id_), {-1, 0, 8});
   EXPECT_NEAR(Range().max_distance, 8, 1e-12);
+}
+
+TEST_F(Viewing, IsTheSameForThreadsThatAskAtATime) {
+  const Map& map = map_;
+  const Landmark& landmark = map.At(id_);
+  for (int round = 0; round < 200; ++round) {
+    map_.SetPosition(landmark, {0.01 * round, 0, 4});
+    std::array<ViewingRange, 4> ranges;
+    std::vector<std::thread> threads;
+    for (ViewingRange& range : ranges) threads.emplace_back([&] { range = map.Viewing(landmark); });
+    for (std::thread& thread : threads) thread.join();
+    for (const ViewingRange& range : ranges) {
+      EXPECT_NEAR(range.max_distance, std::hypot(0.01 * round + 1, 4), 1e-12);
+      EXPECT_EQ(range.mean_direction, Range().mean_direction);
+    }
+  }
 }
 
 TEST_F(Viewing, StaysWhenNobodySeesTheLandmarkAnyMore) {

@@ -14,7 +14,7 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
       uv->x() >= camera.width_px + limits.border_px || uv->y() >= camera.height_px + limits.border_px) {
     return std::nullopt;
   }
-  const Landmark::ViewingRange& viewing = map.Viewing(landmark);
+  const ViewingRange viewing = map.Viewing(landmark);
   const Eigen::Vector3d ray = landmark.p_world - T_cam_world.Center();
   const double distance = ray.norm();
   if (distance < viewing.min_distance / limits.distance_slack ||
