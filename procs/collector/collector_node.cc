@@ -355,7 +355,7 @@ void CollectorNode::OnMapReset(const Record& record) {
 
 void CollectorNode::CountReset(const MapReset& reset) {
   ++run_.resets;
-  if (reset.drop) dropped_maps_.insert(reset.map_id);
+  if (reset.fate == MapReset::Fate::kDrop) dropped_maps_.insert(reset.map_id);
 }
 
 /// A disk that is full ends no run: what it does not take waits in memory, and is not acknowledged, so that

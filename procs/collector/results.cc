@@ -64,7 +64,7 @@ void WriteGraph(const std::string& path, const Map& map) {
 
 /// Depth of the scene where a pose was told, by what its keyframe sees; 1 where nothing is left of that.
 double DepthAt(const Map& map, const FramePose& pose) {
-  const std::optional<KeyframeId> id = map.ResolveKeyframe(pose.reference);
+  const std::optional<KeyframeId> id = map.ResolveKeyframe(*pose.reference);
   const Keyframe* keyframe = id ? map.FindKeyframe(*id) : nullptr;
   if (keyframe == nullptr) return 1.0;
   return map.MedianDepth(*keyframe).value_or(1.0) * pose.reference_scale / keyframe->scale;
@@ -83,7 +83,7 @@ std::vector<ToldPose> ToldPoses(const TrajectoryBuilder& builder) {
                      frame.index,
                      static_cast<int>(pose.state),
                      pose.map_id.value_or(0),
-                     pose.reference.frame_index(),
+                     pose.reference->frame_index(),
                      pose.T_cam_reference,
                      pose.reference_scale,
                      DepthAt(builder.map(), pose),

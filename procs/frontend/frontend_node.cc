@@ -228,7 +228,7 @@ int FrontendNode::UnacceptedKeyframes() {
   return static_cast<int>(keyframe_seqs_.size());
 }
 
-bool FrontendNode::HoldsBack() const { return pace_.lockstep && core_->awaited().valid(); }
+bool FrontendNode::HoldsBack() const { return pace_.lockstep && core_->awaited(); }
 
 /// Nothing can be done before a saved map has come.
 bool FrontendNode::AwaitsSavedMap() const { return run_.saved_map && core_->map().keyframes().empty(); }
@@ -291,7 +291,7 @@ int64_t FrontendNode::WorkDeadline() const {
   if (end_.Is(Phase::kTelling)) return last_words_.next_portion_ns();
   if (stopping_ || AwaitsSavedMap() || (pace_.takes_turns && pace_.turn.asked != pace_.turn.given))
     return INT64_MAX;
-  const bool grows = end_.Is(Phase::kGrowingBack) && !core_->awaited().valid();
+  const bool grows = end_.Is(Phase::kGrowingBack) && !core_->awaited();
   return grows || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
 }
 
@@ -578,8 +578,7 @@ void FrontendNode::FillPoseStatus(FrontendStatus* status) const {
 /// Waits for the mapper before it can go on.
 bool FrontendNode::IsHeldUp() const {
   return core_ != nullptr && work_->Idle() &&
-         (HoldsBack() || AwaitsSavedMap() ||
-          (end_.Is(SequenceEnd::Phase::kGrowingBack) && core_->awaited().valid()));
+         (HoldsBack() || AwaitsSavedMap() || (end_.Is(SequenceEnd::Phase::kGrowingBack) && core_->awaited()));
 }
 
 /// On the core, or while it is idle.

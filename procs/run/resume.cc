@@ -59,7 +59,7 @@ class JournalState {
     std::map<KeyframeId, MapId> proposed;
   };
   void Take(std::span<const uint8_t> record) {
-    if (const auto reset = wire::Decode<MapReset>(record); reset && reset->drop)
+    if (const auto reset = wire::Decode<MapReset>(record); reset && reset->fate == MapReset::Fate::kDrop)
       dropped_.insert(reset->map_id);
     const auto pose = wire::Decode<FramePose>(record);
     if (!pose || pose->state == TrackingState::kLocalizedLater) return;

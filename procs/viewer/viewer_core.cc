@@ -109,7 +109,7 @@ void ViewerCore::OnFramePose(const FramePose& pose) {
   dirty_ = true;
   if (!pose.HasPose()) return;
   frames_[FrameOf(pose)] = pose;
-  frames_of_[map_.ResolveKeyframe(pose.reference).value_or(pose.reference)].push_back(FrameOf(pose));
+  frames_of_[map_.ResolveKeyframe(*pose.reference).value_or(*pose.reference)].push_back(FrameOf(pose));
   dirty_frames_.insert(FrameOf(pose));
   const bool is_shown = shown_map_ && pose.map_id == shown_map_;
   if (pose.state != TrackingState::kLocalizedLater && !is_shown) ChooseMap();
@@ -144,7 +144,7 @@ void ViewerCore::MarkMap(MapId map_id) {
 
 /// What it was told from may have become part of another map.
 std::optional<MapId> ViewerCore::MapOf(const FramePose& pose) const {
-  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
   return reference ? std::optional(reference->map_id) : pose.map_id;
 }
 
@@ -272,7 +272,7 @@ void ViewerCore::DrawKeyframe(KeyframeId id, ViewerScene* scene) {
 
 void ViewerCore::DrawFrame(const SceneFrame& frame, ViewerScene* scene) {
   const FramePose& pose = frames_.at(frame);
-  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
   const MapLayout::Place* place = reference ? layout_.Find(reference->map_id) : nullptr;
   positions_.erase(frame);
   if (place == nullptr) {

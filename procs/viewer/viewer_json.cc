@@ -137,6 +137,7 @@ std::string StateWord(TrackingState state) {
     case TrackingState::kTracking:
       return "tracking";
     case TrackingState::kUncertain:
+    case TrackingState::kMissing:
       return "uncertain";
     case TrackingState::kLost:
       return "lost";
@@ -231,7 +232,7 @@ std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn) 
   Json json{{"frame", view.frame_index},
             {"camera", view.camera_id},
             {"t", static_cast<double>(view.stamp_ns) * 1e-9},
-            {"state", static_cast<int>(view.state)},
+            {"state", static_cast<int>(OnTheWire(view.state))},
             {"word", StateWord(view.state)},
             {"map", view.map_id ? Json(*view.map_id) : Json()},
             {"inliers", view.inliers},

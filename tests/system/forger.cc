@@ -221,7 +221,7 @@ class Forger {
     if (!header) return;
     MapReset reset;
     reset.map_id = 1;
-    reset.drop = true;
+    reset.fate = MapReset::Fate::kDrop;
     SendRecord(channels::kMapReset, *header, wire::Encode(reset));
   }
   /// What nobody's settings fit: as the first record of a stream of now, and as the next one of the

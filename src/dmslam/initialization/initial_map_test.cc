@@ -36,7 +36,7 @@ TEST(MakeInitialMap, TellsBothKeyframesAndWhatEachSees) {
   EXPECT_EQ(told.first.stamp_ns, 1004);
   EXPECT_EQ(told.second.stamp_ns, 1019);
   EXPECT_EQ(told.second.reference, told.first.id);
-  EXPECT_FALSE(told.first.reference.valid());
+  EXPECT_FALSE(told.first.reference);
   EXPECT_EQ(told.second.T_cam_reference.translation, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(told.first.features.keypoints, map.frame0.features->set.keypoints);
   EXPECT_EQ(told.second.features.descriptors, map.frame1.features->set.descriptors);

@@ -20,7 +20,9 @@ struct KeyframeProposal {
   KeyframeId id;
   MapId map_id = 0;
   int64_t stamp_ns = 0;
-  KeyframeId reference;  ///< the keyframe its pose is told from; may have been culled meanwhile
+  /// The keyframe its pose is told from, which may have been culled meanwhile; none: it is the world's
+  /// origin.
+  std::optional<KeyframeId> reference;
   Rigid3d T_cam_reference;
   double reference_scale = 1.0;  ///< the reference's scale (Keyframe::scale) when the pose was told
   FeatureSet features;
@@ -71,17 +73,18 @@ struct FrameEvidence {
   CameraId camera_id = 0;
 };
 
-/// How well is known where the camera is. lcmtypes/dmslam_frame_pose_t.lcm says which of them come with a
-/// pose.
+/// How well is known where the camera is. The numbers are those of lcmtypes/dmslam_frame_pose_t.lcm, where
+/// one stands for kUncertain and kMissing.
 enum class TrackingState : uint8_t {
-  kNotInitialized = 0,  ///< a first map is looked for
-  kWaitingForMap = 1,   ///< a first map was proposed and has not come back yet
+  kNotInitialized = 0,  ///< a first map is looked for; no pose
+  kWaitingForMap = 1,   ///< a first map was proposed and has not come back yet; no pose
   kTrial = 2,           ///< a young map must still prove that it predicts
   kTracking = 3,        ///< enough static landmarks fix position and rotation
-  kUncertain = 4,       ///< the landmarks fix the pose badly, as its covariance says; or too few: none
-  kLost = 5,
+  kUncertain = 4,       ///< the landmarks fix the pose badly, as its covariance says
+  kLost = 5,            ///< no pose for a while: it is looked for in the map
   kLocalizedLater = 6,  ///< a frame placed in the map, or placed better, after the fact
-  kRotationOnly = 7,    ///< how the camera turns is measured, where it is is not
+  kRotationOnly = 7,    ///< how the camera turns is measured, where it is is not; no pose
+  kMissing = 8,         ///< no pose since a moment ago: too few landmarks are found
 };
 
 /// How many numbers the covariance of a pose takes: position x, y, z [map units], then the rotation vector
@@ -95,7 +98,7 @@ struct FramePose {
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::kNotInitialized;
   std::optional<MapId> map_id;
-  KeyframeId reference;  ///< invalid: no pose
+  std::optional<KeyframeId> reference;  ///< none: no pose
   Rigid3d T_cam_reference;
   double reference_scale = 1.0;  ///< the reference's scale (Keyframe::scale) when the pose was told
   Rigid3d T_cam_world;           ///< in the map as the frontend knew it then
@@ -111,13 +114,16 @@ struct FramePose {
   /// The same of this camera's pose in the camera of frame `step_from`.
   std::vector<double> step_covariance;
   std::optional<uint32_t> step_from;
-  bool HasPose() const { return reference.valid(); }
+  bool HasPose() const { return reference.has_value(); }
 };
 
 /// The frontend gives a map up.
 struct MapReset {
   MapId map_id = 0;
-  bool drop = false;  ///< true: it was wrong from the beginning; false: keep it, a new one follows
+  enum class Fate : uint8_t {
+    kKeep = 0,  ///< a new one follows
+    kDrop = 1,  ///< it was wrong from the beginning
+  } fate = Fate::kKeep;
   std::string reason;
   std::optional<int64_t> stamp_ns;  ///< capture time of the frame at which it did so, where that is known
   CameraId camera_id = 0;

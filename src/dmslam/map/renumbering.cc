@@ -71,7 +71,7 @@ class Namer {
   const Renumbering& names_;
 };
 
-MapDelta Whole(const Map& map) { return std::move(CutSnapshot(map, KeyframeId{}, kAtOnce).front()); }
+MapDelta Whole(const Map& map) { return std::move(CutSnapshot(map, std::nullopt, kAtOnce).front()); }
 
 }  // namespace
 

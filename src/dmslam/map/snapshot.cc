@@ -13,9 +13,9 @@ constexpr size_t kFeatureBytes = 42, kLandmarkBytes = 120, kObservationBytes = 1
                  kTombstoneBytes = 16;
 
 /// Those that see what `center` sees first, most first; then the newest.
-std::vector<const Keyframe*> NearestFirst(const Map& map, KeyframeId center) {
+std::vector<const Keyframe*> NearestFirst(const Map& map, std::optional<KeyframeId> center) {
   std::vector<const Keyframe*> order;
-  if (const Keyframe* keyframe = map.FindKeyframe(center)) {
+  if (const Keyframe* keyframe = center ? map.FindKeyframe(*center) : nullptr) {
     order = map.BestCovisible(*keyframe, static_cast<int>(map.keyframes().size()), 1);
     order.insert(order.begin(), keyframe);
   }
@@ -76,7 +76,7 @@ class Cutter {
 
 }  // namespace
 
-std::vector<MapDelta> CutSnapshot(const Map& map, KeyframeId center, size_t max_bytes_hint) {
+std::vector<MapDelta> CutSnapshot(const Map& map, std::optional<KeyframeId> center, size_t max_bytes_hint) {
   Cutter cutter(map, max_bytes_hint);
   for (const Keyframe* keyframe : NearestFirst(map, center)) cutter.Add(*keyframe);
   cutter.AddUnobserved();
@@ -89,7 +89,7 @@ std::vector<MapDelta> CutSnapshot(const Map& map, KeyframeId center, size_t max_
     part.event = MapEvent::kSnapshot;
     part.version = map.version();
     part.progress = cameras.empty() ? map.progress() : map.progress(cameras[i % cameras.size()]);
-    if (center.valid()) part.about = center;
+    if (center) part.about = center;
   }
   return parts;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "dmslam/map/map.h"
@@ -9,6 +10,6 @@ namespace dmslam {
 
 /// The whole map as deltas with at most `max_bytes_hint` of payload each, keyframes near `center` first.
 /// Applying all of them to an empty replica gives this map.
-std::vector<MapDelta> CutSnapshot(const Map& map, KeyframeId center, size_t max_bytes_hint);
+std::vector<MapDelta> CutSnapshot(const Map& map, std::optional<KeyframeId> center, size_t max_bytes_hint);
 
 }  // namespace dmslam

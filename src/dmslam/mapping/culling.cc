@@ -67,7 +67,7 @@ int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order
   return culled;
 }
 
-int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, KeyframeId keep,
+int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, std::optional<KeyframeId> keep,
                            const MapperOptions& options) {
   int culled = 0;
   for (const Keyframe* neighbour : map.BestCovisible(keyframe, kMostNeighbours, options.min_covisibility)) {

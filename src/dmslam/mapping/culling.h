@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "dmslam/map/map_editor.h"
 #include "dmslam/mapping/insertion_order.h"
 #include "dmslam/mapping/mapper_options.h"
@@ -13,7 +15,7 @@ int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order
 
 /// Removes neighbours of `keyframe` whose landmarks others see as well. `keep` is never removed (the frontend
 /// tracks against it). Returns how many.
-int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, KeyframeId keep,
+int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, std::optional<KeyframeId> keep,
                            const MapperOptions& options);
 
 /// Removes a keyframe, and of its landmarks those that no two others see.

@@ -31,8 +31,9 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   InsertionReport report;
   report.repeated = map.HasKnown(proposal.id);
   if (report.repeated) return report;
-  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(proposal.reference);
-  const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(proposal.reference);
+  if (!proposal.reference) return report;
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*proposal.reference);
+  const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(*proposal.reference);
   if (!reference || !stands_for_it) return report;
   // A map that is gone has been joined with another since the frontend heard of it last.
   if (reference->map_id != proposal.map_id && !map.KeyframesOf(proposal.map_id).empty()) return report;

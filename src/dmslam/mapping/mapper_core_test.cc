@@ -109,7 +109,7 @@ TEST_F(Corrections, OneWhoseKeyframesAreGoneIsRefused) {
   const uint64_t base = core_.map().version();
   MapReset reset;
   reset.map_id = 1;
-  reset.drop = true;
+  reset.fate = MapReset::Fate::kDrop;
   core_.OnReset(reset);
   core_.OnLoopAnswer(OneUp(base));
   EXPECT_EQ(core_.counters().corrections_refused, 1u);
@@ -119,7 +119,7 @@ TEST_F(Corrections, OneWhoseKeyframesAreGoneIsRefused) {
 TEST_F(Corrections, AMapInWhichAnotherCameraHasAPartIsNotDropped) {
   MapReset reset;
   reset.map_id = 1;
-  reset.drop = true;
+  reset.fate = MapReset::Fate::kDrop;
   reset.camera_id = 1;  // as that one knew it before it was joined
   core_.OnReset(reset);
   EXPECT_EQ(core_.map().keyframes().size(), 3u);

@@ -190,7 +190,7 @@ void FinalPoses::Add(const Map& map, FinalPose pose) {
 /// Whether keyframes of the poses are elsewhere than they were.
 bool FinalPoses::HasMoved(const Map& map) const {
   return std::any_of(poses_.begin(), poses_.end(), [&map](const FinalPose& p) {
-    const Keyframe* reference = map.FindKeyframe(p.pose.reference);
+    const Keyframe* reference = map.FindKeyframe(*p.pose.reference);
     return reference == nullptr || reference->map_id != p.pose.map_id ||
            reference->T_cam_world.translation != p.T_reference_world.translation ||
            reference->T_cam_world.rotation.coeffs() != p.T_reference_world.rotation.coeffs();
@@ -283,8 +283,8 @@ std::vector<uint8_t> FinalPoses::Leaps(const Map& map, size_t begin, size_t end)
   std::vector<SeenFrom> frames;
   for (size_t i = begin; i < end; ++i) {
     const FinalPose& frame = poses_[i];
-    const auto [depth, is_new] = depths.try_emplace(frame.pose.reference, 1.0);
-    const Keyframe* reference = is_new ? map.FindKeyframe(frame.pose.reference) : nullptr;
+    const auto [depth, is_new] = depths.try_emplace(*frame.pose.reference, 1.0);
+    const Keyframe* reference = is_new ? map.FindKeyframe(*frame.pose.reference) : nullptr;
     if (reference != nullptr) depth->second = map.MedianDepth(*reference).value_or(1.0);
     frames.push_back(
         {frame.pose.stamp_ns, frame.measured, depth->second, SpreadOf(frame.information, depth->second)});

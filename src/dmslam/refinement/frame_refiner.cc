@@ -21,7 +21,7 @@ const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
   return landmark != nullptr && landmark->map_id == map_id ? landmark : nullptr;
 }
 
-/// Computes those that are stale: reading the map changes nothing then, and several threads may.
+/// Computes those that are stale once, and not in each of the threads that look.
 void FillViewingRanges(const Map& map) {
   for (const LandmarkId id : map.LandmarkIdsSorted()) map.Viewing(map.At(id));
 }
@@ -66,7 +66,7 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
   std::deque<Kept> others;
   ahead_.clear();  // others may come first now
   for (Kept& kept : std::exchange(frames_, {})) {
-    const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
+    const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*kept.pose.reference);
     if (!reference) continue;
     (map_id && reference->map_id != *map_id ? others : due_).push_back(std::move(kept));
   }
@@ -157,7 +157,7 @@ void FrameRefiner::LookFromMotion(const Map& map, MapId map_id, const Kept& kept
 
 std::optional<FrameRefiner::Looked> FrameRefiner::Look(const Map& map, const Kept& kept,
                                                        const Search& search) const {
-  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*kept.pose.reference);
   if (!reference) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
   Looked looked{SightsNow(map, reference->map_id, kept), std::nullopt};
@@ -179,8 +179,8 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   due_.pop_front();
   std::optional<Looked> looked = IsAhead() ? std::move(ahead_.front()) : Look(map, kept, search);
   if (IsAhead()) ahead_.pop_front();
-  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(kept.pose.reference);
-  const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(kept.pose.reference);
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*kept.pose.reference);
+  const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(*kept.pose.reference);
   if (!looked || !reference || !keyframe_id) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
   std::optional<FinalPose> refined = std::move(looked->refined);

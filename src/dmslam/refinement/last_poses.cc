@@ -32,7 +32,7 @@ LastPoses::LastPoses(const FrameRefinerOptions& refiner, bool smooth, const Trac
 }
 
 LastPoses::Tracked LastPoses::PlaceOf(const FramePose& pose) {
-  return {pose.frame_index, pose.stamp_ns, {pose.reference, pose.T_cam_reference, pose.reference_scale}};
+  return {pose.frame_index, pose.stamp_ns, {*pose.reference, pose.T_cam_reference, pose.reference_scale}};
 }
 
 void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
@@ -79,7 +79,7 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Frame
     later.measured = frame.T_cam_world;
     later.information.setZero();
   }
-  later.SetPose(map.At(pose.reference), smooth_ ? later.measured : frame.T_cam_world);
+  later.SetPose(map.At(*pose.reference), smooth_ ? later.measured : frame.T_cam_world);
   final_.Add(map, std::move(later));
 }
 

@@ -26,7 +26,7 @@ class LastPosesTest : public ::testing::Test {
     return frame;
   }
   FramePose Pose(uint32_t index, TrackingState state) const {
-    const auto placed = PlacedPose::Of(scene_.map(), MapScene::PoseAt(0), First());
+    const auto placed = PlacedPose::Of(scene_.map().FindKeyframe(First()), MapScene::PoseAt(0));
     FramePose pose;
     pose.frame_index = index;
     pose.stamp_ns = index * MapScene::kStepNs;

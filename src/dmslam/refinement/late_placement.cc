@@ -102,8 +102,7 @@ void LatePlacement::FindNeighbour(const Map& map, const TrackedFrame& frame) {
 }
 
 /// Whether the camera gets there from its neighbour and from the keyframes aside.
-bool LatePlacement::IsPlausible(const Map& map, KeyframeId reference_id, const TrackedFrame& frame) const {
-  const Keyframe* reference = map.FindKeyframe(reference_id);
+bool LatePlacement::IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const {
   if (reference == nullptr) return false;
   const double depth = map.MedianDepth(*reference).value_or(1.0);
   if (follower_) {
@@ -121,7 +120,7 @@ TrackingReport LatePlacement::FindBeside(const Map& map, PoseSearch* search, Tra
   const auto found = search->FromFrame(map, next, next.T_cam_world, std::nullopt, frame);
   if (found != PoseSearch::FromFrameResult::kFound) return {};
   TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
-  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
+  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->Reference(map), *frame);
   return report;
 }
 
@@ -133,7 +132,7 @@ TrackingReport LatePlacement::TrackBackwards(const Map& map, PoseSearch* search,
   const uint64_t seed = DeriveSeed(seed_, frame->index, "late_keyframe");
   MotionFollower::Attempt attempt = follower_->Follow(map, time, false, seed, search, frame);
   TrackingReport& report = attempt.report;
-  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
+  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->Reference(map), *frame);
   if (!report.ok && attempt.weak_pose) Coast(map, *attempt.weak_pose, report, *search, *frame);
   return report;
 }
@@ -142,7 +141,7 @@ TrackingReport LatePlacement::TrackBackwards(const Map& map, PoseSearch* search,
 void LatePlacement::Coast(const Map& map, const FoundPose& weak_pose, const TrackingReport& report,
                           const PoseSearch& search, const TrackedFrame& frame) {
   follower_->Coast(map, weak_pose, Backwards(frame.index, frame.stamp_ns));
-  const auto pose = PlacedPose::Of(map, weak_pose.T_cam_world, search.reference());
+  const auto pose = PlacedPose::Of(search.Reference(map), weak_pose.T_cam_world);
   if (pose && report.num_static >= options_.min_coasting_inliers)
     weak_.push_back({.frame = frame, .report = report, .pose = *pose});
 }
@@ -158,7 +157,7 @@ LatePlacement::Found LatePlacement::Place(const Map& map, PoseSearch* search, co
   if (!relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   found = {search->InLocalMap(map, true, std::nullopt, frame), true};
   TrackingReport& report = found.report;
-  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->reference(), *frame);
+  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->Reference(map), *frame);
   return found;
 }
 

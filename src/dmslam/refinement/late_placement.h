@@ -73,7 +73,7 @@ class LatePlacement {
  private:
   void LeaveNeighbour();
   void FindNeighbour(const Map& map, const TrackedFrame& frame);
-  bool IsPlausible(const Map& map, KeyframeId reference, const TrackedFrame& frame) const;
+  bool IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const;
   bool LeadsTo(const Map& map, const std::optional<Before>& before) const;
   TrackingReport FindBeside(const Map& map, PoseSearch* search, TrackedFrame* frame) const;
   TrackingReport TrackBackwards(const Map& map, PoseSearch* search, TrackedFrame* frame);

@@ -95,7 +95,7 @@ class GrowingBack : public ::testing::Test {
   }
   std::vector<LatePlacement::Placed> GoOnFrom(const TrackedFrame& frame, const TrackingReport& report,
                                               const std::optional<LatePlacement::Before>& before = {}) {
-    const PlacedPose pose = *PlacedPose::Of(scene_.map(), frame.T_cam_world, search_.reference());
+    const PlacedPose pose = *PlacedPose::Of(search_.Reference(scene_.map()), frame.T_cam_world);
     return placement_.GoOnFrom(scene_.map(), search_, {frame, report, pose, jumped_}, before);
   }
   static LatePlacement::Before Tracked(uint32_t index, double x) {
@@ -214,7 +214,7 @@ TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
     TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(0));
     const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &frame);
     ASSERT_TRUE(report.ok) << report.reason;
-    const PlacedPose pose = *PlacedPose::Of(scene.map(), frame.T_cam_world, search.reference());
+    const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
     const auto told = placement.GoOnFrom(scene.map(), search, {frame, report, pose, jumped}, std::nullopt);
     ASSERT_EQ(told.size(), 1u);
     EXPECT_EQ(told.front().confirmed, keyframes == 280u);
@@ -238,7 +238,7 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
     TrackedFrame frame = see(index);
     const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &frame);
     ASSERT_TRUE(report.ok) << index << ": " << report.reason;
-    const PlacedPose pose = *PlacedPose::Of(scene.map(), frame.T_cam_world, search.reference());
+    const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
     placement.GoOnFrom(scene.map(), search, {frame, report, pose, jumped}, std::nullopt);
   }
   for (const uint32_t index : {17u, 16u, 15u}) {

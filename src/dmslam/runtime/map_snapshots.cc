@@ -1,5 +1,7 @@
 #include "dmslam/runtime/map_snapshots.h"
 
+#include <optional>
+
 #include "dmslam/map/snapshot.h"
 #include "dmslam/wire/codec.h"
 
@@ -16,7 +18,8 @@ bool MapSnapshots::Ready() {
 }
 
 void MapSnapshots::BeginSnapshot(int64_t) {
-  const KeyframeId newest = map_->keyframes().empty() ? KeyframeId{} : map_->keyframes().rbegin()->first;
+  std::optional<KeyframeId> newest;
+  if (!map_->keyframes().empty()) newest = map_->keyframes().rbegin()->first;
   const std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kPieceBytes);
   parts_.assign(parts.begin(), parts.end());
 }

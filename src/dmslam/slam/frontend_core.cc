@@ -98,11 +98,12 @@ void FrontendCore::ForgetMap() {
   tracker_.OnMapForgotten();
 }
 
-FrontendOutput FrontendCore::GiveUpMap(bool drop, const std::string& reason) {
+FrontendOutput FrontendCore::GiveUpMap(MapReset::Fate fate, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
-  drop = drop && !(map_id_ && IsSharedMap(*map_id_));
-  if (map_id_) output.Add(MapReset{*map_id_, drop, reason, frame_.stamp_ns, camera_id_});
+  if (map_id_ && IsSharedMap(*map_id_)) fate = MapReset::Fate::kKeep;
+  const bool drop = fate == MapReset::Fate::kDrop;
+  if (map_id_) output.Add(MapReset{*map_id_, fate, reason, frame_.stamp_ns, camera_id_});
   if (drop) dropped_ = map_id_;
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
@@ -152,7 +153,7 @@ FrontendOutput FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp
   if (IsBehind()) return AwaitTurn();
   FrontendOutput output;
   if (phase_.HasMap() && map_.keyframes().empty())
-    output = GiveUpMap(true, "the mapper began with an empty map");
+    output = GiveUpMap(MapReset::Fate::kDrop, "the mapper began with an empty map");
   output.Append(ProcessFrame());
   return output;
 }
@@ -197,11 +198,11 @@ FrontendOutput FrontendCore::Initialize() {
 
 FrontendOutput FrontendCore::AwaitMap() {
   FrontendOutput output;
-  const Keyframe* second = map_.FindKeyframe(phase_.awaited_second());
+  const Keyframe* second = map_.FindKeyframe(phase_.awaited_second().value());
   if (second == nullptr) {
     unplaced_.Keep(WaitingFrame(frame_));
     // Settled without it.
-    if (!gate_.awaited().valid()) output = GiveUpMap(true, "the mapper refused the first map");
+    if (!awaited()) output = GiveUpMap(MapReset::Fate::kDrop, "the mapper refused the first map");
     output.Add(NoPose(phase_.state(), "waiting for the mapper to answer the first map"));
     return output;
   }
@@ -240,7 +241,7 @@ FrontendOutput FrontendCore::CatchUp() {
   odometry_.Predict({frame_.index, frame_.stamp_ns});
   if (!map_.keyframes().empty()) return Track();
   unplaced_.Keep(WaitingFrame(frame_));
-  return GiveUpMap(true, "the mapper began with an empty map");
+  return GiveUpMap(MapReset::Fate::kDrop, "the mapper began with an empty map");
 }
 
 // ---- Tracking ----
@@ -283,13 +284,14 @@ FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
   FollowTurn();
   unplaced_.Keep(WaitingFrame(frame_));
   if (phase_.IsTrial() && report.contradicts) {
-    output = GiveUpMap(true, std::string("the first map does not predict the next frames: ") + report.reason);
+    output = GiveUpMap(MapReset::Fate::kDrop,
+                       std::string("the first map does not predict the next frames: ") + report.reason);
   } else {
     const int64_t missing_ns = frame_.stamp_ns - tracker_.last_tracked_ns();
     phase_.OnMissing(missing_ns);
-    ++(phase_.state() == TrackingState::kLost ? counters_.lost : counters_.uncertain);
+    ++(phase_.state() == TrackingState::kLost ? counters_.lost : counters_.missing);
     if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsUndecided())
-      output = GiveUpMap(false, "lost for too long");
+      output = GiveUpMap(MapReset::Fate::kKeep, "lost for too long");
   }
   output.Add(MakePose(phase_.IsSearching() ? phase_.state() : state(), report, std::nullopt));
   return output;
@@ -395,7 +397,7 @@ std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced() {
   frame_ = unplaced_.TakeNewest().ToTracked(camera_, pyramid_);
   const LatePlacement::Found found = late_.Place(map_, &tracker_.search(), tracker_.relocalizer(), &frame_);
   if (!found.report.ok) return std::nullopt;
-  const auto pose = PlacedPose::Of(map_, frame_.T_cam_world, tracker_.search().reference());
+  const auto pose = PlacedPose::Of(tracker_.search().Reference(map_), frame_.T_cam_world);
   if (!pose) return std::nullopt;
   return LatePlacement::Placed{frame_, found.report, *pose, found.jumped};
 }

@@ -59,7 +59,7 @@ class FrontendCore {
   /// Whether the oldest of them may be tracked now. Frames that are late anyway are tracked as in lock-step,
   /// each in the map that the keyframes before it made: a young map that does not grow with them is soon lost
   /// sight of.
-  bool MayCatchUp() const { return IsBehind() && (!gate_.awaited().valid() || map_.keyframes().empty()); }
+  bool MayCatchUp() const { return IsBehind() && (!awaited() || map_.keyframes().empty()); }
   /// From the oldest frame that waits to the newest.
   double seconds_behind() const;
   FrontendOutput CatchUp();
@@ -70,7 +70,7 @@ class FrontendCore {
   /// Joins a system that has been running: it is lost in the newest map that it was given.
   void Resume();
   /// Whether a keyframe was proposed whose settled record has not come: lock-step waits for it.
-  KeyframeId awaited() const { return gate_.awaited(); }
+  std::optional<KeyframeId> awaited() const { return gate_.awaited(); }
   /// Told by the node: no more keyframes now (too many are not acknowledged).
   void SetWithheld(bool withheld) { gate_.SetWithheld(withheld); }
 
@@ -119,7 +119,7 @@ class FrontendCore {
   FrontendOutput OnNotTracked(const TrackingReport& report);
   void FollowTurn();
   bool IsLostInTheLight(int64_t missing_ns);
-  FrontendOutput GiveUpMap(bool drop, const std::string& reason);
+  FrontendOutput GiveUpMap(MapReset::Fate fate, const std::string& reason);
   bool IsSharedMap(MapId map_id) const;
   MapId NextMapId();
   void FollowJoinedMap();

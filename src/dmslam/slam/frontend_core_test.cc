@@ -44,7 +44,7 @@ TEST(TrackingPhaseTest, IsLostAfterAThirdOfASecond) {
   phase.BeginLost();
   phase.OnTracked(0);
   phase.OnMissing(100'000'000);
-  EXPECT_EQ(phase.state(), TrackingState::kUncertain);
+  EXPECT_EQ(phase.state(), TrackingState::kMissing);
   phase.OnMissing(340'000'000);
   EXPECT_EQ(phase.state(), TrackingState::kLost);
   phase.OnTracked(0);
@@ -211,10 +211,10 @@ TEST_F(Phases, ARefusedProposalIsGivenUp) {
   const FrontendOutput output = Frame(2);
   const auto* reset = Find<MapReset>(output);
   ASSERT_NE(reset, nullptr);
-  EXPECT_TRUE(reset->drop);
+  EXPECT_EQ(reset->fate, MapReset::Fate::kDrop);
   EXPECT_EQ(reset->map_id, 1u);
   EXPECT_EQ(core_->state(), TrackingState::kNotInitialized);
-  EXPECT_FALSE(core_->awaited().valid());
+  EXPECT_FALSE(core_->awaited());
 }
 
 TEST_F(Phases, TheTrialEndsInTracking) {
@@ -239,7 +239,7 @@ TEST_F(Phases, ATrialThatIsContradictedDropsTheMapAndBeginsAnew) {
   });
   const auto* reset = Find<MapReset>(output);
   ASSERT_NE(reset, nullptr);
-  EXPECT_TRUE(reset->drop);
+  EXPECT_EQ(reset->fate, MapReset::Fate::kDrop);
   EXPECT_EQ(Find<FramePose>(output)->map_id, 2u) << "a number that no map has had";
 }
 
@@ -250,7 +250,7 @@ TEST_F(Phases, ATrialDuringWhichTheMapIsHiddenKeepsIt) {
   const FrontendOutput hidden = Frame(3, true);
   EXPECT_EQ(Find<MapReset>(hidden), nullptr);
   EXPECT_FALSE(Find<FramePose>(hidden)->HasPose());
-  EXPECT_EQ(core_->state(), TrackingState::kUncertain);
+  EXPECT_EQ(core_->state(), TrackingState::kMissing);
   EXPECT_TRUE(Find<FramePose>(Frame(4))->HasPose());
   EXPECT_EQ(core_->state(), TrackingState::kTracking);
 }
@@ -268,18 +268,18 @@ TEST_F(Phases, LostForLongInTheLightItKeepsTheMapAndLooksForAnother) {
   Start();
   for (uint32_t frame = 2; frame < 30; ++frame) Frame(frame);
   ASSERT_EQ(core_->state(), TrackingState::kTracking);
-  bool was_uncertain = false, was_lost = false;
+  bool was_missing = false, was_lost = false;
   std::optional<MapReset> reset;
   uint32_t frame = 30;
   for (; frame < 300 && !reset; ++frame) {
     const FrontendOutput output = Strange(frame);
     if (const auto* found = Find<MapReset>(output)) reset = *found;
-    was_uncertain = was_uncertain || core_->state() == TrackingState::kUncertain;
+    was_missing = was_missing || core_->state() == TrackingState::kMissing;
     was_lost = was_lost || core_->state() == TrackingState::kLost;
   }
   ASSERT_TRUE(reset);
-  EXPECT_FALSE(reset->drop);
-  EXPECT_TRUE(was_uncertain && was_lost);
+  EXPECT_EQ(reset->fate, MapReset::Fate::kKeep);
+  EXPECT_TRUE(was_missing && was_lost);
   EXPECT_NEAR((frame - 30) / 30.0, FrontendOptions().new_map_after_s, 0.1) << "seconds";
   EXPECT_EQ(core_->state(), TrackingState::kLost) << "it may be in the old map all the same";
 }
@@ -290,7 +290,7 @@ TEST_F(Phases, WhereItsMapBecomesPartOfAnotherItGoesOnThere) {
   for (const auto& [id, keyframe] : scene_.map().keyframes()) scene_.map().SetMapId(keyframe, 7);
   for (size_t i = 0; i < kPoints; ++i) scene_.map().SetMapId(scene_.map().At(MapScene::IdOf(i)), 7);
   MapDelta joined = scene_.map().TakeDelta(MapEvent::kCorrected, KeyframeId::Make(1, 1), 7);
-  if (core_->awaited().valid()) joined.progress.settled = core_->awaited();
+  if (core_->awaited()) joined.progress.settled = core_->awaited();
   core_->ApplyMapDelta(joined);
   std::optional<KeyframeProposal> proposal;
   for (uint32_t frame = 30; frame < 60; ++frame) {
@@ -452,7 +452,7 @@ TEST_F(SecondCamera, AFirstMapOfAnotherDoesNotAnswerItsOwn) {
   Frame(1);
   finds_map_ = false;
   MapArrives();  // of camera 0, settled and all
-  EXPECT_TRUE(core_->awaited().valid());
+  EXPECT_TRUE(core_->awaited());
   EXPECT_EQ(core_->state(), TrackingState::kWaitingForMap);
 }
 

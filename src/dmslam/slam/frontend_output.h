@@ -27,7 +27,7 @@ struct FrontendOutput {
 struct FrontendCounters {
   uint64_t frames = 0;
   uint64_t tracked = 0;
-  uint64_t uncertain = 0;
+  uint64_t missing = 0;  ///< not tracked, for no longer than a moment
   uint64_t lost = 0;
   uint64_t relocalizations = 0;
   uint64_t resets = 0;

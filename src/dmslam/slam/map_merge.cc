@@ -87,7 +87,7 @@ void MapMerge::Weld(std::shared_ptr<const Vocabulary> vocabulary, const Progress
   LoopcloserCore closer(BetweenMaps(options_.loop), map_.camera(), map_.pyramid(), options_.seed,
                         std::move(vocabulary));
   // In one piece: what a keyframe sees is then known when its words are counted.
-  for (const MapDelta& delta : CutSnapshot(map_, KeyframeId{}, SIZE_MAX / 2)) closer.ApplyMapDelta(delta);
+  for (const MapDelta& delta : CutSnapshot(map_, std::nullopt, SIZE_MAX / 2)) closer.ApplyMapDelta(delta);
   std::vector<KeyframeId> order = of_b_;
   order.insert(order.end(), of_a_.begin(), of_a_.end());
   for (const KeyframeId id : order) {

@@ -95,7 +95,7 @@ TEST(MapMergeTest, TwoRoomsStayApart) {
 TEST(MapMergeTest, SomebodyWhoStoodInBothIsNoProofThoughTheClocksAgree) {
   const WorldOptions world{.second_visit_elsewhere = true, .person_at = {20, 100}, .second_map_at = 97};
   TwoMaps maps = MapsOfWorld(world);
-  MapDelta shifted = CutSnapshot(maps.b, KeyframeId{}, SIZE_MAX / 2).front();
+  MapDelta shifted = CutSnapshot(maps.b, std::nullopt, SIZE_MAX / 2).front();
   for (KeyframeState& keyframe : shifted.keyframes) keyframe.stamp_ns -= 80 * testing::kInterval_ns;
   maps.b.Clear();
   maps.b.Apply(shifted);

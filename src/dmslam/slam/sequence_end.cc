@@ -44,7 +44,7 @@ bool SequenceEnd::AwaitsAnswer(const Map& map) const {
 
 /// The map grows one keyframe at a time: the mapper has time for it.
 bool SequenceEnd::Waits(const FrontendCore& core) const {
-  if (Is(Phase::kGrowingBack)) return core.awaited().valid() && !core.map().keyframes().empty();
+  if (Is(Phase::kGrowingBack)) return core.awaited() && !core.map().keyframes().empty();
   return AwaitsAnswer(core.map());
 }
 

@@ -14,14 +14,14 @@ constexpr int64_t kLostAfterNs = 1'000'000'000 / 3;
 TrackingState TrackingPhase::state() const {
   constexpr std::array kStates = {TrackingState::kNotInitialized, TrackingState::kWaitingForMap,
                                   TrackingState::kTrial,          TrackingState::kTracking,
-                                  TrackingState::kUncertain,      TrackingState::kLost};
+                                  TrackingState::kMissing,        TrackingState::kLost};
   static_assert(kStates.size() == std::variant_size_v<decltype(phase_)>);
   return kStates[phase_.index()];
 }
 
-KeyframeId TrackingPhase::awaited_second() const {
+std::optional<KeyframeId> TrackingPhase::awaited_second() const {
   const auto* waiting = std::get_if<WaitingForMap>(&phase_);
-  return waiting != nullptr ? waiting->second : KeyframeId();
+  return waiting != nullptr ? std::optional(waiting->second) : std::nullopt;
 }
 
 void TrackingPhase::Propose(KeyframeId second) {
@@ -47,7 +47,7 @@ void TrackingPhase::OnMissing(int64_t since_ns) {
   if (since_ns > kLostAfterNs) {
     phase_ = Lost{};
   } else {
-    phase_ = Uncertain{};
+    phase_ = Missing{};
   }
 }
 

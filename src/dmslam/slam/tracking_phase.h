@@ -13,7 +13,7 @@ namespace dmslam {
 ///
 ///   NotInitialized --Propose--> WaitingForMap --BeginTrial--> Trial --OnTracked--> Tracking
 ///   Trial: a frame that contradicts the map gives it up; one that does not show it ends the trial.
-///   Tracking, Uncertain, Lost: OnTracked and OnMissing go from any of them to any.
+///   Tracking, Missing, Lost: OnTracked and OnMissing go from any of them to any.
 ///   GiveUpMap: from all of them to NotInitialized.     BeginLost: in a map that is there already.
 class TrackingPhase {
  public:
@@ -23,8 +23,8 @@ class TrackingPhase {
   bool IsTrial() const { return Is<Trial>(); }
   /// Whether there is a map to track in.
   bool HasMap() const { return !IsSearching() && !IsWaiting(); }
-  /// `second` of the first map that was proposed; only while waiting for it.
-  KeyframeId awaited_second() const;
+  /// `second` of the first map that was proposed; none: it is not waited for one.
+  std::optional<KeyframeId> awaited_second() const;
 
   /// A first map was proposed.
   void Propose(KeyframeId second);
@@ -45,7 +45,7 @@ class TrackingPhase {
     int64_t until_ns = 0;
   };
   struct Tracking {};
-  struct Uncertain {};
+  struct Missing {};
   struct Lost {};
 
   template <typename T>
@@ -53,7 +53,7 @@ class TrackingPhase {
     return std::holds_alternative<T>(phase_);
   }
 
-  std::variant<NotInitialized, WaitingForMap, Trial, Tracking, Uncertain, Lost> phase_;
+  std::variant<NotInitialized, WaitingForMap, Trial, Tracking, Missing, Lost> phase_;
 };
 
 }  // namespace dmslam

@@ -81,9 +81,9 @@ void TrajectoryBuilder::OnFramePose(const FramePose& told) {
 }
 
 void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
-  if (!reset.drop) return;
+  if (reset.fate == MapReset::Fate::kKeep) return;
   for (auto& [index, pose] : poses_) {
-    if (index.camera == reset.camera_id && pose.map_id == reset.map_id) pose.reference = {};
+    if (index.camera == reset.camera_id && pose.map_id == reset.map_id) pose.reference.reset();
   }
   std::erase_if(refined_, [&reset](const auto& entry) {
     return entry.first.camera == reset.camera_id && entry.second.map_id == reset.map_id;
@@ -92,7 +92,7 @@ void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
 
 /// Where its reference is no longer known: over the frame that became it, which was placed in the same map.
 bool TrajectoryBuilder::Bridge(FramePose* pose) const {
-  const auto frame = poses_.find({pose->reference.camera(), pose->reference.frame_index()});
+  const auto frame = poses_.find({pose->reference->camera(), pose->reference->frame_index()});
   if (frame == poses_.end() || !MapOfFrame(frame->second)) return false;
   const FramePose& reference = frame->second;
   if (reference.map_id != pose->map_id) return false;  // its units are others
@@ -141,14 +141,14 @@ void TrajectoryBuilder::JoinPosesOf(const std::set<FrameName>& frames) {
 void TrajectoryBuilder::Join(std::span<const FramePose* const> path, std::optional<MotionNoise>* noise) {
   std::vector<PoseEstimate> estimates;
   for (const FramePose* told : path)
-    estimates.push_back(EstimateOf(*told, *map_.ResolvePose(told->reference), path.front()->stamp_ns));
+    estimates.push_back(EstimateOf(*told, *map_.ResolvePose(*told->reference), path.front()->stamp_ns));
   SmoothingOptions options;
   options.noise = *noise;
   const SmoothedTrajectory joined = SmoothTrajectory(estimates, options);
   if (joined.noise) *noise = joined.noise;
   for (size_t i = 0; i < path.size(); ++i) {
     FramePose pose = *path[i];
-    const Map::ResolvedPose reference = *map_.ResolvePose(pose.reference);
+    const Map::ResolvedPose reference = *map_.ResolvePose(*pose.reference);
     pose.T_cam_reference = joined.T_cam_world[i] * reference.T_cam_world.Inverse();
     pose.reference_scale = reference.scale;
     pose.state = TrackingState::kLocalizedLater;
@@ -158,7 +158,7 @@ void TrajectoryBuilder::Join(std::span<const FramePose* const> path, std::option
 
 std::optional<MapId> TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {
   if (!pose.HasPose()) return std::nullopt;
-  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(pose.reference);
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
   return reference ? std::optional(reference->map_id) : std::nullopt;
 }
 
@@ -188,7 +188,7 @@ TrajectoryBuilder::Trajectories TrajectoryBuilder::Build(std::optional<CameraId>
     const auto later = refined_.find(index);
     const FramePose& best =
         later != refined_.end() && MapOfFrame(later->second) == result.map_id ? later->second : pose;
-    const Map::ResolvedPose reference = *map_.ResolvePose(best.reference);
+    const Map::ResolvedPose reference = *map_.ResolvePose(*best.reference);
     const Rigid3d T_cam_world = reference.Compose(best.T_cam_reference, best.reference_scale);
     result.final.push_back({pose.stamp_ns, T_cam_world.Inverse()});
     if (pose.state != TrackingState::kLocalizedLater) {

@@ -45,7 +45,7 @@ class TrajectoryOfTwoMaps : public testing::Test {
 
 TEST_F(TrajectoryOfTwoMaps, PosesOfADroppedMapDoNotComeBackWithAKeyframeOfTheSameNumber) {
   builder_.OnFramePose(PoseIn(1, TrackingState::kTracking, 0.5));
-  builder_.OnMapReset({1, true, "", 0});
+  builder_.OnMapReset({1, MapReset::Fate::kDrop, "", 0});
   const TrajectoryBuilder::Trajectories built = builder_.Build();
   EXPECT_TRUE(built.final.empty());
   EXPECT_TRUE(built.online.empty());
@@ -67,7 +67,7 @@ TEST_F(TrajectoryOfTwoMaps, FramesOfSeveralCamerasAreToldApart) {
   EXPECT_TRUE(builder_.Build(1).keyframes.empty());
   MapReset reset;
   reset.map_id = 2;
-  reset.drop = true;
+  reset.fate = MapReset::Fate::kDrop;
   reset.camera_id = 1;
   builder_.OnMapReset(reset);
   EXPECT_TRUE(builder_.Build(1).final.empty());
@@ -76,7 +76,7 @@ TEST_F(TrajectoryOfTwoMaps, FramesOfSeveralCamerasAreToldApart) {
 
 TEST_F(TrajectoryOfTwoMaps, AFrameOfADroppedMapThatIsPlacedLaterHasThatPose) {
   builder_.OnFramePose(PoseIn(1, TrackingState::kTracking, 0.5));
-  builder_.OnMapReset({1, true, "", 0});
+  builder_.OnMapReset({1, MapReset::Fate::kDrop, "", 0});
   builder_.OnFramePose(PoseIn(2, TrackingState::kLocalizedLater, 1.0));
   const TrajectoryBuilder::Trajectories built = builder_.Build();
   ASSERT_EQ(built.final.size(), 1U);
@@ -86,8 +86,8 @@ TEST_F(TrajectoryOfTwoMaps, AFrameOfADroppedMapThatIsPlacedLaterHasThatPose) {
 
 TEST_F(TrajectoryOfTwoMaps, PosesOfOtherMapsAndOfOneThatIsKeptStay) {
   builder_.OnFramePose(PoseIn(2, TrackingState::kTracking, 0.5));
-  builder_.OnMapReset({1, true, "", 0});
-  builder_.OnMapReset({2, false, "", 0});
+  builder_.OnMapReset({1, MapReset::Fate::kDrop, "", 0});
+  builder_.OnMapReset({2, MapReset::Fate::kKeep, "", 0});
   EXPECT_EQ(builder_.Build().final.size(), 1U);
 }
 

@@ -35,7 +35,7 @@ void SortUnique(std::vector<LandmarkId>* ids, std::vector<uint64_t>* marks) {
 }  // namespace
 
 void LocalMap::Reset() {
-  reference_ = {};
+  reference_.reset();
   keyframes_.clear();
   landmarks_.clear();
 }
@@ -58,8 +58,8 @@ void LocalMap::RankByVotes(const Map& map, const TrackedFrame& frame) {
   std::sort(ranked_.begin(), ranked_.end());
 }
 
-/// The best neighbour of a local keyframe that is not local yet; invalid: none.
-KeyframeId LocalMap::NewNeighbour(const Map& map, KeyframeId of) {
+/// The best neighbour of a local keyframe that is not local yet.
+std::optional<KeyframeId> LocalMap::NewNeighbour(const Map& map, KeyframeId of) {
   ranked_.clear();
   for (const auto& [other, shared] : map.FindKeyframe(of)->covisible) {
     if (shared >= 1) ranked_.emplace_back(-shared, other);
@@ -69,7 +69,7 @@ KeyframeId LocalMap::NewNeighbour(const Map& map, KeyframeId of) {
   const auto found = std::find_if(ranked_.begin(), asked, [this](const auto& item) {
     return !std::binary_search(listed_.begin(), listed_.end(), item.second);
   });
-  return found == asked ? KeyframeId() : found->second;
+  return found == asked ? std::nullopt : std::optional(found->second);
 }
 
 void LocalMap::AddNeighbours(const Map& map) {
@@ -77,10 +77,10 @@ void LocalMap::AddNeighbours(const Map& map) {
   std::sort(listed_.begin(), listed_.end());
   const size_t direct = keyframes_.size();
   for (size_t i = 0; i < direct && keyframes_.size() < max_keyframes_; ++i) {
-    const KeyframeId neighbour = NewNeighbour(map, keyframes_[i]);
-    if (!neighbour.valid()) continue;
-    listed_.insert(std::lower_bound(listed_.begin(), listed_.end(), neighbour), neighbour);
-    keyframes_.push_back(neighbour);
+    const std::optional<KeyframeId> neighbour = NewNeighbour(map, keyframes_[i]);
+    if (!neighbour) continue;
+    listed_.insert(std::lower_bound(listed_.begin(), listed_.end(), *neighbour), *neighbour);
+    keyframes_.push_back(*neighbour);
   }
 }
 

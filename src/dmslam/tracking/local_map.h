@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,19 +22,19 @@ class LocalMap {
   void DropGone(const Map& map);
   void Reset();
 
-  /// The keyframe that shares most landmarks with the frame; invalid before the first.
-  KeyframeId reference() const { return reference_; }
+  /// The keyframe that shares most landmarks with the frame; none before the first.
+  std::optional<KeyframeId> reference() const { return reference_; }
   /// Sorted.
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
  private:
   void RankByVotes(const Map& map, const TrackedFrame& frame);
-  KeyframeId NewNeighbour(const Map& map, KeyframeId of);
+  std::optional<KeyframeId> NewNeighbour(const Map& map, KeyframeId of);
   void AddNeighbours(const Map& map);
   void ListLandmarks(const Map& map);
 
   size_t max_keyframes_;
-  KeyframeId reference_;
+  std::optional<KeyframeId> reference_;
   std::vector<KeyframeId> keyframes_;
   std::vector<LandmarkId> landmarks_;
   // Workspace:

@@ -70,7 +70,7 @@ class Chain : public ::testing::Test {
 
 TEST_F(Chain, TheReferenceIsTheKeyframeThatSharesMost) {
   LocalMap local(60);
-  EXPECT_FALSE(local.reference().valid());
+  EXPECT_FALSE(local.reference());
   local.Collect(map_, Seeing(60, 60));
   EXPECT_EQ(local.reference(), Kf(3));
 }
@@ -116,7 +116,7 @@ TEST_F(Chain, AFrameThatIsMatchedWithNothingLeavesTheReference) {
   local.Collect(map_, Seeing(0, 0));
   EXPECT_EQ(local.reference(), Kf(3));
   local.Reset();
-  EXPECT_FALSE(local.reference().valid());
+  EXPECT_FALSE(local.reference());
   EXPECT_TRUE(local.landmarks().empty());
 }
 

@@ -34,10 +34,8 @@ PosePrior MotionPrior(const MotionModelOptions& options, const Rigid3d& T_cam_wo
   return prior;
 }
 
-std::optional<PlacedPose> PlacedPose::Of(const Map& map, const Rigid3d& T_cam_world, KeyframeId reference) {
-  const Keyframe* keyframe = map.FindKeyframe(reference);
-  if (keyframe == nullptr) return std::nullopt;
-  return PlacedPose{reference, T_cam_world * keyframe->T_cam_world.Inverse(), keyframe->scale};
+PlacedPose PlacedPose::Of(const Keyframe& reference, const Rigid3d& T_cam_world) {
+  return {reference.id, T_cam_world * reference.T_cam_world.Inverse(), reference.scale};
 }
 
 std::optional<Rigid3d> PlacedPose::In(const Map& map) const {
@@ -147,7 +145,8 @@ void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const FoundP
 }
 
 void MotionModel::Coast(const Map& map, const FoundPose& found, const FrameTime& time) {
-  const std::optional<PlacedPose> pose = PlacedPose::Of(map, found.T_cam_world, last_.pose.reference);
+  const std::optional<PlacedPose> pose =
+      PlacedPose::Of(map.FindKeyframe(last_.pose.reference), found.T_cam_world);
   if (!pose || !IsWithin(time, kKnownNs)) return;
   motion_ = MotionTo(map, found, time);
   coasting_ = Pose{*pose, time};

@@ -15,8 +15,11 @@ struct PlacedPose {
   Rigid3d T_cam_reference;
   double scale = 1.0;  ///< of the reference when the pose was told
 
-  /// None where the keyframe is not in the map.
-  static std::optional<PlacedPose> Of(const Map& map, const Rigid3d& T_cam_world, KeyframeId reference);
+  static PlacedPose Of(const Keyframe& reference, const Rigid3d& T_cam_world);
+  /// None where there is no such keyframe.
+  static std::optional<PlacedPose> Of(const Keyframe* reference, const Rigid3d& T_cam_world) {
+    return reference == nullptr ? std::nullopt : std::optional(Of(*reference, T_cam_world));
+  }
   /// T_cam_world in the map as it is now; none where nothing is known of the reference.
   std::optional<Rigid3d> In(const Map& map) const;
 };

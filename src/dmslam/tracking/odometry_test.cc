@@ -42,8 +42,9 @@ class OdometerTest : public ::testing::Test {
   void Track(uint32_t frame, bool follows = true) {
     odometer_.Predict(Time(frame));
     const KeyframeId reference = KeyframeId::Make(MapScene::kSession, frame % 4);
-    odometer_.OnTracked(scene_.map(), Time(frame), *PlacedPose::Of(scene_.map(), CamWorld(frame), reference),
-                        CamWorld(frame), std::nullopt, follows);
+    odometer_.OnTracked(scene_.map(), Time(frame),
+                        PlacedPose::Of(scene_.map().At(reference), CamWorld(frame)), CamWorld(frame),
+                        std::nullopt, follows);
   }
   const OdometryState& state() const { return odometer_.state(); }
   /// How far the pose in the map is from correction times pose in odom.

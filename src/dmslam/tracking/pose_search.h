@@ -48,8 +48,12 @@ class PoseSearch {
   /// says of landmarks is added to the judge's evidence.
   TrackingReport InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
 
-  /// The keyframe that shares most landmarks with the frame searched for last.
-  KeyframeId reference() const { return local_map_.reference(); }
+  /// The keyframe that shares most landmarks with the frame searched for last; null: none was searched for,
+  /// or it has left the map.
+  const Keyframe* Reference(const Map& map) const {
+    const std::optional<KeyframeId> id = local_map_.reference();
+    return id ? map.FindKeyframe(*id) : nullptr;
+  }
   /// What was found last, with the covariance that its matches and the prior leave.
   FoundPose found(const TrackedFrame& frame) const;
   /// What the pose of the frame searched for last rests on.

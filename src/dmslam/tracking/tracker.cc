@@ -65,7 +65,7 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
-  if (attempt.report.ok) result.pose = PlacedPose::Of(map, frame.T_cam_world, search_.reference());
+  if (attempt.report.ok) result.pose = PlacedPose::Of(search_.Reference(map), frame.T_cam_world);
   if (result.pose) {
     Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
@@ -115,7 +115,7 @@ bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const Tra
 
 /// The map that the frame was placed in.
 bool Tracker::IsOldEnoughToProve(const Map& map) const {
-  const Keyframe* reference = map.FindKeyframe(search_.reference());
+  const Keyframe* reference = search_.Reference(map);
   return reference != nullptr && CanBeProven(map, reference->map_id, {});
 }
 
@@ -169,7 +169,7 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
   const uint64_t seed = DeriveSeed(seed_, frame->index, "relocalize");
   const FrameTime time{frame->index, frame->stamp_ns};
   const auto is_here = [&] {
-    const Keyframe* reference = map.FindKeyframe(search_.reference());
+    const Keyframe* reference = search_.Reference(map);
     return reference != nullptr && reference->map_id == asked.map_id;
   };
   // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too

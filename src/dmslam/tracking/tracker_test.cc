@@ -56,7 +56,7 @@ class Motion : public ::testing::Test {
   static FrameTime Time(uint32_t frame) { return {frame, kStartNs + frame * kFrameNs}; }
   void TrackTo(uint32_t frame, bool jumped = false) {
     const Rigid3d T_cam_world = MapScene::PoseAt(kStep * frame);
-    motion_.OnTracked(scene_.map(), *PlacedPose::Of(scene_.map(), T_cam_world, Reference()), {T_cam_world},
+    motion_.OnTracked(scene_.map(), PlacedPose::Of(scene_.map().At(Reference()), T_cam_world), {T_cam_world},
                       Time(frame), jumped);
   }
   MotionModel::Prediction Predict(uint32_t frame) { return motion_.Predict(scene_.map(), Time(frame)); }
@@ -98,8 +98,8 @@ TEST_F(Motion, APredictionOverAGapGoesAsFarAsTheCamera) {
 TEST_F(Motion, AFrameTrackedTwiceHasNotMoved) {
   TrackTo(1);
   const Rigid3d corrected = MapScene::PoseAt(kStep * 1.1);
-  motion_.OnTracked(scene_.map(), *PlacedPose::Of(scene_.map(), corrected, Reference()), {corrected}, Time(1),
-                    false);
+  motion_.OnTracked(scene_.map(), PlacedPose::Of(scene_.map().At(Reference()), corrected), {corrected},
+                    Time(1), false);
   EXPECT_LT(ErrorAt(*Predict(2).T_cam_world, kStep), kStep);
 }
 

@@ -12,6 +12,7 @@ namespace {
 template <typename Copy>
 class FiniteOnly {
  public:
+  static constexpr bool kToWire = Copy::kToWire;
   explicit FiniteOnly(Copy& copy) : copy_(copy) {}
   void operator()(auto& value, auto& wire) {
     copy_(value, wire);
@@ -118,7 +119,7 @@ struct Codec<FrontendStatus> {
   static void Fields(auto& copy, auto& m, auto& w) {
     FiniteOnly s(copy);
     HeadFields(s, m.head, w);
-    s(m.state, w.state);
+    StateField(s, m.state, w.state, false);  // of the frontend, which has no pose where it tracks none
     s(m.fps, w.fps);
     s(m.frames_received, w.frames_received);
     s(m.frames_processed, w.frames_processed);

@@ -290,7 +290,7 @@ TEST(WireTest, WhatIsAbsentStaysAbsent) {
 }
 
 TEST(WireTest, AbsentStampsAndCapturesAtZeroAreTwoThings) {
-  MapReset reset{1, false, "lost", {}};
+  MapReset reset{1, MapReset::Fate::kKeep, "lost", {}};
   EXPECT_FALSE(Decode<MapReset>(Encode(reset))->stamp_ns.has_value());
   reset.stamp_ns = 0;
   EXPECT_EQ(Decode<MapReset>(Encode(reset))->stamp_ns, 0);
@@ -299,7 +299,7 @@ TEST(WireTest, AbsentStampsAndCapturesAtZeroAreTwoThings) {
 }
 
 TEST(WireTest, DepthsAndSigmasAreOfAllKeypointsOrNone) {
-  KeyframeProposal keyframe = RandomMessage<KeyframeProposal>(4, 30);
+  KeyframeProposal keyframe = RandomMessage<KeyframeProposal>(5, 30);
   FeatureSet& features = keyframe.features;
   ASSERT_GT(features.size(), 1U);
   features.sigmas_px.assign(features.size(), 0.5F);

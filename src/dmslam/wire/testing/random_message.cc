@@ -51,6 +51,11 @@ void MakeSound(std::vector<double>& covariance, Random& random) {
   for (double& value : covariance) value = random.Uniform(0, 1);
 }
 
+/// A state that goes with whether there is a pose.
+void MakeSound(TrackingState& state, bool has_pose) {
+  if (state == TrackingState::kUncertain && !has_pose) state = TrackingState::kMissing;
+}
+
 void MakeSoundCamera(auto& m) { m.camera_id %= 256; }
 
 void MakeSound(RecordGroup& group, Random& random) {
@@ -121,7 +126,6 @@ void MakeSound(SessionStart& m, Random& random) {
 void MakeSound(KeyframeProposal& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.map_id);
-  if (random.Below(4) == 0) m.reference = {};
   m.reference_scale = random.Uniform(0.1, 10);
   MakeSound(m.features, random);
   if (m.features.size() == 0) m.matches.clear(), m.moving.clear();
@@ -159,7 +163,7 @@ void MakeSound(InitialMap& m, Random& random) {
 void MakeSound(FramePose& m, Random& random) {
   MakeSoundCamera(m);
   Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
-  if (random.Below(4) == 0) m.reference = {};
+  MakeSound(m.state, m.HasPose());
   m.reference_scale = random.Uniform(0.1, 10);
   m.moving_image_share = static_cast<float>(random.Uniform());
   MakeSound(m.covariance, random);
@@ -205,6 +209,7 @@ void MakeSound(Odometry& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.session);
   Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
+  MakeSound(m.state, m.measured);
   m.segment &= 0x7fffffff;
   m.scale_map_odom = random.Uniform(0.1, 10);
   m.depth = random.Uniform(0.1, 10);
@@ -216,6 +221,7 @@ void MakeSound(PoseView& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.session);
   Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
+  MakeSound(m.state, m.has_pose);
   m.moving_share = random.Uniform();
 }
 
@@ -235,6 +241,7 @@ void MakeSound(FrameTrace& m, Random&) {
 void MakeSound(FrontendStatus& m, Random& random) {
   MakeSoundCamera(m);
   Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
+  MakeSound(m.state, false);
 }
 
 void MakeSound(MapDelta& m, Random& random) {
