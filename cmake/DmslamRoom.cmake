@@ -10,13 +10,19 @@ if(DMSLAM_TOGETHER AND NOT DMSLAM_COMPILE_CACHE AND CMAKE_CXX_COMPILER_ID STREQU
   set(precompile ON)
 endif()
 option(DMSLAM_PRECOMPILE "Compile the headers of Eigen and of the standard library once" ${precompile})
-if(DMSLAM_PRECOMPILE)
+# <target> has these headers. A file that reads them is optimized as they were, whatever its own options say (GCC 12).
+function(dmslam_precompile target)
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled.cc CONTENT "// It has headers only.\n")
-  add_library(dmslam_precompiled STATIC ${PROJECT_BINARY_DIR}/precompiled.cc)
-  target_link_libraries(dmslam_precompiled PRIVATE dmslam_options)
-  target_precompile_headers(dmslam_precompiled PRIVATE <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <algorithm> <array>
+  add_library(${target} STATIC ${PROJECT_BINARY_DIR}/precompiled.cc)
+  target_link_libraries(${target} PRIVATE dmslam_options)
+  target_precompile_headers(${target} PRIVATE <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <algorithm> <array>
     <chrono> <deque> <fstream> <functional> <limits> <map> <memory> <numeric> <optional> <random> <set> <span> <sstream>
     <string> <thread> <unordered_map> <unordered_set> <variant> <vector>)
+endfunction()
+if(DMSLAM_PRECOMPILE)
+  dmslam_precompile(dmslam_precompiled)
+  dmslam_precompile(dmslam_precompiled_lightly)  # for dmslam_compile_lightly
+  target_compile_options(dmslam_precompiled_lightly PRIVATE $<$<CONFIG:Release>:-O1>)
 endif()
 
 # The files of <target> read the headers that were compiled once. CMake compiles a program's files with -fPIE; the compiler
@@ -29,7 +35,12 @@ function(dmslam_use_precompiled target)
   if(type STREQUAL EXECUTABLE)
     target_compile_options(${target} PRIVATE -fPIC)
   endif()
-  target_precompile_headers(${target} REUSE_FROM dmslam_precompiled)
+  get_target_property(lightly ${target} DMSLAM_LIGHTLY)
+  if(lightly)
+    target_precompile_headers(${target} REUSE_FROM dmslam_precompiled_lightly)
+  else()
+    target_precompile_headers(${target} REUSE_FROM dmslam_precompiled)
+  endif()
 endfunction()
 
 # All programs of this project under <folder>.
@@ -62,7 +73,11 @@ endfunction()
 function(dmslam_compile_lightly)
   foreach(target ${ARGN})
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
-    set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # measured: no faster with them, or slower
+    set_target_properties(${target} PROPERTIES DMSLAM_LIGHTLY ON)
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL STATIC_LIBRARY)  # programs: dmslam_programs_use_precompiled
+      dmslam_use_precompiled(${target})
+    endif()
   endforeach()
 endfunction()
 
