@@ -1,12 +1,12 @@
 #include "dmslam/evaluation/nees.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "dmslam/evaluation/alignment.h"
 #include "dmslam/evaluation/association.h"
+#include "dmslam/geometry/solve_symmetric.h"
 
 namespace dmslam {
 namespace {
@@ -86,7 +86,7 @@ std::optional<double> ScaleOf(std::span<const Known> known, uint32_t map, double
 }
 
 double SquaredNorm(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
-  return error.dot(Eigen::LDLT<Eigen::Matrix3d>(covariance).solve(error));
+  return error.dot(SolveSymmetric<3, 1>(covariance, error));
 }
 
 double SigmaAlong(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {

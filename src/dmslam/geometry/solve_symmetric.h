@@ -1,24 +1,25 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 namespace dmslam {
 
-/// Solves A x = b for a symmetric positive (or negative) semidefinite A, by Eigen's LDLT with pivoting. Only
-/// for the sizes below: they are compiled once, in solve_symmetric.cc, for each takes seconds to compile.
+// Small symmetric matrices. Eigen's decompositions of fixed size take three to ten seconds to compile for
+// each size and in each file; these are compiled once, in solve_symmetric.cc, for the sizes that are used.
+
+/// Solves A x = b for a symmetric positive (or negative) semidefinite A, by L D L^T with pivoting; along what
+/// A says nothing of, x is zero. For sizes 3 to 7.
 template <int kSize, int kColumns>
 Eigen::Matrix<double, kSize, kColumns> SolveSymmetric(const Eigen::Matrix<double, kSize, kSize>& A,
                                                       const Eigen::Matrix<double, kSize, kColumns>& b);
 
-extern template Eigen::Matrix<double, 3, 1> SolveSymmetric(const Eigen::Matrix<double, 3, 3>&,
-                                                           const Eigen::Matrix<double, 3, 1>&);
-extern template Eigen::Matrix<double, 3, 2> SolveSymmetric(const Eigen::Matrix<double, 3, 3>&,
-                                                           const Eigen::Matrix<double, 3, 2>&);
-extern template Eigen::Matrix<double, 5, 1> SolveSymmetric(const Eigen::Matrix<double, 5, 5>&,
-                                                           const Eigen::Matrix<double, 5, 1>&);
-extern template Eigen::Matrix<double, 6, 1> SolveSymmetric(const Eigen::Matrix<double, 6, 6>&,
-                                                           const Eigen::Matrix<double, 6, 1>&);
-extern template Eigen::Matrix<double, 7, 1> SolveSymmetric(const Eigen::Matrix<double, 7, 7>&,
-                                                           const Eigen::Matrix<double, 7, 1>&);
+/// Inverse of a symmetric positive definite matrix; none if it is not. For sizes 3 and 6.
+template <int kSize>
+std::optional<Eigen::Matrix<double, kSize, kSize>> InverseOfPositive(
+    const Eigen::Matrix<double, kSize, kSize>& A);
+
+/// Inverse of any matrix, by elimination with pivots; not finite where there is none.
+Eigen::Matrix<double, 6, 6> InverseOf(const Eigen::Matrix<double, 6, 6>& A);
 
 }  // namespace dmslam

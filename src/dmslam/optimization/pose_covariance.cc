@@ -1,11 +1,11 @@
 #include "dmslam/optimization/pose_covariance.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/optimization/reprojection.h"
 
 namespace dmslam {
@@ -70,19 +70,16 @@ Eigen::Matrix3d LandmarkCovariance(const Pinhole& camera, const Eigen::Vector3d&
     const Eigen::Vector3d ray = view.T_cam_world.rotation.conjugate() * p_cam / p_cam.squaredNorm();
     information.noalias() += ray * ray.transpose() / static_cast<double>(views.size());
   }
-  const Eigen::LLT<Eigen::Matrix3d> factor(information);
-  if (views.empty() || factor.info() != Eigen::Success) return Eigen::Matrix3d::Zero();
-  return factor.solve(Eigen::Matrix3d::Identity());
+  return InverseOfPositive(information).value_or(Eigen::Matrix3d::Zero());
 }
 
 std::optional<PoseUncertainty> EstimatePoseUncertainty(const Pinhole& camera, const Rigid3d& T_cam_world,
                                                        std::span<const PoseSight> sights,
                                                        const Matrix6d& information, double noise_variance,
                                                        const PoseErrorModel& model) {
-  const Eigen::LLT<Matrix6d> factor(information);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const Matrix6d inverse = Symmetric(factor.solve(Matrix6d::Identity()));
-  if (!inverse.allFinite()) return std::nullopt;
+  const std::optional<Matrix6d> inverted = InverseOfPositive(information);
+  if (!inverted || !inverted->allFinite()) return std::nullopt;
+  const Matrix6d& inverse = *inverted;
   const Eigen::Matrix3d R = T_cam_world.rotation.toRotationMatrix();
   PoseUncertainty result;
   result.gains.reserve(sights.size());

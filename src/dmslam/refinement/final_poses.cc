@@ -1,6 +1,5 @@
 #include "dmslam/refinement/final_poses.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -56,10 +55,10 @@ struct LandmarkEquations {
 
 /// The share of what is known of the pose that this observation alone says, along the direction where that is
 /// most: 0 to 1 (the greatest eigenvalue of its part of the hat matrix).
-double Leverage(const Pinhole& camera, const Rigid3d& T_cam_world, const Eigen::LDLT<Matrix6d>& information,
+double Leverage(const Pinhole& camera, const Rigid3d& T_cam_world, const Matrix6d& covariance,
                 const PoseObservation& observation) {
   const Matrix26 J = PoseJacobian(camera, T_cam_world * observation.p_world);
-  const Eigen::Matrix2d hat = observation.inv_sigma_squared * J * information.solve(J.transpose());
+  const Eigen::Matrix2d hat = observation.inv_sigma_squared * J * covariance * J.transpose();
   const double mean = 0.5 * hat.trace();
   return mean + std::sqrt(std::max(0.0, mean * mean - hat.determinant()));
 }
@@ -69,11 +68,11 @@ double Leverage(const Pinhole& camera, const Rigid3d& T_cam_world, const Eigen::
 bool DropUnchecked(const Pinhole& camera, const PoseOptimizationReport& report, std::vector<Sight>* sights,
                    std::vector<PoseObservation>* observations) {
   if (!report.usable) return false;
-  const Eigen::LDLT<Matrix6d> information(report.information);
+  const Matrix6d covariance = SolveSymmetric<6, 6>(report.information, Matrix6d::Identity());
   std::vector<size_t> checked;
   for (size_t i = 0; i < sights->size(); ++i) {
     const bool alone = report.inliers[i] != 0 &&
-                       Leverage(camera, report.T_cam_world, information, (*observations)[i]) > kMaxLeverage;
+                       Leverage(camera, report.T_cam_world, covariance, (*observations)[i]) > kMaxLeverage;
     if (!alone) checked.push_back(i);
   }
   if (checked.size() == sights->size() || 2 * checked.size() < sights->size()) return false;
@@ -107,11 +106,10 @@ void SetMeasured(const PoseOptimizationReport& report, const std::vector<Sight>&
 
 /// Standard deviation of the rotation [rad] and of the position over the depth, whichever is more.
 std::optional<double> SpreadOf(const Matrix6d& information, double depth) {
-  const Eigen::LLT<Matrix6d> factor(information);
-  if (information.isZero(0.0) || factor.info() != Eigen::Success) return std::nullopt;
-  const Matrix6d covariance = factor.solve(Matrix6d::Identity());
-  return std::sqrt(std::max(covariance.topLeftCorner<3, 3>().trace(),
-                            covariance.bottomRightCorner<3, 3>().trace() / (depth * depth)));
+  const std::optional<Matrix6d> covariance = InverseOfPositive(information);
+  if (!covariance) return std::nullopt;
+  return std::sqrt(std::max(covariance->topLeftCorner<3, 3>().trace(),
+                            covariance->bottomRightCorner<3, 3>().trace() / (depth * depth)));
 }
 
 /// How sure its keyframes are of a landmark's place.

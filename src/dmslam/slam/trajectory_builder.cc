@@ -1,8 +1,8 @@
 #include "dmslam/slam/trajectory_builder.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/geometry/uncertain_pose.h"
 
 namespace dmslam {
@@ -18,9 +18,8 @@ PoseEstimate EstimateOf(const FramePose& told, const Map::ResolvedPose& referenc
   PoseEstimate estimate;
   estimate.time_s = 1e-9 * static_cast<double>(told.stamp_ns - since_ns);
   estimate.T_cam_world = reference.Compose(told.T_cam_reference, told.reference_scale);
-  const Eigen::LDLT<Matrix6d> known(FromPoseInReference(covariance, told.T_cam_reference));
-  if (known.info() == Eigen::Success && known.isPositive())
-    estimate.information = known.solve(Matrix6d::Identity());
+  const auto known = InverseOfPositive(FromPoseInReference(covariance, told.T_cam_reference));
+  if (known) estimate.information = *known;
   return estimate;
 }
 

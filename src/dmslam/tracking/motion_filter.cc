@@ -1,6 +1,6 @@
 #include "dmslam/tracking/motion_filter.h"
 
-#include <Eigen/Cholesky>
+#include "dmslam/geometry/solve_symmetric.h"
 
 namespace dmslam {
 namespace {
@@ -58,7 +58,7 @@ MotionFilter::Expected MotionFilter::Predict(const Since& since) const {
 
 void MotionFilter::Update(const Since& since, const Vector6d& error, const Matrix6d& covariance) {
   State state = At(since);
-  const Matrix6d gain = state.pose.ldlt().solve(state.cross).transpose();
+  const Matrix6d gain = SolveSymmetric(state.pose, state.cross).transpose();
   state.velocity_per_s += gain * error;
   state.velocity -= gain * (state.pose - covariance) * gain.transpose();
   state.cross = covariance * gain.transpose();

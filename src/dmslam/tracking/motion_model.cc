@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dmslam/geometry/solve_symmetric.h"
+
 namespace dmslam {
 namespace {
 
@@ -113,7 +115,7 @@ MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& ti
   prediction.T_cam_world =
       Rigid3d(ExpSo3(expected.step.head<3>()), expected.step.tail<3>()) * *prediction.T_cam_world;
   if (!IsWithin(time, kKnownNs)) return prediction;
-  prediction.prior = PosePrior{*prediction.T_cam_world, expected.covariance.inverse()};
+  prediction.prior = PosePrior{*prediction.T_cam_world, InverseOf(expected.covariance)};
   return prediction;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/geometry/solve_symmetric.h"
 
 namespace dmslam {
 namespace {
@@ -119,7 +120,7 @@ std::span<const ExpectedLandmark> PoseSearch::MatchAround(const Map& map, double
 }
 
 FoundPose PoseSearch::found(const TrackedFrame& frame) const {
-  return {frame.T_cam_world, basis().information.inverse()};
+  return {frame.T_cam_world, InverseOf(basis().information)};
 }
 
 void PoseSearch::CountExpected(const Map& map, std::span<const ExpectedLandmark> expected,
