@@ -1,10 +1,10 @@
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <numeric>
 
 #include "dmslam/geometry/normalization.h"
 #include "dmslam/geometry/null_space.h"
 #include "dmslam/geometry/polynomial.h"
+#include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/geometry/two_view.h"
 
 namespace dmslam {
@@ -59,9 +59,9 @@ std::optional<Vector9d> LeastSquaresEpipolar(std::span<const Eigen::Vector2d> x1
     EpipolarRow(n1(x1[i]), n2(x2[i]), row);
     normal.selfadjointView<Eigen::Lower>().rankUpdate(row, weights.empty() ? 1.0 : weights[i]);
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix9d> solver(normal);
-  if (!(solver.eigenvalues()(1) > 1e-14 * solver.eigenvalues()(8))) return std::nullopt;
-  return solver.eigenvectors().col(0);
+  const SymmetricEigen<9> eigen = EigenOfSymmetric(normal);
+  if (!(eigen.values(1) > 1e-14 * eigen.values(8))) return std::nullopt;
+  return eigen.vectors.col(0);
 }
 
 }  // namespace

@@ -1,4 +1,3 @@
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -6,6 +5,7 @@
 
 #include "dmslam/geometry/normalization.h"
 #include "dmslam/geometry/null_space.h"
+#include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/geometry/two_view.h"
 
 namespace dmslam {
@@ -81,9 +81,9 @@ std::optional<Eigen::Matrix3d> HomographyLinear(std::span<const Eigen::Vector2d>
     TransferRows((*n1)(x1_px[i]), (*n2)(x2_px[i]), first, second);
     normal.noalias() += a * a.transpose() + b * b.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
-  if (!(solver.eigenvalues()(1) > 1e-12 * solver.eigenvalues()(8))) return std::nullopt;
-  const Eigen::Matrix<double, 9, 1> h = solver.eigenvectors().col(0);
+  const SymmetricEigen<9> eigen = EigenOfSymmetric(normal);
+  if (!(eigen.values(1) > 1e-12 * eigen.values(8))) return std::nullopt;
+  const Eigen::Matrix<double, 9, 1> h = eigen.vectors.col(0);
   return Denormalize(h, *n1, *n2);
 }
 
@@ -107,14 +107,14 @@ std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& H_px, const 
                                              const Pinhole& camera2) {
   Eigen::Matrix3d H = camera2.K().inverse() * H_px * camera1.K();
   if (H.determinant() < 0) H = -H;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(H.transpose() * H);
-  const Eigen::Vector3d squares = solver.eigenvalues();  // Ascending.
+  const SymmetricEigen<3> eigen = EigenOfSymmetric<3>(H.transpose() * H);
+  const Eigen::Vector3d& squares = eigen.values;
   if (!(squares(0) > 1e-14 * squares(2))) return {};
   H /= std::sqrt(squares(1));
   const double s1 = squares(2) / squares(1), s3 = squares(0) / squares(1);
   if (s1 - s3 < 1e-8)
     return {PlaneMotion{Rigid3d(Eigen::Quaterniond(H).normalized(), Eigen::Vector3d::Zero()), {0, 0, 1}}};
-  const Eigen::Matrix3d V = solver.eigenvectors().rowwise().reverse();
+  const Eigen::Matrix3d V = eigen.vectors.rowwise().reverse();
   const double along1 = std::sqrt(std::max(0.0, 1.0 - s3) / (s1 - s3));
   const double along3 = std::sqrt(std::max(0.0, s1 - 1.0) / (s1 - s3));
   std::vector<PlaneMotion> motions;

@@ -1,6 +1,5 @@
 #include "dmslam/motion_segmentation/dlrsac.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <optional>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/neighbor_vote.h"
 #include "dmslam/motion_segmentation/sampling.h"
@@ -207,8 +207,7 @@ CellState Segmentation::Classify(Cell* cell) const {
     const Eigen::Vector2d offset = matches_[order_[static_cast<size_t>(i)]].uv0_px - mean;
     scatter += offset * offset.transpose() / n;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(scatter);
-  const double across_px = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]));
+  const double across_px = std::sqrt(std::max(0.0, SmallerEigenvalue(scatter)));
   if (across_px < options_.collinear_share * CellPx()) return CellState::kCollinear;
   if (ExplainedByRotation(cell)) return CellState::kPureRotation;
   if (ExplainedByPlane(own)) return CellState::kPlane;

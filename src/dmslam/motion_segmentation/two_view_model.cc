@@ -1,6 +1,5 @@
 #include "dmslam/motion_segmentation/two_view_model.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -8,6 +7,7 @@
 
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/geometry/solve_symmetric.h"
+#include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/epipolar_sums.h"
 #include "dmslam/robust/ransac.h"
@@ -446,8 +446,7 @@ double DirectionSigma(const MatchArrays& arrays, std::span<const uint8_t> use, d
   const Eigen::Matrix<double, 3, 2> mixed = information.topRightCorner<3, 2>();
   const Eigen::Matrix2d direction =
       information.bottomRightCorner<2, 2>() - mixed.transpose() * SolveSymmetric(rotation, mixed);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(direction);
-  const double weakest = eigen.eigenvalues()[0];
+  const double weakest = SmallerEigenvalue(direction);
   return weakest > 0.1 ? std::min(M_PI, 1.0 / std::sqrt(weakest)) : M_PI;
 }
 

@@ -1,12 +1,12 @@
 #include "dmslam/optimization/trajectory_smoothing.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/util/parallel.h"
 
 namespace dmslam {
@@ -74,9 +74,9 @@ Likeness MakeLikeness(const Vector6d& carried, const Matrix6d& U) {
 Likeness LikenessOf(const Matrix6d& shared, const Matrix6d& inverse_root,
                     const Matrix6d& inverse_root_before) {
   const Matrix6d covariance = inverse_root * shared * inverse_root_before;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(covariance * covariance.transpose());
-  const Matrix6d& U = eigen.eigenvectors();
-  const Vector6d singular = eigen.eigenvalues().cwiseMax(kMinSpread).cwiseSqrt();
+  const SymmetricEigen<6> eigen = EigenOfSymmetric<6>(covariance * covariance.transpose());
+  const Matrix6d& U = eigen.vectors;
+  const Vector6d singular = eigen.values.cwiseMax(kMinSpread).cwiseSqrt();
   const Vector6d carried = singular.cwiseMin(singular.cwiseInverse()).cwiseMin(kMaxCarried);
   Likeness likeness = MakeLikeness(carried, U);
   likeness.carried = U * carried.cwiseQuotient(singular).asDiagonal() * U.transpose() * covariance;
@@ -158,12 +158,11 @@ class Smoother {
     left.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
     left.bottomRightCorner<3, 3>() = -estimate.T_cam_world.rotation.toRotationMatrix();
     const Matrix6d information = left.transpose() * estimate.information * left;
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
-    const Vector6d root = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+    const SymmetricEigen<6> eigen = EigenOfSymmetric(information);
+    const Vector6d root = eigen.values.cwiseMax(0.0).cwiseSqrt();
     const double least = std::sqrt(kMinSpread) * root.maxCoeff();
     const Vector6d inverse = (root.array() > least).select(root.cwiseInverse(), 0.0);
-    const Matrix6d inverse_root =
-        eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+    const Matrix6d inverse_root = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
     if (!likeness_.empty() && root.isZero(0.0)) {
       likeness_.push_back(MakeLikeness(kMaxCarried * Vector6d::Ones(), Matrix6d::Identity()));
     } else {
@@ -171,7 +170,7 @@ class Smoother {
           LikenessOf(left.transpose() * estimate.shared * left, inverse_root, inverse_root_before_));
       inverse_root_before_ = inverse_root;
     }
-    roots_.push_back(eigen.eigenvectors() * root.asDiagonal() * eigen.eigenvectors().transpose());
+    roots_.push_back(eigen.vectors * root.asDiagonal() * eigen.vectors.transpose());
   }
 
   /// The median of the times between frames.

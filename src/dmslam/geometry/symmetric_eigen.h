@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace dmslam {
+
+/// A = vectors diag(values) vectors^T of a symmetric matrix, values ascending.
+template <int kSize>
+struct SymmetricEigen {
+  Eigen::Matrix<double, kSize, 1> values;
+  Eigen::Matrix<double, kSize, kSize> vectors;
+};
+
+/// By Jacobi's rotations (Golub & Van Loan, Matrix Computations, 8.5), as accurate as any; reads the lower
+/// triangle. Compiled once, in symmetric_eigen.cc, for sizes 3, 6 and 9.
+template <int kSize>
+SymmetricEigen<kSize> EigenOfSymmetric(const Eigen::Matrix<double, kSize, kSize>& A);
+
+/// The smaller eigenvalue.
+double SmallerEigenvalue(const Eigen::Matrix2d& A);
+
+}  // namespace dmslam
