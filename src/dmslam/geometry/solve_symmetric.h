@@ -5,8 +5,8 @@
 
 namespace dmslam {
 
-// Small symmetric matrices. Eigen's decompositions of fixed size take three to ten seconds to compile for
-// each size and in each file; these are compiled once, in solve_symmetric.cc, for the sizes that are used.
+// Small matrices. Eigen's decompositions of fixed size take three to ten seconds to compile for each size and
+// in each file; here they are compiled once for all sizes, with room for the largest (nothing is allocated).
 
 /// Solves A x = b for a symmetric positive (or negative) semidefinite A, by L D L^T with pivoting; along what
 /// A says nothing of, x is zero. For sizes 3 to 7.
@@ -19,7 +19,7 @@ template <int kSize>
 std::optional<Eigen::Matrix<double, kSize, kSize>> InverseOfPositive(
     const Eigen::Matrix<double, kSize, kSize>& A);
 
-/// Inverse of any matrix, by elimination with pivots; not finite where there is none.
+/// Inverse of any matrix, by L U with pivots; not finite where there is none.
 Eigen::Matrix<double, 6, 6> InverseOf(const Eigen::Matrix<double, 6, 6>& A);
 
 }  // namespace dmslam

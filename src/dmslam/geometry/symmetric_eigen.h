@@ -11,8 +11,7 @@ struct SymmetricEigen {
   Eigen::Matrix<double, kSize, kSize> vectors;
 };
 
-/// By Jacobi's rotations (Golub & Van Loan, Matrix Computations, 8.5), as accurate as any; reads the lower
-/// triangle. Compiled once, in symmetric_eigen.cc, for sizes 3, 6 and 9.
+/// Reads the lower triangle. Compiled once, in symmetric_eigen.cc, for sizes 3, 6 and 9.
 template <int kSize>
 SymmetricEigen<kSize> EigenOfSymmetric(const Eigen::Matrix<double, kSize, kSize>& A);
 
