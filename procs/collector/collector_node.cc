@@ -16,15 +16,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t ProcessHealth::*kHealthCounters[] = {
-    &ProcessHealth::dropped_foreign,  &ProcessHealth::dropped_malformed, &ProcessHealth::dropped_checksum,
-    &ProcessHealth::records_repaired, &ProcessHealth::records_lost,      &ProcessHealth::repairs_requested,
-    &ProcessHealth::resent,           &ProcessHealth::resent_bytes,      &ProcessHealth::written,
-    &ProcessHealth::written_bytes};
-constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
-    &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
-    &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
-    &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
 constexpr int64_t kSyncEveryNs = 1'000'000'000;
 constexpr int64_t kCountersEveryNs = 5'000'000'000;
 constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
@@ -146,60 +137,14 @@ void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   heard.push_back({pose.stamp_ns, pose.T_world_cam});
 }
 
-/// A process is heard; where another one of its name was before it, that one's counters are kept. What a
-/// collector after this one must know of it goes into the journal.
-void CollectorNode::OnProcess(const std::string& process, const ProcessHealth& heard,
-                              const ProcessHealth& so_far) {
-  if (!journal_) {
-    heard_early_[{process, heard.pid}] = heard;
-  } else if (processes_[process].instances.IsNew(heard, context_.now_ns())) {
-    NoteProcess(process, heard.pid, so_far);
-  }
-}
-
-void CollectorNode::NoteProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far) {
-  Followed& known = processes_[process];
-  std::ostringstream note;
-  note << "process " << process << ' ' << pid;
-  if (++known.count > 1) {
-    ++run_.restarts;
-    known.former = so_far;
-    if (process == "frontend") known.former_frontend = run_.cameras[0].frontend;
-    for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << so_far.*counter;
-    if (process == "frontend")
-      for (int64_t FrontendStatus::*counter : kFrontendCounters)
-        note << ' ' << run_.cameras[0].frontend.*counter;
-  }
-  journal_->AppendNote(note.str());
-}
-
-/// What each process has counted so far: where all die at once, nobody else knows it.
-void CollectorNode::NoteCounters() {
-  for (const auto& [process, health] : run_.health) {
-    std::ostringstream note;
-    note << "counters " << process << ' ' << health.pid;
-    for (int64_t ProcessHealth::*counter : kHealthCounters) note << ' ' << health.*counter;
-    if (process == "frontend")
-      for (int64_t FrontendStatus::*counter : kFrontendCounters)
-        note << ' ' << run_.cameras[0].frontend.*counter;
-    journal_->AppendNote(note.str());
-  }
-}
-
 /// What a collector before this one has noted.
 void CollectorNode::ReadNote(const std::string& text) {
   std::istringstream note(text);
-  std::string kind, process;
+  std::string kind;
   note >> kind;
-  uint64_t keyframe = 0;
-  MapId map_id = 0;
-  int32_t pid = 0;
-  if (kind == "keyframe" && note >> keyframe >> map_id) {
-    proposals_.maps[KeyframeId{keyframe}] = map_id;
-    if (Version said; note >> said.epoch >> said.seq) proposals_.not_taken[KeyframeId{keyframe}] = said;
-  }
-  if (kind == "mapped" && note >> keyframe) proposals_.not_taken.erase(KeyframeId{keyframe});
-  if (kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
+  if (kind == "keyframe" || kind == "mapped") proposals_.ReadNote(kind, note);
+  if (kind == "counters" || kind == "process") processes_.ReadNote(kind, note, context_.now_ns());
+  if (MapId map_id = 0; kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "resumed") OnResume();
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;
@@ -210,38 +155,21 @@ void CollectorNode::ReadNote(const std::string& text) {
     end.camera_id = camera;
     note >> end.frames_published >> end.frames_missing >> end.frames_blacked >> end.frames_jumped;
   }
-  if (kind == "counters" && note >> process >> pid) {
-    ProcessHealth& health = run_.health[process];
-    health.pid = pid;
-    for (int64_t ProcessHealth::*counter : kHealthCounters) note >> health.*counter;
-    if (process != "frontend") return;
-    for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> run_.cameras[0].frontend.*counter;
-  }
-  if (kind != "process" || !(note >> process >> pid)) return;
-  Followed& known = processes_[process];
-  known.instances.Know(pid, context_.now_ns());
-  if (++known.count > 1) ++run_.restarts;
-  for (int64_t ProcessHealth::*counter : kHealthCounters) note >> known.former.*counter;
-  if (process != "frontend") return;
-  for (int64_t FrontendStatus::*counter : kFrontendCounters) note >> known.former_frontend.*counter;
 }
 
-/// Counters begin at zero in a process that was started again: those of the ones before it are added. False
-/// for a process of another session.
+bool CollectorNode::IsOfThisRun(const std::string& process, const StatusHead& head) {
+  return head.session == 0 ||
+         (process.starts_with("player") ? !IsForeignFrame(head.session) : !IsForeign(head.session));
+}
+
+/// False for a process of another session.
 bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
-  const bool ours = head.session == 0 || (process.starts_with("player") ? !IsForeignFrame(head.session)
-                                                                        : !IsForeign(head.session));
-  if (!ours) return false;
-  ProcessHealth& health = run_.health[process];
-  OnProcess(process, head.health, health);
-  const ProcessHealth& former = processes_[process].former;
-  const double largest = std::max(health.rss_mb, head.health.rss_mb);
-  run_.memory[process].Add({builder_ ? builder_->map().keyframes().size() : 0, head.health.rss_mb});
-  health = head.health;
-  health.rss_mb = largest;
-  for (int64_t ProcessHealth::*counter : kHealthCounters) health.*counter += former.*counter;
+  if (!IsOfThisRun(process, head)) return false;
+  processes_.Hear(process, head.health, NumKeyframes(), context_.now_ns());
   return true;
 }
+
+size_t CollectorNode::NumKeyframes() const { return builder_ ? builder_->map().keyframes().size() : 0; }
 
 /// What this process has heard and lost itself. A loss is noted at once: whoever comes next does not know it.
 void CollectorNode::CountOwn() {
@@ -249,63 +177,25 @@ void CollectorNode::CountOwn() {
   for (const auto& reader : frontend_readers_) readers.push_back(reader.get());
   const int64_t lost_before = run_.health["collector"].records_lost;
   OnHealth("collector", MakeStatusHead("", readers));
-  if (run_.health["collector"].records_lost != lost_before) NoteCounters();
+  if (run_.health["collector"].records_lost != lost_before) processes_.NoteCounters();
 }
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
-  const CameraId camera = status.camera_id;
-  const std::string process = OfCamera("frontend", camera);
-  if (camera >= options_.NumCameras() || !OnHealth(process, status.head)) return;
-  for (int64_t FrontendStatus::*counter : kFrontendCounters)
-    status.*counter += processes_[process].former_frontend.*counter;
-  run_.cameras[camera].frontend = std::move(status);
-}
-
-void CollectorNode::OnProposal(KeyframeId id, MapId map_id, const Version& said) {
-  const auto before = proposals_.not_taken.find(id);
-  const bool said_again = before != proposals_.not_taken.end() && before->second.epoch < said.epoch;
-  if (said_again || !proposals_.maps.contains(id)) {
-    journal_->AppendNote("keyframe " + std::to_string(id.value) + " " + std::to_string(map_id) + " " +
-                         std::to_string(said.epoch) + " " + std::to_string(said.seq));
-    proposals_.not_taken[id] = said;
-  }
-  proposals_.maps[id] = map_id;
-  proposals_.heard_ns.emplace(id, context_.now_ns());
-}
-
-/// What was done with the proposals up to there is in the map: whoever holds that holds them.
-void CollectorNode::NoteTaken(CameraId camera) {
-  const StreamPosition mapped = builder_->map().progress(camera).frontend;
-  std::erase_if(proposals_.not_taken, [&](const auto& item) {
-    const auto& [id, said] = item;
-    const bool taken = id.camera() == camera && said.epoch == mapped.epoch && said.seq <= mapped.seq;
-    if (taken) journal_->AppendNote("mapped " + std::to_string(id.value));
-    if (taken) proposals_.in_flight.erase(id);
-    return taken;
-  });
-}
-
-void CollectorNode::NoteInFlight(KeyframeId id, const SharedBytes& record) {
-  constexpr size_t kMost = 64;  // a frontend makes no more until some are taken
-  auto& in_flight = proposals_.in_flight;
-  if (!proposals_.not_taken.contains(id)) return;
-  in_flight[id] = {record, 0};
-  if (in_flight.size() > kMost) in_flight.erase(in_flight.begin());
+  const std::string process = OfCamera("frontend", status.camera_id);
+  if (status.camera_id >= options_.NumCameras() || !IsOfThisRun(process, status.head)) return;
+  processes_.HearFrontend(process, std::move(status), NumKeyframes(), context_.now_ns());
 }
 
 /// A frontend that is silent, or another one by now, does not say again what it had proposed. Whoever comes
 /// after it hears it from here.
 void CollectorNode::RepeatWhatIsLeft() {
-  constexpr int kMostOften = 30;  // once a second
-  for (auto& [id, in_flight] : proposals_.in_flight) {
-    const StreamReader& reader = *frontend_readers_[id.camera()];
-    const bool its_frontend_lives =
-        reader.term().epoch == proposals_.not_taken.at(id).epoch && SilentNs(reader) < kSilentFrontendNs;
-    if (its_frontend_lives || in_flight.repeated >= kMostOften || IsKnown(id, proposals_.maps.at(id)))
-      continue;
-    ++in_flight.repeated;
-    context_.bus->Publish({ChannelOfCamera(channels::kKeyframe, id.camera()), in_flight.record, false});
-  }
+  const auto lives = [this](CameraId camera, int64_t epoch) {
+    const StreamReader& reader = *frontend_readers_[camera];
+    return reader.term().epoch == epoch && SilentNs(reader) < kSilentFrontendNs;
+  };
+  const auto is_known = [this](KeyframeId id, MapId map_id) { return IsKnown(id, map_id); };
+  for (const auto& left : proposals_.ToSayAgain(lives, is_known))
+    context_.bus->Publish({ChannelOfCamera(channels::kKeyframe, left.id.camera()), left.record, false});
 }
 
 /// Whether it is in the map, or was, or its map was dropped.
@@ -313,19 +203,11 @@ bool CollectorNode::IsKnown(KeyframeId id, MapId map_id) const {
   return builder_->map().HasKnown(id) || dropped_maps_.contains(map_id);
 }
 
-/// No mapper had taken it when the frontend died that had said it, and the map goes on with another one.
-bool CollectorNode::WentWithFrontend(KeyframeId id) const {
-  const auto said = proposals_.not_taken.find(id);
-  return said != proposals_.not_taken.end() &&
-         builder_->map().progress(id.camera()).frontend.epoch > said->second.epoch;
-}
-
 /// As all who listen see it: the streams' own time is in it, and whatever the mapper did before.
 void CollectorNode::TimeKeyframe(const MapDelta& delta) {
-  const auto& heard_ns = proposals_.heard_ns;
-  const auto heard = delta.about ? heard_ns.find(*delta.about) : heard_ns.end();
-  if (heard == heard_ns.end()) return;
-  const double elapsed_ms = static_cast<double>(context_.now_ns() - heard->second) * 1e-6;
+  const std::optional<int64_t> heard_ns = delta.about ? proposals_.HeardNs(*delta.about) : std::nullopt;
+  if (!heard_ns) return;
+  const double elapsed_ms = static_cast<double>(context_.now_ns() - *heard_ns) * 1e-6;
   if (delta.event == MapEvent::kLandmarksCreated) run_.keyframes.to_landmarks_ms.push_back(elapsed_ms);
   if (delta.event == MapEvent::kAdjusted) run_.keyframes.to_adjusted_ms.push_back(elapsed_ms);
 }
@@ -433,15 +315,17 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
     OnFramePose(*record);
   } else if (record->channel == channels::kKeyframe) {
     if (const auto proposal = Read<KeyframeProposal>(*record->bytes)) {
-      OnProposal(proposal->id, proposal->map_id, record->version());
-      if (proposal->id.camera() == camera) NoteInFlight(proposal->id, record->bytes);
+      proposals_.OnProposal(proposal->id, proposal->map_id, record->version(), context_.now_ns());
+      if (proposal->id.camera() == camera) proposals_.KeepRecord(proposal->id, record->bytes);
     }
   } else if (record->channel == channels::kInitialMap) {
     if (const auto proposal = Read<InitialMap>(*record->bytes)) {
-      OnProposal(proposal->first.id, proposal->map_id, record->version());
-      for (const InitialMap::View& view : proposal->between)
-        OnProposal(view.keyframe.id, proposal->map_id, record->version());
-      OnProposal(proposal->second.id, proposal->map_id, record->version());
+      const auto propose = [&](KeyframeId id) {
+        proposals_.OnProposal(id, proposal->map_id, record->version(), context_.now_ns());
+      };
+      propose(proposal->first.id);
+      for (const InitialMap::View& view : proposal->between) propose(view.keyframe.id);
+      propose(proposal->second.id);
     }
   } else if (record->channel == channels::kMapReset) {
     OnMapReset(*record);
@@ -451,24 +335,6 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   if (kept) safe_[camera] = record->version();
   AcceptWhatIsSafe();
   return true;
-}
-
-/// What was proposed in a map that still stands must be in it, or have left it by being culled.
-void CollectorNode::CountMissingKeyframes() {
-  run_.keyframes.proposed = proposals_.maps.size();
-  for (const auto& [id, map_id] : proposals_.maps) {
-    if (IsKnown(id, map_id)) continue;
-    if (proposals_.before_crash.contains(id)) {
-      ++run_.keyframes.lost_in_crash;
-    } else if (WentWithFrontend(id)) {
-      ++run_.keyframes.lost_with_frontend;
-      LogWarning("the keyframe of frame {} is lost: its frontend died before a mapper had it",
-                 id.frame_index());
-    } else {
-      ++run_.keyframes.missing;
-      LogWarning("the keyframe of frame {} is missing in map {}", id.frame_index(), map_id);
-    }
-  }
 }
 
 /// Behind what a collector that was before this one had accepted.
@@ -500,12 +366,9 @@ void CollectorNode::OpenJournal() {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
   }
   for (const auto& [camera, frames] : announced_before) Announce(camera, frames.first, frames.second);
-  processes_["collector"].former = run_.health["collector"];
-  const ProcessHealth own = MeasureProcess(context_.pid);
-  processes_["collector"].instances.IsNew(own, context_.now_ns());
-  NoteProcess("collector", own.pid, run_.health["collector"]);  // whatever the id of the one before it was
-  for (const auto& [key, health] : std::exchange(heard_early_, {}))
-    OnProcess(key.first, health, run_.health[key.first]);
+  const auto note = [this](const std::string& text) { journal_->AppendNote(text); };
+  proposals_.NoteTo(note);
+  processes_.Begin(note, MeasureProcess(context_.pid), context_.now_ns());
   if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(
@@ -519,7 +382,7 @@ void CollectorNode::OpenJournal() {
 /// All who held the map had died, and a mapper begins with the last checkpoint: what came after it is gone.
 void CollectorNode::OnResume() {
   ++run_.resumes;
-  for (const auto& [id, map_id] : proposals_.maps) proposals_.before_crash.insert(id);
+  proposals_.OnAllDied();
 }
 
 void CollectorNode::BeginCheckpoints() {
@@ -587,8 +450,7 @@ bool CollectorNode::TakeMapRecord() {
   }
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
-  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot &&
-      !proposals_.maps.empty()) {
+  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot && !proposals_.empty()) {
     OnResume();
     journal_->AppendNote("resumed");
   }
@@ -603,7 +465,7 @@ bool CollectorNode::TakeMapRecord() {
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     const StreamPosition mapped = builder_->map().progress(camera).frontend;
     frontend_readers_[camera]->NoteWritten({mapped.epoch, mapped.seq});
-    NoteTaken(camera);
+    proposals_.OnMapped(camera, mapped);
   }
   return true;
 }
@@ -751,7 +613,9 @@ void CollectorNode::Gather(bool ended) {
   CountOwn();
   builder_->BridgeLostKeyframes();
   builder_->JoinPosesOf(of_the_dead);
-  CountMissingKeyframes();
+  proposals_.CountMissing([this](KeyframeId id, MapId map_id) { return IsKnown(id, map_id); },
+                          [this](CameraId camera) { return builder_->map().progress(camera).frontend.epoch; },
+                          &run_.keyframes);
   if (journal_->lost() > 0)
     run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
 }
@@ -810,7 +674,7 @@ void CollectorNode::PublishStatus() {
   CountOwn();
   if (context_.now_ns() >= due_.counters_ns) {
     due_.counters_ns = context_.now_ns() + kCountersEveryNs;
-    NoteCounters();
+    processes_.NoteCounters();
   }
   if (!collector_.progress) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",

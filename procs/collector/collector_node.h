@@ -10,9 +10,10 @@
 
 #include "collector/checkpointer.h"
 #include "collector/make_collector.h"
+#include "collector/process_ledger.h"
+#include "collector/proposed_keyframes.h"
 #include "collector/results.h"
 #include "dmslam/recording/journal.h"
-#include "dmslam/runtime/instance_watch.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
@@ -43,26 +44,6 @@ class CollectorNode : public StreamNode {
     int64_t newest_stamp_ns = 0;  ///< time of the newest
     /// Of every camera, its index; none: none has come.
     std::map<CameraId, std::optional<uint32_t>> newest;
-  };
-  /// Processes of one name that followed one another.
-  struct Followed {
-    InstanceWatch instances;
-    int64_t count = 0;     ///< of them all
-    ProcessHealth former;  ///< counters of those before the present one, together
-    FrontendStatus former_frontend;
-  };
-  /// A keyframe that no mapper has taken yet, as its frontend said it.
-  struct InFlight {
-    SharedBytes record;
-    int repeated = 0;
-  };
-  /// Keyframes that the frontend said should be.
-  struct Proposals {
-    std::map<KeyframeId, MapId> maps;
-    std::map<KeyframeId, int64_t> heard_ns;    ///< when each was said to be one
-    std::set<KeyframeId> before_crash;         ///< those of before all processes died
-    std::map<KeyframeId, Version> not_taken;   ///< by a mapper, as the map says; and where they were said
-    std::map<KeyframeId, InFlight> in_flight;  ///< of those, as far as they were heard by this process
   };
   /// What waits for room on the disk.
   struct Disk {
@@ -106,24 +87,19 @@ class CollectorNode : public StreamNode {
   void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
   void BeginCheckpoints();
-  void OnProcess(const std::string& process, const ProcessHealth& heard, const ProcessHealth& so_far);
-  void NoteProcess(const std::string& process, int32_t pid, const ProcessHealth& so_far);
   void ReadNote(const std::string& text);
+  bool IsOfThisRun(const std::string& process, const StatusHead& head);
   bool OnHealth(const std::string& process, const StatusHead& head);
+  size_t NumKeyframes() const;
   void OnFrontendStatus(FrontendStatus status);
   void CountOwn();
-  void OnProposal(KeyframeId id, MapId map_id, const Version& said);
-  void NoteInFlight(KeyframeId id, const SharedBytes& record);
-  void NoteTaken(CameraId camera);
   void RepeatWhatIsLeft();
   bool IsKnown(KeyframeId id, MapId map_id) const;
-  bool WentWithFrontend(KeyframeId id) const;
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
   void OnMapReset(const Record& record);
   void OnSessionStart(const Record& record);
   void CountReset(const MapReset& reset);
-  void NoteCounters();
   void OnResume();
   bool MapMayBeKept() const;
   void KeepCheckpoint();
@@ -136,7 +112,6 @@ class CollectorNode : public StreamNode {
   bool EndedMapIsSafe();
   void RecallEndedMap();
   void CountFrame(const FramePose& pose);
-  void CountMissingKeyframes();
   void OpenJournal();
   std::string OfTotal() const;
   void SayProgress();
@@ -157,10 +132,8 @@ class CollectorNode : public StreamNode {
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
   std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
-  std::map<std::string, Followed> processes_;  ///< by name
-  std::map<std::pair<std::string, int32_t>, ProcessHealth>
-      heard_early_;  ///< by process and id, before there was a journal
-  Proposals proposals_;
+  ProcessLedger processes_{&run_};
+  ProposedKeyframes proposals_;
   std::set<MapId> dropped_maps_;
   std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
   std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal

@@ -38,7 +38,7 @@ class ObservedCloud {
     basis_ = solver_.basis();
   }
   std::optional<PoseCertainty> Estimate(bool follows = true, uint32_t reference = 0) {
-    const PlacedPose pose = *PlacedPose::Of(scene_.map(), frame_.T_cam_world, Id(reference));
+    const PlacedPose pose = PlacedPose::Of(*scene_.map().FindKeyframe(Id(reference)), frame_.T_cam_world);
     return estimator_.Estimate(scene_.map(), frame_, pose, basis_, follows);
   }
   std::optional<PoseCertainty> SeeAndEstimate(uint32_t index, double x) {

@@ -1,0 +1,108 @@
+#include "collector/process_ledger.h"
+
+#include <algorithm>
+#include <sstream>
+
+namespace dmslam {
+namespace {
+
+constexpr int64_t ProcessHealth::*kHealthCounters[] = {
+    &ProcessHealth::dropped_foreign,  &ProcessHealth::dropped_malformed, &ProcessHealth::dropped_checksum,
+    &ProcessHealth::records_repaired, &ProcessHealth::records_lost,      &ProcessHealth::repairs_requested,
+    &ProcessHealth::resent,           &ProcessHealth::resent_bytes,      &ProcessHealth::written,
+    &ProcessHealth::written_bytes};
+constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
+    &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
+    &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
+    &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
+constexpr char kFrontend[] = "frontend";  // of the first camera: its counters are noted
+
+}  // namespace
+
+void ProcessLedger::Hear(const std::string& process, const ProcessHealth& heard, size_t keyframes,
+                         int64_t now_ns) {
+  OnProcess(process, heard, now_ns);
+  ProcessHealth& health = run_->health[process];
+  const ProcessHealth& former = processes_[process].former;
+  const double largest = std::max(health.rss_mb, heard.rss_mb);
+  run_->memory[process].Add({keyframes, heard.rss_mb});
+  health = heard;
+  health.rss_mb = largest;
+  for (int64_t ProcessHealth::*counter : kHealthCounters) health.*counter += former.*counter;
+}
+
+void ProcessLedger::HearFrontend(const std::string& process, FrontendStatus status, size_t keyframes,
+                                 int64_t now_ns) {
+  Hear(process, status.head.health, keyframes, now_ns);
+  for (int64_t FrontendStatus::*counter : kFrontendCounters)
+    status.*counter += processes_[process].former_frontend.*counter;
+  run_->cameras[status.camera_id].frontend = std::move(status);
+}
+
+/// A process is heard; where another one of its name was before it, that one's counters are kept.
+void ProcessLedger::OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns) {
+  if (!note_) {
+    heard_early_[{process, heard.pid}] = heard;
+  } else if (processes_[process].instances.IsNew(heard, now_ns)) {
+    NoteProcess(process, heard.pid);
+  }
+}
+
+void ProcessLedger::NoteProcess(const std::string& process, int32_t pid) {
+  Followed& known = processes_[process];
+  std::string note = "process " + process + " " + std::to_string(pid);
+  if (++known.count > 1) {
+    ++run_->restarts;
+    known.former = run_->health[process];
+    if (process == kFrontend) known.former_frontend = run_->cameras[0].frontend;
+    note += CountersOf(process);
+  }
+  note_(note);
+}
+
+std::string ProcessLedger::CountersOf(const std::string& process) const {
+  std::ostringstream text;
+  const ProcessHealth& health = run_->health.at(process);
+  for (int64_t ProcessHealth::*counter : kHealthCounters) text << ' ' << health.*counter;
+  if (process == kFrontend)
+    for (int64_t FrontendStatus::*counter : kFrontendCounters)
+      text << ' ' << run_->cameras[0].frontend.*counter;
+  return text.str();
+}
+
+/// This process is another one than the collector before it, whatever its id.
+void ProcessLedger::Begin(Note note, const ProcessHealth& own, int64_t now_ns) {
+  note_ = std::move(note);
+  Followed& known = processes_["collector"];
+  known.former = run_->health["collector"];
+  known.instances.IsNew(own, now_ns);
+  NoteProcess("collector", own.pid);
+  for (const auto& [key, health] : std::exchange(heard_early_, {})) OnProcess(key.first, health, now_ns);
+}
+
+void ProcessLedger::NoteCounters() {
+  for (const auto& [process, health] : run_->health)
+    note_("counters " + process + " " + std::to_string(health.pid) + CountersOf(process));
+}
+
+void ProcessLedger::ReadNote(const std::string& kind, std::istream& text, int64_t now_ns) {
+  std::string process;
+  int32_t pid = 0;
+  if (!(text >> process >> pid)) return;
+  if (kind == "counters") {
+    ProcessHealth& health = run_->health[process];
+    health.pid = pid;
+    for (int64_t ProcessHealth::*counter : kHealthCounters) text >> health.*counter;
+    if (process != kFrontend) return;
+    for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> run_->cameras[0].frontend.*counter;
+  } else {
+    Followed& known = processes_[process];
+    known.instances.Know(pid, now_ns);
+    if (++known.count > 1) ++run_->restarts;
+    for (int64_t ProcessHealth::*counter : kHealthCounters) text >> known.former.*counter;
+    if (process != kFrontend) return;
+    for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> known.former_frontend.*counter;
+  }
+}
+
+}  // namespace dmslam

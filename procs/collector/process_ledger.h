@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <istream>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "collector/results.h"
+#include "dmslam/runtime/instance_watch.h"
+
+namespace dmslam {
+
+/// What each process of a run has counted, and how often one was started again. Counters begin at zero in a
+/// process that was started again: those of the ones before it are added. What a collector after this one
+/// must know of it goes into the journal as notes.
+class ProcessLedger {
+ public:
+  using Note = std::function<void(const std::string&)>;
+  /// Keeps `run`'s health, memory, restarts and the frontends' statuses.
+  explicit ProcessLedger(RunRecord* run) : run_(run) {}
+
+  /// A status of this session. `keyframes`: that the map has.
+  void Hear(const std::string& process, const ProcessHealth& health, size_t keyframes, int64_t now_ns);
+  /// The same of a camera's frontend, with what it says of itself.
+  void HearFrontend(const std::string& process, FrontendStatus status, size_t keyframes, int64_t now_ns);
+
+  /// There is a journal, and what a collector before this one has noted is read. `own`: of this process.
+  void Begin(Note note, const ProcessHealth& own, int64_t now_ns);
+  /// A note of this ledger's kinds, "process" or "counters"; `text` stands behind the kind.
+  void ReadNote(const std::string& kind, std::istream& text, int64_t now_ns);
+  /// What each process has counted so far: where all die at once, nobody else knows it.
+  void NoteCounters();
+
+ private:
+  /// Processes of one name that followed one another.
+  struct Followed {
+    InstanceWatch instances;
+    int64_t count = 0;     ///< of them all
+    ProcessHealth former;  ///< counters of those before the present one, together
+    FrontendStatus former_frontend;
+  };
+  void OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns);
+  void NoteProcess(const std::string& process, int32_t pid);
+  std::string CountersOf(const std::string& process) const;
+
+  RunRecord* run_;
+  Note note_;                                                             ///< empty before there is a journal
+  std::map<std::string, Followed> processes_;                             ///< by name
+  std::map<std::pair<std::string, int32_t>, ProcessHealth> heard_early_;  ///< before there was a journal
+};
+
+}  // namespace dmslam

@@ -1,0 +1,105 @@
+#include "collector/proposed_keyframes.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <sstream>
+
+namespace dmslam {
+namespace {
+
+constexpr MapId kMap = 1;
+constexpr int64_t kEpoch = 100;
+
+KeyframeId Id(uint32_t frame) { return KeyframeId::Make(4, frame); }
+bool NoneIsKnown(KeyframeId, MapId) { return false; }
+
+class ProposedKeyframesTest : public testing::Test {
+ protected:
+  ProposedKeyframesTest() {
+    proposed_.NoteTo([this](const std::string& note) { notes_.push_back(note); });
+  }
+  void Propose(uint32_t frame, int64_t seq, int64_t epoch = kEpoch) {
+    proposed_.OnProposal(Id(frame), kMap, {epoch, seq}, 0);
+    proposed_.KeepRecord(Id(frame), std::make_shared<const Bytes>(Bytes{static_cast<uint8_t>(frame)}));
+  }
+  static bool Lives(CameraId, int64_t epoch) { return epoch > kEpoch; }
+  KeyframeRecord Count(int64_t mapped_epoch, const ProposedKeyframes::IsKnown& is_known = NoneIsKnown) const {
+    KeyframeRecord record;
+    proposed_.CountMissing(
+        is_known, [=](CameraId) { return mapped_epoch; }, &record);
+    return record;
+  }
+
+  ProposedKeyframes proposed_;
+  std::vector<std::string> notes_;
+};
+
+TEST_F(ProposedKeyframesTest, WhatADeadFrontendLeftIsSaidAgainUntilAMapperHasIt) {
+  Propose(1, 10);
+  Propose(2, 20);
+  proposed_.OnMapped(0, {kEpoch, 10});
+  auto left = proposed_.ToSayAgain(Lives, NoneIsKnown);
+  ASSERT_EQ(left.size(), 1u);
+  EXPECT_EQ(left[0].id, Id(2));
+  EXPECT_EQ(left[0].record->front(), 2);
+  EXPECT_TRUE(proposed_.ToSayAgain([](CameraId, int64_t) { return true; }, NoneIsKnown).empty())
+      << "its frontend says it itself";
+  EXPECT_TRUE(proposed_.ToSayAgain(Lives, [](KeyframeId, MapId) { return true; }).empty());
+  proposed_.OnMapped(0, {kEpoch, 20});
+  EXPECT_TRUE(proposed_.ToSayAgain(Lives, NoneIsKnown).empty());
+}
+
+TEST_F(ProposedKeyframesTest, NothingIsSaidAgainForEver) {
+  Propose(1, 10);
+  int times = 0;
+  while (times < 1000 && !proposed_.ToSayAgain(Lives, NoneIsKnown).empty()) ++times;
+  EXPECT_GE(times, 10);
+  EXPECT_LE(times, 100);
+}
+
+TEST_F(ProposedKeyframesTest, WhatIsNotInTheMapIsNamedByWhatBecameOfIt) {
+  Propose(1, 10);
+  proposed_.OnAllDied();
+  Propose(2, 20);
+  Propose(3, 30);
+  proposed_.OnMapped(0, {kEpoch, 25});  // 1 and 2 were taken
+  const auto only_2_is_lacking = [](KeyframeId id, MapId) { return id != Id(2); };
+  EXPECT_EQ(Count(kEpoch, only_2_is_lacking).missing, 1u);
+  const KeyframeRecord record = Count(kEpoch + 1);
+  EXPECT_EQ(record.proposed, 3u);
+  EXPECT_EQ(record.lost_in_crash, 1u);
+  EXPECT_EQ(record.missing, 1u);
+  EXPECT_EQ(record.lost_with_frontend, 1u) << "3: the map goes on with another frontend";
+}
+
+TEST_F(ProposedKeyframesTest, ItsNotesTellTheNextOne) {
+  Propose(1, 10);
+  Propose(2, 20);
+  Propose(2, 20);  // again
+  proposed_.OnMapped(0, {kEpoch, 10});
+  EXPECT_EQ(notes_.size(), 3u);
+  ProposedKeyframes next;
+  for (const std::string& text : notes_) {
+    std::istringstream note(text);
+    std::string kind;
+    note >> kind;
+    next.ReadNote(kind, note);
+  }
+  KeyframeRecord record;
+  next.CountMissing(
+      NoneIsKnown, [](CameraId) { return kEpoch + 1; }, &record);
+  EXPECT_EQ(record.proposed, 2u);
+  EXPECT_EQ(record.missing, 1u) << "1 was taken, and is not there";
+  EXPECT_EQ(record.lost_with_frontend, 1u);
+}
+
+TEST_F(ProposedKeyframesTest, WhenEachWasHeardIsKnown) {
+  proposed_.OnProposal(Id(1), kMap, {kEpoch, 10}, 77);
+  proposed_.OnProposal(Id(1), kMap, {kEpoch, 10}, 99);
+  EXPECT_EQ(proposed_.HeardNs(Id(1)), 77);
+  EXPECT_FALSE(proposed_.HeardNs(Id(2)));
+}
+
+}  // namespace
+}  // namespace dmslam
