@@ -27,6 +27,7 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
                          Exchange* exchange)
     : path_(path), options_(std::move(options)), viewer_(std::move(viewer)), exchange_(exchange) {
   EventLogReader reader(path);
+  options_.of_a_log = true;
   if (options_.key) reader.UseKey(*options_.key);
   int64_t events = 0;
   while (const std::optional<LogEvent> event = reader.Next()) {

@@ -22,6 +22,7 @@ struct NodeOptions {
   Link link = Link::kHost;
   bool accept_recorded =
       false;                  ///< camera and frames of a recorded session (a log that is replayed) are ours
+  bool of_a_log = false;      ///< what is heard is played from a file: a camera that is said once is believed
   bool take_over = false;     ///< asks a present writer of its stream to close
   bool fresh = false;         ///< a mapper begins with an empty map, whatever replicas there are
   std::optional<BusKey> key;  ///< of the bus; what is recorded under it can be told from what is not
