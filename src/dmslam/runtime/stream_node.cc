@@ -94,7 +94,8 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   if (IsOfCamera() && camera != options_.camera_id) return OnOtherCamera(*info);
   const auto known = cameras_.find(camera);
   if (known == cameras_.end()) {
-    if (MayBeOurs(info->session) && camera_claims_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
+    if (!MayBeOurs(info->session)) return;
+    if (options_.of_a_log || camera_claims_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
   } else if (!IsForeignFrame(info->session)) {
     known->second.due_ns = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
   }

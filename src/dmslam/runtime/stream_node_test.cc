@@ -332,9 +332,11 @@ class PublisherTest : public testing::Test {
     CameraInfo info;
     info.session = kSession;
     info.camera = TestCamera();
-    other_->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+    const int64_t begin = now_ns_;
     for (const int64_t end = now_ns_ + static_cast<int64_t>(seconds * 1e9); now_ns_ < end;
          now_ns_ += 10 * kMs) {
+      if ((now_ns_ - begin) % (50 * kMs) == 0)  // as a player that begins
+        other_->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
       while (bus_.DeliverOne()) {
       }
       for (const auto& node : nodes_) node->Advance();
