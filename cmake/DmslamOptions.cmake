@@ -17,8 +17,10 @@ if(NOT CCACHE_PROGRAM OR NOT "$ENV{CCACHE_DISABLE}" STREQUAL "")
   set(compile_cache OFF)
 endif()
 option(DMSLAM_COMPILE_CACHE "Compile through ccache" ${compile_cache})
+# Precompiled headers are cached only where the cache may take it that no macro that is defined before them, nor the time,
+# changes what they say: ours are the first thing that a file reads.
 if(DMSLAM_COMPILE_CACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE_PROGRAM})
 endif()
 
 set(DMSLAM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")

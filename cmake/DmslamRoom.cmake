@@ -4,18 +4,20 @@
 # what it needs, and compile_commands.json, which clang-tidy and editors read, lists each file.
 option(DMSLAM_TOGETHER "Compile the files of a room together" ON)
 # The headers that nearly all rooms read (Eigen, the standard library) are then compiled once, which saves a second in
-# every room. Where there is a compile cache it is off: the cache does not know what to make of such files.
+# every room, and GoogleTest's with them for the tests.
 set(precompile OFF)
-if(DMSLAM_TOGETHER AND NOT DMSLAM_COMPILE_CACHE AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+if(DMSLAM_TOGETHER AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   set(precompile ON)
 endif()
 option(DMSLAM_PRECOMPILE "Compile the headers of Eigen and of the standard library once" ${precompile})
-# <target> has these headers. A file that reads them is optimized as they were, whatever its own options say (GCC 12).
+# dmslam_precompile(<target> [headers...]): <target> has these headers beside those of all rooms. A file that reads them is
+# optimized as they were, whatever its own options say (GCC 12). -fpch-preprocess: for the compile cache.
 function(dmslam_precompile target)
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled.cc CONTENT "// It has headers only.\n")
   add_library(${target} STATIC ${PROJECT_BINARY_DIR}/precompiled.cc)
   target_link_libraries(${target} PRIVATE dmslam_options)
-  target_precompile_headers(${target} PRIVATE <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <algorithm> <array>
+  target_compile_options(${target} PRIVATE -fpch-preprocess)
+  target_precompile_headers(${target} PRIVATE ${ARGN} <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <algorithm> <array>
     <chrono> <deque> <fstream> <functional> <limits> <map> <memory> <numeric> <optional> <random> <set> <span> <sstream>
     <string> <thread> <unordered_map> <unordered_set> <variant> <vector>)
 endfunction()
@@ -23,6 +25,11 @@ if(DMSLAM_PRECOMPILE)
   dmslam_precompile(dmslam_precompiled)
   dmslam_precompile(dmslam_precompiled_lightly)  # for dmslam_compile_lightly
   target_compile_options(dmslam_precompiled_lightly PRIVATE $<$<CONFIG:Release>:-O1>)
+  if(DMSLAM_BUILD_TESTS)
+    dmslam_precompile(dmslam_precompiled_for_tests <gtest/gtest.h>)
+    target_link_libraries(dmslam_precompiled_for_tests PRIVATE GTest::gtest)
+    target_compile_options(dmslam_precompiled_for_tests PRIVATE $<$<CONFIG:Release>:-O1>)
+  endif()
 endif()
 
 # The files of <target> read the headers that were compiled once. CMake compiles a program's files with -fPIE; the compiler
@@ -35,8 +42,12 @@ function(dmslam_use_precompiled target)
   if(type STREQUAL EXECUTABLE)
     target_compile_options(${target} PRIVATE -fPIC)
   endif()
+  target_compile_options(${target} PRIVATE -fpch-preprocess)
+  get_target_property(is_test ${target} DMSLAM_TEST)
   get_target_property(lightly ${target} DMSLAM_LIGHTLY)
-  if(lightly)
+  if(is_test)
+    target_precompile_headers(${target} REUSE_FROM dmslam_precompiled_for_tests)
+  elseif(lightly)
     target_precompile_headers(${target} REUSE_FROM dmslam_precompiled_lightly)
   else()
     target_precompile_headers(${target} REUSE_FROM dmslam_precompiled)
@@ -117,11 +128,14 @@ function(dmslam_room)
   endif()
 endfunction()
 
-# dmslam_test(<source> <libraries...>): one GoogleTest program, registered with ctest under its file name.
+# dmslam_test(<source> <libraries...>): one GoogleTest program, registered with ctest under its file name. What is worth
+# optimizing is in the rooms.
 function(dmslam_test test_source)
   get_filename_component(test_name ${test_source} NAME_WE)
   add_executable(${test_name} ${test_source})
   target_link_libraries(${test_name} PRIVATE ${ARGN} GTest::gtest_main)
+  target_compile_options(${test_name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  set_target_properties(${test_name} PROPERTIES DMSLAM_TEST ON)
   add_test(NAME ${test_name} COMMAND ${test_name})
   set_tests_properties(${test_name} PROPERTIES TIMEOUT 600 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [1-9]"
     ENVIRONMENT "DMSLAM_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
