@@ -94,6 +94,10 @@ step_killsets() { # every two and three of the five at once, and all of them
 step_killstorm() { # 200 deaths in ten minutes
   "$top/scripts/kill_storm.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml" --out "$1"
 }
+step_forgeries() { # by who has no key, with a key and without
+  "$top/scripts/forgeries.sh" --out "$1"
+}
+step_keycost() { "$top/scripts/key_cost.sh" --sequence "$data/kitchen_walk1" --camera "$top/config/kitchen.yaml" --out "$1"; }
 step_twohosts() { # a link that drops 0, 5 and 20 % of the packets, and a mapper that moves to the other host
   local play=("$top/scripts/two_hosts.sh" --sequence "$data/kitchen" --camera "$top/config/kitchen.yaml")
   "${play[@]}" --out "$1/drops" && "${play[@]}" --lockstep --drop 5 --move-mapper 15 --out "$1/moved"
@@ -131,12 +135,12 @@ done
 for ((first = 1; first <= SCHEDULES; first += SCHEDULES_PER_STEP)); do steps+=("schedules_$first $first"); done
 for ((first = 1; first <= SYSTEM_SCHEDULES; first += SYSTEM_SCHEDULES_PER_STEP)); do steps+=("system_$first $first"); done
 steps+=("lost" "loops" "welds")
-steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "killsets" "killstorm" "noise" "localize" "sessions" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
+steps+=("kills_kitchen kitchen" "kills_walk1 kitchen_walk1" "killsets" "killstorm" "noise" "forgeries" "keycost" "localize" "sessions" "replay" "viewer" "bench" "sanitizers" "fuzz" "mutations")
 ((EUID != 0)) || steps+=("twohosts") # it makes network namespaces
 ((soak == 0)) || steps+=("soak")
 if ((list)); then printf '%s\n' "${steps[@]%% *}"; exit 0; fi
 
-needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|bench|localize|sessions|replay|kills|noise|twohosts|soak|lost) ]]; }
+needs_data() { [[ $1 =~ ^(kitchen|again|realtime|walk|notexture|bench|localize|sessions|replay|kills|noise|keycost|twohosts|soak|lost) ]]; }
 run_step() { # NAME [ARGUMENT]
   local folder=$out/$1 status=0
   [[ ! -e $folder/done ]] || return 0

@@ -105,6 +105,13 @@ chmod 600 "$key"
 chmod 600 "$work/empty"
 refused "has 0 bytes; wanted are 32" run "${sequence[@]}" --key "$work/empty" --out "$work/o"
 
+# The scripts that measure it.
+check "a key costs little" "$root/scripts/key_cost.sh" --sequence "$synthetic" --camera "$root/config/synthetic.yaml" --frames 40 \
+  --build-dir "$build" --out "$work/cost" >"$work/said" 2>&1
+check "all five say what it cost" test "$(grep -cE '^\| (player|frontend|mapper|loopcloser|collector) ' "$work/cost/table.md")" = 5
+check "one kind of forgery is measured" "$root/scripts/forgeries.sh" --kinds ack --build-dir "$build" --out "$work/table" >"$work/said" 2>&1
+check "it is refused with a key" grep -qE '^\| `ack` \| .* \| same bytes \| [1-9][0-9]* \|$' "$work/table/table.md"
+
 # The forgers are in earnest: without a key the same ones ruin the run.
 forge 23465 "${kinds[@]}"
 timeout 60 "$root/scripts/run.sh" --build-dir "$build" "${sequence[@]}" --out "$work/ruined" --port 23465 --share-port >/dev/null 2>&1 &&

@@ -70,9 +70,12 @@ void KeyedBus::DrawChallenge() { randombytes_buf(challenge_.data(), sizeof(chall
 
 void KeyedBus::Publish(const Outgoing& message) {
   const Tag tag{options_.session, ++counter_, sender_};
-  bus_->Publish({message.channel,
-                 std::make_shared<const Bytes>(key_.WithTag(message.channel, *message.bytes, tag)),
-                 message.local});
+  const int64_t began_ns = options_.now_ns();
+  auto tagged = std::make_shared<const Bytes>(key_.WithTag(message.channel, *message.bytes, tag));
+  statistics_.tags_ns += options_.now_ns() - began_ns;
+  ++statistics_.made;
+  statistics_.bytes += static_cast<int64_t>(message.bytes->size());
+  bus_->Publish({message.channel, std::move(tagged), message.local});
 }
 
 void KeyedBus::SendProof(int32_t kind, uint64_t to, const Challenge& challenge) {
@@ -89,8 +92,16 @@ void KeyedBus::Refuse(int64_t Statistics::*counter, const std::string& channel, 
     options_.warn("refused a message on " + channel + ": " + why + " (further ones are only counted)");
 }
 
+std::optional<Tag> KeyedBus::Verify(const std::string& channel, std::span<const uint8_t> bytes) {
+  const int64_t began_ns = options_.now_ns();
+  std::optional<Tag> tag = key_.Verify(channel, bytes);
+  statistics_.tags_ns += options_.now_ns() - began_ns;
+  ++statistics_.verified;
+  return tag;
+}
+
 void KeyedBus::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
-  const std::optional<Tag> tag = key_.Verify(channel, bytes);
+  const std::optional<Tag> tag = Verify(channel, bytes);
   if (!tag) {
     return Refuse(&Statistics::unverified, channel,
                   HasTag(bytes) ? "its sender has another key, or it was changed on its way"

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "dmslam/messaging/bus.h"
@@ -45,11 +46,14 @@ class KeyedBus : public Bus {
     std::function<void(const std::string&)> warn;  ///< told once of each way to be refused; may be empty
   };
   struct Statistics {
-    int64_t unverified = 0;  ///< no tag, another key, changed, or of another channel
-    int64_t foreign = 0;     ///< of another session
-    int64_t repeated = 0;    ///< seen before, or older than what is remembered
-    int64_t echoes = 0;      ///< of senders that do not show that they are there
-    int64_t early = 0;       ///< left out until their sender had shown it; not among the refused
+    int64_t unverified = 0;          ///< no tag, another key, changed, or of another channel
+    int64_t foreign = 0;             ///< of another session
+    int64_t repeated = 0;            ///< seen before, or older than what is remembered
+    int64_t echoes = 0;              ///< of senders that do not show that they are there
+    int64_t early = 0;               ///< left out until their sender had shown it; not among the refused
+    int64_t made = 0, verified = 0;  ///< tags
+    int64_t bytes = 0;               ///< of what was published, without tags
+    int64_t tags_ns = 0;             ///< what making and verifying tags took
     int64_t refused() const { return unverified + foreign + repeated + echoes; }
   };
 
@@ -77,6 +81,7 @@ class KeyedBus : public Bus {
   };
 
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  std::optional<Tag> Verify(const std::string& channel, std::span<const uint8_t> bytes);
   void ReceiveUnproven(const Tag& tag, const std::string& channel, std::span<const uint8_t> bytes);
   void ReceiveProof(const Tag& tag, std::span<const uint8_t> bytes);
   void Answer(const Tag& tag, const Challenge& challenge);

@@ -132,6 +132,18 @@ TEST_F(KeyedBusTest, ThoseWithTheKeyHearOneAnother) {
   EXPECT_EQ(a->bus.overhead_bytes(), kTagBytes);
 }
 
+TEST_F(KeyedBusTest, TagsAreCountedAsTheyAreMadeAndVerified) {
+  const auto a = Start(), b = Start();
+  const KeyedBus::Statistics before = a->counts(), heard_before = b->counts();
+  b->bus.Publish({kX, std::make_shared<const Bytes>(Bytes{1, 2, 3}), false});
+  Say(*a, 1);
+  EXPECT_EQ(a->counts().made - before.made, 1);
+  EXPECT_EQ(a->counts().verified - before.verified, 1);
+  EXPECT_EQ(a->counts().bytes - before.bytes, 1);
+  EXPECT_EQ(b->counts().verified - heard_before.verified, 1);
+  EXPECT_EQ(b->counts().bytes - heard_before.bytes, 3);
+}
+
 TEST_F(KeyedBusTest, WhoHasNoKeyIsNotHeard) {
   const auto a = Start(), b = Start();
   for (int i = 0; i < 3; ++i) air_.Send(kX, {1, 2, 3});

@@ -1,5 +1,7 @@
 #include "dmslam/runtime/process_main.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
@@ -111,6 +113,17 @@ std::unique_ptr<KeyedBus> ProcessMain::MakeKeyedBus(Bus* bus) const {
   return std::make_unique<KeyedBus>(bus, *options_.key, options);
 }
 
+void ProcessMain::LogCostOfKey(const KeyedBus::Statistics& statistics) const {
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  const auto ms = [](const timeval& time) {
+    return 1e3 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_usec);
+  };
+  LogInfo("{}: key: {} tags made, {} verified, {} bytes published, {:.2f} ms of {:.0f} ms of CPU time", role_,
+          statistics.made, statistics.verified, statistics.bytes,
+          1e-6 * static_cast<double>(statistics.tags_ns), ms(used.ru_utime) + ms(used.ru_stime));
+}
+
 int ProcessMain::RunNode(const Factory& factory) {
   options_.settings = LoadSettings(config_, overrides_);
   options_.link = link_ == "lan" ? Link::kLan : Link::kHost;
@@ -153,6 +166,7 @@ int ProcessMain::RunNode(const Factory& factory) {
     if (!loop.PumpOnce(std::min(node->deadline_ns(), notice.deadline_ns())) || loop.stop_signal() != 0)
       node->Stop();
   }
+  if (keyed) LogCostOfKey(keyed->statistics());
   if (!node->problem().empty()) LogError("{}", node->problem());
   return *node->exit_code();
 }

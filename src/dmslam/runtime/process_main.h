@@ -38,6 +38,8 @@ class ProcessMain {
   int RunNode(const Factory& factory);
   void AddCameras();
   std::unique_ptr<KeyedBus> MakeKeyedBus(Bus* bus) const;
+  /// At the end: what tags took of the process' time.
+  void LogCostOfKey(const KeyedBus::Statistics& statistics) const;
 
   CommandLine app_;
   std::string role_;
