@@ -342,7 +342,10 @@ void CollectorNode::OpenJournal() {
   std::error_code error;
   std::filesystem::create_directories(collector_.out_dir, error);
   if (error) throw InputError(collector_.out_dir + ": cannot be made (" + error.message() + "); check --out");
-  journal_ = std::make_unique<Journal>(collector_.out_dir + "/collector.journal");
+  const bool begins = context_.fresh_system && !context_.resumed;
+  if (const auto aside = SetFormerRunAside(collector_.out_dir, session_, begins))
+    LogInfo("what another run has left is kept in {}", *aside);
+  journal_ = std::make_unique<Journal>(JournalPath(collector_.out_dir));
   const auto announced_before =
       std::exchange(frames_.announced, {});  // by the players, before there was a journal
   const auto take = [&](std::span<const uint8_t> record) {
@@ -360,7 +363,7 @@ void CollectorNode::OpenJournal() {
     const std::optional<RecordHeader> header = ParseHeader(record);
     safe_[camera] = {header->epoch, header->seq};
   };
-  if (context_.fresh_system && !context_.resumed) {
+  if (begins) {
     journal_->Begin(session_);
   } else {
     journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });

@@ -223,12 +223,24 @@ dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
   return place;
 }
 
-int Start(const dmslam::RunArguments& arguments, dmslam::RunIdentity identity,
+/// A map that lay among what was moved is read where it is now.
+void KeepFormerRun(dmslam::RunArguments* arguments) {
+  const std::string& out = arguments->output.folder;
+  const std::optional<std::string> kept = dmslam::KeepUnfinishedRun(out);
+  if (!kept) return;
+  Say("a run in " + out + " has not ended; what it needs to go on is kept in " + *kept +
+      ": dmslam-run --resume " + *kept);
+  std::string& map = arguments->map.begin;
+  if (!map.empty() && !fs::exists(map)) map = *kept + "/" + fs::path(map).filename().string();
+}
+
+int Start(dmslam::RunArguments arguments, dmslam::RunIdentity identity,
           const std::optional<dmslam::ResumePoint>& resume) {
   dmslam::Supervisor::Options options;
   options.watchdog_ns = static_cast<int64_t>(arguments.care.watchdog_s * 1e9);
   options.wait_for_what_may_come = arguments.care.wait;
   dmslam::RunPlace place = PlaceOf(arguments);
+  if (!resume) KeepFormerRun(&arguments);
   place.session = identity.session;
   place.resume = resume;
   identity.pid = getpid();

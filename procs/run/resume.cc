@@ -16,6 +16,7 @@
 
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/recording/journal.h"
+#include "dmslam/recording/set_aside.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/output_file.h"
@@ -27,14 +28,17 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-std::string RunFile(const std::string& out) { return out + "/run.json"; }
+constexpr char kRunFile[] = "run.json";
+std::string RunFile(const std::string& out) { return out + "/" + kRunFile; }
+
+std::string NameOf(const std::string& path) { return fs::path(path).filename().string(); }
 
 /// What the journal says of how far a run had come.
 class JournalState {
  public:
   JournalState(const std::string& out, uint32_t session) {
     there_ = Journal::Read(
-        out + "/collector.journal", session, [this](std::span<const uint8_t> record) { Take(record); },
+        JournalPath(out), session, [this](std::span<const uint8_t> record) { Take(record); },
         [this](const std::string& note) { ReadNote(note); });
     if (!life_.last_frame) life_ = former_life_;  // it died again before its first frame
   }
@@ -125,6 +129,16 @@ RunLock::RunLock(const std::string& out) : fd_(open(out.c_str(), O_RDONLY | O_DI
 
 RunLock::~RunLock() {
   if (fd_ >= 0) close(fd_);
+}
+
+/// A run that has ended has removed its journal and its checkpoints; one that died before there was a
+/// checkpoint cannot be resumed.
+std::optional<std::string> KeepUnfinishedRun(const std::string& out) {
+  const std::string newest = CheckpointPath(out), former = FormerCheckpointPath(newest);
+  if (!fs::exists(RunFile(out)) || (!fs::exists(newest) && !fs::exists(former))) return std::nullopt;
+  const std::optional<int64_t> session = Journal::SessionOf(JournalPath(out));
+  if (!session || *session != RunIdentity::Read(out).session) return std::nullopt;
+  return SetAside(out, *session, {kRunFile, NameOf(newest), NameOf(former), NameOf(JournalPath(out))});
 }
 
 ResumePoint FindResumePoint(const std::string& out, const RunIdentity& identity) {

@@ -192,6 +192,37 @@ TEST_F(ResumeTest, AFolderIsHeldByOneRun) {
   const RunLock again(out_);
 }
 
+TEST_F(ResumeTest, WhatAnotherRunLeftIsKeptAndCanBeResumed) {
+  identity_.Write(out_);
+  WriteJournal(41);
+  EXPECT_EQ(KeepUnfinishedRun(out_), std::nullopt) << "without a map it cannot be resumed";
+  WriteMap(3);
+  WriteMap(4);
+  for (const std::string name : {"/former-7", "/former-7-2"}) {
+    ASSERT_EQ(KeepUnfinishedRun(out_), std::optional(out_ + name));
+    for (const std::string& file : {CheckpointPath(out_), JournalPath(out_), out_ + "/run.json"})
+      EXPECT_FALSE(fs::exists(file)) << file;
+    const ResumePoint point = FindResumePoint(out_ + name, RunIdentity::Read(out_ + name));
+    EXPECT_EQ(point.last_frame, std::optional<uint32_t>(41));
+    EXPECT_EQ(point.keyframes, 4U);
+    EXPECT_TRUE(fs::exists(FormerCheckpointPath(CheckpointPath(out_ + "/former-7"))));
+    identity_.Write(out_);
+    WriteJournal(41);
+    WriteMap(4);
+  }
+}
+
+TEST_F(ResumeTest, ARunThatHasEndedIsNotKept) {
+  EXPECT_EQ(KeepUnfinishedRun(out_), std::nullopt);
+  identity_.Write(out_);
+  WriteMap(3);
+  EXPECT_EQ(KeepUnfinishedRun(out_), std::nullopt) << "the journal is removed first";
+  WriteJournal(41);
+  ++identity_.session;
+  identity_.Write(out_);
+  EXPECT_EQ(KeepUnfinishedRun(out_), std::nullopt) << "the journal is of another run";
+}
+
 TEST_F(ResumeTest, ProcessesAreToldToGoOn) {
   RunArguments arguments;
   arguments.source.sequence = arguments.output.folder = out_;

@@ -91,6 +91,16 @@ if [[ -e $work/gone/checkpoint.lcmlog.former ]]; then
   complete "twice" "$work/damaged" 2
 fi
 
+# ---- Another run in the same folder leaves what the one that died needs: both end, in folders of their own
+cp -r "$work/gone" "$work/twice"
+former=$(sed -nE 's/ *"session": ([0-9]+),/\1/p' "$work/twice/run.json")
+check "another run in the same folder" run "${arguments[@]}" --out "$work/twice" >"$work/said" 2>&1 </dev/null
+grep -q -- "--resume $work/twice/former-$former\$" "$work/said" || failed "it does not say what is kept: $(<"$work/said")"
+expect "the other run has its own results" "$work/twice" frames "== $frames"
+expect "the other run is none that was resumed" "$work/twice" resumed "== 0"
+check "what it kept is resumed" run --resume "$work/twice/former-$former" >"$work/said" 2>&1
+complete "the former run" "$work/twice/former-$former" 1
+
 # ---- What cannot be resumed is refused by name
 refused "this run has ended" run --resume "$work/out"
 refused "no such folder" run --resume "$work/nowhere"

@@ -6,7 +6,10 @@
 #include <cstring>
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
+#include "dmslam/recording/journal.h"
+#include "dmslam/recording/set_aside.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/output_file.h"
 
@@ -110,6 +113,16 @@ FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session,
   }
   if (found.problem.empty()) found.problem = path + ": there is no checkpoint of this run";
   return found;
+}
+
+std::optional<std::string> SetFormerRunAside(const std::string& folder, int64_t session, bool begins) {
+  const std::string journal = JournalPath(folder), newest = CheckpointPath(folder);
+  const std::optional<int64_t> there = Journal::SessionOf(journal);
+  if (!there || (*there == session && !begins)) return std::nullopt;
+  std::vector<std::string> names;
+  for (const std::string& path : {newest, FormerCheckpointPath(newest), journal})
+    names.push_back(fs::path(path).filename().string());
+  return SetAside(folder, *there, names);
 }
 
 void RemoveCheckpoints(const std::string& path) {

@@ -68,6 +68,11 @@ struct FoundCheckpoint {
 FoundCheckpoint FindCheckpoint(const std::string& path, uint32_t session,
                                const std::shared_ptr<FeatureStore>& features = nullptr);
 
+/// What a run of another session than this one needs to be resumed, its journal and its checkpoints, is moved
+/// out of the way, together: see SetAside. `begins`: so is what one of the same session has left. Returns the
+/// folder; none where there is nothing of the kind. Throws InputError.
+std::optional<std::string> SetFormerRunAside(const std::string& folder, int64_t session, bool begins);
+
 /// The run has ended, or another one begins.
 void RemoveCheckpoints(const std::string& path);
 

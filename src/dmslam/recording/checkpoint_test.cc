@@ -13,6 +13,7 @@
 
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
+#include "dmslam/recording/journal.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
 
@@ -201,6 +202,27 @@ TEST_F(CheckpointTest, OfAnotherSessionIsNone) {
   EXPECT_EQ(Found(7), 2U) << "the former one is of session 7";
   EXPECT_EQ(Found(9), 0U);
   EXPECT_NE(FindCheckpoint(path_, 9).problem.find("no checkpoint of this run"), std::string::npos);
+}
+
+TEST_F(CheckpointTest, AnotherSessionsJournalAndCheckpointsAreSetAsideTogether) {
+  const auto write = [this] {
+    Write(2, 7);
+    Write(3, 7);
+    Journal journal(JournalPath(folder_));
+    journal.Begin(7);
+    journal.AppendNote("x");
+  };
+  write();
+  EXPECT_EQ(SetFormerRunAside(folder_, 7, false), std::nullopt) << "this run goes on with them";
+  for (const std::string name : {"/former-7", "/former-7-2"}) {
+    ASSERT_EQ(SetFormerRunAside(folder_, 8, false), std::optional(folder_ + name));
+    EXPECT_EQ(FindCheckpoint(CheckpointPath(folder_ + name), 7).map->map.keyframes().size(), 3U);
+    EXPECT_TRUE(fs::exists(FormerCheckpointPath(CheckpointPath(folder_ + name))));
+    EXPECT_EQ(Journal::SessionOf(JournalPath(folder_ + name)), 7);
+    EXPECT_FALSE(fs::exists(path_) || fs::exists(JournalPath(folder_)));
+    write();
+  }
+  EXPECT_EQ(SetFormerRunAside(folder_, 7, true), std::optional(folder_ + "/former-7-3"));
 }
 
 TEST_F(CheckpointTest, AFullDiskLeavesTheFormerOne) {

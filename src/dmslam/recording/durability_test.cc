@@ -148,7 +148,7 @@ TEST_F(DurabilityTest, AJournalIsSyncedWithItsFolderAndAnotherSessionsIsSetAside
   }
   Journal journal(path);
   journal.Begin(8);
-  EXPECT_EQ(Taken(), (Steps{"sync collector.journal", "rename to collector.journal.former",
+  EXPECT_EQ(Taken(), (Steps{"sync collector.journal", "rename to collector.journal", "sync former-7",
                             "sync " + NameOf(folder_), "sync " + NameOf(folder_)}));
 }
 

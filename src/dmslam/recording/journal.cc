@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "dmslam/messaging/codec.h"
+#include "dmslam/recording/set_aside.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/crc32c.h"
 #include "dmslam/util/output_file.h"
@@ -36,6 +37,8 @@ bool IsNote(std::span<const uint8_t> framed) { return (GetInt<uint32_t>(framed, 
 
 }  // namespace
 
+std::string JournalPath(const std::string& folder) { return folder + "/collector.journal"; }
+
 std::vector<uint8_t> Journal::ReadAt(int64_t offset, size_t size) const {
   std::vector<uint8_t> bytes(size);
   const ssize_t got = pread(fd_, bytes.data(), size, offset);
@@ -61,10 +64,28 @@ std::optional<Journal::Entry> Journal::ReadEntry(int64_t* offset) const {
   return entry;
 }
 
-bool Journal::IsOf(int64_t session, const Entry& entry) {
-  if (entry.is_note) return entry.bytes.size() >= kSessionBytes && GetInt<int64_t>(entry.bytes, 0) == session;
+std::optional<int64_t> Journal::SessionOf(const Entry& entry) {
+  if (entry.is_note) {
+    if (entry.bytes.size() < kSessionBytes) return std::nullopt;
+    return GetInt<int64_t>(entry.bytes, 0);
+  }
   const std::optional<RecordHeader> header = ParseHeader(entry.bytes);
-  return header && header->session == session;
+  if (!header) return std::nullopt;
+  return header->session;
+}
+
+/// Of the first record.
+std::optional<int64_t> Journal::SessionThere() const {
+  int64_t offset = 0;
+  const std::optional<Entry> entry = ReadEntry(&offset);
+  return entry ? SessionOf(*entry) : std::nullopt;
+}
+
+std::optional<int64_t> Journal::SessionOf(const std::string& path) {
+  if (access(path.c_str(), F_OK) != 0) return std::nullopt;
+  Journal journal(path);
+  journal.Open(O_RDONLY);
+  return journal.SessionThere();
 }
 
 /// False where it begins with another session's.
@@ -72,7 +93,7 @@ bool Journal::ReadAll(const Handler& handle, const NoteHandler& read) {
   size_ = 0;
   int64_t whole = 0;
   while (const std::optional<Entry> entry = ReadEntry(&whole)) {
-    if (!IsOf(session_, *entry)) return size_ > 0;
+    if (SessionOf(*entry) != session_) return size_ > 0;
     if (!entry->is_note && handle) handle(entry->bytes);
     if (entry->is_note && read) read({entry->bytes.begin() + kSessionBytes, entry->bytes.end()});
     size_ = whole;
@@ -84,7 +105,7 @@ void Journal::Resume(int64_t session, const Handler& handle, const NoteHandler& 
   session_ = session;
   Open(O_RDWR | O_CREAT);
   if (!ReadAll(handle, read)) {
-    SetAside();
+    SetAsideWhatIsThere();
   } else if (ftruncate(fd_, size_) != 0) {
     throw InputError(path_ + ": cannot be written; check its rights");
   }
@@ -102,7 +123,7 @@ bool Journal::Read(const std::string& path, int64_t session, const Handler& hand
 void Journal::Begin(int64_t session) {
   session_ = session;
   Open(O_RDWR | O_CREAT);
-  if (!ReadAt(0, 1).empty()) SetAside();
+  if (!ReadAt(0, 1).empty()) SetAsideWhatIsThere();
   SyncFolderOf(path_);
 }
 
@@ -183,10 +204,12 @@ void Journal::Remove() {
 }
 
 /// What another session has left is none of ours, and not ours to remove.
-void Journal::SetAside() {
+void Journal::SetAsideWhatIsThere() {
+  const int64_t session = SessionThere().value_or(0);
   Close();
-  if (!RenameDurably(path_, path_ + ".former"))
-    throw InputError(path_ + ": is of another session, and cannot be renamed; check its rights");
+  const std::filesystem::path path(path_);
+  const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
+  SetAside(folder, session, {path.filename().string()});
   Open(O_RDWR | O_CREAT);
 }
 

@@ -12,6 +12,9 @@
 
 namespace dmslam {
 
+/// The collector's, in the folder of a run's results, while it goes on.
+std::string JournalPath(const std::string& folder);
+
 /// Records on disk: what a run of any length needs only at its end takes no memory, and a collector that is
 /// started again has what the one before it had accepted. A record that was not written whole is not there,
 /// nor is what follows it: each carries a checksum, since after a power cut a file may end in anything.
@@ -26,7 +29,7 @@ class Journal {
   using NoteHandler = std::function<void(const std::string& note)>;
 
   /// Hands out the records of `session` that are there, in order, and goes on behind them. A journal of
-  /// another session is set aside (FILE.former); what is damaged is cut off.
+  /// another session is set aside (see SetAside); what is damaged is cut off.
   void Resume(int64_t session, const Handler& handle, const NoteHandler& read = {});
   /// Begins an empty one; what is there is set aside.
   void Begin(int64_t session);
@@ -34,6 +37,8 @@ class Journal {
   /// no journal of this session.
   static bool Read(const std::string& path, int64_t session, const Handler& handle,
                    const NoteHandler& read = {});
+  /// Whose records are there; none where there is no journal, or no whole record in it.
+  static std::optional<int64_t> SessionOf(const std::string& path);
   /// Hands out all records, in order.
   void ForEach(const Handler& handle);
   /// Where the disk takes no more the record is kept in memory, at most kMostKept bytes of them, and written
@@ -62,14 +67,15 @@ class Journal {
   void Open(int how);
   void Close();
   bool ReadAll(const Handler& handle, const NoteHandler& read);
-  void SetAside();
+  void SetAsideWhatIsThere();
   std::vector<uint8_t> ReadAt(int64_t offset, size_t size) const;
   struct Entry {
     bool is_note = false;
     std::vector<uint8_t> bytes;  ///< of a note: its session and its text
   };
   std::optional<Entry> ReadEntry(int64_t* offset) const;
-  static bool IsOf(int64_t session, const Entry& entry);
+  static std::optional<int64_t> SessionOf(const Entry& entry);
+  std::optional<int64_t> SessionThere() const;
   void AppendEntry(const Entry& entry);
   bool WriteFramed(const std::vector<uint8_t>& framed);
   void DropFirstKept();

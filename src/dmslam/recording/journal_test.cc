@@ -28,11 +28,18 @@ void LimitFiles(rlim_t bytes) {
 
 class JournalTest : public testing::Test {
  protected:
-  JournalTest() : path_(testing::TempDir() + "/dmslam_journal_" + std::to_string(getpid())) {}
+  JournalTest()
+      : folder_(testing::TempDir() + "/dmslam_journal_" + std::to_string(getpid())),
+        path_(folder_ + "/journal") {
+    fs::create_directories(folder_);
+  }
   ~JournalTest() override {
     LimitFiles(RLIM_INFINITY);
-    fs::remove(path_);
-    fs::remove(path_ + ".former");
+    fs::remove_all(folder_);
+  }
+  /// Where the journal of a session is set aside.
+  std::string Former(int64_t session) const {
+    return folder_ + "/former-" + std::to_string(session) + "/journal";
   }
   static Bytes RecordOf(int64_t session, int64_t seq) {
     FramePose pose;
@@ -64,7 +71,7 @@ class JournalTest : public testing::Test {
                    [&](std::span<const uint8_t> record) { numbers.push_back(ParseHeader(record)->seq); });
     return numbers;
   }
-  std::string path_;
+  std::string folder_, path_;
 };
 
 TEST_F(JournalTest, AFullDiskLosesNothingAndLeavesNoHalfRecord) {
@@ -97,7 +104,7 @@ TEST_F(JournalTest, AnotherSessionsJournalIsSetAsideAndNotTruncated) {
     for (int64_t i = 1; i <= 5; ++i) journal.Append(RecordOf(7, i));
   }
   EXPECT_TRUE(Resumed(8).empty());
-  fs::rename(path_ + ".former", path_);
+  fs::rename(Former(7), path_);
   EXPECT_EQ(Resumed(7), UpTo(5));
 }
 
@@ -110,7 +117,20 @@ TEST_F(JournalTest, OneThatBeginsSetsAsideWhatIsThere) {
     journal.AppendNote("x");
   }
   EXPECT_EQ(Resumed(7), UpTo(1));
-  EXPECT_TRUE(fs::exists(path_ + ".former"));
+  EXPECT_TRUE(fs::exists(Former(7)));
+  Journal(path_).Begin(7);
+  EXPECT_TRUE(fs::exists(folder_ + "/former-7-2/journal")) << "an older one is not overwritten";
+}
+
+TEST_F(JournalTest, ItsSessionIsThatOfItsFirstRecord) {
+  EXPECT_EQ(Journal::SessionOf(path_), std::nullopt);
+  {
+    Journal journal(path_);
+    journal.Begin(7);
+    EXPECT_EQ(Journal::SessionOf(path_), std::nullopt) << "it is empty";
+    journal.AppendNote("x");
+  }
+  EXPECT_EQ(Journal::SessionOf(path_), 7);
 }
 
 TEST_F(JournalTest, NotesAreReadAgainAndAreNoRecords) {
@@ -159,7 +179,7 @@ TEST_F(JournalTest, WhatIsDamagedIsCutOffAndWhatComesBeforeStays) {
   EXPECT_EQ(Resumed(7), UpTo(5));
   std::fstream(path_, std::ios::in | std::ios::out | std::ios::binary).seekp(records - 60).write("x", 1);
   EXPECT_EQ(Resumed(7), UpTo(4));
-  EXPECT_FALSE(fs::exists(path_ + ".former")) << "damage is no other session";
+  EXPECT_FALSE(fs::exists(Former(0))) << "damage is no other session";
 }
 
 TEST_F(JournalTest, IsReadWhileSomebodyWritesIt) {
