@@ -20,6 +20,7 @@ WriterElection::Options ElectionOptions(const NodeContext& context, const Player
   options.name = context.name;
   options.writer = context.random_id;
   options.schema_hash = SchemaHash();
+  options.clock_offset_us = ClockOffsetUs(context);
   options.take_over = take_over;
   if (context.fresh_system) options.listen_ns = 0;
   return options;
@@ -81,6 +82,7 @@ void PlayerOffice::Open() {
   options.owner = OfCamera(kOwner, part_.camera_id);
   options.name = context_.name;
   options.schema_hash = SchemaHash();
+  options.clock_offset_us = ClockOffsetUs(context_);
   const Term term = election_.Win(context_.wall_us());
   endpoint_->Remove(&election_);
   writer_ = std::make_unique<StreamWriter>(options, term, Version{});

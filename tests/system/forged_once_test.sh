@@ -1,6 +1,6 @@
-# One forged message of each kind, and of those that speak of what is played or ask for a stream five in a tenth of a second, by who
-# knows the protocol and has no key, in the middle of a run: it goes on to its end, nobody dies of it, hangs or is deaf to what comes
-# after it.
+# One forged message of each kind, and of those that speak of what is played, ask for a stream or name a term that would leave none
+# behind it five in a tenth of a second, by who knows the protocol and has no key, in the middle of a run: it goes on to its end, nobody
+# dies of it, hangs or is deaf to what comes after it.
 source "$(dirname "$0")/lib.sh"
 port=23500
 source "$(dirname "$0")/forging.sh"
@@ -13,7 +13,7 @@ forged() { # KIND TIMES: it does no harm
   expect "$name: what comes after it is tracked" "$work/$name" tracked_percent ">= 85"
 }
 for kind in head record reset ack session; do forged "$kind" 1; done
-for kind in take-over frame small-frame far-frame end camera "done" far-done sequence-done; do
+for kind in take-over frame small-frame far-frame far-head end camera "done" far-done sequence-done; do
   forged "$kind" 1
   forged "$kind" 5
 done

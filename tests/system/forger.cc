@@ -56,6 +56,7 @@ class Forger {
                                                                      {"camera", &Forger::AnotherCamera},
                                                                      {"take-over", &Forger::TakeOvers},
                                                                      {"head", &Forger::Heads},
+                                                                     {"far-head", &Forger::FarHeads},
                                                                      {"record", &Forger::Records},
                                                                      {"reset", &Forger::Reset},
                                                                      {"ack", &Forger::Acks},
@@ -192,8 +193,18 @@ class Forger {
     });
   }
   void Heads() {
-    ForEachHead([this](const std::string& owner, head_t head) {
-      head.header.epoch += 1000;
+    ForgeHeads([](head_t& head) { head.header.epoch += 1000; });
+  }
+  /// Of the last term that there can be, each said a little later than the one before: no copies.
+  void FarHeads() {
+    ForgeHeads([this](head_t& head) {
+      head.header.epoch = kMaxEpoch - 1;
+      head.utime += sent_;
+    });
+  }
+  void ForgeHeads(const std::function<void(head_t&)>& change) {
+    ForEachHead([&](const std::string& owner, head_t head) {
+      change(head);
       head.header.writer = 99;
       head.name = "forger";
       SendSealed(HeadChannel(owner), head);
@@ -281,10 +292,10 @@ int main(int argc, char** argv) {
   app.AddOption("--lcm-url", url).Required();
   app.AddOption("--key", key, "of another system");
   app.AddFlag("--keep-tag", keeps_tag, "put the tag of what was heard behind what is forged");
-  app.AddOption(
-         "--kind", kinds,
-         "frame, small-frame, far-frame, end, camera, take-over, head, record, reset, ack, done, far-done, "
-         "sequence-done, session, replay")
+  app.AddOption("--kind", kinds,
+                "frame, small-frame, far-frame, end, camera, take-over, head, far-head, record, reset, ack, "
+                "done, far-done, "
+                "sequence-done, session, replay")
       .Required();
   app.AddOption("--times", times, "end after so many forgeries of each kind; default: a signal ends it");
   app.AddOption("--from-frame", from_frame, "begin when this frame has been played");

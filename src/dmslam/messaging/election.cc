@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/messaging/believed_terms.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/util/check.h"
@@ -11,8 +12,6 @@ namespace dmslam {
 namespace {
 
 constexpr size_t kMaxHeard = 64;  // more writers than this are noise
-/// Ten years: a term that is named once and lies further ahead of this host's clock is not believed.
-constexpr int64_t kBelievedLeadUs = int64_t{10} * 365 * 86400 * 1'000'000;
 
 }  // namespace
 
@@ -44,6 +43,7 @@ void WriterElection::ReceiveAck(const ack_t& ack) {
 void WriterElection::ReceiveHead(const head_t& head, int64_t now_ns) {
   const Term term{head.header.epoch, head.header.writer};
   if (term.writer == options_.writer || !term.valid()) return;  // our own echo
+  if (term.epoch > LatestBelievedEpoch(options_.clock_offset_us + now_ns / 1000, 0, 0)) return;
   epochs_.SaidAgain(term.epoch, head.utime);
   if (heard_.size() >= kMaxHeard && !heard_.contains(term)) return;
   Heard& heard = heard_[term];
@@ -121,9 +121,10 @@ int64_t WriterElection::deadline_ns() const {
 
 Term WriterElection::Win(int64_t wall_us, int64_t named_epoch) const {
   DMSLAM_CHECK(state_ == State::kWon, "only who won an election may write");
+  const int64_t latest = LatestBelievedEpoch(wall_us, named_epoch, named_epoch);
   int64_t named = named_epoch;
   epochs_.ForEach([&](int64_t epoch, bool again) {
-    if (again || epoch <= wall_us + kBelievedLeadUs) named = std::max(named, epoch);
+    if (epoch <= (again ? latest : wall_us + kBelievedLeadUs)) named = std::max(named, epoch);
   });
   return {std::min(std::max(wall_us, named + 1), kMaxEpoch - 1), options_.writer};
 }

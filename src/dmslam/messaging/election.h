@@ -29,7 +29,9 @@ class WriterElection : public StateMachine {
     std::string name;    ///< for messages to people
     int64_t writer = 0;  ///< random id, positive
     int64_t schema_hash = 0;
-    bool take_over = false;                         ///< asks a live writer to close instead of refusing
+    int64_t clock_offset_us =
+        0;                   ///< the wall clock minus that of `now_ns`: bounds the terms that are believed
+    bool take_over = false;  ///< asks a live writer to close instead of refusing
     int64_t listen_ns = 2'000'000'000;              ///< 0: a private system, wins at once
     int64_t ask_ns = 200'000'000;                   ///< between requests
     int64_t silence_ns = 1'000'000'000;             ///< a writer not heard for so long while asked is gone
@@ -49,8 +51,8 @@ class WriterElection : public StateMachine {
   const std::string& refusal() const { return refusal_; }
   /// The term won. Terms never go back, whatever the clock of this host: the epoch is the largest of the wall
   /// clock (microseconds), every epoch that a beacon or a reader's acknowledgement named + 1, and
-  /// `named_epoch` + 1: of the replica that the owner continues. An epoch that was named once only and lies
-  /// far beyond the wall clock is not believed.
+  /// `named_epoch` + 1: of the replica that the owner continues. An epoch that lies far beyond the wall clock
+  /// is not believed; of a wall clock that was never set, one that was named once only.
   Term Win(int64_t wall_us, int64_t named_epoch = 0) const;
   /// How far the highest writer heard had come; nothing when none was heard.
   const std::optional<Version>& predecessor() const { return predecessor_; }

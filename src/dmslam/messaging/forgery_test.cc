@@ -5,6 +5,7 @@
 
 #include <functional>
 
+#include "dmslam/messaging/believed_terms.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/election.h"
 #include "dmslam/messaging/protocol_messages.h"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kHourUs = 3'600'000'000;
+constexpr int64_t kWall = 1'700'000'000'000'000;
 
 Bytes MakeRecord(int64_t value) {
   replica_t message{};
@@ -34,17 +36,24 @@ struct Wire {
   std::optional<head_t> head;
   std::optional<ack_t> ack;
 
-  Wire() : writer(WriterOptions(), Term{1000, 5}, Version{}), reader(ReaderOptions()) { Run(1000); }
+  Wire() : Wire(0, 1000, 0) {}
+  /// The writer's host has the wall clock `writer_us` at the beginning [us since 1970], the reader's another.
+  Wire(int64_t writer_us, int64_t epoch, int64_t reader_us)
+      : writer(WriterOptions(writer_us), Term{epoch, 5}, Version{}), reader(ReaderOptions(reader_us)) {
+    Run(1000);
+  }
 
-  static StreamWriter::Options WriterOptions() {
+  static StreamWriter::Options WriterOptions(int64_t wall_us = 0) {
     StreamWriter::Options options;
+    options.clock_offset_us = wall_us;
     options.owner = "TEST";
     options.name = "writer";
     options.roles = {{"reader", true}};
     return options;
   }
-  static StreamReader::Options ReaderOptions() {
+  static StreamReader::Options ReaderOptions(int64_t wall_us = 0) {
     StreamReader::Options options;
+    options.clock_offset_us = wall_us;
     options.owner = "TEST";
     options.reader = "READER";
     options.role = "reader";
@@ -76,6 +85,14 @@ struct Wire {
     forged.utime = now_ns / 1000;
     change(forged);
     Deliver(SealedMessage(HeadChannel("TEST"), forged));
+  }
+  /// Beacons and acknowledgements of a term, so many times in a row, as one who keeps speaking.
+  void ForgeTerm(int64_t epoch, int times) {
+    for (int i = 0; i < times; ++i) {
+      ForgeHead([&](head_t& forged) { forged.header.epoch = epoch; });
+      ForgeAck([&](ack_t& forged) { forged.header.epoch = epoch; });
+      Run(20);
+    }
   }
   void ForgeAck(const std::function<void(ack_t&)>& change) {
     ack_t forged = *ack;
@@ -150,6 +167,38 @@ void ForgeTheFuture(int before) {
 
 TEST(Forgery, AHeadFromTheFutureBeforeAnyOtherIsHeard) { ForgeTheFuture(0); }
 TEST(Forgery, AHeadFromTheFutureThatIsTheSecondOneHeard) { ForgeTheFuture(1); }
+
+/// Believed, such a term would leave none for whoever comes next.
+TEST(Forgery, TwoHeadsOfAFarTermExhaustNothing) {
+  for (const int64_t far : {kMaxEpoch - 1, kWall + 11 * kYearUs}) {
+    for (const int64_t reader_us : {kWall, kWall - kHourUs, int64_t{0}}) {  // 0: a clock that was never set
+      for (const int64_t writer_us : {kWall, int64_t{0}}) {
+        Wire wire(writer_us, kWall, reader_us);
+        wire.ForgeTerm(far, 3);
+        EXPECT_EQ(wire.reader.term(), wire.writer.term()) << far << " " << reader_us << " " << writer_us;
+        EXPECT_GE(wire.reader.statistics().dropped_doubtful, 3);
+        EXPECT_GE(wire.writer.statistics().dropped_doubtful, 6) << "heads and acknowledgements";
+        wire.ExpectUnharmed();
+      }
+    }
+  }
+}
+
+/// A writer whose clock is years ahead is a writer; and no chain of leaps leads beyond that.
+TEST(Forgery, ATermWithinTenYearsIsFollowedAndNoneBeyondIt) {
+  Wire wire(kWall, kWall, kWall);
+  wire.ForgeTerm(kWall + 9 * kYearUs, 2);
+  EXPECT_TRUE(wire.writer.superseded_by());
+  EXPECT_EQ(wire.reader.term().epoch, kWall + 9 * kYearUs);
+  wire.ForgeTerm(kWall + 18 * kYearUs, 3);
+  EXPECT_EQ(wire.reader.term().epoch, kWall + 9 * kYearUs);
+}
+
+TEST(Forgery, AHostWhoseClockWasNeverSetFollowsTheFirstTermOfNow) {
+  const Wire wire(kWall, kWall, 0);
+  EXPECT_EQ(wire.reader.term(), (Term{kWall, 5}));
+  EXPECT_EQ(wire.reader.state(), StreamReader::State::kFollowing);
+}
 
 TEST(Forgery, AHeadThatSaysTheStreamIsClosed) {
   Wire wire;
@@ -295,8 +344,28 @@ TEST(Forgery, AnEpochFarInTheFutureExhaustsNothing) {
   EXPECT_EQ(election.Win(5000).epoch, 5000);
 }
 
+TEST(Forgery, AnEpochFarInTheFutureThatIsSaidAgainExhaustsNothing) {
+  for (const int64_t clock_us : {kWall, int64_t{0}}) {
+    WriterElection::Options options = Newcomer();
+    options.clock_offset_us = clock_us;
+    WriterElection election(options, 0);
+    for (int64_t i = 0; i < 3; ++i) Hear(&election, LiveHead(kMaxEpoch - 1), i * 100 * kMs);
+    for (int64_t i = 0; i < 3; ++i) {
+      ack_t ack{};
+      ack.utime = 1 + i;
+      ack.header.session = 1;
+      ack.header.stream = static_cast<int32_t>(StreamId::kTest);
+      ack.header.epoch = kMaxEpoch - 1;
+      const Outgoing sealed = SealedMessage(AckChannel("READER"), ack);
+      election.Receive(sealed.channel, *sealed.bytes, i * 100 * kMs);
+    }
+    election.Advance(3000 * kMs);
+    ASSERT_EQ(election.state(), WriterElection::State::kWon) << "nobody believable writes";
+    EXPECT_EQ(election.Win(clock_us + 5000).epoch, clock_us + 5000);
+  }
+}
+
 TEST(Terms, NeverGoBackWhateverTheClock) {
-  constexpr int64_t kWall = 1'700'000'000'000'000;
   WriterElection election(Newcomer(), 0);
   ack_t ack{};  // of a reader that follows nobody alive, and holds what an earlier one wrote
   ack.header.session = 1;

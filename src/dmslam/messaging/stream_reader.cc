@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dmslam/ack_t.hpp"
+#include "dmslam/messaging/believed_terms.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/part_t.hpp"
@@ -61,7 +62,7 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
     ++statistics_.dropped_foreign;
     return;
   }
-  if (!IsWanted(*head)) return;
+  if (!IsWanted(*head, now_ns)) return;
   const Term term{head->header.epoch, head->header.writer};
   if (term == term_ && !IsPlausible(*head, now_ns)) return;
   if (!SpeaksOurLanguage(*head)) return;
@@ -75,17 +76,26 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
 }
 
 /// Of the term that is followed, or of one that is to be followed from now on.
-bool StreamReader::IsWanted(const head_t& head) {
+bool StreamReader::IsWanted(const head_t& head, int64_t now_ns) {
   const Term term{head.header.epoch, head.header.writer};
   const bool of_ours = options_.only_writer == 0 || term.writer == options_.only_writer;
   if (!of_ours || !term.valid() || term.epoch < held_.epoch || term < term_) {
     ++statistics_.dropped_stale;
     return false;
   }
+  if (term != term_ && LeapsTooFar(term, now_ns)) {
+    ++statistics_.dropped_doubtful;
+    return false;
+  }
   if (term == term_ || options_.only_writer != 0) return true;
   if (terms_.SaidAgain(term, head.utime)) return true;
   statistics_.dropped_doubtful += term_.valid() ? 1 : 0;
   return false;
+}
+
+bool StreamReader::LeapsTooFar(const Term& term, int64_t now_ns) const {
+  const int64_t newest = std::max(term_.epoch, held_.epoch);
+  return term.epoch > LatestBelievedEpoch(options_.clock_offset_us + now_ns / 1000, first_epoch_, newest);
 }
 
 /// A beacon's time and number follow from those of the one before; where they have leapt in earnest, the next

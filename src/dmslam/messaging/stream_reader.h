@@ -57,6 +57,8 @@ class StreamReader : public StateMachine {
     std::string name;         ///< for messages to people: process, host and process id
     int64_t id = 0;           ///< random, not zero
     int64_t schema_hash = 0;  ///< over all message types; writers with another one are refused
+    int64_t clock_offset_us =
+        0;  ///< the wall clock minus that of `now_ns`: bounds the terms that are believed
     /// What the owner holds already; none: that will turn out, and what it has not received of a writer that
     /// is gone may be what it holds.
     std::optional<Version> start = Version();
@@ -172,7 +174,8 @@ class StreamReader : public StateMachine {
   void NoteMissing(const std::vector<MissingRange>& missing, int64_t now_ns);
   void NoteArrival(int64_t seq, int64_t now_ns);
   ReceiveWindow* WindowOf(const RecordHeader& header);
-  bool IsWanted(const head_t& head);
+  bool IsWanted(const head_t& head, int64_t now_ns);
+  bool LeapsTooFar(const Term& term, int64_t now_ns) const;
   bool IsPlausible(const head_t& head, int64_t now_ns);
   void NoteEnd(const head_t& head);
   void RetractWhatIsNot();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dmslam/head_t.hpp"
+#include "dmslam/messaging/believed_terms.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/take_over_t.hpp"
@@ -103,7 +104,7 @@ void StreamWriter::Receive(const std::string& channel, std::span<const uint8_t> 
   if (type == ack_t::getHash()) {
     ReceiveAck(channel, bytes, now_ns);
   } else if (type == head_t::getHash() && channel == HeadChannel(options_.owner)) {
-    ReceiveHead(channel, bytes);
+    ReceiveHead(channel, bytes, now_ns);
   } else if (type == take_over_t::getHash()) {
     ReceiveTakeOver(channel, bytes, now_ns);
   } else {
@@ -111,7 +112,7 @@ void StreamWriter::Receive(const std::string& channel, std::span<const uint8_t> 
   }
 }
 
-void StreamWriter::ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes) {
+void StreamWriter::ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) {
   const std::optional<head_t> head = DecodeHead(channel, bytes);
   if (!head) {
     ++statistics_.dropped_bad;
@@ -123,14 +124,16 @@ void StreamWriter::ReceiveHead(const std::string& channel, std::span<const uint8
     return;
   }
   const Term other{head->header.epoch, head->header.writer};
-  if (other > term_ && SaidAgain(other, head->utime)) superseded_by_ = head->name;
+  if (other > term_ && IsBelieved(other, head->utime, now_ns)) superseded_by_ = head->name;
 }
 
-/// One message alone may be forged.
-bool StreamWriter::SaidAgain(const Term& term, int64_t utime) {
-  const bool again = terms_.SaidAgain(term, utime);
-  statistics_.dropped_doubtful += again ? 0 : 1;
-  return again;
+/// One message alone may be forged, and a term that lies too far ahead is.
+bool StreamWriter::IsBelieved(const Term& term, int64_t utime, int64_t now_ns) {
+  const int64_t latest =
+      LatestBelievedEpoch(options_.clock_offset_us + now_ns / 1000, term_.epoch, term_.epoch);
+  const bool believed = term.epoch <= latest && terms_.SaidAgain(term, utime);
+  statistics_.dropped_doubtful += believed ? 0 : 1;
+  return believed;
 }
 
 void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes,
@@ -181,7 +184,7 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
     ++statistics_.dropped_doubtful;
     return;
   }
-  if (followed > term_ && SaidAgain(followed, ack->utime))
+  if (followed > term_ && IsBelieved(followed, ack->utime, now_ns))
     superseded_by_ = "the writer that " + ack->name + " follows";
   reader->following = followed == term_;
   reader->wants_snapshot = ack->wants == ack_t::WANTS_SNAPSHOT && reader->following;

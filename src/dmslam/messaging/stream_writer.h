@@ -72,6 +72,8 @@ class StreamWriter : public StateMachine {
     std::string owner;        ///< names the beacon's and the parts' channels: "MAPPER"
     std::string name;         ///< for messages to people: process, host and process id
     int64_t schema_hash = 0;  ///< over all message types; readers with another one are refused
+    int64_t clock_offset_us =
+        0;                    ///< the wall clock minus that of `now_ns`: bounds the terms that are believed
     std::vector<Role> roles;  ///< the lossless readers
     Link link = Link::kHost;
     size_t max_records = 65536;     ///< kept at most; beyond them the oldest are forgotten
@@ -177,11 +179,11 @@ class StreamWriter : public StateMachine {
   };
 
   void ReceiveAck(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
-  void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes);
+  void ReceiveHead(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
   void ReceiveTakeOver(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns);
   Reader* Meet(const ack_t& ack, int64_t now_ns);
   bool IsInTime(const ack_t& ack, int64_t now_ns, Reader* reader);
-  bool SaidAgain(const Term& term, int64_t utime);
+  bool IsBelieved(const Term& term, int64_t utime, int64_t now_ns);
   void ReceiveSnapshotAck(const ack_t& ack, int64_t now_ns);
   void ForgetSilentReaders(int64_t now_ns);
   void ForgetAccepted();

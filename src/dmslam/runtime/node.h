@@ -29,6 +29,11 @@ struct NodeContext {
   bool resumed = false;  ///< ... and what a run whose processes all died has left on disk is gone on with
 };
 
+/// The wall clock minus the monotonic one, as they are now [us].
+inline int64_t ClockOffsetUs(const NodeContext& context) {
+  return context.wall_us() - context.now_ns() / 1000;
+}
+
 /// A process without its main: connects a core to the bus. Message handlers only store what comes; all work
 /// is done in Advance, one thread.
 class Node {

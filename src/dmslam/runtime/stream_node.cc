@@ -218,6 +218,7 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   options.name = context_.name;
   options.id = context_.random_id;
   options.schema_hash = SchemaHash();
+  options.clock_offset_us = ClockOffsetUs(context_);
   options.start = start;
   auto reader = std::make_unique<StreamReader>(options);
   std::vector<std::string> record_channels_of_camera;
@@ -266,6 +267,7 @@ void StreamNode::StartElection() {
   options.name = context_.name;
   options.writer = context_.random_id;
   options.schema_hash = SchemaHash();
+  options.clock_offset_us = ClockOffsetUs(context_);
   options.take_over = options_.take_over;
   if (context_.fresh_system) options.listen_ns = 0;
   election_ = std::make_unique<WriterElection>(options, context_.now_ns());
@@ -298,6 +300,7 @@ void StreamNode::OpenWriter() {
   options.owner = UpperCase(role_);
   options.name = context_.name;
   options.schema_hash = SchemaHash();
+  options.clock_offset_us = ClockOffsetUs(context_);
   options.link = options_.link;
   options.part_bytes -= static_cast<int32_t>(context_.bus->overhead_bytes());
   for (const std::string& reader : plan_->readers)
