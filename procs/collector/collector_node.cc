@@ -143,8 +143,9 @@ void CollectorNode::ReadNote(const std::string& text) {
   std::string kind;
   note >> kind;
   if (kind == "keyframe" || kind == "mapped") proposals_.ReadNote(kind, note);
-  if (kind == "counters" || kind == "process") processes_.ReadNote(kind, note, context_.now_ns());
   if (MapId map_id = 0; kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
+  if (kind == "counters" || kind == "process" || kind == "heard")
+    processes_.ReadNote(kind, note, context_.now_ns());
   if (kind == "resumed") OnResume();
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;

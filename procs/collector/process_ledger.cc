@@ -44,13 +44,15 @@ void ProcessLedger::OnProcess(const std::string& process, const ProcessHealth& h
   if (!note_) {
     heard_early_[{process, heard.pid}] = heard;
   } else if (processes_[process].instances.IsNew(heard, now_ns)) {
-    NoteProcess(process, heard.pid);
+    NoteProcess(process, heard);
+  } else if (heard.epoch != 0 && processes_[process].noted_epoch == 0) {
+    NoteHeard(process, heard);
   }
 }
 
-void ProcessLedger::NoteProcess(const std::string& process, int32_t pid) {
+void ProcessLedger::NoteProcess(const std::string& process, const ProcessHealth& heard) {
   Followed& known = processes_[process];
-  std::string note = "process " + process + " " + std::to_string(pid);
+  std::string note = "process " + process + " " + std::to_string(heard.pid);
   if (++known.count > 1) {
     ++run_->restarts;
     known.former = run_->health[process];
@@ -58,6 +60,16 @@ void ProcessLedger::NoteProcess(const std::string& process, int32_t pid) {
     note += CountersOf(process);
   }
   note_(note);
+  NoteHeard(process, heard);
+}
+
+/// How long it has run [ms] and its term of office: what tells it from one that comes after it with its id.
+void ProcessLedger::NoteHeard(const std::string& process, const ProcessHealth& heard) {
+  processes_[process].noted_epoch = heard.epoch;
+  std::ostringstream note;
+  note << "heard " << process << ' ' << heard.pid << ' ' << static_cast<int64_t>(heard.uptime_s * 1e3) << ' '
+       << heard.epoch;
+  note_(note.str());
 }
 
 std::string ProcessLedger::CountersOf(const std::string& process) const {
@@ -76,33 +88,45 @@ void ProcessLedger::Begin(Note note, const ProcessHealth& own, int64_t now_ns) {
   Followed& known = processes_["collector"];
   known.former = run_->health["collector"];
   known.instances.IsNew(own, now_ns);
-  NoteProcess("collector", own.pid);
+  NoteProcess("collector", own);
   for (const auto& [key, health] : std::exchange(heard_early_, {})) OnProcess(key.first, health, now_ns);
 }
 
 void ProcessLedger::NoteCounters() {
-  for (const auto& [process, health] : run_->health)
+  for (const auto& [process, health] : run_->health) {
     note_("counters " + process + " " + std::to_string(health.pid) + CountersOf(process));
+    NoteHeard(process, health);
+  }
 }
 
 void ProcessLedger::ReadNote(const std::string& kind, std::istream& text, int64_t now_ns) {
   std::string process;
   int32_t pid = 0;
   if (!(text >> process >> pid)) return;
-  if (kind == "counters") {
-    ProcessHealth& health = run_->health[process];
-    health.pid = pid;
-    for (int64_t ProcessHealth::*counter : kHealthCounters) text >> health.*counter;
-    if (process != kFrontend) return;
-    for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> run_->cameras[0].frontend.*counter;
-  } else {
-    Followed& known = processes_[process];
-    known.instances.Know(pid, now_ns);
-    if (++known.count > 1) ++run_->restarts;
-    for (int64_t ProcessHealth::*counter : kHealthCounters) text >> known.former.*counter;
-    if (process != kFrontend) return;
-    for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> known.former_frontend.*counter;
-  }
+  if (kind == "process") ReadProcess(process, pid, text, now_ns);
+  if (kind == "counters") ReadCounters(process, pid, text);
+  int64_t uptime_ms = 0;
+  InstanceWatch::Noted noted;
+  if (kind != "heard" || !(text >> uptime_ms >> noted.epoch)) return;
+  noted.uptime_s = static_cast<double>(uptime_ms) * 1e-3;
+  processes_[process].instances.Know(pid, now_ns, noted);
+}
+
+void ProcessLedger::ReadProcess(const std::string& process, int32_t pid, std::istream& text, int64_t now_ns) {
+  Followed& known = processes_[process];
+  known.instances.Know(pid, now_ns, {});
+  if (++known.count > 1) ++run_->restarts;
+  for (int64_t ProcessHealth::*counter : kHealthCounters) text >> known.former.*counter;
+  if (process != kFrontend) return;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> known.former_frontend.*counter;
+}
+
+void ProcessLedger::ReadCounters(const std::string& process, int32_t pid, std::istream& text) {
+  ProcessHealth& health = run_->health[process];
+  health.pid = pid;
+  for (int64_t ProcessHealth::*counter : kHealthCounters) text >> health.*counter;
+  if (process != kFrontend) return;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> run_->cameras[0].frontend.*counter;
 }
 
 }  // namespace dmslam

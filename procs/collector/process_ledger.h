@@ -29,7 +29,8 @@ class ProcessLedger {
 
   /// There is a journal, and what a collector before this one has noted is read. `own`: of this process.
   void Begin(Note note, const ProcessHealth& own, int64_t now_ns);
-  /// A note of this ledger's kinds, "process" or "counters"; `text` stands behind the kind.
+  /// A note of this ledger's kinds, "process", "heard" or "counters"; `text` stands behind the kind. Others
+  /// are not read.
   void ReadNote(const std::string& kind, std::istream& text, int64_t now_ns);
   /// What each process has counted so far: where all die at once, nobody else knows it.
   void NoteCounters();
@@ -38,12 +39,16 @@ class ProcessLedger {
   /// Processes of one name that followed one another.
   struct Followed {
     InstanceWatch instances;
-    int64_t count = 0;     ///< of them all
-    ProcessHealth former;  ///< counters of those before the present one, together
+    int64_t count = 0;        ///< of them all
+    int64_t noted_epoch = 0;  ///< of the present one, as writer
+    ProcessHealth former;     ///< counters of those before the present one, together
     FrontendStatus former_frontend;
   };
   void OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns);
-  void NoteProcess(const std::string& process, int32_t pid);
+  void NoteProcess(const std::string& process, const ProcessHealth& heard);
+  void NoteHeard(const std::string& process, const ProcessHealth& heard);
+  void ReadProcess(const std::string& process, int32_t pid, std::istream& text, int64_t now_ns);
+  void ReadCounters(const std::string& process, int32_t pid, std::istream& text);
   std::string CountersOf(const std::string& process) const;
 
   RunRecord* run_;

@@ -5,7 +5,6 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/runtime/exit_codes.h"
-#include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
@@ -122,8 +121,7 @@ void LiveNode::PublishStatus() {
   PlayerStatus status;
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
-  status.head.health = MeasureProcess(context_.pid);
-  status.head.health.dropped_foreign = context_.refused();
+  status.head.health = office_.Health();
   if (!away_.empty()) status.head.reason = "the camera is away";
   status.state = ending_ ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying;
   status.frames_published = published_;

@@ -8,7 +8,6 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/runtime/exit_codes.h"
-#include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
 #include "player/intervals.h"
@@ -257,8 +256,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   PlayerStatus status;
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
-  status.head.health = MeasureProcess(context_.pid);
-  status.head.health.dropped_foreign = context_.refused();
+  status.head.health = office_.Health();
   if (awaiting_done_) status.head.health.waiting_for = "frontend";
   status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
   status.frames_published = counts_.published;

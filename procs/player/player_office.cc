@@ -3,6 +3,7 @@
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/wire/channels.h"
 
@@ -32,6 +33,7 @@ PlayerOffice::PlayerOffice(const NodeContext& context, const Part& part, bool ta
     : context_(context),
       part_(part),
       endpoint_(endpoint),
+      begun_ns_(context_.now_ns()),
       election_(ElectionOptions(context, part, take_over), context.now_ns()) {
   endpoint_->AddElection(&election_, OfCamera(kOwner, part_.camera_id));
 }
@@ -73,6 +75,14 @@ void PlayerOffice::WatchWriter() {
     exit_code_ = kExitSuperseded;
     problem_ = NobodyWentOn(*writer_->close_requested_by());
   }
+}
+
+ProcessHealth PlayerOffice::Health() const {
+  ProcessHealth health = MeasureProcess(context_.pid);
+  health.uptime_s = static_cast<double>(context_.now_ns() - begun_ns_) * 1e-9;
+  health.dropped_foreign = context_.refused();
+  health.epoch = writer_ ? writer_->term().epoch : 0;
+  return health;
 }
 
 void PlayerOffice::Open() {

@@ -9,6 +9,7 @@
 #include "dmslam/messaging/endpoint.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/util/ids.h"
+#include "dmslam/wire/status.h"
 
 namespace dmslam {
 
@@ -38,6 +39,8 @@ class PlayerOffice {
   /// one's place.
   std::optional<int> exit_code() const { return exit_code_; }
   const std::string& problem() const { return problem_; }
+  /// Of this process: the beginning of each status.
+  ProcessHealth Health() const;
   /// When Advance has something to do that no message brings.
   int64_t deadline_ns() const { return hands_over_until_ns_.value_or(INT64_MAX); }
 
@@ -48,6 +51,7 @@ class PlayerOffice {
   NodeContext context_;
   Part part_;
   Endpoint* endpoint_;
+  int64_t begun_ns_;
   WriterElection election_;
   std::unique_ptr<StreamWriter> writer_;
   std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for it must have gone on

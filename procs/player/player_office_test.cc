@@ -64,6 +64,15 @@ TEST_F(PlayerOfficeTest, ASecondPlayerIsRefusedByNameAndTheFirstGoesOn) {
   EXPECT_EQ(first.office.exit_code(), std::nullopt);
 }
 
+TEST_F(PlayerOfficeTest, ItsStatusTellsItsTermAndHowLongItHasRun) {
+  Player& player = Add();
+  Pass(1);
+  EXPECT_EQ(player.office.Health().epoch, 0) << "it listens first";
+  Pass(2);
+  EXPECT_GT(player.office.Health().epoch, 0);
+  EXPECT_NEAR(player.office.Health().uptime_s, 3, 0.1);
+}
+
 TEST_F(PlayerOfficeTest, AnotherSessionIsNotItsBusiness) {
   Player& first = Add(7);
   Player& second = Add(8);

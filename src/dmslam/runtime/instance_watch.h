@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 
 #include "dmslam/wire/status.h"
 
@@ -10,22 +11,31 @@ namespace dmslam {
 
 /// Tells a process that was started again from the one before it, by what their statuses say: it has another
 /// process id, or, where ids are alike (each container has its own), it has run for no longer than nobody was
-/// heard. One watch for each role.
+/// heard; who is known from notes alone may also have come while nobody listened: then it has run for less
+/// than was noted, or writes in another term of office. One watch for each role.
 class InstanceWatch {
  public:
   /// A status came: whether its process was not heard before.
   bool IsNew(const ProcessHealth& health, int64_t now_ns) {
-    const auto [known, is_new] = heard_.try_emplace(health.pid, Heard{health.uptime_s, now_ns});
+    const auto [known, is_new] = heard_.try_emplace(health.pid, Heard{health.uptime_s, now_ns, {}});
     Heard& before = known->second;
     const double silent_s = static_cast<double>(now_ns - before.at_ns) * 1e-9;
     const bool began_since =
         health.uptime_s < before.uptime_s && health.uptime_s <= silent_s + kSlackS;  // no late status
-    before = {health.uptime_s, now_ns};
+    const bool is_other = before.noted ? IsOther(*before.noted, health) : began_since;
+    before = {health.uptime_s, now_ns, {}};
     if (heard_.size() > kMost) Forget(health.pid);
-    return is_new || began_since;
+    return is_new || is_other;
   }
-  /// A process with this id was heard by who watched before; how long it had run is not known.
-  void Know(int32_t pid, int64_t now_ns) { heard_.try_emplace(pid, Heard{-1, now_ns}); }
+  /// What who watched before has noted of a process.
+  struct Noted {
+    double uptime_s = -1;  ///< how long it had run; below zero: not known
+    int64_t epoch = 0;     ///< as writer; 0: not known
+  };
+  /// A process with this id was heard by who watched before.
+  void Know(int32_t pid, int64_t now_ns, const Noted& noted) {
+    heard_[pid] = {noted.uptime_s, now_ns, noted};
+  }
 
  private:
   static constexpr size_t kMost = 64;
@@ -33,7 +43,12 @@ class InstanceWatch {
   struct Heard {
     double uptime_s = 0;
     int64_t at_ns = 0;
+    std::optional<Noted> noted;  ///< it was not heard here
   };
+  static bool IsOther(const Noted& noted, const ProcessHealth& health) {
+    if (noted.epoch != 0 && health.epoch != 0 && noted.epoch != health.epoch) return true;
+    return health.uptime_s < noted.uptime_s;
+  }
   void Forget(int32_t but) {
     auto oldest = heard_.end();
     for (auto it = heard_.begin(); it != heard_.end(); ++it) {

@@ -39,8 +39,26 @@ TEST(InstanceWatch, AStatusThatComesLateIsNoOtherProcess) {
 
 TEST(InstanceWatch, WhoIsKnownFromBeforeIsNotNew) {
   InstanceWatch watch;
-  watch.Know(7, 0);
+  watch.Know(7, 0, {});
   EXPECT_FALSE(watch.IsNew(Health(7, 12), Seconds(1)));
+}
+
+TEST(InstanceWatch, WhoCameWhileNobodyListenedIsToldByWhatWasNoted) {
+  const auto is_new = [](const InstanceWatch::Noted& noted, double uptime_s, int64_t epoch) {
+    InstanceWatch watch;
+    watch.Know(1, Seconds(100), noted);
+    ProcessHealth health = Health(1, uptime_s);
+    health.epoch = epoch;
+    const bool counted = watch.IsNew(health, Seconds(101));
+    health.uptime_s += 1;
+    EXPECT_FALSE(watch.IsNew(health, Seconds(102))) << "it is counted once";
+    return counted;
+  };
+  EXPECT_FALSE(is_new({30, 5}, 40, 5));
+  EXPECT_TRUE(is_new({30, 5}, 40, 6)) << "it writes in another term";
+  EXPECT_TRUE(is_new({30, 5}, 20, 0)) << "it has run for less, though for long";
+  EXPECT_FALSE(is_new({30, 5}, 40, 0)) << "its term is not known yet";
+  EXPECT_FALSE(is_new({30, 0}, 40, 6)) << "it had none when it was noted";
 }
 
 TEST(InstanceWatch, ItsMemoryIsBoundedAndKeepsTheNewest) {
