@@ -8,6 +8,7 @@ namespace {
 
 constexpr size_t kImagesKept = 12;  // of each camera
 constexpr int kJpegQuality = 85;
+constexpr int64_t kHealthHoldsNs = 5'000'000'000;
 
 std::vector<uint8_t> Raw(const Frame& frame, ImageEncoding encoding) {
   const EncodedImage image{encoding, frame.width_px, frame.height_px, frame.data};
@@ -77,10 +78,12 @@ std::shared_ptr<ServedImage> Exchange::FindImage(std::optional<uint32_t> frame_i
 void Exchange::SetHealth(HealthText health) {
   const std::lock_guard lock(mutex_);
   health_ = std::move(health);
+  health_ns_ = now_ns_();
 }
 
-HealthText Exchange::Health() const {
+std::optional<HealthText> Exchange::Health() const {
   const std::lock_guard lock(mutex_);
+  if (!health_ns_ || now_ns_() - *health_ns_ > kHealthHoldsNs) return std::nullopt;
   return health_;
 }
 

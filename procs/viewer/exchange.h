@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/messaging/event_loop.h"
 #include "dmslam/wire/player_messages.h"
 #include "viewer/event_hub.h"
 #include "viewer/frame_series.h"
@@ -37,6 +39,9 @@ class ServedImage {
 /// than it takes to copy what has changed; nothing is sent or encoded under it.
 class Exchange {
  public:
+  /// `now_ns`: monotonic; tells how old is what was said of the system's health.
+  explicit Exchange(std::function<int64_t()> now_ns = &EventLoop::now_ns) : now_ns_(std::move(now_ns)) {}
+
   /// For the replica: changes scene or series.
   template <typename Edit>
   void Change(const Edit& edit) {
@@ -52,15 +57,18 @@ class Exchange {
 
   /// How the system fares, for machines.
   void SetHealth(HealthText health);
-  HealthText Health() const;
+  /// Nothing where the replica has said nothing for 5 s: it says so four times a second.
+  std::optional<HealthText> Health() const;
 
   EventHub& hub() { return hub_; }
 
  private:
+  std::function<int64_t()> now_ns_;
   mutable std::mutex mutex_;
   ViewerScene scene_;
   CameraSeries series_;
   HealthText health_;
+  std::optional<int64_t> health_ns_;  ///< when it was said
   std::map<CameraId, std::deque<std::shared_ptr<ServedImage>>> images_;
   EventHub hub_;
 };

@@ -14,6 +14,21 @@ namespace {
 using std::chrono::milliseconds;
 constexpr int64_t kSecond = 1'000'000'000;
 
+/// Where the replica's thread hangs, the one that serves must not go on saying that all is well.
+TEST(ExchangeTest, HealthOfFiveSecondsAgoIsNone) {
+  int64_t now_ns = 0;
+  Exchange exchange([&] { return now_ns; });
+  EXPECT_FALSE(exchange.Health()) << "nothing was said yet";
+  exchange.SetHealth({true, "{}", ""});
+  now_ns = 5 * kSecond;
+  ASSERT_TRUE(exchange.Health());
+  EXPECT_TRUE(exchange.Health()->well);
+  now_ns += 1;
+  EXPECT_FALSE(exchange.Health());
+  exchange.SetHealth({true, "{}", ""});
+  EXPECT_TRUE(exchange.Health());
+}
+
 TEST(EventHubTest, AListenerWhoIsSlowGetsTheNewestOfEachKind) {
   EventHub hub;
   const auto listener = hub.Join();

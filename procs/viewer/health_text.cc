@@ -9,7 +9,10 @@ namespace {
 using Process = ProcessBoard::Process;
 using Life = ProcessBoard::Life;
 
-bool IsNeeded(const std::string& name) { return name == "player" || name == "frontend" || name == "mapper"; }
+bool IsNeeded(const Process& process) {
+  const std::string& name = process.name;
+  return process.needed || name == "player" || name == "frontend" || name == "mapper";
+}
 
 std::string Number(double value) {
   char text[32];
@@ -54,6 +57,7 @@ struct Column {
   const char* type;
   const char* help;
   std::function<double(const Process&)> value;
+  bool told = true;  ///< known of those only who say how they fare
 };
 
 template <typename Field>
@@ -64,10 +68,12 @@ std::function<double(const Process&)> Of(Field ProcessHealth::*field) {
 const std::vector<Column>& Columns() {
   static const std::vector<Column> columns = {
       {"up", "gauge", "1 where the process is heard, 0 where it is silent",
-       [](const Process& p) { return p.life == Life::kUp || p.life == Life::kBack ? 1.0 : 0.0; }},
-      {"restarts_total", "counter", "other process ids heard under this name",
-       [](const Process& p) { return static_cast<double>(p.restarts); }},
+       [](const Process& p) { return p.life == Life::kUp || p.life == Life::kBack ? 1.0 : 0.0; }, false},
+      {"restarts_total", "counter", "other processes heard under this name",
+       [](const Process& p) { return static_cast<double>(p.restarts); }, false},
       {"resident_megabytes", "gauge", "resident memory", Of(&ProcessHealth::rss_mb)},
+      {"cpu_percent", "gauge", "processor time of one core, over the last second",
+       Of(&ProcessHealth::cpu_percent)},
       {"queue_depth", "gauge", "messages received and not yet worked on", Of(&ProcessHealth::queue_depth)},
       {"unacknowledged_records", "gauge", "records that some reader still lacks",
        Of(&ProcessHealth::unacknowledged)},
@@ -89,8 +95,10 @@ std::string Prometheus(const ProcessBoard& board, const FrontendStatus& f, const
   Page page;
   for (const Column& column : Columns()) {
     page.Family(column.name, column.type, column.help);
-    for (const Process& process : board.processes())
-      if (process.life != Life::kAwaited) page.Sample("process", process.name, column.value(process));
+    for (const Process& process : board.processes()) {
+      const bool known = process.life != Life::kAwaited && (process.tells || !column.told);
+      if (known) page.Sample("process", process.name, column.value(process));
+    }
   }
   page.One("frames_per_second", "gauge", "frames processed over the last second", f.fps);
   page.One("frames_processed_total", "counter", "frames worked on", static_cast<double>(f.frames_processed));
@@ -117,8 +125,7 @@ HealthText WriteHealth(const ProcessBoard& board, const FrontendStatus& frontend
   health.well = true;
   std::string processes;
   for (const Process& process : board.processes()) {
-    const bool absent =
-        process.life == Life::kDown || (process.life == Life::kAwaited && IsNeeded(process.name));
+    const bool absent = process.life == Life::kDown || (process.life == Life::kAwaited && IsNeeded(process));
     if (absent) health.well = false;
     processes += processes.empty() ? "" : ", ";
     processes += Quoted(process.name) + ": " + Quoted(ProcessBoard::Word(process.life));

@@ -9,8 +9,8 @@ namespace dmslam {
 
 /// How a system fares, for machines.
 struct HealthText {
-  bool well = false;  ///< nobody who was heard is silent, and player, frontend and mapper have been heard
-  std::string json;   ///< {"well": true, "processes": {"mapper": "up", ...}}
+  bool well = false;       ///< nobody who was heard is silent, and all whom a run needs have been heard
+  std::string json;        ///< {"well": true, "processes": {"mapper": "up", ...}}
   std::string prometheus;  ///< the text format of Prometheus, version 0.0.4
 };
 

@@ -18,6 +18,7 @@ TEST(HealthTextTest, SaysWhoIsThereAndWhoIsSilent) {
     StatusHead head;
     head.health.pid = pid;
     head.health.rss_mb = 12.5;
+    head.health.cpu_percent = 75;
     head.health.records_lost = 3;
     board.OnStatus(name, head, "", now_ns, 0);
   };
@@ -27,6 +28,7 @@ TEST(HealthTextTest, SaysWhoIsThereAndWhoIsSilent) {
   EXPECT_NE(health().json.find("\"loopcloser\": \"awaited\""), std::string::npos);
   EXPECT_TRUE(Has(health().prometheus, "dmslam_up{process=\"mapper\"} 1"));
   EXPECT_TRUE(Has(health().prometheus, "dmslam_resident_megabytes{process=\"mapper\"} 12.5"));
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_cpu_percent{process=\"mapper\"} 75"));
   EXPECT_TRUE(Has(health().prometheus, "dmslam_records_lost_total{process=\"mapper\"} 3"));
   say("mapper", 8, 2 * kSecond);
   EXPECT_TRUE(Has(health().prometheus, "dmslam_restarts_total{process=\"mapper\"} 1"));
@@ -36,6 +38,34 @@ TEST(HealthTextTest, SaysWhoIsThereAndWhoIsSilent) {
   EXPECT_FALSE(health().well);
   EXPECT_NE(health().json.find("\"mapper\": \"down\""), std::string::npos);
   EXPECT_TRUE(Has(health().prometheus, "dmslam_up{process=\"mapper\"} 0"));
+}
+
+/// The collector says no status, but acknowledges what it has.
+TEST(HealthTextTest, WhoTellsNothingOfItselfIsUpOrDown) {
+  ProcessBoard board({"player", "frontend", "mapper", "collector"});
+  const auto health = [&] { return WriteHealth(board, {}, {}); };
+  const auto all_but_the_collector = [&](int64_t now_ns) {
+    for (const char* name : {"player", "frontend", "mapper"}) board.OnStatus(name, {}, "", now_ns, 0);
+  };
+  all_but_the_collector(kSecond);
+  EXPECT_TRUE(health().well) << "a run without a collector";
+  board.Need("collector");
+  EXPECT_FALSE(health().well) << "one with a collector that was not heard yet";
+  board.OnWord("collector", 77, kSecond, 0);
+  EXPECT_TRUE(health().well);
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_up{process=\"collector\"} 1"));
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_restarts_total{process=\"collector\"} 0"));
+  EXPECT_EQ(health().prometheus.find("megabytes{process=\"collector\"}"), std::string::npos)
+      << "what it does not tell is not said to be zero";
+  all_but_the_collector(5 * kSecond);
+  board.Advance(5 * kSecond, 0);
+  EXPECT_FALSE(health().well);
+  EXPECT_NE(health().json.find("\"collector\": \"down\""), std::string::npos);
+  board.OnWord("collector", 77, 5 * kSecond, 0);
+  EXPECT_TRUE(health().well);
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_restarts_total{process=\"collector\"} 0"));
+  board.OnWord("collector", 78, 5 * kSecond, 0);
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_restarts_total{process=\"collector\"} 1"));
 }
 
 TEST(HealthTextTest, EveryFamilySaysItsTypeOnce) {

@@ -36,7 +36,7 @@ class ServedViewer : public dmslam::Node {
 int ShowLog(const std::string& log, const dmslam::NodeOptions& options, const dmslam::ViewerOptions& viewer,
             const dmslam::WebServerOptions& web) {
   dmslam::EventLoop loop;
-  dmslam::Exchange exchange;
+  dmslam::Exchange exchange([] { return int64_t{0}; });  // a log that stands still is not ill
   dmslam::PlaybackControl control;
   dmslam::LogPlayback playback(log, options, viewer, &exchange);
   const dmslam::WebServer server(web, &exchange, &control);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,8 +35,11 @@ class ProcessBoard {
     int64_t restart_ns = 0;
     std::string state;  ///< what it does, in a word
     std::string reason;
+    bool tells = false;  ///< how it fares: it has said a status
     ProcessHealth health;
     InstanceWatch instances;
+    std::set<int64_t> ids;  ///< of those who were heard by them alone
+    bool needed = false;    ///< a run without it is not well
   };
 
   /// `names`: in the order in which they are shown.
@@ -44,8 +48,12 @@ class ProcessBoard {
   /// A status. `done`: it says that it is about to end.
   void OnStatus(const std::string& name, const StatusHead& head, const std::string& state, int64_t now_ns,
                 int64_t wall_us);
+  /// A word of a process that says no status; `id`: random, drawn at its start.
+  void OnWord(const std::string& name, int64_t id, int64_t now_ns, int64_t wall_us);
   /// A sign of life without a status (a beacon).
   void OnSign(const std::string& name, int64_t now_ns);
+  /// A run without this one is not well.
+  void Need(const std::string& name);
   /// The sequence is over for these: their silence is no failure.
   void Expect(const std::string& name) { ending_[name] = true; }
   /// Finds who has fallen silent.
@@ -59,6 +67,9 @@ class ProcessBoard {
 
  private:
   Process* Find(const std::string& name);
+  /// What it says about being there. `as`: how the event names the process, and the one that has come back.
+  void Hear(Process* process, bool restarted, const std::string& as, const std::string& as_restarted,
+            int64_t now_ns, int64_t wall_us);
   void SetLife(Process* process, Life life, int64_t now_ns);
 
   std::vector<Process> processes_;

@@ -26,23 +26,24 @@ Json ToJson(const ProcessBoard::Process& process, int64_t now_ns) {
             {"life", ProcessBoard::Word(process.life)},
             {"state", process.state},
             {"reason", process.reason},
-            {"waiting_for", h.waiting_for},
-            {"restarts", process.restarts},
-            {"pid", h.pid},
-            {"uptime", Round(h.uptime_s, 1)},
-            {"cpu", Round(h.cpu_percent, 1)},
-            {"rss", Round(h.rss_mb, 1)},
-            {"queue", h.queue_depth},
-            {"received", h.received},
-            {"written", h.written},
-            {"dropped", dropped},
-            {"lost", h.records_lost},
-            {"repaired", h.records_repaired},
-            {"resent", h.resent},
-            {"unacknowledged", h.unacknowledged},
-            {"snapshots", h.snapshots},
-            {"host", h.host}};
+            {"restarts", process.restarts}};
   json["age"] = heard ? Json(Round(static_cast<double>(now_ns - process.heard_ns) * 1e-9, 2)) : Json(nullptr);
+  if (!process.tells) return json;
+  json.update(Json{{"waiting_for", h.waiting_for},
+                   {"pid", h.pid},
+                   {"uptime", Round(h.uptime_s, 1)},
+                   {"cpu", Round(h.cpu_percent, 1)},
+                   {"rss", Round(h.rss_mb, 1)},
+                   {"queue", h.queue_depth},
+                   {"received", h.received},
+                   {"written", h.written},
+                   {"dropped", dropped},
+                   {"lost", h.records_lost},
+                   {"repaired", h.records_repaired},
+                   {"resent", h.resent},
+                   {"unacknowledged", h.unacknowledged},
+                   {"snapshots", h.snapshots},
+                   {"host", h.host}});
   return json;
 }
 

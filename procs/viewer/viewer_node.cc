@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/runtime/process_info.h"
 #include "viewer/viewer_json.h"
 
@@ -12,13 +13,14 @@ namespace {
 constexpr int64_t kDrawEveryNs = 120'000'000;
 constexpr int64_t kReportEveryNs = 250'000'000;
 constexpr int64_t kAlignEveryNs = 1'000'000'000;
+constexpr char kCollector[] = "collector";
 
 std::vector<std::string> Shown(CameraId num_cameras) {
   std::vector<std::string> names;
   for (const char* role : {"player", "frontend"}) {
     for (CameraId camera = 0; camera < num_cameras; ++camera) names.push_back(OfCamera(role, camera));
   }
-  names.insert(names.end(), {"mapper", "loopcloser", "viewer"});
+  names.insert(names.end(), {"mapper", "loopcloser", kCollector, "viewer"});
   return names;
 }
 
@@ -30,7 +32,8 @@ ViewerNode::ViewerNode(NodeContext context, NodeOptions options, ViewerOptions v
       exchange_(exchange),
       board_(Shown(options_.NumCameras())),
       seen_cameras_(options_.NumCameras()) {
-  Listen({channels::kMapperStatus, channels::kLoopcloserStatus});
+  Listen({channels::kMapperStatus, channels::kLoopcloserStatus, AckChannel("COLLECTOR")});
+  if (options_.HasPeer(kCollector)) board_.Need(kCollector);
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kPoseView,
             channels::kFeatureView, channels::kPlayerStatus, channels::kFrontendStatus},
@@ -77,8 +80,16 @@ void ViewerNode::SetInHaste(bool in_haste) {
 }
 
 void ViewerNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (channel == AckChannel("COLLECTOR")) return OnCollector(channel, bytes);
   OnStatusMessage(channel, bytes);
   if (core_) OnLoose(channel, bytes);
+}
+
+/// The collector says no status: what it acknowledges, once a second at least, tells that it is there.
+void ViewerNode::OnCollector(const std::string& channel, std::span<const uint8_t> bytes) {
+  const std::optional<ack_t> ack = DecodeAck(channel, bytes);
+  if (!ack || ack->role != kCollector || session_ == 0 || ack->header.session != session_) return;
+  board_.OnWord(kCollector, ack->reader, context_.now_ns(), context_.wall_us());
 }
 
 /// In haste pictures are kept, each camera's newest, until it is over.

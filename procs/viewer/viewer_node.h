@@ -49,6 +49,7 @@ class ViewerNode : public StreamNode {
 
   void OnLoose(const std::string& channel, std::span<const uint8_t> bytes);
   bool PassOver(const std::string& channel, std::span<const uint8_t> bytes);
+  void OnCollector(const std::string& channel, std::span<const uint8_t> bytes);
   void OnEnd(const EndOfSequence& end);
   void OnStatusMessage(const std::string& channel, std::span<const uint8_t> bytes);
   template <typename Status>

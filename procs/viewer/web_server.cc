@@ -82,6 +82,20 @@ HttpResponse Content(std::string type, std::string body) {
   return response;
 }
 
+/// `health`: nothing where the viewer hangs, which no former answer may hide.
+HttpResponse ServeHealth(const std::optional<HealthText>& health, bool metrics) {
+  HttpResponse response;
+  if (!health) {
+    response = Content("application/json", "{\"well\": false, \"reason\": \"the viewer hangs\"}\n");
+  } else if (metrics) {
+    response = Content("text/plain; version=0.0.4; charset=utf-8", health->prometheus);
+  } else {
+    response = Content("application/json", health->json);
+  }
+  if (!health || (!metrics && !health->well)) response.status = 503;
+  return response;
+}
+
 HttpResponse Status(int status) {
   HttpResponse response;
   response.status = status;
@@ -154,14 +168,8 @@ HttpResponse WebServer::Impl::Serve(const HttpRequest& request) const {
     const CameraId camera = Query<CameraId>(request, "camera").value_or(0);
     return Content("application/json", exchange->SeriesJson(since, kMostSeries, camera));
   }
-  if (request.path == "/metrics")
-    return Content("text/plain; version=0.0.4; charset=utf-8", exchange->Health().prometheus);
-  if (request.path == "/healthz") {
-    const HealthText health = exchange->Health();
-    HttpResponse response = Content("application/json", health.json);
-    response.status = health.well ? 200 : 503;
-    return response;
-  }
+  if (request.path == "/metrics" || request.path == "/healthz")
+    return ServeHealth(exchange->Health(), request.path == "/metrics");
   if (request.path != "/api/events") return Status(404);
   HttpResponse response = Content("text/event-stream", "");
   response.events = true;

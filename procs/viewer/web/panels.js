@@ -285,11 +285,12 @@ export class ProcessPanel {
     row.cells[2].title = [process.reason, process.waiting_for && `waits for ${process.waiting_for}`].filter((s) => s).join('; ');
     row.cells[3].firstChild.textContent = known ? process.age.toFixed(1) + ' s' : '–';
     row.cells[3].className = silent ? 'alarm' : '';
-    set(4, known ? process.rss.toFixed(0) + ' MB' : '–');
-    set(5, known ? thousands(process.queue) : '–');
-    set(6, known ? thousands(process.dropped) : '–', process.dropped > 0);
-    set(7, known ? thousands(process.repaired) : '–');
-    set(8, known ? thousands(process.lost) : '–', process.lost > 0);
+    const tells = process.rss !== undefined;  // the collector only says that it is there
+    set(4, tells ? process.rss.toFixed(0) + ' MB' : '–');
+    set(5, tells ? thousands(process.queue) : '–');
+    set(6, tells ? thousands(process.dropped) : '–', process.dropped > 0);
+    set(7, tells ? thousands(process.repaired) : '–');
+    set(8, tells ? thousands(process.lost) : '–', process.lost > 0);
   }
 
   /// Text of a weld that happened since this was asked last; none where nothing did.
