@@ -60,17 +60,20 @@ std::string Difference(const Outcome& outcome, const Outcome& undisturbed) {
   return difference;
 }
 
-std::string Loss(const Outcome& outcome, const Outcome& undisturbed, double most_apart, int64_t frames_lost,
-                 int64_t records_lost, const std::string& folder) {
+std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allowance& allowed,
+                 const std::string& folder) {
   if (!outcome.failure.empty()) return outcome.failure;
   std::string loss;
-  if (Number(outcome, "keyframes_missing") != 0) loss += " keyframes are missing,";
-  if (Number(outcome, "records_lost") > static_cast<double>(records_lost)) loss += " records are lost,";
+  const auto more = [&](const char* key, int64_t most) {
+    return Number(outcome, key) < 0 || Number(outcome, key) > static_cast<double>(most);
+  };
+  if (more("keyframes_missing", allowed.keyframes_missing)) loss += " keyframes are missing,";
+  if (more("records_lost", allowed.records_lost)) loss += " records are lost,";
   if (Number(outcome, "resumed") != 0) loss += " it began again from a checkpoint,";
   const Distance distance = Measure(outcome, undisturbed, folder);
-  if (distance.rmse > most_apart) loss += " poses are off by " + std::to_string(distance.rmse) + ",";
+  if (distance.rmse > allowed.most_apart) loss += " poses are off by " + std::to_string(distance.rmse) + ",";
   const size_t tracked = Poses(undisturbed.online, folder).size();
-  if (distance.tracked + frames_lost < static_cast<int64_t>(tracked))
+  if (distance.tracked + allowed.frames_lost < static_cast<int64_t>(tracked))
     loss += " only " + std::to_string(distance.tracked) + " frames were tracked,";
   const auto placed = Stamps(Poses(outcome.trajectory, folder));
   const auto told = Stamps(Poses(outcome.online, folder));

@@ -23,10 +23,15 @@ double Number(const Outcome& outcome, const std::string& key);
 /// What of the collector's files differs; empty: nothing.
 std::string Difference(const Outcome& outcome, const Outcome& undisturbed);
 
-/// What a run has lost in which processes that make the map died or moved; empty: nothing. `most_apart`: how
-/// far poses may be from those of the undisturbed run. `frames_lost`: how many frames may not have been
-/// tracked. `records_lost`: how many records may have been lost with who wrote them.
-std::string Loss(const Outcome& outcome, const Outcome& undisturbed, double most_apart, int64_t frames_lost,
-                 int64_t records_lost, const std::string& folder);
+/// What may be lost.
+struct Allowance {
+  double most_apart = 0;          ///< how far poses may be from those of the undisturbed run
+  int64_t frames_lost = 0;        ///< so many frames may not have been tracked
+  int64_t records_lost = 0;       ///< so many records, with who wrote them
+  int64_t keyframes_missing = 0;  ///< so many keyframes, without a word of why
+};
+/// What a run has lost beyond that; empty: nothing.
+std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allowance& allowed,
+                 const std::string& folder);
 
 }  // namespace dmslam::simulation

@@ -89,6 +89,20 @@ void DrawDeaths(uint32_t num_frames, Schedule* schedule, Random* random) {
   }
 }
 
+/// Forged messages: in one of three schedules also those that may cost what they stand for.
+void DrawForgedContents(uint32_t num_frames, Schedule* schedule, Random* random) {
+  const bool may_cost = random->Below(3) == 0;
+  for (uint32_t i = 1 + random->Below(3); i > 0; --i) {
+    Fault fault;
+    fault.kind = Fault::Kind::kContent;
+    do {
+      fault.content = static_cast<Content>(random->Below(kNumContents));
+    } while (MayCost(fault.content) && !may_cost);
+    Place(&fault, random->Below(num_frames + 1), num_frames, random);
+    schedule->faults.push_back(fault);
+  }
+}
+
 }  // namespace
 
 std::string ToText(const Fault& fault) {
@@ -121,6 +135,9 @@ std::string ToText(const Fault& fault) {
     case Fault::Kind::kFullDisk:
       text = "the disk is full for " + lasts;
       break;
+    case Fault::Kind::kContent:
+      text = "a forged " + ToText(fault.content);
+      break;
   }
   return "frame " + std::to_string(fault.at_frame) + " + " +
          Number(static_cast<double>(fault.after_ns) * 1e-9) + " s: " + text;
@@ -133,6 +150,12 @@ std::string Schedule::ToText() const {
                      std::to_string(num_hosts) + " hosts";
   for (const Fault& fault : faults) text += "; " + simulation::ToText(fault);
   return text;
+}
+
+bool Schedule::MeetsDeaths() const {
+  return std::ranges::any_of(faults, [](const Fault& fault) {
+    return fault.kind == Fault::Kind::kKill || fault.kind == Fault::Kind::kMove;
+  });
 }
 
 const std::vector<std::string>& Roles() {
@@ -164,6 +187,8 @@ Schedule DrawSchedule(uint64_t seed, uint32_t num_frames) {
     schedule.faults.push_back(fault);
   }
   DrawDeaths(num_frames, &schedule, &random);
+  Random more(DeriveSeed(seed, 0, "more of the schedule"));  // the draws above stay what they were
+  if (more.Below(2) == 0) DrawForgedContents(num_frames, &schedule, &more);
   std::ranges::stable_sort(schedule.faults, {}, &Fault::at_frame);
   return schedule;
 }

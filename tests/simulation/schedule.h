@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "content_forger.h"
 #include "dmslam/messaging/types.h"
 #include "simulated_network.h"
 
@@ -21,6 +22,7 @@ struct Fault {
     kForgery,    ///< a message of somebody else's, with the right checksum
     kEcho,       ///< the newest message of some channel, once more
     kFullDisk,   ///< the collector's disk takes nothing
+    kContent,    ///< a forged message of what is played or computed
   };
   Kind kind = Kind::kPause;
   std::string process;    ///< whom it meets
@@ -29,7 +31,8 @@ struct Fault {
   int64_t lasts_ns = 0;   ///< until it is over; of a kill: until the next one begins
   int host = 0;           ///< that is cut off or whose clock is set; where the next process begins
   int64_t step_us = 0;    ///< by which the clock is set
-  int records = 0;        ///< who is killed dies in the middle of its work, when it has sent so many more
+  Content content = Content::kSession;
+  int records = 0;  ///< who is killed dies in the middle of its work, when it has sent so many more
 };
 
 std::string ToText(const Fault& fault);
@@ -50,6 +53,8 @@ struct Schedule {
   std::vector<Fault> faults;           ///< in the order of their frames
 
   std::string ToText() const;
+  /// Whether a process dies or moves.
+  bool MeetsDeaths() const;
 };
 
 /// The processes of a run.

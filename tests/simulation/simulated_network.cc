@@ -53,7 +53,9 @@ void SimulatedNetwork::Fly(Port* to, const Outgoing& message) {
 }
 
 void SimulatedNetwork::Send(const Port& from, const Outgoing& message) {
-  if (from.closed_ || message.local) return;  // a tap for tools; its parts arrive as well
+  if (from.closed_) return;
+  content_forger_.Hear(message);
+  if (message.local) return;  // a tap for tools; its parts arrive as well
   ++statistics_.sent;
   forger_.Hear(message);
   newest_[message.channel] = message;
@@ -103,6 +105,12 @@ void SimulatedNetwork::FlyToAll(const Outgoing& message) {
 
 void SimulatedNetwork::Forge() {
   if (const std::optional<Outgoing> forged = forger_.Make(random_)) FlyToAll(*forged);
+}
+
+bool SimulatedNetwork::Forge(Content content) {
+  const std::optional<Outgoing> forged = content_forger_.Make(content, random_);
+  if (forged) FlyToAll(*forged);
+  return forged.has_value();
 }
 
 void SimulatedNetwork::Echo() {

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <vector>
 
+#include "content_forger.h"
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/forger.h"
 #include "dmslam/util/random.h"
@@ -73,6 +74,8 @@ class SimulatedNetwork {
 
   /// A beacon or an acknowledgement that somebody has changed, heard by all who want its channel.
   void Forge();
+  /// A message of that content that somebody has made of what was said; false: not enough was said yet.
+  bool Forge(Content content);
   /// The newest message of some channel, once more.
   void Echo();
 
@@ -117,6 +120,7 @@ class SimulatedNetwork {
   std::set<int> cut_off_;
   std::map<std::string, Outgoing> newest_;  ///< of each channel
   Forger forger_;
+  ContentForger content_forger_;
   Statistics statistics_;
 };
 

@@ -297,6 +297,7 @@ class SimulatedSystem {
     process->last_code = code;
     if (process->role == "collector" && code == kExitDone && !moving_) farewell_ns_ = now_ns_ + kFarewellNs;
     if (WorthRestarting(code)) {
+      ++outcome_.restarts;
       process->begins_ns = now_ns_ + kSecond / 2;
     } else {
       process->done = true;
@@ -343,6 +344,10 @@ class SimulatedSystem {
         return Tell("somebody", ToText(fault));
       case Fault::Kind::kForgery:
         network_.Forge();
+        return Tell("somebody", ToText(fault));
+      case Fault::Kind::kContent:
+        if (!network_.Forge(fault.content)) return;
+        outcome_.forged.push_back({fault.content, frames_played_});
         return Tell("somebody", ToText(fault));
       case Fault::Kind::kEcho:
         network_.Echo();

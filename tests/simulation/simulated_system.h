@@ -50,6 +50,12 @@ struct Outcome {
   std::string story;                                        ///< what happened when, a line each
   double virtual_s = 0;
   int64_t turns = 0, faults = 0;
+  int64_t restarts = 0;  ///< of processes that had ended themselves
+  struct Forged {
+    Content content;
+    uint32_t frame;  ///< so many had been played
+  };
+  std::vector<Forged> forged;
   SimulatedNetwork::Statistics network;
 };
 
