@@ -396,7 +396,7 @@ void CollectorNode::BeginCheckpoints() {
   options.every_s = collector_.checkpoints ? options_.settings.Read<CheckpointOptions>().every_s : 0;
   if (collector_.checkpoints && context_.fresh_system && !context_.resumed) RemoveCheckpoints(options.path);
   checkpointer_ =
-      std::make_unique<Checkpointer>(options, MakeCoreThread(PlaybackMode::kRealtime), journal_.get());
+      std::make_unique<Checkpointer>(options, MakeUnwatchedThread(PlaybackMode::kRealtime), journal_.get());
 }
 
 /// It is whole, and no newer than the poses in the journal.

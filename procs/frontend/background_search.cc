@@ -10,8 +10,10 @@ constexpr double kLongestWaitS = 1.0;
 
 }  // namespace
 
-BackgroundSearch::BackgroundSearch(FirstMapSearch search)
-    : search_(std::move(search)), worker_([this](const std::stop_token& stop) { Work(stop); }) {
+BackgroundSearch::BackgroundSearch(FirstMapSearch search, std::shared_ptr<WorkSign> sign)
+    : search_(std::move(search)),
+      sign_(std::move(sign)),
+      worker_([this](const std::stop_token& stop) { Work(stop); }) {
   last_.reason = "the search has just begun";
 }
 
@@ -38,19 +40,21 @@ void BackgroundSearch::Work(const std::stop_token& stop) {
     lock.unlock();
     InitializerReport report;
     std::exception_ptr problem;
+    sign_->Begin();
     try {
       report = search_(frame);
     } catch (...) {
       problem = std::current_exception();  // for who asks next
     }
+    sign_->Rest();
     lock.lock();
     last_ = std::move(report);
     problem_ = problem;
   }
 }
 
-FirstMapSearch InBackground(FirstMapSearch search) {
-  auto background = std::make_shared<BackgroundSearch>(std::move(search));
+FirstMapSearch InBackground(FirstMapSearch search, std::shared_ptr<WorkSign> sign) {
+  auto background = std::make_shared<BackgroundSearch>(std::move(search), std::move(sign));
   return [background](const InitializerFrame& frame) { return background->AddFrame(frame); };
 }
 

@@ -3,9 +3,11 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <thread>
 
+#include "dmslam/runtime/work_sign.h"
 #include "dmslam/slam/frontend_core.h"
 
 namespace dmslam {
@@ -16,7 +18,9 @@ namespace dmslam {
 /// only: which frames it sees depends on the machine.
 class BackgroundSearch {
  public:
-  explicit BackgroundSearch(FirstMapSearch search);
+  /// `sign`: says of each frame when it is taken up, and when it is done.
+  explicit BackgroundSearch(FirstMapSearch search,
+                            std::shared_ptr<WorkSign> sign = std::make_shared<WorkSign>());
   ~BackgroundSearch();
   BackgroundSearch(const BackgroundSearch&) = delete;
   BackgroundSearch& operator=(const BackgroundSearch&) = delete;
@@ -29,6 +33,7 @@ class BackgroundSearch {
   void Work(const std::stop_token& stop);
 
   FirstMapSearch search_;
+  std::shared_ptr<WorkSign> sign_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<InitializerFrame> waiting_;
@@ -38,6 +43,6 @@ class BackgroundSearch {
 };
 
 /// A search that runs in the background.
-FirstMapSearch InBackground(FirstMapSearch search);
+FirstMapSearch InBackground(FirstMapSearch search, std::shared_ptr<WorkSign> sign);
 
 }  // namespace dmslam

@@ -85,6 +85,25 @@ TEST(BackgroundSearch, NobodyWaitsAndWhatIsASecondOldIsLeftOut) {
   EXPECT_EQ(OfferUntilFound(&background, 100).result->frame1.index, 69u) << "a second before the newest";
 }
 
+TEST(BackgroundSearch, ASearchThatDoesNotEndIsSeen) {
+  Gate begun, gate;
+  const auto sign = std::make_shared<WorkSign>();
+  BackgroundSearch background(
+      [&](const InitializerFrame& frame) {
+        begun.Open();
+        gate.Pass();
+        return Found(frame);
+      },
+      sign);
+  EXPECT_FALSE(sign->Hangs(INT64_MAX, 0)) << "there is nothing to search";
+  background.AddFrame({0, 0, nullptr});
+  begun.Pass();
+  EXPECT_TRUE(sign->Hangs(INT64_MAX, 0));
+  gate.Open();
+  OfferUntilFound(&background, 1);
+  EXPECT_FALSE(sign->Hangs(INT64_MAX, 0));
+}
+
 TEST(BackgroundSearch, PassesProblemsOn) {
   BackgroundSearch background(
       [](const InitializerFrame&) -> InitializerReport { throw std::runtime_error("no such thing"); });

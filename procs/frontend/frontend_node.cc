@@ -43,7 +43,11 @@ void FrontendNode::Begin(const CameraInfo& info) {
   setup.camera_id = options_.camera_id;
   setup.in_saved_map = run_.saved_map;
   setup.localize_only = run_.localize_only;
-  if (!pace_.lockstep && context_.watch) setup.run_search = InBackground;
+  if (!pace_.lockstep && context_.watch) {
+    setup.run_search = [sign = search_sign_](FirstMapSearch search) {
+      return InBackground(std::move(search), sign);
+    };
+  }
   setup.catch_up_in_portions = !pace_.lockstep;
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
@@ -205,6 +209,7 @@ void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
       const HeldRecords::Held& held = held_[applied];
       if (held.begins_anew) core_->ForgetMap();
       core_->ApplyMapDelta(held.delta);
+      work_->Beat();
     }
     work_->Report([this, applied] { OnApplied(applied); });
   });
@@ -595,6 +600,10 @@ FrontendStatus FrontendNode::CoreStatus() const {
   status.resets = static_cast<int64_t>(counters.resets);
   status.relocalisations = static_cast<int64_t>(counters.relocalizations);
   return status;
+}
+
+bool FrontendNode::Hangs(int64_t now_ns, int64_t longest_ns) const {
+  return StreamNode::Hangs(now_ns, longest_ns) || search_sign_->Hangs(now_ns, longest_ns);
 }
 
 /// A core in work is waited for.

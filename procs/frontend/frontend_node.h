@@ -33,6 +33,7 @@ class FrontendNode : public StreamNode {
   FrontendNode(NodeContext context, const NodeOptions& options, FrontendExtras extras);
 
   void Stop() override;
+  bool Hangs(int64_t now_ns, int64_t longest_ns) const override;
 
  protected:
   void Begin(const CameraInfo& info) override;
@@ -155,6 +156,7 @@ class FrontendNode : public StreamNode {
   FrameCounts counts_;
   FirstMap first_map_;
   FrameTimes times_;
+  std::shared_ptr<WorkSign> search_sign_ = std::make_shared<WorkSign>();  ///< of the search for a first map
   FrontendStatus core_status_;        ///< what the core had to say of itself last
   std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
 };

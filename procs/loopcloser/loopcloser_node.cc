@@ -50,7 +50,12 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
                                            settings.Read<Pyramid>(), settings.Read<RunOptions>().seed,
                                            vocabulary_);
   core_->KeepFeaturesIn(feature_store_);
-  if (info.mode == PlaybackMode::kRealtime) core_->SetInterrupt([this] { return stop_.load(); });
+  if (info.mode == PlaybackMode::kRealtime) {
+    core_->SetInterrupt([this] {
+      work_->Beat();
+      return stop_.load();
+    });
+  }
   map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
   ServeReplica(
       &core_->map(), [this] { return MapHeld(*map_reader_); }, [this] { return work_->Idle(); });

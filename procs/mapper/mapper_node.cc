@@ -79,8 +79,12 @@ void MapperNode::Begin(const CameraInfo& info) {
     core_->ContinueSaved(std::exchange(saved_.loaded, std::nullopt)->map);
     PutInParts();
   }
-  if (!lockstep_) core_->SetInterrupt([this] { return keyframe_waits_.load(); });
-  core_->SetStop([this] { return stops_.load(); });
+  const auto goes_on = [this](const std::atomic<bool>& ends) {  // asked before every step of an adjustment
+    work_->Beat();
+    return ends.load();
+  };
+  if (!lockstep_) core_->SetInterrupt([this, goes_on] { return goes_on(keyframe_waits_); });
+  core_->SetStop([this, goes_on] { return goes_on(stops_); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   std::vector<std::string> readers;
   for (CameraId camera = 0; camera < num_cameras_; ++camera) readers.push_back(OfCamera("frontend", camera));

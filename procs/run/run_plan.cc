@@ -122,6 +122,7 @@ ChildSpec MakeChild(const std::string& program, const RunArguments& a, const Run
   child.output = child.errors = place.LogOf(name);
   child.pid_file = place.out + "/log/" + name + ".pid";
   child.restart = !a.care.no_restart;
+  child.speaks = true;
   return child;
 }
 
@@ -171,6 +172,7 @@ ChildSpec MakeForeign(const std::string& name, const RunArguments& a, const RunP
   ChildSpec child = MakeChild(name, a, place, {});
   child.arguments = std::move(command);
   child.first.clear();
+  child.speaks = false;
   return child;
 }
 

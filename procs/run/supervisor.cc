@@ -280,12 +280,17 @@ void Supervisor::OnNotice(pid_t sender, const std::string& text) {
   events_.push_back(std::move(event));
 }
 
+/// How long a child that is alive may say nothing; after that it hangs. No end: it is asked nothing.
+int64_t Supervisor::SilentUntil(const Child& child) const {
+  if (options_.watchdog_ns <= 0 || child.pid <= 0 || child.hung) return INT64_MAX;
+  if (child.heard_ns) return *child.heard_ns + options_.watchdog_ns;
+  return child.spec.speaks ? child.began_ns + options_.first_word_ns : INT64_MAX;
+}
+
 void Supervisor::KillHung() {
-  if (options_.watchdog_ns <= 0) return;
   const int64_t now = now_ns();
   for (Child& child : children_) {
-    const bool silent = child.heard_ns && now - *child.heard_ns > options_.watchdog_ns;
-    if (child.pid <= 0 || child.hung || !silent) continue;
+    if (now <= SilentUntil(child)) continue;
     child.hung = true;
     kill(child.pid, SIGKILL);
   }
@@ -306,8 +311,8 @@ int64_t Supervisor::NextDeadline() const {
   int64_t deadline = INT64_MAX;
   for (const Child& child : children_) {
     deadline = std::min(deadline, child.due_ns);
-    const bool watched = options_.watchdog_ns > 0 && child.pid > 0 && child.heard_ns && !child.hung;
-    if (watched) deadline = std::min(deadline, *child.heard_ns + options_.watchdog_ns + 1);
+    const int64_t silent_until = SilentUntil(child);
+    if (silent_until != INT64_MAX) deadline = std::min(deadline, silent_until + 1);
   }
   return deadline;
 }

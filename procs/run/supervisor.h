@@ -26,6 +26,7 @@ struct ChildSpec {
   std::string pid_file;         ///< holds its process id; empty: none
   bool restart = true;          ///< where that is worth it
   int stop_signal = SIGTERM;
+  bool speaks = false;  ///< says that it is ready and then, again and again, that it is alive
 };
 
 /// What became of a child, or who spoke to the supervisor.
@@ -65,8 +66,11 @@ class Supervisor {
         60'000'000'000;                   ///< bus or camera may be gone for so long; never at the first start
     bool wait_for_what_may_come = false;  ///< ... for ever, and at the first start too
     int64_t watchdog_ns = 0;              ///< who says nothing for so long hangs; 0: nobody is asked
-    int64_t stop_ns = 10'000'000'000;     ///< who does not end when asked to is killed after so long
-    pid_t (*fork)() = ::fork;             ///< a test lets it fail
+    /// ... as does who is known to speak, and has said no word since its start: what it begins with, as a
+    /// large map, may take long to load.
+    int64_t first_word_ns = 300'000'000'000;
+    int64_t stop_ns = 10'000'000'000;  ///< who does not end when asked to is killed after so long
+    pid_t (*fork)() = ::fork;          ///< a test lets it fail
   };
 
   explicit Supervisor(Options options);
@@ -117,6 +121,7 @@ class Supervisor {
   void HearNotices();
   void OnNotice(pid_t sender, const std::string& text);
   void KillHung();
+  int64_t SilentUntil(const Child& child) const;
   void TakeSignals();
   void Poll(int64_t deadline_ns);
   int64_t NextDeadline() const;

@@ -201,6 +201,24 @@ TEST(SupervisorTest, KillsWhoHangsAndStartsItAgain) {
   EXPECT_TRUE(supervisor.Alive("silent"));
 }
 
+TEST(SupervisorTest, KillsWhoHangsBeforeItsFirstWord) {
+  Supervisor::Options options = Eager();
+  options.watchdog_ns = 100'000'000;
+  options.first_word_ns = 400'000'000;
+  Supervisor supervisor(options);
+  ChildSpec ours = Sleeper("ours");
+  ours.speaks = true;
+  supervisor.Start(Sleeper("foreign"));
+  const int64_t begun_ns = Supervisor::now_ns();
+  supervisor.Start(ours);
+  const ChildEvent event = supervisor.Wait(begun_ns + 20 * kSecondNs);
+  EXPECT_EQ(event.kind, Kind::kRestarted);
+  EXPECT_EQ(event.name, "ours");
+  EXPECT_TRUE(event.hung);
+  EXPECT_GE(Supervisor::now_ns() - begun_ns, options.first_word_ns) << "it has longer to begin";
+  EXPECT_TRUE(supervisor.Alive("foreign"));
+}
+
 TEST(SupervisorTest, StopsAllAndKillsWhoDoesNotListen) {
   Supervisor::Options options = Eager();
   options.stop_ns = 300'000'000;

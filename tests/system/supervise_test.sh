@@ -1,4 +1,4 @@
-# Processes that die together, and one that hangs: dmslam-run misses none, and the run comes to its end.
+# Processes that die together, one that hangs, and one whose core hangs: dmslam-run misses none, and the run comes to its end.
 source "$(dirname "$0")/lib.sh"
 need_synthetic
 multicast
@@ -68,4 +68,31 @@ strike STOP mapper
 ends hung 1
 check "it says who hung" grep -q "mapper said nothing for too long" "$work/hung.said"
 expect "nothing is lost with a mapper that hangs" "$work/hung" records_lost "== 0"
+
+# Only its core hangs: its loop turns and speaks on the bus.
+find_python
+if [[ -z $python ]]; then
+  echo "left out: there is no python with ctypes to stop a single thread with"
+else
+  arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --seed 1 --watchdog 2)
+  begin core 20
+  "$python" - "$(pid_of mapper)" <<'STOP_CORE' &
+import ctypes, os, sys
+ptrace = ctypes.CDLL(None).ptrace
+ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+main = int(sys.argv[1])
+for thread in map(int, os.listdir(f"/proc/{main}/task")):
+    if thread != main:
+        ptrace(0x4206, thread, None, None)  # PTRACE_SEIZE
+        ptrace(0x4207, thread, None, None)  # PTRACE_INTERRUPT
+try:
+    while True:
+        os.waitpid(-1, 0x40000000)  # until all of them are dead
+except ChildProcessError:
+    pass
+STOP_CORE
+  ends core 1
+  check "the mapper says that its core hangs" grep -q "a job has given no sign" "$work/core/log/mapper.log"
+  check "it is killed" grep -q "mapper said nothing for too long" "$work/core.said"
+fi
 finish

@@ -175,7 +175,7 @@ BundleReport AdjustBundle(const BundleOptions& options, BundleProblem& problem) 
   // a long run they would lie in the gaps between landmarks all over it, and with a large map the adjustment
   // would spend two thirds of its time waiting for memory. A thread has a heap of its own (an arena of
   // malloc), which is empty before and after. The caller waits for it; nothing runs beside it, and
-  // `interrupt` only reads a flag.
+  // `interrupt` only reads and sets flags.
   return std::async(std::launch::async, [&] { return Adjustment(options, problem).Run(); }).get();
 }
 

@@ -43,6 +43,7 @@ void CoreThread::Post(Job job) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     DMSLAM_CHECK(jobs_.size() < options_.max_jobs, "a job was posted without room for it");
+    if (jobs_.empty()) sign_.Begin();  // else it is that of the one before
     jobs_.push_back(std::move(job));
   }
   changed_.notify_all();
@@ -52,7 +53,9 @@ void CoreThread::Report(Job report) {
   if (!thread_.joinable()) return report();
   {
     std::unique_lock<std::mutex> lock(mutex_);
+    sign_.Rest();  // it waits for who delivers
     changed_.wait(lock, [this] { return stopping_ || reports_.size() < options_.max_reports; });
+    sign_.Begin();
     if (stopping_) return;
     reports_.push_back(std::move(report));
   }
@@ -105,11 +108,13 @@ void CoreThread::RunNext(std::unique_lock<std::mutex>& lock) {
   const Job job = std::move(jobs_.front());
   lock.unlock();
   std::exception_ptr failure;
+  sign_.Begin();
   try {
     job();
   } catch (...) {
     failure = std::current_exception();
   }
+  sign_.Rest();
   lock.lock();
   jobs_.pop_front();
   if (failure) failure_ = failure;

@@ -8,6 +8,8 @@
 #include <mutex>
 #include <thread>
 
+#include "dmslam/runtime/work_sign.h"
+
 namespace dmslam {
 
 /// Runs the jobs of a core one after another, in the order in which they are posted, and hands back what they
@@ -46,11 +48,15 @@ class CoreThread {
   void Finish();
   /// Readable when there is something to deliver; -1 where jobs run at once.
   int fd() const { return event_fd_; }
+  /// Whether a job is in work that has given no sign for longer than this. Of jobs that run at once: never.
+  bool Hangs(int64_t now_ns, int64_t longest_ns) const { return sign_.Hangs(now_ns, longest_ns); }
 
   // ---- From within a job
 
   /// To be called on the thread that posts.
   void Report(Job report);
+  /// The job goes on: to be said now and then by one that takes long. A report says so too.
+  void Beat() { sign_.Beat(); }
 
  private:
   void Work();
@@ -66,6 +72,7 @@ class CoreThread {
   std::exception_ptr failure_;
   size_t delivering_ = 0;  ///< reports that the poster calls just now, or next
   bool stopping_ = false;
+  WorkSign sign_;       ///< of the job in work; at rest where jobs run at once
   std::thread thread_;  ///< not joinable: jobs run at once
 };
 

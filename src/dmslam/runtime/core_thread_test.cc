@@ -4,9 +4,14 @@
 #include <poll.h>
 
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
+
+#include "dmslam/messaging/event_loop.h"
 
 namespace dmslam {
 namespace {
@@ -111,6 +116,82 @@ TEST(CoreThread, AJobWaitsWhereTooMuchWasNotDelivered) {
   }
   core.Finish();
   EXPECT_EQ(heard, 100);
+}
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kLongest = 10'000 * kMs;
+
+/// Runs a job that says `beat` when it has begun, and again when it is let go on; then it waits to end.
+struct WatchedJob {
+  explicit WatchedJob(Mode mode = Mode::kOwnThread) : core(mode) {
+    core.Post([this] {
+      begun = 1;
+      begun.notify_one();
+      go_on.wait(0);
+      core.Beat();
+      beaten = 1;
+      beaten.notify_one();
+      end.wait(0);
+    });
+    AwaitAtLeast(1, begun);
+  }
+  ~WatchedJob() { LetEnd(); }
+  void LetBeat() {
+    go_on = 1;
+    go_on.notify_one();
+    AwaitAtLeast(1, beaten);
+  }
+  void LetEnd() {
+    go_on = end = 1;
+    go_on.notify_one();
+    end.notify_one();
+    core.Finish();
+  }
+  std::atomic<int> begun = 0, go_on = 0, beaten = 0, end = 0;
+  CoreThread core;
+};
+
+TEST(CoreThread, AJobThatGivesNoSignHangs) {
+  WatchedJob job;
+  const int64_t begun_ns = EventLoop::now_ns();
+  EXPECT_FALSE(job.core.Hangs(begun_ns, kLongest)) << "it has just begun";
+  EXPECT_TRUE(job.core.Hangs(begun_ns + kLongest + kMs, kLongest));
+  std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  job.LetBeat();
+  EXPECT_FALSE(job.core.Hangs(begun_ns + kLongest + kMs, kLongest)) << "it goes on";
+  EXPECT_TRUE(job.core.Hangs(EventLoop::now_ns() + kLongest + kMs, kLongest)) << "that was the last of it";
+  job.LetEnd();
+  EXPECT_FALSE(job.core.Hangs(INT64_MAX, kLongest)) << "there is nothing to do";
+  job.core.Beat();
+  EXPECT_FALSE(job.core.Hangs(INT64_MAX, kLongest)) << "said by nobody who works";
+}
+
+TEST(CoreThread, WhoWaitsForItsReportsToBeHeardDoesNotHang) {
+  CoreThread core(Mode::kOwnThread, {1, 1});
+  std::atomic<int> made = 0;
+  core.Post([&] {
+    for (int i = 0; i < 2; ++i) {
+      core.Report([] {});
+      ++made;
+      made.notify_one();
+    }
+  });
+  AwaitAtLeast(1, made);
+  while (core.Hangs(INT64_MAX, 0)) std::this_thread::yield();  // until it waits with the second one
+  EXPECT_EQ(made, 1);
+  core.Finish();
+  EXPECT_EQ(made, 2);
+}
+
+TEST(CoreThread, WhatRunsAtOnceIsWatchedByNobody) {
+  CoreThread core(Mode::kAtOnce);
+  bool hangs = true;
+  core.Post([&] {
+    core.Beat();
+    core.Report([] {});
+    hangs = core.Hangs(INT64_MAX, 0);
+  });
+  EXPECT_FALSE(hangs);
 }
 
 TEST(CoreThread, AnExceptionIsThrownAfterWhatWasSaidBeforeIt) {

@@ -49,6 +49,9 @@ class Node {
   virtual std::optional<int> exit_code() const = 0;
   /// Why it ended, when not well; one line with the cure.
   virtual std::string problem() const { return {}; }
+  /// Whether a thread of it has given no sign of its work for longer than this: then the process is as good
+  /// as dead, though its loop turns.
+  virtual bool Hangs(int64_t /*now_ns*/, int64_t /*longest_ns*/) const { return false; }
   /// What whoever started the process (dmslam-run, systemd) is told once it is ready; one line.
   virtual std::string ready_text() const { return {}; }
 };

@@ -30,6 +30,13 @@ int64_t RandomId() {
   return static_cast<int64_t>((bits >> 1) | 1);
 }
 
+/// Whoever watches the process hears nothing then, and ends it.
+bool IsSeenToHang(const Node& node, int64_t now_ns, int64_t longest_ns) {
+  const bool hangs = node.Hangs(now_ns, longest_ns);
+  if (hangs) LogError("hangs: a job has given no sign for more than {} s", longest_ns / 1'000'000'000);
+  return hangs;
+}
+
 }  // namespace
 
 ProcessMain::ProcessMain(const std::string& role, const std::string& description)
@@ -145,9 +152,14 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.now_ns = &EventLoop::now_ns;
   context.wall_us = &EventLoop::wall_us;
   ServiceNotice notice;
-  context.pump = [&loop, &notice] {
+  std::unique_ptr<Node> node;
+  const auto say_alive = [&notice, &node] {
+    const int64_t now_ns = EventLoop::now_ns();
+    notice.Alive(now_ns, [&] { return !node || !IsSeenToHang(*node, now_ns, notice.longest_silence_ns()); });
+  };
+  context.pump = [&loop, &say_alive] {
     loop.PumpOnce();
-    notice.Alive(EventLoop::now_ns());
+    say_alive();
   };
   context.watch = [&loop](int fd, std::function<void()> on_readable) {
     loop.Watch(fd, std::move(on_readable));
@@ -156,11 +168,11 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.name = ProcessName(OfCamera(role_, options_.camera_id));
   context.fresh_system = fresh_system_;
   context.resumed = resumed_;
-  const std::unique_ptr<Node> node = factory(context, options_);
+  node = factory(context, options_);
   loop.Watch(bus.fd(), [&bus] { bus.Deliver(); });
   notice.Ready(node->ready_text());
   while (!node->exit_code()) {
-    notice.Alive(EventLoop::now_ns());
+    say_alive();
     node->Advance();
     if (node->exit_code()) break;
     if (!loop.PumpOnce(std::min(node->deadline_ns(), notice.deadline_ns())) || loop.stop_signal() != 0)

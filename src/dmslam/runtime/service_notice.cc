@@ -22,7 +22,8 @@ ServiceNotice::ServiceNotice() {
   socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const char* period_us = std::getenv("WATCHDOG_USEC");
   if (period_us == nullptr) return;
-  every_ns_ = std::atoll(period_us) * 1000 / kNoticesPerPeriod;
+  longest_silence_ns_ = std::atoll(period_us) * 1000;
+  every_ns_ = longest_silence_ns_ / kNoticesPerPeriod;
   if (every_ns_ > 0) next_ns_ = INT64_MIN;
 }
 
@@ -36,10 +37,10 @@ void ServiceNotice::Ready(std::string_view status) {
   Send(text);
 }
 
-void ServiceNotice::Alive(int64_t now_ns) {
+void ServiceNotice::Alive(int64_t now_ns, const std::function<bool()>& well) {
   if (every_ns_ <= 0 || now_ns < next_ns_) return;
   next_ns_ = now_ns + every_ns_;
-  Send("WATCHDOG=1");
+  if (well()) Send("WATCHDOG=1");
 }
 
 void ServiceNotice::Send(std::string_view text) {

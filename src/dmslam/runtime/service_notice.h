@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -20,7 +21,10 @@ class ServiceNotice {
   /// `status`: one line that is shown with it; may be empty.
   void Ready(std::string_view status = "");
   /// Says so, four times within the time that was asked for. Cheap: to be called from every turn of a loop.
-  void Alive(int64_t now_ns);
+  /// `well`: asked when it is due; where it is false nothing is said.
+  void Alive(int64_t now_ns, const std::function<bool()>& well);
+  /// Who says nothing for so long is killed; 0: nobody asked.
+  int64_t longest_silence_ns() const { return longest_silence_ns_; }
   /// When Alive wants to be called next.
   int64_t deadline_ns() const { return next_ns_; }
 
@@ -29,6 +33,7 @@ class ServiceNotice {
 
   int socket_ = -1;
   std::string address_;
+  int64_t longest_silence_ns_ = 0;
   int64_t every_ns_ = 0;  ///< 0: nobody asked
   int64_t next_ns_ = INT64_MAX;
 };

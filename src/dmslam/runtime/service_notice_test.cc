@@ -13,6 +13,8 @@
 namespace dmslam {
 namespace {
 
+bool Well() { return true; }
+
 class ServiceNoticeTest : public testing::Test {
  protected:
   ServiceNoticeTest() : fd_(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0)) {
@@ -45,20 +47,30 @@ TEST_F(ServiceNoticeTest, SaysThatItIsReadyAndFourTimesAPeriodThatItIsAlive) {
   EXPECT_EQ(Heard(), "READY=1");
   notice.Ready("to be seen there");
   EXPECT_EQ(Heard(), "READY=1\nSTATUS=to be seen there");
-  notice.Alive(5'000'000'000);
+  notice.Alive(5'000'000'000, Well);
   EXPECT_EQ(Heard(), "WATCHDOG=1");
   EXPECT_EQ(notice.deadline_ns(), 6'000'000'000);
-  notice.Alive(5'999'999'999);
+  notice.Alive(5'999'999'999, Well);
   EXPECT_EQ(Heard(), "");
-  notice.Alive(6'000'000'000);
+  notice.Alive(6'000'000'000, Well);
   EXPECT_EQ(Heard(), "WATCHDOG=1");
+}
+
+TEST_F(ServiceNoticeTest, WhoIsNotWellSaysNothingAndDoesNotSpin) {
+  ServiceNotice notice;
+  EXPECT_EQ(notice.longest_silence_ns(), 4'000'000'000);
+  notice.Alive(5'000'000'000, [] { return false; });
+  EXPECT_EQ(Heard(), "");
+  EXPECT_EQ(notice.deadline_ns(), 6'000'000'000) << "a loop that waits until then turns four times a period";
+  notice.Alive(6'000'000'000, Well);
+  EXPECT_EQ(Heard(), "WATCHDOG=1") << "it has come to itself";
 }
 
 TEST_F(ServiceNoticeTest, SaysNothingWhereNobodyAsked) {
   unsetenv("NOTIFY_SOCKET");
   ServiceNotice notice;
   notice.Ready();
-  notice.Alive(0);
+  notice.Alive(0, Well);
   EXPECT_EQ(notice.deadline_ns(), INT64_MAX);
   EXPECT_EQ(Heard(), "");
 }

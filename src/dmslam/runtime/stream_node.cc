@@ -230,6 +230,17 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
 }
 
 std::unique_ptr<CoreThread> StreamNode::MakeCoreThread(PlaybackMode mode) {
+  auto thread = MakeUnwatchedThread(mode);
+  core_threads_.push_back(thread.get());
+  return thread;
+}
+
+bool StreamNode::Hangs(int64_t now_ns, int64_t longest_ns) const {
+  return std::ranges::any_of(core_threads_,
+                             [&](const CoreThread* thread) { return thread->Hangs(now_ns, longest_ns); });
+}
+
+std::unique_ptr<CoreThread> StreamNode::MakeUnwatchedThread(PlaybackMode mode) {
   const bool own = mode == PlaybackMode::kRealtime && context_.watch;
   auto thread = std::make_unique<CoreThread>(own ? CoreThread::Mode::kOwnThread : CoreThread::Mode::kAtOnce);
   if (own) context_.watch(thread->fd(), [to = thread.get()] { to->Deliver(); });

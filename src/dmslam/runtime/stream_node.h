@@ -42,6 +42,7 @@ class StreamNode : public Node {
   void Stop() override;
   std::optional<int> exit_code() const override { return exit_code_; }
   std::string problem() const override { return problem_; }
+  bool Hangs(int64_t now_ns, int64_t longest_ns) const override;
 
  protected:
   /// `role` in lower case: "frontend". It names channels in upper case.
@@ -87,6 +88,8 @@ class StreamNode : public Node {
   /// Where a core's jobs run: on a thread of its own in real time, at once in lock-step and wherever nothing
   /// can wake this node.
   std::unique_ptr<CoreThread> MakeCoreThread(PlaybackMode mode);
+  /// The same for work whose hanging is no reason to end the process, as a disk's.
+  std::unique_ptr<CoreThread> MakeUnwatchedThread(PlaybackMode mode);
   /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence, for so
   /// long.
   bool MapIsOver(const Map& map, const StreamReader& map_reader, int64_t silent_ns) const;
@@ -227,6 +230,7 @@ class StreamNode : public Node {
   wire::RecordGroups<MapDelta> map_groups_;
   bool map_in_parts_ = false;
   std::vector<Watched> readers_;
+  std::vector<const CoreThread*> core_threads_;  ///< that are watched; owned by the node that asked for them
   ServedReplica replica_;
 };
 

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <functional>
+
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/replica.h"
+#include "dmslam/messaging/event_loop.h"
 #include "dmslam/runtime/exit_codes.h"
 
 namespace dmslam {
@@ -294,6 +298,48 @@ TEST_F(BrokenGroupTest, TheWriterIsSucceededWithinAGroup) {
   EXPECT_EQ(holder_->malformed(), 1) << "the group is named";
   EXPECT_EQ(writer_->statistics().snapshots, 0) << "the replica is good";
   EXPECT_EQ(holder_->held(), (Version{20, 1}));
+}
+
+/// Works on a core's thread, and on a disk's.
+class Worker : public StreamNode {
+ public:
+  Worker(NodeContext context, NodeOptions options)
+      : StreamNode(std::move(context), std::move(options), "mapper"),
+        core(MakeCoreThread(PlaybackMode::kRealtime)),
+        disk(MakeUnwatchedThread(PlaybackMode::kRealtime)) {}
+
+  std::unique_ptr<CoreThread> core, disk;
+
+ private:
+  void Begin(const CameraInfo&) override {}
+  bool WorkOnce() override { return false; }
+};
+
+TEST(StreamNodeTest, HangsWithItsCoreAndNotWithADisk) {
+  MemoryBus bus;
+  NodeContext context;
+  context.bus = &bus.AddPort();
+  context.now_ns = &EventLoop::now_ns;
+  context.wall_us = &EventLoop::wall_us;
+  context.watch = [](int, const std::function<void()>&) {};
+  Worker node(context, {});
+  std::atomic<bool> begun = false, go_on = false;
+  const auto job = [&] {
+    begun = true;
+    begun.notify_one();
+    go_on.wait(false);
+  };
+  node.disk->Post(job);
+  begun.wait(false);
+  EXPECT_FALSE(node.Hangs(INT64_MAX, kMs));
+  begun = false;
+  node.core->Post(job);
+  begun.wait(false);
+  EXPECT_TRUE(node.Hangs(INT64_MAX, kMs));
+  go_on = true;
+  go_on.notify_all();
+  node.core->Finish();
+  EXPECT_FALSE(node.Hangs(INT64_MAX, kMs));
 }
 
 /// Publishes whatever it is told to.
