@@ -27,6 +27,11 @@ std::set<int64_t> Stamps(const std::vector<StampedPose>& poses) {
   return stamps;
 }
 
+bool ToldIsPlaced(const Outcome& outcome, const std::string& folder) {
+  return std::ranges::includes(Stamps(Poses(outcome.trajectory, folder)),
+                               Stamps(Poses(outcome.online, folder)));
+}
+
 }  // namespace
 
 double Number(const Outcome& outcome, const std::string& key) {
@@ -60,6 +65,19 @@ std::string Difference(const Outcome& outcome, const Outcome& undisturbed) {
   return difference;
 }
 
+bool NamesLosses(const Outcome& outcome) {
+  return Number(outcome, "records_lost") > 0 || Number(outcome, "keyframes_lost_with_frontend") > 0 ||
+         Number(outcome, "keyframes_lost_in_crash") > 0 || Number(outcome, "resumed") > 0;
+}
+
+std::string Unnamed(const Outcome& outcome, const std::string& folder) {
+  if (!outcome.failure.empty()) return outcome.failure;
+  std::string loss;
+  if (Number(outcome, "keyframes_missing") != 0) loss += " keyframes are missing,";
+  if (!ToldIsPlaced(outcome, folder)) loss += " a pose that was told is missing,";
+  return loss;
+}
+
 std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allowance& allowed,
                  const std::string& folder) {
   if (!outcome.failure.empty()) return outcome.failure;
@@ -75,9 +93,7 @@ std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allow
   const size_t tracked = Poses(undisturbed.online, folder).size();
   if (distance.tracked + allowed.frames_lost < static_cast<int64_t>(tracked))
     loss += " only " + std::to_string(distance.tracked) + " frames were tracked,";
-  const auto placed = Stamps(Poses(outcome.trajectory, folder));
-  const auto told = Stamps(Poses(outcome.online, folder));
-  if (!std::ranges::includes(placed, told)) loss += " a pose that was told is missing,";
+  if (!ToldIsPlaced(outcome, folder)) loss += " a pose that was told is missing,";
   return loss;
 }
 

@@ -103,6 +103,28 @@ void DrawForgedContents(uint32_t num_frames, Schedule* schedule, Random* random)
   }
 }
 
+/// In the moment in which one process dies others do so too, or all.
+void DrawCompanions(Schedule* schedule, Random* random) {
+  schedule->at_once = true;
+  std::vector<size_t> deaths;
+  for (size_t i = 0; i < schedule->faults.size(); ++i) {
+    if (schedule->faults[i].kind == Fault::Kind::kKill) deaths.push_back(i);
+  }
+  if (deaths.empty()) return;
+  const size_t leader = AnyOf(deaths, random);
+  std::vector<Fault> companions;
+  const uint32_t percent = random->Below(3) == 0 ? 100 : 40;
+  for (const std::string& role : Roles()) {
+    if (role == schedule->faults[leader].process || random->Below(100) >= percent) continue;
+    Fault fault = DrawDeath(*schedule, {role}, random);
+    fault.kind = Fault::Kind::kKill;
+    fault.at_frame = schedule->faults[leader].at_frame;
+    companions.push_back(fault);
+  }
+  schedule->faults.insert(schedule->faults.begin() + static_cast<std::ptrdiff_t>(leader) + 1,
+                          companions.begin(), companions.end());
+}
+
 }  // namespace
 
 std::string ToText(const Fault& fault) {
@@ -189,6 +211,7 @@ Schedule DrawSchedule(uint64_t seed, uint32_t num_frames) {
   DrawDeaths(num_frames, &schedule, &random);
   Random more(DeriveSeed(seed, 0, "more of the schedule"));  // the draws above stay what they were
   if (more.Below(2) == 0) DrawForgedContents(num_frames, &schedule, &more);
+  if (more.Below(2) == 0 && schedule.meets_writers) DrawCompanions(&schedule, &more);
   std::ranges::stable_sort(schedule.faults, {}, &Fault::at_frame);
   return schedule;
 }
