@@ -146,7 +146,10 @@ void CollectorNode::ReadNote(const std::string& text) {
   if (MapId map_id = 0; kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "counters" || kind == "process" || kind == "heard")
     processes_.ReadNote(kind, note, context_.now_ns());
-  if (kind == "resumed") OnResume();
+  if (int64_t epoch = 0; kind == "resumed") {
+    note >> epoch;
+    OnResume(epoch);
+  }
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;
   if (CameraId camera = 0; kind == "frames" && note >> camera)
@@ -383,10 +386,14 @@ void CollectorNode::OpenJournal() {
   }
 }
 
-/// All who held the map had died, and a mapper begins with the last checkpoint: what came after it is gone.
-void CollectorNode::OnResume() {
+/// All who held the map had died, and a mapper begins with the last checkpoint in this term: what came after
+/// it is gone. Collectors that follow each other may all hear the beginning of that term. Whether it is news.
+bool CollectorNode::OnResume(int64_t epoch) {
+  if (resumed_in_ == epoch) return false;
+  resumed_in_ = epoch;
   ++run_.resumes;
   proposals_.OnAllDied();
+  return true;
 }
 
 void CollectorNode::BeginCheckpoints() {
@@ -455,8 +462,8 @@ bool CollectorNode::TakeMapRecord() {
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
   if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot && !proposals_.empty()) {
-    OnResume();
-    journal_->AppendNote("resumed");
+    const int64_t epoch = record->version().epoch;
+    if (OnResume(epoch)) journal_->AppendNote("resumed " + std::to_string(epoch));
   }
   const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
   builder_->OnMapDelta(*delta);

@@ -100,7 +100,7 @@ class CollectorNode : public StreamNode {
   void OnMapReset(const Record& record);
   void OnSessionStart(const Record& record);
   void CountReset(const MapReset& reset);
-  void OnResume();
+  bool OnResume(int64_t epoch);
   bool MapMayBeKept() const;
   void KeepCheckpoint();
   void KeepOnDisk(const Record& record);
@@ -145,7 +145,8 @@ class CollectorNode : public StreamNode {
   Due due_;
   int64_t begun_ns_ = 0;
   FrameCount frames_;
-  bool map_is_fresh_ = false;  ///< a map stream has begun that continues none
+  std::optional<int64_t> resumed_in_;  ///< the mapper's term that began with a checkpoint
+  bool map_is_fresh_ = false;          ///< a map stream has begun that continues none
 };
 
 }  // namespace dmslam

@@ -78,6 +78,29 @@ std::string Unnamed(const Outcome& outcome, const std::string& folder) {
   return loss;
 }
 
+std::string LossByResuming(const Outcome& outcome, const std::string& folder) {
+  std::string loss;
+  int64_t resumed = 0, behind = 0;
+  const std::set<int64_t> placed = Stamps(Poses(outcome.trajectory, folder));
+  for (const Outcome::Resumed& time : outcome.resumed) {
+    if (time.anew) resumed = behind = 0, loss.clear();
+    if (time.anew) continue;
+    resumed += !time.complete;
+    behind += std::ranges::count_if(time.proposed, [&](uint32_t frame) {
+      return !time.newest_keyframe || frame > *time.newest_keyframe;
+    });
+    const auto is_gone = [&](int64_t stamp_ns) { return !placed.contains(stamp_ns); };
+    if (const auto gone = std::ranges::count_if(time.written, is_gone); gone > 0)
+      loss += " of poses that were written are missing: " + std::to_string(gone) + ",";
+  }
+  if (Number(outcome, "resumed") < static_cast<double>(resumed))
+    loss += " it does not say that it was resumed,";
+  const bool only_so = Number(outcome, "resumed") == static_cast<double>(resumed);
+  if (only_so && Number(outcome, "keyframes_lost_in_crash") > static_cast<double>(behind))
+    loss += " keyframes of the checkpoint are lost,";
+  return loss;
+}
+
 std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allowance& allowed,
                  const std::string& folder) {
   if (!outcome.failure.empty()) return outcome.failure;
@@ -87,7 +110,7 @@ std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allow
   };
   if (more("keyframes_missing", allowed.keyframes_missing)) loss += " keyframes are missing,";
   if (more("records_lost", allowed.records_lost)) loss += " records are lost,";
-  if (Number(outcome, "resumed") != 0) loss += " it began again from a checkpoint,";
+  if (more("resumed", allowed.resumed)) loss += " it began again from a checkpoint,";
   const Distance distance = Measure(outcome, undisturbed, folder);
   if (distance.rmse > allowed.most_apart) loss += " poses are off by " + std::to_string(distance.rmse) + ",";
   const size_t tracked = Poses(undisturbed.online, folder).size();

@@ -29,11 +29,15 @@ struct Allowance {
   int64_t frames_lost = 0;        ///< so many frames may not have been tracked
   int64_t records_lost = 0;       ///< so many records, with who wrote them
   int64_t keyframes_missing = 0;  ///< so many keyframes, without a word of why
+  int64_t resumed = 0;            ///< so often it may have begun again from a checkpoint
 };
 /// Whether the results name anything that was lost: records, keyframes, or a map from which it went on.
 bool NamesLosses(const Outcome& outcome);
 /// What is missing in a run although nothing of it is named; empty: nothing.
 std::string Unnamed(const Outcome& outcome, const std::string& folder);
+
+/// What a run has lost that was on the disk when all processes died, or does not count; empty: nothing.
+std::string LossByResuming(const Outcome& outcome, const std::string& folder);
 
 /// What a run has lost beyond that; empty: nothing.
 std::string Loss(const Outcome& outcome, const Outcome& undisturbed, const Allowance& allowed,

@@ -125,6 +125,18 @@ void DrawCompanions(Schedule* schedule, Random* random) {
                           companions.begin(), companions.end());
 }
 
+/// All die, once or twice, and somebody resumes the run.
+void DrawResumes(uint32_t num_frames, Schedule* schedule, Random* random) {
+  if (random->Below(2) == 0) schedule->checkpoint_s = random->Uniform(0.3, 2);
+  for (uint32_t i = 1 + (random->Below(4) == 0); i > 0; --i) {
+    Fault fault;
+    fault.kind = random->Below(2) == 0 ? Fault::Kind::kKillAll : Fault::Kind::kPowerCut;
+    fault.lasts_ns = Between(kSecond / 2, random->Below(2) ? 5 * kSecond : 60 * kSecond, random);
+    Place(&fault, random->Below(num_frames + 1), num_frames, random);
+    schedule->faults.push_back(fault);
+  }
+}
+
 }  // namespace
 
 std::string ToText(const Fault& fault) {
@@ -157,6 +169,12 @@ std::string ToText(const Fault& fault) {
     case Fault::Kind::kFullDisk:
       text = "the disk is full for " + lasts;
       break;
+    case Fault::Kind::kKillAll:
+      text = "all are killed, and the run is resumed after " + lasts;
+      break;
+    case Fault::Kind::kPowerCut:
+      text = "the power is cut, and the run is resumed after " + lasts;
+      break;
     case Fault::Kind::kContent:
       text = "a forged " + ToText(fault.content);
       break;
@@ -177,6 +195,12 @@ std::string Schedule::ToText() const {
 bool Schedule::MeetsDeaths() const {
   return std::ranges::any_of(faults, [](const Fault& fault) {
     return fault.kind == Fault::Kind::kKill || fault.kind == Fault::Kind::kMove;
+  });
+}
+
+bool Schedule::IsResumed() const {
+  return std::ranges::any_of(faults, [](const Fault& fault) {
+    return fault.kind == Fault::Kind::kKillAll || fault.kind == Fault::Kind::kPowerCut;
   });
 }
 
@@ -212,6 +236,7 @@ Schedule DrawSchedule(uint64_t seed, uint32_t num_frames) {
   Random more(DeriveSeed(seed, 0, "more of the schedule"));  // the draws above stay what they were
   if (more.Below(2) == 0) DrawForgedContents(num_frames, &schedule, &more);
   if (more.Below(2) == 0 && schedule.meets_writers) DrawCompanions(&schedule, &more);
+  if (more.Below(4) == 0) DrawResumes(num_frames, &schedule, &more);
   std::ranges::stable_sort(schedule.faults, {}, &Fault::at_frame);
   return schedule;
 }

@@ -22,6 +22,8 @@ struct Fault {
     kForgery,    ///< a message of somebody else's, with the right checksum
     kEcho,       ///< the newest message of some channel, once more
     kFullDisk,   ///< the collector's disk takes nothing
+    kKillAll,    ///< all processes and who started them die; somebody resumes the run later
+    kPowerCut,   ///< ... and the hosts begin again, with what was synced
     kContent,    ///< a forged message of what is played or computed
   };
   Kind kind = Kind::kPause;
@@ -50,11 +52,14 @@ struct Schedule {
   bool meets_writers = false;          ///< processes that make the map die or move
   bool at_once = false;                ///< faults do not wait for each other: several may be away
   bool realtime = false;               ///< frames come at their rate, and nobody waits for the mapper
+  double checkpoint_s = 10;            ///< so often the collector keeps the map
   std::vector<Fault> faults;           ///< in the order of their frames
 
   std::string ToText() const;
   /// Whether a process dies or moves.
   bool MeetsDeaths() const;
+  /// Whether all of them die, and the run is resumed.
+  bool IsResumed() const;
 };
 
 /// The processes of a run.

@@ -9,10 +9,12 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "collector/make_collector.h"
 #include "dmslam/recording/checkpoint.h"
+#include "dmslam/recording/journal.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/not_yet_error.h"
@@ -20,6 +22,8 @@
 #include "loopcloser/make_loopcloser.h"
 #include "mapper/make_mapper.h"
 #include "player/player_node.h"
+#include "run/resume.h"
+#include "simulated_disk.h"
 
 namespace dmslam::simulation {
 namespace {
@@ -35,7 +39,8 @@ constexpr int64_t kLookAgainNs = kSecond / 500;
 constexpr int64_t kBackNs = 8 * kSecond;  // who begins is surely back in the run
 constexpr int64_t kFarewellNs = 5 * kSecond;
 constexpr int64_t kStepNs = 20'000;  // what happens within it happens at once
-constexpr uint32_t kSession = 1;
+constexpr uint32_t kFirstSession = 1;
+constexpr int64_t kBootNs = 20 * kSecond;  // from a host's start until its processes begin
 
 /// The clocks of a host: none agrees with another one's.
 struct Host {
@@ -87,8 +92,10 @@ class SimulatedSystem {
       : workload_(workload),
         schedule_(schedule),
         folder_(std::move(folder)),
+        settings_(workload.settings),
         random_(DeriveSeed(schedule.seed, 0, "run")),
         network_(schedule.network, &random_) {
+    settings_.Set("collector.checkpoint_s", std::to_string(schedule.checkpoint_s));
     for (int i = 0; i < schedule.num_hosts; ++i) {
       hosts_.push_back({static_cast<int64_t>(random_.Below(100'000)) * kSecond,
                         i == 0 ? 0 : (random_.Below(7200) - int64_t{3600}) * 1'000'000});
@@ -97,8 +104,7 @@ class SimulatedSystem {
       Process process;
       process.role = role;
       process.host = schedule.host_of.at(role);
-      process.begins_ns =
-          kBeginNs + static_cast<int64_t>(random_.Uniform() * static_cast<double>(schedule.latest_start_ns));
+      process.begins_ns = kBeginNs + LittleLater();
       processes_.push_back(std::move(process));
     }
   }
@@ -230,18 +236,25 @@ class SimulatedSystem {
     context.name = process.role + " on host " + std::to_string(process.host) + " (life " +
                    std::to_string(process.lives) + ")";
     context.pid = ++pids_;
-    context.fresh_system = schedule_.fresh_system && process.lives == 1 && !process.takes_over;
+    const bool is_first = process.lives == 1 && !process.takes_over;
+    context.resumed = resume_.has_value() && is_first;
+    context.fresh_system = (schedule_.fresh_system && is_first) || context.resumed;
     return context;
   }
 
   NodeOptions OptionsFor(const Process& process) const {
     NodeOptions options;
     options.take_over = process.takes_over;
-    options.session = kSession;
+    options.session = session_;
     options.peers = {"frontend", "mapper", "loopcloser", "collector"};
     options.link = schedule_.link;
-    options.settings = workload_.settings;
+    options.settings = settings_;
     return options;
+  }
+
+  /// Processes that begin together do so one after the other.
+  int64_t LittleLater() {
+    return static_cast<int64_t>(random_.Uniform() * static_cast<double>(schedule_.latest_start_ns));
   }
 
   void Begin(Process* process) {
@@ -272,8 +285,10 @@ class SimulatedSystem {
     PlayerOptions player;
     player.sequence = "simulated";
     player.camera = workload_.camera;
-    player.session = kSession;
+    player.session = session_;
     player.take_over = options.take_over;
+    if (resume_) player.behind = resume_->play_behind;
+    if (resume_ && process->lives == 1) player.lead_s = resume_->lead_s;
     player.mode = schedule_.realtime ? PlaybackMode::kRealtime : PlaybackMode::kLockstep;
     auto node =
         std::make_unique<PlayerNode>(context, player, std::make_unique<StoredFrames>(&workload_.frames));
@@ -345,6 +360,10 @@ class SimulatedSystem {
       case Fault::Kind::kForgery:
         network_.Forge();
         return Tell("somebody", ToText(fault));
+      case Fault::Kind::kKillAll:
+      case Fault::Kind::kPowerCut:
+        if (!farewell_ns_) KillAll(fault);
+        return;
       case Fault::Kind::kContent:
         if (!network_.Forge(fault.content)) return;
         outcome_.forged.push_back({fault.content, frames_played_});
@@ -395,6 +414,68 @@ class SimulatedSystem {
     process->begins_ns = now_ns_ + fault.lasts_ns;
   }
 
+  /// Whoever resumes it finds what is on the disk then, or begins the run anew.
+  void KillAll(const Fault& fault) {
+    Tell("everybody", ToText(fault));
+    for (Process& process : processes_) {
+      if (process.node) Remove(&process);
+    }
+    processes_.clear();
+    if (fault.kind == Fault::Kind::kPowerCut) {
+      LoseUnsynced(JournalPath(), &random_);
+      for (Host& host : hosts_) host.up_since_ns = kBootNs - now_ns_ - fault.lasts_ns;
+    }
+    outcome_.resumed.push_back(LookAtDisk());
+    Outcome::Resumed& found = outcome_.resumed.back();
+    try {
+      resume_ = FindResumePoint(folder_, {session_, "", {}, 0, 0});
+      found.last_frame = resume_->last_frame;
+      found.newest_keyframe = resume_->newest_keyframe;
+      found.complete = FindCheckpoint(CheckpointPath(folder_), session_).map->map.progress().ended;
+      Tell("somebody", "resumes the run behind frame " + std::to_string(resume_->play_behind.value_or(0)));
+    } catch (const InputError& error) {
+      found.anew = true;
+      Tell("somebody", std::string("begins anew: ") + error.what());
+      BeginAnew();
+    }
+    for (const std::string& role : Roles()) {
+      Process process;
+      process.role = role;
+      process.host = schedule_.host_of.at(role);
+      process.begins_ns = now_ns_ + fault.lasts_ns + LittleLater();
+      processes_.push_back(std::move(process));
+    }
+  }
+
+  /// Another run, in an empty folder.
+  void BeginAnew() {
+    ++session_;
+    resume_.reset();
+    frames_played_ = 0;
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+
+  std::string JournalPath() const { return folder_ + "/collector.journal"; }
+
+  Outcome::Resumed LookAtDisk() const {
+    Outcome::Resumed found;
+    found.at_frame = frames_played_;
+    const auto take = [&](std::span<const uint8_t> record) {
+      const auto pose = wire::Decode<FramePose>(record);
+      if (pose && pose->HasPose()) found.written.insert(pose->stamp_ns);
+    };
+    const auto read = [&](const std::string& text) {
+      std::istringstream note(text);
+      std::string kind;
+      uint64_t keyframe = 0;
+      if (note >> kind >> keyframe && kind == "keyframe")
+        found.proposed.insert(KeyframeId{keyframe}.frame_index());
+    };
+    Journal::Read(JournalPath(), session_, take, read);
+    return found;
+  }
+
   /// The newest of its role that is there.
   Process* Find(const std::string& role) {
     const auto found = std::ranges::find_if(
@@ -422,10 +503,13 @@ class SimulatedSystem {
   const Workload& workload_;
   const Schedule& schedule_;
   const std::string folder_;
+  Settings settings_;
   Random random_;
   SimulatedNetwork network_;
   std::vector<Host> hosts_;
   std::deque<Process> processes_;
+  uint32_t session_ = kFirstSession;
+  std::optional<ResumePoint> resume_;  ///< from where the run went on when all had died
   int64_t now_ns_ = kBeginNs;
   size_t next_fault_ = 0;
   std::optional<int64_t> frame_ns_;  ///< when the next fault's frame was played

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -56,6 +58,17 @@ struct Outcome {
     uint32_t frame;  ///< so many had been played
   };
   std::vector<Forged> forged;
+  /// All processes had died.
+  struct Resumed {
+    uint32_t at_frame = 0;                    ///< so many had been played
+    bool complete = false;                    ///< the last map is on the disk: nothing is left to compute
+    bool anew = false;                        ///< nothing was left to resume: it was begun anew
+    std::optional<uint32_t> last_frame;       ///< of which there was a word on the disk
+    std::optional<uint32_t> newest_keyframe;  ///< of the checkpoint, its frame
+    std::set<uint32_t> proposed;  ///< frames that were proposed as keyframes, as far as the disk has it
+    std::set<int64_t> written;    ///< stamps of the frames whose poses were in the journal
+  };
+  std::vector<Resumed> resumed;
   SimulatedNetwork::Statistics network;
 };
 

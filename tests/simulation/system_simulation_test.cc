@@ -34,6 +34,7 @@ constexpr int64_t kRecordsLost =
 constexpr uint32_t kFirstMapFrame =
     15;                           // a frontend that dies before it loses all that it had for the first map
 constexpr double kMostApart = 2;  // of the spread of undisturbed runs
+constexpr double kBetweenKeyframesS = 1;  // in the sequence of these tests
 constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kSecond = 1000 * kMs;
 
@@ -163,6 +164,14 @@ class SystemSimulation : public ::testing::Test {
     if (forged.content == Content::kReset) allowed.frames_lost += forged.frame + kFirstMapFrame;
     return allowed;
   }
+  static Allowance AllowedBy(const Outcome::Resumed& resumed) {
+    Allowance allowed;
+    if (resumed.anew) return allowed;
+    allowed.resumed = !resumed.complete;
+    allowed.most_apart = UnrefinedApart();
+    allowed.frames_lost = kFramesLostByFrontend;
+    return allowed;
+  }
   static Allowance AllowedBy(const Schedule& schedule, const Outcome& outcome) {
     Allowance sum;
     sum.most_apart = kMostApart * Spread();
@@ -171,9 +180,11 @@ class SystemSimulation : public ::testing::Test {
       sum.frames_lost += allowed.frames_lost;
       sum.records_lost += allowed.records_lost;
       sum.keyframes_missing += allowed.keyframes_missing;
+      sum.resumed += allowed.resumed;
     };
     for (const Fault& fault : schedule.faults) add(AllowedBy(fault));
     for (const Outcome::Forged& forged : outcome.forged) add(AllowedBy(forged));
+    for (const Outcome::Resumed& resumed : outcome.resumed) add(AllowedBy(resumed));
     return sum;
   }
 
@@ -189,16 +200,42 @@ class SystemSimulation : public ::testing::Test {
            outcome.failure.starts_with("collector has ended with 6: no frame was tracked");
   }
 
+  /// Where nobody kept the collector from its work, no change of the map is older than the checkpoint's age,
+  /// but for the keyframe that comes next.
+  static std::string TooOldACheckpoint(const Schedule& schedule, const Outcome& outcome) {
+    using Kind = Fault::Kind;
+    const bool was_kept_from_it = std::ranges::any_of(schedule.faults, [](const Fault& fault) {
+      return fault.kind != Kind::kKillAll && fault.kind != Kind::kPowerCut && fault.kind != Kind::kContent;
+    });
+    const auto& frames = common_->workload.frames;
+    const auto is_too_old = [&](const Outcome::Resumed& time) {
+      if (time.anew || time.complete || !time.last_frame || !time.newest_keyframe) return false;
+      const double age_s =
+          static_cast<double>(frames[*time.last_frame].stamp_ns - frames[*time.newest_keyframe].stamp_ns) *
+          1e-9;
+      return age_s > schedule.checkpoint_s + kBetweenKeyframesS;
+    };
+    return !was_kept_from_it && std::ranges::any_of(outcome.resumed, is_too_old)
+               ? " the checkpoint is too old,"
+               : "";
+  }
+  static bool WasResumed(const Outcome& outcome) {
+    return std::ranges::any_of(outcome.resumed, [](const Outcome::Resumed& time) { return !time.anew; });
+  }
+
   /// Why the promises are not kept; empty: they are.
   static std::string Broken(const Schedule& schedule, const Outcome& outcome) {
     if (LostItsOnlyMap(outcome)) return "";
     if (outcome.restarts > 0 && !schedule.MeetsDeaths()) return " a process had to be started again";
     // Who holds something together may lose it together: that is named.
-    if (schedule.at_once && NamesLosses(outcome)) return Unnamed(outcome, common_->folder.string());
+    const std::string folder = common_->folder.string();
+    const std::string by_resuming = LossByResuming(outcome, folder) + TooOldACheckpoint(schedule, outcome);
+    if (schedule.at_once && NamesLosses(outcome)) return Unnamed(outcome, folder) + by_resuming;
     const bool costly =
         WasForged(outcome, [](const Outcome::Forged& forged) { return MayCost(forged.content); });
-    if (!schedule.meets_writers && !costly) return Difference(outcome, common_->undisturbed);
-    return Loss(outcome, common_->undisturbed, AllowedBy(schedule, outcome), common_->folder.string());
+    if (!schedule.meets_writers && !costly && !WasResumed(outcome))
+      return Difference(outcome, common_->undisturbed);
+    return Loss(outcome, common_->undisturbed, AllowedBy(schedule, outcome), folder) + by_resuming;
   }
 
   static void Tell(const Schedule& schedule, const Outcome& outcome) {
@@ -442,12 +479,30 @@ TEST_F(SystemSimulation, PlayerAndFrontendThatDieTogetherDoNotGoBack) {
   }
 }
 
+/// The mapper's stream begins with the checkpoint, and is kept while the loop closer lacks it: the second
+/// collector hears the same beginning.
+TEST_F(SystemSimulation, CollectorsThatFollowEachOtherCountOneResume) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  Fault all_die = Kill("", 21, kSecond);
+  all_die.kind = Fault::Kind::kKillAll;
+  Fault stands_still = Kill("loopcloser", 21, 2 * kSecond, kSecond + 10 * kMs);
+  stands_still.kind = Fault::Kind::kPause;
+  schedule.faults = {all_die, stands_still, Kill("collector", 21, kSecond / 10, kSecond)};
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  ASSERT_EQ(outcome.failure, "") << outcome.story;
+  ASSERT_EQ(outcome.resumed.size(), 1u);
+  EXPECT_FALSE(outcome.resumed[0].anew);
+  EXPECT_EQ(Number(outcome, "resumed"), 1) << outcome.story;
+}
+
 TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {
   const int64_t first = FromEnvironment("DMSLAM_FIRST_SCHEDULE", 1);
   const int64_t count = FromEnvironment("DMSLAM_SCHEDULES", 100);
   std::map<Fault::Kind, int64_t> faults;
   std::map<Content, int64_t> forged;
-  int64_t lost = 0, broken = 0, of_writers = 0, at_once = 0;
+  int64_t lost = 0, broken = 0, of_writers = 0, at_once = 0, resumed = 0;
   const double began_s = ProcessorSeconds();
   for (int64_t seed = first; seed < first + count && broken < 20; ++seed) {
     const Schedule schedule = DrawSchedule(static_cast<uint64_t>(seed), NumFrames());
@@ -458,20 +513,22 @@ TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {
     lost += outcome.network.lost;
     of_writers += schedule.meets_writers;
     at_once += schedule.at_once;
+    resumed += WasResumed(outcome);
     const std::string why = Broken(schedule, outcome);
     broken += !why.empty();
     EXPECT_EQ(why, "") << "schedule " << seed << ": " << schedule.ToText() << "\n" << outcome.story;
   }
   std::printf(
-      "%ld schedules, %ld of them with deaths or moves of who makes the map, %ld with several at once; %ld "
-      "not as promised; %ld messages lost; %.2f s of processor time each\n",
+      "%ld schedules, %ld of them with deaths or moves of who makes the map, %ld with several at once, %ld "
+      "resumed; %ld not as promised; %ld messages lost; %.2f s of processor time each\n",
       static_cast<long>(count), static_cast<long>(of_writers), static_cast<long>(at_once),
-      static_cast<long>(broken), static_cast<long>(lost),
+      static_cast<long>(resumed), static_cast<long>(broken), static_cast<long>(lost),
       (ProcessorSeconds() - began_s) / static_cast<double>(count));
   if (count < 100) return;
   for (const auto& [kind, times] : faults) EXPECT_GT(times, 5) << "of kind " << static_cast<int>(kind);
-  EXPECT_EQ(faults.size(), 9u) << "the schedules really try what they are for";
+  EXPECT_EQ(faults.size(), 11u) << "the schedules really try what they are for";
   EXPECT_GT(at_once, 5);
+  EXPECT_GT(resumed, 5);
   EXPECT_EQ(forged.size(), static_cast<size_t>(kNumContents));
 }
 
