@@ -352,7 +352,9 @@ void CollectorNode::OpenJournal() {
   journal_ = std::make_unique<Journal>(JournalPath(collector_.out_dir));
   const auto announced_before =
       std::exchange(frames_.announced, {});  // by the players, before there was a journal
+  bool is_first = true;  // of this run's collectors: what was told before it came, nobody else has
   const auto take = [&](std::span<const uint8_t> record) {
+    is_first = false;
     CameraId camera = 0;
     if (const auto pose = wire::Decode<FramePose>(record)) {
       CountFrame(*pose);
@@ -370,7 +372,10 @@ void CollectorNode::OpenJournal() {
   if (begins) {
     journal_->Begin(session_);
   } else {
-    journal_->Resume(session_, take, [this](const std::string& note) { ReadNote(note); });
+    journal_->Resume(session_, take, [&](const std::string& note) {
+      is_first = false;
+      ReadNote(note);
+    });
   }
   for (const auto& [camera, frames] : announced_before) Announce(camera, frames.first, frames.second);
   const auto note = [this](const std::string& text) { journal_->AppendNote(text); };
@@ -382,7 +387,7 @@ void CollectorNode::OpenJournal() {
         StreamId::kFrontend, "FRONTEND",
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
          channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        safe_[camera], camera));
+        safe_[camera], camera, is_first));
   }
 }
 

@@ -45,15 +45,16 @@ struct Schedule {
   NetworkConditions network;
   Link link = Link::kHost;
   int num_hosts = 1;
-  std::map<std::string, int> host_of;  ///< where each process begins
-  int64_t slowest_turn_ns = 0;         ///< a process takes up to so long until it looks again
-  int64_t latest_start_ns = 0;         ///< processes begin within this time
-  bool fresh_system = true;            ///< they are told that nobody else can be writing
-  bool meets_writers = false;          ///< processes that make the map die or move
-  bool at_once = false;                ///< faults do not wait for each other: several may be away
-  bool realtime = false;               ///< frames come at their rate, and nobody waits for the mapper
-  double checkpoint_s = 10;            ///< so often the collector keeps the map
-  std::vector<Fault> faults;           ///< in the order of their frames
+  std::map<std::string, int> host_of;        ///< where each process begins
+  int64_t slowest_turn_ns = 0;               ///< a process takes up to so long until it looks again
+  int64_t latest_start_ns = 0;               ///< processes begin within this time
+  std::map<std::string, int64_t> begins_ns;  ///< but these, which begin so much later
+  bool fresh_system = true;                  ///< they are told that nobody else can be writing
+  bool meets_writers = false;                ///< processes that make the map die or move
+  bool at_once = false;                      ///< faults do not wait for each other: several may be away
+  bool realtime = false;                     ///< frames come at their rate, and nobody waits for the mapper
+  double checkpoint_s = 10;                  ///< so often the collector keeps the map
+  std::vector<Fault> faults;                 ///< in the order of their frames
 
   std::string ToText() const;
   /// Whether a process dies or moves.

@@ -105,6 +105,8 @@ class SimulatedSystem {
       process.role = role;
       process.host = schedule.host_of.at(role);
       process.begins_ns = kBeginNs + LittleLater();
+      const auto later = schedule.begins_ns.find(role);
+      if (later != schedule.begins_ns.end()) process.begins_ns = kBeginNs + later->second;
       processes_.push_back(std::move(process));
     }
   }

@@ -313,6 +313,33 @@ TEST_F(SystemSimulation, WhatADeadFrontendHadNotDeliveredIsCounted) {
   EXPECT_GE(Number(outcome, "records_lost"), 5) << outcome.summary;
 }
 
+/// In real time nobody waits for the collector: whether the next frontend begins before it or after it. The
+/// map says how far the dead one had told. (The next one comes too late to track anything here.)
+TEST_F(SystemSimulation, WhatAFrontendToldThatDiedBeforeTheCollectorCameIsCounted) {
+  for (const uint32_t frame : {16u, 30u}) {
+    Schedule schedule = CalmSchedule();
+    schedule.at_once = true;
+    schedule.realtime = true;
+    schedule.begins_ns["collector"] = 4 * kSecond;
+    schedule.faults = {Kill("frontend", frame, kSecond / 10)};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    EXPECT_GE(Number(outcome, "records_lost"), frame) << outcome.story << outcome.summary;
+  }
+}
+
+/// ... and where it only comes late, it misses nothing.
+TEST_F(SystemSimulation, ACollectorThatComesLateMissesNothingOfAFrontendThatLives) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  schedule.realtime = true;
+  schedule.begins_ns["collector"] = 4 * kSecond;
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  EXPECT_EQ(outcome.failure, "") << outcome.story;
+  EXPECT_EQ(Number(outcome, "records_lost"), 0) << outcome.story;
+}
+
 /// The mapper, and the collector half a second later, at the very end: whatever they had told whom until
 /// then.
 TEST_F(SystemSimulation, MapperAndCollectorMayDieTogetherAtTheEnd) {

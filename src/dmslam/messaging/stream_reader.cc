@@ -239,7 +239,8 @@ void StreamReader::CountLostOfFormerTerms() {
 }
 
 void StreamReader::NoteWritten(const Version& version) {
-  if (first_epoch_ == 0 || version.epoch < first_epoch_) return;
+  const bool before_it_came = first_epoch_ == 0 || version.epoch < first_epoch_;
+  if (version.empty() || (before_it_came && !options_.wants_all)) return;
   int64_t& known = written_[version.epoch].known;
   known = std::max(known, version.seq);
   CountLostOfFormerTerms();
@@ -270,7 +271,8 @@ void StreamReader::Follow(const head_t& head) {
   window_.Expose(head.header.seq);
   const bool gap = head.first_seq > window_.received() + 1;
   if (gap && !std::exchange(beacons_.gap_seen, true)) return;
-  const bool joins = !std::exchange(joined_, true) && held_.empty();  // what was before it came is another's
+  const bool joins = !std::exchange(joined_, true) && held_.empty();
+  const bool is_anothers = joins && !options_.wants_all;  // what was before it came
   beacons_.gap_seen = false;
   if (!gap) return;
   if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
@@ -278,7 +280,7 @@ void StreamReader::Follow(const head_t& head) {
     FollowSnapshot(head);
   } else {
     const int64_t given_up = window_.GiveUpBefore(head.first_seq);
-    if (!joins) statistics_.lost += given_up;
+    if (!is_anothers) statistics_.lost += given_up;
   }
 }
 

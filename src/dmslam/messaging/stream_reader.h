@@ -24,7 +24,7 @@ struct ReaderStatistics {
   int64_t requested = 0;      ///< ranges of bytes or records named as missing
   int64_t repaired = 0;       ///< records that came late or in pieces, after they had been named as missing
   int64_t lost = 0;  ///< records given up: no longer kept, and the writer offers no snapshot; those that
-                     ///< were gone before a reader that held nothing came are not counted
+                     ///< were gone before a reader that held nothing came are counted where it wants all
   int64_t lost_with_writer =
       0;                        ///< of them: those of a writer that is gone and has no successor who has them
   int64_t snapshots = 0;        ///< received whole
@@ -62,6 +62,9 @@ class StreamReader : public StateMachine {
     /// What the owner holds already; none: that will turn out, and what it has not received of a writer that
     /// is gone may be what it holds.
     std::optional<Version> start = Version();
+    /// What was written before this reader came, and does not come any more, counts as lost: it is the first
+    /// of its owners, and begins with nothing.
+    bool wants_all = false;
     int64_t only_writer = 0;  ///< follows terms of this writer id alone (a hand-over); 0: of any
     ReceiveWindow::Limits limits;
     int64_t ack_ns = 30'000'000;          ///< between acknowledgements while something is new or missing
@@ -98,7 +101,7 @@ class StreamReader : public StateMachine {
 
   /// Another reader of the stream has had it up to `version`: what of that is not here when its writer is
   /// gone is lost, even where no beacon told of it. Terms that were over before this reader came do not
-  /// count.
+  /// count, unless it wants all.
   void NoteWritten(const Version& version);
 
   void Advance(int64_t now_ns) override;

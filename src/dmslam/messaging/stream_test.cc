@@ -288,6 +288,12 @@ TEST(Stream, WithoutSnapshotsAReaderSkipsWhatIsGoneAndCountsWhatItMissed) {
   pair.Run(300 * kMs);
   EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{11, 12, 13}));
   EXPECT_EQ(pair.reader.statistics().lost, 2);
+  StreamReader::Options first = ReaderOptions();
+  first.wants_all = true;
+  pair.reader = StreamReader(first);
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{11, 12, 13}));
+  EXPECT_EQ(pair.reader.statistics().lost, 10) << "it is the first one, and wanted them too";
 }
 
 TEST(Stream, AReaderThatHeldSomethingCountsWhatIsGoneWhenItComesBack) {
@@ -509,6 +515,31 @@ TEST(Stream, OfAWriterThatIsGoneWhatOthersHadIsCountedOnce) {
   pair.reader.NoteWritten({2000, 1});
   EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{1, 2, 3, 4, 5, 6}));
   EXPECT_EQ(pair.reader.statistics().lost_with_writer, 7);
+}
+
+/// Of terms that were over before it came.
+TEST(Stream, WhoWantsAllMissesWhatWasWrittenBeforeItCame) {
+  for (const bool wants_all : {false, true}) {
+    Pair pair;
+    StreamReader::Options options = ReaderOptions();
+    options.wants_all = wants_all;
+    pair.reader = StreamReader(options);
+    pair.reader.NoteWritten({900, 6});
+    pair.reader.NoteWritten({900, 7});
+    EXPECT_EQ(pair.reader.statistics().lost, 0) << "no later writer was heard: it may live";
+    pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(1), 0);
+    pair.Run(300 * kMs);
+    EXPECT_EQ(pair.reader.statistics().lost, wants_all ? 7 : 0);
+    pair.reader.NoteWritten({800, 2});
+    pair.reader.NoteWritten({900, 7});
+    EXPECT_EQ(pair.reader.statistics().lost, wants_all ? 9 : 0) << "each once";
+    EXPECT_EQ(pair.reader.statistics().lost_with_writer, wants_all ? 9 : 0);
+    EXPECT_EQ(pair.TakeAll(), std::vector<int64_t>{1});
+    pair.reader.NoteWritten({1000, 1});
+    pair.writer = StreamWriter(WriterOptions(), Term{2000, 1}, Version{});
+    pair.Run(300 * kMs);
+    EXPECT_EQ(pair.reader.statistics().lost, wants_all ? 9 : 0) << "what came is not lost";
+  }
 }
 
 TEST(Stream, AReaderThatStartsFromAVersionMissesWhatItsWriterWroteBehindIt) {

@@ -208,7 +208,8 @@ int64_t StreamNode::PublishBytes(const std::string& channel, Bytes bytes) {
 
 std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
                                                      const std::vector<std::string>& record_channels,
-                                                     std::optional<Version> start, CameraId camera) {
+                                                     std::optional<Version> start, CameraId camera,
+                                                     bool wants_all) {
   StreamReader::Options options;
   options.session = session_;
   options.stream = StreamOfCamera(stream, camera);
@@ -220,6 +221,7 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   options.schema_hash = SchemaHash();
   options.clock_offset_us = ClockOffsetUs(context_);
   options.start = start;
+  options.wants_all = wants_all;
   auto reader = std::make_unique<StreamReader>(options);
   std::vector<std::string> record_channels_of_camera;
   for (const std::string& channel : record_channels)

@@ -70,7 +70,8 @@ class StreamNode : public Node {
   void Listen(const std::vector<std::string>& channels, CameraId camera);
   std::unique_ptr<StreamReader> MakeReader(StreamId stream, const std::string& owner,
                                            const std::vector<std::string>& record_channels,
-                                           std::optional<Version> start = Version(), CameraId camera = 0);
+                                           std::optional<Version> start = Version(), CameraId camera = 0,
+                                           bool wants_all = false);
   struct WriterPlan {
     StreamId stream = StreamId::kTest;
     std::vector<std::string> readers;  ///< roles of the lossless readers
