@@ -1,5 +1,6 @@
 # The command lines of the systemd units, with the settings file that is installed beside them, make a whole run; what dies
-# of a signal is started again as Restart=on-failure does, and the others go on.
+# of a signal is started again as Restart=on-failure does, and the others go on; where all died the mapper goes on from the
+# collector's checkpoint.
 source "$(dirname "$0")/lib.sh"
 source "$(dirname "$0")/units.sh"
 need_synthetic
@@ -21,11 +22,21 @@ until grep -qs 'frame [0-9]* of' "$work/collector.log"; do
   sleep 0.05
 done
 kill -KILL "$(mine | sed -nE 's/^([0-9]+): .*bin\/dmslam-mapper .*/\1/p')"
+until grep -qs 'frame [6-9][0-9] of' "$work/collector.log" && [[ -s $work/out/checkpoint.lcmlog ]]; do
+  kill -0 "$collector" 2>/dev/null || break
+  sleep 0.05
+done
+mapfile -t all < <(mine | cut -d: -f1)
+check "all five are there when they are killed: ${all[*]}" test "${#all[@]}" -eq 5
+kill -KILL "${all[@]}"
 wait "$collector" || failed "the collector ended with $?; its log: $(tail -n 3 "$work/collector.log")"
 check "the mapper was started again" grep -qs "ended with 137" "$work/mapper.restarts"
 check "results are in DMSLAM_OUT" test -s "$work/out/trajectory.txt"
+check "the mapper goes on from the checkpoint" grep -qs "checkpoint.lcmlog: continues with" "$work/mapper.log"
+expect "all had died" "$work/out" resumed "== 1"
+expect "all frames are there" "$work/out" frames "== 150"
 expect "nothing is lost" "$work/out" records_lost "== 0"
 expect "no keyframe is missing" "$work/out" keyframes_missing "== 0"
-expect "the collector saw the restart" "$work/out" restarts "== 1"
+expect "the collector saw the restarts" "$work/out" restarts ">= 1"
 no_orphans "the run"
 finish
