@@ -35,8 +35,8 @@ class RunLock {
 };
 
 /// Moves what `--resume` needs of a run that has not ended (its run.json, journal and checkpoints) out of the
-/// way of another one that begins in the same folder: see SetAside. Returns the folder in which it is kept and
-/// can be resumed; none where there is no such run. The caller holds the RunLock. Throws InputError.
+/// way of another one that begins in the same folder: see SetAside. Returns the folder in which it is kept
+/// and can be resumed; none where there is no such run. The caller holds the RunLock. Throws InputError.
 std::optional<std::string> KeepUnfinishedRun(const std::string& out);
 
 /// From where a run whose processes all died goes on.
