@@ -524,6 +524,24 @@ TEST_F(SystemSimulation, CollectorsThatFollowEachOtherCountOneResume) {
   EXPECT_EQ(Number(outcome, "resumed"), 1) << outcome.story;
 }
 
+/// The collector has a later term of the frontend's in its journal, and nobody is left who could name it.
+TEST_F(SystemSimulation, AllMayDieAndBeginAgainOnAClockThatIsBehind) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  Fault set_back;
+  set_back.kind = Fault::Kind::kClockStep;
+  set_back.at_frame = 30;
+  set_back.step_us = -3'600'000'000;
+  schedule.faults = {set_back};
+  for (const std::string& role : Roles())
+    schedule.faults.push_back(Kill(role, 30, role == "player" ? 4 * kSecond : kSecond / 2));
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  EXPECT_EQ(outcome.failure, "") << outcome.story;
+  EXPECT_EQ(Number(outcome, "frames"), NumFrames());
+  EXPECT_EQ(Unnamed(outcome, common_->folder.string()), "") << outcome.story;
+}
+
 TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {
   const int64_t first = FromEnvironment("DMSLAM_FIRST_SCHEDULE", 1);
   const int64_t count = FromEnvironment("DMSLAM_SCHEDULES", 100);

@@ -18,6 +18,7 @@ constexpr int64_t kMaxBurst = 4096;             // records behind the last beaco
 constexpr int64_t kMinNsPerRecord = 50'000;     // no writer is faster for long
 constexpr int kBelieved = 2;                    // beacons
 constexpr int64_t kRefusedAckNs = 100'000'000;  // who holds more than the writer knows says so soon
+constexpr int64_t kOnlyOneNs = 5'000'000'000;   // a writer that is there says so more often than that
 constexpr size_t kMaxRangesNamed = 32;  // ranges named in one acknowledgement: it must fit one datagram
 
 Version ParentOf(const head_t& head) { return {head.header.parent_epoch, head.header.parent_seq}; }
@@ -79,7 +80,8 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
 bool StreamReader::IsWanted(const head_t& head, int64_t now_ns) {
   const Term term{head.header.epoch, head.header.writer};
   const bool of_ours = options_.only_writer == 0 || term.writer == options_.only_writer;
-  if (!of_ours || !term.valid() || term.epoch < held_.epoch || term < term_) {
+  const bool is_over = term.epoch < held_.epoch && term != term_ && !IsOnlyOneLeft(term, now_ns);
+  if (!of_ours || !term.valid() || is_over || term < term_) {
     ++statistics_.dropped_stale;
     return false;
   }
@@ -96,6 +98,14 @@ bool StreamReader::IsWanted(const head_t& head, int64_t now_ns) {
 bool StreamReader::LeapsTooFar(const Term& term, int64_t now_ns) const {
   const int64_t newest = std::max(term_.epoch, held_.epoch);
   return term.epoch > LatestBelievedEpoch(options_.clock_offset_us + now_ns / 1000, first_epoch_, newest);
+}
+
+/// Since this reader began nobody has been heard for a while but a writer of an earlier term than it held
+/// then: all died, and began again on a clock that is behind.
+bool StreamReader::IsOnlyOneLeft(const Term& term, int64_t now_ns) {
+  if (term_.valid()) return false;
+  if (!(only_one_ == term)) only_one_ = term, only_one_since_ns_ = now_ns;
+  return now_ns - only_one_since_ns_ > kOnlyOneNs;
 }
 
 /// A beacon's time and number follow from those of the one before; where they have leapt in earnest, the next
@@ -445,7 +455,8 @@ std::optional<Record> StreamReader::TakeFromSnapshot() {
 
 void StreamReader::Accept(const Version& version) {
   if (version.epoch != term_.epoch || version > held_) return;
-  accepted_ = std::max(accepted_, version);
+  // What was accepted of a later term, before all died and a clock was set back, is no measure for this one.
+  accepted_ = accepted_.epoch == term_.epoch ? std::max(accepted_, version) : version;
 }
 
 bool StreamReader::AtEnd() const {

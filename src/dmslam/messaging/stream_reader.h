@@ -179,6 +179,7 @@ class StreamReader : public StateMachine {
   ReceiveWindow* WindowOf(const RecordHeader& header);
   bool IsWanted(const head_t& head, int64_t now_ns);
   bool LeapsTooFar(const Term& term, int64_t now_ns) const;
+  bool IsOnlyOneLeft(const Term& term, int64_t now_ns);
   bool IsPlausible(const head_t& head, int64_t now_ns);
   void NoteEnd(const head_t& head);
   void RetractWhatIsNot();
@@ -210,6 +211,8 @@ class StreamReader : public StateMachine {
   std::optional<Snapshot> snapshot_;
   Recovery recovery_;
   bool writer_closed_ = false;
+  Term only_one_;  // of an earlier term than was held at the start, and heard before anybody else
+  int64_t only_one_since_ns_ = 0;
   Claims<Term> terms_;  // that are not followed, yet
   Claims<Term> leaps_;  // of the beacons of the term that is followed
   Beacons beacons_;
