@@ -273,8 +273,10 @@ void MapperNode::NoteArrivals() {
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
     Frontend& frontend = frontends_[camera];
     while (std::optional<Record> record = frontend.reader->Take()) {
-      if (record->version() <= frontend.mapped) {
-        frontend.reader->Accept(record->version());
+      // A term before that one is of a frontend that began on a clock that is behind, when nobody named it.
+      const Version version = record->version();
+      if (version.epoch == frontend.mapped.epoch && version <= frontend.mapped) {
+        frontend.reader->Accept(version);
         continue;
       }
       record->channel = SplitCamera(record->channel).channel;
