@@ -542,6 +542,28 @@ TEST_F(SystemSimulation, AllMayDieAndBeginAgainOnAClockThatIsBehind) {
   EXPECT_EQ(Unnamed(outcome, common_->folder.string()), "") << outcome.story;
 }
 
+/// Mapper and collector have just come back and name no term of the frontend's; the map says how far an
+/// earlier one had come, whose clock was ahead.
+TEST_F(SystemSimulation, AFrontendMayBeginOnAClockThatIsBehind) {
+  Schedule schedule = CalmSchedule();
+  schedule.at_once = true;
+  schedule.num_hosts = 2;
+  for (const std::string& role : Roles()) schedule.host_of[role] = 1;
+  Fault set_back;
+  set_back.kind = Fault::Kind::kClockStep;
+  set_back.at_frame = 20;
+  set_back.step_us = -3'600'000'000;
+  Fault frontend = Kill("frontend", 36, 3 * kSecond);
+  frontend.host = 0;
+  Fault collector = Kill("collector", 36, kSecond / 20), mapper = Kill("mapper", 36, kSecond / 2);
+  collector.host = mapper.host = 1;
+  schedule.faults = {set_back, collector, mapper, frontend};
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  EXPECT_EQ(outcome.failure, "") << outcome.story;
+  EXPECT_EQ(Number(outcome, "frames"), NumFrames());
+}
+
 TEST_F(SystemSimulation, EverySchedulesPromisesAreKept) {
   const int64_t first = FromEnvironment("DMSLAM_FIRST_SCHEDULE", 1);
   const int64_t count = FromEnvironment("DMSLAM_SCHEDULES", 100);
