@@ -36,8 +36,7 @@ constexpr int64_t kBeginNs = kSecond;
 constexpr int64_t kWallUs = 1'700'000'000'000'000;  // at the beginning
 constexpr int64_t kLongestNs = 1200 * kSecond;
 constexpr int64_t kLookAgainNs = kSecond / 500;
-constexpr int64_t kBackNs = 8 * kSecond;   // who begins is surely back in the run
-constexpr int64_t kHeardNs = 2 * kSecond;  // who begins has heard what the others kept for it
+constexpr int64_t kBackNs = 8 * kSecond;  // who begins is surely back in the run
 constexpr int64_t kFarewellNs = 5 * kSecond;
 constexpr int64_t kStepNs = 20'000;  // what happens within it happens at once
 constexpr uint32_t kFirstSession = 1;
@@ -337,7 +336,6 @@ class SimulatedSystem {
     if (fault.kind != Fault::Kind::kKill && fault.kind != Fault::Kind::kMove) return true;
     const auto is_away = [](const Process& process) { return process.begins_ns || process.paused_until_ns; };
     if (std::ranges::any_of(processes_, is_away) || now_ns_ < caught_up_ns_) return false;
-    if (schedule_.realtime) return now_ns_ >= begun_ns_ + kHeardNs;  // nobody waits for who is back
     return now_ns_ >= begun_ns_ + kBackNs || frames_played_ >= begun_frame_ + 3;
   }
 
