@@ -49,7 +49,7 @@ void PoseSolver::Observe(const Map& map, const LandmarkVotes& votes, const Track
 }
 
 /// Takes out the younger matches that contradict the elders, and weighs the others down. False: there are
-/// none who are old enough to be trusted, or they do not agree.
+/// none who are old enough to be trusted, or none who are younger, or the elders do not agree.
 bool PoseSolver::LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
                                  const PoseOptimizationOptions& options, Elders* elders) {
   const std::optional<double> elder_age_s = elders->FromAge(current_.ages_s);

@@ -36,8 +36,9 @@ enum class Elderhood : uint8_t { kCounts, kIgnored };
 
 /// Optimises a frame's pose over its matches: the elders first, then everyone who agrees with them, each with
 /// the weight that its age deserves. While no landmark is old enough to be trusted, what contradicts that
-/// pose is asked for a motion of its own, and the one that holds more of the image is the camera's. Does not
-/// ask the heap for memory once its buffers have grown.
+/// pose is asked for a motion of its own, and the one that holds more of the image is the camera's. The same
+/// holds where all landmarks are that old: then age tells nobody apart, and width decides. Does not ask the
+/// heap for memory once its buffers have grown.
 class PoseSolver {
  public:
   explicit PoseSolver(double max_chi2) : max_chi2_(max_chi2) {}
