@@ -20,11 +20,22 @@ constexpr double kTurnRadPerS = 0.3;           // ...and more with time...
 constexpr double kMostTurnRad = 0.3;           // ...up to this
 constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
 constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
-constexpr int kSomeProven = 8;  // proven landmarks that must be seen where a place is confirmed by time
+constexpr double kThinShare = 0.25;            // a pose that finds less of what it should see is thin...
+constexpr double kBesideRad = 0.1;    // ...and compared with one beside it, turned by up to so much...
+constexpr double kClearlyMore = 1.3;  // ...which must find so many times as much
+constexpr int kOldToCompare = 60;  // landmarks older than people stand that should be seen: fewer say nothing
+constexpr int kSomeProven = 8;     // proven landmarks that must be seen where a place is confirmed by time
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
   return report.cells >= kWideCells && report.num_static >= kWholeShare * report.num_expected;
+}
+
+/// Whether one pose of a frame explains clearly more of it than another does: of all landmarks and of those
+/// that are older than people stand, and wider over the image.
+bool ExplainsClearlyMore(const TrackingReport& a, const TrackingReport& b) {
+  return a.num_static >= kClearlyMore * b.num_static && a.num_old >= kClearlyMore * b.num_old &&
+         a.cells > b.cells;
 }
 
 void Refuse(const char* reason, TrackingReport* report) {
@@ -38,6 +49,7 @@ Tracker::Tracker(const Setup& setup)
     : options_(setup.options),
       seed_(setup.seed),
       search_(setup.options, setup.camera),
+      second_search_(setup.options, setup.camera),
       relocalizer_(setup.vocabulary),
       follower_(setup.options) {}
 
@@ -48,11 +60,13 @@ void Tracker::BeginAt(const Keyframe& keyframe) {
 void Tracker::OnMapForgotten() {
   relocalizer_.Clear();
   search_.Reset();
+  second_search_.Reset();
   certainty_.Forget();
 }
 
 void Tracker::OnMapGivenUp() {
   search_.Reset();
+  second_search_.Reset();
   follower_.Stop();
   unbelieved_.reset();
 }
@@ -61,7 +75,11 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   Attempt attempt = FollowMotion(map, &frame);
   if (IsDoubtfulForLong(attempt.report, frame.stamp_ns)) attempt.report.ok = false;
   if (!attempt.report.ok && unbelieved_) GoBack();
-  if (!attempt.report.ok) FindTurned(map, &frame, &attempt);
+  if (attempt.report.ok) {
+    FindBetterPlace(map, &frame, &attempt);
+  } else {
+    FindTurned(map, &frame, &attempt);
+  }
   if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
@@ -161,6 +179,22 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
   attempt->report = report;
   attempt->relocalized = frame->stamp_ns - last_tracked_ns() > kCoastNs;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
+}
+
+/// A pose that finds little of what it should see may be a little beside the true one, where new landmarks
+/// have been made in the wrong places and the old ones lie beyond the search around them. It gives way to one
+/// nearby that explains clearly more of the same frame.
+void Tracker::FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* attempt) {
+  const TrackingReport& now = attempt->report;
+  if (now.num_static >= kThinShare * now.num_expected || now.num_old_expected < kOldToCompare) return;
+  TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
+  if (!second_search_.FromTurn(map, *frame, frame->T_cam_world, kBesideRad, &found)) return;
+  const TrackingReport beside = second_search_.InLocalMap(map, true, std::nullopt, &found);
+  if (!beside.ok || beside.doubtful || !ExplainsClearlyMore(beside, now)) return;
+  search_.judge().DropEvidence();  // what the pose that was wrong said of landmarks
+  *frame = std::move(found);
+  attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
+  attempt->by_rival = true;
 }
 
 /// The frame stays as it was where no place in the map fits.

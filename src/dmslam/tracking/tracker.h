@@ -74,6 +74,7 @@ class Tracker {
   };
 
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
+  void FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* attempt);
   void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
   void Relocalize(const Map& map, const Request& request, TrackedFrame* frame, Attempt* attempt);
@@ -87,6 +88,7 @@ class Tracker {
   TrackingOptions options_;
   uint64_t seed_;
   PoseSearch search_;
+  PoseSearch second_search_;  ///< for a pose beside that which the motion leads to
   Relocalizer relocalizer_;
   MotionFollower follower_;
   PoseCertaintyEstimator certainty_;

@@ -389,7 +389,7 @@ class Recovering : public ::testing::Test {
 
   /// `until`: the first frame that is not shown.
   void Start(double map_s, uint32_t until = kFound) {
-    scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
+    scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5}, mapped_ns_);
     const auto keyframes = static_cast<uint32_t>(map_s * 1e9 / MapScene::kStepNs) + 1;
     scene_.MapAll(keyframes, 0.2 / keyframes);
     replica_.Apply(scene_.map().TakeDelta(MapEvent::kMapStarted, KeyframeId::Make(MapScene::kSession, 1), 1));
@@ -419,6 +419,7 @@ class Recovering : public ::testing::Test {
     return 0;
   }
 
+  int64_t mapped_ns_ = 0;           ///< of the points
   bool partly_hidden_ = false;      ///< three of four points are not seen
   std::optional<MapId> lost_in_{};  ///< none: nowhere
   bool may_be_nowhere_ = false;     ///< in none of the maps
@@ -519,6 +520,32 @@ TEST_F(Recovering, APlaceThatDoesNotPredictIsDropped) {
   for (uint32_t frame = kFound + 1; frame < kFound + 10; ++frame) Track(frame, true);
   const uint32_t found = FirstFound(kFound + 10);
   EXPECT_GE(found, kFound + 10 + 14) << "the half second begins anew";
+}
+
+/// One in eight points walks off while all others are hidden, and takes the camera along. Then the others are
+/// seen again, in their places.
+TEST_F(Recovering, APoseThatFindsLittleGivesWayToOneBesideThatExplainsMuchMore) {
+  constexpr uint32_t kShown = 40;
+  constexpr double kStepAside = 0.006;
+  mapped_ns_ = -10'000'000'000;
+  Start(1.0, 1);
+  lost_in_ = MapScene::kMap;
+  const auto track = [&](uint32_t frame) {
+    const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
+      const bool walks = i % 8 == 0;
+      if (frame < kShown && !walks) return std::nullopt;
+      const double aside = walks ? kStepAside * std::min(frame, kShown) : 0.0;
+      return scene_.point(i) + Eigen::Vector3d(aside, 0, 0);
+    };
+    return tracker_->Track(replica_, {.map_id = lost_in_},
+                           scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(0), place));
+  };
+  for (uint32_t frame = 1; frame + 1 < kShown; ++frame) track(frame);
+  ASSERT_GT(ErrorAt(track(kShown - 1).frame.T_cam_world, 0), 0.2) << "it was carried away";
+  const TrackingResult result = track(kShown);
+  ASSERT_TRUE(result.pose) << result.report.reason;
+  EXPECT_FALSE(result.relocalized);
+  EXPECT_LT(ErrorAt(result.frame.T_cam_world, 0), 0.02);
 }
 
 // ---- Projection search ----
