@@ -80,7 +80,8 @@ function(dmslam_compile_together target)
   endif()
 endfunction()
 
-# What waits for people and disks is not optimized to the utmost: that takes a third of the time to compile.
+# What waits for people, disks and the bus is not optimized to the utmost: that takes a third of the time to compile.
+# What computes (geometry, matching, optimization) is, in the rooms.
 function(dmslam_compile_lightly)
   foreach(target ${ARGN})
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)

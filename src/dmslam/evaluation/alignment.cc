@@ -1,7 +1,6 @@
 #include "dmslam/evaluation/alignment.h"
 
-#include <Eigen/SVD>
-
+#include "dmslam/geometry/svd.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -65,13 +64,13 @@ std::optional<Sim3d> AlignPoints(std::span<const Eigen::Vector3d> source,
   if (alignment == Alignment::kNone) return Sim3d();
   if (source.size() < 3) return std::nullopt;
   const Moments moments = ComputeMoments(source, target);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moments.covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d& singular = svd.singularValues();
+  const Svd3 svd = SvdOf(moments.covariance);
+  const Eigen::Vector3d& singular = svd.values;
   if (!(singular(1) > kRankTolerance * singular(0)) || !(moments.source_variance > 0)) return std::nullopt;
 
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
-  const Eigen::Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  if (svd.U.determinant() * svd.V.determinant() < 0) signs.z() = -1;
+  const Eigen::Matrix3d rotation = svd.U * signs.asDiagonal() * svd.V.transpose();
   const double scale = singular.dot(signs) / moments.source_variance;
   if (alignment == Alignment::kScale) {
     return Sim3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), scale);

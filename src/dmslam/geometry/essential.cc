@@ -1,15 +1,15 @@
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <numeric>
 
+#include "dmslam/geometry/svd.h"
 #include "dmslam/geometry/two_view.h"
 
 namespace dmslam {
 
 Eigen::Matrix3d ProjectToEssential(const Eigen::Matrix3d& E) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(E, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Svd3 svd = SvdOf(E);
   const double size = std::sqrt(0.5);
-  return svd.matrixU() * Eigen::Vector3d(size, size, 0.0).asDiagonal() * svd.matrixV().transpose();
+  return svd.U * Eigen::Vector3d(size, size, 0.0).asDiagonal() * svd.V.transpose();
 }
 
 Eigen::Matrix3d EssentialFromFundamental(const Eigen::Matrix3d& F, const Pinhole& camera1,
@@ -45,8 +45,8 @@ std::optional<Eigen::Matrix3d> EssentialEightPoint(std::span<const Eigen::Vector
 }
 
 std::array<Rigid3d, 4> DecomposeEssential(const Eigen::Matrix3d& E) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(E, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d U = svd.matrixU(), V = svd.matrixV();
+  const Svd3 svd = SvdOf(E);
+  Eigen::Matrix3d U = svd.U, V = svd.V;
   if (U.determinant() < 0) U.col(2) = -U.col(2);
   if (V.determinant() < 0) V.col(2) = -V.col(2);
   Eigen::Matrix3d W;

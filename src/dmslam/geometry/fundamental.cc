@@ -1,4 +1,3 @@
-#include <Eigen/Eigenvalues>
 #include <numeric>
 
 #include "dmslam/geometry/normalization.h"
@@ -37,9 +36,7 @@ Eigen::Matrix3d FromRows(const Vector& f) {
 /// The matrix of rank two that is nearest but for the accuracy of the direct eigen solver: F - F v v^T with
 /// the smallest right singular vector v is singular whatever v is.
 Eigen::Matrix3d MakeRankTwo(const Eigen::Matrix3d& F) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(F.transpose() * F);
-  const Eigen::Vector3d v = solver.eigenvectors().col(0);
+  const Eigen::Vector3d v = DirectEigenOfSymmetric(F.transpose() * F).vectors.col(0);
   return F - (F * v) * v.transpose();
 }
 

@@ -1,10 +1,11 @@
 #include "dmslam/geometry/similarity.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "dmslam/geometry/svd.h"
 
 namespace dmslam {
 namespace {
@@ -41,14 +42,13 @@ std::optional<Sim3d> AlignSim3(std::span<const Eigen::Vector3d> points_a,
                                bool fix_scale) {
   if ((indices.empty() ? points_a.size() : indices.size()) < 3) return std::nullopt;
   const Moments m = ComputeMoments(points_a, points_b, indices);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d values = svd.singularValues();
+  const Svd3 svd = SvdOf(m.cross);
+  const Eigen::Vector3d values = svd.values;
   if (!(values(1) > 1e-9 * values(0)) || !(m.spread_a > 0.0)) return std::nullopt;
   Eigen::Vector3d signs(1, 1, 1);
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
+  if (svd.U.determinant() * svd.V.determinant() < 0) signs.z() = -1;
   Sim3d S;
-  S.rotation =
-      Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
+  S.rotation = Eigen::Quaterniond(Eigen::Matrix3d(svd.U * signs.asDiagonal() * svd.V.transpose()));
   S.rotation.normalize();
   S.scale = fix_scale ? 1.0 : values.dot(signs) / m.spread_a;
   if (!(S.scale > 0.0)) return std::nullopt;

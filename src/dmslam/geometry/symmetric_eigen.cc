@@ -23,6 +23,18 @@ template SymmetricEigen<3> EigenOfSymmetric(const Eigen::Matrix<double, 3, 3>&);
 template SymmetricEigen<6> EigenOfSymmetric(const Eigen::Matrix<double, 6, 6>&);
 template SymmetricEigen<9> EigenOfSymmetric(const Eigen::Matrix<double, 9, 9>&);
 
+SymmetricEigen<3> DirectEigenOfSymmetric(const Eigen::Matrix3d& A) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(A);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Eigen::Vector3d DirectEigenvaluesOfSymmetric(const Eigen::Matrix3d& A) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(A, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues();
+}
+
 double SmallerEigenvalue(const Eigen::Matrix2d& A) {
   const double mean = 0.5 * (A(0, 0) + A(1, 1));
   return mean - std::hypot(0.5 * (A(0, 0) - A(1, 1)), A(1, 0));

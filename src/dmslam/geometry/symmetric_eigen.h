@@ -15,6 +15,10 @@ struct SymmetricEigen {
 template <int kSize>
 SymmetricEigen<kSize> EigenOfSymmetric(const Eigen::Matrix<double, kSize, kSize>& A);
 
+/// In closed form: faster, and less accurate where eigenvalues are close to each other.
+SymmetricEigen<3> DirectEigenOfSymmetric(const Eigen::Matrix3d& A);
+Eigen::Vector3d DirectEigenvaluesOfSymmetric(const Eigen::Matrix3d& A);
+
 /// The smaller eigenvalue.
 double SmallerEigenvalue(const Eigen::Matrix2d& A);
 

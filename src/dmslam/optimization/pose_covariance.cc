@@ -1,11 +1,11 @@
 #include "dmslam/optimization/pose_covariance.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "dmslam/geometry/solve_symmetric.h"
+#include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/optimization/reprojection.h"
 
 namespace dmslam {
@@ -39,10 +39,8 @@ class SumByCell {
 
 /// The symmetric one: alike for covariances that are alike.
 Eigen::Matrix3d Root(const Eigen::Matrix3d& covariance) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(covariance);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-         eigen.eigenvectors().transpose();
+  const SymmetricEigen<3> eigen = DirectEigenOfSymmetric(covariance);
+  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
 }
 
 /// What a step (w, v) on the left of the pose that stands right of T becomes on the left of the product.

@@ -1,11 +1,11 @@
 #include "dmslam/tracking/pose_certainty.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "dmslam/camera/image_cells.h"
+#include "dmslam/geometry/symmetric_eigen.h"
 
 namespace dmslam {
 namespace {
@@ -28,9 +28,7 @@ double MedianDepth(const Rigid3d& T_cam_world, const std::vector<PoseSight>& sig
 }
 
 double LargestSigma(const Eigen::Matrix3d& covariance) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+  return std::sqrt(std::max(0.0, DirectEigenvaluesOfSymmetric(covariance).maxCoeff()));
 }
 
 }  // namespace
