@@ -8,6 +8,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/settings/run_options.h"
@@ -33,7 +34,8 @@ std::unique_ptr<Node> MakeCollector(NodeContext context, NodeOptions options, Co
 }
 
 CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
-    : StreamNode(std::move(context), std::move(options), "collector"), collector_(std::move(collector)) {
+    : StreamNode(std::move(context), std::move(options), roles::kCollector),
+      collector_(std::move(collector)) {
   Listen({channels::kMapperStatus, channels::kLoopcloserStatus});
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
@@ -91,7 +93,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
     run_.cameras[camera].ground_truth = collector_.ground_truth[camera];
   OpenJournal();
   BeginCheckpoints();
-  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
   ServeReplica(&builder_->map(), [this] { return MapHeld(*map_reader_); });
 }
 
@@ -107,15 +109,15 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
       OnGroundTruth(*pose);
   } else if (channel == channels::kPlayerStatus) {
     if (const auto status = Read<PlayerStatus>(bytes))
-      OnHealth(OfCamera("player", status->camera_id), status->head);
+      OnHealth(OfCamera(roles::kPlayer, status->camera_id), status->head);
   } else if (channel == channels::kFrontendStatus) {
     if (auto status = Read<FrontendStatus>(bytes)) OnFrontendStatus(std::move(*status));
   } else if (channel == channels::kMapperStatus) {
     auto status = Read<MapperStatus>(bytes);
-    if (status && OnHealth("mapper", status->head)) run_.mapper = std::move(*status);
+    if (status && OnHealth(roles::kMapper, status->head)) run_.mapper = std::move(*status);
   } else if (channel == channels::kLoopcloserStatus) {
     auto status = Read<LoopcloserStatus>(bytes);
-    if (status && OnHealth("loopcloser", status->head)) run_.loopcloser = std::move(*status);
+    if (status && OnHealth(roles::kLoopCloser, status->head)) run_.loopcloser = std::move(*status);
   }
 }
 
@@ -163,7 +165,7 @@ void CollectorNode::ReadNote(const std::string& text) {
 
 bool CollectorNode::IsOfThisRun(const std::string& process, const StatusHead& head) {
   return head.session == 0 ||
-         (process.starts_with("player") ? !IsForeignFrame(head.session) : !IsForeign(head.session));
+         (process.starts_with(roles::kPlayer) ? !IsForeignFrame(head.session) : !IsForeign(head.session));
 }
 
 /// False for a process of another session.
@@ -179,13 +181,13 @@ size_t CollectorNode::NumKeyframes() const { return builder_ ? builder_->map().k
 void CollectorNode::CountOwn() {
   std::vector<const StreamReader*> readers = {map_reader_.get()};
   for (const auto& reader : frontend_readers_) readers.push_back(reader.get());
-  const int64_t lost_before = run_.health["collector"].records_lost;
-  OnHealth("collector", MakeStatusHead("", readers));
-  if (run_.health["collector"].records_lost != lost_before) processes_.NoteCounters();
+  const int64_t lost_before = run_.health[roles::kCollector].records_lost;
+  OnHealth(roles::kCollector, MakeStatusHead("", readers));
+  if (run_.health[roles::kCollector].records_lost != lost_before) processes_.NoteCounters();
 }
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {
-  const std::string process = OfCamera("frontend", status.camera_id);
+  const std::string process = OfCamera(roles::kFrontend, status.camera_id);
   if (status.camera_id >= options_.NumCameras() || !IsOfThisRun(process, status.head)) return;
   processes_.HearFrontend(process, std::move(status), NumKeyframes(), context_.now_ns());
 }
@@ -384,7 +386,7 @@ void CollectorNode::OpenJournal() {
   if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(
-        StreamId::kFrontend, "FRONTEND",
+        StreamId::kFrontend, owners::kFrontend,
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
          channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
         safe_[camera], camera, is_first));

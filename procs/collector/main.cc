@@ -1,10 +1,11 @@
 #include <unistd.h>
 
 #include "collector/make_collector.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/process_main.h"
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("collector",
+  dmslam::ProcessMain process(dmslam::roles::kCollector,
                               "Collects a run's trajectory, map and statuses and writes its results.");
   dmslam::CollectorOptions collector;
   process.app().AddOption("--out", collector.out_dir, "folder for the results").Required();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "dmslam/messaging/roles.h"
+
 namespace dmslam {
 namespace {
 
@@ -15,7 +17,7 @@ constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
     &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
     &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
     &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
-constexpr char kFrontend[] = "frontend";  // of the first camera: its counters are noted
+constexpr const char* kFrontend = roles::kFrontend;  // of the first camera: its counters are noted
 
 }  // namespace
 
@@ -85,10 +87,10 @@ std::string ProcessLedger::CountersOf(const std::string& process) const {
 /// This process is another one than the collector before it, whatever its id.
 void ProcessLedger::Begin(Note note, const ProcessHealth& own, int64_t now_ns) {
   note_ = std::move(note);
-  Followed& known = processes_["collector"];
-  known.former = run_->health["collector"];
+  Followed& known = processes_[roles::kCollector];
+  known.former = run_->health[roles::kCollector];
   known.instances.IsNew(own, now_ns);
-  NoteProcess("collector", own);
+  NoteProcess(roles::kCollector, own);
   for (const auto& [key, health] : std::exchange(heard_early_, {})) OnProcess(key.first, health, now_ns);
 }
 

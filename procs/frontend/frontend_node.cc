@@ -4,6 +4,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/session_check.h"
@@ -27,10 +28,10 @@ std::unique_ptr<Node> MakeFrontend(NodeContext context, const NodeOptions& optio
 }
 
 FrontendNode::FrontendNode(NodeContext context, const NodeOptions& options, FrontendExtras extras)
-    : StreamNode(std::move(context), options, OfCamera("frontend", options.camera_id)),
+    : StreamNode(std::move(context), options, OfCamera(roles::kFrontend, options.camera_id)),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)),
-      end_(options_.HasPeer("mapper")) {
+      end_(options_.HasPeer(roles::kMapper)) {
   Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kKeyframe});
 }
 
@@ -52,17 +53,17 @@ void FrontendNode::Begin(const CameraInfo& info) {
   work_ = MakeCoreThread(info.mode);
   core_ = std::make_unique<FrontendCore>(setup);
   left_ = LeftBehind{LeftKeyframes(session_, options_.camera_id), {}};
-  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
   ServeReplica(
       &core_->map(), [this] { return HandOverVersion(); },
       [this] { return work_->Idle() && held_.IsUpToDate(); });
-  WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
+  WantWriter({StreamId::kFrontend, {roles::kMapper, roles::kCollector}, {}, nullptr});
 }
 
 /// Into a running system a frontend comes with the map; where nobody has one it begins with a first.
 bool FrontendNode::ReadyToWrite() {
   if (context_.fresh_system && !context_.resumed) return true;
-  if (!map_reader_->term().valid()) return !options_.HasPeer("mapper");
+  if (!map_reader_->term().valid()) return !options_.HasPeer(roles::kMapper);
   if (!work_->Idle()) return false;
   TakeMapRecords();
   ApplyHeldRecords(held_.NumReady(true), true);
@@ -227,7 +228,7 @@ void FrontendNode::OnApplied(size_t count) {
 }
 
 int FrontendNode::UnacceptedKeyframes() {
-  const std::optional<int64_t> accepted = writer_->AcknowledgedBy("mapper");
+  const std::optional<int64_t> accepted = writer_->AcknowledgedBy(roles::kMapper);
   while (accepted && !keyframe_seqs_.empty() && keyframe_seqs_.front() <= *accepted)
     keyframe_seqs_.pop_front();
   return static_cast<int>(keyframe_seqs_.size());
@@ -276,7 +277,7 @@ bool FrontendNode::WorkOnce() {
     if (!work_->Idle()) return false;
   }
   if (end_.Is(SequenceEnd::Phase::kDone)) {
-    if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
+    if (!options_.HasPeer(roles::kMapper) || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
@@ -550,7 +551,7 @@ void FrontendNode::PublishStatus() {
   FrontendStatus status = core_status_;
   status.head = MakeStatusHead(core_ ? last_pose_.reason : "waiting for a camera", {map_reader_.get()});
   status.head.health.dropped_malformed += counts_.bad;
-  if (IsHeldUp()) status.head.health.waiting_for = "mapper";
+  if (IsHeldUp()) status.head.health.waiting_for = roles::kMapper;
   status.frames_received = counts_.received;
   status.frames_processed = counts_.processed;
   status.frames_skipped = counts_.skipped;

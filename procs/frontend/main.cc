@@ -1,9 +1,10 @@
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "frontend/make_frontend.h"
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("frontend", "Tracks the camera and proposes keyframes.");
+  dmslam::ProcessMain process(dmslam::roles::kFrontend, "Tracks the camera and proposes keyframes.");
   dmslam::FrontendExtras extras;
   std::string vocabulary;
   process.app().AddOption("--vocabulary", vocabulary, "bag-of-words vocabulary; default: the one that ships");

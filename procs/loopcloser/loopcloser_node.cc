@@ -4,6 +4,7 @@
 
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/settings/run_options.h"
 #include "loopcloser/make_loopcloser.h"
 
@@ -16,7 +17,8 @@ std::unique_ptr<Node> MakeLoopcloser(NodeContext context, NodeOptions options,
 
 LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)
-    : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {
+    : StreamNode(std::move(context), std::move(options), roles::kLoopCloser),
+      vocabulary_(std::move(vocabulary)) {
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) Listen({channels::kSession}, camera);
 }
 
@@ -56,10 +58,10 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
       return stop_.load();
     });
   }
-  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
   ServeReplica(
       &core_->map(), [this] { return MapHeld(*map_reader_); }, [this] { return work_->Idle(); });
-  WantWriter({StreamId::kLoopCloser, {"mapper"}, {}, nullptr});
+  WantWriter({StreamId::kLoopCloser, {roles::kMapper}, {}, nullptr});
 }
 
 /// On the core.

@@ -4,6 +4,7 @@
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
@@ -168,7 +169,8 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("player", "Feeds the frames of a recording or of a camera to the bus.");
+  dmslam::ProcessMain process(dmslam::roles::kPlayer,
+                              "Feeds the frames of a recording or of a camera to the bus.");
   Arguments arguments;
   Declare(process.app(), arguments);
   process.SetOffline([&](const dmslam::NodeOptions& node) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
@@ -257,7 +258,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
   status.head.health = office_.Health();
-  if (awaiting_done_) status.head.health.waiting_for = "frontend";
+  if (awaiting_done_) status.head.health.waiting_for = roles::kFrontend;
   status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
   status.frames_published = counts_.published;
   status.frames_total = static_cast<int64_t>(order_.size());

@@ -2,6 +2,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/camera_channels.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/stream_node.h"
@@ -10,7 +11,7 @@
 namespace dmslam {
 namespace {
 
-constexpr char kOwner[] = "PLAYER";
+constexpr const char* kOwner = owners::kPlayer;
 
 WriterElection::Options ElectionOptions(const NodeContext& context, const PlayerOffice::Part& part,
                                         bool take_over) {

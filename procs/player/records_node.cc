@@ -4,6 +4,7 @@
 #include <map>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
 #include "player/intervals.h"
@@ -12,7 +13,7 @@ namespace dmslam {
 
 RecordsNode::RecordsNode(NodeContext context, NodeOptions options, std::shared_ptr<const LogIndex> log,
                          uint32_t session)
-    : StreamNode(std::move(context), std::move(options), "frontend"),
+    : StreamNode(std::move(context), std::move(options), roles::kFrontend),
       log_(std::move(log)),
       recorded_(Camera(), Pyramid()),
       live_(Camera(), Pyramid()) {
@@ -45,8 +46,8 @@ void RecordsNode::PublishCameraInfo() {
 }
 
 void RecordsNode::Begin(const CameraInfo&) {
-  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
-  WantWriter({StreamId::kFrontend, {"mapper", "collector"}, {}, nullptr});
+  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
+  WantWriter({StreamId::kFrontend, {roles::kMapper, roles::kCollector}, {}, nullptr});
   PublishCameraInfo();
 }
 
@@ -75,7 +76,7 @@ bool RecordsNode::WorkOnce() {
   if (context_.now_ns() >= next_info_ns_) PublishCameraInfo();
   TakeMapRecords();
   if (finished_) {
-    if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(live_, *map_reader_)) Stop();
+    if (!options_.HasPeer(roles::kMapper) || NobodyNeedsTheMap(live_, *map_reader_)) Stop();
     return false;
   }
   if (awaited_.valid()) return false;

@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "dmslam/console/command_line.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
@@ -77,11 +78,11 @@ class Run {
 
   static void RemoveLogs(const dmslam::ChildSpec& child) {
     if (child.errors != child.output && !child.errors_to_ours) fs::remove(child.errors);
-    if (child.name != "collector") fs::remove(child.output);
+    if (child.name != dmslam::roles::kCollector) fs::remove(child.output);
   }
 
   void OnReady(const ChildEvent& event) {
-    if (event.name != "viewer") return;
+    if (event.name != dmslam::roles::kViewer) return;
     viewer_ready_ = true;
     Say(event.text);
     OpenBrowser(event.text.substr(std::min(event.text.find("http"), event.text.size())));
@@ -92,11 +93,13 @@ class Run {
     if (std::system(("xdg-open '" + address + "' </dev/null >/dev/null 2>&1 &").c_str()) != 0) return;
   }
 
-  static bool IsCompanion(const std::string& name) { return name == "viewer" || name == "logger"; }
+  static bool IsCompanion(const std::string& name) {
+    return name == dmslam::roles::kViewer || name == "logger";
+  }
 
   bool PipelineAlive() const {
     const size_t companions =
-        (supervisor_.Alive("viewer") ? 1u : 0u) + (supervisor_.Alive("logger") ? 1u : 0u);
+        (supervisor_.Alive(dmslam::roles::kViewer) ? 1u : 0u) + (supervisor_.Alive("logger") ? 1u : 0u);
     return supervisor_.size() > companions;
   }
 
@@ -118,8 +121,8 @@ class Run {
     if (event.kind == ChildEvent::Kind::kSignal) return Interrupt(event.code);
     if (event.kind == ChildEvent::Kind::kRestarted) return OnRestart(event);
     if (event.kind == ChildEvent::Kind::kReady) return OnReady(event);
-    if (event.name == "viewer" && !viewer_ready_)
-      throw dmslam::InputError("the viewer did not start: " + LastWords("viewer"));
+    if (event.name == dmslam::roles::kViewer && !viewer_ready_)
+      throw dmslam::InputError("the viewer did not start: " + LastWords(dmslam::roles::kViewer));
     if (IsCompanion(event.name) || (plan_.replay_end && event.name == plan_.replay_end->name)) return;
     if (event.yields) return Say(event.name + ": another one has taken its place, and goes on");
     if (event.code != 0) return Fail(event);
@@ -128,16 +131,16 @@ class Run {
 
   void OnSuccess(const std::string& name) {
     const int64_t now = dmslam::Supervisor::now_ns();
-    if (name == "player" && plan_.replay_end) replay_end_.Begin(now);
-    if (name == "frontend") replay_end_.Finish();
-    if (name != "collector") return;
+    if (name == dmslam::roles::kPlayer && plan_.replay_end) replay_end_.Begin(now);
+    if (name == dmslam::roles::kFrontend) replay_end_.Finish();
+    if (name != dmslam::roles::kCollector) return;
     farewell_ns_ = now + kFarewellNs;
     supervisor_.StopRestarting();
   }
 
   void EndReplay() {
     const dmslam::ReplayEnd::Step step = replay_end_.Next(dmslam::Supervisor::now_ns());
-    const pid_t frontend = supervisor_.PidOf("frontend");
+    const pid_t frontend = supervisor_.PidOf(dmslam::roles::kFrontend);
     if (frontend == 0) return;
     if (step == dmslam::ReplayEnd::Step::kPlayAgain && !supervisor_.Alive(plan_.replay_end->name))
       supervisor_.Start(*plan_.replay_end);
@@ -160,7 +163,8 @@ class Run {
   }
 
   void OnRestart(const ChildEvent& event) {
-    if (event.name == "frontend" && replay_end_.begun()) replay_end_.Begin(dmslam::Supervisor::now_ns());
+    if (event.name == dmslam::roles::kFrontend && replay_end_.begun())
+      replay_end_.Begin(dmslam::Supervisor::now_ns());
     const std::string when = event.delay_ns > 0 ? " in " + Seconds(event.delay_ns) : "";
     Say(event.name + " " + HowItEnded(event) + "; started again" + when + " (" +
         std::to_string(event.restarts) + ")");
@@ -168,7 +172,8 @@ class Run {
 
   void Fail(const ChildEvent& event) {
     code_ = event.code;
-    if (event.name == "collector" && place_.terminal) return;  // it has spoken on the terminal itself
+    if (event.name == dmslam::roles::kCollector && place_.terminal)
+      return;  // it has spoken on the terminal itself
     const std::string log = "; its log is " + place_.LogOf(event.name);
     std::string words = event.code > dmslam::kExitSignal ? "" : LastWords(event.name);
     Say(words.empty() ? event.name + " " + HowItEnded(event) + log : words);
@@ -178,10 +183,11 @@ class Run {
 
   /// Who has a terminal can go on looking at what was made.
   void StayOpen() {
-    if (!supervisor_.Alive("viewer") || isatty(STDIN_FILENO) == 0 || !place_.terminal) return;
+    if (!supervisor_.Alive(dmslam::roles::kViewer) || isatty(STDIN_FILENO) == 0 || !place_.terminal) return;
     PrintTable();
     Say("the results are in " + place_.out + "; the viewer stays until Ctrl-C");
-    while (supervisor_.Alive("viewer") && supervisor_.Wait().kind != ChildEvent::Kind::kSignal) {
+    while (supervisor_.Alive(dmslam::roles::kViewer) &&
+           supervisor_.Wait().kind != ChildEvent::Kind::kSignal) {
     }
   }
 

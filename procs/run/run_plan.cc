@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "dmslam/messaging/camera_channels.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/recording/log_index.h"
 #include "dmslam/util/check.h"
@@ -104,8 +105,9 @@ std::string LogToReplay(const RunArguments& a, const RunPlace& place) {
   Words words = changes;
   Append(&words, {"--prefix", a.bus.prefix, "--log", a.source.replay, "--to-log", copy});
   for (const std::string& word : words) command += " " + Quoted(word);
-  command += " 2>" + Quoted(place.LogOf("player"));
-  if (std::system(command.c_str()) != 0) throw InputError(LastWords("player", place.LogOf("player")));
+  command += " 2>" + Quoted(place.LogOf(roles::kPlayer));
+  if (std::system(command.c_str()) != 0)
+    throw InputError(LastWords(roles::kPlayer, place.LogOf(roles::kPlayer)));
   return copy;
 }
 
@@ -147,12 +149,12 @@ std::vector<ChildSpec> MakeOtherCameras(const RunArguments& a, const RunPlace& p
   std::vector<ChildSpec> children;
   for (size_t i = 0; i < a.source.others.size(); ++i) {
     const CameraId camera = static_cast<CameraId>(i + 1);
-    children.push_back(MakeChild("frontend", a, place, common, camera));
+    children.push_back(MakeChild(roles::kFrontend, a, place, common, camera));
     Words words = common;
     Append(&words, PlayerArguments(OfOther(a, i)));
     if (!a.source.other_cameras.empty()) Append(&words, {"--as-camera", a.camera.file});
     Append(&words, {"--sequence", a.source.others[i]});
-    children.push_back(MakeChild("player", a, place, std::move(words), camera));
+    children.push_back(MakeChild(roles::kPlayer, a, place, std::move(words), camera));
   }
   return children;
 }
@@ -161,7 +163,7 @@ ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, Words words) 
   Append(&words, PlayerArguments(a));
   Append(&words,
          a.source.log.empty() ? Words{"--sequence", a.source.sequence} : Words{"--log", a.source.log});
-  ChildSpec player = MakeChild("player", a, place, std::move(words));
+  ChildSpec player = MakeChild(roles::kPlayer, a, place, std::move(words));
   if (place.resume) GoOnBehind(*place.resume, IsCamera(a.source.sequence), &player);
   return player;
 }
@@ -194,11 +196,11 @@ void PlanReplay(const RunArguments& a, const RunPlace& place, RunPlan* plan) {
   replay.log = LogToReplay(a, place);
   replay.lcm_url = Url(a.bus, place);
   replay.speed = a.pace.speed;
-  ChildSpec player = MakeForeign("player", a, place, PlayCamera(replay));
+  ChildSpec player = MakeForeign(roles::kPlayer, a, place, PlayCamera(replay));
   for (const ChildSpec& listener : plan->pipeline) player.after.push_back(listener.name);
   plan->pipeline.push_back(std::move(player));
   plan->replay_end = MakeCompanion(MakeForeign("end of the sequence", a, place, PlayEnd(replay)));
-  plan->replay_end->output = plan->replay_end->errors = place.LogOf("player");
+  plan->replay_end->output = plan->replay_end->errors = place.LogOf(roles::kPlayer);
 }
 
 Words GroundTruth(const RunArguments::Source& source) {
@@ -224,7 +226,7 @@ ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Word
   if (place.terminal) words.push_back("--quiet");
   Append(&words, {"--out", a.output.folder});
   Append(&words, GroundTruths(a.source));
-  ChildSpec child = MakeChild("collector", a, place, words);
+  ChildSpec child = MakeChild(roles::kCollector, a, place, words);
   child.output = place.out + "/log/table.txt";
   child.errors_to_ours = place.terminal;
   return child;
@@ -236,13 +238,13 @@ ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words
     fs::create_directories(place.out + "/pictures");
     Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.output.pictures});
   }
-  return MakeChild("frontend", a, place, words);
+  return MakeChild(roles::kFrontend, a, place, words);
 }
 
 ChildSpec MakeMapper(const RunArguments& a, const RunPlace& place, Words words) {
   AppendOption(&words, "--map", a.map.begin);
   AppendOption(&words, "--save-map", a.map.save);
-  ChildSpec mapper = MakeChild("mapper", a, place, std::move(words));
+  ChildSpec mapper = MakeChild(roles::kMapper, a, place, std::move(words));
   mapper.environment["DMSLAM_CHECKPOINT"] = CheckpointPath(place.out);  // a mapper of one's own need not know
   return mapper;
 }
@@ -261,7 +263,7 @@ ChildSpec MakeViewer(const RunArguments& a, const RunPlace& place, const Words& 
   Words words = common;
   AppendOption(&words, "--http", a.output.http);
   Append(&words, GroundTruth(a.source));
-  return MakeCompanion(MakeChild("viewer", a, place, words));
+  return MakeCompanion(MakeChild(roles::kViewer, a, place, words));
 }
 
 /// A line of a log behind the time it begins with; none where it begins with none.
@@ -303,7 +305,7 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   const Words common = CommonArguments(a, place);
   RunPlan plan;
   plan.table = place.out + "/log/table.txt";
-  plan.pipeline = {MakeMapper(a, place, common), MakeChild("loopcloser", a, place, common),
+  plan.pipeline = {MakeMapper(a, place, common), MakeChild(roles::kLoopCloser, a, place, common),
                    MakeFrontend(a, place, common), MakeCollector(a, place, common)};
   if (a.source.replay.empty()) {
     plan.pipeline.push_back(MakePlayer(a, place, common));
@@ -315,7 +317,7 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   if (a.output.WantsViewer()) {
     plan.companions.push_back(MakeViewer(a, place, common));
     for (ChildSpec& child : plan.pipeline)
-      child.after.push_back("viewer");  // it shows the run from its beginning
+      child.after.push_back(roles::kViewer);  // it shows the run from its beginning
   }
   return plan;
 }

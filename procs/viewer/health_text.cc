@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <functional>
 
+#include "dmslam/messaging/roles.h"
+
 namespace dmslam {
 namespace {
 
@@ -11,7 +13,7 @@ using Life = ProcessBoard::Life;
 
 bool IsNeeded(const Process& process) {
   const std::string& name = process.name;
-  return process.needed || name == "player" || name == "frontend" || name == "mapper";
+  return process.needed || name == roles::kPlayer || name == roles::kFrontend || name == roles::kMapper;
 }
 
 std::string Number(double value) {

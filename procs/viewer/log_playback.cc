@@ -6,6 +6,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/camera_channels.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/former_types.h"
@@ -47,7 +48,7 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
 
 /// It is in the log: the node listens to it, too.
 void LogPlayback::AddCamera(CameraId camera) {
-  const std::string frontend = OfCamera("frontend", std::min(camera, kMaxCameras - 1));
+  const std::string frontend = OfCamera(roles::kFrontend, std::min(camera, kMaxCameras - 1));
   if (camera > 0 && !options_.HasPeer(frontend)) options_.peers.push_back(frontend);
 }
 

@@ -4,6 +4,7 @@
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/event_loop.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/process_main.h"
 #include "viewer/log_playback.h"
 #include "viewer/viewer_node.h"
@@ -49,7 +50,7 @@ int ShowLog(const std::string& log, const dmslam::NodeOptions& options, const dm
 }  // namespace
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("viewer",
+  dmslam::ProcessMain process(dmslam::roles::kViewer,
                               "Shows a running system in browsers; reads the bus and writes nothing to it.");
   dmslam::ViewerOptions viewer;
   dmslam::WebServerOptions web;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dmslam/messaging/protocol_messages.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/process_info.h"
 #include "viewer/viewer_json.h"
 
@@ -13,27 +14,26 @@ namespace {
 constexpr int64_t kDrawEveryNs = 120'000'000;
 constexpr int64_t kReportEveryNs = 250'000'000;
 constexpr int64_t kAlignEveryNs = 1'000'000'000;
-constexpr char kCollector[] = "collector";
 
 std::vector<std::string> Shown(CameraId num_cameras) {
   std::vector<std::string> names;
-  for (const char* role : {"player", "frontend"}) {
+  for (const char* role : {roles::kPlayer, roles::kFrontend}) {
     for (CameraId camera = 0; camera < num_cameras; ++camera) names.push_back(OfCamera(role, camera));
   }
-  names.insert(names.end(), {"mapper", "loopcloser", kCollector, "viewer"});
+  names.insert(names.end(), {roles::kMapper, roles::kLoopCloser, roles::kCollector, roles::kViewer});
   return names;
 }
 
 }  // namespace
 
 ViewerNode::ViewerNode(NodeContext context, NodeOptions options, ViewerOptions viewer, Exchange* exchange)
-    : StreamNode(std::move(context), std::move(options), "viewer"),
+    : StreamNode(std::move(context), std::move(options), roles::kViewer),
       viewer_(std::move(viewer)),
       exchange_(exchange),
       board_(Shown(options_.NumCameras())),
       seen_cameras_(options_.NumCameras()) {
-  Listen({channels::kMapperStatus, channels::kLoopcloserStatus, AckChannel("COLLECTOR")});
-  if (options_.HasPeer(kCollector)) board_.Need(kCollector);
+  Listen({channels::kMapperStatus, channels::kLoopcloserStatus, AckChannel(owners::kCollector)});
+  if (options_.HasPeer(roles::kCollector)) board_.Need(roles::kCollector);
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kPoseView,
             channels::kFeatureView, channels::kPlayerStatus, channels::kFrontendStatus},
@@ -60,15 +60,15 @@ void ViewerNode::Begin(const CameraInfo& info) {
     scene->Clear();
     series->Clear();
   });
-  map_reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
   for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera) {
     seen_cameras_[camera].reader =
-        MakeReader(StreamId::kFrontend, "FRONTEND",
+        MakeReader(StreamId::kFrontend, owners::kFrontend,
                    {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
                     channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
                    {}, camera);
   }
-  loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked});
+  loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked});
 }
 
 void ViewerNode::SetInHaste(bool in_haste) {
@@ -80,7 +80,7 @@ void ViewerNode::SetInHaste(bool in_haste) {
 }
 
 void ViewerNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
-  if (channel == AckChannel("COLLECTOR")) return OnCollector(channel, bytes);
+  if (channel == AckChannel(owners::kCollector)) return OnCollector(channel, bytes);
   OnStatusMessage(channel, bytes);
   if (core_) OnLoose(channel, bytes);
 }
@@ -88,8 +88,8 @@ void ViewerNode::OnMessage(const std::string& channel, std::span<const uint8_t> 
 /// The collector says no status: what it acknowledges, once a second at least, tells that it is there.
 void ViewerNode::OnCollector(const std::string& channel, std::span<const uint8_t> bytes) {
   const std::optional<ack_t> ack = DecodeAck(channel, bytes);
-  if (!ack || ack->role != kCollector || session_ == 0 || ack->header.session != session_) return;
-  board_.OnWord(kCollector, ack->reader, context_.now_ns(), context_.wall_us());
+  if (!ack || ack->role != roles::kCollector || session_ == 0 || ack->header.session != session_) return;
+  board_.OnWord(roles::kCollector, ack->reader, context_.now_ns(), context_.wall_us());
 }
 
 /// In haste pictures are kept, each camera's newest, until it is over.
@@ -128,7 +128,7 @@ void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> by
 void ViewerNode::OnEnd(const EndOfSequence& end) {
   CameraState* camera = FindCamera(end.camera_id);
   if (camera == nullptr || std::exchange(camera->ended, true)) return;
-  board_.Expect(OfCamera("player", end.camera_id));
+  board_.Expect(OfCamera(roles::kPlayer, end.camera_id));
   const std::string whose = seen_cameras_.size() == 1 ? "" : " of camera " + std::to_string(end.camera_id);
   Note(BoardEvent::Level::kInfo,
        "the sequence" + whose + " has ended: " + std::to_string(end.frames_published) + " frames");
@@ -143,20 +143,20 @@ void ViewerNode::Board(const std::string& name, const Status& status, const std:
 void ViewerNode::OnStatusMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel == channels::kPlayerStatus) {
     if (const auto status = Read<PlayerStatus>(bytes))
-      Board(OfCamera("player", status->camera_id), *status, StateWord(status->state));
+      Board(OfCamera(roles::kPlayer, status->camera_id), *status, StateWord(status->state));
   } else if (channel == channels::kFrontendStatus) {
     auto status = Read<FrontendStatus>(bytes);
     CameraState* camera = status ? FindCamera(status->camera_id) : nullptr;
     if (camera == nullptr) return;
     camera->frontend = std::move(*status);
-    Board(OfCamera("frontend", camera->frontend.camera_id), camera->frontend,
+    Board(OfCamera(roles::kFrontend, camera->frontend.camera_id), camera->frontend,
           StateWord(camera->frontend.state));
   } else if (channel == channels::kMapperStatus) {
     if (auto status = Read<MapperStatus>(bytes))
-      Board("mapper", mapper_ = std::move(*status), StateWord(mapper_.state));
+      Board(roles::kMapper, mapper_ = std::move(*status), StateWord(mapper_.state));
   } else if (channel == channels::kLoopcloserStatus) {
     if (auto status = Read<LoopcloserStatus>(bytes)) {
-      Board("loopcloser", loopcloser_ = std::move(*status), StateWord(loopcloser_.state));
+      Board(roles::kLoopCloser, loopcloser_ = std::move(*status), StateWord(loopcloser_.state));
     }
   }
 }
@@ -306,13 +306,14 @@ void ViewerNode::ReportIfDue() {
   const int64_t now = context_.now_ns();
   if (in_haste_ || now < next_report_ns_) return;
   next_report_ns_ = now + kReportEveryNs;
-  if (map_reader_ && map_reader_->writer_present(now)) board_.OnSign("mapper", now);
+  if (map_reader_ && map_reader_->writer_present(now)) board_.OnSign(roles::kMapper, now);
   for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera) {
     const StreamReader* reader = seen_cameras_[camera].reader.get();
-    if (reader != nullptr && reader->writer_present(now)) board_.OnSign(OfCamera("frontend", camera), now);
+    if (reader != nullptr && reader->writer_present(now))
+      board_.OnSign(OfCamera(roles::kFrontend, camera), now);
   }
-  if (loop_reader_ && loop_reader_->writer_present(now)) board_.OnSign("loopcloser", now);
-  board_.OnSign("viewer", now);
+  if (loop_reader_ && loop_reader_->writer_present(now)) board_.OnSign(roles::kLoopCloser, now);
+  board_.OnSign(roles::kViewer, now);
   board_.Advance(now, context_.wall_us());
   exchange_->hub().Send(EventKind::kStatus, StatusJson());
   exchange_->SetHealth(WriteHealth(board_, seen_cameras_[0].frontend, mapper_));
@@ -322,7 +323,8 @@ void ViewerNode::PublishStatus() {
   std::vector<const StreamReader*> readers = {map_reader_.get(), loop_reader_.get()};
   for (const CameraState& camera : seen_cameras_) readers.push_back(camera.reader.get());
   const StatusHead head = MakeStatusHead(core_ ? "" : "waiting for a camera", readers);
-  board_.OnStatus("viewer", head, core_ ? "watching" : "waiting", context_.now_ns(), context_.wall_us());
+  board_.OnStatus(roles::kViewer, head, core_ ? "watching" : "waiting", context_.now_ns(),
+                  context_.wall_us());
   ReportIfDue();
 }
 

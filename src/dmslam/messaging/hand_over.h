@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/messaging/roles.h"
 #include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
 
@@ -23,11 +24,11 @@ class ReplicaSearch : public StateMachine {
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kMap;
-    std::string owner = "MAPPER";       ///< of the stream: names the questions' channel
-    int64_t asker = 0;                  ///< random id, not zero; the next few are used as well
-    std::vector<std::string> roles;     ///< who may hold a replica
-    int64_t absent_ns = 5'000'000'000;  ///< a role that does not answer for so long is absent
-    int64_t ask_ns = 100'000'000;       ///< between questions
+    std::string owner = owners::kMapper;  ///< of the stream: names the questions' channel
+    int64_t asker = 0;                    ///< random id, not zero; the next few are used as well
+    std::vector<std::string> roles;       ///< who may hold a replica
+    int64_t absent_ns = 5'000'000'000;    ///< a role that does not answer for so long is absent
+    int64_t ask_ns = 100'000'000;         ///< between questions
   };
   struct Replica {
     std::string role;
@@ -73,8 +74,8 @@ class ReplicaHolder : public StateMachine {
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kMap;
-    std::string owner = "MAPPER";  ///< of the stream
-    std::string holder;            ///< this process: names the answers' channel, "FRONTEND"
+    std::string owner = owners::kMapper;  ///< of the stream
+    std::string holder;                   ///< this process: names the answers' channel, "FRONTEND"
     std::string role;
     int64_t id = 0;  ///< random, not zero: the one its reader of the stream uses
   };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dmslam/messaging/hand_over.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
@@ -27,9 +28,9 @@ class ReplicaFetch : public StateMachine {
   struct Options {
     int64_t session = 1;
     StreamId stream = StreamId::kMap;
-    std::string owner = "MAPPER";  ///< upper-case name of this process
-    std::string name;              ///< for messages to people
-    int64_t id = 0;                ///< random, not zero
+    std::string owner = owners::kMapper;  ///< upper-case name of this process
+    std::string name;                     ///< for messages to people
+    int64_t id = 0;                       ///< random, not zero
     int64_t schema_hash = 0;
     std::vector<Holder> holders;  ///< who is waited for; none: nothing to fetch
     ReceiveWindow::Limits limits;

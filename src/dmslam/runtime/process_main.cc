@@ -14,6 +14,7 @@
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/messaging/lcm_bus.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/service_notice.h"
@@ -52,8 +53,10 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
       .ShowDefault();
   app_.AddOption("--session", options_.session, "session id; 0: that of the first camera heard");
   // Those who take part in a run wait for one another; tools and viewers wait for nobody.
-  const std::vector<std::string> pipeline = {"frontend", "mapper", "loopcloser", "collector"};
-  if (role == "player" || std::ranges::find(pipeline, role) != pipeline.end()) options_.peers = pipeline;
+  const std::vector<std::string> pipeline = {roles::kFrontend, roles::kMapper, roles::kLoopCloser,
+                                             roles::kCollector};
+  if (role == roles::kPlayer || std::ranges::find(pipeline, role) != pipeline.end())
+    options_.peers = pipeline;
   app_.AddOption("--peers", options_.peers, "processes that take part: they are waited for")
       .Delimiter(',')
       .ShowDefault();
@@ -63,7 +66,7 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
           "are the peers player1 and frontend1")
       .InRange(1, static_cast<int>(kMaxCameras))
       .ShowDefault();
-  if (role == "player" || role == "frontend") {
+  if (role == roles::kPlayer || role == roles::kFrontend) {
     app_.AddOption("--camera-id", options_.camera_id, "whose it is, from 0, where several cameras take part")
         .InRange(0, static_cast<int>(kMaxCameras) - 1);
   }
@@ -105,9 +108,9 @@ void ProcessMain::AddCameras() {
     throw InputError("--camera-id " + std::to_string(options_.camera_id) + ": there are --cameras " +
                      std::to_string(cameras_) + ", numbered from 0");
   }
-  if (role_ != "viewer" && !options_.HasPeer("frontend")) return;
+  if (role_ != roles::kViewer && !options_.HasPeer(roles::kFrontend)) return;
   for (CameraId camera = 1; camera < cameras_; ++camera)
-    options_.peers.push_back(OfCamera("frontend", camera));
+    options_.peers.push_back(OfCamera(roles::kFrontend, camera));
 }
 
 std::unique_ptr<KeyedBus> ProcessMain::MakeKeyedBus(Bus* bus) const {

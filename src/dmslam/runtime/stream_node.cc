@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/session_check.h"
@@ -40,7 +41,7 @@ bool NodeOptions::HasPeer(std::string_view name) const {
 CameraId NodeOptions::NumCameras() const {
   CameraId count = 1;
   for (CameraId camera = 1; camera < kMaxCameras; ++camera) {
-    if (HasPeer(OfCamera("frontend", camera))) count = camera + 1;
+    if (HasPeer(OfCamera(roles::kFrontend, camera))) count = camera + 1;
   }
   return count;
 }
@@ -62,7 +63,7 @@ StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string rol
 }
 
 /// Whether it is one camera's, as a frontend is.
-bool StreamNode::IsOfCamera() const { return role_ == OfCamera("frontend", options_.camera_id); }
+bool StreamNode::IsOfCamera() const { return role_ == OfCamera(roles::kFrontend, options_.camera_id); }
 
 void StreamNode::OnMessage(const std::string&, std::span<const uint8_t>) {}
 
@@ -260,7 +261,7 @@ void StreamNode::ServeReplica(const Map* map, std::function<Version()> held, std
   options.schema_hash = SchemaHash();
   options.link = options_.link;
   replica_.server = std::make_unique<ReplicaServer>(options, std::move(held), replica_.snapshots.get());
-  endpoint_.AddServer(replica_.server.get(), "MAPPER");
+  endpoint_.AddServer(replica_.server.get(), owners::kMapper);
 }
 
 void StreamNode::LetSnapshotBegin() {

@@ -12,6 +12,7 @@
 #include "dmslam/map/feature_store.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/endpoint.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/camera_claims.h"
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/map_snapshots.h"
@@ -78,7 +79,7 @@ class StreamNode : public Node {
     Version parent;
     SnapshotSource* snapshots = nullptr;
     std::vector<std::string> watchers = {
-        "viewer"};  ///< roles whose wishes are heard, but who hold nothing back
+        roles::kViewer};  ///< roles whose wishes are heard, but who hold nothing back
   };
   /// Offers the replica of the map that this process holds to a mapper that starts. `held`: its version,
   /// empty while it is not whole. `map` must stay where it is.
