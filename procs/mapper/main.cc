@@ -1,10 +1,11 @@
 #include <cstdlib>
 
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/process_main.h"
 #include "mapper/make_mapper.h"
 
 int main(int argc, char** argv) {
-  dmslam::ProcessMain process("mapper", "Builds the map: the only process that writes it.");
+  dmslam::ProcessMain process(dmslam::roles::kMapper, "Builds the map: the only process that writes it.");
   dmslam::MapperFiles files;
   if (const char* checkpoint = std::getenv("DMSLAM_CHECKPOINT")) files.checkpoint = checkpoint;
   process.app().AddOption("--map", files.load,

@@ -5,6 +5,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/check.h"
@@ -21,7 +22,7 @@ std::unique_ptr<Node> MakeMapper(NodeContext context, NodeOptions options, Mappe
 }
 
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
-    : StreamNode(std::move(context), std::move(options), "mapper"),
+    : StreamNode(std::move(context), std::move(options), roles::kMapper),
       run_(options_.settings.Read<RunOptions>()),
       files_(std::move(files)),
       num_cameras_(options_.NumCameras()) {
@@ -87,8 +88,9 @@ void MapperNode::Begin(const CameraInfo& info) {
   core_->SetStop([this, goes_on] { return goes_on(stops_); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   std::vector<std::string> readers;
-  for (CameraId camera = 0; camera < num_cameras_; ++camera) readers.push_back(OfCamera("frontend", camera));
-  readers.insert(readers.end(), {"loopcloser", "collector"});
+  for (CameraId camera = 0; camera < num_cameras_; ++camera)
+    readers.push_back(OfCamera(roles::kFrontend, camera));
+  readers.insert(readers.end(), {roles::kLoopCloser, roles::kCollector});
   WantWriter({StreamId::kMap, readers, {}, snapshots_.get()});
   ListenToFrontends();
 }
@@ -99,7 +101,7 @@ void MapperNode::ListenToFrontends() {
   frontends_.resize(num_cameras_);
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
     frontends_[camera].reader = MakeReader(
-        StreamId::kFrontend, "FRONTEND",
+        StreamId::kFrontend, owners::kFrontend,
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
          channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
         std::nullopt, camera);
@@ -109,56 +111,56 @@ void MapperNode::ListenToFrontends() {
 // ---- Continuing what another mapper began ----
 
 void MapperNode::BeginFetch() {
-  ReplicaFetch::Options options;
-  options.session = session_;
-  options.owner = "MAPPER";
-  options.name = context_.name;
-  options.id = context_.random_id;
-  options.schema_hash = SchemaHash();
+  ReplicaFetch::Options fetch;
+  fetch.session = session_;
+  fetch.owner = owners::kMapper;
+  fetch.name = context_.name;
+  fetch.id = context_.random_id;
+  fetch.schema_hash = SchemaHash();
   std::vector<ReplicaFetch::Holder> holders;
   for (CameraId camera = 0; camera < num_cameras_; ++camera)
-    holders.push_back({OfCamera("frontend", camera), OfCamera("FRONTEND", camera)});
-  holders.insert(holders.end(), {{"loopcloser", "LOOPCLOSER"}, {"collector", "COLLECTOR"}});
+    holders.push_back({OfCamera(roles::kFrontend, camera), OfCamera(owners::kFrontend, camera)});
+  holders.insert(holders.end(),
+                 {{roles::kLoopCloser, owners::kLoopCloser}, {roles::kCollector, owners::kCollector}});
   for (const ReplicaFetch::Holder& holder : holders) {
-    if (options_.peers.empty() || options_.HasPeer(holder.role)) options.holders.push_back(holder);
+    if (options_.peers.empty() || options_.HasPeer(holder.role)) fetch.holders.push_back(holder);
   }
-  left_.fetch = std::make_unique<ReplicaFetch>(options, context_.now_ns());
-  endpoint_.AddFetch(left_.fetch.get(), {channels::kMap});
+  left_ = std::make_unique<LeftMap>(
+      LeftMap::Options{fetch, core_->map().camera(), core_->map().pyramid(), feature_store_}, &endpoint_,
+      context_.now_ns());
 }
 
-/// Takes the newest replica, if there is one; true when that is done.
+/// Takes the newest replica, if there is one, or else what is on the disk; true when that is done.
 bool MapperNode::FetchReplica() {
-  while (std::optional<Record> record = left_.fetch->Take()) {
-    if (record->begins_anew()) {
-      left_.replica.emplace(core_->map().camera(), core_->map().pyramid());
-      left_.replica->KeepFeaturesIn(feature_store_);
-      left_.groups.Clear();
-    }
-    auto delta = Read<MapDelta>(*record->bytes);
-    const bool readable = delta.has_value();
-    if (readable) delta = left_.groups.Add(std::move(*delta), record->term());
-    if (!left_.groups.fault().empty()) CountMalformed(record->channel, left_.groups.fault());
-    if (!readable || !left_.groups.fault().empty()) {  // half a map is none: all of it is asked for again
-      endpoint_.Remove(left_.fetch.get());
-      left_.replica.reset();
-      BeginFetch();
+  const LeftMap::State state = left_->Advance(
+      context_.now_ns(), [this](const Record& record) { return Read<MapDelta>(*record.bytes); },
+      [this](const Record& record, const std::string& why) { CountMalformed(record.channel, why); });
+  switch (state) {
+    case LeftMap::State::kFetching:
       return false;
-    }
-    if (delta) left_.replica->Apply(*delta);
+    case LeftMap::State::kKeepsGrowing:
+      Exit(kExitPresent,
+           "the map that the others hold grows while it is fetched: another mapper writes it, which is not "
+           "heard here; check the network, or stop that one");
+      return false;
+    case LeftMap::State::kWhole:
+      ContinueLeftMap();
+      break;
+    case LeftMap::State::kNone:
+      TakeCheckpoint();
+      break;
   }
-  if (left_.fetch->state() == ReplicaFetch::State::kNone) return true;
-  if (left_.fetch->KeepsGrowing(context_.now_ns()))
-    Exit(kExitPresent,
-         "the map that the others hold grows while it is fetched: another mapper writes it, which is not "
-         "heard here; check the network, or stop that one");
-  if (left_.fetch->state() != ReplicaFetch::State::kDone) return false;
-  const Version version = left_.fetch->version();
+  left_.reset();
+  return true;
+}
+
+void MapperNode::ContinueLeftMap() {
+  const Version version = left_->version();
   LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
-          left_.replica->keyframes().size(), left_.replica->num_landmarks());
-  core_->Continue(std::move(*left_.replica), static_cast<uint64_t>(context_.random_id));
+          left_->replica().keyframes().size(), left_->replica().num_landmarks());
+  core_->Continue(left_->TakeReplica(), static_cast<uint64_t>(context_.random_id));
   saved_.parts.clear();  // what the others hold is newer
   writer_plan().parent = version;
-  return true;
 }
 
 /// Whoever held the map has died with the mapper: what is on the disk is all there is. False: nothing is.
@@ -188,22 +190,17 @@ bool MapperNode::ReadyToWrite() {
       throw InputError(files_.checkpoint + ": holds no map of this session to go on from");
     return true;
   }
-  if (!left_.fetch) BeginFetch();
-  if (!FetchReplica()) return false;
-  endpoint_.Remove(left_.fetch.get());
-  if (left_.fetch->state() == ReplicaFetch::State::kNone) TakeCheckpoint();
-  return true;
+  if (!left_) BeginFetch();
+  return FetchReplica();
 }
 
 void MapperNode::OnWriterOpen() {
-  left_.fetch.reset();
-  left_.replica.reset();
   const MapProgress progress = core_->map().progress();
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
     const StreamPosition mapped = core_->map().progress(camera).frontend;
     frontends_[camera].mapped = {mapped.epoch, mapped.seq};
   }
-  loop_reader_ = MakeReader(StreamId::kLoopCloser, "LOOPCLOSER", {channels::kChecked},
+  loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked},
                             Version{progress.loopcloser.epoch, progress.loopcloser.seq});
   if (progress.ended) {  // the one before could not say goodbye: whoever has died since may lack the map
     give_up_ns_ = context_.now_ns() + kBackAfterDeathNs;
@@ -229,24 +226,6 @@ void MapperNode::PublishDelta(MapDelta delta) {
   const MapEvent event = delta.event;
   PublishChange(std::move(delta));
   timing_.OnPublished(event, context_.now_ns());
-}
-
-void MapperNode::Timing::OnPublished(MapEvent event, int64_t now_ns) {
-  const double elapsed_ms = static_cast<double>(now_ns - arrived_ns) * 1e-6;
-  if (event == MapEvent::kFused) fused_ns = now_ns;
-  if (event == MapEvent::kAdjusted) adjustment.Add(static_cast<double>(now_ns - fused_ns) * 1e-6);
-  if (event == MapEvent::kLandmarksCreated) to_landmarks.Add(elapsed_ms);
-  if (event == MapEvent::kAdjusted) to_adjusted.Add(elapsed_ms);
-}
-
-void MapperNode::Timing::Fill(MapperStatus* status) const {
-  status->landmarks_p50_ms = to_landmarks.Quantile(0.5);
-  status->landmarks_p95_ms = to_landmarks.Quantile(0.95);
-  status->landmarks_p99_ms = to_landmarks.Quantile(0.99);
-  status->adjusted_p50_ms = to_adjusted.Quantile(0.5);
-  status->adjusted_p95_ms = to_adjusted.Quantile(0.95);
-  status->adjusted_p99_ms = to_adjusted.Quantile(0.99);
-  status->adjustment_ms = adjustment.Quantile(0.5);
 }
 
 bool MapperNode::KeyframeWaits() const {
@@ -286,29 +265,25 @@ void MapperNode::NoteArrivals() {
 }
 
 void MapperNode::TakeLoopAnswers() {
-  while (std::optional<Record> record = loop_reader_->Take()) {
-    auto answer = Read<LoopAnswer>(*record->bytes);
-    loop_answers_.any_broken = loop_answers_.any_broken || !answer;
-    if (!answer) continue;
-    const std::optional<uint64_t> correction_id = answer->correction_id;
-    answer = loop_answers_.groups.Add(std::move(*answer), record->term());
-    if (!loop_answers_.groups.abandoned().empty())
-      CountMalformed(record->channel, loop_answers_.groups.abandoned());
-    if (!loop_answers_.groups.fault().empty()) {
-      CountMalformed(record->channel, loop_answers_.groups.fault());
-      loop_answers_.any_broken = true;
-      if (correction_id) loop_answers_.broken.push_back(*correction_id);
+  while (const std::optional<Record> record = loop_reader_->Take()) {
+    std::optional<LoopAnswer> answer = Read<LoopAnswer>(*record->bytes);
+    if (!answer) {
+      loop_answers_.AddUnreadable();
+      continue;
     }
-    if (answer) loop_answers_.whole.push_back({std::move(*answer), record->version()});
+    for (const std::string& problem :
+         loop_answers_.Add(std::move(*answer), record->term(), record->version()))
+      CountMalformed(record->channel, problem);
   }
   RefuseBrokenCorrections();
 }
 
 /// Whoever proposed a correction that did not come whole hears so, and may propose it again.
 void MapperNode::RefuseBrokenCorrections() {
-  if (loop_answers_.broken.empty()) return;
-  Run([this, ids = std::exchange(loop_answers_.broken, {})] {
-    for (const uint64_t id : ids) core_->RefuseCorrection(id, "its records did not come whole");
+  const std::vector<uint64_t> broken = loop_answers_.TakeBroken();
+  if (broken.empty()) return;
+  Run([this, broken] {
+    for (const uint64_t id : broken) core_->RefuseCorrection(id, "its records did not come whole");
   });
 }
 
@@ -326,18 +301,19 @@ bool MapperNode::PublishSavedMap() {
   return true;
 }
 
-void MapperNode::ApplyFirstAnswer() {
-  const PendingAnswer pending = std::move(loop_answers_.whole.front());
-  loop_answers_.whole.pop_front();
-  const auto apply = [this, pending] {
+/// Returns which keyframe it answers.
+KeyframeId MapperNode::ApplyFirstAnswer() {
+  const LoopAnswers::Answer first = loop_answers_.TakeFirst();
+  const auto apply = [this, first] {
     MapProgress progress = core_->map().progress();
-    progress.loopcloser = {pending.version.epoch, pending.version.seq};
+    progress.loopcloser = {first.version.epoch, first.version.seq};
     core_->SetProgress(progress);
-    core_->OnLoopAnswer(pending.answer);
+    core_->OnLoopAnswer(first.answer);
   };
-  Run(apply, [this, version = pending.version] {
+  Run(apply, [this, version = first.version] {
     pending_answers_.push_back({0, version, writer_->last_seq()});
   });
+  return first.answer.keyframe;
 }
 
 /// Has the core do something, and then this node. The core is idle.
@@ -345,7 +321,7 @@ void MapperNode::Run(Job job, std::function<void()> when_done) {
   keyframe_waits_ = KeyframeWaits();
   work_->Post([this, job = std::move(job), when_done = std::move(when_done)] {
     job();
-    work_->Report([this, when_done, status = CoreStatus()] {
+    work_->Report([this, when_done, status = StatusOf(*core_)] {
       core_status_ = status;
       if (when_done) when_done();
     });
@@ -379,7 +355,7 @@ bool MapperNode::WorkOnce() {
     SettleAwaited();
     return !awaited_;
   }
-  if (!lockstep_ && !loop_answers_.whole.empty()) {
+  if (!lockstep_ && !loop_answers_.empty()) {
     ApplyFirstAnswer();
     return work_->Idle();
   }
@@ -407,7 +383,7 @@ void MapperNode::JoinFrontend(CameraId camera, const SessionStart& start) {
 bool MapperNode::HandleFirstRecord() {
   const Record record = std::move(taken_.front().record);
   const CameraId camera = taken_.front().camera;
-  timing_.arrived_ns = taken_.front().at_ns;
+  timing_.OnRecord(taken_.front().at_ns);
   taken_.pop_front();
   if (record.channel == channels::kSession) {
     if (const auto start = ReadSessionStart(record.header, *record.bytes)) JoinFrontend(camera, *start);
@@ -472,7 +448,7 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
 /// answered it.
 void MapperNode::AfterKeyframe(const Version& version, KeyframeId id, MapId map_id,
                                bool checked_by_loopcloser) {
-  const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer("loopcloser");
+  const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer(roles::kLoopCloser);
   if (!wait) return Settle(id, map_id, version);
   work_->Report([this, version, id, map_id] { awaited_ = {id, map_id, version, loop_reader_->term()}; });
 }
@@ -487,11 +463,9 @@ void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend)
 /// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
 /// due.
 void MapperNode::SettleAwaited() {
-  bool ask_again = std::exchange(loop_answers_.any_broken, false);
-  while (!loop_answers_.whole.empty() && awaited_) {
-    const KeyframeId answered = loop_answers_.whole.front().answer.keyframe;
-    ApplyFirstAnswer();
-    if (answered != awaited_->id) {
+  bool ask_again = loop_answers_.TakeLost();
+  while (!loop_answers_.empty() && awaited_) {
+    if (ApplyFirstAnswer() != awaited_->id) {
       ask_again = true;  // it has just come, and answers what is newest
       continue;
     }
@@ -571,7 +545,7 @@ bool MapperNode::EndIfDone() {
   const bool all_ended = AllFrontends([](const Frontend& frontend) { return frontend.reader->AtEnd(); });
   if (ending_ == Ending::kNo && all_ended) ending_ = Ending::kFrontendEnded;
   if (ending_ == Ending::kNo) return false;
-  if (!loop_answers_.whole.empty() && ending_ == Ending::kFrontendEnded) {
+  if (!loop_answers_.empty() && ending_ == Ending::kFrontendEnded) {
     ApplyFirstAnswer();
     return work_->Idle();
   }
@@ -624,7 +598,7 @@ void MapperNode::Stop() {
 }
 
 void MapperNode::PublishStatus() {
-  if (core_ && work_->Idle()) core_status_ = CoreStatus();
+  if (core_ && work_->Idle()) core_status_ = StatusOf(*core_);
   MapperStatus status = core_status_;
   std::vector<const StreamReader*> readers;
   for (const Frontend& frontend : frontends_) readers.push_back(frontend.reader.get());
@@ -637,30 +611,6 @@ void MapperNode::PublishStatus() {
   status.last_settled = last_settled_;
   timing_.Fill(&status);
   PublishLoose(status);
-}
-
-/// On the core, or while it is idle.
-MapperStatus MapperNode::CoreStatus() const {
-  MapperStatus status;
-  const Map& map = core_->map();
-  const MapperCounters& counters = core_->counters();
-  status.version = static_cast<int64_t>(map.version());
-  status.maps = static_cast<int32_t>(counters.maps_started - counters.maps_dropped);
-  status.keyframes = static_cast<int32_t>(map.keyframes().size());
-  status.landmarks = static_cast<int32_t>(map.num_landmarks());
-  status.keyframes_inserted = static_cast<int64_t>(counters.keyframes_inserted);
-  status.keyframes_culled = static_cast<int64_t>(counters.keyframes_culled);
-  status.landmarks_created = counters.creation.created;
-  status.landmarks_culled = static_cast<int64_t>(counters.landmarks_culled);
-  status.landmarks_fused = static_cast<int64_t>(counters.fusions);
-  status.observations_dropped = static_cast<int64_t>(counters.observations_dropped);
-  status.refused_neighbourhood = counters.creation.refused_neighbourhood + counters.creation.refused_count;
-  status.refused_motion = static_cast<int64_t>(counters.landmarks_moving_removed);
-  status.refused_geometry = counters.creation.refused_parallax + counters.creation.refused_depth +
-                            counters.creation.refused_reprojection + counters.creation.refused_scale;
-  status.corrections_applied = static_cast<int64_t>(counters.corrections_applied);
-  status.corrections_refused = static_cast<int64_t>(counters.corrections_refused);
-  return status;
 }
 
 }  // namespace dmslam

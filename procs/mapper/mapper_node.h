@@ -7,15 +7,16 @@
 #include <optional>
 #include <vector>
 
-#include "dmslam/map/replica.h"
 #include "dmslam/mapping/mapper_core.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/runtime/core_thread.h"
-#include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
+#include "mapper/left_map.h"
+#include "mapper/loop_answers.h"
 #include "mapper/make_mapper.h"
+#include "mapper/mapper_report.h"
 
 namespace dmslam {
 
@@ -63,17 +64,6 @@ class MapperNode : public StreamNode {
     Version version;
     int64_t map_seq = 0;
   };
-  struct PendingAnswer {
-    LoopAnswer answer;
-    Version version;
-  };
-  /// What the loop closer has said.
-  struct LoopAnswers {
-    std::deque<PendingAnswer> whole;  ///< to be applied
-    wire::RecordGroups<LoopAnswer> groups;
-    bool any_broken = false;       ///< one was lost: who awaits it asks again
-    std::vector<uint64_t> broken;  ///< corrections whose records did not come whole: to be refused
-  };
   /// The map to begin with.
   struct SavedMap {
     std::optional<RebuiltMap> loaded;  ///< not yet taken over
@@ -81,27 +71,12 @@ class MapperNode : public StreamNode {
     int64_t next_part_ns = 0;
     SessionStart made;  ///< how it was made
   };
-  /// The map that another mapper left, while the newest replica of it is looked for.
-  struct LeftMap {
-    std::unique_ptr<ReplicaFetch> fetch;
-    std::optional<Replica> replica;
-    wire::RecordGroups<MapDelta> groups;
-  };
   /// Lock-step: a keyframe to which the loop closer's answer is due.
   struct Awaited {
     KeyframeId id;
     MapId map_id = 0;
     Version version;  ///< of the record that brought it
     Term asked;       ///< of the loop closer that was asked
-  };
-  /// How long keyframes take.
-  struct Timing {
-    int64_t arrived_ns = 0;  ///< the one that is handled
-    int64_t fused_ns = 0;    ///< since then it adjusts
-    LatencyWindow to_landmarks, to_adjusted, adjustment;
-
-    void OnPublished(MapEvent event, int64_t now_ns);
-    void Fill(MapperStatus* status) const;
   };
   enum class Ending : uint8_t {
     kNo,
@@ -119,10 +94,11 @@ class MapperNode : public StreamNode {
   bool TakeCheckpoint();
   void BeginFetch();
   bool FetchReplica();
+  void ContinueLeftMap();
   void TakeLoopAnswers();
   void RefuseBrokenCorrections();
   void SettleAgain();
-  void ApplyFirstAnswer();
+  KeyframeId ApplyFirstAnswer();
   void Complete();
   void DrainAfterEnd();
   bool HandleFirstRecord();
@@ -144,7 +120,6 @@ class MapperNode : public StreamNode {
   void PublishDelta(MapDelta delta);
   void InterruptCore();
   bool EndIfDone();
-  MapperStatus CoreStatus() const;
 
   const RunOptions run_;
   Files files_;
@@ -154,7 +129,7 @@ class MapperNode : public StreamNode {
   std::unique_ptr<MapSnapshots> snapshots_;
   std::vector<Frontend> frontends_;  ///< by camera
   std::unique_ptr<StreamReader> loop_reader_;
-  LeftMap left_;
+  std::unique_ptr<LeftMap> left_;  ///< while it is looked for
   bool lockstep_ = false;
   const CameraId num_cameras_;
   Ending ending_ = Ending::kNo;
@@ -166,7 +141,7 @@ class MapperNode : public StreamNode {
   LoopAnswers loop_answers_;
   std::optional<Awaited> awaited_;
   std::optional<KeyframeId> last_settled_;
-  Timing timing_;
+  KeyframeTiming timing_;
   MapperStatus core_status_;                 ///< what the core had to say of itself last
   std::atomic<bool> keyframe_waits_{false};  ///< asked by the core: it finishes early
   std::atomic<bool> stops_{false};           ///< asked by the core while it adjusts whole maps
