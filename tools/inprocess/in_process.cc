@@ -9,6 +9,7 @@
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/event_log.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/wire/codec.h"
 #include "frontend/make_frontend.h"
 #include "loopcloser/make_loopcloser.h"
@@ -117,12 +118,13 @@ class System {
 void AddMapSide(InProcessOptions* options, System* system) {
   NodeOptions& node = options->node;
   node.session = options->player.session;
-  node.peers.insert(node.peers.end(), {"frontend", "mapper", "loopcloser", "collector"});
+  node.peers.insert(node.peers.end(),
+                    {roles::kFrontend, roles::kMapper, roles::kLoopCloser, roles::kCollector});
   if (!options->record.empty()) system->Record(options->record);
   options->collector.checkpoints = false;  // nobody resumes it
-  system->Add(MakeCollector(system->ContextFor("collector"), node, options->collector));
-  system->Add(MakeLoopcloser(system->ContextFor("loopcloser"), node, options->vocabulary));
-  system->Add(MakeMapper(system->ContextFor("mapper"), node, options->map_files));
+  system->Add(MakeCollector(system->ContextFor(roles::kCollector), node, options->collector));
+  system->Add(MakeLoopcloser(system->ContextFor(roles::kLoopCloser), node, options->vocabulary));
+  system->Add(MakeMapper(system->ContextFor(roles::kMapper), node, options->map_files));
 }
 
 }  // namespace
@@ -131,8 +133,8 @@ int RunRecordsInProcess(InProcessOptions options, std::shared_ptr<const LogIndex
                         std::string* problem) {
   System system;
   AddMapSide(&options, &system);
-  system.Add(
-      std::make_unique<RecordsNode>(system.ContextFor("player"), options.node, std::move(log), log_session));
+  system.Add(std::make_unique<RecordsNode>(system.ContextFor(roles::kPlayer), options.node, std::move(log),
+                                           log_session));
   return system.Run(options.stop, problem);
 }
 
@@ -140,20 +142,21 @@ int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, 
                  std::vector<AnotherCamera> others) {
   options.player.mode = PlaybackMode::kLockstep;
   for (size_t i = 0; i < others.size(); ++i)
-    options.node.peers.push_back(OfCamera("frontend", static_cast<CameraId>(i + 1)));
+    options.node.peers.push_back(OfCamera(roles::kFrontend, static_cast<CameraId>(i + 1)));
   System system;
   AddMapSide(&options, &system);
-  system.Add(MakeFrontend(system.ContextFor("frontend"), options.node,
+  system.Add(MakeFrontend(system.ContextFor(roles::kFrontend), options.node,
                           {options.vocabulary, options.picture_dir, options.picture_every}));
-  system.Add(std::make_unique<PlayerNode>(system.ContextFor("player"), options.player, std::move(source)));
+  system.Add(
+      std::make_unique<PlayerNode>(system.ContextFor(roles::kPlayer), options.player, std::move(source)));
   for (AnotherCamera& other : others) {
     NodeOptions node = options.node;
     node.camera_id = other.player.camera_id = ++options.node.camera_id;
     other.player.mode = PlaybackMode::kLockstep;
     other.player.session = options.player.session;
-    system.Add(MakeFrontend(system.ContextFor(OfCamera("frontend", node.camera_id)), node,
+    system.Add(MakeFrontend(system.ContextFor(OfCamera(roles::kFrontend, node.camera_id)), node,
                             {options.vocabulary, "", 0}));
-    system.Add(std::make_unique<PlayerNode>(system.ContextFor(OfCamera("player", node.camera_id)),
+    system.Add(std::make_unique<PlayerNode>(system.ContextFor(OfCamera(roles::kPlayer, node.camera_id)),
                                             other.player, std::move(other.source)));
   }
   return system.Run(options.stop, problem);

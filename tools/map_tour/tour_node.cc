@@ -3,11 +3,12 @@
 #include <algorithm>
 
 #include "dmslam/console/log.h"
+#include "dmslam/messaging/roles.h"
 
 namespace dmslam {
 
 TourNode::TourNode(NodeContext context, NodeOptions options, const TourNodeOptions& tour)
-    : StreamNode(std::move(context), std::move(options), "mapper"), tour_options_(tour) {
+    : StreamNode(std::move(context), std::move(options), roles::kMapper), tour_options_(tour) {
   if (session_ == 0) session_ = 1;
 }
 
@@ -15,7 +16,8 @@ void TourNode::Begin(const CameraInfo&) {
   tour_ = std::make_unique<TourMap>(tour_options_.tour, session_);
   tour_->KeepFeaturesIn(feature_store_);
   snapshots_ = std::make_unique<MapSnapshots>(&tour_->map());
-  WantWriter({StreamId::kMap, {"frontend", "loopcloser", "collector"}, {}, snapshots_.get()});
+  WantWriter(
+      {StreamId::kMap, {roles::kFrontend, roles::kLoopCloser, roles::kCollector}, {}, snapshots_.get()});
 }
 
 bool TourNode::WorkOnce() {
