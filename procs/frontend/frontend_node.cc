@@ -98,6 +98,11 @@ Version FrontendNode::HandOverVersion() {
 
 void FrontendNode::OnWriterOpen() {
   left_->until_ns = context_.now_ns() + kBackAfterDeathNs;
+  session_start_ = MakeSessionStart();
+  PublishRecord(session_start_);
+}
+
+SessionStart FrontendNode::MakeSessionStart() const {
   SessionStart start;
   start.session = session_;
   start.camera_id = options_.camera_id;
@@ -110,7 +115,16 @@ void FrontendNode::OnWriterOpen() {
   start.pyramid = options_.settings.Read<Pyramid>();
   start.sequence = camera_info_->sequence;
   start.profile = options_.settings.profile();
-  PublishRecord(start);
+  return start;
+}
+
+/// On a channel of its own: who reads the stream has it from there.
+void FrontendNode::SaySessionAgain() {
+  if (!writer_) return;
+  Bytes bytes = wire::Encode(session_start_);
+  const std::string channel = ChannelOfCamera(channels::kSessionAgain, options_.camera_id);
+  Seal(writer_->HeaderOf(1), channel, bytes);
+  context_.bus->Publish({channel, std::make_shared<const Bytes>(std::move(bytes)), false});
 }
 
 void FrontendNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
@@ -276,8 +290,9 @@ bool FrontendNode::WorkOnce() {
     ApplyHeldRecords(held_.NumReady(!pace_.lockstep || end_.AppliesAllRecords()), false);
     if (!work_->Idle()) return false;
   }
-  if (end_.Is(SequenceEnd::Phase::kDone)) {
-    if (!options_.HasPeer(roles::kMapper) || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
+  // The map may have ended with the frontend that this one has taken over from.
+  if (end_.Is(SequenceEnd::Phase::kDone) || core_->map().progress().ended) {
+    if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;
@@ -547,6 +562,7 @@ void FrontendNode::FinishFrame() {
 // ---- Status ----
 
 void FrontendNode::PublishStatus() {
+  SaySessionAgain();
   if (core_ && work_->Idle()) core_status_ = CoreStatus();
   FrontendStatus status = core_status_;
   status.head = MakeStatusHead(core_ ? last_pose_.reason : "waiting for a camera", {map_reader_.get()});

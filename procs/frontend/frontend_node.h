@@ -75,6 +75,8 @@ class FrontendNode : public StreamNode {
     double extract_ms = 0;
   };
 
+  SessionStart MakeSessionStart() const;
+  void SaySessionAgain();
   void OnFrame(std::span<const uint8_t> bytes);
   std::optional<PlayOrder::Place> NewestFrame() const;
   FrameDone DoneWithNewest() const;
@@ -149,6 +151,7 @@ class FrontendNode : public StreamNode {
     LeftKeyframes keyframes;
     std::optional<int64_t> until_ns;  ///< then all of it was heard; none: not yet known
   };
+  SessionStart session_start_;         ///< as it was said
   std::optional<LeftBehind> left_;     ///< by a frontend before this one
   std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
   FramePose last_pose_;

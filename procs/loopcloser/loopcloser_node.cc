@@ -4,7 +4,7 @@
 
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
-#include "dmslam/messaging/roles.h"
+#include "dmslam/runtime/session_check.h"
 #include "dmslam/settings/run_options.h"
 #include "loopcloser/make_loopcloser.h"
 
@@ -17,19 +17,18 @@ std::unique_ptr<Node> MakeLoopcloser(NodeContext context, NodeOptions options,
 
 LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)
-    : StreamNode(std::move(context), std::move(options), roles::kLoopCloser),
-      vocabulary_(std::move(vocabulary)) {
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) Listen({channels::kSession}, camera);
+    : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    Listen({channels::kSession, channels::kSessionAgain}, camera);
 }
 
-/// The frontend's word on its settings and its vocabulary. Its stream is not read here; who comes later has
-/// the same settings as the one before.
+/// The frontend's word on its settings and its vocabulary. Its stream is not read here.
 void LoopcloserNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   const std::optional<RecordHeader> header = ParseHeader(bytes);
   for (CameraId camera = 0; header && camera < options_.NumCameras(); ++camera) {
     if (!IsIntact(ChannelOfCamera(channel, camera), bytes)) continue;
     const std::optional<SessionStart> start = ReadSessionStart(*header, bytes);
-    if (start && !IsForeign(start->session)) sessions_.Hear(camera, header->epoch, *start);
+    if (start && !IsForeign(start->session)) sessions_.Hear(camera, header->epoch, *start, context_.now_ns());
     return;
   }
   CountMalformed(channel, "its checksum does not fit");
@@ -39,8 +38,13 @@ void LoopcloserNode::OnMessage(const std::string& channel, std::span<const uint8
 void LoopcloserNode::JoinMappedSessions() {
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     const auto start = sessions_.Mapped(camera, core_->map().progress(camera).frontend.epoch);
-    if (start) JoinsSession(*start, vocabulary_ ? std::optional(vocabulary_->checksum()) : std::nullopt);
+    if (start) JoinSession(*start);
   }
+}
+
+std::string LoopcloserNode::WhyMisfits(const SessionStart& start) const {
+  return WhyMisfit(start, options_.settings,
+                   vocabulary_ ? std::optional(vocabulary_->checksum()) : std::nullopt);
 }
 
 LoopcloserNode::~LoopcloserNode() { stop_ = true; }

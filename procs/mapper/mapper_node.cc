@@ -252,6 +252,7 @@ void MapperNode::NoteArrivals() {
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
     Frontend& frontend = frontends_[camera];
     while (std::optional<Record> record = frontend.reader->Take()) {
+      if (IsDoubtful(*record, frontend.reader.get())) break;
       // A term before that one is of a frontend that began on a clock that is behind, when nobody named it.
       const Version version = record->version();
       if (version.epoch == frontend.mapped.epoch && version <= frontend.mapped) {
@@ -372,11 +373,14 @@ void MapperNode::MarkFrontend(CameraId camera, const Version& version) {
 
 /// It must have the settings of this process, and the vocabulary with which the map was made that it begins
 /// in.
+std::string MapperNode::WhyMisfits(const SessionStart& start) const {
+  const std::string why = StreamNode::WhyMisfits(start);
+  return why.empty() ? WhyOtherVocabulary(files_.load, saved_.made, start.vocabulary_checksum) : why;
+}
+
 void MapperNode::JoinFrontend(CameraId camera, const SessionStart& start) {
   if (camera == 0) session_start_ = start;
-  if (!JoinsSession(start)) return;
-  const std::string why = WhyOtherVocabulary(files_.load, saved_.made, start.vocabulary_checksum);
-  if (!why.empty()) Exit(kExitMisfit, why);
+  JoinSession(start);
 }
 
 /// True: there may be more to do.

@@ -69,10 +69,25 @@ struct Wire {
       for (const Outgoing& out : writer.TakeOutgoing()) Deliver(out);
       reader.Advance(now_ns);
       for (const Outgoing& out : reader.TakeOutgoing()) Deliver(out);
-      while (const std::optional<Record> record = reader.Take())
-        taken.push_back(DecodeReplica(record->channel, *record->bytes)->holder);
+      TakeAll();
       reader.AcceptTaken();
     }
+  }
+  /// A value below zero is grave.
+  void TakeAll() {
+    while (const std::optional<Record> record = reader.Take()) {
+      const int64_t value = DecodeReplica(record->channel, *record->bytes)->holder;
+      if (value < 0 && reader.Doubt(*record, now_ns)) return;
+      taken.push_back(value);
+    }
+  }
+  void ForgeRecord(int64_t seq, int64_t value) {
+    RecordHeader header = head->header;
+    header.seq = seq;
+    Bytes bytes = MakeRecord(value);
+    Seal(header, "DMSLAM_TEST_X", bytes);
+    Deliver({"DMSLAM_TEST_X", std::make_shared<const Bytes>(bytes), false});
+    TakeAll();
   }
   void Deliver(const Outgoing& out) {
     if (out.channel == HeadChannel("TEST")) head = DecodeHead(out.channel, *out.bytes);
@@ -288,15 +303,51 @@ TEST(Forgery, AnAckOfAHigherTermOrANewerVersion) {
 TEST(Forgery, ARecordWithALeapInItsNumber) {
   for (const int64_t more : {int64_t{3}, int64_t{3000}, int64_t{1} << 40}) {
     Wire wire;
-    RecordHeader header = wire.head->header;
-    header.seq = wire.writer.last_seq() + more;
-    Bytes bytes = MakeRecord(-1);
-    Seal(header, "DMSLAM_TEST_X", bytes);
-    wire.Deliver({"DMSLAM_TEST_X", std::make_shared<const Bytes>(bytes), false});
+    wire.ForgeRecord(wire.writer.last_seq() + more, 77);
     wire.Run(1000, false);
     EXPECT_EQ(wire.reader.backlog(), 0) << more;
     wire.ExpectUnharmed();
   }
+}
+
+/// Who goes on is not kept from it by one that is doubted, nor by copies of that on their way.
+TEST(Forgery, AGraveRecordInThePlaceOfTheNext) {
+  for (const int64_t later_ms : {1, 300}) {
+    Wire wire;
+    const int64_t seq = wire.writer.last_seq() + 1;
+    for (const int64_t copy_ms : {0, 20, 60}) {
+      wire.ForgeRecord(seq, -1);
+      wire.Run(copy_ms, false);
+    }
+    wire.Run(later_ms, false);
+    wire.ExpectUnharmed();
+  }
+}
+
+/// What was held before is held again.
+TEST(Forgery, AGraveRecordInThePlaceOfTheFirst) {
+  Wire wire;
+  const Version before = wire.reader.held();
+  wire.writer = StreamWriter(Wire::WriterOptions(), Term{2000, 6}, Version{});
+  wire.writer.Advance(wire.now_ns);
+  for (const Outgoing& out : wire.writer.TakeOutgoing()) wire.Deliver(out);
+  wire.Run(200, false);
+  ASSERT_EQ(wire.reader.term().epoch, 2000);
+  wire.taken.clear();
+  wire.next_value = 0;
+  wire.ForgeRecord(1, -1);
+  EXPECT_EQ(wire.reader.held(), before);
+  wire.ExpectUnharmed();
+}
+
+TEST(Forgery, AGraveRecordThatItsWriterSaysAgainIsBelieved) {
+  Wire wire;
+  wire.writer.Publish("DMSLAM_TEST_X", MakeRecord(-1), wire.now_ns);
+  wire.Run(50, false);
+  EXPECT_NE(wire.taken.back(), -1);
+  wire.Run(450, false);
+  EXPECT_EQ(wire.taken.back(), -1);
+  EXPECT_EQ(wire.writer.Backlog("reader"), 0);
 }
 
 TEST(Forgery, AClockThatHasLeaptInEarnestIsBelieved) {

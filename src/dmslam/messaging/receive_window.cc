@@ -132,6 +132,11 @@ std::optional<Record> ReceiveWindow::Take() {
   return record;
 }
 
+void ReceiveWindow::PutBack() {
+  --next_;
+  received_ = next_ - 1;
+}
+
 std::vector<MissingRange> ReceiveWindow::Missing(size_t limit) const {
   std::vector<MissingRange> missing;
   // Only what there is room for is asked for.

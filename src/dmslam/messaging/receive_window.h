@@ -58,6 +58,8 @@ class ReceiveWindow {
 
   /// The next record in order, if it is here.
   std::optional<Record> Take();
+  /// The one that was handed out last counts as missing again.
+  void PutBack();
   /// Whether Take would give one.
   bool CanTake() const { return !whole_.empty() && whole_.begin()->first == next_; }
 

@@ -18,6 +18,7 @@ constexpr int64_t kMaxBurst = 4096;             // records behind the last beaco
 constexpr int64_t kMinNsPerRecord = 50'000;     // no writer is faster for long
 constexpr int kBelieved = 2;                    // beacons
 constexpr int64_t kRefusedAckNs = 100'000'000;  // who holds more than the writer knows says so soon
+constexpr int64_t kNoCopyNs = 100'000'000;      // no network keeps a copy of a message for longer
 constexpr int64_t kOnlyOneNs = 5'000'000'000;   // a writer that is there says so more often than that
 constexpr size_t kMaxRangesNamed = 32;  // ranges named in one acknowledgement: it must fit one datagram
 
@@ -282,7 +283,8 @@ void StreamReader::Follow(const head_t& head) {
   const bool gap = head.first_seq > window_.received() + 1;
   if (gap && !std::exchange(beacons_.gap_seen, true)) return;
   const bool joins = !std::exchange(joined_, true) && held_.empty();
-  const bool is_anothers = joins && !options_.wants_all;  // what was before it came
+  const bool may_hold_it = !options_.start && held_.empty();  // nothing has come, and it may need none of it
+  const bool is_anothers = (joins || may_hold_it) && !options_.wants_all;  // what was before it came
   beacons_.gap_seen = false;
   if (!gap) return;
   if ((head.offers & head_t::OFFERS_SNAPSHOT) != 0) {
@@ -433,11 +435,26 @@ std::optional<Record> StreamReader::Take() {
     record = window_.Take();
   }
   if (!record) return std::nullopt;
+  before_take_ = {held_, taken_};
   held_before_ = record->begins_anew() ? Version() : held_;
   held_ = taken_ = record->version();
   ++statistics_.records;
   statistics_.payload_bytes += static_cast<int64_t>(record->bytes->size());
   return record;
+}
+
+bool StreamReader::Doubt(const Record& record, int64_t now_ns) {
+  const bool is_last_taken = window_.next() == record.header.seq + 1 && record.term() == term_;
+  if (state_ != State::kFollowing || record.in_snapshot() || !is_last_taken) return false;
+  const bool said_before = doubt_.record && *doubt_.record == *record.bytes;
+  if (said_before && now_ns - doubt_.since_ns >= kNoCopyNs) return false;
+  if (!said_before) doubt_ = {record.bytes, now_ns};
+  ++statistics_.dropped_doubtful;
+  window_.PutBack();
+  held_ = before_take_.held;
+  taken_ = before_take_.taken;
+  acknowledged_.due = true;
+  return true;
 }
 
 std::optional<Record> StreamReader::TakeFromSnapshot() {

@@ -90,6 +90,11 @@ class StreamReader : public StateMachine {
   /// held stays as it was before.
   void KeepHeld() { held_ = held_before_; }
 
+  /// The record taken last says what would end its owner or cost it much, and may be forged: true, and it is
+  /// as if it had not been taken, and asked for again. False: it is believed, for it has come again as it
+  /// was, too late for a copy on its way through a network; or nobody is left who could say it again.
+  bool Doubt(const Record& record, int64_t now_ns);
+
   /// The owner has all records up to this version safe: this is what the writer hears. Versions of earlier
   /// terms and those that were not yet taken are ignored.
   void Accept(const Version& version);
@@ -204,6 +209,13 @@ class StreamReader : public StateMachine {
   Version parent_, held_, accepted_;
   Version taken_;        // the record taken last, be it of what is not whole yet
   Version held_before_;  // what was held before that
+  struct {
+    Version held, taken;
+  } before_take_;  // the same, be it void since
+  struct {
+    SharedBytes record;
+    int64_t since_ns = 0;
+  } doubt_;  // the record doubted last
   ReceiveWindow window_;
   std::deque<Record> former_;           // of former terms, in order, not yet taken
   std::map<int64_t, Written> written_;  // by epoch: terms that are over, and those that others have told of

@@ -496,6 +496,31 @@ TEST(Stream, WhoDoesNotKnowYetWhatItHoldsCountsOnlyGaps) {
   }
 }
 
+/// ... nor does it count what its predecessor, who is still there, has accepted before anything came here.
+TEST(Stream, WhoDoesNotKnowYetWhatItHoldsCountsNothingThatIsForgottenBeforeAnythingCame) {
+  StreamWriter::Options options = WriterOptions();
+  options.max_records = 3;
+  Pair pair(options);
+  StreamReader::Options newcomer = ReaderOptions();
+  newcomer.start = std::nullopt;
+  pair.reader = StreamReader(newcomer);
+  pair.drop = [](const Outgoing& out) { return out.channel != HeadChannel("TEST"); };
+  for (int i = 1; i <= 8; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  pair.Run(300 * kMs);
+  for (int i = 9; i <= 13; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), pair.now_ns);
+  pair.Run(300 * kMs);
+  pair.drop = [](const Outgoing&) { return false; };
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.TakeAll(), (std::vector<int64_t>{11, 12, 13}));
+  EXPECT_EQ(pair.reader.statistics().lost, 0);
+  pair.drop = [](const Outgoing&) { return true; };
+  for (int i = 14; i <= 18; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), pair.now_ns);
+  pair.Run(300 * kMs);
+  pair.drop = [](const Outgoing&) { return false; };
+  pair.Run(300 * kMs);
+  EXPECT_EQ(pair.reader.statistics().lost, 2) << "what is behind that counts";
+}
+
 TEST(Stream, OfAWriterThatIsGoneWhatOthersHadIsCountedOnce) {
   Pair pair;
   pair.reader.NoteWritten({900, 7});  // before it came

@@ -99,6 +99,8 @@ class StreamWriter : public StateMachine {
 
   /// Publishes an encoded message whose second field is a record header. Returns its seq. Ask Full() before.
   int64_t Publish(const std::string& channel, Bytes message, int64_t now_ns);
+  /// As record `seq` carries it, or would.
+  RecordHeader HeaderOf(int64_t seq) const;
 
   void Receive(const std::string& channel, std::span<const uint8_t> bytes, int64_t now_ns) override;
   void Advance(int64_t now_ns) override;
@@ -196,7 +198,6 @@ class StreamWriter : public StateMachine {
   void AdvanceClosing(int64_t now_ns);
   int64_t Floor(bool followers_only) const;
   bool AllAccepted() const;
-  RecordHeader HeaderOf(int64_t seq) const;
   bool IsSilent() const { return superseded_by_.has_value() || closed(); }
 
   Options options_;

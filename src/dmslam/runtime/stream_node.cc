@@ -180,6 +180,7 @@ std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamRe
   if (record.begins_anew()) map_groups_.Clear();
   std::string reason;
   std::optional<MapDelta> delta = wire::Decode<MapDelta>(*record.bytes, &reason);
+  if (delta && IsOldChange(record, *delta, reader)) return std::nullopt;
   if (delta) {
     delta = map_groups_.Add(std::move(*delta), record.term());
     reason = map_groups_.fault();
@@ -194,6 +195,15 @@ std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamRe
   map_groups_.Clear();
   reader->Forget();
   return std::nullopt;
+}
+
+/// A record that stands for a change which was there before is none of the writer's: versions count changes.
+bool StreamNode::IsOldChange(const Record& record, const MapDelta& delta, StreamReader* reader) {
+  if (record.begins_anew() || record.term() != newest_change_.term) newest_change_ = {record.term(), 0};
+  if (record.in_snapshot() || delta.event == MapEvent::kSnapshot || map_groups_.open()) return false;
+  if (delta.version <= newest_change_.version && reader->Doubt(record, context_.now_ns())) return true;
+  newest_change_.version = delta.version;
+  return false;
 }
 
 /// What is too large for a record is a mistake of who made it; the others are spared it.
@@ -368,10 +378,26 @@ std::optional<SessionStart> StreamNode::ReadSessionStart(const RecordHeader& hea
   return std::nullopt;
 }
 
-bool StreamNode::JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum) {
-  const std::string why = WhyMisfit(start, options_.settings, vocabulary_checksum);
+std::string StreamNode::WhyMisfits(const SessionStart& start) const {
+  return WhyMisfit(start, options_.settings);
+}
+
+void StreamNode::JoinSession(const SessionStart& start) {
+  const std::string why = WhyMisfits(start);
   if (!why.empty()) Exit(kExitMisfit, why);
-  return why.empty();
+}
+
+bool StreamNode::IsDoubtful(const Record& record, StreamReader* reader) {
+  bool is_grave = false;
+  const std::string channel = SplitCamera(record.channel).channel;
+  if (channel == channels::kSession) {
+    const auto start = wire::Decode<SessionStart>(*record.bytes);
+    is_grave = start && !WhyMisfits(*start).empty();
+  } else if (channel == channels::kMapReset) {
+    const auto reset = wire::Decode<MapReset>(*record.bytes);
+    is_grave = reset && reset->fate == MapReset::Fate::kDrop;
+  }
+  return is_grave && reader->Doubt(record, context_.now_ns());
 }
 
 /// Who comes into a system that speaks other message types leaves; whoever was there before goes on with what
@@ -516,6 +542,7 @@ void AddWriter(const StreamWriter& writer, ProcessHealth* health) {
   health->dropped_checksum += s.dropped_bad;
   health->dropped_malformed += s.dropped_doubtful;
   health->dropped_foreign += s.dropped_foreign;
+  health->dropped_overflow += s.overrun;
   health->resent = s.parts_repaired;
   health->resent_bytes = s.repaired_bytes;
   health->kept_bytes = static_cast<int64_t>(s.kept_bytes);

@@ -141,7 +141,8 @@ class StreamNode : public Node {
   }
   /// The change that is complete with a record of the map stream; none while its group is not whole. None,
   /// too, where the record cannot be read or breaks its group: that is counted and named, and the reader asks
-  /// for a snapshot, so that nothing is applied to a replica that lacks it, and nothing acknowledged.
+  /// for a snapshot, so that nothing is applied to a replica that lacks it, and nothing acknowledged. None
+  /// where the record tells of no later change than the one before: it is asked for again.
   std::optional<MapDelta> ReadMapRecord(const Record& record, StreamReader* reader);
   /// The version that a replica made of what ReadMapRecord returned holds.
   Version MapHeld(const StreamReader& reader) const { return map_in_parts_ ? Version() : reader.held(); }
@@ -156,8 +157,13 @@ class StreamNode : public Node {
   /// On what the session of a frontend rests: the first record of its stream says so, and no other. None
   /// where it does not, which is counted.
   std::optional<SessionStart> ReadSessionStart(const RecordHeader& header, std::span<const uint8_t> bytes);
-  /// False where this process does not fit that: it ends, and says why.
-  bool JoinsSession(const SessionStart& start, std::optional<uint64_t> vocabulary_checksum = std::nullopt);
+  /// Why this process does not fit that; empty: it fits.
+  virtual std::string WhyMisfits(const SessionStart& start) const;
+  /// Where this process does not fit that it ends, and says why.
+  void JoinSession(const SessionStart& start);
+  /// Whether a record of a frontend, the last one taken, would end this process or drop the map, and has not
+  /// been said twice: it may be forged, and is asked for again.
+  bool IsDoubtful(const Record& record, StreamReader* reader);
 
   void Exit(int code, std::string problem = {});
   StatusHead MakeStatusHead(const std::string& reason, const std::vector<const StreamReader*>& readers) const;
@@ -192,6 +198,7 @@ class StreamNode : public Node {
   /// Keeps the protocol alive while one step of work follows the other.
   void PumpBetweenSteps();
   void PublishStatusIfDue();
+  bool IsOldChange(const Record& record, const MapDelta& delta, StreamReader* reader);
   struct Watched;
   void RefuseOtherTypes(Watched* watched);
   void WarnOnce(const std::string& matter, const std::string& text);
@@ -199,6 +206,11 @@ class StreamNode : public Node {
   struct KnownCamera {
     Bytes message;       ///< what the player says; empty: of a recorded session, and not repeated
     int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
+  };
+  /// The change of the map that was read last.
+  struct NewestChange {
+    Term term;
+    uint64_t version = 0;
   };
   struct Traffic {
     int64_t received = 0, received_bytes = 0, dropped_foreign = 0, dropped_malformed = 0;
@@ -230,6 +242,7 @@ class StreamNode : public Node {
   Traffic traffic_;
   std::vector<std::string> logged_;
   wire::RecordGroups<MapDelta> map_groups_;
+  NewestChange newest_change_;
   bool map_in_parts_ = false;
   std::vector<Watched> readers_;
   std::vector<const CoreThread*> core_threads_;  ///< that are watched; owned by the node that asked for them

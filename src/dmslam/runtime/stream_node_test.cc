@@ -8,6 +8,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/replica.h"
+#include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/runtime/exit_codes.h"
 
@@ -174,6 +175,37 @@ TEST_F(MapStreamTest, ARecordThatCannotBeReadIsNamedAndTheMapComesAsASnapshot) {
   Run();
   EXPECT_EQ(holder_->map().keyframes().size(), 3U);
   EXPECT_EQ(holder_->malformed(), 1);
+}
+
+/// An earlier change in the place of the next one, as somebody forges it who repeats what he hears.
+TEST_F(MapStreamTest, AnEarlierChangeInThePlaceOfTheNextOneIsAskedForAgain) {
+  const MapDelta first = AddKeyframe(1);
+  Publish(first);
+  Run();
+  Bytes forged = wire::Encode(first);
+  Seal(writer_->HeaderOf(2), channels::kMap, forged);
+  mapper_.bus().Publish({channels::kMap, std::make_shared<const Bytes>(forged), false});
+  while (bus_.DeliverOne()) {
+  }
+  holder_->Advance();
+  EXPECT_EQ(holder_->applied(), 1);
+  const int64_t seq = Publish(AddKeyframe(2));
+  ASSERT_EQ(seq, 2);
+  Run();
+  EXPECT_EQ(holder_->applied(), 2);
+  EXPECT_EQ(holder_->map().keyframes().size(), 2U);
+  EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
+  EXPECT_EQ(holder_->malformed(), 0);
+}
+
+/// ... and one that its writer means is applied.
+TEST_F(MapStreamTest, AnEarlierChangeThatItsWriterSaysAgainIsBelieved) {
+  const MapDelta first = AddKeyframe(1);
+  Publish(first);
+  const int64_t seq = Publish(first);
+  Run();
+  EXPECT_EQ(holder_->applied(), 2);
+  EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
 }
 
 TEST_F(MapStreamTest, AGroupIsAppliedAsOneOrReplacedByASnapshot) {
@@ -347,6 +379,7 @@ class Publisher : public StreamNode {
  public:
   Publisher(NodeContext context, NodeOptions options)
       : StreamNode(std::move(context), std::move(options), "mapper") {}
+  using StreamNode::MakeStatusHead;
   using StreamNode::PublishChange;
   using StreamNode::PublishRecord;
   const StreamWriter* writer() const { return writer_.get(); }
@@ -359,7 +392,7 @@ class Publisher : public StreamNode {
 /// Nodes that publish, on a bus with somebody else.
 class PublisherTest : public testing::Test {
  protected:
-  Publisher& Add(int64_t id, bool take_over = false) {
+  Publisher& Add(int64_t id, bool take_over = false, const std::vector<std::string>& peers = {"mapper"}) {
     NodeContext context;
     context.bus = &bus_.AddPort();
     context.now_ns = [this] { return now_ns_; };
@@ -370,7 +403,7 @@ class PublisherTest : public testing::Test {
     NodeOptions options;
     options.session = kSession;
     options.take_over = take_over;
-    options.peers = {"mapper"};
+    options.peers = peers;
     nodes_.push_back(std::make_unique<Publisher>(context, options));
     return *nodes_.back();
   }
@@ -438,16 +471,32 @@ TEST_F(PublisherTest, WhoIsAskedToEndAsWellWaitsForNobody) {
   EXPECT_EQ(first.exit_code(), kExitDone);
 }
 
+/// A change of more than a record.
+MapDelta LargeChange(uint64_t version) {
+  MapDelta change;
+  change.event = MapEvent::kGloballyAdjusted;
+  change.correction_id = 1;
+  change.version = version;
+  for (uint64_t i = 0; i < 100'000; ++i)
+    change.landmark_positions.push_back({LandmarkId::Make(1, i + 1), {1, 2, 3}});
+  return change;
+}
+
+/// The collector is expected, and does not come.
+TEST_F(PublisherTest, WhatAWriterHadToForgetIsInItsStatus) {
+  Publisher& publisher = Add(7, false, {"mapper", "collector"});
+  Pass(0.1);
+  ASSERT_NE(publisher.writer(), nullptr);
+  EXPECT_EQ(publisher.MakeStatusHead("", {}).health.dropped_overflow, 0);
+  for (int i = 0; i < 30; ++i) publisher.PublishChange(LargeChange(5));  // 64 MB are kept
+  EXPECT_GT(publisher.MakeStatusHead("", {}).health.dropped_overflow, 0);
+}
+
 TEST_F(PublisherTest, ARecordAboveTheBoundIsRefusedAndAChangeIsSplit) {
   Publisher& publisher = Add(7);
   Pass(0.1);
   ASSERT_NE(publisher.writer(), nullptr);
-  MapDelta change;
-  change.event = MapEvent::kGloballyAdjusted;
-  change.correction_id = 1;
-  change.version = 5;
-  for (uint64_t i = 0; i < 100'000; ++i)
-    change.landmark_positions.push_back({LandmarkId::Make(1, i + 1), {1, 2, 3}});
+  const MapDelta change = LargeChange(5);
   ASSERT_GT(wire::Encode(change).size(), wire::kMaxRecordBytes);
   EXPECT_EQ(publisher.PublishRecord(change), 0) << "nothing is published";
   EXPECT_EQ(publisher.writer()->last_seq(), 0);

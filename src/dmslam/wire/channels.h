@@ -22,6 +22,8 @@ inline constexpr char kMapReset[] = "DMSLAM_FRONTEND_RESET";
 inline constexpr char kAdjustRequest[] = "DMSLAM_FRONTEND_ADJUST_REQUEST";
 inline constexpr char kTurnRequest[] = "DMSLAM_FRONTEND_TURN_REQUEST";
 // Not records: what may be lost.
+/// The session once more, again and again: for who does not read the stream.
+inline constexpr char kSessionAgain[] = "DMSLAM_FRONTEND_SESSION_AGAIN";
 inline constexpr char kFrameDone[] = "DMSLAM_FRONTEND_FRAME_DONE";
 inline constexpr char kSequenceDone[] = "DMSLAM_FRONTEND_SEQUENCE_DONE";
 inline constexpr char kOdometry[] = "DMSLAM_FRONTEND_ODOMETRY";
