@@ -47,6 +47,28 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
   run_.cameras.resize(options_.NumCameras());
   for (std::string& path : collector_.ground_truth) path = path == "-" ? "" : path;
   RecallEndedMap();
+  RecallSession();
+}
+
+/// A collector before this one has noted what the run rests on: nobody need say it again, and what a frontend
+/// has kept for this one is taken at once.
+void CollectorNode::RecallSession() {
+  if (context_.fresh_system || session_ == 0) return;
+  std::optional<SessionStart> start;
+  Journal::Read(JournalPath(collector_.out_dir), session_, [&](std::span<const uint8_t> record) {
+    if (!start) start = wire::Decode<SessionStart>(record);
+    if (start && start->camera_id != 0) start.reset();
+  });
+  if (start) KnowSession(*start);
+}
+
+void CollectorNode::KnowSession(const SessionStart& start) {
+  CameraInfo info;
+  info.session = session_;
+  info.camera = start.camera;
+  info.sequence = start.sequence;
+  info.mode = start.mode;
+  KnowCamera(info);
 }
 
 /// Where the map on the disk is the last one, nobody is needed any more, and nobody may be left.
@@ -55,13 +77,8 @@ void CollectorNode::RecallEndedMap() {
   FoundCheckpoint found = FindCheckpoint(CheckpointPath(collector_.out_dir), session_, feature_store_);
   if (!found.map || !found.map->map.progress().ended) return;
   LogInfo("{}: the map is complete; what is left to do is to write the results", found.path);
-  CameraInfo info;
-  info.session = session_;
-  info.camera = found.map->session.camera;
-  info.sequence = found.map->session.sequence;
-  info.mode = found.map->session.mode;
   ended_map_.found = std::move(found.map->map);
-  KnowCamera(info);
+  KnowSession(found.map->session);
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
@@ -148,9 +165,9 @@ void CollectorNode::ReadNote(const std::string& text) {
   if (MapId map_id = 0; kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
   if (kind == "counters" || kind == "process" || kind == "heard")
     processes_.ReadNote(kind, note, context_.now_ns());
-  if (int64_t epoch = 0; kind == "resumed") {
-    note >> epoch;
-    OnResume(epoch);
+  if (int64_t epoch = 0; (kind == "begun" || kind == "resumed") && note >> epoch) {
+    map_begun_in_ = epoch;
+    if (kind == "resumed") OnAllDied();
   }
   if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
     note >> safe_[camera].epoch >> safe_[camera].seq;
@@ -229,7 +246,7 @@ void CollectorNode::OnFramePose(const Record& record) {
 void CollectorNode::OnSessionStart(const Record& record) {
   std::optional<SessionStart> start = ReadSessionStart(record.header, *record.bytes);
   if (!start) return;
-  JoinsSession(*start);
+  JoinSession(*start);
   if (start->camera_id == 0) session_start_ = std::move(start);
   KeepOnDisk(record);
 }
@@ -313,7 +330,7 @@ bool CollectorNode::TakeFrontendRecord() {
 
 bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   std::optional<Record> record = frontend_readers_[camera]->Take();
-  if (!record) return false;
+  if (!record || IsDoubtful(*record, frontend_readers_[camera].get())) return false;
   record->channel = SplitCamera(record->channel).channel;
   if (record->channel == channels::kSession) {
     OnSessionStart(*record);
@@ -393,14 +410,20 @@ void CollectorNode::OpenJournal() {
   }
 }
 
-/// All who held the map had died, and a mapper begins with the last checkpoint in this term: what came after
-/// it is gone. Collectors that follow each other may all hear the beginning of that term. Whether it is news.
-bool CollectorNode::OnResume(int64_t epoch) {
-  if (resumed_in_ == epoch) return false;
-  resumed_in_ = epoch;
+/// In this term a map begins that continues none. Where something was to be in one before, all who held that
+/// had died, and it goes on with the last checkpoint (`is_saved`), or with nothing where there was none yet.
+/// Collectors that follow each other may all hear the beginning of the same term.
+void CollectorNode::OnFreshMap(int64_t epoch, bool is_saved) {
+  if (map_begun_in_ == epoch) return;
+  const bool all_died = proposals_.AnyMapped() || (is_saved && !proposals_.empty());
+  journal_->AppendNote((all_died ? "resumed " : "begun ") + std::to_string(epoch));
+  map_begun_in_ = epoch;
+  if (all_died) OnAllDied();
+}
+
+void CollectorNode::OnAllDied() {
   ++run_.resumes;
   proposals_.OnAllDied();
-  return true;
 }
 
 void CollectorNode::BeginCheckpoints() {
@@ -464,13 +487,13 @@ bool CollectorNode::TakeMapRecord() {
   if (!record) return false;
   if (record->begins_anew()) {
     builder_->ForgetMap();
-    map_is_fresh_ = !record->in_snapshot();
+    map_is_fresh_ = map_reader_->parent().empty();
   }
   const auto delta = ReadMapRecord(*record, map_reader_.get());
   if (!delta) return true;
-  if (std::exchange(map_is_fresh_, false) && delta->event == MapEvent::kSnapshot && !proposals_.empty()) {
-    const int64_t epoch = record->version().epoch;
-    if (OnResume(epoch)) journal_->AppendNote("resumed " + std::to_string(epoch));
+  if (std::exchange(map_is_fresh_, false)) {
+    const bool is_saved = delta->event == MapEvent::kSnapshot && !record->in_snapshot();
+    OnFreshMap(record->term().epoch, is_saved);
   }
   const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
   builder_->OnMapDelta(*delta);

@@ -100,7 +100,8 @@ class CollectorNode : public StreamNode {
   void OnMapReset(const Record& record);
   void OnSessionStart(const Record& record);
   void CountReset(const MapReset& reset);
-  bool OnResume(int64_t epoch);
+  void OnFreshMap(int64_t epoch, bool is_saved);
+  void OnAllDied();
   bool MapMayBeKept() const;
   void KeepCheckpoint();
   void KeepOnDisk(const Record& record);
@@ -111,6 +112,8 @@ class CollectorNode : public StreamNode {
   void AcceptMap();
   bool EndedMapIsSafe();
   void RecallEndedMap();
+  void RecallSession();
+  void KnowSession(const SessionStart& start);
   void CountFrame(const FramePose& pose);
   void OpenJournal();
   std::string OfTotal() const;
@@ -145,8 +148,8 @@ class CollectorNode : public StreamNode {
   Due due_;
   int64_t begun_ns_ = 0;
   FrameCount frames_;
-  std::optional<int64_t> resumed_in_;  ///< the mapper's term that began with a checkpoint
-  bool map_is_fresh_ = false;          ///< a map stream has begun that continues none
+  std::optional<int64_t> map_begun_in_;  ///< the mapper's newest term that continues none
+  bool map_is_fresh_ = false;            ///< ... is being read from its beginning
 };
 
 }  // namespace dmslam

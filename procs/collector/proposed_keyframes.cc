@@ -1,5 +1,7 @@
 #include "collector/proposed_keyframes.h"
 
+#include <algorithm>
+
 #include "dmslam/console/log.h"
 
 namespace dmslam {
@@ -49,6 +51,12 @@ void ProposedKeyframes::OnMapped(CameraId camera, const StreamPosition& mapped) 
     if (taken) note_("mapped " + std::to_string(id.value));
     if (taken) in_flight_.erase(id);
     return taken;
+  });
+}
+
+bool ProposedKeyframes::AnyMapped() const {
+  return std::ranges::any_of(maps_, [this](const auto& item) {
+    return !not_taken_.contains(item.first) && !before_crash_.contains(item.first);
   });
 }
 

@@ -32,7 +32,9 @@ class ProposedKeyframes {
   void KeepRecord(KeyframeId id, const SharedBytes& record);
   /// The records of a camera's frontend up to there are worked into the map: whoever holds that holds them.
   void OnMapped(CameraId camera, const StreamPosition& mapped);
-  /// All who held the map had died, and a mapper began with the last checkpoint.
+  /// Whether a mapper has taken any, since all had died.
+  bool AnyMapped() const;
+  /// All who held the map had died, and a mapper began with the last checkpoint, or with nothing.
   void OnAllDied();
 
   struct Left {

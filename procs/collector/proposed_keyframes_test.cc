@@ -73,6 +73,15 @@ TEST_F(ProposedKeyframesTest, WhatIsNotInTheMapIsNamedByWhatBecameOfIt) {
   EXPECT_EQ(record.lost_with_frontend, 1u) << "3: the map goes on with another frontend";
 }
 
+TEST_F(ProposedKeyframesTest, WhetherAMapperHadTakenAnySinceAllDied) {
+  Propose(1, 10);
+  EXPECT_FALSE(proposed_.AnyMapped());
+  proposed_.OnMapped(0, {kEpoch, 10});
+  EXPECT_TRUE(proposed_.AnyMapped());
+  proposed_.OnAllDied();
+  EXPECT_FALSE(proposed_.AnyMapped());
+}
+
 TEST_F(ProposedKeyframesTest, ItsNotesTellTheNextOne) {
   Propose(1, 10);
   Propose(2, 20);

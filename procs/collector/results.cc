@@ -389,6 +389,7 @@ Json StreamsJson(const RunRecord& run) {
     sum.records_lost += health.records_lost;
     sum.records_repaired += health.records_repaired;
     sum.dropped_foreign += health.dropped_foreign;
+    sum.dropped_overflow += health.dropped_overflow;
     dropped += health.dropped_malformed + health.dropped_checksum + health.dropped_foreign;
     sum.written_bytes += health.written_bytes;
     sum.resent_bytes += health.resent_bytes;
@@ -396,6 +397,7 @@ Json StreamsJson(const RunRecord& run) {
   Json json;
   json["records_lost"] = sum.records_lost;
   json["records_repaired"] = sum.records_repaired;
+  json["records_without_room"] = sum.dropped_overflow;
   json["dropped_of_other_sessions"] = sum.dropped_foreign;
   json["messages_dropped"] = dropped;
   json["recovery_p50_ms"] = HealthJson(run, &ProcessHealth::recovery_p50_ms);
