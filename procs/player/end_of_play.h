@@ -18,6 +18,8 @@ class EndOfPlay {
   /// The frontend says that all is done, to us or to a player before us: whether that is so. Who has not said
   /// the end believes it when it is said for a while: the frontend answers every frame with it then.
   bool OnSequenceDone(int64_t now_ns);
+  /// The frontend has done the frame that was played last, so that not all is done.
+  void OnFrameDone() { all_done_.Clear(); }
   /// A message on any channel. The statuses of this session's mapper and frontend say that these are alive: a
   /// frontend may still be tracking, adjusting or telling its last poses. All others are left alone.
   void OnStatus(const std::string& channel, std::span<const uint8_t> bytes, uint32_t session, int64_t now_ns);

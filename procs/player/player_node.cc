@@ -128,6 +128,7 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session || !frame_bytes_ || done.frame_index < frame_.frame_index) return;
   if (done.frame_index == frame_.frame_index) {
     further_.Clear();
+    end_.OnFrameDone();
     awaiting_done_ = false;
   } else if (const auto newest = further_.OnAnswer({done.frame_index, done.stamp_ns}, context_.now_ns())) {
     SkipBehind(newest->index);

@@ -120,6 +120,19 @@ TEST_F(PlayerNodeTest, OneForgedAnswerInTheMiddleChangesNothing) {
   EXPECT_EQ(ends_, 0);
 }
 
+TEST_F(PlayerNodeTest, TwoForgedAnswersThatAreContradictedMeanwhileChangeNothing) {
+  Begin();
+  SayAllDone();
+  Advance(100);
+  SayDone(0);
+  Advance(110);
+  ASSERT_EQ(frames_.back(), 1u);
+  SayAllDone();
+  Advance(10);
+  EXPECT_EQ(frames_.back(), 1u);
+  EXPECT_EQ(ends_, 0);
+}
+
 /// Started again, it begins from the front; the frontend answers each repeat with what it has done.
 TEST_F(PlayerNodeTest, GoesOnBehindAFrontendThatIsFurther) {
   Begin();
