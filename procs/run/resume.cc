@@ -148,6 +148,7 @@ ResumePoint FindResumePoint(const std::string& out, const RunIdentity& identity)
                                 ? ": this run has ended, and its results are there; nothing is left to resume"
                                 : ": this run died before its first frame; begin it anew"));
   }
+  Journal::Sync(JournalPath(out));  // those who wrote it may have died before they did
   const FoundCheckpoint found = FindCheckpoint(CheckpointPath(out), identity.session);
   if (!found.map) {
     throw InputError(found.problem +

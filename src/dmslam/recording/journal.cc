@@ -197,6 +197,12 @@ void Journal::Sync() const {
   throw InputError(path_ + ": is not safe from a power cut (" + std::strerror(errno) + "); check its disk");
 }
 
+void Journal::Sync(const std::string& path) {
+  Journal journal(path);
+  journal.Open(O_RDONLY);
+  journal.Sync();
+}
+
 void Journal::Remove() {
   Close();
   std::error_code ignored;

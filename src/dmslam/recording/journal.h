@@ -58,6 +58,8 @@ class Journal {
   int64_t lost() const { return lost_; }
   /// On the disk, whatever becomes of this host. Throws InputError where the disk refuses.
   void Sync() const;
+  /// The same for what others have left.
+  static void Sync(const std::string& path);
   /// It is no longer needed.
   void Remove();
 
