@@ -69,14 +69,9 @@ ends hung 1
 check "it says who hung" grep -q "mapper said nothing for too long" "$work/hung.said"
 expect "nothing is lost with a mapper that hangs" "$work/hung" records_lost "== 0"
 
-# Only its core hangs: its loop turns and speaks on the bus.
-find_python
-if [[ -z $python ]]; then
-  echo "left out: there is no python with ctypes to stop a single thread with"
-else
-  arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --seed 1 --watchdog 2)
-  begin core 20
-  "$python" - "$(pid_of mapper)" <<'STOP_CORE' &
+# stop_threads PID: all but the main one, until the process is dead.
+stop_threads() {
+  "$python" - "$1" <<'STOP_THREADS' &
 import ctypes, os, sys
 ptrace = ctypes.CDLL(None).ptrace
 ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
@@ -90,7 +85,23 @@ try:
         os.waitpid(-1, 0x40000000)  # until all of them are dead
 except ChildProcessError:
     pass
-STOP_CORE
+STOP_THREADS
+}
+find_python
+if [[ -z $python ]]; then
+  echo "left out: there is no python with ctypes to stop a single thread with"
+else
+  # In lock-step the core has no thread of its own: there is LCM's, which receives.
+  begin deaf 40
+  stop_threads "$(pid_of mapper)"
+  ends deaf 1
+  check "the mapper says that it is deaf" grep -q "LCM hears not even this process" "$work/deaf/log/mapper.log"
+  expect "nothing is lost with a mapper that is deaf" "$work/deaf" records_lost "== 0"
+
+  # Only its core hangs: its loop turns and speaks on the bus.
+  arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --seed 1 --watchdog 2)
+  begin core 20
+  stop_threads "$(pid_of mapper)"
   ends core 1
   check "the mapper says that its core hangs" grep -q "a job has given no sign" "$work/core/log/mapper.log"
   check "it is killed" grep -q "mapper said nothing for too long" "$work/core.said"

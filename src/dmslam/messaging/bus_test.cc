@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <stdexcept>
 
@@ -10,6 +13,18 @@
 #include "dmslam/messaging/lcm_bus.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/util/check.h"
+
+namespace {
+
+std::atomic<bool> receiver_stands_still = false;
+
+}  // namespace
+
+/// In the place of the library's: only LCM's receiving thread calls it.
+extern "C" ssize_t recvmsg(int fd, msghdr* message, int flags) {
+  while (receiver_stands_still) usleep(1000);
+  return syscall(SYS_recvmsg, fd, message, flags);
+}
 
 namespace dmslam {
 namespace {
@@ -101,6 +116,43 @@ TEST(LcmBus, WhatAHandlerThrowsComesOutOfDeliver) {
   bus.Publish(Message("X", {1}));  // and the bus still works
   PumpUntil(&loop, [&] { return caught; });
   EXPECT_TRUE(caught);
+}
+
+/// Asked four times within what is the longest, as a process does that is watched: after how many times.
+int TimesUntilDeaf(EventLoop* loop, LcmBus* bus, int64_t* now_ns) {
+  for (int times = 1; times <= 20; ++times) {
+    const int64_t until_ns = EventLoop::now_ns() + 20'000'000;
+    while (EventLoop::now_ns() < until_ns) loop->PumpOnce(until_ns);
+    if (bus->IsDeaf(*now_ns += 1'000'000'000, 4'000'000'000)) return times;
+  }
+  return 0;
+}
+
+TEST(LcmBus, WhereItsThreadStandsStillItIsDeaf) {
+  EventLoop loop;
+  LcmBus bus(Options(17704));
+  bus.Subscribe("X");
+  loop.Watch(bus.fd(), [&] { bus.Deliver(); });
+  int64_t now_ns = 0;
+  EXPECT_EQ(TimesUntilDeaf(&loop, &bus, &now_ns), 0) << "it hears itself where it is alone";
+  receiver_stands_still = true;
+  EXPECT_GE(TimesUntilDeaf(&loop, &bus, &now_ns), 5);
+  receiver_stands_still = false;
+  EXPECT_EQ(TimesUntilDeaf(&loop, &bus, &now_ns), 0) << "it has come to itself";
+}
+
+TEST(LcmBus, WhoHearsOthersIsNotDeaf) {
+  EventLoop loop;
+  LcmBus bus(Options(17705)), other(Options(17705));
+  bus.Subscribe("X");
+  loop.Watch(bus.fd(), [&] { bus.Deliver(); });
+  int heard = 0;
+  bus.SetHandler([&](const std::string&, std::span<const uint8_t>) { ++heard; });
+  for (int i = 1; i <= 5; ++i) {
+    other.Publish(Message("X", {1}));
+    PumpUntil(&loop, [&] { return heard == i; });
+    EXPECT_FALSE(bus.IsDeaf(i * 1'000'000'000LL, 1));
+  }
 }
 
 TEST(LcmBus, AWrongUrlIsRefusedWithTheCure) {

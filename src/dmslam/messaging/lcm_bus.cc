@@ -5,6 +5,7 @@
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
+#include <random>
 #include <string_view>
 #include <utility>
 
@@ -15,6 +16,7 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kWantedReceiveBuffer = 4 << 20;
+constexpr char kSelfChannel[] = "DMSLAM_SELF_";
 
 bool IsUdp(const std::string& url) { return url.rfind("udpm://", 0) == 0; }
 bool IsTcp(const std::string& url) { return url.rfind("tcpq://", 0) == 0; }
@@ -138,8 +140,27 @@ int LcmBus::Deliver(int max_messages) {
   return delivered;
 }
 
+bool LcmBus::IsDeaf(int64_t now_ns, int64_t longest_ns) {
+  const bool silent = !std::exchange(hearing_.any, false);
+  const bool for_long = std::exchange(hearing_.was_silent, silent) && silent;
+  if (!silent) hearing_.unheard_ns.reset();
+  if (for_long && SpeakToItself() && !hearing_.unheard_ns) hearing_.unheard_ns = now_ns;
+  return hearing_.unheard_ns && now_ns - *hearing_.unheard_ns > longest_ns;
+}
+
+/// Whether that was sent: where there is no network it cannot be heard.
+bool LcmBus::SpeakToItself() {
+  if (hearing_.own_channel.empty()) {
+    hearing_.own_channel = kSelfChannel + std::to_string(std::random_device()());
+    Subscribe(hearing_.own_channel);
+  }
+  const uint8_t nothing = 0;
+  return impl_->lcm.publish(options_.prefix + hearing_.own_channel, &nothing, sizeof(nothing)) == 0;
+}
+
 void LcmBus::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
-  if (!handler_) return;
+  hearing_.any = true;
+  if (!handler_ || channel == options_.prefix + hearing_.own_channel) return;
   try {
     handler_(channel.substr(options_.prefix.size()), bytes);
   } catch (...) {  // must not unwind through LCM

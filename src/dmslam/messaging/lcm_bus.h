@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "dmslam/messaging/bus.h"
@@ -35,17 +37,32 @@ class LcmBus : public Bus {
   /// comes out here, after LCM has returned. Throws NotYetError when the connection is gone (tcpq).
   int Deliver(int max_messages = 1000);
 
+  /// Whether LCM's receiving thread has died or stands still: nothing at all was heard for longer than this,
+  /// though this process has sent something to itself meanwhile. To be asked a few times within that; sends
+  /// only where nobody else is heard.
+  bool IsDeaf(int64_t now_ns, int64_t longest_ns);
+
   /// How large the receive buffer really is, and how to raise it if that is less than was asked for; empty
   /// without UDP.
   const std::string& receive_buffer_note() const { return receive_buffer_note_; }
 
  private:
   struct Impl;
+  /// What is heard at all.
+  struct Hearing {
+    bool any = false;                   ///< since it was asked about
+    bool was_silent = false;            ///< when it was asked about last
+    std::string own_channel;            ///< on which this process speaks to itself; empty: not yet
+    std::optional<int64_t> unheard_ns;  ///< since when it does, and nothing is heard
+  };
+
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
+  bool SpeakToItself();
 
   Options options_;
   Handler handler_;
   std::exception_ptr error_;
+  Hearing hearing_;
   std::string receive_buffer_note_;
   std::unique_ptr<Impl> impl_;
 };

@@ -32,10 +32,12 @@ int64_t RandomId() {
 }
 
 /// Whoever watches the process hears nothing then, and ends it.
-bool IsSeenToHang(const Node& node, int64_t now_ns, int64_t longest_ns) {
-  const bool hangs = node.Hangs(now_ns, longest_ns);
+bool IsSeenToHang(const Node* node, LcmBus* bus, int64_t now_ns, int64_t longest_ns) {
+  const bool hangs = node != nullptr && node->Hangs(now_ns, longest_ns);
+  const bool deaf = bus->IsDeaf(now_ns, longest_ns);
   if (hangs) LogError("hangs: a job has given no sign for more than {} s", longest_ns / 1'000'000'000);
-  return hangs;
+  if (deaf) LogError("hangs: LCM hears not even this process for more than {} s", longest_ns / 1'000'000'000);
+  return hangs || deaf;
 }
 
 }  // namespace
@@ -156,9 +158,10 @@ int ProcessMain::RunNode(const Factory& factory) {
   context.wall_us = &EventLoop::wall_us;
   ServiceNotice notice;
   std::unique_ptr<Node> node;
-  const auto say_alive = [&notice, &node] {
+  const auto say_alive = [&notice, &node, &bus] {
     const int64_t now_ns = EventLoop::now_ns();
-    notice.Alive(now_ns, [&] { return !node || !IsSeenToHang(*node, now_ns, notice.longest_silence_ns()); });
+    notice.Alive(now_ns,
+                 [&] { return !IsSeenToHang(node.get(), &bus, now_ns, notice.longest_silence_ns()); });
   };
   context.pump = [&loop, &say_alive] {
     loop.PumpOnce();
