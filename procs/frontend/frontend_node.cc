@@ -290,8 +290,8 @@ bool FrontendNode::WorkOnce() {
     ApplyHeldRecords(held_.NumReady(!pace_.lockstep || end_.AppliesAllRecords()), false);
     if (!work_->Idle()) return false;
   }
-  // The map may have ended with the frontend that this one has taken over from.
-  if (end_.Is(SequenceEnd::Phase::kDone) || core_->map().progress().ended) {
+  if (core_->map().progress().ended && !end_.Is(SequenceEnd::Phase::kDone)) LeaveEndedMap();
+  if (end_.Is(SequenceEnd::Phase::kDone)) {
     if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
     return false;
   }
@@ -357,6 +357,13 @@ void FrontendNode::AskForAdjustedMaps() {
   const auto request =
       end_.Ask(core_->map(), context_.now_ns(), newest_ ? DoneWithNewest().stamp_ns : 0, options_.camera_id);
   if (request) PublishRecord(*request);
+}
+
+/// Who waits for this stream's end to let go of the map need not wait for it.
+void FrontendNode::LeaveEndedMap() {
+  end_.OnMapEnded();
+  PublishStatus();
+  writer_->Complete(context_.now_ns());
 }
 
 bool FrontendNode::TellLastPoses() {

@@ -77,6 +77,7 @@ class FrontendNode : public StreamNode {
 
   SessionStart MakeSessionStart() const;
   void SaySessionAgain();
+  void LeaveEndedMap();
   void OnFrame(std::span<const uint8_t> bytes);
   std::optional<PlayOrder::Place> NewestFrame() const;
   FrameDone DoneWithNewest() const;

@@ -63,6 +63,8 @@ class SequenceEnd {
   void OnWorked(bool is_done);
   /// The last poses are told.
   void OnTold();
+  /// The map has ended with the frontend that this one has taken over from: there is nothing left to say.
+  void OnMapEnded() { phase_ = Phase::kDone; }
 
  private:
   bool AwaitsAnswer(const Map& map) const;
