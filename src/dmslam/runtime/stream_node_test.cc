@@ -374,6 +374,101 @@ TEST(StreamNodeTest, HangsWithItsCoreAndNotWithADisk) {
   EXPECT_FALSE(node.Hangs(INT64_MAX, kMs));
 }
 
+/// Reads a frontend's stream, as mapper and collector do.
+class Follower : public StreamNode {
+ public:
+  Follower(NodeContext context, NodeOptions options)
+      : StreamNode(std::move(context), std::move(options), "mapper") {}
+  int taken() const { return taken_; }
+
+ private:
+  void Begin(const CameraInfo&) override {
+    reader_ = MakeReader(StreamId::kFrontend, "FRONTEND", {channels::kSession});
+  }
+  bool WorkOnce() override {
+    const std::optional<Record> record = reader_->Take();
+    if (!record || IsDoubtful(*record, reader_.get())) return false;
+    if (const auto start = ReadSessionStart(record->header, *record->bytes)) JoinSession(*start);
+    ++taken_;
+    reader_->AcceptTaken();
+    return true;
+  }
+
+  std::unique_ptr<StreamReader> reader_;
+  int taken_ = 0;
+};
+
+class SessionTest : public testing::Test {
+ protected:
+  SessionTest() : frontend_(&bus_.AddPort(), [this] { return now_ns_; }) {
+    StreamWriter::Options options;
+    options.session = kSession;
+    options.stream = StreamId::kFrontend;
+    options.owner = "FRONTEND";
+    options.schema_hash = SchemaHash();
+    options.roles = {{"mapper", true}};
+    writer_ = std::make_unique<StreamWriter>(options, Term{10, 3}, Version{});
+    frontend_.AddWriter(writer_.get(), "FRONTEND", {"MAPPER"});
+    NodeContext context;
+    context.bus = &bus_.AddPort();
+    context.now_ns = [this] { return now_ns_; };
+    context.wall_us = [this] { return now_ns_ / 1000; };
+    context.random_id = 7;
+    NodeOptions node;
+    node.session = kSession;
+    settings_hash_ = node.settings.Hash();
+    follower_ = std::make_unique<Follower>(context, node);
+    Pass(500);
+  }
+  void Pass(int64_t ms) {
+    CameraInfo info;
+    info.session = kSession;
+    info.camera = TestCamera();
+    for (int64_t i = 0; i < ms; i += 5, now_ns_ += 5 * kMs) {
+      if (i % 100 == 0) Say(channels::kCameraInfo, wire::Encode(info));
+      frontend_.Advance();
+      while (bus_.DeliverOne()) {
+      }
+      follower_->Advance();
+    }
+  }
+  void Say(const std::string& channel, Bytes bytes) {
+    frontend_.bus().Publish({channel, std::make_shared<const Bytes>(std::move(bytes)), false});
+  }
+  Bytes Session(uint64_t configuration_hash) const {
+    SessionStart start;
+    start.session = kSession;
+    start.camera = TestCamera();
+    start.configuration_hash = configuration_hash;
+    return wire::Encode(start);
+  }
+
+  int64_t now_ns_ = kMs;
+  MemoryBus bus_;
+  Endpoint frontend_;
+  std::unique_ptr<StreamWriter> writer_;
+  std::unique_ptr<Follower> follower_;
+  uint64_t settings_hash_ = 0;
+};
+
+TEST_F(SessionTest, OneOfOtherSettingsInThePlaceOfTheTrueOneEndsNobody) {
+  Bytes forged = Session(settings_hash_ + 1);
+  Seal(writer_->HeaderOf(1), channels::kSession, forged);
+  Say(channels::kSession, forged);
+  Pass(50);
+  writer_->Publish(channels::kSession, Session(settings_hash_), now_ns_);
+  Pass(1000);
+  EXPECT_EQ(follower_->exit_code(), std::nullopt) << follower_->problem();
+  EXPECT_EQ(follower_->taken(), 1);
+  EXPECT_EQ(writer_->AcknowledgedBy("mapper"), 1);
+}
+
+TEST_F(SessionTest, WhoDoesNotFitTheTrueOneEnds) {
+  writer_->Publish(channels::kSession, Session(settings_hash_ + 1), now_ns_);
+  Pass(1000);
+  EXPECT_EQ(follower_->exit_code(), kExitMisfit);
+}
+
 /// Publishes whatever it is told to.
 class Publisher : public StreamNode {
  public:
