@@ -1,6 +1,7 @@
 #include "run/resume.h"
 
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -15,6 +16,18 @@
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 #include "run/run_plan.h"
+
+namespace {
+
+int syncs = 0;
+
+}  // namespace
+
+/// In the place of the library's.
+extern "C" int fdatasync(int fd) {
+  ++syncs;
+  return static_cast<int>(syscall(SYS_fdatasync, fd));
+}
 
 namespace dmslam {
 namespace {
@@ -105,6 +118,15 @@ TEST_F(ResumeTest, GoesOnBehindTheNewestFrameInTheCheckpointsMap) {
   EXPECT_EQ(point.newest_keyframe, std::optional<uint32_t>(2));
   EXPECT_GT(point.lead_s, 0);
   EXPECT_EQ(point.warning, "");
+}
+
+/// Those who had written it may have died before they did.
+TEST_F(ResumeTest, WhatItGoesOnFromIsMadeSafe) {
+  WriteJournal(41);
+  WriteMap(3);
+  syncs = 0;
+  FindResumePoint(out_, identity_);
+  EXPECT_EQ(syncs, 1);
 }
 
 /// A keyframe that was proposed and is in no checkpoint: the recording is played again from there.
