@@ -292,7 +292,7 @@ bool FrontendNode::WorkOnce() {
   }
   if (core_->map().progress().ended && !end_.Is(SequenceEnd::Phase::kDone)) LeaveEndedMap();
   if (end_.Is(SequenceEnd::Phase::kDone)) {
-    if (!options_.HasPeer("mapper") || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
+    if (!options_.HasPeer(roles::kMapper) || NobodyNeedsTheMap(core_->map(), *map_reader_)) Stop();
     return false;
   }
   if (HoldsBack() || AwaitsSavedMap()) return false;

@@ -4,6 +4,7 @@
 
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/settings/run_options.h"
 #include "loopcloser/make_loopcloser.h"
@@ -17,7 +18,8 @@ std::unique_ptr<Node> MakeLoopcloser(NodeContext context, NodeOptions options,
 
 LoopcloserNode::LoopcloserNode(NodeContext context, NodeOptions options,
                                std::shared_ptr<const Vocabulary> vocabulary)
-    : StreamNode(std::move(context), std::move(options), "loopcloser"), vocabulary_(std::move(vocabulary)) {
+    : StreamNode(std::move(context), std::move(options), roles::kLoopCloser),
+      vocabulary_(std::move(vocabulary)) {
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
     Listen({channels::kSession, channels::kSessionAgain}, camera);
 }
