@@ -371,8 +371,8 @@ void MapperNode::MarkFrontend(CameraId camera, const Version& version) {
   core_->SetProgress(progress);
 }
 
-/// It must have the settings of this process, and the vocabulary with which the map was made that it begins
-/// in.
+/// A frontend must have the settings of this process, and the vocabulary with which the map was made that it
+/// begins in.
 std::string MapperNode::WhyMisfits(const SessionStart& start) const {
   const std::string why = StreamNode::WhyMisfits(start);
   return why.empty() ? WhyOtherVocabulary(files_.load, saved_.made, start.vocabulary_checksum) : why;
