@@ -132,19 +132,6 @@ class SystemSimulation : public ::testing::Test {
     as_told.trajectory = as_told.online;
     return Apart(as_told);
   }
-  /// The same of runs that begin a few frames later, as after a frontend that dies before its first map.
-  static double UnrefinedApartBegunLater() {
-    static const double apart = [] {
-      double most = UnrefinedApart();
-      for (const size_t start : {3u, 6u, 9u}) {
-        Outcome as_told = common_->Undisturbed(SmallSettings(1), start);
-        as_told.trajectory = as_told.online;
-        most = std::max(most, Apart(as_told));
-      }
-      return most;
-    }();
-    return apart;
-  }
   static double Apart(const Outcome& outcome) {
     const Distance distance = Measure(outcome, common_->undisturbed, common_->folder.string());
     if (common_->tells)
@@ -162,9 +149,7 @@ class SystemSimulation : public ::testing::Test {
     if (dies) allowed.records_lost = kRecordsLost;
     if (dies && frontend) allowed.most_apart = UnrefinedApart();
     allowed.frames_lost = frontend ? kFramesLostByFrontend : kFramesLost;
-    const bool before_first_map = frontend && fault.at_frame < kFirstMapFrame;
-    if (before_first_map) allowed.frames_lost += NumFrames();
-    if (before_first_map && dies) allowed.most_apart = UnrefinedApartBegunLater();
+    if (frontend && fault.at_frame < kFirstMapFrame) allowed.frames_lost += NumFrames();
     return allowed;
   }
   /// One that drops the map is asked for again, and then it is not there.
