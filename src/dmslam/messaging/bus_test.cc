@@ -22,7 +22,7 @@ std::atomic<bool> receiver_stands_still = false;
 
 /// In the place of the library's: only LCM's receiving thread calls it.
 extern "C" ssize_t recvmsg(int fd, msghdr* message, int flags) {
-  while (receiver_stands_still) usleep(1000);
+  receiver_stands_still.wait(true);
   return syscall(SYS_recvmsg, fd, message, flags);
 }
 
@@ -138,6 +138,7 @@ TEST(LcmBus, WhereItsThreadStandsStillItIsDeaf) {
   receiver_stands_still = true;
   EXPECT_GE(TimesUntilDeaf(&loop, &bus, &now_ns), 5);
   receiver_stands_still = false;
+  receiver_stands_still.notify_all();
   EXPECT_EQ(TimesUntilDeaf(&loop, &bus, &now_ns), 0) << "it has come to itself";
 }
 

@@ -1,5 +1,6 @@
 #include "dmslam/runtime/core_thread.h"
 
+#include <pthread.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@ CoreThread::CoreThread(Mode mode, Options options) : options_(options) {
   event_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   DMSLAM_CHECK(event_fd_ >= 0, "no descriptor is left for an event");
   thread_ = std::thread([this] { Work(); });
+  pthread_setname_np(thread_.native_handle(), "core");  // as debuggers and top show it
 }
 
 CoreThread::~CoreThread() {
