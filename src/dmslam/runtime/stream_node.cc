@@ -389,7 +389,8 @@ void StreamNode::JoinSession(const SessionStart& start) {
 
 bool StreamNode::IsDoubtful(const Record& record, StreamReader* reader) {
   bool is_grave = false;
-  const std::string channel = SplitCamera(record.channel).channel;
+  const CameraChannel split = SplitCamera(record.channel);
+  const std::string_view channel = split.channel;
   if (channel == channels::kSession) {
     const auto start = wire::Decode<SessionStart>(*record.bytes);
     is_grave = start && !WhyMisfits(*start).empty();
