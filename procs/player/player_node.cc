@@ -136,12 +136,13 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
 }
 
 /// The frontend is further than this player, which was started again: goes on where the one before was, and
-/// never back.
+/// never back. What was published last is done in any case, also where nothing comes after it.
 void PlayerNode::SkipBehind(uint32_t frame_index) {
   const auto next =
       std::upper_bound(order_.begin(), order_.end(), frame_index,
                        [this](uint32_t frame, size_t index) { return frame < source_->FrameIndex(index); });
-  if (next - order_.begin() <= static_cast<std::ptrdiff_t>(position_)) return;
+  const auto skipped = next - order_.begin() - static_cast<std::ptrdiff_t>(position_);
+  if (skipped < 0 || (skipped == 0 && !awaiting_done_)) return;
   if (playing_) LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
   position_ = static_cast<size_t>(next - order_.begin());
   counts_.published = static_cast<int64_t>(position_);

@@ -144,6 +144,22 @@ TEST_F(PlayerNodeTest, GoesOnBehindAFrontendThatIsFurther) {
   EXPECT_EQ(frames_.back(), 6u) << "of what is said the least counts";
 }
 
+/// Somebody forged a frame behind the last one, and the frontend took it.
+TEST_F(PlayerNodeTest, EndsWhereTheFrontendIsBehindTheLastFrame) {
+  Begin();
+  for (uint32_t frame = 0; frame < 9; ++frame) {
+    SayDone(frame);
+    Advance(10);
+  }
+  ASSERT_EQ(frames_.back(), 9u);
+  SayDone(10);
+  Advance(200);
+  EXPECT_EQ(ends_, 0) << "one answer may be forged";
+  SayDone(10);
+  Advance(300);
+  EXPECT_GE(ends_, 1);
+}
+
 TEST_F(PlayerNodeTest, GoesToTheEndWhereAllIsDone) {
   Begin();
   SayAllDone();

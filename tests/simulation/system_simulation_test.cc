@@ -625,6 +625,23 @@ TEST_F(SystemSimulation, AFrontendMayBeMovedAtTheVeryEnd) {
   }
 }
 
+/// Of the two that come, the one that is superseded at once has written nothing.
+TEST_F(SystemSimulation, AFrontendMayBeMovedTwiceAtOnce) {
+  for (const int64_t seed : {145, 150, 160, 163, 164}) {
+    Schedule schedule = CalmSchedule();
+    schedule.seed = static_cast<uint64_t>(seed);
+    schedule.network.loss = 0.15;
+    schedule.network.max_delay_ns = 3 * kMs;
+    Fault move = Kill("frontend", 38, 0), again = Kill("frontend", 38, 0, seed * kMs);
+    move.kind = again.kind = Fault::Kind::kMove;
+    schedule.faults = {move, again};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    ASSERT_EQ(outcome.failure, "") << outcome.story;
+    EXPECT_EQ(Number(outcome, "records_lost"), 0) << outcome.story;
+  }
+}
+
 Fault Forge(Content content, uint32_t at_frame, int64_t after_ns = 0) {
   Fault fault;
   fault.kind = Fault::Kind::kContent;

@@ -19,6 +19,7 @@ namespace {
 constexpr int64_t kMisfitNs = 2'000'000'000;
 constexpr int64_t kCameraSilentNs = 1'500'000'000;
 constexpr int64_t kTidyEveryNs = 60'000'000'000;
+constexpr int64_t kSettledNs = 300'000'000;  // so long nobody else must say that he has taken over, too
 
 std::string UpperCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -303,6 +304,7 @@ void StreamNode::StartElection() {
 /// a refusal.
 void StreamNode::RunElection() {
   if (!plan_ || writer_) return;
+  if (settling_.writer) return BeginWritingWhenSettled();
   if (!election_) StartElection();
   if (election_->state() == WriterElection::State::kWon && ReadyToWrite() && !exit_code_) OpenWriter();
   if (election_->state() == WriterElection::State::kRefused) Exit(kExitPresent, election_->refusal());
@@ -331,8 +333,18 @@ void StreamNode::OpenWriter() {
     options.roles.push_back({reader, options_.HasPeer(reader)});
   const Term term = election_->Win(context_.wall_us(), plan_->parent.epoch);
   endpoint_.Remove(election_.get());
-  writer_ = std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots);
-  endpoint_.AddWriter(writer_.get(), UpperCase(role_), ReaderNames());
+  const bool may_be_contested = options_.take_over && !context_.fresh_system;
+  settling_ = {std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots),
+               context_.now_ns() + (may_be_contested ? kSettledNs : 0)};
+  endpoint_.AddWriter(settling_.writer.get(), UpperCase(role_), ReaderNames());
+  BeginWritingWhenSettled();
+}
+
+/// Of two that take over at once the one with the higher term goes on. The other has written nothing yet, so
+/// nothing is lost with it.
+void StreamNode::BeginWritingWhenSettled() {
+  if (context_.now_ns() < settling_.until_ns || settling_.writer->superseded_by()) return;
+  writer_ = std::move(settling_.writer);
   OnWriterOpen();
 }
 
@@ -346,17 +358,18 @@ std::string StreamNode::AwaitedReaders() const {
 }
 
 void StreamNode::WatchWriter() {
-  if (!writer_) return;
+  const StreamWriter* writer = writer_ ? writer_.get() : settling_.writer.get();
+  if (writer == nullptr) return;
   if (hands_over_until_ns_) return WatchHandOver();
-  if (writer_->superseded_by())
-    Exit(kExitSuperseded, "another writer has taken over the stream: " + *writer_->superseded_by());
-  if (const std::optional<Version>& newer = writer_->newer_replica()) {
+  if (writer->superseded_by())
+    Exit(kExitSuperseded, "another writer has taken over the stream: " + *writer->superseded_by());
+  if (const std::optional<Version>& newer = writer->newer_replica()) {
     Exit(kExitNewerMap, "another process holds version " + std::to_string(newer->epoch) + ":" +
                             std::to_string(newer->seq) +
                             ", which is newer than what this one began with; start it again");
   }
-  if (writer_->close_requested_by() && !stopping_) {
-    LogInfo("{}: hands its stream over to {}", role_, *writer_->close_requested_by());
+  if (writer->close_requested_by() && !stopping_) {
+    LogInfo("{}: hands its stream over to {}", role_, *writer->close_requested_by());
     Stop();
     hands_over_until_ns_ = context_.now_ns() + kGoesOnWithinNs;
   }
@@ -492,13 +505,15 @@ void StreamNode::PumpBetweenSteps() {
 }
 
 int64_t StreamNode::deadline_ns() const {
-  return std::min({endpoint_.deadline_ns(), next_status_ns_, WorkDeadline()});
+  const int64_t settled_ns = settling_.writer ? settling_.until_ns : INT64_MAX;
+  return std::min({endpoint_.deadline_ns(), next_status_ns_, settled_ns, WorkDeadline()});
 }
 
 void StreamNode::Stop() {
   hands_over_until_ns_.reset();  // who is asked to end as well waits for nobody
   if (stopping_) return;
   stopping_ = true;
+  if (settling_.writer) writer_ = std::move(settling_.writer);
   if (writer_) {
     writer_->Close(context_.now_ns());
   } else {

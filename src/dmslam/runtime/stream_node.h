@@ -191,6 +191,7 @@ class StreamNode : public Node {
   void RunElection();
   void StartElection();
   void OpenWriter();
+  void BeginWritingWhenSettled();
   std::vector<std::string> ReaderNames() const;
   void WatchWriter();
   void WatchHandOver();
@@ -233,6 +234,12 @@ class StreamNode : public Node {
   CameraClaims camera_claims_;  ///< of those that are not known yet
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterElection> election_;
+  /// A writer that has taken over, and may write from then on if nobody else has.
+  struct Settling {
+    std::unique_ptr<StreamWriter> writer;
+    int64_t until_ns = 0;
+  };
+  Settling settling_;  ///< without a writer: nothing is to be settled
   std::optional<int> exit_code_;
   std::string problem_;
   std::vector<std::string> other_channels_;
