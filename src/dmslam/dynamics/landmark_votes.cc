@@ -6,6 +6,15 @@
 
 namespace dmslam {
 
+double AgeAt(const Map& map, const Landmark& landmark, int64_t stamp_ns) {
+  int64_t last_ns = landmark.first_ns;
+  if (!landmark.observations.empty()) {
+    const Keyframe* last = map.FindKeyframe(landmark.observations.back().keyframe);
+    if (last != nullptr) last_ns = std::max(last_ns, last->stamp_ns);
+  }
+  return static_cast<double>(std::max(stamp_ns - landmark.first_ns, last_ns - stamp_ns)) * 1e-9;
+}
+
 bool LandmarkVotes::HasVote(const Landmark& landmark) const {
   if (!options_.motion_belief) return true;
   if (!IsStatic(&landmark)) return false;
@@ -13,9 +22,8 @@ bool LandmarkVotes::HasVote(const Landmark& landmark) const {
   return streak == streaks_.end() || streak->second < options_.streak_without_vote;
 }
 
-double LandmarkVotes::Trust(const Landmark& landmark, int64_t stamp_ns) const {
+double LandmarkVotes::Trust(double age_s) const {
   if (!options_.motion_belief) return 1.0;
-  const double age_s = static_cast<double>(stamp_ns - landmark.first_ns) * 1e-9;
   const double grown = std::clamp(age_s / options_.trusted_age_s, 0.0, 1.0);
   return options_.young_trust + (1.0 - options_.young_trust) * grown;
 }

@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "dmslam/dynamics/proven.h"
-#include "dmslam/map/landmark.h"
+#include "dmslam/map/map.h"
 
 namespace dmslam {
 
@@ -28,6 +28,10 @@ struct VoteOptions {
   }
 };
 
+/// For how long the landmark stands in its place at that moment [s]: since it was made, or, where time runs
+/// backwards and in a map of another time, until it was seen last.
+double AgeAt(const Map& map, const Landmark& landmark, int64_t stamp_ns);
+
 /// Which landmarks have a say in a frame's pose, and how much: what the map believes of them, their age, and
 /// a short memory of those that were just seen elsewhere.
 class LandmarkVotes {
@@ -36,8 +40,8 @@ class LandmarkVotes {
 
   /// Whether the landmark may be matched at all.
   bool HasVote(const Landmark& landmark) const;
-  /// Weight of the landmark in a pose at `stamp_ns`: young_trust to 1.
-  double Trust(const Landmark& landmark, int64_t stamp_ns) const;
+  /// Weight in a pose of a landmark of this age: young_trust to 1.
+  double Trust(double age_s) const;
 
   void OnSeenElsewhere(LandmarkId id) { ++streaks_[id]; }
   void OnFound(LandmarkId id) { streaks_.erase(id); }

@@ -33,11 +33,26 @@ TEST(LandmarkVotesTest, AStreakElsewhereCostsTheVoteUntilItIsFound) {
 }
 
 TEST(LandmarkVotesTest, TrustGrowsWithAge) {
-  Landmark landmark;
   const LandmarkVotes votes({.young_trust = 0.3, .trusted_age_s = 4.0});
-  EXPECT_DOUBLE_EQ(votes.Trust(landmark, 0), 0.3);
-  EXPECT_DOUBLE_EQ(votes.Trust(landmark, 2'000'000'000), 0.65);
-  EXPECT_DOUBLE_EQ(votes.Trust(landmark, 9'000'000'000), 1.0);
+  EXPECT_DOUBLE_EQ(votes.Trust(0), 0.3);
+  EXPECT_DOUBLE_EQ(votes.Trust(2), 0.65);
+  EXPECT_DOUBLE_EQ(votes.Trust(9), 1.0);
+}
+
+/// Keyframes see it from 10 to 10.1 s.
+TEST(LandmarkVotesTest, AgeCountsFromTheFarEndOfTheTimeInWhichItIsSeen) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  MapScene scene;
+  scene.AddPoint({0, 0, 4}, 10 * kSecond);
+  scene.MapAll(4, 0.05, 300, 10 * kSecond);
+  const auto age_s = [&](double at_s) {
+    return AgeAt(scene.map(), scene.map().At(MapScene::IdOf(0)), static_cast<int64_t>(at_s * 1e9));
+  };
+  EXPECT_NEAR(age_s(15), 5, 1e-9) << "since it was made";
+  EXPECT_NEAR(age_s(7), 3.1, 1e-6) << "time runs backwards";
+  Landmark unseen;
+  unseen.first_ns = 10 * kSecond;
+  EXPECT_NEAR(AgeAt(scene.map(), unseen, 7 * kSecond), 3, 1e-9);
 }
 
 TEST(LandmarkVotesTest, OfAMapThatIsGoneNothingIsRemembered) {
@@ -51,9 +66,7 @@ TEST(LandmarkVotesTest, OfAMapThatIsGoneNothingIsRemembered) {
 }
 
 TEST(LandmarkVotesTest, SwitchedOffAllAreEqual) {
-  Landmark young;
-  young.first_ns = 10'000'000'000;
-  EXPECT_DOUBLE_EQ(LandmarkVotes({.motion_belief = false}).Trust(young, young.first_ns), 1.0);
+  EXPECT_DOUBLE_EQ(LandmarkVotes({.motion_belief = false}).Trust(0), 1.0);
 }
 
 }  // namespace

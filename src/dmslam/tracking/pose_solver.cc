@@ -10,11 +10,10 @@ double Chi2(const Pinhole& camera, const Rigid3d& T_cam_world, const PoseObserva
 
 }  // namespace
 
-void PoseSolver::Matches::Add(const Map& map, const TrackedFrame& frame, uint16_t feature, LandmarkId id,
-                              double weight) {
-  const Landmark& landmark = *map.FindLandmark(id);
-  matches.push_back({feature, id});
-  ages_s.push_back(static_cast<double>(frame.stamp_ns - landmark.first_ns) * 1e-9);
+void PoseSolver::Matches::Add(const Map& map, const TrackedFrame& frame, uint16_t feature,
+                              const Landmark& landmark, double age_s, double weight) {
+  matches.push_back({feature, landmark.id});
+  ages_s.push_back(age_s);
   observations.push_back({landmark.p_world, frame.features->uv_px[feature],
                           1.0 / frame.features->Variance(feature, map.pyramid()), weight});
 }
@@ -44,7 +43,8 @@ void PoseSolver::Observe(const Map& map, const LandmarkVotes& votes, const Track
     if (!frame.landmarks[i].valid()) continue;
     const Landmark* landmark = map.FindLandmark(frame.landmarks[i]);
     if (landmark == nullptr) continue;
-    all_.Add(map, frame, static_cast<uint16_t>(i), landmark->id, votes.Trust(*landmark, frame.stamp_ns));
+    const double age_s = AgeAt(map, *landmark, frame.stamp_ns);
+    all_.Add(map, frame, static_cast<uint16_t>(i), *landmark, age_s, votes.Trust(age_s));
   }
 }
 
@@ -172,8 +172,10 @@ bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior
   const size_t elsewhere = judge.moved().size();
   if (!judge.enabled() || !judge.rivals().IsWorthALook(static_cast<int>(elsewhere))) return false;
   Observe(map, judge.votes(), *frame);
-  for (size_t k = 0; k < elsewhere; ++k)
-    all_.Add(map, *frame, judge.moved_features()[k], judge.moved()[k], 1.0);
+  for (size_t k = 0; k < elsewhere; ++k) {
+    const Landmark& landmark = *map.FindLandmark(judge.moved()[k]);
+    all_.Add(map, *frame, judge.moved_features()[k], landmark, AgeAt(map, landmark, frame->stamp_ns), 1.0);
+  }
   const PoseOptimizationOptions options = Options(prior);
   const Pinhole camera = map.camera().Ideal();
   const auto wider = FindWiderMotion(camera, frame->T_cam_world, options, judge.rivals());

@@ -62,7 +62,8 @@ class PoseSolver {
     std::vector<double> ages_s;
     std::vector<PoseObservation> observations;
 
-    void Add(const Map& map, const TrackedFrame& frame, uint16_t feature, LandmarkId id, double weight);
+    void Add(const Map& map, const TrackedFrame& frame, uint16_t feature, const Landmark& landmark,
+             double age_s, double weight);
     void Move(size_t from, size_t to);
     void Resize(size_t count);
     size_t size() const { return matches.size(); }

@@ -233,6 +233,27 @@ TEST_F(PoseSolverTest, ThoseWhoAreOlderThanPeopleStandDecideAgainstAnyNumberOfOt
   EXPECT_EQ(Matched(frame, false), 0);
 }
 
+/// The map grows into the past: of the room it has known for six seconds what is seen, of somebody for half a
+/// second.
+TEST_F(PoseSolverTest, WhereTimeRunsBackwardsThoseSeenForLongestDecide) {
+  AddRoom(80, -6);
+  AddSomebody(110, -0.4);
+  scene_.MapAll(4, 0.05, 110, Ago(-0.4));
+  Keyframe later = scene_.map().keyframes().begin()->second;
+  later.id = KeyframeId::Make(MapScene::kSession, 280);
+  later.stamp_ns = Ago(-6);
+  scene_.map().AddKeyframe(later);
+  for (size_t i = 0; i < room_; ++i) {
+    scene_.map().SetObservation(scene_.map().At(later.id), static_cast<uint16_t>(i),
+                                scene_.map().At(MapScene::IdOf(i)));
+  }
+  TrackedFrame frame = Frame(Gone(gone_));
+  const PoseFit fit = Solve(&frame);
+  EXPECT_TRUE(fit.by_trusted_elders);
+  EXPECT_LT(Error(frame.T_cam_world), 2e-3);
+  EXPECT_EQ(Rejected(fit, true), 0);
+}
+
 TEST_F(PoseSolverTest, WhereAgeDoesNotCountOrNothingMovesTheMajorityDecides) {
   AddRoom(80, 10);
   AddSomebody(110, 1);
