@@ -87,11 +87,11 @@ void CollectorNode::OnCamera(const CameraInfo& info) {
 }
 
 /// Noted: a collector after this one may come when the player has left.
-void CollectorNode::Announce(CameraId camera, int64_t num_frames, uint32_t first_frame) {
-  if (num_frames <= 0) return;
-  const bool is_new = frames_.announced.emplace(camera, std::pair(num_frames, first_frame)).second;
+void CollectorNode::Announce(CameraId camera, std::optional<int64_t> num_frames, uint32_t first_frame) {
+  if (!num_frames) return;
+  const bool is_new = frames_.announced.emplace(camera, std::pair(*num_frames, first_frame)).second;
   if (is_new && journal_)
-    journal_->AppendNote("frames " + std::to_string(camera) + " " + std::to_string(num_frames) + " " +
+    journal_->AppendNote("frames " + std::to_string(camera) + " " + std::to_string(*num_frames) + " " +
                          std::to_string(first_frame));
 }
 

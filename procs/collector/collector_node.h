@@ -79,7 +79,7 @@ class CollectorNode : public StreamNode {
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
   void OnEnd(const EndOfSequence& end);
-  void Announce(CameraId camera, int64_t num_frames, uint32_t first_frame);
+  void Announce(CameraId camera, std::optional<int64_t> num_frames, uint32_t first_frame);
   int64_t PublishedAsFarAsKnown(CameraId camera, bool ended) const;
   void TakeEnds(bool ended);
   bool TakeMapRecord();

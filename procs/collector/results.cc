@@ -110,11 +110,11 @@ Json LoopJson(const RunRecord& run) {
     corrections.push_back(
         {{"frame", correction.keyframe.frame_index()}, {"kind", kind}, {"note", correction.note}});
     if (several) corrections.back()["camera"] = correction.keyframe.camera();
-    if (!correction.matched.valid()) continue;
-    if (several) corrections.back()["matched_camera"] = correction.matched.camera();
+    if (!correction.matched) continue;
+    if (several) corrections.back()["matched_camera"] = correction.matched->camera();
     const Eigen::Vector3d& t = correction.T_matched_keyframe.translation;
     const Eigen::Quaterniond& q = correction.T_matched_keyframe.rotation;
-    corrections.back()["matched_frame"] = correction.matched.frame_index();
+    corrections.back()["matched_frame"] = correction.matched->frame_index();
     corrections.back()["T_matched_keyframe"] = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
   }
   json["corrections"] = corrections;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,8 @@ struct CorrectionRecord {
   MapEvent event = MapEvent::kCorrected;
   KeyframeId keyframe;
   std::string note;
-  KeyframeId matched;          ///< of a loop: its other end; invalid where it is not known
-  Rigid3d T_matched_keyframe;  ///< of a loop: as it was closed [map units]
+  std::optional<KeyframeId> matched;  ///< of a loop: its other end, where that is known
+  Rigid3d T_matched_keyframe;         ///< of a loop: as it was closed [map units]
 };
 
 /// What each frame took [ms]: five numbers a frame are kept, whatever the length of the run.

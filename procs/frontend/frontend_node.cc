@@ -580,7 +580,7 @@ void FrontendNode::PublishStatus() {
   status.frames_skipped = counts_.skipped;
   status.fps =
       static_cast<double>(counts_.processed - std::exchange(counts_.processed_at_status, counts_.processed));
-  status.frame_index = newest_ ? static_cast<int32_t>(newest_->index) : -1;
+  if (newest_) status.frame_index = static_cast<int32_t>(newest_->index);
   status.latency_p50_ms = times_.latency.Quantile(0.5);
   status.latency_p95_ms = times_.latency.Quantile(0.95);
   status.latency_p99_ms = times_.latency.Quantile(0.99);
@@ -589,7 +589,7 @@ void FrontendNode::PublishStatus() {
   status.step_ms = times_.step.Quantile(0.5);
   status.step_p95_ms = times_.step.Quantile(0.95);
   status.track_ms = status.step_ms - status.decode_ms - status.extract_ms;
-  status.first_map_s = first_map_.after_s.value_or(-1);
+  status.first_map_s = first_map_.after_s;
   if (core_) FillPoseStatus(&status);
   PublishLoose(status);
 }

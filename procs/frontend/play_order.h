@@ -36,7 +36,7 @@ class PlayOrder {
   };
   struct End {
     int64_t frames_published = 0;
-    int32_t last_frame_index = -1;
+    std::optional<int32_t> last_frame_index;
     int64_t since_ns = 0;
     bool certain = false;
   };

@@ -112,7 +112,8 @@ void LiveNode::PublishCameraInfo() {
   info.session = options_.session;
   info.camera = options_.camera;
   info.sequence = CameraName(options_.sequence);
-  info.num_frames = options_.frames == SIZE_MAX ? 0 : static_cast<int64_t>(options_.frames);
+  const bool bounded = options_.frames > 0 && options_.frames != SIZE_MAX;
+  if (bounded) info.num_frames = static_cast<int64_t>(options_.frames);
   info.mode = PlaybackMode::kRealtime;
   PublishLoose(context_.bus, info, false, options_.camera_id);
 }
@@ -126,7 +127,7 @@ void LiveNode::PublishStatus() {
   status.state = ending_ ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying;
   status.frames_published = published_;
   status.frames_missing = source_->dropped();
-  status.frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  if (published_ > 0) status.frame_index = static_cast<int32_t>(frame_.frame_index);
   status.late_ms = published_ > 0 ? static_cast<double>(frame_.publish_us - frame_.capture_us) * 1e-3 : 0;
   PublishLoose(context_.bus, status, false, options_.camera_id);
 }
@@ -138,7 +139,7 @@ void LiveNode::PublishEnd() {
   end.frames_published = published_ + first_index_;  // with those of players before this one
   end.frames_listed = end.frames_published + source_->dropped();
   end.frames_missing = source_->dropped();
-  end.last_frame_index = published_ > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  if (published_ > 0) end.last_frame_index = static_cast<int32_t>(frame_.frame_index);
   end.last_stamp_ns = frame_.stamp_ns;
   PublishLoose(context_.bus, end, false, options_.camera_id);
 }

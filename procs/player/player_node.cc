@@ -266,7 +266,7 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.frames_total = static_cast<int64_t>(order_.size());
   status.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
   status.repeats = counts_.repeats;
-  status.frame_index = counts_.published > 0 ? static_cast<int32_t>(frame_.frame_index) : -1;
+  if (counts_.published > 0) status.frame_index = static_cast<int32_t>(frame_.frame_index);
   status.late_ms = late_ms_;
   PublishLoose(context_.bus, status, false, options_.camera_id);
 }

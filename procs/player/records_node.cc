@@ -65,7 +65,7 @@ void RecordsNode::TakeMapRecords() {
     const bool settled = event == MapEvent::kSettled || event == MapEvent::kRequestDone || finished_;
     while (settled && !held_.empty()) {
       live_.Apply(held_.front());
-      if (held_.front().event == MapEvent::kSettled && held_.front().about == awaited_) awaited_ = {};
+      if (held_.front().event == MapEvent::kSettled && held_.front().about == awaited_) awaited_.reset();
       held_.pop_front();
     }
     map_reader_->AcceptTaken();
@@ -79,7 +79,7 @@ bool RecordsNode::WorkOnce() {
     if (!options_.HasPeer(roles::kMapper) || NobodyNeedsTheMap(live_, *map_reader_)) Stop();
     return false;
   }
-  if (awaited_.valid()) return false;
+  if (awaited_) return false;
   if (next_record_ == records_.steps.size()) return Finish();
   const RecordedMessage& message = *records_.steps[next_record_++].message;
   AdvanceRecordedMap(message.order);
@@ -142,11 +142,11 @@ void RecordsNode::Enter(const RecordedMessage& message) {
 
 /// The landmark that most of the recorded one's features see in the map of now; none if they see none. Where
 /// both maps are the same it keeps its name, whatever became of it.
-LandmarkId RecordsNode::Translate(LandmarkId recorded) const {
+std::optional<LandmarkId> RecordsNode::Translate(LandmarkId recorded) const {
   const std::optional<LandmarkId> known = recorded_.Resolve(recorded);
   const Landmark* landmark = known ? recorded_.FindLandmark(*known) : nullptr;
   const std::optional<LandmarkId> namesake = live_.Resolve(recorded);
-  if (landmark == nullptr) return namesake ? LandmarkId{} : recorded;
+  if (landmark == nullptr) return namesake ? std::nullopt : std::optional(recorded);
   std::map<LandmarkId, int> votes;
   for (const Observation& observation : landmark->observations) {
     const Keyframe* keyframe = live_.FindKeyframe(observation.keyframe);
@@ -158,15 +158,14 @@ LandmarkId RecordsNode::Translate(LandmarkId recorded) const {
   if (unseen || (namesake && votes.contains(*namesake))) return recorded;
   const auto most =
       std::max_element(votes.begin(), votes.end(), [](auto& a, auto& b) { return a.second < b.second; });
-  return most == votes.end() ? LandmarkId{} : most->first;
+  return most == votes.end() ? std::nullopt : std::optional(most->first);
 }
 
 void RecordsNode::Translate(KeyframeProposal* proposal) {
   std::vector<KeyframeProposal::Match> matches;
   for (const KeyframeProposal::Match& match : proposal->matches) {
-    const LandmarkId now = Translate(match.landmark);
-    if (now.valid()) {
-      matches.push_back({match.feature, now});
+    if (const std::optional<LandmarkId> now = Translate(match.landmark)) {
+      matches.push_back({match.feature, *now});
     } else {
       ++dropped_;
     }
@@ -177,10 +176,10 @@ void RecordsNode::Translate(KeyframeProposal* proposal) {
 void RecordsNode::Translate(FrameEvidence* evidence) {
   std::map<LandmarkId, FrameEvidence::Item> items;
   for (const FrameEvidence::Item& item : evidence->items) {
-    const LandmarkId now = Translate(item.landmark);
-    if (!now.valid()) continue;
-    FrameEvidence::Item& sum = items[now];
-    sum.landmark = now;
+    const std::optional<LandmarkId> now = Translate(item.landmark);
+    if (!now) continue;
+    FrameEvidence::Item& sum = items[*now];
+    sum.landmark = *now;
     sum.visible = static_cast<uint16_t>(std::min(0xffff, sum.visible + item.visible));
     sum.found = static_cast<uint16_t>(std::min(0xffff, sum.found + item.found));
     sum.moved = static_cast<uint16_t>(std::min(0xffff, sum.moved + item.moved));

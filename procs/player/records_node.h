@@ -33,7 +33,7 @@ class RecordsNode : public StreamNode {
   void TakeMapRecords();
   void AdvanceRecordedMap(int64_t until_order);
   void Enter(const RecordedMessage& message);
-  LandmarkId Translate(LandmarkId recorded) const;
+  std::optional<LandmarkId> Translate(LandmarkId recorded) const;
   void Translate(KeyframeProposal* proposal);
   void Translate(FrameEvidence* evidence);
   bool Finish();
@@ -46,7 +46,7 @@ class RecordsNode : public StreamNode {
   Replica live_;               ///< the map that is being made
   std::deque<MapDelta> held_;  ///< not yet followed by a settled record
   std::unique_ptr<StreamReader> map_reader_;
-  KeyframeId awaited_;  ///< proposed, not yet settled
+  std::optional<KeyframeId> awaited_;  ///< proposed, not yet settled
   bool finished_ = false;
   int64_t next_info_ns_ = 0;
   int64_t infos_said_ = 0;

@@ -97,19 +97,20 @@ void LogPlayback::Fulfil(const PlaybackWish& wish, int64_t now_ns) {
     PlayTo(to_us, back || to_us - at_us_ > kHasteUs);
   }
   anchor_us_ = at_us_;
-  anchor_ns_ = next_ns_ = now_ns;
+  next_ns_ = now_ns;
+  anchor_ns_ = now_ns;
   Say();
 }
 
 void LogPlayback::Advance(int64_t now_ns) {
   if (!playing_ || now_ns < next_ns_) return;
-  if (anchor_ns_ == 0) {
+  if (!anchor_ns_) {
     anchor_ns_ = now_ns;
     anchor_us_ = at_us_;
   }
   next_ns_ = now_ns + kStepNs;
   const int64_t to_us =
-      anchor_us_ + static_cast<int64_t>(static_cast<double>(now_ns - anchor_ns_) * 1e-3 * speed_);
+      anchor_us_ + static_cast<int64_t>(static_cast<double>(now_ns - *anchor_ns_) * 1e-3 * speed_);
   PlayTo(to_us, to_us - at_us_ > kHasteUs);
   if (to_us >= end_us_) playing_ = false;
   Say();

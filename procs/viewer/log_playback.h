@@ -58,9 +58,9 @@ class LogPlayback {
   std::unique_ptr<EventLogReader> reader_;
   std::optional<LogEvent> next_;  ///< read, and not yet its turn
   int64_t begin_us_ = 0, end_us_ = 0;
-  int64_t at_us_ = 0;      ///< the log's clock
-  int64_t anchor_us_ = 0;  ///< where it was at `anchor_ns_`
-  int64_t anchor_ns_ = 0;
+  int64_t at_us_ = 0;                 ///< the log's clock
+  int64_t anchor_us_ = 0;             ///< where it was at `anchor_ns_`
+  std::optional<int64_t> anchor_ns_;  ///< none: it has not begun
   int64_t next_ns_ = 0;
   double speed_ = 1;
   bool playing_ = true;

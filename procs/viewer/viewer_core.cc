@@ -263,7 +263,7 @@ void ViewerCore::DrawKeyframe(KeyframeId id, ViewerScene* scene) {
     if (slot >= 0 && !known) drawn.links.push_back({static_cast<uint32_t>(slot), kind});
   };
   for (const KeyframeId other : keyframe->loop_edges) link(other, SceneKeyframe::LinkKind::kLoop);
-  link(keyframe->parent, SceneKeyframe::LinkKind::kParent);
+  if (keyframe->parent) link(*keyframe->parent, SceneKeyframe::LinkKind::kParent);
   for (const KeyframeId other : map_.BestCovisible(id, kMostLinks, kMinShared)) {
     if (other < id) link(other, SceneKeyframe::LinkKind::kCovisible);
   }

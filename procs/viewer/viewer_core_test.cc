@@ -26,7 +26,8 @@ class ViewerCoreTest : public testing::Test {
   void AddKeyframe(int i, size_t features = 40) {
     AddKeyframeOf(kMapId, Kf(i), i, i > 0 ? Kf(i - 1) : KeyframeId(), features);
   }
-  void AddKeyframeOf(MapId map_id, KeyframeId id, int i, KeyframeId parent = {}, size_t features = 40) {
+  void AddKeyframeOf(MapId map_id, KeyframeId id, int i, std::optional<KeyframeId> parent = {},
+                     size_t features = 40) {
     FeatureSet set;
     Random random(static_cast<uint64_t>(i));
     for (size_t k = 0; k < features; ++k) {

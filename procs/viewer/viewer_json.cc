@@ -90,7 +90,7 @@ Json CamerasJson(const std::vector<CameraView>& views) {
     Json camera{{"id", cameras.size()}, {"map", view.map_id ? NameOf(*view.map_id) : ""}};
     if (view.info != nullptr) {
       camera["sequence"] = view.info->sequence;
-      camera["frames"] = view.info->num_frames;
+      camera["frames"] = view.info->num_frames.value_or(0);
       camera["first_frame"] = view.info->first_frame;
     }
     cameras.push_back(std::move(camera));
@@ -188,7 +188,7 @@ std::string ToJson(const StatusView& view) {
   if (view.camera != nullptr) {
     const Camera& camera = view.camera->camera;
     json["sequence"] = view.camera->sequence;
-    json["frames"] = view.camera->num_frames;
+    json["frames"] = view.camera->num_frames.value_or(0);
     json["first_frame"] = view.camera->first_frame;
     json["lockstep"] = view.camera->mode == PlaybackMode::kLockstep;
     json["camera"] = {{"width", camera.width_px}, {"height", camera.height_px}, {"fx", camera.fx_px},

@@ -44,15 +44,15 @@ void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected
   const Landmark& landmark = *map.FindLandmark(expected.id);
   const std::optional<Eigen::Vector2d> uv = map.camera().Project(frame->T_cam_world * landmark.p_world);
   if (!uv) return;
-  const FeatureHit hit =
+  const std::optional<FeatureHit> hit =
       FindFeature(*frame->features, *uv, SearchRadiusPx(map.camera(), options_.radius_rad),
                   expected.view.octave - 1, expected.view.octave + 1, landmark.descriptor, taken_);
-  const bool alone = hit.distance <= options_.ratio * hit.second_distance;
-  if (hit.feature < 0 || hit.distance > options_.max_distance || !alone) return;
-  if (NormalizedErrorSquared(*frame->features, hit.feature, *uv, map.pyramid()) < options_.chi2) return;
+  if (!hit || hit->distance > options_.max_distance) return;
+  if (hit->distance > options_.ratio * hit->second_distance) return;
+  if (NormalizedErrorSquared(*frame->features, hit->feature, *uv, map.pyramid()) < options_.chi2) return;
   moved_.push_back(expected.id);
-  features_.push_back(static_cast<uint16_t>(hit.feature));
-  frame->classes[static_cast<size_t>(hit.feature)] = FeatureClass::kMoving;
+  features_.push_back(static_cast<uint16_t>(hit->feature));
+  frame->classes[static_cast<size_t>(hit->feature)] = FeatureClass::kMoving;
 }
 
 }  // namespace dmslam

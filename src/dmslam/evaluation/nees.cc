@@ -73,11 +73,11 @@ void FindChanges(std::vector<Known>* known) {
 /// Map units in a metre, by the first seconds of a map.
 std::optional<double> ScaleOf(std::span<const Known> known, uint32_t map, double gauge_s) {
   std::vector<Eigen::Vector3d> truth, told;
-  int64_t begin_ns = -1;
+  std::optional<int64_t> begin_ns;
   for (const Known& pose : known) {
     if (pose.told->map != map) continue;
-    if (begin_ns < 0) begin_ns = pose.told->pose.stamp_ns;
-    if (static_cast<double>(pose.told->pose.stamp_ns - begin_ns) * 1e-9 > gauge_s) break;
+    if (!begin_ns) begin_ns = pose.told->pose.stamp_ns;
+    if (static_cast<double>(pose.told->pose.stamp_ns - *begin_ns) * 1e-9 > gauge_s) break;
     truth.push_back(pose.T_true_cam.translation);
     told.push_back(pose.told->pose.T_world_cam.translation);
   }

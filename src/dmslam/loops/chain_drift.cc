@@ -30,7 +30,8 @@ void ForEachLink(const Map& map, const Keyframe& keyframe, int min_shared, const
   for (const auto& [other, shared] : keyframe.covisible) {
     if (shared >= min_shared) visit(other, shared);
   }
-  if (map.FindKeyframe(keyframe.parent) != nullptr) visit(keyframe.parent, shared_with(keyframe.parent));
+  if (keyframe.parent && map.FindKeyframe(*keyframe.parent) != nullptr)
+    visit(*keyframe.parent, shared_with(*keyframe.parent));
   for (const KeyframeId child : map.Children(keyframe.id)) {
     if (map.FindKeyframe(child) != nullptr) visit(child, shared_with(child));
   }

@@ -97,7 +97,7 @@ class EssentialGraph {
     AddEdge(a, b, group_.at(a), Sim3d(map_.FindKeyframe(b)->T_cam_world));
   }
   void AddMapEdges(const Keyframe& keyframe, int essential_covisibility) {
-    if (keyframe.parent.valid()) AddMapEdge(keyframe.id, keyframe.parent);
+    if (keyframe.parent) AddMapEdge(keyframe.id, *keyframe.parent);
     for (const KeyframeId other : keyframe.loop_edges) AddMapEdge(keyframe.id, other);
     for (const auto& [other, shared] : keyframe.covisible) {
       if (shared >= essential_covisibility) AddMapEdge(keyframe.id, other);

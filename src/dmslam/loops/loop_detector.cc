@@ -27,7 +27,8 @@ std::vector<const Keyframe*> OfOtherMapsAtThatTime(const Map& map, const Keyfram
 }
 
 std::set<KeyframeId> ConnectedWith(const Keyframe& keyframe, int min_shared) {
-  std::set<KeyframeId> connected{keyframe.id, keyframe.parent};
+  std::set<KeyframeId> connected{keyframe.id};
+  if (keyframe.parent) connected.insert(*keyframe.parent);
   for (const auto& [other, shared] : keyframe.covisible) {
     if (shared >= min_shared) connected.insert(other);
   }

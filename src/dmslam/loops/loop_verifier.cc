@@ -284,11 +284,11 @@ PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const 
     ++support.expected;
     const size_t cell = CellOf(map.camera(), view->uv_px);
     ++counts.expected[cell];
-    const FeatureHit hit =
+    const std::optional<FeatureHit> hit =
         FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
                     std::max(0, view->octave - 1), view->octave + 1, landmark.descriptor, taken);
-    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
-    const size_t feature = static_cast<size_t>(hit.feature);
+    if (!hit || hit->distance > options_.max_descriptor_distance) continue;
+    const size_t feature = static_cast<size_t>(hit->feature);
     taken[feature] = 1;
     support.matches.push_back({static_cast<uint16_t>(feature), id});
     cells.set(CellOf(map.camera(), keyframe.features->uv_px[feature]));

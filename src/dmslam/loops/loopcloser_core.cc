@@ -49,7 +49,7 @@ void LoopcloserCore::ForgetMap() {
   places_.Clear();
   detector_.Reset();
   proposals_.clear();
-  asked_again_ = {};
+  asked_again_.reset();
   sightings_.Clear();
   awaited_correction_.reset();
   // An adjustment that is due stays so: the loop that asked for it may be in the snapshot.
@@ -180,7 +180,7 @@ std::vector<KeyframeId> LoopcloserCore::NextToAsk(const Keyframe& newest) const 
   for (const auto& [id, keyframe] : map_.keyframes()) {
     if (keyframe.map_id != newest.map_id) of_others.push_back(id);
   }
-  const auto next = std::ranges::upper_bound(of_others, asked_again_);
+  const auto next = asked_again_ ? std::ranges::upper_bound(of_others, *asked_again_) : of_others.begin();
   std::rotate(of_others.begin(), next, of_others.end());
   of_others.resize(std::min(of_others.size(), static_cast<size_t>(std::max(0, options_.asked_again))));
   return of_others;

@@ -97,9 +97,9 @@ class LoopcloserCore {
     int64_t first_ns = 0, last_ns = 0;
     int confirmations = 0;
   };
-  std::vector<Proposal> proposals_;  ///< oldest first
-  KeyframeId asked_again_;           ///< the last one; invalid: none
-  Sightings sightings_;              ///< of one map in another
+  std::vector<Proposal> proposals_;        ///< oldest first
+  std::optional<KeyframeId> asked_again_;  ///< the last one
+  Sightings sightings_;                    ///< of one map in another
   int keyframes_since_loop_;
   bool adjustment_due_ = false;
   std::optional<uint64_t> awaited_correction_;  ///< proposed; the mapper's word on it has not been heard

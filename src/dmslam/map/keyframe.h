@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dmslam/camera/camera.h"
@@ -26,7 +27,7 @@ struct Keyframe {
   int64_t stamp_ns = 0;
   Rigid3d T_cam_world;
   double scale = 1.0;                  ///< product of the scales of all corrections since it was made
-  KeyframeId parent;                   ///< spanning tree; invalid for a map's first keyframe
+  std::optional<KeyframeId> parent;    ///< spanning tree; none: a map's first keyframe
   std::vector<KeyframeId> loop_edges;  ///< sorted
   std::shared_ptr<const FrameFeatures> features;
   std::vector<LandmarkId> landmarks;

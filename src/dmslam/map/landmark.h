@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dmslam/features/types.h"
@@ -26,7 +27,7 @@ struct LandmarkEvidence {
   uint32_t moved = 0;    ///< frames in which something like it was seen elsewhere
   float motion_belief =
       0.0F;  ///< log odds that it moves; above zero it has no vote (see docs/motion_belief.md)
-  int64_t last_moved_ns = 0;  ///< stamp of the newest frame that saw it elsewhere; 0 = never
+  std::optional<int64_t> last_moved_ns;  ///< stamp of the newest frame that saw it elsewhere; none: never
   auto operator<=>(const LandmarkEvidence&) const = default;
 };
 

@@ -76,8 +76,8 @@ std::optional<LandmarkId> Map::Resolve(LandmarkId id) const {
   for (int steps = 0; steps < 1000; ++steps) {
     if (FindLandmark(id) != nullptr) return id;
     const auto it = landmark_tombstones_.find(id);
-    if (it == landmark_tombstones_.end() || !it->second.valid()) return std::nullopt;
-    id = it->second;
+    if (it == landmark_tombstones_.end() || !it->second) return std::nullopt;
+    id = *it->second;
   }
   return std::nullopt;
 }
@@ -253,12 +253,13 @@ void Map::UpdateStandpoint(const Keyframe& keyframe) {
   }
 }
 
-void Map::Attach(KeyframeId child, KeyframeId parent) {
-  if (parent.valid()) InsertSorted(children_[parent], child);
+void Map::Attach(KeyframeId child, std::optional<KeyframeId> parent) {
+  if (parent) InsertSorted(children_[*parent], child);
 }
 
-void Map::Detach(KeyframeId child, KeyframeId parent) {
-  const auto it = children_.find(parent);
+void Map::Detach(KeyframeId child, std::optional<KeyframeId> parent) {
+  if (!parent) return;
+  const auto it = children_.find(*parent);
   if (it == children_.end()) return;
   EraseSorted(it->second, child);
   if (it->second.empty()) children_.erase(it);
@@ -308,7 +309,7 @@ void Map::MoveLandmarks(const std::vector<ReferenceMove>& moves) {
   });
 }
 
-void Map::Hang(Keyframe& keyframe, KeyframeId parent) {
+void Map::Hang(Keyframe& keyframe, std::optional<KeyframeId> parent) {
   Detach(keyframe.id, keyframe.parent);
   keyframe.parent = parent;
   Attach(keyframe.id, parent);
@@ -365,7 +366,7 @@ void Map::EraseKeyframe(KeyframeId id) {
 
 void Map::EraseLandmark(LandmarkId id) { landmarks_.Erase(id); }
 
-void Map::Bury(LandmarkId id, LandmarkId replaced_by) {
+void Map::Bury(LandmarkId id, std::optional<LandmarkId> replaced_by) {
   if (landmark_tombstones_.insert_or_assign(id, replaced_by).second) burials_.push_back(id);
 }
 

@@ -80,10 +80,12 @@ class Map {
   /// Whether a keyframe of this id is in the map, or was and has been culled.
   bool HasKnown(KeyframeId id) const;
   const std::map<KeyframeId, KeyframeTombstone>& keyframe_tombstones() const { return keyframe_tombstones_; }
-  /// What dead landmarks were fused into; 0: culled. Of those that died last (kLandmarkTombstones, some
+  /// What dead landmarks were fused into; none: culled. Of those that died last (kLandmarkTombstones, some
   /// minutes' worth): keyframes in flight, and what the frontend keeps of its newest frames, refer to no
   /// older ones.
-  const std::map<LandmarkId, LandmarkId>& landmark_tombstones() const { return landmark_tombstones_; }
+  const std::map<LandmarkId, std::optional<LandmarkId>>& landmark_tombstones() const {
+    return landmark_tombstones_;
+  }
   static constexpr size_t kLandmarkTombstones = 32768;
   /// Their ids in the order of death.
   const std::deque<LandmarkId>& landmark_burials() const { return burials_; }
@@ -128,7 +130,7 @@ class Map {
   static void Place(Landmark& landmark, const Eigen::Vector3d& p_world);
   /// All landmarks whose reference is among those of `moves`, with it.
   void MoveLandmarks(const std::vector<ReferenceMove>& moves);
-  void Hang(Keyframe& keyframe, KeyframeId parent);
+  void Hang(Keyframe& keyframe, std::optional<KeyframeId> parent);
   /// The landmark is seen anew; its viewing range is stale.
   static void SetReference(Landmark& landmark, KeyframeId reference);
   /// A feature sees a landmark instead of what it saw before. Returns the feature of the same keyframe that
@@ -137,7 +139,7 @@ class Map {
   void Release(Keyframe& keyframe, uint16_t feature);
   void EraseKeyframe(KeyframeId id);  ///< that sees nothing any more, or whose whole map goes
   void EraseLandmark(LandmarkId id);  ///< that nobody sees any more, or whose whole map goes
-  void Bury(LandmarkId id, LandmarkId replaced_by);
+  void Bury(LandmarkId id, std::optional<LandmarkId> replaced_by);
   void Bury(const KeyframeTombstone& tombstone) { keyframe_tombstones_[tombstone.id] = tombstone; }
   void ForgetOldTombstones();
   /// What was there of a map that is forgotten as a whole.
@@ -163,8 +165,8 @@ class Map {
 
   void UpdateStandpoint(const Keyframe& keyframe);
   void Link(const Landmark& landmark, Keyframe& keyframe, int sign);
-  void Attach(KeyframeId child, KeyframeId parent);
-  void Detach(KeyframeId child, KeyframeId parent);
+  void Attach(KeyframeId child, std::optional<KeyframeId> parent);
+  void Detach(KeyframeId child, std::optional<KeyframeId> parent);
   std::optional<ViewingRange> ComputeViewing(const Landmark& landmark) const;
 
   Camera camera_;
@@ -179,7 +181,7 @@ class Map {
   std::map<KeyframeId, std::vector<KeyframeId>>
       children_;  ///< by parent, whether the parent is known yet or not
   std::map<KeyframeId, KeyframeTombstone> keyframe_tombstones_;
-  std::map<LandmarkId, LandmarkId> landmark_tombstones_;
+  std::map<LandmarkId, std::optional<LandmarkId>> landmark_tombstones_;
   std::deque<LandmarkId> burials_;
 };
 

@@ -45,7 +45,7 @@ struct KeyframeState {
   int64_t stamp_ns = 0;
   Rigid3d T_cam_world;
   double scale = 1.0;
-  KeyframeId parent;
+  std::optional<KeyframeId> parent;  ///< none: a map's first keyframe
   std::vector<KeyframeId> loop_edges;
   std::shared_ptr<const FeatureSet> features;  ///< those of the keyframe, not copied; null: they are known
   CameraId camera_id = 0;
@@ -87,11 +87,11 @@ struct LandmarkEvidenceState {
   LandmarkEvidence evidence;
 };
 
-/// What feature `feature` of `keyframe` observes now (invalid: nothing).
+/// What feature `feature` of `keyframe` observes now.
 struct ObservationState {
   KeyframeId keyframe;
   uint16_t feature = 0;
-  LandmarkId landmark;
+  std::optional<LandmarkId> landmark;  ///< none: nothing
   auto operator<=>(const ObservationState&) const = default;
 };
 
@@ -106,7 +106,7 @@ struct KeyframeTombstone {
 
 struct LandmarkTombstone {
   LandmarkId id;
-  LandmarkId replaced_by;  ///< invalid: culled
+  std::optional<LandmarkId> replaced_by;  ///< none: culled
 };
 
 /// A place in a stream of records: all of `epoch` up to `seq`. Zero: before the first.

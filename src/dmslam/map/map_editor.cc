@@ -83,7 +83,7 @@ void MapEditor::SetEvidence(const Landmark& landmark, const LandmarkEvidence& ev
   journal_.Note(landmark.id, LandmarkChange::kEvidence);
 }
 
-void MapEditor::SetParent(const Keyframe& keyframe, KeyframeId parent) {
+void MapEditor::SetParent(const Keyframe& keyframe, std::optional<KeyframeId> parent) {
   Hang(Mutable(keyframe), parent);
   journal_.Note(keyframe.id, KeyframeChange::kState);
 }
@@ -139,11 +139,11 @@ void MapEditor::Fuse(const Landmark& from, const Landmark& into) {
 void MapEditor::RemoveLandmark(const Landmark& landmark) {
   const std::vector<Observation> observations = landmark.observations;
   for (const Observation& o : observations) ClearObservation(At(o.keyframe), o.feature);
-  EraseAndBury(landmark, LandmarkId{});
+  EraseAndBury(landmark, std::nullopt);
 }
 
 /// Of a landmark that nobody sees any more.
-void MapEditor::EraseAndBury(const Landmark& landmark, LandmarkId replaced_by) {
+void MapEditor::EraseAndBury(const Landmark& landmark, std::optional<LandmarkId> replaced_by) {
   const LandmarkId id = landmark.id;
   EraseLandmark(id);
   journal_.Forget(id);
@@ -153,9 +153,9 @@ void MapEditor::EraseAndBury(const Landmark& landmark, LandmarkId replaced_by) {
 
 /// Children hang on whom they share most with: the removed keyframe's parent, or one of them that hangs
 /// already.
-void MapEditor::ReparentChildren(const Keyframe& removed) {
+void MapEditor::ReparentChildren(const Keyframe& removed, KeyframeId parent) {
   std::vector<KeyframeId> orphans = Children(removed.id);
-  std::vector<KeyframeId> candidates = {removed.parent};
+  std::vector<KeyframeId> candidates = {parent};
   while (!orphans.empty()) {
     int best_shared = 0;
     KeyframeId best_child, best_parent;
@@ -175,7 +175,7 @@ void MapEditor::ReparentChildren(const Keyframe& removed) {
     candidates.push_back(best_child);
     std::erase(orphans, best_child);
   }
-  for (const KeyframeId child : orphans) SetParent(At(child), removed.parent);
+  for (const KeyframeId child : orphans) SetParent(At(child), parent);
 }
 
 /// The landmark that feature `feature` of a keyframe sees loses it; one that nobody else sees goes.
@@ -193,10 +193,10 @@ void MapEditor::TakeFrom(const Keyframe& keyframe, uint16_t feature) {
 
 void MapEditor::RemoveKeyframe(const Keyframe& keyframe) {
   const KeyframeId id = keyframe.id;
-  const Keyframe* parent = FindKeyframe(keyframe.parent);
+  const Keyframe* parent = keyframe.parent ? FindKeyframe(*keyframe.parent) : nullptr;
   DMSLAM_CHECK(parent != nullptr, "a map's first keyframe stays");
   for (size_t i = 0; i < keyframe.landmarks.size(); ++i) TakeFrom(keyframe, static_cast<uint16_t>(i));
-  ReparentChildren(keyframe);
+  ReparentChildren(keyframe, parent->id);
   for (const KeyframeId other : keyframe.loop_edges) {
     if (Keyframe* end = Find(other)) {
       std::erase(end->loop_edges, id);

@@ -37,7 +37,7 @@ class MapEditor : public Map {
   void MoveWithReference(const Landmark& landmark, const Sim3d& after_from_before);
   void SetEvidence(const Landmark& landmark, const LandmarkEvidence& evidence);
   /// `parent` need not be there, and may be none.
-  void SetParent(const Keyframe& keyframe, KeyframeId parent);
+  void SetParent(const Keyframe& keyframe, std::optional<KeyframeId> parent);
   void AddLoopEdge(const Keyframe& a, const Keyframe& b);
   void SetMapId(const Keyframe& keyframe, MapId map_id);
   void SetMapId(const Landmark& landmark, MapId map_id);
@@ -59,9 +59,9 @@ class MapEditor : public Map {
   MapDelta TakeDelta(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id);
 
  private:
-  void ReparentChildren(const Keyframe& removed);
+  void ReparentChildren(const Keyframe& removed, KeyframeId parent);
   void TakeFrom(const Keyframe& keyframe, uint16_t feature);
-  void EraseAndBury(const Landmark& landmark, LandmarkId replaced_by);
+  void EraseAndBury(const Landmark& landmark, std::optional<LandmarkId> replaced_by);
 
   MapJournal journal_;
 };

@@ -92,7 +92,7 @@ TEST_F(Editor, ALandmarkHasOneFeaturePerKeyframe) {
   EXPECT_EQ(map_.At(Lm(1)).observations.size(), 3u);
   const MapDelta delta = Take();
   ASSERT_EQ(delta.observations.size(), 2u);
-  EXPECT_EQ(delta.observations[0], (ObservationState{Kf(2), 1, LandmarkId{}}));
+  EXPECT_EQ(delta.observations[0], (ObservationState{Kf(2), 1, std::nullopt}));
   EXPECT_EQ(delta.observations[1], (ObservationState{Kf(2), 9, Lm(1)}));
 }
 

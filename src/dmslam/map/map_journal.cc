@@ -47,7 +47,7 @@ void MapJournal::Write(const Map& map, MapDelta* delta) const {
     if (Has(changes, LandmarkChange::kEvidence)) delta->landmark_evidence.push_back({id, landmark.evidence});
   }
   for (const auto& [keyframe, feature] : observations_) {
-    delta->observations.push_back({keyframe, feature, map.At(keyframe).landmarks[feature]});
+    delta->observations.push_back({keyframe, feature, ObservedBy(map.At(keyframe), feature)});
   }
   for (const KeyframeId id : keyframe_tombstones_) {
     delta->keyframe_tombstones.push_back(map.keyframe_tombstones().at(id));

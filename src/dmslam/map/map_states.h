@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "dmslam/map/keyframe.h"
 #include "dmslam/map/landmark.h"
 #include "dmslam/map/map_delta.h"
@@ -13,6 +15,12 @@ inline KeyframeState StateOf(const Keyframe& keyframe, bool with_features) {
                       keyframe.loop_edges,  nullptr,         keyframe.camera_id};
   if (with_features) state.features = {keyframe.features, &keyframe.features->set};
   return state;
+}
+
+/// What feature `feature` of a keyframe observes; none: nothing.
+inline std::optional<LandmarkId> ObservedBy(const Keyframe& keyframe, size_t feature) {
+  const LandmarkId id = keyframe.landmarks[feature];
+  return id.valid() ? std::optional(id) : std::nullopt;
 }
 
 /// All of a landmark's own state.

@@ -93,10 +93,9 @@ TEST(Map, SpanningTreeStaysOneTree) {
   editor.Steps(3000);
   for (const auto& [id, keyframe] : editor.map().keyframes()) {
     std::set<KeyframeId> seen;
-    KeyframeId at = id;
-    while (at.valid()) {
-      ASSERT_TRUE(seen.insert(at).second) << "a circle in the spanning tree";
-      const Keyframe* node = editor.map().FindKeyframe(at);
+    for (std::optional<KeyframeId> at = id; at;) {
+      ASSERT_TRUE(seen.insert(*at).second) << "a circle in the spanning tree";
+      const Keyframe* node = editor.map().FindKeyframe(*at);
       ASSERT_NE(node, nullptr) << "a parent that is gone";
       at = node->parent;
     }

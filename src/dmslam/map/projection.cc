@@ -29,22 +29,21 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
                       static_cast<int>(std::clamp(octave, 0.0, pyramid.levels - 1.0))};
 }
 
-FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px,
-                       int min_octave, int max_octave, const Descriptor& descriptor,
-                       const std::vector<uint8_t>& taken) {
-  FeatureHit hit;
+std::optional<FeatureHit> FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px,
+                                      double radius_px, int min_octave, int max_octave,
+                                      const Descriptor& descriptor, const std::vector<uint8_t>& taken) {
+  std::optional<FeatureHit> hit;
   features.grid.ForEachInRadius(uv_px, radius_px, min_octave, max_octave, [&](uint32_t i) {
     if (!taken.empty() && taken[i] != 0) return;
     const int distance = HammingDistance(descriptor, features.set.descriptors[i]);
-    if (distance < hit.distance || (distance == hit.distance && static_cast<int>(i) < hit.feature)) {
-      hit.second_distance = hit.distance;
-      hit.second_octave = hit.octave;
-      hit.distance = distance;
-      hit.octave = features.set.keypoints[i].octave;
-      hit.feature = static_cast<int>(i);
-    } else if (distance < hit.second_distance) {
-      hit.second_distance = distance;
-      hit.second_octave = features.set.keypoints[i].octave;
+    const FeatureHit found{static_cast<int>(i), distance, features.set.keypoints[i].octave};
+    if (!hit) {
+      hit = found;
+    } else if (distance < hit->distance || (distance == hit->distance && found.feature < hit->feature)) {
+      hit = FeatureHit{found.feature, distance, found.octave, hit->distance, hit->octave};
+    } else if (distance < hit->second_distance) {
+      hit->second_distance = distance;
+      hit->second_octave = found.octave;
     }
   });
   return hit;

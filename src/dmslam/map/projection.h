@@ -29,19 +29,19 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
 
 /// The feature near a pixel whose descriptor is nearest.
 struct FeatureHit {
-  int feature = -1;           ///< -1: none
-  int distance = 257;         ///< bits
-  int second_distance = 257;  ///< of the next best feature
-  int octave = -1;
-  int second_octave = -1;
+  int feature = 0;
+  int distance = 0;  ///< bits
+  int octave = 0;
+  int second_distance = 257;           ///< of the next best feature; more than any has: there is no other
+  std::optional<int> second_octave{};  ///< of that feature
 };
 
-/// Looks within `radius_px` of `uv_px`, at octaves min..max, for the feature nearest to `descriptor`.
-/// Features whose entry in `taken` is non-zero are passed over (`taken` may be empty). Ties go to the lower
-/// index.
-FeatureHit FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px, double radius_px,
-                       int min_octave, int max_octave, const Descriptor& descriptor,
-                       const std::vector<uint8_t>& taken);
+/// Looks within `radius_px` of `uv_px`, at octaves min..max, for the feature nearest to `descriptor`; none:
+/// there is none. Features whose entry in `taken` is non-zero are passed over (`taken` may be empty). Ties go
+/// to the lower index.
+std::optional<FeatureHit> FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px,
+                                      double radius_px, int min_octave, int max_octave,
+                                      const Descriptor& descriptor, const std::vector<uint8_t>& taken);
 
 /// Squared reprojection error over the feature's variance.
 inline double NormalizedErrorSquared(const FrameFeatures& features, int feature, const Eigen::Vector2d& uv_px,

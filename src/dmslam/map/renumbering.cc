@@ -25,11 +25,14 @@ class Namer {
   explicit Namer(const Renumbering& names) : names_(names) {}
 
   void Rename(KeyframeId& id) const {
-    if (id.valid())
-      id = KeyframeId::Make(Named(names_.sessions, id.session()), id.frame_index(), id.camera());
+    id = KeyframeId::Make(Named(names_.sessions, id.session()), id.frame_index(), id.camera());
   }
   void Rename(LandmarkId& id) const {
-    if (id.valid()) id = LandmarkId::Make(Named(names_.ordinals, id.epoch_ordinal()), id.number());
+    id = LandmarkId::Make(Named(names_.ordinals, id.epoch_ordinal()), id.number());
+  }
+  template <typename Id>
+  void Rename(std::optional<Id>& id) const {
+    if (id) Rename(*id);
   }
   void RenameMap(MapId& id) const { id = Named(names_.maps, id); }
 
@@ -118,9 +121,9 @@ Renumbering NamesBeside(const Map& a, const Map& b, bool sessions_too) {
 
 MapDelta Renumbered(MapDelta delta, const Renumbering& names) {
   const Namer namer(names);
-  if (delta.about) namer.Rename(*delta.about);
+  namer.Rename(delta.about);
   if (delta.map_id) namer.RenameMap(*delta.map_id);
-  if (delta.progress.settled) namer.Rename(*delta.progress.settled);
+  namer.Rename(delta.progress.settled);
   namer.RenameAll(delta.keyframes);
   namer.RenameAll(delta.keyframe_poses);
   namer.RenameAll(delta.reference_moves);
@@ -154,7 +157,7 @@ Replica OnlyMap(const Map& map, MapId map_id) {
     return !rest.ResolvePose(tombstone.id).has_value();
   });
   std::erase_if(whole.landmark_tombstones, [&](const LandmarkTombstone& tombstone) {
-    return tombstone.replaced_by.valid() && !rest.Resolve(tombstone.id).has_value();
+    return tombstone.replaced_by.has_value() && !rest.Resolve(tombstone.id).has_value();
   });
   only.Apply(whole);
   return only;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/map/map_states.h"
+
 namespace dmslam {
 
 void Replica::Apply(const MapDelta& delta) {
@@ -100,14 +102,14 @@ void Replica::ApplyObservations(const MapDelta& delta) {
     Keyframe* keyframe = Find(o.keyframe);
     if (keyframe == nullptr || o.feature >= keyframe->landmarks.size()) {
       ++skipped_references_;
-    } else if (keyframe->landmarks[o.feature] != o.landmark) {
+    } else if (ObservedBy(*keyframe, o.feature) != o.landmark) {
       Release(*keyframe, o.feature);
     }
   }
   for (const ObservationState& o : delta.observations) {
     Keyframe* keyframe = Find(o.keyframe);
-    if (!o.landmark.valid() || keyframe == nullptr || o.feature >= keyframe->landmarks.size()) continue;
-    if (Landmark* landmark = Find(o.landmark)) {
+    if (!o.landmark || keyframe == nullptr || o.feature >= keyframe->landmarks.size()) continue;
+    if (Landmark* landmark = Find(*o.landmark)) {
       Observe(*keyframe, o.feature, *landmark);
     } else {
       ++skipped_references_;

@@ -116,7 +116,7 @@ TEST(Replica, ACulledKeyframeDoesNotComeBack) {
   replica.Apply(everything);
   KeyframeId culled;
   for (const auto& [id, keyframe] : editor.map().keyframes()) {
-    if (keyframe.parent.valid()) culled = id;
+    if (keyframe.parent) culled = id;
   }
   ASSERT_TRUE(culled.valid());
   editor.map().RemoveKeyframe(editor.map().At(culled));

@@ -25,19 +25,19 @@ class Corrections {
   /// The correction of a keyframe, there or culled: its own, or that of its nearest ancestor that has one;
   /// null: it stays.
   const Sim3d* Of(KeyframeId id) const {
-    while (id.valid()) {
-      const auto own = own_.find(id);
+    for (std::optional<KeyframeId> at = id; at; at = ParentOf(*at)) {
+      const auto own = own_.find(*at);
       if (own != own_.end()) return &own->second;
-      id = ParentOf(id);
     }
     return nullptr;
   }
 
  private:
-  KeyframeId ParentOf(KeyframeId id) const {
+  std::optional<KeyframeId> ParentOf(KeyframeId id) const {
     if (const Keyframe* keyframe = map_.FindKeyframe(id)) return keyframe->parent;
     const auto tombstone = map_.keyframe_tombstones().find(id);
-    return tombstone == map_.keyframe_tombstones().end() ? KeyframeId{} : tombstone->second.parent;
+    if (tombstone == map_.keyframe_tombstones().end()) return std::nullopt;
+    return tombstone->second.parent;
   }
 
   const Map& map_;
@@ -150,12 +150,12 @@ int Connect(MapEditor& map, const LoopAnswer& answer, const LoopEnds& ends, cons
 
 /// Turns the spanning tree of a keyframe around, so that it hangs from `parent`.
 void Reroot(MapEditor& map, KeyframeId id, KeyframeId parent) {
-  while (id.valid()) {
-    const Keyframe& keyframe = map.At(id);
-    const KeyframeId next = keyframe.parent;
+  for (std::optional<KeyframeId> at = id; at;) {
+    const Keyframe& keyframe = map.At(*at);
+    const std::optional<KeyframeId> next = keyframe.parent;
     map.SetParent(keyframe, parent);
-    parent = id;
-    id = next;
+    parent = *at;
+    at = next;
   }
 }
 

@@ -148,7 +148,7 @@ TEST_F(Joining, TheTreeHangsFromThePlaceAtTheLoop) {
   EXPECT_EQ(map_.At(Id(12)).parent, Id(2));
   EXPECT_EQ(map_.At(Id(11)).parent, Id(12)) << "turned around";
   EXPECT_EQ(map_.At(Id(13)).parent, Id(12));
-  EXPECT_FALSE(map_.At(Id(1)).parent.valid());
+  EXPECT_FALSE(map_.At(Id(1)).parent.has_value());
   EXPECT_EQ(map_.At(Id(12)).loop_edges, std::vector<KeyframeId>{Id(2)});
   EXPECT_EQ(map_.At(Id(2)).loop_edges, std::vector<KeyframeId>{Id(12)});
 }

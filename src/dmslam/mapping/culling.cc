@@ -71,7 +71,7 @@ int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, std::option
                            const MapperOptions& options) {
   int culled = 0;
   for (const Keyframe* neighbour : map.BestCovisible(keyframe, kMostNeighbours, options.min_covisibility)) {
-    const bool stays = !neighbour->parent.valid() || neighbour->id == keep || !neighbour->loop_edges.empty();
+    const bool stays = !neighbour->parent || neighbour->id == keep || !neighbour->loop_edges.empty();
     if (stays || !IsRedundant(map, *neighbour, options.redundant_share)) continue;
     RemoveWithLonelyLandmarks(map, *neighbour);
     ++culled;

@@ -69,13 +69,13 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
   if (!view) return std::nullopt;
   const double radius_px =
       SearchRadiusPx(map.camera(), options.fuse_radius_rad) * map.pyramid().Scale(view->octave);
-  const FeatureHit hit =
+  const std::optional<FeatureHit> hit =
       FindFeature(*keyframe.features, view->uv_px, radius_px, std::max(0, view->octave - 1), view->octave,
                   landmark.descriptor, kNoneTaken);
-  if (hit.feature < 0 || hit.distance > options.max_fuse_distance) return std::nullopt;
-  const double error = NormalizedErrorSquared(*keyframe.features, hit.feature, view->uv_px, map.pyramid());
+  if (!hit || hit->distance > options.max_fuse_distance) return std::nullopt;
+  const double error = NormalizedErrorSquared(*keyframe.features, hit->feature, view->uv_px, map.pyramid());
   if (error > options.creation.reprojection_sigmas_squared) return std::nullopt;
-  return static_cast<uint16_t>(hit.feature);
+  return static_cast<uint16_t>(hit->feature);
 }
 
 /// Joins a landmark with what the feature sees already.

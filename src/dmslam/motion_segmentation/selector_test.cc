@@ -205,8 +205,8 @@ TEST(Dlrsac, ReportsCellsAndCoupleMatrix) {
     }
   }
   EXPECT_EQ(matches, 800);
-  ASSERT_GE(selection.leading_cell, 0);
-  EXPECT_TRUE(selection.cells[static_cast<size_t>(selection.leading_cell)].chosen);
+  ASSERT_TRUE(selection.leading_cell.has_value());
+  EXPECT_TRUE(selection.cells[static_cast<size_t>(*selection.leading_cell)].chosen);
 }
 
 TEST(Dlrsac, RefusesACompactSet) {
@@ -334,7 +334,7 @@ TEST(Dlrsac, CollinearCellsDoNotVote) {
       EXPECT_EQ(cell.state, CellState::kCollinear);
     }
   }
-  EXPECT_EQ(selection.leading_cell, -1);
+  EXPECT_FALSE(selection.leading_cell.has_value());
   EXPECT_FALSE(selection.IsUsable());
 }
 

@@ -81,8 +81,8 @@ struct StaticSelection {
   /// C(i, j): share of cell j's own inliers that cell i's model explains (paper 2.1). Empty for RANSAC and
   /// ARSAC.
   Eigen::MatrixXd couple;
-  int leading_cell = -1;  ///< whose coupled set was chosen; -1 for RANSAC and ARSAC
-  int iterations = 0;     ///< samples drawn in all
+  std::optional<int> leading_cell;  ///< whose coupled set was chosen; none for RANSAC and ARSAC
+  int iterations = 0;               ///< samples drawn in all
 
   bool IsUsable() const { return refusal == Refusal::kNone; }
 };

@@ -84,7 +84,7 @@ MapAdjustmentReport AdjustKeyframes(MapEditor& map, const std::vector<const Keyf
                                     int max_fixed, double sigma_px, const BundleOptions& options) {
   Window window;
   window.problem.camera = map.camera().Ideal();
-  for (const Keyframe* keyframe : keyframes) window.AddPose(*keyframe, !keyframe->parent.valid());
+  for (const Keyframe* keyframe : keyframes) window.AddPose(*keyframe, !keyframe->parent.has_value());
   window.landmarks = LandmarksSeenBy(map, keyframes);
   for (const KeyframeId id : FixedObservers(window, max_fixed)) window.AddPose(map.At(id), true);
   AddObservations(map, sigma_px, window);

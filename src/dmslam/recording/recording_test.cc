@@ -50,7 +50,7 @@ class TinyMapper {
     keyframe.id = id;
     keyframe.map_id = 1;
     keyframe.stamp_ns = frame_ * 1'000'000'000LL;
-    keyframe.parent = frame_ > 1 ? KeyframeId::Make(kSession, 1) : KeyframeId{};
+    if (frame_ > 1) keyframe.parent = KeyframeId::Make(kSession, 1);
     keyframe.T_cam_world.translation = {random_.Gaussian(), random_.Gaussian(), random_.Gaussian()};
     keyframe.features = MakeFrameFeatures(RandomFeatures(random_, 20), TestCamera(), Pyramid());
     const auto num_features = static_cast<uint16_t>(keyframe.features->size());

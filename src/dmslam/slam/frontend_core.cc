@@ -131,7 +131,9 @@ MapId FrontendCore::NextMapId() {
 void FrontendCore::FollowJoinedMap() {
   if (!phase_.HasMap() || !map_id_ || !map_.KeyframesOf(*map_id_).empty()) return;
   if (*map_id_ / kMapsPerCamera == camera_id_) newest_map_ = std::max(newest_map_, *map_id_);
-  if (const auto last = map_.ResolvePose(tracker_.last_reference())) map_id_ = last->map_id;
+  const std::optional<KeyframeId> reference = tracker_.last_reference();
+  const auto last = reference ? map_.ResolvePose(*reference) : std::nullopt;
+  if (last) map_id_ = last->map_id;
 }
 
 TrackingState FrontendCore::state() const {
@@ -287,7 +289,8 @@ FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
     output = GiveUpMap(MapReset::Fate::kDrop,
                        std::string("the first map does not predict the next frames: ") + report.reason);
   } else {
-    const int64_t missing_ns = frame_.stamp_ns - tracker_.last_tracked_ns();
+    const std::optional<int64_t> last_ns = tracker_.last_tracked_ns();
+    const int64_t missing_ns = last_ns ? frame_.stamp_ns - *last_ns : INT64_MAX;
     phase_.OnMissing(missing_ns);
     ++(phase_.state() == TrackingState::kLost ? counters_.lost : counters_.missing);
     if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsUndecided())

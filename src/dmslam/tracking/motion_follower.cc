@@ -41,7 +41,7 @@ bool MotionFollower::FindFirstPose(const Map& map, const MotionModel::Prediction
     if (inliers >= options_.min_local_inliers) return true;
     if (inliers >= options_.min_coasting_inliers) attempt->weak_pose = search->found(*frame);
   }
-  return search->FromKeyframe(map, motion_.last().reference, seed, prediction.prior, frame);
+  return search->FromKeyframe(map, motion_.last()->reference, seed, prediction.prior, frame);
 }
 
 void MotionFollower::OnTracked(const Map& map, const PlacedPose& pose, const FoundPose& found,

@@ -47,7 +47,7 @@ std::optional<Rigid3d> PlacedPose::In(const Map& map) const {
 }
 
 void MotionModel::Begin(const PlacedPose& pose, const FrameTime& time) {
-  last_ = {pose, time};
+  last_ = Pose{pose, time};
   Stop();
 }
 
@@ -58,8 +58,7 @@ void MotionModel::Stop() {
 }
 
 /// The motion goes on evenly, for no longer than it says something.
-MotionFilter::Since MotionModel::Since(const Map& map, const FrameTime& time) const {
-  const Pose& newest = Newest();
+MotionFilter::Since MotionModel::Since(const Map& map, const Pose& newest, const FrameTime& time) const {
   int64_t since_ns = time.stamp_ns - newest.time.stamp_ns;
   if (time.index - newest.time.index != 1) since_ns = std::min(since_ns, kKnownNs);
   const auto reference = map.ResolvePose(newest.pose.reference);
@@ -79,55 +78,58 @@ Matrix6d MotionModel::Floored(const Map& map, const Matrix6d& covariance) const 
 /// that was tracked twice, as the one that made the first map is, has corrected its pose and not moved.
 std::optional<MotionFilter> MotionModel::MotionTo(const Map& map, const FoundPose& found,
                                                   const FrameTime& time) const {
-  const std::optional<Rigid3d> T_last_world = Newest().pose.In(map);
+  const std::optional<Pose>& newest = Newest();
+  const std::optional<Rigid3d> T_last_world = newest ? newest->pose.In(map) : std::nullopt;
   if (!T_last_world) return std::nullopt;
-  const MotionFilter::Since since = Since(map, time);
+  const MotionFilter::Since since = Since(map, *newest, time);
   if (since.duration_s <= 0) return motion_;
-  if (motion_ && IsWithin(time, kKnownNs)) {
+  if (motion_ && IsWithin(newest->time, time, kKnownNs)) {
     const Prediction prediction = Predict(map, time);
     MotionFilter motion = *motion_;
     motion.Update(since, Difference(found.T_cam_world, *prediction.T_cam_world),
                   Floored(map, found.covariance));
     return motion;
   }
-  if (!IsWithin(time, kSuccessiveNs)) return std::nullopt;
+  if (!IsWithin(newest->time, time, kSuccessiveNs)) return std::nullopt;
   return MotionFilter(options_.evenness, since, Difference(found.T_cam_world, *T_last_world),
                       Floored(map, covariance_.value_or(Matrix6d::Zero())), Floored(map, found.covariance));
 }
 
-bool MotionModel::IsWithin(const FrameTime& time, int64_t limit_ns) const {
-  const FrameTime& newest = Newest().time;
+bool MotionModel::IsWithin(const FrameTime& newest, const FrameTime& time, int64_t limit_ns) {
   return time.index - newest.index == 1 || time.stamp_ns - newest.stamp_ns <= limit_ns;
 }
 
 /// Of the scene, as the keyframe seen last has it.
 double MotionModel::Depth(const Map& map) const {
-  const Keyframe* reference = map.FindKeyframe(last_.pose.reference);
+  const Keyframe* reference = last_ ? map.FindKeyframe(last_->pose.reference) : nullptr;
   return reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
 }
 
 MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time) const {
   Prediction prediction;
-  prediction.recent = time.stamp_ns - last_.time.stamp_ns < kRecentNs;
-  prediction.T_cam_world = Newest().pose.In(map);
+  const std::optional<Pose>& newest = Newest();
+  if (!newest) return prediction;
+  prediction.recent = time.stamp_ns - last_->time.stamp_ns < kRecentNs;
+  prediction.T_cam_world = newest->pose.In(map);
   if (!prediction.T_cam_world || !motion_) return prediction;
-  const MotionFilter::Expected expected = motion_->Predict(Since(map, time));
+  const MotionFilter::Expected expected = motion_->Predict(Since(map, *newest, time));
   prediction.T_cam_world =
       Rigid3d(ExpSo3(expected.step.head<3>()), expected.step.tail<3>()) * *prediction.T_cam_world;
-  if (!IsWithin(time, kKnownNs)) return prediction;
+  if (!IsWithin(newest->time, time, kKnownNs)) return prediction;
   prediction.prior = PosePrior{*prediction.T_cam_world, InverseOf(expected.covariance)};
   return prediction;
 }
 
 bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const {
-  if (time.stamp_ns - last_.time.stamp_ns > static_cast<int64_t>(options_.reach_known_s * 1e9)) return true;
+  if (!last_) return true;
+  if (time.stamp_ns - last_->time.stamp_ns > static_cast<int64_t>(options_.reach_known_s * 1e9)) return true;
+  const Pose& newest = *Newest();
   const Prediction prediction = Predict(map, time);
   if (!prediction.T_cam_world) return true;
-  const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *Newest().pose.In(map);
+  const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *newest.pose.In(map);
   const double turned_rad = AngleBetween(T_cam_world.rotation, from.rotation);
   const double moved = (T_cam_world.Center() - from.Center()).norm() / Depth(map);
-  const double since_s =
-      std::max(1.0 / 30, static_cast<double>(time.stamp_ns - Newest().time.stamp_ns) * 1e-9);
+  const double since_s = std::max(1.0 / 30, static_cast<double>(time.stamp_ns - newest.time.stamp_ns) * 1e-9);
   if (prediction.prior) {
     const double steps = std::max(1.0, std::round(since_s * 30));
     return turned_rad <= options_.max_surprise * options_.prior_rotation_rad * steps &&
@@ -147,9 +149,10 @@ void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const FoundP
 }
 
 void MotionModel::Coast(const Map& map, const FoundPose& found, const FrameTime& time) {
+  if (!last_ || !IsWithin(Newest()->time, time, kKnownNs)) return;
   const std::optional<PlacedPose> pose =
-      PlacedPose::Of(map.FindKeyframe(last_.pose.reference), found.T_cam_world);
-  if (!pose || !IsWithin(time, kKnownNs)) return;
+      PlacedPose::Of(map.FindKeyframe(last_->pose.reference), found.T_cam_world);
+  if (!pose) return;
   motion_ = MotionTo(map, found, time);
   coasting_ = Pose{*pose, time};
   covariance_ = found.covariance;

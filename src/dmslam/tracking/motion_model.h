@@ -80,9 +80,11 @@ class MotionModel {
   /// The motion is not known any more.
   void Stop();
 
-  /// Of the frame tracked last.
-  const PlacedPose& last() const { return last_.pose; }
-  int64_t last_stamp_ns() const { return last_.time.stamp_ns; }
+  /// Of the frame tracked last; none: none was.
+  std::optional<PlacedPose> last() const { return last_ ? std::optional(last_->pose) : std::nullopt; }
+  std::optional<int64_t> last_stamp_ns() const {
+    return last_ ? std::optional(last_->time.stamp_ns) : std::nullopt;
+  }
   bool IsCoasting() const { return coasting_.has_value(); }
 
  private:
@@ -90,15 +92,16 @@ class MotionModel {
     PlacedPose pose;
     FrameTime time;
   };
-  const Pose& Newest() const { return coasting_ ? *coasting_ : last_; }
-  MotionFilter::Since Since(const Map& map, const FrameTime& time) const;
+  /// Coasted ones included.
+  const std::optional<Pose>& Newest() const { return coasting_ ? coasting_ : last_; }
+  MotionFilter::Since Since(const Map& map, const Pose& newest, const FrameTime& time) const;
   std::optional<MotionFilter> MotionTo(const Map& map, const FoundPose& found, const FrameTime& time) const;
   Matrix6d Floored(const Map& map, const Matrix6d& covariance) const;
-  bool IsWithin(const FrameTime& time, int64_t limit_ns) const;
+  static bool IsWithin(const FrameTime& newest, const FrameTime& time, int64_t limit_ns);
   double Depth(const Map& map) const;
 
   MotionModelOptions options_;
-  Pose last_;
+  std::optional<Pose> last_;
   std::optional<Pose> coasting_;
   std::optional<Matrix6d> covariance_;  ///< of the newest pose, coasted ones included; none: it was given
   std::optional<MotionFilter> motion_;  ///< to the newest pose; none: it is not known

@@ -33,11 +33,11 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
     const std::optional<Eigen::Vector2d> uv = map.camera().Project(T_cam_world * landmark.p_world);
     if (!uv) continue;
     const Keypoint& seen = last.features->set.keypoints[i];
-    const FeatureHit hit =
+    const std::optional<FeatureHit> hit =
         FindFeature(features, *uv, radius_px * map.pyramid().Scale(seen.octave), seen.octave - 1,
                     seen.octave + 1, last.features->set.descriptors[i], taken_);
-    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
-    const size_t feature = static_cast<size_t>(hit.feature);
+    if (!hit || hit->distance > options_.max_descriptor_distance) continue;
+    const size_t feature = static_cast<size_t>(hit->feature);
     taken_[feature] = 1;
     matches_.push_back({static_cast<uint16_t>(feature), *id});
     turns_.push_back(
@@ -73,12 +73,13 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchKeyframe(const Map& map
     const Landmark* landmark =
         keyframe.landmarks[i].valid() ? map.FindLandmark(keyframe.landmarks[i]) : nullptr;
     if (landmark == nullptr || !votes.HasVote(*landmark)) continue;
-    const FeatureHit hit = FindFeature(features, middle_px, 2.0 * camera.width_px, 0, map.pyramid().levels,
-                                       keyframe.features->set.descriptors[i], taken_);
-    const bool alone = hit.distance <= kMaxKeyframeRatio * hit.second_distance;
-    if (hit.feature < 0 || hit.distance > kMaxKeyframeDistance || !alone) continue;
-    taken_[static_cast<size_t>(hit.feature)] = 1;
-    matches_.push_back({static_cast<uint16_t>(hit.feature), landmark->id});
+    const std::optional<FeatureHit> hit =
+        FindFeature(features, middle_px, 2.0 * camera.width_px, 0, map.pyramid().levels,
+                    keyframe.features->set.descriptors[i], taken_);
+    if (!hit || hit->distance > kMaxKeyframeDistance) continue;
+    if (hit->distance > kMaxKeyframeRatio * hit->second_distance) continue;
+    taken_[static_cast<size_t>(hit->feature)] = 1;
+    matches_.push_back({static_cast<uint16_t>(hit->feature), landmark->id});
   }
   return matches_;
 }
@@ -98,14 +99,14 @@ std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& ma
     expected_.push_back({id, *view});
     if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), id)) continue;
     const double radius_px = view->view_cos > kFrontalCos ? frontal_px : oblique_px;
-    const FeatureHit hit =
+    const std::optional<FeatureHit> hit =
         FindFeature(*frame->features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
                     view->octave - 1, view->octave, landmark.descriptor, taken_);
-    if (hit.feature < 0 || hit.distance > options_.max_descriptor_distance) continue;
-    if (hit.octave == hit.second_octave && hit.distance > options_.local_ratio * hit.second_distance)
+    if (!hit || hit->distance > options_.max_descriptor_distance) continue;
+    if (hit->octave == hit->second_octave && hit->distance > options_.local_ratio * hit->second_distance)
       continue;
-    frame->landmarks[static_cast<size_t>(hit.feature)] = id;
-    taken_[static_cast<size_t>(hit.feature)] = 1;
+    frame->landmarks[static_cast<size_t>(hit->feature)] = id;
+    taken_[static_cast<size_t>(hit->feature)] = 1;
   }
   return expected_;
 }

@@ -43,7 +43,7 @@ void Relocalizer::Clear() { places_.Clear(); }
 
 void Relocalizer::Update(const Replica& map) { places_.Update(map); }
 
-std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, KeyframeId last_seen,
+std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<KeyframeId> last,
                                                 const BowImage& image) const {
   const auto none = [](const Keyframe&) { return false; };
   std::vector<KeyframeId> ids;
@@ -53,7 +53,7 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, KeyframeId last_
   const auto add = [&](KeyframeId id) {
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
   };
-  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(last_seen)) {
+  if (last) {
     add(*last);
     for (const KeyframeId id : map.BestCovisible(*last, kNeighboursOfLast, kMinCovisibility)) add(id);
   }
@@ -129,13 +129,15 @@ bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch*
     return report && (!request.credible || request.credible(*frame, *report));
   };
   const BowImage image = places_.Transform(frame->features->set);
-  const std::vector<KeyframeId> candidates = Candidates(map, request.last_seen, image);
+  const std::optional<KeyframeId> last =
+      request.last_seen ? map.ResolveKeyframe(*request.last_seen) : std::nullopt;
+  const std::vector<KeyframeId> candidates = Candidates(map, last, image);
   for (const KeyframeId id : candidates) {
     if (TryKeyframe(map, *map.FindKeyframe(id), image, request.seed, frame) && fits()) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
-  if (const std::optional<KeyframeId> last = map.ResolveKeyframe(request.last_seen)) places.push_back(*last);
+  if (last) places.push_back(*last);
   return TryTogether(map, places, request.seed, frame) && fits();
 }
 

@@ -25,7 +25,7 @@ class Relocalizer {
   void Clear();
   /// The camera is looked for in all maps.
   struct Request {
-    KeyframeId last_seen{};  ///< invalid: not known
+    std::optional<KeyframeId> last_seen{};  ///< none: not known
     /// Asked of a frame with its pose and what it sees there; empty: all are.
     std::function<bool(const TrackedFrame&, const TrackingReport&)> credible{};
     uint64_t seed = 0;
@@ -36,7 +36,8 @@ class Relocalizer {
   bool Relocalize(const Map& map, const Request& request, PoseSearch* search, TrackedFrame* frame) const;
 
  private:
-  std::vector<KeyframeId> Candidates(const Map& map, KeyframeId last_seen, const BowImage& image) const;
+  std::vector<KeyframeId> Candidates(const Map& map, std::optional<KeyframeId> last,
+                                     const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                    TrackedFrame* frame) const;
   /// All that these places and their neighbours show, by descriptor alone.

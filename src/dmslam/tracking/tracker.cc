@@ -109,7 +109,8 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   if (attempt.relocalized) {
     unbelieved_ = Unbelieved{Unbelieved::Why::kFoundAnew, attempt.in_another_map, frame.stamp_ns, follower_};
   } else if (attempt.report.doubtful && !unbelieved_) {
-    unbelieved_ = Unbelieved{Unbelieved::Why::kDoubtful, false, last_tracked_ns(), follower_};
+    unbelieved_ =
+        Unbelieved{Unbelieved::Why::kDoubtful, false, last_tracked_ns().value_or(frame.stamp_ns), follower_};
   }
   follower_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns}, frame,
                       attempt.relocalized || attempt.by_rival);
@@ -151,8 +152,9 @@ void Tracker::GoBack() {
 /// While the motion still leads, a place that looks alike is no better guess: people are such places. Who was
 /// nowhere yet has no motion.
 bool Tracker::MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const {
-  if (!follower_.motion().last().reference.valid()) return true;
-  const int64_t missing_ns = stamp_ns - last_tracked_ns();
+  const std::optional<int64_t> last_ns = last_tracked_ns();
+  if (!last_ns) return true;
+  const int64_t missing_ns = stamp_ns - *last_ns;
   return missing_ns > (attempt.weak_pose ? kCoastNs : kNoPlacesNs);
 }
 
@@ -165,9 +167,12 @@ Tracker::Attempt Tracker::FollowMotion(const Map& map, TrackedFrame* frame) {
 /// A camera that was lost a moment ago is nearly where it was, and may look elsewhere. The frame stays as it
 /// was where nothing is found.
 void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) {
-  const std::optional<Rigid3d> T_last = follower_.motion().last().In(map);
-  const double since_s = static_cast<double>(frame->stamp_ns - last_tracked_ns()) * 1e-9;
-  if (!T_last || since_s > kTurnKnownS) return;
+  const std::optional<PlacedPose> last = follower_.motion().last();
+  const std::optional<Rigid3d> T_last = last ? last->In(map) : std::nullopt;
+  if (!T_last) return;
+  const int64_t since_ns = frame->stamp_ns - *last_tracked_ns();
+  const double since_s = static_cast<double>(since_ns) * 1e-9;
+  if (since_s > kTurnKnownS) return;
   const double reach_rad = std::min(kTurnReachRad + kTurnRadPerS * since_s, kMostTurnRad);
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   if (!search_.FromTurn(map, follower_.last(), *T_last, reach_rad, &found)) return;
@@ -177,7 +182,7 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
     return;
   *frame = std::move(found);
   attempt->report = report;
-  attempt->relocalized = frame->stamp_ns - last_tracked_ns() > kCoastNs;
+  attempt->relocalized = since_ns > kCoastNs;
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 
@@ -214,7 +219,7 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
            CountProven(map, at.landmarks, {}) >= kManyProven ||
            (!here && !IsOldEnoughToProve(map) && IsSeenAsAWhole(report));
   };
-  Relocalizer::Request request{.last_seen = follower_.motion().last().reference, .seed = seed};
+  Relocalizer::Request request{.last_seen = last_reference(), .seed = seed};
   const bool may_be_elsewhere = asked.map_id || asked.may_be_nowhere;
   if (may_be_elsewhere) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;

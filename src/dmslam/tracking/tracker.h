@@ -53,12 +53,15 @@ class Tracker {
   /// The map that was tracked in is given up.
   void OnMapGivenUp();
 
-  /// The keyframe that the frame tracked last was placed by.
-  KeyframeId last_reference() const { return follower_.motion().last().reference; }
+  /// The keyframe that the frame tracked last was placed by; none: no frame was tracked yet.
+  std::optional<KeyframeId> last_reference() const {
+    const std::optional<PlacedPose> last = follower_.motion().last();
+    return last ? std::optional(last->reference) : std::nullopt;
+  }
   /// Whether the camera is followed and not believed: that will show.
   bool IsUndecided() const { return unbelieved_.has_value(); }
-  /// Stamp of the frame tracked last.
-  int64_t last_tracked_ns() const { return follower_.motion().last_stamp_ns(); }
+  /// Stamp of the frame tracked last; none: no frame was tracked yet.
+  std::optional<int64_t> last_tracked_ns() const { return follower_.motion().last_stamp_ns(); }
   /// What frames said of landmarks since the last call.
   FrameEvidence TakeEvidence(int64_t stamp_ns, std::optional<MapId> map_id) {
     return search_.judge().TakeEvidence(stamp_ns, map_id);

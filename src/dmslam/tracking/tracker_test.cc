@@ -317,7 +317,7 @@ TEST_F(Tracking, WhoHidesTheRoomIsNotTheRoom) {
 
 TEST_F(Tracking, WhoHidesTheRoomForLongIsFollowedNoFarther) {
   for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
-  const int64_t believed_ns = tracker_->last_tracked_ns();
+  const std::optional<int64_t> believed_ns = tracker_->last_tracked_ns();
   const auto wall = [](size_t i) { return !IsPerson(i); };
   for (uint32_t frame = 4; frame < 33; ++frame) {
     EXPECT_FALSE(Track(Frame(frame, 0.0, wall)).pose);

@@ -81,13 +81,14 @@ class Put {
     (*this)(*value, wire);
     check_.Require(wire != 0, "an id that is zero");
   }
-  /// Stamps and indices: absent is -1.
-  template <typename Value, std::integral WireValue>
+  /// Stamps, indices and durations: absent is -1.
+  template <typename Value, typename WireValue>
+  requires std::is_arithmetic_v<WireValue>
   void OrMinusOne(const std::optional<Value>& value, WireValue& wire) {
     wire = -1;
     if (!value) return;
     (*this)(*value, wire);
-    check_.Require(wire != -1, "an index that is -1");
+    check_.Require(wire != -1, "a number that is -1");
   }
   void operator()(const std::string& text, std::string& wire) { wire = CleanText(text); }
   void operator()(const Rigid3d& T, double (&rotation)[4], double (&translation)[3]) {
@@ -160,7 +161,8 @@ class Get {
     value.reset();
     if (wire != 0) (*this)(value.emplace(), wire);
   }
-  template <typename Value, std::integral WireValue>
+  template <typename Value, typename WireValue>
+  requires std::is_arithmetic_v<WireValue>
   void OrMinusOne(std::optional<Value>& value, const WireValue& wire) {
     value.reset();
     if (wire != -1) (*this)(value.emplace(), wire);

@@ -27,7 +27,7 @@ struct Codec<CameraInfo> {
     check.Session(m.session);
     check.CameraNumber(m.camera_id);
     check.CameraModel(m.camera);
-    check.Require(m.num_frames >= 0, "negative number of frames");
+    check.Require(!m.num_frames || *m.num_frames >= 0, "negative number of frames");
     check.Require(std::isfinite(m.speed) && m.speed >= 0, "speed below zero");
   }
 };
@@ -89,14 +89,14 @@ struct Codec<EndOfSequence> {
     s(m.frames_missing, w.frames_missing);
     s(m.frames_blacked, w.frames_blacked);
     s(m.frames_jumped, w.frames_jumped);
-    s(m.last_frame_index, w.last_frame_index);
+    s.OrMinusOne(m.last_frame_index, w.last_frame_index);
     s(m.last_stamp_ns, w.last_stamp_ns);
   }
   static void Validate(const EndOfSequence& m, Checker& check) {
     check.Session(m.session);
     check.CameraNumber(m.camera_id);
     check.Stamp(m.last_stamp_ns);
-    check.Require(m.last_frame_index >= -1, "negative frame index");
+    check.Require(!m.last_frame_index || *m.last_frame_index >= 0, "negative frame index");
     for (const int64_t count :
          {m.frames_published, m.frames_listed, m.frames_missing, m.frames_blacked, m.frames_jumped}) {
       check.Require(count >= 0, "negative number of frames");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,9 +21,9 @@ struct CameraInfo {
   int64_t utime = 0;  ///< wall time at which it was sent [us]
   uint32_t session = 0;
   Camera camera;
-  std::string sequence;      ///< name of what is played
-  int64_t num_frames = 0;    ///< 0: not known
-  uint32_t first_frame = 0;  ///< index of the first frame published
+  std::string sequence;               ///< name of what is played
+  std::optional<int64_t> num_frames;  ///< where it is known
+  uint32_t first_frame = 0;           ///< index of the first frame published
   PlaybackMode mode = PlaybackMode::kRealtime;
   double speed = 1.0;  ///< factor on the recorded rate, in real time; 0: as fast as possible
   CameraId camera_id = 0;
@@ -50,10 +51,10 @@ struct EndOfSequence {
   uint32_t session = 0;
   int64_t frames_published = 0;
   int64_t frames_listed = 0;
-  int64_t frames_missing = 0;  ///< listed, but without an image that can be read
-  int64_t frames_blacked = 0;  ///< replaced by black images, as asked for
-  int64_t frames_jumped = 0;   ///< left out by jumps, as asked for
-  int32_t last_frame_index = -1;
+  int64_t frames_missing = 0;               ///< listed, but without an image that can be read
+  int64_t frames_blacked = 0;               ///< replaced by black images, as asked for
+  int64_t frames_jumped = 0;                ///< left out by jumps, as asked for
+  std::optional<int32_t> last_frame_index;  ///< none: no frame was published
   int64_t last_stamp_ns = 0;
   CameraId camera_id = 0;
 };

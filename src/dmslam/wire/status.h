@@ -56,12 +56,12 @@ struct PlayerStatus {
   StatusHead head;
   State state = State::kStarting;
   int64_t frames_published = 0;
-  int64_t frames_total = 0;  ///< 0: not known
+  std::optional<int64_t> frames_total;  ///< where it is known
   int64_t frames_missing = 0;
-  int64_t repeats = 0;       ///< frames sent again in lock-step
-  int32_t frame_index = -1;  ///< of the newest frame
-  double fps = 0;            ///< over the last second
-  double late_ms = 0;        ///< how late the newest frame was published
+  int64_t repeats = 0;                 ///< frames sent again in lock-step
+  std::optional<int32_t> frame_index;  ///< of the newest frame; none: none yet
+  double fps = 0;                      ///< over the last second
+  double late_ms = 0;                  ///< how late the newest frame was published
   CameraId camera_id = 0;
 };
 
@@ -71,9 +71,9 @@ struct FrontendStatus {
   double fps = 0;  ///< frames processed over the last second
   int64_t frames_received = 0;
   int64_t frames_processed = 0;
-  int64_t frames_skipped = 0;  ///< a newer one was there already
-  int32_t frame_index = -1;    ///< of the newest frame
-  int32_t features = 0;        ///< in the newest frame
+  int64_t frames_skipped = 0;          ///< a newer one was there already
+  std::optional<int32_t> frame_index;  ///< of the newest frame; none: none yet
+  int32_t features = 0;                ///< in the newest frame
   int32_t inliers = 0;
   int32_t moving = 0;
   int32_t unknown = 0;
@@ -95,7 +95,7 @@ struct FrontendStatus {
   int32_t keyframes_unacknowledged = 0;
   int64_t resets = 0;
   int64_t relocalisations = 0;
-  double first_map_s = -1;  ///< from the first frame to the first map that lasted; -1: none yet
+  std::optional<double> first_map_s;  ///< from the first frame to the first map that lasted; none: none yet
   CameraId camera_id = 0;
 };
 

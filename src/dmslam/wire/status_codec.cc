@@ -16,6 +16,15 @@ class FiniteOnly {
   explicit FiniteOnly(Copy& copy) : copy_(copy) {}
   void operator()(auto& value, auto& wire) {
     copy_(value, wire);
+    MakeFinite(wire);
+  }
+  void OrMinusOne(auto& value, auto& wire) {
+    copy_.OrMinusOne(value, wire);
+    MakeFinite(wire);
+  }
+
+ private:
+  void MakeFinite(auto& wire) {
     if constexpr (std::is_floating_point_v<std::remove_cvref_t<decltype(wire)>>) {
       if constexpr (Copy::kToWire) {
         if (!std::isfinite(wire)) wire = -1;
@@ -25,7 +34,6 @@ class FiniteOnly {
     }
   }
 
- private:
   Copy& copy_;
 };
 
@@ -100,7 +108,7 @@ struct Codec<PlayerStatus> {
     s(m.frames_total, w.frames_total);
     s(m.frames_missing, w.frames_missing);
     s(m.repeats, w.repeats);
-    s(m.frame_index, w.frame_index);
+    s.OrMinusOne(m.frame_index, w.frame_index);
     s(m.fps, w.fps);
     s(m.late_ms, w.late_ms);
     s(m.camera_id, w.camera_id);
@@ -124,7 +132,7 @@ struct Codec<FrontendStatus> {
     s(m.frames_received, w.frames_received);
     s(m.frames_processed, w.frames_processed);
     s(m.frames_skipped, w.frames_skipped);
-    s(m.frame_index, w.frame_index);
+    s.OrMinusOne(m.frame_index, w.frame_index);
     s(m.features, w.features);
     s(m.inliers, w.inliers);
     s(m.moving, w.moving);
@@ -147,7 +155,7 @@ struct Codec<FrontendStatus> {
     s(m.keyframes_unacknowledged, w.keyframes_unacknowledged);
     s(m.resets, w.resets);
     s(m.relocalisations, w.relocalisations);
-    s(m.first_map_s, w.first_map_s);
+    s.OrMinusOne(m.first_map_s, w.first_map_s);
     s(m.camera_id, w.camera_id);
   }
   static void Validate(const FrontendStatus& m, Checker& check) { check.CameraNumber(m.camera_id); }

@@ -4,6 +4,9 @@
 #include <limits>
 #include <set>
 
+#include "dmslam/end_of_sequence_t.hpp"
+#include "dmslam/frontend_status_t.hpp"
+#include "dmslam/map_record_t.hpp"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/check.h"
@@ -287,6 +290,42 @@ TEST(WireTest, WhatIsAbsentStaysAbsent) {
   pose.covariance.assign(kPoseCovarianceSize, 0.25);
   pose.covariance[6] = -1;  // of y
   EXPECT_THROW(Encode(pose), InvariantError);
+}
+
+template <typename Wire>
+Wire OnTheWire(const auto& message) {
+  const std::vector<uint8_t> bytes = Encode(message);
+  Wire wire;
+  EXPECT_EQ(wire.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  return wire;
+}
+
+TEST(WireTest, WhatIsAbsentTravelsAsZeroOrMinusOne) {
+  MapDelta delta;
+  delta.keyframes.resize(1);
+  delta.keyframes[0].id = delta.observations.emplace_back().keyframe = KeyframeId::Make(1, 7);
+  delta.keyframes[0].map_id = 1;
+  delta.landmark_tombstones.resize(1);
+  delta.landmark_tombstones[0].id = LandmarkId::Make(1, 9);
+  delta.landmark_evidence.resize(1);
+  delta.landmark_evidence[0].id = LandmarkId::Make(1, 8);
+  const auto record = OnTheWire<map_record_t>(delta);
+  EXPECT_EQ(record.kf_parent[0], 0);
+  EXPECT_EQ(record.observation_landmark[0], 0);
+  EXPECT_EQ(record.dead_lm_replaced_by[0], 0);
+  EXPECT_EQ(record.evidence_last_moved_ns[0], 0);
+  const std::optional<MapDelta> back = Decode<MapDelta>(Encode(delta));
+  ASSERT_TRUE(back.has_value());
+  EXPECT_TRUE(Identical(delta, *back));
+
+  FrontendStatus status;
+  EXPECT_EQ(OnTheWire<frontend_status_t>(status).frame_index, -1);
+  EXPECT_EQ(OnTheWire<frontend_status_t>(status).first_map_s, -1);
+  EXPECT_TRUE(Identical(status, *Decode<FrontendStatus>(Encode(status))));
+  EndOfSequence end;
+  end.session = 1;
+  EXPECT_EQ(OnTheWire<end_of_sequence_t>(end).last_frame_index, -1);
+  EXPECT_TRUE(Identical(end, *Decode<EndOfSequence>(Encode(end))));
 }
 
 TEST(WireTest, AbsentStampsAndCapturesAtZeroAreTwoThings) {

@@ -90,15 +90,16 @@ class RandomEditor {
   }
 
  private:
-  KeyframeId AnyKeyframe() {
-    if (map_.keyframes().empty()) return {};
+  std::optional<KeyframeId> AnyKeyframe() {
+    if (map_.keyframes().empty()) return std::nullopt;
     auto it = map_.keyframes().begin();
     std::advance(it, random_.Below(static_cast<uint32_t>(map_.keyframes().size())));
     return it->first;
   }
-  LandmarkId AnyLandmark() {
+  std::optional<LandmarkId> AnyLandmark() {
     const std::vector<LandmarkId> ids = map_.LandmarkIdsSorted();
-    return ids.empty() ? LandmarkId{} : ids[random_.Below(static_cast<uint32_t>(ids.size()))];
+    if (ids.empty()) return std::nullopt;
+    return ids[random_.Below(static_cast<uint32_t>(ids.size()))];
   }
   void AddKeyframe() {
     Keyframe keyframe;
@@ -116,41 +117,41 @@ class RandomEditor {
     landmark.id = LandmarkId::Make(1, next_landmark_++);
     landmark.map_id = 1;
     landmark.p_world = {random_.Uniform(), random_.Uniform(), 5};
-    landmark.reference = AnyKeyframe();
+    landmark.reference = *AnyKeyframe();
     const KeyframeId observer = landmark.reference;
     const LandmarkId id = landmark.id;
     map_.AddLandmark(landmark);
     map_.SetObservation(map_.At(observer), static_cast<uint16_t>(random_.Below(30)), map_.At(id));
   }
   void Observe() {
-    const LandmarkId landmark = AnyLandmark();
-    if (!landmark.valid()) return;
-    const KeyframeId keyframe = AnyKeyframe();
-    map_.SetObservation(map_.At(keyframe), static_cast<uint16_t>(random_.Below(30)), map_.At(landmark));
-    if (random_.Below(3) == 0) map_.UpdateDescriptor(map_.At(landmark));
+    const std::optional<LandmarkId> landmark = AnyLandmark();
+    if (!landmark) return;
+    const std::optional<KeyframeId> keyframe = AnyKeyframe();
+    map_.SetObservation(map_.At(*keyframe), static_cast<uint16_t>(random_.Below(30)), map_.At(*landmark));
+    if (random_.Below(3) == 0) map_.UpdateDescriptor(map_.At(*landmark));
   }
   void MoveSomething() {
-    if (const KeyframeId id = AnyKeyframe(); id.valid()) {
-      map_.SetPoseAndScale(map_.At(id), Rigid3d(ExpSo3({random_.Uniform(), 0, 0}), {random_.Uniform(), 0, 0}),
-                           1.25);
+    if (const std::optional<KeyframeId> id = AnyKeyframe()) {
+      map_.SetPoseAndScale(map_.At(*id),
+                           Rigid3d(ExpSo3({random_.Uniform(), 0, 0}), {random_.Uniform(), 0, 0}), 1.25);
     }
-    if (const LandmarkId id = AnyLandmark(); id.valid()) {
-      map_.SetPosition(map_.At(id), {random_.Uniform(), random_.Uniform(), 4});
+    if (const std::optional<LandmarkId> id = AnyLandmark()) {
+      map_.SetPosition(map_.At(*id), {random_.Uniform(), random_.Uniform(), 4});
       LandmarkEvidence evidence;
       evidence.found = random_.Below(100);
-      map_.SetEvidence(map_.At(id), evidence);
+      map_.SetEvidence(map_.At(*id), evidence);
     }
   }
   void FuseSomething() {
-    const LandmarkId a = AnyLandmark(), b = AnyLandmark();
-    if (a.valid() && a != b) map_.Fuse(map_.At(a), map_.At(b));
+    const std::optional<LandmarkId> a = AnyLandmark(), b = AnyLandmark();
+    if (a && a != b) map_.Fuse(map_.At(*a), map_.At(*b));
   }
   void RemoveSomeLandmark() {
-    if (const LandmarkId id = AnyLandmark(); id.valid()) map_.RemoveLandmark(map_.At(id));
+    if (const std::optional<LandmarkId> id = AnyLandmark()) map_.RemoveLandmark(map_.At(*id));
   }
   void RemoveSomeKeyframe() {
-    const KeyframeId id = AnyKeyframe();
-    if (id.valid() && map_.FindKeyframe(id)->parent.valid()) map_.RemoveKeyframe(map_.At(id));
+    const std::optional<KeyframeId> id = AnyKeyframe();
+    if (id && map_.At(*id).parent) map_.RemoveKeyframe(map_.At(*id));
   }
 
   Random random_;

@@ -13,6 +13,11 @@ void Draw(Enum& value, Enum first, Enum last, Random& random) {
 
 void MakeSound(uint32_t& session) { session = std::max(session, 1U); }
 
+/// Numbers and stamps that are zero travel as none.
+void MakeSound(std::optional<int64_t>& number) {
+  if (number == 0) number.reset();
+}
+
 void MakeSound(Camera& camera, Random& random) {
   camera.width_px = 1 + static_cast<int>(random.Below(4096));
   camera.height_px = 1 + static_cast<int>(random.Below(4096));
@@ -83,6 +88,7 @@ void MakeSound(CameraInfo& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.session);
   MakeSound(m.camera, random);
+  MakeSound(m.num_frames);
   Draw(m.mode, PlaybackMode::kRealtime, PlaybackMode::kLockstep, random);
   m.speed = random.Uniform(0, 10);
 }
@@ -112,6 +118,7 @@ void MakeSound(GroundTruthPose& m, Random&) {
 void MakeSound(PlayerStatus& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.head.session);
+  MakeSound(m.frames_total);
   Draw(m.state, PlayerStatus::State::kStarting, PlayerStatus::State::kDone, random);
 }
 
@@ -266,7 +273,11 @@ void MakeSound(MapDelta& m, Random& random) {
   }
   for (KeyframePose& pose : m.keyframe_poses) pose.scale = random.Uniform(0.1, 10);
   for (ReferenceMove& move : m.reference_moves) move.after_from_before.scale = random.Uniform(0.1, 10);
-  for (LandmarkState& landmark : m.landmarks) MakeSound(landmark.map_id);
+  for (LandmarkState& landmark : m.landmarks) {
+    MakeSound(landmark.map_id);
+    MakeSound(landmark.evidence.last_moved_ns);
+  }
+  for (LandmarkEvidenceState& state : m.landmark_evidence) MakeSound(state.evidence.last_moved_ns);
   for (KeyframeTombstone& dead : m.keyframe_tombstones) dead.parent_scale = random.Uniform(0.1, 10);
   for (LandmarkTombstone& dead : m.landmark_tombstones) {
     if (random.Below(2) == 0) dead.replaced_by = {};

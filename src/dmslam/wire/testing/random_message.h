@@ -35,6 +35,23 @@ inline constexpr bool kIsArray = false;
 template <typename Item, size_t kSize>
 inline constexpr bool kIsArray<std::array<Item, kSize>> = true;
 
+/// Structs all of whose members are drawn, as optional indices and real numbers always are. Which of them are
+/// not there is for MakeSound to say.
+template <typename T>
+inline constexpr bool kDrawnInFull = false;
+template <>
+inline constexpr bool kDrawnInFull<CameraInfo> = true;
+template <>
+inline constexpr bool kDrawnInFull<PlayerStatus> = true;
+template <>
+inline constexpr bool kDrawnInFull<KeyframeState> = true;
+template <>
+inline constexpr bool kDrawnInFull<LandmarkEvidence> = true;
+template <>
+inline constexpr bool kDrawnInFull<ObservationState> = true;
+template <>
+inline constexpr bool kDrawnInFull<LandmarkTombstone> = true;
+
 /// Fills everything with random values of all sizes; ids, poses and real numbers are such as may travel.
 class Filler {
  public:
@@ -91,10 +108,11 @@ class Filler {
           1);  // known to all enumerations that travel; the messages' own are drawn in MakeSound
     } else if constexpr (kIsOptional<T>) {
       value.reset();
-      if (random_.Below(3) == 0) return;
+      using Value = typename T::value_type;
+      const bool in_full = in_full_ || std::is_same_v<Value, int32_t> || std::is_floating_point_v<Value>;
+      if (!in_full && random_.Below(3) == 0) return;
       (*this)(value.emplace());
-      if constexpr (std::is_unsigned_v<typename T::value_type>)
-        value = std::max<typename T::value_type>(*value, 1);
+      if constexpr (std::is_unsigned_v<Value>) value = std::max<Value>(*value, 1);
     } else if constexpr (kIsShared<T>) {
       bool there = false;
       (*this)(there);
@@ -107,7 +125,9 @@ class Filler {
     } else if constexpr (kIsArray<T>) {
       for (auto& item : value) (*this)(item);
     } else {
+      const bool before = std::exchange(in_full_, kDrawnInFull<T>);
       std::apply([&](auto&... members) { ((*this)(members), ...); }, TieMembers(value));
+      in_full_ = before;
     }
   }
 
@@ -120,6 +140,7 @@ class Filler {
 
   Random random_;
   uint32_t max_items_;
+  bool in_full_ = false;
 };
 
 /// Makes a random message keep the promises that Decode checks.
