@@ -55,9 +55,10 @@ TEST_F(HiddenPlacesTest, OneThatLooksVeryMuchLikeItsLandmarkIsKept) {
 }
 
 TEST_F(HiddenPlacesTest, WhatHasNoVoteIsNotMissed) {
+  LandmarkEvidence moves;
+  moves.motion_belief = 1.0F;
   for (size_t i = 0; i < scene_.size(); ++i) {
-    if (IsLeft(i) && i != lonely_)
-      scene_.map().SetEvidence(scene_.map().At(MapScene::IdOf(i)), {.motion_belief = 1.0F});
+    if (IsLeft(i) && i != lonely_) scene_.map().SetEvidence(scene_.map().At(MapScene::IdOf(i)), moves);
   }
   EXPECT_TRUE(Outlives(80, [&](size_t i) { return !IsLeft(i); }));
 }

@@ -122,7 +122,9 @@ TEST_F(AfterARound, TheNeighboursGoWithTheKeyframeAndBringTheirLandmarks) {
 TEST_F(AfterARound, WhatIsBelievedToMoveIsNotFused) {
   MapEditor map(room_.map());
   const std::vector<LandmarkId> seen = map.At(loop_.keyframe).landmarks;
-  for (const LandmarkId id : seen) map.SetEvidence(map.At(id), {.motion_belief = 1.0F});
+  LandmarkEvidence moves;
+  moves.motion_belief = 1.0F;
+  for (const LandmarkId id : seen) map.SetEvidence(map.At(id), moves);
   const LoopcloserOptions options;
   const LoopAnswer answer = CorrectLoop(map, loop_, LoopVerifier(options, 1), options, {});
   for (const auto& fusion : answer.fusions)

@@ -89,7 +89,9 @@ TEST_F(Looking, WhatLooksOtherwiseIsNotThePlace) {
 TEST_F(Looking, LandmarksThatAreBelievedToMoveAreNoPlace) {
   const KeyframeId place = KeyframeId::Make(MapScene::kSession, 0);
   ASSERT_EQ(StaticLandmarksAround(scene_.map(), place, 15, 15).size(), kPoints);
-  scene_.map().SetEvidence(scene_.map().At(MapScene::IdOf(3)), {.motion_belief = 1.0F});
+  LandmarkEvidence moves;
+  moves.motion_belief = 1.0F;
+  scene_.map().SetEvidence(scene_.map().At(MapScene::IdOf(3)), moves);
   const std::vector<LandmarkId> around = StaticLandmarksAround(scene_.map(), place, 15, 15);
   EXPECT_EQ(around.size(), kPoints - 1);
   EXPECT_EQ(std::ranges::count(around, MapScene::IdOf(3)), 0);
