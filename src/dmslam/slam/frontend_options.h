@@ -15,7 +15,7 @@ struct FrontendOptions {
       2.0;  ///< features of a frame while there is no map, times those of others
   TrackingOptions tracking;
   KeyframeOptions keyframe;
-  double trial_s = 0.5;  ///< a first map must predict the frames of this time, else it is dropped
+  double trial_s = 1.0;  ///< a first map must predict the frames of this time, else it is dropped
   /// Lost for so long while there is something to see: a new first map is looked for, while every frame goes
   /// on asking all maps where it is. The old map is kept.
   double new_map_after_s = 1.5;
