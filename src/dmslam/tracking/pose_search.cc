@@ -11,6 +11,7 @@ namespace {
 constexpr double kWiderAfterRelocalization = 2.0;  // times the radius of the search
 constexpr double kWiderAroundPrediction = 4.0;
 constexpr size_t kMinKeyframeMatches = 15;
+constexpr double kSeenShare = 0.5;  // of what the last frame showed: less is hidden, and contradicts nothing
 // Somebody who fills the picture hides the room: of so many landmarks that are older than people stand, less
 // than this share is seen.
 constexpr int kEnoughOld = 60;
@@ -53,7 +54,11 @@ PoseSearch::FromFrameResult PoseSearch::FromFrame(const Map& map, const TrackedF
   if (matches->size() < needed) return FromFrameResult::kNotSeen;
   SetMatches(*matches, T_predicted, frame);
   const PoseFit fit = solver_.Solve(map, prior, &judge_, frame);
-  if (fit.inliers < options_.min_motion_inliers) return FromFrameResult::kContradicted;
+  if (fit.inliers < options_.min_motion_inliers) {
+    const auto shown = std::ranges::count_if(last.landmarks, &LandmarkId::valid);
+    const bool hidden = static_cast<double>(matches->size()) < kSeenShare * static_cast<double>(shown);
+    return hidden ? FromFrameResult::kNotSeen : FromFrameResult::kContradicted;
+  }
   return fit.by_rival ? FromFrameResult::kFoundRival : FromFrameResult::kFound;
 }
 

@@ -28,7 +28,7 @@ class PoseSearch {
     kFound,
     kFoundRival,    ///< by a wider motion than that of the frames before
     kNotSeen,       ///< too little of what the last frame saw is near its place
-    kContradicted,  ///< enough is, but not in its place
+    kContradicted,  ///< enough is, half of it at least, but not in its place
   };
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
   FromFrameResult FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,

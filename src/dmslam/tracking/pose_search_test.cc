@@ -181,6 +181,14 @@ TEST_F(PoseSearchTest, WhatIsNearButNotInItsPlaceContradicts) {
   EXPECT_EQ(search_->FromFrame(scene_.map(), Last(), truth_, {}, &frame), Result::kContradicted);
 }
 
+/// Somebody hides all but a third of what the last frame saw.
+TEST_F(PoseSearchTest, WhatIsMostlyHiddenContradictsNothing) {
+  AddRoom(120);
+  scene_.MapAll();
+  TrackedFrame frame = SeeScattered(9, [](size_t i) { return i % 3 == 0; });
+  EXPECT_EQ(search_->FromFrame(scene_.map(), Last(), truth_, {}, &frame), Result::kNotSeen);
+}
+
 TEST_F(PoseSearchTest, AWiderMotionThanThatOfTheFramesBeforeIsTold) {
   AddRoom(80);
   AddSomebody(110);
