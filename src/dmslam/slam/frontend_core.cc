@@ -151,7 +151,7 @@ FrontendOutput FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp
   frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
   // In a saved map it is lost from now on.
   odometry_.Predict({frame_index, stamp_ns});
-  if (++counters_.frames == 1) tracker_.BeginLost({frame_index, stamp_ns});
+  if (++counters_.frames == 1) tracker_.BeginLost();
   if (IsBehind()) return AwaitTurn();
   FrontendOutput output;
   if (phase_.HasMap() && map_.keyframes().empty())

@@ -19,7 +19,7 @@ class MotionFollower {
   /// Stands at a keyframe; nothing is known of the motion.
   void BeginAt(const Keyframe& keyframe, const FrameTime& time);
   /// Is nowhere.
-  void BeginLost(const FrameTime& time) { motion_.Begin({}, time); }
+  void BeginLost() { motion_.BeginLost(); }
   /// The motion is not known any more.
   void Stop() { motion_.Stop(); }
 

@@ -129,7 +129,9 @@ TEST_F(MotionFollowerTest, GoesOnFromAKeyframeAndThenFromFrameToFrame) {
 TEST_F(MotionFollowerTest, WhoIsNowhereIsNotFollowed) {
   AddRoom();
   Begin();
-  follower_.BeginLost(Time(0));
+  follower_.BeginLost();
+  EXPECT_FALSE(follower_.motion().last()) << "who is nowhere has no place to be near to";
+  EXPECT_FALSE(follower_.motion().last_stamp_ns());
   TrackedFrame frame = Sharp(1, kStep);
   const MotionFollower::Attempt attempt = Follow(&frame);
   EXPECT_FALSE(attempt.report.ok);

@@ -68,6 +68,11 @@ class MotionModel {
 
   /// Stands at a known pose; its motion is not known.
   void Begin(const PlacedPose& pose, const FrameTime& time);
+  /// Has no pose.
+  void BeginLost() {
+    last_.reset();
+    Stop();
+  }
   Prediction Predict(const Map& map, const FrameTime& time) const;
   /// Whether a carried camera can have come to `T_cam_world` since its newest pose: near where its motion
   /// leads, and where that is not known, no faster than hands and cars are.

@@ -253,7 +253,7 @@ TEST(RelocalizerTest, WhoIsLostInOneMapIsLookedForInAll) {
     tracker.OnMapChanged(replica);
   }
   const int64_t now_ns = kKeyframes * kInterval_ns;
-  tracker.BeginLost({0, now_ns});
+  tracker.BeginLost();
   TrackedFrame frame = wall.Frame(4.4);
   frame.stamp_ns = now_ns + 1'000'000'000;
   const TrackingResult result = tracker.Track(replica, {MapId{7}, true}, std::move(frame));

@@ -34,7 +34,7 @@ class Tracker {
   /// Begins at a keyframe; nothing is known of the motion.
   void BeginAt(const Keyframe& keyframe);
   /// Begins lost.
-  void BeginLost(const FrameTime& time) { follower_.BeginLost(time); }
+  void BeginLost() { follower_.BeginLost(); }
 
   struct Request {
     /// The map that is tracked in: a lost camera is looked for in all maps, and there it must be within

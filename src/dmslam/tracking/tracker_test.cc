@@ -446,7 +446,7 @@ TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
 
 TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict) {
   Start(1.0);
-  tracker_->BeginLost({kFound - 1, (kFound - 1) * kFrameNs});
+  tracker_->BeginLost();
   lost_in_ = MapScene::kMap + 1;
   const TrackingResult first = Track(kFound);
   EXPECT_TRUE(first.relocalized) << first.report.reason;
@@ -457,7 +457,7 @@ TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict
 
 TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
   Start(1.0);
-  tracker_->BeginLost({kFound - 1, (kFound - 1) * kFrameNs});
+  tracker_->BeginLost();
   lost_in_ = MapScene::kMap + 1;
   partly_hidden_ = true;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized);
@@ -466,7 +466,7 @@ TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
 /// As one that looks for a first map of its own, beside that of another camera.
 TEST_F(Recovering, WhoMayBeInNoMapBelievesNoPartOfAYoungOne) {
   Start(1.0);
-  tracker_->BeginLost({kFound - 1, (kFound - 1) * kFrameNs});
+  tracker_->BeginLost();
   may_be_nowhere_ = true;
   partly_hidden_ = true;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized) << frame;
@@ -477,7 +477,7 @@ TEST_F(Recovering, WhoMayBeInNoMapBelievesNoPartOfAYoungOne) {
 
 TEST_F(Recovering, WhoBeginsInAMapLooksAtOnce) {
   Start(1.0);
-  tracker_->BeginLost({kFound, kFound * kFrameNs});
+  tracker_->BeginLost();
   EXPECT_TRUE(Track(kFound).pose);
 }
 
