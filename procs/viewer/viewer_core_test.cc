@@ -24,7 +24,7 @@ class ViewerCoreTest : public testing::Test {
     return Rigid3d(ExpSo3({0, angle, 0}), {2 * std::cos(angle), 0.1 * i, 2 * std::sin(angle)}).Inverse();
   }
   void AddKeyframe(int i, size_t features = 40) {
-    AddKeyframeOf(kMapId, Kf(i), i, i > 0 ? Kf(i - 1) : KeyframeId(), features);
+    AddKeyframeOf(kMapId, Kf(i), i, i > 0 ? std::optional(Kf(i - 1)) : std::nullopt, features);
   }
   void AddKeyframeOf(MapId map_id, KeyframeId id, int i, std::optional<KeyframeId> parent = {},
                      size_t features = 40) {
@@ -88,7 +88,7 @@ class ViewerCoreTest : public testing::Test {
   static KeyframeId OtherKf(int i) { return KeyframeId::Make(1, static_cast<uint32_t>(10 * i), 1); }
   void AddOtherMap() {
     for (int i = 0; i < 3; ++i)
-      AddKeyframeOf(kOtherMap, OtherKf(i), i, i > 0 ? OtherKf(i - 1) : KeyframeId());
+      AddKeyframeOf(kOtherMap, OtherKf(i), i, i > 0 ? std::optional(OtherKf(i - 1)) : std::nullopt);
     Landmark landmark;
     landmark.id = kOtherLandmark;
     landmark.map_id = kOtherMap;

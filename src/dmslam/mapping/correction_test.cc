@@ -107,7 +107,7 @@ class Joining : public Correction {
     for (uint16_t i = 20; i < 60; ++i) scene_.AddLandmark(map_, 100U + i, i, {1, 2, 3});
     for (uint32_t frame = 11; frame <= 13; ++frame) {
       scene_.AddKeyframe(map_, frame, 0.1 * (frame - 10));
-      map_.SetParent(map_.At(Id(frame)), frame > 11 ? Id(frame - 1) : KeyframeId());
+      map_.SetParent(map_.At(Id(frame)), frame > 11 ? std::optional(Id(frame - 1)) : std::nullopt);
       map_.SetMapId(map_.At(Id(frame)), 2);
       map_.SetPose(map_.At(Id(frame)), map_.At(Id(frame)).T_cam_world * Lift(-1));
     }

@@ -219,12 +219,12 @@ TEST_F(Phases, ARefusedProposalIsGivenUp) {
 
 TEST_F(Phases, TheTrialEndsInTracking) {
   Start();
-  for (uint32_t frame = 2; frame < 30; ++frame) {
+  for (uint32_t frame = 2; frame < 45; ++frame) {
     const FrontendOutput output = Frame(frame);
     ASSERT_EQ(Find<MapReset>(output), nullptr) << frame << ": " << Find<MapReset>(output)->reason;
-    EXPECT_EQ(core_->state(), frame < 17 ? TrackingState::kTrial : TrackingState::kTracking) << frame;
+    EXPECT_EQ(core_->state(), frame < 32 ? TrackingState::kTrial : TrackingState::kTracking) << frame;
   }
-  EXPECT_GT(core_->counters().tracked, 25u);
+  EXPECT_GT(core_->counters().tracked, 40u);
 }
 
 TEST_F(Phases, ATrialThatIsContradictedDropsTheMapAndBeginsAnew) {
