@@ -266,11 +266,11 @@ TEST_F(Phases, InDarknessItIsLostHoweverLong) {
 
 TEST_F(Phases, LostForLongInTheLightItKeepsTheMapAndLooksForAnother) {
   Start();
-  for (uint32_t frame = 2; frame < 30; ++frame) Frame(frame);
+  for (uint32_t frame = 2; frame < 45; ++frame) Frame(frame);
   ASSERT_EQ(core_->state(), TrackingState::kTracking);
   bool was_missing = false, was_lost = false;
   std::optional<MapReset> reset;
-  uint32_t frame = 30;
+  uint32_t frame = 45;
   for (; frame < 300 && !reset; ++frame) {
     const FrontendOutput output = Strange(frame);
     if (const auto* found = Find<MapReset>(output)) reset = *found;
@@ -280,7 +280,7 @@ TEST_F(Phases, LostForLongInTheLightItKeepsTheMapAndLooksForAnother) {
   ASSERT_TRUE(reset);
   EXPECT_EQ(reset->fate, MapReset::Fate::kKeep);
   EXPECT_TRUE(was_missing && was_lost);
-  EXPECT_NEAR((frame - 30) / 30.0, FrontendOptions().new_map_after_s, 0.1) << "seconds";
+  EXPECT_NEAR((frame - 45) / 30.0, FrontendOptions().new_map_after_s, 0.1) << "seconds";
   EXPECT_EQ(core_->state(), TrackingState::kLost) << "it may be in the old map all the same";
 }
 
