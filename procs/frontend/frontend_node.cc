@@ -99,7 +99,7 @@ Version FrontendNode::HandOverVersion() {
 void FrontendNode::OnWriterOpen() {
   left_->until_ns = context_.now_ns() + kBackAfterDeathNs;
   session_start_ = MakeSessionStart();
-  PublishRecord(session_start_);
+  PublishRecord(*session_start_);
 }
 
 SessionStart FrontendNode::MakeSessionStart() const {
@@ -120,8 +120,8 @@ SessionStart FrontendNode::MakeSessionStart() const {
 
 /// On a channel of its own: who reads the stream has it from there.
 void FrontendNode::SaySessionAgain() {
-  if (!writer_) return;
-  Bytes bytes = wire::Encode(session_start_);
+  if (!session_start_) return;
+  Bytes bytes = wire::Encode(*session_start_);
   const std::string channel = ChannelOfCamera(channels::kSessionAgain, options_.camera_id);
   Seal(writer_->HeaderOf(1), channel, bytes);
   context_.bus->Publish({channel, std::make_shared<const Bytes>(std::move(bytes)), false});

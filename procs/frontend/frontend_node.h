@@ -152,9 +152,9 @@ class FrontendNode : public StreamNode {
     LeftKeyframes keyframes;
     std::optional<int64_t> until_ns;  ///< then all of it was heard; none: not yet known
   };
-  SessionStart session_start_;         ///< as it was said
-  std::optional<LeftBehind> left_;     ///< by a frontend before this one
-  std::deque<int64_t> keyframe_seqs_;  ///< of records not yet accepted by the mapper
+  std::optional<SessionStart> session_start_;  ///< as it was said
+  std::optional<LeftBehind> left_;             ///< by a frontend before this one
+  std::deque<int64_t> keyframe_seqs_;          ///< of records not yet accepted by the mapper
   FramePose last_pose_;
   OnlineError error_;
   FrameCounts counts_;
