@@ -17,9 +17,7 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kMisfitNs = 2'000'000'000;
-constexpr int64_t kCameraSilentNs = 1'500'000'000;
 constexpr int64_t kTidyEveryNs = 60'000'000'000;
-constexpr int64_t kSettledNs = 300'000'000;  // so long nobody else must say that he has taken over, too
 
 std::string UpperCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -56,6 +54,7 @@ StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string rol
       role_(std::move(role)),
       endpoint_(context_.bus, context_.now_ns),
       session_(options_.session),
+      cameras_(context_.random_id % kStatusEveryNs),
       started_ns_(context_.now_ns()) {
   Listen({channels::kCameraInfo});
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
@@ -94,12 +93,11 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   if (!info) return;
   info->camera_id = camera;
   if (IsOfCamera() && camera != options_.camera_id) return OnOtherCamera(*info);
-  const auto known = cameras_.find(camera);
-  if (known == cameras_.end()) {
+  if (!cameras_.Knows(camera)) {
     if (!MayBeOurs(info->session)) return;
-    if (options_.of_a_log || camera_claims_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
+    if (options_.of_a_log || cameras_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
   } else if (!IsForeignFrame(info->session)) {
-    known->second.due_ns = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
+    cameras_.Heard(camera, context_.now_ns());
   }
 }
 
@@ -110,8 +108,8 @@ bool StreamNode::MayBeOurs(uint32_t session) {
 }
 
 void StreamNode::ConfirmCamera(uint32_t session) {
-  const std::optional<CameraInfo> info = camera_claims_.OfFrame(options_.camera_id, session);
-  if (info && !cameras_.contains(info->camera_id) && MayBeOurs(session)) BelieveCamera(*info);
+  const std::optional<CameraInfo> info = cameras_.ClaimOfFrame(options_.camera_id, session);
+  if (info && MayBeOurs(session)) BelieveCamera(*info);
 }
 
 void StreamNode::BelieveCamera(CameraInfo info) {
@@ -120,10 +118,7 @@ void StreamNode::BelieveCamera(CameraInfo info) {
     recorded_session_ = info.session;
     LogInfo("{}: takes the frames of recorded session {} for its own {}", role_, info.session, session_);
   }
-  camera_claims_.Forget(info.camera_id);
-  KnownCamera& known = cameras_[info.camera_id];
-  known.due_ns = context_.now_ns() + kCameraSilentNs + context_.random_id % kStatusEveryNs;
-  if (!recorded_session_) known.message = wire::Encode(info);
+  cameras_.Believe(info, !recorded_session_, context_.now_ns());
   if (recorded_session_) info.mode = PlaybackMode::kRealtime;  // who replays a log waits for nobody
   if (!camera_info_) camera_info_ = info;
   OnCamera(info);
@@ -151,12 +146,10 @@ void StreamNode::OnOtherCamera(const CameraInfo& info) {
 /// A process that starts after the player has left still learns the camera, from those who write: one of them
 /// repeats what the player said.
 void StreamNode::KeepCameraKnown() {
-  for (auto& [camera, known] : cameras_) {
-    if (known.message.empty() || !plan_ || context_.now_ns() < known.due_ns) continue;
-    known.due_ns = context_.now_ns() + kCameraSilentNs;
-    context_.bus->Publish({ChannelOfCamera(channels::kCameraInfo, camera),
-                           std::make_shared<const Bytes>(known.message), false});
-  }
+  if (!plan_) return;
+  for (const CameraInfo& info : cameras_.TakeSilent(context_.now_ns()))
+    context_.bus->Publish({ChannelOfCamera(channels::kCameraInfo, info.camera_id),
+                           std::make_shared<const Bytes>(wire::Encode(info)), false});
 }
 
 bool StreamNode::IsForeignFrame(uint32_t session) {
@@ -172,39 +165,14 @@ bool StreamNode::IsForeign(uint32_t session) {
 
 void StreamNode::CountMalformed(const std::string& channel, const std::string& reason) {
   ++traffic_.dropped_malformed;
-  if (std::find(logged_.begin(), logged_.end(), channel) != logged_.end()) return;
-  logged_.push_back(channel);
+  if (!traffic_.IsFirst(channel)) return;
   LogWarning("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
 }
 
 std::optional<MapDelta> StreamNode::ReadMapRecord(const Record& record, StreamReader* reader) {
-  if (record.begins_anew()) map_groups_.Clear();
-  std::string reason;
-  std::optional<MapDelta> delta = wire::Decode<MapDelta>(*record.bytes, &reason);
-  if (delta && IsOldChange(record, *delta, reader)) return std::nullopt;
-  if (delta) {
-    delta = map_groups_.Add(std::move(*delta), record.term());
-    reason = map_groups_.fault();
-    if (!map_groups_.abandoned().empty()) CountMalformed(record.channel, map_groups_.abandoned());
-    if (map_groups_.open()) reader->KeepHeld();
-  }
-  if (reason.empty()) {
-    if (delta) map_in_parts_ = delta->event == MapEvent::kSnapshot && !record.in_snapshot();
-    return delta;
-  }
-  CountMalformed(record.channel, reason + "; asks for a snapshot of the map");
-  map_groups_.Clear();
-  reader->Forget();
-  return std::nullopt;
-}
-
-/// A record that stands for a change which was there before is none of the writer's: versions count changes.
-bool StreamNode::IsOldChange(const Record& record, const MapDelta& delta, StreamReader* reader) {
-  if (record.begins_anew() || record.term() != newest_change_.term) newest_change_ = {record.term(), 0};
-  if (record.in_snapshot() || delta.event == MapEvent::kSnapshot || map_groups_.open()) return false;
-  if (delta.version <= newest_change_.version && reader->Doubt(record, context_.now_ns())) return true;
-  newest_change_.version = delta.version;
-  return false;
+  MapRecords::Outcome read = map_records_.Read(record, reader, context_.now_ns());
+  for (const std::string& complaint : read.complaints) CountMalformed(record.channel, complaint);
+  return std::move(read.change);
 }
 
 /// What is too large for a record is a mistake of who made it; the others are spared it.
@@ -295,19 +263,21 @@ void StreamNode::StartElection() {
   options.clock_offset_us = ClockOffsetUs(context_);
   options.take_over = options_.take_over;
   if (context_.fresh_system) options.listen_ns = 0;
-  election_ = std::make_unique<WriterElection>(options, context_.now_ns());
-  endpoint_.AddElection(election_.get(), UpperCase(role_), ReaderNames());
-  election_->Advance(context_.now_ns());
+  const bool may_be_contested = options_.take_over && !context_.fresh_system;
+  candidacy_ = std::make_unique<WriterCandidacy>(options, may_be_contested, ReaderNames(), &endpoint_,
+                                                 context_.now_ns());
 }
 
-/// The election goes on until the writer is open: another one that is heard meanwhile turns the victory into
-/// a refusal.
 void StreamNode::RunElection() {
   if (!plan_ || writer_) return;
-  if (settling_.writer) return BeginWritingWhenSettled();
-  if (!election_) StartElection();
-  if (election_->state() == WriterElection::State::kWon && ReadyToWrite() && !exit_code_) OpenWriter();
-  if (election_->state() == WriterElection::State::kRefused) Exit(kExitPresent, election_->refusal());
+  if (!candidacy_) StartElection();
+  if (candidacy_->writer()) return BeginWritingWhenSettled();
+  if (const auto refusal = candidacy_->Refusal()) return Exit(kExitPresent, *refusal);
+  if (candidacy_->IsWon() && ReadyToWrite() && !ending_) {
+    candidacy_->Open(MakeWriterOptions(), plan_->parent, plan_->snapshots, context_.wall_us(),
+                     context_.now_ns());
+    BeginWritingWhenSettled();
+  }
 }
 
 /// Of all whose acknowledgements are heard.
@@ -319,7 +289,7 @@ std::vector<std::string> StreamNode::ReaderNames() const {
   return names;
 }
 
-void StreamNode::OpenWriter() {
+StreamWriter::Options StreamNode::MakeWriterOptions() const {
   StreamWriter::Options options;
   options.session = session_;
   options.stream = StreamOfCamera(plan_->stream, options_.camera_id);
@@ -331,20 +301,13 @@ void StreamNode::OpenWriter() {
   options.part_bytes -= static_cast<int32_t>(context_.bus->overhead_bytes());
   for (const std::string& reader : plan_->readers)
     options.roles.push_back({reader, options_.HasPeer(reader)});
-  const Term term = election_->Win(context_.wall_us(), plan_->parent.epoch);
-  endpoint_.Remove(election_.get());
-  const bool may_be_contested = options_.take_over && !context_.fresh_system;
-  settling_ = {std::make_unique<StreamWriter>(options, term, plan_->parent, plan_->snapshots),
-               context_.now_ns() + (may_be_contested ? kSettledNs : 0)};
-  endpoint_.AddWriter(settling_.writer.get(), UpperCase(role_), ReaderNames());
-  BeginWritingWhenSettled();
+  return options;
 }
 
-/// Of two that take over at once the one with the higher term goes on. The other has written nothing yet, so
-/// nothing is lost with it.
 void StreamNode::BeginWritingWhenSettled() {
-  if (context_.now_ns() < settling_.until_ns || settling_.writer->superseded_by()) return;
-  writer_ = std::move(settling_.writer);
+  writer_ = candidacy_->TakeSettled(context_.now_ns());
+  if (!writer_) return;
+  candidacy_.reset();
   OnWriterOpen();
 }
 
@@ -358,7 +321,7 @@ std::string StreamNode::AwaitedReaders() const {
 }
 
 void StreamNode::WatchWriter() {
-  const StreamWriter* writer = writer_ ? writer_.get() : settling_.writer.get();
+  const StreamWriter* writer = writer_ || !candidacy_ ? writer_.get() : candidacy_->writer();
   if (writer == nullptr) return;
   if (hands_over_until_ns_) return WatchHandOver();
   if (writer->superseded_by())
@@ -373,7 +336,7 @@ void StreamNode::WatchWriter() {
     Stop();
     hands_over_until_ns_ = context_.now_ns() + kGoesOnWithinNs;
   }
-  if (stopping_ && writer_->closed() && !exit_code_) Exit(kExitDone);
+  if (stopping_ && writer_->closed() && !ending_) Exit(kExitDone);
 }
 
 /// The stream is closed, and goes on with who asked for it. That may be nobody: then this process is to be
@@ -429,11 +392,15 @@ void StreamNode::RefuseOtherTypes(Watched* watched) {
   }
 }
 
+bool StreamNode::Traffic::IsFirst(const std::string& matter) {
+  if (std::find(logged.begin(), logged.end(), matter) != logged.end()) return false;
+  logged.push_back(matter);
+  return true;
+}
+
 /// Once for each matter.
 void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
-  if (std::find(logged_.begin(), logged_.end(), matter) != logged_.end()) return;
-  logged_.push_back(matter);
-  LogWarning("{}: {} (further ones are only counted)", role_, text);
+  if (traffic_.IsFirst(matter)) LogWarning("{}: {} (further ones are only counted)", role_, text);
 }
 
 void StreamNode::WatchReaders() {
@@ -464,7 +431,7 @@ void StreamNode::WatchReaders() {
 
 void StreamNode::Advance() {
   endpoint_.Advance();
-  if (exit_code_) return;
+  if (ending_) return;
   if (camera_info_ && !begun_) {
     begun_ = true;
     Begin(*camera_info_);
@@ -472,9 +439,9 @@ void StreamNode::Advance() {
   RunElection();
   WatchWriter();
   WatchReaders();
-  if (exit_code_) return;
+  if (ending_) return;
   if (begun_ && (!plan_ || writer_)) {
-    while (!exit_code_ && !stopping_ && WorkOnce()) {
+    while (!ending_ && !stopping_ && WorkOnce()) {
       PumpBetweenSteps();
       PublishStatusIfDue();  // who has much to do says so too
     }
@@ -505,7 +472,7 @@ void StreamNode::PumpBetweenSteps() {
 }
 
 int64_t StreamNode::deadline_ns() const {
-  const int64_t settled_ns = settling_.writer ? settling_.until_ns : INT64_MAX;
+  const int64_t settled_ns = candidacy_ ? candidacy_->deadline_ns() : INT64_MAX;
   return std::min({endpoint_.deadline_ns(), next_status_ns_, settled_ns, WorkDeadline()});
 }
 
@@ -513,7 +480,7 @@ void StreamNode::Stop() {
   hands_over_until_ns_.reset();  // who is asked to end as well waits for nobody
   if (stopping_) return;
   stopping_ = true;
-  if (settling_.writer) writer_ = std::move(settling_.writer);
+  if (candidacy_) writer_ = candidacy_->TakeWriter();
   if (writer_) {
     writer_->Close(context_.now_ns());
   } else {
@@ -522,9 +489,7 @@ void StreamNode::Stop() {
 }
 
 void StreamNode::Exit(int code, std::string problem) {
-  if (exit_code_) return;
-  exit_code_ = code;
-  problem_ = std::move(problem);
+  if (!ending_) ending_ = {code, std::move(problem)};
 }
 
 std::string NobodyWentOn(const std::string& who_asked) {

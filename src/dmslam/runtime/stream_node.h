@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,12 +12,14 @@
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/endpoint.h"
 #include "dmslam/messaging/roles.h"
-#include "dmslam/runtime/camera_claims.h"
 #include "dmslam/runtime/core_thread.h"
+#include "dmslam/runtime/known_cameras.h"
+#include "dmslam/runtime/map_records.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/node_options.h"
 #include "dmslam/runtime/publish.h"
+#include "dmslam/runtime/writer_candidacy.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
 
@@ -41,8 +42,10 @@ class StreamNode : public Node {
   void Advance() final;
   int64_t deadline_ns() const override;
   void Stop() override;
-  std::optional<int> exit_code() const override { return exit_code_; }
-  std::string problem() const override { return problem_; }
+  std::optional<int> exit_code() const override {
+    return ending_ ? std::optional(ending_->code) : std::nullopt;
+  }
+  std::string problem() const override { return ending_ ? ending_->problem : ""; }
   bool Hangs(int64_t now_ns, int64_t longest_ns) const override;
 
  protected:
@@ -145,9 +148,9 @@ class StreamNode : public Node {
   /// where the record tells of no later change than the one before: it is asked for again.
   std::optional<MapDelta> ReadMapRecord(const Record& record, StreamReader* reader);
   /// The version that a replica made of what ReadMapRecord returned holds.
-  Version MapHeld(const StreamReader& reader) const { return map_in_parts_ ? Version() : reader.held(); }
+  Version MapHeld(const StreamReader& reader) const { return MapComesInParts() ? Version() : reader.held(); }
   /// Whether a saved map is being published, and more of it is to come: what is here of it is no whole map.
-  bool MapComesInParts() const { return map_in_parts_; }
+  bool MapComesInParts() const { return map_records_.InParts(); }
   /// A message was dropped; the first one of a channel is logged.
   void CountMalformed(const std::string& channel, const std::string& reason);
   /// Counts messages of other sessions; the first is logged.
@@ -190,8 +193,8 @@ class StreamNode : public Node {
   void KeepCameraKnown();
   void RunElection();
   void StartElection();
-  void OpenWriter();
   void BeginWritingWhenSettled();
+  StreamWriter::Options MakeWriterOptions() const;
   std::vector<std::string> ReaderNames() const;
   void WatchWriter();
   void WatchHandOver();
@@ -199,22 +202,19 @@ class StreamNode : public Node {
   /// Keeps the protocol alive while one step of work follows the other.
   void PumpBetweenSteps();
   void PublishStatusIfDue();
-  bool IsOldChange(const Record& record, const MapDelta& delta, StreamReader* reader);
   struct Watched;
   void RefuseOtherTypes(Watched* watched);
   void WarnOnce(const std::string& matter, const std::string& text);
 
-  struct KnownCamera {
-    Bytes message;       ///< what the player says; empty: of a recorded session, and not repeated
-    int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
-  };
-  /// The change of the map that was read last.
-  struct NewestChange {
-    Term term;
-    uint64_t version = 0;
-  };
+  /// What came outside the streams, what of it was dropped, and what was said of that.
   struct Traffic {
     int64_t received = 0, received_bytes = 0, dropped_foreign = 0, dropped_malformed = 0;
+    std::vector<std::string> logged;
+    bool IsFirst(const std::string& matter);
+  };
+  struct Ending {
+    int code = 0;
+    std::string problem;
   };
   struct Watched {
     const StreamReader* reader;
@@ -230,27 +230,16 @@ class StreamNode : public Node {
 
   bool begun_ = false;
   std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for the stream must have gone on with it
-  std::map<CameraId, KnownCamera> cameras_;
-  CameraClaims camera_claims_;  ///< of those that are not known yet
+  KnownCameras cameras_;
   std::optional<WriterPlan> plan_;
-  std::unique_ptr<WriterElection> election_;
-  /// A writer that has taken over, and may write from then on if nobody else has.
-  struct Settling {
-    std::unique_ptr<StreamWriter> writer;
-    int64_t until_ns = 0;
-  };
-  Settling settling_;  ///< without a writer: nothing is to be settled
-  std::optional<int> exit_code_;
-  std::string problem_;
+  std::unique_ptr<WriterCandidacy> candidacy_;  ///< until the writer is open
+  std::optional<Ending> ending_;
   std::vector<std::string> other_channels_;
   int64_t next_status_ns_ = 0;
   int64_t next_tidy_ns_ = 0;
   int64_t started_ns_ = 0;
   Traffic traffic_;
-  std::vector<std::string> logged_;
-  wire::RecordGroups<MapDelta> map_groups_;
-  NewestChange newest_change_;
-  bool map_in_parts_ = false;
+  MapRecords map_records_;
   std::vector<Watched> readers_;
   std::vector<const CoreThread*> core_threads_;  ///< that are watched; owned by the node that asked for them
   ServedReplica replica_;

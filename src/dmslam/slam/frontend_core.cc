@@ -50,8 +50,7 @@ FrontendCore::FrontendCore(const Setup& setup)
       localize_only_(setup.localize_only),
       catch_up_in_portions_(setup.catch_up_in_portions),
       map_(setup.camera, setup.pyramid),
-      map_id_(setup.camera_id * kMapsPerCamera + 1),
-      newest_map_(*map_id_),
+      own_maps_(setup.camera_id),
       features_(setup.extractor, setup.options.initializer_feature_factor),
       first_map_(SearchMaker(setup)),
       tracker_({setup.options.tracking, setup.camera, setup.vocabulary, setup.seed}),
@@ -60,9 +59,11 @@ FrontendCore::FrontendCore(const Setup& setup)
       last_poses_(setup.options.refiner, setup.options.smooth_at_end, setup.options.tracking, setup.camera),
       unplaced_(setup.options.max_kept_frames) {
   map_.KeepFeaturesIn(setup.feature_store);
-  if (!setup.in_saved_map) return;
-  phase_.BeginLost();
-  map_id_.reset();
+  if (setup.in_saved_map) {
+    phase_.BeginLost();
+  } else {
+    map_id_ = own_maps_.First();
+  }
 }
 
 // ---- The map ----
@@ -104,11 +105,12 @@ FrontendOutput FrontendCore::GiveUpMap(MapReset::Fate fate, const std::string& r
   if (map_id_ && IsSharedMap(*map_id_)) fate = MapReset::Fate::kKeep;
   const bool drop = fate == MapReset::Fate::kDrop;
   if (map_id_) output.Add(MapReset{*map_id_, fate, reason, frame_.stamp_ns, camera_id_});
-  if (drop) dropped_ = map_id_;
+  if (drop && map_id_) own_maps_.Drop(*map_id_);
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
   if (drop && map_id_ && options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(*map_id_));
-  map_id_ = NextMapId();
+  if (map_id_) own_maps_.Take(*map_id_);
+  map_id_ = own_maps_.Next(map_);
   tracker_.OnMapGivenUp();
   first_map_.Restart();
   phase_.GiveUpMap();
@@ -116,21 +118,10 @@ FrontendOutput FrontendCore::GiveUpMap(MapReset::Fate fate, const std::string& r
   return output;
 }
 
-/// A number that no map has had: those of a saved one are taken, and those of maps that were joined. Of this
-/// camera's own numbers: the others number theirs at the same time.
-MapId FrontendCore::NextMapId() {
-  const auto take = [this](MapId taken) {
-    if (taken / kMapsPerCamera == camera_id_) newest_map_ = std::max(newest_map_, taken);
-  };
-  if (map_id_) take(*map_id_);
-  for (const auto& [id, keyframe] : map_.keyframes()) take(keyframe.map_id);
-  return ++newest_map_;
-}
-
 /// The map that was tracked in may have become part of another.
 void FrontendCore::FollowJoinedMap() {
   if (!phase_.HasMap() || !map_id_ || !map_.KeyframesOf(*map_id_).empty()) return;
-  if (*map_id_ / kMapsPerCamera == camera_id_) newest_map_ = std::max(newest_map_, *map_id_);
+  own_maps_.Take(*map_id_);
   const std::optional<KeyframeId> reference = tracker_.last_reference();
   const auto last = reference ? map_.ResolvePose(*reference) : std::nullopt;
   if (last) map_id_ = last->map_id;
@@ -169,7 +160,7 @@ FrontendOutput FrontendCore::ProcessFrame() {
 /// While a first map is looked for, every frame also asks the maps that there are where it is: who is
 /// recognised goes on there.
 std::optional<FrontendOutput> FrontendCore::FindAgain() {
-  if (map_.keyframes().empty() || (dropped_ && !map_.KeyframesOf(*dropped_).empty())) return std::nullopt;
+  if (map_.keyframes().empty() || own_maps_.HasDropped(map_)) return std::nullopt;
   TrackingResult result =
       tracker_.Track(map_, {.map_id = std::nullopt, .may_be_nowhere = true}, std::move(frame_));
   frame_ = std::move(result.frame);

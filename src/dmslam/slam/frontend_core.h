@@ -16,6 +16,7 @@
 #include "dmslam/slam/frontend_options.h"
 #include "dmslam/slam/frontend_output.h"
 #include "dmslam/slam/keyframe_gate.h"
+#include "dmslam/slam/own_maps.h"
 #include "dmslam/slam/tracking_phase.h"
 #include "dmslam/tracking/odometry.h"
 #include "dmslam/tracking/tracker.h"
@@ -121,7 +122,6 @@ class FrontendCore {
   bool IsLostInTheLight(int64_t missing_ns);
   FrontendOutput GiveUpMap(MapReset::Fate fate, const std::string& reason);
   bool IsSharedMap(MapId map_id) const;
-  MapId NextMapId();
   void FollowJoinedMap();
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
   bool IsEvidenceDue();
@@ -145,9 +145,8 @@ class FrontendCore {
 
   // The map and where tracking stands
   Replica map_;
-  std::optional<MapId> map_id_;   ///< of the map tracked in or looked for; none: whichever it finds itself in
-  MapId newest_map_;              ///< the highest number that was given to a map that this camera began
-  std::optional<MapId> dropped_;  ///< the map that was dropped last: the replica may have it for a while yet
+  std::optional<MapId> map_id_;  ///< of the map tracked in or looked for; none: whichever it finds itself in
+  OwnMaps own_maps_;
   TrackingPhase phase_;
 
   // What does the work

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "dmslam/runtime/camera_claims.h"
+
+namespace dmslam {
+
+/// What the players say of their cameras: believed as CameraClaims has it, and said by others in their place
+/// when they have fallen silent, so that a process which starts after a player has left still learns of it.
+class KnownCameras {
+ public:
+  /// `jitter_ns`: how much longer than others this process waits before it speaks for a silent player.
+  explicit KnownCameras(int64_t jitter_ns) : jitter_ns_(jitter_ns) {}
+
+  bool Knows(CameraId camera) const { return known_.contains(camera); }
+  /// Of a camera that is not known: whether the same was said before, and not just now.
+  bool SaidAgain(const CameraInfo& info, int64_t now_ns) { return claims_.SaidAgain(info, now_ns); }
+  /// What was said of a camera that is not known, of which a frame of this session came.
+  std::optional<CameraInfo> ClaimOfFrame(CameraId camera, uint32_t session) const {
+    return Knows(camera) ? std::nullopt : claims_.OfFrame(camera, session);
+  }
+  /// From now on the camera is known. `repeat`: whether it is one to be said again.
+  void Believe(const CameraInfo& info, bool repeat, int64_t now_ns) {
+    claims_.Forget(info.camera_id);
+    known_[info.camera_id] = {info, repeat, now_ns + kSilentNs + jitter_ns_};
+  }
+  /// Somebody said what is known already.
+  void Heard(CameraId camera, int64_t now_ns) { known_.at(camera).due_ns = now_ns + kSilentNs + jitter_ns_; }
+  /// The cameras of which nobody has said anything for a while. They are to be said now.
+  std::vector<CameraInfo> TakeSilent(int64_t now_ns) {
+    std::vector<CameraInfo> silent;
+    for (auto& [id, known] : known_) {
+      if (!known.repeat || now_ns < known.due_ns) continue;
+      known.due_ns = now_ns + kSilentNs;
+      silent.push_back(known.info);
+    }
+    return silent;
+  }
+
+ private:
+  static constexpr int64_t kSilentNs = 1'500'000'000;
+  struct Known {
+    CameraInfo info;
+    bool repeat = false;
+    int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
+  };
+
+  int64_t jitter_ns_;
+  CameraClaims claims_;
+  std::map<CameraId, Known> known_;
+};
+
+}  // namespace dmslam
