@@ -44,7 +44,7 @@ TEST_F(OwnMapsTest, AMapThatWasDroppedIsThereUntilTheMapperHasHeardOfIt) {
   EXPECT_FALSE(maps.HasDropped(map_));
   maps.Drop(1);
   EXPECT_TRUE(maps.HasDropped(map_));
-  map_.RemoveKeyframe(KeyframeId::Make(1, 1));
+  map_.DropMap(1);
   EXPECT_FALSE(maps.HasDropped(map_));
 }
 
