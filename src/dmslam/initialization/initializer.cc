@@ -267,6 +267,8 @@ ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
   const Eigen::Quaterniond R_k_0 = window.TurnAt(view.since_reference_s);
   view.pair.matches = MatchFrames(features0, *frame.features, camera_, options_.matching, &matcher,
                                   Turned(features0.uv_px, camera_, R_k_0));
+  // Somebody who has most of the features leads the turn, and then the room is where it was, if anywhere.
+  AddMatchesInPlace(features0, *frame.features, camera_, options_.matching, &matcher, &view.pair.matches);
   view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;

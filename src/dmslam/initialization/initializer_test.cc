@@ -172,6 +172,16 @@ TEST(Initializer, MapsTheRoomAndNotTheWalker) {
   }
 }
 
+/// The turn by which features are looked for is then the walker's, and the room is not where it would bring
+/// it.
+TEST(Initializer, DoesNotMapAWalkerWhoHasMostOfTheFeatures) {
+  const SyntheticRoom room(250, 700);
+  const std::optional<FirstMap> map = MapFrom(room, {}, 0);
+  if (map) {
+    EXPECT_LT(ShareOfWalker(room, *map), 0.05);
+  }
+}
+
 TEST(Initializer, TellsTheViewsBetweenTheTwo) {
   const SyntheticRoom room(600, 150);
   const std::optional<FirstMap> map = MapFrom(room, {}, 0);

@@ -1,6 +1,10 @@
 #include "dmslam/motion_segmentation/match_frames.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "dmslam/camera/image_scale.h"
+
 namespace dmslam {
 
 std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
@@ -35,6 +39,21 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
     matches.push_back(match_px);
   }
   return matches;
+}
+
+void AddMatchesInPlace(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
+                       const MatchingOptions& options, FeatureMatcher* matcher, std::vector<Match>* matches) {
+  const Eigen::Vector2d nowhere = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  std::vector<Eigen::Vector2d> places(frame0.uv_px.begin(), frame0.uv_px.end());
+  std::vector<uint8_t> is_taken(frame1.size(), 0);
+  for (const Match& match : *matches) {
+    places[match.index0] = nowhere;
+    is_taken[match.index1] = 1;
+  }
+  for (const Match& match : MatchFrames(frame0, frame1, camera, options, matcher, places)) {
+    if (!is_taken[match.index1]) matches->push_back(match);
+  }
+  std::ranges::sort(*matches, {}, &Match::index0);
 }
 
 std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most) {

@@ -26,6 +26,12 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
                                const MatchingOptions& options, FeatureMatcher* matcher,
                                std::span<const Eigen::Vector2d> predicted_px = {});
 
+/// Looks for the features of the first frame that are in none of `matches` where they were, and adds what is
+/// found to them, sorted by index0: what moves apart from the rest is not where the others' motion would have
+/// brought it.
+void AddMatchesInPlace(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
+                       const MatchingOptions& options, FeatureMatcher* matcher, std::vector<Match>* matches);
+
 /// At most so many of the matches, spread evenly over them.
 std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most);
 
