@@ -67,9 +67,9 @@ TEST(AddMatchesInPlace, FindsTheRoomWhereTheTurnIsThatOfSomebodyWhoCrosses) {
 
 TEST(AddMatchesInPlace, NoFeatureIsMatchedTwice) {
   Crossing crossing;
-  // A feature of the room looks like one that crosses, and only that one is there afterwards.
+  // A feature of the room looks like one that crosses, and was where that one is afterwards.
   crossing.before.set.descriptors[kMost] = crossing.before.set.descriptors[0];
-  crossing.after.uv_px[0] = crossing.after.uv_px[kMost];
+  crossing.before.uv_px[kMost] = crossing.after.uv_px[0];
   FeatureMatcher matcher;
   std::vector<Match> matches =
       MatchFrames(crossing.before, crossing.after, crossing.camera, {}, &matcher, crossing.Predicted());
