@@ -304,11 +304,19 @@ double CandidateBuilder::Parallax(const CandidateMap& candidate) const {
   return Median(std::move(parallax));
 }
 
-double CandidateBuilder::DirectionSigma(const CandidateMap& candidate) const {
-  const auto& matches = candidate.last().pair.matches;
+MatchArrays CandidateBuilder::ArraysOf(std::span<const Match> matches) const {
   std::vector<uint32_t> order(matches.size());
   std::iota(order.begin(), order.end(), 0U);
-  const MatchArrays arrays = MakeArrays(matches, order, camera_, options_.selector.inlier);
+  return MakeArrays(matches, order, camera_, options_.selector.inlier);
+}
+
+int CandidateBuilder::NumAgreeing(const ReferenceView& view, const Rigid3d& T_k_0) const {
+  const Eigen::Matrix3d E = Hat(T_k_0.translation.normalized()) * T_k_0.rotation.toRotationMatrix();
+  return CountInliers(E, ArraysOf(view.pair.matches), {0, view.pair.matches.size()});
+}
+
+double CandidateBuilder::DirectionSigma(const CandidateMap& candidate) const {
+  const MatchArrays arrays = ArraysOf(candidate.last().pair.matches);
   TwoViewModel model;
   model.R = candidate.T_last_0().rotation.toRotationMatrix();
   model.t = candidate.T_last_0().translation.normalized();

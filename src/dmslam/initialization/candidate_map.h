@@ -75,6 +75,8 @@ class CandidateBuilder {
   static bool SameMotion(const Rigid3d& a, const Rigid3d& b);
   /// Median over the points, at the last view [rad].
   double Parallax(const CandidateMap& candidate) const;
+  /// How many of the view's matches agree with such a motion: those of somebody who moves do not.
+  int NumAgreeing(const ReferenceView& view, const Rigid3d& T_k_0) const;
   /// How well the direction of translation to the last view is known [rad].
   double DirectionSigma(const CandidateMap& candidate) const;
   FirstMap MakeMap(const InitializerFrame& reference, const CandidateMap& candidate,
@@ -84,6 +86,7 @@ class CandidateBuilder {
   std::optional<CandidateMap> PointsOfPair(const ReferenceView& last, std::span<const uint8_t> is_static,
                                            const TwoViewModel& model, Refused* refused) const;
   bool Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, const Match& match) const;
+  MatchArrays ArraysOf(std::span<const Match> matches) const;
   double Cost(const CandidateMap& candidate, std::span<const uint8_t> is_static) const;
 
   InitializerOptions options_;

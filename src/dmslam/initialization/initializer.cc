@@ -26,6 +26,13 @@ double MedianDisplacement(std::span<const Match> matches) {
   return squared.empty() ? 0.0 : std::sqrt(*middle);
 }
 
+/// Whether the matches lie so close together that they may be somebody's.
+bool IsCompact(std::span<const Match> matches, double distribution_px) {
+  std::vector<Eigen::Vector2d> points;
+  for (const Match& match : matches) points.push_back(match.uv0_px);
+  return Spread(points) < distribution_px;
+}
+
 WaitReason FromAgreement(AgreementRefusal refusal) {
   switch (refusal) {
     case AgreementRefusal::kNone:
@@ -267,8 +274,9 @@ ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
   const Eigen::Quaterniond R_k_0 = window.TurnAt(view.since_reference_s);
   view.pair.matches = MatchFrames(features0, *frame.features, camera_, options_.matching, &matcher,
                                   Turned(features0.uv_px, camera_, R_k_0));
-  // Somebody who has most of the features leads the turn, and then the room is where it was, if anywhere.
-  AddMatchesInPlace(features0, *frame.features, camera_, options_.matching, &matcher, &view.pair.matches);
+  // Somebody who has most of the features may lead the turn; then the room is where it was, if anywhere.
+  if (IsCompact(view.pair.matches, options_.agreement.min_distribution_share * DiagonalPx(camera_)))
+    AddMatchesInPlace(features0, *frame.features, camera_, options_.matching, &matcher, &view.pair.matches);
   view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;

@@ -59,8 +59,8 @@ struct GeometryOptions {
   /// Where no other reference frame has a say, a map beside whose motion another one comes near
   /// (alone_runner_up_cost) must know its direction to so much.
   double clear_direction_sigma_rad = 0.05;
-  /// A view with no more than this share of the first view's matches: the camera turns away from what the
-  /// reference frame shows, and waiting brings no more parallax.
+  /// A view with no more than this share of the first view's matches, of those that agree with the motion:
+  /// the camera turns away from what the reference frame shows, and waiting brings no more parallax.
   double losing_share = 0.5;
   double losing_parallax_rad = 0.006;  ///< so much is enough then, with clear_direction_sigma_rad
   double max_view_chi2 = 9.0;          ///< a view agrees with a point: squared reprojection error / variance

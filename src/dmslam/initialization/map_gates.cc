@@ -29,15 +29,20 @@ bool MapGates::HasParallax(const CandidateMap& candidate, const ReferenceWindow&
   const GeometryOptions& asked = options_.geometry;
   const double parallax = builder_.Parallax(candidate), sigma = builder_.DirectionSigma(candidate);
   if (parallax >= asked.min_parallax_rad && sigma <= asked.max_direction_sigma_rad) return true;
-  const auto left = static_cast<double>(candidate.last().pair.matches.size());
-  const auto shown = static_cast<double>(window.views().front().pair.matches.size());
-  if (left <= asked.losing_share * shown && parallax >= asked.losing_parallax_rad &&
-      sigma <= asked.clear_direction_sigma_rad) {
+  if (parallax >= asked.losing_parallax_rad && sigma <= asked.clear_direction_sigma_rad &&
+      TurnsAway(candidate, window))
     return true;
-  }
   *refused = {WaitReason::kParallaxTooSmall,
               "median " + Degrees(parallax) + ", direction known to " + Degrees(sigma), parallax};
   return false;
+}
+
+/// Whether little is left of what the first view showed. Somebody who leaves the picture is no loss.
+bool MapGates::TurnsAway(const CandidateMap& candidate, const ReferenceWindow& window) const {
+  const ReferenceView& first = window.views().front();
+  const std::optional<Rigid3d> T_first_0 = builder_.PoseOf(first, candidate);
+  return T_first_0 && builder_.NumAgreeing(candidate.last(), candidate.T_last_0()) <=
+                          options_.geometry.losing_share * builder_.NumAgreeing(first, *T_first_0);
 }
 
 bool MapGates::Admit(const std::deque<ReferenceWindow>& windows, const MatchFunction& match,

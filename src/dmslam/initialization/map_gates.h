@@ -26,6 +26,7 @@ class MapGates {
   bool HasPointsAndParallax(const CandidateMap& candidate, const ReferenceWindow& window,
                             Refused* refused) const;
   bool HasParallax(const CandidateMap& candidate, const ReferenceWindow& window, Refused* refused) const;
+  bool TurnsAway(const CandidateMap& candidate, const ReferenceWindow& window) const;
   bool AgreesWithPast(const MatchFunction& match, ReferenceWindow* window, CandidateMap* candidate,
                       Refused* refused) const;
   bool IsBelieved(const std::deque<ReferenceWindow>& windows, const CandidateMap& candidate,

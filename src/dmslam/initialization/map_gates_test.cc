@@ -37,8 +37,8 @@ class MapGatesTest : public ::testing::Test {
   }
   static InitializerFrame Frame(uint32_t index) { return {index, int64_t{index} * 33'333'333, nullptr}; }
 
-  /// A view that shows the first `shown` points.
-  ReferenceView View(uint32_t reference, uint32_t frame, size_t shown = kPoints) const {
+  /// A view that shows the first `shown` points, and so many of somebody who moves.
+  ReferenceView View(uint32_t reference, uint32_t frame, size_t shown = kPoints, size_t somebodys = 0) const {
     Random random(DeriveSeed(3, frame, "view"));
     ReferenceView view;
     view.frame = Frame(frame);
@@ -51,6 +51,13 @@ class MapGatesTest : public ::testing::Test {
       match.index0 = match.index1 = static_cast<uint32_t>(k);
       match.uv0_px = *camera_.Project(PoseAt(reference) * points_[k]);
       match.uv1_px = *camera_.Project(PoseAt(frame) * place) + Eigen::Vector2d(right_px, down_px);
+      view.pair.matches.push_back(match);
+    }
+    for (size_t k = 0; k < somebodys; ++k) {
+      Match match;
+      match.index0 = match.index1 = static_cast<uint32_t>(kPoints + k);
+      match.uv0_px = {random.Uniform(200, 300), random.Uniform(100, 300)};
+      match.uv1_px = match.uv0_px + Eigen::Vector2d(5, 40);
       view.pair.matches.push_back(match);
     }
     return view;
@@ -163,6 +170,16 @@ TEST_F(MapGatesTest, LessParallaxIsAskedWhereTheCameraTurnsAwayFromWhatTheRefere
   options_.geometry.clear_direction_sigma_rad = 10;
   step_ = 0.0009;
   EXPECT_FALSE(admit(100)) << "so little is chance";
+}
+
+TEST_F(MapGatesTest, SomebodyWhoLeavesThePictureIsNoReasonToAskForLessParallax) {
+  step_ = 0.002;
+  options_.geometry.clear_direction_sigma_rad = 0.35;
+  ReferenceWindow& window = windows_.emplace_back(Frame(0));
+  window.AddView(View(0, 4, 100, 150));
+  window.AddView(View(0, 20, 100));
+  EXPECT_FALSE(AdmitRoom(&window));
+  EXPECT_EQ(refused_.wait, WaitReason::kParallaxTooSmall);
 }
 
 // ---- Adjustment ----
