@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "dmslam/camera/testing/test_camera.h"
-#include "dmslam/motion_segmentation/turn.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
