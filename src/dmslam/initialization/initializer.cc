@@ -323,6 +323,7 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   const std::vector<const ReferenceView*> views = window->PairsToAgree(options_.num_pairs, step_s);
   if (views.empty()) return Wait(WaitReason::kTooFewFrames, "too few pairs yet");
   std::vector<const PairView*> pairs;
+  pairs.reserve(views.size());
   for (const ReferenceView* view : views) pairs.push_back(&view->pair);
   AgreementOptions asked = options_.agreement;
   if (views.back()->since_reference_s < options_.sure_age_s) asked.dominance.reset();

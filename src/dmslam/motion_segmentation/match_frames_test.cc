@@ -74,6 +74,7 @@ TEST(AddMatchesInPlace, NoFeatureIsMatchedTwice) {
       MatchFrames(crossing.before, crossing.after, crossing.camera, {}, &matcher, crossing.Predicted());
   AddMatchesInPlace(crossing.before, crossing.after, crossing.camera, {}, &matcher, &matches);
   std::vector<uint32_t> taken;
+  taken.reserve(matches.size());
   for (const Match& match : matches) taken.push_back(match.index1);
   std::ranges::sort(taken);
   EXPECT_EQ(std::ranges::adjacent_find(taken), taken.end());

@@ -204,6 +204,7 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   options.wants_all = wants_all;
   auto reader = std::make_unique<StreamReader>(options);
   std::vector<std::string> record_channels_of_camera;
+  record_channels_of_camera.reserve(record_channels.size());
   for (const std::string& channel : record_channels)
     record_channels_of_camera.push_back(ChannelOfCamera(channel, camera));
   endpoint_.AddReader(reader.get(), options.owner, record_channels_of_camera);
