@@ -22,7 +22,6 @@ constexpr int64_t kCountersEveryNs = 5'000'000'000;
 constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processes say their last words
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kSilentFrontendNs = 1'000'000'000;  // it says ten times a second that it is there
-constexpr int64_t kNobodyNs = 60'000'000'000;         // after the player's end: no frontend comes any more
 constexpr int64_t kRoomOnDiskNs = 30'000'000'000;     // after the end: no room comes any more
 constexpr int64_t kSayAgainNs = 30'000'000'000;       // how much waits for the disk
 constexpr int64_t kTryAgainNs = 1'000'000'000;
@@ -552,9 +551,9 @@ bool CollectorNode::FrontendsHaveEnded() {
   };
   if (std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AtEnd(); })) return true;
   if (builder_->map().progress().ended && all_silent(kSilentAfterEndNs)) return true;
-  if (ends_.heard.size() < options_.NumCameras() || !all_silent(kNobodyNs)) return false;
+  if (ends_.heard.size() < options_.NumCameras() || !all_silent(kNoFrontendNs)) return false;
   run_.end_problem = "the sequence had ended, and no frontend was heard for " +
-                     std::to_string(kNobodyNs / 1'000'000'000) + " s: the map may lack its last changes";
+                     std::to_string(kNoFrontendNs / 1'000'000'000) + " s: the map may lack its last changes";
   LogWarning("{}", run_.end_problem);
   return true;
 }

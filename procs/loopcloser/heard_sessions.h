@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 
+#include "dmslam/messaging/claims.h"
 #include "dmslam/util/ids.h"
 #include "dmslam/wire/codec.h"
 
@@ -43,7 +44,6 @@ class HeardSessions {
 
  private:
   static constexpr size_t kMost = 8;
-  static constexpr int64_t kNoCopyNs = 100'000'000;
   struct Said {
     std::optional<SessionStart> start;  ///< none: it was contradicted
     int64_t since_ns = 0;

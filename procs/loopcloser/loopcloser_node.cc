@@ -64,10 +64,22 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
       return stop_.load();
     });
   }
+  core_->SetOnStep([this](LoopcloserCore::Step step) { OnStep(step); });
   map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
   ServeReplica(
       &core_->map(), [this] { return MapHeld(*map_reader_); }, [this] { return work_->Idle(); });
   WantWriter({StreamId::kLoopCloser, {roles::kMapper}, {}, nullptr});
+}
+
+/// On the core.
+void LoopcloserNode::OnStep(LoopcloserCore::Step step) {
+  using Step = LoopcloserCore::Step;
+  const int64_t now_ns = context_.now_ns();
+  if (step == Step::kNamePlaces) query_began_ns_ = now_ns;
+  if (step == Step::kVerify)
+    work_->Report([this, ms = static_cast<double>(now_ns - query_began_ns_) * 1e-6] { query_.Add(ms); });
+  if (step == Step::kCorrect)
+    work_->Report([this] { core_status_.state = LoopcloserStatus::State::kCorrecting; });
 }
 
 /// On the core.
@@ -129,12 +141,27 @@ bool LoopcloserNode::EndIfDone() {
   return false;
 }
 
+/// The state, and for whom it waits in it.
+std::pair<LoopcloserStatus::State, std::string> LoopcloserNode::StateAndReason() const {
+  using State = LoopcloserStatus::State;
+  if (!core_) return {State::kStarting, "waiting for a camera"};
+  if (ended_) return {State::kDone, ""};
+  if (!writer_) return {State::kWaiting, "asks who else closes loops"};
+  if (core_status_.state == State::kCorrecting) return {State::kCorrecting, ""};
+  if (!map_reader_->writer_present(context_.now_ns())) return {State::kWaiting, "waiting for a mapper"};
+  return {State::kWatching, ""};
+}
+
 void LoopcloserNode::PublishStatus() {
   if (core_ && work_->Idle()) core_status_ = CoreStatus();
   LoopcloserStatus status = core_status_;
-  status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", {map_reader_.get()});
-  status.state = core_ ? LoopcloserStatus::State::kWatching : LoopcloserStatus::State::kStarting;
+  const auto [state, reason] = StateAndReason();
+  status.head = MakeStatusHead(reason, {map_reader_.get()});
+  status.state = state;
+  if (map_reader_) status.keyframe_queue = static_cast<int32_t>(map_reader_->backlog());
   if (vocabulary_) status.vocabulary_checksum = vocabulary_->checksum();
+  status.query_p50_ms = query_.Quantile(0.5);
+  status.query_p95_ms = query_.Quantile(0.95);
   status.check_p50_ms = check_.Quantile(0.5);
   status.check_p95_ms = check_.Quantile(0.95);
   PublishLoose(status);
@@ -144,6 +171,7 @@ void LoopcloserNode::PublishStatus() {
 LoopcloserStatus LoopcloserNode::CoreStatus() const {
   LoopcloserStatus status;
   const LoopcloserCounters& counters = core_->counters();
+  if (core_->AwaitsMapper()) status.state = LoopcloserStatus::State::kCorrecting;
   status.replica_version = static_cast<int64_t>(core_->map().version());
   status.indexed_keyframes = static_cast<int32_t>(core_->map().keyframes().size());
   status.keyframes_checked = static_cast<int64_t>(counters.checked);

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "dmslam/loops/loopcloser_core.h"
 #include "dmslam/runtime/core_thread.h"
@@ -29,17 +32,20 @@ class LoopcloserNode : public StreamNode {
 
  private:
   void WorkOn(const Record& record);
+  void OnStep(LoopcloserCore::Step step);
   void Answer(KeyframeId keyframe);
   void JoinMappedSessions();
   bool EndIfDone();
   LoopcloserStatus CoreStatus() const;
+  std::pair<LoopcloserStatus::State, std::string> StateAndReason() const;
 
   std::shared_ptr<const Vocabulary> vocabulary_;
   std::unique_ptr<LoopcloserCore> core_;
   std::unique_ptr<StreamReader> map_reader_;
   HeardSessions sessions_;
   bool ended_ = false;
-  LatencyWindow check_;
+  LatencyWindow query_, check_;
+  int64_t query_began_ns_ = 0;        ///< the core's
   LoopcloserStatus core_status_;      ///< what the core had to say of itself last
   std::atomic<bool> stop_{false};     ///< asked by the core: it finishes early
   std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch

@@ -20,15 +20,21 @@ void LeftMap::Begin(int64_t now_ns) {
 
 LeftMap::State LeftMap::Advance(int64_t now_ns, const ReadRecord& read, const Complain& complain) {
   while (const std::optional<Record> record = fetch_->Take()) {
-    if (TakeIn(*record, read, complain)) continue;
-    endpoint_->Remove(fetch_.get());  // half a map is none: all of it is asked for again
-    replica_.reset();
-    Begin(now_ns);
-    return State::kFetching;
+    if (!TakeIn(*record, read, complain)) return Refuse(now_ns);
   }
   if (fetch_->state() == ReplicaFetch::State::kNone) return State::kNone;
   if (fetch_->KeepsGrowing(now_ns)) return State::kKeepsGrowing;
   return fetch_->state() == ReplicaFetch::State::kDone ? State::kWhole : State::kFetching;
+}
+
+/// Half a map is none: all of it is asked for again.
+LeftMap::State LeftMap::Refuse(int64_t now_ns) {
+  if (!first_refused_ns_) first_refused_ns_ = now_ns;
+  if (++refused_ > kMostRefused && now_ns - *first_refused_ns_ > kMostRefusingNs) return State::kBroken;
+  endpoint_->Remove(fetch_.get());
+  replica_.reset();
+  Begin(now_ns);
+  return State::kFetching;
 }
 
 /// False: the record is not to be used, and so nothing of the fetch.

@@ -27,6 +27,7 @@ class LeftMap {
     kFetching,
     kNone,          ///< nobody holds one
     kKeepsGrowing,  ///< another mapper writes it, whom the holder hears and this process does not
+    kBroken,        ///< what is handed over cannot be used, however often it is asked for
     kWhole,
   };
   /// Decodes a record, and counts those that cannot be read.
@@ -45,9 +46,13 @@ class LeftMap {
   const Replica& replica() const { return *replica_; }
   Replica TakeReplica() { return std::move(*replica_); }
   Version version() const { return fetch_->version(); }
+  std::string giver() const { return fetch_->giver(); }
 
  private:
+  static constexpr int kMostRefused = 5;
+  static constexpr int64_t kMostRefusingNs = 10'000'000'000;  // a forger may be at work for a while
   void Begin(int64_t now_ns);
+  State Refuse(int64_t now_ns);
   bool TakeIn(const Record& record, const ReadRecord& read, const Complain& complain);
 
   const Options options_;
@@ -55,6 +60,8 @@ class LeftMap {
   std::unique_ptr<ReplicaFetch> fetch_;
   std::optional<Replica> replica_;
   wire::RecordGroups<MapDelta> groups_;
+  int refused_ = 0;  // fetches
+  std::optional<int64_t> first_refused_ns_;
 };
 
 }  // namespace dmslam

@@ -189,6 +189,17 @@ TEST_F(LeftMapTest, WithAGroupThatIsBrokenAllIsFetchedAgain) {
   EXPECT_EQ(num_keyframes(), 3U);
 }
 
+TEST_F(LeftMapTest, AMapThatIsAlwaysBrokenIsTold) {
+  std::vector<MapDelta> broken = GroupOfThree();
+  broken.erase(broken.begin() + 1);
+  broken.emplace_back();  // a sound end
+  pieces_.snapshots = {broken};
+  EXPECT_EQ(Fetch(60), LeftMap::State::kBroken);
+  EXPECT_GT(now_ns_, 10'000'000'000) << "for a while it may be somebody's forgery";
+  EXPECT_GT(complaints_.size(), 5U);
+  EXPECT_EQ(left_->giver(), roles::kFrontend);
+}
+
 TEST_F(LeftMapTest, WhatCameBeforeAMapGrewIsVoid) {
   MapDelta dropped;
   dropped.keyframes = {StateNamed(9, 2)};

@@ -62,7 +62,7 @@ uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
 /// What the core has is to be published as records.
 void MapperNode::PutInParts() {
   const KeyframeId newest = core_->map().keyframes().rbegin()->first;
-  const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, 56 * 1024);
+  const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, kSnapshotPieceBytes);
   saved_.parts.assign(parts.begin(), parts.end());
 }
 
@@ -71,6 +71,7 @@ void MapperNode::Begin(const CameraInfo& info) {
   const uint16_t ordinal = saved_.loaded ? ContinueSavedMap(info) : uint16_t{1};
   work_ = MakeCoreThread(info.mode);
   const auto publish = [this](const MapDelta& delta) {
+    core_report_.tally.OnDelta(delta, core_->map());
     work_->Report([this, delta] { PublishDelta(delta); });
   };
   core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera,
@@ -143,6 +144,11 @@ bool MapperNode::FetchReplica() {
            "the map that the others hold grows while it is fetched: another mapper writes it, which is not "
            "heard here; check the network, or stop that one");
       return false;
+    case LeftMap::State::kBroken:
+      Exit(kExitInternal, "the map that " + left_->giver() +
+                              " holds cannot be used, however often it is asked for (the warnings above say "
+                              "what is wrong with it): restart that process");
+      return false;
     case LeftMap::State::kWhole:
       ContinueLeftMap();
       break;
@@ -202,12 +208,15 @@ void MapperNode::OnWriterOpen() {
   }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked},
                             Version{progress.loopcloser.epoch, progress.loopcloser.seq});
-  if (progress.ended) {  // the one before could not say goodbye: whoever has died since may lack the map
-    give_up_ns_ = context_.now_ns() + kBackAfterDeathNs;
-    Run([this] { core_->End(true); }, [this] { Complete(); });
-  } else {
-    Run([this] { SettleAgain(); });
-  }
+  // One that has ended could not say goodbye: whoever has died since may lack the map.
+  if (progress.ended) give_up_ns_ = context_.now_ns() + kBackAfterDeathNs;
+  const auto begin = [this, ended = progress.ended] {
+    core_report_.tally.Count(core_->map());
+    ended ? core_->End(true) : SettleAgain();
+  };
+  Run(begin, [this, ended = progress.ended] {
+    if (ended) Complete();
+  });
 }
 
 /// On the core. Somebody may not have heard it.
@@ -322,8 +331,8 @@ void MapperNode::Run(Job job, std::function<void()> when_done) {
   keyframe_waits_ = KeyframeWaits();
   work_->Post([this, job = std::move(job), when_done = std::move(when_done)] {
     job();
-    work_->Report([this, when_done, status = StatusOf(*core_)] {
-      core_status_ = status;
+    work_->Report([this, when_done, status = StatusOf(*core_, core_report_.tally)] {
+      core_report_.status = status;
       if (when_done) when_done();
     });
   });
@@ -601,15 +610,27 @@ void MapperNode::Stop() {
   StreamNode::Stop();
 }
 
+/// The state, and for whom it waits in it.
+std::pair<MapperStatus::State, std::string> MapperNode::StateAndReason() const {
+  using State = MapperStatus::State;
+  if (!core_) return {State::kStarting, "waiting for a camera"};
+  if (ending_ == Ending::kCompleting) return {State::kDone, ""};
+  if (!writer_) return {State::kWaiting, "asks who writes the map, and who holds one"};
+  const bool idle = ending_ == Ending::kNo && work_->Idle() && arrived_.empty() && taken_.empty();
+  const auto is_gone = [this](const Frontend& f) { return !f.reader->writer_present(context_.now_ns()); };
+  if (idle && AllFrontends(is_gone)) return {State::kWaiting, "waiting for a frontend"};
+  return {State::kMapping, ""};
+}
+
 void MapperNode::PublishStatus() {
-  if (core_ && work_->Idle()) core_status_ = StatusOf(*core_);
-  MapperStatus status = core_status_;
+  if (core_ && work_->Idle()) core_report_.status = StatusOf(*core_, core_report_.tally);
+  MapperStatus status = core_report_.status;
   std::vector<const StreamReader*> readers;
   for (const Frontend& frontend : frontends_) readers.push_back(frontend.reader.get());
   readers.push_back(loop_reader_.get());
-  status.head = MakeStatusHead(core_ ? "" : "waiting for a camera", readers);
-  status.state = core_ ? MapperStatus::State::kMapping : MapperStatus::State::kStarting;
-  if (ending_ == Ending::kCompleting) status.state = MapperStatus::State::kDone;
+  const auto [state, reason] = StateAndReason();
+  status.head = MakeStatusHead(reason, readers);
+  status.state = state;
   status.keyframe_queue = static_cast<int32_t>(arrived_.size() + taken_.size());
   status.keyframes_unaccepted = static_cast<int32_t>(pending_.size()) + (awaited_ ? 1 : 0);
   status.last_settled = last_settled_;

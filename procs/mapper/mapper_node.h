@@ -5,6 +5,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/mapping/mapper_core.h"
@@ -79,6 +81,11 @@ class MapperNode : public StreamNode {
     Version version;  ///< of the record that brought it
     Term asked;       ///< of the loop closer that was asked
   };
+  /// What the core has to say of itself.
+  struct CoreReport {
+    MapTally tally;       ///< the core's, as the map is
+    MapperStatus status;  ///< as it was said last
+  };
   enum class Ending : uint8_t {
     kNo,
     kFrontendEnded,
@@ -121,6 +128,7 @@ class MapperNode : public StreamNode {
   void PublishDelta(MapDelta delta);
   void InterruptCore();
   bool EndIfDone();
+  std::pair<MapperStatus::State, std::string> StateAndReason() const;
 
   const RunOptions run_;
   Files files_;
@@ -143,7 +151,7 @@ class MapperNode : public StreamNode {
   std::optional<Awaited> awaited_;
   std::optional<KeyframeId> last_settled_;
   KeyframeTiming timing_;
-  MapperStatus core_status_;                 ///< what the core had to say of itself last
+  CoreReport core_report_;
   std::atomic<bool> keyframe_waits_{false};  ///< asked by the core: it finishes early
   std::atomic<bool> stops_{false};           ///< asked by the core while it adjusts whole maps
   std::unique_ptr<CoreThread> work_;         ///< ends before everything that jobs touch

@@ -4,10 +4,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/mapping/testing/wall_scene.h"
 #include "dmslam/settings/settings.h"
 
 namespace dmslam {
@@ -142,6 +145,86 @@ TEST_F(LoopAnswersTest, OneWhoseRecordsTellOfDifferentThingsIsRefusedByName) {
   Publish(records[0]);
   Publish(records[1]);
   ExpectNotWhole(9);
+}
+
+/// ... with somebody who hears the mapper's status, and a frontend.
+class MapperStatusTest : public LoopAnswersTest {
+ protected:
+  using State = MapperStatus::State;
+
+  MapperStatusTest() : ear_(bus_.AddPort()) {
+    ear_.Subscribe(channels::kMapperStatus);
+    ear_.SetHandler([this](const std::string&, std::span<const uint8_t> bytes) {
+      status_ = wire::Decode<MapperStatus>(bytes).value();
+    });
+  }
+  void BeginFrontend() {
+    StreamWriter::Options writer;
+    writer.session = kSession;
+    writer.stream = StreamId::kFrontend;
+    writer.owner = "FRONTEND";
+    writer.name = "frontend";
+    writer.schema_hash = SchemaHash();
+    writer.roles = {{"mapper", true}};
+    frontend_ = std::make_unique<StreamWriter>(writer, Term{10, 5}, Version{});
+    other_.AddWriter(frontend_.get(), "FRONTEND", {"MAPPER"});
+  }
+  template <typename Message>
+  void Say(const Message& message) {
+    frontend_->Publish(wire::Info<Message>().channel, wire::Encode(message), now_ns_);
+  }
+  /// Until what was said is in the status.
+  void RunOn() {
+    Run();
+    Run();
+  }
+  static InitialMap FirstMap() {
+    const WallScene scene;
+    InitialMap proposal;
+    proposal.map_id = 1;
+    proposal.first = scene.Propose(1, 0, 1, 0, 0);
+    proposal.second = scene.Propose(2, 0.3, 1, 0, 1);
+    for (uint16_t i = 0; i < 60; ++i) proposal.points.push_back({i, i, scene.point(i)});
+    return proposal;
+  }
+  /// One of those of which the mapper has told.
+  std::optional<LandmarkId> SomeLandmark() {
+    std::optional<LandmarkId> some;
+    while (const std::optional<Record> record = map_->Take()) {
+      const auto delta = wire::Decode<MapDelta>(*record->bytes);
+      if (delta && !delta->landmarks.empty()) some = delta->landmarks.front().id;
+      map_->AcceptTaken();
+    }
+    return some;
+  }
+
+  MemoryBus::Port& ear_;
+  std::unique_ptr<StreamWriter> frontend_;
+  MapperStatus status_;
+};
+
+TEST_F(MapperStatusTest, SaysForWhomItWaitsAndWhatIsInTheMap) {
+  RunOn();
+  EXPECT_EQ(status_.state, State::kWaiting);
+  EXPECT_EQ(status_.head.reason, "waiting for a frontend");
+  BeginFrontend();
+  RunOn();
+  EXPECT_EQ(status_.state, State::kMapping);
+  EXPECT_EQ(status_.head.reason, "");
+  EXPECT_EQ(status_.maps, 0);
+  Say(FirstMap());
+  RunOn();
+  EXPECT_EQ(status_.maps, 1);
+  EXPECT_EQ(status_.keyframes, 2);
+  EXPECT_EQ(status_.moving_landmarks, 0);
+  const std::optional<LandmarkId> moving = SomeLandmark();
+  ASSERT_TRUE(moving);
+  FrameEvidence evidence;
+  evidence.map_id = 1;
+  evidence.items.push_back({*moving, 1, 0, 1});
+  Say(evidence);
+  RunOn();
+  EXPECT_EQ(status_.moving_landmarks, 1);
 }
 
 }  // namespace

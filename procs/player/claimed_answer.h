@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "dmslam/messaging/claims.h"
+
 namespace dmslam {
 
 /// An answer that contradicts what a player knows may be forged: it is believed when it has been said for
@@ -17,13 +19,12 @@ class ClaimedAnswer {
     return now_ns - *since_ns_ >= kLongEnoughNs;
   }
   /// Whether it was said within the last second.
-  bool IsOpen(int64_t now_ns) const { return since_ns_ && now_ns - last_ns_ <= kSilentNs; }
+  bool IsOpen(int64_t now_ns) const { return since_ns_ && now_ns - last_ns_ <= kInsistsEveryNs; }
   /// What it contradicts was said meanwhile.
   void Clear() { since_ns_.reset(); }
 
  private:
   static constexpr int64_t kLongEnoughNs = 150'000'000;
-  static constexpr int64_t kSilentNs = 1'000'000'000;
   std::optional<int64_t> since_ns_;
   int64_t last_ns_ = 0;
 };

@@ -9,7 +9,6 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kTellEveryNs = 200'000'000;
-constexpr int64_t kNobodyNs = 60'000'000'000;
 constexpr int64_t kNobodyWhenStoppedNs = 2'000'000'000;
 constexpr int64_t kMapperSilentNs = 5'000'000'000;  // nobody to wait for
 
@@ -46,7 +45,7 @@ std::optional<int> EndOfPlay::ExitCode(int64_t now_ns, bool stopped) const {
     return mapper_done_ || mapper_silent ? std::optional(0) : std::nullopt;
   }
   if (stopped && now_ns - since_ns_ > kNobodyWhenStoppedNs) return 0;
-  if (now_ns - std::max(frontend_heard_ns_, since_ns_) > kNobodyNs) return kExitNoFrontend;
+  if (now_ns - std::max(frontend_heard_ns_, since_ns_) > kNoFrontendNs) return kExitNoFrontend;
   return std::nullopt;
 }
 

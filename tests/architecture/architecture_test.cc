@@ -165,7 +165,9 @@ std::string Misplaced(const Include& include) {
   return "";
 }
 
-/// The algorithms know no bus and no threads.
+/// The algorithms know no bus and no threads. The one way by which they use several is ForEachInParallel
+/// (util/parallel.h): it waits for all, and no piece of work depends on another, so that results are the same
+/// whatever the number of threads. (optimization/bundle_adjustment.cc has a task for its heap's sake alone.)
 std::string NotForCores(const Include& include) {
   static const std::regex core(
       R"(^(src/dmslam/(initialization|dynamics|tracking|mapping|loops|refinement|slam)/|procs/[a-z]+/.*_core\.).*(h|cc)$)");

@@ -13,8 +13,6 @@
 namespace dmslam::replay {
 namespace {
 
-constexpr size_t kPartBytes = 56 * 1024;
-
 std::string Text(const std::vector<StampedPose>& poses) {
   std::string text;
   for (const StampedPose& pose : poses) text += FormatPose(pose) + "\n";
@@ -28,7 +26,7 @@ Outcome ToOutcome(const TrajectoryBuilder::Trajectories& trajectories, const Map
   outcome.keyframes = map.keyframes().size();
   outcome.landmarks = map.num_landmarks();
   if (map.keyframes().empty()) return outcome;
-  for (const MapDelta& part : CutSnapshot(map, map.keyframes().rbegin()->first, kPartBytes)) {
+  for (const MapDelta& part : CutSnapshot(map, map.keyframes().rbegin()->first, kSnapshotPieceBytes)) {
     const std::vector<uint8_t> bytes = wire::Encode(part);
     outcome.map.append(bytes.begin(), bytes.end());
   }

@@ -42,6 +42,21 @@ expect 0 "seen at \(345.75, 292.00\)" "$work/outside/outside_project" "$prefix/s
 expect 0 "poses, ATE 0\.0[0-9]+" "$work/outside/outside_project" "$prefix/share/dmslam/config/synthetic.yaml" \
   "$sequence/groundtruth.txt" "$work/run/trajectory.txt"
 
+# A room that is asked for is there, or refused by name.
+mkdir "$work/rooms"
+cat >"$work/rooms/CMakeLists.txt" <<'EOF'
+cmake_minimum_required(VERSION 3.25)
+project(rooms LANGUAGES CXX)
+find_package(dmslam 0.2 REQUIRED COMPONENTS ${ROOMS})
+foreach(room IN LISTS ROOMS)
+  get_target_property(type dmslam::${room} TYPE)
+  message(STATUS "dmslam::${room} is a ${type}")
+endforeach()
+EOF
+expect 0 "dmslam::loops is a STATIC_LIBRARY" cmake -S "$work/rooms" -B "$work/rooms/all" \
+  -DCMAKE_PREFIX_PATH="$prefix" "-DROOMS=tracking;mapping;loops;evaluation"
+expect fail "no room of the name 'cellar'" cmake -S "$work/rooms" -B "$work/rooms/none" -DCMAKE_PREFIX_PATH="$prefix" -DROOMS=cellar
+
 # The whole SLAM in one program, without LCM: the poses are those of the processes.
 camera=$prefix/share/dmslam/config/synthetic.yaml
 expect 0 "" cmake -S "$root/examples/slam_folder" -B "$work/slam" -DCMAKE_PREFIX_PATH="$prefix" \

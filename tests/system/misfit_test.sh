@@ -46,7 +46,7 @@ misfit() { # NAME PATTERN ARGUMENTS...
   done
   no_orphans "the run with another $odd"
 }
-settings="the frontend of session 5 has other settings \(profile dm, seed 1, hash [0-9a-f]{16}\) than this process"
+settings="the frontend of session 5 \(version [0-9.]+, this is [0-9.]+\) has other settings \(profile dm, seed 1, hash [0-9a-f]{16}\) than this process"
 for name in mapper loopcloser collector; do
   misfit "$name" "$settings .*give every process the same --config and --set" --set tracking.min_inliers=25
 done

@@ -15,6 +15,10 @@ double AgeAt(const Map& map, const Landmark& landmark, int64_t stamp_ns) {
   return static_cast<double>(std::max(stamp_ns - landmark.first_ns, last_ns - stamp_ns)) * 1e-9;
 }
 
+bool IsOldAt(const Landmark& landmark, int64_t stamp_ns, const VoteOptions& options) {
+  return static_cast<double>(stamp_ns - landmark.first_ns) * 1e-9 >= options.trusted_age_s;
+}
+
 bool LandmarkVotes::HasVote(const Landmark& landmark) const {
   if (!options_.motion_belief) return true;
   if (!IsStatic(&landmark)) return false;

@@ -32,6 +32,11 @@ struct VoteOptions {
 /// backwards and in a map of another time, until it was seen last.
 double AgeAt(const Map& map, const Landmark& landmark, int64_t stamp_ns);
 
+/// Whether the landmark was made so long before that moment that it has full weight. Not AgeAt, which looks
+/// both ways: where time runs backwards none is old here, for the map begins where the room was hidden
+/// before, so that landmarks which are not seen there are no sign of a wrong pose.
+bool IsOldAt(const Landmark& landmark, int64_t stamp_ns, const VoteOptions& options);
+
 /// Which landmarks have a say in a frame's pose, and how much: what the map believes of them, their age, and
 /// a short memory of those that were just seen elsewhere.
 class LandmarkVotes {

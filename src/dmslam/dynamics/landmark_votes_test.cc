@@ -55,6 +55,16 @@ TEST(LandmarkVotesTest, AgeCountsFromTheFarEndOfTheTimeInWhichItIsSeen) {
   EXPECT_NEAR(AgeAt(scene.map(), unseen, 7 * kSecond), 3, 1e-9);
 }
 
+TEST(LandmarkVotesTest, OldIsWhatWasMadeLongBefore) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  Landmark landmark;
+  landmark.first_ns = 10 * kSecond;
+  const auto old = [&](int64_t at_s) { return IsOldAt(landmark, at_s * kSecond, {.trusted_age_s = 4.0}); };
+  EXPECT_FALSE(old(13));
+  EXPECT_TRUE(old(14));
+  EXPECT_FALSE(old(2)) << "where time runs backwards none is";
+}
+
 TEST(LandmarkVotesTest, OfAMapThatIsGoneNothingIsRemembered) {
   Landmark landmark;
   landmark.id = MapScene::IdOf(0);

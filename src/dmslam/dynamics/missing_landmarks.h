@@ -43,6 +43,8 @@ class WitnessGrid {
   }
 
  private:
+  // An index alone: with any other number of cells the same witnesses are visited (FoundShare's cells, of
+  // which there are as many, are what it measures by).
   static constexpr int kColumns = 20, kRows = 15;
 
   int Column(double x) const;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
+#include <vector>
 
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/proven.h"
@@ -14,7 +14,12 @@ namespace {
 
 constexpr int kCoarsestOctave = std::numeric_limits<int>::max();
 
+// Suspects and witnesses are found once and named by reference. What is still looked up is what the map's own
+// records name by id: what a feature sees (`LandmarkSeenBy`), and who observes a landmark (`At`). Nothing is
+// removed before all is decided, so every reference holds until then.
+
 struct Suspect {
+  const Landmark* landmark = nullptr;
   int64_t first_ns = 0, last_ns = 0;  ///< seen from then to then
   int through = 0;                    ///< keyframes of another time that see through it
   int support = 0;                    ///< that see something at its place
@@ -26,11 +31,11 @@ using Suspects = std::map<LandmarkId, Suspect>;
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-void AddIfUnproven(const Map& map, LandmarkId id, const SeenThroughOptions& options, Suspects* suspects) {
-  const Landmark& landmark = *map.FindLandmark(id);
+void AddIfUnproven(const Map& map, const Landmark& landmark, const SeenThroughOptions& options,
+                   Suspects* suspects) {
   const std::vector<int64_t> stamps = ObservationStamps(map, landmark);
   if (stamps.empty() || OutlastsStanding(stamps, {options.standing_s, options.outer_observations})) return;
-  (*suspects)[id] = {stamps.front(), stamps.back()};
+  (*suspects)[landmark.id] = {&landmark, stamps.front(), stamps.back()};
 }
 
 bool InImage(const Camera& camera, const Eigen::Vector2d& uv_px) {
@@ -52,11 +57,11 @@ Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3
   if (!uv_px || !InImage(map.camera(), *uv_px)) return depths;
   witness.features->grid.ForEachInRadius(
       *uv_px, SearchRadiusPx(map.camera(), options.radius_rad), 0, kCoarsestOctave, [&](uint32_t feature) {
-        const LandmarkId other = witness.landmarks[feature];
-        if (!other.valid()) return;
-        const auto suspect = suspects.find(other);
+        const Landmark* other = map.LandmarkSeenBy(witness, feature);
+        if (other == nullptr) return;
+        const auto suspect = suspects.find(other->id);
         if (suspect != suspects.end() && suspect->second.condemned) return;
-        const double ratio = (witness.T_cam_world * map.FindLandmark(other)->p_world).z() / p_cam.z();
+        const double ratio = (witness.T_cam_world * other->p_world).z() / p_cam.z();
         if (ratio > 1 + options.depth_tolerance) {
           ++depths.behind;
         } else if (ratio > 1 - options.depth_tolerance) {
@@ -68,47 +73,49 @@ Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3
   return depths;
 }
 
+/// Returns how many.
+int Condemn(const std::vector<Suspect*>& found) {
+  for (Suspect* suspect : found) suspect->condemned = true;
+  return static_cast<int>(found.size());
+}
+
 /// Asks every witness from another time, and condemns the suspects that are seen through. Returns how many.
-int CondemnSeenThrough(const Map& map, const std::vector<KeyframeId>& witnesses,
+int CondemnSeenThrough(const Map& map, const std::vector<const Keyframe*>& witnesses,
                        const SeenThroughOptions& options, Suspects* suspects) {
-  std::vector<LandmarkId> found;
+  std::vector<Suspect*> found;
   for (auto& [id, suspect] : *suspects) {
     if (suspect.condemned) continue;
     suspect.through = suspect.support = suspect.proven_support = 0;
-    const Eigen::Vector3d p_world = map.FindLandmark(id)->p_world;
-    for (const KeyframeId witness_id : witnesses) {
-      const Keyframe& witness = *map.FindKeyframe(witness_id);
-      if (Seconds(suspect.first_ns - witness.stamp_ns) < options.guard_s &&
-          Seconds(witness.stamp_ns - suspect.last_ns) < options.guard_s) {
+    for (const Keyframe* witness : witnesses) {
+      if (Seconds(suspect.first_ns - witness->stamp_ns) < options.guard_s &&
+          Seconds(witness->stamp_ns - suspect.last_ns) < options.guard_s) {
         continue;
       }
-      const Depths depths = LookThrough(map, witness, p_world, *suspects, options);
+      const Depths depths = LookThrough(map, *witness, suspect.landmark->p_world, *suspects, options);
       if (depths.behind > 0 && depths.same == 0) ++suspect.through;
       if (depths.same > 0) ++suspect.support;
       if (depths.proven_same > 0) ++suspect.proven_support;
     }
-    if (suspect.through > options.through_per_support * suspect.support) found.push_back(id);
+    if (suspect.through > options.through_per_support * suspect.support) found.push_back(&suspect);
   }
-  for (const LandmarkId id : found) suspects->at(id).condemned = true;
-  return static_cast<int>(found.size());
+  return Condemn(found);
 }
 
 /// Share of a landmark's neighbours, in the keyframes that see it and at its depth, that are condemned.
-double CondemnedAround(const Map& map, LandmarkId id, const Suspects& suspects,
+double CondemnedAround(const Map& map, const Landmark& landmark, const Suspects& suspects,
                        const SeenThroughOptions& options) {
-  const Landmark& landmark = *map.FindLandmark(id);
   const double together_px = SearchRadiusPx(map.camera(), options.together_rad);
   int all = 0, condemned = 0;
   for (const Observation& o : landmark.observations) {
-    const Keyframe& keyframe = *map.FindKeyframe(o.keyframe);
+    const Keyframe& keyframe = map.At(o.keyframe);
     const double depth = (keyframe.T_cam_world * landmark.p_world).z();
     const auto visit = [&](uint32_t feature) {
-      const LandmarkId other = keyframe.landmarks[feature];
-      if (!other.valid() || other == id) return;
-      const double ratio = (keyframe.T_cam_world * map.FindLandmark(other)->p_world).z() / depth;
+      const Landmark* other = map.LandmarkSeenBy(keyframe, feature);
+      if (other == nullptr || other == &landmark) return;
+      const double ratio = (keyframe.T_cam_world * other->p_world).z() / depth;
       if (std::abs(ratio - 1) > options.depth_tolerance) return;
       ++all;
-      const auto suspect = suspects.find(other);
+      const auto suspect = suspects.find(other->id);
       if (suspect != suspects.end() && suspect->second.condemned) ++condemned;
     };
     keyframe.features->grid.ForEachInRadius(keyframe.features->uv_px[o.feature], together_px, 0,
@@ -123,8 +130,7 @@ class CondemnedPlaces {
   CondemnedPlaces(const Map& map, const Suspects& suspects) : map_(map) {
     for (const auto& [id, suspect] : suspects) {
       if (!suspect.condemned) continue;
-      for (const Observation& o : map.FindLandmark(id)->observations)
-        uv_px_[o.keyframe].push_back(PixelOf(o));
+      for (const Observation& o : suspect.landmark->observations) uv_px_[o.keyframe].push_back(PixelOf(o));
     }
   }
 
@@ -141,7 +147,7 @@ class CondemnedPlaces {
 
  private:
   const Eigen::Vector2d& PixelOf(const Observation& o) const {
-    return map_.FindKeyframe(o.keyframe)->features->uv_px[o.feature];
+    return map_.At(o.keyframe).features->uv_px[o.feature];
   }
 
   const Map& map_;
@@ -150,17 +156,16 @@ class CondemnedPlaces {
 
 /// Suspects among the condemned share their fate. Returns how many.
 int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
-  std::vector<LandmarkId> found;
+  std::vector<Suspect*> found;
   const CondemnedPlaces condemned(map, *suspects);
   const double together_px = SearchRadiusPx(map.camera(), options.together_rad);
-  for (const auto& [id, suspect] : *suspects) {
+  for (auto& [id, suspect] : *suspects) {
     if (suspect.condemned) continue;
-    const bool near = condemned.AnyNear(*map.FindLandmark(id), together_px + 1e-6);
-    const double share = near ? CondemnedAround(map, id, *suspects, options) : 0.0;
-    if (share >= options.together_share) found.push_back(id);
+    const bool near = condemned.AnyNear(*suspect.landmark, together_px + 1e-6);
+    const double share = near ? CondemnedAround(map, *suspect.landmark, *suspects, options) : 0.0;
+    if (share >= options.together_share) found.push_back(&suspect);
   }
-  for (const LandmarkId id : found) suspects->at(id).condemned = true;
-  return static_cast<int>(found.size());
+  return Condemn(found);
 }
 
 /// Where somebody stood, an unproven landmark needs proven ones at its place, seen at other times by more
@@ -168,7 +173,7 @@ int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects*
 /// by chance seldom. Its neighbours share its fate.
 void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
   for (auto& [id, suspect] : *suspects) {
-    const auto observers = static_cast<double>(map.FindLandmark(id)->observations.size());
+    const auto observers = static_cast<double>(suspect.landmark->observations.size());
     const bool supported = suspect.proven_support > options.support_per_observation * observers;
     if (!supported) suspect.condemned = true;
   }
@@ -179,16 +184,17 @@ int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   int removed = 0;
   for (const auto& [id, suspect] : suspects) {
     if (!suspect.condemned) continue;
-    map.RemoveLandmark(map.At(id));
+    map.RemoveLandmark(*suspect.landmark);
     ++removed;
   }
   return removed;
 }
 
-/// Keyframes that look where keyframe `id` looks, nearest first.
-std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenThroughOptions& options) {
-  const double depth = map.MedianDepth(*map.FindKeyframe(id)).value_or(0.0);
-  std::vector<KeyframeId> witnesses = map.KeyframesNear(id, depth, options.witness_angle_rad);
+/// Keyframes that look where this one looks, nearest first.
+std::vector<const Keyframe*> WitnessesNear(const Map& map, const Keyframe& keyframe,
+                                           const SeenThroughOptions& options) {
+  const double depth = map.MedianDepth(keyframe).value_or(0.0);
+  std::vector<const Keyframe*> witnesses = map.KeyframesNear(keyframe, depth, options.witness_angle_rad);
   if (witnesses.size() > static_cast<size_t>(options.max_witnesses))
     witnesses.resize(static_cast<size_t>(options.max_witnesses));
   return witnesses;
@@ -196,12 +202,13 @@ std::vector<KeyframeId> WitnessesNear(const Map& map, KeyframeId id, const SeenT
 
 }  // namespace
 
-int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& options) {
+int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe, const SeenThroughOptions& options) {
   Suspects suspects;
-  for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-    if (landmark.valid()) AddIfUnproven(map, landmark, options, &suspects);
+  for (size_t feature = 0; feature < keyframe.landmarks.size(); ++feature) {
+    const Landmark* landmark = map.LandmarkSeenBy(keyframe, feature);
+    if (landmark != nullptr) AddIfUnproven(map, *landmark, options, &suspects);
   }
-  const std::vector<KeyframeId> witnesses = WitnessesNear(map, id, options);
+  const std::vector<const Keyframe*> witnesses = WitnessesNear(map, keyframe, options);
   if (CondemnSeenThrough(map, witnesses, options, &suspects) == 0) return 0;
   for (int round = 0; round < options.rounds; ++round) {
     const int together = CondemnTogether(map, options, &suspects);
@@ -212,23 +219,16 @@ int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& o
 
 int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
   Suspects suspects;
-  size_t landmarks = 0;
-  for (const LandmarkId id : map.LandmarkIdsSorted()) {
-    if (map.FindLandmark(id)->map_id != map_id) continue;
-    AddIfUnproven(map, id, options, &suspects);
-    ++landmarks;
-  }
-  std::vector<KeyframeId> witnesses;
-  for (const auto& [id, keyframe] : map.keyframes()) {
-    if (keyframe.map_id == map_id) witnesses.push_back(id);
-  }
+  const std::vector<const Landmark*> landmarks = map.LandmarksOf(map_id);
+  for (const Landmark* landmark : landmarks) AddIfUnproven(map, *landmark, options, &suspects);
+  const std::vector<const Keyframe*> witnesses = map.KeyframesOf(map_id);
   const double before = static_cast<double>(removed_before);
   const double seen_through = before + CondemnSeenThrough(map, witnesses, options, &suspects);
-  const bool any_proven = suspects.size() < landmarks;
+  const bool any_proven = suspects.size() < landmarks.size();
   const bool somebody_stood =
       any_proven && seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
   for (auto& [id, suspect] : suspects) {
-    if (somebody_stood && map.FindLandmark(id)->evidence.moved > 0) suspect.condemned = true;
+    if (somebody_stood && suspect.landmark->evidence.moved > 0) suspect.condemned = true;
   }
   for (int round = 0; round < options.rounds; ++round) {
     const int together = CondemnTogether(map, options, &suspects);

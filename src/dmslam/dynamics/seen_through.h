@@ -45,9 +45,9 @@ struct SeenThroughOptions {
 /// pixel that lie behind it, and none at its depth: free-space carving with the map's own points. Its
 /// neighbours in the image and in depth go with it.
 
-/// Removes those among the landmarks that keyframe `id` sees. Witnesses are the keyframes that look at the
-/// same place. Returns how many.
-int RemoveSeenThrough(MapEditor& map, KeyframeId id, const SeenThroughOptions& options);
+/// Removes those among the landmarks that a keyframe of this map sees. Witnesses are the keyframes that look
+/// at the same place. Returns how many.
+int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe, const SeenThroughOptions& options);
 
 /// The same over a whole map when its sequence has ended. Where so many of the unproven were seen through
 /// (now, or `removed_before` while mapping) that somebody must have stood there, unproven landmarks that were

@@ -95,7 +95,7 @@ TEST_F(StandingPerson, IsRemovedWhereTheWallWasSeenBefore) {
   const auto person = AddLandmarks(kPersonDepth, with_too, true);
   See(with, wall, person);
   See(with_too, wall, person);
-  EXPECT_EQ(RemoveSeenThrough(map_, with_too, SeenThroughOptions()), 9);
+  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(with_too), SeenThroughOptions()), 9);
   EXPECT_EQ(CountLeft(map_, person), 0);
   EXPECT_EQ(CountLeft(map_, wall), 63);
 }
@@ -106,7 +106,7 @@ TEST_F(StandingPerson, StaysWhileNobodySawWhatIsBehind) {
   const auto person = AddLandmarks(kPersonDepth, with_too, true);
   See(with, wall, person);
   See(with_too, wall, person);
-  EXPECT_EQ(RemoveSeenThrough(map_, with_too, SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(with_too), SeenThroughOptions()), 0);
   EXPECT_EQ(CountLeft(map_, person), 9);
 }
 
@@ -141,7 +141,7 @@ TEST_F(StandingPerson, FurnitureIsProvenByTime) {
   const KeyframeId odd =
       AddKeyframe(400, 13);  // sees the wall where the cupboard stands, for whatever reason
   See(odd, wall, {});
-  EXPECT_EQ(RemoveSeenThrough(map_, late_too, SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(late_too), SeenThroughOptions()), 0);
   EXPECT_EQ(CountLeft(map_, cupboard), 9);
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/map/conventions.h"
 #include "dmslam/map/map.h"
 
 namespace dmslam {
@@ -14,7 +15,7 @@ struct ChainDriftOptions {
   double link_rotation_rad = 0.0075;
   double link_position = 0.02;  ///< share of the median depth
   double link_log_scale = 0.0075;
-  int min_shared = 15;  ///< fewer landmarks in common make no link, beside the spanning tree's
+  int min_shared = kMinCovisibility;  ///< fewer landmarks in common make no link, beside the spanning tree's
 };
 
 /// How far the relative pose of two keyframes may be off, one sigma each.

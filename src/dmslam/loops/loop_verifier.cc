@@ -13,6 +13,7 @@
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/loops/chain_drift.h"
 #include "dmslam/loops/same_time.h"
+#include "dmslam/map/conventions.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 #include "dmslam/optimization/sim3_optimization.h"
@@ -21,7 +22,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int kPlaceNeighbours = 15;
 constexpr int kPlaceNeighboursMatched = 5;
 constexpr int kMaxPoseIterations = 1000;
 constexpr size_t kMinDepthRatios = 5;

@@ -44,6 +44,10 @@ void LoopcloserCore::HearOfCorrection(const MapDelta& delta) {
   keyframes_since_loop_ = options_.min_keyframes_between;
 }
 
+void LoopcloserCore::Begin(Step step) const {
+  if (on_step_) on_step_(step);
+}
+
 void LoopcloserCore::ForgetMap() {
   map_.Clear();
   places_.Clear();
@@ -93,6 +97,7 @@ const Keyframe* LoopcloserCore::Index(KeyframeId id) {
 
 /// Places that words name, for this keyframe and for those before it.
 std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
+  Begin(Step::kNamePlaces);
   LoopDetector::Found found;
   if (options_.within_maps) found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
@@ -103,6 +108,14 @@ std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
   });
   counters_.candidates += places.size();
   places.insert(places.begin(), found.candidates.begin(), found.candidates.end());
+  Begin(Step::kVerify);
+  return places;
+}
+
+std::vector<KeyframeId> LoopcloserCore::NamePlacesInOtherMaps(const Keyframe& keyframe) const {
+  Begin(Step::kNamePlaces);
+  std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
+  Begin(Step::kVerify);
   return places;
 }
 
@@ -195,7 +208,7 @@ std::optional<VerifiedLoop> LoopcloserCore::AskAgain(const Keyframe& newest) {
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::FindInOtherMaps(const Keyframe& keyframe) {
-  for (const KeyframeId candidate : detector_.DetectInOtherMaps(map_, places_, keyframe)) {
+  for (const KeyframeId candidate : NamePlacesInOtherMaps(keyframe)) {
     Verdict verdict;
     verdict.place = candidate;
     std::optional<VerifiedLoop> loop =
@@ -209,6 +222,7 @@ std::optional<VerifiedLoop> LoopcloserCore::FindInOtherMaps(const Keyframe& keyf
 }
 
 LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
+  Begin(Step::kCorrect);
   LoopAnswer answer = CorrectLoop(map_, loop, verifier_, options_, interrupt_);
   if (answer.kind != LoopAnswer::Kind::kLoop) return {};
   ++counters_.loops;
@@ -222,6 +236,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
 }
 
 LoopAnswer LoopcloserCore::AdjustAfterLoop(KeyframeId keyframe) {
+  Begin(Step::kCorrect);
   adjustment_due_ = false;
   LoopAnswer answer = AdjustGlobally(map_, keyframe, options_.correction, interrupt_);
   if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) ++counters_.global_adjustments;

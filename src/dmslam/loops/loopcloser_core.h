@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/loops/loop_detector.h"
@@ -38,6 +39,11 @@ class LoopcloserCore {
 
   /// Asked now and then during long work; true: finish early. May be empty (lock-step).
   void SetInterrupt(std::function<bool()> interrupt) { interrupt_ = std::move(interrupt); }
+  /// What a check does next, for who has a clock: places are named, geometry is asked about them, and a
+  /// correction is worked out.
+  enum class Step : uint8_t { kNamePlaces, kVerify, kCorrect };
+  /// Told of every step as it begins. May be empty.
+  void SetOnStep(std::function<void(Step)> on_step) { on_step_ = std::move(on_step); }
   void ApplyMapDelta(const MapDelta& delta);
   /// The replica is void: a fresh map stream, or a snapshot, begins.
   void ForgetMap();
@@ -50,6 +56,8 @@ class LoopcloserCore {
   void KeepFeaturesIn(std::shared_ptr<FeatureStore> store) { map_.KeepFeaturesIn(std::move(store)); }
   const Map& map() const { return map_; }
   const LoopcloserCounters& counters() const { return counters_; }
+  /// Whether a loop was proposed on which the mapper's word has not been heard.
+  bool AwaitsMapper() const { return awaited_correction_.has_value(); }
   /// A place that words named consistently, or that an earlier keyframe proposed, and what geometry said of
   /// it.
   struct Verdict {
@@ -62,10 +70,12 @@ class LoopcloserCore {
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
 
  private:
+  void Begin(Step step) const;
   void HearOfCorrection(const MapDelta& delta);
   LoopAnswer FindCorrection(KeyframeId id);
   const Keyframe* Index(KeyframeId id);
   std::vector<KeyframeId> NamePlaces(const Keyframe& keyframe);
+  std::vector<KeyframeId> NamePlacesInOtherMaps(const Keyframe& keyframe) const;
   void ForgetUnconfirmed(int64_t now_ns);
   /// Follows what earlier keyframes proposed: a loop that enough of them have confirmed for long enough.
   std::optional<VerifiedLoop> ConfirmProposed(const Keyframe& keyframe);
@@ -87,6 +97,7 @@ class LoopcloserCore {
   Camera camera_;
   Pyramid pyramid_;
   std::function<bool()> interrupt_;
+  std::function<void(Step)> on_step_;
   Replica map_;
   MapPlaces places_;
   LoopDetector detector_;

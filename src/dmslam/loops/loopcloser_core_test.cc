@@ -116,6 +116,35 @@ TEST(LoopcloserCoreTest, TheKeyframeAfterALoopIsAnsweredWithAGlobalAdjustment) {
   EXPECT_EQ(core.counters().loops, answers.loops.size());
 }
 
+TEST(LoopcloserCoreTest, ItsStepsAreToldAndThatItWaitsForTheMapper) {
+  using Step = LoopcloserCore::Step;
+  Room room({});
+  LoopcloserCore core = MakeCore();
+  std::vector<Step> steps;
+  core.SetOnStep([&](Step step) { steps.push_back(step); });
+  LoopAnswer answer;
+  while (answer.kind == LoopAnswer::Kind::kNone) {
+    ASSERT_LT(core.counters().checked, static_cast<uint64_t>(kKeyframes));
+    EXPECT_FALSE(core.AwaitsMapper());
+    const MapDelta delta = room.Next();
+    core.ApplyMapDelta(delta);
+    steps.clear();
+    answer = core.Check(*delta.about);
+    ASSERT_GE(steps.size(), 2u);
+    EXPECT_EQ(steps[0], Step::kNamePlaces);
+    EXPECT_EQ(steps[1], Step::kVerify);
+  }
+  EXPECT_EQ(steps.back(), Step::kCorrect);
+  EXPECT_TRUE(core.AwaitsMapper());
+  core.ApplyMapDelta(room.SayOf(answer, MapEvent::kCorrected));
+  EXPECT_FALSE(core.AwaitsMapper());
+  const MapDelta delta = room.Next();
+  core.ApplyMapDelta(delta);
+  steps.clear();
+  EXPECT_EQ(core.Check(*delta.about).kind, LoopAnswer::Kind::kGlobalAdjustment);
+  EXPECT_EQ(steps, std::vector<Step>{Step::kCorrect});
+}
+
 TEST(LoopcloserCoreTest, ALoopThatWasRefusedIsFoundAgainAndNotAdjusted) {
   Room room({});
   LoopcloserCore core = MakeCore();

@@ -163,23 +163,23 @@ std::vector<const Landmark*> Map::LandmarksOf(MapId map_id) const {
   return landmarks;
 }
 
-std::vector<KeyframeId> Map::KeyframesNear(KeyframeId id, double distance, double angle_rad) const {
-  std::vector<KeyframeId> ids;
-  const Keyframe* keyframe = FindKeyframe(id);
-  if (keyframe == nullptr) return ids;
-  const Eigen::Vector3d center = keyframe->T_cam_world.Center();
+std::vector<const Keyframe*> Map::KeyframesNear(const Keyframe& keyframe, double distance,
+                                                double angle_rad) const {
+  const Eigen::Vector3d center = keyframe.T_cam_world.Center();
   std::vector<std::pair<double, KeyframeId>> near;
   for (const Standpoint& other : standpoints_) {
-    if (other.map_id != keyframe->map_id || other.id == id) continue;
+    if (other.map_id != keyframe.map_id || other.id == keyframe.id) continue;
     const double apart = (other.center - center).norm();
     if (apart < distance) near.emplace_back(apart, other.id);
   }
   std::sort(near.begin(), near.end());
-  for (const auto& [apart, other] : near) {
-    const Eigen::Quaterniond& rotation = keyframes_.at(other).T_cam_world.rotation;
-    if (AngleBetween(rotation, keyframe->T_cam_world.rotation) < angle_rad) ids.push_back(other);
+  std::vector<const Keyframe*> keyframes;
+  for (const auto& [apart, id] : near) {
+    const Keyframe& other = At(id);
+    if (AngleBetween(other.T_cam_world.rotation, keyframe.T_cam_world.rotation) < angle_rad)
+      keyframes.push_back(&other);
   }
-  return ids;
+  return keyframes;
 }
 
 int Map::CountTracked(const Keyframe& keyframe, int min_observations) const {

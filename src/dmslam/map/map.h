@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dmslam/camera/camera.h"
+#include "dmslam/map/conventions.h"
 #include "dmslam/map/feature_store.h"
 #include "dmslam/map/keyframe.h"
 #include "dmslam/map/landmark.h"
@@ -96,12 +97,13 @@ class Map {
   const std::vector<KeyframeId>& Children(KeyframeId id) const;
   /// Keyframes that share at least `min_shared` landmarks with `id`, most first (ties: older first), at most
   /// `most`.
-  std::vector<KeyframeId> BestCovisible(KeyframeId id, int most, int min_shared = 15) const;
+  std::vector<KeyframeId> BestCovisible(KeyframeId id, int most, int min_shared = kMinCovisibility) const;
   /// The same of a keyframe of this map.
   std::vector<const Keyframe*> BestCovisible(const Keyframe& keyframe, int most, int min_shared) const;
-  /// The other keyframes of the same map whose cameras stand nearer to that of `id` than `distance` and are
-  /// turned from it by less than `angle_rad`, nearest first.
-  std::vector<KeyframeId> KeyframesNear(KeyframeId id, double distance, double angle_rad) const;
+  /// The other keyframes of the same map whose cameras stand nearer to that of `keyframe` than `distance` and
+  /// are turned from it by less than `angle_rad`, nearest first.
+  std::vector<const Keyframe*> KeyframesNear(const Keyframe& keyframe, double distance,
+                                             double angle_rad) const;
   /// Keyframes of one map, by id.
   std::vector<const Keyframe*> KeyframesOf(MapId map_id) const;
   /// Landmarks of one map, by id.

@@ -6,14 +6,14 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/map/conventions.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/mapping/landmark_fusion.h"
 
 namespace dmslam {
 namespace {
 
-constexpr int kMaxLoopSide = 1000;    // keyframes on a loop's side that are joined with the place
-constexpr int kPlaceNeighbours = 15;  // keyframes around the place
+constexpr int kMaxLoopSide = 1000;  // keyframes on a loop's side that are joined with the place
 
 /// Who follows which correction.
 class Corrections {

@@ -222,14 +222,23 @@ std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t fe
   return point;
 }
 
-/// Features without a landmark, and not seen to move.
-std::vector<uint8_t> FreeFeatures(const Keyframe& keyframe, const std::vector<uint16_t>& moving) {
+/// Features without a landmark.
+std::vector<uint8_t> FreeFeatures(const Keyframe& keyframe) {
   std::vector<uint8_t> use(keyframe.features->size(), 1);
   for (size_t i = 0; i < use.size(); ++i) {
     if (keyframe.landmarks[i].valid()) use[i] = 0;
   }
+  return use;
+}
+
+/// Those of them that were not seen to move.
+std::vector<uint8_t> FreeStillFeatures(const Keyframe& keyframe, const std::vector<uint16_t>& moving,
+                                       CreationDiagnostics* diagnostics) {
+  std::vector<uint8_t> use = FreeFeatures(keyframe);
   for (const uint16_t feature : moving) {
-    if (feature < use.size()) use[feature] = 0;
+    if (feature >= use.size() || use[feature] == 0) continue;
+    use[feature] = 0;
+    ++diagnostics->refused_motion;
   }
   return use;
 }
@@ -268,6 +277,7 @@ class MutualExclusion {
 }  // namespace
 
 CreationDiagnostics& CreationDiagnostics::operator+=(const CreationDiagnostics& other) {
+  refused_motion += other.refused_motion;
   matched += other.matched;
   refused_parallax += other.refused_parallax;
   refused_depth += other.refused_depth;
@@ -335,7 +345,7 @@ std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, const Ke
                                                         const std::vector<uint16_t>& moving,
                                                         const LandmarkCreationOptions& options,
                                                         CreationDiagnostics* diagnostics) {
-  const std::vector<uint8_t> use = FreeFeatures(keyframe, moving);
+  const std::vector<uint8_t> use = FreeStillFeatures(keyframe, moving, diagnostics);
   const double max_parallax_cos = std::cos(MinParallaxRad(map, keyframe, options));
   std::vector<std::vector<PairCandidate>> pairs(keyframe.features->size());
   for (const Keyframe* neighbour : map.BestCovisible(keyframe, options.neighbours, 1)) {
@@ -344,7 +354,7 @@ std::vector<std::vector<PairCandidate>> MatchNeighbours(const Map& map, const Ke
     if (!depth || baseline < options.min_baseline_over_depth * *depth) continue;
     const PairGeometry pair{keyframe, *neighbour, map, options, max_parallax_cos};
     for (const auto& [feature, other] :
-         MatchAlongEpipolarPlanes(keyframe, use, *neighbour, FreeFeatures(*neighbour, {}), map, options)) {
+         MatchAlongEpipolarPlanes(keyframe, use, *neighbour, FreeFeatures(*neighbour), map, options)) {
       ++diagnostics->matched;
       const std::optional<Eigen::Vector3d> point = Triangulate(pair, feature, other, diagnostics);
       if (!point) continue;

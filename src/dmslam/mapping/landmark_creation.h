@@ -11,6 +11,7 @@ namespace dmslam {
 
 /// How many candidates each test of Algorithm 1 refused.
 struct CreationDiagnostics {
+  uint32_t refused_motion = 0;  ///< features of the keyframe that were free, and were seen to move
   uint32_t matched = 0;
   uint32_t refused_parallax = 0;
   uint32_t refused_depth = 0;

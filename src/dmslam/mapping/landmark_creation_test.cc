@@ -68,8 +68,17 @@ TEST_F(Creation, NothingIsMadeOfWhatMoves) {
   std::vector<uint16_t> moving;
   for (uint16_t i = 30; i < 60; ++i) moving.push_back(i);
   const std::set<uint16_t> features = FeaturesOf(Propose(moving));
+  EXPECT_EQ(diagnostics_.refused_motion, 30u);
   for (const uint16_t feature : moving) EXPECT_FALSE(features.contains(feature)) << feature;
   EXPECT_GT(features.size(), 80u);
+}
+
+TEST_F(Creation, WhatMovesAndHasALandmarkIsNotCounted) {
+  Build(WallScene(), 2, 20);
+  std::vector<uint16_t> moving;
+  for (uint16_t i = 10; i < 60; ++i) moving.push_back(i);
+  Propose(moving);
+  EXPECT_EQ(diagnostics_.refused_motion, 40u) << "ten of them have one already";
 }
 
 TEST_F(Creation, NeedsABaseline) {

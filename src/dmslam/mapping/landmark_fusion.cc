@@ -46,10 +46,10 @@ void AddKeyframesNearby(const Map& map, const Keyframe& keyframe, const MapperOp
                         Targets* targets) {
   const double depth = map.MedianDepth(keyframe).value_or(0.0);
   int added = 0;
-  for (const KeyframeId near :
-       map.KeyframesNear(keyframe.id, options.nearby_distance * depth, options.nearby_angle_rad)) {
+  for (const Keyframe* near :
+       map.KeyframesNear(keyframe, options.nearby_distance * depth, options.nearby_angle_rad)) {
     if (added == options.nearby_keyframes) return;
-    if (targets->Add(&map.At(near))) ++added;
+    if (targets->Add(near)) ++added;
   }
 }
 

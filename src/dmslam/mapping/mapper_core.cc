@@ -50,7 +50,8 @@ void MapperCore::Publish(MapEvent event, std::optional<KeyframeId> about, std::o
 void MapperCore::Emit(MapDelta delta) {
   const bool answers = delta.event == MapEvent::kSettled || delta.event == MapEvent::kRefused ||
                        delta.event == MapEvent::kMapped || delta.event == MapEvent::kRequestDone ||
-                       delta.event == MapEvent::kEnded || delta.event == MapEvent::kTurn;
+                       delta.event == MapEvent::kEnded || delta.event == MapEvent::kTurn ||
+                       delta.event == MapEvent::kFirstMapRefused;
   if (answers || !delta.Empty()) sink_(delta);
 }
 
@@ -136,7 +137,7 @@ void MapperCore::CullYoung(MapId map_id) {
 void MapperCore::RemoveSeenThroughBy(const Keyframe& keyframe) {
   if (!options_.seen_through.enabled) return;
   const MapId map_id = keyframe.map_id;
-  const int removed = RemoveSeenThrough(map_, keyframe.id, options_.seen_through);
+  const int removed = RemoveSeenThrough(map_, keyframe, options_.seen_through);
   Count(removed, &counters_.landmarks_seen_through);
   Count(removed, &seen_through_[map_id]);
 }

@@ -508,6 +508,8 @@ TEST_F(KeyframeStep, AFirstMapOfANumberThatIsTakenChangesNothing) {
   other.first = scene_.Propose(5, PlaceOf(5), 5, PlaceOf(5), 5);
   other.second = scene_.Propose(6, PlaceOf(6), 5, PlaceOf(5), 6);
   EXPECT_FALSE(core_.OnInitialMap(other));
+  EXPECT_EQ(said_.back().event, MapEvent::kFirstMapRefused) << "it is told, though nothing has changed";
+  EXPECT_EQ(said_.back().about, other.second.id);
   InitialMap again = FirstMap();
   again.second = scene_.Propose(6, PlaceOf(6), 0, PlaceOf(0), 6);
   EXPECT_FALSE(core_.OnInitialMap(again)) << "its first keyframe is known";

@@ -6,6 +6,11 @@
 
 namespace dmslam {
 
+/// No network keeps a copy of a message for longer: what is heard again so much later was said again.
+inline constexpr int64_t kNoCopyNs = 100'000'000;
+/// Who insists on something is never silent for longer.
+inline constexpr int64_t kInsistsEveryNs = 1'000'000'000;
+
 /// Tells who keeps speaking from a message that was forged, or is a late echo of a sender that is gone: a
 /// claim is believed once it has been made again, at a later moment of its sender's clock. A copy of a
 /// message is not a second one. Keeps a few claims: the one that was heard longest ago makes room.
@@ -63,7 +68,7 @@ class Insistence {
     const auto [found, is_new] = asked_.try_emplace(who, Asked{now_ns, now_ns, utime});
     Asked& asked = found->second;
     if (!is_new && utime <= asked.utime) return false;
-    if (now_ns - asked.last_ns > kSilentNs) asked.since_ns = now_ns;
+    if (now_ns - asked.last_ns > kInsistsEveryNs) asked.since_ns = now_ns;
     asked.last_ns = now_ns;
     asked.utime = utime;
     const bool insists = now_ns - asked.since_ns >= kLongEnoughNs;
@@ -74,7 +79,6 @@ class Insistence {
  private:
   static constexpr size_t kMost = 16;
   static constexpr int64_t kLongEnoughNs = 500'000'000;
-  static constexpr int64_t kSilentNs = 1'000'000'000;
   struct Asked {
     int64_t since_ns = 0, last_ns = 0;
     int64_t utime = 0;  // of the newest one

@@ -5,6 +5,7 @@
 
 #include "dmslam/ack_t.hpp"
 #include "dmslam/messaging/believed_terms.h"
+#include "dmslam/messaging/claims.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/part_t.hpp"
@@ -18,7 +19,6 @@ constexpr int64_t kMaxBurst = 4096;             // records behind the last beaco
 constexpr int64_t kMinNsPerRecord = 50'000;     // no writer is faster for long
 constexpr int kBelieved = 2;                    // beacons
 constexpr int64_t kRefusedAckNs = 100'000'000;  // who holds more than the writer knows says so soon
-constexpr int64_t kNoCopyNs = 100'000'000;      // no network keeps a copy of a message for longer
 constexpr int64_t kOnlyOneNs = 5'000'000'000;   // a writer that is there says so more often than that
 constexpr size_t kMaxRangesNamed = 32;  // ranges named in one acknowledgement: it must fit one datagram
 

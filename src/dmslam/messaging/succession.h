@@ -58,6 +58,8 @@ class ReplicaFetch : public StateMachine {
   /// What was fetched: the parent of the term to come; empty when nothing was.
   const Version& version() const { return version_; }
   const std::vector<Holder>& holders() const { return options_.holders; }
+  /// Who hands it over; empty: nobody was found yet.
+  std::string giver() const { return search_.replica().role; }
   /// What is handed over grows again and again, so that it never comes to its end: somebody writes the stream
   /// whom the holder hears, and this process does not.
   bool KeepsGrowing(int64_t now_ns) const {

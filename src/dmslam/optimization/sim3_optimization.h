@@ -7,6 +7,7 @@
 
 #include "dmslam/geometry/pinhole.h"
 #include "dmslam/geometry/rigid3.h"
+#include "dmslam/util/chi_squared.h"
 
 namespace dmslam {
 
@@ -25,7 +26,7 @@ struct Sim3RansacOptions {
   int max_iterations = 300;
   double confidence = 0.99;
   int min_inliers = 20;
-  double max_chi2 = 9.210;  ///< On both sides (99 %, 2 dof).
+  double max_chi2 = kChiSquared2Dof99;  ///< On both sides.
   bool fix_scale = false;
   uint64_t seed = 0;
 };

@@ -17,8 +17,6 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kPieceBytes = 56 * 1024;
-
 template <typename Message>
 void WriteRecord(EventLogWriter* log, int64_t utime_us, RecordHeader header, const Message& message) {
   const char* channel = wire::Info<Message>().channel;
@@ -115,7 +113,7 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
 CutMap Cut(const std::string& path, const Map& map) {
   if (map.keyframes().empty()) throw InputError(path + ": is not written: the map is empty");
   const Keyframe& newest = map.keyframes().rbegin()->second;
-  return {CutSnapshot(map, newest.id, kPieceBytes), newest.stamp_ns};
+  return {CutSnapshot(map, newest.id, kSnapshotPieceBytes), newest.stamp_ns};
 }
 
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session) {

@@ -21,7 +21,7 @@ class CameraClaims {
     std::vector<Claim>& claims = claims_[info.camera_id];
     const auto known = std::find_if(claims.begin(), claims.end(),
                                     [&](const Claim& claim) { return Same(claim.info, info); });
-    if (known != claims.end()) return now_ns - known->since_ns >= kNoCopyNs;
+    if (known != claims.end()) return now_ns - known->since_ns >= kNotJustNowNs;
     if (claims.size() == kMost) claims.erase(claims.begin());
     claims.push_back({info, now_ns});
     return false;
@@ -37,7 +37,8 @@ class CameraClaims {
 
  private:
   static constexpr size_t kMost = 8;
-  static constexpr int64_t kNoCopyNs = 50'000'000;
+  /// Less than kNoCopyNs, for a player that begins says it every tenth of a second: the second time counts.
+  static constexpr int64_t kNotJustNowNs = 50'000'000;
   struct Claim {
     CameraInfo info;
     int64_t since_ns = 0;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 namespace dmslam {
 
 /// How a process of the system ends. The same for dmslam-run, which starts again what is worth it, and for
@@ -19,6 +21,10 @@ enum ExitCode : int {
   kExitNoProgram = 127,  ///< the program is not there; said by who starts it
   kExitSignal = 128,     ///< plus the number of the signal that ended it
 };
+
+/// Where no frontend is heard for so long after the end of the sequence, none comes any more: the player ends
+/// with kExitNoFrontend, and the collector makes the results of what there is.
+inline constexpr int64_t kNoFrontendNs = 60'000'000'000;
 
 /// Whether a process that ended so may do better when it is started again. What it refused, as a wrong option
 /// or a stream that somebody else writes, it would refuse again.

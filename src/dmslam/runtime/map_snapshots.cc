@@ -6,11 +6,6 @@
 #include "dmslam/wire/codec.h"
 
 namespace dmslam {
-namespace {
-
-constexpr size_t kPieceBytes = 56 * 1024;  // with headers below 64 KiB
-
-}  // namespace
 
 bool MapSnapshots::Ready() {
   wanted_ = may_read_ && !may_read_();
@@ -20,7 +15,7 @@ bool MapSnapshots::Ready() {
 void MapSnapshots::BeginSnapshot(int64_t) {
   std::optional<KeyframeId> newest;
   if (!map_->keyframes().empty()) newest = map_->keyframes().rbegin()->first;
-  const std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kPieceBytes);
+  const std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kSnapshotPieceBytes);
   parts_.assign(parts.begin(), parts.end());
 }
 

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdio>
 
+#include "dmslam/util/version.h"
+
 namespace dmslam {
 namespace {
 
@@ -20,7 +22,8 @@ std::string Describe(const std::string& profile, const std::string& seed, uint64
 
 std::string WhyMisfit(const SessionStart& start, const Settings& settings,
                       std::optional<uint64_t> vocabulary_checksum) {
-  const std::string frontend = "the frontend of session " + std::to_string(start.session) + " has ";
+  const std::string frontend = "the frontend of session " + std::to_string(start.session) + " (version " +
+                               start.software + ", this is " + kVersion + ") has ";
   if (start.configuration_hash != settings.Hash()) {
     return frontend + "other settings (" +
            Describe(start.profile, std::to_string(start.seed), start.configuration_hash) +

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include "dmslam/util/version.h"
+
 namespace dmslam {
 namespace {
 
 SessionStart StartOf(const Settings& settings, std::optional<uint64_t> vocabulary) {
   SessionStart start;
   start.session = 7;
+  start.software = "0.1.9";
   start.seed = 1;
   start.profile = settings.profile();
   start.configuration_hash = settings.Hash();
@@ -16,6 +19,14 @@ SessionStart StartOf(const Settings& settings, std::optional<uint64_t> vocabular
 }
 
 bool Says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// Both versions are named.
+std::string TheFrontendHas(const std::string& what) {
+  std::string text = "the frontend of session 7 (version 0.1.9, this is ";
+  text += kVersion;
+  text += ") has ";
+  return text += what;
+}
 
 TEST(SessionCheckTest, TheSameSettingsAndVocabularyFit) {
   Settings settings("baseline");
@@ -29,16 +40,15 @@ TEST(SessionCheckTest, OtherSettingsAreNamedWithTheCure) {
   Settings ours;
   ours.Set("tracking.min_inliers", "25");
   const std::string why = WhyMisfit(StartOf(Settings("baseline"), std::nullopt), ours);
-  EXPECT_TRUE(Says(why, "the frontend of session 7 has other settings (profile baseline, seed 1, hash "))
-      << why;
+  EXPECT_TRUE(Says(why, TheFrontendHas("other settings (profile baseline, seed 1, hash "))) << why;
   EXPECT_TRUE(Says(why, "this process (profile dm, seed 1, hash ")) << why;
   EXPECT_TRUE(Says(why, "give every process the same --config and --set")) << why;
 }
 
 TEST(SessionCheckTest, AnotherVocabularyIsNamedWithTheCure) {
   const std::string why = WhyMisfit(StartOf(Settings(), 5), Settings(), 6);
-  EXPECT_TRUE(
-      Says(why, "another vocabulary (checksum 0000000000000005) than this process (0000000000000006)"))
+  EXPECT_TRUE(Says(why, TheFrontendHas("another vocabulary (checksum 0000000000000005) than this process "
+                                       "(0000000000000006)")))
       << why;
 }
 

@@ -432,6 +432,7 @@ void StreamNode::WatchReaders() {
 
 void StreamNode::Advance() {
   endpoint_.Advance();
+  NoteQueue();
   if (ending_) return;
   if (camera_info_ && !begun_) {
     begun_ = true;
@@ -470,6 +471,14 @@ void StreamNode::PublishStatusIfDue() {
 void StreamNode::PumpBetweenSteps() {
   if (context_.pump) context_.pump();
   endpoint_.Advance();
+  NoteQueue();
+}
+
+/// Before it is worked off: what comes and goes between two statuses is seen, too.
+void StreamNode::NoteQueue() {
+  int64_t depth = 0;
+  for (const Watched& watched : readers_) depth += watched.reader->backlog();
+  traffic_.queue_peak = std::max(traffic_.queue_peak, depth);
 }
 
 int64_t StreamNode::deadline_ns() const {
@@ -551,6 +560,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   for (const StreamReader* reader : readers) {
     if (reader != nullptr) AddReader(reader->statistics(), &health);
   }
+  health.queue_peak = std::max(health.queue_depth, static_cast<int32_t>(traffic_.queue_peak));
   if (!writer_) return head;
   AddWriter(*writer_, &health);
   for (const std::string& role : plan_->readers)

@@ -201,14 +201,16 @@ class StreamNode : public Node {
   void WatchReaders();
   /// Keeps the protocol alive while one step of work follows the other.
   void PumpBetweenSteps();
+  void NoteQueue();
   void PublishStatusIfDue();
   struct Watched;
   void RefuseOtherTypes(Watched* watched);
   void WarnOnce(const std::string& matter, const std::string& text);
 
-  /// What came outside the streams, what of it was dropped, and what was said of that.
+  /// What came outside the streams, what of it was dropped, and what was said of that; and how many records
+  /// of the streams have waited at most.
   struct Traffic {
-    int64_t received = 0, received_bytes = 0, dropped_foreign = 0, dropped_malformed = 0;
+    int64_t received = 0, received_bytes = 0, dropped_foreign = 0, dropped_malformed = 0, queue_peak = 0;
     std::vector<std::string> logged;
     bool IsFirst(const std::string& matter);
   };

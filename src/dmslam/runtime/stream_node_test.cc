@@ -28,6 +28,7 @@ class Holder : public StreamNode {
   int applied() const { return applied_; }
   Version held() const { return MapHeld(*reader_); }
   const std::optional<CameraInfo>& camera() const { return camera_info_; }
+  ProcessHealth health() const { return MakeStatusHead("", {reader_.get()}).health; }
   int64_t malformed() const { return MakeStatusHead("", {}).health.dropped_malformed; }
 
  private:
@@ -153,6 +154,23 @@ TEST_F(MapStreamTest, AReplicaFollows) {
   EXPECT_EQ(holder_->map().keyframes().size(), 1U);
   EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
   EXPECT_EQ(holder_->malformed(), 0);
+}
+
+TEST_F(MapStreamTest, TheDeepestThatTheQueueWasIsKept) {
+  EXPECT_EQ(holder_->health().queue_peak, 0);
+  for (const uint32_t frame : {1, 2, 3}) Publish(AddKeyframe(frame));
+  mapper_.Advance();
+  while (bus_.DeliverOne()) {
+  }
+  EXPECT_EQ(holder_->health().queue_depth, 3);
+  EXPECT_EQ(holder_->health().queue_peak, 3);
+  Run();
+  EXPECT_EQ(holder_->applied(), 3);
+  EXPECT_EQ(holder_->health().queue_depth, 0);
+  EXPECT_EQ(holder_->health().queue_peak, 3);
+  Publish(AddKeyframe(4));
+  Run();
+  EXPECT_EQ(holder_->health().queue_peak, 3);
 }
 
 TEST_F(MapStreamTest, ARecordThatCannotBeReadIsNamedAndTheMapComesAsASnapshot) {

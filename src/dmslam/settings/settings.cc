@@ -31,19 +31,22 @@ struct Given {
                             : "docs/configuration.md lists all"));
 }
 
+/// "a number from 0 to 1 [s]"
+std::string WhatIsAllowed(const SettingInfo& setting) {
+  using Kind = SettingInfo::Type;
+  const bool is_whole = setting.type == Kind::kWhole || setting.type == Kind::kUnsigned;
+  const bool is_number = setting.choices.empty() && setting.type != Kind::kSwitch;
+  const std::string unit = setting.unit.empty() ? "" : " [" + setting.unit + "]";
+  return (is_whole ? "a whole number from " : is_number ? "a number from " : "") + setting.allowed + unit;
+}
+
 /// The value as it is kept.
 std::string CanonicalValue(std::string_view key, std::string_view value) {
   const SettingInfo* setting = FindSetting(key);
   if (setting == nullptr) ThrowUnknown(key);
   if (std::optional<std::string> canonical = setting->Canonical(value)) return *canonical;
-  const std::string unit = setting->unit.empty() ? "" : " [" + setting->unit + "]";
-  throw InputError(
-      "setting '" + setting->key + "': '" + std::string(value) + "' is not allowed; write " +
-      (setting->type == SettingInfo::Type::kWhole || setting->type == SettingInfo::Type::kUnsigned
-           ? "a whole number from "
-       : setting->choices.empty() && setting->type != SettingInfo::Type::kSwitch ? "a number from "
-                                                                                 : "") +
-      setting->allowed + unit);
+  throw InputError("setting '" + setting->key + "': '" + std::string(value) + "' is not allowed; write " +
+                   WhatIsAllowed(*setting));
 }
 
 std::string PlaceOf(const std::string& path, const YAML::Mark& mark) {
@@ -64,8 +67,9 @@ void CollectYaml(const YAML::Node& node, const std::string& prefix, const std::s
     } else if (item.second.IsScalar()) {
       all->push_back({key, item.second.as<std::string>(), place});
     } else {
-      throw InputError(place + ": setting '" + key +
-                       "' is neither a value nor a section; write 'key: value'");
+      const SettingInfo* setting = FindSetting(key);
+      throw InputError(place + ": setting '" + key + "' is neither a value nor a section; write " +
+                       (setting != nullptr ? WhatIsAllowed(*setting) : "'key: value'"));
     }
   }
 }

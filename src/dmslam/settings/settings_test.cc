@@ -165,7 +165,10 @@ TEST(SettingsTest, WhatIsWrongIsNamedWithFileLineAndCure) {
   EXPECT_EQ(Refusal("seed: 1\nprofile: fast\n"),
             "FILE:2: setting 'profile': 'fast' is not allowed; write dm, baseline or paper");
   EXPECT_EQ(Refusal("mapping:\n  alpha: [1, 2]\n"),
-            "FILE:2: setting 'mapping.alpha' is neither a value nor a section; write 'key: value'");
+            "FILE:2: setting 'mapping.alpha' is neither a value nor a section; write a number from 0 to 100");
+  EXPECT_NE(
+      Refusal("seed:\n").find("setting 'seed' is neither a value nor a section; write a whole number from 0"),
+      std::string::npos);
   EXPECT_EQ(Refusal("seed: 1\nfeatures.count: 1000\nfeatures:\n  count: 1200\n"),
             "FILE:4: setting 'features.count' stands at FILE:2 too; delete one of them");
   EXPECT_NE(Refusal("keyframe:\n  max_interval_s: 1\n")

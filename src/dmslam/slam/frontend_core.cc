@@ -74,6 +74,7 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   late_.OnMapChanged(map_);
   tracker_.OnMapChanged(map_);
   FollowJoinedMap();
+  if (delta.event == MapEvent::kFirstMapRefused && delta.about) phase_.OnRefused(*delta.about);
   if (delta.progress.settled) gate_.OnSettled(*delta.progress.settled, !late_.IsGrowing());
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
   if (delta.event == MapEvent::kMapAdjusted) last_poses_.Begin(map_, delta.map_id);
@@ -194,8 +195,8 @@ FrontendOutput FrontendCore::AwaitMap() {
   const Keyframe* second = map_.FindKeyframe(phase_.awaited_second().value());
   if (second == nullptr) {
     unplaced_.Keep(WaitingFrame(frame_));
-    // Settled without it.
-    if (!awaited()) output = GiveUpMap(MapReset::Fate::kDrop, "the mapper refused the first map");
+    // A mapper that was started again may have settled it without a word.
+    if (phase_.IsRefused() || !awaited()) output = GiveUpRefusedMap();
     output.Add(NoPose(phase_.state(), "waiting for the mapper to answer the first map"));
     return output;
   }
@@ -206,6 +207,13 @@ FrontendOutput FrontendCore::AwaitMap() {
   frame_ = std::move(present);
   output.Append(phase_.IsSearching() ? Initialize() : Track());
   return output;
+}
+
+/// Where a map of that number is there, it is another one, which stays.
+FrontendOutput FrontendCore::GiveUpRefusedMap() {
+  const bool is_taken = !map_.KeyframesOf(*map_id_).empty();
+  return GiveUpMap(is_taken ? MapReset::Fate::kKeep : MapReset::Fate::kDrop,
+                   "the mapper refused the first map");
 }
 
 /// The frames since the one that made the map are tracked in their order: in real time some came while it was

@@ -113,6 +113,7 @@ class FrontendCore {
   std::optional<FrontendOutput> FindAgain();
   FrontendOutput Initialize();
   FrontendOutput AwaitMap();
+  FrontendOutput GiveUpRefusedMap();
   void BeginTrial(const Keyframe& second);
   FrontendOutput AwaitTurn();
   FrontendOutput Track();

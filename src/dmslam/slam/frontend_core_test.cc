@@ -201,13 +201,49 @@ TEST_F(Phases, ACameraThatTurnsWithoutAMapHasARotationAndNoPose) {
   EXPECT_LT(AngleBetween(core_->odometry().T_odom_cam.rotation, turned(14).conjugate()), 0.002);
 }
 
-TEST_F(Phases, ARefusedProposalIsGivenUp) {
+TEST_F(Phases, AProposalThatTheMapperRefusesIsGivenUp) {
   Frame(0);
   finds_map_ = true;
   Frame(1);
   MapDelta refused;
-  refused.progress.settled = KeyframeId::Make(1, 1);
+  refused.event = MapEvent::kFirstMapRefused;
+  refused.about = KeyframeId::Make(1, 7);
   core_->ApplyMapDelta(refused);
+  EXPECT_EQ(Find<MapReset>(Frame(2)), nullptr) << "another one";
+  refused.about = KeyframeId::Make(1, 1);
+  core_->ApplyMapDelta(refused);
+  const FrontendOutput output = Frame(3);
+  const auto* reset = Find<MapReset>(output);
+  ASSERT_NE(reset, nullptr);
+  EXPECT_EQ(reset->fate, MapReset::Fate::kDrop);
+  EXPECT_EQ(core_->state(), TrackingState::kNotInitialized);
+}
+
+TEST_F(Phases, AMapWhoseNumberTheProposalTookStays) {
+  Frame(0);
+  finds_map_ = true;
+  Frame(1);
+  MapDelta refused;
+  refused.keyframes.resize(1);  // of a map of this number that has been there before
+  refused.keyframes[0].id = KeyframeId::Make(1, 40);
+  refused.keyframes[0].map_id = 1;
+  refused.keyframes[0].features = std::make_shared<const FeatureSet>();
+  refused.event = MapEvent::kFirstMapRefused;
+  refused.about = KeyframeId::Make(1, 1);
+  core_->ApplyMapDelta(refused);
+  const FrontendOutput output = Frame(2);
+  const auto* reset = Find<MapReset>(output);
+  ASSERT_NE(reset, nullptr);
+  EXPECT_EQ(reset->fate, MapReset::Fate::kKeep);
+}
+
+TEST_F(Phases, AProposalThatWasSettledWithoutAMapIsGivenUp) {
+  Frame(0);
+  finds_map_ = true;
+  Frame(1);
+  MapDelta settled;
+  settled.progress.settled = KeyframeId::Make(1, 1);
+  core_->ApplyMapDelta(settled);
   const FrontendOutput output = Frame(2);
   const auto* reset = Find<MapReset>(output);
   ASSERT_NE(reset, nullptr);

@@ -24,9 +24,19 @@ std::optional<KeyframeId> TrackingPhase::awaited_second() const {
   return waiting != nullptr ? std::optional(waiting->second) : std::nullopt;
 }
 
+bool TrackingPhase::IsRefused() const {
+  const auto* waiting = std::get_if<WaitingForMap>(&phase_);
+  return waiting != nullptr && waiting->refused;
+}
+
 void TrackingPhase::Propose(KeyframeId second) {
   DMSLAM_CHECK(IsSearching(), "a first map is proposed where there is none");
   phase_ = WaitingForMap{second};
+}
+
+void TrackingPhase::OnRefused(KeyframeId second) {
+  auto* waiting = std::get_if<WaitingForMap>(&phase_);
+  if (waiting != nullptr && waiting->second == second) waiting->refused = true;
 }
 
 void TrackingPhase::BeginTrial(int64_t until_ns) {

@@ -25,9 +25,13 @@ class TrackingPhase {
   bool HasMap() const { return !IsSearching() && !IsWaiting(); }
   /// `second` of the first map that was proposed; none: it is not waited for one.
   std::optional<KeyframeId> awaited_second() const;
+  /// Whether the mapper has refused the first map that is waited for.
+  bool IsRefused() const;
 
   /// A first map was proposed.
   void Propose(KeyframeId second);
+  /// The mapper refused the first map with this `second`. Of another one than is waited for it means nothing.
+  void OnRefused(KeyframeId second);
   /// It has come, and must predict the frames until then.
   void BeginTrial(int64_t until_ns);
   void BeginLost();
@@ -40,6 +44,7 @@ class TrackingPhase {
   struct NotInitialized {};
   struct WaitingForMap {
     KeyframeId second;
+    bool refused = false;
   };
   struct Trial {
     int64_t until_ns = 0;

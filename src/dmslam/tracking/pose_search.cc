@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/dynamics/landmark_votes.h"
 #include "dmslam/geometry/solve_symmetric.h"
 
 namespace dmslam {
@@ -131,11 +132,9 @@ FoundPose PoseSearch::found(const TrackedFrame& frame) const {
 void PoseSearch::CountExpected(const Map& map, std::span<const ExpectedLandmark> expected,
                                const TrackedFrame& frame, TrackingReport* report) const {
   report->num_expected = static_cast<int>(expected.size());
-  // Where time runs backwards none is: the map begins where the room was hidden before, which is no sign.
   const auto is_old = [&](LandmarkId id) {
     const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
-    return landmark != nullptr && static_cast<double>(frame.stamp_ns - landmark->first_ns) * 1e-9 >=
-                                      options_.dynamics.vote.trusted_age_s;
+    return landmark != nullptr && IsOldAt(*landmark, frame.stamp_ns, options_.dynamics.vote);
   };
   report->num_old_expected = static_cast<int>(std::ranges::count_if(expected, is_old, &ExpectedLandmark::id));
   report->num_old = static_cast<int>(std::ranges::count_if(frame.landmarks, is_old));

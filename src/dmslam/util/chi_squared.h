@@ -7,6 +7,8 @@ inline constexpr double kChiSquared1Dof = 3.841;
 inline constexpr double kChiSquared2Dof = 5.991;
 /// The square root of the second: an error in sigmas.
 inline constexpr double kChi2Dof = 2.447651936;
+/// 99 % of those with two degrees of freedom lie below this.
+inline constexpr double kChiSquared2Dof99 = 9.210;
 
 /// The first one as the segmentation and the epipolar search round it...
 inline constexpr double kRoundedChiSquared1Dof = 3.84;

@@ -50,12 +50,12 @@ struct EndOfSequence {
   int64_t utime = 0;  ///< wall time at which it was sent [us]
   uint32_t session = 0;
   int64_t frames_published = 0;
-  int64_t frames_listed = 0;
+  int64_t frames_listed = 0;                ///< for people and plots
   int64_t frames_missing = 0;               ///< listed, but without an image that can be read
   int64_t frames_blacked = 0;               ///< replaced by black images, as asked for
   int64_t frames_jumped = 0;                ///< left out by jumps, as asked for
   std::optional<int32_t> last_frame_index;  ///< none: no frame was published
-  int64_t last_stamp_ns = 0;
+  int64_t last_stamp_ns = 0;                ///< of the last frame published; for people and plots
   CameraId camera_id = 0;
 };
 

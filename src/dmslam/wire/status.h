@@ -16,8 +16,8 @@ struct ProcessHealth {
   double rss_mb = 0;        ///< resident memory [MiB]
   double cpu_percent = 0;   ///< of one core, over the last second
   int32_t queue_depth = 0;  ///< messages received and not yet worked on
-  int32_t queue_peak = 0;
-  int64_t received = 0;  ///< messages that arrived
+  int32_t queue_peak = 0;   ///< the deepest it was
+  int64_t received = 0;     ///< messages that arrived
   int64_t received_bytes = 0;
   int64_t dropped_foreign = 0;    ///< of another session
   int64_t dropped_malformed = 0;  ///< length, counts or values are wrong
@@ -100,11 +100,16 @@ struct FrontendStatus {
 };
 
 struct MapperStatus {
-  enum class State : uint8_t { kStarting = 1, kWaiting = 2, kMapping = 3, kDone = 4 };
+  enum class State : uint8_t {
+    kStarting = 1,  ///< no camera is known yet
+    kWaiting = 2,   ///< its stream is not open yet, or no frontend is there
+    kMapping = 3,
+    kDone = 4,  ///< the map is complete
+  };
   StatusHead head;
   State state = State::kStarting;
   int64_t version = 0;
-  int32_t maps = 0;
+  int32_t maps = 0;  ///< that have a keyframe
   int32_t keyframes = 0;
   int32_t landmarks = 0;
   int32_t moving_landmarks = 0;      ///< believed to move
@@ -113,11 +118,11 @@ struct MapperStatus {
   int64_t keyframes_inserted = 0;
   int64_t keyframes_culled = 0;
   int64_t landmarks_created = 0;
-  int64_t landmarks_culled = 0;
+  int64_t landmarks_culled = 0;  ///< hardly found, seen to move, or seen through
   int64_t landmarks_fused = 0;
   int64_t observations_dropped = 0;   ///< of keyframes in flight, whose landmark was gone
   int64_t refused_neighbourhood = 0;  ///< candidates for landmarks refused by mutual exclusion
-  int64_t refused_motion = 0;
+  int64_t refused_motion = 0;         ///< features of keyframes, seen to move: none is made of them
   int64_t refused_geometry = 0;
   int64_t corrections_applied = 0;
   int64_t corrections_refused = 0;
@@ -132,12 +137,18 @@ struct MapperStatus {
 };
 
 struct LoopcloserStatus {
-  enum class State : uint8_t { kStarting = 1, kWaiting = 2, kWatching = 3, kCorrecting = 4, kDone = 5 };
+  enum class State : uint8_t {
+    kStarting = 1,  ///< no camera is known yet
+    kWaiting = 2,   ///< its stream is not open yet, or no mapper is there
+    kWatching = 3,
+    kCorrecting = 4,  ///< works a correction out, or waits for the mapper's word on it
+    kDone = 5,        ///< the map is complete
+  };
   StatusHead head;
   State state = State::kStarting;
   int64_t replica_version = 0;
   int32_t indexed_keyframes = 0;
-  int32_t keyframe_queue = 0;  ///< known and not yet checked
+  int32_t keyframe_queue = 0;  ///< records of the map known and not yet taken, with keyframes among them
   int64_t keyframes_checked = 0;
   int64_t candidates = 0;
   int64_t refused_consistency = 0;
@@ -146,7 +157,7 @@ struct LoopcloserStatus {
   int64_t global_adjustments = 0;
   std::optional<KeyframeId> last_keyframe;       ///< newest keyframe checked
   std::optional<KeyframeId> last_loop_keyframe;  ///< newest keyframe that closed a loop
-  double query_p50_ms = 0;
+  double query_p50_ms = 0;  ///< time in which the places are named that a keyframe may show
   double query_p95_ms = 0;
   double check_p50_ms = 0;  ///< keyframe received to answer published
   double check_p95_ms = 0;

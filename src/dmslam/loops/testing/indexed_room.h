@@ -5,6 +5,7 @@
 
 #include "dmslam/loops/loop_verifier.h"
 #include "dmslam/loops/testing/ring_room.h"
+#include "dmslam/map/conventions.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/place_recognition/map_places.h"
 
@@ -40,7 +41,8 @@ class IndexedRoom {
     loop.joins = At(k).map_id != At(place).map_id;
     loop.S_keyframe_place = room_.TrueSimilarity(k, place);
     loop.S_keyframe_world = loop.S_keyframe_place * Sim3d(At(place).T_cam_world);
-    loop.landmarks = StaticLandmarksAround(map_, loop.place, 15, LoopcloserOptions().min_covisibility);
+    loop.landmarks =
+        StaticLandmarksAround(map_, loop.place, kPlaceNeighbours, LoopcloserOptions().min_covisibility);
     return loop;
   }
   std::optional<VerifiedLoop> Propose(const LoopcloserOptions& options, int k, int place) const {

@@ -185,9 +185,9 @@ inline void ExpectNeighboursInSpace(const Map& map) {
       if (other_id != id && other.map_id == keyframe.map_id && is_near) near.emplace_back(apart, other_id);
     }
     std::sort(near.begin(), near.end());
-    std::vector<KeyframeId> expected;
-    for (const auto& [apart, other_id] : near) expected.push_back(other_id);
-    EXPECT_EQ(map.KeyframesNear(id, kDistance, kAngleRad), expected);
+    std::vector<const Keyframe*> expected;
+    for (const auto& [apart, other_id] : near) expected.push_back(&map.At(other_id));
+    EXPECT_EQ(map.KeyframesNear(keyframe, kDistance, kAngleRad), expected);
   }
 }
 

@@ -1,0 +1,182 @@
+// What a motion model promises beside what a tracker shows of it (tracker_test.cc).
+#include "dmslam/tracking/motion_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "dmslam/map/testing/map_scene.h"
+
+namespace dmslam {
+namespace {
+
+using testing::MapScene;
+
+constexpr int64_t kFrameNs = 33'333'333;
+constexpr double kStep = 0.01;  // of the camera, per frame [map units]
+
+/// A camera that goes sideways before a cloud of landmarks, at depth 4.
+class MotionModelTest : public ::testing::Test {
+ protected:
+  MotionModelTest() {
+    scene_.AddCloud(60, {0, 0, 4}, {1, 1, 0});
+    scene_.MapAll();
+  }
+  MapEditor& map() { return scene_.map(); }
+  static KeyframeId Kf(uint32_t k) { return KeyframeId::Make(MapScene::kSession, k); }
+  static FrameTime Time(uint32_t frame, int64_t step_ns = kFrameNs) { return {frame, frame * step_ns}; }
+  PlacedPose Placed(const Rigid3d& T_cam_world) { return PlacedPose::Of(map().At(Kf(0)), T_cam_world); }
+  void Track(double x, const FrameTime& time, double variance = 0) {
+    const Rigid3d T_cam_world = MapScene::PoseAt(x);
+    model_.OnTracked(map(), Placed(T_cam_world), {T_cam_world, variance * Matrix6d::Identity()}, time, false);
+  }
+  double PredictedX(const FrameTime& time) {
+    return model_.Predict(map(), time).T_cam_world.value().Center().x();
+  }
+
+  MapScene scene_;
+  MotionModel model_{{}};
+};
+
+TEST_F(MotionModelTest, APlacedPoseGoesWithItsKeyframeAndItsScale) {
+  map().SetPoseAndScale(map().At(Kf(2)), map().At(Kf(2)).T_cam_world, 3.0);  // before the pose is told
+  const Rigid3d T_cam_world = MapScene::PoseAt(0.3);
+  const PlacedPose pose = PlacedPose::Of(map().At(Kf(2)), T_cam_world);  // 0.2 beside it
+  EXPECT_LT((pose.In(map())->Center() - Eigen::Vector3d(0.3, 0, 0)).norm(), 1e-12);
+  map().SetPoseAndScale(map().At(Kf(2)), MapScene::PoseAt(1.0), 2.0);
+  EXPECT_LT((pose.In(map())->Center() - Eigen::Vector3d(1.4, 0, 0)).norm(), 1e-12);
+}
+
+TEST_F(MotionModelTest, APlacedPoseOutlivesItsKeyframe) {
+  const PlacedPose pose = PlacedPose::Of(map().At(Kf(2)), MapScene::PoseAt(0.3));
+  map().RemoveKeyframe(map().At(Kf(2)));
+  ASSERT_TRUE(pose.In(map()));
+  EXPECT_LT((pose.In(map())->Center() - Eigen::Vector3d(0.3, 0, 0)).norm(), 1e-12);
+}
+
+TEST_F(MotionModelTest, WhereNothingIsKnownOfTheReferenceThereIsNoPose) {
+  EXPECT_FALSE(PlacedPose::Of(nullptr, Rigid3d()));
+  PlacedPose pose = Placed(Rigid3d());
+  pose.reference = Kf(99);
+  EXPECT_FALSE(pose.In(map()));
+  model_.Begin(pose, Time(1));
+  EXPECT_FALSE(model_.Predict(map(), Time(2)).T_cam_world);
+  EXPECT_TRUE(model_.IsReachable(map(), MapScene::PoseAt(50), Time(2))) << "nothing contradicts it";
+}
+
+TEST(MotionPrior, IsAsWideAsItsOptionsSay) {
+  MotionModelOptions options;
+  options.prior_rotation_rad = 0.02;
+  options.prior_translation = 0.05;
+  const PosePrior prior = MotionPrior(options, MapScene::PoseAt(1), 4.0, 3.0);
+  EXPECT_EQ(prior.T_cam_world.Center().x(), 1.0);
+  for (int i = 0; i < 6; ++i) {
+    const double sigma = i < 3 ? 0.02 * 3 : 0.05 * 4 * 3;
+    EXPECT_NEAR(1 / std::sqrt(prior.information(i, i)), sigma, 1e-12) << i;
+  }
+  EXPECT_EQ(prior.information.norm(), prior.information.diagonal().norm());
+}
+
+TEST_F(MotionModelTest, TheMotionGrowsWithTheMap) {
+  Track(kStep, Time(1));
+  Track(2 * kStep, Time(2));
+  map().SetPoseAndScale(map().At(Kf(0)), Rigid3d(), 3.0);
+  EXPECT_NEAR(PredictedX(Time(3)), 3 * 3 * kStep, 1e-9);
+}
+
+TEST_F(MotionModelTest, TheFrameThatComesNextIsNearEnoughAtAnyRate) {
+  constexpr int64_t kSlowNs = 250'000'000;
+  Track(kStep, Time(1, kSlowNs));
+  Track(2 * kStep, Time(2, kSlowNs));
+  const MotionModel::Prediction next = model_.Predict(map(), Time(3, kSlowNs));
+  ASSERT_TRUE(next.prior);
+  EXPECT_NEAR(next.T_cam_world->Center().x(), 3 * kStep, 1e-9);
+  EXPECT_NEAR(next.prior->T_cam_world.Center().x(), 3 * kStep, 1e-9);
+  const FrameTime after_a_gap{4, 3 * kSlowNs};
+  EXPECT_FALSE(model_.Predict(map(), after_a_gap).prior) << "as long, but frames are missing between";
+  Track(3 * kStep, after_a_gap);
+  EXPECT_NEAR(PredictedX({5, 4 * kSlowNs}), 3 * kStep, 1e-9) << "the step over a gap so long is no motion";
+}
+
+TEST_F(MotionModelTest, WhoStandsAtAGivenPoseOrHasStoppedHasNoMotion) {
+  Track(kStep, Time(1));
+  Track(2 * kStep, Time(2));
+  model_.Stop();
+  EXPECT_NEAR(PredictedX(Time(3)), 2 * kStep, 1e-9);
+  EXPECT_FALSE(model_.Predict(map(), Time(3)).prior);
+  Track(3 * kStep, Time(3));
+  EXPECT_TRUE(model_.Predict(map(), Time(4)).prior) << "it is known again from the next pose on";
+  model_.Begin(Placed(MapScene::PoseAt(1)), Time(4));
+  EXPECT_NEAR(PredictedX(Time(5)), 1.0, 1e-9);
+  EXPECT_FALSE(model_.Predict(map(), Time(5)).prior);
+}
+
+TEST_F(MotionModelTest, WhoIsLostHasNoPoseAndMayBeAnywhere) {
+  Track(kStep, Time(1));
+  Track(2 * kStep, Time(2));
+  ASSERT_TRUE(model_.last());
+  EXPECT_EQ(model_.last()->reference, Kf(0));
+  EXPECT_EQ(model_.last_stamp_ns(), Time(2).stamp_ns);
+  EXPECT_FALSE(model_.IsReachable(map(), MapScene::PoseAt(3), Time(3)));
+  model_.BeginLost();
+  EXPECT_FALSE(model_.last());
+  EXPECT_FALSE(model_.last_stamp_ns());
+  EXPECT_FALSE(model_.Predict(map(), Time(3)).T_cam_world);
+  EXPECT_FALSE(model_.Predict(map(), Time(3)).recent);
+  EXPECT_TRUE(model_.IsReachable(map(), MapScene::PoseAt(3), Time(3)));
+}
+
+TEST_F(MotionModelTest, AWeakPoseLeadsOnlyFromARecentOne) {
+  const FoundPose weak{MapScene::PoseAt(1), Matrix6d::Zero()};
+  model_.Coast(map(), weak, Time(1));
+  EXPECT_FALSE(model_.IsCoasting()) << "nothing was tracked";
+  Track(kStep, Time(1));
+  model_.Coast(map(), weak, Time(7));
+  EXPECT_FALSE(model_.IsCoasting()) << "a fifth of a second ago";
+  EXPECT_NEAR(PredictedX(Time(8)), kStep, 1e-9);
+  model_.Coast(map(), weak, Time(6));
+  EXPECT_TRUE(model_.IsCoasting());
+  EXPECT_NEAR(model_.Predict(map(), Time(6)).T_cam_world->Center().x(), 1.0, 1e-9);
+  model_.Stop();
+  EXPECT_FALSE(model_.IsCoasting());
+  EXPECT_NEAR(PredictedX(Time(7)), kStep, 1e-9) << "what was tracked stands";
+}
+
+TEST_F(MotionModelTest, HoweverLongWeakPosesLeadTheyAreNotTracked) {
+  Track(kStep, Time(1));
+  for (uint32_t frame = 2; frame < 30; ++frame) {
+    model_.Coast(map(), {MapScene::PoseAt(kStep * frame), Matrix6d::Zero()}, Time(frame));
+    if (frame == 10) {
+      EXPECT_TRUE(model_.Predict(map(), Time(11)).recent);
+    }
+  }
+  EXPECT_TRUE(model_.IsCoasting());
+  EXPECT_FALSE(model_.Predict(map(), Time(30)).recent) << "the last tracked frame is a second old";
+  EXPECT_EQ(model_.last_stamp_ns(), Time(1).stamp_ns);
+}
+
+/// Of the next pose, where the two before it are known so well.
+TEST_F(MotionModelTest, APoseThatIsHardlyKnownLeavesTheNextOneOpen) {
+  const auto variance = [&](double first, double second) {
+    model_.BeginLost();
+    Track(kStep, Time(1), first);
+    Track(2 * kStep, Time(2), second);
+    return 1 / model_.Predict(map(), Time(3)).prior->information(3, 3);
+  };
+  const double known = variance(0, 0), first_weak = variance(0.01, 0), second_weak = variance(0, 0.01);
+  EXPECT_GT(first_weak, known + 0.009);
+  EXPECT_GT(second_weak, known + 0.03) << "it is off by its own error, and its motion by as much again";
+}
+
+TEST_F(MotionModelTest, TheReachGrowsWithTheFramesThatAreMissing) {
+  Track(kStep, Time(1));
+  Track(2 * kStep, Time(2));
+  const auto reachable = [&](uint32_t frame) {
+    return model_.IsReachable(map(), MapScene::PoseAt(kStep * frame + 0.4), Time(frame));
+  };
+  EXPECT_FALSE(reachable(3)) << "a tenth of the depth beside where the motion leads";
+  EXPECT_TRUE(reachable(5));
+}
+
+}  // namespace
+}  // namespace dmslam
