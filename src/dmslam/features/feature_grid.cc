@@ -10,6 +10,7 @@ namespace dmslam {
 namespace {
 
 constexpr uint32_t kLanes = 4;
+constexpr double kRoundingPx = 1e-3;  // more than what a coordinate loses as a float
 // Vectors of the compiler: of all machines, and no wider than any of them has.
 using Floats [[gnu::vector_size(4 * kLanes)]] = float;
 using Ints [[gnu::vector_size(4 * kLanes)]] = int32_t;
@@ -72,21 +73,26 @@ size_t FeatureGrid::CollectInRadius(const Eigen::Vector2d& center_px, double rad
                                     int max_octave, uint32_t* features) const {
   const Circle circle(center_px, radius_px);
   const Rows rows = RowsOf(circle);
+  size_t count = 0;
+  for (int row = rows.begin; row < rows.end; ++row)
+    count += CollectOf(circle, RunOf(circle, row), min_octave, max_octave, features + count);
+  return count;
+}
+
+size_t FeatureGrid::CollectOf(const Circle& circle, const Run& run, int min_octave, int max_octave,
+                              uint32_t* features) const {
   const Floats x = Repeat<Floats>(circle.x_px), y = Repeat<Floats>(circle.y_px);
   const Floats radius_squared = Repeat<Floats>(circle.radius_px * circle.radius_px);
   const Ints least = Repeat<Ints>(min_octave), most = Repeat<Ints>(max_octave);
   size_t count = 0;
-  for (int row = rows.begin; row < rows.end; ++row) {
-    const Run run = RunOf(circle, row);
-    for (uint32_t i = run.begin; i < run.end; i += kLanes) {
-      const Floats dx = Load<Floats>(&x_px_[i]) - x, dy = Load<Floats>(&y_px_[i]) - y;
-      const Ints octave = Load<Ints>(&octaves_[i]);
-      const Ints wanted = (dx * dx + dy * dy <= radius_squared) & (octave >= least) & (octave <= most);
-      const uint32_t in_run = std::min<uint32_t>(kLanes, run.end - i);
-      for (uint32_t k = 0; k < in_run; ++k) {
-        features[count] = features_[i + k];
-        count += static_cast<size_t>(wanted[k] & 1);
-      }
+  for (uint32_t i = run.begin; i < run.end; i += kLanes) {
+    const Floats dx = Load<Floats>(&x_px_[i]) - x, dy = Load<Floats>(&y_px_[i]) - y;
+    const Ints octave = Load<Ints>(&octaves_[i]);
+    const Ints wanted = (dx * dx + dy * dy <= radius_squared) & (octave >= least) & (octave <= most);
+    const uint32_t in_run = std::min<uint32_t>(kLanes, run.end - i);
+    for (uint32_t k = 0; k < in_run; ++k) {
+      features[count] = features_[i + k];
+      count += static_cast<size_t>(wanted[k] & 1);
     }
   }
   return count;
@@ -101,16 +107,23 @@ FeatureGrid::Rows FeatureGrid::RowsOf(const Circle& circle) const {
           ClampedCell(circle.y_px + circle.radius_px, kCellSizePx, rows_) + 1};
 }
 
-/// The part of the row that the circle reaches; the outermost rows go on beyond the image.
+/// The part of the row that the circle reaches; the outermost rows go on beyond the image. Of a small circle,
+/// which hardly leaves out a cell, that of the square around it.
 FeatureGrid::Run FeatureGrid::RunOf(const Circle& circle, int row) const {
+  const double radius = circle.radius_px;
+  if (circle.radius_px <= kSmallRadiusPx)
+    return RunBetween(circle.x_px - radius - kRoundingPx, circle.x_px + radius + kRoundingPx, row);
   const double top = row * kCellSizePx, bottom = top + kCellSizePx;
   double away = 0;
   if (circle.y_px < top && row > 0) away = top - circle.y_px;
   if (circle.y_px > bottom && row + 1 < rows_) away = circle.y_px - bottom;
-  const double radius = circle.radius_px;
-  const double half = std::sqrt(std::max(0.0, radius * radius - away * away)) + 1e-3;
-  return {starts_[CellIndex(ClampedCell(circle.x_px - half, kCellSizePx, columns_), row)],
-          starts_[CellIndex(ClampedCell(circle.x_px + half, kCellSizePx, columns_), row) + 1]};
+  const double half = std::sqrt(std::max(0.0, radius * radius - away * away)) + kRoundingPx;
+  return RunBetween(circle.x_px - half, circle.x_px + half, row);
+}
+
+FeatureGrid::Run FeatureGrid::RunBetween(double left_px, double right_px, int row) const {
+  return {starts_[CellIndex(ClampedCell(left_px, kCellSizePx, columns_), row)],
+          starts_[CellIndex(ClampedCell(right_px, kCellSizePx, columns_), row) + 1]};
 }
 
 size_t FeatureGrid::CellOf(const Eigen::Vector2d& uv_px) const {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory_resource>
@@ -49,6 +51,24 @@ class FeatureGrid {
     }
   }
 
+  /// The same in order, in batches of at most kBatch: visit(std::span<const uint32_t> features).
+  static constexpr size_t kBatch = 64;
+  template <typename Visit>
+  void ForEachBatchInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave,
+                            int max_octave, Visit&& visit) const {
+    const Circle circle(center_px, radius_px);
+    const Rows rows = RowsOf(circle);
+    std::array<uint32_t, kBatch> batch;
+    for (int row = rows.begin; row < rows.end; ++row) {
+      const Run run = RunOf(circle, row);
+      for (uint32_t i = run.begin; i < run.end; i += kBatch - kSlack) {
+        const Run part = {i, std::min<uint32_t>(run.end, i + (kBatch - kSlack))};
+        if (const size_t count = CollectOf(circle, part, min_octave, max_octave, batch.data()))
+          visit(std::span<const uint32_t>(batch.data(), count));
+      }
+    }
+  }
+
   /// The same into `features`, which is cleared first.
   void FindInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
                     std::vector<uint32_t>* features) const;
@@ -87,9 +107,14 @@ class FeatureGrid {
   };
 
   static constexpr double kCellSizePx = 20.0;
+  static constexpr float kSmallRadiusPx = 30.0F;
 
   Rows RowsOf(const Circle& circle) const;
   Run RunOf(const Circle& circle, int row) const;
+  Run RunBetween(double left_px, double right_px, int row) const;
+  /// Those of the run's entries that lie in the circle, into `features`, which has room for kSlack more.
+  size_t CollectOf(const Circle& circle, const Run& run, int min_octave, int max_octave,
+                   uint32_t* features) const;
   size_t CellIndex(int column, int row) const {
     return static_cast<size_t>(row) * static_cast<size_t>(columns_) + static_cast<size_t>(column);
   }

@@ -22,7 +22,12 @@ struct Rigid3d {
   Rigid3d operator*(const Rigid3d& other) const {
     return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
   }
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
+  /// As rotation * point, in the same order of sums, but the compiler puts it where it is used.
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
+    Eigen::Vector3d twice = rotation.vec().cross(point);
+    twice += twice;
+    return point + rotation.w() * twice + rotation.vec().cross(twice) + translation;
+  }
   /// Where the camera stands, for T_cam_world.
   Eigen::Vector3d Center() const { return rotation.conjugate() * -translation; }
   bool AllFinite() const { return rotation.coeffs().allFinite() && translation.allFinite(); }

@@ -1,21 +1,25 @@
 #include "dmslam/map/projection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
+
+#include "dmslam/features/hamming.h"
 
 namespace dmslam {
 
-std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark, const Rigid3d& T_cam_world,
+std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark, const Viewpoint& from,
                                         const ViewLimits& limits) {
   const Camera& camera = map.camera();
-  const Eigen::Vector3d p_cam = T_cam_world * landmark.p_world;
+  const Eigen::Vector3d p_cam = from.T_cam_world * landmark.p_world;
   const std::optional<Eigen::Vector2d> uv = camera.Project(p_cam);
   if (!uv || uv->x() < -limits.border_px || uv->y() < -limits.border_px ||
       uv->x() >= camera.width_px + limits.border_px || uv->y() >= camera.height_px + limits.border_px) {
     return std::nullopt;
   }
   const ViewingRange viewing = map.Viewing(landmark);
-  const Eigen::Vector3d ray = landmark.p_world - T_cam_world.Center();
+  const Eigen::Vector3d ray = landmark.p_world - from.center;
   const double distance = ray.norm();
   if (distance < viewing.min_distance / limits.distance_slack ||
       distance > viewing.max_distance * limits.distance_slack) {
@@ -29,24 +33,47 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
                       static_cast<int>(std::clamp(octave, 0.0, pyramid.levels - 1.0))};
 }
 
+namespace {
+
+/// The nearest feature and the next best, of those that are offered.
+class TwoNearest {
+ public:
+  void Offer(const FrameFeatures& features, uint32_t feature, int distance) {
+    const int index = static_cast<int>(feature);
+    if (!hit_) {
+      hit_ = FeatureHit{index, distance, features.set.keypoints[feature].octave};
+    } else if (distance < hit_->distance || (distance == hit_->distance && index < hit_->feature)) {
+      hit_ =
+          FeatureHit{index, distance, features.set.keypoints[feature].octave, hit_->distance, hit_->octave};
+    } else if (distance < hit_->second_distance) {
+      hit_->second_distance = distance;
+      hit_->second_octave = features.set.keypoints[feature].octave;
+    }
+  }
+  const std::optional<FeatureHit>& hit() const { return hit_; }
+
+ private:
+  std::optional<FeatureHit> hit_;
+};
+
+}  // namespace
+
 std::optional<FeatureHit> FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px,
                                       double radius_px, int min_octave, int max_octave,
                                       const Descriptor& descriptor, const std::vector<uint8_t>& taken) {
-  std::optional<FeatureHit> hit;
-  features.grid.ForEachInRadius(uv_px, radius_px, min_octave, max_octave, [&](uint32_t i) {
-    if (!taken.empty() && taken[i] != 0) return;
-    const int distance = HammingDistance(descriptor, features.set.descriptors[i]);
-    const FeatureHit found{static_cast<int>(i), distance, features.set.keypoints[i].octave};
-    if (!hit) {
-      hit = found;
-    } else if (distance < hit->distance || (distance == hit->distance && found.feature < hit->feature)) {
-      hit = FeatureHit{found.feature, distance, found.octave, hit->distance, hit->octave};
-    } else if (distance < hit->second_distance) {
-      hit->second_distance = distance;
-      hit->second_octave = found.octave;
-    }
-  });
-  return hit;
+  const HammingToIndexed distances_to = BestHammingKernels().to_indexed;
+  TwoNearest nearest;
+  std::array<uint16_t, FeatureGrid::kBatch> distances;
+  features.grid.ForEachBatchInRadius(uv_px, radius_px, min_octave, max_octave,
+                                     [&](std::span<const uint32_t> batch) {
+                                       distances_to(descriptor, features.set.descriptors.data(), batch.data(),
+                                                    static_cast<int>(batch.size()), distances.data());
+                                       for (size_t k = 0; k < batch.size(); ++k) {
+                                         if (taken.empty() || taken[batch[k]] == 0)
+                                           nearest.Offer(features, batch[k], distances[k]);
+                                       }
+                                     });
+  return nearest.hit();
 }
 
 }  // namespace dmslam

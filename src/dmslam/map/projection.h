@@ -22,9 +22,17 @@ struct ViewLimits {
   double border_px = 0;         ///< how far outside the image a projection may lie
 };
 
+/// Where the camera stands, worked out once for all landmarks.
+struct Viewpoint {
+  Viewpoint(const Rigid3d& T) : T_cam_world(T), center(T.Center()) {}  // NOLINT: a pose is one
+
+  Rigid3d T_cam_world;
+  Eigen::Vector3d center;  ///< in the world
+};
+
 /// Predicts the view of a landmark; none when it is behind, outside the image, or seen from too different a
 /// place.
-std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark, const Rigid3d& T_cam_world,
+std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark, const Viewpoint& from,
                                         const ViewLimits& limits = {});
 
 /// The feature near a pixel whose descriptor is nearest.

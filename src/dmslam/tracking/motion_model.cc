@@ -58,17 +58,18 @@ void MotionModel::Stop() {
 }
 
 /// The motion goes on evenly, for no longer than it says something.
-MotionFilter::Since MotionModel::Since(const Map& map, const Pose& newest, const FrameTime& time) const {
+MotionFilter::Since MotionModel::Since(const Map& map, const Pose& newest, const FrameTime& time,
+                                       double depth) const {
   int64_t since_ns = time.stamp_ns - newest.time.stamp_ns;
   if (time.index - newest.time.index != 1) since_ns = std::min(since_ns, kKnownNs);
   const auto reference = map.ResolvePose(newest.pose.reference);
-  return {static_cast<double>(since_ns) * 1e-9, Depth(map),
+  return {static_cast<double>(since_ns) * 1e-9, depth,
           reference ? reference->scale / newest.pose.scale : 1.0};
 }
 
-Matrix6d MotionModel::Floored(const Map& map, const Matrix6d& covariance) const {
+Matrix6d MotionModel::Floored(const Matrix6d& covariance, double depth) {
   Matrix6d floored = covariance;
-  const double v = kFloor * Depth(map);
+  const double v = kFloor * depth;
   floored.diagonal() +=
       (Vector6d() << Eigen::Vector3d::Constant(kFloor * kFloor), Eigen::Vector3d::Constant(v * v)).finished();
   return floored;
@@ -81,18 +82,20 @@ std::optional<MotionFilter> MotionModel::MotionTo(const Map& map, const FoundPos
   const std::optional<Pose>& newest = Newest();
   const std::optional<Rigid3d> T_last_world = newest ? newest->pose.In(map) : std::nullopt;
   if (!T_last_world) return std::nullopt;
-  const MotionFilter::Since since = Since(map, *newest, time);
+  const double depth = Depth(map);
+  const MotionFilter::Since since = Since(map, *newest, time, depth);
   if (since.duration_s <= 0) return motion_;
   if (motion_ && IsWithin(newest->time, time, kKnownNs)) {
-    const Prediction prediction = Predict(map, time);
+    const Prediction prediction = Predict(map, time, depth);
     MotionFilter motion = *motion_;
     motion.Update(since, Difference(found.T_cam_world, *prediction.T_cam_world),
-                  Floored(map, found.covariance));
+                  Floored(found.covariance, depth));
     return motion;
   }
   if (!IsWithin(newest->time, time, kSuccessiveNs)) return std::nullopt;
   return MotionFilter(options_.evenness, since, Difference(found.T_cam_world, *T_last_world),
-                      Floored(map, covariance_.value_or(Matrix6d::Zero())), Floored(map, found.covariance));
+                      Floored(covariance_.value_or(Matrix6d::Zero()), depth),
+                      Floored(found.covariance, depth));
 }
 
 bool MotionModel::IsWithin(const FrameTime& newest, const FrameTime& time, int64_t limit_ns) {
@@ -106,13 +109,17 @@ double MotionModel::Depth(const Map& map) const {
 }
 
 MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time) const {
+  return Predict(map, time, Depth(map));
+}
+
+MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time, double depth) const {
   Prediction prediction;
   const std::optional<Pose>& newest = Newest();
   if (!newest) return prediction;
   prediction.recent = time.stamp_ns - last_->time.stamp_ns < kRecentNs;
   prediction.T_cam_world = newest->pose.In(map);
   if (!prediction.T_cam_world || !motion_) return prediction;
-  const MotionFilter::Expected expected = motion_->Predict(Since(map, *newest, time));
+  const MotionFilter::Expected expected = motion_->Predict(Since(map, *newest, time, depth));
   prediction.T_cam_world =
       Rigid3d(ExpSo3(expected.step.head<3>()), expected.step.tail<3>()) * *prediction.T_cam_world;
   if (!IsWithin(newest->time, time, kKnownNs)) return prediction;
@@ -124,11 +131,12 @@ bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const 
   if (!last_) return true;
   if (time.stamp_ns - last_->time.stamp_ns > static_cast<int64_t>(options_.reach_known_s * 1e9)) return true;
   const Pose& newest = *Newest();
-  const Prediction prediction = Predict(map, time);
+  const double depth = Depth(map);
+  const Prediction prediction = Predict(map, time, depth);
   if (!prediction.T_cam_world) return true;
   const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *newest.pose.In(map);
   const double turned_rad = AngleBetween(T_cam_world.rotation, from.rotation);
-  const double moved = (T_cam_world.Center() - from.Center()).norm() / Depth(map);
+  const double moved = (T_cam_world.Center() - from.Center()).norm() / depth;
   const double since_s = std::max(1.0 / 30, static_cast<double>(time.stamp_ns - newest.time.stamp_ns) * 1e-9);
   if (prediction.prior) {
     const double steps = std::max(1.0, std::round(since_s * 30));

@@ -92,9 +92,10 @@ std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& ma
   expected_.clear();
   const double oblique_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_rad);
   const double frontal_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_frontal_rad);
+  const Viewpoint viewpoint(frame->T_cam_world);
   for (const LandmarkId id : landmarks) {
     const Landmark& landmark = *map.FindLandmark(id);
-    const std::optional<LandmarkView> view = PredictView(map, landmark, frame->T_cam_world);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint);
     if (!view) continue;
     expected_.push_back({id, *view});
     if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), id)) continue;
