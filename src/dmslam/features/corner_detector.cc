@@ -1,11 +1,32 @@
 #include "dmslam/features/corner_detector.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 
 #include "dmslam/util/check.h"
 
 namespace dmslam {
+namespace {
+
+/// The stronger one is the lesser, then the one with the lesser index.
+uint64_t Rank(const Corner& corner, uint32_t index) {
+  const int less = INT16_MAX - corner.score;
+  return static_cast<uint64_t>(less) << 32 | index;
+}
+int ScoreOf(uint64_t rank) { return INT16_MAX - static_cast<int>(rank >> 32); }
+uint32_t IndexOf(uint64_t rank) { return static_cast<uint32_t>(rank); }
+
+/// The cell of each coordinate below `length`; returns how many cells there are.
+uint32_t ListCells(int length, int cell_size, std::vector<uint32_t>* cells) {
+  cells->clear();
+  uint32_t count = 0;
+  for (int begin = 0; begin < length; begin += cell_size)
+    cells->insert(cells->end(), static_cast<size_t>(std::min(cell_size, length - begin)), count++);
+  return count;
+}
+
+}  // namespace
 
 void CornerDetector::Detect(const PaddedImage& image, int threshold, int border_px,
                             const ImageKernels& kernels, std::vector<Corner>* corners) {
@@ -44,7 +65,7 @@ void CornerSelector::Select(std::span<const Corner> corners, int count, int widt
   candidates_.clear();
   for (size_t cell = 0; cell + 1 < cell_starts_.size(); ++cell) {
     const uint32_t begin = cell_starts_[cell], end = cell_starts_[cell + 1];
-    if (begin < end) RankCell(corners, std::span(by_cell_).subspan(begin, end - begin), options);
+    if (begin < end) RankCell(std::span(by_cell_).subspan(begin, end - begin), options);
   }
   if (candidates_.size() > static_cast<size_t>(count)) {
     std::nth_element(candidates_.begin(), candidates_.begin() + count, candidates_.end(),
@@ -64,13 +85,12 @@ void CornerSelector::Reserve(size_t num_corners) {
 }
 
 void CornerSelector::SortIntoCells(std::span<const Corner> corners, int width, int height, int cell_size_px) {
-  const int columns = (width + cell_size_px - 1) / cell_size_px;
-  const int rows = (height + cell_size_px - 1) / cell_size_px;
+  const uint32_t columns = ListCells(width, cell_size_px, &column_of_);
+  const uint32_t rows = ListCells(height, cell_size_px, &row_of_);
   const auto cell_of = [&](const Corner& corner) {
-    return static_cast<size_t>(corner.y / cell_size_px) * static_cast<size_t>(columns) +
-           static_cast<size_t>(corner.x / cell_size_px);
+    return row_of_[static_cast<size_t>(corner.y)] * columns + column_of_[static_cast<size_t>(corner.x)];
   };
-  cell_starts_.assign(static_cast<size_t>(columns * rows) + 1, 0);
+  cell_starts_.assign(size_t{columns} * rows + 1, 0);
   for (const Corner& corner : corners) ++cell_starts_[cell_of(corner)];
   uint32_t end = 0;
   for (uint32_t& start : cell_starts_) {
@@ -79,20 +99,18 @@ void CornerSelector::SortIntoCells(std::span<const Corner> corners, int width, i
   }
   by_cell_.resize(corners.size());
   for (size_t i = corners.size(); i-- > 0;)
-    by_cell_[--cell_starts_[cell_of(corners[i])]] = static_cast<uint32_t>(i);
+    by_cell_[--cell_starts_[cell_of(corners[i])]] = Rank(corners[i], static_cast<uint32_t>(i));
 }
 
-void CornerSelector::RankCell(std::span<const Corner> corners, std::span<uint32_t> cell,
-                              const Options& options) {
-  std::sort(cell.begin(), cell.end(), [&](uint32_t a, uint32_t b) {
-    return corners[a].score != corners[b].score ? corners[a].score > corners[b].score : a < b;
-  });
-  const bool has_strong = corners[cell.front()].score > options.strong_threshold;
+void CornerSelector::RankCell(std::span<uint64_t> cell, const Options& options) {
+  std::sort(cell.begin(), cell.end());
+  const bool has_strong = ScoreOf(cell.front()) > options.strong_threshold;
   const float decay = static_cast<float>(options.rank_decay);
   float factor = 1.0F;
-  for (const uint32_t index : cell) {
-    if (has_strong && corners[index].score <= options.strong_threshold) break;
-    candidates_.push_back({static_cast<float>(corners[index].score) * factor, index});
+  for (const uint64_t rank : cell) {
+    const int score = ScoreOf(rank);
+    if (has_strong && score <= options.strong_threshold) break;
+    candidates_.push_back({static_cast<float>(score) * factor, IndexOf(rank)});
     factor *= decay;
   }
 }

@@ -52,10 +52,11 @@ class CornerSelector {
   };
 
   void SortIntoCells(std::span<const Corner> corners, int width, int height, int cell_size_px);
-  void RankCell(std::span<const Corner> corners, std::span<uint32_t> cell, const Options& options);
+  void RankCell(std::span<uint64_t> cell, const Options& options);
 
+  std::vector<uint32_t> column_of_, row_of_;  ///< of cells, for each x, y
   std::vector<uint32_t> cell_starts_;
-  std::vector<uint32_t> by_cell_;
+  std::vector<uint64_t> by_cell_;  ///< each corner's score and index, sorted by cell
   std::vector<Candidate> candidates_;
 };
 

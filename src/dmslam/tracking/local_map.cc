@@ -85,12 +85,16 @@ void LocalMap::AddNeighbours(const Map& map) {
 }
 
 void LocalMap::ListLandmarks(const Map& map) {
-  landmarks_.clear();
+  size_t most = 0, count = 0;
+  for (const KeyframeId id : keyframes_) most += map.FindKeyframe(id)->landmarks.size();
+  landmarks_.resize(most);
   for (const KeyframeId id : keyframes_) {
     for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-      if (landmark.valid()) landmarks_.push_back(landmark);
+      landmarks_[count] = landmark;
+      count += static_cast<size_t>(landmark.valid());  // no branch: which ones are has no pattern
     }
   }
+  landmarks_.resize(count);
   SortUnique(&landmarks_, &marks_);
 }
 
