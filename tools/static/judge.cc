@@ -141,9 +141,6 @@ std::vector<NamedSelector> DlrsacAblations() {
   other.distribution_weight = DistributionWeight::kMatches;
   selectors.push_back(MakeDlrsac("default, D weighted by matches", other));
   other = ungated;
-  other.neighbor_share = 0.6;
-  selectors.push_back(MakeDlrsac("default with the neighbours' vote, 0.6", other));
-  other = ungated;
   other.couple_over_own_inliers = false;
   selectors.push_back(MakeDlrsac("default, couple degree over all matches", other));
   for (const double share : {0.75, 1.5}) {

@@ -65,10 +65,9 @@ InitializerReport TwoFrameInitializer::BeginWith(const InitializerFrame& frame, 
 }
 
 InitializerReport TwoFrameInitializer::AddFrame(const InitializerFrame& frame) {
-  if (!reference_) return BeginWith(frame, WaitReason::kTooFewFrames, "this is the reference frame");
-  if (static_cast<int>(frame.features->size()) < options_.min_features) {
+  if (static_cast<int>(frame.features->size()) < options_.min_features)
     return BeginWith(frame, WaitReason::kTooFewFeatures, "too few features");
-  }
+  if (!reference_) return BeginWith(frame, WaitReason::kTooFewFrames, "this is the reference frame");
   const std::vector<Match> matches =
       MatchFrames(*reference_->features, *frame.features, camera_, options_.matching, &matcher_);
   if (static_cast<int>(matches.size()) < options_.min_matches) {

@@ -133,6 +133,7 @@ TEST_F(ThingsTest, AFrameOfTooFewFeaturesEndsTheReferenceAndIsNone) {
   initializer.AddFrame(Frame(0, 0, 99));
   EXPECT_FALSE(initializer.AddFrame(Frame(1, 0, 200)).result);
   EXPECT_EQ(initializer.AddFrame(Frame(2, 0, 99)).wait, WaitReason::kTooFewFeatures);
+  EXPECT_EQ(initializer.AddFrame(Frame(2, 0, 99)).wait, WaitReason::kTooFewFeatures) << "without one, too";
   EXPECT_EQ(initializer.AddFrame(Frame(3, 0, 100)).wait, WaitReason::kTooFewFrames);
   const InitializerReport report = initializer.AddFrame(Frame(4, 0, 200));
   ASSERT_TRUE(report.result) << report.reason;

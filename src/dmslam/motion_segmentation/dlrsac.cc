@@ -11,7 +11,6 @@
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/geometry/two_view.h"
-#include "dmslam/motion_segmentation/neighbor_vote.h"
 #include "dmslam/motion_segmentation/sampling.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/chi_squared.h"
@@ -95,7 +94,6 @@ class Segmentation {
   void SearchMinima(TwoViewModel* model, std::vector<uint8_t>* flags) const;
   double RivalShare(std::span<const uint8_t> flags) const;
   bool RefusedAsAmbiguous(std::span<const uint8_t> flags);
-  void VoteWithNeighbors(std::vector<uint8_t>* flags) const;
 
   int NumModels() const {
     return static_cast<int>(
@@ -378,7 +376,6 @@ void Segmentation::Select(const CoupledSet& set) {
     RefitOnAll(&model, &flags);
     SearchMinima(&model, &flags);
     if (RefusedAsAmbiguous(flags)) return;
-    if (options_.neighbor_share > 0) VoteWithNeighbors(&flags);
   } else {
     for (const size_t j : set.members) FlagInliers(model.M, arrays_, kept_[j].range, flags);
     if (options_.scope == StaticScope::kCoupledCells) {
@@ -479,16 +476,6 @@ bool Segmentation::RefusedAsAmbiguous(std::span<const uint8_t> flags) {
   return true;
 }
 
-void Segmentation::VoteWithNeighbors(std::vector<uint8_t>* flags) const {
-  std::vector<Match> sorted(matches_.size());
-  for (size_t k = 0; k < order_.size(); ++k) sorted[k] = matches_[order_[k]];
-  const std::vector<float> shares =
-      NeighborShares(sorted, *flags, options_.neighbors, options_.neighbor_reach_rad * FocalPx(camera_));
-  for (size_t k = 0; k < flags->size(); ++k) {
-    if (shares[k] < options_.neighbor_share) (*flags)[k] = 0;
-  }
-}
-
 }  // namespace
 
 DlrsacOptions DlrsacOptions::Paper() {
@@ -502,7 +489,6 @@ DlrsacOptions DlrsacOptions::Paper() {
   options.tell_degenerate = false;
   options.layers.enabled = false;
   options.search_minima = false;
-  options.neighbor_share = 0.0;
   options.min_distribution_share = 0.0;
   options.max_rival_share = 0.0;
   return options;
@@ -517,7 +503,6 @@ void DlrsacOptions::Check() const {
   require(min_cells >= 1, "min_cells", "at least 1");
   require(is_share(couple_threshold), "couple_threshold", "in 0..1");
   require(is_share(degenerate_share), "degenerate_share", "in 0..1");
-  require(is_share(neighbor_share), "neighbor_share", "in 0..1");
   require(is_share(min_distribution_share), "min_distribution_share", "in 0..1");
   require(is_share(max_rival_share), "max_rival_share", "in 0..1");
 }

@@ -67,12 +67,6 @@ struct DlrsacOptions {
   double loose_bound = 9.0;   ///< nearly agrees: squared Sampson distance up to so many times its bound
   double minima_slack = 3.0;  ///< minima with up to so many times the lowest cost are tried
 
-  /// A match is called static only if this share of its neighbours in the image agrees with the model too.
-  /// What moves agrees by accident, and not all of it together. 0: not asked.
-  double neighbor_share = 0.0;
-  int neighbors = 10;                 ///< how many nearest matches are asked at most
-  double neighbor_reach_rad = 0.076;  ///< and how far they may be, about
-
   /// Root of D of the chosen set below this share of the image's diagonal: refused, the motion is too complex
   /// (paper 2.3.1). Two neighbouring cells stay below it.
   double min_distribution_share = 0.12;
