@@ -23,14 +23,8 @@ constexpr uint32_t kSession = 4;
 class LoopAnswersTest : public testing::Test {
  protected:
   LoopAnswersTest() : other_(&bus_.AddPort(), [this] { return now_ns_; }) {
-    StreamWriter::Options writer;
-    writer.session = kSession;
-    writer.stream = StreamId::kLoopCloser;
-    writer.owner = "LOOPCLOSER";
-    writer.name = "loopcloser";
-    writer.schema_hash = SchemaHash();
-    writer.roles = {{"mapper", true}};
-    answers_ = std::make_unique<StreamWriter>(writer, Term{10, 3}, Version{});
+    answers_ = std::make_unique<StreamWriter>(ForMapper(StreamId::kLoopCloser, "LOOPCLOSER", "loopcloser"),
+                                              Term{10, 3}, Version{});
     other_.AddWriter(answers_.get(), "LOOPCLOSER", {"MAPPER"});
     StreamReader::Options reader;
     reader.session = kSession;
@@ -61,6 +55,18 @@ class LoopAnswersTest : public testing::Test {
       other_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
       Run();
     }
+  }
+
+  /// A stream that the mapper reads.
+  static StreamWriter::Options ForMapper(StreamId stream, const char* owner, const char* name) {
+    StreamWriter::Options writer;
+    writer.session = kSession;
+    writer.stream = stream;
+    writer.owner = owner;
+    writer.name = name;
+    writer.schema_hash = SchemaHash();
+    writer.roles = {{"mapper", true}};
+    return writer;
   }
 
   void Run() {
@@ -159,14 +165,8 @@ class MapperStatusTest : public LoopAnswersTest {
     });
   }
   void BeginFrontend() {
-    StreamWriter::Options writer;
-    writer.session = kSession;
-    writer.stream = StreamId::kFrontend;
-    writer.owner = "FRONTEND";
-    writer.name = "frontend";
-    writer.schema_hash = SchemaHash();
-    writer.roles = {{"mapper", true}};
-    frontend_ = std::make_unique<StreamWriter>(writer, Term{10, 5}, Version{});
+    frontend_ = std::make_unique<StreamWriter>(ForMapper(StreamId::kFrontend, "FRONTEND", "frontend"),
+                                               Term{10, 5}, Version{});
     other_.AddWriter(frontend_.get(), "FRONTEND", {"MAPPER"});
   }
   template <typename Message>

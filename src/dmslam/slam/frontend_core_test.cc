@@ -150,11 +150,15 @@ class Phases : public ::testing::Test {
     delta.progress.settled = KeyframeId::Make(1, 1);
     core_->ApplyMapDelta(delta);
   }
-  /// To a map whose frames are tracked.
-  void Start() {
+  /// A first map, of frames 0 and 1.
+  void Propose() {
     Frame(0);
     finds_map_ = true;
     Frame(1);
+  }
+  /// To a map whose frames are tracked.
+  void Start() {
+    Propose();
     finds_map_ = false;
     MapArrives();
   }
@@ -202,9 +206,7 @@ TEST_F(Phases, ACameraThatTurnsWithoutAMapHasARotationAndNoPose) {
 }
 
 TEST_F(Phases, AProposalThatTheMapperRefusesIsGivenUp) {
-  Frame(0);
-  finds_map_ = true;
-  Frame(1);
+  Propose();
   MapDelta refused;
   refused.event = MapEvent::kFirstMapRefused;
   refused.about = KeyframeId::Make(1, 7);
@@ -220,9 +222,7 @@ TEST_F(Phases, AProposalThatTheMapperRefusesIsGivenUp) {
 }
 
 TEST_F(Phases, AMapWhoseNumberTheProposalTookStays) {
-  Frame(0);
-  finds_map_ = true;
-  Frame(1);
+  Propose();
   MapDelta refused;
   refused.keyframes.resize(1);  // of a map of this number that has been there before
   refused.keyframes[0].id = KeyframeId::Make(1, 40);
@@ -238,9 +238,7 @@ TEST_F(Phases, AMapWhoseNumberTheProposalTookStays) {
 }
 
 TEST_F(Phases, AProposalThatWasSettledWithoutAMapIsGivenUp) {
-  Frame(0);
-  finds_map_ = true;
-  Frame(1);
+  Propose();
   MapDelta settled;
   settled.progress.settled = KeyframeId::Make(1, 1);
   core_->ApplyMapDelta(settled);
