@@ -111,7 +111,7 @@ FeatureGrid::Rows FeatureGrid::RowsOf(const Circle& circle) const {
 /// which hardly leaves out a cell, that of the square around it.
 FeatureGrid::Run FeatureGrid::RunOf(const Circle& circle, int row) const {
   const double radius = circle.radius_px;
-  if (circle.radius_px <= kSmallRadiusPx)
+  if (radius <= kSmallRadiusPx)
     return RunBetween(circle.x_px - radius - kRoundingPx, circle.x_px + radius + kRoundingPx, row);
   const double top = row * kCellSizePx, bottom = top + kCellSizePx;
   double away = 0;

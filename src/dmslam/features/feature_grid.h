@@ -61,8 +61,8 @@ class FeatureGrid {
     std::array<uint32_t, kBatch> batch;
     for (int row = rows.begin; row < rows.end; ++row) {
       const Run run = RunOf(circle, row);
-      for (uint32_t i = run.begin; i < run.end; i += kBatch - kSlack) {
-        const Run part = {i, std::min<uint32_t>(run.end, i + (kBatch - kSlack))};
+      for (uint32_t i = run.begin; i < run.end; i += kBatch) {
+        const Run part = {i, std::min<uint32_t>(run.end, i + kBatch)};
         if (const size_t count = CollectOf(circle, part, min_octave, max_octave, batch.data()))
           visit(std::span<const uint32_t>(batch.data(), count));
       }
@@ -107,12 +107,12 @@ class FeatureGrid {
   };
 
   static constexpr double kCellSizePx = 20.0;
-  static constexpr float kSmallRadiusPx = 30.0F;
+  static constexpr double kSmallRadiusPx = 1.5 * kCellSizePx;
 
   Rows RowsOf(const Circle& circle) const;
   Run RunOf(const Circle& circle, int row) const;
   Run RunBetween(double left_px, double right_px, int row) const;
-  /// Those of the run's entries that lie in the circle, into `features`, which has room for kSlack more.
+  /// Those of the run's entries that lie in the circle, into `features`, which has room for all of them.
   size_t CollectOf(const Circle& circle, const Run& run, int min_octave, int max_octave,
                    uint32_t* features) const;
   size_t CellIndex(int column, int row) const {

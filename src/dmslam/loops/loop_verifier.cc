@@ -277,9 +277,10 @@ PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const 
   std::vector<uint8_t> taken(keyframe.features->size(), 0);
   std::bitset<kCellColumns * kCellRows> cells;
   CellCounts counts;
+  const Viewpoint viewpoint(T_cam_world);
   for (const LandmarkId id : landmarks) {
     const Landmark& landmark = *map.FindLandmark(id);
-    const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world, kSurelySeen);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint, kSurelySeen);
     if (!view) continue;
     ++support.expected;
     const size_t cell = CellOf(map.camera(), view->uv_px);

@@ -64,15 +64,14 @@ std::optional<FeatureHit> FindFeature(const FrameFeatures& features, const Eigen
   const HammingToIndexed distances_to = BestHammingKernels().to_indexed;
   TwoNearest nearest;
   std::array<uint16_t, FeatureGrid::kBatch> distances;
-  features.grid.ForEachBatchInRadius(uv_px, radius_px, min_octave, max_octave,
-                                     [&](std::span<const uint32_t> batch) {
-                                       distances_to(descriptor, features.set.descriptors.data(), batch.data(),
-                                                    static_cast<int>(batch.size()), distances.data());
-                                       for (size_t k = 0; k < batch.size(); ++k) {
-                                         if (taken.empty() || taken[batch[k]] == 0)
-                                           nearest.Offer(features, batch[k], distances[k]);
-                                       }
-                                     });
+  const auto compare = [&](std::span<const uint32_t> batch) {
+    distances_to(descriptor, features.set.descriptors.data(), batch.data(), static_cast<int>(batch.size()),
+                 distances.data());
+    for (size_t k = 0; k < batch.size(); ++k) {
+      if (taken.empty() || taken[batch[k]] == 0) nearest.Offer(features, batch[k], distances[k]);
+    }
+  };
+  features.grid.ForEachBatchInRadius(uv_px, radius_px, min_octave, max_octave, compare);
   return nearest.hit();
 }
 

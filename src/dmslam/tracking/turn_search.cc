@@ -35,9 +35,10 @@ void TurnSearch::ListPairs(const Map& map, const LandmarkVotes& votes, std::span
                            const Rigid3d& T_cam_world, double reach_rad, const FrameFeatures& features) {
   pairs_.clear();
   const double radius_px = SearchRadiusPx(map.camera(), reach_rad);
+  const Viewpoint viewpoint(T_cam_world);
   for (const LandmarkId id : landmarks) {
     const Landmark& landmark = *map.FindLandmark(id);
-    const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world);
+    const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint);
     if (!view || !votes.HasVote(landmark)) continue;
     alike_.clear();
     features.grid.ForEachInRadius(
