@@ -9,10 +9,12 @@
 
 namespace dmslam {
 
-/// A landmark that a frame should see, and where.
+/// A landmark of the map that a frame should see, and where.
 struct ExpectedLandmark {
-  LandmarkId id;
+  const Landmark* landmark;
   LandmarkView view;
+
+  LandmarkId id() const { return landmark->id; }
 };
 
 /// A match that the frame's pose does not agree with.

@@ -10,9 +10,9 @@ void HiddenPlaces::DropMatches(const Map& map, std::span<const ExpectedLandmark>
                                const LandmarkVotes& votes, TrackedFrame* frame) {
   ListMatched(*frame, &matched_);
   FoundShare share(map.camera());
-  for (const auto& [id, view] : expected) {
-    if (!votes.HasVote(*map.FindLandmark(id))) continue;
-    share.Add(view.uv_px, std::binary_search(matched_.begin(), matched_.end(), id));
+  for (const auto& [landmark, view] : expected) {
+    if (!votes.HasVote(*landmark)) continue;
+    share.Add(view.uv_px, std::binary_search(matched_.begin(), matched_.end(), landmark->id));
   }
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     const Landmark* landmark = frame->landmarks[i].valid() ? map.FindLandmark(frame->landmarks[i]) : nullptr;

@@ -6,13 +6,17 @@
 
 namespace dmslam {
 
-double AgeAt(const Map& map, const Landmark& landmark, int64_t stamp_ns) {
+double LandmarkAges::Of(const Landmark& landmark) {
   int64_t last_ns = landmark.first_ns;
   if (!landmark.observations.empty()) {
-    const Keyframe* last = map.FindKeyframe(landmark.observations.back().keyframe);
-    if (last != nullptr) last_ns = std::max(last_ns, last->stamp_ns);
+    const KeyframeId last = landmark.observations.back().keyframe;
+    if (last != last_) {
+      last_ = last;
+      last_keyframe_ = map_.FindKeyframe(last);
+    }
+    if (last_keyframe_ != nullptr) last_ns = std::max(last_ns, last_keyframe_->stamp_ns);
   }
-  return static_cast<double>(std::max(stamp_ns - landmark.first_ns, last_ns - stamp_ns)) * 1e-9;
+  return static_cast<double>(std::max(stamp_ns_ - landmark.first_ns, last_ns - stamp_ns_)) * 1e-9;
 }
 
 bool IsOldAt(const Landmark& landmark, int64_t stamp_ns, const VoteOptions& options) {

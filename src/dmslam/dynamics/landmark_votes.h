@@ -28,12 +28,24 @@ struct VoteOptions {
   }
 };
 
-/// For how long the landmark stands in its place at that moment [s]: since it was made, or, where time runs
-/// backwards and in a map of another time, until it was seen last.
-double AgeAt(const Map& map, const Landmark& landmark, int64_t stamp_ns);
+/// For how long landmarks stand in their places at a moment [s]: since they were made, or, where time runs
+/// backwards and in a map of another time, until they were seen last.
+class LandmarkAges {
+ public:
+  /// The map stays as it is meanwhile.
+  LandmarkAges(const Map& map, int64_t stamp_ns) : map_(map), stamp_ns_(stamp_ns) {}
+  double Of(const Landmark& landmark);
 
-/// Whether the landmark was made so long before that moment that it has full weight. Not AgeAt, which looks
-/// both ways: where time runs backwards none is old here, for the map begins where the room was hidden
+ private:
+  const Map& map_;
+  int64_t stamp_ns_;
+  // The keyframe that was asked for last: neighbours were seen last by the same.
+  KeyframeId last_;
+  const Keyframe* last_keyframe_ = nullptr;
+};
+
+/// Whether the landmark was made so long before that moment that it has full weight. Not LandmarkAges, which
+/// look both ways: where time runs backwards none is old here, for the map begins where the room was hidden
 /// before, so that landmarks which are not seen there are no sign of a wrong pose.
 bool IsOldAt(const Landmark& landmark, int64_t stamp_ns, const VoteOptions& options);
 

@@ -46,13 +46,13 @@ TEST(LandmarkVotesTest, AgeCountsFromTheFarEndOfTheTimeInWhichItIsSeen) {
   scene.AddPoint({0, 0, 4}, 10 * kSecond);
   scene.MapAll(4, 0.05, 300, 10 * kSecond);
   const auto age_s = [&](double at_s) {
-    return AgeAt(scene.map(), scene.map().At(MapScene::IdOf(0)), static_cast<int64_t>(at_s * 1e9));
+    return LandmarkAges(scene.map(), static_cast<int64_t>(at_s * 1e9)).Of(scene.map().At(MapScene::IdOf(0)));
   };
   EXPECT_NEAR(age_s(15), 5, 1e-9) << "since it was made";
   EXPECT_NEAR(age_s(7), 3.1, 1e-6) << "time runs backwards";
   Landmark unseen;
   unseen.first_ns = 10 * kSecond;
-  EXPECT_NEAR(AgeAt(scene.map(), unseen, 7 * kSecond), 3, 1e-9);
+  EXPECT_NEAR(LandmarkAges(scene.map(), 7 * kSecond).Of(unseen), 3, 1e-9);
 }
 
 TEST(LandmarkVotesTest, OldIsWhatWasMadeLongBefore) {

@@ -64,11 +64,11 @@ void MissingLandmarks::Judge(const Map& map, const TrackedFrame& frame,
   CallWitnesses(map, frame, moved);
   gone_.clear();
   hidden_.clear();
-  for (const auto& [id, view] : expected) {
-    if (std::binary_search(known_.begin(), known_.end(), id)) continue;
+  for (const auto& [landmark, view] : expected) {
+    if (std::binary_search(known_.begin(), known_.end(), landmark->id)) continue;
     const Verdict verdict = AskAround(view);
-    if (verdict == Verdict::kGone) gone_.push_back(id);
-    if (verdict == Verdict::kHidden) hidden_.push_back(id);
+    if (verdict == Verdict::kGone) gone_.push_back(landmark->id);
+    if (verdict == Verdict::kHidden) hidden_.push_back(landmark->id);
   }
 }
 

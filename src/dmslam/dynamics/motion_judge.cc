@@ -51,7 +51,7 @@ void MotionJudge::Believe(const Map& map, std::span<const ExpectedLandmark> expe
                           const TrackedFrame& frame) {
   const std::vector<LandmarkId>& hidden = missing_.hidden();
   for (const ExpectedLandmark& landmark : expected) {
-    if (!std::binary_search(hidden.begin(), hidden.end(), landmark.id)) evidence_.OnVisible(landmark.id);
+    if (!std::binary_search(hidden.begin(), hidden.end(), landmark.id())) evidence_.OnVisible(landmark.id());
   }
   for (const LandmarkId id : moved_now_) {
     evidence_.OnMoved(id);

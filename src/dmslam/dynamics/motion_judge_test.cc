@@ -87,7 +87,7 @@ TEST_F(Judgement, WhatIsSeenBesideItsPlaceHasMovedAndLosesItsVote) {
   const FrameEvidence evidence = JudgedAndBelieved(frame, 3);
   EXPECT_GE(OfPoster(evidence).moved, 3 * 20);
   const auto voteless = std::count_if(expected.begin(), expected.end(), [&](const ExpectedLandmark& e) {
-    return !judge_.votes().HasVote(*scene_.map().FindLandmark(e.id));
+    return !judge_.votes().HasVote(*e.landmark);
   });
   EXPECT_GE(voteless, 20);
   EXPECT_LE(voteless, static_cast<long>(kPosterPoints));

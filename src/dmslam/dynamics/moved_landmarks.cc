@@ -18,7 +18,7 @@ const std::vector<LandmarkId>& MovedLandmarks::Find(const Map& map,
   JudgeRejected(map, rejected, frame);
   std::sort(used_.begin(), used_.end());
   for (const ExpectedLandmark& landmark : expected) {
-    if (!std::binary_search(used_.begin(), used_.end(), landmark.id)) LookAround(map, landmark, frame);
+    if (!std::binary_search(used_.begin(), used_.end(), landmark.id())) LookAround(map, landmark, frame);
   }
   return moved_;
 }
@@ -41,7 +41,7 @@ void MovedLandmarks::JudgeRejected(const Map& map, std::span<const RejectedMatch
 
 /// One that is missed in its place and found in the neighbourhood, where nothing else looks like it.
 void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected, TrackedFrame* frame) {
-  const Landmark& landmark = *map.FindLandmark(expected.id);
+  const Landmark& landmark = *expected.landmark;
   const std::optional<Eigen::Vector2d> uv = map.camera().Project(frame->T_cam_world * landmark.p_world);
   if (!uv) return;
   const std::optional<FeatureHit> hit =
@@ -50,7 +50,7 @@ void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected
   if (!hit || hit->distance > options_.max_distance) return;
   if (hit->distance > options_.ratio * hit->second_distance) return;
   if (NormalizedErrorSquared(*frame->features, hit->feature, *uv, map.pyramid()) < options_.chi2) return;
-  moved_.push_back(expected.id);
+  moved_.push_back(landmark.id);
   features_.push_back(static_cast<uint16_t>(hit->feature));
   frame->classes[static_cast<size_t>(hit->feature)] = FeatureClass::kMoving;
 }

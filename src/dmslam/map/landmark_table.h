@@ -1,7 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -38,6 +41,19 @@ class LandmarkTable {
     }
   }
 
+  /// Calls visit(const Landmark&) for each of `ids`, all of which are there, in their order. Those that come
+  /// next are fetched while one is visited: most of the time it takes is the memory's.
+  template <typename Visit>
+  void ForEachOf(std::span<const LandmarkId> ids, Visit visit) const {
+    std::array<const Landmark*, kAhead> ahead;
+    for (size_t i = 0; i < std::min(kAhead, ids.size()); ++i) ahead[i] = Fetch(ids[i]);
+    for (size_t i = 0; i < ids.size(); ++i) {
+      const Landmark& landmark =
+          *std::exchange(ahead[i % kAhead], i + kAhead < ids.size() ? Fetch(ids[i + kAhead]) : nullptr);
+      visit(landmark);
+    }
+  }
+
   /// One that is not there yet, with a valid id.
   Landmark& Insert(Landmark landmark);
   /// Nothing happens where it is not there.
@@ -56,6 +72,16 @@ class LandmarkTable {
     LandmarkId id;  ///< invalid: free
     std::unique_ptr<Landmark> landmark;
   };
+
+  static constexpr size_t kAhead = 8;
+  static constexpr size_t kCacheLineBytes = 64;
+
+  const Landmark* Fetch(LandmarkId id) const {
+    const Landmark* landmark = Find(id);
+    const char* bytes = reinterpret_cast<const char*>(landmark);
+    for (size_t at = 0; at < sizeof(Landmark); at += kCacheLineBytes) __builtin_prefetch(bytes + at);
+    return landmark;
+  }
 
   /// Running numbers come to lie far apart, as those of two epochs would otherwise push each other along.
   size_t HomeOf(LandmarkId id) const {

@@ -17,7 +17,8 @@ auto WhereObserved(std::vector<Observation>& observations, KeyframeId keyframe) 
 
 }  // namespace
 
-Map::Map(const Camera& camera, const Pyramid& pyramid) : camera_(camera), pyramid_(pyramid) {}
+Map::Map(const Camera& camera, const Pyramid& pyramid)
+    : camera_(camera), pyramid_(pyramid), log_scale_factor_(std::log(pyramid.scale_factor)) {}
 
 void Map::KeepFeaturesIn(std::shared_ptr<FeatureStore> store) {
   if (feature_store_ == store) return;

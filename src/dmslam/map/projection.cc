@@ -27,10 +27,9 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
   }
   const double view_cos = ray.dot(viewing.mean_direction) / distance;
   if (view_cos < limits.min_view_cos) return std::nullopt;
-  const Pyramid& pyramid = map.pyramid();
-  const double octave = std::ceil(std::log(viewing.max_distance / distance) / std::log(pyramid.scale_factor));
+  const double octave = std::ceil(map.LevelOf(viewing.max_distance / distance));
   return LandmarkView{*uv, p_cam.z(), view_cos,
-                      static_cast<int>(std::clamp(octave, 0.0, pyramid.levels - 1.0))};
+                      static_cast<int>(std::clamp(octave, 0.0, map.pyramid().levels - 1.0))};
 }
 
 namespace {

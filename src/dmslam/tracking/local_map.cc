@@ -11,6 +11,8 @@ constexpr int kNeighboursAsked = 10;
 
 /// Ids that lie closer than this are marked in a table; it is smaller than the list and never compares.
 constexpr uint64_t kWidestRange = 64;  // ids between the ends, for each in the list
+/// The same of those that are counted.
+constexpr uint64_t kWidestCounted = 8;
 
 /// Sorts, and leaves each once. `marks` is workspace.
 void SortUnique(std::vector<LandmarkId>* ids, std::vector<uint64_t>* marks) {
@@ -32,6 +34,29 @@ void SortUnique(std::vector<LandmarkId>* ids, std::vector<uint64_t>* marks) {
   }
 }
 
+/// Calls visit(id, count) for each id of the list, in their order. `counts` is workspace; sorts the list
+/// where it is too wide to count.
+template <typename Visit>
+void CountEach(std::vector<KeyframeId>* ids, std::vector<int>* counts, const Visit& visit) {
+  if (ids->empty()) return;
+  const auto [least, most] = std::minmax_element(ids->begin(), ids->end());
+  const uint64_t first = least->value, range = most->value - first;
+  if (range / kWidestCounted < ids->size()) {
+    counts->assign(range + 1, 0);
+    for (const KeyframeId id : *ids) ++(*counts)[id.value - first];
+    for (uint64_t at = 0; at <= range; ++at) {
+      if ((*counts)[at] > 0) visit(KeyframeId{first + at}, (*counts)[at]);
+    }
+    return;
+  }
+  std::sort(ids->begin(), ids->end());
+  for (auto begin = ids->begin(); begin != ids->end();) {
+    const auto end = std::find_if(begin, ids->end(), [begin](KeyframeId other) { return other != *begin; });
+    visit(*begin, static_cast<int>(end - begin));
+    begin = end;
+  }
+}
+
 }  // namespace
 
 void LocalMap::Reset() {
@@ -40,7 +65,7 @@ void LocalMap::Reset() {
   landmarks_.clear();
 }
 
-/// The keyframes that see most of the frame's landmarks, most first.
+/// The keyframes that see most of the frame's landmarks, most first; as many as the local map may have.
 void LocalMap::RankByVotes(const Map& map, const TrackedFrame& frame) {
   votes_.clear();
   for (const LandmarkId id : frame.landmarks) {
@@ -48,14 +73,10 @@ void LocalMap::RankByVotes(const Map& map, const TrackedFrame& frame) {
     if (landmark == nullptr) continue;
     for (const Observation& o : landmark->observations) votes_.push_back(o.keyframe);
   }
-  std::sort(votes_.begin(), votes_.end());
   ranked_.clear();
-  for (auto begin = votes_.begin(); begin != votes_.end();) {
-    const auto end = std::find_if(begin, votes_.end(), [begin](KeyframeId other) { return other != *begin; });
-    ranked_.emplace_back(-static_cast<int>(end - begin), *begin);
-    begin = end;
-  }
-  std::sort(ranked_.begin(), ranked_.end());
+  CountEach(&votes_, &counts_, [this](KeyframeId id, int count) { ranked_.emplace_back(-count, id); });
+  const auto asked = ranked_.begin() + static_cast<ptrdiff_t>(std::min(ranked_.size(), max_keyframes_));
+  std::partial_sort(ranked_.begin(), asked, ranked_.end());
 }
 
 /// The best neighbour of a local keyframe that is not local yet.

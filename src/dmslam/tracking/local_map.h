@@ -41,6 +41,7 @@ class LocalMap {
   std::vector<KeyframeId> votes_;  ///< one for each observation of the frame's landmarks
   std::vector<std::pair<int, KeyframeId>> ranked_;
   std::vector<KeyframeId> listed_;  ///< keyframes_, sorted
+  std::vector<int> counts_;         ///< of the votes, by keyframe
   std::vector<uint64_t> marks_;     ///< one bit for each landmark id
 };
 

@@ -132,12 +132,13 @@ FoundPose PoseSearch::found(const TrackedFrame& frame) const {
 void PoseSearch::CountExpected(const Map& map, std::span<const ExpectedLandmark> expected,
                                const TrackedFrame& frame, TrackingReport* report) const {
   report->num_expected = static_cast<int>(expected.size());
-  const auto is_old = [&](LandmarkId id) {
-    const Landmark* landmark = id.valid() ? map.FindLandmark(id) : nullptr;
+  const auto is_old = [&](const Landmark* landmark) {
     return landmark != nullptr && IsOldAt(*landmark, frame.stamp_ns, options_.dynamics.vote);
   };
-  report->num_old_expected = static_cast<int>(std::ranges::count_if(expected, is_old, &ExpectedLandmark::id));
-  report->num_old = static_cast<int>(std::ranges::count_if(frame.landmarks, is_old));
+  const auto is_match_old = [&](LandmarkId id) { return id.valid() && is_old(map.FindLandmark(id)); };
+  report->num_old_expected =
+      static_cast<int>(std::ranges::count_if(expected, is_old, &ExpectedLandmark::landmark));
+  report->num_old = static_cast<int>(std::ranges::count_if(frame.landmarks, is_match_old));
 }
 
 void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report) const {

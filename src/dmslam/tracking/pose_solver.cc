@@ -39,11 +39,12 @@ PoseOptimizationOptions PoseSolver::Options(const std::optional<PosePrior>& prio
 
 void PoseSolver::Observe(const Map& map, const LandmarkVotes& votes, const TrackedFrame& frame) {
   all_.Resize(0);
+  LandmarkAges ages(map, frame.stamp_ns);
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].valid()) continue;
     const Landmark* landmark = map.FindLandmark(frame.landmarks[i]);
     if (landmark == nullptr) continue;
-    const double age_s = AgeAt(map, *landmark, frame.stamp_ns);
+    const double age_s = ages.Of(*landmark);
     all_.Add(map, frame, static_cast<uint16_t>(i), *landmark, age_s, votes.Trust(age_s));
   }
 }
@@ -172,9 +173,10 @@ bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior
   const size_t elsewhere = judge.moved().size();
   if (!judge.enabled() || !judge.rivals().IsWorthALook(static_cast<int>(elsewhere))) return false;
   Observe(map, judge.votes(), *frame);
+  LandmarkAges ages(map, frame->stamp_ns);
   for (size_t k = 0; k < elsewhere; ++k) {
     const Landmark& landmark = *map.FindLandmark(judge.moved()[k]);
-    all_.Add(map, *frame, judge.moved_features()[k], landmark, AgeAt(map, landmark, frame->stamp_ns), 1.0);
+    all_.Add(map, *frame, judge.moved_features()[k], landmark, ages.Of(landmark), 1.0);
   }
   const PoseOptimizationOptions options = Options(prior);
   const Pinhole camera = map.camera().Ideal();

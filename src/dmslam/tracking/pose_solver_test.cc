@@ -444,7 +444,7 @@ class FollowWiderMotionTest : public PoseSolverTest {
     for (size_t i = 0; i < scene_.size(); ++i) {
       const Landmark& landmark = *scene_.map().FindLandmark(MapScene::IdOf(i));
       if (const auto view = PredictView(scene_.map(), landmark, frame->T_cam_world))
-        expected.push_back({landmark.id, *view});
+        expected.push_back({&landmark, *view});
     }
     judge_->Judge(scene_.map(), expected, {}, frame);
   }

@@ -93,22 +93,21 @@ std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& ma
   const double oblique_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_rad);
   const double frontal_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_frontal_rad);
   const Viewpoint viewpoint(frame->T_cam_world);
-  for (const LandmarkId id : landmarks) {
-    const Landmark& landmark = *map.FindLandmark(id);
+  map.ForEachOf(landmarks, [&](const Landmark& landmark) {
     const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint);
-    if (!view) continue;
-    expected_.push_back({id, *view});
-    if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), id)) continue;
+    if (!view) return;
+    expected_.push_back({&landmark, *view});
+    if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), landmark.id)) return;
     const double radius_px = view->view_cos > kFrontalCos ? frontal_px : oblique_px;
     const std::optional<FeatureHit> hit =
         FindFeature(*frame->features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
                     view->octave - 1, view->octave, landmark.descriptor, taken_);
-    if (!hit || hit->distance > options_.max_descriptor_distance) continue;
+    if (!hit || hit->distance > options_.max_descriptor_distance) return;
     if (hit->octave == hit->second_octave && hit->distance > options_.local_ratio * hit->second_distance)
-      continue;
-    frame->landmarks[static_cast<size_t>(hit->feature)] = id;
+      return;
+    frame->landmarks[static_cast<size_t>(hit->feature)] = landmark.id;
     taken_[static_cast<size_t>(hit->feature)] = 1;
-  }
+  });
   return expected_;
 }
 

@@ -33,26 +33,38 @@ Eigen::Quaterniond Turned(double roll_rad, const Eigen::Vector2d& shift_rad) {
 
 void TurnSearch::ListPairs(const Map& map, const LandmarkVotes& votes, std::span<const LandmarkId> landmarks,
                            const Rigid3d& T_cam_world, double reach_rad, const FrameFeatures& features) {
+  landmarks_.clear();
   pairs_.clear();
   const double radius_px = SearchRadiusPx(map.camera(), reach_rad);
   const Viewpoint viewpoint(T_cam_world);
-  for (const LandmarkId id : landmarks) {
-    const Landmark& landmark = *map.FindLandmark(id);
+  map.ForEachOf(landmarks, [&](const Landmark& landmark) {
     const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint);
-    if (!view || !votes.HasVote(landmark)) continue;
-    alike_.clear();
-    features.grid.ForEachInRadius(
-        view->uv_px, radius_px, view->octave - 1, view->octave + 1, [&](uint32_t i) {
-          const int distance = HammingDistance(landmark.descriptor, features.set.descriptors[i]);
-          if (distance <= kMaxDistance) alike_.emplace_back(distance, i);
-        });
-    const size_t named = std::min(kMostAlike, alike_.size());
-    std::partial_sort(alike_.begin(), alike_.begin() + static_cast<ptrdiff_t>(named), alike_.end());
-    const Eigen::Vector3d p_cam = T_cam_world * landmark.p_world;
-    for (size_t k = 0; k < named; ++k) {
-      pairs_.push_back({p_cam, AzimuthElevation(map.camera().Ray(features.uv_px[alike_[k].second]))});
-    }
-  }
+    if (!view || !votes.HasVote(landmark)) return;
+    const SearchArea area = {view->uv_px, radius_px, view->octave - 1, view->octave + 1};
+    const std::span<const uint32_t> named = MostAlike(landmark.descriptor, area, features);
+    if (named.empty()) return;
+    landmarks_.push_back(T_cam_world * landmark.p_world);
+    for (const uint32_t feature : named)
+      pairs_.push_back({landmarks_.size() - 1, AzimuthElevation(map.camera().Ray(features.uv_px[feature]))});
+  });
+}
+
+/// The features of the area that look most like the descriptor, and not too unlike, best first.
+std::span<const uint32_t> TurnSearch::MostAlike(const Descriptor& descriptor, const SearchArea& area,
+                                                const FrameFeatures& features) {
+  in_area_.resize(features.size() + FeatureGrid::kSlack);
+  distances_.resize(in_area_.size());
+  const size_t found = features.grid.CollectInRadius(area.center_px, area.radius_px, area.min_octave,
+                                                     area.max_octave, in_area_.data());
+  const int near =
+      BestHammingKernels().keep_near(descriptor, features.set.descriptors.data(), in_area_.data(),
+                                     static_cast<int>(found), kMaxDistance, distances_.data());
+  alike_.clear();
+  for (size_t k = 0; k < static_cast<size_t>(near); ++k) alike_.emplace_back(distances_[k], in_area_[k]);
+  const size_t named = std::min(kMostAlike, alike_.size());
+  std::partial_sort(alike_.begin(), alike_.begin() + static_cast<ptrdiff_t>(named), alike_.end());
+  for (size_t k = 0; k < named; ++k) in_area_[k] = alike_[k].second;
+  return {in_area_.data(), named};
 }
 
 /// The shift of azimuth and elevation that most pairs agree on, after a turn about the optical axis.
@@ -65,8 +77,10 @@ TurnSearch::Turn TurnSearch::BestShift(double roll_rad, double reach_rad) {
     return static_cast<int>(std::lround(shift_rad / kBinRad)) + side / 2;
   };
   const auto inside = [side](int b) { return b >= 1 && b < side - 1; };
+  expected_.clear();
+  for (const Eigen::Vector3d& landmark : landmarks_) expected_.push_back(AzimuthElevation(rolled * landmark));
   for (const Pair& pair : pairs_) {
-    shifts_rad_.push_back(pair.feature - AzimuthElevation(rolled * pair.landmark));
+    shifts_rad_.push_back(pair.feature - expected_[pair.landmark]);
     const int x = bin(shifts_rad_.back().x()), y = bin(shifts_rad_.back().y());
     if (inside(x) && inside(y)) ++counts_[static_cast<size_t>(y * side + x)];
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dmslam/dynamics/landmark_votes.h"
+#include "dmslam/features/matcher.h"
 #include "dmslam/map/map.h"
 
 namespace dmslam {
@@ -25,8 +26,8 @@ class TurnSearch {
 
  private:
   struct Pair {
-    Eigen::Vector3d landmark;  ///< direction in the camera before it turned
-    Eigen::Vector2d feature;   ///< azimuth and elevation [rad]
+    size_t landmark;          ///< place in landmarks_
+    Eigen::Vector2d feature;  ///< azimuth and elevation [rad]
   };
   struct Turn {
     double roll_rad = 0;
@@ -36,11 +37,17 @@ class TurnSearch {
 
   void ListPairs(const Map& map, const LandmarkVotes& votes, std::span<const LandmarkId> landmarks,
                  const Rigid3d& T_cam_world, double reach_rad, const FrameFeatures& features);
+  std::span<const uint32_t> MostAlike(const Descriptor& descriptor, const SearchArea& area,
+                                      const FrameFeatures& features);
   Turn BestShift(double roll_rad, double reach_rad);
 
+  std::vector<Eigen::Vector3d> landmarks_;  ///< directions in the camera before it turned
   std::vector<Pair> pairs_;
   // Workspace:
+  std::vector<uint32_t> in_area_;                ///< features
+  std::vector<uint16_t> distances_;              ///< of those [bits]
   std::vector<std::pair<int, uint32_t>> alike_;  ///< distance [bits] and feature
+  std::vector<Eigen::Vector2d> expected_;  ///< azimuth and elevation of the landmarks after a roll [rad]
   std::vector<Eigen::Vector2d> shifts_rad_;
   std::vector<int> counts_;
 };
