@@ -37,12 +37,6 @@ class SumByCell {
   std::vector<Factor> cells_;
 };
 
-/// The symmetric one: alike for covariances that are alike.
-Eigen::Matrix3d Root(const Eigen::Matrix3d& covariance) {
-  const SymmetricEigen<3> eigen = DirectEigenOfSymmetric(covariance);
-  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
-}
-
 /// What a step (w, v) on the left of the pose that stands right of T becomes on the left of the product.
 Matrix6d Adjoint(const Rigid3d& T) {
   const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
@@ -71,6 +65,11 @@ Eigen::Matrix3d LandmarkCovariance(const Pinhole& camera, const Eigen::Vector3d&
   return InverseOfPositive(information).value_or(Eigen::Matrix3d::Zero());
 }
 
+Eigen::Matrix3d SymmetricRoot(const Eigen::Matrix3d& covariance) {
+  const SymmetricEigen<3> eigen = DirectEigenOfSymmetric(covariance);
+  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
+}
+
 std::optional<PoseUncertainty> EstimatePoseUncertainty(const Pinhole& camera, const Rigid3d& T_cam_world,
                                                        std::span<const PoseSight> sights,
                                                        const Matrix6d& information, double noise_variance,
@@ -92,7 +91,7 @@ std::optional<PoseUncertainty> EstimatePoseUncertainty(const Pinhole& camera, co
     const Matrix62 gain = weight * inverse * J.transpose();
     noise.Add(sight.cell, std::sqrt(noise_variance * sight.variance_px) * gain);
     result.gains.push_back(-gain * ProjectionJacobian(camera, p_cam) * R);
-    landmarks.Add(sight.cell, result.gains.back() * Root(sight.landmark_covariance));
+    landmarks.Add(sight.cell, result.gains.back() * sight.landmark_root);
   }
   // What the information has besides is the prior's, which errs as it says.
   const Matrix6d prior = information - seen;
@@ -106,7 +105,7 @@ Matrix6d StepUncertainty(const StepEnd& before, const StepEnd& after, const Pose
   SumByCell<3> landmarks;
   size_t b = 0;
   const auto add_before = [&](const PoseSight& sight) {
-    landmarks.Add(sight.cell, -adjoint * before.uncertainty->gains[b] * Root(sight.landmark_covariance));
+    landmarks.Add(sight.cell, -adjoint * before.uncertainty->gains[b] * sight.landmark_root);
   };
   for (size_t a = 0; a < after.sights.size(); ++a) {
     const PoseSight& sight = after.sights[a];
@@ -115,7 +114,7 @@ Matrix6d StepUncertainty(const StepEnd& before, const StepEnd& after, const Pose
     LandmarkGain gain = after.uncertainty->gains[a];
     if (b < before.sights.size() && before.sights[b].landmark == sight.landmark)
       gain -= adjoint * before.uncertainty->gains[b++];
-    landmarks.Add(sight.cell, gain * Root(sight.landmark_covariance));
+    landmarks.Add(sight.cell, gain * sight.landmark_root);
   }
   for (; b < before.sights.size(); ++b) add_before(before.sights[b]);
   return Symmetric(landmarks.Covariance(model.neighbour_correlation) + after.uncertainty->noise +

@@ -29,11 +29,14 @@ struct LandmarkRay {
 Eigen::Matrix3d LandmarkCovariance(const Pinhole& camera, const Eigen::Vector3d& p_world,
                                    std::span<const LandmarkRay> views);
 
+/// The symmetric root of a covariance: alike for covariances that are alike.
+Eigen::Matrix3d SymmetricRoot(const Eigen::Matrix3d& covariance);
+
 /// A landmark that a pose was found by.
 struct PoseSight {
   LandmarkId landmark;
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d landmark_covariance = Eigen::Matrix3d::Zero();  ///< along the world's axes
+  Eigen::Matrix3d landmark_root = Eigen::Matrix3d::Zero();  ///< SymmetricRoot of the landmark's covariance
   double variance_px = 1.0;  ///< of the pixel's coordinates as they are believed to be
   double weight = 1.0;       ///< that its squared error / variance_px had in the pose's optimisation
   int cell = 0;              ///< of the image: features in the same one err alike

@@ -61,7 +61,7 @@ class Scene {
       sight.p_world = scene_.points[static_cast<size_t>(seen.point)];
       const Eigen::Vector3d ray = Ray(sight.p_world);
       const double sigma = errors.landmark_depth * ray.norm();
-      sight.landmark_covariance = sigma * sigma * ray.normalized() * ray.normalized().transpose();
+      sight.landmark_root = sigma * ray.normalized() * ray.normalized().transpose();
       sight.variance_px = errors.noise_px * errors.noise_px;
       // By the first camera's cells, so that those of a point are the same in all.
       const Eigen::Vector2d uv = scene_.camera.Project(scene_.T_cam_world[0] * sight.p_world);

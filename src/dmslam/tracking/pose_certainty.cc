@@ -39,15 +39,15 @@ void PoseCertaintyEstimator::Forget() {
   known_.clear();
 }
 
-const Eigen::Matrix3d& PoseCertaintyEstimator::CovarianceOf(const Map& map, const Pinhole& camera,
-                                                            const Landmark& landmark) {
+const Eigen::Matrix3d& PoseCertaintyEstimator::RootOf(const Map& map, const Pinhole& camera,
+                                                      const Landmark& landmark) {
   if (known_.size() > kMostKnown) known_.clear();
   const auto [it, is_new] = known_.try_emplace(landmark.id);
   Known& known = it->second;
   const size_t observations = landmark.observations.size();
   if (is_new || known.observations != observations || known.p_world != landmark.p_world)
-    known = {observations, landmark.p_world, WorkOutCovariance(map, camera, landmark)};
-  return known.covariance;
+    known = {observations, landmark.p_world, SymmetricRoot(WorkOutCovariance(map, camera, landmark))};
+  return known.root;
 }
 
 Eigen::Matrix3d PoseCertaintyEstimator::WorkOutCovariance(const Map& map, const Pinhole& camera,
@@ -68,17 +68,20 @@ Eigen::Matrix3d PoseCertaintyEstimator::WorkOutCovariance(const Map& map, const 
 
 std::vector<PoseSight> PoseCertaintyEstimator::SightsOf(const Map& map, const PoseBasis& basis) {
   const Pinhole camera = map.camera().Ideal();
-  std::vector<PoseSight> sights;
-  sights.reserve(basis.matches.size());
+  order_.clear();
   for (size_t i = 0; i < basis.matches.size(); ++i) {
-    const Landmark* landmark = map.FindLandmark(basis.matches[i].landmark);
-    if (basis.inliers[i] == 0 || landmark == nullptr) continue;
-    const PoseObservation& seen = basis.observations[i];
-    sights.push_back({landmark->id, landmark->p_world, CovarianceOf(map, camera, *landmark),
-                      1.0 / seen.inv_sigma_squared, seen.weight,
-                      static_cast<int>(CellOf(map.camera(), seen.uv_px))});
+    if (basis.inliers[i] != 0) order_.emplace_back(basis.matches[i].landmark, i);
   }
-  std::ranges::sort(sights, {}, &PoseSight::landmark);
+  std::sort(order_.begin(), order_.end());
+  std::vector<PoseSight> sights;
+  sights.reserve(order_.size());
+  for (const auto& [id, i] : order_) {
+    const Landmark* landmark = map.FindLandmark(id);
+    if (landmark == nullptr) continue;
+    const PoseObservation& seen = basis.observations[i];
+    sights.push_back({id, landmark->p_world, RootOf(map, camera, *landmark), 1.0 / seen.inv_sigma_squared,
+                      seen.weight, static_cast<int>(CellOf(map.camera(), seen.uv_px))});
+  }
   return sights;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "dmslam/map/map.h"
@@ -54,15 +55,15 @@ class PoseCertaintyEstimator {
     PoseUncertainty uncertainty;
   };
 
-  /// A landmark's covariance, which holds until keyframes see it anew or it is moved.
+  /// The root of a landmark's covariance, which holds until keyframes see it anew or it is moved.
   struct Known {
     size_t observations = 0;
     Eigen::Vector3d p_world;
-    Eigen::Matrix3d covariance;
+    Eigen::Matrix3d root;
   };
 
   std::vector<PoseSight> SightsOf(const Map& map, const PoseBasis& basis);
-  const Eigen::Matrix3d& CovarianceOf(const Map& map, const Pinhole& camera, const Landmark& landmark);
+  const Eigen::Matrix3d& RootOf(const Map& map, const Pinhole& camera, const Landmark& landmark);
   Eigen::Matrix3d WorkOutCovariance(const Map& map, const Pinhole& camera, const Landmark& landmark);
   std::optional<PoseCertainty::Step> StepTo(const Map& map, const Told& now, double depth) const;
 
@@ -72,7 +73,9 @@ class PoseCertaintyEstimator {
   PoseJitter jitter_;
   std::optional<Told> last_;
   std::unordered_map<LandmarkId, Known> known_;
-  std::vector<LandmarkRay> views_;  ///< workspace
+  // Workspace:
+  std::vector<LandmarkRay> views_;
+  std::vector<std::pair<LandmarkId, size_t>> order_;  ///< places in the basis, by landmark
 };
 
 }  // namespace dmslam
