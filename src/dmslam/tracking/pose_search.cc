@@ -87,11 +87,11 @@ bool PoseSearch::FromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t s
 }
 
 bool PoseSearch::FromTurn(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world,
-                          double reach_rad, TrackedFrame* frame) {
+                          const TurnRange& range, TrackedFrame* frame) {
   local_map_.Collect(map, last);
   const std::optional<Rigid3d> T_turned =
-      turns_.Find(map, judge_.votes(), local_map_.landmarks(), T_cam_world, reach_rad, *frame->features);
-  if (!T_turned) return false;
+      turns_.Find(map, judge_.votes(), local_map_.landmarks(), T_cam_world, range.most_rad, *frame->features);
+  if (!T_turned || AngleBetween(T_turned->rotation, T_cam_world.rotation) < range.least_rad) return false;
   SetMatches({}, *T_turned, frame);
   MatchAround(map, kWiderAroundPrediction, frame);
   return solver_.Solve(map, std::nullopt, &judge_, frame).inliers >= options_.min_motion_inliers;

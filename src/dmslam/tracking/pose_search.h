@@ -33,9 +33,14 @@ class PoseSearch {
   /// Matches the landmarks that `last` saw near their projections at `T_predicted`, and optimises the pose.
   FromFrameResult FromFrame(const Map& map, const TrackedFrame& last, const Rigid3d& T_predicted,
                             const Prior& prior, TrackedFrame* frame);
+  /// How far a camera has turned.
+  struct TurnRange {
+    double least_rad = 0;
+    double most_rad = 0;
+  };
   /// Finds how far the camera has turned since it saw `last` from `T_cam_world`, matches what lies around,
-  /// and optimises the pose. `reach_rad`: it has not turned farther.
-  bool FromTurn(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, double reach_rad,
+  /// and optimises the pose. False where it has not turned by so much, or where nothing is found.
+  bool FromTurn(const Map& map, const TrackedFrame& last, const Rigid3d& T_cam_world, const TurnRange& range,
                 TrackedFrame* frame);
   /// Matches the landmarks around the frame searched for last, many more than it saw itself, near their
   /// projections at `T_predicted`, and optimises the pose. Returns the number of inliers.

@@ -335,25 +335,29 @@ TEST_F(PoseSearchTest, ACameraThatTurnedTooFastIsFoundByItsTurn) {
   scene_.MapAll();
   const Rigid3d before = Beside(60);
   TrackedFrame frame = See();
-  EXPECT_TRUE(search_->FromTurn(scene_.map(), Last(), before, 0.3, &frame));
+  EXPECT_TRUE(search_->FromTurn(scene_.map(), Last(), before, {.most_rad = 0.3}, &frame));
   EXPECT_LT(Error(frame), 2e-3);
   EXPECT_GT(CountMatches(frame), 150);
   frame = See();
-  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), before, 0.03, &frame)) << "it turned farther";
+  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), before, {.most_rad = 0.03}, &frame))
+      << "it turned farther";
+  frame = See();
+  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), before, {.least_rad = 0.2, .most_rad = 0.3}, &frame))
+      << "it turned by less";
 }
 
 TEST_F(PoseSearchTest, WhatLooksLikeNothingInTheMapIsNoTurn) {
   AddRoom(300);
   scene_.MapAll();
   TrackedFrame frame = See([](size_t) { return false; });
-  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), Beside(60), 0.3, &frame));
+  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), Beside(60), {.most_rad = 0.3}, &frame));
 }
 
 TEST_F(PoseSearchTest, ATurnThatNothingFollowsExactlyIsNotBelieved) {
   AddRoom(40);
   scene_.MapAll();
   TrackedFrame frame = SeeScattered(8);
-  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), Beside(60), 0.3, &frame));
+  EXPECT_FALSE(search_->FromTurn(scene_.map(), Last(), Beside(60), {.most_rad = 0.3}, &frame));
 }
 
 // ---- In the local map ----

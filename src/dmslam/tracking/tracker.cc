@@ -175,7 +175,7 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
   if (since_s > kTurnKnownS) return;
   const double reach_rad = std::min(kTurnReachRad + kTurnRadPerS * since_s, kMostTurnRad);
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
-  if (!search_.FromTurn(map, follower_.last(), *T_last, reach_rad, &found)) return;
+  if (!search_.FromTurn(map, follower_.last(), *T_last, {.most_rad = reach_rad}, &found)) return;
   const TrackingReport report = search_.InLocalMap(map, true, std::nullopt, &found);
   if (!report.ok || report.doubtful ||
       !follower_.motion().IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}))
@@ -186,24 +186,16 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }
 
-/// Whether landmarks are looked for in the same surroundings from both poses, and so are found alike.
-bool Tracker::LooksAtTheSame(const Map& map, const Rigid3d& T_cam_world, const Rigid3d& T_other_world) const {
-  const Keyframe* reference = search_.Reference(map);
-  const double depth = reference != nullptr ? map.MedianDepth(*reference).value_or(0.0) : 0.0;
-  const double reach = options_.local_radius_rad;
-  return AngleBetween(T_cam_world.rotation, T_other_world.rotation) < reach &&
-         (T_cam_world.Center() - T_other_world.Center()).norm() < reach * depth;
-}
-
 /// A pose that finds little of what it should see may be a little beside the true one, where new landmarks
 /// have been made in the wrong places and the old ones lie beyond the search around them. It gives way to one
-/// nearby that explains clearly more of the same frame.
+/// nearby that explains clearly more of the same frame. One that is turned by no more than the search around
+/// landmarks reaches finds the same.
 void Tracker::FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* attempt) {
   const TrackingReport& now = attempt->report;
   if (now.num_static >= kThinShare * now.num_expected || now.num_old_expected < kOldToCompare) return;
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
-  if (!second_search_.FromTurn(map, *frame, frame->T_cam_world, kBesideRad, &found)) return;
-  if (LooksAtTheSame(map, frame->T_cam_world, found.T_cam_world)) return;
+  const PoseSearch::TurnRange beyond_search = {options_.local_radius_rad, kBesideRad};
+  if (!second_search_.FromTurn(map, *frame, frame->T_cam_world, beyond_search, &found)) return;
   const TrackingReport beside = second_search_.InLocalMap(map, true, std::nullopt, &found);
   if (!beside.ok || beside.doubtful || !ExplainsClearlyMore(beside, now)) return;
   search_.judge().DropEvidence();  // what the pose that was wrong said of landmarks

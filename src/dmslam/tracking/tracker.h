@@ -77,7 +77,6 @@ class Tracker {
   };
 
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
-  bool LooksAtTheSame(const Map& map, const Rigid3d& T_cam_world, const Rigid3d& T_other_world) const;
   void FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* attempt);
   void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
   bool MayRelocalize(const Attempt& attempt, int64_t stamp_ns) const;
