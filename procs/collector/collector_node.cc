@@ -431,8 +431,8 @@ void CollectorNode::BeginCheckpoints() {
   options.now_ns = context_.now_ns;
   options.every_s = collector_.checkpoints ? options_.settings.Read<CheckpointOptions>().every_s : 0;
   if (collector_.checkpoints && context_.fresh_system && !context_.resumed) RemoveCheckpoints(options.path);
-  checkpointer_ =
-      std::make_unique<Checkpointer>(options, MakeUnwatchedThread(PlaybackMode::kRealtime), journal_.get());
+  checkpointer_ = std::make_unique<Checkpointer>(
+      options, MakeUnwatchedThread(PlaybackMode::kRealtime, {.lets_others_go_first = true}), journal_.get());
 }
 
 /// It is whole, and no newer than the poses in the journal.

@@ -3,6 +3,8 @@
 #include <memory>
 #include <utility>
 
+#include "dmslam/util/thread_priority.h"
+
 namespace dmslam {
 namespace {
 
@@ -33,6 +35,7 @@ InitializerReport BackgroundSearch::AddFrame(const InitializerFrame& frame) {
 }
 
 void BackgroundSearch::Work(const std::stop_token& stop) {
+  LetOthersGoFirst();
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !waiting_.empty() && !last_.result && !problem_; })) {
     const InitializerFrame frame = std::move(waiting_.front());

@@ -13,9 +13,9 @@
 namespace dmslam {
 
 /// Runs a search for the first map on a thread of its own: a search may take longer than frames are apart,
-/// and nothing else waits for it. What it finds is told with the next frame; its frames are then earlier
-/// ones. Where it is too slow for all frames, those that have waited for a second are left out. For real time
-/// only: which frames it sees depends on the machine.
+/// and nothing else waits for it, not even for a core. What it finds is told with the next frame; its frames
+/// are then earlier ones. Where it is too slow for all frames, those that have waited for a second are left
+/// out. For real time only: which frames it sees depends on the machine.
 class BackgroundSearch {
  public:
   /// `sign`: says of each frame when it is taken up, and when it is done.

@@ -53,7 +53,7 @@ LoopcloserNode::~LoopcloserNode() { stop_ = true; }
 
 void LoopcloserNode::Begin(const CameraInfo& info) {
   const Settings& settings = options_.settings;
-  work_ = MakeCoreThread(info.mode);
+  work_ = MakeCoreThread(info.mode, {.lets_others_go_first = true});
   core_ = std::make_unique<LoopcloserCore>(settings.Read<LoopcloserOptions>(), info.camera,
                                            settings.Read<Pyramid>(), settings.Read<RunOptions>().seed,
                                            vocabulary_);

@@ -69,7 +69,7 @@ void MapperNode::PutInParts() {
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
   const uint16_t ordinal = saved_.loaded ? ContinueSavedMap(info) : uint16_t{1};
-  work_ = MakeCoreThread(info.mode);
+  work_ = MakeCoreThread(info.mode, {.lets_others_go_first = true});
   const auto publish = [this](const MapDelta& delta) {
     core_report_.tally.OnDelta(delta, core_->map());
     work_->Report([this, delta] { PublishDelta(delta); });

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/thread_priority.h"
 
 namespace dmslam {
 
@@ -15,7 +16,10 @@ CoreThread::CoreThread(Mode mode, Options options) : options_(options) {
   if (mode == Mode::kAtOnce) return;
   event_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   DMSLAM_CHECK(event_fd_ >= 0, "no descriptor is left for an event");
-  thread_ = std::thread([this] { Work(); });
+  thread_ = std::thread([this] {
+    if (options_.lets_others_go_first) LetOthersGoFirst();
+    Work();
+  });
   pthread_setname_np(thread_.native_handle(), "core");  // as debuggers and top show it
 }
 

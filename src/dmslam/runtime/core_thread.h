@@ -26,6 +26,8 @@ class CoreThread {
   struct Options {
     size_t max_jobs = 1;      ///< posted, and not done
     size_t max_reports = 64;  ///< made, and not delivered: beyond them a job waits
+    bool lets_others_go_first =
+        false;  ///< where cores are short (LetOthersGoFirst); a thread of its own only
   };
 
   explicit CoreThread(Mode mode) : CoreThread(mode, Options()) {}

@@ -212,8 +212,9 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   return reader;
 }
 
-std::unique_ptr<CoreThread> StreamNode::MakeCoreThread(PlaybackMode mode) {
-  auto thread = MakeUnwatchedThread(mode);
+std::unique_ptr<CoreThread> StreamNode::MakeCoreThread(PlaybackMode mode,
+                                                       const CoreThread::Options& options) {
+  auto thread = MakeUnwatchedThread(mode, options);
   core_threads_.push_back(thread.get());
   return thread;
 }
@@ -223,9 +224,11 @@ bool StreamNode::Hangs(int64_t now_ns, int64_t longest_ns) const {
                              [&](const CoreThread* thread) { return thread->Hangs(now_ns, longest_ns); });
 }
 
-std::unique_ptr<CoreThread> StreamNode::MakeUnwatchedThread(PlaybackMode mode) {
+std::unique_ptr<CoreThread> StreamNode::MakeUnwatchedThread(PlaybackMode mode,
+                                                            const CoreThread::Options& options) {
   const bool own = mode == PlaybackMode::kRealtime && context_.watch;
-  auto thread = std::make_unique<CoreThread>(own ? CoreThread::Mode::kOwnThread : CoreThread::Mode::kAtOnce);
+  auto thread =
+      std::make_unique<CoreThread>(own ? CoreThread::Mode::kOwnThread : CoreThread::Mode::kAtOnce, options);
   if (own) context_.watch(thread->fd(), [to = thread.get()] { to->Deliver(); });
   return thread;
 }

@@ -92,9 +92,9 @@ class StreamNode : public Node {
   void LetSnapshotBegin();
   /// Where a core's jobs run: on a thread of its own in real time, at once in lock-step and wherever nothing
   /// can wake this node.
-  std::unique_ptr<CoreThread> MakeCoreThread(PlaybackMode mode);
+  std::unique_ptr<CoreThread> MakeCoreThread(PlaybackMode mode, const CoreThread::Options& options = {});
   /// The same for work whose hanging is no reason to end the process, as a disk's.
-  std::unique_ptr<CoreThread> MakeUnwatchedThread(PlaybackMode mode);
+  std::unique_ptr<CoreThread> MakeUnwatchedThread(PlaybackMode mode, const CoreThread::Options& options = {});
   /// Whether the mapper has said its last word, or has fallen silent after the end of the sequence, for so
   /// long.
   bool MapIsOver(const Map& map, const StreamReader& map_reader, int64_t silent_ns) const;
