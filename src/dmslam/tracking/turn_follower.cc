@@ -14,6 +14,7 @@ namespace dmslam {
 namespace {
 
 constexpr double kLongestGapS = 0.3;     // between frames that are compared
+constexpr double kFastestRadPerS = 3.0;  // pictures that pass by faster are a blur
 constexpr double kNearRad = 0.08;        // where a camera that goes on turning will see what it saw
 constexpr double kProvenS = 0.2;         // so long one turn must explain the pictures to be believed
 constexpr size_t kLeastMatches = 60;     // that tell a turn
@@ -65,8 +66,9 @@ void TurnFollower::Follow(const TrackedFrame& frame) {
   const double since_s = SecondsFromTo(newest_ns_, frame.stamp_ns);
   if (!anchor_ || since_s <= 0 || since_s > kLongestGapS) return Begin(frame);
   const Eigen::Quaterniond predicted = Predicted(frame.stamp_ns);
+  const bool is_speed_known = newest_ns_ > begun_ns_;
   MatchingOptions matching;
-  if (newest_ns_ > begun_ns_) matching.window_rad = kNearRad;  // how fast it turns is known
+  matching.window_rad = is_speed_known ? kNearRad : std::min(matching.window_rad, kFastestRadPerS * since_s);
   const std::vector<Match> matches = MatchFrames(*anchor_, *frame.features, camera_, matching, &matcher_,
                                                  Turned(anchor_->uv_px, camera_, predicted));
   const Eigen::Quaterniond R_1_0 = FitTurn(matches, camera_, predicted);

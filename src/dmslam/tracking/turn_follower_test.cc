@@ -50,6 +50,14 @@ TEST_F(TurnFollowerTest, FollowsFarBeyondThePictureThatItBeganWith) {
   EXPECT_LT(AngleBetween(follower_.R_now_begun(), TurnedAt(90, kRadPerS).rotation), 0.01);
 }
 
+TEST_F(TurnFollowerTest, FollowsAFastTurn) {
+  constexpr double kRadPerS = 2.0;
+  for (int frame = 0; frame <= 10; ++frame) follower_.Follow(See(frame, TurnedAt(frame, kRadPerS)));
+  EXPECT_TRUE(follower_.IsMeasured());
+  EXPECT_EQ(follower_.begun_ns(), 0);
+  EXPECT_LT(AngleBetween(follower_.R_now_begun(), TurnedAt(10, kRadPerS).rotation), 0.01);
+}
+
 TEST_F(TurnFollowerTest, SomebodyInThePictureDoesNotTurnIt) {
   for (int frame = 0; frame <= 30; ++frame) follower_.Follow(See(frame, TurnedAt(frame, 0.3), 1000));
   EXPECT_TRUE(follower_.IsMeasured());
