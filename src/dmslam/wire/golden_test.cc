@@ -11,8 +11,8 @@
 #include "dmslam/wire/testing/random_message.h"
 
 // One message of each type as bytes in tests/golden: what is on the wire, and in recorded logs, must not
-// change by accident. After an intended change of a type: DMSLAM_UPDATE_GOLDEN=1 bin/golden_test writes them
-// anew.
+// change by accident. After an intended change of a type, in the project's root:
+// DMSLAM_UPDATE_GOLDEN=1 build/release/bin/golden_test writes them anew.
 namespace dmslam::wire {
 namespace {
 
