@@ -1,6 +1,7 @@
 #include "frontend/background_search.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <stdexcept>
 #include <vector>
@@ -102,6 +103,20 @@ TEST(BackgroundSearch, ASearchThatDoesNotEndIsSeen) {
   gate.Open();
   OfferUntilFound(&background, 1);
   EXPECT_FALSE(sign->Hangs(INT64_MAX, 0));
+}
+
+TEST(BackgroundSearch, LetsFramesGoFirst) {
+  const auto niceness = [] { return getpriority(PRIO_PROCESS, 0); };
+  Gate searched;
+  int of_search = 0;
+  BackgroundSearch background([&](const InitializerFrame&) {
+    of_search = niceness();
+    searched.Open();
+    return InitializerReport();
+  });
+  background.AddFrame({0, 0, nullptr});
+  searched.Pass();
+  EXPECT_GT(of_search, niceness());
 }
 
 TEST(BackgroundSearch, PassesProblemsOn) {

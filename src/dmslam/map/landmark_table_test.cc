@@ -4,6 +4,7 @@
 
 #include <map>
 #include <utility>
+#include <vector>
 
 #include "dmslam/util/random.h"
 
@@ -54,6 +55,20 @@ TEST(LandmarkTable, AgreesWithAMap) {
     EXPECT_EQ(expected.at(landmark.id), &landmark);
   });
   EXPECT_EQ(visited, expected.size());
+}
+
+TEST(LandmarkTable, VisitsThoseThatAreAskedForInTheirOrder) {
+  LandmarkTable table;
+  for (uint64_t number = 1; number <= 100; ++number) table.Insert(Make(1, number));
+  for (const size_t count : {0u, 1u, 7u, 8u, 9u, 100u}) {  // some are fetched ahead
+    std::vector<LandmarkId> asked, visited;
+    for (size_t i = 0; i < count; ++i) asked.push_back(LandmarkId::Make(1, 1 + 37 * i % 100));
+    table.ForEachOf(asked, [&](const Landmark& landmark) {
+      EXPECT_EQ(&landmark, table.Find(landmark.id));
+      visited.push_back(landmark.id);
+    });
+    EXPECT_EQ(visited, asked);
+  }
 }
 
 TEST(LandmarkTable, ACopyIsAnother) {

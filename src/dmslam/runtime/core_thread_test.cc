@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <cstdint>
@@ -51,6 +52,19 @@ TEST(CoreThread, IsNotIdleWhileAReportIsStillDue) {
   core.Deliver();
   EXPECT_EQ(idle, (std::vector<bool>{false, false}));
   EXPECT_TRUE(core.Idle());
+}
+
+TEST(CoreThread, LetsOthersGoFirstWhereItIsToldTo) {
+  const auto niceness = [] { return getpriority(PRIO_PROCESS, 0); };
+  const auto of_job = [&](const CoreThread::Options& options) {
+    CoreThread core(Mode::kOwnThread, options);
+    int found = 0;
+    core.Post([&] { found = niceness(); });
+    core.Finish();
+    return found;
+  };
+  EXPECT_EQ(of_job({}), niceness());
+  EXPECT_GT(of_job({.lets_others_go_first = true}), niceness());
 }
 
 TEST(CoreThread, AtOnceAJobIsDoneWhenItIsPosted) {

@@ -101,6 +101,23 @@ TEST_F(Chain, LandmarksOfAMapperThatTookOverAreSortedBehindTheOthers) {
   EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
 }
 
+/// Keyframes of another session have numbers far from the others'; they are counted all the same.
+TEST_F(Chain, KeyframesOfAnotherSessionCountAsWell) {
+  Keyframe keyframe;
+  keyframe.id = KeyframeId::Make(2, 1);
+  keyframe.map_id = 1;
+  keyframe.parent = Kf(0);
+  keyframe.features = MakeFrameFeatures(NoMatterWhich(), map_.camera(), map_.pyramid());
+  map_.AddKeyframe(std::move(keyframe));
+  for (size_t i = 0; i < 60; ++i)
+    map_.SetObservation(map_.At(KeyframeId::Make(2, 1)), static_cast<uint16_t>(i), map_.At(Lm(30 + i)));
+  LocalMap local(60);
+  local.Collect(map_, Seeing(30, 60));
+  EXPECT_EQ(local.reference(), KeyframeId::Make(2, 1)) << "it sees all of them";
+  local.Collect(map_, Seeing(20, 60));
+  EXPECT_EQ(local.reference(), Kf(1)) << "the other sees fewer";
+}
+
 TEST_F(Chain, NoMoreKeyframesThanAllowed) {
   LocalMap all(60), one(1);
   const TrackedFrame frame = Seeing(0, 100);
