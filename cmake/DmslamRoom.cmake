@@ -18,15 +18,12 @@ function(dmslam_precompile target)
   target_link_libraries(${target} PRIVATE dmslam_options)
   target_compile_options(${target} PRIVATE -fpch-preprocess)
   target_precompile_headers(${target} PRIVATE ${ARGN} <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <algorithm> <array>
-    <chrono> <condition_variable> <deque> <filesystem> <fstream> <functional> <future> <iostream> <limits> <map> <memory>
-    <memory_resource> <mutex> <numeric> <optional> <random> <set> <span> <sstream> <string> <thread> <unordered_map>
-    <unordered_set> <variant> <vector>)
+    <chrono> <deque> <fstream> <functional> <limits> <map> <memory> <numeric> <optional> <random> <set> <span> <sstream>
+    <string> <thread> <unordered_map> <unordered_set> <variant> <vector>)
 endfunction()
 if(DMSLAM_PRECOMPILE)
   dmslam_precompile(dmslam_precompiled)
-  find_package(nlohmann_json REQUIRED)
-  dmslam_precompile(dmslam_precompiled_lightly <nlohmann/json.hpp>)  # for dmslam_compile_lightly
-  target_link_libraries(dmslam_precompiled_lightly PRIVATE nlohmann_json::nlohmann_json)
+  dmslam_precompile(dmslam_precompiled_lightly)  # for dmslam_compile_lightly
   target_compile_options(dmslam_precompiled_lightly PRIVATE $<$<CONFIG:Release>:-O1>)
   if(DMSLAM_BUILD_TESTS)
     dmslam_precompile(dmslam_precompiled_for_tests <gtest/gtest.h>)
