@@ -70,7 +70,10 @@ std::span<const uint32_t> TurnSearch::MostAlike(const Descriptor& descriptor, co
 /// The shift of azimuth and elevation that most pairs agree on, after a turn about the optical axis.
 TurnSearch::Turn TurnSearch::BestShift(double roll_rad, double reach_rad) {
   const int side = 2 * static_cast<int>(std::ceil(reach_rad / kBinRad)) + 3;  // and a rim of one
-  counts_.assign(static_cast<size_t>(side * side), 0);
+  const auto at = [side](int x, int y) {
+    return static_cast<size_t>(y) * static_cast<size_t>(side) + static_cast<size_t>(x);
+  };
+  counts_.assign(at(0, side), 0);
   shifts_rad_.clear();
   const Eigen::Quaterniond rolled = Turned(roll_rad, Eigen::Vector2d::Zero());
   const auto bin = [side](double shift_rad) {
@@ -82,7 +85,7 @@ TurnSearch::Turn TurnSearch::BestShift(double roll_rad, double reach_rad) {
   for (const Pair& pair : pairs_) {
     shifts_rad_.push_back(pair.feature - expected_[pair.landmark]);
     const int x = bin(shifts_rad_.back().x()), y = bin(shifts_rad_.back().y());
-    if (inside(x) && inside(y)) ++counts_[static_cast<size_t>(y * side + x)];
+    if (inside(x) && inside(y)) ++counts_[at(x, y)];
   }
   Turn best{roll_rad, Eigen::Vector2d::Zero(), 0};
   Eigen::Vector2i middle = Eigen::Vector2i::Zero();
@@ -90,8 +93,7 @@ TurnSearch::Turn TurnSearch::BestShift(double roll_rad, double reach_rad) {
     for (int x = 1; x < side - 1; ++x) {
       int votes = 0;
       for (int row = y - 1; row <= y + 1; ++row) {
-        for (int column = x - 1; column <= x + 1; ++column)
-          votes += counts_[static_cast<size_t>(row * side + column)];
+        for (int column = x - 1; column <= x + 1; ++column) votes += counts_[at(column, row)];
       }
       if (votes <= best.votes) continue;
       best.votes = votes;
