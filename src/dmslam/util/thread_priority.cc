@@ -5,9 +5,8 @@
 namespace dmslam {
 
 void LetOthersGoFirst() {
-  constexpr int kSteps = 5;
   // On Linux "this process" is this thread. What is refused leaves it as it was.
-  setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + kSteps);
+  setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + kNicer);
 }
 
 }  // namespace dmslam
