@@ -22,9 +22,9 @@ bool ClearlyBetter(int distance, int second_distance, double max_ratio) {
 }
 
 /// A candidate farther away [bits] is no match, takes none from another, and is no second best to one.
-int FarthestThatCounts(const MatchOptions& options) {
-  const double ratio = std::clamp(options.max_ratio, 0.01, 1.0);
-  return std::min(kNoDistance - 1, static_cast<int>(std::ceil(std::max(0, options.max_distance) / ratio)));
+int FarthestThatCounts(int max_distance, double max_ratio) {
+  const double ratio = std::clamp(max_ratio, 0.01, 1.0);
+  return std::min(kNoDistance - 1, static_cast<int>(std::ceil(std::max(0, max_distance) / ratio)));
 }
 
 int TurnBin(const Keypoint& from, const Keypoint& to) {
@@ -70,17 +70,13 @@ void FeatureMatcher::MatchWindow(const MatchSide& a, const MatchSide& b, const F
   if (predicted_px.empty()) predicted_px = a.uv_px;
   DMSLAM_CHECK(predicted_px.size() == a.size(), "every feature of the first image needs a position");
   Start(a, b, matches);
-  const int limit = FarthestThatCounts(options.match);
+  const int limit = FarthestThatCounts(options.match.max_distance, options.match.max_ratio);
   for (uint32_t i = 0; i < a.size(); ++i) {
     const int octave = a.keypoints[i].octave;
     if (!a.Usable(i) || octave > options.max_octave0) continue;
     const SearchArea area = {predicted_px[i], options.window_px, octave - options.octave_slack,
                              octave + options.octave_slack};
-    const size_t found = FindInArea(area, b, grid_b);
-    distances_.resize(std::max(distances_.size(), found));
-    const int near = kernels_.keep_near(a.descriptors[i], b.descriptors.data(), in_area_.data(),
-                                        static_cast<int>(found), limit, distances_.data());
-    candidates_.assign(in_area_.data(), in_area_.data() + near);
+    CompareInArea(a.descriptors[i], area, b, grid_b, limit);
     Propose(i, options.match, matches);
   }
   Finish(a, b, options.match, matches);
@@ -129,7 +125,14 @@ void FeatureMatcher::MatchGroups(const MatchSide& a, std::span<const GroupedFeat
 std::optional<NearestFeatures> FeatureMatcher::FindNearest(const Descriptor& descriptor,
                                                            const SearchArea& area, const MatchSide& side,
                                                            const FeatureGrid& grid) {
-  CompareInArea(descriptor, area, side, grid);
+  return FindNearestWithin(kNoDistance - 1, descriptor, area, side, grid);
+}
+
+std::optional<NearestFeatures> FeatureMatcher::FindNearestWithin(int limit, const Descriptor& descriptor,
+                                                                 const SearchArea& area,
+                                                                 const MatchSide& side,
+                                                                 const FeatureGrid& grid) {
+  CompareInArea(descriptor, area, side, grid, limit);
   if (candidates_.empty()) return std::nullopt;
   const BestTwo two = BestTwoOfCandidates();
   NearestFeatures nearest;
@@ -145,7 +148,8 @@ std::optional<NearestFeatures> FeatureMatcher::FindNearest(const Descriptor& des
 std::optional<FeatureMatch> FeatureMatcher::FindMatch(const Descriptor& descriptor, const SearchArea& area,
                                                       const MatchSide& side, const FeatureGrid& grid,
                                                       int max_distance, double max_ratio) {
-  const std::optional<NearestFeatures> nearest = FindNearest(descriptor, area, side, grid);
+  const std::optional<NearestFeatures> nearest =
+      FindNearestWithin(FarthestThatCounts(max_distance, max_ratio), descriptor, area, side, grid);
   if (!nearest || nearest->distance > max_distance) return std::nullopt;
   const bool comparable = nearest->second_distance < kNoDistance && nearest->second_octave == nearest->octave;
   if (comparable && !ClearlyBetter(nearest->distance, nearest->second_distance, max_ratio))
@@ -207,10 +211,12 @@ size_t FeatureMatcher::FindInArea(const SearchArea& area, const MatchSide& side,
 }
 
 void FeatureMatcher::CompareInArea(const Descriptor& descriptor, const SearchArea& area,
-                                   const MatchSide& side, const FeatureGrid& grid) {
+                                   const MatchSide& side, const FeatureGrid& grid, int limit) {
   const size_t found = FindInArea(area, side, grid);
-  candidates_.assign(in_area_.data(), in_area_.data() + found);
-  CompareWithCandidates(descriptor, side);
+  distances_.resize(std::max(distances_.size(), found));
+  const int near = kernels_.keep_near(descriptor, side.descriptors.data(), in_area_.data(),
+                                      static_cast<int>(found), limit, distances_.data());
+  candidates_.assign(in_area_.data(), in_area_.data() + near);
 }
 
 void FeatureMatcher::CompareWithCandidates(const Descriptor& descriptor, const MatchSide& side) {

@@ -128,9 +128,14 @@ class FeatureMatcher {
               std::vector<FeatureMatch>* matches);
   /// Usable features of the area into in_area_; returns how many.
   size_t FindInArea(const SearchArea& area, const MatchSide& side, const FeatureGrid& grid);
-  /// Fills candidates_ and distances_.
+  /// FindNearest, to which what is farther than `limit` [bits] does not exist.
+  std::optional<NearestFeatures> FindNearestWithin(int limit, const Descriptor& descriptor,
+                                                   const SearchArea& area, const MatchSide& side,
+                                                   const FeatureGrid& grid);
+  /// Fills candidates_ and distances_ with those no farther than `limit` [bits].
   void CompareInArea(const Descriptor& descriptor, const SearchArea& area, const MatchSide& side,
-                     const FeatureGrid& grid);
+                     const FeatureGrid& grid, int limit);
+  /// Fills distances_ with those of candidates_.
   void CompareWithCandidates(const Descriptor& descriptor, const MatchSide& side);
 
   const HammingKernels& kernels_;

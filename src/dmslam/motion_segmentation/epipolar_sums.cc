@@ -127,11 +127,11 @@ struct Sums {
 [[gnu::always_inline]] inline EssentialNormal SumNormal(const PackedMatches& matches,
                                                         const TwoViewModel& model,
                                                         const Eigen::Matrix<double, 3, 2>& B,
-                                                        double bound_scale) {
+                                                        double bound_scale, double enough) {
   const Eigen::Matrix3d M = Hat(model.t) * model.R;
   Terms terms;
   Sums sums;
-  for (size_t begin = 0; begin < matches.count; begin += kBlock) {
+  for (size_t begin = 0; begin < matches.count && !(sums.cost >= enough); begin += kBlock) {
     const size_t n = std::min(kBlock, matches.count - begin);
     MakeTerms(matches, begin, n, model, M, B, bound_scale, &terms);
     WeighTerms(n, &terms);
@@ -231,8 +231,8 @@ constexpr size_t kCostBlock = 32;  // small, as most sums end early
 __attribute__((target("avx2"))) EssentialNormal SumNormalAvx2(const PackedMatches& matches,
                                                               const TwoViewModel& model,
                                                               const Eigen::Matrix<double, 3, 2>& B,
-                                                              double bound_scale) {
-  return SumNormal(matches, model, B, bound_scale);
+                                                              double bound_scale, double enough) {
+  return SumNormal(matches, model, B, bound_scale, enough);
 }
 __attribute__((target("avx2"))) RotationNormal SumRotationAvx2(const PackedMatches& matches,
                                                                const UnitRays& rays1,
@@ -278,11 +278,12 @@ UnitRays::UnitRays(const PackedMatches& matches) {
 
 EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewModel& model,
                                    const Eigen::Matrix<double, 3, 2>& tangent, double bound_scale,
-                                   [[maybe_unused]] VectorPath path) {
+                                   double enough, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return SumNormalAvx2(matches, model, tangent, bound_scale);
+  if (path == VectorPath::kAvx2 && HasAvx2())
+    return SumNormalAvx2(matches, model, tangent, bound_scale, enough);
 #endif
-  return SumNormal(matches, model, tangent, bound_scale);
+  return SumNormal(matches, model, tangent, bound_scale, enough);
 }
 
 RotationNormal SumRotationNormal(const PackedMatches& matches, const UnitRays& rays1,

@@ -31,9 +31,11 @@ struct EssentialNormal {
   double cost = 0;  ///< sum of s / (1 + s), s the squared distance over its bound
   int count = 0;    ///< matches with a denominator above zero, which take part
 };
-/// `bound_scale` widens the robust cost's bounds (squared).
+/// `bound_scale` widens the robust cost's bounds (squared). Where the cost is not below `enough`, the sums
+/// may be of some of the matches only, with some cost from `enough` up.
 EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewModel& model,
                                    const Eigen::Matrix<double, 3, 2>& tangent, double bound_scale,
+                                   double enough = std::numeric_limits<double>::infinity(),
                                    VectorPath path = VectorPath::kAvx2);
 
 /// Rays of frame 1, made unit vectors, and the sum of both bounds; parallel to PackedMatches.

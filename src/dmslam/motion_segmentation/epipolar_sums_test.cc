@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "dmslam/geometry/rigid3.h"
@@ -11,6 +12,8 @@
 
 namespace dmslam {
 namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Every third match of a pair is left out; the number that takes part is no multiple of a vector.
 struct Input {
@@ -74,14 +77,14 @@ TEST(SumEssentialNormal, IsTheSumOfItsFormulaAndTheSameOnEveryPath) {
     cost += squared / (1.0 + squared);
   }
   const EssentialNormal plain =
-      SumEssentialNormal(matches, in.model, in.tangent, kScale, VectorPath::kBaseline);
+      SumEssentialNormal(matches, in.model, in.tangent, kScale, kInfinity, VectorPath::kBaseline);
   EXPECT_EQ(static_cast<size_t>(plain.count), matches.count);
   const Eigen::Matrix<double, 5, 5> lower = matrix.triangularView<Eigen::Lower>();
   EXPECT_LT((plain.matrix - lower).norm(), 1e-6 * lower.norm());
   EXPECT_LT((plain.gradient - gradient).norm(), 1e-6 * gradient.norm());
   EXPECT_NEAR(plain.cost, cost, 1e-9 * cost);
   for (const VectorPath path : VectorPaths()) {
-    const EssentialNormal other = SumEssentialNormal(matches, in.model, in.tangent, kScale, path);
+    const EssentialNormal other = SumEssentialNormal(matches, in.model, in.tangent, kScale, kInfinity, path);
     EXPECT_EQ(other.matrix, plain.matrix);
     EXPECT_EQ(other.gradient, plain.gradient);
     EXPECT_EQ(other.cost, plain.cost);
@@ -113,6 +116,20 @@ TEST(FindEssentialMinima, FindsTheLowestWhereTheParallaxIsSmall) {
   EXPECT_GE(near, 18);
 }
 
+TEST(SumEssentialNormal, EndsOnlyWhereTheCostIsNotBelowEnough) {
+  const Input in;
+  const PackedMatches matches(in.arrays, in.use);
+  for (const VectorPath path : VectorPaths()) {
+    const EssentialNormal all = SumEssentialNormal(matches, in.model, in.tangent, 1.0, kInfinity, path);
+    const double above = std::nextafter(all.cost, kInfinity);
+    EXPECT_EQ(SumEssentialNormal(matches, in.model, in.tangent, 1.0, above, path).matrix, all.matrix);
+    const double half = 0.5 * all.cost;
+    const EssentialNormal some = SumEssentialNormal(matches, in.model, in.tangent, 1.0, half, path);
+    EXPECT_GE(some.cost, half);
+    EXPECT_LT(some.count, all.count);
+  }
+}
+
 TEST(SumEssentialNormal, LeavesOutWhatHasNoDenominator) {
   Input in;
   std::fill(in.arrays.bound0.begin(), in.arrays.bound0.begin() + 30, 0.0F);
@@ -122,8 +139,8 @@ TEST(SumEssentialNormal, LeavesOutWhatHasNoDenominator) {
   const PackedMatches all(in.arrays, in.use), some(in.arrays, rest);
   ASSERT_LT(some.count, all.count);
   for (const VectorPath path : VectorPaths()) {
-    const EssentialNormal a = SumEssentialNormal(all, in.model, in.tangent, 1.0, path);
-    const EssentialNormal b = SumEssentialNormal(some, in.model, in.tangent, 1.0, path);
+    const EssentialNormal a = SumEssentialNormal(all, in.model, in.tangent, 1.0, kInfinity, path);
+    const EssentialNormal b = SumEssentialNormal(some, in.model, in.tangent, 1.0, kInfinity, path);
     EXPECT_EQ(static_cast<size_t>(a.count), some.count);
     EXPECT_EQ(a.matrix, b.matrix);
     EXPECT_EQ(a.gradient, b.gradient);

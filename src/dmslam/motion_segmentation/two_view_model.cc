@@ -247,7 +247,8 @@ bool DescendEssential(const PackedMatches& matches, int iterations, double bound
     if (!step.allFinite()) return false;
     TwoViewModel trial = *model;
     UpdateEssential(step, B, &trial);
-    EssentialNormal there = SumEssentialNormal(matches, trial, Tangent(trial.t), bound_scale);
+    const EssentialNormal there =
+        SumEssentialNormal(matches, trial, Tangent(trial.t), bound_scale, normal.cost);
     const bool lower = there.count >= 5 && there.cost < normal.cost;
     damping = lower ? std::max(1e-6, 0.1 * damping) : 10.0 * damping;
     if (lower) {
