@@ -69,7 +69,7 @@ BENCHMARK(BM_ExtractorPortable)->Arg(1000)->Unit(benchmark::kMicrosecond);
 ImagePyramid PyramidOf(const cv::Mat& frame) {
   ImagePyramid pyramid;
   pyramid.SetUp(frame.cols, frame.rows, Pyramid(), 32);
-  pyramid.CopyFirst(ViewOf(frame));
+  pyramid.MakeFirst(ViewOf(frame), KernelsOn(SimdPath::kBest));
   for (size_t i = 1; i < pyramid.size(); ++i) pyramid.ShrinkInto(i, KernelsOn(SimdPath::kBest));
   return pyramid;
 }
@@ -79,7 +79,7 @@ void BM_PartPyramid(benchmark::State& state) {
   pyramid.SetUp(Frames()[0].cols, Frames()[0].rows, Pyramid(), 32);
   size_t iteration = 0;
   for (auto _ : state) {
-    pyramid.CopyFirst(ViewOf(FrameOf(iteration++)));
+    pyramid.MakeFirst(ViewOf(FrameOf(iteration++)), KernelsOn(SimdPath::kBest));
     for (size_t i = 1; i < pyramid.size(); ++i) pyramid.ShrinkInto(i, KernelsOn(SimdPath::kBest));
   }
 }

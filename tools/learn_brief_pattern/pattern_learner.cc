@@ -141,7 +141,7 @@ std::vector<KeypointPatch> CutPatches(const GrayView& image, const FeatureSet& f
   const ImageKernels& kernels = KernelsOn(SimdPath::kBest);
   ImagePyramid levels;
   levels.SetUp(image.width, image.height, pyramid, 32);
-  levels.CopyFirst(image);
+  levels.MakeFirst(image, kernels);
   std::vector<PaddedImage> smooth(levels.size());
   ImageSmoother smoother;
   for (size_t i = 0; i < levels.size(); ++i) {

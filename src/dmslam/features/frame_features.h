@@ -15,7 +15,7 @@ namespace dmslam {
 struct FrameFeatures {
   FeatureSet set;
   std::pmr::vector<Eigen::Vector2d> uv_px;  ///< undistorted pixel of each keypoint
-  std::pmr::vector<float> sigmas_px;        ///< of these pixels; empty: Pyramid::Scale says them
+  std::pmr::vector<float> sigmas_px;        ///< of these pixels; empty: Pyramid::Sigma says them
   FeatureGrid grid;                         ///< finds features near an undistorted pixel
 
   size_t size() const { return set.size(); }

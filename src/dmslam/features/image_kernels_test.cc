@@ -131,10 +131,10 @@ TEST_P(KernelPath, ShrinkingAndSmoothingAreThePortableOnesBitForBit) {
     const PaddedImage image = Noise(width, 40, static_cast<uint64_t>(width));
     const ImageKernels* sets[2] = {&KernelsOn(SimdPath::kPortable), &kernels()};
     PaddedImage shrunken[2], smooth[2];
-    ImageShrinker shrinker(width, 40, (width * 10 + 11) / 12, 34);
+    ImageResizer shrinker(width, 40, (width * 10 + 11) / 12, 34);
     ImageSmoother smoother;
     for (int i = 0; i < 2; ++i) {
-      shrinker.Shrink(image, *sets[i], &shrunken[i]);
+      shrinker.Resize(image, *sets[i], &shrunken[i]);
       smoother.Smooth(image, *sets[i], &smooth[i]);
     }
     for (int y = 0; y < 34; ++y) {
@@ -149,13 +149,13 @@ TEST_P(KernelPath, ShrinkingAndSmoothingAreThePortableOnesBitForBit) {
 INSTANTIATE_TEST_SUITE_P(Paths, KernelPath,
                          testing::Values(SimdPath::kPortable, SimdPath::kSse2, SimdPath::kAvx2));
 
-TEST(ImageShrinker, MapsPixelCentresToPixelCentres) {
+TEST(ImageResizer, MapsPixelCentresToPixelCentres) {
   PaddedImage ramp, shrunken;
   ramp.Resize(240, 60);
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 240; ++x) ramp.row(y)[x] = static_cast<uint8_t>(x);
   }
-  ImageShrinker(240, 60, 200, 50).Shrink(ramp, KernelsOn(SimdPath::kBest), &shrunken);
+  ImageResizer(240, 60, 200, 50).Resize(ramp, KernelsOn(SimdPath::kBest), &shrunken);
   for (int x = 0; x < 200; ++x) {
     const double expected = std::clamp((x + 0.5) * 1.2 - 0.5, 0.0, 239.0);
     EXPECT_NEAR(shrunken.row(25)[x], expected, 0.52) << x;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
@@ -14,6 +15,12 @@ int LevelSize(int size, double scale) { return static_cast<int>(std::ceil(size /
 
 }  // namespace
 
+Pyramid Pyramid::OfImages(int width_px, int height_px) const {
+  Pyramid pyramid = *this;
+  pyramid.finest_px = FinestPx(width_px, height_px);
+  return pyramid;
+}
+
 void PaddedImage::Resize(int width, int height) {
   constexpr int kAlignment = 64;
   width_ = width;
@@ -22,12 +29,13 @@ void PaddedImage::Resize(int width, int height) {
   pixels_.resize(static_cast<size_t>(stride_) * static_cast<size_t>(height) + 2 * kRowPadding);
 }
 
-ImageShrinker::ImageShrinker(int from_width, int from_height, int width, int height)
+ImageResizer::ImageResizer(int from_width, int from_height, int width, int height)
     : from_width_(from_width), from_height_(from_height), width_(width), height_(height) {
-  DMSLAM_CHECK(width > 0 && height > 0, "the shrunken image must have pixels");
-  DMSLAM_CHECK(width <= from_width && from_width <= 2 * width, "shrinks to between half and the whole width");
-  DMSLAM_CHECK(height <= from_height && from_height <= 2 * height,
-               "shrinks to between half and the whole height");
+  DMSLAM_CHECK(width > 0 && height > 0, "the image made must have pixels");
+  DMSLAM_CHECK(width <= 2 * from_width && from_width <= 2 * width,
+               "resizes to between half and twice the width");
+  DMSLAM_CHECK(height <= 2 * from_height && from_height <= 2 * height,
+               "resizes to between half and twice the height");
   blended_.resize(static_cast<size_t>(from_width) + kRowPadding);
   blocks_.resize(static_cast<size_t>(width + 7) / 8);
   for (size_t b = 0; b < blocks_.size(); ++b) {
@@ -45,7 +53,7 @@ ImageShrinker::ImageShrinker(int from_width, int from_height, int width, int hei
   }
 }
 
-void ImageShrinker::Shrink(const PaddedImage& from, const ImageKernels& kernels, PaddedImage* to) {
+void ImageResizer::Resize(const PaddedImage& from, const ImageKernels& kernels, PaddedImage* to) {
   DMSLAM_CHECK(from.width() == from_width_ && from.height() == from_height_,
                "image has another size than agreed");
   to->Resize(width_, height_);
@@ -58,7 +66,7 @@ void ImageShrinker::Shrink(const PaddedImage& from, const ImageKernels& kernels,
   }
 }
 
-ImageShrinker::Source ImageShrinker::SourceOf(int index, int from_size, int size) {
+ImageResizer::Source ImageResizer::SourceOf(int index, int from_size, int size) {
   // (index + 0.5) * from_size / size - 0.5 in 64ths, rounded, in integers.
   const int64_t numerator = (2 * static_cast<int64_t>(index) + 1) * from_size * 64 - 64LL * size;
   const int64_t position = (numerator + size) / (2 * static_cast<int64_t>(size));
@@ -71,9 +79,11 @@ void ImagePyramid::SetUp(int width, int height, const Pyramid& pyramid, int min_
   height_ = height;
   levels_.clear();
   shrinkers_.clear();
+  enlarger_.reset();
+  const Pyramid of_images = pyramid.OfImages(width, height);
   for (int i = 0; i < pyramid.levels; ++i) {
-    const int level_width = LevelSize(width, pyramid.Scale(i));
-    const int level_height = LevelSize(height, pyramid.Scale(i));
+    const int level_width = LevelSize(width, of_images.Sigma(i));
+    const int level_height = LevelSize(height, of_images.Sigma(i));
     if (std::min(level_width, level_height) <= min_size_px) break;
     if (i > 0) {
       const PaddedImage& before = levels_.back().image;
@@ -84,18 +94,23 @@ void ImagePyramid::SetUp(int width, int height, const Pyramid& pyramid, int min_
     level.scale_x = static_cast<double>(width) / level_width;
     level.scale_y = static_cast<double>(height) / level_height;
   }
+  if (levels_.empty() || of_images.finest_px == 1.0) return;
+  original_.Resize(width, height);
+  enlarger_.emplace(width, height, levels_[0].image.width(), levels_[0].image.height());
 }
 
-void ImagePyramid::CopyFirst(const GrayView& image) {
+void ImagePyramid::MakeFirst(const GrayView& image, const ImageKernels& kernels) {
   DMSLAM_CHECK(image.width == width_ && image.height == height_, "image has another size than agreed");
   if (levels_.empty()) return;
+  PaddedImage& copy = enlarger_ ? original_ : levels_[0].image;
   for (int y = 0; y < image.height; ++y) {
-    std::memcpy(levels_[0].image.row(y), image.row(y), static_cast<size_t>(image.width));
+    std::memcpy(copy.row(y), image.row(y), static_cast<size_t>(image.width));
   }
+  if (enlarger_) enlarger_->Resize(original_, kernels, &levels_[0].image);
 }
 
 void ImagePyramid::ShrinkInto(size_t index, const ImageKernels& kernels) {
-  shrinkers_[index - 1].Shrink(levels_[index - 1].image, kernels, &levels_[index].image);
+  shrinkers_[index - 1].Resize(levels_[index - 1].image, kernels, &levels_[index].image);
 }
 
 void ImageSmoother::Smooth(const PaddedImage& image, const ImageKernels& kernels, PaddedImage* smooth) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dmslam/features/image_kernels.h"
@@ -29,15 +30,15 @@ class PaddedImage {
   ptrdiff_t stride_ = 0;
 };
 
-/// Shrinks images of one size to another, not smaller than half: linear interpolation between the four
+/// Brings images of one size to another, from half to twice as large: linear interpolation between the four
 /// neighbours, positions and weights in 64ths. Pixel centres map to pixel centres: x_from = (x + 0.5) *
 /// from_width / width - 0.5.
-class ImageShrinker {
+class ImageResizer {
  public:
-  ImageShrinker(int from_width, int from_height, int width, int height);
+  ImageResizer(int from_width, int from_height, int width, int height);
 
   /// `to` gets the size given above. Allocates only on the first call.
-  void Shrink(const PaddedImage& from, const ImageKernels& kernels, PaddedImage* to);
+  void Resize(const PaddedImage& from, const ImageKernels& kernels, PaddedImage* to);
 
  private:
   /// Source of a row or column: the one before, and the weight of the one behind in 64ths.
@@ -52,20 +53,21 @@ class ImageShrinker {
   std::vector<uint8_t> blended_;
 };
 
-/// An image and its shrunken versions, each made from the one before.
+/// An image, enlarged where Pyramid::OfImages says so, and its shrunken versions, each made from the one
+/// before.
 class ImagePyramid {
  public:
   struct Level {
     PaddedImage image;
-    double scale_x = 1.0, scale_y = 1.0;  ///< size of a pixel in pixels of level 0
+    double scale_x = 1.0, scale_y = 1.0;  ///< size of a pixel in pixels of the image
   };
 
   /// Sets sizes and memory for images of one size. Levels are left out whose smaller side is not above
   /// `min_size_px`.
   void SetUp(int width, int height, const Pyramid& pyramid, int min_size_px);
 
-  /// Copies `image` into level 0; its size must be the one set up.
-  void CopyFirst(const GrayView& image);
+  /// Makes level 0 of `image`, whose size must be the one set up.
+  void MakeFirst(const GrayView& image, const ImageKernels& kernels);
   /// Makes level `index` >= 1 from the one before.
   void ShrinkInto(size_t index, const ImageKernels& kernels);
 
@@ -78,7 +80,9 @@ class ImagePyramid {
   int width_ = 0;
   int height_ = 0;
   std::vector<Level> levels_;
-  std::vector<ImageShrinker> shrinkers_;  ///< entry i makes level i + 1
+  PaddedImage original_;                  ///< where it is to be enlarged
+  std::optional<ImageResizer> enlarger_;  ///< makes level 0 of it
+  std::vector<ImageResizer> shrinkers_;   ///< entry i makes level i + 1
 };
 
 /// Smooths images with the triangle filter of seven taps, (1 2 3 4 3 2 1) / 16 in both directions, sigma 1.58

@@ -21,7 +21,7 @@ uint8_t Orientation(int moment_x, int moment_y) {
   return static_cast<uint8_t>(std::lround(radians * (128.0 / std::numbers::pi)) & 255);
 }
 
-/// A level's coordinate in sixteenths of a pixel of level 0; pixel centres map to pixel centres.
+/// A level's coordinate in sixteenths of a pixel of the image; pixel centres map to pixel centres.
 uint16_t FullResolutionQ4(double coordinate, double scale) {
   return static_cast<uint16_t>(std::lround(((coordinate + 0.5) * scale - 0.5) * 16.0));
 }
@@ -52,7 +52,7 @@ void OrbExtractor::Extract(const GrayView& image, FeatureSet* features) {
   features->keypoints.reserve(static_cast<size_t>(options_.num_features));
   features->descriptors.reserve(static_cast<size_t>(options_.num_features));
   if (image.width != pyramid_.width() || image.height != pyramid_.height()) SetUp(image.width, image.height);
-  pyramid_.CopyFirst(image);
+  pyramid_.MakeFirst(image, kernels_);
   int missing = 0;  // what finer levels could not give is asked of the coarser ones
   for (size_t octave = 0; octave < pyramid_.size(); ++octave) {
     if (octave > 0) pyramid_.ShrinkInto(octave, kernels_);
@@ -69,12 +69,15 @@ void OrbExtractor::Extract(const GrayView& image, FeatureSet* features) {
 void OrbExtractor::SetUp(int width, int height) {
   pyramid_.SetUp(width, height, options_.pyramid, 2 * options_.border_px);
   SetQuotas();
+  if (pyramid_.size() == 0) return;
+  const PaddedImage& finest = pyramid_.level(0).image;
   // No two of eight neighbours are both corners.
-  const size_t most_corners = static_cast<size_t>(width / 2 + 1) * static_cast<size_t>(height / 2 + 1);
+  const size_t most_corners =
+      static_cast<size_t>(finest.width() / 2 + 1) * static_cast<size_t>(finest.height() / 2 + 1);
   corners_.reserve(most_corners);
   selector_.Reserve(most_corners);
   chosen_.reserve(std::min(most_corners, static_cast<size_t>(options_.num_features)));
-  smooth_.Resize(width, height);
+  smooth_.Resize(finest.width(), finest.height());
 }
 
 void OrbExtractor::SetQuotas() {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -72,6 +73,40 @@ TEST(OrbExtractor, GivesTheNumberAskedAndUniqueKeypoints) {
         std::pow(1 / 1.2, static_cast<double>(i)) * (1 - 1 / 1.2) / (1 - std::pow(1 / 1.2, 8));
     EXPECT_NEAR(per_octave[i], 1000 * share, 0.25 * 1000 * share) << "octave " << i;
   }
+}
+
+TEST(OrbExtractor, FindsInASmallImageWhatTheImageTwiceAsLargeShows) {
+  const GrayPixels small = RandomRectangles(320, 240, 150, 4);
+  PaddedImage from, to;
+  from.Resize(320, 240);
+  for (int y = 0; y < 240; ++y) std::copy_n(small.View().row(y), 320, from.row(y));
+  ImageResizer(320, 240, 640, 480).Resize(from, KernelsOn(SimdPath::kBest), &to);
+  OrbExtractor extractor;
+  FeatureSet found, enlarged;
+  extractor.Extract(small.View(), &found);
+  extractor.Extract(to.View(), &enlarged);
+  ASSERT_GT(found.size(), 500U);
+  EXPECT_EQ(found.descriptors, enlarged.descriptors);
+  ASSERT_EQ(found.size(), enlarged.size());
+  for (size_t i = 0; i < found.size(); ++i) {
+    const Keypoint &a = found.keypoints[i], &b = enlarged.keypoints[i];
+    EXPECT_EQ(a.octave, b.octave);
+    EXPECT_NEAR(2 * (a.x_px() + 0.5), b.x_px() + 0.5, 0.1);
+    EXPECT_NEAR(2 * (a.y_px() + 0.5), b.y_px() + 0.5, 0.1);
+  }
+}
+
+TEST(Pyramid, EnlargesSmallImagesToTwiceTheirSizeAtMost) {
+  const auto finest_px = [](int width, int height) { return Pyramid().OfImages(width, height).finest_px; };
+  EXPECT_EQ(finest_px(640, 480), 1.0);
+  EXPECT_EQ(finest_px(1226, 370), 1.0);
+  EXPECT_EQ(finest_px(600, 450), 1.0) << "too little to be worth it";
+  EXPECT_NEAR(finest_px(480, 360), 0.75, 1e-12);
+  EXPECT_EQ(finest_px(320, 240), 0.5);
+  EXPECT_EQ(finest_px(80, 60), 0.5);
+  EXPECT_EQ(Pyramid().OfImages(320, 240).Sigma(0), 0.5);
+  EXPECT_EQ(Pyramid().OfImages(320, 240).SigmaSquared(0), 0.25);
+  EXPECT_EQ(Pyramid().OfImages(320, 240).Scale(1), 1.2) << "of two levels";
 }
 
 TEST(OrbExtractor, DescriptorsTurnWithTheImage) {

@@ -25,7 +25,7 @@ struct GrayView {
 struct Keypoint {
   uint16_t x_q4 = 0;   ///< x [px] * 16
   uint16_t y_q4 = 0;   ///< y [px] * 16
-  uint8_t octave = 0;  ///< pyramid level, 0 = full resolution
+  uint8_t octave = 0;  ///< pyramid level, 0 = the finest
   uint8_t angle = 0;   ///< orientation, 256 steps per turn
 
   double x_px() const { return x_q4 / 16.0; }
@@ -73,7 +73,7 @@ struct FeatureSet {
   std::pmr::vector<Descriptor> descriptors;
   std::pmr::vector<float> depths_m;        ///< along the optical axis [m]; -1: not measured
   std::pmr::vector<float> depth_sigmas_m;  ///< standard deviations of the depths [m]; -1: not measured
-  std::pmr::vector<float> sigmas_px;       ///< of the positions; empty: Pyramid::Scale says it
+  std::pmr::vector<float> sigmas_px;       ///< of the positions; empty: Pyramid::Sigma says it
 
   size_t size() const { return keypoints.size(); }
 };
@@ -90,10 +90,18 @@ struct Pyramid {
     v.Number("features.scale_factor", scale_factor, 1.05, 2, "", "between two levels");
   }
 
-  /// Size of one pixel of a level in pixels of level 0; also the standard deviation of a keypoint's position
-  /// [px].
+  /// Size of a pixel of level 0 in pixels of the image: below 1 where small images are enlarged first. No
+  /// setting: OfImages says it.
+  double finest_px = 1.0;
+
+  /// The same pyramid over images of this size (FinestPx).
+  Pyramid OfImages(int width_px, int height_px) const;
+
+  /// Size of one pixel of a level in pixels of level 0.
   double Scale(int octave) const { return std::pow(scale_factor, octave); }
-  double SigmaSquared(int octave) const { return std::pow(scale_factor, 2 * octave); }
+  /// Standard deviation of a keypoint's position [px of the image]: one pixel of its level.
+  double Sigma(int octave) const { return finest_px * Scale(octave); }
+  double SigmaSquared(int octave) const { return finest_px * finest_px * std::pow(scale_factor, 2 * octave); }
 };
 
 }  // namespace dmslam

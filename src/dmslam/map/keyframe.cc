@@ -11,8 +11,9 @@ namespace {
 void AddSigmas(const Camera& camera, const Pyramid& pyramid, FrameFeatures* features) {
   const FeatureSet& set = features->set;
   if (set.sigmas_px.empty() && !camera.Stretches()) return;
+  const Pyramid of_images = pyramid.OfImages(camera.width_px, camera.height_px);
   for (size_t i = 0; i < set.size(); ++i) {
-    const double raw_px = set.sigmas_px.empty() ? pyramid.Scale(set.keypoints[i].octave)
+    const double raw_px = set.sigmas_px.empty() ? of_images.Sigma(set.keypoints[i].octave)
                                                 : static_cast<double>(set.sigmas_px[i]);
     features->sigmas_px.push_back(static_cast<float>(raw_px * camera.StretchAt(features->uv_px[i])));
   }

@@ -18,7 +18,9 @@ auto WhereObserved(std::vector<Observation>& observations, KeyframeId keyframe) 
 }  // namespace
 
 Map::Map(const Camera& camera, const Pyramid& pyramid)
-    : camera_(camera), pyramid_(pyramid), log_scale_factor_(std::log(pyramid.scale_factor)) {}
+    : camera_(camera),
+      pyramid_(pyramid.OfImages(camera.width_px, camera.height_px)),
+      log_scale_factor_(std::log(pyramid.scale_factor)) {}
 
 void Map::KeepFeaturesIn(std::shared_ptr<FeatureStore> store) {
   if (feature_store_ == store) return;

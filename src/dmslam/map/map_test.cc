@@ -35,6 +35,21 @@ TEST(FrameFeatures, OctavesSayHowExactTheyAreUnlessSigmasDo) {
   EXPECT_EQ(NormalizedErrorSquared(*measured, 1, measured->uv_px[1] + Eigen::Vector2d(6, 0), Pyramid()), 4.0);
 }
 
+TEST(FrameFeatures, OfSmallImagesAreExactToAPartOfAPixel) {
+  Camera camera = TestCamera();
+  camera.width_px = 320;
+  camera.height_px = 240;
+  FeatureSet set = TwoKeypoints();
+  set.keypoints[0].x_q4 = set.keypoints[1].x_q4 = 160 * 16;
+  const Map map(camera, Pyramid());
+  const auto features = MakeFrameFeatures(set, camera, Pyramid());
+  EXPECT_EQ(features->Variance(0, map.pyramid()), 0.25);
+  camera.lens = Lens::kFisheye;
+  camera.cx_px = 160;
+  camera.cy_px = 240;
+  EXPECT_NEAR(MakeFrameFeatures(set, camera, Pyramid())->Variance(0, map.pyramid()), 0.25, 1e-6);
+}
+
 TEST(FrameFeatures, AreLessExactWhereTheLensStretchesTheImage) {
   Camera camera = TestCamera(300);
   camera.lens = Lens::kFisheye;

@@ -53,7 +53,7 @@ std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector
     const double across = std::hypot(x, y);
     if (across < 0.02) continue;  // nearly along the baseline: any plane would do
     const uint8_t octave = keyframe.features->set.keypoints[i].octave;
-    const double sigma_px = map.pyramid().Scale(octave);
+    const double sigma_px = map.pyramid().Sigma(octave);
     const double along = ray.dot(pencil.axis);
     entries.push_back({std::atan2(y, x), across, along, along / across, sigma_px / (camera.fx_px * across),
                        static_cast<uint16_t>(i), octave});

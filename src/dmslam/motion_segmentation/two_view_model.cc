@@ -74,10 +74,11 @@ MatchArrays MakeArrays(std::span<const Match> matches, std::span<const uint32_t>
   for (auto* array : {&arrays.ray0, &arrays.ray1}) array->resize(n);
   const double focal = 0.5 * (camera.fx_px + camera.fy_px);
   const double unit = options.chi2 * options.sigma_px * options.sigma_px / (focal * focal);
+  const Pyramid pyramid = options.pyramid.OfImages(camera.width_px, camera.height_px);
   std::array<double, 256> variance{};
   for (int octave = 0; octave < 256; ++octave) {
-    const bool known = options.scale_by_octave && octave < options.pyramid.levels;
-    variance[static_cast<size_t>(octave)] = known ? options.pyramid.SigmaSquared(octave) : 1.0;
+    const bool known = options.scale_by_octave && octave < pyramid.levels;
+    variance[static_cast<size_t>(octave)] = pyramid.SigmaSquared(known ? octave : 0);
   }
   for (size_t k = 0; k < n; ++k) {
     const Match& match = matches[order[k]];

@@ -19,7 +19,8 @@ FirstMapSearch Search(TwoFrameInitializer initializer) {
 }  // namespace
 
 FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
-                                  const Camera& camera, const Pyramid& pyramid, uint64_t seed) {
+                                  const Camera& camera, const Pyramid& levels, uint64_t seed) {
+  const Pyramid pyramid = levels.OfImages(camera.width_px, camera.height_px);
   if (method == "ransac") {
     return Search(TwoFrameInitializer({}, camera, ReconstructByRansac(camera, pyramid), seed));
   }

@@ -19,7 +19,7 @@ constexpr double kNearRad = 0.08;        // where a camera that goes on turning 
 constexpr double kProvenS = 0.2;         // so long one turn must explain the pictures to be believed
 constexpr size_t kLeastMatches = 60;     // that tell a turn
 constexpr double kMostAsideRad = 0.003;  // from where the turn puts it, of a match that the turn explains...
-constexpr double kMostAsidePx = 1.5;     // ...but no finer than features are found...
+constexpr double kMostAside = 1.5;       // ...but no finer than features are found [their pixels]...
 constexpr double kLeastShare = 0.7;      // ...of the matches...
 constexpr size_t kLeastCells = kNumCells / 2;  // ...in so many cells of the image
 constexpr double kOverlap = 0.5;  // of the matches that were there at first: with fewer a new picture begins
@@ -49,7 +49,8 @@ Eigen::Quaterniond TurnFollower::Predicted(int64_t stamp_ns) const {
 
 bool TurnFollower::IsTurn(const std::vector<Match>& matches, const Eigen::Quaterniond& R_1_0) const {
   std::array<bool, kNumCells> seen{};
-  const double most_aside = std::max(kMostAsideRad, kMostAsidePx / FocalPx(camera_));
+  const double most_aside =
+      std::max(kMostAsideRad, kMostAside * FinestPx(camera_.width_px, camera_.height_px) / FocalPx(camera_));
   size_t explained = 0;
   for (const Match& match : matches) {
     const Eigen::Vector3d turned = R_1_0 * camera_.Ray(match.uv0_px).normalized();
