@@ -101,6 +101,8 @@ class Filler {
   void operator()(Sim3d& S) {
     (*this)(S.rotation), (*this)(S.translation), S.scale = random_.Uniform(0.1, 10);
   }
+  /// The size of its finest pixels does not travel: the images' size says it.
+  void operator()(Pyramid& pyramid) { (*this)(pyramid.levels), (*this)(pyramid.scale_factor); }
   template <typename T>
   void operator()(T& value) {
     if constexpr (std::is_enum_v<T>) {
