@@ -9,6 +9,7 @@
 #include <fstream>
 #include <string>
 
+#include "dmslam/camera/image_scale.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
 
@@ -29,6 +30,16 @@ TEST(Camera, UndistortIsInverseOfDistort) {
     ASSERT_TRUE(ideal.has_value()) << raw.transpose();
     EXPECT_NEAR((camera.Distort(*ideal) - raw).norm(), 0.0, 1e-5);
   }
+}
+
+TEST(ImageScale, SearchesNoNearerThanKeypointsScatterInTheImageOrTheImageEnlarged) {
+  Camera camera = Freiburg1();
+  EXPECT_EQ(SearchRadiusPx(camera, 1e-3), 2.5);
+  EXPECT_EQ(SearchRadiusPx(camera, 0.02), 0.02 * FocalPx(camera));
+  camera.width_px = 320;
+  camera.height_px = 240;
+  EXPECT_EQ(SearchRadiusPx(camera, 1e-3), 1.25);
+  EXPECT_EQ(FinestPx(0, 0), 1.0) << "no image";
 }
 
 TEST(Camera, DistortionMovesCornersByPixels) {

@@ -17,7 +17,7 @@ enum class SimdPath {
 /// much longer.
 inline constexpr int kRowPadding = 64;
 
-/// Eight neighbouring pixels of a shrunken row: where their sources begin, which of the 16 bytes from there
+/// Eight neighbouring pixels of a resized row: where their sources begin, which of the 16 bytes from there
 /// are the left and right source of each, and the weights of these in 64ths.
 struct ResizeBlock {
   int32_t source_begin = 0;
@@ -53,8 +53,9 @@ struct ImageKernels {
   /// the four behind them. Appends at most (x_end - x_begin) / 2 + 1 corners at `out`; returns how many.
   int (*local_maxima)(const ScoreRows& rows, int x_begin, int x_end, int y, Corner* out);
 
-  /// One row of the next level: pixels blended from rows `upper` and `lower` with `lower_weight` / 64 of the
-  /// lower, then along the row as `blocks` say. `blended` holds a source row. Writes 8 * num_blocks pixels.
+  /// One row of the resized image: pixels blended from rows `upper` and `lower` with `lower_weight` / 64 of
+  /// the lower, then along the row as `blocks` say. `blended` holds a source row. Writes 8 * num_blocks
+  /// pixels.
   void (*resize_row)(const uint8_t* upper, const uint8_t* lower, int lower_weight, int source_width,
                      const ResizeBlock* blocks, int num_blocks, uint8_t* blended, uint8_t* out);
 

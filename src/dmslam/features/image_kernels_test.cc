@@ -146,11 +146,26 @@ TEST_P(KernelPath, ShrinkingAndSmoothingAreThePortableOnesBitForBit) {
   }
 }
 
+TEST_P(KernelPath, EnlargingIsThePortableOneBitForBit) {
+  for (const int width : {33, 97, 321}) {
+    const PaddedImage image = Noise(width, 40, static_cast<uint64_t>(width));
+    for (const double by : {1.33, 1.96, 2.0}) {
+      const int to_width = static_cast<int>(std::ceil(by * width));
+      ImageResizer resizer(width, 40, to_width, static_cast<int>(by * 40));
+      PaddedImage plain, fast;
+      resizer.Resize(image, KernelsOn(SimdPath::kPortable), &plain);
+      resizer.Resize(image, kernels(), &fast);
+      for (int y = 0; y < plain.height(); ++y)
+        ASSERT_TRUE(std::equal(plain.row(y), plain.row(y) + to_width, fast.row(y))) << width << " by " << by;
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Paths, KernelPath,
                          testing::Values(SimdPath::kPortable, SimdPath::kSse2, SimdPath::kAvx2));
 
 TEST(ImageResizer, MapsPixelCentresToPixelCentres) {
-  PaddedImage ramp, shrunken;
+  PaddedImage ramp, shrunken, enlarged;
   ramp.Resize(240, 60);
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 240; ++x) ramp.row(y)[x] = static_cast<uint8_t>(x);
@@ -159,6 +174,11 @@ TEST(ImageResizer, MapsPixelCentresToPixelCentres) {
   for (int x = 0; x < 200; ++x) {
     const double expected = std::clamp((x + 0.5) * 1.2 - 0.5, 0.0, 239.0);
     EXPECT_NEAR(shrunken.row(25)[x], expected, 0.52) << x;
+  }
+  ImageResizer(240, 60, 480, 120).Resize(ramp, KernelsOn(SimdPath::kBest), &enlarged);
+  for (int x = 0; x < 480; ++x) {
+    const double expected = std::clamp((x + 0.5) / 2 - 0.5, 0.0, 239.0);
+    EXPECT_NEAR(enlarged.row(60)[x], expected, 0.52) << x;
   }
 }
 

@@ -22,7 +22,7 @@ uint8_t Orientation(int moment_x, int moment_y) {
 }
 
 /// A level's coordinate in sixteenths of a pixel of the image; pixel centres map to pixel centres.
-uint16_t FullResolutionQ4(double coordinate, double scale) {
+uint16_t ImageQ4(double coordinate, double scale) {
   return static_cast<uint16_t>(std::lround(((coordinate + 0.5) * scale - 0.5) * 16.0));
 }
 
@@ -106,8 +106,8 @@ void OrbExtractor::Describe(size_t octave, FeatureSet* features) {
     int moment_x = 0, moment_y = 0;
     kernels_.disc_moments(pixel, level.image.stride(), &moment_x, &moment_y);
     Keypoint keypoint;
-    keypoint.x_q4 = FullResolutionQ4(corner.x + offset.x, level.scale_x);
-    keypoint.y_q4 = FullResolutionQ4(corner.y + offset.y, level.scale_y);
+    keypoint.x_q4 = ImageQ4(corner.x + offset.x, level.scale_x);
+    keypoint.y_q4 = ImageQ4(corner.y + offset.y, level.scale_y);
     keypoint.octave = static_cast<uint8_t>(octave);
     keypoint.angle = Orientation(moment_x, moment_y);
     features->keypoints.push_back(keypoint);

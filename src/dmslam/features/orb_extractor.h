@@ -35,10 +35,10 @@ struct OrbExtractorOptions {
   void Check() const;
 };
 
-/// Extracts ORB features: FAST corners of an image pyramid, spread over the image, oriented by the intensity
-/// centroid and described by 256 comparisons turned along (Rublee, Rabaud, Konolige, Bradski: ORB: an
-/// efficient alternative to SIFT or SURF, ICCV 2011). Positions are refined below the pixel by the peak of
-/// the FAST score (see subpixel.h).
+/// Extracts ORB features: FAST corners of a pyramid over the image, enlarged where it is small, spread over
+/// the image, oriented by the intensity centroid and described by 256 comparisons turned along (Rublee,
+/// Rabaud, Konolige, Bradski: ORB: an efficient alternative to SIFT or SURF, ICCV 2011). Positions are
+/// refined below the pixel by the peak of the FAST score (see subpixel.h).
 ///
 /// The same image and options give the same features on every machine and SIMD path. Keeps its buffers: once
 /// it has seen an image of a size, further ones of this size allocate nothing (given that `features` keeps

@@ -27,6 +27,7 @@ FeatureSet Extract(const GrayPixels& image, const OrbExtractorOptions& options =
 }
 
 TEST(OrbExtractor, FindsTheCornersOfASquare) {
+  const Pyramid pyramid = Pyramid().OfImages(200, 160);
   GrayPixels image(200, 160, 60);
   for (int y = 50; y < 110; ++y) {
     for (int x = 60; x < 140; ++x) image.at(x, y) = 200;
@@ -38,13 +39,13 @@ TEST(OrbExtractor, FindsTheCornersOfASquare) {
     for (const Keypoint& k : features.keypoints) {
       if (k.octave == 0) nearest = std::min(nearest, std::hypot(k.x_px() - corner[0], k.y_px() - corner[1]));
     }
-    EXPECT_LT(nearest, 2.5);  // scores around a perfect corner are equal: the first counts
+    EXPECT_LT(nearest, 2.5 * pyramid.Sigma(0));  // scores around a perfect corner are equal: the first counts
   }
   for (const Keypoint& k : features.keypoints) {
     double nearest = 1e9;
     for (const auto& corner : corners)
       nearest = std::min(nearest, std::hypot(k.x_px() - corner[0], k.y_px() - corner[1]));
-    EXPECT_LT(nearest, 4.0 * std::pow(1.2, k.octave)) << "a keypoint away from every corner";
+    EXPECT_LT(nearest, 4.0 * pyramid.Sigma(k.octave)) << "a keypoint away from every corner";
   }
 }
 
@@ -204,14 +205,16 @@ TEST(OrbExtractor, IsTheSameOnEveryPathAndEveryTime) {
 }
 
 TEST(OrbExtractor, DoesNotDependOnWhatItSawBefore) {
-  const GrayPixels image = RandomRectangles(320, 240, 200, 5), other = RandomRectangles(500, 300, 300, 6);
+  const GrayPixels small = RandomRectangles(320, 240, 200, 5), other = RandomRectangles(500, 300, 300, 6),
+                   large = RandomRectangles(640, 480, 600, 7);
   OrbExtractor extractor;
   FeatureSet features;
-  extractor.Extract(other.View(), &features);
-  extractor.Extract(image.View(), &features);
-  const FeatureSet fresh = Extract(image);
-  EXPECT_EQ(features.keypoints, fresh.keypoints);
-  EXPECT_EQ(features.descriptors, fresh.descriptors);
+  for (const GrayPixels* image : {&other, &small, &large, &small}) {
+    extractor.Extract(image->View(), &features);
+    const FeatureSet fresh = Extract(*image);
+    EXPECT_EQ(features.keypoints, fresh.keypoints);
+    EXPECT_EQ(features.descriptors, fresh.descriptors);
+  }
 }
 
 TEST(OrbExtractor, ReadsNothingBesideTheView) {
@@ -228,17 +231,20 @@ TEST(OrbExtractor, ReadsNothingBesideTheView) {
 }
 
 TEST(OrbExtractor, AllocatesNothingOnceItKnowsTheSize) {
-  const GrayPixels plain = RandomRectangles(640, 480, 20, 9), rich = RandomRectangles(640, 480, 2000, 10);
-  OrbExtractor extractor;
-  FeatureSet features;
-  extractor.Extract(plain.View(), &features);
-  const size_t before = testing::NumAllocations();
-  extractor.Extract(rich.View(), &features);
-  extractor.Extract(plain.View(), &features);
-  EXPECT_EQ(testing::NumAllocations(), before);
-  FeatureSet another;
-  another.keypoints.reserve(1);
-  EXPECT_GT(testing::NumAllocations(), before) << "the counter must count";
+  for (const auto& [width, height] : {std::pair(640, 480), std::pair(320, 240)}) {
+    const GrayPixels plain = RandomRectangles(width, height, 20, 9),
+                     rich = RandomRectangles(width, height, 2000, 10);
+    OrbExtractor extractor;
+    FeatureSet features;
+    extractor.Extract(plain.View(), &features);
+    const size_t before = testing::NumAllocations();
+    extractor.Extract(rich.View(), &features);
+    extractor.Extract(plain.View(), &features);
+    EXPECT_EQ(testing::NumAllocations(), before) << width;
+    FeatureSet another;
+    another.keypoints.reserve(1);
+    EXPECT_GT(testing::NumAllocations(), before) << "the counter must count";
+  }
 }
 
 TEST(OrbExtractor, SmallAndBlankImagesGiveNothing) {
@@ -250,7 +256,8 @@ TEST(OrbExtractor, SmallAndBlankImagesGiveNothing) {
     extractor.Extract(image.View(), &features);
     EXPECT_EQ(features.size(), 0U) << width << "x" << height;
   }
-  for (const auto& [width, height] : {std::pair(33, 33), std::pair(640, 480), std::pair(641, 479)}) {
+  for (const auto& [width, height] : {std::pair(17, 17), std::pair(33, 33), std::pair(40, 2000),
+                                      std::pair(640, 480), std::pair(641, 479)}) {
     extractor.Extract(GrayPixels(width, height, 200).View(), &features);
     EXPECT_EQ(features.size(), 0U) << width << "x" << height;
   }

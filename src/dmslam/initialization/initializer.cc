@@ -462,9 +462,19 @@ bool Initializer::Impl::Admit(ReferenceWindow* window, CandidateMap* candidate, 
   return gates_.Admit(stream_.windows.all(), match, window, candidate, refused);
 }
 
+namespace {
+
+InitializerOptions ForImages(InitializerOptions options, const Camera& camera) {
+  for (Pyramid* pyramid : {&options.selector.inlier.pyramid, &options.reconstruction.pyramid})
+    *pyramid = pyramid->OfImages(camera.width_px, camera.height_px);
+  return options;
+}
+
+}  // namespace
+
 Initializer::Initializer(const InitializerOptions& options, const Camera& camera, uint64_t seed,
                          AdjustFunction adjust)
-    : impl_(std::make_unique<Impl>(options, camera, seed, std::move(adjust))) {}
+    : impl_(std::make_unique<Impl>(ForImages(options, camera), camera, seed, std::move(adjust))) {}
 Initializer::~Initializer() = default;
 
 InitializerReport Initializer::AddFrame(const InitializerFrame& frame) { return impl_->AddFrame(frame); }

@@ -34,6 +34,7 @@ InitializerReport Waiting(WaitReason wait, const char* reason) {
 
 ReconstructPair ReconstructByRansac(const Camera& camera, const Pyramid& pyramid) {
   HomographyOrFundamentalOptions options;
+  options.sigma_px = pyramid.Sigma(0);
   options.reconstruction.pyramid = pyramid;
   return [camera, options](std::span<const Match> matches, uint64_t seed) {
     return ReconstructBaseline(matches, camera, options, seed);

@@ -27,6 +27,24 @@ Score ScoreOf(const SyntheticPair& pair, const StaticSelection& selection) {
   return {called == 0 ? 1.0 : right / static_cast<double>(called), right / static_cast<double>(all)};
 }
 
+TEST(MatchArrays, OfSmallImagesAreExactToAPartOfAPixel) {
+  const SyntheticPair pair = MakeSyntheticPair({}, 1);
+  std::vector<uint32_t> order(pair.matches.size());
+  std::iota(order.begin(), order.end(), 0U);
+  Camera small = pair.camera;
+  small.width_px = 320;
+  small.height_px = 240;
+  for (const bool by_octave : {true, false}) {
+    const InlierOptions options{.scale_by_octave = by_octave};
+    const MatchArrays whole = MakeArrays(pair.matches, order, pair.camera, options);
+    const MatchArrays half = MakeArrays(pair.matches, order, small, options);
+    for (size_t i = 0; i < order.size(); ++i) {
+      EXPECT_FLOAT_EQ(half.bound0[i], 0.25F * whole.bound0[i]);
+      EXPECT_FLOAT_EQ(half.bound1[i], 0.25F * whole.bound1[i]);
+    }
+  }
+}
+
 TEST(CountInliers, IsTheSameOnEveryPathAndExactAboveItsBound) {
   SyntheticPairOptions options;
   options.num_moving = 200;

@@ -102,7 +102,7 @@ struct InputOptions {
 /// When a matched pair of points agrees with a model.
 struct InlierOptions {
   double chi2 = kRoundedChiSquared1Dof;  ///< bound on the squared Sampson distance in units of its variance
-  double sigma_px = 1.0;                 ///< standard deviation of a keypoint of octave 0
+  double sigma_px = 1.0;                 ///< standard deviation of a keypoint [pixels of its level]
   /// Standard deviation grows with the octave's scale (Pyramid). Off: every keypoint counts as octave 0 (the
   /// paper).
   bool scale_by_octave = true;

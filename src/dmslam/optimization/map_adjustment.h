@@ -16,9 +16,9 @@ struct MapAdjustmentReport {
 };
 
 /// Bundle adjustment of a set of keyframes and of all landmarks they see, held in place by the other
-/// observers of those landmarks (at most `max_fixed`). `sigma_px`: standard deviation of a keypoint of octave
-/// 0. Results are written into the map, observations that do not fit are cleared, and landmarks left with
-/// fewer than two observers are removed.
+/// observers of those landmarks (at most `max_fixed`). `sigma_px`: standard deviation of a keypoint
+/// [pixels of its level]. Results are written into the map, observations that do not fit are cleared, and
+/// landmarks left with fewer than two observers are removed.
 MapAdjustmentReport AdjustKeyframes(MapEditor& map, const std::vector<const Keyframe*>& keyframes,
                                     int max_fixed, double sigma_px, const BundleOptions& options);
 

@@ -16,7 +16,7 @@ namespace dmslam {
 struct PoseObservation {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
   Eigen::Vector2d uv_px = Eigen::Vector2d::Zero();  ///< Undistorted.
-  double inv_sigma_squared = 1.0;                   ///< [1 / px^2], 1 / scale^2 of the keypoint's octave.
+  double inv_sigma_squared = 1.0;                   ///< [1 / px^2], 1 / Pyramid::SigmaSquared of the octave.
   double weight = 1.0;  ///< Trust in the landmark, multiplies its cost; the inlier test does not see it.
 };
 
