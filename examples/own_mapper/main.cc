@@ -8,31 +8,26 @@
 
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/runtime/process_main.h"
-#include "mapper/mapper_node.h"
+#include "mapper/make_mapper.h"
 
 namespace {
 
 /// Hands everything on to the mapper, and measures.
-class MeasuredNode : public dmslam::Node {
+class MeasuredNode : public dmslam::NodeDecorator {
  public:
-  explicit MeasuredNode(std::unique_ptr<dmslam::Node> node) : node_(std::move(node)) {}
+  using NodeDecorator::NodeDecorator;
   ~MeasuredNode() override {
     std::printf("own mapper: %d turns, the longest took %.1f ms\n", turns_, longest_ms_);
   }
 
   void Advance() override {
     const int64_t begin_ns = dmslam::EventLoop::now_ns();
-    node_->Advance();
+    NodeDecorator::Advance();
     longest_ms_ = std::max(longest_ms_, 1e-6 * static_cast<double>(dmslam::EventLoop::now_ns() - begin_ns));
     ++turns_;
   }
-  int64_t deadline_ns() const override { return node_->deadline_ns(); }
-  void Stop() override { node_->Stop(); }
-  std::optional<int> exit_code() const override { return node_->exit_code(); }
-  std::string problem() const override { return node_->problem(); }
 
  private:
-  std::unique_ptr<dmslam::Node> node_;
   int turns_ = 0;
   double longest_ms_ = 0;
 };
@@ -41,8 +36,9 @@ class MeasuredNode : public dmslam::Node {
 
 int main(int argc, char** argv) {
   dmslam::ProcessMain process("mapper", "The library's mapper under a main of its own.");
-  return process.Run(argc, argv, [](dmslam::NodeContext context, dmslam::NodeOptions options) {
-    return std::make_unique<MeasuredNode>(
-        std::make_unique<dmslam::MapperNode>(std::move(context), std::move(options)));
+  dmslam::MapperFiles files;
+  dmslam::AddMapperOptions(process.app(), &files);
+  return process.Run(argc, argv, [&](dmslam::NodeContext context, dmslam::NodeOptions options) {
+    return std::make_unique<MeasuredNode>(dmslam::MakeMapper(std::move(context), std::move(options), files));
   });
 }

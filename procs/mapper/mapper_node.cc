@@ -1,6 +1,7 @@
 #include "mapper/mapper_node.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "dmslam/console/log.h"
@@ -16,6 +17,16 @@ namespace {
 constexpr int64_t kPartEveryNs = 3'000'000;
 
 }  // namespace
+
+void AddMapperOptions(CommandLine& app, MapperFiles* files) {
+  if (const char* checkpoint = std::getenv("DMSLAM_CHECKPOINT")) files->checkpoint = checkpoint;
+  app.AddOption("--map", files->load, "saved map or log: begin with this map (needs the setting map.saved)");
+  app.AddOption(
+      "--checkpoint", files->checkpoint,
+      "the collector's checkpoint of this session: go on from it where no other process has the map "
+      "any more; default: what DMSLAM_CHECKPOINT names");
+  app.AddOption("--save-map", files->save, "write the map into this file at the end");
+}
 
 std::unique_ptr<Node> MakeMapper(NodeContext context, NodeOptions options, MapperFiles files) {
   return std::make_unique<MapperNode>(std::move(context), std::move(options), std::move(files));

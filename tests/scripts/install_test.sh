@@ -77,7 +77,9 @@ expect 0 "" cmake -S "$root/examples/own_mapper" -B "$work/mapper" -DCMAKE_PREFI
 expect 0 "" cmake --build "$work/mapper"
 mv "$prefix/bin/dmslam-mapper" "$work/replaced"
 cp "$work/mapper/own_mapper" "$prefix/bin/dmslam-mapper"
-expect 0 "" "$prefix/bin/dmslam-run" --sequence "$sequence" --camera "$camera" --seed 1 --lockstep --out "$work/own"
+expect 0 "" "$prefix/bin/dmslam-run" --sequence "$sequence" --camera "$camera" --seed 1 --lockstep --out "$work/own" \
+  --save-map "$work/own.map"
 check "it was this mapper" grep -rq "own mapper: [0-9]* turns" "$work/own/log"
 check "the run gives the same trajectory" cmp "$work/own/trajectory.txt" "$work/whole/trajectory.txt"
+expect 0 "keyframes" "$prefix/bin/dmslam-map" info "$work/own.map"
 finish

@@ -60,6 +60,7 @@ class SyntheticRoom {
   InitializerFrame Frame(uint32_t index) const {
     auto features = std::make_shared<FrameFeatures>();
     Random random(DeriveSeed(3, index, "frame"));
+    const double sigma_px = 0.4 * Pyramid().OfImages(camera_.width_px, camera_.height_px).Sigma(0);
     for (size_t k = 0; k < points_.size(); ++k) {
       const Point& point = points_[k];
       if (shown_ && !shown_(k, index)) continue;
@@ -68,7 +69,7 @@ class SyntheticRoom {
       const Eigen::Vector3d walk(walk_ * walked, 0.05 * std::sin(turn), 0.0);
       const auto uv =
           camera_.Project(TruePose(index) * (point.p_world + (point.moves ? walk : Eigen::Vector3d::Zero())));
-      const double dx = 0.4 * random.Gaussian(), dy = 0.4 * random.Gaussian();
+      const double dx = sigma_px * random.Gaussian(), dy = sigma_px * random.Gaussian();
       if (!uv) continue;
       const Eigen::Vector2d seen = *uv + Eigen::Vector2d(dx, dy);
       if (!(seen.x() > 1 && seen.y() > 1 && seen.x() < camera_.width_px - 2 &&

@@ -35,7 +35,8 @@ TEST(MatchArrays, OfSmallImagesAreExactToAPartOfAPixel) {
   small.width_px = 320;
   small.height_px = 240;
   for (const bool by_octave : {true, false}) {
-    const InlierOptions options{.scale_by_octave = by_octave};
+    InlierOptions options;
+    options.scale_by_octave = by_octave;
     const MatchArrays whole = MakeArrays(pair.matches, order, pair.camera, options);
     const MatchArrays half = MakeArrays(pair.matches, order, small, options);
     for (size_t i = 0; i < order.size(); ++i) {

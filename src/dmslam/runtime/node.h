@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "dmslam/messaging/bus.h"
 
@@ -54,6 +56,22 @@ class Node {
   virtual bool Hangs(int64_t /*now_ns*/, int64_t /*longest_ns*/) const { return false; }
   /// What whoever started the process (dmslam-run, systemd) is told once it is ready; one line.
   virtual std::string ready_text() const { return {}; }
+};
+
+/// Hands everything on to another node: what a node of one's own that adds to one begins with.
+class NodeDecorator : public Node {
+ public:
+  explicit NodeDecorator(std::unique_ptr<Node> node) : node_(std::move(node)) {}
+  void Advance() override { node_->Advance(); }
+  int64_t deadline_ns() const override { return node_->deadline_ns(); }
+  void Stop() override { node_->Stop(); }
+  std::optional<int> exit_code() const override { return node_->exit_code(); }
+  std::string problem() const override { return node_->problem(); }
+  bool Hangs(int64_t now_ns, int64_t longest_ns) const override { return node_->Hangs(now_ns, longest_ns); }
+  std::string ready_text() const override { return node_->ready_text(); }
+
+ private:
+  std::unique_ptr<Node> node_;
 };
 
 }  // namespace dmslam
