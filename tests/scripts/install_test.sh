@@ -81,5 +81,5 @@ expect 0 "" "$prefix/bin/dmslam-run" --sequence "$sequence" --camera "$camera" -
   --save-map "$work/own.map"
 check "it was this mapper" grep -rq "own mapper: [0-9]* turns" "$work/own/log"
 check "the run gives the same trajectory" cmp "$work/own/trajectory.txt" "$work/whole/trajectory.txt"
-expect 0 "keyframes" "$prefix/bin/dmslam-map" info "$work/own.map"
+expect 0 "keyframes" "$prefix/bin/dmslam-map" list "$work/own.map"
 finish
