@@ -13,7 +13,7 @@ namespace dmslam {
 inline double FocalPx(const Camera& camera) { return 0.5 * (camera.fx_px + camera.fy_px); }
 /// Size of the pixels in which features are found [px of the image]. A corner and its descriptor take as many
 /// pixels in a small image as in a large one, so that a small one has few features. It is enlarged first, to
-/// twice its size at most; 1 from 640 x 480 on, where less than a tenth would be gained, and for no image.
+/// twice its size at most. 1 from 640 x 480 on, where less than a tenth would be gained, and without a size.
 inline double FinestPx(int width_px, int height_px) {
   constexpr double kEnoughPixels = 640.0 * 480.0, kMostEnlarged = 2.0, kWorthwhile = 1.1;
   const double pixels = static_cast<double>(width_px) * height_px;

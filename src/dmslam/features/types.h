@@ -20,8 +20,8 @@ struct GrayView {
   const uint8_t* row(int y) const { return data + y * stride; }
 };
 
-/// A keypoint as it travels: position in the raw (distorted) image, in sixteenths of a
-/// pixel, so that every process computes with the same numbers.
+/// A keypoint as it travels: position in the raw (distorted) image, in sixteenths of a pixel, so that every
+/// process computes with the same numbers.
 struct Keypoint {
   uint16_t x_q4 = 0;   ///< x [px] * 16
   uint16_t y_q4 = 0;   ///< y [px] * 16
