@@ -8,7 +8,7 @@
 namespace dmslam {
 namespace {
 
-constexpr auto Id = WallScene::Id;
+KeyframeId Id(uint32_t frame) { return WallScene::Id(frame); }
 
 /// A mapper whose deltas are counted, and a camera that moves along a wall in steps of 0.3.
 class MapperReportTest : public testing::Test {

@@ -17,7 +17,7 @@ inline size_t CellOf(const Camera& camera, const Eigen::Vector2d& uv_px) {
   const int column =
       std::clamp(static_cast<int>(uv_px.x() * kCellColumns / camera.width_px), 0, kCellColumns - 1);
   const int row = std::clamp(static_cast<int>(uv_px.y() * kCellRows / camera.height_px), 0, kCellRows - 1);
-  return static_cast<size_t>(row * kCellColumns + column);
+  return static_cast<size_t>(row) * kCellColumns + static_cast<size_t>(column);
 }
 
 }  // namespace dmslam

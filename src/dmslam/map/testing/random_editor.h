@@ -186,6 +186,7 @@ inline void ExpectNeighboursInSpace(const Map& map) {
     }
     std::sort(near.begin(), near.end());
     std::vector<const Keyframe*> expected;
+    expected.reserve(near.size());
     for (const auto& [apart, other_id] : near) expected.push_back(&map.At(other_id));
     EXPECT_EQ(map.KeyframesNear(keyframe, kDistance, kAngleRad), expected);
   }
