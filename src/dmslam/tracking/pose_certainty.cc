@@ -121,14 +121,14 @@ std::optional<PoseCertainty> PoseCertaintyEstimator::Estimate(const Map& map, co
   PoseCertainty result;
   result.depth = MedianDepth(frame.T_cam_world, now.sights);
   const double change = ViewChange(pose.T_cam_reference, result.depth);
-  result.covariance = ToPoseInReference(
-      now.uncertainty.Sum() + SharedErrors(model_, {change, change}, result.depth), pose.T_cam_reference);
+  const Matrix6d told = now.uncertainty.Sum() + SharedErrors(model_, {change, change}, result.depth);
+  result.covariance = ToPoseInReference(told, pose.T_cam_reference);
   result.position_share = LargestSigma(result.covariance.topLeftCorner<3, 3>()) / result.depth;
   result.rotation_rad = LargestSigma(result.covariance.bottomRightCorner<3, 3>());
   result.step = StepTo(map, now, result.depth);
   if (HasMapMoved(map)) jitter_.OnMapMoved();
   jitter_.OnPose(frame.stamp_ns, map.FindKeyframe(pose.reference)->map_id, frame.T_cam_world, result.depth);
-  result.covariance += ToPoseInReference(jitter_.Covariance(result.depth), pose.T_cam_reference);
+  result.covariance += ToPoseInReference(jitter_.Beyond(told, result.depth), pose.T_cam_reference);
   last_ = std::move(now);
   return result;
 }

@@ -35,10 +35,12 @@ PoseJitter::Told PoseJitter::Follow(int64_t stamp_ns, const Rigid3d& T_cam_world
   const Eigen::Vector3d went = now.T_cam_before->Center(), turned = LogSo3(now.T_cam_before->rotation);
   const Eigen::Vector3d goes = -last_->T_cam_before->translation,
                         turns = LogSo3(last_->T_cam_before->rotation);
-  const double own = std::pow(options_.acceleration * now.step_s * now.step_s, 2);
+  const double own = options_.acceleration * now.step_s * now.step_s;
+  const double own_turn = options_.turn_acceleration * now.step_s * now.step_s;
   position_squared_ =
-      std::max(position_squared_, (went - longer * goes).squaredNorm() / (depth * depth) - own);
-  rotation_squared_ = std::max(rotation_squared_, (turned - longer * turns).squaredNorm() - own);
+      std::max(position_squared_, (went - longer * goes).squaredNorm() / (depth * depth) - own * own);
+  rotation_squared_ =
+      std::max(rotation_squared_, (turned - longer * turns).squaredNorm() - own_turn * own_turn);
   return now;
 }
 
@@ -48,6 +50,15 @@ Matrix6d PoseJitter::Covariance(double depth) const {
   covariance.diagonal() << Eigen::Vector3d::Constant(share * rotation_squared_),
       Eigen::Vector3d::Constant(share * position_squared_ * depth * depth);
   return covariance;
+}
+
+Matrix6d PoseJitter::Beyond(const Matrix6d& told, double depth) const {
+  Matrix6d beyond = Covariance(depth);
+  for (const int block : {0, 3}) {
+    auto of_block = beyond.diagonal().segment<3>(block);
+    of_block = (of_block.array() - told.diagonal().segment<3>(block).mean()).max(0.0);
+  }
+  return beyond;
 }
 
 }  // namespace dmslam

@@ -13,10 +13,10 @@ struct PoseJitterOptions {
   /// How large a pose's error is beside what the motion has changed by from one frame to the next: poses that
   /// err by turns of a frame would have 0.4 (each change holds three errors, squared 1, 4 and 1); what errs
   /// for longer changes by less.
-  double gain = 0.5;
-  /// A change that a camera makes itself: depths of the scene, and radians, per second squared.
-  double acceleration = 1.0;
-  double memory_s = 1.0;  ///< so long a pose that has jumped is believed to be wrong
+  double gain = 0.45;
+  double acceleration = 1.0;       ///< of a camera itself: depths of the scene per second squared
+  double turn_acceleration = 5.0;  ///< and of its rotation: a hand turns less evenly than it moves [rad/s^2]
+  double memory_s = 1.0;           ///< so long a pose that has jumped is believed to be wrong
 };
 
 /// How wrong poses are by how unevenly they move. What residuals say is how well a pose agrees with its
@@ -31,8 +31,11 @@ class PoseJitter {
   void OnPose(int64_t stamp_ns, MapId map, const Rigid3d& T_cam_world, double depth);
   /// The map has moved under the poses so far: what comes is no motion.
   void OnMapMoved() { last_.reset(); }
-  /// Of the pose told last, to be added to what its landmarks say: tangent (w, v).
+  /// Of the pose told last: tangent (w, v).
   Matrix6d Covariance(double depth) const;
+  /// What of it the pose's own covariance does not account for, of rotation and position each: to be added.
+  /// Poses that err as much as they are told to do jitter, too. All in tangents (w, v).
+  Matrix6d Beyond(const Matrix6d& told, double depth) const;
 
  private:
   struct Told {

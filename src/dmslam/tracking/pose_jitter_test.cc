@@ -64,7 +64,7 @@ TEST(PoseJitterTest, IsNoSmallerThanErrorsThatLast) {
 }
 
 TEST(PoseJitterTest, IsForgottenAfterASecond) {
-  PoseJitter jitter;
+  PoseJitter jitter({.gain = 0.5});
   std::vector<double> sigmas;
   for (int frame = 0; frame < 100; ++frame) {
     Rigid3d told = TrueWorldCam(frame);
@@ -86,6 +86,32 @@ TEST(PoseJitterTest, OfCorrectionsAndOtherMapsThereIsNone) {
     Tell(frame, frame < 20 ? T : frame < 40 ? moved * T : moved * moved * T, &jitter, frame < 40 ? 1 : 2);
     EXPECT_EQ(jitter.Covariance(kDepth), Matrix6d::Zero()) << frame;
   }
+}
+
+/// Poses that err by `sigma` (of the depth, and radians), each on its own, and what is beyond a covariance
+/// that says `told` of them, as a share of the whole.
+double ShareBeyond(double sigma, double told) {
+  PoseJitter jitter;
+  Random random(5);
+  for (int frame = 0; frame < 60; ++frame) {
+    const Rigid3d truth = TrueWorldCam(frame);
+    Tell(frame,
+         Rigid3d(ExpSo3(sigma * Normal3(random)) * truth.rotation,
+                 truth.translation + sigma * kDepth * Normal3(random)),
+         &jitter);
+  }
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal() << Eigen::Vector3d::Constant(told * told),
+      Eigen::Vector3d::Constant(told * told * kDepth * kDepth);
+  return jitter.Beyond(covariance, kDepth).trace() / jitter.Covariance(kDepth).trace();
+}
+
+TEST(PoseJitterTest, WhatThePoseIsToldToErrByAccountsForIt) {
+  EXPECT_EQ(ShareBeyond(0.02, 0.0), 1) << "nothing was told";
+  EXPECT_EQ(ShareBeyond(0.02, 0.1), 0) << "more was told than poses show";
+  const double most = ShareBeyond(0.05, 0.02);
+  EXPECT_GT(most, 0.7) << "less was told";
+  EXPECT_LT(most, 1);
 }
 
 TEST(PoseJitterTest, FramesThatAreMissing) {
