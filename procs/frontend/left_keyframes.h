@@ -17,10 +17,13 @@ class LeftKeyframes {
  public:
   LeftKeyframes(uint32_t session, CameraId camera) : session_(session), camera_(camera) {}
 
+  /// This frontend says its own in term `ours` from now on. By `until_ns` whatever was left has been heard.
+  void BeginTerm(const Term& ours, int64_t until_ns) { term_ = {ours, until_ns}; }
   /// A record on the channel of keyframes, whosoever it is.
-  void Hear(std::span<const uint8_t> bytes);
-  /// The next one that was said in a term before `ours` and that the map does not know; each once.
-  std::optional<KeyframeProposal> Next(const Map& map, const Term& ours);
+  void Hear(std::span<const uint8_t> bytes, int64_t now_ns);
+  /// The next one that was said in a term before ours, which has begun, and that the map does not know; each
+  /// once.
+  std::optional<KeyframeProposal> Next(const Map& map);
 
  private:
   static constexpr size_t kMost = 8;  // a frontend waits with the next one until the mapper has the first
@@ -28,8 +31,13 @@ class LeftKeyframes {
     Term said_in;
     KeyframeProposal proposal;
   };
+  struct OurTerm {
+    Term term;
+    int64_t until_ns = 0;
+  };
   uint32_t session_;
   CameraId camera_;
+  std::optional<OurTerm> term_;
   std::deque<Left> left_;
   std::deque<KeyframeId> told_;
 };

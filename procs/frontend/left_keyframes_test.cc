@@ -14,6 +14,7 @@ namespace {
 
 constexpr uint32_t kSession = 4;
 constexpr Term kOurs{100, 1};
+constexpr int64_t kUntilNs = 1000;
 
 Bytes Said(uint32_t frame, const Term& term, uint32_t session = kSession) {
   auto proposal = wire::testing::RandomMessage<KeyframeProposal>(frame);
@@ -34,21 +35,24 @@ Bytes Said(uint32_t frame, const Term& term, uint32_t session = kSession) {
 class LeftKeyframesTest : public testing::Test {
  protected:
   std::optional<uint32_t> Next() {
-    const auto proposal = left_.Next(map_, kOurs);
+    left_.BeginTerm(kOurs, kUntilNs);
+    const auto proposal = left_.Next(map_);
     return proposal ? std::optional(proposal->id.frame_index()) : std::nullopt;
   }
+  void Hear(const Bytes& bytes, int64_t now_ns = 0) { left_.Hear(bytes, now_ns); }
+
   LeftKeyframes left_{kSession, 0};
   MapEditor map_{TestCamera(), Pyramid()};
 };
 
 TEST_F(LeftKeyframesTest, WhatWasSaidBeforeOurTermIsGivenOnce) {
   EXPECT_EQ(Next(), std::nullopt);
-  left_.Hear(Said(7, {99, 8}));
-  left_.Hear(Said(7, {99, 8}));
-  left_.Hear(Said(9, {99, 8}));
+  Hear(Said(7, {99, 8}));
+  Hear(Said(7, {99, 8}));
+  Hear(Said(9, {99, 8}));
   EXPECT_EQ(Next(), 7U);
   EXPECT_EQ(Next(), 9U);
-  left_.Hear(Said(7, {99, 8}));
+  Hear(Said(7, {99, 8}));
   EXPECT_EQ(Next(), std::nullopt) << "it is repeated until the map has it";
 }
 
@@ -58,19 +62,37 @@ TEST_F(LeftKeyframesTest, WhatTheMapKnowsIsNotLeft) {
   keyframe.map_id = 1;
   keyframe.features = MakeFrameFeatures({}, TestCamera(), Pyramid());
   map_.AddKeyframe(keyframe);
-  left_.Hear(Said(7, {99, 8}));
+  Hear(Said(7, {99, 8}));
   EXPECT_EQ(Next(), std::nullopt);
 }
 
 TEST_F(LeftKeyframesTest, OurOwnAndForeignOnesAreNoneAndDamagedOnesNeither) {
-  left_.Hear(Said(7, kOurs));
-  left_.Hear(Said(8, {101, 3}));
-  left_.Hear(Said(9, {99, 8}, kSession + 1));
+  Hear(Said(7, kOurs));
+  Hear(Said(8, {101, 3}));
+  Hear(Said(9, {99, 8}, kSession + 1));
   Bytes damaged = Said(10, {99, 8});
   damaged[damaged.size() / 2] ^= 1;
-  left_.Hear(damaged);
-  left_.Hear(Bytes(3));
+  Hear(damaged);
+  Hear(Bytes(3));
   EXPECT_EQ(Next(), std::nullopt);
+}
+
+TEST_F(LeftKeyframesTest, WhatIsSaidWhenAllOfItHasBeenHeardIsNotLeft) {
+  Hear(Said(7, {99, 8}), kUntilNs);
+  left_.BeginTerm(kOurs, kUntilNs);
+  Hear(Said(8, {99, 8}), kUntilNs - 1);
+  Hear(Said(9, {99, 8}), kUntilNs);
+  EXPECT_EQ(Next(), 7U) << "before our term begins nobody knows how long it takes";
+  EXPECT_EQ(Next(), 8U);
+  EXPECT_EQ(Next(), std::nullopt);
+}
+
+/// They would take the room of what was left.
+TEST_F(LeftKeyframesTest, OurOwnTakeNoRoom) {
+  Hear(Said(7, {99, 8}));
+  left_.BeginTerm(kOurs, kUntilNs);
+  for (uint32_t frame = 20; frame < 60; ++frame) Hear(Said(frame, kOurs));
+  EXPECT_EQ(Next(), 7U);
 }
 
 }  // namespace

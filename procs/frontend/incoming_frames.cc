@@ -1,0 +1,64 @@
+#include "frontend/incoming_frames.h"
+
+#include <utility>
+
+#include "dmslam/util/check.h"
+#include "frontend/camera_turns.h"
+
+namespace dmslam {
+
+std::optional<IncomingFrames::Verdict> IncomingFrames::WhyNotNew(const Frame& frame) const {
+  if (frame.frame_index >= CameraTurns::kTheEnd) return Verdict::kOutOfRange;
+  if (IsOld(frame)) return in_work() ? Verdict::kKnown : Verdict::kOld;
+  if (waiting_ && waiting_->frame.frame_index == frame.frame_index) return Verdict::kKnown;
+  return std::nullopt;
+}
+
+bool IncomingFrames::IsOld(const Frame& frame) const {
+  if (!newest_) return false;
+  const bool goes_back =
+      mode_ == PlaybackMode::kRealtime && newest_->stamp_ns && frame.stamp_ns <= *newest_->stamp_ns;
+  return frame.frame_index <= newest_->index || goes_back;
+}
+
+IncomingFrames::Verdict IncomingFrames::Hear(ReceivedFrame received, int64_t now_ns) {
+  const Frame& frame = received.frame;
+  if (const std::optional<Verdict> known = WhyNotNew(frame)) {
+    if (known != Verdict::kOutOfRange) order_.OnRepeat();
+    return *known;
+  }
+  if (mode_ == PlaybackMode::kLockstep && in_work()) order_.OnPlayerWaits();
+  if (!order_.Takes({frame.frame_index, frame.stamp_ns}, NewestHeard(), now_ns)) return Verdict::kFarAhead;
+  ++received_;
+  if (waiting_) ++skipped_;
+  waiting_ = std::move(received);
+  return Verdict::kWaits;
+}
+
+/// None: none was, or its stamp is not known.
+std::optional<PlayOrder::Place> IncomingFrames::NewestHeard() const {
+  if (waiting_) return PlayOrder::Place{waiting_->frame.frame_index, waiting_->frame.stamp_ns};
+  if (!newest_ || !newest_->stamp_ns) return std::nullopt;
+  return PlayOrder::Place{newest_->index, *newest_->stamp_ns};
+}
+
+ReceivedFrame IncomingFrames::Take() {
+  DMSLAM_CHECK(waiting_.has_value(), "a frame that is taken out has waited");
+  ReceivedFrame taken = *std::exchange(waiting_, std::nullopt);
+  newest_ = {taken.frame.frame_index, taken.frame.stamp_ns, true};
+  return taken;
+}
+
+/// A player that was started again, too, begins from the front until it hears how far we are.
+void IncomingFrames::GoOnBehind(uint32_t frame_index) {
+  newest_ = {frame_index, {}, false};
+  if (waiting_ && waiting_->frame.frame_index <= frame_index) waiting_.reset();
+}
+
+void IncomingFrames::Fill(FrontendStatus* status) const {
+  status->frames_received = received_;
+  status->frames_skipped = skipped_;
+  if (newest_) status->frame_index = static_cast<int32_t>(newest_->index);
+}
+
+}  // namespace dmslam
