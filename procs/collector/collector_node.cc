@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "collector/corrections.h"
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/roles.h"
@@ -23,7 +24,6 @@ constexpr int64_t kLastStatusesNs = 300'000'000;  // after the end, the processe
 constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kSilentFrontendNs = 1'000'000'000;  // it says ten times a second that it is there
 constexpr int64_t kRoomOnDiskNs = 30'000'000'000;     // after the end: no room comes any more
-constexpr int64_t kSayAgainNs = 30'000'000'000;       // how much waits for the disk
 constexpr int64_t kTryAgainNs = 1'000'000'000;
 
 }  // namespace
@@ -34,13 +34,14 @@ std::unique_ptr<Node> MakeCollector(NodeContext context, NodeOptions options, Co
 
 CollectorNode::CollectorNode(NodeContext context, NodeOptions options, CollectorOptions collector)
     : StreamNode(std::move(context), std::move(options), roles::kCollector),
-      collector_(std::move(collector)) {
+      collector_(std::move(collector)),
+      sequences_(options_.NumCameras()),
+      frames_(options_.NumCameras()) {
   Listen({channels::kMapperStatus, channels::kLoopcloserStatus});
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
             channels::kPlayerStatus, channels::kFrontendStatus},
            camera);
-    frames_.newest[camera].reset();
   }
   collector_.ground_truth.resize(options_.NumCameras());
   run_.cameras.resize(options_.NumCameras());
@@ -81,17 +82,8 @@ void CollectorNode::RecallEndedMap() {
 }
 
 void CollectorNode::OnCamera(const CameraInfo& info) {
-  Announce(info.camera_id, info.num_frames, info.first_frame);
+  sequences_.Announce(info.camera_id, info.num_frames, info.first_frame);
   run_.cameras[info.camera_id].sequence = info.sequence;
-}
-
-/// Noted: a collector after this one may come when the player has left.
-void CollectorNode::Announce(CameraId camera, std::optional<int64_t> num_frames, uint32_t first_frame) {
-  if (!num_frames) return;
-  const bool is_new = frames_.announced.emplace(camera, std::pair(*num_frames, first_frame)).second;
-  if (is_new && journal_)
-    journal_->AppendNote("frames " + std::to_string(camera) + " " + std::to_string(*num_frames) + " " +
-                         std::to_string(first_frame));
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
@@ -119,7 +111,8 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
         trace && !IsForeign(trace->session) && trace->camera_id == 0)
       run_.durations.Add(*trace);
   } else if (channel == channels::kEndOfSequence) {
-    if (const auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session)) OnEnd(*end);
+    if (const auto end = Read<EndOfSequence>(bytes); end && !IsForeignFrame(end->session))
+      sequences_.OnEnd(*end);
   } else if (channel == channels::kGroundTruthPose) {
     if (const auto pose = Read<GroundTruthPose>(bytes); pose && !IsForeignFrame(pose->session))
       OnGroundTruth(*pose);
@@ -137,17 +130,6 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
   }
 }
 
-/// Noted: a collector after this one may come when the player has left.
-void CollectorNode::OnEnd(const EndOfSequence& end) {
-  if (end.camera_id >= options_.NumCameras()) return;
-  ends_.heard[end.camera_id] = end;
-  if (!journal_ || !ends_.noted.insert(end.camera_id).second) return;
-  std::ostringstream note;
-  note << "end " << end.camera_id << ' ' << end.frames_published << ' ' << end.frames_missing << ' '
-       << end.frames_blacked << ' ' << end.frames_jumped;
-  journal_->AppendNote(note.str());
-}
-
 void CollectorNode::OnGroundTruth(const GroundTruthPose& pose) {
   if (pose.camera_id >= options_.NumCameras() || !collector_.ground_truth[pose.camera_id].empty()) return;
   std::vector<StampedPose>& heard = run_.cameras[pose.camera_id].heard_ground_truth;
@@ -160,23 +142,12 @@ void CollectorNode::ReadNote(const std::string& text) {
   std::istringstream note(text);
   std::string kind;
   note >> kind;
-  if (kind == "keyframe" || kind == "mapped") proposals_.ReadNote(kind, note);
-  if (MapId map_id = 0; kind == "dropped" && note >> map_id) dropped_maps_.insert(map_id);
+  if (kind == "keyframe" || kind == "mapped" || kind == "dropped" || kind == "begun" || kind == "resumed")
+    proposals_.ReadNote(kind, note);
   if (kind == "counters" || kind == "process" || kind == "heard")
     processes_.ReadNote(kind, note, context_.now_ns());
-  if (int64_t epoch = 0; (kind == "begun" || kind == "resumed") && note >> epoch) {
-    map_begun_in_ = epoch;
-    if (kind == "resumed") OnAllDied();
-  }
-  if (CameraId camera = 0; kind == "taken" && note >> camera && camera < options_.NumCameras())
-    note >> safe_[camera].epoch >> safe_[camera].seq;
-  if (CameraId camera = 0; kind == "frames" && note >> camera)
-    note >> frames_.announced[camera].first >> frames_.announced[camera].second;
-  if (CameraId camera = 0; kind == "end" && note >> camera && camera < options_.NumCameras()) {
-    EndOfSequence& end = ends_.heard[camera];
-    end.camera_id = camera;
-    note >> end.frames_published >> end.frames_missing >> end.frames_blacked >> end.frames_jumped;
-  }
+  if (kind == "frames" || kind == "end") sequences_.ReadNote(kind, note);
+  if (kind == "taken") kept_->ReadNote(note, options_.NumCameras());
 }
 
 bool CollectorNode::IsOfThisRun(const std::string& process, const StatusHead& head) {
@@ -215,14 +186,9 @@ void CollectorNode::RepeatWhatIsLeft() {
     const StreamReader& reader = *frontend_readers_[camera];
     return reader.term().epoch == epoch && SilentNs(reader) < kSilentFrontendNs;
   };
-  const auto is_known = [this](KeyframeId id, MapId map_id) { return IsKnown(id, map_id); };
+  const auto is_known = [this](KeyframeId id) { return builder_->map().HasKnown(id); };
   for (const auto& left : proposals_.ToSayAgain(lives, is_known))
     context_.bus->Publish({ChannelOfCamera(channels::kKeyframe, left.id.camera()), left.record, false});
-}
-
-/// Whether it is in the map, or was, or its map was dropped.
-bool CollectorNode::IsKnown(KeyframeId id, MapId map_id) const {
-  return builder_->map().HasKnown(id) || dropped_maps_.contains(map_id);
 }
 
 /// As all who listen see it: the streams' own time is in it, and whatever the mapper did before.
@@ -237,7 +203,7 @@ void CollectorNode::TimeKeyframe(const MapDelta& delta) {
 void CollectorNode::OnFramePose(const Record& record) {
   const auto pose = Read<FramePose>(*record.bytes);
   if (!pose) return;
-  CountFrame(*pose);
+  frames_.Hear(*pose);
   KeepOnDisk(record);
 }
 
@@ -259,65 +225,29 @@ void CollectorNode::OnMapReset(const Record& record) {
 
 void CollectorNode::CountReset(const MapReset& reset) {
   ++run_.resets;
-  if (reset.fate == MapReset::Fate::kDrop) dropped_maps_.insert(reset.map_id);
+  if (reset.fate == MapReset::Fate::kDrop) proposals_.OnDropped(reset.map_id, true);
 }
 
-/// A disk that is full ends no run: what it does not take waits in memory, and is not acknowledged, so that
-/// the frontend keeps it too.
 void CollectorNode::KeepOnDisk(const Record& record) {
-  journal_->Append(*record.bytes);
-  if (journal_->complete() || disk_.refuses) return;
-  disk_.refuses = true;
-  disk_.say_again_ns = context_.now_ns() + kSayAgainNs;
-  if (run_.disk_problems.empty()) run_.disk_problems.push_back(journal_->problem());
-  LogError("{}; the run goes on, and frame poses wait in memory, not acknowledged, until there is room",
-           journal_->problem());
-}
-
-void CollectorNode::RetryDisk() {
-  if (!disk_.refuses) return;
-  const int64_t waiting = journal_->pending();
-  if (journal_->Flush()) {
-    disk_.refuses = false;
-    LogInfo("the disk takes frame poses again: all that waited are written");
-  } else if (context_.now_ns() >= disk_.say_again_ns) {
-    disk_.say_again_ns = context_.now_ns() + kSayAgainNs;
-    LogWarning("{} frame poses wait for room on the disk", waiting);
-  }
-  AcceptWhatIsSafe();
+  const std::optional<std::string> problem = kept_->Keep(record, context_.now_ns());
+  if (problem && run_.disk_problems.empty()) run_.disk_problems.push_back(*problem);
 }
 
 /// What is in the journal, with all that came before it: a collector after this one goes on behind it.
 void CollectorNode::AcceptWhatIsSafe() {
-  if (!journal_->complete()) return;
+  if (!kept_->complete()) return;
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
-    frontend_readers_[camera]->Accept(safe_[camera]);
+    frontend_readers_[camera]->Accept(kept_->PositionOf(camera));
 }
 
-/// Behind the last frame pose there may be what is kept nowhere: that it was here is noted.
 void CollectorNode::NotePositions() {
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
-    const Version held = frontend_readers_[camera]->held();
-    if (held == safe_[camera]) continue;
-    std::ostringstream note;
-    note << "taken " << camera << ' ' << held.epoch << ' ' << held.seq;
-    journal_->AppendNote(note.str());
-    safe_[camera] = held;
-  }
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    kept_->NotePosition(camera, frontend_readers_[camera]->held());
   AcceptWhatIsSafe();
 }
 
 bool CollectorNode::AllTaken() const {
   return std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AllTaken(); });
-}
-
-/// Those that were placed later have been seen before.
-void CollectorNode::CountFrame(const FramePose& pose) {
-  std::optional<uint32_t>& newest = frames_.newest[pose.camera_id];
-  if (pose.state == TrackingState::kLocalizedLater || (newest && pose.frame_index <= *newest)) return;
-  newest = pose.frame_index;
-  frames_.newest_stamp_ns = pose.stamp_ns;
-  ++frames_.seen;
 }
 
 bool CollectorNode::TakeFrontendRecord() {
@@ -354,7 +284,7 @@ bool CollectorNode::TakeFrontendRecord(CameraId camera) {
   }
   const bool kept = record->channel == channels::kSession || record->channel == channels::kFramePose ||
                     record->channel == channels::kMapReset;
-  if (kept) safe_[camera] = record->version();
+  if (kept) kept_->SetPosition(camera, record->version());
   AcceptWhatIsSafe();
   return true;
 }
@@ -367,15 +297,13 @@ void CollectorNode::OpenJournal() {
   const bool begins = context_.fresh_system && !context_.resumed;
   if (const auto aside = SetFormerRunAside(collector_.out_dir, session_, begins))
     LogInfo("what another run has left is kept in {}", *aside);
-  journal_ = std::make_unique<Journal>(JournalPath(collector_.out_dir));
-  const auto announced_before =
-      std::exchange(frames_.announced, {});  // by the players, before there was a journal
+  kept_.emplace(JournalPath(collector_.out_dir));
   bool is_first = true;  // of this run's collectors: what was told before it came, nobody else has
   const auto take = [&](std::span<const uint8_t> record) {
     is_first = false;
     CameraId camera = 0;
     if (const auto pose = wire::Decode<FramePose>(record)) {
-      CountFrame(*pose);
+      frames_.Hear(*pose);
       camera = pose->camera_id;
     } else if (const auto reset = wire::Decode<MapReset>(record)) {
       CountReset(*reset);
@@ -385,44 +313,28 @@ void CollectorNode::OpenJournal() {
       if (camera == 0) session_start_ = std::move(start);
     }
     const std::optional<RecordHeader> header = ParseHeader(record);
-    safe_[camera] = {header->epoch, header->seq};
+    kept_->SetPosition(camera, {header->epoch, header->seq});
   };
   if (begins) {
-    journal_->Begin(session_);
+    kept_->journal().Begin(session_);
   } else {
-    journal_->Resume(session_, take, [&](const std::string& note) {
+    kept_->journal().Resume(session_, take, [&](const std::string& note) {
       is_first = false;
       ReadNote(note);
     });
   }
-  for (const auto& [camera, frames] : announced_before) Announce(camera, frames.first, frames.second);
-  const auto note = [this](const std::string& text) { journal_->AppendNote(text); };
+  const auto note = [this](const std::string& text) { kept_->journal().AppendNote(text); };
+  sequences_.NoteTo(note);
   proposals_.NoteTo(note);
   processes_.Begin(note, MeasureProcess(context_.pid), context_.now_ns());
-  if (context_.resumed) safe_.clear();  // the frontend that wrote it is gone, too
+  if (context_.resumed) kept_->ForgetPositions();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(
         StreamId::kFrontend, owners::kFrontend,
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
          channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        safe_[camera], camera, is_first));
+        kept_->PositionOf(camera), camera, is_first));
   }
-}
-
-/// In this term a map begins that continues none. Where something was to be in one before, all who held that
-/// had died, and it goes on with the last checkpoint (`is_saved`), or with nothing where there was none yet.
-/// Collectors that follow each other may all hear the beginning of the same term.
-void CollectorNode::OnFreshMap(int64_t epoch, bool is_saved) {
-  if (map_begun_in_ == epoch) return;
-  const bool all_died = proposals_.AnyMapped() || (is_saved && !proposals_.empty());
-  journal_->AppendNote((all_died ? "resumed " : "begun ") + std::to_string(epoch));
-  map_begun_in_ = epoch;
-  if (all_died) OnAllDied();
-}
-
-void CollectorNode::OnAllDied() {
-  ++run_.resumes;
-  proposals_.OnAllDied();
 }
 
 void CollectorNode::BeginCheckpoints() {
@@ -432,24 +344,20 @@ void CollectorNode::BeginCheckpoints() {
   options.every_s = collector_.checkpoints ? options_.settings.Read<CheckpointOptions>().every_s : 0;
   if (collector_.checkpoints && context_.fresh_system && !context_.resumed) RemoveCheckpoints(options.path);
   checkpointer_ = std::make_unique<Checkpointer>(
-      options, MakeUnwatchedThread(PlaybackMode::kRealtime, {.lets_others_go_first = true}), journal_.get());
+      options, MakeUnwatchedThread(PlaybackMode::kRealtime, {.lets_others_go_first = true}),
+      &kept_->journal());
 }
 
 /// It is whole, and no newer than the poses in the journal.
 bool CollectorNode::MapMayBeKept() const {
   const Map& map = builder_->map();
-  if (map.keyframes().empty() || MapHeld(*map_reader_).empty() || !journal_->complete()) return false;
-  if (map.progress().ended) return true;  // no pose comes any more
-  return std::ranges::all_of(frames_.newest, [&](const auto& item) {
-    const Keyframe* newest = map.NewestKeyframeOf(item.first);
-    return newest == nullptr || newest->id.session() != session_ ||
-           (item.second && newest->id.frame_index() <= *item.second);
-  });
+  if (map.keyframes().empty() || MapHeld(*map_reader_).empty() || !kept_->complete()) return false;
+  return map.progress().ended || frames_.ReachAsFarAs(map, session_);  // ended: no pose comes any more
 }
 
 void CollectorNode::KeepCheckpoint() {
   if (IsWritten()) return;
-  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), frames_.newest_stamp_ns, session_start_);
+  checkpointer_->OnMap(builder_->map(), MapMayBeKept(), frames_.newest_stamp_ns(), session_start_);
   const std::string problem = checkpointer_->TakeProblem();
   if (problem.empty()) return;
   run_.disk_problems.push_back(problem);
@@ -458,27 +366,6 @@ void CollectorNode::KeepCheckpoint() {
 
 int64_t CollectorNode::WorkDeadline() const {
   return checkpointer_ && !IsWritten() ? checkpointer_->deadline_ns() : INT64_MAX;
-}
-
-std::vector<KeyframeId> CollectorNode::LoopsOf(std::optional<KeyframeId> id) const {
-  const Keyframe* keyframe = id ? builder_->map().FindKeyframe(*id) : nullptr;
-  return keyframe == nullptr ? std::vector<KeyframeId>() : keyframe->loop_edges;
-}
-
-/// A loop's other end is the keyframe to which there was no edge before; how they lie is known best now.
-void CollectorNode::OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before) {
-  CorrectionRecord correction{delta.event, delta.about.value_or(KeyframeId()), delta.note, {}, {}};
-  const std::vector<KeyframeId> loops = LoopsOf(delta.about);
-  const auto added = std::find_if(loops.begin(), loops.end(), [&](KeyframeId id) {
-    return !std::binary_search(loops_before.begin(), loops_before.end(), id);
-  });
-  if (delta.event == MapEvent::kCorrected && added != loops.end()) {
-    const Map& map = builder_->map();
-    correction.matched = *added;
-    correction.T_matched_keyframe =
-        map.FindKeyframe(*added)->T_cam_world * map.FindKeyframe(*delta.about)->T_cam_world.Inverse();
-  }
-  run_.corrections.push_back(std::move(correction));
 }
 
 bool CollectorNode::TakeMapRecord() {
@@ -492,15 +379,13 @@ bool CollectorNode::TakeMapRecord() {
   if (!delta) return true;
   if (std::exchange(map_is_fresh_, false)) {
     const bool is_saved = delta->event == MapEvent::kSnapshot && !record->in_snapshot();
-    OnFreshMap(record->term().epoch, is_saved);
+    proposals_.OnFreshMap(record->term().epoch, is_saved);
   }
-  const std::vector<KeyframeId> loops_before = LoopsOf(delta->about);
+  const std::vector<KeyframeId> loops_before = LoopsOf(builder_->map(), delta->about);
   builder_->OnMapDelta(*delta);
   if (!record->in_snapshot()) TimeKeyframe(*delta);
-  if (delta->correction_id) OnCorrection(*delta, loops_before);
-  for (const MapId dropped : delta->dropped_maps) {
-    if (dropped_maps_.insert(dropped).second) journal_->AppendNote("dropped " + std::to_string(dropped));
-  }
+  if (delta->correction_id) run_.corrections.push_back(RecordOf(*delta, loops_before, builder_->map()));
+  for (const MapId dropped : delta->dropped_maps) proposals_.OnDropped(dropped, false);
   AcceptMap();
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     const StreamPosition mapped = builder_->map().progress(camera).frontend;
@@ -521,9 +406,9 @@ bool CollectorNode::EndedMapIsSafe() {
   const Map& map = builder_->map();
   if (IsWritten() || map.keyframes().empty() || !checkpointer_->enabled()) return true;
   if (ended_map_.safe_version == map.version()) return true;
-  if (context_.now_ns() < disk_.try_again_ns || MapHeld(*map_reader_).empty()) return false;
-  disk_.try_again_ns = context_.now_ns() + kTryAgainNs;
-  checkpointer_->OnMap(map, false, frames_.newest_stamp_ns, session_start_);
+  if (context_.now_ns() < try_again_ns_ || MapHeld(*map_reader_).empty()) return false;
+  try_again_ns_ = context_.now_ns() + kTryAgainNs;
+  checkpointer_->OnMap(map, false, frames_.newest_stamp_ns(), session_start_);
   const bool kept = MapMayBeKept() && checkpointer_->WriteLast(map, true, session_start_);
   if (!ended_map_.here_ns) ended_map_.here_ns = context_.now_ns();
   const bool too_late = context_.now_ns() - *ended_map_.here_ns > kRoomOnDiskNs;
@@ -551,7 +436,7 @@ bool CollectorNode::FrontendsHaveEnded() {
   };
   if (std::ranges::all_of(frontend_readers_, [](const auto& reader) { return reader->AtEnd(); })) return true;
   if (builder_->map().progress().ended && all_silent(kSilentAfterEndNs)) return true;
-  if (ends_.heard.size() < options_.NumCameras() || !all_silent(kNoFrontendNs)) return false;
+  if (!sequences_.AllEnded() || !all_silent(kNoFrontendNs)) return false;
   run_.end_problem = "the sequence had ended, and no frontend was heard for " +
                      std::to_string(kNoFrontendNs / 1'000'000'000) + " s: the map may lack its last changes";
   LogWarning("{}", run_.end_problem);
@@ -574,26 +459,26 @@ bool CollectorNode::EndIfDone() {
 
 /// The sequence has ended, all poses are here, and the disk does not take them.
 bool CollectorNode::GiveUpOnDisk() {
-  if (journal_->complete() || !AllTaken()) {
-    disk_.refused_since_ns.reset();
+  if (kept_->complete() || !AllTaken()) {
+    ends_.disk_refuses_since_ns.reset();
     return false;
   }
-  if (!disk_.refused_since_ns) disk_.refused_since_ns = context_.now_ns();
-  if (context_.now_ns() - *disk_.refused_since_ns < kRoomOnDiskNs) return true;
-  const std::string lacks = std::to_string(journal_->pending()) + " frame poses could not be written";
+  if (!ends_.disk_refuses_since_ns) ends_.disk_refuses_since_ns = context_.now_ns();
+  if (context_.now_ns() - *ends_.disk_refuses_since_ns < kRoomOnDiskNs) return true;
+  const std::string lacks = std::to_string(kept_->journal().pending()) + " frame poses could not be written";
   run_.disk_problems.push_back(lacks);
   const std::string problem = WriteResultFiles(false);
-  Exit(kExitInput,
-       (problem.empty() ? journal_->problem() : problem) + "; " + lacks + "; make room, then resume the run");
+  Exit(kExitInput, (problem.empty() ? kept_->journal().problem() : problem) + "; " + lacks +
+                       "; make room, then resume the run");
   return true;
 }
 
 /// Where there is no room for the results, there may be soon.
 void CollectorNode::WriteAtEnd() {
-  if (context_.now_ns() < disk_.try_again_ns) return;
+  if (context_.now_ns() < try_again_ns_) return;
   const std::string problem = WriteResultFiles(true);
   if (problem.empty()) return ExitAtEnd();
-  disk_.try_again_ns = context_.now_ns() + kTryAgainNs;
+  try_again_ns_ = context_.now_ns() + kTryAgainNs;
   if (context_.now_ns() - *ends_.drained_ns > kRoomOnDiskNs) return Exit(kExitInput, problem);
   if (std::exchange(results_, Results::kDelayed) != Results::kDelayed) LogError("{}; tries again", problem);
 }
@@ -606,33 +491,6 @@ void CollectorNode::ExitAtEnd() {
        any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
 }
 
-/// Where the player's last word was not heard. A frame that never came to the frontend has no pose that could
-/// be counted, but a number. `ended`: the sequence has come to its end.
-int64_t CollectorNode::PublishedAsFarAsKnown(CameraId camera, bool ended) const {
-  const auto announced = frames_.announced.find(camera);
-  if (ended && announced != frames_.announced.end()) return announced->second.first;
-  std::optional<uint32_t> first, last;
-  for (const auto& [frame, pose] : builder_->frame_poses()) {
-    if (frame.camera != camera) continue;
-    if (!first) first = frame.index;
-    last = frame.index;
-  }
-  const int64_t span = first ? int64_t{*last} - *first + 1 : 0;
-  return announced == frames_.announced.end() ? span : std::min(span, announced->second.first);
-}
-
-/// How many frames there were, as the players said it at the end, or else as far as is known.
-void CollectorNode::TakeEnds(bool ended) {
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
-    run_.cameras[camera].frames.published = PublishedAsFarAsKnown(camera, ended);
-  for (const auto& [camera, end] : ends_.heard)
-    run_.cameras[camera].frames = {end.frames_published, end.frames_missing, end.frames_blacked,
-                                   end.frames_jumped};
-  for (const auto& [camera, announced] : frames_.announced)
-    if (camera < options_.NumCameras()) run_.cameras[camera].frames.first_index = announced.second;
-  run_.end_heard = ends_.heard.contains(0);
-}
-
 /// All that the results are made of, once. `ended`: the sequence has come to its end. One that is interrupted
 /// can be resumed.
 void CollectorNode::Gather(bool ended) {
@@ -641,23 +499,25 @@ void CollectorNode::Gather(bool ended) {
   if (ended) checkpointer_->Finish();
   if (!ended) checkpointer_->WriteLast(builder_->map(), MapMayBeKept(), session_start_);
   std::set<TrajectoryBuilder::FrameName> of_the_dead;
-  journal_->ForEach([&](std::span<const uint8_t> record) {
+  kept_->journal().ForEach([&](std::span<const uint8_t> record) {
     if (const auto pose = wire::Decode<FramePose>(record)) {
       builder_->OnFramePose(*pose);
-      const bool its_frontend_lives = ParseHeader(record)->epoch == safe_[pose->camera_id].epoch;
+      const bool its_frontend_lives = ParseHeader(record)->epoch == kept_->PositionOf(pose->camera_id).epoch;
       if (!its_frontend_lives) of_the_dead.insert({pose->camera_id, pose->frame_index});
     }
     if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
   });
-  TakeEnds(ended);
+  sequences_.Fill(builder_->frame_poses(), ended, &run_);
+  run_.resumes = proposals_.times_all_died();
   CountOwn();
   builder_->BridgeLostKeyframes();
   builder_->JoinPosesOf(of_the_dead);
-  proposals_.CountMissing([this](KeyframeId id, MapId map_id) { return IsKnown(id, map_id); },
+  proposals_.CountMissing([this](KeyframeId id) { return builder_->map().HasKnown(id); },
                           [this](CameraId camera) { return builder_->map().progress(camera).frontend.epoch; },
                           &run_.keyframes);
-  if (journal_->lost() > 0)
-    run_.disk_problems.push_back(std::to_string(journal_->lost()) + " frame poses were lost to a full disk");
+  if (kept_->journal().lost() > 0)
+    run_.disk_problems.push_back(std::to_string(kept_->journal().lost()) +
+                                 " frame poses were lost to a full disk");
 }
 
 /// Why not all of them could be written; empty: they are there.
@@ -670,7 +530,7 @@ std::string CollectorNode::WriteResultFiles(bool ended) {
   if (collector_.for_people) std::fputs(results.table.c_str(), stdout);
   std::fflush(stdout);
   if (!ended || !results.problem.empty()) return results.problem;
-  journal_->Remove();
+  kept_->journal().Remove();
   if (collector_.checkpoints) RemoveCheckpoints(CheckpointPath(collector_.out_dir));
   return "";
 }
@@ -689,23 +549,23 @@ void CollectorNode::Stop() {
 
 /// A camera has no end that is known.
 std::string CollectorNode::OfTotal() const {
-  int64_t total = 0;
-  for (const auto& [camera, frames] : frames_.announced) total += frames.first;
-  return total > 0 ? " of " + std::to_string(total) : "";
+  const std::optional<int64_t> total = sequences_.NumFrames();
+  return total ? " of " + std::to_string(*total) : "";
 }
 
 /// Into the log: where a first map stands, and every so many frames.
 void CollectorNode::SayProgress() {
   constexpr int64_t kEveryFrames = 20;
-  if (frames_.seen < due_.progress_frames || builder_->map().keyframes().empty()) return;
-  due_.progress_frames = frames_.seen + kEveryFrames;
-  LogInfo("frame {}{}, {} keyframes", frames_.seen, OfTotal(), builder_->map().keyframes().size());
+  if (frames_.count() < due_.progress_frames || builder_->map().keyframes().empty()) return;
+  due_.progress_frames = frames_.count() + kEveryFrames;
+  LogInfo("frame {}{}, {} keyframes", frames_.count(), OfTotal(), builder_->map().keyframes().size());
 }
 
 void CollectorNode::PublishStatus() {
-  if (!journal_ || IsWritten()) return;
+  if (!kept_ || IsWritten()) return;
   NotePositions();
-  RetryDisk();
+  kept_->Retry(context_.now_ns());
+  AcceptWhatIsSafe();
   RepeatWhatIsLeft();
   if (context_.now_ns() >= due_.sync_ns) {
     due_.sync_ns = context_.now_ns() + kSyncEveryNs;
@@ -718,7 +578,7 @@ void CollectorNode::PublishStatus() {
   }
   if (!collector_.progress) return;
   std::fprintf(stderr, "\r%s: frame %lld%s, %s, %d static, %zu keyframes, %zu landmarks   ",
-               run_.cameras[0].sequence.c_str(), static_cast<long long>(frames_.seen), OfTotal().c_str(),
+               run_.cameras[0].sequence.c_str(), static_cast<long long>(frames_.count()), OfTotal().c_str(),
                run_.cameras[0].frontend.inliers > 0 ? "tracking" : "waiting",
                run_.cameras[0].frontend.inliers, builder_->map().keyframes().size(),
                builder_->map().num_landmarks());

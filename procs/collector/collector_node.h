@@ -1,19 +1,18 @@
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "collector/checkpointer.h"
+#include "collector/heard_frames.h"
+#include "collector/kept_records.h"
 #include "collector/make_collector.h"
+#include "collector/played_sequences.h"
 #include "collector/process_ledger.h"
 #include "collector/proposed_keyframes.h"
 #include "collector/results.h"
-#include "dmslam/recording/journal.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
@@ -37,21 +36,6 @@ class CollectorNode : public StreamNode {
   void PublishStatus() override;
 
  private:
-  struct FrameCount {
-    /// Of a sequence, by its player: how many, and the index of the first. A live camera announces none.
-    std::map<CameraId, std::pair<int64_t, uint32_t>> announced;
-    int64_t seen = 0;             ///< whose poses were heard
-    int64_t newest_stamp_ns = 0;  ///< time of the newest
-    /// Of every camera, its index; none: none has come.
-    std::map<CameraId, std::optional<uint32_t>> newest;
-  };
-  /// What waits for room on the disk.
-  struct Disk {
-    bool refuses = false;                     ///< frame poses wait
-    std::optional<int64_t> refused_since_ns;  ///< ... and nothing else is to come
-    int64_t say_again_ns = 0;
-    int64_t try_again_ns = 0;  ///< to write the last map, or the results
-  };
   /// The map with which the run has ended.
   struct EndedMap {
     std::optional<Replica> found;          ///< on the disk, not yet taken over
@@ -60,10 +44,9 @@ class CollectorNode : public StreamNode {
   };
   /// How the run ends.
   struct Ends {
-    std::map<CameraId, EndOfSequence> heard;
-    std::set<CameraId> noted;  ///< of those heard, in the journal
     bool of_frontends = false;
-    std::optional<int64_t> drained_ns;  ///< since when all streams have been read to their end
+    std::optional<int64_t> drained_ns;             ///< since when all streams have been read to their end
+    std::optional<int64_t> disk_refuses_since_ns;  ///< frame poses wait, and nothing else is to come
   };
   enum class Results : uint8_t {
     kNone,
@@ -78,13 +61,7 @@ class CollectorNode : public StreamNode {
 
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
-  void OnEnd(const EndOfSequence& end);
-  void Announce(CameraId camera, std::optional<int64_t> num_frames, uint32_t first_frame);
-  int64_t PublishedAsFarAsKnown(CameraId camera, bool ended) const;
-  void TakeEnds(bool ended);
   bool TakeMapRecord();
-  std::vector<KeyframeId> LoopsOf(std::optional<KeyframeId> id) const;
-  void OnCorrection(const MapDelta& delta, const std::vector<KeyframeId>& loops_before);
   void OnGroundTruth(const GroundTruthPose& pose);
   void BeginCheckpoints();
   void ReadNote(const std::string& text);
@@ -94,18 +71,14 @@ class CollectorNode : public StreamNode {
   void OnFrontendStatus(FrontendStatus status);
   void CountOwn();
   void RepeatWhatIsLeft();
-  bool IsKnown(KeyframeId id, MapId map_id) const;
   void TimeKeyframe(const MapDelta& delta);
   void OnFramePose(const Record& record);
   void OnMapReset(const Record& record);
   void OnSessionStart(const Record& record);
   void CountReset(const MapReset& reset);
-  void OnFreshMap(int64_t epoch, bool is_saved);
-  void OnAllDied();
   bool MapMayBeKept() const;
   void KeepCheckpoint();
   void KeepOnDisk(const Record& record);
-  void RetryDisk();
   void AcceptWhatIsSafe();
   void NotePositions();
   bool AllTaken() const;
@@ -114,7 +87,6 @@ class CollectorNode : public StreamNode {
   void RecallEndedMap();
   void RecallSession();
   void KnowSession(const SessionStart& start);
-  void CountFrame(const FramePose& pose);
   void OpenJournal();
   std::string OfTotal() const;
   void SayProgress();
@@ -133,23 +105,21 @@ class CollectorNode : public StreamNode {
   RunRecord run_;
   std::unique_ptr<TrajectoryBuilder> builder_;
   std::vector<std::unique_ptr<StreamReader>> frontend_readers_;  ///< by camera
-  std::map<CameraId, Version> safe_;  ///< how far each frontend's stream is in the journal
   std::unique_ptr<StreamReader> map_reader_;
   ProcessLedger processes_{&run_};
   ProposedKeyframes proposals_;
-  std::set<MapId> dropped_maps_;
-  std::unique_ptr<Journal> journal_;  ///< of frame poses: they are in no replica, and needed at the end
+  PlayedSequences sequences_;
+  HeardFrames frames_;
+  std::optional<KeptRecords> kept_;
   std::unique_ptr<Checkpointer> checkpointer_;  ///< ends before the journal
   std::optional<SessionStart> session_start_;   ///< as the frontend said it
   EndedMap ended_map_;
-  Disk disk_;
+  int64_t try_again_ns_ = 0;  ///< to write the last map, or the results, where there was no room on the disk
   Ends ends_;
   Results results_ = Results::kNone;
   Due due_;
   int64_t begun_ns_ = 0;
-  FrameCount frames_;
-  std::optional<int64_t> map_begun_in_;  ///< the mapper's newest term that continues none
-  bool map_is_fresh_ = false;            ///< ... is being read from its beginning
+  bool map_is_fresh_ = false;  ///< a map that continues none is read from its beginning
 };
 
 }  // namespace dmslam

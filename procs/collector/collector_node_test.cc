@@ -1,6 +1,7 @@
 #include "collector/collector_node.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -30,7 +31,8 @@ class CollectorNodeTest : public testing::Test {
  protected:
   CollectorNodeTest() : others_(&bus_.AddPort(), [this] { return now_ns_; }) {
     const testing::TestInfo* test = testing::UnitTest::GetInstance()->current_test_info();
-    out_dir_ = std::filesystem::temp_directory_path() / (std::string("dmslam_collector_") + test->name());
+    out_dir_ = std::filesystem::path(testing::TempDir()) /
+               ("dmslam_collector_" + std::string(test->name()) + "_" + std::to_string(getpid()));
     std::filesystem::remove_all(out_dir_);
     others_.SetOtherHandler({channels::kKeyframe},
                             [this](const std::string&, std::span<const uint8_t> bytes) {

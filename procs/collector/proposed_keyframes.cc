@@ -13,8 +13,13 @@ constexpr int kMostOften = 30;        // a record is said again
 }  // namespace
 
 void ProposedKeyframes::ReadNote(const std::string& kind, std::istream& text) {
+  if (MapId map_id = 0; kind == "dropped" && text >> map_id) dropped_.insert(map_id);
+  if (int64_t epoch = 0; (kind == "begun" || kind == "resumed") && text >> epoch) {
+    map_begun_in_ = epoch;
+    if (kind == "resumed") OnAllDied();
+  }
   uint64_t value = 0;
-  if (!(text >> value)) return;
+  if ((kind != "keyframe" && kind != "mapped") || !(text >> value)) return;
   const KeyframeId id{value};
   if (kind == "mapped") {
     not_taken_.erase(id);
@@ -61,7 +66,26 @@ bool ProposedKeyframes::AnyMapped() const {
 }
 
 void ProposedKeyframes::OnAllDied() {
+  ++times_all_died_;
   for (const auto& [id, map_id] : maps_) before_crash_.insert(id);
+}
+
+void ProposedKeyframes::OnFreshMap(int64_t epoch, bool is_saved) {
+  if (map_begun_in_ == epoch) return;
+  const bool all_died = AnyMapped() || (is_saved && !maps_.empty());
+  note_((all_died ? "resumed " : "begun ") + std::to_string(epoch));
+  map_begun_in_ = epoch;
+  if (all_died) OnAllDied();
+}
+
+void ProposedKeyframes::OnDropped(MapId map_id, bool noted) {
+  const bool is_new = dropped_.insert(map_id).second;
+  if (is_new && !noted) note_("dropped " + std::to_string(map_id));
+}
+
+/// It is there, or was, or its map was dropped.
+bool ProposedKeyframes::NeedNotBeThere(KeyframeId id, MapId map_id, const IsKnown& is_known) const {
+  return is_known(id) || dropped_.contains(map_id);
 }
 
 std::vector<ProposedKeyframes::Left> ProposedKeyframes::ToSayAgain(const LivesIn& lives,
@@ -69,7 +93,7 @@ std::vector<ProposedKeyframes::Left> ProposedKeyframes::ToSayAgain(const LivesIn
   std::vector<Left> left;
   for (auto& [id, in_flight] : in_flight_) {
     if (lives(id.camera(), not_taken_.at(id).epoch) || in_flight.repeated >= kMostOften ||
-        is_known(id, maps_.at(id)))
+        NeedNotBeThere(id, maps_.at(id), is_known))
       continue;
     ++in_flight.repeated;
     left.push_back({id, in_flight.record});
@@ -86,7 +110,7 @@ void ProposedKeyframes::CountMissing(const IsKnown& is_known, const std::functio
                                      KeyframeRecord* record) const {
   record->proposed = maps_.size();
   for (const auto& [id, map_id] : maps_) {
-    if (is_known(id, map_id)) continue;
+    if (NeedNotBeThere(id, map_id, is_known)) continue;
     const auto said = not_taken_.find(id);
     if (before_crash_.contains(id)) {
       ++record->lost_in_crash;

@@ -12,7 +12,7 @@ constexpr MapId kMap = 1;
 constexpr int64_t kEpoch = 100;
 
 KeyframeId Id(uint32_t frame) { return KeyframeId::Make(4, frame); }
-bool NoneIsKnown(KeyframeId, MapId) { return false; }
+bool NoneIsKnown(KeyframeId) { return false; }
 
 class ProposedKeyframesTest : public testing::Test {
  protected:
@@ -31,6 +31,18 @@ class ProposedKeyframesTest : public testing::Test {
     return record;
   }
 
+  /// Of the notes.
+  ProposedKeyframes ReadByTheNext() const {
+    ProposedKeyframes next;
+    for (const std::string& text : notes_) {
+      std::istringstream note(text);
+      std::string kind;
+      note >> kind;
+      next.ReadNote(kind, note);
+    }
+    return next;
+  }
+
   ProposedKeyframes proposed_;
   std::vector<std::string> notes_;
 };
@@ -45,7 +57,7 @@ TEST_F(ProposedKeyframesTest, WhatADeadFrontendLeftIsSaidAgainUntilAMapperHasIt)
   EXPECT_EQ(left[0].record->front(), 2);
   EXPECT_TRUE(proposed_.ToSayAgain([](CameraId, int64_t) { return true; }, NoneIsKnown).empty())
       << "its frontend says it itself";
-  EXPECT_TRUE(proposed_.ToSayAgain(Lives, [](KeyframeId, MapId) { return true; }).empty());
+  EXPECT_TRUE(proposed_.ToSayAgain(Lives, [](KeyframeId) { return true; }).empty());
   proposed_.OnMapped(0, {kEpoch, 20});
   EXPECT_TRUE(proposed_.ToSayAgain(Lives, NoneIsKnown).empty());
 }
@@ -64,7 +76,7 @@ TEST_F(ProposedKeyframesTest, WhatIsNotInTheMapIsNamedByWhatBecameOfIt) {
   Propose(2, 20);
   Propose(3, 30);
   proposed_.OnMapped(0, {kEpoch, 25});  // 1 and 2 were taken
-  const auto only_2_is_lacking = [](KeyframeId id, MapId) { return id != Id(2); };
+  const auto only_2_is_lacking = [](KeyframeId id) { return id != Id(2); };
   EXPECT_EQ(Count(kEpoch, only_2_is_lacking).missing, 1u);
   const KeyframeRecord record = Count(kEpoch + 1);
   EXPECT_EQ(record.proposed, 3u);
@@ -82,19 +94,60 @@ TEST_F(ProposedKeyframesTest, WhetherAMapperHadTakenAnySinceAllDied) {
   EXPECT_FALSE(proposed_.AnyMapped());
 }
 
+TEST_F(ProposedKeyframesTest, OfADroppedMapNothingIsMissingNorSaidAgain) {
+  Propose(1, 10);
+  proposed_.OnDropped(kMap + 1, false);
+  EXPECT_EQ(Count(kEpoch).missing, 1u);
+  proposed_.OnDropped(kMap, true);
+  EXPECT_EQ(Count(kEpoch).missing, 0u);
+  EXPECT_TRUE(proposed_.ToSayAgain(Lives, NoneIsKnown).empty());
+}
+
+TEST_F(ProposedKeyframesTest, ADroppedMapIsNotedOnceUnlessItIsKeptElsewhere) {
+  proposed_.OnDropped(1, true);
+  EXPECT_TRUE(notes_.empty());
+  proposed_.OnDropped(2, false);
+  proposed_.OnDropped(2, false);
+  EXPECT_EQ(notes_, std::vector<std::string>{"dropped 2"});
+}
+
+TEST_F(ProposedKeyframesTest, AMapThatContinuesNoneSaysThatAllHadDiedWhereSomethingWasToBeInOne) {
+  proposed_.OnFreshMap(10, false);
+  EXPECT_EQ(proposed_.times_all_died(), 0) << "the run's first";
+  Propose(1, 10);
+  proposed_.OnFreshMap(11, false);
+  EXPECT_EQ(proposed_.times_all_died(), 0) << "nothing was in a map";
+  proposed_.OnFreshMap(12, true);
+  EXPECT_EQ(proposed_.times_all_died(), 1) << "it goes on with a checkpoint";
+  Propose(2, 20);
+  proposed_.OnMapped(0, {kEpoch, 20});
+  proposed_.OnFreshMap(13, false);
+  proposed_.OnFreshMap(13, false);
+  EXPECT_EQ(proposed_.times_all_died(), 2);
+  EXPECT_EQ(Count(kEpoch).lost_in_crash, 2u);
+}
+
+TEST_F(ProposedKeyframesTest, TheNextOneKnowsWhichTermItsMapBeganInAndWhatWasDropped) {
+  Propose(1, 10);
+  proposed_.OnFreshMap(11, true);
+  proposed_.OnDropped(5, false);
+  ProposedKeyframes next = ReadByTheNext();
+  EXPECT_EQ(next.times_all_died(), 1);
+  std::vector<std::string> notes;
+  next.NoteTo([&](const std::string& note) { notes.push_back(note); });
+  next.OnFreshMap(11, true);
+  next.OnDropped(5, false);
+  EXPECT_EQ(next.times_all_died(), 1) << "both hear the beginning of the same term";
+  EXPECT_TRUE(notes.empty());
+}
+
 TEST_F(ProposedKeyframesTest, ItsNotesTellTheNextOne) {
   Propose(1, 10);
   Propose(2, 20);
   Propose(2, 20);  // again
   proposed_.OnMapped(0, {kEpoch, 10});
   EXPECT_EQ(notes_.size(), 3u);
-  ProposedKeyframes next;
-  for (const std::string& text : notes_) {
-    std::istringstream note(text);
-    std::string kind;
-    note >> kind;
-    next.ReadNote(kind, note);
-  }
+  const ProposedKeyframes next = ReadByTheNext();
   KeyframeRecord record;
   next.CountMissing(
       NoneIsKnown, [](CameraId) { return kEpoch + 1; }, &record);

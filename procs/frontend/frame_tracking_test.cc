@@ -1,8 +1,11 @@
 #include "frontend/frame_tracking.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
+#include <string>
+#include <variant>
 
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/features/testing/synthetic_images.h"
@@ -86,8 +89,8 @@ TEST_F(FrameTrackingTest, AnImageOfOtherSizeIsNamedWithTheCure) {
 }
 
 TEST_F(FrameTrackingTest, EveryNthFrameIsDrawn) {
-  const auto dir = std::filesystem::temp_directory_path() / "dmslam_frame_tracking_test";
-  std::filesystem::remove_all(dir);
+  const auto dir =
+      std::filesystem::path(::testing::TempDir()) / ("dmslam_frame_tracking_" + std::to_string(getpid()));
   std::filesystem::create_directories(dir);
   options_.picture_dir = dir;
   options_.picture_every = 3;
