@@ -1,6 +1,7 @@
 #include "frontend/frontend_node.h"
 
 #include <utility>
+#include <variant>
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"

@@ -36,7 +36,8 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), roles::kMapper),
       run_(options_.settings.Read<RunOptions>()),
       files_(std::move(files)),
-      num_cameras_(options_.NumCameras()) {
+      num_cameras_(options_.NumCameras()),
+      requests_(num_cameras_) {
   if (run_.saved_map == files_.load.empty()) {
     throw InputError(files_.load.empty()
                          ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
@@ -332,7 +333,7 @@ KeyframeId MapperNode::ApplyFirstAnswer() {
     core_->OnLoopAnswer(first.answer);
   };
   Run(apply, [this, version = first.version] {
-    pending_answers_.push_back({0, version, writer_->last_seq()});
+    unsafe_answers_.OnHandled({0, version, writer_->last_seq()});
   });
   return first.answer.keyframe;
 }
@@ -420,7 +421,7 @@ bool MapperNode::HandleFirstRecord() {
     if (job) job();
   };
   Run(work, [this, camera, version] {
-    if (!awaited_) pending_.push_back({camera, version, writer_->last_seq()});
+    if (!awaited_) unsafe_.OnHandled({camera, version, writer_->last_seq()});
     AcceptWhatIsSafe();
   });
   return work_->Idle();
@@ -430,7 +431,8 @@ bool MapperNode::HandleFirstRecord() {
 MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
   const Version version = record.version();
   if (record.channel == channels::kTurnRequest) {
-    NoteTurnRequest(camera, record);
+    if (const auto request = Read<TurnRequest>(*record.bytes))
+      requests_.OnTurn(camera, version.epoch, *request);
     return {};
   }
   if (run_.localize_only) {
@@ -462,7 +464,7 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
   } else if (record.channel == channels::kAdjustRequest) {
     if (const auto request = Read<AdjustRequest>(*record.bytes)) {
       if (num_cameras_ == 1) return [this, request] { core_->OnAdjustRequest(*request); };
-      frontends_[camera].request = request->request;  // the others go on mapping
+      requests_.OnAdjust(camera, request->request);  // the others go on mapping
     }
   }
   return {};
@@ -496,7 +498,7 @@ void MapperNode::SettleAwaited() {
     const Awaited settled = *std::exchange(awaited_, std::nullopt);
     Run([this, settled] { Settle(settled.id, settled.map_id, settled.version); },
         [this, settled] {
-          pending_.push_back({settled.id.camera(), settled.version, writer_->last_seq()});
+          unsafe_.OnHandled({settled.id.camera(), settled.version, writer_->last_seq()});
         });
   }
   // Another loop closer than the one that was asked does not know what is due.
@@ -508,59 +510,37 @@ void MapperNode::SettleAwaited() {
 }
 
 void MapperNode::AcceptWhatIsSafe() {
-  while (!pending_.empty() && writer_->AcknowledgedByAny(pending_.front().map_seq)) {
-    frontends_[pending_.front().camera].reader->Accept(pending_.front().version);
-    pending_.pop_front();
-  }
-  while (!pending_answers_.empty() && writer_->AcknowledgedByAny(pending_answers_.front().map_seq)) {
-    loop_reader_->Accept(pending_answers_.front().version);
-    pending_answers_.pop_front();
-  }
+  const auto is_held = [this](int64_t map_seq) { return writer_->AcknowledgedByAny(map_seq); };
+  while (const auto safe = unsafe_.TakeSafe(is_held)) frontends_[safe->camera].reader->Accept(safe->version);
+  while (const auto safe = unsafe_answers_.TakeSafe(is_held)) loop_reader_->Accept(safe->version);
 }
 
 // ---- Several cameras ----
 
-/// What was answered already is not answered again.
-void MapperNode::NoteTurnRequest(CameraId camera, const Record& record) {
-  const auto request = Read<TurnRequest>(*record.bytes);
-  if (!request) return;
-  const Version asked{record.version().epoch, request->frame_index};
-  if (frontends_[camera].given != asked) frontends_[camera].turn = request;
-}
-
-/// Lock-step: frames are taken by stamp, then by camera. The next one is known when every camera has named
-/// its own; true: there may be more to do.
+/// True: there may be more to do.
 bool MapperNode::GiveTurn() {
   if (!lockstep_ || num_cameras_ == 1 || ending_ != Ending::kNo) return false;
-  Frontend* next = nullptr;
-  for (Frontend& frontend : frontends_) {
-    if (frontend.IsDone()) continue;
-    if (!frontend.turn) return false;
-    const auto when = [](const Frontend& f) { return f.turn->stamp_ns.value_or(INT64_MAX); };
-    if (next == nullptr || when(frontend) < when(*next)) next = &frontend;
-  }
-  if (next == nullptr) return false;
-  const TurnRequest request = *std::exchange(next->turn, std::nullopt);
-  const CameraId camera = static_cast<CameraId>(next - frontends_.data());
-  next->given = {next->reader->term().epoch, request.frame_index};
-  Run([this, frame = KeyframeId::Make(session_, request.frame_index, camera)] { core_->GiveTurn(frame); });
+  const auto turn = requests_.TakeTurn(
+      HasEnded(), [this](CameraId camera) { return frontends_[camera].reader->term().epoch; });
+  if (!turn) return false;
+  Run([this, frame = KeyframeId::Make(session_, turn->frame_index, turn->camera)] {
+    core_->GiveTurn(frame);
+  });
   return work_->Idle();
 }
 
-/// The maps are adjusted as a whole when no camera adds to them any more.
 bool MapperNode::AnswerRequests() {
-  if (num_cameras_ == 1 || !AllFrontends([](const Frontend& frontend) { return frontend.IsDone(); }))
-    return false;
-  std::vector<AdjustRequest> requests;
-  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
-    const std::optional<uint32_t> request = std::exchange(frontends_[camera].request, std::nullopt);
-    if (request) requests.push_back({*request, "the sequences have ended", std::nullopt, camera});
-  }
+  if (num_cameras_ == 1) return false;
+  const std::vector<AdjustRequest> requests = requests_.TakeAdjust(HasEnded());
   if (requests.empty()) return false;
   Run([this, requests] {
     for (const AdjustRequest& request : requests) core_->OnAdjustRequest(request);
   });
   return work_->Idle();
+}
+
+CameraRequests::HasEnded MapperNode::HasEnded() const {
+  return [this](CameraId camera) { return frontends_[camera].reader->AtEnd(); };
 }
 
 // ---- The end ----
@@ -643,7 +623,7 @@ void MapperNode::PublishStatus() {
   status.head = MakeStatusHead(reason, readers);
   status.state = state;
   status.keyframe_queue = static_cast<int32_t>(arrived_.size() + taken_.size());
-  status.keyframes_unaccepted = static_cast<int32_t>(pending_.size()) + (awaited_ ? 1 : 0);
+  status.keyframes_unaccepted = static_cast<int32_t>(unsafe_.size()) + (awaited_ ? 1 : 0);
   status.last_settled = last_settled_;
   timing_.Fill(&status);
   PublishLoose(status);

@@ -15,10 +15,12 @@
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
+#include "mapper/camera_requests.h"
 #include "mapper/left_map.h"
 #include "mapper/loop_answers.h"
 #include "mapper/make_mapper.h"
 #include "mapper/mapper_report.h"
+#include "mapper/unsafe_records.h"
 
 namespace dmslam {
 
@@ -53,19 +55,7 @@ class MapperNode : public StreamNode {
   /// A camera's frontend.
   struct Frontend {
     std::unique_ptr<StreamReader> reader;
-    Version mapped;                   ///< what the map holds already when this mapper begins with it
-    std::optional<TurnRequest> turn;  ///< several cameras in lock-step: its next frame, which waits
-    Version given;                    ///< the request that was answered last: its term and frame
-    std::optional<uint32_t> request;  ///< of several cameras: to adjust the maps, not answered yet
-
-    /// No frame of it follows, and nothing that changes the map.
-    bool IsDone() const { return request || reader->AtEnd(); }
-  };
-  /// A record whose effect is in the map, and the map record that must be safe before it is accepted.
-  struct Pending {
-    CameraId camera = 0;  ///< of a frontend's
-    Version version;
-    int64_t map_seq = 0;
+    Version mapped;  ///< what the map holds already when this mapper begins with it
   };
   /// The map to begin with.
   struct SavedMap {
@@ -110,9 +100,9 @@ class MapperNode : public StreamNode {
   void Complete();
   void DrainAfterEnd();
   bool HandleFirstRecord();
-  void NoteTurnRequest(CameraId camera, const Record& record);
   bool GiveTurn();
   bool AnswerRequests();
+  CameraRequests::HasEnded HasEnded() const;
   bool AllFrontends(const std::function<bool(const Frontend&)>& is_so) const;
   int64_t FrontendBacklog() const;
   using Job = std::function<void()>;
@@ -145,8 +135,8 @@ class MapperNode : public StreamNode {
   std::optional<int64_t> give_up_ns_;  ///< until then who lacks a map that was complete already is waited for
   std::deque<Arrived> arrived_;        ///< records of the frontend that came while it worked
   std::deque<Arrived> taken_;          ///< the same, to be handled next
-  std::deque<Pending> pending_;        ///< records of the frontend: handled, not yet safe
-  std::deque<Pending> pending_answers_;  ///< the same for the loop closer's
+  UnsafeRecords unsafe_, unsafe_answers_;  ///< the frontends' and the loop closer's
+  CameraRequests requests_;
   LoopAnswers loop_answers_;
   std::optional<Awaited> awaited_;
   std::optional<KeyframeId> last_settled_;
