@@ -22,8 +22,8 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
 
 }  // namespace
 
-void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks) {
-  std::erase_if(*landmarks, [&](LandmarkId id) { return !IsStatic(map.FindLandmark(id)); });
+void KeepStatic(std::vector<const Landmark*>* landmarks) {
+  std::erase_if(*landmarks, [](const Landmark* landmark) { return !IsStatic(landmark); });
 }
 
 std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe) {

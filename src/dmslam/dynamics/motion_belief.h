@@ -37,8 +37,8 @@ inline bool IsStatic(const Landmark* landmark) {
   return landmark != nullptr && landmark->evidence.motion_belief <= kBelievedToMove;
 }
 
-/// Removes the ids of landmarks that are gone or are believed to move.
-void KeepStatic(const Map& map, std::vector<LandmarkId>* landmarks);
+/// Removes those that are gone (null) or are believed to move.
+void KeepStatic(std::vector<const Landmark*>* landmarks);
 
 /// One entry per feature of a keyframe: 1 where it sees a static landmark.
 std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe);

@@ -110,9 +110,9 @@ TEST_F(MotionBeliefTest, OnlyWhatIsStaticSpeaksForAPlace) {
   std::vector<uint8_t> expected(kPoints, 1);
   expected[3] = 0;
   EXPECT_EQ(StaticFeatures(scene_.map(), keyframe), expected);
-  std::vector<LandmarkId> ids{MapScene::IdOf(2), MapScene::IdOf(3), MapScene::IdOf(kPoints + 5)};
-  KeepStatic(scene_.map(), &ids);
-  EXPECT_EQ(ids, std::vector<LandmarkId>{MapScene::IdOf(2)});
+  std::vector<const Landmark*> landmarks{Find(2), Find(3), Find(kPoints + 5)};
+  KeepStatic(&landmarks);
+  EXPECT_EQ(landmarks, std::vector<const Landmark*>{Find(2)});
 }
 
 }  // namespace

@@ -14,30 +14,28 @@ namespace {
 constexpr double kReferenceShared = 100;
 
 struct Step {
-  KeyframeId before;  ///< on the way from the start; invalid at the start itself
+  const Keyframe* before = nullptr;  ///< on the way from the start; null at the start itself
   double cost = std::numeric_limits<double>::infinity();  ///< sum of the links' 1 / shared
   int shared = 0;                                         ///< with `before`
 };
 using Steps = std::map<KeyframeId, Step>;
 
-/// Calls visit(other, shared) for each link of a keyframe.
+/// Calls visit(other, shared) for each link of a keyframe, of the spanning tree also to one that is not
+/// there.
 template <typename Visit>
 void ForEachLink(const Map& map, const Keyframe& keyframe, int min_shared, const Visit& visit) {
-  const auto shared_with = [&](KeyframeId other) {
+  const auto visit_relative = [&](KeyframeId other) {
     const auto it = keyframe.covisible.find(other);
-    return it == keyframe.covisible.end() ? 1 : std::max(1, it->second);
+    visit(other, it == keyframe.covisible.end() ? 1 : std::max(1, it->second));
   };
   for (const auto& [other, shared] : keyframe.covisible) {
     if (shared >= min_shared) visit(other, shared);
   }
-  if (keyframe.parent && map.FindKeyframe(*keyframe.parent) != nullptr)
-    visit(*keyframe.parent, shared_with(*keyframe.parent));
-  for (const KeyframeId child : map.Children(keyframe.id)) {
-    if (map.FindKeyframe(child) != nullptr) visit(child, shared_with(child));
-  }
+  if (keyframe.parent) visit_relative(*keyframe.parent);
+  for (const KeyframeId child : map.Children(keyframe.id)) visit_relative(child);
 }
 
-/// Dijkstra's shortest path, by variance.
+/// Dijkstra's shortest path, by variance. No way leads on from a keyframe that is not there.
 Steps StepsFrom(const Map& map, KeyframeId from, KeyframeId to, int min_shared) {
   Steps steps;
   std::set<std::pair<double, KeyframeId>> open;
@@ -47,39 +45,40 @@ Steps StepsFrom(const Map& map, KeyframeId from, KeyframeId to, int min_shared) 
     const auto [cost, id] = *open.begin();
     open.erase(open.begin());
     if (id == to) break;
-    ForEachLink(map, *map.FindKeyframe(id), min_shared,
-                [&, cost = cost, id = id](KeyframeId other, int shared) {
-                  const double longer = cost + 1.0 / shared;
-                  Step& step = steps[other];
-                  if (longer >= step.cost) return;
-                  open.erase({step.cost, other});
-                  step = {id, longer, shared};
-                  open.insert({longer, other});
-                });
+    const Keyframe* keyframe = map.FindKeyframe(id);
+    if (keyframe == nullptr) continue;
+    ForEachLink(map, *keyframe, min_shared, [&, cost = cost](KeyframeId other, int shared) {
+      const double longer = cost + 1.0 / shared;
+      Step& step = steps[other];
+      if (longer >= step.cost) return;
+      open.erase({step.cost, other});
+      step = {keyframe, longer, shared};
+      open.insert({longer, other});
+    });
   }
   return steps;
 }
 
 }  // namespace
 
-std::optional<ChainDrift> DriftAlongChain(const Map& map, KeyframeId from, KeyframeId to,
+std::optional<ChainDrift> DriftAlongChain(const Map& map, const Keyframe& from, const Keyframe& to,
                                           const ChainDriftOptions& options) {
-  if (map.FindKeyframe(from) == nullptr || map.FindKeyframe(to) == nullptr) return std::nullopt;
-  const Steps steps = StepsFrom(map, from, to, options.min_shared);
-  if (!steps.contains(to)) return std::nullopt;
-  const Eigen::Vector3d end = map.FindKeyframe(to)->T_cam_world.Center();
+  const Steps steps = StepsFrom(map, from.id, to.id, options.min_shared);
+  if (!steps.contains(to.id)) return std::nullopt;
+  const Eigen::Vector3d end = to.T_cam_world.Center();
   double rotation = 0, position = 0, scale = 0;  // variances
   ChainDrift drift;
-  for (KeyframeId id = to; id != from; id = steps.at(id).before) {
-    const Keyframe& keyframe = *map.FindKeyframe(id);
-    const double weakness = kReferenceShared / steps.at(id).shared;
-    const double lever = (end - map.FindKeyframe(steps.at(id).before)->T_cam_world.Center()).norm();
-    const double shift = options.link_position * map.MedianDepth(keyframe).value_or(0.0);
+  for (const Keyframe* at = &to; at != &from;) {
+    const Step& step = steps.at(at->id);
+    const double weakness = kReferenceShared / step.shared;
+    const double lever = (end - step.before->T_cam_world.Center()).norm();
+    const double shift = options.link_position * map.MedianDepth(*at).value_or(0.0);
     const double turn = std::pow(options.link_rotation_rad, 2), growth = std::pow(options.link_log_scale, 2);
     rotation += weakness * turn;
     scale += weakness * growth;
     position += weakness * (shift * shift + (turn + growth) * lever * lever);
     ++drift.links;
+    at = step.before;
   }
   drift.rotation_rad = std::sqrt(rotation);
   drift.position = std::sqrt(position);

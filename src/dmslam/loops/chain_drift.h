@@ -30,7 +30,7 @@ struct ChainDrift {
 /// common, loops that were closed among them, and the spanning tree. Each link turns, shifts and scales all
 /// that comes after it a little, so a turn or a scale weighs more the farther away the end is. None where no
 /// chain leads there, as between two maps.
-std::optional<ChainDrift> DriftAlongChain(const Map& map, KeyframeId from, KeyframeId to,
+std::optional<ChainDrift> DriftAlongChain(const Map& map, const Keyframe& from, const Keyframe& to,
                                           const ChainDriftOptions& options);
 
 /// By how many sigmas a keyframe that the map has at `T_cam_world` would move to stand at `S_cam_world`: the

@@ -49,7 +49,7 @@ class Row {
     }
   }
   std::optional<ChainDrift> Drift(int a, int b) const {
-    return DriftAlongChain(map_, Id(a), Id(b), ChainDriftOptions());
+    return DriftAlongChain(map_, map_.At(Id(a)), map_.At(Id(b)), ChainDriftOptions());
   }
   MapEditor& map() { return map_; }
 
@@ -110,6 +110,14 @@ TEST(ChainDriftTest, TheSpanningTreeLinksWhatSharesNothing) {
   const auto drift = row.Drift(0, 1);
   ASSERT_TRUE(drift);
   EXPECT_NEAR(drift->rotation_rad, 10 * ChainDriftOptions().link_rotation_rad, 1e-9);
+}
+
+TEST(ChainDriftTest, NoChainLeadsThroughAParentThatIsNotThere) {
+  Row row;
+  row.Add(0);
+  row.Add(1);
+  for (const int k : {0, 1}) row.map().SetParent(row.map().At(Id(k)), Id(7));
+  EXPECT_FALSE(row.Drift(0, 1));
 }
 
 TEST(ChainDriftTest, AMoveIsMeasuredInSigmas) {

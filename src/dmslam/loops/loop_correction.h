@@ -19,7 +19,7 @@ LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerif
 
 /// Bundle adjustment of all that hangs together with `keyframe`, as a correction of `map`. Kind kNone when it
 /// failed.
-LoopAnswer AdjustGlobally(const Map& map, KeyframeId keyframe, const LoopCorrectionOptions& options,
+LoopAnswer AdjustGlobally(const Map& map, const Keyframe& keyframe, const LoopCorrectionOptions& options,
                           const std::function<bool()>& interrupt);
 
 }  // namespace dmslam

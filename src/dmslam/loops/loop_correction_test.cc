@@ -60,8 +60,8 @@ class AfterARound : public ::testing::Test {
 
 TEST_F(AfterARound, TheKeyframeGoesWhereThePlaceSaysAndThePlaceStays) {
   ASSERT_EQ(answer_.kind, LoopAnswer::Kind::kLoop);
-  EXPECT_EQ(answer_.seen_from, loop_.keyframe);
-  EXPECT_EQ(answer_.matched, loop_.place);
+  EXPECT_EQ(answer_.seen_from, loop_.keyframe->id);
+  EXPECT_EQ(answer_.matched, loop_.place->id);
   EXPECT_LT(MovedBy(kThere), 1e-9);
   EXPECT_GT(MovedBy(kHere), 0.15);
   const Sim3d S_here_there = Corrected(kHere) * Corrected(kThere).Inverse();
@@ -121,12 +121,13 @@ TEST_F(AfterARound, TheNeighboursGoWithTheKeyframeAndBringTheirLandmarks) {
 
 TEST_F(AfterARound, WhatIsBelievedToMoveIsNotFused) {
   MapEditor map(room_.map());
-  const std::vector<LandmarkId> seen = map.At(loop_.keyframe).landmarks;
+  const std::vector<LandmarkId> seen = loop_.keyframe->landmarks;
   LandmarkEvidence moves;
   moves.motion_belief = 1.0F;
   for (const LandmarkId id : seen) map.SetEvidence(map.At(id), moves);
   const LoopcloserOptions options;
-  const LoopAnswer answer = CorrectLoop(map, loop_, LoopVerifier(options, 1), options, {});
+  const VerifiedLoop loop = room_.TrueLoopIn(map, kHere, kThere);
+  const LoopAnswer answer = CorrectLoop(map, loop, LoopVerifier(options, 1), options, {});
   for (const auto& fusion : answer.fusions)
     EXPECT_EQ(std::ranges::count(seen, fusion.from), 0) << fusion.from.number();
 }
@@ -173,7 +174,7 @@ class Adjusting : public ::testing::Test {
 
 TEST_F(Adjusting, KeyframesAndLandmarksGoWhereTheObservationsPutThem) {
   const Map& map = scene_.map();
-  const LoopAnswer answer = AdjustGlobally(map, Id(kMisplaced), {}, {});
+  const LoopAnswer answer = AdjustGlobally(map, map.At(Id(kMisplaced)), {}, {});
   ASSERT_EQ(answer.kind, LoopAnswer::Kind::kGlobalAdjustment);
   std::map<KeyframeId, Sim3d> corrections = ByKeyframe(answer);
   ASSERT_EQ(corrections.size(), kKeyframesOfCloud);
@@ -191,7 +192,7 @@ TEST_F(Adjusting, KeyframesAndLandmarksGoWhereTheObservationsPutThem) {
 TEST_F(Adjusting, WhatHangsOnAKeyframeShrinksWithItsWorld) {
   MapEditor& map = scene_.map();
   for (size_t i = 0; i < kPoints; ++i) map.SetPosition(map.At(MapScene::IdOf(i)), 1.1 * scene_.point(i));
-  const LoopAnswer answer = AdjustGlobally(map, Id(0), {}, {});
+  const LoopAnswer answer = AdjustGlobally(map, map.At(Id(0)), {}, {});
   ASSERT_EQ(answer.kind, LoopAnswer::Kind::kGlobalAdjustment);
   for (const auto& [id, correction] : ByKeyframe(answer)) EXPECT_NEAR(correction.scale, 1 / 1.1, 0.005);
   for (const auto& [id, left_world] : answer.landmark_offsets) EXPECT_LT(left_world.norm(), 0.02);

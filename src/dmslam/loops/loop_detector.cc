@@ -52,43 +52,40 @@ std::vector<PlaceCandidate> LoopDetector::Candidates(const Map& map, const MapPl
                       [&](const Keyframe& other) { return connected.contains(other.id); });
 }
 
-LoopDetector::Group LoopDetector::GroupOf(const Map& map, KeyframeId id) const {
-  return {ConnectedWith(*map.FindKeyframe(id), options_.min_covisibility), 1};
-}
-
 LoopDetector::Found LoopDetector::Detect(const Map& map, const MapPlaces& places, const Keyframe& keyframe) {
   Found found;
   std::vector<Group> groups;
   for (const PlaceCandidate& candidate : Candidates(map, places, keyframe)) {
     ++found.named;
-    Group group = GroupOf(map, candidate.keyframe);
+    const Keyframe& place = map.At(candidate.keyframe);
+    Group group{ConnectedWith(place, options_.min_covisibility), 1};
     for (const Group& before : groups_[keyframe.camera_id]) {
       if (Overlap(group.members, before.members)) group.seen = std::max(group.seen, before.seen + 1);
     }
-    if (group.seen >= options_.consistency) found.candidates.push_back(candidate.keyframe);
+    if (group.seen >= options_.consistency) found.candidates.push_back(&place);
     groups.push_back(std::move(group));
   }
   groups_[keyframe.camera_id] = std::move(groups);
   return found;
 }
 
-std::vector<KeyframeId> LoopDetector::DetectInOtherMaps(const Map& map, const MapPlaces& places,
-                                                        const Keyframe& keyframe) const {
+std::vector<const Keyframe*> LoopDetector::DetectInOtherMaps(const Map& map, const MapPlaces& places,
+                                                             const Keyframe& keyframe) const {
   const bool alone = std::ranges::all_of(
       map.keyframes(), [&](const auto& item) { return item.second.map_id == keyframe.map_id; });
   const BowVector* words = places.Words(keyframe.id);
   if (alone || words == nullptr) return {};
-  std::vector<KeyframeId> found;
-  const auto add = [&](KeyframeId id, size_t most) {
-    if (found.size() < most && std::ranges::find(found, id) == found.end()) found.push_back(id);
+  std::vector<const Keyframe*> found;
+  const auto add = [&](const Keyframe* other, size_t most) {
+    if (found.size() < most && std::ranges::find(found, other) == found.end()) found.push_back(other);
   };
   for (const Keyframe* other : OfOtherMapsAtThatTime(map, keyframe, options_.same_time_s))
-    add(other->id, kMostAtThatTime);
+    add(other, kMostAtThatTime);
   const size_t most = found.size() + kMostAlike;
   for (const PlaceCandidate& candidate :
        places.Query(map, *words, 0.0, options_.min_covisibility,
                     [&](const Keyframe& other) { return other.map_id == keyframe.map_id; }))
-    add(candidate.keyframe, most);
+    add(&map.At(candidate.keyframe), most);
   return found;
 }
 

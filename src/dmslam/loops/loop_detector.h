@@ -17,16 +17,16 @@ class LoopDetector {
   explicit LoopDetector(const LoopcloserOptions& options) : options_(options) {}
 
   struct Found {
-    std::vector<KeyframeId> candidates;  ///< consistent, best first
-    int named = 0;                       ///< before consistency was asked
+    std::vector<const Keyframe*> candidates;  ///< consistent, best first
+    int named = 0;                            ///< before consistency was asked
   };
   /// Keyframes in order, each once.
   Found Detect(const Map& map, const MapPlaces& places, const Keyframe& keyframe);
   /// Keyframes of other maps that may show the same place: those taken at nearly the same time, when nothing
   /// can have moved far, and those that look most alike. A single keyframe's word is enough here: of these
   /// places geometry asks more.
-  std::vector<KeyframeId> DetectInOtherMaps(const Map& map, const MapPlaces& places,
-                                            const Keyframe& keyframe) const;
+  std::vector<const Keyframe*> DetectInOtherMaps(const Map& map, const MapPlaces& places,
+                                                 const Keyframe& keyframe) const;
   /// A loop was closed, or the map is another one: begins anew.
   void Reset() { groups_.clear(); }
 
@@ -39,7 +39,6 @@ class LoopDetector {
 
   std::vector<PlaceCandidate> Candidates(const Map& map, const MapPlaces& places,
                                          const Keyframe& keyframe) const;
-  Group GroupOf(const Map& map, KeyframeId id) const;
 
   LoopcloserOptions options_;
   std::map<CameraId, std::vector<Group>> groups_;  ///< what the keyframe before named, of each camera

@@ -23,9 +23,10 @@ LoopDetector MakeDetector(int consistency, double same_time_s = 0.5) {
 }
 
 /// Whether one of the keyframes shows what number `k` does.
-bool Contain(const std::vector<KeyframeId>& found, int k) {
-  return std::ranges::any_of(
-      found, [&](KeyframeId id) { return std::abs(static_cast<int>(id.frame_index()) - 1 - k) <= kNear; });
+bool Contain(const std::vector<const Keyframe*>& found, int k) {
+  return std::ranges::any_of(found, [&](const Keyframe* keyframe) {
+    return std::abs(static_cast<int>(keyframe->id.frame_index()) - 1 - k) <= kNear;
+  });
 }
 
 class WithinAMap : public ::testing::Test {
@@ -69,9 +70,9 @@ TEST_F(WithinAMap, WhatAKeyframeSharesLandmarksWithIsNoReturn) {
   LoopDetector detector = MakeDetector(1);
   for (const int k : {20, 50, kPerRound + 2}) {
     const Keyframe& keyframe = room_.At(k);
-    for (const KeyframeId id : Detect(detector, keyframe).candidates) {
-      EXPECT_NE(id, keyframe.id);
-      const auto shared = keyframe.covisible.find(id);
+    for (const Keyframe* place : Detect(detector, keyframe).candidates) {
+      EXPECT_NE(place->id, keyframe.id);
+      const auto shared = keyframe.covisible.find(place->id);
       EXPECT_TRUE(shared == keyframe.covisible.end() || shared->second < kMinCovisibility) << k;
     }
   }
@@ -93,7 +94,8 @@ TEST_F(WithinAMap, APlaceLooksAtLeastAsMuchAlikeAsTheNeighbours) {
       if (shared >= options.min_covisibility) least = std::min(least, alike(id));
     }
     ASSERT_LT(least, 1.0);
-    for (const KeyframeId id : Detect(detector, keyframe).candidates) EXPECT_GE(alike(id), least) << k;
+    for (const Keyframe* place : Detect(detector, keyframe).candidates)
+      EXPECT_GE(alike(place->id), least) << k;
   }
 }
 
@@ -109,26 +111,27 @@ TEST_F(WithinAMap, EachCameraNamesItsPlacesInItsOwnRow) {
 
 class BetweenMaps : public ::testing::Test {
  protected:
-  std::vector<KeyframeId> Detect(const IndexedRoom& room, int k, double same_time_s = 0.5) const {
+  std::vector<const Keyframe*> Detect(const IndexedRoom& room, int k, double same_time_s = 0.5) const {
     return MakeDetector(3, same_time_s).DetectInOtherMaps(room.map(), room.places(), room.At(k));
   }
 };
 
 TEST_F(BetweenMaps, WhatLooksAlikeIsNamedAtOnceAndOfOtherMapsOnly) {
   const IndexedRoom room({.second_map_at = kPerRound - 2}, kPerRound + 6);
-  const std::vector<KeyframeId> found = Detect(room, kPerRound + 3);
+  const std::vector<const Keyframe*> found = Detect(room, kPerRound + 3);
   EXPECT_TRUE(Contain(found, 3));
   EXPECT_LE(found.size(), 3U);
-  for (const KeyframeId id : found) EXPECT_EQ(room.map().At(id).map_id, 1U);
+  for (const Keyframe* place : found) EXPECT_EQ(place->map_id, 1U);
 }
 
 TEST_F(BetweenMaps, WhatWasTakenAtTheSameTimeIsNamedHoweverItLooks) {
   const IndexedRoom room({.second_visit_elsewhere = true, .second_map_at = kPerRound}, kPerRound + 4);
   const KeyframeId last_of_first = Room::IdOf(kPerRound - 1);
-  const std::vector<KeyframeId> meanwhile = Detect(room, kPerRound, 1e-9 * kInterval_ns);
+  const std::vector<const Keyframe*> meanwhile = Detect(room, kPerRound, 1e-9 * kInterval_ns);
   ASSERT_FALSE(meanwhile.empty());
-  EXPECT_EQ(meanwhile.front(), last_of_first);
-  EXPECT_EQ(std::ranges::count(Detect(room, kPerRound, 0.9e-9 * kInterval_ns), last_of_first), 0);
+  EXPECT_EQ(meanwhile.front()->id, last_of_first);
+  EXPECT_EQ(std::ranges::count(Detect(room, kPerRound, 0.9e-9 * kInterval_ns), last_of_first, &Keyframe::id),
+            0);
 }
 
 }  // namespace

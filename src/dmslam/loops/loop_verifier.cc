@@ -49,36 +49,42 @@ struct CellCounts {
   }
 };
 
+/// How a keyframe sees a landmark.
+struct LandmarkSight {
+  const Keyframe& keyframe;
+  size_t feature;
+  const Landmark& landmark;
+};
+
 /// A landmark of each keyframe that should be the same one.
-Sim3Match MakeMatch(const Map& map, const Keyframe& a, size_t feature_a, const Keyframe& b,
-                    size_t feature_b) {
+Sim3Match MakeMatch(const Pyramid& pyramid, const LandmarkSight& a, const LandmarkSight& b) {
   Sim3Match match;
-  match.p_cam1 = a.T_cam_world * map.FindLandmark(a.landmarks[feature_a])->p_world;
-  match.p_cam2 = b.T_cam_world * map.FindLandmark(b.landmarks[feature_b])->p_world;
-  match.uv1_px = a.features->uv_px[feature_a];
-  match.uv2_px = b.features->uv_px[feature_b];
-  match.inv_sigma_squared1 = 1.0 / a.features->Variance(feature_a, map.pyramid());
-  match.inv_sigma_squared2 = 1.0 / b.features->Variance(feature_b, map.pyramid());
+  match.p_cam1 = a.keyframe.T_cam_world * a.landmark.p_world;
+  match.p_cam2 = b.keyframe.T_cam_world * b.landmark.p_world;
+  match.uv1_px = a.keyframe.features->uv_px[a.feature];
+  match.uv2_px = b.keyframe.features->uv_px[b.feature];
+  match.inv_sigma_squared1 = 1.0 / a.keyframe.features->Variance(a.feature, pyramid);
+  match.inv_sigma_squared2 = 1.0 / b.keyframe.features->Variance(b.feature, pyramid);
   return match;
 }
 
 /// The keyframe that sees most of what was found and is no neighbour of `keyframe`; null where there is none.
 /// A few landmarks in common make no neighbour: local mapping may have fused some across the loop already.
-const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const PlaceSupport& support,
+const Keyframe* BestObserver(const Map& map, const Keyframe& keyframe, const SeenPlace& seen,
                              int min_covisibility) {
   std::map<KeyframeId, int> votes;
   const auto is_neighbour = [&](KeyframeId other) {
     const auto shared = keyframe.covisible.find(other);
     return other == keyframe.id || (shared != keyframe.covisible.end() && shared->second >= min_covisibility);
   };
-  for (const LandmarkMatch& match : support.matches) {
-    for (const Observation& o : map.FindLandmark(match.landmark)->observations) {
+  for (const LandmarkMatch& match : seen.matches) {
+    for (const Observation& o : match.landmark->observations) {
       if (!is_neighbour(o.keyframe)) ++votes[o.keyframe];
     }
   }
   const auto best = std::max_element(votes.begin(), votes.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
-  return best == votes.end() ? nullptr : map.FindKeyframe(best->first);
+  return best == votes.end() ? nullptr : &map.At(best->first);
 }
 
 /// Where the camera has come back to nearly the same place, pixels do not tell the scale: the farther the
@@ -102,10 +108,10 @@ std::optional<double> ScaleOfPairs(const Map& map, const Keyframe& keyframe, con
                                    const std::vector<LandmarkMatch>& matches) {
   std::vector<double> ratios;
   for (const LandmarkMatch& match : matches) {
-    const LandmarkId mine = keyframe.landmarks[match.feature];
-    if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
-    const double depth_mine = (keyframe.T_cam_world * map.FindLandmark(mine)->p_world).z();
-    const double depth_theirs = (T_cam_world * map.FindLandmark(match.landmark)->p_world).z();
+    const Landmark* mine = map.LandmarkSeenBy(keyframe, match.feature);
+    if (!IsStatic(mine)) continue;
+    const double depth_mine = (keyframe.T_cam_world * mine->p_world).z();
+    const double depth_theirs = (T_cam_world * match.landmark->p_world).z();
     if (depth_mine > 0 && depth_theirs > 0) ratios.push_back(depth_mine / depth_theirs);
   }
   if (ratios.size() < kMinDepthRatios) return std::nullopt;
@@ -143,9 +149,12 @@ std::string Describe(const VerifiedLoop& loop) {
 
 }  // namespace
 
-std::vector<LandmarkId> StaticLandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared) {
-  std::vector<LandmarkId> landmarks = LandmarksAround(map, id, neighbours, min_shared);
-  KeepStatic(map, &landmarks);
+std::vector<const Landmark*> StaticLandmarksAround(const Map& map, const Keyframe& keyframe, int neighbours,
+                                                   int min_shared) {
+  std::vector<const Keyframe*> around = map.BestCovisible(keyframe, neighbours, min_shared);
+  around.push_back(&keyframe);
+  std::vector<const Landmark*> landmarks = LandmarksSeenBy(map, around);
+  KeepStatic(&landmarks);
   return landmarks;
 }
 
@@ -163,9 +172,9 @@ std::optional<Sim3d> LoopVerifier::FirstSimilarity(const Map& map, const MapPlac
 /// of the place and its neighbours, without words.
 std::optional<Sim3d> LoopVerifier::SimilarityFromFeatures(const Map& map, const Keyframe& keyframe,
                                                           const Keyframe& place, std::string* why) const {
-  const std::vector<LandmarkId> ids =
-      StaticLandmarksAround(map, place.id, kPlaceNeighboursMatched, options_.min_covisibility);
-  const std::vector<LandmarkMatch> matches = MatchLandmarks(map, ids, keyframe.features->set);
+  const std::vector<LandmarkMatch> matches =
+      MatchLandmarks(StaticLandmarksAround(map, place, kPlaceNeighboursMatched, options_.min_covisibility),
+                     keyframe.features->set);
   const bool one_map = keyframe.map_id == place.map_id;
   if (one_map) return SimilarityFromPose(map, keyframe, place, matches, 1.0, options_.min_pose_inliers, why);
   return SimilarityFromPose(map, keyframe, place, matches, {}, options_.joining.min_pose_inliers, why);
@@ -180,8 +189,8 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromPose(const Map& map, const Keyf
                                                       std::optional<double> scale, int min_inliers,
                                                       std::string* why) const {
   std::erase_if(matches, [&](const LandmarkMatch& match) {
-    const LandmarkId mine = keyframe.landmarks[match.feature];
-    return mine.valid() && !IsStatic(map.FindLandmark(mine));
+    const Landmark* mine = map.LandmarkSeenBy(keyframe, match.feature);
+    return mine != nullptr && !IsStatic(mine);
   });
   PoseRansacOptions options;
   options.min_inliers = min_inliers;
@@ -217,7 +226,10 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromWords(const Map& map, const Map
     return std::nullopt;
   }
   std::vector<Sim3Match> matches;
-  for (const BowMatch& pair : pairs) matches.push_back(MakeMatch(map, keyframe, pair.a, place, pair.b));
+  for (const BowMatch& pair : pairs) {
+    matches.push_back(MakeMatch(map.pyramid(), {keyframe, pair.a, *map.LandmarkSeenBy(keyframe, pair.a)},
+                                {place, pair.b, *map.LandmarkSeenBy(place, pair.b)}));
+  }
   Sim3RansacOptions options;
   options.min_inliers = options_.min_sim3_inliers;
   options.seed = DeriveSeed(seed_, keyframe.id.frame_index(), "loop");
@@ -235,18 +247,17 @@ std::optional<Sim3d> LoopVerifier::SimilarityFromWords(const Map& map, const Map
 std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyframe& keyframe,
                                                      const Keyframe& place, const Sim3d& S_keyframe_place,
                                                      std::string* why) const {
-  std::vector<LandmarkId> seen = LandmarksSeenBy(map, {place.id});
-  KeepStatic(map, &seen);
+  std::vector<const Landmark*> theirs = LandmarksSeenBy(map, std::vector{&place});
+  KeepStatic(&theirs);
   const Rigid3d T_cam_world = (S_keyframe_place * Sim3d(place.T_cam_world)).ToRigid();
-  const PlaceSupport support =
-      Look(map, keyframe, T_cam_world, seen, SearchRadiusPx(map.camera(), options_.search_radius_rad));
+  const SeenPlace seen =
+      Look(map, keyframe, T_cam_world, theirs, SearchRadiusPx(map.camera(), options_.search_radius_rad));
   std::vector<Sim3Match> matches;
-  for (const LandmarkMatch& match : support.matches) {
-    const LandmarkId mine = keyframe.landmarks[match.feature];
-    if (!mine.valid() || !IsStatic(map.FindLandmark(mine))) continue;
-    const auto at = std::find(place.landmarks.begin(), place.landmarks.end(), match.landmark);
-    matches.push_back(
-        MakeMatch(map, keyframe, match.feature, place, static_cast<size_t>(at - place.landmarks.begin())));
+  for (const auto& [feature, landmark] : seen.matches) {
+    const Landmark* mine = map.LandmarkSeenBy(keyframe, feature);
+    if (!IsStatic(mine)) continue;
+    matches.push_back(MakeMatch(map.pyramid(), {keyframe, feature, *mine},
+                                {place, landmark->SeenBy(place.id)->feature, *landmark}));
   }
   const Pinhole camera = map.camera().Ideal();
   Sim3OptimizationOptions options;
@@ -266,63 +277,59 @@ std::optional<Sim3d> LoopVerifier::RefinedSimilarity(const Map& map, const Keyfr
   }
   const int enough = joins ? options_.joining.min_pose_inliers : options_.min_pose_inliers;
   const auto similarity =
-      SimilarityFromPose(map, keyframe, place, support.matches, S_keyframe_place.scale, enough, why);
+      SimilarityFromPose(map, keyframe, place, seen.matches, S_keyframe_place.scale, enough, why);
   if (!similarity) *why = pairs + "; " + *why;
   return similarity;
 }
 
-PlaceSupport LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
-                                const std::vector<LandmarkId>& landmarks, double radius_px) const {
-  PlaceSupport support;
+SeenPlace LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                             const std::vector<const Landmark*>& landmarks, double radius_px) const {
+  SeenPlace seen;
   std::vector<uint8_t> taken(keyframe.features->size(), 0);
   std::bitset<kCellColumns * kCellRows> cells;
   CellCounts counts;
   const Viewpoint viewpoint(T_cam_world);
-  for (const LandmarkId id : landmarks) {
-    const Landmark& landmark = *map.FindLandmark(id);
-    const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint, kSurelySeen);
+  for (const Landmark* landmark : landmarks) {
+    const std::optional<LandmarkView> view = PredictView(map, *landmark, viewpoint, kSurelySeen);
     if (!view) continue;
-    ++support.expected;
+    ++seen.support.expected;
     const size_t cell = CellOf(map.camera(), view->uv_px);
     ++counts.expected[cell];
     const std::optional<FeatureHit> hit =
         FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
-                    std::max(0, view->octave - 1), view->octave + 1, landmark.descriptor, taken);
+                    std::max(0, view->octave - 1), view->octave + 1, landmark->descriptor, taken);
     if (!hit || hit->distance > options_.max_descriptor_distance) continue;
     const size_t feature = static_cast<size_t>(hit->feature);
     taken[feature] = 1;
-    support.matches.push_back({static_cast<uint16_t>(feature), id});
+    seen.matches.push_back({static_cast<uint16_t>(feature), landmark});
     cells.set(CellOf(map.camera(), keyframe.features->uv_px[feature]));
     ++counts.found[cell];
   }
-  counts.Tell(&support);
-  std::sort(support.matches.begin(), support.matches.end(),
-            [](const LandmarkMatch& a, const LandmarkMatch& b) { return a.feature < b.feature; });
-  support.found = static_cast<int>(support.matches.size());
-  support.cells = static_cast<int>(cells.count());
-  return support;
+  counts.Tell(&seen.support);
+  std::ranges::sort(seen.matches, {}, &LandmarkMatch::feature);
+  seen.support.found = static_cast<int>(seen.matches.size());
+  seen.support.cells = static_cast<int>(cells.count());
+  return seen;
 }
 
 VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                                    const Sim3d& S_keyframe_place, std::string* why) const {
   VerifiedLoop loop;
-  loop.keyframe = keyframe.id;
-  loop.place = place.id;
+  loop.keyframe = &keyframe;
+  loop.place = &place;
   loop.S_keyframe_place = S_keyframe_place;
   loop.S_keyframe_world = S_keyframe_place * Sim3d(place.T_cam_world);
   loop.joins = keyframe.map_id != place.map_id;
   loop.at_same_time = AreAtSameTime(keyframe, place, options_.same_time_s);
-  loop.landmarks = StaticLandmarksAround(map, place.id, kPlaceNeighbours, options_.min_covisibility);
-  const Rigid3d T_cam_world = loop.S_keyframe_world.ToRigid();
-  loop.support = Look(map, keyframe, T_cam_world, loop.landmarks,
-                      SearchRadiusPx(map.camera(), options_.search_radius_rad));
-  const PlaceSupport own =
-      Look(map, keyframe, keyframe.T_cam_world,
-           StaticLandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility),
-           SearchRadiusPx(map.camera(), options_.search_radius_rad));
+  loop.landmarks = StaticLandmarksAround(map, place, kPlaceNeighbours, options_.min_covisibility);
+  const double radius_px = SearchRadiusPx(map.camera(), options_.search_radius_rad);
+  loop.support = Look(map, keyframe, loop.S_keyframe_world.ToRigid(), loop.landmarks, radius_px).support;
+  const std::vector<const Landmark*> around =
+      StaticLandmarksAround(map, keyframe, kPlaceNeighbours, options_.min_covisibility);
+  const PlaceSupport own = Look(map, keyframe, keyframe.T_cam_world, around, radius_px).support;
   loop.share = loop.support.ShareOver(own);
-  MeasureProven(map, keyframe, place, own, &loop);
-  const auto drift = DriftAlongChain(map, place.id, keyframe.id, options_.drift);
+  MeasureProven(map, around, own, &loop);
+  const auto drift = DriftAlongChain(map, place, keyframe, options_.drift);
   if (drift) loop.drift_sigmas = SigmasOf(*drift, keyframe.T_cam_world, loop.S_keyframe_world);
   *why = Describe(loop);
   if (drift) *why += Text(" (%d links, sigma %.3f)", drift->links, drift->position);
@@ -330,30 +337,33 @@ VerifiedLoop LoopVerifier::Measure(const Map& map, const Keyframe& keyframe, con
 }
 
 /// What outlasts people, asked from both sides: of the place in the keyframe, and of the keyframe's
-/// surroundings in the place's keyframe.
-void LoopVerifier::MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place,
+/// surroundings (`around`, of which it shows `own`) in the place's keyframe.
+void LoopVerifier::MeasureProven(const Map& map, const std::vector<const Landmark*>& around,
                                  const PlaceSupport& own, VerifiedLoop* loop) const {
-  const double radius = SearchRadiusPx(map.camera(), options_.search_radius_rad);
-  std::vector<LandmarkId> here =
-      LandmarksAround(map, keyframe.id, kPlaceNeighbours, options_.min_covisibility);
-  std::vector<LandmarkId> there = loop->landmarks;
-  KeepProven(map, &here);
-  KeepProven(map, &there);
-  const PlaceSupport own_here = Look(map, keyframe, keyframe.T_cam_world, here, radius);
-  PlaceSupport own_there = Look(map, place, place.T_cam_world, there, radius);
+  const double radius_px = SearchRadiusPx(map.camera(), options_.search_radius_rad);
+  const auto look = [&](const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                        const std::vector<const Landmark*>& landmarks) {
+    return Look(map, keyframe, T_cam_world, landmarks, radius_px).support;
+  };
+  const Keyframe &keyframe = *loop->keyframe, &place = *loop->place;
+  const std::vector<const Landmark*> here = ProvenOf(map, around), there = ProvenOf(map, loop->landmarks);
+  const PlaceSupport own_here = look(keyframe, keyframe.T_cam_world, here);
+  PlaceSupport own_there = look(place, place.T_cam_world, there);
   // A young map has nothing that is proven: then by all that stands there.
   if (loop->joins && own_there.expected < options_.min_told)
-    own_there = Look(map, place, place.T_cam_world, loop->landmarks, radius);
-  loop->proven = Look(map, keyframe, loop->S_keyframe_world.ToRigid(), there, radius);
+    own_there = look(place, place.T_cam_world, loop->landmarks);
+  loop->proven = look(keyframe, loop->S_keyframe_world.ToRigid(), there);
   loop->proven_share = loop->proven.ShareOver(own_here.expected >= options_.min_told ? own_here : own);
   const Sim3d S_place_world = loop->S_keyframe_place.Inverse() * Sim3d(keyframe.T_cam_world);
-  loop->counter = Look(map, place, S_place_world.ToRigid(), here, radius);
+  loop->counter = look(place, S_place_world.ToRigid(), here);
   if (loop->counter.expected >= options_.min_told) loop->counter_share = loop->counter.ShareOver(own_there);
 }
 
-void LoopVerifier::KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const {
-  std::erase_if(*landmarks,
-                [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), options_.proven); });
+std::vector<const Landmark*> LoopVerifier::ProvenOf(const Map& map,
+                                                    std::vector<const Landmark*> landmarks) const {
+  std::erase_if(landmarks,
+                [&](const Landmark* landmark) { return !IsProven(map, *landmark, options_.proven); });
+  return landmarks;
 }
 
 /// Seen all over the image and around whoever may stand in it, and nothing that outlasts people says
@@ -413,7 +423,7 @@ std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlace
 }
 
 std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe& keyframe,
-                                                  const VerifiedLoop& earlier, std::string* why) const {
+                                                  const LoopClaim& earlier, std::string* why) const {
   const Keyframe* before = map.FindKeyframe(earlier.keyframe);
   const Keyframe* place_before = map.FindKeyframe(earlier.place);
   if (before == nullptr || place_before == nullptr || before->map_id != keyframe.map_id) {
@@ -422,10 +432,10 @@ std::optional<VerifiedLoop> LoopVerifier::Confirm(const Map& map, const Keyframe
   }
   const Sim3d S_before_world = earlier.S_keyframe_place * Sim3d(place_before->T_cam_world);
   const Sim3d S_keyframe_world = Sim3d(keyframe.T_cam_world * before->T_cam_world.Inverse()) * S_before_world;
-  const std::vector<LandmarkId> landmarks =
-      StaticLandmarksAround(map, earlier.place, kPlaceNeighbours, options_.min_covisibility);
-  const PlaceSupport seen = Look(map, keyframe, S_keyframe_world.ToRigid(), landmarks,
-                                 2 * SearchRadiusPx(map.camera(), options_.search_radius_rad));
+  const SeenPlace seen =
+      Look(map, keyframe, S_keyframe_world.ToRigid(),
+           StaticLandmarksAround(map, *place_before, kPlaceNeighbours, options_.min_covisibility),
+           2 * SearchRadiusPx(map.camera(), options_.search_radius_rad));
   const Keyframe* place = BestObserver(map, keyframe, seen, options_.min_covisibility);
   if (place == nullptr) {
     *why = "nothing of the place is seen";

@@ -22,18 +22,31 @@ struct PlaceSupport {
     int agreeing = 0;  ///< of these, cells in which it does see a good part of them
     bool Hold(int least, double min_share) const { return agreeing >= least && agreeing >= min_share * told; }
   };
-  Cells anywhere, at_rim;              ///< of the whole image, and of its outermost cells alone
-  std::vector<LandmarkMatch> matches;  ///< sorted by feature
+  Cells anywhere, at_rim;  ///< of the whole image, and of its outermost cells alone
   double Share() const { return expected == 0 ? 0.0 : static_cast<double>(found) / expected; }
   /// How much of what this should show it does, over the same share of what stands there for certain: 1 where
   /// a place is seen as well as the camera's own surroundings.
   double ShareOver(const PlaceSupport& own) const { return own.found == 0 ? 0.0 : Share() / own.Share(); }
 };
 
-/// The keyframe sees the place again.
-struct VerifiedLoop {
+/// What a keyframe shows of a place.
+struct SeenPlace {
+  PlaceSupport support;
+  std::vector<LandmarkMatch> matches;  ///< sorted by feature
+};
+
+/// That a keyframe sees a place again, in terms that outlast changes of the map: either may be gone
+/// meanwhile.
+struct LoopClaim {
   KeyframeId keyframe;
   KeyframeId place;
+  Sim3d S_keyframe_place;  ///< camera of the keyframe from camera of the place
+};
+
+/// The keyframe sees the place again. Names what the map has handed out: valid until the map changes.
+struct VerifiedLoop {
+  const Keyframe* keyframe = nullptr;
+  const Keyframe* place = nullptr;
   Sim3d S_keyframe_place;     ///< camera of the keyframe from camera of the place
   Sim3d S_keyframe_world;     ///< where the place's landmarks say the keyframe is
   bool joins = false;         ///< the two are of different maps
@@ -48,9 +61,11 @@ struct VerifiedLoop {
   /// Of what is proven around the keyframe, seen by the place's keyframe; over the same share of the place.
   /// None where too little of it should be seen from there.
   std::optional<double> counter_share;
-  std::optional<double> drift_sigmas;  ///< how far the loop moves the keyframe, over what the chain of
-                                       ///< keyframes can have drifted; none between two maps
-  std::vector<LandmarkId> landmarks;   ///< of the place and its neighbours, static, sorted
+  std::optional<double> drift_sigmas;      ///< how far the loop moves the keyframe, over what the chain of
+                                           ///< keyframes can have drifted; none between two maps
+  std::vector<const Landmark*> landmarks;  ///< of the place and its neighbours, static, by id
+
+  LoopClaim Claim() const { return {keyframe->id, place->id, S_keyframe_place}; }
 };
 
 /// Asks geometry whether a keyframe shows a place: a similarity from matches of landmarks, refined, a guided
@@ -67,7 +82,7 @@ class LoopVerifier {
   std::optional<VerifiedLoop> Propose(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
                                       const Keyframe& place, std::string* why) const;
   /// Whether a later keyframe shows what an earlier one's loop says it should; `why` has the numbers.
-  std::optional<VerifiedLoop> Confirm(const Map& map, const Keyframe& keyframe, const VerifiedLoop& earlier,
+  std::optional<VerifiedLoop> Confirm(const Map& map, const Keyframe& keyframe, const LoopClaim& earlier,
                                       std::string* why) const;
 
   /// Whether a place of another map is seen so well that the maps may be welded, once others confirm it.
@@ -76,8 +91,8 @@ class LoopVerifier {
   bool HoldsAmongOthers(const VerifiedLoop& loop) const;
 
   /// Which of `landmarks` a camera at `T_cam_world` finds among the features of `keyframe`.
-  PlaceSupport Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
-                    const std::vector<LandmarkId>& landmarks, double radius_px) const;
+  SeenPlace Look(const Map& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                 const std::vector<const Landmark*>& landmarks, double radius_px) const;
 
  private:
   std::optional<Sim3d> FirstSimilarity(const Map& map, const MapPlaces& places, const Keyframe& keyframe,
@@ -93,9 +108,9 @@ class LoopVerifier {
                                          const Sim3d& S_keyframe_place, std::string* why) const;
   VerifiedLoop Measure(const Map& map, const Keyframe& keyframe, const Keyframe& place,
                        const Sim3d& S_keyframe_place, std::string* why) const;
-  void MeasureProven(const Map& map, const Keyframe& keyframe, const Keyframe& place, const PlaceSupport& own,
+  void MeasureProven(const Map& map, const std::vector<const Landmark*>& around, const PlaceSupport& own,
                      VerifiedLoop* loop) const;
-  void KeepProven(const Map& map, std::vector<LandmarkId>* landmarks) const;
+  std::vector<const Landmark*> ProvenOf(const Map& map, std::vector<const Landmark*> landmarks) const;
   bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
   bool FillsTheImage(const VerifiedLoop& loop) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;
@@ -104,7 +119,8 @@ class LoopVerifier {
   uint64_t seed_;
 };
 
-/// Static landmarks of a keyframe and of its best neighbours, sorted.
-std::vector<LandmarkId> StaticLandmarksAround(const Map& map, KeyframeId id, int neighbours, int min_shared);
+/// Static landmarks of a keyframe and of its best neighbours, by id.
+std::vector<const Landmark*> StaticLandmarksAround(const Map& map, const Keyframe& keyframe, int neighbours,
+                                                   int min_shared);
 
 }  // namespace dmslam

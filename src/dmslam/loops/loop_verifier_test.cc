@@ -32,8 +32,9 @@ class Looking : public ::testing::Test {
   PlaceSupport Look(const MapScene::Place& place) {
     Keyframe keyframe = scene_.map().At(KeyframeId::Make(MapScene::kSession, 0));
     keyframe.features = scene_.See(9, 0, Rigid3d(), place).features;
-    return LoopVerifier({}, 1).Look(scene_.map(), keyframe, Rigid3d(), scene_.map().LandmarkIdsSorted(),
-                                    kRadiusPx);
+    return LoopVerifier({}, 1)
+        .Look(scene_.map(), keyframe, Rigid3d(), scene_.map().LandmarksOf(MapScene::kMap), kRadiusPx)
+        .support;
   }
   MapScene::Place Shown(const std::function<bool(size_t)>& shown) const {
     return [this, shown](size_t i) { return shown(i) ? std::optional(scene_.point(i)) : std::nullopt; };
@@ -87,14 +88,14 @@ TEST_F(Looking, WhatLooksOtherwiseIsNotThePlace) {
 }
 
 TEST_F(Looking, LandmarksThatAreBelievedToMoveAreNoPlace) {
-  const KeyframeId place = KeyframeId::Make(MapScene::kSession, 0);
+  const Keyframe& place = scene_.map().At(KeyframeId::Make(MapScene::kSession, 0));
   ASSERT_EQ(StaticLandmarksAround(scene_.map(), place, 15, 15).size(), kPoints);
   LandmarkEvidence moves;
   moves.motion_belief = 1.0F;
   scene_.map().SetEvidence(scene_.map().At(MapScene::IdOf(3)), moves);
-  const std::vector<LandmarkId> around = StaticLandmarksAround(scene_.map(), place, 15, 15);
+  const std::vector<const Landmark*> around = StaticLandmarksAround(scene_.map(), place, 15, 15);
   EXPECT_EQ(around.size(), kPoints - 1);
-  EXPECT_EQ(std::ranges::count(around, MapScene::IdOf(3)), 0);
+  EXPECT_EQ(std::ranges::count(around, MapScene::IdOf(3), &Landmark::id), 0);
 }
 
 // ---- A keyframe that may show a place ----
@@ -184,7 +185,7 @@ TEST_F(SomebodyInTwoPlaces, IsNoneAsTheOtherKeyframeDoesNotSeeWhatIsProvenAround
 class Confirming : public ::testing::Test {
  protected:
   static constexpr int kFirst = kPerRound + 2, kThere = 2;
-  std::optional<VerifiedLoop> Confirm(const VerifiedLoop& earlier, int k,
+  std::optional<VerifiedLoop> Confirm(const LoopClaim& earlier, int k,
                                       const LoopcloserOptions& options = {}) const {
     std::string why;
     return LoopVerifier(options, 1).Confirm(room_.map(), room_.At(k), earlier, &why);
@@ -193,26 +194,26 @@ class Confirming : public ::testing::Test {
 };
 
 TEST_F(Confirming, ALaterKeyframeSeesThePlaceWhereAnEarlierOneSaidItIs) {
-  const auto later = Confirm(room_.TrueLoop(kFirst, kThere), kFirst + 4);
+  const auto later = Confirm(room_.TrueLoop(kFirst, kThere).Claim(), kFirst + 4);
   ASSERT_TRUE(later);
-  EXPECT_EQ(later->keyframe, Room::IdOf(kFirst + 4));
-  const int place = static_cast<int>(later->place.frame_index()) - 1;
+  EXPECT_EQ(later->keyframe->id, Room::IdOf(kFirst + 4));
+  const int place = static_cast<int>(later->place->id.frame_index()) - 1;
   EXPECT_LT(place, kThere + 16) << "not one of its own neighbours";
   ExpectNear(later->S_keyframe_place, room_.TrueLoop(kFirst + 4, place).S_keyframe_place, 0.06);
 }
 
 TEST_F(Confirming, ALaterKeyframePutsRightWhatTheEarlierOneHadALittleWrong) {
-  VerifiedLoop earlier = room_.TrueLoop(kFirst, kThere);
+  LoopClaim earlier = room_.TrueLoop(kFirst, kThere).Claim();
   const Sim3d turned(ExpSo3({0, 0.015, 0}), Eigen::Vector3d::Zero(), 1);
   earlier.S_keyframe_place = turned * earlier.S_keyframe_place;
   const auto later = Confirm(earlier, kFirst + 4);
   ASSERT_TRUE(later);
-  const int place = static_cast<int>(later->place.frame_index()) - 1;
+  const int place = static_cast<int>(later->place->id.frame_index()) - 1;
   ExpectNear(later->S_keyframe_place, room_.TrueLoop(kFirst + 4, place).S_keyframe_place, 0.06);
 }
 
 TEST_F(Confirming, AKeyframeThatDoesNotSeeItThereDoesNot) {
-  VerifiedLoop earlier = room_.TrueLoop(kFirst, kThere);
+  LoopClaim earlier = room_.TrueLoop(kFirst, kThere).Claim();
   const Sim3d turned(ExpSo3({0, 0.2, 0}), Eigen::Vector3d::Zero(), 1);
   earlier.S_keyframe_place = turned * earlier.S_keyframe_place;
   EXPECT_FALSE(Confirm(earlier, kFirst + 4));
@@ -221,12 +222,12 @@ TEST_F(Confirming, AKeyframeThatDoesNotSeeItThereDoesNot) {
 TEST_F(Confirming, MoreIsAskedThanOfAProposal) {
   LoopcloserOptions options;
   options.min_confirmed_share = 1.5;
-  EXPECT_FALSE(Confirm(room_.TrueLoop(kFirst, kThere), kFirst + 4, options));
+  EXPECT_FALSE(Confirm(room_.TrueLoop(kFirst, kThere).Claim(), kFirst + 4, options));
   EXPECT_TRUE(room_.Propose(options, kFirst + 4, kThere + 4));
 }
 
 TEST_F(Confirming, WhatKeyframesThatAreGoneSaidIsNotConfirmed) {
-  VerifiedLoop earlier = room_.TrueLoop(kFirst, kThere);
+  LoopClaim earlier = room_.TrueLoop(kFirst, kThere).Claim();
   earlier.keyframe = Room::IdOf(1000);
   EXPECT_FALSE(Confirm(earlier, kFirst + 4));
 }
@@ -236,8 +237,8 @@ TEST(ConfirmTest, AFewLandmarksInCommonMakeThePlaceNoNeighbour) {
   const IndexedRoom room({.fused_every = 12}, kPerRound + 10);
   const LoopVerifier verifier({}, 1);
   std::string why;
-  EXPECT_TRUE(verifier.Confirm(room.map(), room.At(kPerRound + 6), room.TrueLoop(kPerRound + 2, 2), &why))
-      << why;
+  const LoopClaim earlier = room.TrueLoop(kPerRound + 2, 2).Claim();
+  EXPECT_TRUE(verifier.Confirm(room.map(), room.At(kPerRound + 6), earlier, &why)) << why;
 }
 
 // ---- Two maps ----

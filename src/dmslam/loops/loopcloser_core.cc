@@ -60,51 +60,48 @@ void LoopcloserCore::ForgetMap() {
 }
 
 LoopAnswer LoopcloserCore::Check(KeyframeId id) {
-  LoopAnswer answer = FindCorrection(id);
-  answer.keyframe = id;
-  answer.base_version = map_.version();
-  if (const Keyframe* keyframe = map_.FindKeyframe(id)) answer.stamp_ns = keyframe->stamp_ns;
-  return answer;
-}
-
-/// What a keyframe goes through. An answer without a correction: it is all right as it is.
-LoopAnswer LoopcloserCore::FindCorrection(KeyframeId id) {
-  const Keyframe* keyframe = Index(id);
-  if (keyframe == nullptr || awaited_correction_) return {};
-  if (adjustment_due_) return AdjustAfterLoop(id);
-  std::vector<KeyframeId> candidates = NamePlaces(*keyframe);
-  ForgetUnconfirmed(keyframe->stamp_ns);
-  // The same place is seen for a while after a loop, and would be one again; another map is another matter.
-  if (keyframes_since_loop_ <= options_.min_keyframes_between)
-    std::erase_if(candidates, [&](KeyframeId place) { return map_.At(place).map_id == keyframe->map_id; });
-  if (const std::optional<VerifiedLoop> loop = ConfirmProposed(*keyframe)) return Close(*loop);
-  if (const std::optional<VerifiedLoop> loop = ProposePlace(*keyframe, candidates)) return Close(*loop);
-  if (const std::optional<VerifiedLoop> loop = AskAgain(*keyframe)) return Close(*loop);
-  return {};
-}
-
-/// The keyframe, in the index of places from now on; null: it is gone, or no places are looked for.
-const Keyframe* LoopcloserCore::Index(KeyframeId id) {
   ++counters_.checked;
   counters_.last_keyframe = id;
   verdicts_.clear();
-  const Keyframe* keyframe = map_.FindKeyframe(id);
-  if (!options_.enabled || !places_.usable() || keyframe == nullptr) return nullptr;
-  places_.Refresh(map_, id);
+  LoopAnswer answer;
+  if (const Keyframe* keyframe = map_.FindKeyframe(id)) {
+    answer = FindCorrection(*keyframe);
+    answer.stamp_ns = keyframe->stamp_ns;
+  }
+  answer.keyframe = id;
+  answer.base_version = map_.version();
+  return answer;
+}
+
+/// What a keyframe goes through; from now on it is in the index of places. An answer without a correction: it
+/// is all right as it is.
+LoopAnswer LoopcloserCore::FindCorrection(const Keyframe& keyframe) {
+  if (!options_.enabled || !places_.usable()) return {};
+  places_.Refresh(map_, keyframe.id);
   ++keyframes_since_loop_;
-  return keyframe;
+  if (awaited_correction_) return {};
+  if (adjustment_due_) return AdjustAfterLoop(keyframe);
+  std::vector<const Keyframe*> candidates = NamePlaces(keyframe);
+  ForgetUnconfirmed(keyframe.stamp_ns);
+  // The same place is seen for a while after a loop, and would be one again; another map is another matter.
+  if (keyframes_since_loop_ <= options_.min_keyframes_between)
+    std::erase_if(candidates, [&](const Keyframe* place) { return place->map_id == keyframe.map_id; });
+  if (const std::optional<VerifiedLoop> loop = ConfirmProposed(keyframe)) return Close(*loop);
+  if (const std::optional<VerifiedLoop> loop = ProposePlace(keyframe, candidates)) return Close(*loop);
+  if (const std::optional<VerifiedLoop> loop = AskAgain(keyframe)) return Close(*loop);
+  return {};
 }
 
 /// Places that words name, for this keyframe and for those before it.
-std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
+std::vector<const Keyframe*> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
   Begin(Step::kNamePlaces);
   LoopDetector::Found found;
   if (options_.within_maps) found = detector_.Detect(map_, places_, keyframe);
   counters_.candidates += static_cast<uint64_t>(found.named);
   counters_.refused_consistency += static_cast<uint64_t>(found.named) - found.candidates.size();
-  std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
-  std::erase_if(places, [&](KeyframeId id) {
-    return std::ranges::find(found.candidates, id) != found.candidates.end();
+  std::vector<const Keyframe*> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
+  std::erase_if(places, [&](const Keyframe* place) {
+    return std::ranges::find(found.candidates, place) != found.candidates.end();
   });
   counters_.candidates += places.size();
   places.insert(places.begin(), found.candidates.begin(), found.candidates.end());
@@ -112,9 +109,9 @@ std::vector<KeyframeId> LoopcloserCore::NamePlaces(const Keyframe& keyframe) {
   return places;
 }
 
-std::vector<KeyframeId> LoopcloserCore::NamePlacesInOtherMaps(const Keyframe& keyframe) const {
+std::vector<const Keyframe*> LoopcloserCore::NamePlacesInOtherMaps(const Keyframe& keyframe) const {
   Begin(Step::kNamePlaces);
-  std::vector<KeyframeId> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
+  std::vector<const Keyframe*> places = detector_.DetectInOtherMaps(map_, places_, keyframe);
   Begin(Step::kVerify);
   return places;
 }
@@ -129,51 +126,50 @@ void LoopcloserCore::ForgetUnconfirmed(int64_t now_ns) {
 std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyframe) {
   std::optional<VerifiedLoop> best;
   for (Proposal& proposal : proposals_) {
-    if (proposal.loop.keyframe.camera() != keyframe.id.camera())
+    if (proposal.claim.keyframe.camera() != keyframe.id.camera())
       continue;  // it sees another part of the world
     Verdict verdict;
-    verdict.place = proposal.loop.place;
+    verdict.place = proposal.claim.place;
     verdict.confirms = true;
-    std::optional<VerifiedLoop> loop = verifier_.Confirm(map_, keyframe, proposal.loop, &verdict.why);
+    std::optional<VerifiedLoop> loop = verifier_.Confirm(map_, keyframe, proposal.claim, &verdict.why);
     verdict.accepted = loop.has_value();
     verdicts_.push_back(std::move(verdict));
     if (!loop) continue;
-    proposal.loop = std::move(*loop);
+    proposal.claim = loop->Claim();
     proposal.last_ns = keyframe.stamp_ns;
     const bool enough = ++proposal.confirmations >= options_.confirmation.times &&
                         SecondsBetween(keyframe.stamp_ns, proposal.first_ns) >= options_.confirmation.for_s;
-    if (enough && (!best || proposal.loop.share > best->share)) best = proposal.loop;
+    if (enough && (!best || loop->share > best->share)) best = std::move(loop);
   }
   return best;
 }
 
 /// The neighbours of the keyframe saw the place as later ones would: as many, over as long a time.
 bool LoopcloserCore::IsConfirmedAround(const VerifiedLoop& loop) const {
-  const Keyframe& keyframe = map_.At(loop.keyframe);
   int confirmations = 0;
   double longest_s = 0;
-  for (const Keyframe* other : map_.BestCovisible(keyframe, kMostWitnesses, options_.min_covisibility)) {
+  for (const Keyframe* other :
+       map_.BestCovisible(*loop.keyframe, kMostWitnesses, options_.min_covisibility)) {
     std::string why;
-    if (!verifier_.Confirm(map_, *other, loop, &why)) continue;
+    if (!verifier_.Confirm(map_, *other, loop.Claim(), &why)) continue;
     ++confirmations;
-    longest_s = std::max(longest_s, SecondsBetween(other->stamp_ns, keyframe.stamp_ns));
+    longest_s = std::max(longest_s, SecondsBetween(other->stamp_ns, loop.keyframe->stamp_ns));
   }
   return confirmations >= options_.confirmation.times && longest_s >= options_.confirmation.for_s;
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::ProposePlace(const Keyframe& keyframe,
-                                                         const std::vector<KeyframeId>& candidates) {
-  for (const KeyframeId candidate : candidates) {
+                                                         const std::vector<const Keyframe*>& candidates) {
+  for (const Keyframe* place : candidates) {
     Verdict verdict;
-    verdict.place = candidate;
-    std::optional<VerifiedLoop> loop =
-        verifier_.Propose(map_, places_, keyframe, *map_.FindKeyframe(candidate), &verdict.why);
+    verdict.place = place->id;
+    std::optional<VerifiedLoop> loop = verifier_.Propose(map_, places_, keyframe, *place, &verdict.why);
     verdict.accepted = loop.has_value();
     verdicts_.push_back(std::move(verdict));
     if (loop) {
-      if (loop->joins) sightings_.Add(*loop);
+      if (loop->joins) sightings_.Add(loop->Claim());
       if (MayJoin(*loop)) return loop;
-      proposals_.push_back({std::move(*loop), keyframe.stamp_ns, keyframe.stamp_ns, 0});
+      proposals_.push_back({loop->Claim(), keyframe.stamp_ns, keyframe.stamp_ns, 0});
       return std::nullopt;
     }
     ++counters_.refused_geometry;
@@ -188,32 +184,32 @@ bool LoopcloserCore::MayJoin(const VerifiedLoop& loop) const {
 }
 
 /// In turn, by their ids.
-std::vector<KeyframeId> LoopcloserCore::NextToAsk(const Keyframe& newest) const {
-  std::vector<KeyframeId> of_others;
+std::vector<const Keyframe*> LoopcloserCore::NextToAsk(const Keyframe& newest) const {
+  std::vector<const Keyframe*> of_others;
   for (const auto& [id, keyframe] : map_.keyframes()) {
-    if (keyframe.map_id != newest.map_id) of_others.push_back(id);
+    if (keyframe.map_id != newest.map_id) of_others.push_back(&keyframe);
   }
-  const auto next = asked_again_ ? std::ranges::upper_bound(of_others, *asked_again_) : of_others.begin();
+  const auto next = asked_again_ ? std::ranges::upper_bound(of_others, *asked_again_, {}, &Keyframe::id)
+                                 : of_others.begin();
   std::rotate(of_others.begin(), next, of_others.end());
   of_others.resize(std::min(of_others.size(), static_cast<size_t>(std::max(0, options_.asked_again))));
   return of_others;
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::AskAgain(const Keyframe& newest) {
-  for (const KeyframeId id : NextToAsk(newest)) {
-    asked_again_ = id;
-    if (std::optional<VerifiedLoop> loop = FindInOtherMaps(map_.At(id))) return loop;
+  for (const Keyframe* keyframe : NextToAsk(newest)) {
+    asked_again_ = keyframe->id;
+    if (std::optional<VerifiedLoop> loop = FindInOtherMaps(*keyframe)) return loop;
   }
   return std::nullopt;
 }
 
 std::optional<VerifiedLoop> LoopcloserCore::FindInOtherMaps(const Keyframe& keyframe) {
-  for (const KeyframeId candidate : NamePlacesInOtherMaps(keyframe)) {
+  for (const Keyframe* place : NamePlacesInOtherMaps(keyframe)) {
     Verdict verdict;
-    verdict.place = candidate;
-    std::optional<VerifiedLoop> loop =
-        verifier_.Propose(map_, places_, keyframe, map_.At(candidate), &verdict.why);
-    if (loop) sightings_.Add(*loop);
+    verdict.place = place->id;
+    std::optional<VerifiedLoop> loop = verifier_.Propose(map_, places_, keyframe, *place, &verdict.why);
+    if (loop) sightings_.Add(loop->Claim());
     verdict.accepted = loop && MayJoin(*loop);
     verdicts_.push_back(verdict);
     if (verdict.accepted) return loop;
@@ -226,7 +222,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
   LoopAnswer answer = CorrectLoop(map_, loop, verifier_, options_, interrupt_);
   if (answer.kind != LoopAnswer::Kind::kLoop) return {};
   ++counters_.loops;
-  counters_.last_loop_keyframe = loop.keyframe;
+  counters_.last_loop_keyframe = loop.keyframe->id;
   keyframes_since_loop_ = 0;
   adjustment_due_ = options_.correction.global_adjustment;
   awaited_correction_ = answer.correction_id;
@@ -235,7 +231,7 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
   return answer;
 }
 
-LoopAnswer LoopcloserCore::AdjustAfterLoop(KeyframeId keyframe) {
+LoopAnswer LoopcloserCore::AdjustAfterLoop(const Keyframe& keyframe) {
   Begin(Step::kCorrect);
   adjustment_due_ = false;
   LoopAnswer answer = AdjustGlobally(map_, keyframe, options_.correction, interrupt_);

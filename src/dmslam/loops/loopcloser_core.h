@@ -72,26 +72,25 @@ class LoopcloserCore {
  private:
   void Begin(Step step) const;
   void HearOfCorrection(const MapDelta& delta);
-  LoopAnswer FindCorrection(KeyframeId id);
-  const Keyframe* Index(KeyframeId id);
-  std::vector<KeyframeId> NamePlaces(const Keyframe& keyframe);
-  std::vector<KeyframeId> NamePlacesInOtherMaps(const Keyframe& keyframe) const;
+  LoopAnswer FindCorrection(const Keyframe& keyframe);
+  std::vector<const Keyframe*> NamePlaces(const Keyframe& keyframe);
+  std::vector<const Keyframe*> NamePlacesInOtherMaps(const Keyframe& keyframe) const;
   void ForgetUnconfirmed(int64_t now_ns);
   /// Follows what earlier keyframes proposed: a loop that enough of them have confirmed for long enough.
   std::optional<VerifiedLoop> ConfirmProposed(const Keyframe& keyframe);
   /// The first of the candidates that geometry bears out is kept as a proposal. A place of another map is a
   /// loop at once where keyframes that are there already confirm it.
   std::optional<VerifiedLoop> ProposePlace(const Keyframe& keyframe,
-                                           const std::vector<KeyframeId>& candidates);
+                                           const std::vector<const Keyframe*>& candidates);
   /// Keyframes of maps that the camera has left see places that were not there when they came.
   std::optional<VerifiedLoop> AskAgain(const Keyframe& newest);
   std::optional<VerifiedLoop> FindInOtherMaps(const Keyframe& keyframe);
-  std::vector<KeyframeId> NextToAsk(const Keyframe& newest) const;
+  std::vector<const Keyframe*> NextToAsk(const Keyframe& newest) const;
   /// Whether what was found of another map is enough to join the two.
   bool MayJoin(const VerifiedLoop& loop) const;
   bool IsConfirmedAround(const VerifiedLoop& loop) const;
   LoopAnswer Close(const VerifiedLoop& loop);
-  LoopAnswer AdjustAfterLoop(KeyframeId keyframe);
+  LoopAnswer AdjustAfterLoop(const Keyframe& keyframe);
 
   LoopcloserOptions options_;
   Camera camera_;
@@ -104,7 +103,7 @@ class LoopcloserCore {
   LoopVerifier verifier_;
   /// A loop that waits for later keyframes to confirm it.
   struct Proposal {
-    VerifiedLoop loop;  ///< as the last of them measured it
+    LoopClaim claim;  ///< as the last of them measured it
     int64_t first_ns = 0, last_ns = 0;
     int confirmations = 0;
   };

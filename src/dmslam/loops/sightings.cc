@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <vector>
 
 namespace dmslam {
 namespace {
@@ -19,12 +17,9 @@ struct Tie {
   Sim3d S_to_from;
 };
 
-std::optional<Tie> TieOf(const Map& map, const VerifiedLoop& loop) {
-  const Keyframe* keyframe = map.FindKeyframe(loop.keyframe);
-  const Keyframe* place = map.FindKeyframe(loop.place);
-  if (keyframe == nullptr || place == nullptr || keyframe->map_id == place->map_id) return std::nullopt;
-  const Sim3d S_keyframe_to = loop.S_keyframe_place * Sim3d(place->T_cam_world);
-  return Tie{keyframe->map_id, place->map_id, S_keyframe_to.Inverse() * Sim3d(keyframe->T_cam_world)};
+Tie TieOf(const Keyframe& keyframe, const Keyframe& place, const Sim3d& S_keyframe_place) {
+  const Sim3d S_keyframe_to = S_keyframe_place * Sim3d(place.T_cam_world);
+  return {keyframe.map_id, place.map_id, S_keyframe_to.Inverse() * Sim3d(keyframe.T_cam_world)};
 }
 
 /// Whether both put the camera `T_cam_from` at the same place in the other map, with the same unit of length.
@@ -39,28 +34,30 @@ bool SaySame(const Tie& a, const Tie& b, const Rigid3d& T_cam_from, double depth
 
 }  // namespace
 
-void Sightings::Add(const VerifiedLoop& loop) {
-  std::erase_if(loops_, [&](const VerifiedLoop& other) { return other.keyframe == loop.keyframe; });
-  loops_.push_back(loop);
-  if (loops_.size() > kMostKept) loops_.pop_front();
+void Sightings::Add(const LoopClaim& claim) {
+  std::erase_if(claims_, [&](const LoopClaim& other) { return other.keyframe == claim.keyframe; });
+  claims_.push_back(claim);
+  if (claims_.size() > kMostKept) claims_.pop_front();
 }
 
 bool Sightings::BearOut(const Map& map, const VerifiedLoop& loop, const JoiningOptions& options) const {
-  const std::optional<Tie> tie = TieOf(map, loop);
-  if (!tie) return false;
-  const Keyframe& keyframe = map.At(loop.keyframe);
-  const double depth = map.MedianDepth(map.At(loop.place)).value_or(0.0);
+  const Keyframe &keyframe = *loop.keyframe, &place = *loop.place;
+  if (keyframe.map_id == place.map_id) return false;
+  const Tie tie = TieOf(keyframe, place, loop.S_keyframe_place);
+  const double depth = map.MedianDepth(place).value_or(0.0);
   int others = 0;
   int64_t first_ns = keyframe.stamp_ns, last_ns = keyframe.stamp_ns;
-  for (const VerifiedLoop& other : loops_) {
-    std::optional<Tie> its = other.keyframe == loop.keyframe ? std::nullopt : TieOf(map, other);
-    if (its && its->from == tie->to && its->to == tie->from)
-      its = Tie{its->to, its->from, its->S_to_from.Inverse()};
-    if (!its || its->from != tie->from || its->to != tie->to) continue;
-    if (!SaySame(*tie, *its, keyframe.T_cam_world, depth)) continue;
+  for (const LoopClaim& claim : claims_) {
+    const Keyframe* other = map.FindKeyframe(claim.keyframe);
+    const Keyframe* its_place = map.FindKeyframe(claim.place);
+    if (other == nullptr || its_place == nullptr || other == &keyframe) continue;
+    Tie its = TieOf(*other, *its_place, claim.S_keyframe_place);
+    if (its.from == tie.to && its.to == tie.from) its = {its.to, its.from, its.S_to_from.Inverse()};
+    if (its.from != tie.from || its.to != tie.to) continue;
+    if (!SaySame(tie, its, keyframe.T_cam_world, depth)) continue;
     ++others;
-    first_ns = std::min(first_ns, map.At(other.keyframe).stamp_ns);
-    last_ns = std::max(last_ns, map.At(other.keyframe).stamp_ns);
+    first_ns = std::min(first_ns, other->stamp_ns);
+    last_ns = std::max(last_ns, other->stamp_ns);
   }
   return others >= options.sightings && static_cast<double>(last_ns - first_ns) * 1e-9 >= options.sightings_s;
 }

@@ -15,15 +15,15 @@ namespace dmslam {
 class Sightings {
  public:
   /// The newest of each keyframe counts.
-  void Add(const VerifiedLoop& loop);
-  void Clear() { loops_.clear(); }
+  void Add(const LoopClaim& claim);
+  void Clear() { claims_.clear(); }
 
   /// Whether enough other keyframes, over enough time, say the same of the two maps as `loop` does. The
   /// keyframes may have moved since they were found.
   bool BearOut(const Map& map, const VerifiedLoop& loop, const JoiningOptions& options) const;
 
  private:
-  std::deque<VerifiedLoop> loops_;  ///< oldest first
+  std::deque<LoopClaim> claims_;  ///< oldest first
 };
 
 }  // namespace dmslam

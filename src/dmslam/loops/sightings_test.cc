@@ -23,6 +23,7 @@ class SightingsTest : public ::testing::Test {
     loop.S_keyframe_place = error * loop.S_keyframe_place;
     return loop;
   }
+  void Add(const VerifiedLoop& loop) { sightings_.Add(loop.Claim()); }
   bool AreBorneOut(const VerifiedLoop& loop, const JoiningOptions& options = {}) const {
     return sightings_.BearOut(room_.map(), loop, options);
   }
@@ -32,25 +33,25 @@ class SightingsTest : public ::testing::Test {
 };
 
 TEST_F(SightingsTest, TwoOthersThatSayTheSameBearALoopOut) {
-  sightings_.Add(Seen(0));
+  Add(Seen(0));
   EXPECT_FALSE(AreBorneOut(Seen(6))) << "one may see a picture that hangs in both";
-  sightings_.Add(Seen(3));
+  Add(Seen(3));
   EXPECT_TRUE(AreBorneOut(Seen(6)));
 }
 
 TEST_F(SightingsTest, AKeyframeCountsOnceAndNotForItself) {
   for (int times = 0; times < 3; ++times) {
-    sightings_.Add(Seen(3));
-    sightings_.Add(Seen(6));
+    Add(Seen(3));
+    Add(Seen(6));
   }
   EXPECT_FALSE(AreBorneOut(Seen(6)));
 }
 
 TEST_F(SightingsTest, OfAKeyframeTheNewestCounts) {
-  sightings_.Add(Seen(0));
-  sightings_.Add(SeenWrongly(3, Sim3d(ExpSo3({0, 0.5, 0}), Eigen::Vector3d::Zero(), 1)));
+  Add(Seen(0));
+  Add(SeenWrongly(3, Sim3d(ExpSo3({0, 0.5, 0}), Eigen::Vector3d::Zero(), 1)));
   ASSERT_FALSE(AreBorneOut(Seen(6)));
-  sightings_.Add(Seen(3));
+  Add(Seen(3));
   EXPECT_TRUE(AreBorneOut(Seen(6)));
 }
 
@@ -61,8 +62,8 @@ TEST_F(SightingsTest, OneThatLaysTheMapsOntoOneAnotherOtherwiseDoesNotCount) {
   const Sim3d grown(straight, Eigen::Vector3d::Zero(), 1.2);
   for (const Sim3d& error : {turned, moved, grown}) {
     sightings_.Clear();
-    sightings_.Add(Seen(5));
-    sightings_.Add(SeenWrongly(7, error));
+    Add(Seen(5));
+    Add(SeenWrongly(7, error));
     EXPECT_FALSE(AreBorneOut(Seen(6))) << error.translation.transpose() << ", scale " << error.scale;
   }
 }
@@ -70,20 +71,31 @@ TEST_F(SightingsTest, OneThatLaysTheMapsOntoOneAnotherOtherwiseDoesNotCount) {
 TEST_F(SightingsTest, WhatIsSeenForAMomentOnlyMayBeSomebody) {
   JoiningOptions options;
   options.sightings_s = 2.5;
-  sightings_.Add(Seen(4));
-  sightings_.Add(Seen(5));
+  Add(Seen(4));
+  Add(Seen(5));
   EXPECT_FALSE(AreBorneOut(Seen(6), options));
-  sightings_.Add(Seen(0));
+  Add(Seen(0));
   EXPECT_TRUE(AreBorneOut(Seen(6), options));
 }
 
 TEST_F(SightingsTest, AKeyframeOfTheFirstMapThatSeesTheSecondSaysTheSame) {
-  for (const int k : {0, 3}) sightings_.Add(room_.TrueLoop(k, kFirstOfSecond + k));
+  for (const int k : {0, 3}) Add(room_.TrueLoop(k, kFirstOfSecond + k));
+  EXPECT_TRUE(AreBorneOut(Seen(6)));
+}
+
+TEST_F(SightingsTest, WhatKeyframesThatAreGoneSawDoesNotCount) {
+  LoopClaim by_one_that_is_gone = Seen(0).Claim(), of_one_that_is_gone = Seen(1).Claim();
+  by_one_that_is_gone.keyframe = of_one_that_is_gone.place = Room::IdOf(1000);
+  sightings_.Add(by_one_that_is_gone);
+  sightings_.Add(of_one_that_is_gone);
+  Add(Seen(3));
+  EXPECT_FALSE(AreBorneOut(Seen(6)));
+  sightings_.Add(Seen(0).Claim());
   EXPECT_TRUE(AreBorneOut(Seen(6)));
 }
 
 TEST_F(SightingsTest, WithinOneMapNothingIsJoined) {
-  for (const int k : {0, 3}) sightings_.Add(room_.TrueLoop(k + 1, k));
+  for (const int k : {0, 3}) Add(room_.TrueLoop(k + 1, k));
   EXPECT_FALSE(AreBorneOut(room_.TrueLoop(7, 6)));
 }
 

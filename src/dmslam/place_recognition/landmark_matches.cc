@@ -10,11 +10,11 @@ constexpr MatchOptions kByDescriptor = {.max_ratio = 0.8, .check_orientation = f
 
 }  // namespace
 
-std::vector<LandmarkMatch> MatchLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks,
+std::vector<LandmarkMatch> MatchLandmarks(const std::vector<const Landmark*>& landmarks,
                                           const FeatureSet& features) {
   std::vector<Descriptor> descriptors;
   descriptors.reserve(landmarks.size());
-  for (const LandmarkId id : landmarks) descriptors.push_back(map.FindLandmark(id)->descriptor);
+  for (const Landmark* landmark : landmarks) descriptors.push_back(landmark->descriptor);
   const std::vector<Keypoint> anywhere(landmarks.size());
   std::vector<FeatureMatch> found;
   FeatureMatcher().MatchAll({anywhere, descriptors}, {features.keypoints, features.descriptors},
@@ -34,7 +34,7 @@ RansacReport<Rigid3d> PoseFromLandmarks(const Map& map, const FrameFeatures& fea
   std::vector<Eigen::Vector2d> pixels;
   std::vector<double> inv_sigma_squared;
   for (const LandmarkMatch& match : matches) {
-    points.push_back(map.FindLandmark(match.landmark)->p_world);
+    points.push_back(match.landmark->p_world);
     pixels.push_back(features.uv_px[match.feature]);
     inv_sigma_squared.push_back(1.0 / features.Variance(match.feature, map.pyramid()));
   }

@@ -8,14 +8,14 @@
 
 namespace dmslam {
 
-/// A feature of an image shows a landmark.
+/// A feature of an image shows a landmark. Valid as long as the landmark is in its map.
 struct LandmarkMatch {
   uint16_t feature = 0;
-  LandmarkId landmark;
+  const Landmark* landmark = nullptr;
 };
 
 /// Landmarks with the features of an image by descriptor alone, wherever they are; in the landmarks' order.
-std::vector<LandmarkMatch> MatchLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks,
+std::vector<LandmarkMatch> MatchLandmarks(const std::vector<const Landmark*>& landmarks,
                                           const FeatureSet& features);
 
 /// T_cam_world of the image on which most matches agree; `inliers` of the report is parallel to them.

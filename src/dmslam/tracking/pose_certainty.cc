@@ -70,7 +70,7 @@ std::vector<PoseSight> PoseCertaintyEstimator::SightsOf(const Map& map, const Po
   const Pinhole camera = map.camera().Ideal();
   order_.clear();
   for (size_t i = 0; i < basis.matches.size(); ++i) {
-    if (basis.inliers[i] != 0) order_.emplace_back(basis.matches[i].landmark, i);
+    if (basis.inliers[i] != 0) order_.emplace_back(basis.matches[i].landmark->id, i);
   }
   std::sort(order_.begin(), order_.end());
   std::vector<PoseSight> sights;

@@ -122,7 +122,7 @@ TEST(PoseCertaintyTest, MatchesThatDoNotAgreeSayNothing) {
   const auto all = camera.Estimate();
   std::vector<char> inliers(camera.basis().inliers.begin(), camera.basis().inliers.end());
   for (size_t i = 0; i < inliers.size(); ++i) {
-    const LandmarkId id = camera.basis().matches[i].landmark;
+    const LandmarkId id = camera.basis().matches[i].landmark->id;
     if (camera.scene().point(id.number() - 1).z() > kDepth) inliers[i] = 0;
   }
   camera.basis().inliers = inliers;

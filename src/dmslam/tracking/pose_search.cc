@@ -23,7 +23,7 @@ constexpr double kChanceShare = 0.1;  // of what is expected: more is not matche
 
 void SetMatches(const std::vector<LandmarkMatch>& matches, const Rigid3d& T_cam_world, TrackedFrame* frame) {
   frame->ClearMatches();
-  for (const LandmarkMatch& match : matches) frame->landmarks[match.feature] = match.landmark;
+  for (const LandmarkMatch& match : matches) frame->landmarks[match.feature] = match.landmark->id;
   frame->T_cam_world = T_cam_world;
 }
 

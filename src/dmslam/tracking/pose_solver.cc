@@ -12,7 +12,7 @@ double Chi2(const Pinhole& camera, const Rigid3d& T_cam_world, const PoseObserva
 
 void PoseSolver::Matches::Add(const Map& map, const TrackedFrame& frame, uint16_t feature,
                               const Landmark& landmark, double age_s, double weight) {
-  matches.push_back({feature, landmark.id});
+  matches.push_back({feature, &landmark});
   ages_s.push_back(age_s);
   observations.push_back({landmark.p_world, frame.features->uv_px[feature],
                           1.0 / frame.features->Variance(feature, map.pyramid()), weight});
@@ -75,7 +75,7 @@ void PoseSolver::KeepWhatAgrees(const Pinhole& camera, const Rigid3d& T_cam_worl
     if (current_.ages_s[i] < elder_age_s) {
       const double chi2 = Chi2(camera, T_cam_world, o);
       if (!elders.Admit(chi2)) {
-        rejected_.push_back({current_.matches[i].landmark, current_.matches[i].feature, chi2});
+        rejected_.push_back({current_.matches[i].landmark->id, current_.matches[i].feature, chi2});
         continue;
       }
       ++young;
@@ -127,7 +127,7 @@ void PoseSolver::GoOnFrom(const Pinhole& camera, const Rigid3d& T_cam_world,
     if (chi2 <= options.max_chi2) {
       current_.Move(i, kept++);
     } else {
-      rejected_.push_back({current_.matches[i].landmark, current_.matches[i].feature, chi2});
+      rejected_.push_back({current_.matches[i].landmark->id, current_.matches[i].feature, chi2});
     }
   }
   current_.Resize(kept);
@@ -139,7 +139,8 @@ void PoseSolver::SetClasses(TrackedFrame* frame) {
     if (optimized_.inliers[i] != 0) {
       frame->classes[current_.matches[i].feature] = FeatureClass::kUsed;
     } else {
-      rejected_.push_back({current_.matches[i].landmark, current_.matches[i].feature, optimized_.chi2[i]});
+      rejected_.push_back(
+          {current_.matches[i].landmark->id, current_.matches[i].feature, optimized_.chi2[i]});
     }
   }
   for (const RejectedMatch& rejected : rejected_) {
@@ -184,7 +185,7 @@ bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior
   if (!wider) return false;
   GoOnFrom(camera, *wider, Options(std::nullopt));
   frame->ClearMatches();
-  for (const LandmarkMatch& match : current_.matches) frame->landmarks[match.feature] = match.landmark;
+  for (const LandmarkMatch& match : current_.matches) frame->landmarks[match.feature] = match.landmark->id;
   frame->T_cam_world = *wider;
   return true;
 }

@@ -145,9 +145,9 @@ TEST_F(PoseSolverTest, TellsWhatThePoseRestsOn) {
   ASSERT_EQ(basis.matches.size(), basis.inliers.size());
   for (size_t i = 0; i < basis.matches.size(); ++i) {
     const auto [feature, landmark] = basis.matches[i];
-    EXPECT_EQ(basis.observations[i].p_world, scene_.map().FindLandmark(landmark)->p_world);
+    EXPECT_EQ(basis.observations[i].p_world, landmark->p_world);
     EXPECT_EQ(basis.observations[i].uv_px, frame.features->uv_px[feature]);
-    EXPECT_EQ(basis.inliers[i] != 0, landmark.number() > 10);
+    EXPECT_EQ(basis.inliers[i] != 0, landmark->id.number() > 10);
   }
   EXPECT_EQ(basis.mean_chi2, fit.mean_chi2);
   EXPECT_GT(basis.information.determinant(), 0);

@@ -39,7 +39,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
     if (!hit || hit->distance > options_.max_descriptor_distance) continue;
     const size_t feature = static_cast<size_t>(hit->feature);
     taken_[feature] = 1;
-    matches_.push_back({static_cast<uint16_t>(feature), *id});
+    matches_.push_back({static_cast<uint16_t>(feature), &landmark});
     turns_.push_back(
         static_cast<float>(static_cast<uint8_t>(features.set.keypoints[feature].angle - seen.angle)));
   }
@@ -79,7 +79,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchKeyframe(const Map& map
     if (!hit || hit->distance > kMaxKeyframeDistance) continue;
     if (hit->distance > kMaxKeyframeRatio * hit->second_distance) continue;
     taken_[static_cast<size_t>(hit->feature)] = 1;
-    matches_.push_back({static_cast<uint16_t>(hit->feature), landmark->id});
+    matches_.push_back({static_cast<uint16_t>(hit->feature), landmark});
   }
   return matches_;
 }

@@ -76,12 +76,12 @@ class Search : public ::testing::Test {
 TEST_F(Search, WhatTheFrameBeforeSawIsFoundWhereItIs) {
   const std::vector<LandmarkMatch> matches = FromFrameBefore(Frame());
   EXPECT_EQ(matches.size(), kPoints);
-  for (const LandmarkMatch& match : matches) EXPECT_EQ(match.landmark, ids_[match.feature]);
+  for (const LandmarkMatch& match : matches) EXPECT_EQ(match.landmark->id, ids_[match.feature]);
 }
 
 TEST_F(Search, ALandmarkThatWasFusedIsTheOneItBecame) {
   scene_.map().Fuse(scene_.map().At(ids_[3]), scene_.map().At(ids_[4]));
-  for (const LandmarkMatch& match : FromFrameBefore(Frame())) EXPECT_NE(match.landmark, ids_[3]);
+  for (const LandmarkMatch& match : FromFrameBefore(Frame())) EXPECT_NE(match.landmark->id, ids_[3]);
 }
 
 TEST_F(Search, WhatIsBelievedToMoveIsNotMatchedButExpected) {
@@ -121,7 +121,7 @@ TEST_F(Search, AKeyframesLandmarksAreFoundWhereverTheyAre) {
 TEST_F(Search, WithoutAPlaceATwinMakesItAmbiguous) {
   const TrackedFrame frame = Changed(MakeTwins);
   const std::vector<LandmarkMatch> matches = FromKeyframe(frame);
-  for (const LandmarkMatch& match : matches) EXPECT_NE(match.landmark, ids_[9]);
+  for (const LandmarkMatch& match : matches) EXPECT_NE(match.landmark->id, ids_[9]);
 }
 
 TEST_F(Search, ATwinBesideItInTheSameOctaveMakesItAmbiguous) {

@@ -68,24 +68,25 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
                    {&frame->features->set, &image.nodes, {}});
   std::vector<LandmarkMatch> seen;
   for (const BowMatch& match : matches)
-    seen.push_back({static_cast<uint16_t>(match.b), keyframe.landmarks[match.a]});
+    seen.push_back({static_cast<uint16_t>(match.b), map.LandmarkSeenBy(keyframe, match.a)});
   return FindPose(map, seen, DeriveSeed(seed, keyframe.id.frame_index(), "relocalize"), frame);
 }
 
 bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
                               TrackedFrame* frame) const {
-  std::vector<KeyframeId> keyframes;
-  for (const KeyframeId place : places) {
-    keyframes.push_back(place);
-    for (const KeyframeId id : map.BestCovisible(place, kNeighboursTogether, kMinCovisibility))
-      keyframes.push_back(id);
+  std::vector<const Keyframe*> keyframes;
+  for (const KeyframeId id : places) {
+    const Keyframe& place = map.At(id);
+    keyframes.push_back(&place);
+    for (const Keyframe* neighbour : map.BestCovisible(place, kNeighboursTogether, kMinCovisibility))
+      keyframes.push_back(neighbour);
   }
-  std::vector<LandmarkId> ids = LandmarksSeenBy(map, keyframes);
-  KeepStatic(map, &ids);
-  std::vector<LandmarkId> proven = ids;
-  std::erase_if(proven, [&](LandmarkId id) { return !IsProven(map, *map.FindLandmark(id), {}); });
-  if (std::ssize(proven) >= kEnoughProvenTogether) ids = std::move(proven);
-  const std::vector<LandmarkMatch> seen = MatchLandmarks(map, ids, frame->features->set);
+  std::vector<const Landmark*> landmarks = LandmarksSeenBy(map, keyframes);
+  KeepStatic(&landmarks);
+  std::vector<const Landmark*> proven = landmarks;
+  std::erase_if(proven, [&](const Landmark* landmark) { return !IsProven(map, *landmark, {}); });
+  if (std::ssize(proven) >= kEnoughProvenTogether) landmarks = std::move(proven);
+  const std::vector<LandmarkMatch> seen = MatchLandmarks(landmarks, frame->features->set);
   return FindPose(map, seen, DeriveSeed(seed, frame->index, "relocalize_together"), frame);
 }
 
@@ -102,7 +103,7 @@ bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& mat
   frame->ClearMatches();
   frame->T_cam_world = report.model;
   for (size_t i = 0; i < matches.size(); ++i) {
-    if (report.inliers[i]) frame->landmarks[matches[i].feature] = matches[i].landmark;
+    if (report.inliers[i]) frame->landmarks[matches[i].feature] = matches[i].landmark->id;
   }
   return true;
 }

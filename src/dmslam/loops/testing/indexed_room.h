@@ -34,15 +34,17 @@ class IndexedRoom {
   const Keyframe& At(int k) const { return map_.At(Room::IdOf(k)); }
 
   /// That keyframe `k` sees the place of `place`, as it is in truth.
-  VerifiedLoop TrueLoop(int k, int place) const {
+  VerifiedLoop TrueLoop(int k, int place) const { return TrueLoopIn(map_, k, place); }
+  /// The same in an edited copy of the map.
+  VerifiedLoop TrueLoopIn(const Map& map, int k, int place) const {
     VerifiedLoop loop;
-    loop.keyframe = Room::IdOf(k);
-    loop.place = Room::IdOf(place);
-    loop.joins = At(k).map_id != At(place).map_id;
+    loop.keyframe = &map.At(Room::IdOf(k));
+    loop.place = &map.At(Room::IdOf(place));
+    loop.joins = loop.keyframe->map_id != loop.place->map_id;
     loop.S_keyframe_place = room_.TrueSimilarity(k, place);
-    loop.S_keyframe_world = loop.S_keyframe_place * Sim3d(At(place).T_cam_world);
+    loop.S_keyframe_world = loop.S_keyframe_place * Sim3d(loop.place->T_cam_world);
     loop.landmarks =
-        StaticLandmarksAround(map_, loop.place, kPlaceNeighbours, LoopcloserOptions().min_covisibility);
+        StaticLandmarksAround(map, *loop.place, kPlaceNeighbours, LoopcloserOptions().min_covisibility);
     return loop;
   }
   std::optional<VerifiedLoop> Propose(const LoopcloserOptions& options, int k, int place) const {
