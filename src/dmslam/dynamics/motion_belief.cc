@@ -34,6 +34,14 @@ std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe) {
   return usable;
 }
 
+LandmarkEvidence Merged(const LandmarkEvidence& stays, const LandmarkEvidence& goes) {
+  LandmarkEvidence merged = stays;
+  merged.visible += goes.visible;
+  merged.found += goes.found;
+  merged.moved += goes.moved;
+  return merged;
+}
+
 EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
                              const MotionBeliefOptions& options) {
   EvidenceReport report;

@@ -43,6 +43,10 @@ void KeepStatic(std::vector<const Landmark*>* landmarks);
 /// One entry per feature of a keyframe: 1 where it sees a static landmark.
 std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe);
 
+/// What is known of two landmarks that were found to be one: all that was said of either. The belief that it
+/// moves, and when it last did, are those of the landmark that stays.
+LandmarkEvidence Merged(const LandmarkEvidence& stays, const LandmarkEvidence& goes);
+
 struct EvidenceReport {
   int applied = 0;
   int unknown = 0;  ///< landmarks that are gone

@@ -84,9 +84,14 @@ TEST_F(MotionBeliefTest, AllThatFramesSayIsCounted) {
 }
 
 TEST_F(MotionBeliefTest, WhatIsSaidOfALandmarkIsSaidOfTheOneItBecame) {
-  scene_.map().Fuse(*Find(0), *Find(1));
+  scene_.map().Fuse(*Find(0), *Find(1), Merged(Find(1)->evidence, Find(0)->evidence));
   EXPECT_EQ(Say(0, 0, 1).applied, 1);
   EXPECT_FLOAT_EQ(BeliefOf(1), 1.0F);
+}
+
+TEST_F(MotionBeliefTest, OfTwoThatBecomeOneAllThatWasSaidCountsAndTheOneThatStaysIsBelieved) {
+  const LandmarkEvidence goes{10, 8, 1, 2.0F, 7}, stays{5, 4, 2, -1.0F, 3};
+  EXPECT_EQ(Merged(stays, goes), (LandmarkEvidence{15, 12, 3, -1.0F, 3}));
 }
 
 TEST_F(MotionBeliefTest, OfOneThatIsGoneNothingIsKept) {

@@ -117,7 +117,7 @@ void MapEditor::UpdateDescriptor(const Landmark& landmark) {
   journal_.Note(landmark.id, LandmarkChange::kState);
 }
 
-void MapEditor::Fuse(const Landmark& from, const Landmark& into) {
+void MapEditor::Fuse(const Landmark& from, const Landmark& into, const LandmarkEvidence& evidence) {
   if (&from == &into) return;
   const std::vector<Observation> observations = from.observations;
   for (const Observation& o : observations) {
@@ -126,9 +126,7 @@ void MapEditor::Fuse(const Landmark& from, const Landmark& into) {
     if (into.SeenBy(o.keyframe) == nullptr) SetObservation(keyframe, o.feature, into);
   }
   Landmark& target = Mutable(into);
-  target.evidence.visible += from.evidence.visible;
-  target.evidence.found += from.evidence.found;
-  target.evidence.moved += from.evidence.moved;
+  target.evidence = evidence;
   target.first_ns = std::min(target.first_ns, from.first_ns);
   target.first_keyframe = std::min(target.first_keyframe, from.first_keyframe);
   journal_.Note(into.id, LandmarkChange::kState);

@@ -44,8 +44,8 @@ class MapEditor : public Map {
   /// Chooses the descriptor nearest to all observations (least median distance).
   void UpdateDescriptor(const Landmark& landmark);
   /// Moves all observations of `from` to `into` (unless the keyframe sees `into` already) and leaves a
-  /// tombstone.
-  void Fuse(const Landmark& from, const Landmark& into);
+  /// tombstone. `evidence` is what is known of the two as one.
+  void Fuse(const Landmark& from, const Landmark& into, const LandmarkEvidence& evidence);
   void RemoveLandmark(const Landmark& landmark);
   /// Removes a keyframe: its children get new parents, a tombstone keeps its place relative to its parent,
   /// landmarks that nobody sees any more go with it. A map's first keyframe cannot be removed.

@@ -103,17 +103,18 @@ TEST_F(Editor, AFeatureSeesOneLandmark) {
   EXPECT_EQ(map_.At(Kf(1)).covisible.at(Kf(3)), 4);
 }
 
-TEST_F(Editor, FusedLandmarksShareObserversAndEvidence) {
+TEST_F(Editor, FusedLandmarksShareObserversAndHaveTheEvidenceThatIsTold) {
   map_.ClearObservation(map_.At(Kf(3)), 2);
   map_.SetEvidence(map_.At(Lm(1)), {10, 8, 1, 0, 0});
   map_.SetEvidence(map_.At(Lm(2)), {5, 4, 2, 0, 0});
   Take();
-  map_.Fuse(map_.At(Lm(1)), map_.At(Lm(2)));
+  map_.Fuse(map_.At(Lm(1)), map_.At(Lm(2)), {15, 12, 3, 0.5F, 0});
   EXPECT_EQ(map_.FindLandmark(Lm(1)), nullptr);
   EXPECT_EQ(map_.Resolve(Lm(1)), Lm(2));
   EXPECT_EQ(map_.At(Lm(2)).evidence.visible, 15u);
   EXPECT_EQ(map_.At(Lm(2)).evidence.found, 12u);
   EXPECT_EQ(map_.At(Lm(2)).evidence.moved, 3u);
+  EXPECT_EQ(map_.At(Lm(2)).evidence.motion_belief, 0.5F);
   EXPECT_EQ(map_.At(Lm(2)).SeenBy(Kf(3))->feature, 1) << "it did not see the other: it sees it now";
   EXPECT_EQ(map_.At(Lm(2)).SeenBy(Kf(1))->feature, 2) << "it saw it already";
   EXPECT_FALSE(map_.At(Kf(1)).landmarks[1].valid());

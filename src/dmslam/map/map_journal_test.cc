@@ -154,7 +154,7 @@ TEST_F(Journal, NothingIsSaidOfAForgottenKeyframeNorOfWhatItSees) {
 }
 
 TEST_F(Journal, TombstonesAreToldInTheOrderOfDeathAndDroppedMapsByName) {
-  map_.Fuse(map_.At(Lm(8)), map_.At(Lm(1)));
+  map_.Fuse(map_.At(Lm(8)), map_.At(Lm(1)), {});
   map_.RemoveLandmark(map_.At(Lm(6)));
   map_.RemoveKeyframe(map_.At(Kf(2)));
   journal_.NoteTombstone(Lm(8));

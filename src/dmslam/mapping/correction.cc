@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/map/conventions.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/mapping/landmark_fusion.h"
@@ -115,8 +116,10 @@ LoopSide SideOf(const Map& map, const LoopEnds& ends, int min_covisibility) {
 
 void FuseAsTold(MapEditor& map, const LoopAnswer& answer) {
   for (const auto& fusion : answer.fusions) {
-    const std::optional<LandmarkId> gone = map.Resolve(fusion.from), kept = map.Resolve(fusion.into);
-    if (gone && kept) map.Fuse(map.At(*gone), map.At(*kept));
+    const std::optional<LandmarkId> from = map.Resolve(fusion.from), into = map.Resolve(fusion.into);
+    if (!from || !into) continue;
+    const Landmark &goes = map.At(*from), &stays = map.At(*into);
+    map.Fuse(goes, stays, Merged(stays.evidence, goes.evidence));
   }
 }
 

@@ -50,7 +50,7 @@ TEST_F(Insertion, ResolvesAReferenceThatWasCulled) {
 
 TEST_F(Insertion, SeesWhatItsLandmarksHaveBecome) {
   KeyframeProposal proposal = Seeing(10);
-  map_.Fuse(map_.At(ids_[3]), map_.At(ids_[20]));
+  map_.Fuse(map_.At(ids_[3]), map_.At(ids_[20]), {});
   map_.RemoveLandmark(map_.At(ids_[4]));
   map_.SetMapId(map_.At(ids_[5]), 2);
   proposal.matches.push_back({60000, ids_[6]});  // no such feature

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/map/neighbourhood.h"
 #include "dmslam/map/projection.h"
 
@@ -88,7 +89,8 @@ void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, const La
   }
   const size_t mine = landmark.observations.size(), theirs = other->observations.size();
   const bool keep_other = theirs > mine || (theirs == mine && other->id < landmark.id);
-  keep_other ? map.Fuse(landmark, *other) : map.Fuse(*other, landmark);
+  const Landmark &stays = keep_other ? *other : landmark, &goes = keep_other ? landmark : *other;
+  map.Fuse(goes, stays, Merged(stays.evidence, goes.evidence));
 }
 
 }  // namespace

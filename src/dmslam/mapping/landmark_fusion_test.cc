@@ -50,6 +50,15 @@ TEST_F(TwoKeyframes, TwoAtOneFeatureBecomeTheOneWithMoreObservers) {
   EXPECT_EQ(Seen(1, 50), other);
 }
 
+TEST_F(TwoKeyframes, WhatWasSaidOfEitherIsSaidOfTheOne) {
+  const LandmarkId goes = Add(1, 50, {1}), stays = Add(2, 50, {2, 3});
+  map_.SetEvidence(map_.At(goes), {10, 8, 1, 0, {}});
+  map_.SetEvidence(map_.At(stays), {5, 4, 0, -1.0F, {}});
+  Fuse(1);
+  ASSERT_EQ(map_.Resolve(goes), stays);
+  EXPECT_EQ(map_.At(stays).evidence, (LandmarkEvidence{15, 12, 1, -1.0F, {}}));
+}
+
 TEST_F(TwoKeyframes, OfEqualsTheOlderStays) {
   const LandmarkId young = Add(9, 50, {1}), old = Add(2, 50, {2});
   Fuse(1);

@@ -60,7 +60,7 @@ class TinyMapper {
     map_.SetPose(map_.At(KeyframeId::Make(kSession, 1)),
                  Rigid3d(Eigen::Quaterniond::UnitRandom(), Eigen::Vector3d::Random()));
     if (frame_ == 5) map_.RemoveKeyframe(map_.At(KeyframeId::Make(kSession, 3)));
-    if (frame_ == 6) map_.Fuse(map_.At(LandmarkId::Make(1, 15)), map_.At(LandmarkId::Make(1, 16)));
+    if (frame_ == 6) map_.Fuse(map_.At(LandmarkId::Make(1, 15)), map_.At(LandmarkId::Make(1, 16)), {});
     return map_.TakeDelta(MapEvent::kMapped, id, 1);
   }
   const Map& map() const { return map_; }

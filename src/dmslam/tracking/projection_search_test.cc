@@ -80,7 +80,7 @@ TEST_F(Search, WhatTheFrameBeforeSawIsFoundWhereItIs) {
 }
 
 TEST_F(Search, ALandmarkThatWasFusedIsTheOneItBecame) {
-  scene_.map().Fuse(scene_.map().At(ids_[3]), scene_.map().At(ids_[4]));
+  scene_.map().Fuse(scene_.map().At(ids_[3]), scene_.map().At(ids_[4]), {});
   for (const LandmarkMatch& match : FromFrameBefore(Frame())) EXPECT_NE(match.landmark->id, ids_[3]);
 }
 

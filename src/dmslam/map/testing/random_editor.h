@@ -144,7 +144,7 @@ class RandomEditor {
   }
   void FuseSomething() {
     const std::optional<LandmarkId> a = AnyLandmark(), b = AnyLandmark();
-    if (a && a != b) map_.Fuse(map_.At(*a), map_.At(*b));
+    if (a && a != b) map_.Fuse(map_.At(*a), map_.At(*b), map_.At(*a).evidence);
   }
   void RemoveSomeLandmark() {
     if (const std::optional<LandmarkId> id = AnyLandmark()) map_.RemoveLandmark(map_.At(*id));
