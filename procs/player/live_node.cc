@@ -7,6 +7,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/time.h"
 #include "dmslam/wire/codec.h"
 #include "player/intervals.h"
 
@@ -65,7 +66,7 @@ void LiveNode::OnFrameDone(const FrameDone& done) {
 int64_t LiveNode::InSessionTime(int64_t stamp_ns) {
   if (stamp_ns + shift_ns_ <= floor_stamp_ns_) {
     const double period_s = options_.camera.fps > 0 ? 1 / options_.camera.fps : 0.05;
-    shift_ns_ = floor_stamp_ns_ - stamp_ns + static_cast<int64_t>(period_s * 1e9);
+    shift_ns_ = floor_stamp_ns_ - stamp_ns + ToNs(period_s);
     LogWarning("player: the session is {:.1f} s ahead of this host's clock; stamps go on behind it",
                static_cast<double>(shift_ns_) * 1e-9);
   }

@@ -8,6 +8,7 @@
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/time.h"
 #include "player/live_node.h"
 #include "player/log_output.h"
 #include "player/open_sequence.h"
@@ -93,7 +94,7 @@ int WriteLog(const Arguments& a, const dmslam::NodeOptions& node_options, const 
   auto source = Open(a, node_options, &options);
   options.mode = dmslam::PlaybackMode::kRealtime;
   options.speed = 1.0;
-  const int64_t lead_ns = static_cast<int64_t>(options.lead_s * 1e9);
+  const int64_t lead_ns = dmslam::ToNs(options.lead_s);
   const int64_t first_ns = source->size() > options.start ? source->StampNs(options.start) : 0;
   dmslam::LogOutput output(a.to_log, prefix, std::max<int64_t>(0, first_ns - lead_ns));
   dmslam::NodeContext context;

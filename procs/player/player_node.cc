@@ -11,6 +11,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/time.h"
 #include "player/intervals.h"
 
 namespace dmslam {
@@ -102,7 +103,7 @@ bool PlayerNode::MayPlay() {
   if (office_.held() && !playing_) {
     playing_ = true;
     if (position_ > 0) LogInfo("player: others have {} frames already; goes on behind them", position_);
-    start_ns_ += context_.now_ns() + static_cast<int64_t>(options_.lead_s * 1e9);
+    start_ns_ += context_.now_ns() + ToNs(options_.lead_s);
   }
   return playing_ && office_.held();
 }

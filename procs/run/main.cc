@@ -13,6 +13,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/time.h"
 #include "run/log_replay.h"
 #include "run/resume.h"
 #include "run/run_plan.h"
@@ -243,7 +244,7 @@ void KeepFormerRun(dmslam::RunArguments* arguments) {
 int Start(dmslam::RunArguments arguments, dmslam::RunIdentity identity,
           const std::optional<dmslam::ResumePoint>& resume) {
   dmslam::Supervisor::Options options;
-  options.watchdog_ns = static_cast<int64_t>(arguments.care.watchdog_s * 1e9);
+  options.watchdog_ns = dmslam::ToNs(arguments.care.watchdog_s);
   options.wait_for_what_may_come = arguments.care.wait;
   dmslam::RunPlace place = PlaceOf(arguments);
   if (!resume) KeepFormerRun(&arguments);

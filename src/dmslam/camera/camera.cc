@@ -16,6 +16,7 @@
 namespace dmslam {
 namespace {
 
+constexpr int kMinImageSidePx = 32;
 constexpr double kMaxRadiusSquared = 100.0;  // of normalised ideal coordinates: 84 degrees from the axis
 
 /// Normalised ideal coordinates to normalised distorted ones (Brown 1971, as OpenCV writes it).
@@ -244,8 +245,10 @@ double Camera::StretchAt(const Eigen::Vector2d& ideal_px) const {
 }
 
 std::optional<std::string> Camera::Problem() const {
-  if (width_px < 32 || height_px < 32 || width_px > 4096 || height_px > 4096) {
-    return "field 'width' or 'height' is outside 32..4096 pixels";
+  if (width_px < kMinImageSidePx || height_px < kMinImageSidePx || width_px > kMaxImageSidePx ||
+      height_px > kMaxImageSidePx) {
+    return "field 'width' or 'height' is outside " + std::to_string(kMinImageSidePx) + ".." +
+           std::to_string(kMaxImageSidePx) + " pixels";
   }
   if (!(fx_px > 0) || !(fy_px > 0)) return "field 'fx' or 'fy' is not positive";
   if (!(fx_px < 1e5) || !(fy_px < 1e5)) return "field 'fx' or 'fy' is too large";

@@ -21,6 +21,9 @@ enum class Lens : uint8_t {
   kFisheye = 1,
 };
 
+/// Images wider or higher than this are refused.
+inline constexpr int kMaxImageSidePx = 4096;
+
 /// Pinhole camera with a lens.
 /// Pixels are in the coordinate frame whose origin is the centre of the top left pixel, x right, y down; the
 /// camera frame has x right, y down, z forward.

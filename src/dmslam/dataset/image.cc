@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
+#include "dmslam/camera/camera.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {

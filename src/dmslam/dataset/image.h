@@ -50,9 +50,6 @@ struct EncodedImage {
   std::vector<uint8_t> bytes;
 };
 
-/// Images wider or higher than this are refused before they are decoded.
-inline constexpr int kMaxImageSidePx = 4096;
-
 /// The encoding that the first bytes announce: kJpeg, kPng or kFile.
 ImageEncoding DetectEncoding(std::span<const uint8_t> bytes);
 
@@ -73,7 +70,8 @@ class GrayDecoder {
   GrayDecoder& operator=(GrayDecoder&&) noexcept;
 
   /// Decodes into `image`. `width`, `height` are read for raw encodings only. Throws InputError that starts
-  /// with `name` when the bytes are no image, damaged or truncated, or larger than kMaxImageSidePx.
+  /// with `name` when the bytes are no image, damaged or truncated, or larger than kMaxImageSidePx; such are
+  /// not decoded.
   void Decode(ImageEncoding encoding, int width, int height, std::span<const uint8_t> bytes,
               const std::string& name, GrayImage& image);
 

@@ -7,6 +7,7 @@
 #include "dmslam/evaluation/alignment.h"
 #include "dmslam/evaluation/association.h"
 #include "dmslam/geometry/solve_symmetric.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
@@ -137,7 +138,7 @@ std::vector<NeesPair> ComputeNees(std::span<const StampedPose> ground_truth, std
       units = ScaleOf(known, map, options.gauge_s);
       if (!units) continue;
     }
-    const int64_t wanted_ns = a.told->pose.stamp_ns + static_cast<int64_t>(after_s * 1e9);
+    const int64_t wanted_ns = a.told->pose.stamp_ns + ToNs(after_s);
     while (end < known.size() && known[end].told->pose.stamp_ns < wanted_ns - options.max_difference_ns)
       ++end;
     if (end == known.size()) break;

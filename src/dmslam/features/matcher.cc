@@ -10,8 +10,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int kNoDistance = 257;
-
 /// Distance and index in one number, which orders by distance and then by index.
 uint64_t KeyOf(int distance, uint32_t index) { return (static_cast<uint64_t>(distance) << 32) | index; }
 int DistanceOf(uint64_t key) { return static_cast<int>(key >> 32); }

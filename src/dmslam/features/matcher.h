@@ -63,12 +63,12 @@ struct SearchArea {
   int max_octave = 255;
 };
 
-/// The two best features of a search area. The second one's distance is 257 where there is none.
+/// The two best features of a search area. The second one's distance is kNoDistance where there is none.
 struct NearestFeatures {
   uint32_t index = 0;
-  int distance = 257;  ///< [bits]
+  int distance = kNoDistance;  ///< [bits]
   int octave = 0;
-  int second_distance = 257;  ///< [bits]
+  int second_distance = kNoDistance;  ///< [bits]
   int second_octave = 0;
 };
 
@@ -111,7 +111,8 @@ class FeatureMatcher {
                                         double max_ratio);
 
  private:
-  /// Distance (high 32 bits) and index of the two nearest candidates; distance 257 where there are fewer.
+  /// Distance (high 32 bits) and index of the two nearest candidates; distance kNoDistance where there are
+  /// fewer.
   struct BestTwo {
     uint64_t best;
     uint64_t second;

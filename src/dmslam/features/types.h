@@ -66,6 +66,9 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
       {a.words[0] ^ b.words[0], a.words[1] ^ b.words[1], a.words[2] ^ b.words[2], a.words[3] ^ b.words[3]});
 }
 
+/// More than any two differ by: where there is none to compare with.
+inline constexpr int kNoDistance = 257;
+
 /// Keypoints of one image and their descriptors, same order and length. The other lists are as long, or empty
 /// where nothing of the kind was measured. A copy lies on the heap, wherever the original lies.
 struct FeatureSet {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dmslam/camera/image_cells.h"
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/loops/chain_drift.h"
 #include "dmslam/map/conventions.h"
@@ -19,7 +20,7 @@ struct JoiningOptions {
   // of the place is seen, and those of them at the image's rim. Of all cells that should show several of its
   // landmarks, and of those at the rim, they must be this share. Somebody who stood in both maps is a figure
   // in the image; what should be around him is not there.
-  int min_filled_cells = 24;
+  int min_filled_cells = kFillingCells;
   int min_filled_rim_cells = 10;
   double min_filled_share = 0.5;
   // Maps are joined where keyframes around see the place as well, or where so many others, each for itself,

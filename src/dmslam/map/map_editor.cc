@@ -14,7 +14,7 @@ using LandmarkChange = MapJournal::LandmarkChange;
 
 /// The descriptor with the least median distance to all; null where there is none. Ties go to the first.
 const Descriptor* MiddleOf(const std::vector<Descriptor>& seen) {
-  int best_median = 257;
+  int best_median = kNoDistance;
   const Descriptor* best = nullptr;
   std::vector<int> distances(seen.size());
   for (const Descriptor& candidate : seen) {

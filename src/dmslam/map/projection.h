@@ -40,7 +40,7 @@ struct FeatureHit {
   int feature = 0;
   int distance = 0;  ///< bits
   int octave = 0;
-  int second_distance = 257;           ///< of the next best feature; more than any has: there is no other
+  int second_distance = kNoDistance;   ///< of the next best feature; kNoDistance: there is no other
   std::optional<int> second_octave{};  ///< of that feature
 };
 

@@ -11,7 +11,6 @@ namespace dmslam {
 namespace {
 
 constexpr size_t kAtOnce = SIZE_MAX / 2;  // bytes of a piece: all in one
-constexpr uint32_t kLastOrdinal = 0xffff;
 
 template <typename Number>
 Number Named(const std::map<Number, Number>& names, Number number) {
@@ -103,7 +102,7 @@ Renumbering NamesBeside(const Map& a, const Map& b, bool sessions_too) {
   const std::set<uint16_t> ordinals = OrdinalsOf(a);
   uint32_t ordinal = ordinals.empty() ? 0 : *ordinals.rbegin();
   for (const uint16_t of_b : OrdinalsOf(b)) {
-    if (++ordinal > kLastOrdinal) throw InputError("the ordinals of landmarks are used up");
+    if (++ordinal > LandmarkId::kLastOrdinal) throw InputError("the ordinals of landmarks are used up");
     names.ordinals[of_b] = static_cast<uint16_t>(ordinal);
   }
   const std::set<MapId> maps = MapsOf(a);

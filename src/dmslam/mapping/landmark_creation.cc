@@ -125,7 +125,7 @@ class PartnerSearch {
     const auto& set_b = pair_.b.features->set;
     hamming_.to_indexed(pair_.a.features->set.descriptors[entry.feature], set_b.descriptors.data(),
                         near_.data(), static_cast<int>(count), distances_.data());
-    int best = 257, second = 257, best_feature = -1;
+    int best = kNoDistance, second = kNoDistance, best_feature = -1;
     for (size_t k = 0; k < count; ++k) {
       const int distance = distances_[k];
       if (distance < best) {
@@ -297,7 +297,7 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
   const PairGeometry pair{a, b, map, options};
   PartnerSearch search(pair, SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5));
   std::vector<int> partner_of_b(b.features->size(), -1);
-  std::vector<int> distance_of_b(b.features->size(), 257);
+  std::vector<int> distance_of_b(b.features->size(), kNoDistance);
   for (const PlaneEntry& entry : entries_a) {
     const int partner = search.Best(entry);
     if (partner < 0) continue;

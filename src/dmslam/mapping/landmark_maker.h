@@ -21,8 +21,8 @@ class LandmarkMaker {
   /// over.
   void Continue(const Map& map, uint64_t successor = 0) {
     const uint32_t highest = std::max(map.HighestOrdinal(), epoch_ordinal_);
-    DMSLAM_CHECK(highest < kLastOrdinal, "the ordinals of landmarks are used up");
-    const uint32_t choice = std::clamp<uint32_t>((kLastOrdinal - highest) / 64, 1, kMostChoice);
+    DMSLAM_CHECK(highest < LandmarkId::kLastOrdinal, "the ordinals of landmarks are used up");
+    const uint32_t choice = std::clamp<uint32_t>((LandmarkId::kLastOrdinal - highest) / 64, 1, kMostChoice);
     epoch_ordinal_ = static_cast<uint16_t>(highest + 1 + successor % choice);
     next_ = 1;
   }
@@ -44,7 +44,7 @@ class LandmarkMaker {
   }
 
  private:
-  static constexpr uint32_t kLastOrdinal = 0xffff, kMostChoice = 1021;
+  static constexpr uint32_t kMostChoice = 1021;
 
   uint16_t epoch_ordinal_;
   uint64_t next_ = 1;

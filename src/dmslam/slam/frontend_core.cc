@@ -6,6 +6,7 @@
 
 #include "dmslam/tracking/keyframe_policy.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
@@ -28,8 +29,6 @@ void TellCertainty(const PoseCertainty& certainty, FramePose* told) {
   told->step_from = certainty.step->from;
   told->step_covariance = UpperTriangle(certainty.step->covariance);
 }
-
-int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
 
 std::function<FirstMapSearch()> SearchMaker(const FrontendCore::Setup& setup) {
   return [method = setup.options.initializer_method, options = setup.initializer, camera = setup.camera,

@@ -2,13 +2,13 @@
 
 #include <ranges>
 
+#include "dmslam/util/time.h"
+
 namespace dmslam {
 namespace {
 
 constexpr double kWeakShare = 0.5;  // of the expected landmarks
 constexpr int kWeak = 60;           // landmarks
-
-int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
 
 /// Young maps have the newest keyframes.
 bool IsOfTwoKeyframes(const Map& map, MapId map_id) {

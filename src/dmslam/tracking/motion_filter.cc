@@ -5,7 +5,7 @@
 namespace dmslam {
 namespace {
 
-constexpr double kStep_s = 1.0 / 30;  // which the options speak of
+constexpr double kStep_s = 1.0 / kStepsPerSecond;
 
 /// Power of a white acceleration under which two successive steps differ by sigma: their difference has the
 /// variance 2/3 * power * step^3.

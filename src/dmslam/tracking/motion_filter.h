@@ -7,8 +7,11 @@
 
 namespace dmslam {
 
-/// How evenly a camera moves: the standard deviations, along each axis, by which the steps of two successive
-/// thirtieths of a second differ.
+/// A camera's motion is told by what it does in a step of a thirtieth of a second, at whatever rate frames
+/// come.
+inline constexpr int kStepsPerSecond = 30;
+
+/// How evenly a camera moves: the standard deviations, along each axis, by which two successive steps differ.
 struct EvennessOptions {
   double rotation_rad = 0.007;
   double translation = 0.0055;  ///< as a share of the scene's depth

@@ -9,7 +9,7 @@
 namespace dmslam {
 namespace {
 
-constexpr double kStep_s = 1.0 / 30;
+constexpr double kStep_s = 1.0 / kStepsPerSecond;
 constexpr double kDepth = 2.0;
 
 Matrix6d Isotropic(double sigma) { return sigma * sigma * Matrix6d::Identity(); }

@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "dmslam/geometry/solve_symmetric.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
 
-// Times are compared half a step beside those at which frames come at 30 Hz. The frame that comes next is
+// Times are compared half a step beside those at which steps end. The frame that comes next is
 // near enough at any rate.
-constexpr int64_t kStepNs = 1'000'000'000 / 30;
+constexpr int64_t kStepNs = 1'000'000'000 / kStepsPerSecond;
 constexpr int64_t kRecentNs = 500'000'000;          // so long a tracked frame's pose leads anywhere
 constexpr int64_t kKnownNs = kStepNs * 11 / 2;      // so long the newest pose's motion says something
 constexpr int64_t kSuccessiveNs = kStepNs * 5 / 2;  // a step no longer than this is a motion...
@@ -129,7 +130,7 @@ MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& ti
 
 bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const {
   if (!last_) return true;
-  if (time.stamp_ns - last_->time.stamp_ns > static_cast<int64_t>(options_.reach_known_s * 1e9)) return true;
+  if (time.stamp_ns - last_->time.stamp_ns > ToNs(options_.reach_known_s)) return true;
   const Pose& newest = *Newest();
   const double depth = Depth(map);
   const Prediction prediction = Predict(map, time, depth);
@@ -137,9 +138,9 @@ bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const 
   const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *newest.pose.In(map);
   const double turned_rad = AngleBetween(T_cam_world.rotation, from.rotation);
   const double moved = (T_cam_world.Center() - from.Center()).norm() / depth;
-  const double since_s = std::max(1.0 / 30, static_cast<double>(time.stamp_ns - newest.time.stamp_ns) * 1e-9);
+  const double since_s = std::max(1.0 / kStepsPerSecond, SecondsFromTo(newest.time.stamp_ns, time.stamp_ns));
   if (prediction.prior) {
-    const double steps = std::max(1.0, std::round(since_s * 30));
+    const double steps = std::max(1.0, std::round(since_s * kStepsPerSecond));
     return turned_rad <= options_.max_surprise * options_.prior_rotation_rad * steps &&
            moved <= options_.max_surprise * options_.prior_translation * steps;
   }

@@ -38,9 +38,8 @@ struct FrameTime {
 
 struct MotionModelOptions {
   EvennessOptions evenness;
-  double prior_rotation_rad =
-      0.01;  ///< how far a step of 1/30 s may be off, for its reach and for late frames...
-  double prior_translation = 0.01;  ///< ...and its translation, as a share of the scene's depth
+  double prior_rotation_rad = 0.01;  ///< how far a step may be off, for its reach and for late frames...
+  double prior_translation = 0.01;   ///< ...and its translation, as a share of the scene's depth
   double max_surprise = 4.0;  ///< a pose that lies more standard deviations of the prior off contradicts it
   double max_speed = 1.0;     ///< of a camera whose motion is not known [depths of the scene / s]...
   double speed_slack = 0.05;  ///< ...and how far it may be off besides [depths]
@@ -49,7 +48,7 @@ struct MotionModelOptions {
   double reach_known_s = 5.0;       ///< of where it was longer ago nothing follows
 };
 
-/// What a motion model that predicts this pose `steps` of 1/30 s ahead knows; `depth` of the scene [map
+/// What a motion model that predicts this pose so many `steps` ahead knows; `depth` of the scene [map
 /// units].
 PosePrior MotionPrior(const MotionModelOptions& options, const Rigid3d& T_cam_world, double depth,
                       double steps = 1.0);

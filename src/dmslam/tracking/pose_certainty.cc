@@ -10,11 +10,10 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kLongestStepNs = 500'000'000;  // so long a step is still one motion
-constexpr double kMaxTurnOfMap = 0.02;           // [rad] the map may have turned under a step to be the same
-constexpr size_t kMostKnown = 20'000;            // landmarks whose covariances are kept
-constexpr size_t kMaxViews = 8;        // of a landmark, spread over all: what more say changes little
-constexpr double kExpectedChi2 = 2.0;  // of a residual in two dimensions, in sigmas
+constexpr double kMaxTurnOfMap = 0.02;  // [rad] the map may have turned under a step to be the same
+constexpr size_t kMostKnown = 20'000;   // landmarks whose covariances are kept
+constexpr size_t kMaxViews = 8;         // of a landmark, spread over all: what more say changes little
+constexpr double kExpectedChi2 = 2.0;   // of a residual in two dimensions, in sigmas
 constexpr double kMinNoiseVariance = 0.05;
 
 double MedianDepth(const Rigid3d& T_cam_world, const std::vector<PoseSight>& sights) {
@@ -95,7 +94,8 @@ bool PoseCertaintyEstimator::HasMapMoved(const Map& map) const {
 /// None where the frames are far apart, or where the map has turned meanwhile.
 std::optional<PoseCertainty::Step> PoseCertaintyEstimator::StepTo(const Map& map, const Told& now,
                                                                   double depth) const {
-  if (!last_ || now.stamp_ns - last_->stamp_ns > kLongestStepNs || HasMapMoved(map)) return std::nullopt;
+  if (!last_ || now.stamp_ns - last_->stamp_ns > PoseJitter::kLongestStepNs || HasMapMoved(map))
+    return std::nullopt;
   const std::optional<Rigid3d> T_last_world = last_->pose.In(map);
   const Rigid3d T_now_last = now.T_cam_world * T_last_world->Inverse();
   Matrix6d covariance = StepUncertainty({*T_last_world, last_->sights, &last_->uncertainty},

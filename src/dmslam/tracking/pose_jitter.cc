@@ -4,12 +4,6 @@
 #include <cmath>
 
 namespace dmslam {
-namespace {
-
-constexpr double kLongestStepS = 0.5;  // so long a step is still one motion
-
-}  // namespace
-
 void PoseJitter::OnPose(int64_t stamp_ns, MapId map, const Rigid3d& T_cam_world, double depth) {
   if (map != map_) {
     last_.reset();
@@ -26,8 +20,9 @@ void PoseJitter::OnPose(int64_t stamp_ns, MapId map, const Rigid3d& T_cam_world,
 PoseJitter::Told PoseJitter::Follow(int64_t stamp_ns, const Rigid3d& T_cam_world, double depth) {
   Told now{stamp_ns, T_cam_world, std::nullopt, 0};
   if (!last_) return now;
-  now.step_s = 1e-9 * static_cast<double>(stamp_ns - last_->stamp_ns);
-  if (now.step_s <= 0 || now.step_s > kLongestStepS) return now;
+  const int64_t step_ns = stamp_ns - last_->stamp_ns;
+  if (step_ns <= 0 || step_ns > kLongestStepNs) return now;
+  now.step_s = 1e-9 * static_cast<double>(step_ns);
   now.T_cam_before = T_cam_world * last_->T_cam_world.Inverse();
   if (!last_->T_cam_before) return now;
   // Along the axes of the camera in the middle.

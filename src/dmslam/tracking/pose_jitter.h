@@ -25,6 +25,9 @@ struct PoseJitterOptions {
 /// themselves (Mehra, IEEE Trans. Automatic Control 1970).
 class PoseJitter {
  public:
+  /// So long a step is still one motion.
+  static constexpr int64_t kLongestStepNs = 500'000'000;
+
   explicit PoseJitter(const PoseJitterOptions& options = {}) : options_(options) {}
 
   /// A pose as it is told; `depth`: of the scene.

@@ -13,9 +13,8 @@ constexpr double kWiderAfterRelocalization = 2.0;  // times the radius of the se
 constexpr double kWiderAroundPrediction = 4.0;
 constexpr size_t kMinKeyframeMatches = 15;
 constexpr double kSeenShare = 0.5;  // of what the last frame showed: less is hidden, and contradicts nothing
-// Somebody who fills the picture hides the room: of so many landmarks that are older than people stand, less
-// than this share is seen.
-constexpr int kEnoughOld = 60;
+// Somebody who fills the picture hides the room: of the landmarks that are older than people stand less than
+// this share is seen.
 constexpr double kLeastOldShare = 0.02;
 // Matches by chance are spread over all that is allowed, true ones are near: the mean squared error tells.
 constexpr double kChanceChi2 = 1.3;
@@ -156,7 +155,8 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
 }
 
 void PoseSearch::Doubt(const PoseFit& fit, TrackingReport* report) {
-  if (report->num_old_expected >= kEnoughOld && report->num_old < kLeastOldShare * report->num_old_expected) {
+  if (report->num_old_expected >= TrackingReport::kEnoughOld &&
+      report->num_old < kLeastOldShare * report->num_old_expected) {
     report->reason = "what has stood here for long is not seen";
   } else if (fit.mean_chi2 > kChanceChi2 && fit.inliers < kChanceShare * report->num_expected) {
     report->reason = "what matches the map may do so by chance";

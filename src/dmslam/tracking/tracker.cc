@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/camera/image_cells.h"
 #include "dmslam/dynamics/proven.h"
 #include "dmslam/util/random.h"
 
@@ -14,21 +15,18 @@ constexpr int64_t kConfirmNs = 500'000'000;    // so long a place must predict w
 constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
 constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
 constexpr int64_t kDoubtNs = 1'000'000'000;    // so long what may be no part of the room leads on
-constexpr double kTurnKnownS = 5.0;            // so long a lost camera is looked for where it was...
-constexpr double kTurnReachRad = 0.06;         // ...turned by so much...
-constexpr double kTurnRadPerS = 0.3;           // ...and more with time...
-constexpr double kMostTurnRad = 0.3;           // ...up to this
-constexpr int kWideCells = 24;                 // half of the image's cells hold what is found...
-constexpr double kWholeShare = 0.3;            // ...and it is so much of what the place should show
-constexpr double kThinShare = 0.25;            // a pose that finds less of what it should see is thin...
-constexpr double kBesideRad = 0.1;    // ...and compared with one beside it, turned by up to so much...
-constexpr double kClearlyMore = 1.3;  // ...which must find so many times as much
-constexpr int kOldToCompare = 60;  // landmarks older than people stand that should be seen: fewer say nothing
-constexpr int kSomeProven = 8;     // proven landmarks that must be seen where a place is confirmed by time
+constexpr double kTurnReachRad = 0.06;  // a lost camera is looked for where it was, turned by so much...
+constexpr double kTurnRadPerS = 0.3;    // ...and more with time...
+constexpr double kMostTurnRad = 0.3;    // ...up to this
+constexpr double kWholeShare = 0.3;     // of what the place should show, where it is seen as a whole
+constexpr double kThinShare = 0.25;     // a pose that finds less of what it should see is thin...
+constexpr double kBesideRad = 0.1;      // ...and compared with one beside it, turned by up to so much...
+constexpr double kClearlyMore = 1.3;    // ...which must find so many times as much
+constexpr int kSomeProven = 8;  // proven landmarks that must be seen where a place is confirmed by time
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
-  return report.cells >= kWideCells && report.num_static >= kWholeShare * report.num_expected;
+  return report.cells >= kFillingCells && report.num_static >= kWholeShare * report.num_expected;
 }
 
 /// Whether one pose of a frame explains clearly more of it than another does: of all landmarks and of those
@@ -172,7 +170,7 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
   if (!T_last) return;
   const int64_t since_ns = frame->stamp_ns - *last_tracked_ns();
   const double since_s = static_cast<double>(since_ns) * 1e-9;
-  if (since_s > kTurnKnownS) return;
+  if (since_s > options_.motion.reach_known_s) return;
   const double reach_rad = std::min(kTurnReachRad + kTurnRadPerS * since_s, kMostTurnRad);
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   if (!search_.FromTurn(map, follower_.last(), *T_last, {.most_rad = reach_rad}, &found)) return;
@@ -192,7 +190,8 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
 /// landmarks reaches finds the same.
 void Tracker::FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* attempt) {
   const TrackingReport& now = attempt->report;
-  if (now.num_static >= kThinShare * now.num_expected || now.num_old_expected < kOldToCompare) return;
+  if (now.num_static >= kThinShare * now.num_expected || now.num_old_expected < TrackingReport::kEnoughOld)
+    return;
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   const PoseSearch::TurnRange beyond_search = {options_.local_radius_rad, kBesideRad};
   if (!second_search_.FromTurn(map, *frame, frame->T_cam_world, beyond_search, &found)) return;

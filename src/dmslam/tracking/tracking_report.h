@@ -7,13 +7,15 @@ namespace dmslam {
 
 /// What tracking one frame against the map came to.
 struct TrackingReport {
+  static constexpr int kEnoughOld = 60;
+
   bool ok = false;
   bool doubtful = false;     ///< it is, but what it sees may be no part of the room
   const char* reason = "";   ///< why not, or why it is doubtful
   bool by_rival = false;     ///< by a wider motion than that of the frames before
   bool contradicts = false;  ///< what looks like the map lies elsewhere than it says; else it is not seen
   int num_expected = 0;      ///< landmarks of the map around that it should see
-  int num_old_expected = 0;  ///< of them, older than people stand...
+  int num_old_expected = 0;  ///< of them, older than people stand: fewer than kEnoughOld say nothing...
   int num_old = 0;           ///< ...and matched
   int num_static = 0;        ///< inliers
   int num_moving = 0;

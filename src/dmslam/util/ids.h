@@ -35,6 +35,7 @@ struct KeyframeId {
 struct LandmarkId {
   uint64_t value = 0;
 
+  static constexpr uint16_t kLastOrdinal = 0xffff;
   static constexpr LandmarkId Make(uint16_t epoch_ordinal, uint64_t number) {
     return LandmarkId{(static_cast<uint64_t>(epoch_ordinal) << 48) | number};
   }

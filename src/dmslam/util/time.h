@@ -12,6 +12,9 @@ inline double SecondsFromTo(int64_t from_ns, int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
 }
 
+/// In whole nanoseconds, towards zero.
+constexpr int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
+
 /// Parses decimal seconds ("1305031102.175304") into nanoseconds exactly, never through floating point. Up to
 /// nine decimals; more are refused unless they are zeros. No sign but a leading '-', no exponent, no white
 /// space.

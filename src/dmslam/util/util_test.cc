@@ -51,6 +51,13 @@ TEST(Time, FormatIsInverseOfParse) {
   EXPECT_EQ(FormatStampNs(1305031102175304000), "1305031102.175304");
 }
 
+TEST(Time, SecondsBecomeWholeNanosecondsTowardsZero) {
+  EXPECT_EQ(ToNs(1.5), 1'500'000'000);
+  EXPECT_EQ(ToNs(-0.25), -250'000'000);
+  EXPECT_EQ(ToNs(1.9e-9), 1);
+  EXPECT_EQ(ToNs(-1.9e-9), -1);
+}
+
 TEST(Crc32c, KnownVectors) {
   EXPECT_EQ(Crc32c(Bytes("123456789")), 0xe3069283u);
   EXPECT_EQ(Crc32c(Bytes("56789"), Crc32c(Bytes("1234"))), 0xe3069283u);

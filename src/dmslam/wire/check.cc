@@ -21,8 +21,8 @@ void Checker::Pose(const Rigid3d& T, const char* what) {
 void Checker::Scale(double scale, const char* what) { Require(scale >= 1e-12 && scale <= 1e12, what); }
 
 void Checker::CameraModel(const Camera& camera) {
-  Require(camera.width_px >= 1 && camera.width_px <= kMaxImageSide && camera.height_px >= 1 &&
-              camera.height_px <= kMaxImageSide,
+  Require(camera.width_px >= 1 && camera.width_px <= kMaxImageSidePx && camera.height_px >= 1 &&
+              camera.height_px <= kMaxImageSidePx,
           "image size of the camera out of range");
   for (const double value : {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.k1, camera.k2,
                              camera.p1, camera.p2, camera.k3, camera.k4, camera.fps}) {

@@ -68,7 +68,6 @@ std::string CleanText(std::string_view text);
 
 /// Largest coordinate of a pose or a point [map units].
 inline constexpr double kMaxCoordinate = 1e12;
-inline constexpr int kMaxImageSide = 4096;
 inline constexpr int kMaxPyramidLevels = 32;
 inline constexpr size_t kMaxFeatures = 65535;
 

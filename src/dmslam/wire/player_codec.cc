@@ -61,9 +61,9 @@ struct Codec<Frame> {
     check.Session(m.session);
     check.CameraNumber(m.camera_id);
     check.Stamp(m.stamp_ns);
-    check.Require(
-        m.width_px >= 0 && m.width_px <= kMaxImageSide && m.height_px >= 0 && m.height_px <= kMaxImageSide,
-        "image size out of range");
+    check.Require(m.width_px >= 0 && m.width_px <= kMaxImageSidePx && m.height_px >= 0 &&
+                      m.height_px <= kMaxImageSidePx,
+                  "image size out of range");
     check.Require(!m.data.empty(), "no image");
     size_t channels = 0;
     if (m.encoding == FrameEncoding::kGray8) channels = 1;

@@ -19,8 +19,8 @@ void MakeSound(std::optional<int64_t>& number) {
 }
 
 void MakeSound(Camera& camera, Random& random) {
-  camera.width_px = 1 + static_cast<int>(random.Below(4096));
-  camera.height_px = 1 + static_cast<int>(random.Below(4096));
+  camera.width_px = 1 + static_cast<int>(random.Below(kMaxImageSidePx));
+  camera.height_px = 1 + static_cast<int>(random.Below(kMaxImageSidePx));
   camera.fx_px = random.Uniform(1, 4000);
   camera.fy_px = random.Uniform(1, 4000);
   camera.fps = random.Uniform(1, 200);
