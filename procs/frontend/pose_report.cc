@@ -40,7 +40,7 @@ Odometry PoseReport::OdometryOf(const OdometryState& odometry, const FrameTrace&
   told.frame_index = trace.frame_index;
   told.stamp_ns = trace.stamp_ns;
   told.state = last_.state;
-  told.segment = odometry.segment;
+  told.segment = odometry.segment.value_or(0);
   told.measured = odometry.measured;
   told.T_odom_cam = odometry.T_odom_cam;
   told.has_velocity = odometry.velocity.has_value();

@@ -35,8 +35,10 @@ struct CandidateMap {
   std::vector<uint8_t> use;             ///< points that stand
   std::vector<Placed> placed;           ///< the last view first
   double cost = 1;                      ///< mean truncated squared error over all views
-  double rival_ratio = 1e9;             ///< what the next best motion costs, in units of this one's cost
+  /// What the next best motion costs, in units of this one's cost; none: there is no other.
+  std::optional<double> rival_ratio;
 
+  bool HasRivalBelow(double ratio) const { return rival_ratio && *rival_ratio < ratio; }
   const ReferenceView& last() const { return *placed.front().view; }
   const Rigid3d& T_last_0() const { return placed.front().T_k_0; }
   int NumPoints() const;

@@ -456,7 +456,8 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(ReferenceWindow* wind
   const CandidateMap& best = *race.best;
   window->hypotheses = {best};
   if (race.runner_up) window->hypotheses.push_back(*race.runner_up);
-  if (best.rival_ratio >= options_.testimony.min_rival_ratio && best.cost <= options_.motion.max_cost_alone &&
+  if (!best.HasRivalBelow(options_.testimony.min_rival_ratio) &&
+      best.cost <= options_.motion.max_cost_alone &&
       builder_.DirectionSigma(best) <= options_.geometry.max_direction_sigma_rad) {
     window->claims.push_back({&best.last(), best.T_last_0()});
   }

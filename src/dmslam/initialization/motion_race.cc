@@ -66,14 +66,14 @@ MotionRace MotionSearch::Run(const std::deque<ReferenceWindow>& windows, const R
 }
 
 bool IsAlone(const CandidateMap& candidate, const PairMotionOptions& options) {
-  return candidate.rival_ratio >= options.alone_runner_up_cost;
+  return !candidate.HasRivalBelow(options.alone_runner_up_cost);
 }
 
 std::optional<CandidateMap> MotionSearch::WinnerOf(const MotionRace& race, Refused* refused) const {
   const PairMotionOptions& asked = options_.motion;
   const std::optional<CandidateMap>& best = race.best;
   if (!best) return std::nullopt;
-  if (best->rival_ratio < asked.min_runner_up_cost) {
+  if (best->HasRivalBelow(asked.min_runner_up_cost)) {
     *refused = {WaitReason::kNoReconstruction, "two motions explain the views about equally well"};
     return std::nullopt;
   }

@@ -25,13 +25,15 @@ std::deque<ReferenceWindow>::iterator ReferenceWindows::Lose(std::deque<Referenc
 }
 
 void ReferenceWindows::BeginIfDue(const InitializerFrame& frame) {
-  const auto age = [&](const auto& last) { return last == windows_.rend() ? 1e9 : last->AgeAt(frame); };
+  const auto has_passed_since = [&](const auto& last, double seconds) {
+    return last == windows_.rend() || last->AgeAt(frame) >= seconds;
+  };
   const auto newest = windows_.rbegin();
   const auto newest_kept =
       std::find_if(newest, windows_.rend(), [](const ReferenceWindow& window) { return !window.brief; });
-  if (age(newest_kept) >= options_.step_s && MakeRoom()) {
+  if (has_passed_since(newest_kept, options_.step_s) && MakeRoom()) {
     Begin(frame);
-  } else if (BriefOnesHelp(frame) && age(newest) >= options_.brief_step_s) {
+  } else if (BriefOnesHelp(frame) && has_passed_since(newest, options_.brief_step_s)) {
     Begin(frame);
     windows_.back().brief = true;
   }

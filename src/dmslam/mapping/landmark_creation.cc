@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/features/hamming.h"
@@ -119,25 +120,26 @@ class PartnerSearch {
         near_(sorted_b_.size()),
         distances_(sorted_b_.size()) {}
 
-  /// The feature of b; -1: none.
-  int Best(const PlaneEntry& entry) {
+  /// The feature of b; none: no one fits, or several do.
+  std::optional<uint16_t> Best(const PlaneEntry& entry) {
     const size_t count = KeepFitting(entry, CollectNear(entry));
     const auto& set_b = pair_.b.features->set;
     hamming_.to_indexed(pair_.a.features->set.descriptors[entry.feature], set_b.descriptors.data(),
                         near_.data(), static_cast<int>(count), distances_.data());
-    int best = kNoDistance, second = kNoDistance, best_feature = -1;
+    int best = kNoDistance, second = kNoDistance;
+    std::optional<uint16_t> best_feature;
     for (size_t k = 0; k < count; ++k) {
       const int distance = distances_[k];
       if (distance < best) {
         second = best;
         best = distance;
-        best_feature = static_cast<int>(near_[k]);
+        best_feature = static_cast<uint16_t>(near_[k]);
       } else if (distance < second) {
         second = distance;
       }
     }
     const bool unambiguous = best < pair_.options.descriptor_ratio * second;
-    return best <= pair_.options.max_descriptor_distance && unambiguous ? best_feature : -1;
+    return best <= pair_.options.max_descriptor_distance && unambiguous ? best_feature : std::nullopt;
   }
 
  private:
@@ -296,12 +298,12 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
   const std::vector<PlaneEntry> entries_a = PlaneEntries(a, use_a, pencil, map);
   const PairGeometry pair{a, b, map, options};
   PartnerSearch search(pair, SortedWithWrap(PlaneEntries(b, use_b, pencil, map), 0.5));
-  std::vector<int> partner_of_b(b.features->size(), -1);
+  std::vector<std::optional<uint16_t>> partner_of_b(b.features->size());
   std::vector<int> distance_of_b(b.features->size(), kNoDistance);
   for (const PlaneEntry& entry : entries_a) {
-    const int partner = search.Best(entry);
-    if (partner < 0) continue;
-    const size_t index = static_cast<size_t>(partner);
+    const std::optional<uint16_t> partner = search.Best(entry);
+    if (!partner) continue;
+    const size_t index = *partner;
     const int distance =
         HammingDistance(a.features->set.descriptors[entry.feature], b.features->set.descriptors[index]);
     if (distance < distance_of_b[index]) {
@@ -311,8 +313,7 @@ std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
   }
   std::vector<std::pair<uint16_t, uint16_t>> matches;
   for (size_t i = 0; i < partner_of_b.size(); ++i) {
-    if (partner_of_b[i] >= 0)
-      matches.emplace_back(static_cast<uint16_t>(partner_of_b[i]), static_cast<uint16_t>(i));
+    if (partner_of_b[i]) matches.emplace_back(*partner_of_b[i], static_cast<uint16_t>(i));
   }
   std::sort(matches.begin(), matches.end());
   return matches;

@@ -80,7 +80,7 @@ void LatePlacement::LeaveNeighbour() {
 
 void LatePlacement::OnMapChanged(const Map& map) {
   if (!follower_) return;
-  const bool follows = growing_ && last_ && last_->index == follower_->last().index;
+  const bool follows = last_ && last_->index == follower_->last().index;
   const std::optional<Rigid3d> T_cam_world = follows ? last_->pose.In(map) : std::nullopt;
   if (!T_cam_world) return LeaveNeighbour();
   const Keyframe* keyframe = map.FindKeyframe(KeyframeId::Make(session_, last_->index, camera_id_));
@@ -90,11 +90,13 @@ void LatePlacement::OnMapChanged(const Map& map) {
 }
 
 /// Where the frame placed last is too far: the next keyframe.
-void LatePlacement::FindNeighbour(const Map& map, const TrackedFrame& frame) {
-  const int64_t after_ns = follower_ ? follower_->last().stamp_ns - frame.stamp_ns : -1;
-  if (after_ns >= 0 && after_ns <= kNearNs) return;
+void LatePlacement::FindNeighbour(const Map& map, LateMap late_map, const TrackedFrame& frame) {
+  if (follower_) {
+    const int64_t after_ns = follower_->last().stamp_ns - frame.stamp_ns;
+    if (after_ns >= 0 && after_ns <= kNearNs) return;
+  }
   LeaveNeighbour();
-  const uint32_t from = growing_ ? frame.index + 1 : frame.index;
+  const uint32_t from = late_map == LateMap::kGrows ? frame.index + 1 : frame.index;
   const auto next = map.keyframes().lower_bound(KeyframeId::Make(session_, from, camera_id_));
   if (next == map.keyframes().end() || next->first.camera() != camera_id_) return;
   follower_.emplace(options_);
@@ -146,9 +148,9 @@ void LatePlacement::Coast(const Map& map, const FoundPose& weak_pose, const Trac
     weak_.push_back({.frame = frame, .report = report, .pose = *pose});
 }
 
-LatePlacement::Found LatePlacement::Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer,
-                                          TrackedFrame* frame) {
-  FindNeighbour(map, *frame);
+LatePlacement::Found LatePlacement::Place(const Map& map, LateMap late_map, PoseSearch* search,
+                                          const Relocalizer& relocalizer, TrackedFrame* frame) {
+  FindNeighbour(map, late_map, *frame);
   Found found{TrackBackwards(map, search, frame)};
   if (found.report.ok) return found;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
@@ -167,14 +169,15 @@ bool LatePlacement::LeadsTo(const Map& map, const std::optional<Before>& before)
                                                    Backwards(before->index, before->stamp_ns));
 }
 
-std::vector<LatePlacement::Placed> LatePlacement::GoOnFrom(const Map& map, const PoseSearch& search,
-                                                           Placed placed,
+std::vector<LatePlacement::Placed> LatePlacement::GoOnFrom(const Map& map, LateMap late_map,
+                                                           const PoseSearch& search, Placed placed,
                                                            const std::optional<Before>& before) {
   if (placed.jumped) weak_.clear();
   if (!follower_) follower_.emplace(options_);
   const FrameTime time = Backwards(placed.frame.index, placed.frame.stamp_ns);
   follower_->OnTracked(map, placed.pose, search.found(placed.frame), time, placed.frame, placed.jumped);
-  last_ = Last{placed.frame.index, placed.pose};
+  last_.reset();
+  if (late_map == LateMap::kGrows) last_ = Last{placed.frame.index, placed.pose};
   const bool believed = placed.jumped || IsWellSeen(placed.report) || LeadsTo(map, before);
   placed.confirmed = CountProven(map, placed.frame.landmarks, {}) >= kManyProven;
   weak_.push_back(std::move(placed));

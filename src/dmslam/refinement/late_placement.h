@@ -25,17 +25,16 @@ bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& 
 /// ended is believed for itself, and may become a keyframe.
 bool IsWellSeen(const TrackingReport& report);
 
+/// Whether frames that are placed late may become keyframes.
+enum class LateMap : uint8_t { kGrows, kStands };
+
 /// Places frames when the sequence has ended, the newest first: each from the placed frame that follows it
-/// and its motion, or else like a lost camera. The map may grow meanwhile by frames that become keyframes.
+/// and its motion, or else like a lost camera. While the map grows the neighbour is a later frame, that may
+/// move with the map; where it stands it can also be the keyframe that was made of the frame itself.
 class LatePlacement {
  public:
   LatePlacement(uint32_t session, CameraId camera_id, uint64_t seed, const TrackingOptions& options)
       : session_(session), camera_id_(camera_id), seed_(seed), options_(options) {}
-
-  /// While the map grows the neighbour is a later frame, that may move with the map; afterwards it can also
-  /// be the keyframe that was made of the frame itself.
-  void SetGrowing(bool growing) { growing_ = growing; }
-  bool IsGrowing() const { return growing_; }
 
   struct Found {
     TrackingReport report;
@@ -43,7 +42,8 @@ class LatePlacement {
   };
   /// Finds the frame's pose; the report is not ok where it is not believed. `search` and `relocalizer`: of
   /// the frontend.
-  Found Place(const Map& map, PoseSearch* search, const Relocalizer& relocalizer, TrackedFrame* frame);
+  Found Place(const Map& map, LateMap late_map, PoseSearch* search, const Relocalizer& relocalizer,
+              TrackedFrame* frame);
   /// A frame with its pose.
   struct Placed {
     TrackedFrame frame;
@@ -62,17 +62,17 @@ class LatePlacement {
   /// this frame, and those after it that see too little to be believed for themselves. They are when the
   /// motion has led through them to a frame that is well seen, or to `before`, the frame just before this one
   /// if that was tracked. Else it may drift away.
-  std::vector<Placed> GoOnFrom(const Map& map, const PoseSearch& search, Placed placed,
+  std::vector<Placed> GoOnFrom(const Map& map, LateMap late_map, const PoseSearch& search, Placed placed,
                                const std::optional<Before>& before);
 
   /// The neighbour may lie elsewhere now; where it became a keyframe that knows more. Any but the frame
-  /// placed last is forgotten.
+  /// that was placed last while the map grows is forgotten.
   void OnMapChanged(const Map& map);
   void Forget();
 
  private:
   void LeaveNeighbour();
-  void FindNeighbour(const Map& map, const TrackedFrame& frame);
+  void FindNeighbour(const Map& map, LateMap late_map, const TrackedFrame& frame);
   bool IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const;
   bool LeadsTo(const Map& map, const std::optional<Before>& before) const;
   TrackingReport FindBeside(const Map& map, PoseSearch* search, TrackedFrame* frame) const;
@@ -84,9 +84,8 @@ class LatePlacement {
   CameraId camera_id_;
   uint64_t seed_;
   TrackingOptions options_;
-  bool growing_ = false;
   std::optional<MotionFollower> follower_;  ///< backwards, from the placed frame or keyframe that follows
-  /// Of the frame placed last.
+  /// Of the frame placed last, while the map grows.
   struct Last {
     uint32_t index = 0;
     PlacedPose pose;

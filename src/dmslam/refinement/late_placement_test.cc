@@ -80,7 +80,6 @@ class GrowingBack : public ::testing::Test {
   GrowingBack() : relocalizer_(nullptr), search_({}, TestCamera()), placement_(MapScene::kSession, 0, 0, {}) {
     scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
     scene_.MapAll(1, 0.0, kFirst, kFirst * kFrameNs);
-    placement_.SetGrowing(true);
   }
 
   TrackedFrame Frame(uint32_t index, double x, const MapScene::Place& place = {}) const {
@@ -89,14 +88,15 @@ class GrowingBack : public ::testing::Test {
     return frame;
   }
   TrackingReport Place(TrackedFrame* frame) {
-    const LatePlacement::Found found = placement_.Place(scene_.map(), &search_, relocalizer_, frame);
+    const LatePlacement::Found found =
+        placement_.Place(scene_.map(), late_map_, &search_, relocalizer_, frame);
     jumped_ = found.jumped;
     return found.report;
   }
   std::vector<LatePlacement::Placed> GoOnFrom(const TrackedFrame& frame, const TrackingReport& report,
                                               const std::optional<LatePlacement::Before>& before = {}) {
     const PlacedPose pose = *PlacedPose::Of(search_.Reference(scene_.map()), frame.T_cam_world);
-    return placement_.GoOnFrom(scene_.map(), search_, {frame, report, pose, jumped_}, before);
+    return placement_.GoOnFrom(scene_.map(), late_map_, search_, {frame, report, pose, jumped_}, before);
   }
   static LatePlacement::Before Tracked(uint32_t index, double x) {
     return {index, index * kFrameNs, MapScene::PoseAt(x)};
@@ -127,6 +127,7 @@ class GrowingBack : public ::testing::Test {
     return [this](size_t i) { return i % 10 == 0 ? std::optional(scene_.point(i)) : std::nullopt; };
   }
 
+  LateMap late_map_ = LateMap::kGrows;
   MapScene scene_;
   Relocalizer relocalizer_;
   PoseSearch search_;
@@ -178,6 +179,18 @@ TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
   EXPECT_LT((next.T_cam_world.Center() - Eigen::Vector3d(2.96, 0, 0)).norm(), 3e-3);
 }
 
+TEST_F(GrowingBack, WhereTheMapStandsAChangeOfItEndsTheWayThatLedThroughFrames) {
+  for (const LateMap late_map : {LateMap::kGrows, LateMap::kStands}) {
+    placement_.Forget();
+    late_map_ = late_map;
+    EXPECT_EQ(Told(19, -0.02), std::vector<uint32_t>{19});
+    EXPECT_EQ(Told(18, -0.04, Few()), std::vector<uint32_t>{});
+    placement_.OnMapChanged(scene_.map());
+    const bool leads_on = late_map == LateMap::kGrows;
+    EXPECT_EQ(Told(17, -0.06), leads_on ? (std::vector<uint32_t>{18, 17}) : std::vector<uint32_t>{17});
+  }
+}
+
 TEST_F(GrowingBack, WhatIsSeenInACornerIsToldBetweenWhatIsWellSeen) {
   EXPECT_EQ(Told(19, -0.02), std::vector<uint32_t>{19});
   EXPECT_EQ(Told(18, -0.04), std::vector<uint32_t>{18});
@@ -210,12 +223,12 @@ TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
     Relocalizer relocalizer(nullptr);
     PoseSearch search({}, TestCamera());
     LatePlacement placement(MapScene::kSession, 0, 0, {});
-    placement.SetGrowing(true);
     TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(0));
-    const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &frame);
+    const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &frame);
     ASSERT_TRUE(report.ok) << report.reason;
     const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
-    const auto told = placement.GoOnFrom(scene.map(), search, {frame, report, pose, jumped}, std::nullopt);
+    const auto told =
+        placement.GoOnFrom(scene.map(), LateMap::kGrows, search, {frame, report, pose, jumped}, std::nullopt);
     ASSERT_EQ(told.size(), 1u);
     EXPECT_EQ(told.front().confirmed, keyframes == 280u);
   }
@@ -230,24 +243,23 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
   Relocalizer relocalizer(nullptr);
   PoseSearch search({}, TestCamera());
   LatePlacement placement(MapScene::kSession, 0, 0, {});
-  placement.SetGrowing(true);
   const auto see = [&](uint32_t index) {
     return scene.See(index, index * kFrameNs, MapScene::PoseAt(0.1 * (index - 20.0)));
   };
   for (const uint32_t index : {19u, 18u}) {
     TrackedFrame frame = see(index);
-    const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &frame);
+    const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &frame);
     ASSERT_TRUE(report.ok) << index << ": " << report.reason;
     const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
-    placement.GoOnFrom(scene.map(), search, {frame, report, pose, jumped}, std::nullopt);
+    placement.GoOnFrom(scene.map(), LateMap::kGrows, search, {frame, report, pose, jumped}, std::nullopt);
   }
   for (const uint32_t index : {17u, 16u, 15u}) {
     TrackedFrame dark(index, index * kFrameNs,
                       MakeFrameFeatures({}, scene.map().camera(), scene.map().pyramid()));
-    EXPECT_FALSE(placement.Place(scene.map(), &search, relocalizer, &dark).report.ok);
+    EXPECT_FALSE(placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &dark).report.ok);
   }
   TrackedFrame again = see(14);
-  const auto [report, jumped] = placement.Place(scene.map(), &search, relocalizer, &again);
+  const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &again);
   ASSERT_TRUE(report.ok) << report.reason;
   EXPECT_NEAR(again.T_cam_world.Center().x(), -0.6, 5e-3);
 }

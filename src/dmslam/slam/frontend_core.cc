@@ -74,7 +74,7 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   tracker_.OnMapChanged(map_);
   FollowJoinedMap();
   if (delta.event == MapEvent::kFirstMapRefused && delta.about) phase_.OnRefused(*delta.about);
-  if (delta.progress.settled) gate_.OnSettled(*delta.progress.settled, !late_.IsGrowing());
+  if (delta.progress.settled) gate_.OnSettled(*delta.progress.settled);
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
   if (delta.event == MapEvent::kMapAdjusted) last_poses_.Begin(map_, delta.map_id);
 }
@@ -265,7 +265,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
   odometry_.OnTracked(map_, {frame_.index, frame_.stamp_ns}, pose, frame_.T_cam_world, result.certainty,
                       !result.relocalized);
   FrontendOutput output;
-  ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &output);
+  ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &evidence_ns_, &output);
   FramePose told = MakePose(phase_.state(), report, pose);
   last_poses_.Keep(frame_, told);
   if (result.certainty) TellCertainty(*result.certainty, &told);
@@ -350,16 +350,14 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId refere
   return gate_.IsOpen();
 }
 
-/// Time runs backwards where the map grows back.
-bool FrontendCore::IsEvidenceDue() {
-  if (!evidence_ns_) evidence_ns_ = frame_.stamp_ns;
-  return std::abs(frame_.stamp_ns - *evidence_ns_) >= ToNs(options_.evidence_every_s);
-}
-
-/// What frames said of landmarks, from time to time and before each keyframe; and the keyframe.
-void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output) {
-  if (IsEvidenceDue() || keyframe) {
-    evidence_ns_ = frame_.stamp_ns;
+/// What frames said of landmarks, from time to time and before each keyframe; and the keyframe. `told_ns`:
+/// when the former was told last.
+void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, std::optional<int64_t>* told_ns,
+                                   FrontendOutput* output) {
+  const int64_t since_ns = std::abs(frame_.stamp_ns - told_ns->value_or(frame_.stamp_ns));
+  const bool due = since_ns >= ToNs(options_.evidence_every_s);
+  if (!*told_ns || due || keyframe) *told_ns = frame_.stamp_ns;
+  if (due || keyframe) {
     FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
     evidence.camera_id = camera_id_;
     if (!evidence.items.empty() && !localize_only_) output->Add(std::move(evidence));
@@ -394,9 +392,10 @@ KeyframeProposal FrontendCore::ProposeKeyframe(const PlacedPose& pose) {
 // ---- After the end ----
 
 /// The newest of the frames without a pose becomes the present one; with its pose if it was placed.
-std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced() {
+std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced(LateMap late_map) {
   frame_ = unplaced_.TakeNewest().ToTracked(camera_, pyramid_);
-  const LatePlacement::Found found = late_.Place(map_, &tracker_.search(), tracker_.relocalizer(), &frame_);
+  const LatePlacement::Found found =
+      late_.Place(map_, late_map, &tracker_.search(), tracker_.relocalizer(), &frame_);
   if (!found.report.ok) return std::nullopt;
   const auto pose = PlacedPose::Of(tracker_.search().Reference(map_), frame_.T_cam_world);
   if (!pose) return std::nullopt;
@@ -405,13 +404,12 @@ std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced() {
 
 std::optional<FrontendOutput> FrontendCore::GrowBack() {
   if (!options_.keyframes_at_end || localize_only_) return std::nullopt;
-  if (!late_.IsGrowing()) evidence_ns_.reset();
-  late_.SetGrowing(!unplaced_.empty() && !map_.keyframes().empty());
-  if (!late_.IsGrowing()) {
+  if (unplaced_.empty() || map_.keyframes().empty()) {
     unplaced_.ReturnSetAside();  // they are tried again in the adjusted map
+    late_.Forget();
     return std::nullopt;
   }
-  std::optional<LatePlacement::Placed> placed = PlaceNewestUnplaced();
+  std::optional<LatePlacement::Placed> placed = PlaceNewestUnplaced(LateMap::kGrows);
   if (!placed) {
     tracker_.search().judge().DropEvidence();
     unplaced_.SetAside(WaitingFrame(frame_));
@@ -423,18 +421,18 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
   const bool known = map_.ResolveKeyframe(ThisFrame()).has_value();
   const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(placed->report, reference);
   FrontendOutput output;
-  ReportLandmarks(placed->pose, wanted, &output);
-  KeepBelieved(*std::move(placed));
+  ReportLandmarks(placed->pose, wanted, &evidence_back_ns_, &output);
+  KeepBelieved(LateMap::kGrows, *std::move(placed));
   return output;
 }
 
 /// While the map grows, last poses come with those of the frames that were tracked, and a frame that is not
 /// believed yet is set aside.
-void FrontendCore::KeepBelieved(LatePlacement::Placed placed) {
+void FrontendCore::KeepBelieved(LateMap late_map, LatePlacement::Placed placed) {
   const MapId map_id = map_.FindKeyframe(placed.pose.reference)->map_id;
   const auto before = last_poses_.TrackedBefore(map_, map_id, frame_.index);
-  auto believed = late_.GoOnFrom(map_, tracker_.search(), std::move(placed), before);
-  const bool grows = late_.IsGrowing();
+  auto believed = late_.GoOnFrom(map_, late_map, tracker_.search(), std::move(placed), before);
+  const bool grows = late_map == LateMap::kGrows;
   if (believed.empty() && grows) unplaced_.SetAside(WaitingFrame(frame_));
   for (LatePlacement::Placed& told : believed) {
     frame_ = std::move(told.frame);
@@ -451,7 +449,7 @@ void FrontendCore::KeepBelieved(LatePlacement::Placed placed) {
 
 bool FrontendCore::WorkAtEnd() {
   if (unplaced_.empty()) return last_poses_.Improve(map_);
-  if (std::optional<LatePlacement::Placed> placed = PlaceNewestUnplaced()) KeepBelieved(*std::move(placed));
+  if (auto placed = PlaceNewestUnplaced(LateMap::kStands)) KeepBelieved(LateMap::kStands, *std::move(placed));
   return true;
 }
 

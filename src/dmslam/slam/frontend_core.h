@@ -125,15 +125,15 @@ class FrontendCore {
   bool IsSharedMap(MapId map_id) const;
   void FollowJoinedMap();
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
-  bool IsEvidenceDue();
-  void ReportLandmarks(const PlacedPose& pose, bool keyframe, FrontendOutput* output);
+  void ReportLandmarks(const PlacedPose& pose, bool keyframe, std::optional<int64_t>* told_ns,
+                       FrontendOutput* output);
   KeyframeId ThisFrame() const { return KeyframeId::Make(session_, frame_.index, camera_id_); }
   KeyframeProposal ProposeKeyframe(const PlacedPose& pose);
   FramePose NoPose(TrackingState state, std::string reason) const;
   FramePose MakePose(TrackingState state, const TrackingReport& report,
                      const std::optional<PlacedPose>& pose) const;
-  std::optional<LatePlacement::Placed> PlaceNewestUnplaced();
-  void KeepBelieved(LatePlacement::Placed placed);
+  std::optional<LatePlacement::Placed> PlaceNewestUnplaced(LateMap late_map);
+  void KeepBelieved(LateMap late_map, LatePlacement::Placed placed);
 
   // What is given
   FrontendOptions options_;
@@ -163,9 +163,10 @@ class FrontendCore {
   // Frames
   TrackedFrame frame_;
   UnplacedFrames unplaced_;
-  std::deque<WaitingFrame> behind_;      ///< since the first map's second keyframe, not tracked yet
-  std::optional<int64_t> evidence_ns_;   ///< when it was told last
-  std::optional<int64_t> lit_since_ns_;  ///< since when the frames of a lost camera show anything
+  std::deque<WaitingFrame> behind_;          ///< since the first map's second keyframe, not tracked yet
+  std::optional<int64_t> evidence_ns_;       ///< when it was told last...
+  std::optional<int64_t> evidence_back_ns_;  ///< ...while the map grows back, where time runs backwards
+  std::optional<int64_t> lit_since_ns_;      ///< since when the frames of a lost camera show anything
   FrontendCounters counters_;
 };
 

@@ -15,19 +15,21 @@ class KeyframeGate {
   void SetWithheld(bool withheld) { withheld_ = withheld; }
   bool IsOpen() const { return !withheld_ && !awaited_; }
   /// The keyframe whose settled record has not come.
-  std::optional<KeyframeId> awaited() const { return awaited_; }
-  /// Between the keyframe before, whichever of them is the older, and `stamp_ns`.
-  int64_t SinceNs(int64_t stamp_ns) const { return std::abs(stamp_ns - last_ns_); }
+  std::optional<KeyframeId> awaited() const { return awaited_ ? std::optional(awaited_->id) : std::nullopt; }
+  /// Between the keyframe before, whichever of them is the older, and `stamp_ns`; none: there was none
+  /// before.
+  std::optional<int64_t> SinceNs(int64_t stamp_ns) const {
+    return last_ns_ ? std::optional(std::abs(stamp_ns - *last_ns_)) : std::nullopt;
+  }
 
   void OnProposed(KeyframeId id, int64_t stamp_ns) {
-    awaited_ = id;
+    awaited_ = Awaited{id, !last_ns_ || stamp_ns >= *last_ns_};
     last_ns_ = stamp_ns;
   }
-  /// All work on keyframe `id` is done. `in_order`: and on all before it, as the keyframes of a camera come
-  /// in the order of their frames.
-  void OnSettled(KeyframeId id, bool in_order) {
-    if (!awaited_ || id.camera() != awaited_->camera()) return;
-    if (in_order ? id >= *awaited_ : id == *awaited_) awaited_.reset();
+  /// All work on keyframe `id` is done: and on all before it, where they come in the order of their frames.
+  void OnSettled(KeyframeId id) {
+    if (!awaited_ || id.camera() != awaited_->id.camera()) return;
+    if (awaited_->in_order ? id >= awaited_->id : id == awaited_->id) awaited_.reset();
   }
   /// The map whose keyframe was awaited is given up.
   void Open() { awaited_.reset(); }
@@ -35,8 +37,13 @@ class KeyframeGate {
   void ContinueAfter(int64_t stamp_ns) { last_ns_ = stamp_ns; }
 
  private:
-  std::optional<KeyframeId> awaited_;
-  int64_t last_ns_ = 0;
+  struct Awaited {
+    KeyframeId id;
+    bool in_order = true;  ///< behind the keyframe before; else the map grows back
+  };
+
+  std::optional<Awaited> awaited_;
+  std::optional<int64_t> last_ns_;  ///< of the keyframe proposed last
   bool withheld_ = false;
 };
 

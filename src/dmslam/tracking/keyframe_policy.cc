@@ -24,7 +24,7 @@ bool IsOfTwoKeyframes(const Map& map, MapId map_id) {
 bool WantsKeyframe(const KeyframeOptions& options, const KeyframeInputs& inputs) {
   if (inputs.num_static <= options.min_inliers) return false;
   const bool weak = inputs.num_static < kWeakShare * inputs.expected || inputs.num_static < kWeak;
-  const bool due = inputs.since_ns >= ToNs(options.min_interval_s) || weak;
+  const bool due = !inputs.since_ns || *inputs.since_ns >= ToNs(options.min_interval_s) || weak;
   return due && inputs.num_static < options.tracked_ratio * inputs.expected;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "dmslam/map/map.h"
 #include "dmslam/tracking/tracking_options.h"
@@ -9,9 +10,9 @@ namespace dmslam {
 
 /// What decides whether a tracked frame becomes a keyframe.
 struct KeyframeInputs {
-  int num_static = 0;    ///< landmarks of the map that the frame sees in their place
-  int expected = 0;      ///< landmarks of its reference keyframe that enough other keyframes see
-  int64_t since_ns = 0;  ///< between it and the keyframe before
+  int num_static = 0;               ///< landmarks of the map that the frame sees in their place
+  int expected = 0;                 ///< landmarks of its reference keyframe that enough other keyframes see
+  std::optional<int64_t> since_ns;  ///< between it and the keyframe before; none: there was none
 };
 
 /// Whether the frame sees so much less of the map than its reference keyframe did that the map should grow

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "dmslam/map/testing/map_scene.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
@@ -33,6 +34,16 @@ TEST(KeyframePolicyTest, AMapOfTwoKeyframesGrowsAlsoBesideALargerOne) {
   }
   EXPECT_EQ(ExpectedOf(map, map.At(KeyframeId::Make(MapScene::kSession, 101))), 150);
   EXPECT_EQ(ExpectedOf(map, map.At(KeyframeId::Make(MapScene::kSession, 3))), 200);
+}
+
+TEST(KeyframePolicyTest, TheFirstKeyframeOfACameraIsDueAtOnce) {
+  const KeyframeOptions options;
+  KeyframeInputs inputs{.num_static = 100, .expected = 150, .since_ns = std::nullopt};
+  EXPECT_TRUE(WantsKeyframe(options, inputs));
+  inputs.since_ns = 0;
+  EXPECT_FALSE(WantsKeyframe(options, inputs));
+  inputs.since_ns = ToNs(options.min_interval_s);
+  EXPECT_TRUE(WantsKeyframe(options, inputs));
 }
 
 }  // namespace

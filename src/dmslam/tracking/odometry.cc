@@ -43,7 +43,7 @@ bool Odometer::Continue(const Map& map, const FrameTime& time, const Rigid3d& T_
 
 /// Where the camera is held to be stays; the correction takes up what is not known of the way.
 void Odometer::BeginSegment(bool same_units) {
-  ++state_.segment;
+  state_.segment = state_.segment.value_or(0) + 1;
   state_.velocity.reset();
   if (!same_units) units_ = 1.0;
 }
@@ -70,7 +70,7 @@ void Odometer::OnTracked(const Map& map, const FrameTime& time, const PlacedPose
     units.head<3>() /= units_;
     state_.step->covariance = units.asDiagonal() * state_.step->covariance * units.asDiagonal();
   }
-  last_ = Last{pose, time, state_.T_odom_cam, state_.segment};
+  last_ = Last{pose, time, state_.T_odom_cam, *state_.segment};
   turned_from_.reset();
 }
 

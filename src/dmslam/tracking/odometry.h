@@ -13,9 +13,9 @@ namespace dmslam {
 /// Where the camera is for who controls its motion, in two frames (REP 105): `odom`, in which it never jumps
 /// and drifts, and where odom lies in the map, which changes with every correction of the map.
 struct OdometryState {
-  /// The unbroken way so far: counted from 1; 0: no motion was measured yet, and nothing below means
+  /// The unbroken way so far, counted from 1; none: no motion was measured yet, and nothing below means
   /// anything. What happened between two segments is not in odom, and their units of length may differ.
-  uint32_t segment = 0;
+  std::optional<uint32_t> segment;
   /// This frame was tracked; else the pose is carried on for a while and then held, or it turns.
   bool measured = false;
   Rigid3d T_odom_cam;             ///< lengths in units of the segment's map at its beginning

@@ -135,7 +135,7 @@ TEST_F(OdometerTest, ATurnThatIsMeasuredGoesOn) {
 
 TEST_F(OdometerTest, ATurnThatBeginsWhereNothingIsKnownIsASegmentOfItsOwn) {
   odometer_.Predict(Time(0));
-  EXPECT_EQ(state().segment, 0u);
+  EXPECT_FALSE(state().segment);
   odometer_.OnTurned(Time(0).stamp_ns, ExpSo3({0, 0.1, 0}));
   EXPECT_EQ(state().segment, 1u);
   odometer_.OnTurned(Time(0).stamp_ns, ExpSo3({0, 0.2, 0}));

@@ -39,7 +39,7 @@ void TurnFollower::MoveAnchor(const TrackedFrame& frame) {
   R_now_anchor_.setIdentity();
   anchor_ = frame.features;
   anchor_ns_ = frame.stamp_ns;
-  first_matches_ = 0;
+  first_matches_.reset();
 }
 
 /// The camera goes on turning as it did.
@@ -78,8 +78,9 @@ void TurnFollower::Follow(const TrackedFrame& frame) {
   R_now_anchor_ = R_1_0;
   newest_ns_ = frame.stamp_ns;
   proven_ = proven_ || SecondsFromTo(anchor_ns_, frame.stamp_ns) >= kProvenS;
-  if (first_matches_ == 0) first_matches_ = matches.size();
-  if (static_cast<double>(matches.size()) < kOverlap * static_cast<double>(first_matches_)) MoveAnchor(frame);
+  if (!first_matches_) first_matches_ = matches.size();
+  if (static_cast<double>(matches.size()) < kOverlap * static_cast<double>(*first_matches_))
+    MoveAnchor(frame);
 }
 
 }  // namespace dmslam

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dmslam/features/matcher.h"
@@ -40,7 +41,7 @@ class TurnFollower {
   FeatureMatcher matcher_;
   std::shared_ptr<const FrameFeatures> anchor_;  ///< the earlier picture; null: none yet
   int64_t anchor_ns_ = 0, begun_ns_ = 0, newest_ns_ = 0;
-  size_t first_matches_ = 0;  ///< of the anchor with the frame after it; 0: none came yet
+  std::optional<size_t> first_matches_;  ///< of the anchor with the frame after it; none: none came yet
   Eigen::Quaterniond R_anchor_begun_ = Eigen::Quaterniond::Identity();
   Eigen::Quaterniond R_now_anchor_ = Eigen::Quaterniond::Identity();
   Eigen::Vector3d rad_per_s_ = Eigen::Vector3d::Zero();
