@@ -82,8 +82,9 @@ std::optional<MotionFilter> MotionModel::MotionTo(const Map& map, const FoundPos
                                                   const FrameTime& time) const {
   const std::optional<Pose>& newest = Newest();
   const std::optional<Rigid3d> T_last_world = newest ? newest->pose.In(map) : std::nullopt;
-  if (!T_last_world) return std::nullopt;
-  const double depth = Depth(map);
+  const std::optional<double> known_depth = Depth(map);
+  if (!T_last_world || !known_depth) return std::nullopt;
+  const double depth = *known_depth;
   const MotionFilter::Since since = Since(map, *newest, time, depth);
   if (since.duration_s <= 0) return motion_;
   if (motion_ && IsWithin(newest->time, time, kKnownNs)) {
@@ -103,24 +104,26 @@ bool MotionModel::IsWithin(const FrameTime& newest, const FrameTime& time, int64
   return time.index - newest.index == 1 || time.stamp_ns - newest.stamp_ns <= limit_ns;
 }
 
-/// Of the scene, as the keyframe seen last has it.
-double MotionModel::Depth(const Map& map) const {
-  const Keyframe* reference = last_ ? map.FindKeyframe(last_->pose.reference) : nullptr;
-  return reference != nullptr ? map.MedianDepth(*reference).value_or(1.0) : 1.0;
+/// Of the scene, as the keyframe seen last has it, or, where that was culled, the one that stands for it.
+/// None where there is no such keyframe, or it sees nothing.
+std::optional<double> MotionModel::Depth(const Map& map) const {
+  const std::optional<KeyframeId> seen = last_ ? map.ResolveKeyframe(last_->pose.reference) : std::nullopt;
+  return seen ? map.MedianDepth(map.At(*seen)) : std::nullopt;
 }
 
 MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time) const {
   return Predict(map, time, Depth(map));
 }
 
-MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time, double depth) const {
+MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time,
+                                             std::optional<double> depth) const {
   Prediction prediction;
   const std::optional<Pose>& newest = Newest();
   if (!newest) return prediction;
   prediction.recent = time.stamp_ns - last_->time.stamp_ns < kRecentNs;
   prediction.T_cam_world = newest->pose.In(map);
-  if (!prediction.T_cam_world || !motion_) return prediction;
-  const MotionFilter::Expected expected = motion_->Predict(Since(map, *newest, time, depth));
+  if (!prediction.T_cam_world || !motion_ || !depth) return prediction;
+  const MotionFilter::Expected expected = motion_->Predict(Since(map, *newest, time, *depth));
   prediction.T_cam_world =
       Rigid3d(ExpSo3(expected.step.head<3>()), expected.step.tail<3>()) * *prediction.T_cam_world;
   if (!IsWithin(newest->time, time, kKnownNs)) return prediction;
@@ -132,12 +135,12 @@ bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const 
   if (!last_) return true;
   if (time.stamp_ns - last_->time.stamp_ns > ToNs(options_.reach_known_s)) return true;
   const Pose& newest = *Newest();
-  const double depth = Depth(map);
+  const std::optional<double> depth = Depth(map);
   const Prediction prediction = Predict(map, time, depth);
-  if (!prediction.T_cam_world) return true;
+  if (!prediction.T_cam_world || !depth) return true;
   const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *newest.pose.In(map);
   const double turned_rad = AngleBetween(T_cam_world.rotation, from.rotation);
-  const double moved = (T_cam_world.Center() - from.Center()).norm() / depth;
+  const double moved = (T_cam_world.Center() - from.Center()).norm() / *depth;
   const double since_s = std::max(1.0 / kStepsPerSecond, SecondsFromTo(newest.time.stamp_ns, time.stamp_ns));
   if (prediction.prior) {
     const double steps = std::max(1.0, std::round(since_s * kStepsPerSecond));

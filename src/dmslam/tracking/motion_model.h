@@ -98,13 +98,13 @@ class MotionModel {
   };
   /// Coasted ones included.
   const std::optional<Pose>& Newest() const { return coasting_ ? coasting_ : last_; }
-  // `depth`: of the scene (Depth), worked out once.
-  Prediction Predict(const Map& map, const FrameTime& time, double depth) const;
+  // `depth`: of the scene (Depth), worked out once. Where it is not known, neither is the motion.
+  Prediction Predict(const Map& map, const FrameTime& time, std::optional<double> depth) const;
   MotionFilter::Since Since(const Map& map, const Pose& newest, const FrameTime& time, double depth) const;
   std::optional<MotionFilter> MotionTo(const Map& map, const FoundPose& found, const FrameTime& time) const;
   static Matrix6d Floored(const Matrix6d& covariance, double depth);
   static bool IsWithin(const FrameTime& newest, const FrameTime& time, int64_t limit_ns);
-  double Depth(const Map& map) const;
+  std::optional<double> Depth(const Map& map) const;
 
   MotionModelOptions options_;
   std::optional<Pose> last_;

@@ -64,6 +64,34 @@ TEST_F(MotionModelTest, WhereNothingIsKnownOfTheReferenceThereIsNoPose) {
   EXPECT_TRUE(model_.IsReachable(map(), MapScene::PoseAt(50), Time(2))) << "nothing contradicts it";
 }
 
+TEST_F(MotionModelTest, WhereTheReferenceIsCulledTheSceneIsAsDeepAsBefore) {
+  const auto track = [&](double x, const FrameTime& time) {
+    const PlacedPose pose = PlacedPose::Of(map().At(Kf(2)), MapScene::PoseAt(x));
+    model_.OnTracked(map(), pose, {MapScene::PoseAt(x), Matrix6d::Zero()}, time, false);
+  };
+  track(kStep, Time(1));
+  track(2 * kStep, Time(2));
+  const Matrix6d before = model_.Predict(map(), Time(3)).prior.value().information;
+  const Rigid3d beside = MapScene::PoseAt(3 * kStep + 0.1);
+  ASSERT_TRUE(model_.IsReachable(map(), beside, Time(3)));
+  map().RemoveKeyframe(map().At(Kf(2)));
+  const MotionModel::Prediction after = model_.Predict(map(), Time(3));
+  ASSERT_TRUE(after.prior);
+  EXPECT_LT((after.prior->information - before).norm(), 1e-9 * before.norm());
+  EXPECT_TRUE(model_.IsReachable(map(), beside, Time(3))) << "a fortieth of the depth beside the way";
+}
+
+TEST_F(MotionModelTest, WhereTheDepthIsNotKnownNothingFollowsButTheNewestPose) {
+  Track(kStep, Time(1));
+  Track(2 * kStep, Time(2));
+  for (const Landmark* landmark : map().LandmarksOf(MapScene::kMap)) map().RemoveLandmark(*landmark);
+  EXPECT_NEAR(PredictedX(Time(3)), 2 * kStep, 1e-9);
+  EXPECT_FALSE(model_.Predict(map(), Time(3)).prior);
+  EXPECT_TRUE(model_.IsReachable(map(), MapScene::PoseAt(3), Time(3)));
+  Track(3 * kStep, Time(3));
+  EXPECT_FALSE(model_.Predict(map(), Time(4)).prior);
+}
+
 TEST(MotionPrior, IsAsWideAsItsOptionsSay) {
   MotionModelOptions options;
   options.prior_rotation_rad = 0.02;
