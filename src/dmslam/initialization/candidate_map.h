@@ -36,7 +36,7 @@ struct CandidateMap {
   std::vector<Placed> placed;           ///< the last view first
   double cost = 1;                      ///< mean truncated squared error over all views
   /// What the next best motion costs, in units of this one's cost; none: there is no other.
-  std::optional<double> rival_ratio;
+  std::optional<double> rival_ratio = std::nullopt;
 
   bool HasRivalBelow(double ratio) const { return rival_ratio && *rival_ratio < ratio; }
   const ReferenceView& last() const { return *placed.front().view; }
