@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numeric>
 #include <utility>
 
-#include "dmslam/camera/image_scale.h"
 #include "dmslam/geometry/absolute_pose.h"
 #include "dmslam/geometry/triangulation.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
@@ -344,70 +342,16 @@ std::vector<FirstMap::View> ViewsBetween(const CandidateMap& candidate, std::spa
   return views;
 }
 
-/// Whether most of a candidate's matches around a place have a point: somebody's features do not.
-bool IsAmongPoints(const CandidateMap& candidate, const Eigen::Vector2d& uv0_px, double radius_px) {
-  const std::vector<Match>& matches = candidate.last().pair.matches;
-  int with = 0, without = 0;
-  for (size_t k = 0; k < matches.size(); ++k) {
-    if ((matches[k].uv0_px - uv0_px).cwiseAbs().maxCoeff() > radius_px) continue;
-    ++(candidate.use[k] ? with : without);
-  }
-  return with > without;
-}
-
 }  // namespace
 
-/// A candidate with all matches of its views.
-struct CandidateBuilder::Filled {
-  std::vector<ReferenceView> views;
-  CandidateMap map;
-  std::vector<uint8_t> is_static;
-};
-
-CandidateBuilder::Filled CandidateBuilder::FillIn(const CandidateMap& candidate,
-                                                  std::span<const uint8_t> is_static) const {
-  Filled filled;
-  filled.map.placed = candidate.placed;
-  filled.views.reserve(candidate.placed.size());
-  for (CandidateMap::Placed& placed : filled.map.placed) {
-    ReferenceView& view = filled.views.emplace_back();
-    view.frame = placed.view->frame;
-    std::ranges::merge(placed.view->pair.matches, placed.view->left_out,
-                       std::back_inserter(view.pair.matches), {}, &Match::index0, &Match::index0);
-    placed.view = &view;
-  }
-  const std::vector<Match>&had = candidate.last().pair.matches, &has = filled.map.last().pair.matches;
-  filled.map.points.resize(has.size());
-  filled.map.use.assign(has.size(), 0);
-  filled.is_static.assign(has.size(), 0);
-  std::vector<uint8_t> is_new(has.size(), 0);
-  const double radius_px = options_.spread_cell_share * DiagonalPx(camera_);
-  for (size_t k = 0, i = 0; k < has.size(); ++k) {
-    if (i == had.size() || has[k].index0 != had[i].index0) {
-      is_new[k] = IsAmongPoints(candidate, has[k].uv0_px, radius_px) ? 1 : 0;
-      continue;
-    }
-    filled.map.points[k] = candidate.points[i];
-    filled.map.use[k] = candidate.use[i];
-    filled.is_static[k] = is_static[i++];
-  }
-  AddMissing(is_new, &filled.map);
-  for (size_t k = 0; k < has.size(); ++k) {
-    if (is_new[k]) filled.is_static[k] = filled.map.use[k];
-  }
-  return filled;
-}
-
-FirstMap CandidateBuilder::MakeMap(const InitializerFrame& reference, const CandidateMap& searched,
-                                   std::span<const uint8_t> searched_static) const {
-  const Filled filled = FillIn(searched, searched_static);
-  const CandidateMap& candidate = filled.map;
+FirstMap CandidateBuilder::MakeMap(const InitializerFrame& reference, const CandidateMap& candidate,
+                                   std::span<const uint8_t> is_static) const {
   const ReferenceView& last = candidate.last();
   FirstMap map;
   map.frame0 = reference;
   map.frame1 = last.frame;
   map.matches = last.pair.matches;
-  map.is_static = filled.is_static;
+  map.is_static.assign(is_static.begin(), is_static.end());
   map.num_views = static_cast<int>(candidate.placed.size()) + 1;
   map.median_parallax_rad = Parallax(candidate);
   std::vector<double> depths;

@@ -18,7 +18,6 @@ namespace dmslam {
 struct ReferenceView {
   InitializerFrame frame;
   PairView pair;
-  std::vector<Match> left_out;   ///< matches that the search does not look at, sorted by index0
   double since_reference_s = 0;  ///< negative for frames before the reference frame
   bool moved = false;            ///< far enough for the selector to be asked
   Eigen::Quaterniond R_k_0 = Eigen::Quaterniond::Identity();  ///< roughly: how far the camera has turned
@@ -82,13 +81,10 @@ class CandidateBuilder {
   int NumAgreeing(const ReferenceView& view, const Rigid3d& T_k_0) const;
   /// How well the direction of translation to the last view is known [rad].
   double DirectionSigma(const CandidateMap& candidate) const;
-  /// The map of a candidate, with what the search had left out, where all views agree with it.
   FirstMap MakeMap(const InitializerFrame& reference, const CandidateMap& candidate,
                    std::span<const uint8_t> is_static) const;
 
  private:
-  struct Filled;
-  Filled FillIn(const CandidateMap& candidate, std::span<const uint8_t> is_static) const;
   std::optional<CandidateMap> PointsOfPair(const ReferenceView& last, std::span<const uint8_t> is_static,
                                            const TwoViewModel& model, Refused* refused) const;
   bool Sees(const Rigid3d& T_k_0, const Eigen::Vector3d& point, const Match& match) const;

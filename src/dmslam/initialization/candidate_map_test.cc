@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <deque>
-#include <utility>
 
 #include "dmslam/geometry/two_view.h"
 #include "dmslam/motion_segmentation/synthetic_pair.h"
@@ -72,28 +70,6 @@ TEST_F(CandidateBuilderTest, AViewThatShowsOtherPlacesAgreesWithFewPoints) {
   builder_.PlaceView(there, &candidate);
   ASSERT_EQ(candidate.placed.size(), 2U);
   EXPECT_LT(candidate.placed.back().consistent_share, 0.5);
-}
-
-/// Of a view's matches the search looks at every third; those on the right half are somebody's, and got no
-/// point.
-TEST_F(CandidateBuilderTest, AFirstMapHasWhatTheSearchLeftOutButNotBesideWhatItRefused) {
-  const Rigid3d T_last(ExpSo3({0, 0.01, 0}), {-0.2, 0, 0});
-  ReferenceView last = AddView(0.6, T_last);
-  const std::vector<Match> all = std::exchange(last.pair.matches, {});
-  const auto is_left = [](const Match& match) { return match.uv0_px.x() < 320; };
-  CandidateMap candidate{.points = {}, .use = {}, .placed = {{&last, T_last, 1.0}}};
-  for (size_t k = 0; k < all.size(); ++k) {
-    (k % 3 == 0 ? last.pair.matches : last.left_out).push_back(all[k]);
-    if (k % 3 != 0) continue;
-    candidate.points.push_back(points_[k]);
-    candidate.use.push_back(is_left(all[k]) ? 1 : 0);
-  }
-  const FirstMap map = builder_.MakeMap({}, candidate, candidate.use);
-  EXPECT_EQ(map.matches.size(), all.size());
-  const auto of_left = std::ranges::count_if(all, is_left);
-  EXPECT_GT(static_cast<double>(map.points.size()), 0.7 * static_cast<double>(of_left));
-  for (const FirstMap::Point& point : map.points)
-    EXPECT_LT(all[point.feature0].uv0_px.x(), 345) << "beside what has no point";
 }
 
 /// A wall with a picture before it, under hardly any parallax: noise puts half of the wall behind the

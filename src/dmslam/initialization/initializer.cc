@@ -277,12 +277,6 @@ ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
   // Somebody who has most of the features may lead the turn; then the room is where it was, if anywhere.
   if (IsCompact(view.pair.matches, options_.agreement.min_distribution_share * DiagonalPx(camera_)))
     AddMatchesInPlace(features0, *frame.features, camera_, options_.matching, &matcher, &view.pair.matches);
-  std::vector<Match> spread =
-      SpreadOverImage(view.pair.matches, options_.spread_cell_share * DiagonalPx(camera_),
-                      static_cast<size_t>(options_.max_matches));
-  std::ranges::set_difference(view.pair.matches, spread, std::back_inserter(view.left_out), {},
-                              &Match::index0, &Match::index0);
-  view.pair.matches = std::move(spread);
   view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;

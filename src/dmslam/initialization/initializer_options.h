@@ -123,12 +123,8 @@ struct InitializerOptions {
   double frame_step_s = 0.045;         ///< frames nearer to the last one looked at are left out...
   double nearly_parallax_share = 0.9;  ///< ...unless that had this share of the parallax asked for
   int min_matches = 120;               ///< of a frame with the reference frame; fewer: it is given up
-  /// Of more matches so many are looked at, in turns from cells of the image with this side (by its
-  /// diagonal): somebody whose texture is finer than the room's has the most.
-  int max_matches = 500;
-  double spread_cell_share = 0.028;
-  int num_pairs = 3;             ///< pairs with the reference frame that must agree
-  double min_pair_step_s = 0.1;  ///< the frames of two such pairs are apart by so much in the mean
+  int num_pairs = 3;                   ///< pairs with the reference frame that must agree
+  double min_pair_step_s = 0.1;        ///< the frames of two such pairs are apart by so much in the mean
   /// Median displacement of the matches before a pair is worth its cost.
   double min_displacement_rad = 0.015;
   int max_views = 8;       ///< frames after the reference frame that a map is made of, at most

@@ -189,17 +189,6 @@ TEST(Initializer, DoesNotMapAWalkerWhoHasMostOfTheFeatures) {
   }
 }
 
-/// Of somebody whose texture is finer than the room's there are more matches, not more places in the image.
-TEST(Initializer, DoesNotMapAWalkerWhoseTextureIsFiner) {
-  for (const double walk : {-0.04, 0.04, 0.06, 0.08}) {
-    SyntheticRoom room(150, 1200);
-    room.SetWalk(walk);
-    room.SetTurn(-0.01);
-    const std::optional<FirstMap> map = MapFrom(room, {}, 0);
-    EXPECT_LT(map ? ShareOfWalker(room, *map) : 0, 0.02) << "he walks " << walk;
-  }
-}
-
 TEST(Initializer, TellsTheViewsBetweenTheTwo) {
   const SyntheticRoom room(600, 150);
   const std::optional<FirstMap> map = MapFrom(room, {}, 0);

@@ -1,10 +1,7 @@
 #include "dmslam/motion_segmentation/match_frames.h"
 
 #include <algorithm>
-#include <iterator>
 #include <limits>
-#include <map>
-#include <utility>
 
 #include "dmslam/camera/image_scale.h"
 
@@ -57,24 +54,6 @@ void AddMatchesInPlace(const FrameFeatures& frame0, const FrameFeatures& frame1,
     if (!is_taken[match.index1]) matches->push_back(match);
   }
   std::ranges::sort(*matches, {}, &Match::index0);
-}
-
-std::vector<Match> SpreadOverImage(const std::vector<Match>& matches, double cell_px, size_t most) {
-  if (matches.size() <= most) return matches;
-  std::map<std::pair<int, int>, size_t> taken;  // of each cell
-  std::vector<std::vector<Match>> turns;
-  for (const Match& match : matches) {
-    const Eigen::Vector2i cell = (match.uv0_px / cell_px).array().floor().cast<int>();
-    const size_t turn = taken[{cell.x(), cell.y()}]++;
-    turns.resize(std::max(turns.size(), turn + 1));
-    turns[turn].push_back(match);
-  }
-  std::vector<Match> spread;
-  spread.reserve(most);
-  for (const std::vector<Match>& turn : turns)
-    std::ranges::copy(ChooseEvenly(turn, most - spread.size()), std::back_inserter(spread));
-  std::ranges::sort(spread, {}, &Match::index0);
-  return spread;
 }
 
 std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most) {

@@ -32,10 +32,6 @@ std::vector<Match> MatchFrames(const FrameFeatures& frame0, const FrameFeatures&
 void AddMatchesInPlace(const FrameFeatures& frame0, const FrameFeatures& frame1, const Camera& camera,
                        const MatchingOptions& options, FeatureMatcher* matcher, std::vector<Match>* matches);
 
-/// At most `most` of the matches, taken in turns from the square cells of the first image in which they lie:
-/// what is more finely textured than the rest has no more to say. Sorted by index0, as they came.
-std::vector<Match> SpreadOverImage(const std::vector<Match>& matches, double cell_px, size_t most);
-
 /// At most so many of the matches, spread evenly over them.
 std::vector<Match> ChooseEvenly(const std::vector<Match>& matches, size_t most);
 

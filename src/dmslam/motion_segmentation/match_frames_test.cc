@@ -80,48 +80,5 @@ TEST(AddMatchesInPlace, NoFeatureIsMatchedTwice) {
   EXPECT_EQ(std::ranges::adjacent_find(taken), taken.end());
 }
 
-/// Matches at random places of two strips of the picture that are equally wide.
-std::vector<Match> TwoStrips(size_t in_left, size_t in_right) {
-  Random random(5);
-  std::vector<Match> matches(in_left + in_right);
-  for (size_t k = 0; k < matches.size(); ++k) {
-    const double left = k < in_left ? 0 : 320;
-    matches[k].uv0_px = {random.Uniform(left, left + 320), random.Uniform(0, 480)};
-    matches[k].index0 = static_cast<uint32_t>(k);
-  }
-  return matches;
-}
-
-size_t InTheRightStrip(const std::vector<Match>& matches) {
-  return static_cast<size_t>(
-      std::ranges::count_if(matches, [](const Match& m) { return m.uv0_px.x() > 320; }));
-}
-
-TEST(SpreadOverImage, WhatIsFinelyTexturedHasNoMoreSay) {
-  const std::vector<Match> spread = SpreadOverImage(TwoStrips(2000, 200), 22, 300);
-  EXPECT_EQ(spread.size(), 300u);
-  EXPECT_GT(InTheRightStrip(spread), 90u) << "as their number goes it would have 27";
-  EXPECT_TRUE(std::ranges::is_sorted(spread, {}, &Match::index0));
-}
-
-TEST(SpreadOverImage, LeavesFewMatchesAsTheyAre) {
-  const std::vector<Match> matches = TwoStrips(250, 50);
-  const std::vector<Match> spread = SpreadOverImage(matches, 22, 300);
-  ASSERT_EQ(spread.size(), matches.size());
-  for (size_t k = 0; k < matches.size(); ++k) EXPECT_EQ(spread[k].index0, matches[k].index0);
-}
-
-TEST(SpreadOverImage, NoMatchComesTwice) {
-  const std::vector<Match> spread = SpreadOverImage(TwoStrips(2000, 200), 22, 900);
-  EXPECT_EQ(spread.size(), 900u);
-  EXPECT_EQ(std::ranges::adjacent_find(spread, {}, &Match::index0), spread.end());
-}
-
-TEST(SpreadOverImage, PlacesOutsideTheImageHaveCells) {
-  std::vector<Match> matches = TwoStrips(100, 100);
-  for (Match& match : matches) match.uv0_px -= Eigen::Vector2d(400, 300);  // undistorted places may lie there
-  EXPECT_EQ(SpreadOverImage(matches, 22, 50).size(), 50u);
-}
-
 }  // namespace
 }  // namespace dmslam
