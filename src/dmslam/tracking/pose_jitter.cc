@@ -30,12 +30,10 @@ PoseJitter::Told PoseJitter::Follow(int64_t stamp_ns, const Rigid3d& T_cam_world
   const Eigen::Vector3d went = now.T_cam_before->Center(), turned = LogSo3(now.T_cam_before->rotation);
   const Eigen::Vector3d goes = -last_->T_cam_before->translation,
                         turns = LogSo3(last_->T_cam_before->rotation);
-  const double own = options_.acceleration * now.step_s * now.step_s;
-  const double own_turn = options_.turn_acceleration * now.step_s * now.step_s;
+  const double own = std::pow(options_.acceleration * now.step_s * now.step_s, 2);
   position_squared_ =
-      std::max(position_squared_, (went - longer * goes).squaredNorm() / (depth * depth) - own * own);
-  rotation_squared_ =
-      std::max(rotation_squared_, (turned - longer * turns).squaredNorm() - own_turn * own_turn);
+      std::max(position_squared_, (went - longer * goes).squaredNorm() / (depth * depth) - own);
+  rotation_squared_ = std::max(rotation_squared_, (turned - longer * turns).squaredNorm() - own);
   return now;
 }
 

@@ -14,9 +14,9 @@ struct PoseJitterOptions {
   /// err by turns of a frame would have 0.4 (each change holds three errors, squared 1, 4 and 1); what errs
   /// for longer changes by less.
   double gain = 0.45;
-  double acceleration = 1.0;       ///< of a camera itself: depths of the scene per second squared
-  double turn_acceleration = 5.0;  ///< and of its rotation: a hand turns less evenly than it moves [rad/s^2]
-  double memory_s = 1.0;           ///< so long a pose that has jumped is believed to be wrong
+  /// A change that a camera makes itself: depths of the scene, and radians, per second squared.
+  double acceleration = 1.0;
+  double memory_s = 1.0;  ///< so long a pose that has jumped is believed to be wrong
 };
 
 /// How wrong poses are by how unevenly they move. What residuals say is how well a pose agrees with its
