@@ -4,6 +4,7 @@
 #include <cmath>
 
 namespace dmslam {
+
 void PoseJitter::OnPose(int64_t stamp_ns, MapId map, const Rigid3d& T_cam_world, double depth) {
   if (map != map_) {
     last_.reset();
