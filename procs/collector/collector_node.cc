@@ -225,7 +225,7 @@ void CollectorNode::OnMapReset(const Record& record) {
 
 void CollectorNode::CountReset(const MapReset& reset) {
   ++run_.resets;
-  if (reset.fate == MapReset::Fate::kDrop) proposals_.OnDropped(reset.map_id, true);
+  if (reset.fate == MapReset::Fate::kDrop) proposals_.OnGivenUp(reset.map_id);
 }
 
 void CollectorNode::KeepOnDisk(const Record& record) {
@@ -385,7 +385,7 @@ bool CollectorNode::TakeMapRecord() {
   builder_->OnMapDelta(*delta);
   if (!record->in_snapshot()) TimeKeyframe(*delta);
   if (delta->correction_id) run_.corrections.push_back(RecordOf(*delta, loops_before, builder_->map()));
-  for (const MapId dropped : delta->dropped_maps) proposals_.OnDropped(dropped, false);
+  for (const MapId dropped : delta->dropped_maps) proposals_.OnDropped(dropped);
   AcceptMap();
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     const StreamPosition mapped = builder_->map().progress(camera).frontend;
@@ -491,6 +491,12 @@ void CollectorNode::ExitAtEnd() {
        any_pose ? "" : "no frame was tracked; the frontend's last word: " + why);
 }
 
+/// A frontend's reset that no mapper carried out leaves its map as it was: the frontend died as it said so,
+/// and the next one went on in that map; or somebody forged it in the name of the dead.
+bool CollectorNode::WasCarriedOut(const MapReset& reset) const {
+  return proposals_.WasDropped(reset.map_id) || builder_->map().KeyframesOf(reset.map_id).empty();
+}
+
 /// All that the results are made of, once. `ended`: the sequence has come to its end. One that is interrupted
 /// can be resumed.
 void CollectorNode::Gather(bool ended) {
@@ -505,7 +511,8 @@ void CollectorNode::Gather(bool ended) {
       const bool its_frontend_lives = ParseHeader(record)->epoch == kept_->PositionOf(pose->camera_id).epoch;
       if (!its_frontend_lives) of_the_dead.insert({pose->camera_id, pose->frame_index});
     }
-    if (const auto reset = wire::Decode<MapReset>(record)) builder_->OnMapReset(*reset);
+    const auto reset = wire::Decode<MapReset>(record);
+    if (reset && WasCarriedOut(*reset)) builder_->OnMapReset(*reset);
   });
   sequences_.Fill(builder_->frame_poses(), ended, &run_);
   run_.resumes = proposals_.times_all_died();

@@ -76,6 +76,7 @@ class CollectorNode : public StreamNode {
   void OnMapReset(const Record& record);
   void OnSessionStart(const Record& record);
   void CountReset(const MapReset& reset);
+  bool WasCarriedOut(const MapReset& reset) const;
   bool MapMayBeKept() const;
   void KeepCheckpoint();
   void KeepOnDisk(const Record& record);

@@ -137,6 +137,14 @@ class CollectorNodeTest : public testing::Test {
     }
     PublishFrom(*frontend_, pose);
   }
+  /// Of the only map; it costs much, and is said until it is believed.
+  void PublishReset() {
+    MapReset reset;
+    reset.map_id = 1;
+    reset.fate = MapReset::Fate::kDrop;
+    PublishFrom(*frontend_, reset);
+    Run(1000);
+  }
   void PublishFirstKeyframe() {
     scene_.AddKeyframe(map_, 0, 0);
     PublishFrom(*mapper_, map_.TakeDelta(MapEvent::kMapped, WallScene::Id(0), std::nullopt));
@@ -257,6 +265,33 @@ TEST_F(CollectorNodeTest, ACollectorThatFollowsHasWhatWasHeardBeforeIt) {
   EXPECT_EQ(ReadPositions("trajectory.txt").size(), 3U);
   EXPECT_EQ(Summary()["frames"], 5) << "the player has left";
   EXPECT_EQ(Summary()["frames_missing"], 2);
+}
+
+TEST_F(CollectorNodeTest, AResetThatNoMapperHasCarriedOutCostsNoPose) {
+  Start();
+  SayCamera();
+  BeginStreams();
+  PublishFirstKeyframe();
+  PublishPose(1, 1);
+  PublishReset();
+  EndAll();
+  EXPECT_EQ(ReadPositions("trajectory.txt").size(), 1U);
+  EXPECT_EQ(Summary()["resets"], 1);
+}
+
+TEST_F(CollectorNodeTest, PosesOfAMapThatWasDroppedStayVoidWhereItsNumberIsGivenAgain) {
+  Start();
+  SayCamera();
+  BeginStreams();
+  PublishFirstKeyframe();
+  PublishPose(1, 1);
+  PublishReset();
+  map_.DropMap(1);
+  PublishFrom(*mapper_, map_.TakeDelta(MapEvent::kMapDropped, std::nullopt, 1));
+  PublishFirstKeyframe();
+  PublishPose(2, 2);
+  EndAll();
+  EXPECT_EQ(ReadPositions("trajectory.txt").size(), 1U);
 }
 
 TEST_F(CollectorNodeTest, WhereNoFrameWasTrackedTheFrontendsWordSaysWhy) {

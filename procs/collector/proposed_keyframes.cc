@@ -78,14 +78,13 @@ void ProposedKeyframes::OnFreshMap(int64_t epoch, bool is_saved) {
   if (all_died) OnAllDied();
 }
 
-void ProposedKeyframes::OnDropped(MapId map_id, bool noted) {
-  const bool is_new = dropped_.insert(map_id).second;
-  if (is_new && !noted) note_("dropped " + std::to_string(map_id));
+void ProposedKeyframes::OnDropped(MapId map_id) {
+  if (dropped_.insert(map_id).second) note_("dropped " + std::to_string(map_id));
 }
 
-/// It is there, or was, or its map was dropped.
+/// It is there, or was, or its map was given up.
 bool ProposedKeyframes::NeedNotBeThere(KeyframeId id, MapId map_id, const IsKnown& is_known) const {
-  return is_known(id) || dropped_.contains(map_id);
+  return is_known(id) || given_up_.contains(map_id) || dropped_.contains(map_id);
 }
 
 std::vector<ProposedKeyframes::Left> ProposedKeyframes::ToSayAgain(const LivesIn& lives,

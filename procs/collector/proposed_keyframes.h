@@ -33,9 +33,12 @@ class ProposedKeyframes {
   void KeepRecord(KeyframeId id, const SharedBytes& record);
   /// The records of a camera's frontend up to there are worked into the map: whoever holds that holds them.
   void OnMapped(CameraId camera, const StreamPosition& mapped);
-  /// A map is no more, and none of its keyframes is missing. `noted`: whether it is kept elsewhere that it
-  /// was dropped.
-  void OnDropped(MapId map_id, bool noted);
+  /// Its frontend says that a map was wrong: none of its keyframes is missing. It is kept elsewhere that this
+  /// was said.
+  void OnGivenUp(MapId map_id) { given_up_.insert(map_id); }
+  /// The mapper says that a map is no more: none of its keyframes is missing.
+  void OnDropped(MapId map_id);
+  bool WasDropped(MapId map_id) const { return dropped_.contains(map_id); }
   /// In this term of a mapper a map begins that continues none. Where something was to be in one before, all
   /// who held that had died, and it goes on with the last checkpoint (`is_saved`), or with nothing where
   /// there was none yet. Collectors that follow each other may all hear the beginning of the same term.
@@ -73,7 +76,7 @@ class ProposedKeyframes {
 
   std::map<KeyframeId, MapId> maps_;
   std::map<KeyframeId, int64_t> heard_ns_;  ///< when each was said to be one
-  std::set<MapId> dropped_;
+  std::set<MapId> given_up_, dropped_;
   std::set<KeyframeId> before_crash_;  ///< those of before all processes died
   int times_all_died_ = 0;
   std::optional<int64_t> map_begun_in_;       ///< a mapper's newest term that continues none

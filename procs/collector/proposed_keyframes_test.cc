@@ -96,18 +96,27 @@ TEST_F(ProposedKeyframesTest, WhetherAMapperHadTakenAnySinceAllDied) {
 
 TEST_F(ProposedKeyframesTest, OfADroppedMapNothingIsMissingNorSaidAgain) {
   Propose(1, 10);
-  proposed_.OnDropped(kMap + 1, false);
+  proposed_.OnDropped(kMap + 1);
   EXPECT_EQ(Count(kEpoch).missing, 1u);
-  proposed_.OnDropped(kMap, true);
+  proposed_.OnDropped(kMap);
   EXPECT_EQ(Count(kEpoch).missing, 0u);
   EXPECT_TRUE(proposed_.ToSayAgain(Lives, NoneIsKnown).empty());
 }
 
-TEST_F(ProposedKeyframesTest, ADroppedMapIsNotedOnceUnlessItIsKeptElsewhere) {
-  proposed_.OnDropped(1, true);
+TEST_F(ProposedKeyframesTest, OfAMapThatItsFrontendGaveUpNothingIsMissing) {
+  Propose(1, 10);
+  proposed_.OnGivenUp(kMap + 1);
+  EXPECT_EQ(Count(kEpoch).missing, 1u);
+  proposed_.OnGivenUp(kMap);
+  EXPECT_EQ(Count(kEpoch).missing, 0u);
+  EXPECT_FALSE(proposed_.WasDropped(kMap)) << "no mapper has said so";
+}
+
+TEST_F(ProposedKeyframesTest, ADroppedMapIsNotedOnceAlsoWhereItsFrontendGaveItUp) {
+  proposed_.OnGivenUp(2);
   EXPECT_TRUE(notes_.empty());
-  proposed_.OnDropped(2, false);
-  proposed_.OnDropped(2, false);
+  proposed_.OnDropped(2);
+  proposed_.OnDropped(2);
   EXPECT_EQ(notes_, std::vector<std::string>{"dropped 2"});
 }
 
@@ -130,15 +139,16 @@ TEST_F(ProposedKeyframesTest, AMapThatContinuesNoneSaysThatAllHadDiedWhereSometh
 TEST_F(ProposedKeyframesTest, TheNextOneKnowsWhichTermItsMapBeganInAndWhatWasDropped) {
   Propose(1, 10);
   proposed_.OnFreshMap(11, true);
-  proposed_.OnDropped(5, false);
+  proposed_.OnDropped(5);
   ProposedKeyframes next = ReadByTheNext();
   EXPECT_EQ(next.times_all_died(), 1);
   std::vector<std::string> notes;
   next.NoteTo([&](const std::string& note) { notes.push_back(note); });
   next.OnFreshMap(11, true);
-  next.OnDropped(5, false);
+  next.OnDropped(5);
   EXPECT_EQ(next.times_all_died(), 1) << "both hear the beginning of the same term";
   EXPECT_TRUE(notes.empty());
+  EXPECT_TRUE(next.WasDropped(5));
 }
 
 TEST_F(ProposedKeyframesTest, ItsNotesTellTheNextOne) {

@@ -243,6 +243,7 @@ bool FrontendNode::WorkOnce() {
     if (!work_->Idle()) return false;
   }
   if (core().map().progress().ended && !end_.Is(SequenceEnd::Phase::kDone)) LeaveEndedMap();
+  if (end_.HandsOver()) return WorkAtEnd();
   if (end_.Is(SequenceEnd::Phase::kDone)) {
     if (!options_.HasPeer(roles::kMapper) || NobodyNeedsTheMap(core().map(), *map_reader_)) Stop();
     return false;
@@ -262,7 +263,8 @@ int64_t FrontendNode::WorkDeadline() const {
   if (end_.Is(Phase::kTelling)) return last_words_.next_portion_ns();
   if (stopping_ || AwaitsSavedMap() || turns_.Waits()) return INT64_MAX;
   const bool grows = end_.Is(Phase::kGrowingBack) && !core().awaited();
-  return grows || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
+  const bool hands_over = end_.HandsOver() && end_.Is(Phase::kAwaitingAdjustedMap);
+  return grows || hands_over || end_.Is(Phase::kRefining) || end_.Is(Phase::kJoining) ? 0 : INT64_MAX;
 }
 
 // ---- When the sequence has ended ----
@@ -271,7 +273,7 @@ int64_t FrontendNode::WorkDeadline() const {
 bool FrontendNode::WorkAtEnd() {
   using Phase = SequenceEnd::Phase;
   const Phase phase = end_.phase();
-  if (phase == Phase::kPlaying) return false;
+  if (phase == Phase::kPlaying || phase == Phase::kHandedOver) return false;
   if (phase >= Phase::kTelling) return TellLastPoses();
   if (phase == Phase::kGrowingBack && !HasTurn(CameraTurns::kTheEnd, std::nullopt)) return false;
   AskForAdjustedMaps();
@@ -319,6 +321,7 @@ bool FrontendNode::TellLastPoses() {
   Publish(last_words_.NextPortion(context_.now_ns()));
   if (!last_words_.AreTold()) return false;
   end_.OnTold();
+  if (end_.HandsOver()) return true;
   PublishSequenceDone();
   PublishStatus();
   writer_->Complete(context_.now_ns());
@@ -425,6 +428,14 @@ bool FrontendNode::IsHeldUp() const {
 
 bool FrontendNode::Hangs(int64_t now_ns, int64_t longest_ns) const {
   return StreamNode::Hangs(now_ns, longest_ns) || search_sign_->Hangs(now_ns, longest_ns);
+}
+
+/// In real time the camera waits for nobody: the collector joins the poses as they were told.
+bool FrontendNode::MayHandOver() {
+  using Phase = SequenceEnd::Phase;
+  if (!InLockstep() || core().map().keyframes().empty()) return true;
+  end_.OnHandOver();
+  return end_.Is(Phase::kHandedOver) || end_.Is(Phase::kDone);
 }
 
 /// A core in work is waited for.

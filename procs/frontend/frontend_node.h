@@ -41,6 +41,7 @@ class FrontendNode : public StreamNode {
   void Begin(const CameraInfo& info) override;
   bool ReadyToWrite() override;
   void OnWriterOpen() override;
+  bool MayHandOver() override;
   bool WorkOnce() override;
   int64_t WorkDeadline() const override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;

@@ -625,6 +625,20 @@ TEST_F(SystemSimulation, AFrontendMayBeMovedAtTheVeryEnd) {
   }
 }
 
+/// The one that comes has not the features of the frames before: the old one refines their poses while it
+/// still can.
+TEST_F(SystemSimulation, AFrontendThatIsMovedLateLeavesRefinedPoses) {
+  Schedule schedule = CalmSchedule();
+  schedule.network.loss = 0.2;
+  Fault move = Kill("frontend", NumFrames() - 7, 0);
+  move.kind = Fault::Kind::kMove;
+  schedule.faults = {move};
+  const Outcome outcome = Run(schedule);
+  if (common_->tells) Tell(schedule, outcome);
+  const Allowance allowed{Spread(), kFramesLost};
+  EXPECT_EQ(Loss(outcome, common_->undisturbed, allowed, common_->folder.string()), "") << outcome.story;
+}
+
 /// Of the two that come, the one that is superseded at once has written nothing.
 TEST_F(SystemSimulation, AFrontendMayBeMovedTwiceAtOnce) {
   for (const int64_t seed : {145, 150, 160, 163, 164}) {

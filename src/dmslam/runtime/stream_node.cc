@@ -335,7 +335,7 @@ void StreamNode::WatchWriter() {
                             std::to_string(newer->seq) +
                             ", which is newer than what this one began with; start it again");
   }
-  if (writer->close_requested_by() && !stopping_) {
+  if (writer->close_requested_by() && !stopping_ && MayHandOver()) {
     LogInfo("{}: hands its stream over to {}", role_, *writer->close_requested_by());
     Stop();
     hands_over_until_ns_ = context_.now_ns() + kGoesOnWithinNs;

@@ -59,6 +59,9 @@ class StreamNode : public Node {
   virtual bool ReadyToWrite() { return true; }
   /// The writer is open: the node may work.
   virtual void OnWriterOpen() {}
+  /// Another process asks for the stream: whether this one has told what only it knows. Asked again and
+  /// again.
+  virtual bool MayHandOver() { return true; }
   /// Some work, if there is any; called as long as it returns true.
   virtual bool WorkOnce() = 0;
   /// A message outside the streams; `channel` as it is called where there is one camera.

@@ -496,9 +496,11 @@ class Publisher : public StreamNode {
   using StreamNode::PublishChange;
   using StreamNode::PublishRecord;
   const StreamWriter* writer() const { return writer_.get(); }
+  bool has_more_to_tell = false;
 
  private:
   void Begin(const CameraInfo&) override { WantWriter({StreamId::kMap, {"collector"}, {}, nullptr}); }
+  bool MayHandOver() override { return !has_more_to_tell; }
   bool WorkOnce() override { return false; }
 };
 
@@ -556,6 +558,20 @@ TEST_F(PublisherTest, WhoIsAskedToLeaveEndsWellOnceTheOtherGoesOn) {
   EXPECT_EQ(first.exit_code(), kExitDone) << first.problem();
   ASSERT_NE(second.writer(), nullptr);
   EXPECT_EQ(second.exit_code(), std::nullopt);
+}
+
+TEST_F(PublisherTest, WhoIsAskedToLeaveTellsFirstWhatItHasToTell) {
+  Publisher& first = Add(7);
+  Pass(1);
+  first.has_more_to_tell = true;
+  Publisher& second = Add(8, true);
+  Pass(10);
+  EXPECT_EQ(first.exit_code(), std::nullopt);
+  EXPECT_EQ(second.writer(), nullptr);
+  first.has_more_to_tell = false;
+  Pass(10);
+  EXPECT_EQ(first.exit_code(), kExitDone) << first.problem();
+  EXPECT_NE(second.writer(), nullptr);
 }
 
 /// Who asks and is not there afterwards may be somebody who forges: else nobody would write this stream.

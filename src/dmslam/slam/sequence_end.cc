@@ -25,6 +25,7 @@ Phase After(Phase phase) {
     case Phase::kPlaying:
     case Phase::kTelling:
     case Phase::kDone:
+    case Phase::kHandedOver:
       break;
   }
   DMSLAM_CHECK(false, "the end of a sequence is worked on step by step");
@@ -38,8 +39,17 @@ void SequenceEnd::OnEndHeard() {
   if (Is(Phase::kPlaying)) phase_ = has_mapper_ ? Phase::kGrowingBack : Phase::kAwaitingAdjustedMap;
 }
 
+/// What has been refined by then is told as at the end.
+void SequenceEnd::OnHandOver() {
+  const bool is_refining = phase_ >= Phase::kRefining;
+  if (hands_over_ || is_refining) return;
+  hands_over_ = true;
+  phase_ = Phase::kAwaitingAdjustedMap;
+}
+
 bool SequenceEnd::AwaitsAnswer(const Map& map) const {
-  return Is(Phase::kAwaitingAdjustedMap) && has_mapper_ && !map.keyframes().empty() && !answered_;
+  return Is(Phase::kAwaitingAdjustedMap) && has_mapper_ && !hands_over_ && !map.keyframes().empty() &&
+         !answered_;
 }
 
 /// The map grows one keyframe at a time: the mapper has time for it.
@@ -74,6 +84,7 @@ SequenceEnd::Worked SequenceEnd::Work(Phase phase, FrontendCore* core) {
     case Phase::kPlaying:
     case Phase::kTelling:
     case Phase::kDone:
+    case Phase::kHandedOver:
       break;
   }
   DMSLAM_CHECK(false, "there is work between the end of the sequence and the last poses alone");
@@ -87,7 +98,7 @@ void SequenceEnd::OnWorked(bool is_done) {
 
 void SequenceEnd::OnTold() {
   DMSLAM_CHECK(Is(Phase::kTelling), "the last poses are told when they are known");
-  phase_ = Phase::kDone;
+  phase_ = hands_over_ ? Phase::kHandedOver : Phase::kDone;
 }
 
 void FinishSequence(FrontendCore* core, std::optional<int64_t> newest_stamp_ns,

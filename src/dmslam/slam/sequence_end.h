@@ -11,10 +11,12 @@
 
 namespace dmslam {
 
-/// How far a frontend is when the sequence has ended:
+/// How far a frontend is when the sequence has ended, or when another one goes on with it:
 ///
 ///   Playing --OnEndHeard--> GrowingBack --> AwaitingAdjustedMap --> Refining --> Joining --> Telling
 ///     --OnTold--> Done
+///   Playing, GrowingBack --OnHandOver--> AwaitingAdjustedMap (which waits for nobody) --> ... --> Telling
+///     --OnTold--> HandedOver
 ///
 /// The arrows without a name are gone by OnWorked(), with what a portion of work has come to. Work is done on
 /// the core, where that has a thread of its own on that; everything else is for the caller's thread. Knows
@@ -30,6 +32,7 @@ class SequenceEnd {
     kJoining,              ///< their poses are joined with the camera's motion
     kTelling,              ///< the last poses
     kDone,                 ///< everything is said; stays until the mapper has ended
+    kHandedOver,           ///< what only this frontend knew is said; another one goes on
   };
 
   /// `has_mapper`: there is one that maps what is proposed and adjusts what it has.
@@ -41,6 +44,10 @@ class SequenceEnd {
   bool AppliesAllRecords() const { return asked_ns_ || Is(Phase::kDone); }
 
   void OnEndHeard();
+  /// Another frontend asks for the stream. It will not have the features of the frames before: their poses
+  /// are refined in the map as it is, and told. To be called again changes nothing.
+  void OnHandOver();
+  bool HandsOver() const { return hands_over_; }
 
   /// Whether the map must change before Work() can go on: a keyframe is awaited, or the mapper's answer.
   bool Waits(const FrontendCore& core) const;
@@ -70,6 +77,7 @@ class SequenceEnd {
   bool AwaitsAnswer(const Map& map) const;
 
   bool has_mapper_;
+  bool hands_over_ = false;
   Phase phase_ = Phase::kPlaying;
   uint32_t requests_ = 0;            ///< to adjust the maps, so far
   std::optional<int64_t> asked_ns_;  ///< when the mapper was asked last

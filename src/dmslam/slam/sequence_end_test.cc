@@ -117,6 +117,33 @@ TEST_F(SequenceEndTest, WithoutAMapperNothingGrowsAndNobodyIsAsked) {
   EXPECT_FALSE(end.Waits(core_));
 }
 
+TEST_F(SequenceEndTest, WhoHandsOverTellsThePosesOfItsFramesInTheMapAsItIs) {
+  MapArrives();
+  SequenceEnd end(true);
+  end.OnHandOver();
+  EXPECT_TRUE(end.HandsOver());
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0)) << "the mapper has other things to do";
+  EXPECT_FALSE(end.Waits(core_));
+  WorkOn(&end);
+  WorkOn(&end);
+  end.OnHandOver();
+  EXPECT_TRUE(end.Is(Phase::kJoining)) << "it is asked for again, and nothing begins anew";
+  EXPECT_EQ(WorkOn(&end).output.events.size(), kFrames);
+  end.OnTold();
+  EXPECT_TRUE(end.Is(Phase::kHandedOver)) << "the sequence is not over";
+}
+
+TEST_F(SequenceEndTest, WhoTellsItsLastPosesAnywayNeedNotHandOver) {
+  SequenceEnd end(true);
+  end.OnEndHeard();
+  WorkOn(&end);
+  WorkOn(&end);
+  ASSERT_TRUE(end.Is(Phase::kRefining));
+  end.OnHandOver();
+  EXPECT_FALSE(end.HandsOver());
+  EXPECT_TRUE(end.Is(Phase::kRefining));
+}
+
 TEST_F(SequenceEndTest, InOneGoItTellsTheLastPosesInTheAdjustedMap) {
   MapArrives();
   int requests = 0;
