@@ -20,7 +20,7 @@ size_t HeldRecords::NumReady(bool all) const {
   const auto is_ready = [&](const Held& held) {
     if (held.in_snapshot) return held.ends_snapshot;
     const MapEvent event = held.delta.event;
-    return all || event == MapEvent::kSettled || event == MapEvent::kTurn;
+    return all || event == MapEvent::kSettled || event == MapEvent::kTurn || event == MapEvent::kEnded;
   };
   while (ready > 0 && !is_ready(held_[ready - 1])) --ready;
   return ready;

@@ -10,7 +10,8 @@ namespace dmslam {
 
 /// Map records that are here but not yet applied, and how far the replica has come. In lock-step they are
 /// applied up to a settled record, so that which frame sees what does not depend on how fast the mapper was
-/// with what nobody waits for (evidence). A snapshot takes the place of the replica when all of it is here.
+/// with what nobody waits for (evidence); or up to the end of the map, which settles nothing any more. A
+/// snapshot takes the place of the replica when all of it is here.
 class HeldRecords {
  public:
   struct Held {
@@ -26,7 +27,8 @@ class HeldRecords {
   void BeginAnew();
   void Add(MapDelta delta, Version version, bool in_snapshot, bool ends_snapshot);
   bool empty() const { return held_.empty(); }
-  /// How many may be applied: `all` that are whole (in real time), or those up to a settled record.
+  /// How many may be applied: `all` that are whole (in real time), or those up to a settled record or the
+  /// end.
   size_t NumReady(bool all) const;
   /// The first `count` will be applied.
   void Promise(size_t count) { promised_ = held_[count - 1].version; }

@@ -27,6 +27,13 @@ TEST(HeldRecordsTest, InLockStepNothingBehindASettledRecordIsApplied) {
   EXPECT_EQ(records.held.NumReady(true), 3u);
 }
 
+TEST(HeldRecordsTest, TheEndOfTheMapIsAppliedThoughWhatIsAwaitedWasNeverSettled) {
+  Records records;
+  records.Say(MapEvent::kFused);
+  records.Say(MapEvent::kEnded);
+  EXPECT_EQ(records.held.NumReady(false), 2u);
+}
+
 TEST(HeldRecordsTest, ASnapshotIsAppliedWhenAllOfItIsHere) {
   Records records;
   records.Say(MapEvent::kSettled);

@@ -625,6 +625,21 @@ TEST_F(SystemSimulation, AFrontendMayBeMovedAtTheVeryEnd) {
   }
 }
 
+/// ... or when the old one has just said that all is done: nobody waits for a frame that does not come.
+TEST_F(SystemSimulation, AFrontendMayBeMovedAsItSaysThatItIsDone) {
+  for (const uint32_t frame : {38u, 44u, 50u}) {
+    Schedule schedule = CalmSchedule();
+    schedule.network.loss = 0.02;
+    schedule.network.max_delay_ns = 2 * kMs;
+    Fault move = Kill("frontend", frame, 0);
+    move.kind = Fault::Kind::kMove;
+    schedule.faults = {move};
+    const Outcome outcome = Run(schedule);
+    if (common_->tells) Tell(schedule, outcome);
+    EXPECT_EQ(outcome.failure, "") << "frame " << frame << "\n" << outcome.story;
+  }
+}
+
 /// The one that comes has not the features of the frames before: the old one refines their poses while it
 /// still can.
 TEST_F(SystemSimulation, AFrontendThatIsMovedLateLeavesRefinedPoses) {

@@ -1,5 +1,6 @@
 #include "dmslam/slam/sequence_end.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "dmslam/util/check.h"
@@ -39,12 +40,11 @@ void SequenceEnd::OnEndHeard() {
   if (Is(Phase::kPlaying)) phase_ = has_mapper_ ? Phase::kGrowingBack : Phase::kAwaitingAdjustedMap;
 }
 
-/// What has been refined by then is told as at the end.
+/// Work on the last poses goes on where it is: only the next frontend says that the sequence is done.
 void SequenceEnd::OnHandOver() {
-  const bool is_refining = phase_ >= Phase::kRefining;
-  if (hands_over_ || is_refining) return;
+  if (hands_over_ || Is(Phase::kDone)) return;
   hands_over_ = true;
-  phase_ = Phase::kAwaitingAdjustedMap;
+  phase_ = std::max(phase_, Phase::kAwaitingAdjustedMap);
 }
 
 bool SequenceEnd::AwaitsAnswer(const Map& map) const {

@@ -15,8 +15,8 @@ namespace dmslam {
 ///
 ///   Playing --OnEndHeard--> GrowingBack --> AwaitingAdjustedMap --> Refining --> Joining --> Telling
 ///     --OnTold--> Done
-///   Playing, GrowingBack --OnHandOver--> AwaitingAdjustedMap (which waits for nobody) --> ... --> Telling
-///     --OnTold--> HandedOver
+///   Playing, GrowingBack --OnHandOver--> AwaitingAdjustedMap (which waits for nobody) --> Refining
+///     --> Joining --> Telling --OnTold--> HandedOver
 ///
 /// The arrows without a name are gone by OnWorked(), with what a portion of work has come to. Work is done on
 /// the core, where that has a thread of its own on that; everything else is for the caller's thread. Knows

@@ -133,15 +133,26 @@ TEST_F(SequenceEndTest, WhoHandsOverTellsThePosesOfItsFramesInTheMapAsItIs) {
   EXPECT_TRUE(end.Is(Phase::kHandedOver)) << "the sequence is not over";
 }
 
-TEST_F(SequenceEndTest, WhoTellsItsLastPosesAnywayNeedNotHandOver) {
+TEST_F(SequenceEndTest, WhoIsAskedWhileItRefinesLeavesTheEndToTheNextOne) {
   SequenceEnd end(true);
   end.OnEndHeard();
   WorkOn(&end);
   WorkOn(&end);
   ASSERT_TRUE(end.Is(Phase::kRefining));
   end.OnHandOver();
+  EXPECT_TRUE(end.Is(Phase::kRefining)) << "nothing is done twice";
+  WorkOn(&end);
+  WorkOn(&end);
+  end.OnTold();
+  EXPECT_TRUE(end.Is(Phase::kHandedOver));
+}
+
+TEST_F(SequenceEndTest, WhoIsDoneHasNothingToHandOver) {
+  SequenceEnd end(true);
+  end.OnMapEnded();
+  end.OnHandOver();
   EXPECT_FALSE(end.HandsOver());
-  EXPECT_TRUE(end.Is(Phase::kRefining));
+  EXPECT_TRUE(end.Is(Phase::kDone));
 }
 
 TEST_F(SequenceEndTest, InOneGoItTellsTheLastPosesInTheAdjustedMap) {
