@@ -97,7 +97,7 @@ void MapperNode::Begin(const CameraInfo& info) {
     work_->Beat();
     return ends.load();
   };
-  if (!lockstep_) core_->SetInterrupt([this, goes_on] { return goes_on(keyframe_waits_); });
+  if (!lockstep_) core_->SetInterrupt([this, goes_on] { return goes_on(hurries_); });
   core_->SetStop([this, goes_on] { return goes_on(stops_); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   std::vector<std::string> readers;
@@ -111,13 +111,12 @@ void MapperNode::Begin(const CameraInfo& info) {
 /// From the beginning, not only when the map is here: a frontend that dies meanwhile has left behind what it
 /// had to say.
 void MapperNode::ListenToFrontends() {
-  frontends_.resize(num_cameras_);
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
-    frontends_[camera].reader = MakeReader(
+    frontends_.Add(MakeReader(
         StreamId::kFrontend, owners::kFrontend,
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
          channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        std::nullopt, camera);
+        std::nullopt, camera));
   }
 }
 
@@ -216,7 +215,7 @@ void MapperNode::OnWriterOpen() {
   const MapProgress progress = core_->map().progress();
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
     const StreamPosition mapped = core_->map().progress(camera).frontend;
-    frontends_[camera].mapped = {mapped.epoch, mapped.seq};
+    frontends_.BeginWith(camera, {mapped.epoch, mapped.seq});
   }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked},
                             Version{progress.loopcloser.epoch, progress.loopcloser.seq});
@@ -249,40 +248,14 @@ void MapperNode::PublishDelta(MapDelta delta) {
   timing_.OnPublished(event, context_.now_ns());
 }
 
-bool MapperNode::KeyframeWaits() const {
-  return std::any_of(taken_.begin(), taken_.end(),
-                     [](const Arrived& arrived) { return arrived.record.channel == channels::kKeyframe; }) ||
-         arrived_.size() + static_cast<size_t>(FrontendBacklog()) > 60;
-}
-
-/// Of the frontend that is furthest ahead.
-int64_t MapperNode::FrontendBacklog() const {
-  int64_t most = 0;
-  for (const Frontend& frontend : frontends_) most = std::max<int64_t>(most, frontend.reader->backlog());
-  return most;
-}
-
-bool MapperNode::AllFrontends(const std::function<bool(const Frontend&)>& is_so) const {
-  return std::ranges::all_of(frontends_, is_so);
-}
-
-/// Latencies count from when a record came, not from when there was time for it. What is in the map that
-/// another mapper left is not done again.
 void MapperNode::NoteArrivals() {
   const int64_t now_ns = context_.now_ns();
+  const auto is_doubtful = [this](const Record& record, StreamReader* reader) {
+    return IsDoubtful(record, reader);
+  };
   for (CameraId camera = 0; camera < num_cameras_; ++camera) {
-    Frontend& frontend = frontends_[camera];
-    while (std::optional<Record> record = frontend.reader->Take()) {
-      if (IsDoubtful(*record, frontend.reader.get())) break;
-      // A term before that one is of a frontend that began on a clock that is behind, when nobody named it.
-      const Version version = record->version();
-      if (version.epoch == frontend.mapped.epoch && version <= frontend.mapped) {
-        frontend.reader->Accept(version);
-        continue;
-      }
-      record->channel = SplitCamera(record->channel).channel;
-      arrived_.push_back({camera, std::move(*record), now_ns});
-    }
+    while (std::optional<Record> record = frontends_.Take(camera, is_doubtful))
+      records_.Add({camera, std::move(*record), now_ns});
   }
 }
 
@@ -340,7 +313,7 @@ KeyframeId MapperNode::ApplyFirstAnswer() {
 
 /// Has the core do something, and then this node. The core is idle.
 void MapperNode::Run(Job job, std::function<void()> when_done) {
-  keyframe_waits_ = KeyframeWaits();
+  hurries_ = RecordsAreUrgent();
   work_->Post([this, job = std::move(job), when_done = std::move(when_done)] {
     job();
     work_->Report([this, when_done, status = StatusOf(*core_, core_report_.tally)] {
@@ -362,17 +335,14 @@ bool MapperNode::WorkOnce() {
   NoteArrivals();
   AcceptWhatIsSafe();
   if (!work_->Idle()) {
-    if (KeyframeWaits()) keyframe_waits_ = true;
+    if (RecordsAreUrgent()) hurries_ = true;
     return false;
   }
   if (snapshots_->wanted()) endpoint_.Advance();  // now the map may be read
   if (!saved_.parts.empty()) return PublishSavedMap();
   TakeLoopAnswers();
   if (!work_->Idle()) return false;
-  while (!arrived_.empty()) {
-    taken_.push_back(std::move(arrived_.front()));
-    arrived_.pop_front();
-  }
+  records_.MakeDue();
   if (awaited_) {
     SettleAwaited();
     return !awaited_;
@@ -381,7 +351,7 @@ bool MapperNode::WorkOnce() {
     ApplyFirstAnswer();
     return work_->Idle();
   }
-  if (!taken_.empty()) return HandleFirstRecord();
+  if (!records_.NoneIsDue()) return HandleFirstRecord();
   return AnswerRequests() || GiveTurn() || EndIfDone();
 }
 
@@ -406,21 +376,20 @@ void MapperNode::JoinFrontend(CameraId camera, const SessionStart& start) {
 
 /// True: there may be more to do.
 bool MapperNode::HandleFirstRecord() {
-  const Record record = std::move(taken_.front().record);
-  const CameraId camera = taken_.front().camera;
-  timing_.OnRecord(taken_.front().at_ns);
-  taken_.pop_front();
+  const ArrivedRecords::Arrived first = records_.TakeFirst();
+  const Record& record = first.record;
+  timing_.OnRecord(first.at_ns);
   if (record.channel == channels::kSession) {
-    if (const auto start = ReadSessionStart(record.header, *record.bytes)) JoinFrontend(camera, *start);
+    if (const auto start = ReadSessionStart(record.header, *record.bytes)) JoinFrontend(first.camera, *start);
   }
   // A keyframe makes several map records: only the last one says that it is done.
   const bool many = record.channel == channels::kInitialMap || record.channel == channels::kKeyframe;
   const Version version = record.version();
-  const auto work = [this, many, camera, version, job = JobFor(camera, record)] {
+  const auto work = [this, many, camera = first.camera, version, job = JobFor(first.camera, record)] {
     if (!many) MarkFrontend(camera, version);
     if (job) job();
   };
-  Run(work, [this, camera, version] {
+  Run(work, [this, camera = first.camera, version] {
     if (!awaited_) unsafe_.OnHandled({camera, version, writer_->last_seq()});
     AcceptWhatIsSafe();
   });
@@ -511,7 +480,7 @@ void MapperNode::SettleAwaited() {
 
 void MapperNode::AcceptWhatIsSafe() {
   const auto is_held = [this](int64_t map_seq) { return writer_->AcknowledgedByAny(map_seq); };
-  while (const auto safe = unsafe_.TakeSafe(is_held)) frontends_[safe->camera].reader->Accept(safe->version);
+  while (const auto safe = unsafe_.TakeSafe(is_held)) frontends_.Accept(safe->camera, safe->version);
   while (const auto safe = unsafe_answers_.TakeSafe(is_held)) loop_reader_->Accept(safe->version);
 }
 
@@ -520,8 +489,8 @@ void MapperNode::AcceptWhatIsSafe() {
 /// True: there may be more to do.
 bool MapperNode::GiveTurn() {
   if (!lockstep_ || num_cameras_ == 1 || ending_ != Ending::kNo) return false;
-  const auto turn = requests_.TakeTurn(
-      HasEnded(), [this](CameraId camera) { return frontends_[camera].reader->term().epoch; });
+  const auto turn =
+      requests_.TakeTurn(HasEnded(), [this](CameraId camera) { return frontends_.Epoch(camera); });
   if (!turn) return false;
   Run([this, frame = KeyframeId::Make(session_, turn->frame_index, turn->camera)] {
     core_->GiveTurn(frame);
@@ -540,14 +509,13 @@ bool MapperNode::AnswerRequests() {
 }
 
 CameraRequests::HasEnded MapperNode::HasEnded() const {
-  return [this](CameraId camera) { return frontends_[camera].reader->AtEnd(); };
+  return [this](CameraId camera) { return frontends_.HasEnded(camera); };
 }
 
 // ---- The end ----
 
 bool MapperNode::EndIfDone() {
-  const bool all_ended = AllFrontends([](const Frontend& frontend) { return frontend.reader->AtEnd(); });
-  if (ending_ == Ending::kNo && all_ended) ending_ = Ending::kFrontendEnded;
+  if (ending_ == Ending::kNo && frontends_.AllHaveEnded()) ending_ = Ending::kFrontendEnded;
   if (ending_ == Ending::kNo) return false;
   if (!loop_answers_.empty() && ending_ == Ending::kFrontendEnded) {
     ApplyFirstAnswer();
@@ -570,9 +538,7 @@ void MapperNode::Complete() {
 
 /// All readers take the last record before this process leaves. What still comes in changes nothing any more.
 void MapperNode::DrainAfterEnd() {
-  for (const Frontend& frontend : frontends_) {
-    while (frontend.reader->Take()) frontend.reader->AcceptTaken();
-  }
+  frontends_.AcceptUnread();
   while (loop_reader_->Take()) loop_reader_->AcceptTaken();
   if (writer_->completed()) return Stop();
   if (!give_up_ns_ || context_.now_ns() < *give_up_ns_) return;
@@ -589,11 +555,11 @@ void MapperNode::Save() {
 
 /// A step in work inserts and creates, and leaves out what takes long; an adjustment ends where it is.
 void MapperNode::InterruptCore() {
-  keyframe_waits_ = stops_ = true;
+  hurries_ = stops_ = true;
   if (work_) work_->Finish();
 }
 
-MapperNode::~MapperNode() { keyframe_waits_ = stops_ = true; }
+MapperNode::~MapperNode() { hurries_ = stops_ = true; }
 
 void MapperNode::Stop() {
   if (!stopping_) InterruptCore();
@@ -607,22 +573,20 @@ std::pair<MapperStatus::State, std::string> MapperNode::StateAndReason() const {
   if (!core_) return {State::kStarting, "waiting for a camera"};
   if (ending_ == Ending::kCompleting) return {State::kDone, ""};
   if (!writer_) return {State::kWaiting, "asks who writes the map, and who holds one"};
-  const bool idle = ending_ == Ending::kNo && work_->Idle() && arrived_.empty() && taken_.empty();
-  const auto is_gone = [this](const Frontend& f) { return !f.reader->writer_present(context_.now_ns()); };
-  if (idle && AllFrontends(is_gone)) return {State::kWaiting, "waiting for a frontend"};
+  const bool idle = ending_ == Ending::kNo && work_->Idle() && records_.size() == 0;
+  if (idle && frontends_.AllAreGone(context_.now_ns())) return {State::kWaiting, "waiting for a frontend"};
   return {State::kMapping, ""};
 }
 
 void MapperNode::PublishStatus() {
   if (core_ && work_->Idle()) core_report_.status = StatusOf(*core_, core_report_.tally);
   MapperStatus status = core_report_.status;
-  std::vector<const StreamReader*> readers;
-  for (const Frontend& frontend : frontends_) readers.push_back(frontend.reader.get());
+  std::vector<const StreamReader*> readers = frontends_.readers();
   readers.push_back(loop_reader_.get());
   const auto [state, reason] = StateAndReason();
   status.head = MakeStatusHead(reason, readers);
   status.state = state;
-  status.keyframe_queue = static_cast<int32_t>(arrived_.size() + taken_.size());
+  status.keyframe_queue = static_cast<int32_t>(records_.size());
   status.keyframes_unaccepted = static_cast<int32_t>(unsafe_.size()) + (awaited_ ? 1 : 0);
   status.last_settled = last_settled_;
   timing_.Fill(&status);

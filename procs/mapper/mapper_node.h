@@ -15,7 +15,9 @@
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
+#include "mapper/arrived_records.h"
 #include "mapper/camera_requests.h"
+#include "mapper/frontend_streams.h"
 #include "mapper/left_map.h"
 #include "mapper/loop_answers.h"
 #include "mapper/make_mapper.h"
@@ -47,16 +49,6 @@ class MapperNode : public StreamNode {
   std::string WhyMisfits(const SessionStart& start) const override;
 
  private:
-  struct Arrived {
-    CameraId camera = 0;
-    Record record;
-    int64_t at_ns = 0;
-  };
-  /// A camera's frontend.
-  struct Frontend {
-    std::unique_ptr<StreamReader> reader;
-    Version mapped;  ///< what the map holds already when this mapper begins with it
-  };
   /// The map to begin with.
   struct SavedMap {
     std::optional<RebuiltMap> loaded;  ///< not yet taken over
@@ -103,8 +95,6 @@ class MapperNode : public StreamNode {
   bool GiveTurn();
   bool AnswerRequests();
   CameraRequests::HasEnded HasEnded() const;
-  bool AllFrontends(const std::function<bool(const Frontend&)>& is_so) const;
-  int64_t FrontendBacklog() const;
   using Job = std::function<void()>;
   void Run(Job job, std::function<void()> when_done = {});
   Job JobFor(CameraId camera, const Record& record);
@@ -113,7 +103,7 @@ class MapperNode : public StreamNode {
   void SettleAwaited();
   void MarkFrontend(CameraId camera, const Version& version);
   void AcceptWhatIsSafe();
-  bool KeyframeWaits() const;
+  bool RecordsAreUrgent() const { return records_.AreUrgent(frontends_.LargestBacklog()); }
   void NoteArrivals();
   void PublishDelta(MapDelta delta);
   void InterruptCore();
@@ -126,15 +116,14 @@ class MapperNode : public StreamNode {
   SessionStart session_start_;  ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
-  std::vector<Frontend> frontends_;  ///< by camera
+  FrontendStreams frontends_;
   std::unique_ptr<StreamReader> loop_reader_;
   std::unique_ptr<LeftMap> left_;  ///< while it is looked for
   bool lockstep_ = false;
   const CameraId num_cameras_;
   Ending ending_ = Ending::kNo;
   std::optional<int64_t> give_up_ns_;  ///< until then who lacks a map that was complete already is waited for
-  std::deque<Arrived> arrived_;        ///< records of the frontend that came while it worked
-  std::deque<Arrived> taken_;          ///< the same, to be handled next
+  ArrivedRecords records_;             ///< of the frontends
   UnsafeRecords unsafe_, unsafe_answers_;  ///< the frontends' and the loop closer's
   CameraRequests requests_;
   LoopAnswers loop_answers_;
@@ -142,9 +131,9 @@ class MapperNode : public StreamNode {
   std::optional<KeyframeId> last_settled_;
   KeyframeTiming timing_;
   CoreReport core_report_;
-  std::atomic<bool> keyframe_waits_{false};  ///< asked by the core: it finishes early
-  std::atomic<bool> stops_{false};           ///< asked by the core while it adjusts whole maps
-  std::unique_ptr<CoreThread> work_;         ///< ends before everything that jobs touch
+  std::atomic<bool> hurries_{false};  ///< asked by the core: it finishes early
+  std::atomic<bool> stops_{false};    ///< asked by the core while it adjusts whole maps
+  std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
 };
 
 }  // namespace dmslam
