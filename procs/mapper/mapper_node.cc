@@ -12,11 +12,6 @@
 #include "dmslam/util/check.h"
 
 namespace dmslam {
-namespace {
-
-constexpr int64_t kPartEveryNs = 3'000'000;
-
-}  // namespace
 
 void AddMapperOptions(CommandLine& app, MapperFiles* files) {
   if (const char* checkpoint = std::getenv("DMSLAM_CHECKPOINT")) files->checkpoint = checkpoint;
@@ -47,51 +42,25 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
   if (run_.localize_only && !run_.saved_map) {
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
-  if (files_.load.empty()) return;
-  saved_.loaded = LoadMap(files_.load, std::nullopt, feature_store_);
-  saved_.made = saved_.loaded->session;
-}
-
-/// Takes the loaded map over and returns the ordinal under which new landmarks are numbered.
-uint16_t MapperNode::ContinueSavedMap(const CameraInfo& info) {
-  CheckFits(files_.load, *saved_.loaded, info.camera, options_.settings.Read<Pyramid>());
-  const Map& map = saved_.loaded->map;
-  if (session_ <= NewestSession(map)) {
-    throw InputError(files_.load + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
-                     "; give all processes a higher one with --session");
-  }
-  if (saved_.loaded->missing > 0) {
-    LogWarning(
-        "{}: {} map records are missing in it, {} references lead nowhere; the map is as good as it can be",
-        files_.load, saved_.loaded->missing, saved_.loaded->skipped);
-  }
-  const uint16_t ordinal = static_cast<uint16_t>(NewestOrdinal(map) + 1);
-  LogInfo("{}: {} keyframes and {} landmarks loaded", files_.load, map.keyframes().size(),
-          map.num_landmarks());
-  return ordinal;
-}
-
-/// What the core has is to be published as records.
-void MapperNode::PutInParts() {
-  const KeyframeId newest = core_->map().keyframes().rbegin()->first;
-  const std::vector<MapDelta> parts = CutSnapshot(core_->map(), newest, kSnapshotPieceBytes);
-  saved_.parts.assign(parts.begin(), parts.end());
+  if (!files_.load.empty()) saved_.emplace(files_.load, feature_store_);
 }
 
 void MapperNode::Begin(const CameraInfo& info) {
   lockstep_ = info.mode == PlaybackMode::kLockstep;
-  const uint16_t ordinal = saved_.loaded ? ContinueSavedMap(info) : uint16_t{1};
+  const auto pyramid = options_.settings.Read<Pyramid>();
+  std::optional<SavedMap::Beginning> saved;
+  if (saved_) saved = saved_->Begin(info.camera, pyramid, session_);
   work_ = MakeCoreThread(info.mode, {.lets_others_go_first = true});
   const auto publish = [this](const MapDelta& delta) {
     core_report_.tally.OnDelta(delta, core_->map());
     work_->Report([this, delta] { PublishDelta(delta); });
   };
-  core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera,
-                                       options_.settings.Read<Pyramid>(), ordinal, publish);
+  core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera, pyramid,
+                                       saved ? saved->ordinal : uint16_t{1}, publish);
   core_->KeepFeaturesIn(feature_store_);
-  if (saved_.loaded) {
-    core_->ContinueSaved(std::exchange(saved_.loaded, std::nullopt)->map);
-    PutInParts();
+  if (saved) {
+    core_->ContinueSaved(std::move(saved->map));
+    parts_.Cut(core_->map());
   }
   const auto goes_on = [this](const std::atomic<bool>& ends) {  // asked before every step of an adjustment
     work_->Beat();
@@ -176,7 +145,7 @@ void MapperNode::ContinueLeftMap() {
   LogInfo("mapper: continues version {}:{} with {} keyframes and {} landmarks", version.epoch, version.seq,
           left_->replica().keyframes().size(), left_->replica().num_landmarks());
   core_->Continue(left_->TakeReplica(), static_cast<uint64_t>(context_.random_id));
-  saved_.parts.clear();  // what the others hold is newer
+  parts_.Drop();  // what the others hold is newer
   writer_plan().parent = version;
 }
 
@@ -196,7 +165,7 @@ bool MapperNode::TakeCheckpoint() {
     Save();
     Exit(kExitDone);
   }
-  PutInParts();
+  parts_.Cut(core_->map());
   return true;
 }
 
@@ -282,17 +251,13 @@ void MapperNode::RefuseBrokenCorrections() {
   });
 }
 
-/// The loaded map goes out as records like any other, and is settled: then lock-step goes on. One part at a
-/// time: a logger, which nobody repairs, keeps up.
-bool MapperNode::PublishSavedMap() {
-  if (context_.now_ns() < saved_.next_part_ns) return false;
-  saved_.next_part_ns = context_.now_ns() + kPartEveryNs;
-  if (writer_->Full()) return false;
-  PublishDelta(saved_.parts.front());
-  saved_.parts.pop_front();
+/// A map with which this mapper has begun is settled when all of it is out: then lock-step goes on.
+bool MapperNode::PublishPart() {
+  std::optional<MapDelta> part = parts_.TakeNext(context_.now_ns(), !writer_->Full());
+  if (!part) return false;
+  PublishDelta(std::move(*part));
   const Keyframe& newest = core_->map().keyframes().rbegin()->second;
-  if (saved_.parts.empty())
-    Run([this, id = newest.id, map_id = newest.map_id] { core_->Settle(id, map_id); });
+  if (parts_.empty()) Run([this, id = newest.id, map_id = newest.map_id] { core_->Settle(id, map_id); });
   return true;
 }
 
@@ -323,9 +288,7 @@ void MapperNode::Run(Job job, std::function<void()> when_done) {
   });
 }
 
-int64_t MapperNode::WorkDeadline() const {
-  return writer_ && !saved_.parts.empty() ? saved_.next_part_ns : INT64_MAX;
-}
+int64_t MapperNode::WorkDeadline() const { return writer_ ? parts_.next_ns() : INT64_MAX; }
 
 bool MapperNode::WorkOnce() {
   if (ending_ == Ending::kCompleting) {
@@ -339,7 +302,7 @@ bool MapperNode::WorkOnce() {
     return false;
   }
   if (snapshots_->wanted()) endpoint_.Advance();  // now the map may be read
-  if (!saved_.parts.empty()) return PublishSavedMap();
+  if (!parts_.empty()) return PublishPart();
   TakeLoopAnswers();
   if (!work_->Idle()) return false;
   records_.MakeDue();
@@ -366,7 +329,7 @@ void MapperNode::MarkFrontend(CameraId camera, const Version& version) {
 /// begins in.
 std::string MapperNode::WhyMisfits(const SessionStart& start) const {
   const std::string why = StreamNode::WhyMisfits(start);
-  return why.empty() ? WhyOtherVocabulary(files_.load, saved_.made, start.vocabulary_checksum) : why;
+  return why.empty() && saved_ ? saved_->WhyMisfits(start.vocabulary_checksum) : why;
 }
 
 void MapperNode::JoinFrontend(CameraId camera, const SessionStart& start) {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "dmslam/mapping/mapper_core.h"
-#include "dmslam/recording/map_file.h"
 #include "dmslam/runtime/core_thread.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
@@ -21,7 +20,9 @@
 #include "mapper/left_map.h"
 #include "mapper/loop_answers.h"
 #include "mapper/make_mapper.h"
+#include "mapper/map_parts.h"
 #include "mapper/mapper_report.h"
+#include "mapper/saved_map.h"
 #include "mapper/unsafe_records.h"
 
 namespace dmslam {
@@ -49,13 +50,6 @@ class MapperNode : public StreamNode {
   std::string WhyMisfits(const SessionStart& start) const override;
 
  private:
-  /// The map to begin with.
-  struct SavedMap {
-    std::optional<RebuiltMap> loaded;  ///< not yet taken over
-    std::deque<MapDelta> parts;        ///< of it, not yet published
-    int64_t next_part_ns = 0;
-    SessionStart made;  ///< how it was made
-  };
   /// Lock-step: a keyframe to which the loop closer's answer is due.
   struct Awaited {
     KeyframeId id;
@@ -75,12 +69,10 @@ class MapperNode : public StreamNode {
     kCompleting,  ///< nothing follows; the readers are waited for
   };
 
-  uint16_t ContinueSavedMap(const CameraInfo& info);
   void ListenToFrontends();
-  bool PublishSavedMap();
+  bool PublishPart();
   void JoinFrontend(CameraId camera, const SessionStart& start);
   void Save();
-  void PutInParts();
   bool TakeCheckpoint();
   void BeginFetch();
   bool FetchReplica();
@@ -112,8 +104,9 @@ class MapperNode : public StreamNode {
 
   const RunOptions run_;
   Files files_;
-  SavedMap saved_;
-  SessionStart session_start_;  ///< as the frontend said it
+  std::optional<SavedMap> saved_;  ///< the map to begin with
+  MapParts parts_;                 ///< of a map with which it has begun
+  SessionStart session_start_;     ///< as the frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   FrontendStreams frontends_;
