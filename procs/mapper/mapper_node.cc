@@ -31,8 +31,7 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), roles::kMapper),
       run_(options_.settings.Read<RunOptions>()),
       files_(std::move(files)),
-      num_cameras_(options_.NumCameras()),
-      requests_(num_cameras_) {
+      requests_(options_.NumCameras()) {
   if (run_.saved_map == files_.load.empty()) {
     throw InputError(files_.load.empty()
                          ? "setting 'map.saved' needs a map: give it to the mapper with --map FILE"
@@ -52,7 +51,7 @@ void MapperNode::Begin(const CameraInfo& info) {
   if (saved_) saved = saved_->Begin(info.camera, pyramid, session_);
   work_ = MakeCoreThread(info.mode, {.lets_others_go_first = true});
   const auto publish = [this](const MapDelta& delta) {
-    core_report_.tally.OnDelta(delta, core_->map());
+    tally_.OnDelta(delta, core_->map());
     work_->Report([this, delta] { PublishDelta(delta); });
   };
   core_ = std::make_unique<MapperCore>(options_.settings.Read<MapperOptions>(), info.camera, pyramid,
@@ -70,7 +69,7 @@ void MapperNode::Begin(const CameraInfo& info) {
   core_->SetStop([this, goes_on] { return goes_on(stops_); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
   std::vector<std::string> readers;
-  for (CameraId camera = 0; camera < num_cameras_; ++camera)
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
     readers.push_back(OfCamera(roles::kFrontend, camera));
   readers.insert(readers.end(), {roles::kLoopCloser, roles::kCollector});
   WantWriter({StreamId::kMap, readers, {}, snapshots_.get()});
@@ -80,7 +79,7 @@ void MapperNode::Begin(const CameraInfo& info) {
 /// From the beginning, not only when the map is here: a frontend that dies meanwhile has left behind what it
 /// had to say.
 void MapperNode::ListenToFrontends() {
-  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontends_.Add(MakeReader(
         StreamId::kFrontend, owners::kFrontend,
         {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
@@ -99,7 +98,7 @@ void MapperNode::BeginFetch() {
   fetch.id = context_.random_id;
   fetch.schema_hash = SchemaHash();
   std::vector<ReplicaFetch::Holder> holders;
-  for (CameraId camera = 0; camera < num_cameras_; ++camera)
+  for (CameraId camera = 0; camera < frontends_.size(); ++camera)
     holders.push_back({OfCamera(roles::kFrontend, camera), OfCamera(owners::kFrontend, camera)});
   holders.insert(holders.end(),
                  {{roles::kLoopCloser, owners::kLoopCloser}, {roles::kCollector, owners::kCollector}});
@@ -182,16 +181,16 @@ bool MapperNode::ReadyToWrite() {
 
 void MapperNode::OnWriterOpen() {
   const MapProgress progress = core_->map().progress();
-  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+  for (CameraId camera = 0; camera < frontends_.size(); ++camera) {
     const StreamPosition mapped = core_->map().progress(camera).frontend;
     frontends_.BeginWith(camera, {mapped.epoch, mapped.seq});
   }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked},
                             Version{progress.loopcloser.epoch, progress.loopcloser.seq});
   // One that has ended could not say goodbye: whoever has died since may lack the map.
-  if (progress.ended) give_up_ns_ = context_.now_ns() + kBackAfterDeathNs;
+  if (progress.ended) end_.WaitUntil(context_.now_ns() + kBackAfterDeathNs);
   const auto begin = [this, ended = progress.ended] {
-    core_report_.tally.Count(core_->map());
+    tally_.Count(core_->map());
     ended ? core_->End(true) : SettleAgain();
   };
   Run(begin, [this, ended = progress.ended] {
@@ -222,7 +221,7 @@ void MapperNode::NoteArrivals() {
   const auto is_doubtful = [this](const Record& record, StreamReader* reader) {
     return IsDoubtful(record, reader);
   };
-  for (CameraId camera = 0; camera < num_cameras_; ++camera) {
+  for (CameraId camera = 0; camera < frontends_.size(); ++camera) {
     while (std::optional<Record> record = frontends_.Take(camera, is_doubtful))
       records_.Add({camera, std::move(*record), now_ns});
   }
@@ -281,8 +280,8 @@ void MapperNode::Run(Job job, std::function<void()> when_done) {
   hurries_ = RecordsAreUrgent();
   work_->Post([this, job = std::move(job), when_done = std::move(when_done)] {
     job();
-    work_->Report([this, when_done, status = StatusOf(*core_, core_report_.tally)] {
-      core_report_.status = status;
+    work_->Report([this, when_done, status = StatusOf(*core_, tally_)] {
+      status_ = status;
       if (when_done) when_done();
     });
   });
@@ -291,7 +290,7 @@ void MapperNode::Run(Job job, std::function<void()> when_done) {
 int64_t MapperNode::WorkDeadline() const { return writer_ ? parts_.next_ns() : INT64_MAX; }
 
 bool MapperNode::WorkOnce() {
-  if (ending_ == Ending::kCompleting) {
+  if (end_.IsCompleting()) {
     DrainAfterEnd();
     return false;
   }
@@ -306,9 +305,9 @@ bool MapperNode::WorkOnce() {
   TakeLoopAnswers();
   if (!work_->Idle()) return false;
   records_.MakeDue();
-  if (awaited_) {
+  if (settling_.Awaits()) {
     SettleAwaited();
-    return !awaited_;
+    return !settling_.Awaits();
   }
   if (!lockstep_ && !loop_answers_.empty()) {
     ApplyFirstAnswer();
@@ -353,7 +352,7 @@ bool MapperNode::HandleFirstRecord() {
     if (job) job();
   };
   Run(work, [this, camera = first.camera, version] {
-    if (!awaited_) unsafe_.OnHandled({camera, version, writer_->last_seq()});
+    if (!settling_.Awaits()) unsafe_.OnHandled({camera, version, writer_->last_seq()});
     AcceptWhatIsSafe();
   });
   return work_->Idle();
@@ -395,7 +394,7 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
     if (const auto reset = Read<MapReset>(*record.bytes)) return [this, reset] { core_->OnReset(*reset); };
   } else if (record.channel == channels::kAdjustRequest) {
     if (const auto request = Read<AdjustRequest>(*record.bytes)) {
-      if (num_cameras_ == 1) return [this, request] { core_->OnAdjustRequest(*request); };
+      if (frontends_.size() == 1) return [this, request] { core_->OnAdjustRequest(*request); };
       requests_.OnAdjust(camera, request->request);  // the others go on mapping
     }
   }
@@ -408,37 +407,31 @@ void MapperNode::AfterKeyframe(const Version& version, KeyframeId id, MapId map_
                                bool checked_by_loopcloser) {
   const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer(roles::kLoopCloser);
   if (!wait) return Settle(id, map_id, version);
-  work_->Report([this, version, id, map_id] { awaited_ = {id, map_id, version, loop_reader_->term()}; });
+  work_->Report([this, version, id, map_id] {
+    settling_.Await({id, map_id, version}, loop_reader_->term());
+  });
 }
 
 /// On the core.
 void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend) {
   MarkFrontend(id.camera(), of_frontend);
   core_->Settle(id, map_id);
-  work_->Report([this, id] { last_settled_ = id; });
+  work_->Report([this, id] { settling_.OnSettled(id); });
 }
 
-/// Lock-step: the answer to the awaited keyframe, applied, lets it settle. Answers to earlier ones cannot be
-/// due.
+/// Lock-step: the answer to the awaited keyframe, applied, lets it settle.
 void MapperNode::SettleAwaited() {
-  bool ask_again = loop_answers_.TakeLost();
-  while (!loop_answers_.empty() && awaited_) {
-    if (ApplyFirstAnswer() != awaited_->id) {
-      ask_again = true;  // it has just come, and answers what is newest
-      continue;
-    }
-    const Awaited settled = *std::exchange(awaited_, std::nullopt);
-    Run([this, settled] { Settle(settled.id, settled.map_id, settled.version); },
+  if (loop_answers_.TakeLost()) settling_.OnLost();
+  while (!loop_answers_.empty() && settling_.Awaits()) {
+    const auto settled = settling_.OnAnswer(ApplyFirstAnswer());
+    if (!settled) continue;
+    Run([this, settled] { Settle(settled->id, settled->map_id, settled->version); },
         [this, settled] {
-          unsafe_.OnHandled({settled.id.camera(), settled.version, writer_->last_seq()});
+          unsafe_.OnHandled({settled->id.camera(), settled->version, writer_->last_seq()});
         });
   }
-  // Another loop closer than the one that was asked does not know what is due.
-  if (!awaited_) return;
-  if (!awaited_->asked.valid()) awaited_->asked = loop_reader_->term();
-  if (!ask_again && loop_reader_->term() == awaited_->asked) return;
-  awaited_->asked = loop_reader_->term();
-  Run([this, awaited = *awaited_] { core_->AskAgain(awaited.id, awaited.map_id); });
+  if (const auto question = settling_.TakeQuestion(loop_reader_->term()))
+    Run([this, question] { core_->AskAgain(question->id, question->map_id); });
 }
 
 void MapperNode::AcceptWhatIsSafe() {
@@ -451,7 +444,7 @@ void MapperNode::AcceptWhatIsSafe() {
 
 /// True: there may be more to do.
 bool MapperNode::GiveTurn() {
-  if (!lockstep_ || num_cameras_ == 1 || ending_ != Ending::kNo) return false;
+  if (!lockstep_ || frontends_.size() == 1 || end_.HasBegun()) return false;
   const auto turn =
       requests_.TakeTurn(HasEnded(), [this](CameraId camera) { return frontends_.Epoch(camera); });
   if (!turn) return false;
@@ -462,7 +455,7 @@ bool MapperNode::GiveTurn() {
 }
 
 bool MapperNode::AnswerRequests() {
-  if (num_cameras_ == 1) return false;
+  if (frontends_.size() == 1) return false;
   const std::vector<AdjustRequest> requests = requests_.TakeAdjust(HasEnded());
   if (requests.empty()) return false;
   Run([this, requests] {
@@ -478,24 +471,24 @@ CameraRequests::HasEnded MapperNode::HasEnded() const {
 // ---- The end ----
 
 bool MapperNode::EndIfDone() {
-  if (ending_ == Ending::kNo && frontends_.AllHaveEnded()) ending_ = Ending::kFrontendEnded;
-  if (ending_ == Ending::kNo) return false;
-  if (!loop_answers_.empty() && ending_ == Ending::kFrontendEnded) {
-    ApplyFirstAnswer();
-    return work_->Idle();
+  switch (end_.TakeStep(frontends_.AllHaveEnded(), !loop_answers_.empty())) {
+    case MapperEnd::Step::kNone:
+      return false;
+    case MapperEnd::Step::kApplyAnswer:
+      ApplyFirstAnswer();
+      return work_->Idle();
+    case MapperEnd::Step::kAnnounce:
+      Run([this] { core_->End(run_.localize_only); });
+      return work_->Idle();
+    case MapperEnd::Step::kComplete:
+      Complete();
   }
-  if (ending_ == Ending::kFrontendEnded) {
-    ending_ = Ending::kAnnounced;
-    Run([this] { core_->End(run_.localize_only); });
-    return work_->Idle();
-  }
-  Complete();
   return true;
 }
 
 void MapperNode::Complete() {
   writer_->Complete(context_.now_ns());
-  ending_ = Ending::kCompleting;
+  end_.Complete();
   PublishStatus();
 }
 
@@ -504,7 +497,7 @@ void MapperNode::DrainAfterEnd() {
   frontends_.AcceptUnread();
   while (loop_reader_->Take()) loop_reader_->AcceptTaken();
   if (writer_->completed()) return Stop();
-  if (!give_up_ns_ || context_.now_ns() < *give_up_ns_) return;
+  if (!end_.GivesUp(context_.now_ns())) return;
   LogInfo("mapper: ends, since the map is complete and not all who lack it have come back within {} s",
           kBackAfterDeathNs / 1'000'000'000);
   Stop();
@@ -534,24 +527,24 @@ void MapperNode::Stop() {
 std::pair<MapperStatus::State, std::string> MapperNode::StateAndReason() const {
   using State = MapperStatus::State;
   if (!core_) return {State::kStarting, "waiting for a camera"};
-  if (ending_ == Ending::kCompleting) return {State::kDone, ""};
+  if (end_.IsCompleting()) return {State::kDone, ""};
   if (!writer_) return {State::kWaiting, "asks who writes the map, and who holds one"};
-  const bool idle = ending_ == Ending::kNo && work_->Idle() && records_.size() == 0;
+  const bool idle = !end_.HasBegun() && work_->Idle() && records_.size() == 0;
   if (idle && frontends_.AllAreGone(context_.now_ns())) return {State::kWaiting, "waiting for a frontend"};
   return {State::kMapping, ""};
 }
 
 void MapperNode::PublishStatus() {
-  if (core_ && work_->Idle()) core_report_.status = StatusOf(*core_, core_report_.tally);
-  MapperStatus status = core_report_.status;
+  if (core_ && work_->Idle()) status_ = StatusOf(*core_, tally_);
+  MapperStatus status = status_;
   std::vector<const StreamReader*> readers = frontends_.readers();
   readers.push_back(loop_reader_.get());
   const auto [state, reason] = StateAndReason();
   status.head = MakeStatusHead(reason, readers);
   status.state = state;
   status.keyframe_queue = static_cast<int32_t>(records_.size());
-  status.keyframes_unaccepted = static_cast<int32_t>(unsafe_.size()) + (awaited_ ? 1 : 0);
-  status.last_settled = last_settled_;
+  status.keyframes_unaccepted = static_cast<int32_t>(unsafe_.size()) + (settling_.Awaits() ? 1 : 0);
+  status.last_settled = settling_.last_settled();
   timing_.Fill(&status);
   PublishLoose(status);
 }

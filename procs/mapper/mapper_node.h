@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -17,10 +16,12 @@
 #include "mapper/arrived_records.h"
 #include "mapper/camera_requests.h"
 #include "mapper/frontend_streams.h"
+#include "mapper/keyframe_settling.h"
 #include "mapper/left_map.h"
 #include "mapper/loop_answers.h"
 #include "mapper/make_mapper.h"
 #include "mapper/map_parts.h"
+#include "mapper/mapper_end.h"
 #include "mapper/mapper_report.h"
 #include "mapper/saved_map.h"
 #include "mapper/unsafe_records.h"
@@ -50,25 +51,6 @@ class MapperNode : public StreamNode {
   std::string WhyMisfits(const SessionStart& start) const override;
 
  private:
-  /// Lock-step: a keyframe to which the loop closer's answer is due.
-  struct Awaited {
-    KeyframeId id;
-    MapId map_id = 0;
-    Version version;  ///< of the record that brought it
-    Term asked;       ///< of the loop closer that was asked
-  };
-  /// What the core has to say of itself.
-  struct CoreReport {
-    MapTally tally;       ///< the core's, as the map is
-    MapperStatus status;  ///< as it was said last
-  };
-  enum class Ending : uint8_t {
-    kNo,
-    kFrontendEnded,
-    kAnnounced,   ///< the last map record says so
-    kCompleting,  ///< nothing follows; the readers are waited for
-  };
-
   void ListenToFrontends();
   bool PublishPart();
   void JoinFrontend(CameraId camera, const SessionStart& start);
@@ -113,17 +95,15 @@ class MapperNode : public StreamNode {
   std::unique_ptr<StreamReader> loop_reader_;
   std::unique_ptr<LeftMap> left_;  ///< while it is looked for
   bool lockstep_ = false;
-  const CameraId num_cameras_;
-  Ending ending_ = Ending::kNo;
-  std::optional<int64_t> give_up_ns_;  ///< until then who lacks a map that was complete already is waited for
-  ArrivedRecords records_;             ///< of the frontends
+  MapperEnd end_;
+  ArrivedRecords records_;                 ///< of the frontends
   UnsafeRecords unsafe_, unsafe_answers_;  ///< the frontends' and the loop closer's
   CameraRequests requests_;
   LoopAnswers loop_answers_;
-  std::optional<Awaited> awaited_;
-  std::optional<KeyframeId> last_settled_;
+  KeyframeSettling settling_;
   KeyframeTiming timing_;
-  CoreReport core_report_;
+  MapTally tally_;                    ///< the core's, as the map is
+  MapperStatus status_;               ///< as the core said it last
   std::atomic<bool> hurries_{false};  ///< asked by the core: it finishes early
   std::atomic<bool> stops_{false};    ///< asked by the core while it adjusts whole maps
   std::unique_ptr<CoreThread> work_;  ///< ends before everything that jobs touch
