@@ -30,7 +30,7 @@ Checkpointer::Checkpointer(Options options, std::unique_ptr<CoreThread> thread, 
 
 Checkpointer::~Checkpointer() = default;
 
-void Checkpointer::OnMap(const Map& map, bool whole, int64_t newest_stamp_ns,
+void Checkpointer::OnMap(const Map& map, bool whole, std::optional<int64_t> newest_stamp_ns,
                          const std::optional<SessionStart>& session) {
   if (map.keyframes().empty()) return;  // an empty map takes no other one's place
   schedule_.OnMap(map.version(), newest_stamp_ns, options_.now_ns());
@@ -84,7 +84,7 @@ void Checkpointer::SyncJournal() {
 
 int64_t Checkpointer::deadline_ns() const {
   const int64_t due_ns = schedule_.deadline_ns();
-  return due_ns == INT64_MAX ? due_ns : std::max(due_ns, look_again_ns_);
+  return due_ns == INT64_MAX ? due_ns : std::max(due_ns, look_again_ns_.value_or(due_ns));
 }
 
 void Checkpointer::Finish() { thread_->Finish(); }

@@ -28,7 +28,8 @@ class Checkpointer {
   ~Checkpointer();
 
   /// The map as it is now. Begins a checkpoint where one is due and the map may be read (`whole`).
-  void OnMap(const Map& map, bool whole, int64_t newest_stamp_ns, const std::optional<SessionStart>& session);
+  void OnMap(const Map& map, bool whole, std::optional<int64_t> newest_stamp_ns,
+             const std::optional<SessionStart>& session);
   /// Begins to sync the journal.
   void SyncJournal();
   /// When OnMap should be called again.
@@ -56,7 +57,7 @@ class Checkpointer {
   Options options_;
   CheckpointSchedule schedule_;
   Journal* journal_;
-  int64_t look_again_ns_ = INT64_MIN;
+  std::optional<int64_t> look_again_ns_;  ///< one was due, and could not begin: not before that
   int64_t written_ = 0;
   bool warned_ = false;
   std::string problem_;

@@ -19,15 +19,15 @@ class HeardFrames {
   void Hear(const FramePose& pose);
   /// How many frames.
   int64_t count() const { return count_; }
-  /// Of the frame that was heard last, over all cameras; 0: none was.
-  int64_t newest_stamp_ns() const { return newest_stamp_ns_; }
+  /// Of the frame that was heard last, over all cameras; none: none was.
+  std::optional<int64_t> newest_stamp_ns() const { return newest_stamp_ns_; }
   /// Whether the map is no newer than what was heard: has no keyframe of this session behind the newest frame
   /// of its camera.
   bool ReachAsFarAs(const Map& map, uint32_t session) const;
 
  private:
   int64_t count_ = 0;
-  int64_t newest_stamp_ns_ = 0;
+  std::optional<int64_t> newest_stamp_ns_;
   std::map<CameraId, std::optional<uint32_t>> newest_;  ///< its index; none: none has come
 };
 

@@ -19,6 +19,7 @@ FramePose PoseOf(uint32_t frame, TrackingState state = TrackingState::kTracking)
 
 TEST(HeardFramesTest, EachFrameCountsOnce) {
   HeardFrames frames(1);
+  EXPECT_EQ(frames.newest_stamp_ns(), std::nullopt);
   for (const uint32_t frame : {3, 4, 4, 6}) frames.Hear(PoseOf(frame));
   frames.Hear(PoseOf(2, TrackingState::kLocalizedLater));
   frames.Hear(PoseOf(9, TrackingState::kLocalizedLater));

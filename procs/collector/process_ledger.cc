@@ -107,10 +107,10 @@ void ProcessLedger::ReadNote(const std::string& kind, std::istream& text, int64_
   if (!(text >> process >> pid)) return;
   if (kind == "process") ReadProcess(process, pid, text, now_ns);
   if (kind == "counters") ReadCounters(process, pid, text);
-  int64_t uptime_ms = 0;
-  InstanceWatch::Noted noted;
-  if (kind != "heard" || !(text >> uptime_ms >> noted.epoch)) return;
-  noted.uptime_s = static_cast<double>(uptime_ms) * 1e-3;
+  int64_t uptime_ms = 0, epoch = 0;
+  if (kind != "heard" || !(text >> uptime_ms >> epoch)) return;
+  InstanceWatch::Noted noted{static_cast<double>(uptime_ms) * 1e-3, std::nullopt};
+  if (epoch != 0) noted.epoch = epoch;  // it was no writer when it was noted
   processes_[process].instances.Know(pid, now_ns, noted);
 }
 

@@ -286,12 +286,13 @@ void ViewerCore::DrawFrame(const SceneFrame& frame, ViewerScene* scene) {
 }
 
 void ViewerCore::DrawTruthFile(ViewerScene* scene) {
-  int64_t last_ns = truth_file_next_ > 0 ? truth_file_[truth_file_next_ - 1].stamp_ns : INT64_MIN / 2;
+  std::optional<int64_t> last_ns;
+  if (truth_file_next_ > 0) last_ns = truth_file_[truth_file_next_ - 1].stamp_ns;
   for (; truth_file_next_ < truth_file_.size(); ++truth_file_next_) {
     const StampedPose& pose = truth_file_[truth_file_next_];
     if (pose.stamp_ns > newest_ns_) break;
     if (frames_.empty() || pose.stamp_ns < frames_.begin()->second.stamp_ns - kTruthStepNs) continue;
-    if (pose.stamp_ns - last_ns < kTruthStepNs) continue;
+    if (last_ns && pose.stamp_ns - *last_ns < kTruthStepNs) continue;
     last_ns = pose.stamp_ns;
     scene->SetTruth({0, static_cast<uint32_t>(truth_file_next_)}, ToFloats(pose.T_world_cam.translation));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 namespace dmslam {
 
@@ -16,15 +17,16 @@ class JoinedClock {
   /// taken; believed where that is on the same clock: within the last second.
   int64_t Stamp(int64_t arrival_ns, int64_t driver_ns) {
     const bool same_clock = driver_ns <= arrival_ns && arrival_ns - driver_ns < kSecondNs;
-    const int64_t stamp_ns = (same_clock ? driver_ns : arrival_ns) + offset_ns_;
-    last_ns_ = std::max(stamp_ns, last_ns_ + 1);
-    return last_ns_;
+    int64_t stamp_ns = (same_clock ? driver_ns : arrival_ns) + offset_ns_;
+    if (last_ns_) stamp_ns = std::max(stamp_ns, *last_ns_ + 1);
+    last_ns_ = stamp_ns;
+    return stamp_ns;
   }
 
  private:
   static constexpr int64_t kSecondNs = 1'000'000'000;
   int64_t offset_ns_;
-  int64_t last_ns_ = INT64_MIN / 2;
+  std::optional<int64_t> last_ns_;
 };
 
 }  // namespace dmslam

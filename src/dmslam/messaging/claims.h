@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <optional>
 
 namespace dmslam {
 
@@ -21,10 +22,9 @@ class Claims {
   bool SaidAgain(const Key& key, int64_t utime) {
     Claim& claim = claims_[key];
     claim.order = ++order_;
-    const bool first = claim.first_utime == kNever;
-    claim.again = claim.again || (!first && utime > claim.first_utime);
+    claim.again = claim.again || (claim.first_utime && utime > *claim.first_utime);
     claim.first_utime =
-        first ? utime : std::min(claim.first_utime, utime);  // one from the future counts once
+        std::min(claim.first_utime.value_or(utime), utime);  // one from the future counts once
     const bool again = claim.again;
     if (claims_.size() > kMost) Forget();
     return again;
@@ -39,9 +39,8 @@ class Claims {
 
  private:
   static constexpr size_t kMost = 16;
-  static constexpr int64_t kNever = INT64_MIN;
   struct Claim {
-    int64_t first_utime = kNever;
+    std::optional<int64_t> first_utime;  // none: it was not made yet
     int64_t order = 0;
     bool again = false;
   };

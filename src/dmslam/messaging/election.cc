@@ -47,8 +47,9 @@ void WriterElection::ReceiveHead(const head_t& head, int64_t now_ns) {
   epochs_.SaidAgain(term.epoch, head.utime);
   if (heard_.size() >= kMaxHeard && !heard_.contains(term)) return;
   Heard& heard = heard_[term];
-  if (head.utime <= heard.utime) {  // late, or the one before was from the future and counts no longer
-    if (heard.utime - head.utime > kTimeToleranceUs) heard.utime = head.utime;
+  if (heard.utime && head.utime <= *heard.utime) {
+    // Late, or the one before was from the future and counts no longer.
+    if (*heard.utime - head.utime > kTimeToleranceUs) heard.utime = head.utime;
     return;
   }
   heard.utime = head.utime;

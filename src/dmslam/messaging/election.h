@@ -59,7 +59,7 @@ class WriterElection : public StateMachine {
 
  private:
   struct Heard {
-    int64_t utime = INT64_MIN;  // of its newest beacon
+    std::optional<int64_t> utime;  // of its newest beacon
     int64_t seq = 0;
     int64_t last_ns = 0;
     int beacons = 0;

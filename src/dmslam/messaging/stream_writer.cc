@@ -217,14 +217,14 @@ StreamWriter::Reader* StreamWriter::Meet(const ack_t& ack, int64_t now_ns) {
 /// Neither late, nor from a future that would make all of its next words late. Where a reader's clock has
 /// leapt in earnest, its next word says so too.
 bool StreamWriter::IsInTime(const ack_t& ack, int64_t now_ns, Reader* reader) {
-  if (reader->last_utime == INT64_MIN) return true;
-  const int64_t expected = reader->last_utime + (now_ns - reader->last_heard_ns) / 1000;
-  const bool leaps =
-      ack.utime > expected + kTimeToleranceUs || ack.utime < reader->last_utime - kTimeToleranceUs;
-  if (!leaps) return ack.utime >= reader->last_utime;
-  const int64_t before = std::exchange(reader->doubtful_utime, ack.utime);
+  if (!reader->last_utime) return true;
+  const int64_t last = *reader->last_utime;
+  const int64_t expected = last + (now_ns - reader->last_heard_ns) / 1000;
+  const bool leaps = ack.utime > expected + kTimeToleranceUs || ack.utime < last - kTimeToleranceUs;
+  if (!leaps) return ack.utime >= last;
+  const std::optional<int64_t> before = std::exchange(reader->doubtful_utime, ack.utime);
   ++statistics_.dropped_doubtful;
-  return before != INT64_MIN && ack.utime > before && ack.utime - before < kTimeToleranceUs;
+  return before && ack.utime > *before && ack.utime - *before < kTimeToleranceUs;
 }
 
 // ---- snapshots

@@ -153,8 +153,8 @@ class StreamWriter : public StateMachine {
     int64_t accepted = 0;
     int64_t floor = 0;  // needs nothing up to here (accepted, or covered by the snapshot it receives)
     int64_t last_heard_ns = 0;
-    int64_t last_utime = INT64_MIN;      // of its newest word: older ones that come late are ignored
-    int64_t doubtful_utime = INT64_MIN;  // of one whose time does not follow from the last: another will tell
+    std::optional<int64_t> last_utime;      // of its newest word: older ones that come late are ignored
+    std::optional<int64_t> doubtful_utime;  // of one that does not follow from the last: another will tell
   };
   struct Snapshot {
     int64_t number = 0;

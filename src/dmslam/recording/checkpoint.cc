@@ -30,7 +30,7 @@ std::string FormerCheckpointPath(const std::string& path) { return path + ".form
 CheckpointSchedule::CheckpointSchedule(double every_s)
     : every_ns_(static_cast<int64_t>(std::llround(every_s * 1e9))) {}
 
-void CheckpointSchedule::OnMap(uint64_t version, int64_t stamp_ns, int64_t now_ns) {
+void CheckpointSchedule::OnMap(uint64_t version, std::optional<int64_t> stamp_ns, int64_t now_ns) {
   newest_ = {now_ns, stamp_ns};
   version_ = version;
   if (!changed_ && begun_version_ != version) changed_ = newest_;
@@ -38,12 +38,14 @@ void CheckpointSchedule::OnMap(uint64_t version, int64_t stamp_ns, int64_t now_n
 
 /// Of the oldest change that is on no disk, when what is begun now will be there.
 int64_t CheckpointSchedule::Age() const {
-  const int64_t age = std::max(newest_.now_ns - changed_->now_ns, newest_.stamp_ns - changed_->stamp_ns);
+  int64_t age = newest_.now_ns - changed_->now_ns;
+  if (newest_.stamp_ns && changed_->stamp_ns) age = std::max(age, *newest_.stamp_ns - *changed_->stamp_ns);
   return age + std::min(duration_ns_, every_ns_ / 2);
 }
 
 bool CheckpointSchedule::Due() const {
-  if (every_ns_ == 0 || writing_ || !changed_ || newest_.now_ns < retry_ns_) return false;
+  if (every_ns_ == 0 || writing_ || !changed_) return false;
+  if (retry_ns_ && newest_.now_ns < *retry_ns_) return false;
   return !any_ || Age() >= every_ns_;
 }
 
@@ -51,7 +53,7 @@ int64_t CheckpointSchedule::deadline_ns() const {
   if (every_ns_ == 0 || writing_ || !changed_) return INT64_MAX;
   const int64_t due_ns =
       any_ ? changed_->now_ns + every_ns_ - std::min(duration_ns_, every_ns_ / 2) : INT64_MIN;
-  return std::max(due_ns, retry_ns_);
+  return std::max(due_ns, retry_ns_.value_or(due_ns));
 }
 
 void CheckpointSchedule::OnBegun() {
@@ -67,7 +69,7 @@ void CheckpointSchedule::OnEnded(bool written, int64_t now_ns) {
   duration_ns_ = now_ns - begun_ns_;
   if (written) {
     any_ = true;
-    retry_ns_ = INT64_MIN;
+    retry_ns_.reset();
     return;
   }
   changed_ = begun_changed_;

@@ -21,8 +21,9 @@ class CheckpointSchedule {
   /// `every_s` = 0: none is ever due.
   explicit CheckpointSchedule(double every_s);
 
-  /// The map is as of `version` now, and the newest frame was taken at `stamp_ns`.
-  void OnMap(uint64_t version, int64_t stamp_ns, int64_t now_ns);
+  /// The map is as of `version` now, and the newest frame was taken at `stamp_ns`; none: no frame is known,
+  /// and only this host's time counts.
+  void OnMap(uint64_t version, std::optional<int64_t> stamp_ns, int64_t now_ns);
   bool Due() const;
   /// There is a change that is on no disk, and none is being written.
   bool HasUnsaved() const { return every_ns_ > 0 && !writing_ && changed_; }
@@ -35,7 +36,8 @@ class CheckpointSchedule {
 
  private:
   struct Moment {
-    int64_t now_ns = 0, stamp_ns = 0;
+    int64_t now_ns = 0;
+    std::optional<int64_t> stamp_ns;
   };
   int64_t Age() const;
 
@@ -48,8 +50,8 @@ class CheckpointSchedule {
   int64_t begun_ns_ = 0;
   int64_t duration_ns_ = 0;  ///< that the last one took
   bool writing_ = false;
-  bool any_ = false;  ///< there is one on the disk
-  int64_t retry_ns_ = INT64_MIN;
+  bool any_ = false;                 ///< there is one on the disk
+  std::optional<int64_t> retry_ns_;  ///< the last one could not be written: not before that
 };
 
 /// Writes a checkpoint so that whatever happens at any time leaves the former one or this one whole: a file

@@ -101,6 +101,19 @@ TEST(CheckpointScheduleTest, ARecordingThatPlaysFasterIsWrittenMoreOften) {
   EXPECT_NEAR(play.begun, 15, 1);
 }
 
+TEST(CheckpointScheduleTest, WhereNoFrameIsKnownOnlyTheHostsTimeCounts) {
+  CheckpointSchedule schedule(10);
+  schedule.OnMap(1, std::nullopt, kSecond);
+  EXPECT_TRUE(schedule.Due()) << "there is none";
+  schedule.OnBegun();
+  schedule.OnEnded(true, kSecond);
+  schedule.OnMap(2, std::nullopt, 2 * kSecond);
+  schedule.OnMap(2, 1000 * kSecond, 3 * kSecond);
+  EXPECT_FALSE(schedule.Due()) << "when the change was made in the frames' time is not known";
+  schedule.OnMap(2, 1001 * kSecond, 12 * kSecond);
+  EXPECT_TRUE(schedule.Due());
+}
+
 TEST(CheckpointScheduleTest, ZeroIsOff) {
   Play play(0);
   play.Until(100 * kSecond, true);

@@ -186,7 +186,7 @@ void LogIndex::AddPart(const LogEvent& event, RecordedMessage message, Parts* pa
   ReceiveWindow::PartResult result = window->second.AddPart(*part);
   if (!result.whole || !IsRecordChannel(result.whole->first)) return;
   message.channel = result.whole->first;
-  message.offset = -1;
+  message.offset.reset();
   message.bytes = std::make_shared<const Bytes>(std::move(result.whole->second));
   const SharedBytes bytes = message.bytes;
   if (const std::optional<int32_t> protocol = wire::FormerProtocol(FingerprintOf(*bytes).value_or(0))) {
@@ -207,9 +207,9 @@ const RecordedSession& LogIndex::Session(uint32_t id) const {
 
 Bytes LogIndex::Read(const RecordedMessage& message) const {
   if (message.bytes) return *message.bytes;
-  reader_.Seek(message.offset);
+  reader_.Seek(message.offset.value());
   std::optional<LogEvent> event = reader_.Next();
-  if (!event || event->offset != message.offset) {
+  if (!event || event->offset != *message.offset) {
     throw InputError(path() + ": has changed while it was read; wait until its writer has finished");
   }
   return std::move(event->bytes);

@@ -14,12 +14,12 @@ namespace dmslam {
 
 /// A message of a log: where it stands, or its bytes where it was put together from parts.
 struct RecordedMessage {
-  int64_t utime_us = 0;  ///< wall time at which the logger received (the last part of) it
-  int64_t order = 0;     ///< counts the messages of the log
-  int64_t offset = -1;   ///< in the log; -1: see `bytes`
-  std::string channel;   ///< without prefix
-  SharedBytes bytes;     ///< null unless it travelled in parts
-  RecordHeader header;   ///< of a record; zero for other messages
+  int64_t utime_us = 0;           ///< wall time at which the logger received (the last part of) it
+  int64_t order = 0;              ///< counts the messages of the log
+  std::optional<int64_t> offset;  ///< in the log; none: see `bytes`
+  std::string channel;            ///< without prefix
+  SharedBytes bytes;              ///< null unless it travelled in parts
+  RecordHeader header;            ///< of a record; zero for other messages
 };
 
 /// What a log holds of one writer's term of office.
@@ -27,8 +27,8 @@ struct RecordedTerm {
   struct Snapshot {
     std::map<int64_t, RecordedMessage> pieces;  ///< by number, from 1
     int64_t cut = 0;                            ///< followed by the record after this one
-    int64_t last = 0;                           ///< number of the last piece; 0: it was not recorded
-    bool whole() const { return last > 0 && pieces.size() == static_cast<size_t>(last); }
+    std::optional<int64_t> last;                ///< number of the last piece; none: it was not recorded
+    bool whole() const { return last && pieces.size() == static_cast<size_t>(*last); }
   };
   std::map<int64_t, RecordedMessage> records;  ///< by seq
   std::map<int64_t, Snapshot> snapshots;       ///< by number
@@ -53,7 +53,7 @@ struct RecordedSession {
   uint32_t id = 0;
   std::map<CameraId, RecordedCamera> cameras;  ///< whose players were recorded
   std::map<StreamId, RecordedStream> streams;
-  int64_t saved_records = 0;  ///< of a saved map: how many map records it was written with; else 0
+  std::optional<int64_t> saved_records;  ///< of a saved map: how many map records it was written with
 
   const RecordedStream& Stream(StreamId id) const;
   /// The cameras of which frames were recorded, in order.

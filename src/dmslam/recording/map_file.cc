@@ -73,10 +73,10 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
                       std::shared_ptr<FeatureStore> features) {
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
   const std::optional<SessionStart> start = FindSessionStart(log, session);
-  const int64_t absent = session.saved_records - RecordsOf(session.Stream(StreamId::kMap));
-  if (session.saved_records > 0 && absent > 0) {
-    throw InputError(log.path() + ": is not whole: " + std::to_string(absent) + " of the " +
-                     std::to_string(session.saved_records) +
+  const int64_t here = RecordsOf(session.Stream(StreamId::kMap));
+  if (const auto saved = session.saved_records; saved && here < *saved) {
+    throw InputError(log.path() + ": is not whole: " + std::to_string(*saved - here) + " of the " +
+                     std::to_string(*saved) +
                      " records of the saved map are missing or damaged; copy or save it again");
   }
   if (replay.steps.empty()) {

@@ -51,10 +51,10 @@ const RecordedCamera& ChooseCamera(const LogIndex& log, uint32_t session_id, Cam
 
 RecordedFrames::RecordedFrames(std::shared_ptr<const LogIndex> log, uint32_t session, CameraId camera)
     : log_(std::move(log)), camera_(&ChooseCamera(*log_, session, camera)) {
-  int64_t newest_ns = INT64_MIN;  // stamps increase strictly, or it is no sequence
+  std::optional<int64_t> newest_ns;  // stamps increase strictly, or it is no sequence
   for (const auto& [index, message] : camera_->frames) {
     const int64_t stamp_ns = camera_->stamps_ns.at(index);
-    if (stamp_ns <= newest_ns) continue;
+    if (newest_ns && stamp_ns <= *newest_ns) continue;
     newest_ns = stamp_ns;
     frames_.emplace_back(index, &message);
   }

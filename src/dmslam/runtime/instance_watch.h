@@ -29,12 +29,12 @@ class InstanceWatch {
   }
   /// What who watched before has noted of a process.
   struct Noted {
-    double uptime_s = -1;  ///< how long it had run; below zero: not known
-    int64_t epoch = 0;     ///< as writer; 0: not known
+    std::optional<double> uptime_s;  ///< how long it had run; none: not known
+    std::optional<int64_t> epoch;    ///< as writer; none: not known
   };
   /// A process with this id was heard by who watched before.
   void Know(int32_t pid, int64_t now_ns, const Noted& noted) {
-    heard_[pid] = {noted.uptime_s, now_ns, noted};
+    heard_[pid] = {noted.uptime_s.value_or(0), now_ns, noted};
   }
 
  private:
@@ -46,8 +46,8 @@ class InstanceWatch {
     std::optional<Noted> noted;  ///< it was not heard here
   };
   static bool IsOther(const Noted& noted, const ProcessHealth& health) {
-    if (noted.epoch != 0 && health.epoch != 0 && noted.epoch != health.epoch) return true;
-    return health.uptime_s < noted.uptime_s;
+    if (noted.epoch && health.epoch != 0 && *noted.epoch != health.epoch) return true;
+    return noted.uptime_s && health.uptime_s < *noted.uptime_s;
   }
   void Forget(int32_t but) {
     auto oldest = heard_.end();

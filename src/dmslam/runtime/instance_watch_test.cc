@@ -58,7 +58,7 @@ TEST(InstanceWatch, WhoCameWhileNobodyListenedIsToldByWhatWasNoted) {
   EXPECT_TRUE(is_new({30, 5}, 40, 6)) << "it writes in another term";
   EXPECT_TRUE(is_new({30, 5}, 20, 0)) << "it has run for less, though for long";
   EXPECT_FALSE(is_new({30, 5}, 40, 0)) << "its term is not known yet";
-  EXPECT_FALSE(is_new({30, 0}, 40, 6)) << "it had none when it was noted";
+  EXPECT_FALSE(is_new({30, {}}, 40, 6)) << "it had none when it was noted";
 }
 
 TEST(InstanceWatch, ItsMemoryIsBoundedAndKeepsTheNewest) {
