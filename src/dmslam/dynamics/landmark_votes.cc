@@ -27,7 +27,7 @@ bool LandmarkVotes::HasVote(const Landmark& landmark) const {
   if (!options_.motion_belief) return true;
   if (!IsStatic(&landmark)) return false;
   const auto streak = streaks_.find(landmark.id);
-  return streak == streaks_.end() || streak->second < options_.streak_without_vote;
+  return streak == streaks_.end() || streak->second < kStreakWithoutVote;
 }
 
 double LandmarkVotes::Trust(double age_s) const {

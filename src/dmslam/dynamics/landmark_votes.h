@@ -14,8 +14,6 @@ struct VoteOptions {
   bool motion_belief = true;  ///< landmarks that are believed to move have no vote; off: all are equal
   double young_trust = 0.3;   ///< weight of a landmark that was just made...
   double trusted_age_s = kPeopleStandS;  ///< ...which grows to one when it stood still for so long
-  int streak_without_vote =
-      3;  ///< so many sightings elsewhere in a row cost the vote, before the mapper says so
 
   template <typename Visitor>
   void Describe(Visitor& v) {
@@ -67,6 +65,8 @@ class LandmarkVotes {
   const VoteOptions& options() const { return options_; }
 
  private:
+  /// So many sightings elsewhere in a row cost the vote, before the mapper says so.
+  static constexpr int kStreakWithoutVote = 3;
   VoteOptions options_;
   std::pmr::unsynchronized_pool_resource pool_;
   std::pmr::unordered_map<LandmarkId, int> streaks_{&pool_};  ///< sightings elsewhere in a row

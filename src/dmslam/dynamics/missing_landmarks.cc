@@ -44,8 +44,8 @@ void MissingLandmarks::CallWitnesses(const Map& map, const TrackedFrame& frame,
 MissingLandmarks::Verdict MissingLandmarks::AskAround(const LandmarkView& view) const {
   int behind = 0, beside = 0, before = 0, moving_beside = 0;
   witnesses_.ForEachNear(view.uv_px, reach_px_, [&](const Witness& witness) {
-    const bool farther = witness.depth > options_.seen_through_depth * view.depth;
-    const bool nearer = witness.depth * options_.seen_through_depth < view.depth;
+    const bool farther = witness.depth > kSeenThroughDepth * view.depth;
+    const bool nearer = witness.depth * kSeenThroughDepth < view.depth;
     if (witness.moves) {
       if (!farther && !nearer) ++moving_beside;
       if (nearer) ++before;
@@ -53,8 +53,8 @@ MissingLandmarks::Verdict MissingLandmarks::AskAround(const LandmarkView& view) 
     }
     ++(farther ? behind : nearer ? before : beside);
   });
-  const bool seen_through = behind >= options_.seen_through_min && beside == 0;
-  const bool goes_with_others = moving_beside >= options_.moving_together_min && moving_beside > 2 * beside;
+  const bool seen_through = behind >= kSeenThroughMin && beside == 0;
+  const bool goes_with_others = moving_beside >= kMovingTogetherMin && moving_beside > 2 * beside;
   if (seen_through || goes_with_others) return Verdict::kGone;
   return before > 0 && beside == 0 ? Verdict::kHidden : Verdict::kNone;
 }

@@ -11,13 +11,6 @@
 
 namespace dmslam {
 
-struct MissingOptions {
-  double seen_through_rad = 0.076;  ///< what is seen this near to a missing landmark...
-  double seen_through_depth = 1.2;  ///< ...and this much farther away says that it has gone...
-  int seen_through_min = 2;     ///< ...where at least so many say it, and nothing of its own depth denies it
-  int moving_together_min = 3;  ///< a missing landmark goes with so many of its depth around it that move
-};
-
 /// What a frame knows of a place in the image: what it sees there, how far away, and whether that moves.
 struct Witness {
   Eigen::Vector2d uv_px;
@@ -62,8 +55,11 @@ class WitnessGrid {
 /// seen: they are hidden, and nothing is said.
 class MissingLandmarks {
  public:
-  MissingLandmarks(const MissingOptions& options, const Camera& camera)
-      : options_(options), reach_px_(SearchRadiusPx(camera, options.seen_through_rad)), witnesses_(camera) {}
+  /// What is seen this near to a missing landmark tells of it.
+  static constexpr double kReachRad = 0.076;
+
+  explicit MissingLandmarks(const Camera& camera)
+      : reach_px_(SearchRadiusPx(camera, kReachRad)), witnesses_(camera) {}
 
   /// `moved`: seen elsewhere by the frame, and so not missing.
   void Judge(const Map& map, const TrackedFrame& frame, std::span<const ExpectedLandmark> expected,
@@ -75,12 +71,18 @@ class MissingLandmarks {
   const std::vector<LandmarkId>& hidden() const { return hidden_; }
 
  private:
+  /// What is this much farther away says that it has gone...
+  static constexpr double kSeenThroughDepth = 1.2;
+  /// ...where at least so many say it, and nothing of its own depth denies it.
+  static constexpr int kSeenThroughMin = 2;
+  /// It goes with so many of its depth around it that move.
+  static constexpr int kMovingTogetherMin = 3;
+
   enum class Verdict { kNone, kGone, kHidden };
 
   void CallWitnesses(const Map& map, const TrackedFrame& frame, std::span<const LandmarkId> moved);
   Verdict AskAround(const LandmarkView& view) const;
 
-  MissingOptions options_;
   double reach_px_;
   WitnessGrid witnesses_;
   std::vector<LandmarkId> gone_, hidden_;

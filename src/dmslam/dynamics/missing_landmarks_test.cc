@@ -38,7 +38,7 @@ class MissingLandmarksTest : public ::testing::Test {
   }
 
   PosterScene scene_;
-  MissingLandmarks missing_{{}, TestCamera()};
+  MissingLandmarks missing_{TestCamera()};
 };
 
 TEST_F(MissingLandmarksTest, WhatIsSeenThroughHasGone) {
@@ -54,7 +54,7 @@ TEST_F(MissingLandmarksTest, WhereSomethingOfItsDepthIsSeenItHasNot) {
 }
 
 TEST_F(MissingLandmarksTest, WhatIsFarFromItInTheImageSaysNothing) {
-  Judge([&](size_t i) { return !OfPoster(i) && FromPoster(i) > MissingOptions().seen_through_rad; });
+  Judge([&](size_t i) { return !OfPoster(i) && FromPoster(i) > MissingLandmarks::kReachRad; });
   EXPECT_EQ(GoneOfPoster(), 0);
 }
 

@@ -15,7 +15,7 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
   if (options.enabled) {
     const float change = options.moved_step * static_cast<float>(item.moved) -
                          options.found_step * static_cast<float>(item.found);
-    state.motion_belief = std::clamp(state.motion_belief + change, options.floor, options.ceiling);
+    state.motion_belief = std::clamp(state.motion_belief + change, kLowestBelief, kHighestBelief);
   }
   return state;
 }

@@ -8,13 +8,15 @@
 
 namespace dmslam {
 
+/// Log odds are kept within these: however long a landmark stood still, it may start to move, and the other
+/// way round.
+inline constexpr float kLowestBelief = -4.0F, kHighestBelief = 4.0F;
+
 /// What each landmark's evidence does to the belief that it moves.
 struct MotionBeliefOptions {
   bool enabled = true;
-  float found_step = 0.5F;  ///< taken from the log odds for each frame that found it in its place
-  float moved_step = 1.0F;  ///< added for each frame that found it elsewhere
-  float floor = -4.0F;      ///< however long it stood still, it may start to move
-  float ceiling = 4.0F;
+  float found_step = 0.5F;    ///< taken from the log odds for each frame that found it in its place
+  float moved_step = 1.0F;    ///< added for each frame that found it elsewhere
   float remove_above = 2.5F;  ///< beyond this it leaves the map
 
   template <typename Visitor>

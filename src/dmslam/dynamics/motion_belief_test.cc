@@ -57,7 +57,7 @@ TEST_F(MotionBeliefTest, WhatGoesOnMovingLeavesTheMap) {
 
 TEST_F(MotionBeliefTest, HoweverLongItStoodWhatBeginsToMoveLeavesSoon) {
   for (int i = 0; i < 50; ++i) Say(0, 30, 0);
-  EXPECT_FLOAT_EQ(BeliefOf(0), options_.floor);
+  EXPECT_FLOAT_EQ(BeliefOf(0), kLowestBelief);
   int frames = 0;
   while (Find(0) != nullptr && frames < 100) {
     Say(0, 0, 1);

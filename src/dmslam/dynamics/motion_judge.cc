@@ -31,10 +31,8 @@ FrameEvidence EvidenceCounter::Take(int64_t stamp_ns, std::optional<MapId> map_i
 MotionJudge::MotionJudge(const DynamicsOptions& options, const Camera& camera)
     : votes_(options.vote),
       elders_(options.elders, options.vote.trusted_age_s),
-      rivals_(options.rivals),
       hidden_(options.hidden),
-      moved_(options.moved),
-      missing_(options.missing, camera) {}
+      missing_(camera) {}
 
 void MotionJudge::DropMatchesOfHiddenPlaces(const Map& map, std::span<const ExpectedLandmark> expected,
                                             TrackedFrame* frame) {

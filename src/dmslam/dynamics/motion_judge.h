@@ -19,10 +19,7 @@ namespace dmslam {
 struct DynamicsOptions {
   VoteOptions vote;
   ElderOptions elders;
-  RivalOptions rivals;
   HiddenPlaceOptions hidden;
-  MovedOptions moved;
-  MissingOptions missing;
 
   template <typename Visitor>
   void Describe(Visitor& v) {

@@ -30,7 +30,7 @@ void MovedLandmarks::JudgeRejected(const Map& map, std::span<const RejectedMatch
     const Landmark& landmark = *map.FindLandmark(match.landmark);
     const int distance =
         HammingDistance(landmark.descriptor, frame->features->set.descriptors[match.feature]);
-    if (match.chi2 < options_.near_chi2 || distance > options_.near_distance) continue;
+    if (match.chi2 < kNearChi2 || distance > kNearDistance) continue;
     moved_.push_back(match.landmark);
     features_.push_back(match.feature);
     used_.push_back(match.landmark);
@@ -45,11 +45,11 @@ void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected
   const std::optional<Eigen::Vector2d> uv = map.camera().Project(frame->T_cam_world * landmark.p_world);
   if (!uv) return;
   const std::optional<FeatureHit> hit =
-      FindFeature(*frame->features, *uv, SearchRadiusPx(map.camera(), options_.radius_rad),
-                  expected.view.octave - 1, expected.view.octave + 1, landmark.descriptor, taken_);
-  if (!hit || hit->distance > options_.max_distance) return;
-  if (hit->distance > options_.ratio * hit->second_distance) return;
-  if (NormalizedErrorSquared(*frame->features, hit->feature, *uv, map.pyramid()) < options_.chi2) return;
+      FindFeature(*frame->features, *uv, SearchRadiusPx(map.camera(), kRadiusRad), expected.view.octave - 1,
+                  expected.view.octave + 1, landmark.descriptor, taken_);
+  if (!hit || hit->distance > kMaxDistance) return;
+  if (hit->distance > kRatio * hit->second_distance) return;
+  if (NormalizedErrorSquared(*frame->features, hit->feature, *uv, map.pyramid()) < kChi2) return;
   moved_.push_back(landmark.id);
   features_.push_back(static_cast<uint16_t>(hit->feature));
   frame->classes[static_cast<size_t>(hit->feature)] = FeatureClass::kMoving;

@@ -10,20 +10,9 @@
 
 namespace dmslam {
 
-struct MovedOptions {
-  double chi2 = 4.0 * kChiSquared2Dof;  ///< a strong match farther off than this speaks for motion
-  double near_chi2 = 16.0;    ///< a match near its place that is rejected by so much speaks for motion too...
-  int near_distance = 60;     ///< ...where it looks like the landmark [bits]
-  double radius_rad = 0.057;  ///< how far a landmark that is missed in its place is looked for
-  int max_distance = 40;      ///< bits; a match elsewhere must be strong...
-  double ratio = 0.7;         ///< ...and alone
-};
-
 /// Finds the landmarks that a frame with a known pose sees elsewhere than the map says.
 class MovedLandmarks {
  public:
-  explicit MovedLandmarks(const MovedOptions& options) : options_(options) {}
-
   /// Marks their features as moving and returns their ids (valid until the next call): first those of the
   /// matches that the pose rejected, then those of `expected` that are found farther off.
   const std::vector<LandmarkId>& Find(const Map& map, std::span<const ExpectedLandmark> expected,
@@ -35,7 +24,17 @@ class MovedLandmarks {
   void JudgeRejected(const Map& map, std::span<const RejectedMatch> rejected, TrackedFrame* frame);
   void LookAround(const Map& map, const ExpectedLandmark& expected, TrackedFrame* frame);
 
-  MovedOptions options_;
+  // A match near its place that the pose rejects by so much speaks for motion, where it looks like the
+  // landmark.
+  static constexpr double kNearChi2 = 16.0;
+  static constexpr int kNearDistance = 60;  // bits
+  // One that is missed in its place and found so near speaks for motion too, where it is far enough from its
+  // place, looks like the landmark, and is the only one that does.
+  static constexpr double kRadiusRad = 0.057;
+  static constexpr double kChi2 = 4.0 * kChiSquared2Dof;
+  static constexpr int kMaxDistance = 40;  // bits
+  static constexpr double kRatio = 0.7;    // of the best distance by the second best
+
   std::vector<LandmarkId> moved_;
   std::vector<uint16_t> features_;
   std::vector<LandmarkId> used_;  ///< workspace: landmarks that are accounted for

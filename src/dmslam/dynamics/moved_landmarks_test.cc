@@ -61,7 +61,7 @@ class MovedLandmarksTest : public ::testing::Test {
   }
 
   PosterScene scene_;
-  MovedLandmarks moved_{{}};
+  MovedLandmarks moved_;
 };
 
 TEST_F(MovedLandmarksTest, WhatIsFoundBesideItsPlaceHasMoved) {

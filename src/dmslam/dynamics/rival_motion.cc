@@ -13,8 +13,8 @@ double SupportWidth::Score() const {
 }
 
 bool RivalMotions::RivalWins(const SupportWidth& first, const SupportWidth& rival, int contradicting) const {
-  return rival.count() >= options_.min_support && rival.count() >= options_.min_share * contradicting &&
-         rival.Score() > options_.min_advantage * first.Score();
+  return rival.count() >= kMinSupport && rival.count() >= kMinShare * contradicting &&
+         rival.Score() > kMinAdvantage * first.Score();
 }
 
 }  // namespace dmslam

@@ -4,12 +4,6 @@
 
 namespace dmslam {
 
-struct RivalOptions {
-  int min_support = 20;    ///< matches that one motion explains and the other does not, to count as a motion
-  double min_share = 0.5;  ///< of the matches that contradict the first motion, those that the rival explains
-  double min_advantage = 3.0;  ///< the rival's number times D by the other's, from which it is believed
-};
-
 /// Number times D (paper Eq. 3) of points in the image, added one by one: how much of the image they hold.
 class SupportWidth {
  public:
@@ -29,16 +23,19 @@ class SupportWidth {
 /// young for age to tell them apart (elders.h).
 class RivalMotions {
  public:
-  explicit RivalMotions(const RivalOptions& options) : options_(options) {}
-
   /// Whether `contradicting` matches are enough to look for a motion of their own.
-  bool IsWorthALook(int contradicting) const { return contradicting >= options_.min_support; }
+  bool IsWorthALook(int contradicting) const { return contradicting >= kMinSupport; }
   /// Whether what only the rival explains outweighs what only the first motion explains; `contradicting` the
   /// first one were so many.
   bool RivalWins(const SupportWidth& first, const SupportWidth& rival, int contradicting) const;
 
  private:
-  RivalOptions options_;
+  /// Matches that one motion explains and the other does not, to count as a motion.
+  static constexpr int kMinSupport = 20;
+  /// Of the matches that contradict the first motion, those that the rival explains.
+  static constexpr double kMinShare = 0.5;
+  /// The rival's number times D by the other's, from which it is believed.
+  static constexpr double kMinAdvantage = 3.0;
 };
 
 }  // namespace dmslam

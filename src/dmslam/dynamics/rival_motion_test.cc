@@ -24,14 +24,14 @@ TEST(SupportWidth, IsNumberTimesD) {
 }
 
 TEST(RivalMotions, TheWiderOneWins) {
-  const RivalMotions rivals{{}};
+  const RivalMotions rivals;
   EXPECT_TRUE(rivals.RivalWins(Circle(100, 60), Circle(60, 200), 70));
   EXPECT_FALSE(rivals.RivalWins(Circle(60, 200), Circle(100, 60), 110));
   EXPECT_FALSE(rivals.RivalWins(Circle(60, 200), Circle(61, 200), 70)) << "hardly wider: the first one stays";
 }
 
 TEST(RivalMotions, WhatContradictsAtRandomIsNoMotion) {
-  const RivalMotions rivals{{}};
+  const RivalMotions rivals;
   EXPECT_FALSE(rivals.IsWorthALook(10));
   EXPECT_FALSE(rivals.RivalWins(Circle(30, 20), Circle(10, 200), 15)) << "too few";
   EXPECT_FALSE(rivals.RivalWins(Circle(30, 20), Circle(40, 200), 200)) << "most contradict both";

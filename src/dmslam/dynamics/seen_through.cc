@@ -14,6 +14,25 @@ namespace {
 
 constexpr int kCoarsestOctave = std::numeric_limits<int>::max();
 
+// Who sees through a suspect.
+constexpr double kGuardS = 0.5;             // witnesses are at least so far in time from when it was seen
+constexpr double kAroundRad = 0.0533;       // around its pixel a witness's landmarks are compared
+constexpr double kDepthTolerance = 0.11;    // relative difference of depth that is still the same place
+constexpr double kThroughPerSupport = 0.2;  // who sees through it, per witness that sees something there
+constexpr size_t kMaxWitnesses = 60;        // while mapping
+constexpr double kWitnessAngleRad = 1.0;    // between the viewing directions of keyframe and witness
+// Who shares its fate.
+constexpr double kTogetherRad = 0.133;  // neighbours within this...
+constexpr double kTogetherShare = 0.3;  // ...when so many of them are condemned
+constexpr int kRounds = 4;              // of both tests
+// Where so many of the unproven are seen through somebody must have stood. Then unproven ones go beside
+// which, at other times, no more keyframes see a proven one of the same depth than this, times their own
+// observers; and so many times their neighbours.
+constexpr double kStoodShare = 0.5;
+constexpr double kSupportPerObservation = 1.0;
+constexpr double kSupportTolerance = 0.05;  // of depth: people stand before furniture, not in it
+constexpr int kRoundsUnsupported = 2;
+
 // Suspects and witnesses are found once and named by reference. What is still looked up is what the map's own
 // records name by id: what a feature sees (`LandmarkSeenBy`), and who observes a landmark (`At`). Nothing is
 // removed before all is decided, so every reference holds until then.
@@ -31,10 +50,9 @@ using Suspects = std::map<LandmarkId, Suspect>;
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-void AddIfUnproven(const Map& map, const Landmark& landmark, const SeenThroughOptions& options,
-                   Suspects* suspects) {
+void AddIfUnproven(const Map& map, const Landmark& landmark, Suspects* suspects) {
   const std::vector<int64_t> stamps = ObservationStamps(map, landmark);
-  if (stamps.empty() || OutlastsStanding(stamps, {options.standing_s, options.outer_observations})) return;
+  if (stamps.empty() || OutlastsStanding(stamps, ProvenOptions())) return;
   (*suspects)[landmark.id] = {&landmark, stamps.front(), stamps.back()};
 }
 
@@ -50,24 +68,23 @@ struct Depths {
 
 /// Depths of the landmarks that `witness` sees around the pixel of `p_world`, relative to its own.
 Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3d& p_world,
-                   const Suspects& suspects, const SeenThroughOptions& options) {
+                   const Suspects& suspects) {
   Depths depths;
   const Eigen::Vector3d p_cam = witness.T_cam_world * p_world;
   const auto uv_px = p_cam.z() > 0 ? map.camera().Project(p_cam) : std::nullopt;
   if (!uv_px || !InImage(map.camera(), *uv_px)) return depths;
   witness.features->grid.ForEachInRadius(
-      *uv_px, SearchRadiusPx(map.camera(), options.radius_rad), 0, kCoarsestOctave, [&](uint32_t feature) {
+      *uv_px, SearchRadiusPx(map.camera(), kAroundRad), 0, kCoarsestOctave, [&](uint32_t feature) {
         const Landmark* other = map.LandmarkSeenBy(witness, feature);
         if (other == nullptr) return;
         const auto suspect = suspects.find(other->id);
         if (suspect != suspects.end() && suspect->second.condemned) return;
         const double ratio = (witness.T_cam_world * other->p_world).z() / p_cam.z();
-        if (ratio > 1 + options.depth_tolerance) {
+        if (ratio > 1 + kDepthTolerance) {
           ++depths.behind;
-        } else if (ratio > 1 - options.depth_tolerance) {
+        } else if (ratio > 1 - kDepthTolerance) {
           ++depths.same;
-          if (suspect == suspects.end() && std::abs(ratio - 1) < options.support_tolerance)
-            ++depths.proven_same;
+          if (suspect == suspects.end() && std::abs(ratio - 1) < kSupportTolerance) ++depths.proven_same;
         }
       });
   return depths;
@@ -80,31 +97,29 @@ int Condemn(const std::vector<Suspect*>& found) {
 }
 
 /// Asks every witness from another time, and condemns the suspects that are seen through. Returns how many.
-int CondemnSeenThrough(const Map& map, const std::vector<const Keyframe*>& witnesses,
-                       const SeenThroughOptions& options, Suspects* suspects) {
+int CondemnSeenThrough(const Map& map, const std::vector<const Keyframe*>& witnesses, Suspects* suspects) {
   std::vector<Suspect*> found;
   for (auto& [id, suspect] : *suspects) {
     if (suspect.condemned) continue;
     suspect.through = suspect.support = suspect.proven_support = 0;
     for (const Keyframe* witness : witnesses) {
-      if (Seconds(suspect.first_ns - witness->stamp_ns) < options.guard_s &&
-          Seconds(witness->stamp_ns - suspect.last_ns) < options.guard_s) {
+      if (Seconds(suspect.first_ns - witness->stamp_ns) < kGuardS &&
+          Seconds(witness->stamp_ns - suspect.last_ns) < kGuardS) {
         continue;
       }
-      const Depths depths = LookThrough(map, *witness, suspect.landmark->p_world, *suspects, options);
+      const Depths depths = LookThrough(map, *witness, suspect.landmark->p_world, *suspects);
       if (depths.behind > 0 && depths.same == 0) ++suspect.through;
       if (depths.same > 0) ++suspect.support;
       if (depths.proven_same > 0) ++suspect.proven_support;
     }
-    if (suspect.through > options.through_per_support * suspect.support) found.push_back(&suspect);
+    if (suspect.through > kThroughPerSupport * suspect.support) found.push_back(&suspect);
   }
   return Condemn(found);
 }
 
 /// Share of a landmark's neighbours, in the keyframes that see it and at its depth, that are condemned.
-double CondemnedAround(const Map& map, const Landmark& landmark, const Suspects& suspects,
-                       const SeenThroughOptions& options) {
-  const double together_px = SearchRadiusPx(map.camera(), options.together_rad);
+double CondemnedAround(const Map& map, const Landmark& landmark, const Suspects& suspects) {
+  const double together_px = SearchRadiusPx(map.camera(), kTogetherRad);
   int all = 0, condemned = 0;
   for (const Observation& o : landmark.observations) {
     const Keyframe& keyframe = map.At(o.keyframe);
@@ -113,7 +128,7 @@ double CondemnedAround(const Map& map, const Landmark& landmark, const Suspects&
       const Landmark* other = map.LandmarkSeenBy(keyframe, feature);
       if (other == nullptr || other == &landmark) return;
       const double ratio = (keyframe.T_cam_world * other->p_world).z() / depth;
-      if (std::abs(ratio - 1) > options.depth_tolerance) return;
+      if (std::abs(ratio - 1) > kDepthTolerance) return;
       ++all;
       const auto suspect = suspects.find(other->id);
       if (suspect != suspects.end() && suspect->second.condemned) ++condemned;
@@ -155,15 +170,15 @@ class CondemnedPlaces {
 };
 
 /// Suspects among the condemned share their fate. Returns how many.
-int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
+int CondemnTogether(const Map& map, Suspects* suspects) {
   std::vector<Suspect*> found;
   const CondemnedPlaces condemned(map, *suspects);
-  const double together_px = SearchRadiusPx(map.camera(), options.together_rad);
+  const double together_px = SearchRadiusPx(map.camera(), kTogetherRad);
   for (auto& [id, suspect] : *suspects) {
     if (suspect.condemned) continue;
     const bool near = condemned.AnyNear(*suspect.landmark, together_px + 1e-6);
-    const double share = near ? CondemnedAround(map, *suspect.landmark, *suspects, options) : 0.0;
-    if (share >= options.together_share) found.push_back(&suspect);
+    const double share = near ? CondemnedAround(map, *suspect.landmark, *suspects) : 0.0;
+    if (share >= kTogetherShare) found.push_back(&suspect);
   }
   return Condemn(found);
 }
@@ -171,13 +186,13 @@ int CondemnTogether(const Map& map, const SeenThroughOptions& options, Suspects*
 /// Where somebody stood, an unproven landmark needs proven ones at its place, seen at other times by more
 /// keyframes than see the landmark itself: whoever stood there was seen often, and what stands at his depth
 /// by chance seldom. Its neighbours share its fate.
-void CondemnUnsupported(const Map& map, const SeenThroughOptions& options, Suspects* suspects) {
+void CondemnUnsupported(const Map& map, Suspects* suspects) {
   for (auto& [id, suspect] : *suspects) {
     const auto observers = static_cast<double>(suspect.landmark->observations.size());
-    const bool supported = suspect.proven_support > options.support_per_observation * observers;
+    const bool supported = suspect.proven_support > kSupportPerObservation * observers;
     if (!supported) suspect.condemned = true;
   }
-  for (int round = 0; round < options.rounds_unsupported; ++round) CondemnTogether(map, options, suspects);
+  for (int round = 0; round < kRoundsUnsupported; ++round) CondemnTogether(map, suspects);
 }
 
 int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
@@ -191,50 +206,48 @@ int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
 }
 
 /// Keyframes that look where this one looks, nearest first.
-std::vector<const Keyframe*> WitnessesNear(const Map& map, const Keyframe& keyframe,
-                                           const SeenThroughOptions& options) {
+std::vector<const Keyframe*> WitnessesNear(const Map& map, const Keyframe& keyframe) {
   const double depth = map.MedianDepth(keyframe).value_or(0.0);
-  std::vector<const Keyframe*> witnesses = map.KeyframesNear(keyframe, depth, options.witness_angle_rad);
-  if (witnesses.size() > static_cast<size_t>(options.max_witnesses))
-    witnesses.resize(static_cast<size_t>(options.max_witnesses));
+  std::vector<const Keyframe*> witnesses = map.KeyframesNear(keyframe, depth, kWitnessAngleRad);
+  if (witnesses.size() > kMaxWitnesses) witnesses.resize(kMaxWitnesses);
   return witnesses;
 }
 
 }  // namespace
 
-int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe, const SeenThroughOptions& options) {
+int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe) {
   Suspects suspects;
   for (size_t feature = 0; feature < keyframe.landmarks.size(); ++feature) {
     const Landmark* landmark = map.LandmarkSeenBy(keyframe, feature);
-    if (landmark != nullptr) AddIfUnproven(map, *landmark, options, &suspects);
+    if (landmark != nullptr) AddIfUnproven(map, *landmark, &suspects);
   }
-  const std::vector<const Keyframe*> witnesses = WitnessesNear(map, keyframe, options);
-  if (CondemnSeenThrough(map, witnesses, options, &suspects) == 0) return 0;
-  for (int round = 0; round < options.rounds; ++round) {
-    const int together = CondemnTogether(map, options, &suspects);
-    if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
+  const std::vector<const Keyframe*> witnesses = WitnessesNear(map, keyframe);
+  if (CondemnSeenThrough(map, witnesses, &suspects) == 0) return 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const int together = CondemnTogether(map, &suspects);
+    if (together + CondemnSeenThrough(map, witnesses, &suspects) == 0) break;
   }
   return RemoveCondemned(map, suspects);
 }
 
-int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before, const SeenThroughOptions& options) {
+int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before) {
   Suspects suspects;
   const std::vector<const Landmark*> landmarks = map.LandmarksOf(map_id);
-  for (const Landmark* landmark : landmarks) AddIfUnproven(map, *landmark, options, &suspects);
+  for (const Landmark* landmark : landmarks) AddIfUnproven(map, *landmark, &suspects);
   const std::vector<const Keyframe*> witnesses = map.KeyframesOf(map_id);
   const double before = static_cast<double>(removed_before);
-  const double seen_through = before + CondemnSeenThrough(map, witnesses, options, &suspects);
+  const double seen_through = before + CondemnSeenThrough(map, witnesses, &suspects);
   const bool any_proven = suspects.size() < landmarks.size();
   const bool somebody_stood =
-      any_proven && seen_through > options.stood_share * (before + static_cast<double>(suspects.size()));
+      any_proven && seen_through > kStoodShare * (before + static_cast<double>(suspects.size()));
   for (auto& [id, suspect] : suspects) {
     if (somebody_stood && suspect.landmark->evidence.moved > 0) suspect.condemned = true;
   }
-  for (int round = 0; round < options.rounds; ++round) {
-    const int together = CondemnTogether(map, options, &suspects);
-    if (together + CondemnSeenThrough(map, witnesses, options, &suspects) == 0) break;
+  for (int round = 0; round < kRounds; ++round) {
+    const int together = CondemnTogether(map, &suspects);
+    if (together + CondemnSeenThrough(map, witnesses, &suspects) == 0) break;
   }
-  if (somebody_stood) CondemnUnsupported(map, options, &suspects);
+  if (somebody_stood) CondemnUnsupported(map, &suspects);
   return RemoveCondemned(map, suspects);
 }
 

@@ -95,7 +95,7 @@ TEST_F(StandingPerson, IsRemovedWhereTheWallWasSeenBefore) {
   const auto person = AddLandmarks(kPersonDepth, with_too, true);
   See(with, wall, person);
   See(with_too, wall, person);
-  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(with_too), SeenThroughOptions()), 9);
+  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(with_too)), 9);
   EXPECT_EQ(CountLeft(map_, person), 0);
   EXPECT_EQ(CountLeft(map_, wall), 63);
 }
@@ -106,7 +106,7 @@ TEST_F(StandingPerson, StaysWhileNobodySawWhatIsBehind) {
   const auto person = AddLandmarks(kPersonDepth, with_too, true);
   See(with, wall, person);
   See(with_too, wall, person);
-  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(with_too), SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(with_too)), 0);
   EXPECT_EQ(CountLeft(map_, person), 9);
 }
 
@@ -119,7 +119,7 @@ TEST_F(StandingPerson, GoesAtTheEndWhenTheWallWasSeenAfter) {
   See(with_too, wall, person);
   See(after, wall, {});
   See(after_too, wall, {});
-  EXPECT_GE(RemoveUnproven(map_, 1, 0, SeenThroughOptions()), 9);
+  EXPECT_GE(RemoveUnproven(map_, 1, 0), 9);
   EXPECT_EQ(CountLeft(map_, person), 0);
 }
 
@@ -129,7 +129,7 @@ TEST_F(StandingPerson, AMapTooShortToProveAnythingIsNotEmptied) {
   const auto wall = AddLandmarks(kWallDepth, all.back(), false);
   for (const KeyframeId id : all) See(id, wall, {});
   constexpr uint64_t kManyBefore = 1000;
-  EXPECT_EQ(RemoveUnproven(map_, 1, kManyBefore, SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveUnproven(map_, 1, kManyBefore), 0);
 }
 
 TEST_F(StandingPerson, FurnitureIsProvenByTime) {
@@ -141,7 +141,7 @@ TEST_F(StandingPerson, FurnitureIsProvenByTime) {
   const KeyframeId odd =
       AddKeyframe(400, 13);  // sees the wall where the cupboard stands, for whatever reason
   See(odd, wall, {});
-  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(late_too), SeenThroughOptions()), 0);
+  EXPECT_EQ(RemoveSeenThrough(map_, map_.At(late_too)), 0);
   EXPECT_EQ(CountLeft(map_, cupboard), 9);
 }
 
@@ -159,7 +159,7 @@ TEST_F(StandingPerson, InFrontOfFurnitureStaysOnlyWhileMoreKeyframesSeeTheFurnit
     for (const KeyframeId id : others) See(id, wall, cupboard);
     for (const KeyframeId id : with) See(id, wall, person);
     constexpr uint64_t kManyBefore = 1000;  // so somebody must have stood
-    RemoveUnproven(map_, 1, kManyBefore, SeenThroughOptions());
+    RemoveUnproven(map_, 1, kManyBefore);
     EXPECT_EQ(CountLeft(map_, cupboard), 9);
     return CountLeft(map_, person);
   };

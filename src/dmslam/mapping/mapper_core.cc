@@ -137,7 +137,7 @@ void MapperCore::CullYoung(MapId map_id) {
 void MapperCore::RemoveSeenThroughBy(const Keyframe& keyframe) {
   if (!options_.seen_through.enabled) return;
   const MapId map_id = keyframe.map_id;
-  const int removed = RemoveSeenThrough(map_, keyframe, options_.seen_through);
+  const int removed = RemoveSeenThrough(map_, keyframe);
   Count(removed, &counters_.landmarks_seen_through);
   Count(removed, &seen_through_[map_id]);
 }
@@ -199,8 +199,7 @@ void MapperCore::AdjustMaps() {
     Publish(MapEvent::kMapAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.
-    Count(RemoveUnproven(map_, map_id, seen_through_[map_id], options_.seen_through),
-          &counters_.landmarks_seen_through);
+    Count(RemoveUnproven(map_, map_id, seen_through_[map_id]), &counters_.landmarks_seen_through);
   }
   adjusted_ = true;
 }
