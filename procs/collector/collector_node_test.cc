@@ -15,6 +15,7 @@
 
 #include "dmslam/mapping/testing/wall_scene.h"
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 #include "dmslam/settings/settings.h"
 #include "dmslam/util/check.h"
 
@@ -43,12 +44,8 @@ class CollectorNodeTest : public testing::Test {
 
   /// `fresh`: of a run that begins; else it follows the one before it.
   void Start(bool fresh = true) {
-    NodeContext context;
-    context.bus = &bus_.AddPort();
-    context.now_ns = [this] { return now_ns_; };
-    context.wall_us = [this] { return now_ns_ / 1000; };
+    NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "collector");
     context.random_id = static_cast<int64_t>(7 + nodes_.size());
-    context.name = "collector";
     context.fresh_system = fresh;
     NodeOptions options;
     options.session = kSession;
@@ -71,24 +68,18 @@ class CollectorNodeTest : public testing::Test {
     }
   }
   void BeginStreams() {
-    frontend_ = MakeWriter(StreamId::kFrontend, "FRONTEND", "frontend");
-    mapper_ = MakeWriter(StreamId::kMap, "MAPPER", "mapper");
+    frontend_ = MakeWriter(StreamId::kFrontend, "frontend");
+    mapper_ = MakeWriter(StreamId::kMap, "mapper");
     SessionStart start;
     start.session = kSession;
     start.configuration_hash = settings_.Hash();
     start.camera = TestCamera();
     PublishFrom(*frontend_, start);
   }
-  std::unique_ptr<StreamWriter> MakeWriter(StreamId stream, const char* owner, const char* name) {
-    StreamWriter::Options options;
-    options.session = kSession;
-    options.stream = stream;
-    options.owner = owner;
-    options.name = name;
-    options.schema_hash = SchemaHash();
-    options.roles = {{"collector", true}};
-    auto writer = std::make_unique<StreamWriter>(options, Term{10, 3}, Version{});
-    others_.AddWriter(writer.get(), owner, {"COLLECTOR"});
+  std::unique_ptr<StreamWriter> MakeWriter(StreamId stream, const std::string& role) {
+    auto writer = std::make_unique<StreamWriter>(WriterOfRole(kSession, stream, role, "collector"),
+                                                 Term{10, 3}, Version{});
+    others_.AddWriter(writer.get(), OwnerOf(role), {"COLLECTOR"});
     return writer;
   }
   template <typename Message>
@@ -98,10 +89,10 @@ class CollectorNodeTest : public testing::Test {
   }
   template <typename Message>
   void Say(const Message& message) {
-    SayBytes(wire::Info<Message>().channel, wire::Encode(message));
+    dmslam::Say(others_.bus(), message);
   }
   void SayBytes(const std::string& channel, Bytes bytes) {
-    others_.bus().Publish({channel, std::make_shared<const Bytes>(std::move(bytes)), false});
+    dmslam::SayBytes(others_.bus(), channel, std::move(bytes));
   }
   void SayEnd() {
     EndOfSequence end;
@@ -111,16 +102,12 @@ class CollectorNodeTest : public testing::Test {
     Say(end);
     Run(50);
   }
-  void Deliver() {
-    while (bus_.DeliverOne()) {
-    }
-  }
   void Run(int64_t ms) {
     for (const int64_t end_ns = now_ns_ + ms * kMs; now_ns_ < end_ns; now_ns_ += 5 * kMs) {
       others_.Advance();
-      Deliver();
+      DeliverAll(bus_);
       node().Advance();
-      Deliver();
+      DeliverAll(bus_);
     }
   }
 
@@ -313,7 +300,7 @@ TEST_F(CollectorNodeTest, WhereNoFrameWasTrackedTheFrontendsWordSaysWhy) {
 TEST_F(CollectorNodeTest, AFrontendWithOtherSettingsEndsIt) {
   Start();
   SayCamera();
-  frontend_ = MakeWriter(StreamId::kFrontend, "FRONTEND", "frontend");
+  frontend_ = MakeWriter(StreamId::kFrontend, "frontend");
   SessionStart start;
   start.session = kSession;
   start.configuration_hash = settings_.Hash() + 1;

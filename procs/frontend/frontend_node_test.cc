@@ -13,6 +13,7 @@
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/features/testing/synthetic_images.h"
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 #include "dmslam/settings/settings.h"
 
 namespace dmslam {
@@ -38,12 +39,7 @@ class FrontendNodeTest : public ::testing::Test {
   }
 
   void Start(PlaybackMode mode, std::vector<std::string> peers = {}) {
-    NodeContext context;
-    context.bus = &bus_.AddPort();
-    context.now_ns = [this] { return now_ns_; };
-    context.wall_us = [this] { return now_ns_ / 1000; };
-    context.random_id = 7;
-    context.name = "frontend";
+    NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "frontend");
     context.fresh_system = true;
     NodeOptions options;
     options.session = kSession;
@@ -61,21 +57,17 @@ class FrontendNodeTest : public ::testing::Test {
   }
   template <typename Message>
   void Say(const Message& message) {
-    SayBytes(wire::Info<Message>().channel, wire::Encode(message));
+    dmslam::Say(others_.bus(), message);
   }
   void SayBytes(const std::string& channel, Bytes bytes) {
-    others_.bus().Publish({channel, std::make_shared<const Bytes>(std::move(bytes)), false});
-  }
-  void Deliver() {
-    while (bus_.DeliverOne()) {
-    }
+    dmslam::SayBytes(others_.bus(), channel, std::move(bytes));
   }
   void Run(int64_t ms = 10) {
     for (const int64_t end_ns = now_ns_ + ms * kMs; now_ns_ < end_ns; now_ns_ += 5 * kMs) {
       others_.Advance();
-      Deliver();
+      DeliverAll(bus_);
       node_->Advance();
-      Deliver();
+      DeliverAll(bus_);
     }
   }
 
@@ -259,25 +251,12 @@ TEST_F(FrontendNodeTest, TheEndOfTheSequenceIsAnsweredWhenAllIsTold) {
 class FrontendWithMapperTest : public FrontendNodeTest {
  protected:
   void BeginMapper() {
-    StreamReader::Options reader;
-    reader.session = kSession;
-    reader.stream = StreamId::kFrontend;
-    reader.owner = "FRONTEND";
-    reader.reader = "MAPPER";
-    reader.role = reader.name = "mapper";
-    reader.id = 3;
-    reader.schema_hash = SchemaHash();
-    frontend_ = std::make_unique<StreamReader>(reader);
+    frontend_ =
+        std::make_unique<StreamReader>(ReaderOfRole(kSession, StreamId::kFrontend, "frontend", "mapper"));
     others_.AddReader(frontend_.get(), "FRONTEND",
                       {channels::kSession, channels::kFramePose, channels::kTurnRequest});
-    StreamWriter::Options writer;
-    writer.session = kSession;
-    writer.stream = StreamId::kMap;
-    writer.owner = "MAPPER";
-    writer.name = "mapper";
-    writer.schema_hash = SchemaHash();
-    writer.roles = {{"frontend", true}};
-    map_ = std::make_unique<StreamWriter>(writer, Term{10, 3}, Version{});
+    map_ = std::make_unique<StreamWriter>(WriterOfRole(kSession, StreamId::kMap, "mapper", "frontend"),
+                                          Term{10, 3}, Version{});
     others_.AddWriter(map_.get(), "MAPPER", {"FRONTEND"});
   }
 

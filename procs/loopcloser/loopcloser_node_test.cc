@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dmslam/loops/testing/ring_room.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 #include "dmslam/settings/settings.h"
 
 namespace dmslam {
@@ -28,12 +29,8 @@ class LoopcloserStatusTest : public ::testing::Test {
       if (channel == channels::kLoopcloserStatus) status_ = wire::Decode<LoopcloserStatus>(bytes).value();
       if (channel == channels::kChecked) answer_ = wire::Decode<LoopAnswer>(bytes).value();
     });
-    NodeContext context;
-    context.bus = &bus_.AddPort();
+    NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "loopcloser");
     context.now_ns = [this] { return now_ns_ += 1000; };  // work takes time
-    context.wall_us = [this] { return now_ns_ / 1000; };
-    context.random_id = 7;
-    context.name = "loopcloser";
     context.fresh_system = true;
     NodeOptions options;
     options.session = kSession;
@@ -41,16 +38,12 @@ class LoopcloserStatusTest : public ::testing::Test {
     node_ = std::make_unique<LoopcloserNode>(context, options, dmslam::testing::ShippedVocabulary());
   }
 
-  void Deliver() {
-    while (bus_.DeliverOne()) {
-    }
-  }
   /// Long enough for a status, unless it is less.
   void Run(int64_t ms = 1100) {
     for (const int64_t end_ns = now_ns_ + ms * kMs; now_ns_ < end_ns; now_ns_ += 5 * kMs) {
       mapper_.Advance();
       node_->Advance();
-      Deliver();
+      DeliverAll(bus_);
     }
   }
   void SayCamera() {
@@ -58,20 +51,13 @@ class LoopcloserStatusTest : public ::testing::Test {
     info.session = kSession;
     info.camera = room_.map().camera();
     for (int said = 0; said < 2; ++said) {
-      mapper_.bus().Publish(
-          {channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+      dmslam::Say(mapper_.bus(), info);
       Run(200);
     }
   }
   void BeginMap() {
-    StreamWriter::Options writer;
-    writer.session = kSession;
-    writer.stream = StreamId::kMap;
-    writer.owner = "MAPPER";
-    writer.name = "mapper";
-    writer.schema_hash = SchemaHash();
-    writer.roles = {{"loopcloser", true}};
-    writer_ = std::make_unique<StreamWriter>(writer, Term{10, 3}, Version{});
+    writer_ = std::make_unique<StreamWriter>(WriterOfRole(kSession, StreamId::kMap, "mapper", "loopcloser"),
+                                             Term{10, 3}, Version{});
     mapper_.AddWriter(writer_.get(), "MAPPER", {"LOOPCLOSER"});
   }
   void Publish(MapDelta change) {
@@ -146,10 +132,10 @@ TEST_F(LoopcloserStatusTest, TellsHowLongQueriesTakeAndWhatWaits) {
 
   for (int k = 0; k < 3; ++k) Publish(room_.Next());
   mapper_.Advance();
-  Deliver();
+  DeliverAll(bus_);
   now_ns_ += 1000 * kMs;
   node_->Advance();  // a status is due as soon as it has worked on the first one
-  Deliver();
+  DeliverAll(bus_);
   EXPECT_EQ(status_.keyframes_checked, 6);
   EXPECT_EQ(status_.keyframe_queue, 2);
   EXPECT_GE(status_.head.health.queue_peak, 3);

@@ -2,14 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <deque>
 #include <memory>
 #include <string>
 
 #include "dmslam/messaging/camera_channels.h"
-#include "dmslam/messaging/stream_writer.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 #include "dmslam/wire/channels.h"
-#include "dmslam/wire/codec.h"
 
 namespace dmslam {
 namespace {
@@ -23,14 +21,8 @@ class FrontendStreamsTest : public testing::Test {
  protected:
   FrontendStreamsTest() {
     for (const CameraId camera : {0, 1}) {
-      StreamReader::Options options;
-      options.session = kSession;
-      options.stream = StreamId::kFrontend;
-      options.owner = "FRONTEND";
-      options.reader = "MAPPER";
-      options.role = options.name = "mapper";
-      options.id = 1;
-      auto reader = std::make_unique<StreamReader>(options);
+      auto reader =
+          std::make_unique<StreamReader>(ReaderOfRole(kSession, StreamId::kFrontend, "frontend", "mapper"));
       readers_.push_back(reader.get());
       streams_.Add(std::move(reader));
       Begin(camera, kEpoch + camera);
@@ -38,14 +30,9 @@ class FrontendStreamsTest : public testing::Test {
   }
   /// A frontend of that camera begins, in place of the one before.
   void Begin(CameraId camera, int64_t epoch) {
-    StreamWriter::Options options;
-    options.session = kSession;
-    options.stream = StreamId::kFrontend;
-    options.owner = "FRONTEND";
-    options.name = "frontend";
-    options.roles = {{"mapper", true}};
     writers_.resize(2);
-    writers_[camera] = std::make_unique<StreamWriter>(options, Term{epoch, 5}, Version{});
+    writers_[camera] = std::make_unique<StreamWriter>(
+        WriterOfRole(kSession, StreamId::kFrontend, "frontend", "mapper"), Term{epoch, 5}, Version{});
   }
   void Say(CameraId camera, int count = 1) {
     TurnRequest request;

@@ -11,6 +11,7 @@
 
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/mapping/testing/wall_scene.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 #include "dmslam/settings/settings.h"
 
 namespace dmslam {
@@ -23,26 +24,13 @@ constexpr uint32_t kSession = 4;
 class LoopAnswersTest : public testing::Test {
  protected:
   LoopAnswersTest() : other_(&bus_.AddPort(), [this] { return now_ns_; }) {
-    answers_ = std::make_unique<StreamWriter>(ForMapper(StreamId::kLoopCloser, "LOOPCLOSER", "loopcloser"),
-                                              Term{10, 3}, Version{});
+    answers_ = std::make_unique<StreamWriter>(
+        WriterOfRole(kSession, StreamId::kLoopCloser, "loopcloser", "mapper"), Term{10, 3}, Version{});
     other_.AddWriter(answers_.get(), "LOOPCLOSER", {"MAPPER"});
-    StreamReader::Options reader;
-    reader.session = kSession;
-    reader.stream = StreamId::kMap;
-    reader.owner = "MAPPER";
-    reader.reader = "LOOPCLOSER";
-    reader.role = reader.name = "loopcloser";
-    reader.id = 3;
-    reader.schema_hash = SchemaHash();
-    map_ = std::make_unique<StreamReader>(reader);
+    map_ = std::make_unique<StreamReader>(ReaderOfRole(kSession, StreamId::kMap, "mapper", "loopcloser"));
     other_.AddReader(map_.get(), "MAPPER", {channels::kMap});
 
-    NodeContext context;
-    context.bus = &bus_.AddPort();
-    context.now_ns = [this] { return now_ns_; };
-    context.wall_us = [this] { return now_ns_ / 1000; };
-    context.random_id = 7;
-    context.name = "mapper";
+    NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "mapper");
     context.fresh_system = true;
     NodeOptions options;
     options.session = kSession;
@@ -52,29 +40,16 @@ class LoopAnswersTest : public testing::Test {
     info.session = kSession;
     info.camera = TestCamera();
     for (int said = 0; said < 2; ++said) {
-      other_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
+      dmslam::Say(other_.bus(), info);
       Run();
     }
-  }
-
-  /// A stream that the mapper reads.
-  static StreamWriter::Options ForMapper(StreamId stream, const char* owner, const char* name) {
-    StreamWriter::Options writer;
-    writer.session = kSession;
-    writer.stream = stream;
-    writer.owner = owner;
-    writer.name = name;
-    writer.schema_hash = SchemaHash();
-    writer.roles = {{"mapper", true}};
-    return writer;
   }
 
   void Run() {
     for (int i = 0; i < 200; ++i) {
       other_.Advance();
       mapper_->Advance();
-      while (bus_.DeliverOne()) {
-      }
+      DeliverAll(bus_);
       now_ns_ += 5 * kMs;
     }
   }
@@ -165,8 +140,8 @@ class MapperStatusTest : public LoopAnswersTest {
     });
   }
   void BeginFrontend() {
-    frontend_ = std::make_unique<StreamWriter>(ForMapper(StreamId::kFrontend, "FRONTEND", "frontend"),
-                                               Term{10, 5}, Version{});
+    frontend_ = std::make_unique<StreamWriter>(
+        WriterOfRole(kSession, StreamId::kFrontend, "frontend", "mapper"), Term{10, 5}, Version{});
     other_.AddWriter(frontend_.get(), "FRONTEND", {"MAPPER"});
   }
   template <typename Message>

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "dmslam/wire/codec.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 
 namespace dmslam {
 namespace {
@@ -57,10 +57,7 @@ class LiveNodeTest : public testing::Test {
     });
   }
   LiveNode Make(size_t frames = SIZE_MAX, std::optional<uint32_t> behind = std::nullopt) {
-    NodeContext context;
-    context.bus = &player_port_;
-    context.now_ns = [this] { return now_ns_; };
-    context.wall_us = [this] { return now_ns_ / 1000; };
+    NodeContext context = ContextOnBus(&player_port_, &now_ns_, "player");
     context.fresh_system = true;
     PlayerOptions options;
     options.sequence = "rtsp://user:secret@robot/stream";
@@ -74,15 +71,12 @@ class LiveNodeTest : public testing::Test {
   void Advance(LiveNode& node, int64_t by_ns = 10'000'000) {
     now_ns_ += by_ns;
     node.Advance();
-    while (bus_.DeliverOne()) {
-    }
+    DeliverAll(bus_);
   }
   template <typename Message>
   void Say(const Message& message) {
-    ear_.Publish(
-        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
-    while (bus_.DeliverOne()) {
-    }
+    dmslam::Say(ear_, message);
+    DeliverAll(bus_);
   }
 
   /// Frames .06 s apart, each of which the frontend answers with what it has done already.

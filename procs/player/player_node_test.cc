@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "dmslam/wire/codec.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 
 namespace dmslam {
 namespace {
@@ -33,10 +33,7 @@ class PlayerNodeTest : public testing::Test {
       if (channel == channels::kFrame) frames_.push_back(wire::Decode<Frame>(bytes)->frame_index);
       if (channel == channels::kEndOfSequence) ++ends_;
     });
-    NodeContext context;
-    context.bus = &player_port_;
-    context.now_ns = [this] { return now_ns_; };
-    context.wall_us = [this] { return now_ns_ / 1000; };
+    NodeContext context = ContextOnBus(&player_port_, &now_ns_, "player");
     PlayerOptions options;
     options.sequence = "ten";
     options.session = kSession;
@@ -49,22 +46,17 @@ class PlayerNodeTest : public testing::Test {
     for (; ms > 0; ms -= every_ms) {
       now_ns_ += every_ms * 1'000'000;
       player_->Advance();
-      Deliver();
+      DeliverAll(bus_);
     }
   }
   /// Until it has played its first frame.
   void Begin() {
     for (int i = 0; i < 1000 && frames_.empty(); ++i) Advance(10);
   }
-  void Deliver() {
-    while (bus_.DeliverOne()) {
-    }
-  }
   template <typename Message>
   void Say(const Message& message) {
-    ear_.Publish(
-        {wire::Info<Message>().channel, std::make_shared<const Bytes>(wire::Encode(message)), false});
-    Deliver();
+    dmslam::Say(ear_, message);
+    DeliverAll(bus_);
   }
   void SayDone(uint32_t frame) { Say(FrameDone{.session = kSession, .frame_index = frame}); }
   void SayAllDone() { Say(SequenceDone{.session = kSession}); }

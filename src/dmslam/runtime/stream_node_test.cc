@@ -11,6 +11,7 @@
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/runtime/exit_codes.h"
+#include "dmslam/runtime/testing/node_on_bus.h"
 
 namespace dmslam {
 namespace {
@@ -65,21 +66,10 @@ class MapStreamTest : public testing::Test {
       : map_(TestCamera(), Pyramid()),
         snapshots_(&map_),
         mapper_(&bus_.AddPort(), [this] { return now_ns_; }) {
-    StreamWriter::Options options;
-    options.session = kSession;
-    options.stream = StreamId::kMap;
-    options.owner = "MAPPER";
-    options.name = "mapper";
-    options.schema_hash = SchemaHash();
-    options.roles = {{"collector", true}};
-    writer_ = std::make_unique<StreamWriter>(options, Term{10, 3}, Version{}, &snapshots_);
+    writer_ = std::make_unique<StreamWriter>(WriterOfRole(kSession, StreamId::kMap, "mapper", "collector"),
+                                             Term{10, 3}, Version{}, &snapshots_);
     mapper_.AddWriter(writer_.get(), "MAPPER", {"COLLECTOR"});
-    NodeContext context;
-    context.bus = &bus_.AddPort();
-    context.now_ns = [this] { return now_ns_; };
-    context.wall_us = [this] { return now_ns_ / 1000; };
-    context.random_id = 7;
-    context.name = "collector";
+    const NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "collector");
     NodeOptions node;
     node.session = kSession;
     holder_ = std::make_unique<Holder>(context, node);
@@ -92,9 +82,8 @@ class MapStreamTest : public testing::Test {
   }
 
   void SayCamera(const CameraInfo& info) {
-    mapper_.bus().Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
-    while (bus_.DeliverOne()) {
-    }
+    dmslam::Say(mapper_.bus(), info);
+    DeliverAll(bus_);
     now_ns_ += 100 * kMs;
   }
 
@@ -102,8 +91,7 @@ class MapStreamTest : public testing::Test {
     for (int i = 0; i < 400; ++i) {
       mapper_.Advance();
       holder_->Advance();
-      while (bus_.DeliverOne()) {
-      }
+      DeliverAll(bus_);
       now_ns_ += 5 * kMs;
     }
   }
@@ -160,8 +148,7 @@ TEST_F(MapStreamTest, TheDeepestThatTheQueueWasIsKept) {
   EXPECT_EQ(holder_->health().queue_peak, 0);
   for (const uint32_t frame : {1, 2, 3}) Publish(AddKeyframe(frame));
   mapper_.Advance();
-  while (bus_.DeliverOne()) {
-  }
+  DeliverAll(bus_);
   EXPECT_EQ(holder_->health().queue_depth, 3);
   EXPECT_EQ(holder_->health().queue_peak, 3);
   Run();
@@ -180,8 +167,7 @@ TEST_F(MapStreamTest, ARecordThatCannotBeReadIsNamedAndTheMapComesAsASnapshot) {
   unreadable[0] ^= 1;  // a type that nobody knows; its seal is sound
   const int64_t seq = Publish(unreadable);
   mapper_.Advance();
-  while (bus_.DeliverOne()) {
-  }
+  DeliverAll(bus_);
   holder_->Advance();
   EXPECT_EQ(holder_->malformed(), 1);
   EXPECT_EQ(holder_->applied(), 1) << "not as an empty change";
@@ -203,8 +189,7 @@ TEST_F(MapStreamTest, AnEarlierChangeInThePlaceOfTheNextOneIsAskedForAgain) {
   Bytes forged = wire::Encode(first);
   Seal(writer_->HeaderOf(2), channels::kMap, forged);
   mapper_.bus().Publish({channels::kMap, std::make_shared<const Bytes>(forged), false});
-  while (bus_.DeliverOne()) {
-  }
+  DeliverAll(bus_);
   holder_->Advance();
   EXPECT_EQ(holder_->applied(), 1);
   const int64_t seq = Publish(AddKeyframe(2));
@@ -270,8 +255,7 @@ class BrokenGroupTest : public MapStreamTest {
     const int applied = holder_->applied();
     for (const MapDelta& record : records) Publish(record);
     mapper_.Advance();
-    while (bus_.DeliverOne()) {
-    }
+    DeliverAll(bus_);
     holder_->Advance();
     EXPECT_EQ(holder_->malformed(), 1);
     EXPECT_EQ(holder_->applied(), applied) << "nothing of it";
@@ -445,13 +429,12 @@ class SessionTest : public testing::Test {
     for (int64_t i = 0; i < ms; i += 5, now_ns_ += 5 * kMs) {
       if (i % 100 == 0) Say(channels::kCameraInfo, wire::Encode(info));
       frontend_.Advance();
-      while (bus_.DeliverOne()) {
-      }
+      DeliverAll(bus_);
       follower_->Advance();
     }
   }
   void Say(const std::string& channel, Bytes bytes) {
-    frontend_.bus().Publish({channel, std::make_shared<const Bytes>(std::move(bytes)), false});
+    dmslam::SayBytes(frontend_.bus(), channel, std::move(bytes));
   }
   Bytes Session(uint64_t configuration_hash) const {
     SessionStart start;
@@ -530,9 +513,8 @@ class PublisherTest : public testing::Test {
     for (const int64_t end = now_ns_ + static_cast<int64_t>(seconds * 1e9); now_ns_ < end;
          now_ns_ += 10 * kMs) {
       if ((now_ns_ - begin) % (50 * kMs) == 0)  // as a player that begins
-        other_->Publish({channels::kCameraInfo, std::make_shared<const Bytes>(wire::Encode(info)), false});
-      while (bus_.DeliverOne()) {
-      }
+        dmslam::Say(*other_, info);
+      DeliverAll(bus_);
       for (const auto& node : nodes_) node->Advance();
     }
   }
