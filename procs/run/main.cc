@@ -153,7 +153,11 @@ class Run {
   void Interrupt(int signal) {
     signal_ = signal;
     supervisor_.StopAll();
-    if (signal == SIGINT) Say("interrupted; what was tracked is in " + place_.out);
+    if (signal != SIGINT) return;
+    const bool any = fs::exists(fs::path(place_.out) / "summary.json");
+    Say(any ? "interrupted; what was tracked is in " + place_.out + ", and dmslam-run --resume " +
+                  place_.out + " goes on with it"
+            : "interrupted before there was anything to write");
   }
 
   static std::string HowItEnded(const ChildEvent& event) {
@@ -169,6 +173,9 @@ class Run {
     const std::string when = event.delay_ns > 0 ? " in " + Seconds(event.delay_ns) : "";
     Say(event.name + " " + HowItEnded(event) + "; started again" + when + " (" +
         std::to_string(event.restarts) + ")");
+    const std::string words =
+        event.code == dmslam::kExitNotYet && event.restarts == 1 ? LastWords(event.name) : "";
+    if (!words.empty()) Say(words);  // what it waits for
   }
 
   void Fail(const ChildEvent& event) {

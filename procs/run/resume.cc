@@ -144,15 +144,18 @@ std::optional<std::string> KeepUnfinishedRun(const std::string& out) {
 ResumePoint FindResumePoint(const std::string& out, const RunIdentity& identity) {
   const JournalState journal(out, identity.session);
   if (!journal.there()) {
-    throw InputError(out + (fs::exists(out + "/summary.json")
-                                ? ": this run has ended, and its results are there; nothing is left to resume"
-                                : ": this run died before its first frame; begin it anew"));
+    throw InputError(
+        out + (fs::exists(out + "/summary.json")
+                   ? ": this run has ended, and its results are there; nothing is left to resume"
+                   : ": it holds no " + NameOf(JournalPath(out)) +
+                         ": this run died before its first frame, or the file was removed; begin it anew"));
   }
   Journal::Sync(JournalPath(out));  // those who wrote it may have died before they did
   const FoundCheckpoint found = FindCheckpoint(CheckpointPath(out), identity.session);
   if (!found.map) {
     throw InputError(found.problem +
-                     "; it died before there was a map, or ran with collector.checkpoint_s=0: begin it anew");
+                     "; where no checkpoint is damaged, the run died before there was a map or had "
+                     "collector.checkpoint_s=0: begin it anew");
   }
   const auto& keyframes = found.map->map.keyframes();
   ResumePoint point;

@@ -54,12 +54,20 @@ no_orphans "the run"
 expect "frames were published" "$work/live" frames ">= 5"
 expect "frames were worked on" "$work/live" frames_processed ">= 5"
 
-# A camera that goes away for a while.
-run --video "http://127.0.0.1:$(<"$work/port")/flickers.mjpg" --camera "$camera" --frames 40 --out "$work/away" >"$work/said" 2>&1 ||
-  (($? == 6)) || failed "the run with a camera that goes away ended with $?: $(tail -n 3 "$work/said")"
+# A camera that goes away for a while, and is tracked before and after it.
+run --video "http://127.0.0.1:$(<"$work/port")/flickers.mjpg" --camera "$camera" --frames 150 --out "$work/away" >"$work/said" 2>&1 ||
+  failed "the run with a camera that goes away ended with $?: $(tail -n 3 "$work/said")"
 no_orphans "the run with a camera that goes away"
 check "it says that the camera is away" grep -q "it is looked for until it is back" "$work/away/log/player.log"
 check "it says that the camera is back" grep -q "the camera is back" "$work/away/log/player.log"
-expect "it goes on" "$work/away" frames "== 40"
+expect "it goes on" "$work/away" frames "== 150"
+expect "it is tracked" "$work/away" tracked_online_percent ">= 40"
+check "frames have the time at which they came" python3 - "$work/away/poses_online.csv" <<'EOF'
+import statistics, sys, time
+poses = [line.split(",") for line in open(sys.argv[1]) if not line.startswith("#")]
+steps = [float(b[0]) - float(a[0]) for a, b in zip(poses, poses[1:]) if int(b[1]) == int(a[1]) + 1]
+assert abs(float(poses[-1][0]) - time.time()) < 60, poses[-1][0]
+assert 0.03 < statistics.median(steps) < 0.3, statistics.median(steps)
+EOF
 kill $server
 finish

@@ -11,6 +11,12 @@ bool IsLive(const std::string& path) {
   return path.starts_with("/dev/") || path.find("://") != std::string::npos;
 }
 
+std::optional<int64_t> DriverNs(double driver_ms) {
+  constexpr double kLatestMs = 4e12;  // a century: what a driver means by more is no time
+  if (!(driver_ms >= 0 && driver_ms < kLatestMs)) return std::nullopt;
+  return static_cast<int64_t>(driver_ms * 1e6);
+}
+
 }  // namespace dmslam
 
 #ifdef DMSLAM_HAVE_VIDEOIO
@@ -121,8 +127,7 @@ class OpenCvCamera : public LiveSource {
   }
 
   int64_t StampOfNewest() {
-    const double driver_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
-    return clock_.Stamp(Now<std::chrono::steady_clock>(), static_cast<int64_t>(driver_ms * 1e6));
+    return clock_.Stamp(Now<std::chrono::steady_clock>(), DriverNs(capture_.get(cv::CAP_PROP_POS_MSEC)));
   }
 
   void Deliver(LiveFrame frame) {

@@ -37,6 +37,10 @@ class LiveSource {
 /// (rtsp://..., http://...).
 bool IsLive(const std::string& path);
 
+/// What OpenCV says of when a frame was taken [ms], as nanoseconds; none: it says nothing that is a time, as
+/// of images that come over HTTP.
+std::optional<int64_t> DriverNs(double driver_ms);
+
 /// Opens a camera with OpenCV's videoio and asks it for the size and rate that `camera` states. A thread
 /// reads it; a camera that goes away is looked for until it is back, at first every 0.2 s and then every 5 s.
 /// Throws NotYetError where it cannot be opened, InputError where it delivers images of another size.

@@ -7,8 +7,10 @@
 
 #include <atomic>
 #include <ctime>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
+#include <optional>
 #include <string>
 
 #include "dmslam/dataset/joined_clock.h"
@@ -61,6 +63,23 @@ TEST(JoinedClock, AWallClockThatIsSetChangesNothing) {
       << "the driver knows better when it was";
   EXPECT_EQ(clock.Stamp(8 * kSecond, 9 * kSecond), 1003 * kSecond) << "no frame is from the future";
   EXPECT_EQ(clock.Stamp(8 * kSecond, 8 * kSecond), 1003 * kSecond + 1) << "stamps rise";
+  EXPECT_EQ(clock.Stamp(9 * kSecond, std::nullopt), 1004 * kSecond);
+}
+
+TEST(JoinedClock, ADriverThatIsFarOffIsNotBelieved) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  for (const int64_t driver_ns : {INT64_MIN, INT64_MIN + kSecond, -kSecond, INT64_MAX}) {
+    JoinedClock clock(1000 * kSecond, 5 * kSecond);
+    EXPECT_EQ(clock.Stamp(6 * kSecond, driver_ns), 1001 * kSecond) << driver_ns;
+  }
+}
+
+// A stream of images over HTTP has no time of its own; what OpenCV says of it is no time either.
+TEST(LiveSource, WhatIsNoTimeOfTheDriverCountsAsNone) {
+  EXPECT_EQ(DriverNs(1234.5), 1'234'500'000);
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  for (const double driver_ms : {nan, inf, -inf, -3.7e17, -1.0, 9.3e15})
+    EXPECT_EQ(DriverNs(driver_ms), std::nullopt) << driver_ms;
 }
 
 // A file stands for the camera: it delivers as fast as it can be read, and ends.
