@@ -29,7 +29,7 @@ LogPlayback::LogPlayback(const std::string& path, NodeOptions options, ViewerOpt
     : path_(path), options_(std::move(options)), viewer_(std::move(viewer)), exchange_(exchange) {
   EventLogReader reader(path);
   options_.of_a_log = true;
-  if (options_.key) reader.UseKey(*options_.key);
+  if (options_.key && !reader.UseKey(*options_.key)) LogWarning("{}: {}", path, kNothingIsVerified);
   int64_t events = 0;
   while (const std::optional<LogEvent> event = reader.Next()) {
     if (WithoutPrefix(event->channel).empty()) continue;

@@ -33,7 +33,7 @@ constexpr int64_t kRecordsLost =
     10;  // that were on their way when their writer died, by each of their readers
 constexpr uint32_t kFirstMapFrame =
     15;                           // a frontend that dies before it loses all that it had for the first map
-constexpr double kMostApart = 2;  // of the spread of undisturbed runs
+constexpr double kMostApart = 1;  // of the spread of undisturbed runs
 constexpr double kBetweenKeyframesS = 1;  // in the sequence of these tests
 constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kSecond = 1000 * kMs;

@@ -92,6 +92,9 @@ for which in keyed recorded; do
 done
 check "what was left out is said" grep -q "[0-9]* messages have no tag that fits the key and were left out" "$work/recorded.said"
 check "and only that" test "$(grep -c "no tag that fits" "$work/keyed.said")" = 0
+(umask 077; head -c 32 /dev/urandom | base64 >"$work/wrong.key")
+check "with another key it can be read" map --log "$work/keyed/run.lcmlog" --key "$work/wrong.key" --ply "$work/wrong.ply" >"$work/wrong.said" 2>&1
+check "but not without a word" grep -q "nothing in it is verified" "$work/wrong.said"
 check "without the key too, where nobody forged" map --log "$work/keyed/run.lcmlog" --ply "$work/open.ply" >"$work/said"
 check "it is the run's own" cmp "$work/quiet/map.ply" "$work/open.ply"
 check "the owner plays the log again" run --log "$work/recorded/run.lcmlog" --seed 3 --lockstep --key "$key" --out "$work/again" --port 23464

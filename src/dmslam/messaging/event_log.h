@@ -34,6 +34,11 @@ struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
 
+/// What is to be said where EventLogReader::UseKey() is false.
+inline constexpr char kNothingIsVerified[] =
+    "no message has a tag that fits the key: it was recorded without one or under another, and nothing in it "
+    "is verified";
+
 /// Reads the files of lcm-logger. Of a damaged or truncated one it reads what is whole: an event that is not
 /// followed by another one or by the end is skipped, reading goes on at the next one, and what was skipped is
 /// remembered.

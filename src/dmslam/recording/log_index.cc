@@ -69,7 +69,7 @@ struct LogIndex::Parts {
 };
 
 LogIndex::LogIndex(const std::string& path, const std::optional<BusKey>& key) : reader_(path) {
-  if (key) reader_.UseKey(*key);
+  unverified_ = key && !reader_.UseKey(*key);
   Parts parts;
   while (const std::optional<LogEvent> event = reader_.Next()) {
     if (num_messages_++ == 0) begin_us_ = event->utime_us;
@@ -218,6 +218,7 @@ Bytes LogIndex::Read(const RecordedMessage& message) const {
 std::string LogIndex::DescribeDamage() const {
   std::string text = reader_.DescribeGaps();
   const auto add = [&](const std::string& more) { text += (text.empty() ? path() + ": " : "; ") + more; };
+  if (unverified_) add(kNothingIsVerified);
   if (reader_.refused() > 0)
     add(std::to_string(reader_.refused()) + " messages have no tag that fits the key and were left out");
   if (bad_messages_ > 0) add(std::to_string(bad_messages_) + " messages hold wrong bytes and were left out");

@@ -98,6 +98,7 @@ class LogIndex {
   RecordedCamera& CameraOf(const Message& message);
 
   mutable EventLogReader reader_;
+  bool unverified_ = false;  ///< a key was given, and it is not the one under which the log was recorded
   std::map<uint32_t, RecordedSession> sessions_;
   int64_t begin_us_ = 0, end_us_ = 0;
   int64_t num_messages_ = 0, bad_messages_ = 0;
