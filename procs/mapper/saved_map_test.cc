@@ -23,7 +23,7 @@ class SavedMapTest : public testing::Test {
     made_.vocabulary_checksum = 0xabc;
     SaveMap(path_, editor_.map(), made_);
   }
-  ~SavedMapTest() override { std::filesystem::remove(path_); }
+  void TearDown() override { std::filesystem::remove(path_); }
   SavedMap Load() const { return {path_, nullptr}; }
   /// Why it cannot be continued so; empty: it can.
   std::string Problem(const Camera& camera, const Pyramid& pyramid, uint32_t session) const {

@@ -70,7 +70,8 @@ SequenceEnd::Worked SequenceEnd::Work(Phase phase, FrontendCore* core) {
     case Phase::kGrowingBack: {
       core->SetWithheld(false);
       std::optional<FrontendOutput> output = core->GrowBack();
-      return {std::move(output).value_or(FrontendOutput()), !output.has_value()};
+      const bool is_done = !output.has_value();
+      return {std::move(output).value_or(FrontendOutput()), is_done};
     }
     case Phase::kAwaitingAdjustedMap:
       core->RefineRest();
