@@ -13,11 +13,22 @@ namespace {
 /// Rounded up, so that no level is less than half of the one before.
 int LevelSize(int size, double scale) { return static_cast<int>(std::ceil(size / scale - 1e-9)); }
 
+/// So many that the coarsest level's shorter side is about what it is in an image of 640 x 480.
+int CoarserLevels(int width_px, int height_px, const Pyramid& pyramid) {
+  constexpr double kShorterSide = 480.0;
+  constexpr int kMostLevels = 16;
+  const double larger = std::min(width_px, height_px) / kShorterSide;
+  if (larger <= 1.0) return 0;
+  const int more = static_cast<int>(std::lround(std::log(larger) / std::log(pyramid.scale_factor)));
+  return std::clamp(more, 0, std::max(0, kMostLevels - pyramid.levels));
+}
+
 }  // namespace
 
 Pyramid Pyramid::OfImages(int width_px, int height_px) const {
   Pyramid pyramid = *this;
   pyramid.finest_px = FinestPx(width_px, height_px);
+  pyramid.coarser_levels = CoarserLevels(width_px, height_px, *this);
   return pyramid;
 }
 
@@ -81,7 +92,7 @@ void ImagePyramid::SetUp(int width, int height, const Pyramid& pyramid, int min_
   shrinkers_.clear();
   enlarger_.reset();
   const Pyramid of_images = pyramid.OfImages(width, height);
-  for (int i = 0; i < pyramid.levels; ++i) {
+  for (int i = 0; i < of_images.NumLevels(); ++i) {
     const int level_width = LevelSize(width, of_images.Sigma(i));
     const int level_height = LevelSize(height, of_images.Sigma(i));
     if (std::min(level_width, level_height) <= min_size_px) break;

@@ -110,6 +110,35 @@ TEST(Pyramid, EnlargesSmallImagesToTwiceTheirSizeAtMost) {
   EXPECT_EQ(Pyramid().OfImages(320, 240).Scale(1), 1.2) << "of two levels";
 }
 
+TEST(Pyramid, ReachesAsFarInLargeImages) {
+  const auto num_levels = [](int width, int height) { return Pyramid().OfImages(width, height).NumLevels(); };
+  EXPECT_EQ(num_levels(320, 240), 8);
+  EXPECT_EQ(num_levels(640, 480), 8);
+  EXPECT_EQ(num_levels(1226, 370), 8) << "its shorter side is no longer";
+  EXPECT_EQ(num_levels(1280, 960), 12);
+  EXPECT_EQ(num_levels(1920, 1080), 12);
+  EXPECT_EQ(Pyramid().OfImages(1280, 960).OfImages(1280, 960).NumLevels(), 12) << "said twice";
+  EXPECT_EQ(Pyramid().OfImages(1280, 960).SearchScale(4), 1.0);
+  EXPECT_EQ(Pyramid().OfImages(1280, 960).SearchScale(5), 1.2);
+  EXPECT_EQ(Pyramid().OfImages(640, 480).SearchScale(1), 1.2);
+  EXPECT_EQ((Pyramid{.levels = 14}.OfImages(1280, 960).NumLevels()), 16);
+}
+
+TEST(OrbExtractor, LooksAsCoarselyAtALargeImageAsAtASmallOne) {
+  const GrayPixels small = RandomRectangles(640, 480, 250, 2);
+  GrayPixels large(2 * small.width, 2 * small.height);
+  for (int y = 0; y < large.height; ++y) {
+    for (int x = 0; x < large.width; ++x) large.at(x, y) = small.at(x / 2, y / 2);
+  }
+  const auto coarsest = [](const FeatureSet& set, int from) {
+    return std::count_if(set.keypoints.begin(), set.keypoints.end(),
+                         [&](const Keypoint& k) { return k.octave >= from; });
+  };
+  const auto found = coarsest(Extract(small), 6);
+  ASSERT_GT(found, 50);
+  EXPECT_GT(coarsest(Extract(large), 10), found / 3) << "as many features share more levels";
+}
+
 TEST(OrbExtractor, DescriptorsTurnWithTheImage) {
   const GrayPixels image = RandomRectangles(400, 400, 250, 2);
   const FeatureSet upright = Extract(image);

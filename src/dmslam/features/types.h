@@ -89,7 +89,8 @@ struct Pyramid {
   /// The settings, for dmslam/settings: key, field, bounds, unit, what it does.
   template <typename Visitor>
   void Describe(Visitor& v) {
-    v.Number("features.levels", levels, 1, 16, "", "levels of the image pyramid");
+    v.Number("features.levels", levels, 1, 16, "",
+             "levels of the image pyramid (of images larger than 640 x 480: more)");
     v.Number("features.scale_factor", scale_factor, 1.05, 2, "", "between two levels");
   }
 
@@ -97,11 +98,22 @@ struct Pyramid {
   /// setting: OfImages says it.
   double finest_px = 1.0;
 
-  /// The same pyramid over images of this size (FinestPx).
+  /// Levels beyond `levels`, over images larger than 640 x 480: the coarsest level is about as large in all
+  /// images, so that what is blurred, or near, is found in large ones, too. No setting: OfImages says it.
+  int coarser_levels = 0;
+
+  /// The same pyramid over images of this size (FinestPx, CoarserLevels).
   Pyramid OfImages(int width_px, int height_px) const;
+
+  int NumLevels() const { return levels + coarser_levels; }
 
   /// Size of one pixel of a level in pixels of level 0.
   double Scale(int octave) const { return std::pow(scale_factor, octave); }
+  /// How much wider than at the finest level a keypoint is searched for. With coarser levels the first ones
+  /// show what an image of 640 x 480 does not: they are searched as wide as its finest.
+  double SearchScale(int octave) const {
+    return Scale(octave > coarser_levels ? octave - coarser_levels : 0);
+  }
   /// Standard deviation of a keypoint's position [px of the image]: one pixel of its level.
   double Sigma(int octave) const { return finest_px * Scale(octave); }
   double SigmaSquared(int octave) const { return finest_px * finest_px * std::pow(scale_factor, 2 * octave); }

@@ -39,7 +39,7 @@ enum class WaitReason : uint8_t {
   kTooLittleMotion,       ///< the picture has hardly moved since the reference frame
   kSelectionRefused,      ///< the selector refused a pair (its reason is in the text)
   kDistributionTooSmall,  ///< the static set is too compact: the motion is too complex
-  kDisagreement,          ///< the pairs call different matches static, or their rotations do not compose
+  kDisagreement,          ///< the pairs call different matches static
   kTooFewStatic,          ///< too few matches are static in all views
   kParallaxTooSmall,      ///< the points are seen under too small an angle
   kNoReconstruction,      ///< no pose, or an ambiguous one

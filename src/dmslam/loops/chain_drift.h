@@ -10,7 +10,7 @@ namespace dmslam {
 
 /// Errors of the relative pose of two keyframes that share a hundred landmarks (one sigma). With n of them
 /// they are sqrt(100 / n) times as large. Several times what noise of pixels alone would make of it: errors
-/// of neighbours are alike. See docs/loops.md for how they were measured.
+/// of neighbours are alike.
 struct ChainDriftOptions {
   double link_rotation_rad = 0.0075;
   double link_position = 0.02;  ///< share of the median depth

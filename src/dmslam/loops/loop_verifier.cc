@@ -296,7 +296,7 @@ SeenPlace LoopVerifier::Look(const Map& map, const Keyframe& keyframe, const Rig
     const size_t cell = CellOf(map.camera(), view->uv_px);
     ++counts.expected[cell];
     const std::optional<FeatureHit> hit =
-        FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
+        FindFeature(*keyframe.features, view->uv_px, radius_px * map.pyramid().SearchScale(view->octave),
                     std::max(0, view->octave - 1), view->octave + 1, landmark->descriptor, taken);
     if (!hit || hit->distance > options_.max_descriptor_distance) continue;
     const size_t feature = static_cast<size_t>(hit->feature);

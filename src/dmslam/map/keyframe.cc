@@ -24,6 +24,7 @@ void AddSigmas(const Camera& camera, const Pyramid& pyramid, FrameFeatures* feat
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Camera& camera,
                                                        const Pyramid& pyramid) {
   auto features = std::make_shared<FrameFeatures>();
+  const int num_levels = pyramid.OfImages(camera.width_px, camera.height_px).NumLevels();
   FeatureSet kept;
   kept.keypoints.reserve(set.size());
   kept.descriptors.reserve(set.size());
@@ -33,7 +34,7 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(FeatureSet set, const Cam
   features->uv_px.reserve(set.size());
   for (size_t i = 0; i < set.size(); ++i) {
     const Keypoint& keypoint = set.keypoints[i];
-    if (keypoint.octave >= pyramid.levels) continue;
+    if (keypoint.octave >= num_levels) continue;
     const std::optional<Eigen::Vector2d> uv = camera.Undistort({keypoint.x_px(), keypoint.y_px()});
     if (!uv) continue;
     kept.keypoints.push_back(keypoint);

@@ -222,7 +222,7 @@ std::optional<ViewingRange> Map::ComputeViewing(const Landmark& landmark) const 
   ViewingRange viewing;
   viewing.max_distance =
       distance * pyramid_.Scale(keyframe.features->set.keypoints[scale_from->feature].octave);
-  viewing.min_distance = viewing.max_distance / pyramid_.Scale(pyramid_.levels - 1);
+  viewing.min_distance = viewing.max_distance / pyramid_.Scale(pyramid_.NumLevels() - 1);
   viewing.mean_direction = sum.normalized();
   return viewing;
 }

@@ -29,7 +29,7 @@ std::optional<LandmarkView> PredictView(const Map& map, const Landmark& landmark
   if (view_cos < limits.min_view_cos) return std::nullopt;
   const double octave = std::ceil(map.LevelOf(viewing.max_distance / distance));
   return LandmarkView{*uv, p_cam.z(), view_cos,
-                      static_cast<int>(std::clamp(octave, 0.0, map.pyramid().levels - 1.0))};
+                      static_cast<int>(std::clamp(octave, 0.0, map.pyramid().NumLevels() - 1.0))};
 }
 
 namespace {

@@ -69,7 +69,7 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
   const std::optional<LandmarkView> view = PredictView(map, landmark, T_cam_world);
   if (!view) return std::nullopt;
   const double radius_px =
-      SearchRadiusPx(map.camera(), options.fuse_radius_rad) * map.pyramid().Scale(view->octave);
+      SearchRadiusPx(map.camera(), options.fuse_radius_rad) * map.pyramid().SearchScale(view->octave);
   const std::optional<FeatureHit> hit =
       FindFeature(*keyframe.features, view->uv_px, radius_px, std::max(0, view->octave - 1), view->octave,
                   landmark.descriptor, kNoneTaken);

@@ -77,7 +77,7 @@ MatchArrays MakeArrays(std::span<const Match> matches, std::span<const uint32_t>
   const Pyramid pyramid = options.pyramid.OfImages(camera.width_px, camera.height_px);
   std::array<double, 256> variance{};
   for (int octave = 0; octave < 256; ++octave) {
-    const bool known = options.scale_by_octave && octave < pyramid.levels;
+    const bool known = options.scale_by_octave && octave < pyramid.NumLevels();
     variance[static_cast<size_t>(octave)] = pyramid.SigmaSquared(known ? octave : 0);
   }
   for (size_t k = 0; k < n; ++k) {

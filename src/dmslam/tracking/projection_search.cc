@@ -34,7 +34,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
     if (!uv) continue;
     const Keypoint& seen = last.features->set.keypoints[i];
     const std::optional<FeatureHit> hit =
-        FindFeature(features, *uv, radius_px * map.pyramid().Scale(seen.octave), seen.octave - 1,
+        FindFeature(features, *uv, radius_px * map.pyramid().SearchScale(seen.octave), seen.octave - 1,
                     seen.octave + 1, last.features->set.descriptors[i], taken_);
     if (!hit || hit->distance > options_.max_descriptor_distance) continue;
     const size_t feature = static_cast<size_t>(hit->feature);
@@ -100,7 +100,7 @@ std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& ma
     if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), landmark.id)) return;
     const double radius_px = view->view_cos > kFrontalCos ? frontal_px : oblique_px;
     const std::optional<FeatureHit> hit =
-        FindFeature(*frame->features, view->uv_px, radius_px * map.pyramid().Scale(view->octave),
+        FindFeature(*frame->features, view->uv_px, radius_px * map.pyramid().SearchScale(view->octave),
                     view->octave - 1, view->octave, landmark.descriptor, taken_);
     if (!hit || hit->distance > options_.max_descriptor_distance) return;
     if (hit->octave == hit->second_octave && hit->distance > options_.local_ratio * hit->second_distance)
