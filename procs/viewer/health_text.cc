@@ -88,6 +88,10 @@ const std::vector<Column>& Columns() {
       {"dropped_checksum_total", "counter", "messages with a wrong checksum",
        Of(&ProcessHealth::dropped_checksum)},
       {"dropped_foreign_total", "counter", "messages of other sessions", Of(&ProcessHealth::dropped_foreign)},
+      {"dropped_without_room_total", "counter", "messages for which the queue had no room",
+       Of(&ProcessHealth::dropped_overflow)},
+      {"refused_peers_total", "counter", "beacons of another protocol or schema",
+       Of(&ProcessHealth::refused_peers)},
       {"recovery_p99_milliseconds", "gauge", "from a record's being named as missing to its being here",
        Of(&ProcessHealth::recovery_p99_ms)}};
   return columns;

@@ -20,6 +20,8 @@ TEST(HealthTextTest, SaysWhoIsThereAndWhoIsSilent) {
     head.health.rss_mb = 12.5;
     head.health.cpu_percent = 75;
     head.health.records_lost = 3;
+    head.health.dropped_overflow = 4;
+    head.health.refused_peers = 5;
     board.OnStatus(name, head, "", now_ns, 0);
   };
   EXPECT_FALSE(health().well) << "nobody was heard";
@@ -30,6 +32,8 @@ TEST(HealthTextTest, SaysWhoIsThereAndWhoIsSilent) {
   EXPECT_TRUE(Has(health().prometheus, "dmslam_resident_megabytes{process=\"mapper\"} 12.5"));
   EXPECT_TRUE(Has(health().prometheus, "dmslam_cpu_percent{process=\"mapper\"} 75"));
   EXPECT_TRUE(Has(health().prometheus, "dmslam_records_lost_total{process=\"mapper\"} 3"));
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_dropped_without_room_total{process=\"mapper\"} 4"));
+  EXPECT_TRUE(Has(health().prometheus, "dmslam_refused_peers_total{process=\"mapper\"} 5"));
   say("mapper", 8, 2 * kSecond);
   EXPECT_TRUE(Has(health().prometheus, "dmslam_restarts_total{process=\"mapper\"} 1"));
   say("player", 7, 5 * kSecond);
