@@ -82,14 +82,15 @@ make_network() {
     ip netns exec "dm$id$host" sysctl -qw net.ipv4.ipfrag_time=2 || true
   done
 }
-drop() { # PERCENT: of what each host receives; what it hears of itself is on no link
-  local host
+drop() { # PERCENT: of what each host receives from others; it hears its own multicast, too
+  local host k=0
   for host in "${hosts[@]}"; do
+    k=$((k + 1))
     ip netns exec "dm$id$host" nft flush ruleset
     (($1 > 0)) || continue
     ip netns exec "dm$id$host" nft add table netdev loss
     ip netns exec "dm$id$host" nft "add chain netdev loss in { type filter hook ingress device link0 priority 0; }"
-    ip netns exec "dm$id$host" nft add rule netdev loss in numgen random mod 100 '<' "$1" counter drop
+    ip netns exec "dm$id$host" nft add rule netdev loss in ip saddr != "10.78.0.$k" numgen random mod 100 '<' "$1" counter drop
   done
 }
 sent() { # HOST: bytes, with Ethernet, IP and UDP headers

@@ -7,10 +7,11 @@ import statistics
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "lib"))
-from trajectories import errors, frame_stamps, read  # noqa: E402
+from trajectories import angle_between, errors, frame_stamps, read, relative, rotation_of, similarity  # noqa: E402
 
-FAR_M = 3.0      # two views of one place are not farther apart
-TORN_M = 0.5     # nor is a camera, in a map that is one, farther from where it should be
+FALSE_M = 0.5    # a weld's two views lie otherwise to one another by more than this, or
+FALSE_DEG = 10   # are turned otherwise by more than this: it joins what is apart
+TORN_M = 0.5     # no camera, in a map that is one, is farther from where it should be
 ASKED = 0.003    # error of each camera, in the similarity of all, of the path of all
 WORST = 10       # times that is the most that a single pose may be off
 
@@ -53,11 +54,18 @@ class Run:
         return loops, [c for c in loops if self.is_false(c)]
 
     def is_false(self, correction):
-        places = []
-        for camera, frame in (("camera", "frame"), ("matched_camera", "matched_frame")):
+        """Whether the two views that it joined do not lie to one another as it says (in metres by the scale of the whole)."""
+        views = []
+        for camera, frame in (("matched_camera", "matched_frame"), ("camera", "frame")):
             k = correction[camera]
-            places.append(self.truth[k].get(self.stamps[k][correction[frame]]))
-        return None not in places and math.dist(places[0][:3], places[1][:3]) > FAR_M
+            views.append(self.truth[k].get(self.stamps[k][correction[frame]]))
+        if None in views:
+            return False
+        scale = similarity(self.together(self.truth), self.together(self.final))[0]
+        position, rotation = relative(*views)
+        found = correction["T_matched_keyframe"]
+        return (math.dist(position, [scale * x for x in found[:3]]) > FALSE_M
+                or angle_between(rotation, rotation_of(found)) > FALSE_DEG)
 
 
 def rms(found):

@@ -43,8 +43,8 @@ def _mean(points):
     return [statistics.fmean(c) for c in zip(*points)]
 
 
-def laid_onto(truth, estimate):
-    """Centres of the estimate by stamp, laid onto the truth by one similarity for all (Umeyama)."""
+def similarity(truth, estimate):
+    """Scale, rotation and both means of the similarity that lays the estimate's centres onto the true ones (Umeyama)."""
     stamps = [s for s in estimate if s in truth]
     a = [estimate[s][:3] for s in stamps]
     b = [truth[s][:3] for s in stamps]
@@ -54,12 +54,40 @@ def laid_onto(truth, estimate):
     covariance = _matmul(_transpose(db), da)
     rotation = _polar(covariance)
     traced = sum(rotation[i][j] * covariance[i][j] for i in range(3) for j in range(3))
-    scale = traced / sum(x * x for p in da for x in p)
+    return traced / sum(x * x for p in da for x in p), rotation, mean_a, mean_b
+
+
+def laid_onto(truth, estimate):
+    """Centres of the estimate by stamp, laid onto the truth by one similarity for all."""
+    scale, rotation, mean_a, mean_b = similarity(truth, estimate)
     result = {}
-    for s, p in zip(stamps, da):
-        turned = [sum(r * x for r, x in zip(row, p)) for row in rotation]
+    for s, pose in estimate.items():
+        if s not in truth:
+            continue
+        turned = [sum(r * (x - m) for r, x, m in zip(row, pose, mean_a)) for row in rotation]
         result[s] = [scale * x + m for x, m in zip(turned, mean_b)]
     return result
+
+
+def rotation_of(pose):
+    """The rotation matrix of x y z qx qy qz qw."""
+    x, y, z, w = pose[3:7]
+    return [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+
+
+def relative(a, b):
+    """Pose b seen from pose a: its position, and its rotation as a matrix."""
+    inverse = _transpose(rotation_of(a))
+    offset = [q - p for p, q in zip(a[:3], b[:3])]
+    return [sum(r * x for r, x in zip(row, offset)) for row in inverse], _matmul(inverse, rotation_of(b))
+
+
+def angle_between(a, b):
+    """Of two rotation matrices [degrees]."""
+    trace = sum(a[i][j] * b[i][j] for i in range(3) for j in range(3))
+    return math.degrees(math.acos(max(-1.0, min(1.0, (trace - 1) / 2))))
 
 
 def errors(truth, estimate):

@@ -4,9 +4,10 @@
 source "$(dirname "$0")/expect.sh"
 table() { expect "$1" "$2" python3 "$DMSLAM_SOURCE_DIR/scripts/welds_table.py" "$work/sequences" "$work/results"; }
 
-# a_run NAME [SHIFT_OF_ONE [SHIFT_OF_CAMERA_1 [FRAMES_OF_CAMERA_1 [MATCHED_FRAME]]]]: two cameras on winding ways of some 12 m each,
-# one behind the other. Frame 50 of camera 0 is told so far aside [m], all of camera 1, and so many of it have poses; frame 10 of
-# camera 1 is joined with that frame of camera 0. 0.3 % of the path are 0.07 m.
+# a_run NAME [SHIFT_OF_ONE [SHIFT_OF_CAMERA_1 [FRAMES_OF_CAMERA_1 [MATCHED_FRAME [SEEN_FROM_IT]]]]]: two cameras on winding ways of some 12 m each,
+# one behind the other. Frame 50 of camera 0 is told so far aside [m], all of camera 1, and so many of it have poses; frame 0 of
+# camera 1 is joined with that frame of camera 0, from which it is said to be there (x, y, z in units of the map, half a metre
+# each). 0.3 % of the path are 0.07 m.
 a_run() {
   local folder=$work/results/$1 camera
   mkdir -p "$folder"
@@ -25,7 +26,7 @@ a_run() {
   done
   cat >"$folder/summary.json" <<EOJ
 {"cameras": [{"other_maps": []}, {"other_maps": []}], "loop_closing": {"corrections": [
-  {"kind": "loop", "camera": 1, "frame": 0, "matched_camera": 0, "matched_frame": ${5:-99}}]}}
+  {"kind": "loop", "camera": 1, "frame": 0, "matched_camera": 0, "matched_frame": ${5:-99}, "T_matched_keyframe": [${6:-0, 0, 0}, ${7:-0, 0, 0, 1}]}]}}
 EOJ
 }
 
@@ -49,4 +50,11 @@ for camera in 0 1; do mv "$work/sequences/left_out_$camera" "$work/sequences/roo
 table 0 '^\| rooms_apart \| 1 of 2 .*\| good \|'
 a_run false_weld 0 0 100 10
 table 1 '^\| false_weld .*\| 1 / 1 .*\| FALSE \|'
+rm -r "$work/results/false_weld"
+# Frame 50 is at 500/99 on its way, five metres before frame 0 of camera 1.
+there=$(awk 'BEGIN { x = 50 / 9.9; print 2 * (10 - x) ", " 2 * (sin(10) - sin(x)) ", " 2 * (cos(20) - cos(2 * x)) / 4 }')
+a_run seen_from_afar 0 0 100 50 "$there"
+table 0 '^\| seen_from_afar .*\| 1 / 0 .*\| good \|'
+a_run turned_weld 0 0 100 50 "$there" '0, 0, 0.26, 0.966'
+table 1 '^\| turned_weld .*\| 1 / 1 .*\| FALSE \|'
 finish
