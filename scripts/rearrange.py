@@ -62,6 +62,9 @@ def order_of(pieces, period_s, count):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__)
+        return
     if len(sys.argv) < 4:
         raise SystemExit(__doc__)
     source, out = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
