@@ -140,6 +140,7 @@ FrontendOutput FrontendCore::ProcessImage(uint32_t frame_index, int64_t stamp_ns
 
 FrontendOutput FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features) {
   frame_ = TrackedFrame(frame_index, stamp_ns, MakeFrameFeatures(std::move(features), camera_, pyramid_));
+  gate_.OnFrame(stamp_ns);
   // In a saved map it is lost from now on.
   odometry_.Predict({frame_index, stamp_ns});
   if (++counters_.frames == 1) tracker_.BeginLost();
@@ -343,8 +344,8 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
 bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId reference_id) {
   const Keyframe* reference = map_.FindKeyframe(reference_id);
   if (localize_only_ || reference == nullptr) return false;
-  const KeyframeInputs inputs{report.num_static, ExpectedOf(map_, *reference),
-                              gate_.SinceNs(frame_.stamp_ns)};
+  const KeyframeInputs inputs{report.num_static, ExpectedOf(map_, *reference), gate_.SinceNs(frame_.stamp_ns),
+                              gate_.step_ns()};
   if (!dmslam::WantsKeyframe(options_.keyframe, inputs)) return false;
   if (!gate_.IsOpen()) ++counters_.keyframes_withheld;
   return gate_.IsOpen();

@@ -75,6 +75,10 @@ TEST(KeyframeGateTest, OneAtATime) {
   gate.SetWithheld(true);
   EXPECT_FALSE(gate.IsOpen());
   EXPECT_EQ(gate.SinceNs(400), 600);
+  EXPECT_EQ(gate.step_ns(), std::nullopt);
+  gate.OnFrame(1000);
+  gate.OnFrame(1030);
+  EXPECT_EQ(gate.step_ns(), 30);
 }
 
 TEST(KeyframeGateTest, WhileTheMapGrowsBackEachIsSettledByItself) {

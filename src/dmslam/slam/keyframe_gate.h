@@ -22,6 +22,14 @@ class KeyframeGate {
     return last_ns_ ? std::optional(std::abs(stamp_ns - *last_ns_)) : std::nullopt;
   }
 
+  /// A frame of the camera, in the order in which they come.
+  void OnFrame(int64_t stamp_ns) {
+    if (frame_ns_) step_ns_ = stamp_ns - *frame_ns_;
+    frame_ns_ = stamp_ns;
+  }
+  /// Between the two frames that came last; none: there were none.
+  std::optional<int64_t> step_ns() const { return step_ns_; }
+
   void OnProposed(KeyframeId id, int64_t stamp_ns) {
     awaited_ = Awaited{id, !last_ns_ || stamp_ns >= *last_ns_};
     last_ns_ = stamp_ns;
@@ -43,7 +51,9 @@ class KeyframeGate {
   };
 
   std::optional<Awaited> awaited_;
-  std::optional<int64_t> last_ns_;  ///< of the keyframe proposed last
+  std::optional<int64_t> last_ns_;   ///< of the keyframe proposed last
+  std::optional<int64_t> frame_ns_;  ///< of the frame that came last
+  std::optional<int64_t> step_ns_;
   bool withheld_ = false;
 };
 

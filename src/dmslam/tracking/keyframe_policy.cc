@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kWeakShare = 0.5;  // of the expected landmarks
 constexpr int kWeak = 60;           // landmarks
+constexpr double kSooner = 0.6;     // of the time between two frames: no later one is nearer
 
 /// Young maps have the newest keyframes.
 bool IsOfTwoKeyframes(const Map& map, MapId map_id) {
@@ -24,7 +25,9 @@ bool IsOfTwoKeyframes(const Map& map, MapId map_id) {
 bool WantsKeyframe(const KeyframeOptions& options, const KeyframeInputs& inputs) {
   if (inputs.num_static <= options.min_inliers) return false;
   const bool weak = inputs.num_static < kWeakShare * inputs.expected || inputs.num_static < kWeak;
-  const bool due = !inputs.since_ns || *inputs.since_ns >= ToNs(options.min_interval_s) || weak;
+  const double sooner_ns = kSooner * static_cast<double>(inputs.step_ns.value_or(0));
+  const auto soonest_ns = static_cast<int64_t>(static_cast<double>(ToNs(options.min_interval_s)) - sooner_ns);
+  const bool due = !inputs.since_ns || *inputs.since_ns >= soonest_ns || weak;
   return due && inputs.num_static < options.tracked_ratio * inputs.expected;
 }
 

@@ -38,12 +38,30 @@ TEST(KeyframePolicyTest, AMapOfTwoKeyframesGrowsAlsoBesideALargerOne) {
 
 TEST(KeyframePolicyTest, TheFirstKeyframeOfACameraIsDueAtOnce) {
   const KeyframeOptions options;
-  KeyframeInputs inputs{.num_static = 100, .expected = 150, .since_ns = std::nullopt};
+  KeyframeInputs inputs{
+      .num_static = 100, .expected = 150, .since_ns = std::nullopt, .step_ns = std::nullopt};
   EXPECT_TRUE(WantsKeyframe(options, inputs));
   inputs.since_ns = 0;
   EXPECT_FALSE(WantsKeyframe(options, inputs));
   inputs.since_ns = ToNs(options.min_interval_s);
   EXPECT_TRUE(WantsKeyframe(options, inputs));
+}
+
+TEST(KeyframePolicyTest, TheFrameNearestToTheIntervalIsDue) {
+  const KeyframeOptions options;  // 0.1 s
+  const auto due_after = [&](int frames, double hz) {
+    const auto ns = [&](int n) { return static_cast<int64_t>(1e9 * n / hz); };
+    return WantsKeyframe(options,
+                         {.num_static = 100, .expected = 150, .since_ns = ns(frames), .step_ns = ns(1)});
+  };
+  EXPECT_FALSE(due_after(2, 30));
+  EXPECT_TRUE(due_after(3, 30));
+  EXPECT_TRUE(due_after(1, 15)) << "the next one would come after 0.133 s";
+  EXPECT_FALSE(due_after(1, 20));
+  EXPECT_TRUE(due_after(2, 20));
+  EXPECT_FALSE(due_after(5, 60));
+  EXPECT_TRUE(due_after(6, 60));
+  EXPECT_TRUE(due_after(1, 10));
 }
 
 }  // namespace
