@@ -53,7 +53,8 @@ struct KeyframeOptions {
   template <typename Visitor>
   void Describe(Visitor& v) {
     v.Number("keyframe.min_interval_s", min_interval_s, 0, 60, "s",
-             "no two keyframes within this time, unless tracking is weak");
+             "no two keyframes within this time (of the frames around it the nearest counts), unless "
+             "tracking is weak");
     v.Number("keyframe.tracked_ratio", tracked_ratio, 0, 1, "",
              "of the reference's landmarks; fewer tracked asks for a keyframe");
     v.InBaseline("0.9");
