@@ -4,6 +4,8 @@ need_synthetic
 camera=$root/config/synthetic.yaml
 
 refused "multicast route.*ip route add" run --sequence "$synthetic" --camera "$camera" --out "$work/o"
+refused "multicast route.*dev DEVICE.*leads to the other hosts" "$build/bin/dmslam-mapper" --session 1 \
+  --lcm-url "udpm://239.255.76.67:7692?ttl=1" --link lan
 multicast
 
 refused "no such folder" run --sequence "$work/none" --out "$work/o"

@@ -49,9 +49,12 @@ std::string UrlWithBuffer(const std::string& url) {
 
 std::string CureFor(const std::string& url) {
   if (IsUdp(url)) {
-    return "is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` makes one on "
-           "this host; "
-           "the form is udpm://239.255.76.67:PORT?ttl=0";
+    const bool leaves_host = std::atoi(QueryValue(url, "ttl").value_or("0").c_str()) > 0;
+    const std::string route =
+        leaves_host ? "`ip route add 224.0.0.0/4 dev DEVICE`, with the device that leads to the other hosts,"
+                    : "`ip link set lo up; ip route add 224.0.0.0/4 dev lo`";
+    return "is there a multicast route? " + route +
+           " makes one; the form is udpm://239.255.76.67:PORT?ttl=" + (leaves_host ? "1" : "0");
   }
   if (IsTcp(url)) return "is its server running? See docs/two-machines.md";
   return "known are udpm://GROUP:PORT?ttl=N, tcpq://HOST:PORT and memq://";
