@@ -154,7 +154,7 @@ bool MapperNode::TakeCheckpoint() {
   FoundCheckpoint found = FindCheckpoint(files_.checkpoint, session_, feature_store_);
   if (!found.problem.empty()) LogWarning("{}", found.problem);
   if (!found.map) return false;
-  CheckFits(found.path, *found.map, camera_info_->camera, options_.settings.Read<Pyramid>());
+  CheckFits(found.path, found.map->session, camera_info_->camera, options_.settings.Read<Pyramid>());
   const bool ended = found.map->map.progress().ended;
   LogInfo("{}: {} with {} keyframes and {} landmarks", found.path, ended ? "is complete" : "continues",
           found.map->map.keyframes().size(), found.map->map.num_landmarks());

@@ -13,12 +13,9 @@ SavedMap::SavedMap(std::string path, std::shared_ptr<FeatureStore> feature_store
       made_(map_->session) {}
 
 SavedMap::Beginning SavedMap::Begin(const Camera& camera, const Pyramid& pyramid, uint32_t session) {
-  CheckFits(path_, *map_, camera, pyramid);
+  CheckFits(path_, made_, camera, pyramid);
   const Map& map = map_->map;
-  if (session <= NewestSession(map)) {
-    throw InputError(path_ + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
-                     "; give all processes a higher one with --session");
-  }
+  CheckSessionIsNew(path_, map, session);
   if (map_->missing > 0) {
     LogWarning(
         "{}: {} map records are missing in it, {} references lead nowhere; the map is as good as it can be",

@@ -57,7 +57,9 @@ TEST_F(SavedMapTest, IsNotContinuedInASessionWhoseIdsItHolds) {
 TEST_F(SavedMapTest, IsNotContinuedWithWhatItWasNotMadeWith) {
   Camera camera = TestCamera();
   camera.fx_px *= 2;
-  EXPECT_NE(Problem(camera, Pyramid(), kSession + 1).find("another camera"), std::string::npos);
+  EXPECT_EQ(
+      Problem(camera, Pyramid(), kSession + 1),
+      path_ + ": was made with fx 500, the camera that plays has fx 1000: give the camera file of that map");
   Pyramid pyramid;
   ++pyramid.levels;
   EXPECT_NE(Problem(TestCamera(), pyramid, kSession + 1).find("features.levels"), std::string::npos);

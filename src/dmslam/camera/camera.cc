@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <numbers>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/util/check.h"
@@ -199,6 +201,19 @@ YAML::Node LoadYaml(const std::string& path) {
   }
 }
 
+/// As short as it can be read again exactly.
+std::string NumberText(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+std::string FieldText(const char* name, const std::string& value) { return std::string(name) + " " + value; }
+
+std::string ModelText(Lens lens) {
+  return FieldText("model", lens == Lens::kFisheye ? "fisheye" : "pinhole");
+}
+
 }  // namespace
 
 Eigen::Matrix3d Camera::K() const {
@@ -218,6 +233,33 @@ bool Camera::SeesAs(const Camera& other) const {
   Camera at_this_rate = other;
   at_this_rate.fps = fps;
   return *this == at_this_rate;
+}
+
+std::optional<CameraDifference> FirstDifference(const Camera& a, const Camera& b) {
+  if (a.lens != b.lens) return CameraDifference{ModelText(a.lens), ModelText(b.lens)};
+  constexpr std::array<std::pair<const char*, int Camera::*>, 2> kWhole = {
+      {{"width", &Camera::width_px}, {"height", &Camera::height_px}}};
+  for (const auto& [name, field] : kWhole) {
+    if (a.*field == b.*field) continue;
+    return CameraDifference{FieldText(name, std::to_string(a.*field)),
+                            FieldText(name, std::to_string(b.*field))};
+  }
+  constexpr std::array<std::pair<const char*, double Camera::*>, 10> kReal = {
+      {{"fx", &Camera::fx_px},
+       {"fy", &Camera::fy_px},
+       {"cx", &Camera::cx_px},
+       {"cy", &Camera::cy_px},
+       {"distortion k1", &Camera::k1},
+       {"distortion k2", &Camera::k2},
+       {"distortion p1", &Camera::p1},
+       {"distortion p2", &Camera::p2},
+       {"distortion k3", &Camera::k3},
+       {"distortion k4", &Camera::k4}}};
+  for (const auto& [name, field] : kReal) {
+    if (a.*field == b.*field) continue;
+    return CameraDifference{FieldText(name, NumberText(a.*field)), FieldText(name, NumberText(b.*field))};
+  }
+  return std::nullopt;
 }
 
 Eigen::Vector2d Camera::Distort(const Eigen::Vector2d& ideal_px) const {

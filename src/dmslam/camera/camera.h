@@ -71,6 +71,13 @@ struct Camera {
   std::optional<std::string> Problem() const;
 };
 
+/// A field of the camera file with its value in each of two cameras, as "fx 525.505".
+struct CameraDifference {
+  std::string a, b;
+};
+/// The first field in which they differ; none: they see the same. The rate does not count.
+std::optional<CameraDifference> FirstDifference(const Camera& a, const Camera& b);
+
 /// Reads a camera file (YAML: width, height, fx, fy, cx, cy, optional distortion [k1, k2, p1, p2, k3], fps
 /// and model; of the model "fisheye", distortion [k1, k2, k3, k4]). Throws InputError that names file, field
 /// and cure; a model other than "pinhole" and "fisheye" is refused by name.

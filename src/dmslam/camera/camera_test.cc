@@ -225,5 +225,40 @@ TEST(Camera, AnotherRateSeesTheSameAnotherLensDoesNot) {
   EXPECT_FALSE(camera.WithoutLens().HasDistortion());
 }
 
+/// The first field in which they differ, as "of a, of b"; empty: none.
+std::string Differ(const Camera& a, const Camera& b) {
+  const std::optional<CameraDifference> first = FirstDifference(a, b);
+  return first ? first->a + ", " + first->b : "";
+}
+
+TEST(Camera, TheFirstFieldInWhichTwoDifferIsNamed) {
+  const Camera camera = Freiburg1();
+  Camera other = camera;
+  other.fps = 60;
+  EXPECT_EQ(Differ(camera, other), "") << "the rate does not count";
+  other.p2 = 0.25;
+  EXPECT_EQ(Differ(other, camera).find("distortion p2 0.25, distortion p2 "), 0u) << Differ(other, camera);
+  other.fy_px = 525.505;
+  other.cx_px += 1;
+  EXPECT_EQ(Differ(other, camera).find("fy 525.505, fy "), 0u) << Differ(other, camera);
+  other.height_px = 240;
+  EXPECT_EQ(Differ(other, camera), "height 240, height 480");
+  other.lens = Lens::kFisheye;
+  EXPECT_EQ(Differ(other, camera), "model fisheye, model pinhole");
+}
+
+TEST(Camera, TwoThatDifferInAnyFieldDoNotSeeTheSame) {
+  const Camera camera = Freiburg1();
+  for (double Camera::*field : {&Camera::fx_px, &Camera::fy_px, &Camera::cx_px, &Camera::cy_px, &Camera::k1,
+                                &Camera::k2, &Camera::p1, &Camera::p2, &Camera::k3, &Camera::k4}) {
+    Camera other = camera;
+    other.*field = std::nextafter(camera.*field, 1e9);
+    EXPECT_FALSE(camera.SeesAs(other));
+    const std::optional<CameraDifference> first = FirstDifference(camera, other);
+    ASSERT_TRUE(first.has_value());
+    EXPECT_NE(first->a, first->b) << "however little it is";
+  }
+}
+
 }  // namespace
 }  // namespace dmslam

@@ -47,6 +47,11 @@ const RecordedStream& RecordedSession::Stream(StreamId stream) const {
   return it == streams.end() ? kNone : it->second;
 }
 
+bool RecordedSession::IsSavedMap() const {
+  return saved || Stream(StreamId::kMap).contains(kSavedTerm) ||
+         Stream(StreamId::kFrontend).contains(kSavedTerm);
+}
+
 std::vector<CameraId> RecordedSession::CamerasWithFrames() const {
   std::vector<CameraId> found;
   for (const auto& [camera, recorded] : cameras) {
@@ -84,6 +89,10 @@ LogIndex::LogIndex(const std::string& path, const std::optional<BusKey>& key) : 
   }
 }
 
+std::optional<int32_t> LogIndex::other_protocol() const {
+  return of_protocol_.empty() ? std::nullopt : std::optional(of_protocol_.rbegin()->first);
+}
+
 template <typename Message>
 std::optional<Message> LogIndex::Decode(std::span<const uint8_t> bytes) {
   std::optional<Message> message = wire::Decode<Message>(bytes);
@@ -102,7 +111,7 @@ void LogIndex::Add(const LogEvent& event, Parts* parts) {
   }
   if (const std::optional<LogContent> content = ReadLogContent(event)) {
     sessions_[content->session].id = content->session;
-    sessions_[content->session].saved_records = content->records;
+    sessions_[content->session].saved = content;
   }
   RecordedMessage message;
   message.utime_us = event.utime_us;

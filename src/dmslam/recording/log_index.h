@@ -8,6 +8,7 @@
 
 #include "dmslam/messaging/event_log.h"
 #include "dmslam/messaging/types.h"
+#include "dmslam/recording/log_version.h"
 #include "dmslam/wire/player_messages.h"
 
 namespace dmslam {
@@ -48,14 +49,19 @@ struct RecordedCamera {
   std::optional<EndOfSequence> end;
 };
 
+/// The term of what SaveMap writes: of no run, whose epochs are microseconds since 1970.
+inline constexpr Term kSavedTerm{1, 1};
+
 /// What a log holds of one session.
 struct RecordedSession {
   uint32_t id = 0;
   std::map<CameraId, RecordedCamera> cameras;  ///< whose players were recorded
   std::map<StreamId, RecordedStream> streams;
-  std::optional<int64_t> saved_records;  ///< of a saved map: how many map records it was written with
+  std::optional<LogContent> saved;  ///< of a saved map: what its first message says of it
 
   const RecordedStream& Stream(StreamId id) const;
+  /// Whether it was written by SaveMap, and by no run: also where its first message is lost.
+  bool IsSavedMap() const;
   /// The cameras of which frames were recorded, in order.
   std::vector<CameraId> CamerasWithFrames() const;
   /// The cameras whose frontends were recorded, in order.
@@ -82,6 +88,8 @@ class LogIndex {
   int64_t end_us() const { return end_us_; }
   int64_t num_messages() const { return num_messages_; }
   int64_t bad_messages() const { return bad_messages_; }
+  /// The protocol of messages that another version has written; none: there are no such messages.
+  std::optional<int32_t> other_protocol() const;
   /// What was skipped, for people, one line; empty when nothing was.
   std::string DescribeDamage() const;
 

@@ -48,7 +48,7 @@ std::optional<LogContent> ReadLogContent(const LogEvent& event) {
                              head->header.session > 0 && head->header.session <= UINT32_MAX &&
                              head->header.seq > 0;
   if (!names_content) return std::nullopt;
-  return LogContent{static_cast<uint32_t>(head->header.session), head->header.seq};
+  return LogContent{static_cast<uint32_t>(head->header.session), head->header.seq, head->schema_hash};
 }
 
 }  // namespace dmslam

@@ -18,6 +18,7 @@ std::optional<int32_t> OtherProtocol(const LogEvent& event);
 struct LogContent {
   uint32_t session = 0;
   int64_t records = 0;
+  int64_t schema_hash = 0;  ///< of the message types; when it is read
 };
 void WriteLogVersion(EventLogWriter* log, const std::string& prefix, int64_t utime_us,
                      const LogContent& content = {});

@@ -30,8 +30,8 @@ RecordHeader HeaderOf(uint32_t session, StreamId stream, int64_t seq) {
   header.session = session;
   header.stream = static_cast<int32_t>(stream);
   header.flags = RecordHeader::FLAG_FRESH;
-  header.epoch = 1;
-  header.writer = 1;
+  header.epoch = kSavedTerm.epoch;
+  header.writer = kSavedTerm.writer;
   header.seq = seq;
   return header;
 }
@@ -46,6 +46,47 @@ std::map<MapId, size_t> KeyframesOfMaps(const Map& map) {
   std::map<MapId, size_t> sizes;
   for (const auto& [id, keyframe] : map.keyframes()) ++sizes[keyframe.map_id];
   return sizes;
+}
+
+std::string Hex(uint64_t value) {
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
+  return text.data();
+}
+
+[[noreturn]] void RefuseVersion(const LogIndex& log, const std::string& its, const std::string& ours) {
+  throw InputError(log.path() + ": was written with " + its + ", this program speaks " + ours +
+                   ": load it with the program that wrote it, or make the map again with this one");
+}
+
+[[noreturn]] void RefuseDamaged(const LogIndex& log, const std::string& what) {
+  throw InputError(log.path() + ": is damaged: " + what + "; copy or save it again");
+}
+
+/// A saved map stands for itself, and is whole and of this version or refused. `start`: its session.
+void CheckSaved(const LogIndex& log, const RecordedSession& session,
+                const std::optional<SessionStart>& start) {
+  std::optional<int32_t> protocol = log.other_protocol();
+  if (!protocol && start && start->protocol_version != kProtocolVersion) protocol = start->protocol_version;
+  if (protocol) RefuseVersion(log, "protocol " + std::to_string(*protocol), std::to_string(kProtocolVersion));
+  if (!session.saved)
+    RefuseDamaged(log,
+                  "its first message, which says how many records it has, is missing or fails its checksum");
+  if (session.saved->schema_hash != wire::SchemaHash()) {
+    RefuseVersion(log, "message types " + Hex(static_cast<uint64_t>(session.saved->schema_hash)),
+                  Hex(static_cast<uint64_t>(wire::SchemaHash())));
+  }
+  const int64_t wanted = session.saved->records, here = RecordsOf(session.Stream(StreamId::kMap));
+  if (here < wanted) {
+    throw InputError(log.path() + ": is not whole: " + std::to_string(wanted - here) + " of the " +
+                     std::to_string(wanted) +
+                     " records of the saved map are missing or damaged; copy or save it again");
+  }
+  if (!start)
+    RefuseDamaged(log,
+                  "session_t, which says with which camera it was made, is missing or fails its checksum");
+  if (log.bad_messages() > 0)
+    RefuseDamaged(log, std::to_string(log.bad_messages()) + " messages fail their checksums");
 }
 
 }  // namespace
@@ -69,22 +110,35 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
   return std::nullopt;
 }
 
+SessionStart MadeWith(const LogIndex& log, const RecordedSession& session) {
+  const std::optional<SessionStart> start = FindSessionStart(log, session);
+  if (session.IsSavedMap()) CheckSaved(log, session, start);
+  if (session.Stream(StreamId::kMap).empty()) {
+    throw InputError(log.path() + ": holds no map record of session " + std::to_string(session.id) +
+                     "; was the mapper recorded too?");
+  }
+  if (!start) {
+    throw InputError(log.path() +
+                     ": does not say which camera the map was made with; record the frontend or the player "
+                     "too, or save the map with `scripts/run.sh --save-map`");
+  }
+  return *start;
+}
+
+SessionStart MadeWith(const std::string& path) {
+  const LogIndex log(path);
+  return MadeWith(log, log.Session());
+}
+
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us,
                       std::shared_ptr<FeatureStore> features) {
+  const SessionStart start = MadeWith(log, session);
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
-  const std::optional<SessionStart> start = FindSessionStart(log, session);
-  const int64_t here = RecordsOf(session.Stream(StreamId::kMap));
-  if (const auto saved = session.saved_records; saved && here < *saved) {
-    throw InputError(log.path() + ": is not whole: " + std::to_string(*saved - here) + " of the " +
-                     std::to_string(*saved) +
-                     " records of the saved map are missing or damaged; copy or save it again");
-  }
   if (replay.steps.empty()) {
     throw InputError(log.path() + ": holds no map record of session " + std::to_string(session.id) +
                      (until_us == INT64_MAX ? "; was the mapper recorded too?" : " up to that time"));
   }
-  if (!start) throw InputError(log.path() + ": does not say which camera the map was made with");
-  RebuiltMap rebuilt{Replica(start->camera, start->pyramid), *start};
+  RebuiltMap rebuilt{Replica(start.camera, start.pyramid), start};
   rebuilt.map.KeepFeaturesIn(std::move(features));
   rebuilt.missing = replay.missing;
   wire::RecordGroups<MapDelta> groups;
@@ -106,6 +160,8 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
     rebuilt.ended = delta->event == MapEvent::kEnded;
   }
   if (groups.open()) ++rebuilt.missing;
+  if (session.IsSavedMap() && rebuilt.missing > 0)
+    RefuseDamaged(log, std::to_string(rebuilt.missing) + " records of the saved map cannot be decoded");
   rebuilt.skipped = rebuilt.map.skipped_references();
   return rebuilt;
 }
@@ -144,12 +200,13 @@ RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key,
   return map;
 }
 
-void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid) {
-  if (!map.map.camera().SeesAs(camera)) {
-    throw InputError(path +
-                     ": was made with another camera than the one that plays; give the same camera file");
+void CheckFits(const std::string& path, const SessionStart& made, const Camera& camera,
+               const Pyramid& pyramid) {
+  if (const auto differ = FirstDifference(made.camera, camera)) {
+    throw InputError(path + ": was made with " + differ->a + ", the camera that plays has " + differ->b +
+                     ": give the camera file of that map");
   }
-  const Pyramid& its = map.map.pyramid();
+  const Pyramid& its = made.pyramid;
   if (its.levels != pyramid.levels || its.scale_factor != pyramid.scale_factor) {
     throw InputError(path + ": was made with features.levels=" + std::to_string(its.levels) +
                      " and features.scale_factor=" + std::to_string(its.scale_factor) + "; set the same");
@@ -159,13 +216,19 @@ void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& cam
 std::string WhyOtherVocabulary(const std::string& path, const SessionStart& made,
                                std::optional<uint64_t> checksum) {
   if (!made.vocabulary_checksum || !checksum || *made.vocabulary_checksum == *checksum) return "";
-  std::array<char, 160> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      ": was made with another vocabulary (checksum %016llx) than the one in use (%016llx); give its "
-      "own with --vocabulary",
-      static_cast<unsigned long long>(*made.vocabulary_checksum), static_cast<unsigned long long>(*checksum));
-  return path + text.data();
+  return path + ": was made with another vocabulary (checksum " + Hex(*made.vocabulary_checksum) +
+         ") than the one in use (" + Hex(*checksum) + "); give its own with --vocabulary";
+}
+
+void CheckVocabulary(const std::string& path, const SessionStart& made, std::optional<uint64_t> checksum) {
+  const std::string why = WhyOtherVocabulary(path, made, checksum);
+  if (!why.empty()) throw MisfitError(why);
+}
+
+void CheckSessionIsNew(const std::string& path, const Map& map, uint32_t session) {
+  if (session > NewestSession(map)) return;
+  throw InputError(path + ": holds keyframes of session " + std::to_string(NewestSession(map)) +
+                   "; give all processes a higher one with --session");
 }
 
 uint32_t NewestSession(const Map& map) {

@@ -25,9 +25,14 @@ struct RebuiltMap {
 /// camera.
 std::optional<SessionStart> FindSessionStart(const LogIndex& log, const RecordedSession& session);
 
+/// How the map of a session was made, found without building it. Throws InputError when the log holds no map
+/// of the session, and for a saved map of which anything is missing, damaged, or of another version.
+SessionStart MadeWith(const LogIndex& log, const RecordedSession& session);
+SessionStart MadeWith(const std::string& path);
+
 /// Builds the map of a session from its recorded map records, up to `until_us` of wall time. With all records
-/// in the log it is the mapper's own map at that time. Throws InputError when the log holds no map of the
-/// session. `features`: where the map keeps them; null: in memory.
+/// in the log it is the mapper's own map at that time. Throws InputError as MadeWith does. `features`:
+/// where the map keeps them; null: in memory.
 RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us = INT64_MAX,
                       std::shared_ptr<FeatureStore> features = nullptr);
 
@@ -49,12 +54,18 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
 RebuiltMap LoadMap(const std::string& path, const std::optional<BusKey>& key = std::nullopt,
                    std::shared_ptr<FeatureStore> features = nullptr);
 
-/// Throws InputError unless `map` can be continued with this camera and pyramid.
-void CheckFits(const std::string& path, const RebuiltMap& map, const Camera& camera, const Pyramid& pyramid);
+/// Throws InputError unless a map that was `made` so can be continued with this camera and pyramid.
+void CheckFits(const std::string& path, const SessionStart& made, const Camera& camera,
+               const Pyramid& pyramid);
+/// Throws InputError where ids of the session could be in `map` already.
+void CheckSessionIsNew(const std::string& path, const Map& map, uint32_t session);
 /// Why a map that was `made` so does not go with the vocabulary of that checksum; empty: it does, or one of
 /// the two has none.
 std::string WhyOtherVocabulary(const std::string& path, const SessionStart& made,
                                std::optional<uint64_t> checksum);
+
+/// Throws MisfitError that says so.
+void CheckVocabulary(const std::string& path, const SessionStart& made, std::optional<uint64_t> checksum);
 
 /// The highest session and the highest epoch's ordinal that the map's ids name: new ids must lie above.
 uint32_t NewestSession(const Map& map);

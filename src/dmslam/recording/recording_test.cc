@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
@@ -126,6 +127,17 @@ class Recording : public testing::Test {
                    const RecordHeader& header) {
     const auto [channel, bytes] = Sealed(message, header);
     log.Write(utime_us, prefix_ + channel, bytes);
+  }
+  /// A map of some keyframes, saved; its bytes.
+  std::string Saved(int keyframes) const {
+    TinyMapper mapper;
+    for (int i = 0; i < keyframes; ++i) mapper.Step();
+    SessionStart start;
+    start.session = kSession;
+    start.camera = TestCamera();
+    SaveMap(path_ + ".map", mapper.map(), start);
+    const std::vector<uint8_t> bytes = ReadFileBytes(path_ + ".map");
+    return {bytes.begin(), bytes.end()};
   }
   void WriteSession(EventLogWriter& log) {
     SessionStart start;
@@ -291,13 +303,13 @@ TEST_F(Recording, ASavedMapIsTheMap) {
   EXPECT_EQ(NewestOrdinal(loaded.map), 1);
   EXPECT_EQ(LargestMap(loaded.map), 1u);
   EXPECT_FALSE(LargestMap(Map(TestCamera(), Pyramid())).has_value());
-  CheckFits("map", loaded, TestCamera(), Pyramid());
+  CheckFits("map", loaded.session, TestCamera(), Pyramid());
   Camera other = TestCamera();
   other.fx_px = 501;
-  EXPECT_THROW(CheckFits("map", loaded, other, Pyramid()), InputError);
+  EXPECT_THROW(CheckFits("map", loaded.session, other, Pyramid()), InputError);
   Pyramid coarse;
   coarse.levels = 4;
-  EXPECT_THROW(CheckFits("map", loaded, TestCamera(), coarse), InputError);
+  EXPECT_THROW(CheckFits("map", loaded.session, TestCamera(), coarse), InputError);
   EXPECT_THROW(SaveMap(path_ + ".map", Map(TestCamera(), Pyramid()), start), InputError);
 }
 
@@ -346,6 +358,120 @@ TEST_F(Recording, HalfASavedMapIsRefusedByName) {
   std::fill_n(damaged.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2), 4096, '\0');
   write(damaged);
   EXPECT_NE(WhyNotLoaded(part).find("is not whole"), std::string::npos) << WhyNotLoaded(part);
+}
+
+/// Where the events of a log begin, and its end.
+std::vector<size_t> EventOffsets(const std::string& path) {
+  std::vector<size_t> offsets;
+  EventLogReader log(path);
+  while (const auto event = log.Next()) offsets.push_back(static_cast<size_t>(event->offset));
+  offsets.push_back(static_cast<size_t>(log.size()));
+  return offsets;
+}
+
+TEST_F(Recording, ADamagedHeadIsRefusedHoweverMuchOfTheSavedMapIsThere) {
+  const std::string whole = Saved(60), part = path_ + ".map2";
+  const std::vector<size_t> events = EventOffsets(path_ + ".map");
+  ASSERT_GT(events.size(), 5u);
+  const auto why = [&](std::string bytes, size_t at) {
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x10);
+    std::ofstream(part, std::ios::binary) << bytes;
+    return WhyNotLoaded(part);
+  };
+  // Its number and time are what lcm-logger says of it; behind those each byte of the first message counts.
+  for (size_t at = 20; at < events[1]; ++at) {
+    EXPECT_NE(why(whole, at).find(part + ": is damaged: its first message, which says how many records"),
+              std::string::npos)
+        << at << ": " << why(whole, at);
+    EXPECT_NE(why(whole.substr(0, events[events.size() / 2]), at), "") << at << ", and half of it is gone";
+  }
+  // So it does of session_t, the camera and all.
+  for (size_t at = events[1] + 20; at < events[2]; at += 3) {
+    EXPECT_NE(why(whole, at).find(part + ": is damaged: session_t, which says with which camera"),
+              std::string::npos)
+        << at << ": " << why(whole, at);
+  }
+  std::ofstream(part, std::ios::binary) << whole.substr(events[1]);
+  EXPECT_NE(WhyNotLoaded(part).find("is damaged: its first message"), std::string::npos) << "it is gone";
+}
+
+/// The messages of the log `from`, with `edit` done to each.
+void CopyLog(const std::string& from, const std::string& to, const std::function<void(LogEvent*)>& edit) {
+  EventLogReader reader(from);
+  EventLogWriter writer(to);
+  while (auto event = reader.Next()) {
+    edit(&*event);
+    writer.Write(event->utime_us, event->channel, event->bytes);
+  }
+  writer.Close();
+}
+
+TEST_F(Recording, ASavedMapOfAnotherVersionIsRefusedByNameEvenIfItsRecordsCanBeRead) {
+  Saved(3);
+  const std::string from = path_ + ".map", to = path_ + ".map2";
+  const auto edit_head = [](const std::function<void(head_t*)>& edit) {
+    return [edit](LogEvent* event) {
+      auto head = DecodeHead(event->channel, event->bytes);
+      if (!head) return;
+      edit(&*head);
+      event->bytes = *SealedMessage(event->channel, *head).bytes;
+    };
+  };
+  CopyLog(from, to, edit_head([](head_t*) {}));
+  EXPECT_EQ(WhyNotLoaded(to), "");
+  const std::string ours = std::to_string(kProtocolVersion), newer = std::to_string(kProtocolVersion + 1);
+  const std::string refusal =
+      to + ": was written with protocol " + newer + ", this program speaks " + ours + ": ";
+  CopyLog(from, to, edit_head([](head_t* head) { head->protocol_version = kProtocolVersion + 1; }));
+  EXPECT_EQ(WhyNotLoaded(to).find(refusal), 0u) << WhyNotLoaded(to);
+  CopyLog(from, to, edit_head([](head_t* head) { head->schema_hash ^= 1; }));
+  EXPECT_NE(WhyNotLoaded(to).find(": was written with message types "), std::string::npos)
+      << WhyNotLoaded(to);
+  CopyLog(from, to, [](LogEvent* event) {
+    auto start = wire::Decode<SessionStart>(event->bytes);
+    if (!start) return;
+    start->protocol_version = kProtocolVersion + 1;
+    const RecordHeader header = *ParseHeader(event->bytes);
+    event->bytes = wire::Encode(*start);
+    Seal(header, event->channel, event->bytes);
+  });
+  EXPECT_EQ(WhyNotLoaded(to).find(refusal), 0u) << WhyNotLoaded(to);
+}
+
+TEST_F(Recording, ALogThatNamesNoCameraSaysTheCure) {
+  TinyMapper mapper;
+  EventLogWriter log(path_);
+  WriteRecord(log, 1, mapper.Step(), Header(StreamId::kMap, 1));
+  log.Close();
+  EXPECT_NE(WhyNotLoaded(path_).find("does not say which camera the map was made with; record the frontend"),
+            std::string::npos)
+      << WhyNotLoaded(path_);
+}
+
+TEST_F(Recording, WhatDoesNotFitAMapIsNamed) {
+  Saved(3);
+  const RebuiltMap loaded = LoadMap(path_ + ".map");
+  EXPECT_EQ(MadeWith(path_ + ".map").camera, TestCamera());
+  const auto why = [](const std::function<void()>& check) -> std::string {
+    try {
+      check();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  Camera other = TestCamera();
+  other.fx_px = 510.25;
+  EXPECT_EQ(
+      why([&] { CheckFits("a.map", loaded.session, other, Pyramid()); }),
+      "a.map: was made with fx 500, the camera that plays has fx 510.25: give the camera file of that map");
+  EXPECT_EQ(why([&] { CheckSessionIsNew("a.map", loaded.map, kSession + 1); }), "");
+  EXPECT_EQ(why([&] { CheckSessionIsNew("a.map", loaded.map, kSession); }),
+            "a.map: holds keyframes of session 7; give all processes a higher one with --session");
+  SessionStart made;
+  made.vocabulary_checksum = 0xabc;
+  CheckVocabulary("a.map", made, 0xabc);
+  EXPECT_THROW(CheckVocabulary("a.map", made, 0xdef), MisfitError);
 }
 
 /// What a camera's player publishes of itself, and of a frame of 2 x 1 pixels.

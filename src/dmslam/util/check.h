@@ -12,6 +12,13 @@ class InputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Input that is right by itself, and does not fit what it is used with: another vocabulary, for one. Programs
+/// end with another code (kExitMisfit).
+class MisfitError : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// A broken invariant of ours.
 class InvariantError : public std::logic_error {
  public:
