@@ -244,6 +244,18 @@ Json OtherMapsJson(const TrajectoryBuilder::Trajectories& t) {
   return others;
 }
 
+/// Of each camera its own: two cameras may have frames in one map.
+Json OtherMapsOfAllJson(const std::vector<CameraResults>& cameras) {
+  Json all = Json::array();
+  for (size_t camera = 0; camera < cameras.size(); ++camera) {
+    for (Json other : OtherMapsJson(cameras[camera].trajectories)) {
+      other["camera"] = camera;
+      all.push_back(std::move(other));
+    }
+  }
+  return all;
+}
+
 /// How many frames were played from the one on that was tracked first: also those that left no record, since
 /// they never came to the frontend. Before that one there are as many of them as indices are missing.
 int64_t FramesSinceFirstMap(const RunRecord& run, const TrajectoryBuilder& builder, int64_t first_stamp_ns) {
@@ -260,22 +272,40 @@ int64_t FramesSinceFirstMap(const RunRecord& run, const TrajectoryBuilder& build
     }
   }
   const int64_t unrecorded = std::max<int64_t>(0, frames.published - recorded);
-  const int64_t gaps = std::max<int64_t>(0, int64_t{first.value_or(0)} - frames.first_index - before);
+  const int64_t gaps =
+      std::max<int64_t>(0, int64_t{first.value_or(0)} - frames.first_index.value_or(0) - before);
   return frames.published - before - std::min(gaps, unrecorded);
+}
+
+/// When the sequence's first frame was taken; none: no frame has left a record. Where the first ones left
+/// none, since they never came to the frontend: by their number, at the median rate of those that did.
+std::optional<int64_t> FirstStampNs(const RunRecord& run, const TrajectoryBuilder& builder) {
+  std::optional<std::pair<uint32_t, int64_t>> first, last;
+  std::vector<double> ns_per_frame;
+  for (const auto& [frame, pose] : builder.frame_poses()) {
+    if (frame.camera != 0) continue;
+    if (!first) first = {frame.index, pose.stamp_ns};
+    if (last)
+      ns_per_frame.push_back(static_cast<double>(pose.stamp_ns - last->second) / (frame.index - last->first));
+    last = {frame.index, pose.stamp_ns};
+  }
+  if (!first) return std::nullopt;
+  const uint32_t played_first = run.first().frames.first_index.value_or(first->first);
+  if (first->first <= played_first || ns_per_frame.empty()) return first->second;
+  return first->second - std::llround(Quantile(ns_per_frame, 0.5) * (first->first - played_first));
 }
 
 Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
                   const TrajectoryBuilder::Trajectories& t) {
   Json json;
-  const auto& poses = builder.frame_poses();
+  const std::optional<int64_t> first_stamp_ns = FirstStampNs(run, builder);
   const int64_t after_first =
       t.online.empty() ? 0 : FramesSinceFirstMap(run, builder, t.online.front().stamp_ns);
   json["tracked_online_percent"] = Percent(t.online.size(), run.first().frames.published);
   json["tracked_online_after_first_map_percent"] = Percent(t.online.size(), after_first);
   json["tracked_percent"] = Percent(t.final.size(), run.first().frames.published);
-  if (!t.online.empty() && !poses.empty()) {
-    json["first_init_s"] =
-        static_cast<double>(t.online.front().stamp_ns - poses.begin()->second.stamp_ns) * 1e-9;
+  if (!t.online.empty() && first_stamp_ns) {
+    json["first_init_s"] = static_cast<double>(t.online.front().stamp_ns - *first_stamp_ns) * 1e-9;
   } else {
     json["first_init_s"] = nullptr;
   }
@@ -309,6 +339,7 @@ Json CamerasJson(const std::vector<CameraResults>& results) {
   for (size_t i = 0; i < results.size(); ++i)
     cameras.push_back(CameraJson(static_cast<CameraId>(i), results[i]));
   json["cameras"] = cameras;
+  json["other_maps"] = OtherMapsOfAllJson(results);
   json["ate_rmse_joint"] = NumberOrNull(EvaluateJointly(results, &Trajectories::final));
   json["ate_rmse_joint_online"] = NumberOrNull(EvaluateJointly(results, &Trajectories::online));
   return json;

@@ -35,7 +35,7 @@ struct FrameDurations {
 /// As the player said it at the end, or else as far as is known.
 struct PlayedFrames {
   int64_t published = 0, missing = 0, blacked = 0, jumped = 0;
-  uint32_t first_index = 0;
+  std::optional<uint32_t> first_index = std::nullopt;  ///< none: not announced
 };
 
 struct CameraRecord {

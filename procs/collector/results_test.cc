@@ -1,0 +1,99 @@
+#include "collector/results.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/map/replica.h"
+
+namespace dmslam {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Maps 1, 2 and 3 with a keyframe each, whose frames have the number of their map.
+class ResultsTest : public testing::Test {
+ protected:
+  ResultsTest() {
+    MapEditor map(TestCamera(), Pyramid());
+    for (MapId map_id = 1; map_id <= 3; ++map_id) {
+      Keyframe keyframe;
+      keyframe.id = KeyframeId::Make(1, map_id);
+      keyframe.map_id = map_id;
+      keyframe.features = MakeFrameFeatures(FeatureSet(), map.camera(), map.pyramid());
+      map.AddKeyframe(std::move(keyframe));
+    }
+    builder_.SetMap(Replica(std::move(map)));
+    run_.cameras.resize(1);
+  }
+  ~ResultsTest() override { std::filesystem::remove_all(folder_); }
+
+  /// A frame of 10 Hz that was tracked in the map; 0: that was not tracked.
+  void Tell(CameraId camera, uint32_t frame, MapId map_id) {
+    FramePose pose;
+    pose.camera_id = camera;
+    pose.frame_index = frame;
+    pose.stamp_ns = 1'000'000'000 + 100'000'000 * int64_t{frame};
+    if (map_id != 0) {
+      pose.map_id = map_id;
+      pose.state = TrackingState::kTracking;
+      pose.reference = KeyframeId::Make(1, map_id);
+    }
+    builder_.OnFramePose(pose);
+  }
+  Json Summary() {
+    WriteResults(folder_, run_, builder_, false);
+    std::ifstream file(folder_ + "/summary.json");
+    return Json::parse(file);
+  }
+
+  const std::string folder_ = testing::TempDir() + "/results_test_" + std::to_string(getpid());
+  TrajectoryBuilder builder_{TestCamera(), Pyramid()};
+  RunRecord run_;
+};
+
+TEST_F(ResultsTest, MapsApartAreThoseOfAllCameras) {
+  run_.cameras.resize(3);
+  for (uint32_t frame = 10; frame < 20; ++frame) Tell(0, frame, 1);
+  Tell(1, 10, 2);
+  Tell(1, 11, 2);
+  Tell(2, 10, 2);
+  Tell(2, 11, 3);
+  const Json summary = Summary();
+  EXPECT_EQ(summary["other_maps"], Json::parse(R"([
+      {"camera": 1, "map": 2, "frames": 2},
+      {"camera": 2, "map": 2, "frames": 1},
+      {"camera": 2, "map": 3, "frames": 1}])"));
+  EXPECT_EQ(summary["cameras"][1]["other_maps"], Json::parse(R"([{"map": 2, "frames": 2}])"));
+}
+
+TEST_F(ResultsTest, OfOneCameraTheMapsApartHaveNoNumberOfACamera) {
+  for (uint32_t frame = 10; frame < 20; ++frame) Tell(0, frame, 1);
+  Tell(0, 20, 2);
+  EXPECT_EQ(Summary()["other_maps"], Json::parse(R"([{"map": 2, "frames": 1}])"));
+}
+
+TEST_F(ResultsTest, TheFirstMapIsTimedFromTheFirstFrameOfTheSequence) {
+  for (uint32_t frame = 66; frame < 71; ++frame) Tell(0, frame, 0);
+  for (uint32_t frame = 71; frame < 90; ++frame) Tell(0, frame, 1);
+  EXPECT_NEAR(Summary()["first_init_s"].get<double>(), 0.5, 1e-9) << "nobody has announced a first frame";
+  run_.cameras[0].frames.first_index = 66;
+  EXPECT_EQ(Summary()["first_init_s"].get<double>(), 0.5) << "as in lock-step, where every frame is told";
+  run_.cameras[0].frames.first_index = 5;
+  EXPECT_NEAR(Summary()["first_init_s"].get<double>(), 6.6, 1e-9) << "61 frames never came to the frontend";
+}
+
+TEST_F(ResultsTest, WhereNothingIsTrackedThereIsNoFirstMap) {
+  EXPECT_TRUE(Summary()["first_init_s"].is_null());
+  Tell(0, 3, 0);
+  EXPECT_TRUE(Summary()["first_init_s"].is_null());
+}
+
+}  // namespace
+}  // namespace dmslam
