@@ -96,7 +96,9 @@ expect_camera "the other one is undisturbed" "$work/killed" 0 tracked_percent ">
 expect_camera "it has found itself again" "$work/killed" 1 tracked_online_percent ">= 30"
 
 # What does not fit is refused by name.
-refused "camera-id 2: there are --cameras 2" "$build/bin/dmslam-frontend" --cameras 2 --camera-id 2
+refused "camera-id 2: there are --cameras 2.*; give --cameras 3" "$build/bin/dmslam-frontend" --cameras 2 --camera-id 2
+"$build/bin/dmslam-frontend" --cameras 2 --camera-id 2 2>/dev/null
+check "64: that is the command line" test $? = 64
 refused "nowhere: no such folder" run --sequence "$synthetic" --also /nowhere --camera "$root/config/synthetic.yaml" --out "$work/none"
 sed -E 's/^( *f[xy][^:]*: *).*/\1400.0/' "$work/half.yaml" >"$work/narrow.yaml"
 refused "half: its camera sees [0-9]+ % of what the one sees" "$build/bin/dmslam-inprocess" --sequence "$synthetic" \

@@ -89,12 +89,20 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
 int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
   if (const std::optional<int> code = app_.Parse(argc, argv)) return *code == 0 ? kExitDone : kExitUsage;
   SetUpLog(role_, quiet_);
+  if (options_.camera_id >= cameras_) {
+    LogError("--camera-id {}: there are --cameras {}, numbered from 0; give --cameras {}", options_.camera_id,
+             cameras_, options_.camera_id + 1);
+    return kExitUsage;
+  }
   std::signal(SIGPIPE, SIG_IGN);  // a log that nobody reads any more ends no process
   try {
     return RunNode(factory);
   } catch (const NotYetError& error) {
     LogError("{}", error.what());
     return kExitNotYet;
+  } catch (const MisfitError& error) {
+    LogError("{}", error.what());
+    return kExitMisfit;
   } catch (const InputError& error) {
     LogError("{}", error.what());
     return kExitInput;
@@ -106,10 +114,6 @@ int ProcessMain::Run(int argc, char** argv, const Factory& factory) {
 
 /// Where the first frontend is waited for, so are the others. A viewer waits for nobody, but hears them all.
 void ProcessMain::AddCameras() {
-  if (options_.camera_id >= cameras_) {
-    throw InputError("--camera-id " + std::to_string(options_.camera_id) + ": there are --cameras " +
-                     std::to_string(cameras_) + ", numbered from 0");
-  }
   if (role_ != roles::kViewer && !options_.HasPeer(roles::kFrontend)) return;
   for (CameraId camera = 1; camera < cameras_; ++camera)
     options_.peers.push_back(OfCamera(roles::kFrontend, camera));
