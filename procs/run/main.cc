@@ -15,6 +15,7 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/time.h"
 #include "run/log_replay.h"
+#include "run/map_check.h"
 #include "run/resume.h"
 #include "run/run_plan.h"
 
@@ -265,6 +266,7 @@ int Start(dmslam::RunArguments arguments, dmslam::RunIdentity identity,
 
 int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
   dmslam::CheckRunArguments(arguments);
+  dmslam::CheckMap(arguments);  // what is in the folder stays as it is, where it does not fit
   std::error_code error;
   fs::create_directories(arguments.output.folder, error);
   const dmslam::RunLock lock(arguments.output.folder);
@@ -320,6 +322,9 @@ int main(int argc, char** argv) {
     if (argc > 3)
       throw dmslam::InputError("--resume goes on with what the run was begun with: give no other option");
     return Resume(arguments.resume);
+  } catch (const dmslam::MisfitError& error) {
+    Say(error.what());
+    return dmslam::kExitMisfit;
   } catch (const dmslam::InputError& error) {
     Say(error.what());
     return dmslam::kExitInput;

@@ -61,6 +61,15 @@ for command in "merge $work/a.map $work/half.map --save $work/none.map" "diff $w
   refused "half.map: is not whole: [0-9]+ of the [0-9]+ records of the saved map" map $command
 done
 refused "half.map: is not whole" "${play[@]}" --map "$work/half.map" --out "$work/o"
+# One byte of the first message, which says how many records there are, is another one.
+python3 - "$work/b.map" "$work/head.map" <<'EOP'
+import sys
+
+data = bytearray(open(sys.argv[1], "rb").read())
+data[120] ^= 1
+open(sys.argv[2], "wb").write(data[:len(data) // 2])
+EOP
+refused "head.map: is damaged: its first message" map list "$work/head.map"
 python3 - "$work/old.map" <<'EOP'
 import struct
 import sys
@@ -78,16 +87,49 @@ refused "none.map: cannot be read" map merge "$work/a.map" "$work/none.map" --sa
 awk '/^fx:/ { $2 *= 1.01 } { print }' "$camera" >"$work/other.yaml"
 check "a map of another camera" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$work/other.yaml" --seed 3 \
   --frames 60 --session 77 --save-map "$work/other.map" --out "$work/o" >/dev/null 2>&1
-refused "a.map and $work/other.map: were made with different cameras" map merge "$work/a.map" "$work/other.map" --save "$work/none.map"
+refused "a.map and $work/other.map: were made with different cameras: fx [0-9.]+ and fx [0-9.]+; join maps of one camera file" \
+  map merge "$work/a.map" "$work/other.map" --save "$work/none.map"
+map diff "$work/a.map" "$work/other.map" >"$work/said"
+check "1: they differ in their cameras" test $? = 1
+check "it says in what" grep -qE "^camera +fx [0-9.]+ in A +fx [0-9.]+ in B$" "$work/said"
 mkdir "$work/few"
 find "$synthetic/rgb" -type f | sort | head -n 3 | xargs -I{} cp {} "$work/few"
 check "a small vocabulary is trained" "$build/bin/dmslam-vocab" train --images "$work/few" --k 4 --levels 2 \
   --out "$work/small.dmv" >/dev/null 2>&1
-refused "a.map: was made with another vocabulary .*--vocabulary" map merge "$work/a.map" "$work/b.map" --vocabulary "$work/small.dmv" \
-  --save "$work/none.map"
-"$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --frames 20 --map "$work/a.map" \
-  --vocabulary "$work/small.dmv" --save-map "$work/none.map" --out "$work/o" >"$work/said" 2>&1
+joins_others=(map merge "$work/a.map" "$work/b.map" --vocabulary "$work/small.dmv" --save "$work/none.map")
+refused "a.map: was made with another vocabulary .*--vocabulary" "${joins_others[@]}"
+"${joins_others[@]}" 2>/dev/null
+check "2: maps of another vocabulary" test $? = 2
+# The results of an earlier run stay as they are: nothing is written before the map is known to fit.
+cp -r "$work/a" "$work/before"
+unchanged() { # DESCRIPTION
+  check "$1: what was in the folder is as it was" diff -r "$work/before" "$work/a"
+}
+inprocess=("$build/bin/dmslam-inprocess" --sequence "$synthetic" --seed 3 --frames 20 --save-map "$work/none.map" --out "$work/a")
+"${inprocess[@]}" --camera "$camera" --map "$work/a.map" --vocabulary "$work/small.dmv" >"$work/said" 2>&1
 check "2: a run with another vocabulary than the map's" test $? = 2
 check "is refused by name: $(tail -n 1 "$work/said")" grep -q "a.map: was made with another vocabulary .*--vocabulary" "$work/said"
+unchanged "another vocabulary, in one process"
+fits="was made with fx [0-9.]+, the camera that plays has fx [0-9.]+: give the camera file of that map"
+refused "a.map: $fits" "${inprocess[@]}" --camera "$work/other.yaml" --map "$work/a.map"
+unchanged "another camera, in one process"
+refused "a.map: holds keyframes of session [0-9]+; give all processes a higher one" "${inprocess[@]}" --camera "$camera" \
+  --map "$work/a.map" --session 1
+unchanged "a session that is in the map, in one process"
+refused "other.map: $fits" "${play[@]}" --map "$work/other.map" --out "$work/a"
+unchanged "another camera"
+refused "a.map: was made with features.levels=8 " "${play[@]}" --map "$work/a.map" --set features.levels=7 --out "$work/a"
+unchanged "other settings"
+refused "half.map: is not whole" "${play[@]}" --map "$work/half.map" --out "$work/a"
+unchanged "half a map"
+"$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --seed 3 --frames 60 --vocabulary "$work/small.dmv" \
+  --save-map "$work/words.map" --out "$work/o" >/dev/null 2>&1
+check "a map of another vocabulary" test $? = 0
+"${play[@]}" --map "$work/words.map" --out "$work/a" >"$work/said" 2>&1
+check "2: a run in a map of another vocabulary" test $? = 2
+check "is refused by name, too: $(tail -n 1 "$work/said")" grep -q "words.map: was made with another vocabulary" "$work/said"
+unchanged "a map of another vocabulary"
+map diff "$work/a.map" "$work/words.map" >"$work/said"
+check "diff names the vocabularies" grep -qE "^vocabulary +[0-9a-f]{16} in A +[0-9a-f]{16} in B$" "$work/said"
 check "nothing was written" test ! -e "$work/none.map"
 finish

@@ -5,8 +5,10 @@
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/console/log.h"
+#include "dmslam/place_recognition/vocabulary.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/runtime/session_check.h"
@@ -149,6 +151,35 @@ int StopSignal() {
   return 0;
 }
 
+/// How the frames, or the recorded keyframes, are told: camera and vocabulary. None: the log does not say.
+std::optional<dmslam::SessionStart> WhoPlays(const Arguments& a, const dmslam::InProcessOptions& options) {
+  if (!a.records.empty()) {
+    const dmslam::LogIndex log(a.records);
+    return dmslam::FindSessionStart(log, log.Session(a.log_session));
+  }
+  dmslam::SessionStart start;
+  start.camera = options.player.camera;
+  start.vocabulary_checksum = options.vocabulary->checksum();
+  return start;
+}
+
+/// Throws where the map to begin in does not go with what is played. Chooses the session where none is given.
+void CheckMap(const Arguments& a, dmslam::InProcessOptions* options) {
+  const std::string& path = a.map_files.load;
+  uint32_t* session = &options->player.session;
+  if (path.empty()) {
+    if (*session == 0) *session = 1;
+    return;
+  }
+  const dmslam::RebuiltMap map = dmslam::LoadMap(path);
+  if (*session == 0) *session = dmslam::NewestSession(map.map) + 1;
+  dmslam::CheckSessionIsNew(path, map.map, *session);
+  const std::optional<dmslam::SessionStart> plays = WhoPlays(a, *options);
+  if (!plays) return;
+  dmslam::CheckFits(path, map.session, plays->camera, options->node.settings.Read<dmslam::Pyramid>());
+  dmslam::CheckVocabulary(path, map.session, plays->vocabulary_checksum);
+}
+
 int Run(const Arguments& a) {
   dmslam::InProcessOptions options;
   std::vector<std::string> overrides;
@@ -165,10 +196,6 @@ int Run(const Arguments& a) {
   options.map_files = a.map_files;
   options.player.session = a.session;
   options.player.encoding.encoding = dmslam::ParseFrameEncoding(a.encoding);
-  if (a.session == 0) {
-    const bool continued = !a.map_files.load.empty();
-    options.player.session = continued ? dmslam::NewestSession(dmslam::LoadMap(a.map_files.load).map) + 1 : 1;
-  }
   options.player.start = a.start;
   options.player.frames = a.frames;
   for (const std::string& text : a.black_outs)
@@ -182,6 +209,7 @@ int Run(const Arguments& a) {
   auto others = all_of_log ? OthersOf(a, log, options.player, &options.collector.ground_truth)
                            : OpenOthers(a, options.player, &options.collector.ground_truth);
   options.vocabulary = dmslam::LoadVocabulary(a.vocabulary);
+  CheckMap(a, &options);
   options.picture_every = a.pictures;
   options.picture_dir = a.out + "/pictures";
   std::filesystem::create_directories(a.pictures > 0 ? options.picture_dir : a.out);
@@ -208,8 +236,11 @@ int main(int argc, char** argv) {
   dmslam::SetUpLog("dmslam-inprocess");
   try {
     return Run(arguments);
+  } catch (const dmslam::MisfitError& error) {
+    dmslam::LogError("{}", error.what());
+    return dmslam::kExitMisfit;
   } catch (const dmslam::InputError& error) {
     dmslam::LogError("{}", error.what());
-    return 1;
+    return dmslam::kExitInput;
   }
 }

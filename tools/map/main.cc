@@ -17,6 +17,7 @@
 #include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/recording/log_version.h"
 #include "dmslam/recording/map_file.h"
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
@@ -262,8 +263,11 @@ int main(int argc, char** argv) {
   const bool is_diff = !command_arguments.other.empty();
   try {
     return command ? command(dmslam::BusKey::LoadIfWanted(command_arguments.key)) : Run(arguments);
+  } catch (const dmslam::MisfitError& error) {
+    dmslam::LogError("{}", error.what());
+    return dmslam::kExitMisfit;
   } catch (const dmslam::InputError& error) {
     dmslam::LogError("{}", error.what());
-    return is_diff ? 2 : 1;
+    return is_diff ? 2 : dmslam::kExitInput;
   }
 }

@@ -137,6 +137,22 @@ void PrintCommon(const CommonMap& common) {
               DisplacementText("landmarks", common.points, common.landmarks).c_str());
 }
 
+/// What two maps were made with, where that differs: a line each, "camera  fx 500 in A  fx 510 in B".
+std::string MadeApart(const SessionStart& a, const SessionStart& b) {
+  std::string text;
+  const auto add = [&text](const char* what, const std::string& in_a, const std::string& in_b) {
+    text += Text("%-11s %s in A  %s in B\n", what, in_a.c_str(), in_b.c_str());
+  };
+  if (const auto differ = FirstDifference(a.camera, b.camera)) add("camera", differ->a, differ->b);
+  const auto pyramid = [](const SessionStart& made) {
+    return Text("levels=%d scale_factor=%g", made.pyramid.levels, made.pyramid.scale_factor);
+  };
+  if (pyramid(a) != pyramid(b)) add("features", pyramid(a), pyramid(b));
+  const auto &words_a = a.vocabulary_checksum, &words_b = b.vocabulary_checksum;
+  if (words_a && words_b && words_a != words_b) add("vocabulary", Hex(*words_a), Hex(*words_b));
+  return text;
+}
+
 void Print(const MapDifference& difference) {
   std::printf("%s\n", CountsOf("maps", difference.maps).c_str());
   std::printf("%s, %zu of them with other links\n", CountsOf("keyframes", difference.keyframes).c_str(),
@@ -162,7 +178,10 @@ WholeMap OpenWhole(const std::string& path, const std::optional<BusKey>& key) {
 
 void CheckMayJoin(const WholeMap& a, const WholeMap& b, bool renumber) {
   const std::string both = a.path + " and " + b.path + ": ";
-  if (!a.map().camera().SeesAs(b.map().camera())) throw InputError(both + "were made with different cameras");
+  if (const auto differ = FirstDifference(a.map().camera(), b.map().camera())) {
+    throw InputError(both + "were made with different cameras: " + differ->a + " and " + differ->b +
+                     "; join maps of one camera file");
+  }
   const Pyramid &of_a = a.map().pyramid(), &of_b = b.map().pyramid();
   if (of_a.levels != of_b.levels || of_a.scale_factor != of_b.scale_factor)
     throw InputError(both + "were made with other features.levels or features.scale_factor");
@@ -175,11 +194,6 @@ void CheckMayJoin(const WholeMap& a, const WholeMap& b, bool renumber) {
         "; where these are different runs, or parts of one, --renumber gives those of the second "
         "file another number");
   }
-}
-
-void CheckVocabulary(const WholeMap& map, uint64_t checksum) {
-  const std::string why = WhyOtherVocabulary(map.path, map.rebuilt.session, checksum);
-  if (!why.empty()) throw InputError(why);
 }
 
 std::string Listing(const std::string& path, const Map& map, const SessionStart& session) {
@@ -203,8 +217,8 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
   const WholeMap a = OpenWhole(arguments.a, key), b = OpenWhole(arguments.b, key);
   CheckMayJoin(a, b, arguments.renumber);
   const std::shared_ptr<const Vocabulary> vocabulary = LoadVocabulary(arguments.vocabulary);
-  CheckVocabulary(a, vocabulary->checksum());
-  CheckVocabulary(b, vocabulary->checksum());
+  for (const WholeMap* map : {&a, &b})
+    CheckVocabulary(map->path, map->rebuilt.session, vocabulary->checksum());
   const Renumbering names = NamesBeside(a.map(), b.map(), arguments.renumber);
   MapMerge merge(a.map(), b.map(), names, OptionsOf(arguments));
   const MapMergeReport report = merge.Run(vocabulary, Progress());
@@ -227,9 +241,11 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
 int DiffMaps(const std::string& path_a, const std::string& path_b, const std::optional<BusKey>& key) {
   const WholeMap a = OpenWhole(path_a, key), b = OpenWhole(path_b, key);
   const MapDifference difference = Compare(a.map(), b.map());
-  if (difference.Equal()) return 0;
+  const std::string made_apart = MadeApart(a.rebuilt.session, b.rebuilt.session);
+  if (difference.Equal() && made_apart.empty()) return 0;
   std::printf("A: %sB: %s", Listing(a.path, a.map(), a.rebuilt.session).c_str(),
               Listing(b.path, b.map(), b.rebuilt.session).c_str());
+  std::fputs(made_apart.c_str(), stdout);
   if (!difference.other_times.empty()) {
     const KeyframeId first = difference.other_times.front();
     std::printf("session %u is another run in each: its frame %u was taken at %.6f in A, at %.6f in B\n",
