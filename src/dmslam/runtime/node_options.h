@@ -15,7 +15,7 @@ namespace dmslam {
 
 /// What every process of the system is told at its start.
 struct NodeOptions {
-  uint32_t session = 0;    ///< 0: that of the first camera heard
+  uint32_t session = 0;    ///< 0: that of the bus, where there is one
   CameraId camera_id = 0;  ///< of a player and a frontend: whose they are
   std::vector<std::string>
       peers;  ///< processes that take part: they are waited for, and hold their streams' writers back

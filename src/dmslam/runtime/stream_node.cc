@@ -56,6 +56,10 @@ StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string rol
       session_(options_.session),
       cameras_(context_.random_id % kStatusEveryNs),
       started_ns_(context_.now_ns()) {
+  if (options_.session == 0 && !options_.of_a_log && !context_.fresh_system) {
+    choice_.emplace(started_ns_ + SessionChoice::kListenNs);
+    Listen(SessionChoice::Channels(options_.NumCameras()), 0);
+  }
   Listen({channels::kCameraInfo});
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     if (camera != options_.camera_id) Listen({channels::kCameraInfo}, camera);
@@ -77,6 +81,10 @@ void StreamNode::Listen(const std::vector<std::string>& channels, CameraId camer
 }
 
 void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
+  if (choice_ && SessionChoice::IsOne(channel)) {
+    if (session_ == 0) choice_->HearBeacon(channel, bytes);
+    return;
+  }
   ++traffic_.received;
   traffic_.received_bytes += static_cast<int64_t>(bytes.size());
   if (std::find(other_channels_.begin(), other_channels_.end(), channel) == other_channels_.end()) return;
@@ -92,6 +100,7 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   std::optional<CameraInfo> info = Read<CameraInfo>(bytes);
   if (!info) return;
   info->camera_id = camera;
+  if (choice_ && session_ == 0) choice_->HearCamera(info->session, info->sequence, info->utime);
   if (IsOfCamera() && camera != options_.camera_id) return OnOtherCamera(*info);
   if (!cameras_.Knows(camera)) {
     if (!MayBeOurs(info->session)) return;
@@ -103,8 +112,17 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
 
 /// What is said of a session that is not known yet, or of a recorded one that is to be taken for ours.
 bool StreamNode::MayBeOurs(uint32_t session) {
-  const bool adopted = session_ == 0 || (options_.accept_recorded && !recorded_session_);
-  return adopted || !IsForeignFrame(session);
+  if (session_ == 0) return MayChooseSession();
+  return (options_.accept_recorded && !recorded_session_) || !IsForeignFrame(session);
+}
+
+/// Who was not told its session takes that of the bus, and does not guess where there are several.
+bool StreamNode::MayChooseSession() {
+  if (!choice_) return true;
+  if (!choice_->MayChoose(context_.now_ns())) return false;
+  const std::string problem = choice_->Problem();
+  if (!problem.empty()) Exit(kExitMisfit, problem);
+  return problem.empty();
 }
 
 void StreamNode::ConfirmCamera(uint32_t session) {
@@ -113,7 +131,10 @@ void StreamNode::ConfirmCamera(uint32_t session) {
 }
 
 void StreamNode::BelieveCamera(CameraInfo info) {
-  if (session_ == 0) session_ = info.session;
+  if (session_ == 0) {
+    session_ = info.session;
+    LogInfo("{}: takes session {}", role_, session_);
+  }
   if (options_.accept_recorded && !recorded_session_ && info.session != session_) {
     recorded_session_ = info.session;
     LogInfo("{}: takes the frames of recorded session {} for its own {}", role_, info.session, session_);
@@ -158,6 +179,7 @@ bool StreamNode::IsForeignFrame(uint32_t session) {
 
 bool StreamNode::IsForeign(uint32_t session) {
   if (session == session_) return false;
+  if (session_ == 0) return true;  // nothing is ours yet, and nothing foreign either
   if (traffic_.dropped_foreign++ == 0)
     LogWarning("{}: dropped a message of session {}; ours is {}", role_, session, session_);
   return true;

@@ -19,6 +19,7 @@
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/node_options.h"
 #include "dmslam/runtime/publish.h"
+#include "dmslam/runtime/session_choice.h"
 #include "dmslam/runtime/writer_candidacy.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
@@ -190,6 +191,7 @@ class StreamNode : public Node {
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes);
   bool MayBeOurs(uint32_t session);
+  bool MayChooseSession();
   void BelieveCamera(CameraInfo info);
   void OnOtherCamera(const CameraInfo& info);
   bool IsOfCamera() const;
@@ -235,6 +237,7 @@ class StreamNode : public Node {
 
   bool begun_ = false;
   std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for the stream must have gone on with it
+  std::optional<SessionChoice> choice_;         ///< of who was not told its session
   KnownCameras cameras_;
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterCandidacy> candidacy_;  ///< until the writer is open

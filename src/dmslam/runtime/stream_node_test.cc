@@ -382,6 +382,9 @@ class Follower : public StreamNode {
   Follower(NodeContext context, NodeOptions options)
       : StreamNode(std::move(context), std::move(options), "mapper") {}
   int taken() const { return taken_; }
+  uint32_t session() const { return session_; }
+  bool HearsAsForeign(uint32_t session) { return IsForeign(session); }
+  int64_t foreign() const { return MakeStatusHead("", {}).health.dropped_foreign; }
 
  private:
   void Begin(const CameraInfo&) override {
@@ -462,6 +465,68 @@ TEST_F(SessionTest, OneOfOtherSettingsInThePlaceOfTheTrueOneEndsNobody) {
   EXPECT_EQ(follower_->exit_code(), std::nullopt) << follower_->problem();
   EXPECT_EQ(follower_->taken(), 1);
   EXPECT_EQ(writer_->AcknowledgedBy("mapper"), 1);
+}
+
+/// Of a process that was not told its session.
+class ChoosingTest : public SessionTest {
+ protected:
+  ChoosingTest() {
+    NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "mapper");
+    context.random_id = 9;
+    chooser_ = std::make_unique<Follower>(context, NodeOptions());
+    for (const uint32_t session : {kSession, kSession + 1}) {
+      StreamWriter::Options options;
+      options.session = session;
+      options.stream = StreamId::kPlayer;
+      options.owner = "PLAYER";
+      options.name = "player on host (pid " + std::to_string(10 * session) + ")";
+      options.schema_hash = SchemaHash();
+      players_.push_back(std::make_unique<StreamWriter>(options, Term{10, session}, Version{}));
+    }
+  }
+  /// So many sessions are played.
+  void Play(uint32_t count, int64_t ms) {
+    for (uint32_t i = 0; i < count; ++i) frontend_.AddWriter(players_[i].get(), "PLAYER", {});
+    for (int64_t i = 0; i < ms; i += 5, now_ns_ += 5 * kMs) {
+      for (uint32_t s = 0; s < count && i % 500 == 0; ++s) SayCamera(kSession + s);
+      frontend_.Advance();
+      DeliverAll(bus_);
+      chooser_->Advance();
+    }
+  }
+  void SayCamera(uint32_t session) {
+    CameraInfo info;
+    info.utime = now_ns_ / 1000;
+    info.session = session;
+    info.camera = TestCamera();
+    Say(channels::kCameraInfo, wire::Encode(info));
+  }
+
+  std::unique_ptr<Follower> chooser_;
+  std::vector<std::unique_ptr<StreamWriter>> players_;
+};
+
+TEST_F(ChoosingTest, TheOnlySessionIsTaken) {
+  Play(1, 3000);
+  EXPECT_EQ(chooser_->exit_code(), std::nullopt) << chooser_->problem();
+  EXPECT_EQ(chooser_->session(), kSession);
+}
+
+TEST_F(ChoosingTest, OfTwoNoneIsGuessed) {
+  Play(2, 3000);
+  EXPECT_EQ(chooser_->exit_code(), kExitMisfit);
+  EXPECT_EQ(chooser_->problem(),
+            "two sessions are on this bus (4: player on host pid 40; 5: player on host pid 50): choose one "
+            "with --session");
+  EXPECT_EQ(chooser_->session(), 0U);
+}
+
+TEST_F(ChoosingTest, BeforeASessionIsChosenNothingIsForeign) {
+  EXPECT_TRUE(chooser_->HearsAsForeign(kSession));
+  EXPECT_EQ(chooser_->foreign(), 0);
+  Play(1, 3000);
+  EXPECT_TRUE(chooser_->HearsAsForeign(kSession + 1));
+  EXPECT_EQ(chooser_->foreign(), 1);
 }
 
 TEST_F(SessionTest, WhoDoesNotFitTheTrueOneEnds) {
