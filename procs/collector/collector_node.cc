@@ -9,6 +9,7 @@
 #include "collector/corrections.h"
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/protocol_messages.h"
 #include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
@@ -25,6 +26,7 @@ constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kSilentFrontendNs = 1'000'000'000;  // it says ten times a second that it is there
 constexpr int64_t kRoomOnDiskNs = 30'000'000'000;     // after the end: no room comes any more
 constexpr int64_t kTryAgainNs = 1'000'000'000;
+constexpr int64_t kSettlingNs = 3'000'000'000;  // of two that began together one leaves within this time
 
 }  // namespace
 
@@ -36,8 +38,10 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
     : StreamNode(std::move(context), std::move(options), roles::kCollector),
       collector_(std::move(collector)),
       sequences_(options_.NumCameras()),
-      frames_(options_.NumCameras()) {
-  Listen({channels::kMapperStatus, channels::kLoopcloserStatus});
+      frames_(options_.NumCameras()),
+      others_(context_.random_id),
+      listens_until_ns_(context_.now_ns() + (context_.fresh_system ? 0 : OtherReaders::kListenNs)) {
+  Listen({channels::kMapperStatus, channels::kLoopcloserStatus, AckChannel(owners::kCollector)});
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
             channels::kPlayerStatus, channels::kFrontendStatus},
@@ -86,6 +90,34 @@ void CollectorNode::OnCamera(const CameraInfo& info) {
   run_.cameras[info.camera_id].sequence = info.sequence;
 }
 
+/// A collector writes no stream, so no election says whether there is another one.
+bool CollectorNode::MayBegin() {
+  YieldToOther();
+  const bool alone = context_.fresh_system || !others_.Find(session_, context_.now_ns());
+  return !exit_code() && alone && context_.now_ns() >= listens_until_ns_;
+}
+
+void CollectorNode::HearReader(std::span<const uint8_t> bytes) {
+  const auto ack = DecodeAck(AckChannel(owners::kCollector), bytes);
+  if (!ack || context_.fresh_system) return;
+  others_.Hear(*ack, context_.now_ns());
+  YieldToOther();
+}
+
+/// Who comes later leaves, before it has written anything. Of two that began together, and could not hear
+/// each other before, it is the one with the larger id.
+void CollectorNode::YieldToOther() {
+  const int64_t now_ns = context_.now_ns();
+  const auto other = others_.Find(session_, now_ns);
+  if (!other || (builder_ && (now_ns - begun_ns_ > kSettlingNs || other->id > context_.random_id))) return;
+  const std::string who = "session " + std::to_string(session_) + ": " + other->name;
+  if (builder_ || !options_.take_over)
+    return Exit(kExitPresent, who +
+                                  " writes results of this session already: stop it, or give another "
+                                  "--session, --prefix or port");
+  if (!std::exchange(waits_for_other_, true)) LogInfo("{} writes its results; waits until it has ended", who);
+}
+
 void CollectorNode::Begin(const CameraInfo& info) {
   builder_ = std::make_unique<TrajectoryBuilder>(info.camera, options_.settings.Read<Pyramid>());
   builder_->KeepFeaturesIn(feature_store_);
@@ -106,7 +138,9 @@ void CollectorNode::Begin(const CameraInfo& info) {
 }
 
 void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
-  if (channel == channels::kFrameTrace) {
+  if (channel == AckChannel(owners::kCollector)) {
+    HearReader(bytes);
+  } else if (channel == channels::kFrameTrace) {
     if (const auto trace = Read<FrameTrace>(bytes);
         trace && !IsForeign(trace->session) && trace->camera_id == 0)
       run_.durations.Add(*trace);
@@ -151,15 +185,14 @@ void CollectorNode::ReadNote(const std::string& text) {
 }
 
 bool CollectorNode::IsOfThisRun(const std::string& process, const StatusHead& head) {
-  return head.session == 0 ||
-         (process.starts_with(roles::kPlayer) ? !IsForeignFrame(head.session) : !IsForeign(head.session));
+  if (head.session == 0 && session_ != 0) return false;  // it has not chosen one yet
+  return process.starts_with(roles::kPlayer) ? !IsForeignFrame(head.session) : !IsForeign(head.session);
 }
 
-/// False for a process of another session.
+/// False for a process of another session, and for a rival of one of ours.
 bool CollectorNode::OnHealth(const std::string& process, const StatusHead& head) {
   if (!IsOfThisRun(process, head)) return false;
-  processes_.Hear(process, head.health, NumKeyframes(), context_.now_ns());
-  return true;
+  return processes_.Hear(process, head.health, NumKeyframes(), context_.now_ns());
 }
 
 size_t CollectorNode::NumKeyframes() const { return builder_ ? builder_->map().keyframes().size() : 0; }
@@ -365,6 +398,7 @@ void CollectorNode::KeepCheckpoint() {
 }
 
 int64_t CollectorNode::WorkDeadline() const {
+  if (!builder_) return context_.now_ns() < listens_until_ns_ ? listens_until_ns_ : INT64_MAX;
   return checkpointer_ && !IsWritten() ? checkpointer_->deadline_ns() : INT64_MAX;
 }
 

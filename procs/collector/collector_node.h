@@ -13,6 +13,7 @@
 #include "collector/process_ledger.h"
 #include "collector/proposed_keyframes.h"
 #include "collector/results.h"
+#include "dmslam/runtime/other_readers.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
@@ -28,6 +29,7 @@ class CollectorNode : public StreamNode {
   void Stop() override;
 
  protected:
+  bool MayBegin() override;
   void Begin(const CameraInfo& info) override;
   void OnCamera(const CameraInfo& info) override;
   bool WorkOnce() override;
@@ -59,6 +61,8 @@ class CollectorNode : public StreamNode {
     int64_t progress_frames = 0;
   };
 
+  void HearReader(std::span<const uint8_t> bytes);
+  void YieldToOther();
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraId camera);
   bool TakeMapRecord();
@@ -119,6 +123,9 @@ class CollectorNode : public StreamNode {
   Ends ends_;
   Results results_ = Results::kNone;
   Due due_;
+  OtherReaders others_;
+  int64_t listens_until_ns_ = 0;  ///< whether another collector is there
+  bool waits_for_other_ = false;
   int64_t begun_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map that continues none is read from its beginning
 };

@@ -43,12 +43,13 @@ class CollectorNodeTest : public testing::Test {
   ~CollectorNodeTest() override { std::filesystem::remove_all(out_dir_); }
 
   /// `fresh`: of a run that begins; else it follows the one before it.
-  void Start(bool fresh = true) {
+  void Start(bool fresh = true, bool take_over = false) {
     NodeContext context = ContextOnBus(&bus_.AddPort(), &now_ns_, "collector");
     context.random_id = static_cast<int64_t>(7 + nodes_.size());
     context.fresh_system = fresh;
     NodeOptions options;
     options.session = kSession;
+    options.take_over = take_over;
     options.settings = settings_;
     CollectorOptions collector;
     collector.out_dir = out_dir_;
@@ -106,7 +107,9 @@ class CollectorNodeTest : public testing::Test {
     for (const int64_t end_ns = now_ns_ + ms * kMs; now_ns_ < end_ns; now_ns_ += 5 * kMs) {
       others_.Advance();
       DeliverAll(bus_);
-      node().Advance();
+      for (const auto& node : nodes_) {
+        if (node == nodes_.back() || (all_live_ && !node->exit_code())) node->Advance();
+      }
       DeliverAll(bus_);
     }
   }
@@ -179,7 +182,8 @@ class CollectorNodeTest : public testing::Test {
   WallScene scene_{4, 3};
   MapEditor map_{TestCamera(), Pyramid()};
   std::unique_ptr<StreamWriter> frontend_, mapper_;
-  std::vector<std::unique_ptr<CollectorNode>> nodes_;  ///< the last one runs; the others are dead
+  std::vector<std::unique_ptr<CollectorNode>> nodes_;  ///< the last one runs; the others are dead ...
+  bool all_live_ = false;                              ///< ... unless this is set
 };
 
 TEST_F(CollectorNodeTest, WritesEachFrameOnceWhenBothStreamsHaveEnded) {
@@ -252,6 +256,67 @@ TEST_F(CollectorNodeTest, ACollectorThatFollowsHasWhatWasHeardBeforeIt) {
   EXPECT_EQ(ReadPositions("trajectory.txt").size(), 3U);
   EXPECT_EQ(Summary()["frames"], 5) << "the player has left";
   EXPECT_EQ(Summary()["frames_missing"], 2);
+}
+
+TEST_F(CollectorNodeTest, ASecondOneIsRefusedByNameAndWritesNothing) {
+  all_live_ = true;
+  Start();
+  SayCamera();
+  BeginStreams();
+  PublishPose(1, 1);
+  const std::filesystem::path first_dir = std::exchange(out_dir_, out_dir_.string() + "_second");
+  Start(false);
+  for (int s = 0; s < 5 && !node().exit_code(); ++s) {
+    SayCamera();
+    Run(600);
+  }
+  EXPECT_EQ(node().exit_code(), kExitPresent);
+  EXPECT_EQ(node().problem(),
+            "session 1: collector writes results of this session already: stop it, or give another "
+            "--session, --prefix or port");
+  EXPECT_FALSE(std::filesystem::exists(out_dir_));
+  EXPECT_EQ(nodes_.front()->exit_code(), std::nullopt) << "nothing happens to the first one";
+
+  std::swap(nodes_.front(), nodes_.back());
+  out_dir_ = first_dir;
+  PublishPose(2, 2);
+  PublishFirstKeyframe();
+  EndAll();
+  EXPECT_EQ(node().exit_code(), kExitDone);
+  EXPECT_EQ(Summary()["restarts"], 0);
+  EXPECT_EQ(ReadPositions("trajectory.txt").size(), 2U);
+}
+
+TEST_F(CollectorNodeTest, WhoIsToTakeOverWaitsUntilTheOtherOneHasEnded) {
+  all_live_ = true;
+  Start();
+  SayCamera();
+  BeginStreams();
+  PublishPose(1, 1);
+  Start(false, true);
+  for (int s = 0; s < 5; ++s) {
+    SayCamera();
+    Run(600);
+  }
+  EXPECT_EQ(node().exit_code(), std::nullopt) << node().problem();
+  nodes_.front()->Stop();
+  Run(2500);
+  PublishPose(2, 2);
+  PublishFirstKeyframe();
+  EndAll();
+  EXPECT_EQ(node().exit_code(), kExitDone) << node().problem();
+  EXPECT_EQ(ReadPositions("trajectory.txt").size(), 2U);
+}
+
+TEST_F(CollectorNodeTest, OfTwoThatBeginTogetherOneGoesOn) {
+  all_live_ = true;
+  Start(false);
+  Start(false);
+  SayCamera();
+  BeginStreams();
+  Run(6000);
+  EXPECT_EQ(nodes_.front()->exit_code(), std::nullopt) << nodes_.front()->problem();
+  EXPECT_EQ(nodes_.back()->exit_code(), kExitPresent);
 }
 
 TEST_F(CollectorNodeTest, AResetThatNoMapperHasCarriedOutCostsNoPose) {

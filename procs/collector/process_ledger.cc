@@ -17,13 +17,15 @@ constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
     &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
     &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
     &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
+constexpr int64_t kSilentNs = 1'500'000'000;  // who lives says so once a second
+constexpr size_t kMostNewcomers = 16;
 constexpr const char* kFrontend = roles::kFrontend;  // of the first camera: its counters are noted
 
 }  // namespace
 
-void ProcessLedger::Hear(const std::string& process, const ProcessHealth& heard, size_t keyframes,
+bool ProcessLedger::Hear(const std::string& process, const ProcessHealth& heard, size_t keyframes,
                          int64_t now_ns) {
-  OnProcess(process, heard, now_ns);
+  if (!OnProcess(process, heard, now_ns)) return false;
   ProcessHealth& health = run_->health[process];
   const ProcessHealth& former = processes_[process].former;
   const double largest = std::max(health.rss_mb, heard.rss_mb);
@@ -31,21 +33,49 @@ void ProcessLedger::Hear(const std::string& process, const ProcessHealth& heard,
   health = heard;
   health.rss_mb = largest;
   for (int64_t ProcessHealth::*counter : kHealthCounters) health.*counter += former.*counter;
+  return true;
 }
 
 void ProcessLedger::HearFrontend(const std::string& process, FrontendStatus status, size_t keyframes,
                                  int64_t now_ns) {
-  Hear(process, status.head.health, keyframes, now_ns);
+  if (!Hear(process, status.head.health, keyframes, now_ns)) return;
   for (int64_t FrontendStatus::*counter : kFrontendCounters)
     status.*counter += processes_[process].former_frontend.*counter;
   run_->cameras[status.camera_id].frontend = std::move(status);
 }
 
-/// A process is heard; where another one of its name was before it, that one's counters are kept.
-void ProcessLedger::OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns) {
+/// Whoever is started again listens before it writes, and so does a rival: which it is shows when the present
+/// one is heard again, or is not.
+bool ProcessLedger::IsHeldBack(const ProcessHealth& heard, int64_t now_ns, Followed* known) {
+  const bool is_present = known->present && known->present->pid == heard.pid;
+  if (is_present) known->newcomers.clear();
+  const bool writes = known->present && known->present->epoch != 0;
+  if (is_present || !writes || heard.epoch != 0 || now_ns - known->present_ns > kSilentNs) {
+    known->present = heard;
+    known->present_ns = now_ns;
+    return false;
+  }
+  std::erase_if(known->newcomers, [&](const ProcessHealth& other) { return other.pid == heard.pid; });
+  if (known->newcomers.size() < kMostNewcomers) known->newcomers.push_back(heard);
+  return true;
+}
+
+bool ProcessLedger::OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns) {
   if (!note_) {
     heard_early_[{process, heard.pid}] = heard;
-  } else if (processes_[process].instances.IsNew(heard, now_ns)) {
+    return true;
+  }
+  Followed& known = processes_[process];
+  if (IsHeldBack(heard, now_ns, &known)) return false;
+  for (const ProcessHealth& newcomer : std::exchange(known.newcomers, {}))
+    Count(process, newcomer, now_ns);  // it has died, too
+  Count(process, heard, now_ns);
+  return true;
+}
+
+/// A process is heard; where another one of its name was before it, that one's counters are kept.
+void ProcessLedger::Count(const std::string& process, const ProcessHealth& heard, int64_t now_ns) {
+  if (processes_[process].instances.IsNew(heard, now_ns)) {
     NoteProcess(process, heard);
   } else if (heard.epoch != 0 && processes_[process].noted_epoch == 0) {
     NoteHeard(process, heard);

@@ -5,8 +5,10 @@
 #include <functional>
 #include <istream>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "collector/results.h"
 #include "dmslam/runtime/instance_watch.h"
@@ -22,8 +24,9 @@ class ProcessLedger {
   /// Keeps `run`'s health, memory, restarts and the frontends' statuses.
   explicit ProcessLedger(RunRecord* run) : run_(run) {}
 
-  /// A status of this session. `keyframes`: that the map has.
-  void Hear(const std::string& process, const ProcessHealth& health, size_t keyframes, int64_t now_ns);
+  /// A status of this session. `keyframes`: that the map has. False: it does not count, for it is of one that
+  /// writes nothing while another one of its name, which does, goes on: a rival that will be refused.
+  bool Hear(const std::string& process, const ProcessHealth& health, size_t keyframes, int64_t now_ns);
   /// The same of a camera's frontend, with what it says of itself.
   void HearFrontend(const std::string& process, FrontendStatus status, size_t keyframes, int64_t now_ns);
 
@@ -39,12 +42,17 @@ class ProcessLedger {
   /// Processes of one name that followed one another.
   struct Followed {
     InstanceWatch instances;
-    int64_t count = 0;        ///< of them all
-    int64_t noted_epoch = 0;  ///< of the present one, as writer
-    ProcessHealth former;     ///< counters of those before the present one, together
+    int64_t count = 0;                     ///< of them all
+    int64_t noted_epoch = 0;               ///< of the present one, as writer
+    std::optional<ProcessHealth> present;  ///< as it was heard last ...
+    int64_t present_ns = 0;                ///< ... and when
+    std::vector<ProcessHealth> newcomers;  ///< heard since: they follow it, if it is heard no more
+    ProcessHealth former;                  ///< counters of those before the present one, together
     FrontendStatus former_frontend;
   };
-  void OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns);
+  bool OnProcess(const std::string& process, const ProcessHealth& heard, int64_t now_ns);
+  void Count(const std::string& process, const ProcessHealth& heard, int64_t now_ns);
+  static bool IsHeldBack(const ProcessHealth& heard, int64_t now_ns, Followed* known);
   void NoteProcess(const std::string& process, const ProcessHealth& heard);
   void NoteHeard(const std::string& process, const ProcessHealth& heard);
   void ReadProcess(const std::string& process, int32_t pid, std::istream& text, int64_t now_ns);

@@ -49,6 +49,34 @@ class ProcessLedgerTest : public testing::Test {
   std::vector<std::string> notes_;
 };
 
+TEST_F(ProcessLedgerTest, ARivalThatIsRefusedDoesNotCount) {
+  const auto writing = [](double uptime_s) {
+    FrontendStatus status = Frontend(1, uptime_s, 100);
+    status.head.health.epoch = 9;
+    return status;
+  };
+  ledger_.HearFrontend("frontend", writing(10), 0, 10 * kSecond);
+  for (int64_t s = 11; s < 14; ++s) {
+    ledger_.HearFrontend("frontend", Frontend(2, 0.5, 0), 0, s * kSecond - kSecond / 2);
+    ledger_.HearFrontend("frontend", writing(static_cast<double>(s)), 0, s * kSecond);
+  }
+  EXPECT_EQ(run_.restarts, 0);
+  EXPECT_EQ(run_.cameras[0].frontend.frames_processed, 100);
+  EXPECT_EQ(run_.cameras[0].frontend.head.health.pid, 1);
+}
+
+TEST_F(ProcessLedgerTest, WhoFollowsOneThatIsSilentCountsBeforeItWrites) {
+  ProcessHealth writing = Health(1, 10, 3);
+  writing.epoch = 9;
+  EXPECT_TRUE(ledger_.Hear("mapper", writing, 0, 10 * kSecond));
+  EXPECT_FALSE(ledger_.Hear("mapper", Health(2, 0), 0, 10 * kSecond + kSecond / 2));
+  EXPECT_EQ(run_.restarts, 0) << "it may be a rival";
+  EXPECT_FALSE(ledger_.Hear("mapper", Health(3, 0), 0, 11 * kSecond));
+  EXPECT_TRUE(ledger_.Hear("mapper", Health(3, 1, 1), 0, 12 * kSecond));
+  EXPECT_EQ(run_.restarts, 2) << "the second one died before the third";
+  EXPECT_EQ(run_.health["mapper"].records_lost, 4);
+}
+
 TEST_F(ProcessLedgerTest, CountersOfTheOneBeforeAreAdded) {
   ledger_.Hear("mapper", Health(1, 10, 3, 50), 0, 10 * kSecond);
   ledger_.Hear("mapper", Health(2, 0.5, 1, 20), 0, 11 * kSecond);

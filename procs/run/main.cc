@@ -18,6 +18,7 @@
 #include "run/map_check.h"
 #include "run/resume.h"
 #include "run/run_plan.h"
+#include "run/session_taken.h"
 
 namespace {
 
@@ -249,12 +250,23 @@ void KeepFormerRun(dmslam::RunArguments* arguments) {
   if (!map.empty() && !fs::exists(map)) map = *kept + "/" + fs::path(map).filename().string();
 }
 
+/// On a port that others share, said where somebody writes the run's session there.
+bool IsTaken(const dmslam::RunArguments::Bus& bus, int port, uint32_t session) {
+  if (!bus.share_port) return false;
+  const std::optional<std::string> who = dmslam::WhoWritesSession(bus, port, session);
+  if (!who) return false;
+  Say("session " + std::to_string(session) + ": " + *who +
+      " writes this session already: stop it, or give another --prefix or --port");
+  return true;
+}
+
 int Start(dmslam::RunArguments arguments, dmslam::RunIdentity identity,
           const std::optional<dmslam::ResumePoint>& resume) {
   dmslam::Supervisor::Options options;
   options.watchdog_ns = dmslam::ToNs(arguments.care.watchdog_s);
   options.wait_for_what_may_come = arguments.care.wait;
   dmslam::RunPlace place = PlaceOf(arguments);
+  if (IsTaken(arguments.bus, place.port, identity.session)) return dmslam::kExitPresent;
   if (!resume) KeepFormerRun(&arguments);
   place.session = identity.session;
   place.resume = resume;

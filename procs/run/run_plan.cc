@@ -46,9 +46,7 @@ void NeedTool(const std::string& program) {
   if (!InPath(program)) throw InputError(program + " is missing; install liblcm-bin (scripts/setup.sh core)");
 }
 
-std::string Url(const RunArguments::Bus& bus, const RunPlace& place) {
-  return "udpm://239.255.76.67:" + std::to_string(place.port) + "?ttl=0&recv_buf_size=" + bus.receive_buffer;
-}
+std::string Url(const RunArguments::Bus& bus, const RunPlace& place) { return BusUrl(bus, place.port); }
 
 /// What all processes are told.
 Words CommonArguments(const RunArguments& a, const RunPlace& place) {
@@ -290,6 +288,10 @@ std::optional<std::string> ErrorIn(const std::string& line) {
 uint32_t ChooseSession(const RunArguments::MapFiles& map) {
   if (map.begin.empty()) return 1 + RandomBelow(1u << 30);
   return LogIndex(map.begin).Session().id + 1;
+}
+
+std::string BusUrl(const RunArguments::Bus& bus, int port) {
+  return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0&recv_buf_size=" + bus.receive_buffer;
 }
 
 int FreePort() {

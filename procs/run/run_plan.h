@@ -36,6 +36,9 @@ RunPlan MakeRunPlan(const RunArguments& arguments, const RunPlace& place);
 /// Ids of a run come after those of the map that it begins in. Throws InputError.
 uint32_t ChooseSession(const RunArguments::MapFiles& map);
 
+/// The LCM URL of all processes of a run.
+std::string BusUrl(const RunArguments::Bus& bus, int port);
+
 /// A port between 20000 and 49999 that nobody on this host is bound to.
 int FreePort();
 

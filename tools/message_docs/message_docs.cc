@@ -81,7 +81,7 @@ std::vector<ChannelRow> ProtocolRows() {
       {HeadChannel(owner), "head_t", "each writer of a stream", "its readers", "10 Hz"},
       {PartChannel(owner), "part_t", "each writer of a stream", "its readers",
        "repairs; every record on a LAN"},
-      {AckChannel(reader), "ack_t", "each reader of a stream", "its writers", "1 Hz to 33 Hz"},
+      {AckChannel(reader), "ack_t", "each reader of a stream", "its writers; another collector", "1 Hz to 33 Hz"},
       {TakeOverChannel(owner), "take_over_t", "a successor", "the present writer", "at a take-over"},
       {HandOverChannel(owner), "hand_over_t", "a starting writer", "holders of replicas", "at a start"},
       {ReplicaChannel("<HOLDER>"), "replica_t", "holders of replicas", "a starting writer", "at a start"},

@@ -459,7 +459,7 @@ void StreamNode::Advance() {
   endpoint_.Advance();
   NoteQueue();
   if (ending_) return;
-  if (camera_info_ && !begun_) {
+  if (camera_info_ && !begun_ && MayBegin()) {
     begun_ = true;
     Begin(*camera_info_);
   }

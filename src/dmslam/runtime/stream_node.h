@@ -53,6 +53,8 @@ class StreamNode : public Node {
   /// `role` in lower case: "frontend". It names channels in upper case.
   StreamNode(NodeContext context, NodeOptions options, std::string role);
 
+  /// The camera is known: whether this process may begin. Asked again and again.
+  virtual bool MayBegin() { return true; }
   /// The camera is known: makes readers, and asks for a writer with WantWriter.
   virtual void Begin(const CameraInfo& info) = 0;
   /// The election is won: whether the writer may be opened now. A mapper first fetches the newest replica, a
