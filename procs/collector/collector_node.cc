@@ -477,6 +477,20 @@ bool CollectorNode::FrontendsHaveEnded() {
   return true;
 }
 
+/// Frontends that are not there, where the sequence of one has ended, or all of another one is here.
+std::string CollectorNode::WaitsFor() const {
+  if (!builder_ || ends_.of_frontends) return "";
+  std::string missing;
+  bool any_ended = sequences_.AnyEnded();
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+    const StreamReader& reader = *frontend_readers_[camera];
+    any_ended = any_ended || reader.AtEnd();
+    if (!reader.AtEnd() && SilentNs(reader) > kGoneNs)
+      missing += (missing.empty() ? "" : ", ") + OfCamera(roles::kFrontend, camera);
+  }
+  return any_ended ? missing : "";
+}
+
 bool CollectorNode::EndIfDone() {
   if (AllTaken()) NotePositions();
   if (GiveUpOnDisk()) return false;

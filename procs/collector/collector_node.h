@@ -36,6 +36,7 @@ class CollectorNode : public StreamNode {
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   int64_t WorkDeadline() const override;
   void PublishStatus() override;
+  std::string WaitsFor() const override;
 
  private:
   /// The map with which the run has ended.
@@ -95,6 +96,7 @@ class CollectorNode : public StreamNode {
   void OpenJournal();
   std::string OfTotal() const;
   void SayProgress();
+  static constexpr int64_t kGoneNs = 2'000'000'000;  ///< whoever was not heard for so long is not there
   int64_t SilentNs(const StreamReader& reader) const;
   bool FrontendsHaveEnded();
   bool EndIfDone();

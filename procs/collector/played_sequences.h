@@ -33,6 +33,7 @@ class PlayedSequences {
   void Announce(CameraId camera, std::optional<int64_t> num_frames, uint32_t first_frame);
   void OnEnd(const EndOfSequence& end);
 
+  bool AnyEnded() const { return !ended_.empty(); }
   bool AllEnded() const { return ended_.size() >= num_cameras_; }
   /// Frames of all cameras that announced them; none: no camera has.
   std::optional<int64_t> NumFrames() const;

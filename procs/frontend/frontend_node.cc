@@ -420,6 +420,15 @@ void FrontendNode::PublishStatus() {
   PublishLoose(status);
 }
 
+std::string FrontendNode::WaitsFor() const {
+  if (!work_ || stopping_ || end_.Is(SequenceEnd::Phase::kDone)) return "";
+  if (writer_ && AwaitsFirstReaders()) return AwaitedReaders();
+  const bool lacks_mapper =
+      options_.HasPeer(roles::kMapper) && !map_reader_->writer_present(context_.now_ns());
+  const bool needs_it = !writer_ || !end_.Is(SequenceEnd::Phase::kPlaying);
+  return lacks_mapper && needs_it ? roles::kMapper : "";
+}
+
 /// Waits for the mapper before it can go on.
 bool FrontendNode::IsHeldUp() const {
   return work_ != nullptr && work_->Idle() &&

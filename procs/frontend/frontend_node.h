@@ -46,6 +46,7 @@ class FrontendNode : public StreamNode {
   int64_t WorkDeadline() const override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
+  std::string WaitsFor() const override;
 
  private:
   SessionStart MakeSessionStart() const;

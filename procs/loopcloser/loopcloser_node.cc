@@ -152,6 +152,11 @@ std::pair<LoopcloserStatus::State, std::string> LoopcloserNode::StateAndReason()
   return {State::kWatching, ""};
 }
 
+std::string LoopcloserNode::WaitsFor() const {
+  const bool waits = core_ && !ended_ && writer_ && !map_reader_->writer_present(context_.now_ns());
+  return waits ? roles::kMapper : "";
+}
+
 void LoopcloserNode::PublishStatus() {
   if (core_ && work_->Idle()) core_status_ = CoreStatus();
   LoopcloserStatus status = core_status_;

@@ -28,6 +28,7 @@ class LoopcloserNode : public StreamNode {
   bool WorkOnce() override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
   void PublishStatus() override;
+  std::string WaitsFor() const override;
   std::string WhyMisfits(const SessionStart& start) const override;
 
  private:

@@ -24,6 +24,9 @@ class CameraRequests {
   /// No frame of a camera follows: it asks for its maps to be adjusted.
   void OnAdjust(CameraId camera, uint32_t request) { cameras_[camera].adjust = request; }
 
+  /// Whether a camera's frontend waits for an answer, which the other cameras hold back.
+  bool Waits(CameraId camera) const { return cameras_[camera].turn || cameras_[camera].adjust; }
+
   /// Whether a camera's stream has ended.
   using HasEnded = std::function<bool(CameraId)>;
   struct Turn {

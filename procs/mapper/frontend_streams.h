@@ -40,6 +40,10 @@ class FrontendStreams {
   bool AllHaveEnded() const;
   /// No frontend was heard lately.
   bool AllAreGone(int64_t now_ns) const;
+  /// The frontend of a camera was heard lately.
+  bool IsThere(CameraId camera, int64_t now_ns) const {
+    return streams_[camera].reader->writer_present(now_ns);
+  }
   /// Records that are not taken yet, of the camera that has most of them.
   size_t LargestBacklog() const;
   std::vector<const StreamReader*> readers() const;

@@ -47,6 +47,8 @@ class LeftMap {
   Replica TakeReplica() { return std::move(*replica_); }
   Version version() const { return fetch_->version(); }
   std::string giver() const { return fetch_->giver(); }
+  /// Who may hold one, and has not said yet whether it does; with commas.
+  std::string Unanswered() const { return fetch_->Unanswered(); }
 
  private:
   static constexpr int kMostRefused = 5;

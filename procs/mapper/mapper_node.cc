@@ -534,6 +534,21 @@ std::pair<MapperStatus::State, std::string> MapperNode::StateAndReason() const {
   return {State::kMapping, ""};
 }
 
+/// The frontends that are not there, where others cannot go on, or the map cannot be complete, without them.
+std::string MapperNode::WaitsFor() const {
+  if (!core_ || end_.HasBegun() || stopping_) return "";
+  if (!writer_) return left_ ? left_->Unanswered() : "";
+  std::string missing;
+  bool any_waits = false;
+  for (CameraId camera = 0; camera < frontends_.size(); ++camera) {
+    const bool ended = frontends_.HasEnded(camera);
+    any_waits = any_waits || ended || requests_.Waits(camera);
+    if (!ended && !frontends_.IsThere(camera, context_.now_ns()))
+      missing += (missing.empty() ? "" : ", ") + OfCamera(roles::kFrontend, camera);
+  }
+  return any_waits ? missing : "";
+}
+
 void MapperNode::PublishStatus() {
   if (core_ && work_->Idle()) status_ = StatusOf(*core_, tally_);
   MapperStatus status = status_;

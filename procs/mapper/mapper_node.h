@@ -48,6 +48,7 @@ class MapperNode : public StreamNode {
   bool WorkOnce() override;
   int64_t WorkDeadline() const override;
   void PublishStatus() override;
+  std::string WaitsFor() const override;
   std::string WhyMisfits(const SessionStart& start) const override;
 
  private:

@@ -45,6 +45,16 @@ void ReplicaSearch::Advance(int64_t now_ns) {
   if (state_ == State::kFound) Ask(replica_.holder, now_ns);
 }
 
+std::string ReplicaSearch::Unanswered() const {
+  std::string waited;
+  for (const std::string& role : options_.roles) {
+    const bool answered = std::any_of(answers_.begin(), answers_.end(),
+                                      [&](const auto& entry) { return entry.second.role == role; });
+    if (!answered && state_ == State::kAsking) waited += (waited.empty() ? "" : ", ") + role;
+  }
+  return waited;
+}
+
 void ReplicaSearch::Choose() {
   state_ = State::kNone;
   replica_ = {};

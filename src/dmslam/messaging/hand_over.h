@@ -48,6 +48,8 @@ class ReplicaSearch : public StateMachine {
   /// The chosen one, once found.
   const Replica& replica() const { return replica_; }
   int64_t asker() const { return options_.asker; }
+  /// Roles that have not answered, and are waited for; with commas.
+  std::string Unanswered() const;
   /// Gives up the chosen one (it fell silent in the middle) and asks all again, under another id.
   void TryAgain(int64_t now_ns);
   /// The replica has arrived: no more questions.

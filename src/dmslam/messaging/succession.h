@@ -60,6 +60,8 @@ class ReplicaFetch : public StateMachine {
   const std::vector<Holder>& holders() const { return options_.holders; }
   /// Who hands it over; empty: nobody was found yet.
   std::string giver() const { return search_.replica().role; }
+  /// Who has not said yet whether it has one; with commas.
+  std::string Unanswered() const { return search_.Unanswered(); }
   /// What is handed over grows again and again, so that it never comes to its end: somebody writes the stream
   /// whom the holder hears, and this process does not.
   bool KeepsGrowing(int64_t now_ns) const {

@@ -482,6 +482,7 @@ void StreamNode::PublishStatusIfDue() {
   next_status_ns_ = context_.now_ns() + kStatusEveryNs;
   KeepCameraKnown();
   PublishStatus();
+  if (const auto notice = wait_notice_.Due(WaitsFor(), context_.now_ns())) LogInfo("{}: {}", role_, *notice);
   const std::string no_room = feature_store_->TakeProblem();
   if (!no_room.empty())
     LogWarning("{}: features of the map stay in memory, as no file can take them: {}", role_, no_room);

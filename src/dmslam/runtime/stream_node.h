@@ -20,6 +20,7 @@
 #include "dmslam/runtime/node_options.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/runtime/session_choice.h"
+#include "dmslam/runtime/wait_notice.h"
 #include "dmslam/runtime/writer_candidacy.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/record_groups.h"
@@ -72,6 +73,9 @@ class StreamNode : public Node {
   /// A camera is known: of a frontend its own, of the others every one.
   virtual void OnCamera(const CameraInfo&) {}
   virtual void PublishStatus() {}
+  /// Processes without which this one cannot go on now, with commas; empty: none. Told to people when it
+  /// lasts.
+  virtual std::string WaitsFor() const { return {}; }
   /// When WorkOnce has something to do without a message.
   virtual int64_t WorkDeadline() const { return INT64_MAX; }
 
@@ -250,6 +254,7 @@ class StreamNode : public Node {
   int64_t started_ns_ = 0;
   Traffic traffic_;
   MapRecords map_records_;
+  WaitNotice wait_notice_;
   std::vector<Watched> readers_;
   std::vector<const CoreThread*> core_threads_;  ///< that are watched; owned by the node that asked for them
   ServedReplica replica_;
