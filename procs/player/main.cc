@@ -121,6 +121,15 @@ std::unique_ptr<dmslam::Node> EnterRecords(const Arguments& a, dmslam::NodeConte
   return std::make_unique<dmslam::RecordsNode>(std::move(context), node, log, a.log_session);
 }
 
+/// Who listens and asks before it begins, among those who take part.
+std::vector<std::string> ToBeReady(const dmslam::NodeOptions& node) {
+  std::vector<std::string> awaited;
+  for (const char* role : {dmslam::roles::kMapper, dmslam::roles::kFrontend}) {
+    if (node.HasPeer(role)) awaited.emplace_back(role);
+  }
+  return awaited;
+}
+
 void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddOption("--sequence,--video", a.options.sequence,
                 "TUM RGB-D folder, EuRoC folder, numbered images, a video, or a camera: /dev/videoN or the "
@@ -186,6 +195,7 @@ int main(int argc, char** argv) {
           return WatchCamera(arguments, std::move(context), node);
         dmslam::PlayerOptions options;
         auto source = Open(arguments, node, &options);
+        if (!context.fresh_system) options.awaited = ToBeReady(node);
         return std::make_unique<dmslam::PlayerNode>(std::move(context), options, std::move(source));
       });
 }

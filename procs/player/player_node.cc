@@ -78,7 +78,8 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
       options_(std::move(options)),
       source_(std::move(source)),
       endpoint_(context_.bus, context_.now_ns),
-      office_(context_, {options_.session, options_.camera_id}, options_.take_over, &endpoint_) {
+      office_(context_, {options_.session, options_.camera_id}, options_.take_over, &endpoint_),
+      readiness_(options_.mode == PlaybackMode::kRealtime ? options_.awaited : std::vector<std::string>()) {
   order_ = OrderOfPlay(options_, source_->size(), &counts_.jumped);
   if (order_.empty()) {
     throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
@@ -102,6 +103,7 @@ bool PlayerNode::MayPlay() {
   }
   if (office_.held() && !playing_) {
     playing_ = true;
+    playing_since_ns_ = context_.now_ns();
     if (position_ > 0) LogInfo("player: others have {} frames already; goes on behind them", position_);
     start_ns_ += context_.now_ns() + ToNs(options_.lead_s);
   }
@@ -110,6 +112,7 @@ bool PlayerNode::MayPlay() {
 
 void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> bytes) {
   end_.OnStatus(channel, bytes, options_.session, context_.now_ns());
+  readiness_.OnStatus(channel, bytes, options_.session);
   if (channel == channels::kFrameDone) {
     if (const auto done = wire::Decode<FrameDone>(bytes)) OnFrameDone(*done);
   } else if (channel == channels::kSequenceDone) {
@@ -172,6 +175,23 @@ int64_t PlayerNode::DueNs(size_t position) const {
 
 bool PlayerNode::FrameIsDue() const {
   return position_ < order_.size() && !awaiting_done_ && context_.now_ns() >= DueNs(position_);
+}
+
+/// Frames that nobody can track yet are not played: the first one waits, and is due when it need not any
+/// more.
+bool PlayerNode::OthersAreReady(int64_t now_ns) {
+  const bool was_held = held_back_;
+  const std::string missing = readiness_.Missing(options_.camera_id);
+  if (const auto notice = wait_notice_.Due(missing, now_ns)) LogInfo("player: {}", *notice);
+  if (!missing.empty() && now_ns - playing_since_ns_ >= Readiness::kAtMostNs) {
+    LogWarning("player: plays without {}, not ready after {} s: the first frames may be skipped", missing,
+               Readiness::kAtMostNs / 1'000'000'000);
+    readiness_.GiveUp();
+  }
+  held_back_ = !readiness_.AllReady();
+  if (was_held && !held_back_ && position_ < order_.size())
+    start_ns_ += std::max<int64_t>(0, now_ns - DueNs(position_));
+  return !held_back_;
 }
 
 bool PlayerNode::IsBlack(size_t index) const {
@@ -261,8 +281,8 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
   status.head.health = office_.Health();
-  if (awaiting_done_) status.head.health.waiting_for = roles::kFrontend;
-  status.state = awaiting_done_ ? PlayerStatus::State::kWaiting : state;
+  status.head.health.waiting_for = awaiting_done_ ? roles::kFrontend : readiness_.Missing(options_.camera_id);
+  status.state = awaiting_done_ || held_back_ ? PlayerStatus::State::kWaiting : state;
   status.frames_published = counts_.published;
   status.frames_total = static_cast<int64_t>(order_.size());
   status.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
@@ -283,7 +303,7 @@ void PlayerNode::Advance() {
     next_status_ns_ = now + kStatusEveryNs;
     PublishStatus(position_ < order_.size() ? PlayerStatus::State::kPlaying : PlayerStatus::State::kDone);
   }
-  if (FrameIsDue()) PublishFrame();
+  if (OthersAreReady(now) && FrameIsDue()) PublishFrame();
   if (awaiting_done_ && now >= next_repeat_ns_) {
     next_repeat_ns_ = now + kRepeatEveryNs;
     ++counts_.repeats;
@@ -300,6 +320,7 @@ int64_t PlayerNode::deadline_ns() const {
   if (!playing_ || !office_.held()) return std::min(endpoint_.deadline_ns(), office_.deadline_ns());
   int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
   if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
+  if (held_back_) return deadline;  // statuses come, and infos go, twice a second
   if (position_ < order_.size()) return std::min(deadline, DueNs(position_));
   return std::min(deadline, end_.due_ns());
 }

@@ -11,10 +11,12 @@
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/messaging/bus.h"
 #include "dmslam/runtime/node.h"
+#include "dmslam/runtime/wait_notice.h"
 #include "dmslam/wire/codec.h"
 #include "player/end_of_play.h"
 #include "player/frame_encoding.h"
 #include "player/player_office.h"
+#include "player/readiness.h"
 
 namespace dmslam {
 
@@ -34,6 +36,9 @@ struct PlayerOptions {
   std::optional<uint32_t> behind;
   EncodingOptions encoding;
   bool local_frames = false;  ///< frames stay on this host: the frontend runs here, and the bus leaves it
+  /// Who is to be ready before the first frame: of frontend and mapper. Only in real time: in lock-step a
+  /// frame is repeated until it is done.
+  std::vector<std::string> awaited;
   double lead_s = 0.5;  ///< between the first camera info and the first frame, so that others can get ready
   struct BlackOut {
     size_t from = 0;
@@ -79,6 +84,7 @@ class PlayerNode : public Node {
   void SkipBehind(uint32_t frame_index);
   void PublishCameraInfo();
   bool FrameIsDue() const;
+  bool OthersAreReady(int64_t now_ns);
   void PublishFrame();
   bool MakeFrame(size_t index);
   void PublishGroundTruth(size_t index);
@@ -99,9 +105,13 @@ class PlayerNode : public Node {
   Frame frame_;          ///< the newest one published
   SharedBytes frame_bytes_;
   bool awaiting_done_ = false;  ///< lock-step
+  Readiness readiness_;
+  WaitNotice wait_notice_{1'000'000'000};
   FurtherFrontend further_;
   EndOfPlay end_;
-  bool playing_ = false;  ///< the office is held: nobody else plays this session
+  bool held_back_ = false;  ///< others are not ready yet
+  bool playing_ = false;    ///< the office is held: nobody else plays this session
+  int64_t playing_since_ns_ = 0;
   int64_t start_ns_ = 0;  ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
   int64_t infos_said_ = 0;

@@ -27,7 +27,8 @@ class TenFrames : public FrameSource {
 /// A player in lock-step, on a bus where somebody listens and answers; time stands still unless it is moved.
 class PlayerNodeTest : public testing::Test {
  protected:
-  PlayerNodeTest() : player_port_(bus_.AddPort()), ear_(bus_.AddPort()) {
+  explicit PlayerNodeTest(PlaybackMode mode = PlaybackMode::kLockstep, std::vector<std::string> awaited = {})
+      : player_port_(bus_.AddPort()), ear_(bus_.AddPort()) {
     for (const char* channel : {channels::kFrame, channels::kEndOfSequence}) ear_.Subscribe(channel);
     ear_.SetHandler([this](const std::string& channel, std::span<const uint8_t> bytes) {
       if (channel == channels::kFrame) frames_.push_back(wire::Decode<Frame>(bytes)->frame_index);
@@ -38,7 +39,8 @@ class PlayerNodeTest : public testing::Test {
     options.sequence = "ten";
     options.session = kSession;
     options.camera = {.width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 32, .cy_px = 24};
-    options.mode = PlaybackMode::kLockstep;
+    options.mode = mode;
+    options.awaited = std::move(awaited);
     options.encoding.encoding = FrameEncoding::kGray8;
     player_ = std::make_unique<PlayerNode>(std::move(context), options, std::make_unique<TenFrames>());
   }
@@ -82,6 +84,49 @@ TEST_F(PlayerNodeTest, PlaysFrameByFrameAndTellsTheEnd) {
   SayAllDone();
   Advance(6000);  // no mapper says anything
   EXPECT_EQ(player_->exit_code(), 0);
+}
+
+/// In real time, where frontend and mapper may need longer than the player to begin.
+class RealtimePlayerTest : public PlayerNodeTest {
+ protected:
+  RealtimePlayerTest() : PlayerNodeTest(PlaybackMode::kRealtime, {"mapper", "frontend"}) {}
+  template <typename Status>
+  void SayStatus(int64_t epoch) {
+    Status status;
+    status.head.session = kSession;
+    status.head.health.epoch = epoch;
+    Say(status);
+  }
+};
+
+TEST_F(RealtimePlayerTest, TheFirstFrameWaitsUntilFrontendAndMapperWrite) {
+  Advance(4000);
+  SayStatus<MapperStatus>(0);
+  SayStatus<FrontendStatus>(5);
+  Advance(2000);
+  EXPECT_TRUE(frames_.empty()) << "the mapper asks who holds a map";
+  SayStatus<MapperStatus>(5);
+  Advance(20);
+  EXPECT_EQ(frames_.size(), 1U);
+  Advance(100);
+  EXPECT_EQ(frames_.size(), 4U) << "at its rate from then on";
+  Advance(1000);
+  EXPECT_EQ(frames_.size(), 10U);
+}
+
+TEST_F(RealtimePlayerTest, WhoIsReadyBeforeHoldsNothingBack) {
+  SayStatus<MapperStatus>(5);
+  SayStatus<FrontendStatus>(5);
+  Advance(2550);
+  EXPECT_FALSE(frames_.empty());
+}
+
+TEST_F(RealtimePlayerTest, WhoDoesNotComeIsNotWaitedForWithoutEnd) {
+  SayStatus<FrontendStatus>(5);
+  Advance(11'500);
+  EXPECT_TRUE(frames_.empty());
+  Advance(1000);
+  EXPECT_FALSE(frames_.empty());
 }
 
 TEST_F(PlayerNodeTest, OneForgedAnswerWhileItBeginsChangesNothing) {
