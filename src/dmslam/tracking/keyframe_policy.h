@@ -13,7 +13,7 @@ struct KeyframeInputs {
   int num_static = 0;               ///< landmarks of the map that the frame sees in their place
   int expected = 0;                 ///< landmarks of its reference keyframe that enough other keyframes see
   std::optional<int64_t> since_ns;  ///< between it and the keyframe before; none: there was none
-  std::optional<int64_t> step_ns;   ///< between two frames; none: not known
+  std::optional<int64_t> step_ns = std::nullopt;  ///< between two frames; none: not known
 };
 
 /// Whether the frame sees so much less of the map than its reference keyframe did that the map should grow
