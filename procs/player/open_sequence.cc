@@ -4,14 +4,12 @@
 
 #include "dmslam/dataset/seen_as.h"
 #include "dmslam/runtime/process_main.h"
-#include "dmslam/util/check.h"
 
 namespace dmslam {
 
 Camera ChooseCamera(const std::string& camera_file, const std::string& sequence) {
   if (!camera_file.empty()) return LoadCamera(camera_file);
-  if (const auto found = FindCamera(sequence, FindDataFolder("config"))) return *found;
-  throw InputError(sequence + ": which camera took this is not known; name its file with --camera");
+  return KnownCamera(sequence, FindDataFolder("config"));
 }
 
 std::unique_ptr<FrameSource> OpenSequence(const std::string& camera_file, double fps,

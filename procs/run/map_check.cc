@@ -4,12 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "dmslam/dataset/frame_source.h"
 #include "dmslam/place_recognition/vocabulary.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/runtime/load_vocabulary.h"
+#include "dmslam/runtime/process_main.h"
 #include "dmslam/settings/settings.h"
-#include "player/open_sequence.h"
 
 namespace dmslam {
 namespace {
@@ -17,7 +18,8 @@ namespace {
 /// That of the first camera, which all others are told as.
 Camera CameraThatPlays(const RunArguments& a) {
   const std::string& log = a.source.log.empty() ? a.source.replay : a.source.log;
-  if (!a.camera.file.empty() || log.empty()) return ChooseCamera(a.camera.file, a.source.sequence);
+  if (!a.camera.file.empty()) return LoadCamera(a.camera.file);
+  if (log.empty()) return KnownCamera(a.source.sequence, FindDataFolder("config"));
   const auto index = std::make_shared<const LogIndex>(log, BusKey::LoadIfWanted(a.bus.key));
   return RecordedFrames(index, 0).camera_info().camera;
 }

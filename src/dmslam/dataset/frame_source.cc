@@ -77,4 +77,9 @@ std::optional<Camera> FindCamera(const std::string& sequence_dir, const std::str
   return std::nullopt;
 }
 
+Camera KnownCamera(const std::string& sequence_dir, const std::string& config_dir) {
+  if (const auto found = FindCamera(sequence_dir, config_dir)) return *found;
+  throw InputError(sequence_dir + ": which camera took this is not known; name its file with --camera");
+}
+
 }  // namespace dmslam

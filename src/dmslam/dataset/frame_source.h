@@ -54,5 +54,7 @@ std::optional<std::string> TumCameraName(const std::string& sequence_dir);
 /// sensor.yaml of a EuRoC camera, or `config_dir`/TUM{1,2,3}.yaml by the folder's name. None where nothing is
 /// known. Throws InputError for a camera file that is there and wrong.
 std::optional<Camera> FindCamera(const std::string& sequence_dir, const std::string& config_dir);
+/// The same; where nothing is known it throws InputError, too.
+Camera KnownCamera(const std::string& sequence_dir, const std::string& config_dir);
 
 }  // namespace dmslam

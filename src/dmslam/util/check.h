@@ -12,8 +12,8 @@ class InputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Input that is right by itself, and does not fit what it is used with: another vocabulary, for one. Programs
-/// end with another code (kExitMisfit).
+/// Input that is right by itself, and does not fit what it is used with: another vocabulary, for one.
+/// Programs end with a code of its own (kExitMisfit).
 class MisfitError : public InputError {
  public:
   using InputError::InputError;

@@ -1,0 +1,103 @@
+#include "run/map_check.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+#include "dmslam/recording/map_file.h"
+#include "dmslam/util/check.h"
+
+namespace dmslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A saved map of one keyframe, and a run that begins in it.
+class MapCheckTest : public testing::Test {
+ protected:
+  MapCheckTest() {
+    fs::create_directories(folder_ + "/sequence");
+    made_.session = 1;
+    made_.camera = TestCamera();
+    WriteCamera(TestCamera());
+    arguments_.source.sequence = folder_ + "/sequence";
+    arguments_.map.begin = folder_ + "/a.map";
+    Save();
+  }
+  ~MapCheckTest() override { fs::remove_all(folder_); }
+
+  void WriteCamera(const Camera& camera) {
+    arguments_.camera.file = folder_ + "/camera.yaml";
+    std::ofstream(arguments_.camera.file) << CameraText(camera);
+  }
+  void Save() const {
+    MapEditor map(TestCamera(), Pyramid());
+    Keyframe keyframe;
+    keyframe.id = KeyframeId::Make(1, 1);
+    keyframe.map_id = 1;
+    keyframe.features = MakeFrameFeatures(FeatureSet(), map.camera(), map.pyramid());
+    map.AddKeyframe(std::move(keyframe));
+    SaveMap(arguments_.map.begin, map, made_);
+  }
+  /// Why the run is not begun; empty: it is.
+  std::string Refusal() const {
+    try {
+      CheckMap(arguments_);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  const std::string folder_ = testing::TempDir() + "/map_check_" + std::to_string(getpid());
+  SessionStart made_;
+  RunArguments arguments_;
+};
+
+TEST_F(MapCheckTest, AMapThatFitsIsBegunIn) {
+  EXPECT_EQ(Refusal(), "");
+  arguments_.map.begin = "";
+  arguments_.camera.file = "/nowhere.yaml";
+  EXPECT_EQ(Refusal(), "") << "there is no map to judge";
+}
+
+TEST_F(MapCheckTest, ACameraThatDoesNotFitIsNamedWhereverItIsFound) {
+  Camera other = TestCamera();
+  other.fx_px = 510;
+  WriteCamera(other);
+  const std::string why =
+      arguments_.map.begin +
+      ": was made with fx 500, the camera that plays has fx 510: give the camera file of that map";
+  EXPECT_EQ(Refusal(), why);
+  fs::rename(arguments_.camera.file, arguments_.source.sequence + "/camera.yaml");
+  arguments_.camera.file = "";
+  EXPECT_EQ(Refusal(), why) << "the sequence brings it along";
+}
+
+TEST_F(MapCheckTest, SettingsThatDoNotFitAreNamed) {
+  arguments_.settings.sets = {"features.levels=7"};
+  EXPECT_NE(Refusal().find("a.map: was made with features.levels=8 "), std::string::npos) << Refusal();
+}
+
+TEST_F(MapCheckTest, AnotherVocabularyIsAMisfit) {
+  made_.vocabulary_checksum = 0xabc;
+  Save();
+  EXPECT_THROW(CheckMap(arguments_), MisfitError);
+  EXPECT_NE(Refusal().find("a.map: was made with another vocabulary (checksum 0000000000000abc)"),
+            std::string::npos);
+  arguments_.build_folder = "/elsewhere";
+  EXPECT_EQ(Refusal(), "") << "programs from elsewhere may have that one";
+}
+
+TEST_F(MapCheckTest, WhatIsNoMapIsNamed) {
+  arguments_.map.begin = arguments_.camera.file;
+  EXPECT_NE(Refusal().find(arguments_.map.begin), std::string::npos);
+}
+
+}  // namespace
+}  // namespace dmslam
