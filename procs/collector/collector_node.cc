@@ -72,6 +72,7 @@ void CollectorNode::KnowSession(const SessionStart& start) {
   info.camera = start.camera;
   info.sequence = start.sequence;
   info.mode = start.mode;
+  continues_ = !options_.take_over;  // else the one before it may still be there
   KnowCamera(info);
 }
 
@@ -90,26 +91,29 @@ void CollectorNode::OnCamera(const CameraInfo& info) {
   run_.cameras[info.camera_id].sequence = info.sequence;
 }
 
-/// A collector writes no stream, so no election says whether there is another one.
+/// A collector writes no stream, so no election says whether there is another one. Who goes on with what one
+/// before it has written begins at once: what a frontend has kept for it is lost when the frontend dies.
 bool CollectorNode::MayBegin() {
   YieldToOther();
   const bool alone = context_.fresh_system || !others_.Find(session_, context_.now_ns());
-  return !exit_code() && alone && context_.now_ns() >= listens_until_ns_;
+  return !exit_code() && alone && (continues_ || context_.now_ns() >= listens_until_ns_);
 }
 
 void CollectorNode::HearReader(std::span<const uint8_t> bytes) {
   const auto ack = DecodeAck(AckChannel(owners::kCollector), bytes);
   if (!ack || context_.fresh_system) return;
-  others_.Hear(*ack, context_.now_ns());
+  others_.Hear({ack->reader, ack->name, ack->header.session, ack->utime}, context_.now_ns());
   YieldToOther();
 }
 
 /// Who comes later leaves, before it has written anything. Of two that began together, and could not hear
-/// each other before, it is the one with the larger id.
+/// each other before, it is the one with the larger id; or the one that believed to go on after the other.
 void CollectorNode::YieldToOther() {
   const int64_t now_ns = context_.now_ns();
   const auto other = others_.Find(session_, now_ns);
-  if (!other || (builder_ && (now_ns - begun_ns_ > kSettlingNs || other->id > context_.random_id))) return;
+  if (!other) return;
+  if (builder_ && now_ns - begun_ns_ > kSettlingNs) return;
+  if (builder_ && !continues_ && other->id > context_.random_id) return;
   const std::string who = "session " + std::to_string(session_) + ": " + other->name;
   if (builder_ || !options_.take_over)
     return Exit(kExitPresent, who +
@@ -398,7 +402,7 @@ void CollectorNode::KeepCheckpoint() {
 }
 
 int64_t CollectorNode::WorkDeadline() const {
-  if (!builder_) return context_.now_ns() < listens_until_ns_ ? listens_until_ns_ : INT64_MAX;
+  if (!builder_) return !continues_ && context_.now_ns() < listens_until_ns_ ? listens_until_ns_ : INT64_MAX;
   return checkpointer_ && !IsWritten() ? checkpointer_->deadline_ns() : INT64_MAX;
 }
 

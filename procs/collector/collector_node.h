@@ -128,6 +128,7 @@ class CollectorNode : public StreamNode {
   OtherReaders others_;
   int64_t listens_until_ns_ = 0;  ///< whether another collector is there
   bool waits_for_other_ = false;
+  bool continues_ = false;  ///< with what a collector before it has written
   int64_t begun_ns_ = 0;
   bool map_is_fresh_ = false;  ///< a map that continues none is read from its beginning
 };

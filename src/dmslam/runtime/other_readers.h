@@ -7,8 +7,6 @@
 #include <optional>
 #include <string>
 
-#include "dmslam/ack_t.hpp"
-
 namespace dmslam {
 
 /// Tells whether another process reads a session's streams in the same part as this one, by what every reader
@@ -22,22 +20,29 @@ class OtherReaders {
     int64_t id = 0;
     std::string name;  ///< as it is told to people
   };
+  /// What an acknowledgement says of who sent it.
+  struct Word {
+    int64_t reader = 0;
+    std::string name;
+    int64_t session = 0;
+    int64_t utime = 0;
+  };
   /// Whoever has been there for two seconds before this is known by the end of it.
   static constexpr int64_t kListenNs = 2'500'000'000;
 
   /// `own_id`: as this process's readers have it; what they say is not heard.
   explicit OtherReaders(int64_t own_id) : own_id_(own_id) {}
 
-  void Hear(const ack_t& ack, int64_t now_ns) {
-    if (ack.reader == own_id_) return;
-    const auto [found, is_new] = heard_.try_emplace(ack.reader, Heard{{}, 0, now_ns, now_ns, ack.utime});
+  void Hear(const Word& word, int64_t now_ns) {
+    if (word.reader == own_id_) return;
+    const auto [found, is_new] = heard_.try_emplace(word.reader, Heard{{}, 0, now_ns, now_ns, word.utime});
     Heard& heard = found->second;
-    if (!is_new && ack.utime <= heard.utime) return;  // a copy
+    if (!is_new && word.utime <= heard.utime) return;  // a copy
     if (!is_new && now_ns - heard.last_ns > kSilentNs) heard.since_ns = now_ns;
-    heard.name = ack.name;
-    heard.session = ack.header.session;
+    heard.name = word.name;
+    heard.session = word.session;
     heard.last_ns = now_ns;
-    heard.utime = ack.utime;
+    heard.utime = word.utime;
     if (heard_.size() > kMost) Forget();
   }
   /// One of the session that is there now; none: there is none.

@@ -12,12 +12,7 @@ class OtherReadersTest : public testing::Test {
   /// `reader` says it at `ms`, by its own clock and by that of who hears it.
   void Hear(int64_t reader, int64_t ms, int64_t session = 1) { HearSaid(reader, ms, ms, session); }
   void HearSaid(int64_t reader, int64_t said_ms, int64_t ms, int64_t session = 1) {
-    ack_t ack{};
-    ack.utime = said_ms * 1000;
-    ack.reader = reader;
-    ack.header.session = session;
-    ack.name = "reader " + std::to_string(reader);
-    others_.Hear(ack, ms * kMs);
+    others_.Hear({reader, "reader " + std::to_string(reader), session, said_ms * 1000}, ms * kMs);
   }
   std::string Found(int64_t ms, int64_t session = 1) const {
     const auto found = others_.Find(session, ms * kMs);
