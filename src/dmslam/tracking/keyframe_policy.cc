@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kWeakShare = 0.5;  // of the expected landmarks
 constexpr int kWeak = 60;           // landmarks
-constexpr double kSooner = 0.6;     // of the time between two frames: no later one is nearer
+constexpr double kSooner = 0.6;     // of the time between two frames: of two as near, the first
 
 /// Young maps have the newest keyframes.
 bool IsOfTwoKeyframes(const Map& map, MapId map_id) {
