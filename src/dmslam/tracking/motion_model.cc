@@ -17,6 +17,20 @@ constexpr int64_t kKnownNs = kStepNs * 11 / 2;      // so long the newest pose's
 constexpr int64_t kSuccessiveNs = kStepNs * 5 / 2;  // a step no longer than this is a motion...
 constexpr double kFloor = 0.0005;                   // no pose is known better than this [rad], [depths]
 
+struct Distance {
+  double turned_rad = 0;
+  double moved = 0;  ///< depths of the scene
+};
+
+Distance DistanceOf(const Rigid3d& a, const Rigid3d& b, double depth) {
+  return {AngleBetween(a.rotation, b.rotation), (a.Center() - b.Center()).norm() / depth};
+}
+
+/// At least a step.
+double SecondsSince(const FrameTime& from, const FrameTime& time) {
+  return std::max(1.0 / kStepsPerSecond, SecondsFromTo(from.stamp_ns, time.stamp_ns));
+}
+
 Vector6d Difference(const Rigid3d& T, const Rigid3d& T_from) {
   const Rigid3d step = T * T_from.Inverse();
   Vector6d difference;
@@ -132,23 +146,36 @@ MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& ti
 }
 
 bool MotionModel::IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const {
-  if (!last_) return true;
-  if (time.stamp_ns - last_->time.stamp_ns > ToNs(options_.reach_known_s)) return true;
+  if (!IsRemembered(time)) return true;
   const Pose& newest = *Newest();
   const std::optional<double> depth = Depth(map);
   const Prediction prediction = Predict(map, time, depth);
-  if (!prediction.T_cam_world || !depth) return true;
-  const Rigid3d& from = prediction.prior ? *prediction.T_cam_world : *newest.pose.In(map);
-  const double turned_rad = AngleBetween(T_cam_world.rotation, from.rotation);
-  const double moved = (T_cam_world.Center() - from.Center()).norm() / *depth;
-  const double since_s = std::max(1.0 / kStepsPerSecond, SecondsFromTo(newest.time.stamp_ns, time.stamp_ns));
-  if (prediction.prior) {
-    const double steps = std::max(1.0, std::round(since_s * kStepsPerSecond));
-    return turned_rad <= options_.max_surprise * options_.prior_rotation_rad * steps &&
-           moved <= options_.max_surprise * options_.prior_translation * steps;
-  }
-  return turned_rad <= options_.turn_slack_rad + options_.max_turn_rad_per_s * since_s &&
-         moved <= options_.speed_slack + options_.max_speed * since_s;
+  if (!prediction.prior || !depth) return IsWithinSpeed(map, newest, T_cam_world, time);
+  const Distance distance = DistanceOf(T_cam_world, *prediction.T_cam_world, *depth);
+  const double steps = std::max(1.0, std::round(SecondsSince(newest.time, time) * kStepsPerSecond));
+  return distance.turned_rad <= options_.max_surprise * options_.prior_rotation_rad * steps &&
+         distance.moved <= options_.max_surprise * options_.prior_translation * steps;
+}
+
+bool MotionModel::IsReachableFromTracked(const Map& map, const Rigid3d& T_cam_world,
+                                         const FrameTime& time) const {
+  return !IsRemembered(time) || IsWithinSpeed(map, *last_, T_cam_world, time);
+}
+
+bool MotionModel::IsRemembered(const FrameTime& time) const {
+  return last_ && time.stamp_ns - last_->time.stamp_ns <= ToNs(options_.reach_known_s);
+}
+
+/// Whether a carried camera comes there from `pose`, no faster than hands and cars are.
+bool MotionModel::IsWithinSpeed(const Map& map, const Pose& pose, const Rigid3d& T_cam_world,
+                                const FrameTime& time) const {
+  const std::optional<double> depth = Depth(map);
+  const std::optional<Rigid3d> from = pose.pose.In(map);
+  if (!from || !depth) return true;
+  const Distance distance = DistanceOf(T_cam_world, *from, *depth);
+  const double since_s = SecondsSince(pose.time, time);
+  return distance.turned_rad <= options_.turn_slack_rad + options_.max_turn_rad_per_s * since_s &&
+         distance.moved <= options_.speed_slack + options_.max_speed * since_s;
 }
 
 void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const FoundPose& found,

@@ -76,6 +76,8 @@ class MotionModel {
   /// Whether a carried camera can have come to `T_cam_world` since its newest pose: near where its motion
   /// leads, and where that is not known, no faster than hands and cars are.
   bool IsReachable(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
+  /// The same from the pose that was tracked last: where a weak pose has led since is a guess.
+  bool IsReachableFromTracked(const Map& map, const Rigid3d& T_cam_world, const FrameTime& time) const;
   /// A frame was tracked. `jumped`: not from the frame before (relocalised), so the step is no motion.
   void OnTracked(const Map& map, const PlacedPose& pose, const FoundPose& found, const FrameTime& time,
                  bool jumped);
@@ -103,6 +105,9 @@ class MotionModel {
   MotionFilter::Since Since(const Map& map, const Pose& newest, const FrameTime& time, double depth) const;
   std::optional<MotionFilter> MotionTo(const Map& map, const FoundPose& found, const FrameTime& time) const;
   static Matrix6d Floored(const Matrix6d& covariance, double depth);
+  bool IsRemembered(const FrameTime& time) const;
+  bool IsWithinSpeed(const Map& map, const Pose& pose, const Rigid3d& T_cam_world,
+                     const FrameTime& time) const;
   static bool IsWithin(const FrameTime& newest, const FrameTime& time, int64_t limit_ns);
   std::optional<double> Depth(const Map& map) const;
 

@@ -196,6 +196,18 @@ TEST_F(MotionModelTest, APoseThatIsHardlyKnownLeavesTheNextOneOpen) {
   EXPECT_GT(second_weak, known + 0.03) << "it is off by its own error, and its motion by as much again";
 }
 
+TEST_F(MotionModelTest, WeakPosesDoNotMoveWhatCanBeReachedFromTheLastTrackedOne) {
+  Track(kStep, Time(1));
+  Track(2 * kStep, Time(2));
+  const auto aside = [](uint32_t frame) { return kStep * frame + 0.2 * (frame - 2); };
+  for (uint32_t frame = 3; frame < 6; ++frame)
+    model_.Coast(map(), {MapScene::PoseAt(aside(frame)), Matrix6d::Identity() * 1e-6}, Time(frame));
+  const Rigid3d where_it_was = MapScene::PoseAt(2 * kStep);
+  EXPECT_FALSE(model_.IsReachable(map(), where_it_was, Time(6)));
+  EXPECT_TRUE(model_.IsReachableFromTracked(map(), where_it_was, Time(6)));
+  EXPECT_FALSE(model_.IsReachableFromTracked(map(), MapScene::PoseAt(50), Time(6)));
+}
+
 TEST_F(MotionModelTest, TheReachGrowsWithTheFramesThatAreMissing) {
   Track(kStep, Time(1));
   Track(2 * kStep, Time(2));

@@ -1,6 +1,7 @@
 #include "dmslam/tracking/tracker.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "dmslam/camera/image_cells.h"
@@ -11,7 +12,7 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kCarefulNs = 1'000'000'000;  // so long more is asked of a camera that was found
-constexpr int64_t kConfirmNs = 500'000'000;    // so long a place must predict what is seen to be believed
+constexpr int64_t kConfirmNs = 500'000'000;    // so long, at most, a place must predict to be believed
 constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
 constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
 constexpr int64_t kDoubtNs = 1'000'000'000;    // so long what may be no part of the room leads on
@@ -22,7 +23,7 @@ constexpr double kWholeShare = 0.3;     // of what the place should show, where 
 constexpr double kThinShare = 0.25;     // a pose that finds less of what it should see is thin...
 constexpr double kBesideRad = 0.1;      // ...and compared with one beside it, turned by up to so much...
 constexpr double kClearlyMore = 1.3;    // ...which must find so many times as much
-constexpr int kSomeProven = 8;  // proven landmarks that must be seen where a place is confirmed by time
+constexpr int kSomeProven = 8;  // proven landmarks that must be seen, in a map that is old enough to have them
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
@@ -34,6 +35,14 @@ bool IsSeenAsAWhole(const TrackingReport& report) {
 bool ExplainsClearlyMore(const TrackingReport& a, const TrackingReport& b) {
   return a.num_static >= kClearlyMore * b.num_static && a.num_old >= kClearlyMore * b.num_old &&
          a.cells > b.cells;
+}
+
+/// How long a place must predict that shows so many proven landmarks: a few may be matched by chance, many at
+/// once (kManyProven) are not. Each time as many again saves as much time.
+int64_t ConfirmNs(int proven) {
+  const double saved = std::log(static_cast<double>(proven) / kSomeProven) /
+                       std::log(static_cast<double>(kManyProven) / kSomeProven);
+  return static_cast<int64_t>((1.0 - saved) * static_cast<double>(kConfirmNs));
 }
 
 void Refuse(const char* reason, TrackingReport* report) {
@@ -118,7 +127,7 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
 /// over the image and as a whole, which a person is not, or if much of what is seen is proven to be no
 /// person; else when the place goes on to predict what is seen, and, in a map that is old enough to have
-/// them, proven landmarks are among it. In another map that is not, it must both be seen as a whole and
+/// them, proven landmarks are among it: the more of them, the sooner. In another map that is not, it must both be seen as a whole and
 /// predict.
 bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
   if (report.doubtful) return false;
@@ -126,8 +135,9 @@ bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const Tra
   const int proven = CountProven(map, frame.landmarks, {});
   const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
   if (at_once || proven >= kManyProven) return true;
-  if (frame.stamp_ns - unbelieved_->since_ns < kConfirmNs) return false;
-  return proven >= kSomeProven || !IsOldEnoughToProve(map);
+  const int64_t since_ns = frame.stamp_ns - unbelieved_->since_ns;
+  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs;
+  return proven >= kSomeProven && since_ns >= ConfirmNs(proven);
 }
 
 /// The map that the frame was placed in.
@@ -213,12 +223,17 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
     return reference != nullptr && reference->map_id == asked.map_id;
   };
   // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too
-  // young to have anything proven, what is seen as a whole.
+  // young to have anything proven, what is seen as a whole. Nearby, some of it must be.
   const auto credible = [&](const TrackedFrame& at, const TrackingReport& report) {
-    const bool here = is_here();
-    return (here && follower_.motion().IsReachable(map, at.T_cam_world, time)) ||
-           CountProven(map, at.landmarks, {}) >= kManyProven ||
-           (!here && !IsOldEnoughToProve(map) && IsSeenAsAWhole(report));
+    const int proven = CountProven(map, at.landmarks, {});
+    if (proven >= kManyProven) return true;
+    const MotionModel& motion = follower_.motion();
+    if (!IsOldEnoughToProve(map))
+      return is_here() ? motion.IsReachable(map, at.T_cam_world, time) : IsSeenAsAWhole(report);
+    const bool is_no_person = proven >= kSomeProven || IsSeenAsAWhole(report);
+    return is_here() && is_no_person &&
+           (motion.IsReachable(map, at.T_cam_world, time) ||
+            motion.IsReachableFromTracked(map, at.T_cam_world, time));
   };
   Relocalizer::Request request{.last_seen = last_reference(), .seed = seed};
   const bool may_be_elsewhere = asked.map_id || asked.may_be_nowhere;

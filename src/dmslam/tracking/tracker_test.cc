@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "dmslam/dynamics/proven.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/map/testing/map_scene.h"
 #include "dmslam/tracking/keyframe_policy.h"
@@ -405,7 +406,7 @@ class Recovering : public ::testing::Test {
   }
   TrackingResult Track(uint32_t frame, bool blind = false) {
     const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
-      const bool hidden = blind || (partly_hidden_ && i % 4 != 0);
+      const bool hidden = blind || i % one_seen_of_ != 0;
       return hidden ? std::nullopt : std::optional(scene_.point(i));
     };
     return tracker_->Track(replica_, {.map_id = lost_in_, .may_be_nowhere = may_be_nowhere_},
@@ -420,7 +421,7 @@ class Recovering : public ::testing::Test {
   }
 
   int64_t mapped_ns_ = 0;           ///< of the points
-  bool partly_hidden_ = false;      ///< three of four points are not seen
+  size_t one_seen_of_ = 1;          ///< points
   std::optional<MapId> lost_in_{};  ///< none: nowhere
   bool may_be_nowhere_ = false;     ///< in none of the maps
   MapScene scene_;
@@ -435,7 +436,7 @@ TEST_F(Recovering, APlaceThatIsSeenAsAWholeIsBelievedAtOnce) {
 
 TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
   Start(1.0);
-  partly_hidden_ = true;
+  one_seen_of_ = 4;
   const TrackingResult first = Track(kFound);
   EXPECT_TRUE(first.relocalized);
   EXPECT_FALSE(first.pose) << "people who stood are places too";
@@ -459,7 +460,7 @@ TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
   Start(1.0);
   tracker_->BeginLost();
   lost_in_ = MapScene::kMap + 1;
-  partly_hidden_ = true;
+  one_seen_of_ = 4;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized);
 }
 
@@ -468,9 +469,9 @@ TEST_F(Recovering, WhoMayBeInNoMapBelievesNoPartOfAYoungOne) {
   Start(1.0);
   tracker_->BeginLost();
   may_be_nowhere_ = true;
-  partly_hidden_ = true;
+  one_seen_of_ = 4;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized) << frame;
-  partly_hidden_ = false;
+  one_seen_of_ = 1;
   const uint32_t found = FirstFound(kFound + 30);
   EXPECT_NEAR((found - kFound - 30) / 30.0, 0.5, 0.05) << "seen as a whole it must predict";
 }
@@ -509,13 +510,61 @@ TEST_F(FarAway, WhatIsProvenIs) {
 
 TEST_F(Recovering, ManyProvenLandmarksAreBelievedAtOnce) {
   Start(10.0);
-  partly_hidden_ = true;
+  one_seen_of_ = 4;
   EXPECT_TRUE(Track(kFound).pose);
+}
+
+TEST_F(Recovering, SomeProvenLandmarksAreBelievedSoon) {
+  Start(10.0);
+  one_seen_of_ = 12;
+  const TrackingResult first = Track(kFound);
+  EXPECT_TRUE(first.relocalized);
+  EXPECT_FALSE(first.pose) << CountProven(replica_, first.frame.landmarks, {});
+  const uint32_t found = FirstFound(kFound + 1);
+  EXPECT_NEAR((found - kFound) / 30.0, 0.12, 0.07) << "half a second is what eight of them take";
+}
+
+/// Fifteen points walk off while all others are hidden, and lead the camera's weak poses along. Then they have
+/// gone, and one in nine others is seen again.
+class LedAstray : public Recovering {
+ protected:
+  static constexpr uint32_t kShown = 18;
+
+  TrackingResult TrackAstray(uint32_t frame) {
+    const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
+      const bool walks = i % 27 == 1;
+      const bool seen = frame < kLost || (frame < kShown ? walks : i % 9 == 0);
+      if (!seen) return std::nullopt;
+      const double aside = walks && frame > kLost ? 0.03 * (frame - kLost) : 0.0;
+      return scene_.point(i) + Eigen::Vector3d(aside, 0, 0);
+    };
+    return tracker_->Track(replica_, {.map_id = MapScene::kMap},
+                           scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(0), place));
+  }
+};
+
+TEST_F(LedAstray, IsFoundWhereSomeOfTheRoomIsProven) {
+  Start(10.0, 1);
+  TrackingResult result;
+  for (uint32_t frame = 1; frame < kShown; ++frame) result = TrackAstray(frame);
+  ASSERT_FALSE(result.pose);
+  ASSERT_GT(ErrorAt(result.frame.T_cam_world, 0), 0.3) << "it was led astray";
+  result = TrackAstray(kShown);
+  EXPECT_TRUE(result.relocalized) << result.report.reason;
+  EXPECT_LT(ErrorAt(result.frame.T_cam_world, 0), 0.02);
+  EXPECT_LT(CountProven(replica_, result.frame.landmarks, {}), kManyProven);
+}
+
+/// In a map too young to have proven anything only the motion says what is possible.
+TEST_F(LedAstray, InAYoungMapItGoesOnFromThere) {
+  Start(1.0, 1);
+  for (uint32_t frame = 1; frame < kShown; ++frame) TrackAstray(frame);
+  EXPECT_FALSE(TrackAstray(kShown).relocalized);
 }
 
 TEST_F(Recovering, APlaceThatDoesNotPredictIsDropped) {
   Start(1.0);
-  partly_hidden_ = true;
+  one_seen_of_ = 4;
   EXPECT_TRUE(Track(kFound).relocalized);
   for (uint32_t frame = kFound + 1; frame < kFound + 10; ++frame) Track(frame, true);
   const uint32_t found = FirstFound(kFound + 10);
