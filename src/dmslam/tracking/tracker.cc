@@ -23,7 +23,8 @@ constexpr double kWholeShare = 0.3;     // of what the place should show, where 
 constexpr double kThinShare = 0.25;     // a pose that finds less of what it should see is thin...
 constexpr double kBesideRad = 0.1;      // ...and compared with one beside it, turned by up to so much...
 constexpr double kClearlyMore = 1.3;    // ...which must find so many times as much
-constexpr int kSomeProven = 8;  // proven landmarks that must be seen, in a map that is old enough to have them
+constexpr int kSomeProven =
+    8;  // proven landmarks that must be seen, in a map that is old enough to have them
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
@@ -127,8 +128,8 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
 /// over the image and as a whole, which a person is not, or if much of what is seen is proven to be no
 /// person; else when the place goes on to predict what is seen, and, in a map that is old enough to have
-/// them, proven landmarks are among it: the more of them, the sooner. In another map that is not, it must both be seen as a whole and
-/// predict.
+/// them, proven landmarks are among it: the more of them, the sooner. In another map that is not, it must
+/// both be seen as a whole and predict.
 bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
   if (report.doubtful) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;

@@ -524,8 +524,8 @@ TEST_F(Recovering, SomeProvenLandmarksAreBelievedSoon) {
   EXPECT_NEAR((found - kFound) / 30.0, 0.12, 0.07) << "half a second is what eight of them take";
 }
 
-/// Fifteen points walk off while all others are hidden, and lead the camera's weak poses along. Then they have
-/// gone, and one in nine others is seen again.
+/// Fifteen points walk off while all others are hidden, and lead the camera's weak poses along. Then they
+/// have gone, and one in nine others is seen again.
 class LedAstray : public Recovering {
  protected:
   static constexpr uint32_t kShown = 18;
