@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <functional>
-#include <tuple>
 #include <vector>
 
 #include "dmslam/messaging/bus.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/event_log.h"
 #include "dmslam/messaging/roles.h"
-#include "dmslam/wire/codec.h"
 #include "frontend/make_frontend.h"
 #include "loopcloser/make_loopcloser.h"
 #include "player/records_node.h"
@@ -20,18 +18,12 @@ namespace {
 
 constexpr int64_t kClockStartNs = 1'000'000'000;
 
-/// Of every camera that there may be.
-template <typename... Message>
-void SubscribeToAll(Bus* bus, const std::tuple<Message...>*) {
-  for (CameraId camera = 0; camera < kMaxCameras; ++camera)
-    (bus->Subscribe(ChannelOfCamera(wire::Info<Message>().channel, camera)), ...);
-}
-
-/// Keeps all typed messages in a log, as lcm-logger does beside processes.
+/// Keeps all that is said in a log, as lcm-logger does beside processes: with the beacons of the streams,
+/// without which no reader follows them.
 class Recorder {
  public:
-  Recorder(Bus* bus, const std::string& path, std::function<int64_t()> now_us) : log_(path) {
-    SubscribeToAll(bus, static_cast<const wire::Messages*>(nullptr));
+  Recorder(MemoryBus::Port* bus, const std::string& path, std::function<int64_t()> now_us) : log_(path) {
+    bus->SubscribeToAll();
     bus->SetHandler([this, now_us](const std::string& channel, std::span<const uint8_t> bytes) {
       log_.Write(now_us(), channel, bytes);
     });

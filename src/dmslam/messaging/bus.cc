@@ -17,8 +17,7 @@ bool MemoryBus::DeliverOne() {
   queue_.pop_front();
   if (sent.message.local) return true;  // a tap for tools; its parts arrive as well
   for (const auto& port : ports_) {
-    if (port.get() == sent.sender || !port->handler_ || !port->channels_.contains(sent.message.channel))
-      continue;
+    if (port.get() == sent.sender || !port->handler_ || !port->Hears(sent.message.channel)) continue;
     port->handler_(sent.message.channel, *sent.message.bytes);
   }
   return true;

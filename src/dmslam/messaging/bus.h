@@ -36,13 +36,17 @@ class MemoryBus {
   class Port : public Bus {
    public:
     void Subscribe(const std::string& channel) override { channels_.insert(channel); }
+    /// Wants all that others say, on whatever channel.
+    void SubscribeToAll() { hears_all_ = true; }
     void SetHandler(Handler handler) override { handler_ = std::move(handler); }
     void Publish(const Outgoing& message) override;
 
    private:
     friend class MemoryBus;
     explicit Port(MemoryBus* bus) : bus_(bus) {}
+    bool Hears(const std::string& channel) const { return hears_all_ || channels_.contains(channel); }
     MemoryBus* bus_;
+    bool hears_all_ = false;
     std::set<std::string> channels_;
     Handler handler_;
   };

@@ -67,6 +67,21 @@ TEST(MemoryBus, DeliversInOrderToAllOthersThatSubscribed) {
   EXPECT_EQ(log, "bX cY aX ");
 }
 
+TEST(MemoryBus, WhoWantsAllHearsWhateverOthersSay) {
+  MemoryBus bus;
+  std::string log;
+  MemoryBus::Port& recorder = bus.AddPort();
+  MemoryBus::Port& speaker = bus.AddPort();
+  recorder.SetHandler([&](const std::string& channel, std::span<const uint8_t>) { log += channel + " "; });
+  recorder.SubscribeToAll();
+  speaker.Publish(Message("X", {1}));
+  recorder.Publish(Message("ITS_OWN", {2}));
+  speaker.Publish(Message("DMSLAM_MAPPER_HEAD", {3}));
+  while (bus.DeliverOne()) {
+  }
+  EXPECT_EQ(log, "X DMSLAM_MAPPER_HEAD ");
+}
+
 TEST(EventLoop, ASignalAsksToStop) {
   EventLoop loop;
   EXPECT_TRUE(loop.PumpOnce());
