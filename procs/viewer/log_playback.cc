@@ -82,6 +82,7 @@ void LogPlayback::PlayTo(int64_t utime_us, bool in_haste) {
   }
   at_us_ = std::clamp(utime_us, begin_us_, end_us_);
   node_->SetInHaste(false);
+  if (!next_) node_->ShowAtOnce();  // what the last messages said would not come by itself any more
   node_->Advance();
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -122,6 +123,61 @@ TEST_F(LogPlaybackTest, RefusesWhatIsNoLog) {
   log.Close();
   EXPECT_THROW(LogPlayback(empty, {}, {}, &exchange_), InputError);
   std::remove(empty.c_str());
+}
+
+/// What the hub tells who joins now, of one kind.
+nlohmann::json Newest(Exchange* exchange, const std::string& kind) {
+  const auto listener = exchange->hub().Join();
+  const std::string said = listener->Next(std::chrono::milliseconds(0));
+  exchange->hub().Leave(listener);
+  const std::string head = "event: " + kind + "\ndata: ";
+  const size_t at = said.find(head);
+  if (at == std::string::npos) return {};
+  return nlohmann::json::parse(
+      said.substr(at + head.size(), said.find('\n', at + head.size()) - at - head.size()));
+}
+
+/// A log at whose end the camera is lost. It ends between two reports, which come four times a second.
+TEST_F(LogPlaybackTest, AtItsEndTheSequenceIsOver) {
+  const std::string path = testing::TempDir() + "log_of_an_ended_run.lcmlog";
+  EventLogWriter log(path);
+  CameraInfo info;
+  info.session = 5;
+  info.camera.width_px = 640;
+  info.camera.height_px = 480;
+  info.camera.fx_px = info.camera.fy_px = 500;
+  Write(&log, kBeginUs, info);
+  for (int i = 0; i <= 10; ++i) {
+    PoseView view;
+    view.session = 5;
+    view.frame_index = static_cast<uint32_t>(i);
+    view.state = TrackingState::kLost;
+    Write(&log, kBeginUs + i * 100'000, view);
+    FrontendStatus status;
+    status.head.session = 5;
+    status.head.health.pid = 77;
+    status.state = TrackingState::kLost;
+    if (i % 5 == 0) Write(&log, kBeginUs + i * 100'000, status);
+  }
+  EndOfSequence end;
+  end.session = 5;
+  Write(&log, kBeginUs + 1'010'000, end);
+  log.Close();
+  Exchange exchange;
+  LogPlayback playback(path, {}, {}, &exchange);
+  const int64_t start = 77'000'000'000;
+  playback.Advance(start);
+  playback.Advance(start + 1'005'000'000);
+  const auto frontend = [&] { return Newest(&exchange, "status")["processes"][1]; };
+  EXPECT_EQ(Newest(&exchange, "status")["ended"], false);
+  EXPECT_EQ(frontend()["name"], "frontend");
+  EXPECT_EQ(frontend()["state"], "lost");
+  playback.Advance(start + 1'030'000'000);
+  EXPECT_FALSE(playback.playing());
+  EXPECT_EQ(Newest(&exchange, "status")["ended"], true);
+  EXPECT_EQ(Newest(&exchange, "status")["cameras"][0]["ended"], true);
+  EXPECT_EQ(frontend()["state"], "ending") << "the camera is lost no more: no frame follows";
+  std::remove(path.c_str());
 }
 
 TEST(PlaybackControlTest, TheNewestWishOfEachKindCounts) {

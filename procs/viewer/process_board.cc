@@ -77,6 +77,11 @@ void ProcessBoard::OnSign(const std::string& name, int64_t now_ns) {
     process->heard_ns = now_ns;
 }
 
+void ProcessBoard::Does(const std::string& name, const std::string& state) {
+  Process* process = Find(name);
+  if (process != nullptr && process->tells) process->state = state;
+}
+
 void ProcessBoard::Need(const std::string& name) {
   if (Process* process = Find(name)) process->needed = true;
 }

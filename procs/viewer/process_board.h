@@ -52,6 +52,8 @@ class ProcessBoard {
   void OnWord(const std::string& name, int64_t id, int64_t now_ns, int64_t wall_us);
   /// A sign of life without a status (a beacon).
   void OnSign(const std::string& name, int64_t now_ns);
+  /// What one that was heard does, in a word, by what others say.
+  void Does(const std::string& name, const std::string& state);
   /// A run without this one is not well.
   void Need(const std::string& name);
   /// The sequence is over for these: their silence is no failure.

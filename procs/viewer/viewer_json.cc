@@ -87,7 +87,8 @@ Json MapsJson(const StatusView& view) {
 Json CamerasJson(const std::vector<CameraView>& views) {
   Json cameras = Json::array();
   for (const CameraView& view : views) {
-    Json camera{{"id", cameras.size()}, {"map", view.map_id ? NameOf(*view.map_id) : ""}};
+    Json camera{
+        {"id", cameras.size()}, {"map", view.map_id ? NameOf(*view.map_id) : ""}, {"ended", view.ended}};
     if (view.info != nullptr) {
       camera["sequence"] = view.info->sequence;
       camera["frames"] = view.info->num_frames.value_or(0);

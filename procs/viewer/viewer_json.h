@@ -18,6 +18,7 @@ namespace dmslam {
 struct CameraView {
   const CameraInfo* info = nullptr;  ///< null: not known yet
   std::optional<MapId> map_id;       ///< in which it was last
+  bool ended = false;                ///< its sequence is over
 };
 
 /// What the page's header, tables and charts are made of.

@@ -75,7 +75,7 @@ void ViewerNode::SetInHaste(bool in_haste) {
   const bool over = in_haste_ && !in_haste;
   in_haste_ = in_haste;
   if (!over) return;
-  next_draw_ns_ = next_report_ns_ = next_align_ns_ = 0;
+  ShowAtOnce();
   for (const auto& [what, bytes] : std::exchange(passed_over_, {})) OnMessage(what.first, bytes);
 }
 
@@ -132,6 +132,18 @@ void ViewerNode::OnEnd(const EndOfSequence& end) {
   const std::string whose = seen_cameras_.size() == 1 ? "" : " of camera " + std::to_string(end.camera_id);
   Note(BoardEvent::Level::kInfo,
        "the sequence" + whose + " has ended: " + std::to_string(end.frames_published) + " frames");
+  NoteWhatFrontendsDo();
+}
+
+/// In a word. Once no frame follows it counts no more how the last one was tracked.
+std::string ViewerNode::DoesOf(const CameraState& camera) const {
+  if (map_ended_) return "done";
+  return camera.ended ? "ending" : StateWord(camera.frontend.state);
+}
+
+void ViewerNode::NoteWhatFrontendsDo() {
+  for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera)
+    board_.Does(OfCamera(roles::kFrontend, camera), DoesOf(seen_cameras_[camera]));
 }
 
 template <typename Status>
@@ -149,8 +161,7 @@ void ViewerNode::OnStatusMessage(const std::string& channel, std::span<const uin
     CameraState* camera = status ? FindCamera(status->camera_id) : nullptr;
     if (camera == nullptr) return;
     camera->frontend = std::move(*status);
-    Board(OfCamera(roles::kFrontend, camera->frontend.camera_id), camera->frontend,
-          StateWord(camera->frontend.state));
+    Board(OfCamera(roles::kFrontend, camera->frontend.camera_id), camera->frontend, DoesOf(*camera));
   } else if (channel == channels::kMapperStatus) {
     if (auto status = Read<MapperStatus>(bytes))
       Board(roles::kMapper, mapper_ = std::move(*status), StateWord(mapper_.state));
@@ -209,6 +220,7 @@ void ViewerNode::NoteMapEvent(const MapDelta& delta) {
     case MapEvent::kEnded:
       map_ended_ = true;
       for (const std::string& name : Shown(options_.NumCameras())) board_.Expect(name);
+      NoteWhatFrontendsDo();
       break;
     default:
       break;
@@ -340,7 +352,7 @@ std::string ViewerNode::StatusJson() const {
   view.board = &board_;
   view.ended = map_ended_ || std::ranges::all_of(seen_cameras_, &CameraState::ended);
   for (const CameraState& camera : seen_cameras_)
-    view.cameras.push_back({camera.info ? &*camera.info : nullptr, camera.map_id});
+    view.cameras.push_back({camera.info ? &*camera.info : nullptr, camera.map_id, camera.ended});
   view.loops = loops_;
   view.browsers = exchange_->hub().num_listeners();
   view.skipped = exchange_->hub().skipped();

@@ -27,6 +27,8 @@ class ViewerNode : public StreamNode {
 
   /// In haste everything is taken in and nothing is shown, for logs: afterwards it is shown at once.
   void SetInHaste(bool in_haste);
+  /// The next Advance shows all there is, whenever something was shown last.
+  void ShowAtOnce() { next_draw_ns_ = next_report_ns_ = next_align_ns_ = 0; }
 
  protected:
   void Begin(const CameraInfo& info) override;
@@ -58,6 +60,8 @@ class ViewerNode : public StreamNode {
   bool TakeFrontendRecord();
   bool TakeFrontendRecord(CameraState* camera);
   void NoteState(const PoseView& view);
+  std::string DoesOf(const CameraState& camera) const;
+  void NoteWhatFrontendsDo();
   std::string Who(CameraId camera) const;
   CameraState* FindCamera(CameraId camera);
   bool TakeLoopRecord();

@@ -11,29 +11,52 @@ const colour = (name) => getComputedStyle(document.documentElement).getPropertyV
 const text = (id, value) => { if (byId(id).textContent !== value) byId(id).textContent = value; };
 
 export class Header {
-  /// `camera`: the one that is shown, where there are several.
+  constructor() {
+    this.poses = new Map();  // by camera: its newest one
+    this.chosen = 0;
+    this.ended = false;
+  }
+
+  choose(camera) {
+    this.chosen = camera;
+    this.showPose();
+  }
+
+  /// `camera`: the one that is shown.
   onStatus(status, camera) {
     const shown = {sequence: status.sequence, frames: status.frames, first_frame: status.first_frame, ...camera};
     text('sequence', shown.sequence || 'waiting for a camera');
     text('mode', status.sequence ? [status.lockstep ? 'lock-step' : 'real time', status.ended ? 'ended' : ''].filter((s) => s).join(', ') : '');
     this.frames = shown.frames > 0 ? shown.frames : 0;
     this.firstFrame = shown.first_frame || 0;
+    this.ended = status.ended || Boolean(camera.ended);
+    this.showPose();
     if (!status.map) return;
     text('count-keyframes', thousands(status.map.keyframes));
     text('count-landmarks', thousands(status.map.landmarks));
     text('count-moving', status.map.landmarks > 0 ? (100 * status.map.moving / status.map.landmarks).toFixed(1) + ' %' : '–');
     text('count-loops', String(status.map.loops));
     text('count-error', status.truth ? this.length(status.truth.rmse) : '–');
-    if (status.ended) this.showState(this.word || 'ended', 'none');
   }
 
   length(metres) { return metres < 1 ? (100 * metres).toFixed(1) + ' cm' : metres.toFixed(2) + ' m'; }
 
   onPose(pose) {
+    this.poses.set(pose.camera, pose);
+    if (pose.camera === this.chosen) this.showPose();
+  }
+
+  /// Once the sequence is over it counts no more how its last frame was tracked.
+  showPose() {
+    const pose = this.poses.get(this.chosen);
+    if (this.ended) this.showState('finished', 'done');
+    else if (pose) this.showState(pose.word, kStates[pose.state]);
+    if (pose) this.showFrame(pose);
+  }
+
+  showFrame(pose) {
     const number = pose.frame - this.firstFrame + 1;
     byId('count-frame').innerHTML = thousands(number) + (this.frames ? ` <small>/ ${thousands(this.frames)}</small>` : '');
-    this.word = pose.word;
-    this.showState(pose.word, kStates[pose.state]);
   }
 
   showState(word, state) {

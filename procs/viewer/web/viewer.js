@@ -55,6 +55,7 @@ let chosen = 0;  // the camera whose frame, curves and numbers are shown
 
 function chooseCamera(camera) {
   chosen = scene.chosen = camera;
+  header.choose(camera);
   frame.choose(camera);
   press('cameras', String(camera), 'camera');
   if (scene.mode === 'follow') scene.goBehind();
@@ -64,7 +65,7 @@ function chooseCamera(camera) {
 
 function onStatus(status) {
   seen.statuses++;
-  header.onStatus(status, status.cameras.length > 1 ? status.cameras[chosen] : {});
+  header.onStatus(status, status.cameras[chosen] || {});
   processes.onStatus(status);
   scene.setNumCameras(status.cameras.length);
   showCameras(status.cameras);
