@@ -9,7 +9,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "browsers are told little-endian words");
 
 constexpr uint32_t kMagic = 0x56534d44;  // "DMSV"
-constexpr uint32_t kLayout = 2;
+constexpr uint32_t kLayout = 3;
 constexpr uint32_t kEverything = 1;
 constexpr uint32_t kGone = 0xffffffff;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -88,6 +88,15 @@ void AddTruth(const ViewerScene::Truth& table, const std::vector<uint32_t>& chan
   for (const uint32_t i : changed) words->Add(slots[i].value);
 }
 
+void AddCameras(const std::map<CameraId, SceneCamera>& cameras, Words* words) {
+  words->Add(static_cast<uint32_t>(cameras.size()));
+  for (const auto& [camera, place] : cameras) {
+    words->Add(camera);
+    words->Add(place.center);
+    words->Add(place.rotation);
+  }
+}
+
 }  // namespace
 
 void ViewerScene::Clear() {
@@ -95,7 +104,9 @@ void ViewerScene::Clear() {
   keyframes_.Clear();
   path_.Clear();
   truth_.Clear();
+  cameras_.clear();
   ++generation_;
+  ++arrangement_;
   ++version_;
 }
 
@@ -110,7 +121,7 @@ std::vector<uint8_t> ViewerScene::Encode(uint32_t generation, uint64_t since) co
   for (const uint32_t i : keyframes) links += keyframes_.slots()[i].value.links.size();
   Words words;
   words.Reserve(10 + 9 * points.size() + 12 * keyframes.size() + 2 * links + 7 * path.size() +
-                5 * truth.size());
+                5 * truth.size() + 2 + 8 * cameras_.size());
   for (const uint32_t word : {kMagic, kLayout, generation_, everything ? kEverything : 0U}) words.Add(word);
   for (const size_t count :
        {static_cast<size_t>(version_), points.size(), keyframes.size(), links, path.size(), truth.size()}) {
@@ -120,6 +131,8 @@ std::vector<uint8_t> ViewerScene::Encode(uint32_t generation, uint64_t since) co
   AddKeyframes(keyframes_, keyframes, &words);
   AddPath(path_, path, &words);
   AddTruth(truth_, truth, &words);
+  words.Add(arrangement_);
+  AddCameras(cameras_, &words);
   return words.Bytes();
 }
 

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "dmslam/util/ids.h"
@@ -51,6 +53,12 @@ struct ScenePathPoint {
   bool operator==(const ScenePathPoint&) const = default;
 };
 
+/// A camera as it is drawn where it is now.
+struct SceneCamera {
+  Float3 center{};                  ///< [map units]
+  std::array<float, 4> rotation{};  ///< unit quaternion x, y, z, w: world from camera
+};
+
 /// What browsers draw of all maps: tables that they mirror. A browser says which version it has and gets what
 /// changed.
 class ViewerScene {
@@ -61,6 +69,10 @@ class ViewerScene {
   void Advance() { ++version_; }
   /// Everything that was drawn is void.
   void Clear();
+  /// What was drawn moves as a whole in this version: places told of before and after do not go together.
+  void Rearrange() { ++arrangement_; }
+  /// Where the cameras are among what is drawn in this version.
+  void SetCameras(std::map<CameraId, SceneCamera> cameras) { cameras_ = std::move(cameras); }
 
   void SetPoint(LandmarkId id, const ScenePoint& point) { points_.Set(id, point, version_); }
   void RemovePoint(LandmarkId id) { points_.Remove(id, version_); }
@@ -79,13 +91,16 @@ class ViewerScene {
   using Truth = SlotTable<SceneFrame, Float3>;
   const Path& path() const { return path_; }
   const Truth& truth() const { return truth_; }
+  const std::map<CameraId, SceneCamera>& cameras() const { return cameras_; }
   uint64_t version() const { return version_; }
   /// Changes when everything was void: what a browser holds of another generation counts for nothing.
   uint32_t generation() const { return generation_; }
+  /// Counts how often what is drawn has moved as a whole (maps were joined, or lie elsewhere).
+  uint32_t arrangement() const { return arrangement_; }
 
   /// What changed after version `since` of `generation`, or everything where that is of another generation
   /// (flag 1), in little-endian words of 32 bits:
-  ///   "DMSV", layout 2, generation, flags, version, points, keyframes, links, path, truth  (ten words), then
+  ///   "DMSV", layout 3, generation, flags, version, points, keyframes, links, path, truth  (ten words), then
   ///   points     slot[n], id low[n], id high[n], x y z [3n] float, belief[n] float (above zero: believed to
   ///              move; NaN: removed),
   ///              first frame[n], colour[n]
@@ -93,6 +108,7 @@ class ViewerScene {
   ///              camera, camera[m], colour[m], end of its links[m], then of all links: slot[l], kind[l]
   ///   path       frame[p], camera[p], x y z [3p] (NaN: removed), placed later[p], colour[p]
   ///   truth      number[t], camera[t], x y z [3t]
+  ///   cameras    arrangement, how many, then of each, always all: camera, x y z, quaternion x y z w
   std::vector<uint8_t> Encode(uint32_t generation, uint64_t since) const;
 
  private:
@@ -100,8 +116,10 @@ class ViewerScene {
   Keyframes keyframes_;
   Path path_;
   Truth truth_;
+  std::map<CameraId, SceneCamera> cameras_;
   uint64_t version_ = 1;
   uint32_t generation_ = 1;
+  uint32_t arrangement_ = 1;
 };
 
 }  // namespace dmslam

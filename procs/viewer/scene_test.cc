@@ -27,9 +27,11 @@ struct Decoded {
     std::memcpy(&value, &words[word], sizeof(value));
     return value;
   }
-  size_t ExpectedWords() const {
+  size_t ExpectedWords() const { return CamerasAt() + 2 + 8 * words.at(CamerasAt() + 1); }
+  size_t CamerasAt() const {
     return 10 + 9 * points() + 12 * keyframes() + 2 * links() + 7 * path() + 5 * truth();
   }
+  uint32_t arrangement() const { return words.at(CamerasAt()); }
 };
 
 ScenePoint PointAt(float x) { return {{x, 2, 3}, -1.5F, 7, 4}; }
@@ -117,6 +119,34 @@ TEST(SceneTest, FramesOfTwoCamerasDoNotCollide) {
   scene.RemovePath({0, 3});
   EXPECT_EQ(scene.path().Find({0, 3}), -1);
   EXPECT_GE(scene.path().Find({1, 3}), 0);
+}
+
+TEST(SceneTest, CamerasAreToldWithTheMapTheyAreIn) {
+  ViewerScene scene;
+  scene.SetPoint(LandmarkId{1}, PointAt(1));
+  scene.SetCameras({{0, {{1, 2, 3}, {0, 0, 0, 1}}}, {5, {{4, 5, 6}, {1, 0, 0, 0}}}});
+  const Decoded first(scene.Encode(0, 0));
+  ASSERT_EQ(first.words.size(), first.ExpectedWords());
+  const size_t at = first.CamerasAt() + 2;
+  ASSERT_EQ(first.words[at - 1], 2u) << "how many";
+  EXPECT_EQ(first.words[at], 0u);
+  EXPECT_EQ(first.Real(at + 3), 3.0F) << "z of the first";
+  EXPECT_EQ(first.words[at + 8], 5u);
+  EXPECT_EQ(first.Real(at + 9), 4.0F) << "x of the second";
+  EXPECT_EQ(first.Real(at + 12), 1.0F) << "x of its quaternion";
+  scene.Advance();
+  const Decoded same(scene.Encode(first.generation(), first.version()));
+  EXPECT_EQ(same.arrangement(), first.arrangement());
+  EXPECT_EQ(same.words[same.CamerasAt() + 1], 2u) << "always all";
+  scene.Advance();
+  scene.Rearrange();
+  scene.SetCameras({});
+  const Decoded moved(scene.Encode(first.generation(), first.version()));
+  EXPECT_NE(moved.arrangement(), first.arrangement());
+  EXPECT_EQ(moved.words.size(), moved.ExpectedWords());
+  EXPECT_EQ(moved.words[moved.CamerasAt() + 1], 0u) << "all are lost";
+  scene.Clear();
+  EXPECT_NE(Decoded(scene.Encode(0, 0)).arrangement(), moved.arrangement());
 }
 
 TEST(SceneTest, AfterClearingNothingOfBeforeCounts) {

@@ -37,6 +37,12 @@ float StepOverThreshold(const Landmark& landmark) {
   return IsStatic(&landmark) ? std::min(step, 0.0F) : std::max(step, kStepOfBelief);
 }
 
+/// Whether keyframes move far, and many at once.
+bool IsCorrection(MapEvent event) {
+  return event == MapEvent::kCorrected || event == MapEvent::kGloballyAdjusted ||
+         event == MapEvent::kMapAdjusted;
+}
+
 }  // namespace
 
 void ViewerCore::OnMapDelta(const MapDelta& delta) {
@@ -46,6 +52,7 @@ void ViewerCore::OnMapDelta(const MapDelta& delta) {
     ++resets_;
     MarkAll();
   }
+  if (IsCorrection(delta.event)) moves_ = true;
   Mark(delta);
   HandFramesOn(delta);
   ChooseMap();
@@ -57,6 +64,7 @@ void ViewerCore::NoteJoined(const MapDelta& delta) {
   for (const KeyframeState& state : delta.keyframes) {
     const Keyframe* before = map_.FindKeyframe(state.id);
     if (before == nullptr || before->map_id == state.map_id) continue;
+    moves_ = true;
     const bool known = std::ranges::any_of(joined_, [&](const JoinedMaps& joined) {
       return joined.from == before->map_id && joined.into == state.map_id;
     });
@@ -107,12 +115,27 @@ void ViewerCore::HandFramesOn(const MapDelta& delta) {
 void ViewerCore::OnFramePose(const FramePose& pose) {
   newest_ns_ = std::max(newest_ns_, pose.stamp_ns);
   dirty_ = true;
+  NoteCamera(pose);
   if (!pose.HasPose()) return;
   frames_[FrameOf(pose)] = pose;
   frames_of_[map_.ResolveKeyframe(*pose.reference).value_or(*pose.reference)].push_back(FrameOf(pose));
   dirty_frames_.insert(FrameOf(pose));
   const bool is_shown = shown_map_ && pose.map_id == shown_map_;
   if (pose.state != TrackingState::kLocalizedLater && !is_shown) ChooseMap();
+}
+
+/// A frame that waits its turn behind the first map says nothing of where the camera is, and what is told
+/// later of one that had no place does not bring the camera back.
+void ViewerCore::NoteCamera(const FramePose& pose) {
+  uint32_t& newest = newest_.try_emplace(pose.camera_id, pose.frame_index).first->second;
+  if (pose.frame_index < newest) return;
+  newest = pose.frame_index;
+  if (pose.state == TrackingState::kWaitingForMap || pose.state == TrackingState::kLocalizedLater) return;
+  if (pose.HasPose()) {
+    present_[pose.camera_id] = pose.frame_index;
+  } else {
+    present_.erase(pose.camera_id);
+  }
 }
 
 void ViewerCore::ForgetMap() {
@@ -192,6 +215,17 @@ std::optional<Rigid3d> ViewerCore::Drawn(const Rigid3d& T_world_cam, std::option
   return Rigid3d(T_world_cam.rotation, T_world_cam.translation + place->offset);
 }
 
+std::optional<CameraPlace> ViewerCore::WhereIs(CameraId camera) const {
+  const auto present = present_.find(camera);
+  if (present == present_.end()) return std::nullopt;
+  const FramePose& pose = frames_.at({camera, present->second});
+  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
+  const MapLayout::Place* place = reference ? layout_.Find(reference->map_id) : nullptr;
+  if (place == nullptr) return std::nullopt;
+  const Rigid3d T_world_cam = reference->Compose(pose.T_cam_reference, pose.reference_scale).Inverse();
+  return CameraPlace{pose.stamp_ns, Rigid3d(T_world_cam.rotation, T_world_cam.translation + place->offset)};
+}
+
 void ViewerCore::Draw(ViewerScene* scene) {
   if (void_) {
     scene->Clear();
@@ -205,6 +239,7 @@ void ViewerCore::Draw(ViewerScene* scene) {
   const std::set<MapId> rearranged = layout_.Arrange(map_, shown_map_);
   for (const MapId map_id : rearranged) MarkMap(map_id);
   if (!rearranged.empty()) MarkFrames();
+  if (moves_ || !rearranged.empty()) scene->Rearrange();
   for (const LandmarkId id : dirty_points_) DrawPoint(id, scene);
   if (scene->points().size() > map_.num_landmarks()) SweepPoints(scene);
   for (const KeyframeId id : dirty_keyframes_) DrawKeyframe(id, scene);
@@ -214,6 +249,7 @@ void ViewerCore::Draw(ViewerScene* scene) {
   }
   for (const SceneFrame& frame : dirty_frames_) DrawFrame(frame, scene);
   DrawTruth(scene);
+  DrawCameras(scene);
   if (!dirty_points_.empty()) {
     num_moving_ = 0;
     for (const auto& slot : scene->points().slots()) num_moving_ += slot.alive && slot.value.moves() ? 1 : 0;
@@ -221,7 +257,17 @@ void ViewerCore::Draw(ViewerScene* scene) {
   dirty_points_.clear();
   dirty_keyframes_.clear();
   dirty_frames_.clear();
-  void_ = dirty_ = false;
+  void_ = moves_ = dirty_ = false;
+}
+
+void ViewerCore::DrawCameras(ViewerScene* scene) const {
+  std::map<CameraId, SceneCamera> cameras;
+  for (const auto& [camera, frame] : present_) {
+    const std::optional<CameraPlace> place = WhereIs(camera);
+    if (place)
+      cameras[camera] = {ToFloats(place->T_world_cam.translation), ToFloats(place->T_world_cam.rotation)};
+  }
+  scene->SetCameras(std::move(cameras));
 }
 
 void ViewerCore::DrawPoint(LandmarkId id, ViewerScene* scene) {

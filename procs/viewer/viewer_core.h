@@ -30,6 +30,12 @@ struct JoinedMaps {
   MapId into = 0;
 };
 
+/// Where a camera is drawn.
+struct CameraPlace {
+  int64_t stamp_ns = 0;  ///< of the frame that says so
+  Rigid3d T_world_cam;   ///< where its map is drawn
+};
+
 /// A replica of the map with the cameras' paths, and how it is drawn. Of several maps the one in which a
 /// camera was last lies as it is, the others beside it.
 class ViewerCore {
@@ -53,6 +59,9 @@ class ViewerCore {
 
   /// Whether anything that is drawn has changed since the last Draw.
   bool dirty() const { return dirty_; }
+  /// Whether the map has moved as a whole since the last Draw (maps were joined, a loop was closed): until
+  /// the next one no place of a camera fits what is drawn.
+  bool moves() const { return moves_; }
   /// Brings the scene up to date.
   void Draw(ViewerScene* scene);
 
@@ -70,12 +79,16 @@ class ViewerCore {
   const MapLayout& layout() const { return layout_; }
   /// A pose in a map, where that is drawn; none where it cannot be told where that is.
   std::optional<Rigid3d> Drawn(const Rigid3d& T_world_cam, std::optional<MapId> map_id) const;
+  /// Where a camera is by its newest frame, told from the keyframe that it was told from: it moves with its
+  /// map and joins another one with it. None: it is lost, or that keyframe is not known.
+  std::optional<CameraPlace> WhereIs(CameraId camera) const;
   /// Maps that were joined since this was asked last.
   std::vector<JoinedMaps> TakeJoined() { return std::exchange(joined_, {}); }
   size_t num_moving() const { return num_moving_; }
   uint32_t resets() const { return resets_; }
 
  private:
+  void NoteCamera(const FramePose& pose);
   void ChooseMap();
   std::vector<std::optional<MapId>> WhereCamerasAre() const;
   std::optional<MapId> MapOf(const FramePose& pose) const;
@@ -89,6 +102,7 @@ class ViewerCore {
   void DrawPoint(LandmarkId id, ViewerScene* scene);
   void DrawKeyframe(KeyframeId id, ViewerScene* scene);
   void DrawFrame(const SceneFrame& frame, ViewerScene* scene);
+  void DrawCameras(ViewerScene* scene) const;
   void DrawTruth(ViewerScene* scene);
   void DrawTruthFile(ViewerScene* scene);
   bool IsInShownMap(CameraId camera) const;
@@ -105,6 +119,8 @@ class ViewerCore {
   MapLayout layout_;
   std::vector<JoinedMaps> joined_;
   std::map<SceneFrame, FramePose> frames_;
+  std::map<CameraId, uint32_t> newest_;   ///< by camera: its newest frame
+  std::map<CameraId, uint32_t> present_;  ///< by camera that is not lost: the frame that says where it is
   std::map<KeyframeId, std::vector<SceneFrame>>
       frames_of_;                                    ///< told from this keyframe, or from one it stands for
   std::map<SceneFrame, Eigen::Vector3d> positions_;  ///< of the frames in the shown map
@@ -114,6 +130,7 @@ class ViewerCore {
   int64_t newest_ns_ = 0;
 
   bool dirty_ = true;
+  bool moves_ = false;
   bool void_ = false;
   std::set<LandmarkId> dirty_points_;
   std::set<KeyframeId> dirty_keyframes_;

@@ -83,6 +83,8 @@ class ViewerCoreTest : public testing::Test {
   Eigen::Vector3d PathAt(uint32_t frame, CameraId camera = 0) {
     return Vector(Drawn(scene_.path(), SceneFrame{camera, frame}).position);
   }
+  /// Where a camera is drawn with this version of the map.
+  Eigen::Vector3d CameraAt(CameraId camera) { return Vector(scene_.cameras().at(camera).center); }
   /// A second map of camera 1, with three keyframes where the first map has its own, and a landmark.
   static constexpr MapId kOtherMap = kMapsPerCamera + 1;
   static KeyframeId OtherKf(int i) { return KeyframeId::Make(1, static_cast<uint32_t>(10 * i), 1); }
@@ -270,6 +272,81 @@ TEST_F(ViewerCoreTest, MapsThatAreJoinedBecomeOnePlaceAndOneColour) {
   EXPECT_NEAR((Vector(point.position) - T_first_other * Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-5);
   EXPECT_NEAR((PathAt(11, 1) - T_first_other * PoseAt(1).Center()).norm(), 0, 1e-5) << "its frames follow";
   EXPECT_EQ(Drawn(scene_.path(), SceneFrame{1, 11}).colour, 0u);
+}
+
+TEST_F(ViewerCoreTest, CamerasMoveWithTheirMapWhenItIsJoined) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  AddOtherMap();
+  SayFrame(11, 1);
+  SayFrameOf(1, 11, kOtherMap, OtherKf(1));
+  Say();
+  const Eigen::Vector3d offset = CameraAt(1) - PoseAt(1).Center();
+  EXPECT_GT(offset.x(), 3) << "beside it, in its own map";
+  EXPECT_NEAR((CameraAt(0) - PoseAt(1).Center()).norm(), 0, 1e-5);
+  const uint32_t apart = scene_.arrangement();
+  Say();
+  EXPECT_EQ(scene_.arrangement(), apart) << "nothing has moved";
+  // The first one's map is joined to the other one's, so it is its keyframes that move.
+  const Rigid3d T_other_first(ExpSo3({0, 0.5, 0}), {0.3, 0.2, 0.1});
+  for (int i = 0; i < 3; ++i) {
+    const Keyframe& keyframe = map_.At(Kf(i));
+    map_.SetPose(keyframe, keyframe.T_cam_world * T_other_first.Inverse());
+    map_.SetMapId(keyframe, kOtherMap);
+  }
+  core_.OnMapDelta(map_.TakeDelta(MapEvent::kCorrected, Kf(2), kOtherMap));
+  EXPECT_TRUE(core_.moves()) << "no place fits what is drawn until it is drawn anew";
+  core_.Draw(&scene_);
+  EXPECT_FALSE(core_.moves());
+  EXPECT_NE(scene_.arrangement(), apart);
+  EXPECT_EQ(core_.shown_map(), kOtherMap);
+  EXPECT_NEAR((CameraAt(0) - T_other_first * PoseAt(1).Center()).norm(), 0, 1e-5)
+      << "its frontend has not said anything yet";
+  EXPECT_NEAR((CameraAt(1) - PoseAt(1).Center()).norm(), 0, 1e-5);
+  const auto now = core_.WhereIs(0);
+  ASSERT_TRUE(now);
+  EXPECT_NEAR((now->T_world_cam.translation - CameraAt(0)).norm(), 0, 1e-5);
+  SayFrameOf(0, 12, kMapId, Kf(1));
+  EXPECT_NEAR((core_.WhereIs(0)->T_world_cam.translation - CameraAt(0)).norm(), 0, 1e-5)
+      << "nor does it matter which map it takes it for";
+}
+
+TEST_F(ViewerCoreTest, ACorrectionMovesCamerasWithTheMap) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  SayFrame(11, 1);
+  Say();
+  const uint32_t before = scene_.arrangement();
+  const Eigen::Vector3d shift(0.5, 0, 0);
+  const Keyframe& keyframe = map_.At(Kf(1));
+  map_.SetPose(keyframe, keyframe.T_cam_world * Rigid3d(Eigen::Quaterniond::Identity(), -shift));
+  Say(MapEvent::kCorrected);
+  EXPECT_NE(scene_.arrangement(), before);
+  EXPECT_NEAR((CameraAt(0) - PoseAt(1).Center() - shift).norm(), 0, 1e-5);
+}
+
+TEST_F(ViewerCoreTest, ALostCameraIsNowhereAndWhatIsToldLaterDoesNotBringItBack) {
+  for (int i = 0; i < 3; ++i) AddKeyframe(i);
+  SayFrame(11, 1);
+  Say();
+  EXPECT_TRUE(core_.WhereIs(0));
+  FramePose frame;
+  frame.frame_index = 12;
+  frame.state = TrackingState::kWaitingForMap;
+  core_.OnFramePose(frame);
+  EXPECT_TRUE(core_.WhereIs(0)) << "that says nothing of where it is";
+  frame.frame_index = 13;
+  frame.state = TrackingState::kLost;
+  core_.OnFramePose(frame);
+  EXPECT_FALSE(core_.WhereIs(0));
+  frame.state = TrackingState::kLocalizedLater;
+  frame.reference = Kf(1);
+  core_.OnFramePose(frame);
+  SayFrame(11, 2);
+  EXPECT_FALSE(core_.WhereIs(0));
+  core_.Draw(&scene_);
+  EXPECT_TRUE(scene_.cameras().empty());
+  SayFrame(14, 2);
+  core_.Draw(&scene_);
+  EXPECT_NEAR((CameraAt(0) - PoseAt(2).Center()).norm(), 0, 1e-5);
 }
 
 TEST_F(ViewerCoreTest, TheMapThatWasShownStaysWhereItIsWhileACameraIsInIt) {

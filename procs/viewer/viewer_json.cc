@@ -230,9 +230,10 @@ std::string ToJson(const StatusView& view) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn) {
+std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn, uint32_t arrangement) {
   Json json{{"frame", view.frame_index},
             {"camera", view.camera_id},
+            {"arrangement", arrangement},
             {"t", static_cast<double>(view.stamp_ns) * 1e-9},
             {"state", static_cast<int>(OnTheWire(view.state))},
             {"word", StateWord(view.state)},

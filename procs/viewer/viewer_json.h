@@ -57,7 +57,8 @@ std::string Describe(const JoinedMaps& joined);
 
 std::string ToJson(const StatusView& view);
 /// `drawn`: the pose where its map is drawn; none: it has none, or it is not known where that is.
-std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn);
+/// `arrangement`: the scene's, among which that place is.
+std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn, uint32_t arrangement);
 /// Features that were matched: "data" is base64 of five bytes each, u and v [px * 16] as little-endian 16 bit
 /// words, kind.
 std::string FeaturesJson(const FeatureView& view, int width_px, int height_px);

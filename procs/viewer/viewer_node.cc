@@ -14,6 +14,7 @@ namespace {
 constexpr int64_t kDrawEveryNs = 120'000'000;
 constexpr int64_t kReportEveryNs = 250'000'000;
 constexpr int64_t kAlignEveryNs = 1'000'000'000;
+constexpr int64_t kPlaceHoldsNs = 500'000'000;  // where a stream comes late, what is said beside it counts
 
 std::vector<std::string> Shown(CameraId num_cameras) {
   std::vector<std::string> names;
@@ -112,7 +113,7 @@ void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> by
         frame && !IsForeignFrame(frame->session) && FindCamera(frame->camera_id) != nullptr)
       exchange_->AddImage(std::move(*frame));
   } else if (channel == channels::kPoseView) {
-    if (const auto view = Read<PoseView>(bytes); view && !IsForeign(view->session)) ShowPose(*view);
+    if (const auto view = Read<PoseView>(bytes); view && !IsForeign(view->session)) NotePose(*view);
   } else if (channel == channels::kFeatureView) {
     if (const auto view = Read<FeatureView>(bytes); view && !IsForeign(view->session)) ShowFeatures(*view);
   } else if (channel == channels::kGroundTruthPose) {
@@ -187,7 +188,7 @@ bool ViewerNode::TakeMapRecord() {
   core_->OnMapDelta(*delta);
   for (const JoinedMaps& joined : core_->TakeJoined()) {
     Note(BoardEvent::Level::kGood, Describe(joined));
-    next_align_ns_ = 0;  // what the ground truth was laid on has moved
+    next_align_ns_ = next_report_ns_ = 0;  // what the ground truth was laid on has moved
   }
   NoteMapEvent(*delta);
   map_reader_->AcceptTaken();
@@ -258,6 +259,7 @@ bool ViewerNode::TakeLoopRecord() {
 bool ViewerNode::WorkOnce() {
   const bool any = TakeMapRecord() || TakeFrontendRecord() || TakeLoopRecord();
   DrawIfDue();
+  if (!any) ShowPoses();
   ReportIfDue();
   return any;
 }
@@ -269,7 +271,7 @@ int64_t ViewerNode::WorkDeadline() const {
 
 void ViewerNode::DrawIfDue() {
   const int64_t now = context_.now_ns();
-  if (in_haste_ || !core_->dirty() || now < next_draw_ns_) return;
+  if (in_haste_ || !core_->dirty() || (now < next_draw_ns_ && !core_->moves())) return;
   next_draw_ns_ = now + kDrawEveryNs;
   uint64_t version = 0;
   uint32_t generation = 0;
@@ -277,6 +279,7 @@ void ViewerNode::DrawIfDue() {
     core_->Draw(scene);
     version = scene->version();
     generation = scene->generation();
+    arrangement_ = scene->arrangement();
   });
   exchange_->hub().Send(EventKind::kMap, "{\"generation\":" + std::to_string(generation) +
                                              ",\"version\":" + std::to_string(version) + "}");
@@ -286,15 +289,32 @@ void ViewerNode::DrawIfDue() {
   up_ = core_->Up(alignment_);
 }
 
-void ViewerNode::ShowPose(const PoseView& view) {
+void ViewerNode::NotePose(const PoseView& view) {
   CameraState* camera = FindCamera(view.camera_id);
   if (camera == nullptr) return;
   exchange_->Change([&](ViewerScene*, CameraSeries* series) { series->Add(view); });
   camera->map_id = view.map_id;
-  const auto drawn = view.has_pose ? core_->Drawn(view.T_world_cam, view.map_id) : std::nullopt;
   if (in_haste_) passed_over_[{channels::kPoseView, view.camera_id}] = wire::Encode(view);
-  if (!in_haste_) exchange_->hub().Send(EventKind::kPose, PoseJson(view, drawn), view.camera_id);
+  if (!in_haste_) camera->to_show = view;
   NoteState(view);
+}
+
+/// Once all that has come is in the map and drawn: a pose and the map that it is in change together.
+void ViewerNode::ShowPoses() {
+  for (CameraState& camera : seen_cameras_) {
+    const std::optional<PoseView> view = std::exchange(camera.to_show, std::nullopt);
+    if (view)
+      exchange_->hub().Send(EventKind::kPose, PoseJson(*view, PlaceOf(*view), arrangement_), view->camera_id);
+  }
+}
+
+/// By the frontend's stream, whose poses are told from keyframes. Where that comes late, or there is none, by
+/// what the frontend took for the map then.
+std::optional<Rigid3d> ViewerNode::PlaceOf(const PoseView& view) const {
+  if (!view.has_pose) return std::nullopt;
+  const std::optional<CameraPlace> place = core_->WhereIs(view.camera_id);
+  if (place && view.stamp_ns - place->stamp_ns <= kPlaceHoldsNs) return place->T_world_cam;
+  return core_->Drawn(view.T_world_cam, view.map_id);
 }
 
 void ViewerNode::NoteState(const PoseView& view) {

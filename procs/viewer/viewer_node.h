@@ -45,7 +45,8 @@ class ViewerNode : public StreamNode {
     std::unique_ptr<StreamReader> reader;  ///< of its frontend's stream
     FrontendStatus frontend;
     std::optional<TrackingState> shown_state;
-    std::optional<MapId> map_id;  ///< of its newest frame
+    std::optional<PoseView> to_show;  ///< of its newest frame; none: it is shown
+    std::optional<MapId> map_id;      ///< of its newest frame
     bool ended = false;
   };
 
@@ -66,7 +67,9 @@ class ViewerNode : public StreamNode {
   CameraState* FindCamera(CameraId camera);
   bool TakeLoopRecord();
   void NoteMapEvent(const MapDelta& delta);
-  void ShowPose(const PoseView& view);
+  void NotePose(const PoseView& view);
+  void ShowPoses();
+  std::optional<Rigid3d> PlaceOf(const PoseView& view) const;
   void ShowFeatures(const FeatureView& view);
   void DrawIfDue();
   void ReportIfDue();
@@ -89,7 +92,8 @@ class ViewerNode : public StreamNode {
   bool in_haste_ = false;
   /// By channel and camera.
   std::map<std::pair<std::string, CameraId>, Bytes>
-      passed_over_;  ///< in haste: the newest of what is shown at its end
+      passed_over_;           ///< in haste: the newest of what is shown at its end
+  uint32_t arrangement_ = 0;  ///< the scene's, as of the last Draw
   int64_t loops_ = 0;
   int64_t map_records_ = 0;
   int64_t next_draw_ns_ = 0;

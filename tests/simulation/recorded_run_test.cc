@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "in_process.h"
 #include "small_workload.h"
@@ -31,12 +33,35 @@ std::string RecordSmallRun(const fs::path& folder) {
   return options.record;
 }
 
-/// A number of the bytes that a browser gets, see ViewerScene::Encode.
-uint32_t WordAt(const Exchange& exchange, size_t index) {
-  const std::vector<uint8_t> bytes = exchange.EncodeScene(0, 0);
-  uint32_t word = 0;
-  std::memcpy(&word, &bytes.at(4 * index), sizeof(word));
-  return word;
+/// What a browser gets of all that is drawn, see ViewerScene::Encode.
+class Drawn {
+ public:
+  explicit Drawn(const Exchange& exchange) : bytes_(exchange.EncodeScene(0, 0)) {}
+  template <typename Word = uint32_t>
+  Word At(size_t index) const {
+    Word word{};
+    std::memcpy(&word, &bytes_.at(4 * index), sizeof(word));
+    return word;
+  }
+  uint32_t landmarks() const { return At(5); }
+  uint32_t keyframes() const { return At(6); }
+  uint32_t frames() const { return At(8); }
+  size_t CamerasAt() const {
+    return 10 + 9 * landmarks() + 12 * keyframes() + 2 * At(7) + 7 * frames() + 5 * At(9);
+  }
+
+ private:
+  std::vector<uint8_t> bytes_;
+};
+
+/// The newest pose that browsers are told of.
+nlohmann::json NewestPose(Exchange* exchange) {
+  const std::string said = exchange->hub().Join()->Next(std::chrono::milliseconds(0));
+  const std::string head = "event: pose\ndata: ";
+  const size_t at = said.find(head);
+  if (at == std::string::npos) return {};
+  return nlohmann::json::parse(
+      said.substr(at + head.size(), said.find('\n', at + head.size()) - at - head.size()));
 }
 
 TEST(RecordedRunTest, TheViewerShowsTheMapOfARunInOneProcess) {
@@ -45,9 +70,21 @@ TEST(RecordedRunTest, TheViewerShowsTheMapOfARunInOneProcess) {
   Exchange exchange;
   LogPlayback playback(log, {}, {}, &exchange);
   playback.Fulfil({playback.duration_s(), false, std::nullopt}, 1);
-  EXPECT_GE(WordAt(exchange, 5), 100u) << "landmarks";
-  EXPECT_GE(WordAt(exchange, 6), 3u) << "keyframes";
-  EXPECT_GE(WordAt(exchange, 8), 20u) << "frames on the path";
+  const Drawn drawn(exchange);
+  EXPECT_GE(drawn.landmarks(), 100u);
+  EXPECT_GE(drawn.keyframes(), 3u);
+  EXPECT_GE(drawn.frames(), 20u);
+  ASSERT_EQ(drawn.At(drawn.CamerasAt() + 1), 1u) << "one camera";
+  // Back in haste, where map and camera are shown but once: it is told of among what is drawn, where that has
+  // it.
+  playback.Fulfil({0.6 * playback.duration_s(), std::nullopt, std::nullopt}, 2);
+  const Drawn before(exchange);
+  const size_t at = before.CamerasAt();
+  ASSERT_EQ(before.At(at + 1), 1u);
+  const nlohmann::json pose = NewestPose(&exchange);
+  ASSERT_TRUE(pose.contains("p")) << pose.dump();
+  EXPECT_EQ(pose["arrangement"], before.At(at));
+  for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(pose["p"][i].get<float>(), before.At<float>(at + 3 + i), 1e-6);
   fs::remove_all(folder);
 }
 

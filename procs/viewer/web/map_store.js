@@ -1,4 +1,4 @@
-// A mirror of the viewer's tables of what is drawn: landmarks in tiles, keyframes, path and ground truth.
+// A mirror of the viewer's tables of what is drawn: landmarks in tiles, keyframes, path, ground truth and cameras.
 
 const kTileSlots = 2048;
 const kMagic = 0x56534d44;
@@ -70,6 +70,8 @@ class Tile {
 export class MapStore {
   constructor() {
     this.generation = 0;
+    this.arrangement = 0;  // places of another one do not go together with these
+    this.cameras = new Map();  // by number: where it is among what is drawn, {p, q}
     this.clear();
   }
 
@@ -89,7 +91,7 @@ export class MapStore {
   apply(buffer) {
     const u32 = new Uint32Array(buffer);
     const f32 = new Float32Array(buffer);
-    if (u32[0] !== kMagic || u32[1] !== 2) throw new Error('this page and the viewer do not belong together; reload');
+    if (u32[0] !== kMagic || u32[1] !== 3) throw new Error('this page and the viewer do not belong together; reload');
     const [generation, flags, version, points, keyframes, links, path, truth] = u32.slice(2, 10);
     const anew = (flags & 1) !== 0;
     if (anew) this.clear();
@@ -99,7 +101,8 @@ export class MapStore {
     at = this.applyPoints(u32, f32, at, points);
     at = this.applyKeyframes(u32, f32, at, keyframes, links);
     at = this.applyPath(u32, f32, at, path);
-    this.applyTruth(u32, f32, at, truth);
+    at = this.applyTruth(u32, f32, at, truth);
+    this.applyCameras(u32, f32, at);
     return anew || points + keyframes + path + truth > 0;
   }
 
@@ -172,6 +175,16 @@ export class MapStore {
       this.truth.set(camera * kFramesOfCamera + u32[at + i], {camera, place: [f32[p], f32[p + 1], f32[p + 2]]});
     }
     if (n > 0) this.truthDirty = true;
+    return at + 5 * n;
+  }
+
+  applyCameras(u32, f32, at) {
+    this.arrangement = u32[at];
+    this.cameras.clear();
+    for (let i = 0; i < u32[at + 1]; ++i) {
+      const c = at + 2 + 8 * i;
+      this.cameras.set(u32[c], {p: [...f32.slice(c + 1, c + 4)], q: [...f32.slice(c + 4, c + 8)]});
+    }
   }
 
   /// Where the cameras were, one after the other, in order of frames: what is known of frames, and keyframes where nothing is

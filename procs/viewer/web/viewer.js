@@ -46,9 +46,34 @@ const wakeMap = paced(kMapEveryMs, async () => {
   if (store.generation === told.generation && store.version >= told.version) return;
   const answer = await fetch(`/api/map?generation=${store.generation}&since=${store.version}`);
   if (!answer.ok) return;
-  if (store.apply(await answer.arrayBuffer())) scene.update();
+  const before = store.arrangement;
+  const bytes = await answer.arrayBuffer();
+  if (store.apply(bytes)) scene.update();
+  if (store.arrangement !== before) moveCameras();
   seen.maps++;
 });
+
+// A camera and the map that it is in change together: a pose waits for the map that it is told in.
+const waiting = new Map();  // by camera: the newest pose whose map is not there
+
+function placeCamera(pose) {
+  // A frame that waits its turn behind the first map says nothing of where the camera is.
+  if (!pose.p && pose.word === 'waiting for map') return;
+  if (pose.arrangement !== store.arrangement) {
+    waiting.set(pose.camera, pose);
+    return;
+  }
+  waiting.delete(pose.camera);
+  scene.setPose(pose.camera, pose.p ? pose : null);
+}
+
+/// What is drawn has moved as a whole, and the cameras with it.
+function moveCameras() {
+  for (const camera of new Set([...scene.poses.keys(), ...store.cameras.keys()])) scene.setPose(camera, store.cameras.get(camera) || null);
+  for (const pose of [...waiting.values()]) {
+    if (pose.arrangement === store.arrangement) placeCamera(pose);
+  }
+}
 const wakeSeries = paced(kSeriesEveryMs, () => series.poll());
 
 let chosen = 0;  // the camera whose frame, curves and numbers are shown
@@ -127,6 +152,7 @@ function connect() {
   const on = (name, handle) => events.addEventListener(name, (event) => handle(JSON.parse(event.data)));
   events.addEventListener('open', () => {
     seen.connected = true;
+    waiting.clear();  // of a viewer that may be gone
     say('');
     wakeSeries();
   });
@@ -140,9 +166,8 @@ function connect() {
   on('features', (features) => { seen.features++; frame.onFeatures(features); });
   on('pose', (pose) => {
     seen.poses++;
-    if (pose.camera === chosen) header.onPose(pose);
-    // A frame that waits its turn behind the first map says nothing of where the camera is.
-    if (pose.p || pose.word !== 'waiting for map') scene.setPose(pose.camera, pose.p ? pose : null);
+    header.onPose(pose);
+    placeCamera(pose);
   });
 }
 
@@ -207,4 +232,4 @@ say('connecting');
 connect();
 
 /// For tests and measurements.
-window.dmslam = {store, scene, series, frame, playback, seen, setMode, setColours, setTheme, setText, toggleLayer, chooseCamera};
+window.dmslam = {store, scene, header, series, frame, placeCamera, moveCameras, playback, seen, setMode, setColours, setTheme, setText, toggleLayer, chooseCamera};
