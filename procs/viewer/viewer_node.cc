@@ -63,11 +63,11 @@ void ViewerNode::Begin(const CameraInfo& info) {
   });
   map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
   for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera) {
-    seen_cameras_[camera].reader =
-        MakeReader(StreamId::kFrontend, owners::kFrontend,
-                   {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-                    channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest},
-                   {}, camera);
+    seen_cameras_[camera].reader = MakeReader(
+        StreamId::kFrontend, owners::kFrontend,
+        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
+         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
+        {}, camera);
   }
   loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked});
 }

@@ -14,8 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A short run in one process that keeps a log of all that is said.
-std::string RecordSmallRun(const fs::path& folder) {
+/// A short run in one process that keeps a log of all that is said. All cameras see the same.
+std::string RecordSmallRun(const fs::path& folder, size_t cameras) {
   const Workload workload = MakeSmallWorkload((folder / "sequence").string());
   InProcessOptions options;
   options.node.settings = SmallSettings(1);
@@ -29,7 +29,14 @@ std::string RecordSmallRun(const fs::path& folder) {
   options.record = (folder / "run.lcmlog").string();
   fs::create_directories(options.collector.out_dir);
   std::string problem;
-  EXPECT_EQ(RunInProcess(options, std::make_unique<StoredFrames>(&workload.frames), &problem), 0) << problem;
+  std::vector<AnotherCamera> others;
+  for (size_t i = 1; i < cameras; ++i) {
+    others.push_back({options.player, std::make_unique<StoredFrames>(&workload.frames)});
+    options.collector.ground_truth.emplace_back("-");
+  }
+  EXPECT_EQ(
+      RunInProcess(options, std::make_unique<StoredFrames>(&workload.frames), &problem, std::move(others)), 0)
+      << problem;
   return options.record;
 }
 
@@ -54,10 +61,10 @@ class Drawn {
   std::vector<uint8_t> bytes_;
 };
 
-/// The newest pose that browsers are told of.
-nlohmann::json NewestPose(Exchange* exchange) {
+/// The newest of a kind that browsers are told of.
+nlohmann::json Newest(Exchange* exchange, const std::string& kind) {
   const std::string said = exchange->hub().Join()->Next(std::chrono::milliseconds(0));
-  const std::string head = "event: pose\ndata: ";
+  const std::string head = "event: " + kind + "\ndata: ";
   const size_t at = said.find(head);
   if (at == std::string::npos) return {};
   return nlohmann::json::parse(
@@ -66,7 +73,7 @@ nlohmann::json NewestPose(Exchange* exchange) {
 
 TEST(RecordedRunTest, TheViewerShowsTheMapOfARunInOneProcess) {
   const fs::path folder = fs::path(testing::TempDir()) / "recorded_run_test";
-  const std::string log = RecordSmallRun(folder);
+  const std::string log = RecordSmallRun(folder, 1);
   Exchange exchange;
   LogPlayback playback(log, {}, {}, &exchange);
   playback.Fulfil({playback.duration_s(), false, std::nullopt}, 1);
@@ -81,10 +88,26 @@ TEST(RecordedRunTest, TheViewerShowsTheMapOfARunInOneProcess) {
   const Drawn before(exchange);
   const size_t at = before.CamerasAt();
   ASSERT_EQ(before.At(at + 1), 1u);
-  const nlohmann::json pose = NewestPose(&exchange);
+  const nlohmann::json pose = Newest(&exchange, "pose");
   ASSERT_TRUE(pose.contains("p")) << pose.dump();
   EXPECT_EQ(pose["arrangement"], before.At(at));
   for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(pose["p"][i].get<float>(), before.At<float>(at + 3 + i), 1e-6);
+  fs::remove_all(folder);
+}
+
+TEST(RecordedRunTest, TheViewerLosesNothingOfARunOfTwoCameras) {
+  const fs::path folder = fs::path(testing::TempDir()) / "recorded_run_of_two_test";
+  const std::string log = RecordSmallRun(folder, 2);
+  Exchange exchange;
+  LogPlayback playback(log, {}, {}, &exchange);
+  playback.Fulfil({playback.duration_s(), false, std::nullopt}, 1);
+  const Drawn drawn(exchange);
+  EXPECT_GE(drawn.frames(), 100u) << "of twice sixty";
+  EXPECT_EQ(drawn.At(drawn.CamerasAt() + 1), 2u);
+  const nlohmann::json viewer = Newest(&exchange, "status")["processes"].back();
+  EXPECT_EQ(viewer["name"], "viewer");
+  EXPECT_EQ(viewer["lost"], 0) << "records that it does not listen to come no more";
+  EXPECT_EQ(viewer["queue"], 0);
   fs::remove_all(folder);
 }
 
