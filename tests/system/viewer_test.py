@@ -26,6 +26,54 @@ def check(condition, what):
     return condition
 
 
+# Makes of the run's cameras, maps and processes as many as there can be, with a long name and a weld, as the page hears of them.
+AMEND = """(() => {
+  const add = EventSource.prototype.addEventListener, count = 9;
+  const crowd = (status) => {
+    if (!status.sequence) return status;
+    while (status.cameras.length < count) status.cameras.push({...status.cameras[0], id: status.cameras.length});
+    status.maps = status.cameras.map((_, i) => ({id: i, name: i ? `map 1 of camera ${i}` : 'map 1', colour: i, keyframes: 3, offset: [0, 0, 0]}));
+    for (let i = 1; i < count; ++i) status.processes.push({...status.processes[0], name: `frontend${i}`}, {...status.processes[0], name: `player${i}`});
+    status.cameras[0].sequence = 'a_sequence_with_a_name_that_says_very_much_of_how_it_was_recorded';
+    status.events.push({n: 99999, at: status.now, level: 'good', text: 'map 1 of camera 3 and map 1 of camera 4 are joined'});
+    return status;
+  };
+  EventSource.prototype.addEventListener = function (name, handle) {
+    return add.call(this, name, name === 'status' ? (event) => handle({data: JSON.stringify(crowd(JSON.parse(event.data)))}) : handle);
+  };
+})()"""
+
+# What of the page's labels nobody can read: outside the window or of what holds it (unless that can be scrolled), shortened, or under
+# another label.
+CUT_OFF = """(() => {
+  const cut = [], shown = (e) => e.getClientRects().length > 0 && e.getBoundingClientRect().width > 0;
+  const name = (e) => `${e.id || e.className || e.tagName} (${e.textContent.trim().slice(0, 30)})`;
+  const beyond = (r, b, style) => (r.right > b.right + 1 || r.left < b.left - 1) && !/auto|scroll/.test(style.overflowX) ||
+      (r.bottom > b.bottom + 1 || r.top < b.top - 1) && !/auto|scroll/.test(style.overflowY);
+  for (const e of document.querySelectorAll('header *, .bar *, .legend span, .kinds li, h2, h2 *, th, td, #events span, footer *, .hint')) {
+    if (!shown(e) || e.tagName === 'OPTION') continue;
+    const r = e.getBoundingClientRect(), style = getComputedStyle(e);
+    if (style.overflowX === 'hidden' && e.scrollWidth > e.clientWidth + 1) cut.push(`${name(e)} is shortened`);
+    if (e.scrollWidth > e.clientWidth + 1 && style.display !== 'inline' && style.overflowX === 'visible') cut.push(`${name(e)} runs over`);
+    let scrolls = false;
+    for (let box = e.parentElement; box && box !== document.body; box = box.parentElement) {
+      const s = getComputedStyle(box);
+      if (s.overflowX === 'visible' && s.overflowY === 'visible') continue;
+      if (!scrolls && beyond(r, box.getBoundingClientRect(), s)) cut.push(`${name(e)} is cut off by ${name(box)}`);
+      scrolls = scrolls || /auto|scroll/.test(s.overflowX + s.overflowY);
+    }
+    if (!scrolls && (r.left < -0.5 || r.right > innerWidth + 0.5)) cut.push(`${name(e)} is outside`);
+  }
+  for (const e of document.querySelectorAll('.scroll, aside, #events')) if (e.scrollWidth > e.clientWidth + 1) cut.push(`${name(e)} is too wide`);
+  const boxes = [...document.querySelectorAll('.bar .group, .legend, #drawn, #weld')].filter((e) => shown(e) && e.textContent.trim());
+  boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => {
+    const r = a.getBoundingClientRect(), q = b.getBoundingClientRect();
+    if (r.left < q.right - 1 && q.left < r.right - 1 && r.top < q.bottom - 1 && q.top < r.bottom - 1) cut.push(`${name(a)} and ${name(b)} overlap`);
+  }));
+  return cut;
+})()"""
+
+
 class System:
     """The processes of a run, started one by one."""
 
@@ -213,6 +261,61 @@ def show_log(options, system, log):
         check(page.wait(f"dmslam.playback.state.speed === 4 && dmslam.playback.state.position > {held + 1}", 40), "it plays on, faster")
         errors = page.errors()
         check(not errors, f"no error on the console with a log: {errors}")
+    check_labels(options, address)
+
+
+def show_whole_log(options, system):
+    """The recording of a run in one process, from its beginning to its end."""
+    system.start("whole_viewer", "--http", "127.0.0.1:0", "--log", options.whole_log, role="viewer")
+    with Browser() as page:
+        page.open(system.address("whole_viewer") + "?theme=dark")
+        check(page.wait("dmslam.store.numPoints > 150 && dmslam.store.numKeyframes >= 3", 40),
+              f"its map is shown: {page.eval('dmslam.store.numPoints')} landmarks")
+        check_end(page)
+        page.screenshot(os.path.join(options.pictures, "finished.png"))
+        check_together(page)
+        errors = page.errors()
+        check(not errors, f"no error on the console with a whole log: {errors}")
+
+
+def check_end(page):
+    """Once the sequence is over, nobody is told that the camera is lost, or tracked."""
+    pill = "document.getElementById('state').textContent"
+    check(page.wait(f"{pill} === 'finished'", 40), f"at its end the run is finished: {page.eval(pill)}")
+    page.eval("dmslam.header.onPose({camera: 0, frame: 7, state: 5, word: 'lost'})")
+    shown = page.eval(f"{pill} + ' ' + document.getElementById('state').dataset.state")
+    check(shown == "finished done", f"however its last frame was tracked: {shown}")
+
+
+def check_together(page):
+    """A pose that is told among maps which the page does not have yet waits for them."""
+    pose = "{camera: 0, arrangement: dmslam.store.arrangement + %d, p: [%d, 0, 0], q: [0, 0, 0, 1], word: 'tracking'}"
+    at = "(dmslam.scene.poses.get(0) || {p: ['nowhere']}).p[0]"
+    page.eval(f"dmslam.placeCamera({pose % (0, 5)})")
+    check(page.eval(at) == 5, "a pose among the maps that are drawn is drawn")
+    page.eval(f"dmslam.placeCamera({pose % (1, 77)})")
+    check(page.eval(at) == 5, "one among maps that are not there yet is not")
+    page.eval("dmslam.moveCameras()")
+    check(page.eval(at) not in (5, 77), f"with the maps the cameras are where those have them: {page.eval(at)}")
+
+
+def check_labels(options, address):
+    with Browser() as page:
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=AMEND)
+        page.open(address + "?theme=dark")
+        page.wait("document.querySelectorAll('#legend span').length > 18 && dmslam.store.numPoints > 150", 20)
+        page.eval("document.getElementById('weld').textContent = 'map 1 of camera 3 and map 1 of camera 4 are joined'")
+        for width, height, text in ((1440, 900, "normal"), (1440, 900, "large"), (1280, 720, "normal"), (1000, 700, "normal"),
+                                    (760, 900, "normal"), (400, 800, "normal")):
+            page.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+            page.eval(f"dmslam.setText('{text}')")
+            time.sleep(0.5)
+            page.eval("document.getElementById('weld').hidden = false")
+            page.screenshot(os.path.join(options.pictures, f"labels_{width}_{text}.png"))
+            cut = page.eval(CUT_OFF)
+            check(not cut, f"nothing is cut off at {width}x{height}, {text} text: {cut}")
+            view = page.eval("document.querySelector('.view').clientHeight")
+            check(view >= 150, f"and there is room for the map: {view} px")
 
 
 def show_cameras(options, system):
@@ -251,7 +354,7 @@ def show_cameras(options, system):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("bin", "logs", "pictures", "sequence", "camera"):
+    for name in ("bin", "logs", "pictures", "sequence", "camera", "whole-log"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--speed", default="0.35")
     parser.add_argument("--frames", default="600")
@@ -264,10 +367,12 @@ def main():
         system.stop()
         show_log(options, system, log)
         system.stop()
+        show_whole_log(options, system)
+        system.stop()
         show_cameras(options, system)
     finally:
         system.stop()
-    for name in ("viewer", "late_viewer", "log_viewer", "two_viewer"):
+    for name in ("viewer", "late_viewer", "log_viewer", "whole_viewer", "two_viewer"):
         check(system.processes[name].returncode == 0, f"{name} ends with {system.processes[name].returncode}")
     return 1 if FAILURES else 0
 

@@ -15,8 +15,11 @@ else
   echo "$data/kitchen_walk1 is not there: the rendered sequence instead"
   sequence=$synthetic camera=$root/config/synthetic.yaml
 fi
+[[ -x $build/bin/dmslam-inprocess ]] || skip "dmslam-inprocess was not built"
+check "a run in one process is recorded" "$build/bin/dmslam-inprocess" --sequence "$sequence" --camera "$camera" \
+  --frames 90 --session 7 --out "$work/whole" --record "$work/whole.lcmlog" >"$work/whole.txt" 2>&1
 check "the page shows the run" /usr/bin/python3 "$(dirname "$0")/viewer_test.py" --bin "$build/bin" --logs "$work" \
-  --pictures "$pictures" --sequence "$sequence" --camera "$camera"
+  --pictures "$pictures" --sequence "$sequence" --camera "$camera" --whole-log "$work/whole.lcmlog"
 check "a screenshot is there" test -s "$pictures/run_dark.png"
 
 # What users get wrong.

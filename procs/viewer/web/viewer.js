@@ -145,6 +145,7 @@ function showLegend(status) {
   if (byId('legend').dataset.html === html) return;
   byId('legend').dataset.html = html;
   byId('legend').innerHTML = html;
+  byId('legend').toggleAttribute('data-many', byId('legend').children.length > 14);
 }
 
 function connect() {
