@@ -10,16 +10,6 @@ namespace {
 constexpr int kOtherObservers = 3;     // that make an observation redundant
 constexpr int kMostNeighbours = 1000;  // that are looked at
 
-bool FailsProbation(const Map& map, const Landmark& landmark, const InsertionOrder& order,
-                    const MapperOptions& options) {
-  const int age = order.CountSince(map, landmark.first_keyframe, options.probation_keyframes);
-  if (age >= options.probation_keyframes) return false;
-  const LandmarkEvidence& evidence = landmark.evidence;
-  if (evidence.visible > 0 && evidence.found < options.min_found_ratio * evidence.visible) return true;
-  return age >= options.probation_keyframes - 1 &&
-         static_cast<int>(landmark.observations.size()) < options.probation_min_observations;
-}
-
 /// Whether enough other keyframes see the landmark at the same or a finer scale.
 bool SeenByOthers(const Map& map, const Landmark& landmark, KeyframeId self, int octave) {
   int others = 0;
@@ -42,7 +32,23 @@ bool IsRedundant(const Map& map, const Keyframe& keyframe, double share) {
   return redundant > share * total;
 }
 
+bool LiesNearer(const Keyframe& keyframe, const Landmark& landmark, double depth) {
+  return (keyframe.T_cam_world * landmark.p_world).z() < depth;
+}
+
 }  // namespace
+
+std::optional<ProbationFault> FaultOnProbation(const Map& map, const Landmark& landmark,
+                                               const InsertionOrder& order, const MapperOptions& options) {
+  const int age = order.CountSince(map, landmark.first_keyframe, options.probation_keyframes);
+  if (age >= options.probation_keyframes) return std::nullopt;
+  const LandmarkEvidence& evidence = landmark.evidence;
+  if (evidence.visible > 0 && evidence.found < options.min_found_ratio * evidence.visible)
+    return ProbationFault::kRarelyFound;
+  const bool few = static_cast<int>(landmark.observations.size()) < options.probation_min_observations;
+  if (age >= options.probation_keyframes - 1 && few) return ProbationFault::kFewObservers;
+  return std::nullopt;
+}
 
 void RemoveWithLonelyLandmarks(MapEditor& map, const Keyframe& keyframe) {
   const std::vector<LandmarkId> seen = keyframe.landmarks;
@@ -60,7 +66,7 @@ int CullYoungLandmarks(MapEditor& map, MapId map_id, const InsertionOrder& order
   int culled = 0;
   for (const LandmarkId id : LandmarksSeenBy(map, newest)) {
     const Landmark& landmark = map.At(id);
-    if (!FailsProbation(map, landmark, order, options)) continue;
+    if (!FaultOnProbation(map, landmark, order, options)) continue;
     map.RemoveLandmark(landmark);
     ++culled;
   }
@@ -79,6 +85,14 @@ int CullRedundantKeyframes(MapEditor& map, const Keyframe& keyframe, std::option
   return culled;
 }
 
+bool IsTooNear(const Map& map, const Landmark& landmark, double share) {
+  return share > 0 && std::ranges::any_of(landmark.observations, [&](const Observation& o) {
+           const Keyframe& keyframe = map.At(o.keyframe);
+           const std::optional<double> depth = map.MedianDepth(keyframe);
+           return depth && LiesNearer(keyframe, landmark, share * *depth);
+         });
+}
+
 int RemoveTooNear(MapEditor& map, MapId map_id, double share) {
   if (share <= 0) return 0;
   std::vector<const Landmark*> near;
@@ -87,9 +101,7 @@ int RemoveTooNear(MapEditor& map, MapId map_id, double share) {
     if (!depth) continue;
     for (size_t i = 0; i < keyframe->landmarks.size(); ++i) {
       const Landmark* landmark = map.LandmarkSeenBy(*keyframe, i);
-      if (landmark == nullptr) continue;
-      const double z = (keyframe->T_cam_world * landmark->p_world).z();
-      if (z < share * *depth) near.push_back(landmark);
+      if (landmark != nullptr && LiesNearer(*keyframe, *landmark, share * *depth)) near.push_back(landmark);
     }
   }
   std::ranges::sort(near, {}, &Landmark::id);

@@ -130,38 +130,52 @@ SessionStart MadeWith(const std::string& path) {
   return MadeWith(log, log.Session());
 }
 
-RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us,
-                      std::shared_ptr<FeatureStore> features) {
-  const SessionStart start = MadeWith(log, session);
+ChangesRead ForEachChange(const LogIndex& log, const RecordedSession& session, int64_t until_us,
+                          const ChangeReader& reader) {
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
   if (replay.steps.empty()) {
     throw InputError(log.path() + ": holds no map record of session " + std::to_string(session.id) +
                      (until_us == INT64_MAX ? "; was the mapper recorded too?" : " up to that time"));
   }
-  RebuiltMap rebuilt{Replica(start.camera, start.pyramid), start};
-  rebuilt.map.KeepFeaturesIn(std::move(features));
-  rebuilt.missing = replay.missing;
+  ChangesRead read{0, replay.missing};
   wire::RecordGroups<MapDelta> groups;
+  Term writer = replay.steps.front().term;
   for (const ReplayStep& step : replay.steps) {
     if (step.begins_anew) {
-      rebuilt.map.Clear();
+      if (reader.begins_anew) reader.begins_anew();
       groups.Clear();
     }
+    if (std::exchange(writer, step.term) != step.term && reader.new_writer) reader.new_writer();
     std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
     if (delta) {
-      ++rebuilt.records;
+      ++read.records;
       delta = groups.Add(std::move(*delta), step.term);
-      if (!groups.fault().empty() || !groups.abandoned().empty()) ++rebuilt.missing;
+      if (!groups.fault().empty() || !groups.abandoned().empty()) ++read.missing;
     } else {
-      ++rebuilt.missing;
+      ++read.missing;
     }
-    if (!delta) continue;
-    rebuilt.map.Apply(*delta);
-    rebuilt.ended = delta->event == MapEvent::kEnded;
+    if (delta) reader.change(*delta);
   }
-  if (groups.open()) ++rebuilt.missing;
-  if (session.IsSavedMap() && rebuilt.missing > 0)
-    RefuseDamaged(log, std::to_string(rebuilt.missing) + " records of the saved map cannot be decoded");
+  if (groups.open()) ++read.missing;
+  if (session.IsSavedMap() && read.missing > 0)
+    RefuseDamaged(log, std::to_string(read.missing) + " records of the saved map cannot be decoded");
+  return read;
+}
+
+RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64_t until_us,
+                      std::shared_ptr<FeatureStore> features) {
+  const SessionStart start = MadeWith(log, session);
+  RebuiltMap rebuilt{Replica(start.camera, start.pyramid), start};
+  rebuilt.map.KeepFeaturesIn(std::move(features));
+  ChangeReader reader;
+  reader.begins_anew = [&] { rebuilt.map.Clear(); };
+  reader.change = [&](const MapDelta& delta) {
+    rebuilt.map.Apply(delta);
+    rebuilt.ended = delta.event == MapEvent::kEnded;
+  };
+  const ChangesRead read = ForEachChange(log, session, until_us, reader);
+  rebuilt.records = read.records;
+  rebuilt.missing = read.missing;
   rebuilt.skipped = rebuilt.map.skipped_references();
   return rebuilt;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,22 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
 /// of the session, and for a saved map of which anything is missing, damaged, or of another version.
 SessionStart MadeWith(const LogIndex& log, const RecordedSession& session);
 SessionStart MadeWith(const std::string& path);
+
+/// Who goes through the recorded changes of a map. What is empty is not called.
+struct ChangeReader {
+  std::function<void()> begins_anew;            ///< what was told before is void
+  std::function<void()> new_writer;             ///< what follows was written by another mapper than so far
+  std::function<void(const MapDelta&)> change;  ///< a whole one, however many records it took
+};
+struct ChangesRead {
+  int64_t records = 0;  ///< that could be read
+  int64_t missing = 0;  ///< that the log lacks, or that cannot be applied
+};
+
+/// Hands out the changes of a session's map in order, up to `until_us` of wall time. Throws InputError where
+/// there are none, and for a saved map of which any cannot be read.
+ChangesRead ForEachChange(const LogIndex& log, const RecordedSession& session, int64_t until_us,
+                          const ChangeReader& reader);
 
 /// Builds the map of a session from its recorded map records, up to `until_us` of wall time. With all records
 /// in the log it is the mapper's own map at that time. Throws InputError as MadeWith does. `features`:
