@@ -22,6 +22,7 @@
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
+#include "landmark_command.h"
 #include "map_commands.h"
 #include "purity.h"
 
@@ -35,10 +36,11 @@ struct Arguments {
   bool channels = false;
 };
 
-/// list, merge, diff and split: what is done to whole files.
+/// list, merge, diff, split and landmark: what is done to whole files.
 struct CommandArguments {
   std::string file, other, prefix, key;
   dmslam::MergeArguments merge;
+  dmslam::LandmarkArguments landmark;
 };
 
 void Declare(dmslam::CommandLine& app, Arguments& a) {
@@ -92,12 +94,32 @@ void DeclareMerge(dmslam::CommandLine& app, CommandArguments& a, Command& chosen
   line.AddOption("--set", m.overrides, "one setting: key=value; may be repeated");
 }
 
+void DeclareLandmark(dmslam::CommandLine& app, CommandArguments& a, Command& chosen) {
+  dmslam::LandmarkArguments& l = a.landmark;
+  dmslam::CommandLine& line = AddCommand(
+      app, "landmark",
+      "Says of a landmark which keyframes see it, which decision made it or took it, and which run "
+      "and seed that was",
+      a, chosen, [&l](const auto& key) { return dmslam::TellLandmark(l, key); });
+  line.AddOption("FILE", l.source.path,
+                 "log of a run, which tells all; or a saved map, which tells what it is")
+      .Required();
+  line.AddOption("ID", l.id, "ORDINAL:NUMBER, such as 1:217, or the one number that messages carry");
+  line.AddFlag("--all", l.all, "instead of ID: all landmarks, into --json");
+  line.AddOption("--json", l.json, "write it into this file, for programs");
+  line.AddOption("--at", l.source.at_s, "seconds after the log's beginning: as it was then").NonNegative();
+  line.AddOption("--log-session", l.source.session, "which of the log's sessions, where it holds several");
+  line.AddOption("--config", l.source.config, "the settings of the run (YAML), where it had some of its own");
+  line.AddOption("--set", l.source.overrides, "one of them: key=value; may be repeated");
+}
+
 void DeclareCommands(dmslam::CommandLine& app, CommandArguments& a, Command& chosen) {
   AddCommand(app, "list", "Says which maps are in a file", a, chosen,
              [&a](const auto& key) { return dmslam::ListMaps(a.file, key); })
       .AddOption("FILE", a.file, "saved map or log of a run")
       .Required();
   DeclareMerge(app, a, chosen);
+  DeclareLandmark(app, a, chosen);
   dmslam::CommandLine& diff =
       AddCommand(app, "diff", "Says what two maps have apart. 0: nothing, 1: something, 2: a file is no map",
                  a, chosen, [&a](const auto& key) { return dmslam::DiffMaps(a.file, a.other, key); });
@@ -209,7 +231,7 @@ void Judge(const Arguments& a, const dmslam::Map& map, std::optional<dmslam::Map
 
 int Run(const Arguments& a) {
   if (a.log.empty())
-    throw dmslam::InputError("give --log FILE, or one of list, merge, diff and split (see --help)");
+    throw dmslam::InputError("give --log FILE, or one of list, merge, diff, split and landmark (see --help)");
   const std::optional<dmslam::BusKey> key = dmslam::BusKey::LoadIfWanted(a.key);
   if (a.channels) return ListChannels(a.log, key);
   const dmslam::LogIndex log(a.log, key);
@@ -251,7 +273,9 @@ int Run(const Arguments& a) {
 
 int main(int argc, char** argv) {
   dmslam::CommandLine app(
-      "Rebuilds the map of a run from its log, and writes it out; joins, compares and lists saved maps.",
+      "Rebuilds the map of a run from its log, and writes it out; joins, compares and lists saved maps; "
+      "proves "
+      "their landmarks.",
       "dmslam-map");
   Arguments arguments;
   CommandArguments command_arguments;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdarg>
 #include <cstdio>
 #include <iterator>
 #include <map>
@@ -18,27 +17,10 @@
 #include "dmslam/settings/settings.h"
 #include "dmslam/slam/map_merge.h"
 #include "dmslam/util/check.h"
+#include "text.h"
 
 namespace dmslam {
 namespace {
-
-[[gnu::format(printf, 1, 2)]] std::string Text(const char* format, ...) {
-  char text[400];
-  va_list values;
-  va_start(values, format);
-  std::vsnprintf(text, sizeof(text), format, values);
-  va_end(values);
-  return text;
-}
-
-template <typename Numbers>
-std::string Listed(const Numbers& numbers) {
-  std::string text;
-  for (const auto number : numbers) text += (text.empty() ? "" : ", ") + std::to_string(number);
-  return text;
-}
-
-std::string Hex(uint64_t checksum) { return Text("%016llx", static_cast<unsigned long long>(checksum)); }
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 

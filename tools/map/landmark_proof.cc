@@ -1,0 +1,197 @@
+#include "landmark_proof.h"
+
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include "dmslam/console/log.h"
+#include "dmslam/map/map_states.h"
+#include "dmslam/messaging/camera_channels.h"
+#include "dmslam/settings/settings.h"
+#include "dmslam/wire/codec.h"
+
+namespace dmslam {
+namespace {
+
+/// The settings of a run as far as they can be known, and whether they are its own.
+struct RunSettings {
+  MapperOptions mapper;
+  bool known = false;
+};
+
+/// Its profile and seed are told; whether all else is as it is given here, its hash tells.
+RunSettings SettingsOf(const SessionStart& run, const ProofSource& source) {
+  std::vector<std::string> overrides = {"seed=" + std::to_string(run.seed)};
+  if (!run.profile.empty()) overrides.push_back("profile=" + run.profile);
+  overrides.insert(overrides.end(), source.overrides.begin(), source.overrides.end());
+  const Settings settings = LoadSettings(source.config, overrides);
+  return {settings.Read<MapperOptions>(), settings.Hash() == run.configuration_hash};
+}
+
+/// When the newest of the frames was taken of which a record of evidence tells; none: it is not in the log.
+std::optional<int64_t> StampOfEvidence(const LogIndex& log, const RecordedSession& session,
+                                       const MapProgress& progress) {
+  const RecordedStream& stream = session.Stream(StreamOfCamera(StreamId::kFrontend, progress.camera));
+  for (const auto& [term, recorded] : stream) {
+    const auto message = recorded.records.find(progress.frontend.seq);
+    if (term.epoch != progress.frontend.epoch || message == recorded.records.end()) continue;
+    if (const auto evidence = wire::Decode<FrameEvidence>(log.Read(message->second)))
+      return evidence->stamp_ns;
+  }
+  return std::nullopt;
+}
+
+template <typename Number>
+bool ParseWhole(std::string_view text, Number* number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *number);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+LandmarkProofs ReadProofs(const ProofSource& source, std::optional<LandmarkId> watched,
+                          const std::optional<BusKey>& key) {
+  const LogIndex log(source.path, key);
+  if (!log.DescribeDamage().empty()) LogWarning("{}", log.DescribeDamage());
+  const RecordedSession& session = log.Session(source.session);
+  const SessionStart run = MadeWith(log, session);
+  const RunSettings settings = SettingsOf(run, source);
+  LandmarkProofs proofs{source.path,
+                        !session.IsSavedMap(),
+                        run,
+                        run.configuration_hash != 0,
+                        settings.known,
+                        {},
+                        LandmarkHistories(run.camera, run.pyramid, settings.mapper)};
+  LandmarkHistories& histories = proofs.histories;
+  if (watched) histories.Watch(*watched);
+  ChangeReader reader;
+  reader.begins_anew = [&] { histories.BeginAnew(); };
+  reader.new_writer = [&] { histories.OnNewWriter(); };
+  reader.change = [&](const MapDelta& delta) {
+    if (delta.event != MapEvent::kEvidence) return histories.Add(delta);
+    MapDelta stamped = delta;
+    stamped.stamp_ns = StampOfEvidence(log, session, delta.progress);
+    histories.Add(stamped);
+  };
+  const int64_t until_us = source.at_s < 0 ? INT64_MAX : log.begin_us() + std::llround(source.at_s * 1e6);
+  proofs.read = ForEachChange(log, session, until_us, reader);
+  histories.Finish();
+  return proofs;
+}
+
+LandmarkNow NowOf(const LandmarkProofs& proofs, const LandmarkHistory& history) {
+  if (const Landmark* landmark = proofs.map().FindLandmark(history.id))
+    return {true, StateOf(*landmark), SightsOf(proofs.map(), *landmark)};
+  if (!history.end) return {};
+  return {false, history.end->last, history.end->seen};
+}
+
+std::optional<LandmarkId> ParseLandmarkId(const std::string& text) {
+  LandmarkId id;
+  const size_t colon = text.find(':');
+  if (colon == std::string::npos) {
+    if (!ParseWhole(text, &id.value)) return std::nullopt;
+  } else {
+    uint16_t ordinal = 0;
+    uint64_t number = 0;
+    const std::string_view view = text;
+    if (!ParseWhole(view.substr(0, colon), &ordinal) || !ParseWhole(view.substr(colon + 1), &number))
+      return std::nullopt;
+    id = LandmarkId::Make(ordinal, number);
+    if (id.number() != number) return std::nullopt;
+  }
+  return id.valid() ? std::optional(id) : std::nullopt;
+}
+
+std::string NameOf(LandmarkId id) {
+  return std::to_string(id.epoch_ordinal()) + ":" + std::to_string(id.number());
+}
+
+std::string NameOf(MapEvent event) {
+  switch (event) {
+    case MapEvent::kKeyframeInserted:
+      return "KEYFRAME_INSERTED";
+    case MapEvent::kLandmarksCreated:
+      return "LANDMARKS_CREATED";
+    case MapEvent::kFused:
+      return "FUSED";
+    case MapEvent::kAdjusted:
+      return "ADJUSTED";
+    case MapEvent::kMapped:
+      return "MAPPED";
+    case MapEvent::kEvidence:
+      return "EVIDENCE";
+    case MapEvent::kCorrected:
+      return "CORRECTED";
+    case MapEvent::kGloballyAdjusted:
+      return "GLOBALLY_ADJUSTED";
+    case MapEvent::kMapStarted:
+      return "MAP_STARTED";
+    case MapEvent::kMapDropped:
+      return "MAP_DROPPED";
+    case MapEvent::kSettled:
+      return "SETTLED";
+    case MapEvent::kSnapshot:
+      return "SNAPSHOT";
+    case MapEvent::kRefused:
+      return "REFUSED";
+    case MapEvent::kEnded:
+      return "ENDED";
+    case MapEvent::kMapAdjusted:
+      return "MAP_ADJUSTED";
+    case MapEvent::kRequestDone:
+      return "REQUEST_DONE";
+    case MapEvent::kFirstMapRefused:
+      return "FIRST_MAP_REFUSED";
+    case MapEvent::kTurn:
+      return "TURN";
+  }
+  return "?";
+}
+
+std::string NameOf(LandmarkOrigin origin) {
+  switch (origin) {
+    case LandmarkOrigin::kNotTold:
+      return "not told";
+    case LandmarkOrigin::kFirstMap:
+      return "first map";
+    case LandmarkOrigin::kTriangulated:
+      return "triangulated";
+    case LandmarkOrigin::kOther:
+      return "other";
+  }
+  return "?";
+}
+
+std::string NameOf(LandmarkFate fate) {
+  switch (fate) {
+    case LandmarkFate::kNotTold:
+      return "not told";
+    case LandmarkFate::kFused:
+      return "fused";
+    case LandmarkFate::kRarelyFound:
+      return "rarely found";
+    case LandmarkFate::kFewObservers:
+      return "few observers";
+    case LandmarkFate::kSeenThrough:
+      return "seen through";
+    case LandmarkFate::kMoved:
+      return "moved";
+    case LandmarkFate::kUnheld:
+      return "unheld";
+    case LandmarkFate::kKeyframeCulled:
+      return "keyframe culled";
+    case LandmarkFate::kTooNear:
+      return "too near";
+    case LandmarkFate::kUnproven:
+      return "unproven";
+    case LandmarkFate::kMapDropped:
+      return "map dropped";
+    case LandmarkFate::kLeftOut:
+      return "left out";
+  }
+  return "?";
+}
+
+}  // namespace dmslam
