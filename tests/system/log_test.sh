@@ -38,6 +38,30 @@ for ((tenth = 1; tenth < 10; ++tenth)); do
 done
 check "an earlier map is a smaller one" test "$(wc -c <"$work/part.map")" -lt "$(wc -c <"$work/mapper.map")"
 
+# The proof of a landmark: which keyframes, which decision, which seed.
+check "all landmarks are proven" map landmark "$log" --all --json "$work/proofs.json" >"$work/said"
+check "of each is told what made it" test "$(grep -c '"decision":"\(not told\|other\)"' "$work/proofs.json")" = 0
+proven=$(grep -cE '^\{"id":"[0-9:]+","state":"(static|moving)"' "$work/proofs.json")
+check "as many are there as the map has" grep -q " $proven landmarks " <(map list "$work/mapper.map")
+one_with() { sed -nE "s/^\{\"id\":\"([0-9:]+)\",$1.*/\1/p" "$work/proofs.json" | tail -n 1; } # PATTERN
+made=$(one_with '"state":"static".*"decision":"triangulated".*"end":null')
+check "a landmark of the run is proven" map landmark "$log" "$made" >"$work/proof" 2>&1
+for words in "^landmark +$made " "seed 3, configuration [0-9a-f]{16}" "in the map, static" \
+  "triangulated from frame [0-9]+ and [0-9]+ more" "LANDMARKS_CREATED about frame" "^seen by +[0-9]+ keyframes"; do
+  check "its proof says '$words'" grep -qE "$words" "$work/proof"
+done
+seen() { sed -n '/^seen by/,/^[a-z]/p' | grep -E '^(seen| )'; }
+check "the saved map knows it, too" map landmark "$work/mapper.map" "$made" >"$work/saved_proof" 2>&1
+check "it is seen by the same, with the same errors" cmp <(seen <"$work/proof") <(seen <"$work/saved_proof")
+check "what only the log can tell is said" grep -q "the log of its run does" "$work/saved_proof"
+check "one that became another says which" grep -qE "fused into [0-9:]+" \
+  <(map landmark "$log" "$(one_with '"state":"fused"')")
+check "one that went says by which rule" grep -qE "removed.*: (found in|no more than|keyframes of another|it moves)" \
+  <(map landmark "$log" "$(one_with '"state":"removed".*"decision":"(rarely found|few observers|seen through|moved)"')")
+refused "run.lcmlog: knows no landmark 1:99999999: it holds [0-9]+ .*--all --json" map landmark "$log" 1:99999999
+refused "mapper.map: knows no landmark 7:1: .* only the run's log tells" map landmark "$work/mapper.map" 7:1
+refused "'217x': is no landmark's name; give ORDINAL:NUMBER" map landmark "$log" 217x
+
 size=$(wc -c <"$log")
 head -c $((size * 2 / 3)) "$log" >"$work/cut.lcmlog"
 printf 'damage' | dd of="$work/cut.lcmlog" bs=1 seek=$((size / 2)) conv=notrunc 2>/dev/null

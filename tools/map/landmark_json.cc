@@ -126,6 +126,7 @@ Json RunJson(const LandmarkProofs& proofs) {
   json["seed"] = proofs.run_told ? Json(run.seed) : Json(nullptr);
   json["configuration_hash"] = proofs.run_told ? Json(Hex(run.configuration_hash)) : Json(nullptr);
   json["settings_known"] = proofs.settings_known;
+  json["modes"] = proofs.modes;
   json["profile"] = run.profile;
   json["version"] = run.software;
   json["vocabulary"] = run.vocabulary_checksum ? Json(Hex(*run.vocabulary_checksum)) : Json(nullptr);

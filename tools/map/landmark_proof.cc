@@ -1,5 +1,6 @@
 #include "landmark_proof.h"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -17,26 +18,40 @@ namespace {
 struct RunSettings {
   MapperOptions mapper;
   bool known = false;
+  std::string modes;  ///< "map.saved=on, loop.enabled=off"
 };
 
-/// Its profile and seed are told; whether all else is as it is given here, its hash tells.
+/// Its profile and seed are told; whether all else is as it is given here, its hash tells. What
+/// scripts/run.sh sets by itself is tried.
 RunSettings SettingsOf(const SessionStart& run, const ProofSource& source) {
-  std::vector<std::string> overrides = {"seed=" + std::to_string(run.seed)};
-  if (!run.profile.empty()) overrides.push_back("profile=" + run.profile);
-  overrides.insert(overrides.end(), source.overrides.begin(), source.overrides.end());
-  const Settings settings = LoadSettings(source.config, overrides);
-  return {settings.Read<MapperOptions>(), settings.Hash() == run.configuration_hash};
+  static constexpr std::array kModes = {"map.saved=on", "map.localize_only=on", "loop.enabled=off"};
+  std::vector<std::string> given = source.overrides;
+  given.push_back("seed=" + std::to_string(run.seed));
+  if (!run.profile.empty()) given.push_back("profile=" + run.profile);
+  for (unsigned chosen = 0; chosen < 1U << kModes.size(); ++chosen) {
+    std::vector<std::string> overrides = given;
+    std::string modes;
+    for (size_t i = 0; i < kModes.size(); ++i) {
+      if ((chosen >> i & 1U) == 0) continue;
+      overrides.emplace_back(kModes[i]);
+      modes += std::string(modes.empty() ? "" : ", ") + kModes[i];
+    }
+    const Settings settings = LoadSettings(source.config, overrides);
+    if (settings.Hash() == run.configuration_hash) return {settings.Read<MapperOptions>(), true, modes};
+  }
+  return {LoadSettings(source.config, given).Read<MapperOptions>(), false, ""};
 }
 
-/// When the newest of the frames was taken of which a record of evidence tells; none: it is not in the log.
-std::optional<int64_t> StampOfEvidence(const LogIndex& log, const RecordedSession& session,
-                                       const MapProgress& progress) {
+/// What the frames said that a change of the map works in; none: it is not in the log.
+std::optional<FrameEvidence> EvidenceOf(const LogIndex& log, const RecordedSession& session,
+                                        const MapDelta& delta) {
+  if (delta.event != MapEvent::kEvidence) return std::nullopt;
+  const MapProgress& progress = delta.progress;
   const RecordedStream& stream = session.Stream(StreamOfCamera(StreamId::kFrontend, progress.camera));
   for (const auto& [term, recorded] : stream) {
     const auto message = recorded.records.find(progress.frontend.seq);
-    if (term.epoch != progress.frontend.epoch || message == recorded.records.end()) continue;
-    if (const auto evidence = wire::Decode<FrameEvidence>(log.Read(message->second)))
-      return evidence->stamp_ns;
+    if (term.epoch == progress.frontend.epoch && message != recorded.records.end())
+      return wire::Decode<FrameEvidence>(log.Read(message->second));
   }
   return std::nullopt;
 }
@@ -61,6 +76,7 @@ LandmarkProofs ReadProofs(const ProofSource& source, std::optional<LandmarkId> w
                         run,
                         run.configuration_hash != 0,
                         settings.known,
+                        settings.modes,
                         {},
                         LandmarkHistories(run.camera, run.pyramid, settings.mapper)};
   LandmarkHistories& histories = proofs.histories;
@@ -69,10 +85,8 @@ LandmarkProofs ReadProofs(const ProofSource& source, std::optional<LandmarkId> w
   reader.begins_anew = [&] { histories.BeginAnew(); };
   reader.new_writer = [&] { histories.OnNewWriter(); };
   reader.change = [&](const MapDelta& delta) {
-    if (delta.event != MapEvent::kEvidence) return histories.Add(delta);
-    MapDelta stamped = delta;
-    stamped.stamp_ns = StampOfEvidence(log, session, delta.progress);
-    histories.Add(stamped);
+    const std::optional<FrameEvidence> said = EvidenceOf(log, session, delta);
+    histories.Add(delta, said ? &*said : nullptr);
   };
   const int64_t until_us = source.at_s < 0 ? INT64_MAX : log.begin_us() + std::llround(source.at_s * 1e6);
   proofs.read = ForEachChange(log, session, until_us, reader);

@@ -25,10 +25,12 @@ struct ProofSource {
 /// What a file proves of its landmarks.
 struct LandmarkProofs {
   std::string path;
-  bool of_log = false;          ///< else a saved map: what is in it, and no history
-  SessionStart run;             ///< seed, configuration ... of the run that made it, or that saved it
-  bool run_told = false;        ///< false: the log lacks what the frontend said of the run
-  bool settings_known = false;  ///< the mapper's rules were asked with the settings of the run
+  bool of_log = false;    ///< else a saved map: what is in it, and no history
+  SessionStart run;       ///< seed, configuration ... of the run that made it, or that saved it
+  bool run_told = false;  ///< false: the log lacks what the frontend said of the run
+  /// The mapper's rules were asked with the settings of the run, which has its profile's, and these.
+  bool settings_known = false;
+  std::string modes;
   ChangesRead read;
   LandmarkHistories histories;
 

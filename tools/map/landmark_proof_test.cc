@@ -69,7 +69,7 @@ TEST_F(OfASavedMap, TellsWhatItHoldsAndWhatOnlyALogTells) {
 
 TEST_F(OfASavedMap, TellsWhatBecameOfOneThatIsGone) {
   EXPECT_TRUE(Has(TextOf(1), "fused into 1:3, which is in the map")) << TextOf(1);
-  EXPECT_TRUE(Has(TextOf(0), "removed; only the log of the run tells why")) << TextOf(0);
+  EXPECT_TRUE(Has(TextOf(0), "not in the map; only the log of the run tells why")) << TextOf(0);
 }
 
 }  // namespace

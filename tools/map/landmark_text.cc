@@ -100,8 +100,8 @@ std::string Words::Gone(const LandmarkHistory& history) const {
   const LandmarkEvidence evidence = end.last ? end.last->evidence : LandmarkEvidence();
   switch (end.fate) {
     case LandmarkFate::kNotTold:
-      return proofs_.of_log ? "removed; why is not in this log"
-                            : "removed; only the log of the run tells why";
+      return proofs_.of_log ? "not in the map; why is not in this log"
+                            : "not in the map; only the log of the run tells why";
     case LandmarkFate::kFused:
       return FusedInto(*end.into);
     case LandmarkFate::kRarelyFound:
@@ -112,7 +112,8 @@ std::string Words::Gone(const LandmarkHistory& history) const {
     case LandmarkFate::kSeenThrough:
       return "removed: keyframes of another time see what lies behind it";
     case LandmarkFate::kMoved:
-      return "removed: it moves; with this record the belief went beyond mapping.belief_remove_above";
+      return Text("removed: it moves: with this record the log odds went to %+.1f",
+                  static_cast<double>(evidence.motion_belief));
     case LandmarkFate::kUnheld:
       return "removed by an adjustment, which left it fewer than two keyframes that see it where it is";
     case LandmarkFate::kKeyframeCulled:
@@ -157,8 +158,9 @@ std::string Words::Absorbed(const LandmarkHistory& history, size_t depth, std::s
   for (const LandmarkFusion& fusion : history.absorbed) {
     const auto other = proofs_.histories.landmarks().find(fusion.absorbed);
     if (other == proofs_.histories.landmarks().end() || !told->insert(fusion.absorbed).second) continue;
-    text += More(std::string(2 * depth, ' ') + NameOf(fusion.absorbed) + ", " + Record(fusion.when) +
-                 (other->second.origin == LandmarkOrigin::kNotTold ? "" : "; " + Made(other->second)));
+    const std::string indent(2 * depth, ' ');
+    text += More(indent + NameOf(fusion.absorbed) + ", " + Record(fusion.when));
+    if (other->second.origin != LandmarkOrigin::kNotTold) text += More(indent + "  " + Made(other->second));
     text += Absorbed(other->second, depth + 1, told);
   }
   return text;
@@ -201,8 +203,10 @@ std::string EvidenceText(const std::vector<EvidenceStep>& steps) {
   return text;
 }
 
-/// What the landmark itself says of its beginning, whoever tells the rest.
-std::string AgeText(const LandmarkProofs& proofs, const LandmarkState& state) {
+/// What the landmark itself says of its beginning, where nothing else tells it, or it took an older one in.
+std::string AgeText(const LandmarkProofs& proofs, const LandmarkHistory& history,
+                    const LandmarkState& state) {
+  if (history.made.about == state.first_keyframe && history.origin != LandmarkOrigin::kNotTold) return "";
   return More("its age counts from " + Words(proofs).Frame(state.first_keyframe) + ", " +
               Stamp(state.first_ns));
 }
@@ -246,10 +250,13 @@ std::string RunText(const LandmarkProofs& proofs) {
         "run",
         Text("session %u; seed and configuration are not in the log: the frontend's first record is missing",
              run.session));
+  std::string profile = "profile " + run.profile;
+  if (!proofs.settings_known) profile += " with settings of its own";
+  if (!proofs.modes.empty()) profile += ", " + proofs.modes;
   std::string text =
-      Line("run", Text("session %u, seed %llu, configuration %s, profile %s%s", run.session,
-                       static_cast<unsigned long long>(run.seed), Hex(run.configuration_hash).c_str(),
-                       run.profile.c_str(), proofs.settings_known ? "" : " with settings of its own"));
+      Line("run", Text("session %u, seed %llu, configuration %s, ", run.session,
+                       static_cast<unsigned long long>(run.seed), Hex(run.configuration_hash).c_str()) +
+                      profile);
   text += More(Text("version %s, vocabulary %s, sequence ", run.software.c_str(),
                     run.vocabulary_checksum ? Hex(*run.vocabulary_checksum).c_str() : "none") +
                run.sequence + (run.mode == PlaybackMode::kLockstep ? ", lock-step" : ", real time"));
@@ -269,7 +276,7 @@ std::string ProofText(const LandmarkProofs& proofs, const LandmarkHistory& histo
   if (now.state) text += More(CountsText(now.state->evidence)) + PlaceText(proofs, *now.state);
   text += Line("made", words.Made(history));
   if (proofs.of_log) text += More(words.Moment(history.made));
-  if (now.state) text += AgeText(proofs, *now.state);
+  if (now.state) text += AgeText(proofs, history, *now.state);
   if (!history.made_from.empty()) text += words.Sights(history.made_from);
   std::set<LandmarkId> told = {history.id};
   if (!history.absorbed.empty())

@@ -1,9 +1,11 @@
 #include "dmslam/mapping/landmark_fate.h"
 
+#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/mapping/culling.h"
 
 namespace dmslam {
@@ -44,6 +46,27 @@ LandmarkFate LandmarkFates::Of(const LandmarkTombstone& tombstone, const Map& ma
     default:
       return LandmarkFate::kNotTold;
   }
+}
+
+/// By the mapper's own rule, applied to the landmark alone, which stays; as far as the mapper went.
+LandmarkEvidence LandmarkFates::With(const FrameEvidence& said, const Map& map,
+                                     const Landmark& landmark) const {
+  MapEditor alone(map.camera(), map.pyramid());
+  Landmark copy;
+  copy.id = landmark.id;
+  copy.evidence = landmark.evidence;
+  alone.AddLandmark(std::move(copy));
+  MotionBeliefOptions belief = options_.belief;
+  belief.remove_above = std::numeric_limits<float>::max();
+  FrameEvidence of_it = said;
+  for (FrameEvidence::Item item : said.items) {
+    if (map.Resolve(item.landmark) != landmark.id) continue;
+    if (alone.At(landmark.id).evidence.motion_belief > options_.belief.remove_above) break;
+    item.landmark = landmark.id;
+    of_it.items = {item};
+    ApplyEvidence(alone, of_it, belief);
+  }
+  return alone.At(landmark.id).evidence;
 }
 
 /// First those on probation go, then landmarks are made, then those that are seen through go, old or new.

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "dmslam/map/map.h"
+#include "dmslam/map/proposals.h"
 #include "dmslam/mapping/insertion_order.h"
 #include "dmslam/mapping/mapper_options.h"
 
@@ -37,6 +38,9 @@ class LandmarkFates {
   void Follow(const Map& map, const MapDelta& delta);
   /// Of one that this change, which is not applied to `map` yet, takes away.
   LandmarkFate Of(const LandmarkTombstone& tombstone, const Map& map, const MapDelta& delta) const;
+  /// What is known of a landmark with what a record of frames says of it, in a map that the record is not
+  /// worked into yet: one that is removed for that takes it along.
+  LandmarkEvidence With(const FrameEvidence& said, const Map& map, const Landmark& landmark) const;
 
  private:
   LandmarkFate WhileMaking(const Map& map, const Landmark* landmark) const;

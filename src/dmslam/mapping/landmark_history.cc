@@ -26,17 +26,17 @@ bool Moves(const LandmarkEvidence& evidence) { return evidence.motion_belief > k
 }  // namespace
 
 void LandmarkHistories::BeginAnew() {
+  const MapMoment until{map_.version(), MapEvent::kSnapshot, std::nullopt, newest_ns_};
+  for (const LandmarkId id : map_.LandmarkIdsSorted()) End(id, until, LandmarkFate::kLeftOut, "");
   map_.Clear();
   fates_.OnNewWriter();
-  begins_anew_ = true;
 }
 
-void LandmarkHistories::Add(const MapDelta& delta) {
-  const MapMoment now = MomentOf(delta);
-  if (std::exchange(begins_anew_, false)) anew_ = now;
+void LandmarkHistories::Add(const MapDelta& delta, const FrameEvidence* said) {
+  const MapMoment now = MomentOf(delta, said);
   fates_.Follow(map_, delta);
   const Sights before = SightsThatMayChange(delta);
-  EndThoseThatGo(delta, now);
+  EndThoseThatGo(delta, now, said);
   map_.Apply(delta);
   for (const LandmarkState& state : delta.landmarks) {
     NoteMade(state.id, now);
@@ -48,8 +48,10 @@ void LandmarkHistories::Add(const MapDelta& delta) {
     newest_ns_ = std::max(newest_ns_.value_or(keyframe.stamp_ns), keyframe.stamp_ns);
 }
 
-MapMoment LandmarkHistories::MomentOf(const MapDelta& delta) const {
-  return {delta.version, delta.event, delta.about, delta.stamp_ns ? delta.stamp_ns : newest_ns_};
+MapMoment LandmarkHistories::MomentOf(const MapDelta& delta, const FrameEvidence* said) const {
+  MapMoment moment{delta.version, delta.event, delta.about, delta.stamp_ns ? delta.stamp_ns : newest_ns_};
+  if (said != nullptr) moment.stamp_ns = said->stamp_ns;
+  return moment;
 }
 
 /// Of landmarks that features see otherwise after the change.
@@ -74,17 +76,19 @@ LandmarkHistories::Sights LandmarkHistories::SightsThatMayChange(const MapDelta&
 
 // ---- How they go ----
 
-void LandmarkHistories::EndThoseThatGo(const MapDelta& delta, const MapMoment& now) {
+void LandmarkHistories::EndThoseThatGo(const MapDelta& delta, const MapMoment& now,
+                                       const FrameEvidence* said) {
   for (const MapId map_id : delta.dropped_maps) {
     for (const Landmark* landmark : map_.LandmarksOf(map_id))
       End(landmark->id, now, LandmarkFate::kMapDropped, delta.note);
   }
   for (const LandmarkTombstone& tombstone : delta.landmark_tombstones) {
-    const auto known = landmarks_.find(tombstone.id);
-    if (known != landmarks_.end() && known->second.end) continue;  // told once more
+    if (IsKnownToBeGone(tombstone.id)) continue;  // told once more
     End(tombstone.id, now, fates_.Of(tombstone, map_, delta), delta.note);
+    LandmarkHistory& history = landmarks_.at(tombstone.id);
+    if (said != nullptr) NoteLastEvidence(&history, *said);
     if (!tombstone.replaced_by) continue;
-    landmarks_[tombstone.id].end->into = tombstone.replaced_by;
+    history.end->into = tombstone.replaced_by;
     HistoryOf(*tombstone.replaced_by, now).absorbed.push_back({tombstone.id, now});
   }
 }
@@ -98,10 +102,25 @@ void LandmarkHistories::End(LandmarkId id, const MapMoment& now, LandmarkFate fa
   HistoryOf(id, now).end = std::move(end);
 }
 
+/// Of one that goes for it: the map's record does not tell it any more.
+void LandmarkHistories::NoteLastEvidence(LandmarkHistory* history, const FrameEvidence& said) const {
+  const Landmark* landmark = map_.FindLandmark(history->id);
+  if (landmark == nullptr) return;
+  LandmarkEnd& end = *history->end;
+  end.last->evidence = fates_.With(said, map_, *landmark);
+  history->evidence.push_back({end.when, end.last->evidence});
+}
+
+/// What a mapper that began anew did not tell may still come.
+bool LandmarkHistories::IsKnownToBeGone(LandmarkId id) const {
+  const auto known = landmarks_.find(id);
+  return known != landmarks_.end() && known->second.end && known->second.end->fate != LandmarkFate::kLeftOut;
+}
+
 void LandmarkHistories::Finish() {
   for (auto& [id, history] : landmarks_) {
     if (!history.end && map_.FindLandmark(id) == nullptr)
-      history.end = LandmarkEnd{anew_.value_or(MapMoment()), LandmarkFate::kLeftOut, {}, "", {}, {}};
+      history.end = LandmarkEnd{history.made, LandmarkFate::kNotTold, {}, "", {}, {}};
   }
 }
 

@@ -19,7 +19,8 @@ struct MapMoment {
   uint64_t version = 0;  ///< of the map, after it
   MapEvent event = MapEvent::kSnapshot;
   std::optional<KeyframeId> about;  ///< the keyframe that caused it
-  /// Capture time of that keyframe; where there is none, of the newest keyframe that was told before.
+  /// Capture time of that keyframe, or of the newest frame whose evidence it is; where there is none, of the
+  /// newest keyframe that was told before.
   std::optional<int64_t> stamp_ns;
 };
 
@@ -54,10 +55,12 @@ struct EvidenceStep {
 struct LandmarkEnd {
   MapMoment when;
   LandmarkFate fate = LandmarkFate::kNotTold;
-  std::optional<LandmarkId> into;     ///< of one that was fused
-  std::string note;                   ///< of the record
-  std::optional<LandmarkState> last;  ///< as it was told last; none: it came and went within one record
-  std::vector<LandmarkSight> seen;    ///< who saw it until then
+  std::optional<LandmarkId> into;  ///< of one that was fused
+  std::string note;                ///< of the record
+  /// As it was told last, with what frames said of it when they took it. None: it came and went within one
+  /// record.
+  std::optional<LandmarkState> last;
+  std::vector<LandmarkSight> seen;  ///< who saw it until then
 };
 
 /// The life of a landmark, as the records tell it. What it is now is in the map.
@@ -86,8 +89,9 @@ class LandmarkHistories {
   void OnNewWriter() { fates_.OnNewWriter(); }
   /// What is told now begins with the whole map, in a snapshot or from nothing.
   void BeginAnew();
-  void Add(const MapDelta& delta);
-  /// No change follows.
+  /// `said`: of EVIDENCE what the frames said, where that is known.
+  void Add(const MapDelta& delta, const FrameEvidence* said = nullptr);
+  /// No change follows. What was named and never told is not in the map.
   void Finish();
 
   const Replica& map() const { return map_; }
@@ -96,10 +100,12 @@ class LandmarkHistories {
  private:
   using Sights = std::map<LandmarkId, std::vector<LandmarkSight>>;
 
-  MapMoment MomentOf(const MapDelta& delta) const;
+  MapMoment MomentOf(const MapDelta& delta, const FrameEvidence* said) const;
   Sights SightsThatMayChange(const MapDelta& delta) const;
-  void EndThoseThatGo(const MapDelta& delta, const MapMoment& now);
+  void EndThoseThatGo(const MapDelta& delta, const MapMoment& now, const FrameEvidence* said);
   void End(LandmarkId id, const MapMoment& now, LandmarkFate fate, const std::string& note);
+  bool IsKnownToBeGone(LandmarkId id) const;
+  void NoteLastEvidence(LandmarkHistory* history, const FrameEvidence& said) const;
   LandmarkHistory& HistoryOf(LandmarkId id, const MapMoment& now);
   void NoteMade(LandmarkId id, const MapMoment& now);
   void NoteEvidence(LandmarkId id, const MapMoment& now);
@@ -107,8 +113,6 @@ class LandmarkHistories {
 
   LandmarkFates fates_;
   Replica map_;
-  std::optional<MapMoment> anew_;  ///< the change with which the map began anew
-  bool begins_anew_ = false;
   std::optional<int64_t> newest_ns_;
   std::set<LandmarkId> watched_;
   std::map<LandmarkId, LandmarkHistory> landmarks_;

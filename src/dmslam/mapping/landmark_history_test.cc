@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/map/testing/map_scene.h"
 #include "dmslam/mapping/mapper_core.h"
@@ -195,6 +196,25 @@ TEST_F(OfAnEditor, ALandmarkBeforeTheLensGoesForThatAtTheEnd) {
   EXPECT_EQ(Of(0).end->fate, LandmarkFate::kTooNear);
 }
 
+TEST_F(OfAnEditor, OneThatMovesTakesAlongWhatFramesSaidOfItLast) {
+  LandmarkEvidence before = At(1).evidence;
+  before.motion_belief = 2.0F;
+  map().SetEvidence(At(1), before);
+  map().Fuse(At(0), At(1), before);
+  Tell(MapEvent::kFused, Id(3));
+  FrameEvidence said;
+  said.stamp_ns = 7'000'000'000;
+  said.items = {{MapScene::IdOf(0), 3, 0, 1}, {MapScene::IdOf(1), 2, 1, 1}};  // with the first it is gone
+  EXPECT_EQ(ApplyEvidence(map(), said, MotionBeliefOptions()).removed, 1);
+  histories_.Add(map().TakeDelta(MapEvent::kEvidence, std::nullopt, MapScene::kMap), &said);
+  ASSERT_TRUE(Of(1).end);
+  EXPECT_EQ(Of(1).end->fate, LandmarkFate::kMoved);
+  EXPECT_EQ(Of(1).end->when.stamp_ns, said.stamp_ns);
+  EXPECT_EQ(Of(1).end->last->evidence.visible, before.visible + 3);
+  EXPECT_EQ(Of(1).end->last->evidence.moved, before.moved + 1);
+  EXPECT_EQ(Of(1).end->last->evidence.motion_belief, 3.0F);
+}
+
 TEST_F(OfAnEditor, WhoSawItOnceIsTold) {
   map().ClearObservation(At(Id(1)), 4);
   Tell(MapEvent::kAdjusted, Id(3));
@@ -251,6 +271,19 @@ TEST_F(OfAnEditor, ASnapshotSaysWhatIsThereAndNotWhy) {
   EXPECT_FALSE(gone.end->last);
 }
 
+TEST_F(OfAnEditor, WhatIsNamedAndNeverToldIsNotSaidToBeInTheMap) {
+  map().Fuse(At(0), At(1), At(1).evidence);
+  MapDelta only = map().TakeDelta(MapEvent::kFused, Id(3), MapScene::kMap);
+  LandmarkHistories histories(TestCamera(), Pyramid(), MapperOptions());
+  only.landmarks.clear();
+  histories.Add(only);  // all before it is missing
+  histories.Finish();
+  const LandmarkHistory& into = histories.landmarks().at(MapScene::IdOf(1));
+  EXPECT_EQ(into.origin, LandmarkOrigin::kOther);
+  ASSERT_TRUE(into.end);
+  EXPECT_EQ(into.end->fate, LandmarkFate::kNotTold);
+}
+
 TEST_F(OfAnEditor, WhatALaterMapperBeganWithMayLackSome) {
   const std::vector<MapDelta> checkpoint = CutSnapshot(map(), Id(3), 60000);
   Landmark newer = At(2);
@@ -265,6 +298,8 @@ TEST_F(OfAnEditor, WhatALaterMapperBeganWithMayLackSome) {
   histories_.Finish();
   ASSERT_TRUE(Of(9).end);
   EXPECT_EQ(Of(9).end->fate, LandmarkFate::kLeftOut);
+  EXPECT_EQ(Of(9).end->when.version, map().version()) << "until then it was there";
+  EXPECT_TRUE(Of(9).end->last);
   EXPECT_FALSE(Of(1).end) << "the older map has it";
   EXPECT_EQ(Of(1).origin, LandmarkOrigin::kFirstMap) << "what was told of it before holds";
 }

@@ -235,6 +235,15 @@ TEST_F(Recording, ATermCountsUpToWhereTheNextOneTookItOver) {
   EXPECT_EQ(rebuilt.map.keyframes().size(), expected.keyframes().size());
   EXPECT_EQ(rebuilt.map.FindLandmark(LandmarkId::Make(1, 1))->p_world, Eigen::Vector3d(9, 9, 9));
   EXPECT_EQ(RebuildMap(index, index.Session(), 5).records, 5);
+  std::vector<MapEvent> changes;
+  size_t of_the_first = 0;
+  ChangeReader reader;
+  reader.change = [&](const MapDelta& delta) { changes.push_back(delta.event); };
+  reader.new_writer = [&] { of_the_first = changes.size(); };
+  EXPECT_EQ(ForEachChange(index, index.Session(), INT64_MAX, reader).records, 5);
+  EXPECT_EQ(changes.size(), 5u);
+  EXPECT_EQ(changes.back(), MapEvent::kAdjusted);
+  EXPECT_EQ(of_the_first, 4u) << "the second writer is told before what it wrote";
 }
 
 TEST_F(Recording, ASnapshotMakesUpForWhatIsMissing) {
