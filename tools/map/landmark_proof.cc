@@ -123,89 +123,41 @@ std::string NameOf(LandmarkId id) {
 }
 
 std::string NameOf(MapEvent event) {
-  switch (event) {
-    case MapEvent::kKeyframeInserted:
-      return "KEYFRAME_INSERTED";
-    case MapEvent::kLandmarksCreated:
-      return "LANDMARKS_CREATED";
-    case MapEvent::kFused:
-      return "FUSED";
-    case MapEvent::kAdjusted:
-      return "ADJUSTED";
-    case MapEvent::kMapped:
-      return "MAPPED";
-    case MapEvent::kEvidence:
-      return "EVIDENCE";
-    case MapEvent::kCorrected:
-      return "CORRECTED";
-    case MapEvent::kGloballyAdjusted:
-      return "GLOBALLY_ADJUSTED";
-    case MapEvent::kMapStarted:
-      return "MAP_STARTED";
-    case MapEvent::kMapDropped:
-      return "MAP_DROPPED";
-    case MapEvent::kSettled:
-      return "SETTLED";
-    case MapEvent::kSnapshot:
-      return "SNAPSHOT";
-    case MapEvent::kRefused:
-      return "REFUSED";
-    case MapEvent::kEnded:
-      return "ENDED";
-    case MapEvent::kMapAdjusted:
-      return "MAP_ADJUSTED";
-    case MapEvent::kRequestDone:
-      return "REQUEST_DONE";
-    case MapEvent::kFirstMapRefused:
-      return "FIRST_MAP_REFUSED";
-    case MapEvent::kTurn:
-      return "TURN";
-  }
-  return "?";
+  static constexpr std::array kNames = {"?",
+                                        "KEYFRAME_INSERTED",
+                                        "LANDMARKS_CREATED",
+                                        "FUSED",
+                                        "ADJUSTED",
+                                        "MAPPED",
+                                        "EVIDENCE",
+                                        "CORRECTED",
+                                        "GLOBALLY_ADJUSTED",
+                                        "MAP_STARTED",
+                                        "MAP_DROPPED",
+                                        "SETTLED",
+                                        "SNAPSHOT",
+                                        "REFUSED",
+                                        "ENDED",
+                                        "MAP_ADJUSTED",
+                                        "REQUEST_DONE",
+                                        "FIRST_MAP_REFUSED",
+                                        "TURN"};
+  static_assert(kNames.size() == static_cast<size_t>(MapEvent::kTurn) + 1);
+  return kNames.at(static_cast<size_t>(event));
 }
 
 std::string NameOf(LandmarkOrigin origin) {
-  switch (origin) {
-    case LandmarkOrigin::kNotTold:
-      return "not told";
-    case LandmarkOrigin::kFirstMap:
-      return "first map";
-    case LandmarkOrigin::kTriangulated:
-      return "triangulated";
-    case LandmarkOrigin::kOther:
-      return "other";
-  }
-  return "?";
+  static constexpr std::array kNames = {"not told", "first map", "triangulated", "other"};
+  static_assert(kNames.size() == static_cast<size_t>(LandmarkOrigin::kOther) + 1);
+  return kNames.at(static_cast<size_t>(origin));
 }
 
 std::string NameOf(LandmarkFate fate) {
-  switch (fate) {
-    case LandmarkFate::kNotTold:
-      return "not told";
-    case LandmarkFate::kFused:
-      return "fused";
-    case LandmarkFate::kRarelyFound:
-      return "rarely found";
-    case LandmarkFate::kFewObservers:
-      return "few observers";
-    case LandmarkFate::kSeenThrough:
-      return "seen through";
-    case LandmarkFate::kMoved:
-      return "moved";
-    case LandmarkFate::kUnheld:
-      return "unheld";
-    case LandmarkFate::kKeyframeCulled:
-      return "keyframe culled";
-    case LandmarkFate::kTooNear:
-      return "too near";
-    case LandmarkFate::kUnproven:
-      return "unproven";
-    case LandmarkFate::kMapDropped:
-      return "map dropped";
-    case LandmarkFate::kLeftOut:
-      return "left out";
-  }
-  return "?";
+  static constexpr std::array kNames = {"not told",     "fused",    "rarely found", "few observers",
+                                        "seen through", "moved",    "unheld",       "keyframe culled",
+                                        "too near",     "unproven", "map dropped",  "left out"};
+  static_assert(kNames.size() == static_cast<size_t>(LandmarkFate::kLeftOut) + 1);
+  return kNames.at(static_cast<size_t>(fate));
 }
 
 }  // namespace dmslam

@@ -26,6 +26,14 @@ TEST(LandmarkName, IsOrdinalAndNumberOrBothAsOne) {
     EXPECT_FALSE(ParseLandmarkId(none)) << none;
 }
 
+TEST(RecordName, IsThatOfTheMessageType) {
+  EXPECT_EQ(NameOf(MapEvent::kKeyframeInserted), "KEYFRAME_INSERTED");
+  EXPECT_EQ(NameOf(MapEvent::kSnapshot), "SNAPSHOT");
+  EXPECT_EQ(NameOf(MapEvent::kTurn), "TURN");
+  EXPECT_EQ(NameOf(LandmarkFate::kFused), "fused");
+  EXPECT_EQ(NameOf(LandmarkFate::kLeftOut), "left out");
+}
+
 /// A map of four keyframes, of which landmark 1 went and landmark 2 became landmark 3, saved by a run.
 class OfASavedMap : public ::testing::Test {
  protected:
