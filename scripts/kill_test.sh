@@ -53,7 +53,7 @@ mkdir -p "$out"
 
 play() { # FOLDER PORT: a run; its processes can be found by the port
   "$top/scripts/run.sh" --build-dir "$build" --port "$2" --sequence "$sequence" "${arguments[@]}" --lockstep --seed 1 \
-    --out "$1"
+    --out "$1" --save-map "$1.map"
 }
 value() { sed -nE "s/^ *\"$2\": *([^,]*),?$/\1/p" "$out/$1/summary.json" 2>/dev/null | head -n 1; }
 free_port() {
@@ -175,6 +175,7 @@ verdict() { # NAME: what is wrong with its run
   [[ $name == undisturbed || $(restarts "$name") -ge 1 ]] || wrong+="nobody was restarted; "
   [[ $name == undisturbed || $name == collector || $name == first || $(value "$name" restarts) -ge 1 ]] ||
     wrong+="the results count no restart; "
+  "$build/bin/dmslam-map" list "$out/$name.map" >/dev/null 2>&1 || wrong+="its map was not saved; "
   [[ -z $(cut -d' ' -f1 "$out/$name/keyframes.txt" | grep -v '#' | sort | uniq -d) ]] || wrong+="a keyframe twice; "
   echo "$wrong"
 }

@@ -6,6 +6,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/map/snapshot.h"
+#include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/roles.h"
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/runtime/exit_codes.h"
@@ -42,6 +43,17 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
   if (!files_.load.empty()) saved_.emplace(files_.load, feature_store_);
+  Listen({channels::kSessionAgain});
+}
+
+/// A mapper that takes over in the middle does not read the beginning of the frontend's stream: this is the
+/// only word it has on how the map was made.
+void MapperNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
+  const std::optional<RecordHeader> header = ParseHeader(bytes);
+  if (!header || !IsIntact(channel, bytes)) return CountMalformed(channel, "its checksum does not fit");
+  const std::optional<SessionStart> start = ReadSessionStart(*header, bytes);
+  const bool fits = start && !IsForeign(start->session) && WhyMisfits(*start).empty();
+  if (fits && !session_start_) session_start_ = start;
 }
 
 void MapperNode::Begin(const CameraInfo& info) {
@@ -506,7 +518,10 @@ void MapperNode::DrainAfterEnd() {
 void MapperNode::Save() {
   const std::string path = std::exchange(files_.save, "");
   if (path.empty() || !core_ || core_->map().keyframes().empty()) return;
-  SaveMap(path, core_->map(), session_start_);
+  if (!session_start_)
+    throw InputError(path +
+                     ": the map is not saved, as no frontend has said yet how it is made; its log has it");
+  SaveMap(path, core_->map(), *session_start_);
 }
 
 /// A step in work inserts and creates, and leaves out what takes long; an adjustment ends where it is.

@@ -50,6 +50,7 @@ class MapperNode : public StreamNode {
   void PublishStatus() override;
   std::string WaitsFor() const override;
   std::string WhyMisfits(const SessionStart& start) const override;
+  void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
 
  private:
   void ListenToFrontends();
@@ -87,9 +88,9 @@ class MapperNode : public StreamNode {
 
   const RunOptions run_;
   Files files_;
-  std::optional<SavedMap> saved_;  ///< the map to begin with
-  MapParts parts_;                 ///< of a map with which it has begun
-  SessionStart session_start_;     ///< as the frontend said it
+  std::optional<SavedMap> saved_;              ///< the map to begin with
+  MapParts parts_;                             ///< of a map with which it has begun
+  std::optional<SessionStart> session_start_;  ///< as the first camera's frontend said it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   FrontendStreams frontends_;
