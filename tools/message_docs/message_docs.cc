@@ -48,7 +48,7 @@ std::vector<ChannelRow> PlayerRows() {
 std::vector<ChannelRow> FrontendRows() {
   return {
       Row<SessionStart>("frontend", "mapper, collector", "once"),
-      {channels::kSessionAgain, wire::Info<SessionStart>().type, "frontend", "loop closer", "1 Hz"},
+      {channels::kSessionAgain, wire::Info<SessionStart>().type, "frontend", "loop closer, mapper", "1 Hz"},
       Row<InitialMap>("frontend", "mapper", "once per map"),
       Row<KeyframeProposal>("frontend", "mapper", "per keyframe"),
       Row<FramePose>("frontend", "mapper, collector", "per frame; once more where refined at the end"),
