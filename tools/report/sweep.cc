@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using State = RunResult::State;
 
-constexpr std::array<int, 8> kShares = {0, 10, 20, 30, 40, 50, 60, 70};
+constexpr std::array<int, 9> kShares = {0, 10, 20, 30, 40, 50, 60, 70, 80};
 constexpr const char* kBegin = "<!-- written by scripts/sweep.sh -->";
 constexpr const char* kEnd = "<!-- end of what scripts/sweep.sh writes -->";
 

@@ -77,6 +77,13 @@ TEST_F(SweepFolder, TablesAreEvenAndSayHowManyRuns) {
   ExpectEvenTables(text);
 }
 
+TEST_F(SweepFolder, ReadsAllSharesThatAreRendered) {
+  Write({"synth_walk_80", "sweep", "dm", 1}, 0.01, 90);
+  const Sweep sweep = Read();
+  const auto counted = [](const SweepPoint& point) { return point.dm.Count(RunResult::State::kDone) == 1; };
+  EXPECT_EQ(std::ranges::count_if(sweep.points, counted), 1);
+}
+
 TEST_F(SweepFolder, FigureHasBandsOverTheSeeds) {
   Write({"synth_walk_30", "sweep", "dm", 1}, 0.01, 90);
   Write({"synth_walk_30", "sweep", "dm", 2}, 0.01, 70);
