@@ -78,6 +78,7 @@ TEST_F(SweepFolder, TablesAreEvenAndSayHowManyRuns) {
 }
 
 TEST_F(SweepFolder, ReadsAllSharesThatAreRendered) {
+  fs::rename(root_ / "out/sequences/synth_walk_30", root_ / "out/sequences/synth_walk_80");
   Write({"synth_walk_80", "sweep", "dm", 1}, 0.01, 90);
   const Sweep sweep = Read();
   const auto counted = [](const SweepPoint& point) { return point.dm.Count(RunResult::State::kDone) == 1; };
