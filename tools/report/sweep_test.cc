@@ -32,10 +32,10 @@ class SweepFolder : public ::testing::Test {
           << R"({"mean_coverage": 0.301, "mean_moving_coverage": 0.25})";
     }
   }
-  ~SweepFolder() override { fs::remove_all(root_); }
+  void TearDown() override { fs::remove_all(root_); }
 
   fs::path Write(const RunKey& key, double noise, double tracked_percent) {
-    const fs::path folder = root_ / "out" / key.Folder();
+    fs::path folder = root_ / "out" / key.Folder();
     fs::create_directories(folder);
     std::ofstream(folder / "summary.json") << "{\"tracked_percent\": " << tracked_percent << "}";
     if (noise > 0)

@@ -19,6 +19,7 @@ using testing::MapScene;
 
 std::vector<uint32_t> FramesOf(const std::vector<LandmarkSight>& sights) {
   std::vector<uint32_t> frames;
+  frames.reserve(sights.size());
   for (const LandmarkSight& sight : sights) frames.push_back(sight.keyframe.frame_index());
   return frames;
 }
@@ -43,8 +44,9 @@ class OfAMapper : public ::testing::Test {
     const uint32_t reference = last.id.frame_index();
     KeyframeProposal proposal = scene_.Propose(frame, kStep * frame, reference, kStep * reference, frame);
     proposal.T_cam_reference.translation *= last.T_cam_world.Center().norm() / (kStep * reference);
-    for (uint16_t i = 0; i < last.landmarks.size(); ++i) {
-      if (last.landmarks[i].valid()) proposal.matches.push_back({i, last.landmarks[i]});
+    for (size_t i = 0; i < last.landmarks.size(); ++i) {
+      if (last.landmarks[i].valid())
+        proposal.matches.push_back({static_cast<uint16_t>(i), last.landmarks[i]});
     }
     return proposal;
   }
