@@ -70,7 +70,7 @@ void BuildWall(SceneBuilder& builder, const Assets& assets, const Wall& wall) {
 Doorway AddCloset(SceneBuilder& builder, const Assets& assets, const Wall& wall, float middle) {
   constexpr float kDepth = 0.9f;
   const Vector2f hinge = wall.a + (middle - 0.5f * kDoorwayWidth) * wall.along();
-  const Doorway doorway{hinge, wall.along(), wall.inward(), kDoorwayWidth, kDoorwayHeight};
+  Doorway doorway{hinge, wall.along(), wall.inward(), kDoorwayWidth, kDoorwayHeight};
   const Vector3f across = On(kDoorwayWidth * wall.along(), 0), back = On(-kDepth * wall.inward(), 0),
                  up(0, 0, kDoorwayHeight), foot = On(hinge, 0);
   const Skin skin = assets.walls[(wall.skin + 2) % assets.walls.size()];
