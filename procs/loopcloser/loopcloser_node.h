@@ -8,9 +8,9 @@
 
 #include "dmslam/loops/loopcloser_core.h"
 #include "dmslam/runtime/core_thread.h"
+#include "dmslam/runtime/heard_sessions.h"
 #include "dmslam/runtime/latency_window.h"
 #include "dmslam/runtime/stream_node.h"
-#include "loopcloser/heard_sessions.h"
 
 namespace dmslam {
 

@@ -46,14 +46,12 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
   Listen({channels::kSessionAgain});
 }
 
-/// A mapper that takes over in the middle does not read the beginning of the frontend's stream: this is the
-/// only word it has on how the map was made.
+/// What the frontend said when it began. A mapper that takes over later does not read that in its stream.
 void MapperNode::OnMessage(const std::string& channel, std::span<const uint8_t> bytes) {
   const std::optional<RecordHeader> header = ParseHeader(bytes);
   if (!header || !IsIntact(channel, bytes)) return CountMalformed(channel, "its checksum does not fit");
   const std::optional<SessionStart> start = ReadSessionStart(*header, bytes);
-  const bool fits = start && !IsForeign(start->session) && WhyMisfits(*start).empty();
-  if (fits && !session_start_) session_start_ = start;
+  if (start && !IsForeign(start->session)) heard_sessions_.Hear(0, header->epoch, *start, context_.now_ns());
 }
 
 void MapperNode::Begin(const CameraInfo& info) {
@@ -518,9 +516,12 @@ void MapperNode::DrainAfterEnd() {
 void MapperNode::Save() {
   const std::string path = std::exchange(files_.save, "");
   if (path.empty() || !core_ || core_->map().keyframes().empty()) return;
-  if (!session_start_)
+  if (!session_start_) session_start_ = heard_sessions_.Mapped(0, core_->map().progress(0).frontend.epoch);
+  if (!session_start_) {
     throw InputError(path +
-                     ": the map is not saved, as no frontend has said yet how it is made; its log has it");
+                     ": not written, since this mapper took over and has not heard from the frontend "
+                     "with which settings the map was made; 'dmslam-map --log LOG --save' writes it");
+  }
   SaveMap(path, core_->map(), *session_start_);
 }
 

@@ -10,6 +10,7 @@
 
 #include "dmslam/mapping/mapper_core.h"
 #include "dmslam/runtime/core_thread.h"
+#include "dmslam/runtime/heard_sessions.h"
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/settings/run_options.h"
@@ -90,7 +91,8 @@ class MapperNode : public StreamNode {
   Files files_;
   std::optional<SavedMap> saved_;              ///< the map to begin with
   MapParts parts_;                             ///< of a map with which it has begun
-  std::optional<SessionStart> session_start_;  ///< as the first camera's frontend said it
+  std::optional<SessionStart> session_start_;  ///< of the first camera, from its frontend's stream
+  HeardSessions heard_sessions_;               ///< ... and beside it
   std::unique_ptr<MapperCore> core_;
   std::unique_ptr<MapSnapshots> snapshots_;
   FrontendStreams frontends_;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr char kIndent[] = "            ";  // under the names in the margin
 
-std::string Line(const char* name, const std::string& text) { return Text("%-12s", name) + text + "\n"; }
+std::string Line(const char* name, const std::string& text) { return Format("%-12s", name) + text + "\n"; }
 std::string More(const std::string& text) { return kIndent + text + "\n"; }
 
 std::string Stamp(std::optional<int64_t> stamp_ns) {
@@ -73,10 +73,10 @@ std::string Words::Made(const LandmarkHistory& history) const {
   if (history.made_from.empty()) return "triangulated from " + who + ", and gone within the same record";
   const size_t others = history.made_from.size() - 1;
   std::string text =
-      "triangulated from " + who + Text(" and %zu more keyframe%s", others, others == 1 ? "" : "s");
+      "triangulated from " + who + Format(" and %zu more keyframe%s", others, others == 1 ? "" : "s");
   if (history.widest) {
     text += "; the widest angle, with " + Frame(history.widest->keyframe) +
-            Text(", is %.2f degrees", history.widest->rad * 180 / std::numbers::pi);
+            Format(", is %.2f degrees", history.widest->rad * 180 / std::numbers::pi);
   }
   return text;
 }
@@ -105,15 +105,15 @@ std::string Words::Gone(const LandmarkHistory& history) const {
     case LandmarkFate::kFused:
       return FusedInto(*end.into);
     case LandmarkFate::kRarelyFound:
-      return Text("removed on probation: found in %u of the %u frames that should have seen it",
-                  evidence.found, evidence.visible);
+      return Format("removed on probation: found in %u of the %u frames that should have seen it",
+                    evidence.found, evidence.visible);
     case LandmarkFate::kFewObservers:
-      return Text("removed on probation: no more than %zu keyframes had come to see it", end.seen.size());
+      return Format("removed on probation: no more than %zu keyframes had come to see it", end.seen.size());
     case LandmarkFate::kSeenThrough:
       return "removed: keyframes of another time see what lies behind it";
     case LandmarkFate::kMoved:
-      return Text("removed: it moves: with this record the log odds went to %+.1f",
-                  static_cast<double>(evidence.motion_belief));
+      return Format("removed: it moves: with this record the log odds went to %+.1f",
+                    static_cast<double>(evidence.motion_belief));
     case LandmarkFate::kUnheld:
       return "removed by an adjustment, which left it fewer than two keyframes that see it where it is";
     case LandmarkFate::kKeyframeCulled:
@@ -134,11 +134,11 @@ std::string Words::Sights(const std::vector<LandmarkSight>& sights) const {
   std::string text =
       More("   session camera   frame               stamp feature    x [px]    y [px] level error [px]");
   for (const LandmarkSight& sight : sights) {
-    const std::string error = sight.error_px ? Text("%.2f", *sight.error_px) : "behind it";
-    text += More(Text("%10u %6u %7u %19s %7u %9.2f %9.2f %5u %10s", sight.keyframe.session(),
-                      sight.keyframe.camera(), sight.keyframe.frame_index(), Stamp(sight.stamp_ns).c_str(),
-                      sight.feature, sight.keypoint.x_px(), sight.keypoint.y_px(), sight.keypoint.octave,
-                      error.c_str()));
+    const std::string error = sight.error_px ? Format("%.2f", *sight.error_px) : "behind it";
+    text += More(Format("%10u %6u %7u %19s %7u %9.2f %9.2f %5u %10s", sight.keyframe.session(),
+                        sight.keyframe.camera(), sight.keyframe.frame_index(), Stamp(sight.stamp_ns).c_str(),
+                        sight.feature, sight.keypoint.x_px(), sight.keypoint.y_px(), sight.keypoint.octave,
+                        error.c_str()));
   }
   return text;
 }
@@ -146,7 +146,7 @@ std::string Words::Sights(const std::vector<LandmarkSight>& sights) const {
 std::string Words::Former(const std::vector<FormerSight>& former) const {
   std::string text;
   for (const FormerSight& sight : former) {
-    text += More(Frame(sight.sight.keyframe) + Text(", feature %u, until ", sight.sight.feature) +
+    text += More(Frame(sight.sight.keyframe) + Format(", feature %u, until ", sight.sight.feature) +
                  Record(sight.until) + (sight.keyframe_culled ? ": the keyframe was culled" : ""));
   }
   return text;
@@ -178,14 +178,14 @@ std::string StateText(const LandmarkProofs& proofs, const LandmarkHistory& histo
 
 std::string CountsText(const LandmarkEvidence& evidence) {
   const double share = evidence.visible > 0 ? 100.0 * evidence.found / evidence.visible : 0.0;
-  return Text(
+  return Format(
       "found in %u of %u frames that should see it (%.0f %%), elsewhere in %u; log odds that it moves %+.1f",
       evidence.found, evidence.visible, share, evidence.moved, static_cast<double>(evidence.motion_belief));
 }
 
 /// The first, the last, and those that brought it nearer to moving.
 std::string EvidenceText(const std::vector<EvidenceStep>& steps) {
-  std::string text = More(Text("%19s  version visible   found elsewhere log odds", "stamp"));
+  std::string text = More(Format("%19s  version visible   found elsewhere log odds", "stamp"));
   size_t left_out = 0;
   for (size_t i = 0; i < steps.size(); ++i) {
     const LandmarkEvidence& evidence = steps[i].evidence;
@@ -194,12 +194,12 @@ std::string EvidenceText(const std::vector<EvidenceStep>& steps) {
       ++left_out;
       continue;
     }
-    text += More(Text("%19s %8llu %7u %7u %9u %8.1f", Stamp(steps[i].when.stamp_ns).c_str(),
-                      static_cast<unsigned long long>(steps[i].when.version), evidence.visible,
-                      evidence.found, evidence.moved, static_cast<double>(evidence.motion_belief)));
+    text += More(Format("%19s %8llu %7u %7u %9u %8.1f", Stamp(steps[i].when.stamp_ns).c_str(),
+                        static_cast<unsigned long long>(steps[i].when.version), evidence.visible,
+                        evidence.found, evidence.moved, static_cast<double>(evidence.motion_belief)));
   }
   if (left_out > 0)
-    text += More(Text("and %zu records between, in which no frame found it elsewhere", left_out));
+    text += More(Format("and %zu records between, in which no frame found it elsewhere", left_out));
   return text;
 }
 
@@ -212,8 +212,8 @@ std::string AgeText(const LandmarkProofs& proofs, const LandmarkHistory& history
 }
 
 std::string PlaceText(const LandmarkProofs& proofs, const LandmarkState& state) {
-  return Line("place", Text("%.6g %.6g %.6g in map %u [map units]; follows ", state.p_world.x(),
-                            state.p_world.y(), state.p_world.z(), state.map_id) +
+  return Line("place", Format("%.6g %.6g %.6g in map %u [map units]; follows ", state.p_world.x(),
+                              state.p_world.y(), state.p_world.z(), state.map_id) +
                            Words(proofs).Frame(state.reference));
 }
 
@@ -237,7 +237,7 @@ std::string SightsText(const LandmarkProofs& proofs, const LandmarkHistory& hist
            std::to_string(now.seen.size()) + (now.seen.size() == 1 ? " keyframe" : " keyframes"));
   if (!now.seen.empty()) text += words.Sights(now.seen);
   if (!history.former.empty())
-    text += Line("once seen", Text("by %zu", history.former.size())) + words.Former(history.former);
+    text += Line("once seen", Format("by %zu", history.former.size())) + words.Former(history.former);
   return text;
 }
 
@@ -248,17 +248,18 @@ std::string RunText(const LandmarkProofs& proofs) {
   if (!proofs.run_told)
     return Line(
         "run",
-        Text("session %u; seed and configuration are not in the log: the frontend's first record is missing",
-             run.session));
+        Format(
+            "session %u; seed and configuration are not in the log: the frontend's first record is missing",
+            run.session));
   std::string profile = "profile " + run.profile;
   if (!proofs.settings_known) profile += " with settings of its own";
   if (!proofs.modes.empty()) profile += ", " + proofs.modes;
   std::string text =
-      Line("run", Text("session %u, seed %llu, configuration %s, ", run.session,
-                       static_cast<unsigned long long>(run.seed), Hex(run.configuration_hash).c_str()) +
+      Line("run", Format("session %u, seed %llu, configuration %s, ", run.session,
+                         static_cast<unsigned long long>(run.seed), Hex(run.configuration_hash).c_str()) +
                       profile);
-  text += More(Text("version %s, vocabulary %s, sequence ", run.software.c_str(),
-                    run.vocabulary_checksum ? Hex(*run.vocabulary_checksum).c_str() : "none") +
+  text += More(Format("version %s, vocabulary %s, sequence ", run.software.c_str(),
+                      run.vocabulary_checksum ? Hex(*run.vocabulary_checksum).c_str() : "none") +
                run.sequence + (run.mode == PlaybackMode::kLockstep ? ", lock-step" : ", real time"));
   if (!proofs.of_log)
     text +=
@@ -270,7 +271,7 @@ std::string ProofText(const LandmarkProofs& proofs, const LandmarkHistory& histo
   const Words words(proofs);
   const LandmarkNow now = NowOf(proofs, history);
   std::string text = Line(
-      "landmark", NameOf(history.id) + Text(" (%llu)", static_cast<unsigned long long>(history.id.value)));
+      "landmark", NameOf(history.id) + Format(" (%llu)", static_cast<unsigned long long>(history.id.value)));
   text += RunText(proofs) + SessionsText(proofs, history, now) + StateText(proofs, history, now);
   if (history.end && proofs.of_log) text += More(words.Moment(history.end->when));
   if (now.state) text += More(CountsText(now.state->evidence)) + PlaceText(proofs, *now.state);
@@ -283,7 +284,7 @@ std::string ProofText(const LandmarkProofs& proofs, const LandmarkHistory& histo
     text += Line("took in", std::to_string(history.absorbed.size())) + words.Absorbed(history, 0, &told);
   text += SightsText(proofs, history, now);
   if (history.evidence.size() > 1)
-    text += Line("evidence", Text("%zu records", history.evidence.size())) + EvidenceText(history.evidence);
+    text += Line("evidence", Format("%zu records", history.evidence.size())) + EvidenceText(history.evidence);
   return text;
 }
 

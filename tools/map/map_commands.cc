@@ -39,10 +39,10 @@ std::string LineOf(const Map& map, MapId map_id) {
     first_ns = std::min(first_ns, keyframe->stamp_ns);
     last_ns = std::max(last_ns, keyframe->stamp_ns);
   }
-  std::string line =
-      Text("map %-8u %6zu keyframes %8zu landmarks  %.3f to %.3f (%.1f s)", map_id, keyframes.size(),
-           map.LandmarksOf(map_id).size(), Seconds(first_ns), Seconds(last_ns), Seconds(last_ns - first_ns));
-  for (const auto& [session, count] : sessions) line += Text("  session %u: %zu", session, count);
+  std::string line = Format("map %-8u %6zu keyframes %8zu landmarks  %.3f to %.3f (%.1f s)", map_id,
+                            keyframes.size(), map.LandmarksOf(map_id).size(), Seconds(first_ns),
+                            Seconds(last_ns), Seconds(last_ns - first_ns));
+  for (const auto& [session, count] : sessions) line += Format("  session %u: %zu", session, count);
   return line + "\n";
 }
 
@@ -83,8 +83,8 @@ void Save(const std::string& path, const Map& map, const SessionStart& session) 
 
 template <typename Id>
 std::string CountsOf(const char* name, const NamesApart<Id>& names) {
-  return Text("%-11s %8zu only in A  %8zu only in B  %8zu in both", name, names.only_a.size(),
-              names.only_b.size(), names.both);
+  return Format("%-11s %8zu only in A  %8zu only in B  %8zu in both", name, names.only_a.size(),
+                names.only_b.size(), names.both);
 }
 
 void PrintKeyframes(const char* mark, const std::vector<KeyframeId>& ids) {
@@ -104,8 +104,8 @@ void PrintKeyframes(const char* mark, const std::vector<KeyframeId>& ids) {
 }
 
 std::string DisplacementText(const char* name, const Displacement& displacement, size_t of) {
-  return Text("  %-9s %zu of %zu moved, median %.5f, largest %.5f of the depth\n", name, displacement.moved,
-              of, displacement.median_depths, displacement.max_depths);
+  return Format("  %-9s %zu of %zu moved, median %.5f, largest %.5f of the depth\n", name, displacement.moved,
+                of, displacement.median_depths, displacement.max_depths);
 }
 
 void PrintCommon(const CommonMap& common) {
@@ -123,11 +123,11 @@ void PrintCommon(const CommonMap& common) {
 std::string MadeApart(const SessionStart& a, const SessionStart& b) {
   std::string text;
   const auto add = [&text](const char* what, const std::string& in_a, const std::string& in_b) {
-    text += Text("%-11s %s in A  %s in B\n", what, in_a.c_str(), in_b.c_str());
+    text += Format("%-11s %s in A  %s in B\n", what, in_a.c_str(), in_b.c_str());
   };
   if (const auto differ = FirstDifference(a.camera, b.camera)) add("camera", differ->a, differ->b);
   const auto pyramid = [](const SessionStart& made) {
-    return Text("levels=%d scale_factor=%g", made.pyramid.levels, made.pyramid.scale_factor);
+    return Format("levels=%d scale_factor=%g", made.pyramid.levels, made.pyramid.scale_factor);
   };
   if (pyramid(a) != pyramid(b)) add("features", pyramid(a), pyramid(b));
   const auto &words_a = a.vocabulary_checksum, &words_b = b.vocabulary_checksum;
@@ -180,10 +180,10 @@ void CheckMayJoin(const WholeMap& a, const WholeMap& b, bool renumber) {
 
 std::string Listing(const std::string& path, const Map& map, const SessionStart& session) {
   const std::set<MapId> maps = MapsOf(map);
-  std::string text = Text("%s: %zu map%s, sessions %s, vocabulary %s, sequence %s\n", path.c_str(),
-                          maps.size(), maps.size() == 1 ? "" : "s", Listed(SessionsOf(map)).c_str(),
-                          session.vocabulary_checksum ? Hex(*session.vocabulary_checksum).c_str() : "none",
-                          session.sequence.c_str());
+  std::string text = Format("%s: %zu map%s, sessions %s, vocabulary %s, sequence %s\n", path.c_str(),
+                            maps.size(), maps.size() == 1 ? "" : "s", Listed(SessionsOf(map)).c_str(),
+                            session.vocabulary_checksum ? Hex(*session.vocabulary_checksum).c_str() : "none",
+                            session.sequence.c_str());
   for (const MapId map_id : maps) text += LineOf(map, map_id);
   return text;
 }

@@ -11,7 +11,7 @@
 #include "dmslam/evaluation/plot.h"
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/util/check.h"
-#include "text.h"
+#include "dmslam/util/format.h"
 
 namespace dmslam {
 namespace {

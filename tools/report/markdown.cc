@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "compare.h"
-#include "text.h"
+#include "dmslam/util/format.h"
 
 namespace dmslam {
 namespace {

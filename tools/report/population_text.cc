@@ -2,8 +2,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dmslam/util/format.h"
 #include "population.h"
-#include "text.h"
 
 namespace dmslam {
 namespace {

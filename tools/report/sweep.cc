@@ -7,8 +7,8 @@
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/format.h"
 #include "markdown.h"
-#include "text.h"
 
 namespace dmslam {
 namespace {

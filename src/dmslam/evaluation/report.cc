@@ -1,22 +1,13 @@
 #include "dmslam/evaluation/report.h"
 
-#include <cstdarg>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "dmslam/util/format.h"
 
 namespace dmslam {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-[[gnu::format(printf, 1, 2)]] std::string Format(const char* format, ...) {
-  char buffer[512];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof(buffer), format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 std::string DeltaName(const RpeOptions& options) {
   const std::string unit(RpeUnitName(options.unit));

@@ -23,8 +23,7 @@ constexpr double kWholeShare = 0.3;     // of what the place should show, where 
 constexpr double kThinShare = 0.25;     // a pose that finds less of what it should see is thin...
 constexpr double kBesideRad = 0.1;      // ...and compared with one beside it, turned by up to so much...
 constexpr double kClearlyMore = 1.3;    // ...which must find so many times as much
-constexpr int kSomeProven =
-    8;  // proven landmarks that must be seen, in a map that is old enough to have them
+constexpr int kSomeProven = 8;  // so many proven landmarks a place must show, in a map that can have them
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
@@ -38,8 +37,8 @@ bool ExplainsClearlyMore(const TrackingReport& a, const TrackingReport& b) {
          a.cells > b.cells;
 }
 
-/// How long a place must predict that shows so many proven landmarks: a few may be matched by chance, many at
-/// once (kManyProven) are not. Each time as many again saves as much time.
+/// How long a place that shows so many proven landmarks must predict: a few may be matched by chance, as many
+/// as kManyProven are not. Each doubling shortens it by the same time.
 int64_t ConfirmNs(int proven) {
   const double saved = std::log(static_cast<double>(proven) / kSomeProven) /
                        std::log(static_cast<double>(kManyProven) / kSomeProven);

@@ -1,4 +1,4 @@
-#include "loopcloser/heard_sessions.h"
+#include "dmslam/runtime/heard_sessions.h"
 
 #include <gtest/gtest.h>
 

@@ -12,10 +12,11 @@
 
 namespace dmslam {
 
-/// On what frontends say that their sessions rest, heard beside their streams, which the loop closer does not
-/// read. It counts once the map is made of that stream and it has been said twice, so much later that it is
-/// no copy on its way through a network; where two different things were said of one stream, neither counts.
-/// So one that is forged ends nobody.
+/// What frontends say of the sessions that they begin, heard beside their streams, for who does not read
+/// the beginning of these: a loop closer, and a mapper that takes over in the middle. It counts once the map
+/// is made of that stream and it has been said twice, so much later that it is no copy on its way through a
+/// network; where two different things were said of one stream, neither counts. So a forged one ends nobody,
+/// and is in no saved map.
 class HeardSessions {
  public:
   /// `epoch`: of the frontend's stream.
