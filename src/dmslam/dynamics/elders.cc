@@ -6,6 +6,7 @@
 namespace dmslam {
 
 std::optional<double> Elders::FromAge(std::span<const double> ages_s) {
+  if (!options_.elders) return std::nullopt;
   const size_t wanted = std::max(static_cast<size_t>(options_.min_elders),
                                  static_cast<size_t>(options_.share * static_cast<double>(ages_s.size())));
   if (ages_s.size() <= wanted) return std::nullopt;

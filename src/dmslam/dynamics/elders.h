@@ -7,11 +7,20 @@
 namespace dmslam {
 
 struct ElderOptions {
+  bool elders = true;         ///< off: all matched landmarks decide at once
   int min_elders = 40;        ///< the oldest so many matched landmarks decide the pose first...
   double share = 0.4;         ///< ...or this share of the matches, if that is more...
   double agreement = 0.6;     ///< ...provided that this share of them agree
   double max_chi2 = 7.8;      ///< younger ones farther from that pose have no say
   double young_weight = 0.5;  ///< all younger ones together weigh at most this much of what the elders weigh
+
+  template <typename Visitor>
+  void Describe(Visitor& v) {
+    v.Switch("tracking.elders", elders,
+             "the landmarks that stood still for longest decide a pose first, and bind the younger ones");
+    v.InBaseline("off");
+    v.InPaper("off");
+  }
 };
 
 /// The landmarks that stood still for longest decide first; the others only refine what agrees with them, and
@@ -24,7 +33,7 @@ class Elders {
       : options_(options), trusted_age_s_(trusted_age_s) {}
 
   /// Age [s] from which a matched landmark is an elder; none where there are too few matches to tell them
-  /// apart.
+  /// apart, or where it is switched off.
   std::optional<double> FromAge(std::span<const double> ages_s);
   /// Whether elders of this age are older than people stand.
   bool AreTrusted(double age_s) const { return age_s >= trusted_age_s_; }

@@ -22,6 +22,11 @@ TEST(EldersTest, OfTooFewMatchesNobodyIsAnElder) {
   EXPECT_TRUE(elders.FromAge(AgesS(41)));
 }
 
+TEST(EldersTest, SwitchedOffNobodyIsAnElder) {
+  Elders elders({.elders = false}, 4.0);
+  EXPECT_FALSE(elders.FromAge(AgesS(300)));
+}
+
 TEST(EldersTest, TheOldestFortyOrFourTenthsAreElders) {
   Elders elders({}, 4.0);
   EXPECT_NEAR(*elders.FromAge(AgesS(60)), 0.20, 1e-9) << "beside the oldest 40 of 60";

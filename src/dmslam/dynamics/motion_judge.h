@@ -24,6 +24,7 @@ struct DynamicsOptions {
   template <typename Visitor>
   void Describe(Visitor& v) {
     vote.Describe(v);
+    elders.Describe(v);
     hidden.Describe(v);
   }
 };
