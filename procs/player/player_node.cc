@@ -24,7 +24,7 @@ std::string SequenceName(const std::string& path) {
   return p.filename().empty() ? p.parent_path().filename().string() : p.filename().string();
 }
 
-/// Frames in the order of play: jumps taken out.
+/// Frames in the order of play: jumps taken out. Throws InputError where there are none.
 std::vector<size_t> OrderOfPlay(const PlayerOptions& options, size_t available, size_t* jumped) {
   std::vector<size_t> order;
   for (size_t i = options.start; i < available && order.size() < options.frames; ++i) {
@@ -37,7 +37,16 @@ std::vector<size_t> OrderOfPlay(const PlayerOptions& options, size_t available, 
       }
     }
   }
+  if (order.empty()) {
+    throw InputError(options.sequence + ": --start " + std::to_string(options.start) +
+                     " leaves no frame of " + std::to_string(available));
+  }
   return order;
+}
+
+/// In lock-step frames are due when the one before is done.
+double SpeedOf(const PlayerOptions& options) {
+  return options.mode == PlaybackMode::kLockstep ? 0.0 : options.speed;
 }
 
 }  // namespace
@@ -79,12 +88,8 @@ PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_p
       source_(std::move(source)),
       endpoint_(context_.bus, context_.now_ns),
       office_(context_, {options_.session, options_.camera_id}, options_.take_over, &endpoint_),
+      schedule_(source_.get(), OrderOfPlay(options_, source_->size(), &counts_.jumped), SpeedOf(options_)),
       readiness_(options_.mode == PlaybackMode::kRealtime ? options_.awaited : std::vector<std::string>()) {
-  order_ = OrderOfPlay(options_, source_->size(), &counts_.jumped);
-  if (order_.empty()) {
-    throw InputError(options_.sequence + ": --start " + std::to_string(options_.start) +
-                     " leaves no frame of " + std::to_string(source_->size()));
-  }
   if (options_.behind) SkipBehind(*options_.behind);
   ground_truth_ = source_->GroundTruth();
   endpoint_.SetOtherHandler(PlayerOffice::AnswersTo(options_.camera_id),
@@ -104,8 +109,9 @@ bool PlayerNode::MayPlay() {
   if (office_.held() && !playing_) {
     playing_ = true;
     playing_since_ns_ = context_.now_ns();
-    if (position_ > 0) LogInfo("player: others have {} frames already; goes on behind them", position_);
-    start_ns_ += context_.now_ns() + ToNs(options_.lead_s);
+    if (schedule_.position() > 0)
+      LogInfo("player: others have {} frames already; goes on behind them", schedule_.position());
+    schedule_.MakeDue(context_.now_ns() + ToNs(options_.lead_s));
   }
   return playing_ && office_.held();
 }
@@ -122,7 +128,7 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
 
 void PlayerNode::OnSequenceDone(const SequenceDone& done) {
   if (done.session != options_.session || !end_.OnSequenceDone(context_.now_ns())) return;
-  position_ = order_.size();
+  schedule_.GoTo(schedule_.size());
   awaiting_done_ = false;
 }
 
@@ -142,16 +148,13 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
 /// The frontend is further than this player, which was started again: goes on where the one before was, and
 /// never back. What was published last is done in any case, also where nothing comes after it.
 void PlayerNode::SkipBehind(uint32_t frame_index) {
-  const auto next =
-      std::upper_bound(order_.begin(), order_.end(), frame_index,
-                       [this](uint32_t frame, size_t index) { return frame < source_->FrameIndex(index); });
-  const auto skipped = next - order_.begin() - static_cast<std::ptrdiff_t>(position_);
-  if (skipped < 0 || (skipped == 0 && !awaiting_done_)) return;
+  const size_t next = schedule_.PositionBehind(frame_index);
+  if (next < schedule_.position() || (next == schedule_.position() && !awaiting_done_)) return;
   if (playing_) LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
-  position_ = static_cast<size_t>(next - order_.begin());
-  counts_.published = static_cast<int64_t>(position_);
+  schedule_.GoTo(next);
+  counts_.published = static_cast<int64_t>(next);
   awaiting_done_ = false;
-  if (position_ < order_.size()) start_ns_ += (playing_ ? context_.now_ns() : 0) - DueNs(position_);
+  schedule_.MakeDue(playing_ ? context_.now_ns() : 0);
 }
 
 void PlayerNode::PublishCameraInfo() {
@@ -160,21 +163,11 @@ void PlayerNode::PublishCameraInfo() {
   info.session = options_.session;
   info.camera = options_.camera;
   info.sequence = SequenceName(options_.sequence);
-  info.num_frames = static_cast<int64_t>(order_.size());
-  info.first_frame = source_->FrameIndex(order_.front());
+  info.num_frames = static_cast<int64_t>(schedule_.size());
+  info.first_frame = source_->FrameIndex(schedule_.first());
   info.mode = options_.mode;
   info.speed = options_.speed;
   PublishLoose(context_.bus, info, false, options_.camera_id);
-}
-
-int64_t PlayerNode::DueNs(size_t position) const {
-  if (options_.mode == PlaybackMode::kLockstep || options_.speed <= 0) return start_ns_;
-  const int64_t since_first = source_->StampNs(order_[position]) - source_->StampNs(order_.front());
-  return start_ns_ + static_cast<int64_t>(static_cast<double>(since_first) / options_.speed);
-}
-
-bool PlayerNode::FrameIsDue() const {
-  return position_ < order_.size() && !awaiting_done_ && context_.now_ns() >= DueNs(position_);
 }
 
 /// Frames that nobody can track yet are not played: the first one waits, and is due when it need not any
@@ -189,8 +182,7 @@ bool PlayerNode::OthersAreReady(int64_t now_ns) {
     readiness_.GiveUp();
   }
   held_back_ = !readiness_.AllReady();
-  if (was_held && !held_back_ && position_ < order_.size())
-    start_ns_ += std::max<int64_t>(0, now_ns - DueNs(position_));
+  if (was_held && !held_back_) schedule_.MakeDueNoEarlier(now_ns);
   return !held_back_;
 }
 
@@ -226,16 +218,14 @@ bool PlayerNode::MakeFrame(size_t index) {
       first_unreadable_ = error.what();
       LogWarning("{} (left out; further ones are only counted)", error.what());
     }
-    if (counts_.unreadable == order_.size()) problem_ = first_unreadable_ + "; no frame could be read";
+    if (counts_.unreadable == schedule_.size()) problem_ = first_unreadable_ + "; no frame could be read";
     return false;
   }
   return true;
 }
 
 void PlayerNode::PublishFrame() {
-  const size_t index = order_[position_];
-  late_ms_ = static_cast<double>(context_.now_ns() - DueNs(position_)) * 1e-6;
-  ++position_;
+  const size_t index = schedule_.Take(context_.now_ns());
   if (!MakeFrame(index)) {
     if (!problem_.empty()) exit_code_ = kExitInput;
     return;
@@ -270,9 +260,8 @@ void PlayerNode::PublishEnd() {
   end.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
   end.frames_blacked = static_cast<int64_t>(counts_.black);
   end.frames_jumped = static_cast<int64_t>(counts_.jumped);
-  const size_t last = order_[std::max<size_t>(position_, 1) - 1];
-  end.last_frame_index = static_cast<int32_t>(source_->FrameIndex(last));
-  end.last_stamp_ns = source_->StampNs(last);
+  end.last_frame_index = static_cast<int32_t>(source_->FrameIndex(schedule_.last()));
+  end.last_stamp_ns = source_->StampNs(schedule_.last());
   PublishLoose(context_.bus, end, false, options_.camera_id);
 }
 
@@ -284,11 +273,11 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.head.health.waiting_for = awaiting_done_ ? roles::kFrontend : readiness_.Missing(options_.camera_id);
   status.state = awaiting_done_ || held_back_ ? PlayerStatus::State::kWaiting : state;
   status.frames_published = counts_.published;
-  status.frames_total = static_cast<int64_t>(order_.size());
+  status.frames_total = static_cast<int64_t>(schedule_.size());
   status.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
   status.repeats = counts_.repeats;
   if (counts_.published > 0) status.frame_index = static_cast<int32_t>(frame_.frame_index);
-  status.late_ms = late_ms_;
+  status.late_ms = schedule_.late_ms();
   PublishLoose(context_.bus, status, false, options_.camera_id);
 }
 
@@ -301,16 +290,16 @@ void PlayerNode::Advance() {
   }
   if (now >= next_status_ns_) {
     next_status_ns_ = now + kStatusEveryNs;
-    PublishStatus(position_ < order_.size() ? PlayerStatus::State::kPlaying : PlayerStatus::State::kDone);
+    PublishStatus(schedule_.IsOver() ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying);
   }
-  if (OthersAreReady(now) && FrameIsDue()) PublishFrame();
+  if (OthersAreReady(now) && !awaiting_done_ && schedule_.IsDue(now)) PublishFrame();
   if (awaiting_done_ && now >= next_repeat_ns_) {
     next_repeat_ns_ = now + kRepeatEveryNs;
     ++counts_.repeats;
     context_.bus->Publish(
         {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
   }
-  if (position_ < order_.size() || awaiting_done_) return;
+  if (!schedule_.IsOver() || awaiting_done_) return;
   if (end_.IsDue(now)) PublishEnd();
   if (const std::optional<int> code = end_.ExitCode(now, false)) exit_code_ = code;
   if (exit_code_ == kExitNoFrontend) problem_ = EndOfPlay::NobodyAnswered();
@@ -321,7 +310,7 @@ int64_t PlayerNode::deadline_ns() const {
   int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
   if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
   if (held_back_) return deadline;  // statuses come, and infos go, twice a second
-  if (position_ < order_.size()) return std::min(deadline, DueNs(position_));
+  if (!schedule_.IsOver()) return std::min(deadline, schedule_.due_ns());
   return std::min(deadline, end_.due_ns());
 }
 

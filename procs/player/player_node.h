@@ -15,6 +15,7 @@
 #include "dmslam/wire/codec.h"
 #include "player/end_of_play.h"
 #include "player/frame_encoding.h"
+#include "player/play_schedule.h"
 #include "player/player_office.h"
 #include "player/readiness.h"
 
@@ -68,7 +69,7 @@ class PlayerNode : public Node {
   std::string problem() const override { return problem_; }
 
   int64_t published() const { return counts_.published; }
-  size_t total() const { return order_.size(); }
+  size_t total() const { return schedule_.size(); }
 
  private:
   /// Of frames.
@@ -83,14 +84,12 @@ class PlayerNode : public Node {
   void OnSequenceDone(const SequenceDone& done);
   void SkipBehind(uint32_t frame_index);
   void PublishCameraInfo();
-  bool FrameIsDue() const;
   bool OthersAreReady(int64_t now_ns);
   void PublishFrame();
   bool MakeFrame(size_t index);
   void PublishGroundTruth(size_t index);
   void PublishEnd();
   void PublishStatus(PlayerStatus::State state);
-  int64_t DueNs(size_t position) const;
   bool IsBlack(size_t index) const;
 
   NodeContext context_;
@@ -99,10 +98,9 @@ class PlayerNode : public Node {
   Endpoint endpoint_;
   PlayerOffice office_;
   std::vector<StampedPose> ground_truth_;
-  std::vector<size_t> order_;  ///< indices into the source, in order of play
   Counts counts_;
-  size_t position_ = 0;  ///< next of `order_`
-  Frame frame_;          ///< the newest one published
+  PlaySchedule schedule_;
+  Frame frame_;  ///< the newest one published
   SharedBytes frame_bytes_;
   bool awaiting_done_ = false;  ///< lock-step
   Readiness readiness_;
@@ -112,10 +110,8 @@ class PlayerNode : public Node {
   bool held_back_ = false;  ///< others are not ready yet
   bool playing_ = false;    ///< the office is held: nobody else plays this session
   int64_t playing_since_ns_ = 0;
-  int64_t start_ns_ = 0;  ///< when the first frame is due
   int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
   int64_t infos_said_ = 0;
-  double late_ms_ = 0;
   std::optional<int> exit_code_;
   std::string problem_, first_unreadable_;
 };
