@@ -32,11 +32,9 @@ std::string ToText(const Version& version) {
 
 StreamReader::StreamReader(Options options)
     : options_(std::move(options)),
-      held_(options_.start.value_or(Version())),
-      accepted_(held_),
-      taken_(held_),
+      versions_(options_.start.value_or(Version())),
       window_(options_.limits),
-      first_epoch_(held_.epoch) {
+      first_epoch_(held().epoch) {
   DMSLAM_CHECK(options_.id != 0, "a reader needs an id");
 }
 
@@ -81,7 +79,7 @@ void StreamReader::ReceiveHead(const std::string& channel, std::span<const uint8
 bool StreamReader::IsWanted(const head_t& head, int64_t now_ns) {
   const Term term{head.header.epoch, head.header.writer};
   const bool of_ours = options_.only_writer == 0 || term.writer == options_.only_writer;
-  const bool is_over = term.epoch < held_.epoch && term != term_ && !IsOnlyOneLeft(term, now_ns);
+  const bool is_over = term.epoch < held().epoch && term != term_ && !IsOnlyOneLeft(term, now_ns);
   if (!of_ours || !term.valid() || is_over || term < term_) {
     ++statistics_.dropped_stale;
     return false;
@@ -97,7 +95,7 @@ bool StreamReader::IsWanted(const head_t& head, int64_t now_ns) {
 }
 
 bool StreamReader::LeapsTooFar(const Term& term, int64_t now_ns) const {
-  const int64_t newest = std::max(term_.epoch, held_.epoch);
+  const int64_t newest = std::max(term_.epoch, held().epoch);
   return term.epoch > LatestBelievedEpoch(options_.clock_offset_us + now_ns / 1000, first_epoch_, newest);
 }
 
@@ -145,8 +143,8 @@ void StreamReader::RetractWhatIsNot() {
   ++statistics_.dropped_doubtful;
   beacons_.below = 0;
   window_.Retract(beacons_.last_seq);
-  const bool holds_of_it = taken_.epoch == term_.epoch;
-  const int64_t next = holds_of_it ? taken_.seq + 1 : 1;
+  const bool holds_of_it = versions_.taken().epoch == term_.epoch;
+  const int64_t next = holds_of_it ? versions_.taken().seq + 1 : 1;
   if (state_ == State::kFollowing && window_.next() > beacons_.last_seq + 1 && next <= beacons_.last_seq + 1)
     window_.Reset(next);
 }
@@ -169,16 +167,17 @@ bool StreamReader::SpeaksOurLanguage(const head_t& head) {
 
 void StreamReader::BeginTerm(const head_t& head) {
   const bool fresh = (head.header.flags & RecordHeader::FLAG_FRESH) != 0;
-  const bool same_epoch = held_.epoch == head.header.epoch && term_.epoch < head.header.epoch;  // as we start
+  const bool same_epoch =
+      held().epoch == head.header.epoch && term_.epoch < head.header.epoch;  // as we start
   const Version parent = ParentOf(head);
-  const Version end = same_epoch ? held_ : DrainFormerTerm(parent, fresh);
+  const Version end = same_epoch ? held() : DrainFormerTerm(parent, fresh);
   const bool nobody_has_it = fresh && (head.offers & head_t::OFFERS_SNAPSHOT) == 0;
   if (nobody_has_it && !same_epoch) DrainBeyondGaps();
   term_ = {head.header.epoch, head.header.writer};
   if (first_epoch_ == 0) first_epoch_ = term_.epoch;
   if (nobody_has_it) CountLostOfFormerTerms();
   parent_ = parent;
-  window_.Reset(same_epoch ? held_.seq + 1 : 1);
+  window_.Reset(same_epoch ? held().seq + 1 : 1);
   terms_.Clear();
   leaps_.Clear();
   beacons_.gap_seen = false;
@@ -208,13 +207,13 @@ Version StreamReader::DrainFormerTerm(const Version& parent, bool fresh) {
   if (!fresh) {
     while (!former_.empty() && former_.back().version() > parent) former_.pop_back();
   }
-  return former_.empty() ? held_ : former_.back().version();
+  return former_.empty() ? held() : former_.back().version();
 }
 
 /// A fresh term that offers no snapshot continues nothing: what of the former one is here is still handed
 /// out, gaps or not, since nobody repairs it any more; what is missing is lost.
 void StreamReader::DrainBeyondGaps() {
-  const Version end = former_.empty() ? held_ : former_.back().version();
+  const Version end = former_.empty() ? held() : former_.back().version();
   if (state_ == State::kFollowing) {
     const int64_t newest = std::max(beacons_.last_seq, window_.newest());
     const int64_t lost = GiveUpAll(newest);
@@ -228,7 +227,7 @@ void StreamReader::DrainBeyondGaps() {
 
 /// How many records of the former term up to `newest` are missing here, and come no more.
 int64_t StreamReader::GiveUpAll(int64_t newest) {
-  if (!options_.start && held_.empty()) window_.GiveUpBefore(window_.oldest().value_or(newest + 1));
+  if (!options_.start && held().empty()) window_.GiveUpBefore(window_.oldest().value_or(newest + 1));
   return window_.GiveUpBefore(newest + 1);
 }
 
@@ -264,7 +263,7 @@ void StreamReader::NeedSnapshot() {
 }
 
 void StreamReader::Forget() {
-  held_ = accepted_ = taken_ = {};
+  versions_.Forget();
   former_.clear();
   if (!term_.valid() || state_ == State::kRefusedVersion) return;
   problem_.clear();
@@ -282,8 +281,8 @@ void StreamReader::Follow(const head_t& head) {
   window_.Expose(head.header.seq);
   const bool gap = head.first_seq > window_.received() + 1;
   if (gap && !std::exchange(beacons_.gap_seen, true)) return;
-  const bool joins = !std::exchange(joined_, true) && held_.empty();
-  const bool may_hold_it = !options_.start && held_.empty();  // nothing has come, and it may need none of it
+  const bool joins = !std::exchange(joined_, true) && held().empty();
+  const bool may_hold_it = !options_.start && held().empty();  // nothing has come, and it may need none of it
   const bool is_anothers = (joins || may_hold_it) && !options_.wants_all;  // what was before it came
   beacons_.gap_seen = false;
   if (!gap) return;
@@ -435,9 +434,7 @@ std::optional<Record> StreamReader::Take() {
     record = window_.Take();
   }
   if (!record) return std::nullopt;
-  before_take_ = {held_, taken_};
-  held_before_ = record->begins_anew() ? Version() : held_;
-  held_ = taken_ = record->version();
+  versions_.Take(*record);
   ++statistics_.records;
   statistics_.payload_bytes += static_cast<int64_t>(record->bytes->size());
   return record;
@@ -451,8 +448,7 @@ bool StreamReader::Doubt(const Record& record, int64_t now_ns) {
   if (!said_before) doubt_ = {record.bytes, now_ns};
   ++statistics_.dropped_doubtful;
   window_.PutBack();
-  held_ = before_take_.held;
-  taken_ = before_take_.taken;
+  versions_.PutBack();
   acknowledged_.due = true;
   return true;
 }
@@ -460,7 +456,7 @@ bool StreamReader::Doubt(const Record& record, int64_t now_ns) {
 std::optional<Record> StreamReader::TakeFromSnapshot() {
   std::optional<Record> record = snapshot_->window.Take();
   if (!record) return std::nullopt;
-  accepted_ = {};
+  versions_.Unaccept();
   if (record->ends_snapshot()) {
     ++statistics_.snapshots;
     snapshot_.reset();
@@ -470,11 +466,7 @@ std::optional<Record> StreamReader::TakeFromSnapshot() {
   return record;
 }
 
-void StreamReader::Accept(const Version& version) {
-  if (version.epoch != term_.epoch || version > held_) return;
-  // What was accepted of a later term, before all died and a clock was set back, is no measure for this one.
-  accepted_ = accepted_.epoch == term_.epoch ? std::max(accepted_, version) : version;
-}
+void StreamReader::Accept(const Version& version) { versions_.Accept(version, term_.epoch); }
 
 bool StreamReader::AtEnd() const {
   return writer_closed_ && state_ == State::kFollowing && former_.empty() &&
@@ -490,7 +482,7 @@ bool StreamReader::AllTaken() const {
 
 bool StreamReader::AckIsUrgent() const {
   if (!term_.valid()) return false;
-  const int64_t accepted = accepted_.epoch == term_.epoch ? accepted_.seq : 0;
+  const int64_t accepted = versions_.AcceptedOf(term_.epoch);
   if (acknowledged_.due || accepted != acknowledged_.accepted || window_.received() != acknowledged_.received)
     return true;
   const bool writer_silent = acknowledged_.last_ns - beacons_.last_ns > options_.writer_timeout_ns;
@@ -530,9 +522,9 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
     ack.header.parent_epoch = snapshot_->number;
     ack.header.parent_seq = snapshot_->cut;
   } else {
-    ack.header.seq = accepted_.epoch == term_.epoch ? accepted_.seq : 0;
-    ack.header.parent_epoch = held_.epoch;
-    ack.header.parent_seq = held_.seq;
+    ack.header.seq = versions_.AcceptedOf(term_.epoch);
+    ack.header.parent_epoch = held().epoch;
+    ack.header.parent_seq = held().seq;
     acknowledged_.accepted = ack.header.seq;
     acknowledged_.received = ack.received;
   }

@@ -10,6 +10,7 @@
 
 #include "dmslam/head_t.hpp"
 #include "dmslam/messaging/claims.h"
+#include "dmslam/messaging/held_versions.h"
 #include "dmslam/messaging/receive_window.h"
 #include "dmslam/messaging/state_machine.h"
 #include "dmslam/messaging/types.h"
@@ -88,7 +89,7 @@ class StreamReader : public StateMachine {
 
   /// The record taken last is a part of what the owner will apply as one: until the rest is here, what is
   /// held stays as it was before.
-  void KeepHeld() { held_ = held_before_; }
+  void KeepHeld() { versions_.KeepHeld(); }
 
   /// The record taken last says what would end its owner or cost it much, and may be forged: true, and it is
   /// as if it had not been taken, and asked for again. False: it is believed, for it has come again as it
@@ -99,7 +100,7 @@ class StreamReader : public StateMachine {
   /// terms and those that were not yet taken are ignored.
   void Accept(const Version& version);
   /// Accepts all that was taken.
-  void AcceptTaken() { Accept(held_); }
+  void AcceptTaken() { Accept(held()); }
 
   /// Gives up what is held, so that a snapshot of the present writer is taken.
   void Forget();
@@ -128,8 +129,8 @@ class StreamReader : public StateMachine {
   /// What keeps this reader from following; empty when nothing does. Names the writer and the cure.
   const std::string& problem() const { return problem_; }
   /// All records up to here were taken (KeepHeld: and are whole); empty inside a snapshot.
-  const Version& held() const { return held_; }
-  const Version& accepted() const { return accepted_; }
+  const Version& held() const { return versions_.held(); }
+  const Version& accepted() const { return versions_.accepted(); }
   const Term& term() const { return term_; }
   /// What the term that is followed continues; empty when it is fresh.
   const Version& parent() const { return parent_; }
@@ -206,12 +207,8 @@ class StreamReader : public StateMachine {
   Options options_;
   State state_ = State::kNoWriter;
   Term term_;
-  Version parent_, held_, accepted_;
-  Version taken_;        // the record taken last, be it of what is not whole yet
-  Version held_before_;  // what was held before that
-  struct {
-    Version held, taken;
-  } before_take_;  // the same, be it void since
+  Version parent_;
+  HeldVersions versions_;
   struct {
     SharedBytes record;
     int64_t since_ns = 0;
