@@ -17,7 +17,6 @@ namespace dmslam {
 namespace {
 
 constexpr int64_t kMisfitNs = 2'000'000'000;
-constexpr int64_t kTidyEveryNs = 60'000'000'000;
 
 std::string UpperCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -74,9 +73,9 @@ void StreamNode::OnMessage(const std::string&, std::span<const uint8_t>) {}
 void StreamNode::Listen(const std::vector<std::string>& channels) { Listen(channels, options_.camera_id); }
 
 void StreamNode::Listen(const std::vector<std::string>& channels, CameraId camera) {
-  for (const std::string& channel : channels) other_channels_.push_back(ChannelOfCamera(channel, camera));
+  for (const std::string& channel : channels) traffic_.Listen(ChannelOfCamera(channel, camera));
   endpoint_.SetOtherHandler(
-      other_channels_,
+      traffic_.channels(),
       [this](const std::string& channel, std::span<const uint8_t> bytes) { Receive(channel, bytes); });
 }
 
@@ -85,9 +84,8 @@ void StreamNode::Receive(const std::string& channel, std::span<const uint8_t> by
     if (session_ == 0) choice_->HearBeacon(channel, bytes);
     return;
   }
-  ++traffic_.received;
-  traffic_.received_bytes += static_cast<int64_t>(bytes.size());
-  if (std::find(other_channels_.begin(), other_channels_.end(), channel) == other_channels_.end()) return;
+  traffic_.OnReceived(bytes.size());
+  if (!traffic_.IsListenedTo(channel)) return;
   const CameraChannel of_camera = SplitCamera(channel);
   if (of_camera.channel == channels::kCameraInfo) {
     OnCameraInfo(of_camera.camera, bytes);
@@ -180,14 +178,13 @@ bool StreamNode::IsForeignFrame(uint32_t session) {
 bool StreamNode::IsForeign(uint32_t session) {
   if (session == session_) return false;
   if (session_ == 0) return true;  // nothing is ours yet, and nothing foreign either
-  if (traffic_.dropped_foreign++ == 0)
+  if (traffic_.DropForeign())
     LogWarning("{}: dropped a message of session {}; ours is {}", role_, session, session_);
   return true;
 }
 
 void StreamNode::CountMalformed(const std::string& channel, const std::string& reason) {
-  ++traffic_.dropped_malformed;
-  if (!traffic_.IsFirst(channel)) return;
+  if (!traffic_.DropMalformed(channel)) return;
   LogWarning("{}: dropped a bad message on {}: {} (further ones are only counted)", role_, channel, reason);
 }
 
@@ -418,12 +415,6 @@ void StreamNode::RefuseOtherTypes(Watched* watched) {
   }
 }
 
-bool StreamNode::Traffic::IsFirst(const std::string& matter) {
-  if (std::find(logged.begin(), logged.end(), matter) != logged.end()) return false;
-  logged.push_back(matter);
-  return true;
-}
-
 /// Once for each matter.
 void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
   if (traffic_.IsFirst(matter)) LogWarning("{}: {} (further ones are only counted)", role_, text);
@@ -478,20 +469,16 @@ void StreamNode::Advance() {
 }
 
 void StreamNode::PublishStatusIfDue() {
-  if (context_.now_ns() < next_status_ns_) return;
-  next_status_ns_ = context_.now_ns() + kStatusEveryNs;
+  if (!rounds_.TakeStatus(context_.now_ns())) return;
   KeepCameraKnown();
   PublishStatus();
   if (const auto notice = wait_notice_.Due(WaitsFor(), context_.now_ns())) LogInfo("{}: {}", role_, *notice);
   const std::string no_room = feature_store_->TakeProblem();
   if (!no_room.empty())
     LogWarning("{}: features of the map stay in memory, as no file can take them: {}", role_, no_room);
-  if (context_.now_ns() < next_tidy_ns_) return;
-  if (next_tidy_ns_ > 0) {
-    ReturnFreeMemory();
-    feature_store_->LetGo();
-  }
-  next_tidy_ns_ = context_.now_ns() + kTidyEveryNs;
+  if (!rounds_.TakeTidying(context_.now_ns())) return;
+  ReturnFreeMemory();
+  feature_store_->LetGo();
 }
 
 void StreamNode::PumpBetweenSteps() {
@@ -504,12 +491,12 @@ void StreamNode::PumpBetweenSteps() {
 void StreamNode::NoteQueue() {
   int64_t depth = 0;
   for (const Watched& watched : readers_) depth += watched.reader->backlog();
-  traffic_.queue_peak = std::max(traffic_.queue_peak, depth);
+  traffic_.NoteQueue(depth);
 }
 
 int64_t StreamNode::deadline_ns() const {
   const int64_t settled_ns = candidacy_ ? candidacy_->deadline_ns() : INT64_MAX;
-  return std::min({endpoint_.deadline_ns(), next_status_ns_, settled_ns, WorkDeadline()});
+  return std::min({endpoint_.deadline_ns(), rounds_.next_status_ns(), settled_ns, WorkDeadline()});
 }
 
 void StreamNode::Stop() {
@@ -579,14 +566,11 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   ProcessHealth& health = head.health;
   health = MeasureProcess(context_.pid);
   health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;
-  health.received = traffic_.received;
-  health.received_bytes = traffic_.received_bytes;
-  health.dropped_foreign = traffic_.dropped_foreign + context_.refused();
-  health.dropped_malformed = traffic_.dropped_malformed;
+  health.dropped_foreign = context_.refused();
   for (const StreamReader* reader : readers) {
     if (reader != nullptr) AddReader(reader->statistics(), &health);
   }
-  health.queue_peak = std::max(health.queue_depth, static_cast<int32_t>(traffic_.queue_peak));
+  traffic_.AddTo(&health);
   if (!writer_) return head;
   AddWriter(*writer_, &health);
   for (const std::string& role : plan_->readers)

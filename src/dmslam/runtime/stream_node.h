@@ -18,8 +18,10 @@
 #include "dmslam/runtime/map_snapshots.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/node_options.h"
+#include "dmslam/runtime/node_traffic.h"
 #include "dmslam/runtime/publish.h"
 #include "dmslam/runtime/session_choice.h"
+#include "dmslam/runtime/status_rounds.h"
 #include "dmslam/runtime/wait_notice.h"
 #include "dmslam/runtime/writer_candidacy.h"
 #include "dmslam/wire/codec.h"
@@ -218,13 +220,6 @@ class StreamNode : public Node {
   void RefuseOtherTypes(Watched* watched);
   void WarnOnce(const std::string& matter, const std::string& text);
 
-  /// What came outside the streams, what of it was dropped, and what was said of that; and how many records
-  /// of the streams have waited at most.
-  struct Traffic {
-    int64_t received = 0, received_bytes = 0, dropped_foreign = 0, dropped_malformed = 0, queue_peak = 0;
-    std::vector<std::string> logged;
-    bool IsFirst(const std::string& matter);
-  };
   struct Ending {
     int code = 0;
     std::string problem;
@@ -248,11 +243,9 @@ class StreamNode : public Node {
   std::optional<WriterPlan> plan_;
   std::unique_ptr<WriterCandidacy> candidacy_;  ///< until the writer is open
   std::optional<Ending> ending_;
-  std::vector<std::string> other_channels_;
-  int64_t next_status_ns_ = 0;
-  int64_t next_tidy_ns_ = 0;
+  StatusRounds rounds_;
   int64_t started_ns_ = 0;
-  Traffic traffic_;
+  NodeTraffic traffic_;
   MapRecords map_records_;
   WaitNotice wait_notice_;
   std::vector<Watched> readers_;
