@@ -1,7 +1,6 @@
 #include "dmslam/slam/frontend_core.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <utility>
 
 #include "dmslam/tracking/keyframe_policy.h"
@@ -56,7 +55,8 @@ FrontendCore::FrontendCore(const Setup& setup)
       turns_(setup.camera),
       late_(setup.session, setup.camera_id, setup.seed, setup.options.tracking),
       last_poses_(setup.options.refiner, setup.options.smooth_at_end, setup.options.tracking, setup.camera),
-      unplaced_(setup.options.max_kept_frames) {
+      unplaced_(setup.options.max_kept_frames),
+      evidence_(ToNs(setup.options.evidence_every_s)) {
   map_.KeepFeaturesIn(setup.feature_store);
   if (setup.in_saved_map) {
     phase_.BeginLost();
@@ -266,7 +266,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
   odometry_.OnTracked(map_, {frame_.index, frame_.stamp_ns}, pose, frame_.T_cam_world, result.certainty,
                       !result.relocalized);
   FrontendOutput output;
-  ReportLandmarks(pose, WantsKeyframe(report, pose.reference), &evidence_ns_, &output);
+  ReportLandmarks(pose, WantsKeyframe(report, pose.reference), EvidenceSchedule::Way::kForward, &output);
   FramePose told = MakePose(phase_.state(), report, pose);
   last_poses_.Keep(frame_, told);
   if (result.certainty) TellCertainty(*result.certainty, &told);
@@ -351,14 +351,10 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId refere
   return gate_.IsOpen();
 }
 
-/// What frames said of landmarks, from time to time and before each keyframe; and the keyframe. `told_ns`:
-/// when the former was told last.
-void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, std::optional<int64_t>* told_ns,
+/// What frames said of landmarks, from time to time and before each keyframe; and the keyframe.
+void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, EvidenceSchedule::Way way,
                                    FrontendOutput* output) {
-  const int64_t since_ns = std::abs(frame_.stamp_ns - told_ns->value_or(frame_.stamp_ns));
-  const bool due = since_ns >= ToNs(options_.evidence_every_s);
-  if (!*told_ns || due || keyframe) *told_ns = frame_.stamp_ns;
-  if (due || keyframe) {
+  if (evidence_.IsDueAt(frame_.stamp_ns, keyframe, way)) {
     FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
     evidence.camera_id = camera_id_;
     if (!evidence.items.empty() && !localize_only_) output->Add(std::move(evidence));
@@ -422,7 +418,7 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
   const bool known = map_.ResolveKeyframe(ThisFrame()).has_value();
   const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(placed->report, reference);
   FrontendOutput output;
-  ReportLandmarks(placed->pose, wanted, &evidence_back_ns_, &output);
+  ReportLandmarks(placed->pose, wanted, EvidenceSchedule::Way::kBack, &output);
   KeepBelieved(LateMap::kGrows, *std::move(placed));
   return output;
 }

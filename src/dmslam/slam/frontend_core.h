@@ -11,6 +11,7 @@
 #include "dmslam/refinement/last_poses.h"
 #include "dmslam/refinement/late_placement.h"
 #include "dmslam/refinement/unplaced_frames.h"
+#include "dmslam/slam/evidence_schedule.h"
 #include "dmslam/slam/feature_stage.h"
 #include "dmslam/slam/first_map_phase.h"
 #include "dmslam/slam/frontend_options.h"
@@ -125,7 +126,7 @@ class FrontendCore {
   bool IsSharedMap(MapId map_id) const;
   void FollowJoinedMap();
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
-  void ReportLandmarks(const PlacedPose& pose, bool keyframe, std::optional<int64_t>* told_ns,
+  void ReportLandmarks(const PlacedPose& pose, bool keyframe, EvidenceSchedule::Way way,
                        FrontendOutput* output);
   KeyframeId ThisFrame() const { return KeyframeId::Make(session_, frame_.index, camera_id_); }
   KeyframeProposal ProposeKeyframe(const PlacedPose& pose);
@@ -163,10 +164,9 @@ class FrontendCore {
   // Frames
   TrackedFrame frame_;
   UnplacedFrames unplaced_;
-  std::deque<WaitingFrame> behind_;          ///< since the first map's second keyframe, not tracked yet
-  std::optional<int64_t> evidence_ns_;       ///< when it was told last...
-  std::optional<int64_t> evidence_back_ns_;  ///< ...while the map grows back, where time runs backwards
-  std::optional<int64_t> lit_since_ns_;      ///< since when the frames of a lost camera show anything
+  std::deque<WaitingFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
+  EvidenceSchedule evidence_;
+  std::optional<int64_t> lit_since_ns_;  ///< since when the frames of a lost camera show anything
   FrontendCounters counters_;
 };
 
