@@ -6,45 +6,10 @@
 #include <optional>
 
 #include "dmslam/geometry/solve_symmetric.h"
-#include "dmslam/optimization/reprojection.h"
+#include "dmslam/optimization/pose_sums.h"
 
 namespace dmslam {
 namespace {
-
-constexpr double kCostBehind =
-    1e5;  ///< Of an observation behind the camera: no step is to gain by moving one there.
-
-/// The upper triangle of a 6x6 sum of row^T row, kept in scalars that the compiler holds in registers.
-class SymmetricSum {
- public:
-  void Add(const double (&row)[6], double weight, double error) {
-    size_t at = 0;
-    for (size_t i = 0; i < 6; ++i) {
-      const double scaled = weight * row[i];
-      gradient_[i] += scaled * error;
-      for (size_t j = i; j < 6; ++j) upper_[at++] += scaled * row[j];
-    }
-  }
-  Matrix6d Hessian() const {
-    Matrix6d h;
-    size_t at = 0;
-    for (int i = 0; i < 6; ++i) {
-      for (int j = i; j < 6; ++j) h(i, j) = h(j, i) = upper_[at++];
-    }
-    return h;
-  }
-  Vector6d Gradient() const { return Eigen::Map<const Vector6d>(gradient_); }
-
- private:
-  double upper_[21] = {};
-  double gradient_[6] = {};
-};
-
-struct Linearization {
-  Matrix6d hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  double cost = 0.0;
-};
 
 /// One pose-only problem: the data, and which observations count.
 class PoseProblem {
@@ -54,31 +19,9 @@ class PoseProblem {
       : camera_(camera), observations_(observations), options_(options), inliers_(inliers) {}
 
   /// Cost (sum of weight * rho(chi2), and the prior's), gradient and Gauss-Newton Hessian, tangent (w, v).
-  Linearization Linearize(const Rigid3d& T, bool robust) const {
-    const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
-    SymmetricSum sum;
-    Linearization result;
-    for (size_t i = 0; i < observations_.size(); ++i) {
-      if (!inliers_[i]) continue;
-      const PoseObservation& o = observations_[i];
-      const Eigen::Vector3d p = R * o.p_world + T.translation;
-      if (!(p.z() > kMinDepth)) {
-        result.cost += o.weight * kCostBehind;
-        continue;
-      }
-      const double w = 1.0 / p.z(), x = p.x() * w, y = p.y() * w;
-      const double fx = camera_.fx_px, fy = camera_.fy_px;
-      const double eu = fx * x + camera_.cx_px - o.uv_px.x(), ev = fy * y + camera_.cy_px - o.uv_px.y();
-      const auto [loss, slope] = Loss((eu * eu + ev * ev) * o.inv_sigma_squared, robust);
-      const double weight = o.weight * o.inv_sigma_squared * slope;
-      const double row_u[6] = {-fx * x * y, fx * (1.0 + x * x), -fx * y, fx * w, 0.0, -fx * x * w};
-      const double row_v[6] = {-fy * (1.0 + y * y), fy * x * y, fy * x, 0.0, fy * w, -fy * y * w};
-      sum.Add(row_u, weight, eu);
-      sum.Add(row_v, weight, ev);
-      result.cost += o.weight * loss;
-    }
-    result.hessian = sum.Hessian();
-    result.gradient = sum.Gradient();
+  PoseNormal Linearize(const Rigid3d& T, bool robust) const {
+    const double huber_chi2 = robust ? options_.max_chi2 : std::numeric_limits<double>::infinity();
+    PoseNormal result = SumPoseNormal(camera_, T, observations_, inliers_, huber_chi2);
     AddPrior(T, result);
     return result;
   }
@@ -110,13 +53,6 @@ class PoseProblem {
     return (camera_.Project(p_cam) - o.uv_px).squaredNorm() * o.inv_sigma_squared;
   }
 
-  /// Huber's loss of a squared error in sigmas, and its slope.
-  std::pair<double, double> Loss(double chi2, bool robust) const {
-    if (!robust || chi2 <= options_.max_chi2) return {chi2, 1.0};
-    const double ratio = std::sqrt(options_.max_chi2 / chi2);
-    return {2.0 * chi2 * ratio - options_.max_chi2, ratio};
-  }
-
   static Vector6d PriorError(const Rigid3d& T, const PosePrior& prior) {
     const Rigid3d difference = T * prior.T_cam_world.Inverse();
     Vector6d error;
@@ -124,7 +60,7 @@ class PoseProblem {
     return error;
   }
 
-  void AddPrior(const Rigid3d& T, Linearization& result) const {
+  void AddPrior(const Rigid3d& T, PoseNormal& result) const {
     if (!options_.prior) return;
     const Vector6d error = PriorError(T, *options_.prior);
     const Matrix6d J = PosePriorJacobian(error);
@@ -143,7 +79,7 @@ class PoseProblem {
 /// Levenberg-Marquardt until the step is tiny or the iterations are spent. `now` is what the problem looks
 /// like at T, before and after. Returns how many were made.
 int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options, bool robust, Rigid3d& T,
-             Linearization& now) {
+             PoseNormal& now) {
   double damping = 1e-6;
   for (int k = 0; k < options.iterations; ++k) {
     Matrix6d damped = now.hessian;
@@ -152,7 +88,7 @@ int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options,
     if (!step.allFinite()) return k;
     const Rigid3d candidate = StepPose(T, step);
     const bool tiny = step.squaredNorm() < options.min_step * options.min_step;
-    Linearization next = problem.Linearize(candidate, robust);
+    PoseNormal next = problem.Linearize(candidate, robust);
     if (next.cost <= now.cost) {
       const bool settled = now.cost - next.cost < 1e-7 * now.cost;
       T = candidate;
@@ -192,7 +128,7 @@ void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
   const PoseProblem problem(camera, observations, options, report.inliers);
   report.num_inliers = static_cast<int>(count);
   // Where a round left the inliers as they were, the next begins with what is known.
-  std::optional<Linearization> known;
+  std::optional<PoseNormal> known;
   bool known_robust = false;
   for (int round = 0; round < options.rounds && report.num_inliers >= options.min_observations; ++round) {
     const bool robust = round < options.robust_rounds;
