@@ -80,6 +80,39 @@ TEST(FeatureGrid, FindsWhatExhaustiveSearchFinds) {
   EXPECT_NE(std::find(found.begin(), found.end(), 0U), found.end());
 }
 
+TEST(FeatureGrid, ListsAndBatchesAreTheSameInTheSameOrderOnEveryPath) {
+  Random random(4);
+  Image image;
+  for (int i = 0; i < 1500; ++i) {  // half of them crowded
+    const double spread = i % 2 == 0 ? 640 : 90;
+    image.Add(random.Uniform(0, spread), random.Uniform(0, 0.75 * spread), static_cast<int>(random.Below(8)),
+              0, {});
+  }
+  image.Index();
+  std::vector<uint32_t> expected, list(1500 + FeatureGrid::kSlack), batched;
+  size_t most = 0;
+  for (int query = 0; query < 300; ++query) {
+    const Eigen::Vector2d center(random.Uniform(-20, 660), random.Uniform(-20, 500));
+    const double radius = random.Uniform(0, query % 3 == 0 ? 200 : 40);
+    const int least = static_cast<int>(random.Below(8)), last = least + static_cast<int>(random.Below(4));
+    image.grid.FindInRadius(center, radius, least, last, &expected);
+    most = std::max(most, expected.size());
+    for (const VectorPath path : VectorPaths()) {
+      const size_t count = image.grid.CollectInRadius(center, radius, least, last, list.data(), path);
+      EXPECT_EQ(std::vector<uint32_t>(list.begin(), list.begin() + static_cast<ptrdiff_t>(count)), expected);
+    }
+    batched.clear();
+    image.grid.ForEachBatchInRadius(center, radius, least, last, [&](std::span<uint32_t> batch) {
+      EXPECT_FALSE(batch.empty());
+      EXPECT_LE(batch.size(), FeatureGrid::kBatch);
+      batched.insert(batched.end(), batch.begin(), batch.end());
+      std::fill(batch.begin(), batch.end(), 0U);  // who is given it may write there
+    });
+    EXPECT_EQ(batched, expected);
+  }
+  EXPECT_GT(most, FeatureGrid::kBatch);
+}
+
 TEST(FeatureGrid, QueriesThatAskForNothing) {
   Image image;
   std::vector<uint32_t> found = {1};

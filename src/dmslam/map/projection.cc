@@ -59,14 +59,15 @@ class TwoNearest {
 
 std::optional<FeatureHit> FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px,
                                       double radius_px, int min_octave, int max_octave,
-                                      const Descriptor& descriptor, const std::vector<uint8_t>& taken) {
-  const HammingToIndexed distances_to = BestHammingKernels().to_indexed;
+                                      const Descriptor& descriptor, const std::vector<uint8_t>& taken,
+                                      int max_distance) {
+  const HammingKeepNear keep_near = BestHammingKernels().keep_near;
   TwoNearest nearest;
   std::array<uint16_t, FeatureGrid::kBatch> distances;
-  const auto compare = [&](std::span<const uint32_t> batch) {
-    distances_to(descriptor, features.set.descriptors.data(), batch.data(), static_cast<int>(batch.size()),
-                 distances.data());
-    for (size_t k = 0; k < batch.size(); ++k) {
+  const auto compare = [&](std::span<uint32_t> batch) {
+    const int near = keep_near(descriptor, features.set.descriptors.data(), batch.data(),
+                               static_cast<int>(batch.size()), max_distance, distances.data());
+    for (size_t k = 0; k < static_cast<size_t>(near); ++k) {
       if (taken.empty() || taken[batch[k]] == 0) nearest.Offer(features, batch[k], distances[k]);
     }
   };

@@ -45,11 +45,15 @@ struct FeatureHit {
 };
 
 /// Looks within `radius_px` of `uv_px`, at octaves min..max, for the feature nearest to `descriptor`; none:
-/// there is none. Features whose entry in `taken` is non-zero are passed over (`taken` may be empty). Ties go
-/// to the lower index.
+/// there is none. Features whose entry in `taken` is non-zero are passed over (`taken` may be empty), and
+/// those that differ by more than `max_distance` bits. Ties go to the lower index.
 std::optional<FeatureHit> FindFeature(const FrameFeatures& features, const Eigen::Vector2d& uv_px,
                                       double radius_px, int min_octave, int max_octave,
-                                      const Descriptor& descriptor, const std::vector<uint8_t>& taken);
+                                      const Descriptor& descriptor, const std::vector<uint8_t>& taken,
+                                      int max_distance = kNoDistance);
+/// Second best features that are farther than this [bits] make no difference where the best one may be
+/// `max_best` away, and at most `ratio` of the second best.
+constexpr int FarthestSecond(int max_best, double ratio) { return static_cast<int>(max_best / ratio) + 1; }
 
 /// Squared reprojection error over the feature's variance.
 inline double NormalizedErrorSquared(const FrameFeatures& features, int feature, const Eigen::Vector2d& uv_px,
