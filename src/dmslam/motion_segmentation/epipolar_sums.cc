@@ -24,8 +24,9 @@ struct Terms {
   Column last, residual, bound, weight, cost;
 };
 
-/// For `n` matches from `begin` on. A sum of three is (a + b) + c, but for the third row of a product with
-/// M or R, a + (b + c).
+/// For `n` matches from `begin` on; without `kRows` residual and bound alone. A sum of three is (a + b) + c,
+/// but for the third row of a product with M or R, a + (b + c).
+template <bool kRows>
 [[gnu::always_inline]] inline void MakeTerms(const PackedMatches& a, size_t begin, size_t n,
                                              const TwoViewModel& model, const Eigen::Matrix3d& M,
                                              const Eigen::Matrix<double, 3, 2>& B, double bound_scale,
@@ -50,6 +51,9 @@ struct Terms {
     const double n0 = y1 - y2 * qy, n1 = y2 * qx - y0, n2 = y0 * qy - y1 * qx;
     const double c0 = qy * t2 - t1, c1 = t0 - qx * t2, c2 = qx * t1 - qy * t0;
     const double residual = t0 * n0 + t1 * n1 + t2 * n2;
+    out->residual[k] = residual;
+    out->bound[k] = bound;
+    if constexpr (!kRows) continue;
     // The denominator changes with the parameters, too: half its derivative is b1 (y x l) + b0 (z x ray1)
     // along t and b1 (y x (l x t)) + b0 (z x turned) along the rotation, l and k the two lines, z = R k.
     const double z0 = r00 * kx + r01 * ky, z1 = r10 * kx + r11 * ky, z2 = r20 * kx + r21 * ky;
@@ -63,8 +67,6 @@ struct Terms {
     out->row[2][k] = y0 * c1 - y1 * c0 - (f1 * (y0 * s1 - y1 * s0) + f0 * (z0 * c1 - z1 * c0));
     out->row[3][k] = u0 * w0 + u1 * w1 + u2 * w2;
     out->last[k] = v0 * w0 + v1 * w1 + v2 * w2;
-    out->residual[k] = residual;
-    out->bound[k] = bound;
   }
 }
 
@@ -133,7 +135,7 @@ struct Sums {
   Sums sums;
   for (size_t begin = 0; begin < matches.count && !(sums.cost >= enough); begin += kBlock) {
     const size_t n = std::min(kBlock, matches.count - begin);
-    MakeTerms(matches, begin, n, model, M, B, bound_scale, &terms);
+    MakeTerms<true>(matches, begin, n, model, M, B, bound_scale, &terms);
     WeighTerms(n, &terms);
     AddTerms(terms, n, &sums);
   }
@@ -150,6 +152,26 @@ struct Sums {
   normal.cost = sums.cost;
   normal.count = sums.count;
   return normal;
+}
+
+[[gnu::always_inline]] inline EssentialCost SumCostOfNormal(const PackedMatches& matches,
+                                                            const TwoViewModel& model, double bound_scale,
+                                                            double enough) {
+  const Eigen::Matrix3d M = Hat(model.t) * model.R;
+  const Eigen::Matrix<double, 3, 2> no_tangent = Eigen::Matrix<double, 3, 2>::Zero();
+  Terms terms;
+  EssentialCost sum;
+  for (size_t begin = 0; begin < matches.count && !(sum.cost >= enough); begin += kBlock) {
+    const size_t n = std::min(kBlock, matches.count - begin);
+    MakeTerms<false>(matches, begin, n, model, M, no_tangent, bound_scale, &terms);
+    WeighTerms(n, &terms);
+    for (size_t k = 0; k < n; ++k) {
+      if (!(terms.bound[k] > 0)) continue;
+      sum.cost += terms.cost[k];
+      ++sum.count;
+    }
+  }
+  return sum;
 }
 
 /// What one match adds to the rotation's normal equations: the lower half of the matrix column by column,
@@ -234,6 +256,11 @@ __attribute__((target("avx2"))) EssentialNormal SumNormalAvx2(const PackedMatche
                                                               double bound_scale, double enough) {
   return SumNormal(matches, model, B, bound_scale, enough);
 }
+__attribute__((target("avx2"))) EssentialCost SumCostOfNormalAvx2(const PackedMatches& matches,
+                                                                  const TwoViewModel& model,
+                                                                  double bound_scale, double enough) {
+  return SumCostOfNormal(matches, model, bound_scale, enough);
+}
 __attribute__((target("avx2"))) RotationNormal SumRotationAvx2(const PackedMatches& matches,
                                                                const UnitRays& rays1,
                                                                const Eigen::Matrix3d& R) {
@@ -284,6 +311,14 @@ EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewMo
     return SumNormalAvx2(matches, model, tangent, bound_scale, enough);
 #endif
   return SumNormal(matches, model, tangent, bound_scale, enough);
+}
+
+EssentialCost SumEssentialCost(const PackedMatches& matches, const TwoViewModel& model, double bound_scale,
+                               double enough, [[maybe_unused]] VectorPath path) {
+#if defined(__x86_64__)
+  if (path == VectorPath::kAvx2 && HasAvx2()) return SumCostOfNormalAvx2(matches, model, bound_scale, enough);
+#endif
+  return SumCostOfNormal(matches, model, bound_scale, enough);
 }
 
 RotationNormal SumRotationNormal(const PackedMatches& matches, const UnitRays& rays1,

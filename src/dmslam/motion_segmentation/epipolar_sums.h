@@ -38,6 +38,15 @@ EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewMo
                                    double enough = std::numeric_limits<double>::infinity(),
                                    VectorPath path = VectorPath::kAvx2);
 
+/// The cost and the count of SumEssentialNormal alone, the same to the last bit.
+struct EssentialCost {
+  double cost = 0;
+  int count = 0;
+};
+EssentialCost SumEssentialCost(const PackedMatches& matches, const TwoViewModel& model, double bound_scale,
+                               double enough = std::numeric_limits<double>::infinity(),
+                               VectorPath path = VectorPath::kAvx2);
+
 /// Rays of frame 1, made unit vectors, and the sum of both bounds; parallel to PackedMatches.
 struct UnitRays {
   std::vector<double> x, y, z, bound;

@@ -147,6 +147,24 @@ TEST(SumEssentialNormal, LeavesOutWhatHasNoDenominator) {
   }
 }
 
+TEST(SumEssentialCost, IsThatOfTheNormalEquationsToTheLastBit) {
+  const Input in;
+  const PackedMatches matches(in.arrays, in.use);
+  ASSERT_GT(matches.count, 200u);
+  for (const double bound_scale : {1.0, 10.0, 100.0}) {
+    const double all = SumEssentialNormal(matches, in.model, in.tangent, bound_scale).cost;
+    for (const double enough : {kInfinity, all, 0.3 * all, 0.0}) {
+      for (const VectorPath path : VectorPaths()) {
+        const EssentialNormal normal =
+            SumEssentialNormal(matches, in.model, in.tangent, bound_scale, enough, path);
+        const EssentialCost cost = SumEssentialCost(matches, in.model, bound_scale, enough, path);
+        EXPECT_EQ(cost.cost, normal.cost);
+        EXPECT_EQ(cost.count, normal.count);
+      }
+    }
+  }
+}
+
 TEST(SumRotationNormal, IsTheSumOfItsFormulaAndTheSameOnEveryPath) {
   const Input in;
   const PackedMatches matches(in.arrays, in.use);

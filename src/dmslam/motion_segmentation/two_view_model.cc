@@ -236,6 +236,7 @@ namespace {
 /// Levenberg and Marquardt's descent: a step that does not lower the cost is taken back and made shorter.
 /// Along a valley of little parallax whole steps lead anywhere.
 bool DescendEssential(const PackedMatches& matches, int iterations, double bound_scale, TwoViewModel* model) {
+  constexpr double kTinyStepSquared = 1e-14;
   double damping = 1e-4;
   EssentialNormal normal = SumEssentialNormal(matches, *model, Tangent(model->t), bound_scale);
   for (int iteration = 0; iteration < iterations; ++iteration) {
@@ -248,6 +249,11 @@ bool DescendEssential(const PackedMatches& matches, int iterations, double bound
     if (!step.allFinite()) return false;
     TwoViewModel trial = *model;
     UpdateEssential(step, B, &trial);
+    if (iteration + 1 == iterations || step.squaredNorm() < kTinyStepSquared) {  // no step follows
+      const EssentialCost last = SumEssentialCost(matches, trial, bound_scale, normal.cost);
+      if (last.count >= 5 && last.cost < normal.cost) *model = trial;
+      break;
+    }
     const EssentialNormal there =
         SumEssentialNormal(matches, trial, Tangent(trial.t), bound_scale, normal.cost);
     const bool lower = there.count >= 5 && there.cost < normal.cost;
@@ -256,7 +262,7 @@ bool DescendEssential(const PackedMatches& matches, int iterations, double bound
       *model = trial;
       normal = there;
     }
-    if (step.squaredNorm() < 1e-14 || damping > 1e6) break;
+    if (damping > 1e6) break;
   }
   model->M = Hat(model->t) * model->R;
   model->M /= model->M.norm();
