@@ -1,9 +1,9 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <vector>
 
+#include "dmslam/map/landmark_set.h"
 #include "dmslam/map/projection.h"
 #include "dmslam/map/tracked_frame.h"
 
@@ -24,13 +24,13 @@ struct RejectedMatch {
   double chi2 = 0;  ///< squared reprojection error over the feature's variance
 };
 
-/// The landmarks that a frame's features are matched with, sorted.
-inline void ListMatched(const TrackedFrame& frame, std::vector<LandmarkId>* matched) {
-  matched->clear();
+/// The landmarks that a frame's features are matched with.
+inline void ListMatched(const TrackedFrame& frame, LandmarkSet* matched) {
+  matched->Clear();
   for (const LandmarkId id : frame.landmarks) {
-    if (id.valid()) matched->push_back(id);
+    if (id.valid()) matched->Add(id);
   }
-  std::sort(matched->begin(), matched->end());
+  matched->Finish();
 }
 
 /// 1 for each feature of a frame that is matched.

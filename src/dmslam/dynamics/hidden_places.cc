@@ -1,7 +1,5 @@
 #include "dmslam/dynamics/hidden_places.h"
 
-#include <algorithm>
-
 #include "dmslam/dynamics/found_share.h"
 
 namespace dmslam {
@@ -12,7 +10,7 @@ void HiddenPlaces::DropMatches(const Map& map, std::span<const ExpectedLandmark>
   FoundShare share(map.camera());
   for (const auto& [landmark, view] : expected) {
     if (!votes.HasVote(*landmark)) continue;
-    share.Add(view.uv_px, std::binary_search(matched_.begin(), matched_.end(), landmark->id));
+    share.Add(view.uv_px, matched_.Holds(landmark->id));
   }
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     const Landmark* landmark = frame->landmarks[i].valid() ? map.FindLandmark(frame->landmarks[i]) : nullptr;

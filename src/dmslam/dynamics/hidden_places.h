@@ -35,7 +35,7 @@ class HiddenPlaces {
 
  private:
   HiddenPlaceOptions options_;
-  std::vector<LandmarkId> matched_;  ///< workspace
+  LandmarkSet matched_;  ///< workspace
 };
 
 }  // namespace dmslam

@@ -27,10 +27,11 @@ int WitnessGrid::Row(double y) const {
 void MissingLandmarks::CallWitnesses(const Map& map, const TrackedFrame& frame,
                                      std::span<const LandmarkId> moved) {
   witnesses_.Clear();
-  known_.assign(moved.begin(), moved.end());
+  known_.Clear();
+  for (const LandmarkId id : moved) known_.Add(id);
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].valid()) continue;
-    known_.push_back(frame.landmarks[i]);
+    known_.Add(frame.landmarks[i]);
     const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
     witnesses_.Add({frame.features->uv_px[i], depth, false});
   }
@@ -38,7 +39,7 @@ void MissingLandmarks::CallWitnesses(const Map& map, const TrackedFrame& frame,
     const Eigen::Vector3d p_cam = frame.T_cam_world * map.FindLandmark(id)->p_world;
     if (const auto uv = map.camera().Project(p_cam)) witnesses_.Add({*uv, p_cam.z(), true});
   }
-  std::sort(known_.begin(), known_.end());
+  known_.Finish();
 }
 
 MissingLandmarks::Verdict MissingLandmarks::AskAround(const LandmarkView& view) const {
@@ -65,7 +66,7 @@ void MissingLandmarks::Judge(const Map& map, const TrackedFrame& frame,
   gone_.clear();
   hidden_.clear();
   for (const auto& [landmark, view] : expected) {
-    if (std::binary_search(known_.begin(), known_.end(), landmark->id)) continue;
+    if (known_.Holds(landmark->id)) continue;
     const Verdict verdict = AskAround(view);
     if (verdict == Verdict::kGone) gone_.push_back(landmark->id);
     if (verdict == Verdict::kHidden) hidden_.push_back(landmark->id);

@@ -26,10 +26,13 @@ class WitnessGrid {
   void Add(const Witness& witness);
   template <typename Visit>
   void ForEachNear(const Eigen::Vector2d& uv_px, double reach_px, const Visit& visit) const {
-    for (int row = Row(uv_px.y() - reach_px); row <= Row(uv_px.y() + reach_px); ++row) {
-      for (int column = Column(uv_px.x() - reach_px); column <= Column(uv_px.x() + reach_px); ++column) {
+    const int top = Row(uv_px.y() - reach_px), bottom = Row(uv_px.y() + reach_px);
+    const int left = Column(uv_px.x() - reach_px), right = Column(uv_px.x() + reach_px);
+    const double reach_squared = reach_px * reach_px;
+    for (int row = top; row <= bottom; ++row) {
+      for (int column = left; column <= right; ++column) {
         for (const Witness& witness : cells_[Index(column, row)]) {
-          if ((witness.uv_px - uv_px).squaredNorm() <= reach_px * reach_px) visit(witness);
+          if ((witness.uv_px - uv_px).squaredNorm() <= reach_squared) visit(witness);
         }
       }
     }
@@ -86,7 +89,7 @@ class MissingLandmarks {
   double reach_px_;
   WitnessGrid witnesses_;
   std::vector<LandmarkId> gone_, hidden_;
-  std::vector<LandmarkId> known_;  ///< workspace: those that the frame sees, in their place or elsewhere
+  LandmarkSet known_;  ///< workspace: those that the frame sees, in their place or elsewhere
 };
 
 }  // namespace dmslam

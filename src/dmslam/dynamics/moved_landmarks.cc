@@ -1,6 +1,5 @@
 #include "dmslam/dynamics/moved_landmarks.h"
 
-#include <algorithm>
 #include <optional>
 
 #include "dmslam/camera/image_scale.h"
@@ -16,9 +15,9 @@ const std::vector<LandmarkId>& MovedLandmarks::Find(const Map& map,
   moved_.clear();
   features_.clear();
   JudgeRejected(map, rejected, frame);
-  std::sort(used_.begin(), used_.end());
+  used_.Finish();
   for (const ExpectedLandmark& landmark : expected) {
-    if (!std::binary_search(used_.begin(), used_.end(), landmark.id())) LookAround(map, landmark, frame);
+    if (!used_.Holds(landmark.id())) LookAround(map, landmark, frame);
   }
   return moved_;
 }
@@ -33,7 +32,7 @@ void MovedLandmarks::JudgeRejected(const Map& map, std::span<const RejectedMatch
     if (match.chi2 < kNearChi2 || distance > kNearDistance) continue;
     moved_.push_back(match.landmark);
     features_.push_back(match.feature);
-    used_.push_back(match.landmark);
+    used_.Add(match.landmark);
     taken_[match.feature] = 1;
     frame->classes[match.feature] = FeatureClass::kMoving;
   }
@@ -44,9 +43,9 @@ void MovedLandmarks::LookAround(const Map& map, const ExpectedLandmark& expected
   const Landmark& landmark = *expected.landmark;
   const std::optional<Eigen::Vector2d> uv = map.camera().Project(frame->T_cam_world * landmark.p_world);
   if (!uv) return;
-  const std::optional<FeatureHit> hit =
-      FindFeature(*frame->features, *uv, SearchRadiusPx(map.camera(), kRadiusRad), expected.view.octave - 1,
-                  expected.view.octave + 1, landmark.descriptor, taken_);
+  const std::optional<FeatureHit> hit = FindFeature(
+      *frame->features, *uv, SearchRadiusPx(map.camera(), kRadiusRad), expected.view.octave - 1,
+      expected.view.octave + 1, landmark.descriptor, taken_, FarthestSecond(kMaxDistance, kRatio));
   if (!hit || hit->distance > kMaxDistance) return;
   if (hit->distance > kRatio * hit->second_distance) return;
   if (NormalizedErrorSquared(*frame->features, hit->feature, *uv, map.pyramid()) < kChi2) return;

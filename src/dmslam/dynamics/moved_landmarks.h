@@ -37,8 +37,8 @@ class MovedLandmarks {
 
   std::vector<LandmarkId> moved_;
   std::vector<uint16_t> features_;
-  std::vector<LandmarkId> used_;  ///< workspace: landmarks that are accounted for
-  std::vector<uint8_t> taken_;    ///< workspace: features that are
+  LandmarkSet used_;            ///< workspace: landmarks that are accounted for
+  std::vector<uint8_t> taken_;  ///< workspace: features that are
 };
 
 }  // namespace dmslam

@@ -20,7 +20,8 @@ struct FrameFeatures {
 
   size_t size() const { return set.size(); }
   /// Variance of an undistorted pixel, in x and in y.
-  double Variance(size_t feature, const Pyramid& pyramid) const {
+  template <typename AnyPyramid>
+  double Variance(size_t feature, const AnyPyramid& pyramid) const {
     if (sigmas_px.empty()) return pyramid.SigmaSquared(set.keypoints[feature].octave);
     return static_cast<double>(sigmas_px[feature]) * static_cast<double>(sigmas_px[feature]);
   }

@@ -119,4 +119,25 @@ struct Pyramid {
   double SigmaSquared(int octave) const { return finest_px * finest_px * std::pow(scale_factor, 2 * octave); }
 };
 
+/// What a pyramid says of its levels, looked up: the same numbers.
+class PyramidTable {
+ public:
+  explicit PyramidTable(const Pyramid& pyramid) {
+    for (int octave = 0; octave < kLevels; ++octave) {
+      const size_t i = static_cast<size_t>(octave);
+      scales_[i] = pyramid.Scale(octave);
+      search_scales_[i] = pyramid.SearchScale(octave);
+      sigmas_squared_[i] = pyramid.SigmaSquared(octave);
+    }
+  }
+
+  double Scale(uint8_t octave) const { return scales_[octave % kLevels]; }
+  double SearchScale(uint8_t octave) const { return search_scales_[octave % kLevels]; }
+  double SigmaSquared(uint8_t octave) const { return sigmas_squared_[octave % kLevels]; }
+
+ private:
+  static constexpr int kLevels = 64;  ///< no pyramid has more
+  std::array<double, kLevels> scales_{}, search_scales_{}, sigmas_squared_{};
+};
+
 }  // namespace dmslam

@@ -33,7 +33,8 @@ struct Keyframe {
   std::vector<LandmarkId> landmarks;
   CameraId camera_id = 0;
 
-  // Derived from the above, the same in every replica.
+  // Derived from the above, the same in every replica but for the order of `seen`.
+  std::vector<LandmarkId> seen;         ///< the valid ones of `landmarks`
   std::map<KeyframeId, int> covisible;  ///< landmarks seen in common (at least one)
 };
 

@@ -15,11 +15,19 @@ auto WhereObserved(std::vector<Observation>& observations, KeyframeId keyframe) 
   return std::ranges::lower_bound(observations, keyframe, {}, &Observation::keyframe);
 }
 
+/// Those that came last go first, as a rule.
+void TakeOut(LandmarkId id, std::vector<LandmarkId>* ids) {
+  const auto at = std::find(ids->rbegin(), ids->rend(), id);
+  *at = ids->back();
+  ids->pop_back();
+}
+
 }  // namespace
 
 Map::Map(const Camera& camera, const Pyramid& pyramid)
     : camera_(camera),
       pyramid_(pyramid.OfImages(camera.width_px, camera.height_px)),
+      pyramid_table_(pyramid_),
       log_scale_factor_(std::log(pyramid.scale_factor)) {}
 
 void Map::KeepFeaturesIn(std::shared_ptr<FeatureStore> store) {
@@ -221,7 +229,7 @@ std::optional<ViewingRange> Map::ComputeViewing(const Landmark& landmark) const 
   const double distance = (landmark.p_world - keyframe.T_cam_world.Center()).norm();
   ViewingRange viewing;
   viewing.max_distance =
-      distance * pyramid_.Scale(keyframe.features->set.keypoints[scale_from->feature].octave);
+      distance * pyramid_table_.Scale(keyframe.features->set.keypoints[scale_from->feature].octave);
   viewing.min_distance = viewing.max_distance / pyramid_.Scale(pyramid_.NumLevels() - 1);
   viewing.mean_direction = sum.normalized();
   return viewing;
@@ -274,6 +282,7 @@ Keyframe& Map::Insert(Keyframe keyframe) {
   DMSLAM_CHECK(keyframe.features != nullptr, "keyframe without features");
   if (feature_store_ != nullptr) keyframe.features = feature_store_->Keep(std::move(keyframe.features));
   keyframe.landmarks.assign(keyframe.features->size(), LandmarkId{});
+  keyframe.seen.clear();
   keyframe.covisible.clear();
   Attach(id, keyframe.parent);
   Keyframe& inserted = keyframes_.emplace(id, std::move(keyframe)).first->second;
@@ -342,6 +351,7 @@ std::optional<uint16_t> Map::Observe(Keyframe& keyframe, uint16_t feature, Landm
     Release(keyframe, *released);
   }
   keyframe.landmarks[feature] = landmark.id;
+  keyframe.seen.push_back(landmark.id);
   landmark.observations.insert(WhereObserved(landmark.observations, keyframe.id), {keyframe.id, feature});
   landmark.viewing_.MarkStale();
   Link(landmark, keyframe, +1);
@@ -351,6 +361,7 @@ std::optional<uint16_t> Map::Observe(Keyframe& keyframe, uint16_t feature, Landm
 void Map::Release(Keyframe& keyframe, uint16_t feature) {
   DMSLAM_CHECK(feature < keyframe.landmarks.size(), "observation by an unknown feature");
   const LandmarkId id = std::exchange(keyframe.landmarks[feature], LandmarkId{});
+  if (id.valid()) TakeOut(id, &keyframe.seen);
   Landmark* landmark = id.valid() ? Find(id) : nullptr;
   if (landmark == nullptr) return;
   Link(*landmark, keyframe, -1);

@@ -44,6 +44,8 @@ class Map {
 
   const Camera& camera() const { return camera_; }
   const Pyramid& pyramid() const { return pyramid_; }
+  /// The same, for those who ask thousands of times.
+  const PyramidTable& pyramid_table() const { return pyramid_table_; }
   /// The level of the pyramid at which something is so many times as small as at the first; between levels,
   /// too.
   double LevelOf(double times) const { return std::log(times) / log_scale_factor_; }
@@ -184,6 +186,7 @@ class Map {
 
   Camera camera_;
   Pyramid pyramid_;
+  PyramidTable pyramid_table_;
   double log_scale_factor_;
   std::shared_ptr<FeatureStore> feature_store_;
   uint64_t version_ = 0;

@@ -79,6 +79,22 @@ TEST(Map, CovisibilityCountsSharedLandmarks) {
   }
 }
 
+TEST(Map, KeyframesListTheLandmarksThatTheySee) {
+  RandomEditor editor(11);
+  editor.Steps(2000);
+  size_t seen = 0;
+  for (const auto& [id, keyframe] : editor.map().keyframes()) {
+    std::vector<LandmarkId> expected;
+    for (const LandmarkId landmark : keyframe.landmarks) {
+      if (landmark.valid()) expected.push_back(landmark);
+    }
+    EXPECT_TRUE(
+        std::is_permutation(keyframe.seen.begin(), keyframe.seen.end(), expected.begin(), expected.end()));
+    seen += expected.size();
+  }
+  EXPECT_GT(seen, 20u);
+}
+
 TEST(Map, BestCovisibleAreThoseThatShareMost) {
   RandomEditor editor(5);
   editor.Steps(2000);

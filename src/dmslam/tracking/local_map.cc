@@ -14,23 +14,35 @@ constexpr uint64_t kWidestRange = 64;  // ids between the ends, for each in the 
 /// The same of those that are counted.
 constexpr uint64_t kWidestCounted = 8;
 
-/// Sorts, and leaves each once. `marks` is workspace.
-void SortUnique(std::vector<LandmarkId>* ids, std::vector<uint64_t>* marks) {
-  if (ids->empty()) return;
-  const auto [least, most] = std::minmax_element(ids->begin(), ids->end());
-  const uint64_t first = least->value, range = most->value - first;
-  if (range / kWidestRange >= ids->size()) {
-    std::sort(ids->begin(), ids->end());
-    ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
+/// All that are in any of the lists, sorted, each once. `marks` is workspace.
+void Unite(std::span<const std::span<const LandmarkId>> lists, std::vector<uint64_t>* marks,
+           std::vector<LandmarkId>* united) {
+  united->clear();
+  uint64_t first = UINT64_MAX, last = 0;
+  size_t count = 0;
+  for (const std::span<const LandmarkId> ids : lists) {
+    count += ids.size();
+    for (const LandmarkId id : ids) {
+      first = std::min(first, id.value);
+      last = std::max(last, id.value);
+    }
+  }
+  if (count == 0) return;
+  const uint64_t range = last - first;
+  if (range / kWidestRange >= count) {
+    for (const std::span<const LandmarkId> ids : lists) united->insert(united->end(), ids.begin(), ids.end());
+    std::sort(united->begin(), united->end());
+    united->erase(std::unique(united->begin(), united->end()), united->end());
     return;
   }
   marks->assign(range / 64 + 1, 0);
-  for (const LandmarkId id : *ids)
-    (*marks)[(id.value - first) / 64] |= uint64_t{1} << ((id.value - first) % 64);
-  ids->clear();
+  for (const std::span<const LandmarkId> ids : lists) {
+    for (const LandmarkId id : ids)
+      (*marks)[(id.value - first) / 64] |= uint64_t{1} << ((id.value - first) % 64);
+  }
   for (size_t word = 0; word < marks->size(); ++word) {
     for (uint64_t left = (*marks)[word]; left != 0; left &= left - 1)
-      ids->push_back({first + 64 * word + static_cast<uint64_t>(std::countr_zero(left))});
+      united->push_back({first + 64 * word + static_cast<uint64_t>(std::countr_zero(left))});
   }
 }
 
@@ -106,17 +118,9 @@ void LocalMap::AddNeighbours(const Map& map) {
 }
 
 void LocalMap::ListLandmarks(const Map& map) {
-  size_t most = 0, count = 0;
-  for (const KeyframeId id : keyframes_) most += map.FindKeyframe(id)->landmarks.size();
-  landmarks_.resize(most);
-  for (const KeyframeId id : keyframes_) {
-    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-      landmarks_[count] = landmark;
-      count += static_cast<size_t>(landmark.valid());  // no branch: which ones are has no pattern
-    }
-  }
-  landmarks_.resize(count);
-  SortUnique(&landmarks_, &marks_);
+  seen_.clear();
+  for (const KeyframeId id : keyframes_) seen_.emplace_back(map.FindKeyframe(id)->seen);
+  Unite(seen_, &marks_, &landmarks_);
 }
 
 void LocalMap::Collect(const Map& map, const TrackedFrame& frame) {

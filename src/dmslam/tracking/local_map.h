@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -40,9 +41,10 @@ class LocalMap {
   // Workspace:
   std::vector<KeyframeId> votes_;  ///< one for each observation of the frame's landmarks
   std::vector<std::pair<int, KeyframeId>> ranked_;
-  std::vector<KeyframeId> listed_;  ///< keyframes_, sorted
-  std::vector<int> counts_;         ///< of the votes, by keyframe
-  std::vector<uint64_t> marks_;     ///< one bit for each landmark id
+  std::vector<KeyframeId> listed_;                 ///< keyframes_, sorted
+  std::vector<int> counts_;                        ///< of the votes, by keyframe
+  std::vector<uint64_t> marks_;                    ///< one bit for each landmark id
+  std::vector<std::span<const LandmarkId>> seen_;  ///< by each local keyframe
 };
 
 }  // namespace dmslam

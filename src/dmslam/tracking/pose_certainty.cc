@@ -58,7 +58,7 @@ Eigen::Matrix3d PoseCertaintyEstimator::WorkOutCovariance(const Map& map, const 
     const Keyframe* keyframe = map.FindKeyframe(seen.keyframe);
     if (keyframe == nullptr) continue;
     // The views that are left out say as much as those that are not.
-    const double variance = keyframe->features->Variance(seen.feature, map.pyramid());
+    const double variance = keyframe->features->Variance(seen.feature, map.pyramid_table());
     views_.push_back(
         {keyframe->T_cam_world, variance * static_cast<double>(used) / static_cast<double>(count)});
   }

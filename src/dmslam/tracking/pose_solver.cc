@@ -15,7 +15,7 @@ void PoseSolver::Matches::Add(const Map& map, const TrackedFrame& frame, uint16_
   matches.push_back({feature, &landmark});
   ages_s.push_back(age_s);
   observations.push_back({landmark.p_world, frame.features->uv_px[feature],
-                          1.0 / frame.features->Variance(feature, map.pyramid()), weight});
+                          1.0 / frame.features->Variance(feature, map.pyramid_table()), weight});
 }
 
 void PoseSolver::Matches::Move(size_t from, size_t to) {

@@ -14,6 +14,7 @@ constexpr int kTurnBins = 30;
 constexpr int kMaxKeyframeDistance = 50;    // bits, without a position
 constexpr double kMaxKeyframeRatio = 0.75;  // best over second best descriptor distance
 constexpr double kFrontalCos = 0.998;
+constexpr int kMaxKeyframeSecond = FarthestSecond(kMaxKeyframeDistance, kMaxKeyframeRatio);
 
 }  // namespace
 
@@ -33,10 +34,10 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
     const std::optional<Eigen::Vector2d> uv = map.camera().Project(T_cam_world * landmark.p_world);
     if (!uv) continue;
     const Keypoint& seen = last.features->set.keypoints[i];
-    const std::optional<FeatureHit> hit =
-        FindFeature(features, *uv, radius_px * map.pyramid().SearchScale(seen.octave), seen.octave - 1,
-                    seen.octave + 1, last.features->set.descriptors[i], taken_);
-    if (!hit || hit->distance > options_.max_descriptor_distance) continue;
+    const std::optional<FeatureHit> hit = FindFeature(
+        features, *uv, radius_px * map.pyramid_table().SearchScale(seen.octave), seen.octave - 1,
+        seen.octave + 1, last.features->set.descriptors[i], taken_, options_.max_descriptor_distance);
+    if (!hit) continue;
     const size_t feature = static_cast<size_t>(hit->feature);
     taken_[feature] = 1;
     matches_.push_back({static_cast<uint16_t>(feature), &landmark});
@@ -75,7 +76,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchKeyframe(const Map& map
     if (landmark == nullptr || !votes.HasVote(*landmark)) continue;
     const std::optional<FeatureHit> hit =
         FindFeature(features, middle_px, 2.0 * camera.width_px, 0, map.pyramid().levels,
-                    keyframe.features->set.descriptors[i], taken_);
+                    keyframe.features->set.descriptors[i], taken_, kMaxKeyframeSecond);
     if (!hit || hit->distance > kMaxKeyframeDistance) continue;
     if (hit->distance > kMaxKeyframeRatio * hit->second_distance) continue;
     taken_[static_cast<size_t>(hit->feature)] = 1;
@@ -92,16 +93,18 @@ std::span<const ExpectedLandmark> ProjectionSearch::MatchLandmarks(const Map& ma
   expected_.clear();
   const double oblique_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_rad);
   const double frontal_px = wider * SearchRadiusPx(map.camera(), options_.local_radius_frontal_rad);
+  const int farthest = FarthestSecond(options_.max_descriptor_distance, options_.local_ratio);
   const Viewpoint viewpoint(frame->T_cam_world);
   map.ForEachOf(landmarks, [&](const Landmark& landmark) {
     const std::optional<LandmarkView> view = PredictView(map, landmark, viewpoint);
     if (!view) return;
     expected_.push_back({&landmark, *view});
-    if (!votes.HasVote(landmark) || std::binary_search(matched_.begin(), matched_.end(), landmark.id)) return;
+    if (!votes.HasVote(landmark) || matched_.Holds(landmark.id)) return;
     const double radius_px = view->view_cos > kFrontalCos ? frontal_px : oblique_px;
     const std::optional<FeatureHit> hit =
-        FindFeature(*frame->features, view->uv_px, radius_px * map.pyramid().SearchScale(view->octave),
-                    view->octave - 1, view->octave, landmark.descriptor, taken_);
+        FindFeature(*frame->features, view->uv_px,
+                    radius_px * map.pyramid_table().SearchScale(static_cast<uint8_t>(view->octave)),
+                    view->octave - 1, view->octave, landmark.descriptor, taken_, farthest);
     if (!hit || hit->distance > options_.max_descriptor_distance) return;
     if (hit->octave == hit->second_octave && hit->distance > options_.local_ratio * hit->second_distance)
       return;

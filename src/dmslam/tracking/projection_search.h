@@ -40,9 +40,9 @@ class ProjectionSearch {
   std::vector<ExpectedLandmark> expected_;
   std::vector<LandmarkMatch> matches_;
   // Workspace:
-  std::vector<float> turns_;         ///< of the keypoints of matches_ [1/256 of a turn]
-  std::vector<uint8_t> taken_;       ///< features that are matched
-  std::vector<LandmarkId> matched_;  ///< landmarks that are, sorted
+  std::vector<float> turns_;    ///< of the keypoints of matches_ [1/256 of a turn]
+  std::vector<uint8_t> taken_;  ///< features that are matched
+  LandmarkSet matched_;         ///< landmarks that are
 };
 
 }  // namespace dmslam

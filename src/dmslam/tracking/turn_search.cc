@@ -23,6 +23,13 @@ Eigen::Vector2d AzimuthElevation(const Eigen::Vector3d& direction) {
           std::atan2(direction.y(), std::hypot(direction.x(), direction.z()))};
 }
 
+/// To the nearest, halves away from zero, as std::lround, which is a call.
+int Round(double value) {
+  const int whole = static_cast<int>(value);
+  const double rest = value - whole;
+  return whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+}
+
 Eigen::Quaterniond Turned(double roll_rad, const Eigen::Vector2d& shift_rad) {
   return Eigen::AngleAxisd(shift_rad.x(), Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(-shift_rad.y(), Eigen::Vector3d::UnitX()) *
@@ -75,16 +82,16 @@ TurnSearch::Turn TurnSearch::BestShift(double roll_rad, double reach_rad) {
   };
   counts_.assign(at(0, side), 0);
   shifts_rad_.clear();
+  bins_.clear();
   const Eigen::Quaterniond rolled = Turned(roll_rad, Eigen::Vector2d::Zero());
-  const auto bin = [side](double shift_rad) {
-    return static_cast<int>(std::lround(shift_rad / kBinRad)) + side / 2;
-  };
+  const auto bin = [side](double shift_rad) { return Round(shift_rad / kBinRad) + side / 2; };
   const auto inside = [side](int b) { return b >= 1 && b < side - 1; };
   expected_.clear();
   for (const Eigen::Vector3d& landmark : landmarks_) expected_.push_back(AzimuthElevation(rolled * landmark));
   for (const Pair& pair : pairs_) {
     shifts_rad_.push_back(pair.feature - expected_[pair.landmark]);
     const int x = bin(shifts_rad_.back().x()), y = bin(shifts_rad_.back().y());
+    bins_.emplace_back(x, y);
     if (inside(x) && inside(y)) ++counts_[at(x, y)];
   }
   Turn best{roll_rad, Eigen::Vector2d::Zero(), 0};
@@ -100,9 +107,9 @@ TurnSearch::Turn TurnSearch::BestShift(double roll_rad, double reach_rad) {
       middle = {x, y};
     }
   }
-  for (const Eigen::Vector2d& shift_rad : shifts_rad_) {
-    if (std::abs(bin(shift_rad.x()) - middle.x()) <= 1 && std::abs(bin(shift_rad.y()) - middle.y()) <= 1)
-      best.shift_rad += shift_rad / best.votes;
+  for (size_t i = 0; i < bins_.size(); ++i) {
+    if (std::abs(bins_[i].x() - middle.x()) <= 1 && std::abs(bins_[i].y() - middle.y()) <= 1)
+      best.shift_rad += shifts_rad_[i] / best.votes;
   }
   return best;
 }

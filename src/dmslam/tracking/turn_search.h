@@ -49,6 +49,7 @@ class TurnSearch {
   std::vector<std::pair<int, uint32_t>> alike_;  ///< distance [bits] and feature
   std::vector<Eigen::Vector2d> expected_;  ///< azimuth and elevation of the landmarks after a roll [rad]
   std::vector<Eigen::Vector2d> shifts_rad_;
+  std::vector<Eigen::Vector2i> bins_;  ///< of those
   std::vector<int> counts_;
 };
 

@@ -203,6 +203,7 @@ inline void ExpectSameMaps(const Map& a, const Map& b) {
     EXPECT_EQ(x.parent, y->parent);
     EXPECT_EQ(x.landmarks, y->landmarks);
     EXPECT_EQ(x.covisible, y->covisible);
+    EXPECT_TRUE(std::is_permutation(x.seen.begin(), x.seen.end(), y->seen.begin(), y->seen.end()));
     EXPECT_EQ(a.Children(id), b.Children(id));
   }
   EXPECT_EQ(a.landmark_tombstones(), b.landmark_tombstones());
