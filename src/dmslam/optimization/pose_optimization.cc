@@ -19,9 +19,9 @@ class PoseProblem {
       : camera_(camera), observations_(observations), options_(options), inliers_(inliers) {}
 
   /// Cost (sum of weight * rho(chi2), and the prior's), gradient and Gauss-Newton Hessian, tangent (w, v).
-  PoseNormal Linearize(const Rigid3d& T, bool robust) const {
+  PoseEquations Linearize(const Rigid3d& T, bool robust) const {
     const double huber_chi2 = robust ? options_.max_chi2 : std::numeric_limits<double>::infinity();
-    PoseNormal result = SumPoseNormal(camera_, T, observations_, inliers_, huber_chi2);
+    PoseEquations result = SumPoseEquations(camera_, T, observations_, inliers_, huber_chi2);
     AddPrior(T, result);
     return result;
   }
@@ -60,7 +60,7 @@ class PoseProblem {
     return error;
   }
 
-  void AddPrior(const Rigid3d& T, PoseNormal& result) const {
+  void AddPrior(const Rigid3d& T, PoseEquations& result) const {
     if (!options_.prior) return;
     const Vector6d error = PriorError(T, *options_.prior);
     const Matrix6d J = PosePriorJacobian(error);
@@ -79,7 +79,7 @@ class PoseProblem {
 /// Levenberg-Marquardt until the step is tiny or the iterations are spent. `now` is what the problem looks
 /// like at T, before and after. Returns how many were made.
 int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options, bool robust, Rigid3d& T,
-             PoseNormal& now) {
+             PoseEquations& now) {
   double damping = 1e-6;
   for (int k = 0; k < options.iterations; ++k) {
     Matrix6d damped = now.hessian;
@@ -88,7 +88,7 @@ int Minimize(const PoseProblem& problem, const PoseOptimizationOptions& options,
     if (!step.allFinite()) return k;
     const Rigid3d candidate = StepPose(T, step);
     const bool tiny = step.squaredNorm() < options.min_step * options.min_step;
-    PoseNormal next = problem.Linearize(candidate, robust);
+    PoseEquations next = problem.Linearize(candidate, robust);
     if (next.cost <= now.cost) {
       const bool settled = now.cost - next.cost < 1e-7 * now.cost;
       T = candidate;
@@ -128,7 +128,7 @@ void OptimizePose(const Pinhole& camera, const Rigid3d& T_cam_world_init,
   const PoseProblem problem(camera, observations, options, report.inliers);
   report.num_inliers = static_cast<int>(count);
   // Where a round left the inliers as they were, the next begins with what is known.
-  std::optional<PoseNormal> known;
+  std::optional<PoseEquations> known;
   bool known_robust = false;
   for (int round = 0; round < options.rounds && report.num_inliers >= options.min_observations; ++round) {
     const bool robust = round < options.robust_rounds;

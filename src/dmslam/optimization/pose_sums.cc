@@ -187,8 +187,8 @@ template <typename... Column>
   *sums = s;
 }
 
-PoseNormal ToNormal(const PoseSums& sums) {
-  PoseNormal normal;
+PoseEquations ToNormal(const PoseSums& sums) {
+  PoseEquations normal;
   for (int i = 0; i < 6; ++i) {
     const size_t row = static_cast<size_t>(i);
     for (int j = i; j < 6; ++j)
@@ -199,9 +199,9 @@ PoseNormal ToNormal(const PoseSums& sums) {
   return normal;
 }
 
-[[gnu::always_inline]] inline PoseNormal SumNormal(const Pinhole& camera, const Rigid3d& T,
-                                                   std::span<const PoseObservation> observations,
-                                                   std::span<const char> use, double huber_chi2) {
+[[gnu::always_inline]] inline PoseEquations SumNormal(const Pinhole& camera, const Rigid3d& T,
+                                                      std::span<const PoseObservation> observations,
+                                                      std::span<const char> use, double huber_chi2) {
   const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
   PackedObservations packed;
   PoseTerms terms;
@@ -216,18 +216,18 @@ PoseNormal ToNormal(const PoseSums& sums) {
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) PoseNormal SumNormalAvx2(const Pinhole& camera, const Rigid3d& T,
-                                                         std::span<const PoseObservation> observations,
-                                                         std::span<const char> use, double huber_chi2) {
+__attribute__((target("avx2"))) PoseEquations SumNormalAvx2(const Pinhole& camera, const Rigid3d& T,
+                                                            std::span<const PoseObservation> observations,
+                                                            std::span<const char> use, double huber_chi2) {
   return SumNormal(camera, T, observations, use, huber_chi2);
 }
 #endif
 
 }  // namespace
 
-PoseNormal SumPoseNormal(const Pinhole& camera, const Rigid3d& T_cam_world,
-                         std::span<const PoseObservation> observations, std::span<const char> use,
-                         double huber_chi2, [[maybe_unused]] VectorPath path) {
+PoseEquations SumPoseEquations(const Pinhole& camera, const Rigid3d& T_cam_world,
+                               std::span<const PoseObservation> observations, std::span<const char> use,
+                               double huber_chi2, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
   if (path == VectorPath::kAvx2 && HasAvx2())
     return SumNormalAvx2(camera, T_cam_world, observations, use, huber_chi2);

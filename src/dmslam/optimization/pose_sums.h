@@ -16,7 +16,7 @@ namespace dmslam {
 // observation by observation in their order. So every path gives the same bits.
 
 /// Normal equations of a step (w, v) on the left of a pose.
-struct PoseNormal {
+struct PoseEquations {
   Matrix6d hessian = Matrix6d::Zero();  ///< Gauss-Newton
   Vector6d gradient = Vector6d::Zero();
   double cost = 0.0;
@@ -25,9 +25,9 @@ struct PoseNormal {
 /// Sums the reprojection errors of those observations whose `use` is not zero (parallel to them): weight *
 /// rho(chi2), with Huber's rho, which begins where chi2 is `huber_chi2`. One at or behind the camera has a
 /// fixed cost that no step is to gain by, and no slope.
-PoseNormal SumPoseNormal(const Pinhole& camera, const Rigid3d& T_cam_world,
-                         std::span<const PoseObservation> observations, std::span<const char> use,
-                         double huber_chi2 = std::numeric_limits<double>::infinity(),
-                         VectorPath path = VectorPath::kAvx2);
+PoseEquations SumPoseEquations(const Pinhole& camera, const Rigid3d& T_cam_world,
+                               std::span<const PoseObservation> observations, std::span<const char> use,
+                               double huber_chi2 = std::numeric_limits<double>::infinity(),
+                               VectorPath path = VectorPath::kAvx2);
 
 }  // namespace dmslam

@@ -43,8 +43,8 @@ struct Input {
 };
 
 /// The formula, observation by observation and element by element.
-PoseNormal SumOneByOne(const Input& in, double huber_chi2) {
-  PoseNormal sum;
+PoseEquations SumOneByOne(const Input& in, double huber_chi2) {
+  PoseEquations sum;
   const Eigen::Matrix3d R = in.T_cam_world.rotation.toRotationMatrix();
   for (size_t i = 0; i < in.observations.size(); ++i) {
     if (!in.use[i]) continue;
@@ -76,14 +76,14 @@ PoseNormal SumOneByOne(const Input& in, double huber_chi2) {
   return sum;
 }
 
-TEST(SumPoseNormal, IsTheSumOfItsFormulaToTheLastBitOnEveryPath) {
+TEST(SumPoseEquations, IsTheSumOfItsFormulaToTheLastBitOnEveryPath) {
   for (const size_t count : {0, 1, 3, 64, 65, 131, 300}) {
     const Input in(count);
     for (const double huber_chi2 : {kInfinity, kHuberChi2}) {
-      const PoseNormal expected = SumOneByOne(in, huber_chi2);
+      const PoseEquations expected = SumOneByOne(in, huber_chi2);
       for (const VectorPath path : VectorPaths()) {
-        const PoseNormal sum =
-            SumPoseNormal(in.camera, in.T_cam_world, in.observations, in.use, huber_chi2, path);
+        const PoseEquations sum =
+            SumPoseEquations(in.camera, in.T_cam_world, in.observations, in.use, huber_chi2, path);
         EXPECT_EQ(sum.cost, expected.cost) << count;
         EXPECT_TRUE(sum.gradient == expected.gradient) << count;
         EXPECT_TRUE(sum.hessian == expected.hessian) << count;
@@ -92,7 +92,7 @@ TEST(SumPoseNormal, IsTheSumOfItsFormulaToTheLastBitOnEveryPath) {
   }
 }
 
-TEST(SumPoseNormal, GradientAndMatrixAreThoseOfTheJacobian) {
+TEST(SumPoseEquations, GradientAndMatrixAreThoseOfTheJacobian) {
   Input in(120);
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -105,7 +105,7 @@ TEST(SumPoseNormal, GradientAndMatrixAreThoseOfTheJacobian) {
     hessian += weight * J.transpose() * J;
     gradient += weight * J.transpose() * (in.camera.Project(p) - o.uv_px);
   }
-  const PoseNormal sum = SumPoseNormal(in.camera, in.T_cam_world, in.observations, in.use);
+  const PoseEquations sum = SumPoseEquations(in.camera, in.T_cam_world, in.observations, in.use);
   EXPECT_LT((sum.hessian - hessian).norm(), 1e-9 * hessian.norm());
   EXPECT_LT((sum.gradient - gradient).norm(), 1e-9 * gradient.norm());
 }
