@@ -3,6 +3,7 @@
 import json
 import math
 import pathlib
+import re
 import statistics
 import sys
 
@@ -14,6 +15,7 @@ FALSE_DEG = 10   # are turned otherwise by more than this: it joins what is apar
 TORN_M = 0.5     # no camera, in a map that is one, is farther from where it should be
 ASKED = 0.003    # error of each camera, in the similarity of all, of the path of all
 WORST = 10       # times that is the most that a single pose may be off
+CARRIED = re.compile(r"scales by ([\d.]+); map (\d+) becomes part of map (\d+)")
 
 
 def path_length(truth):
@@ -50,8 +52,21 @@ class Run:
 
     def welds(self):
         """Loops and welds, and of them those that put together what is apart."""
-        loops = [c for c in self.summary["loop_closing"]["corrections"] if c["kind"] == "loop"]
+        loops = self.welds_and_loops()
         return loops, [c for c in loops if self.is_false(c)]
+
+    def welds_and_loops(self):
+        return [c for c in self.summary["loop_closing"]["corrections"] if c["kind"] == "loop"]
+
+    def growth_since(self, weld):
+        """How many units of the whole are one of the map to which it joined another: that one was carried into others since."""
+        loops = self.welds_and_loops()
+        grown, within = 1.0, CARRIED.search(weld.get("note", ""))
+        for later in loops[loops.index(weld) + 1:]:
+            carried = CARRIED.search(later.get("note", ""))
+            if within and carried and carried[2] == within[3]:
+                grown, within = grown * float(carried[1]), carried
+        return grown
 
     def is_false(self, correction):
         """Whether the two views that it joined do not lie to one another as it says (in metres by the scale of the whole)."""
@@ -61,7 +76,7 @@ class Run:
             views.append(self.truth[k].get(self.stamps[k][correction[frame]]))
         if None in views:
             return False
-        scale = similarity(self.together(self.truth), self.together(self.final))[0]
+        scale = similarity(self.together(self.truth), self.together(self.final))[0] * self.growth_since(correction)
         position, rotation = relative(*views)
         found = correction["T_matched_keyframe"]
         return (math.dist(position, [scale * x for x in found[:3]]) > FALSE_M

@@ -55,6 +55,23 @@ rm -r "$work/results/false_weld"
 there=$(awk 'BEGIN { x = 50 / 9.9; print 2 * (10 - x) ", " 2 * (sin(10) - sin(x)) ", " 2 * (cos(20) - cos(2 * x)) / 4 }')
 a_run seen_from_afar 0 0 100 50 "$there"
 table 0 '^\| seen_from_afar .*\| 1 / 0 .*\| good \|'
+# Told in a map whose unit was a metre and a half, and which became part of one with half a metre afterwards.
+in_thirds=$(awk -v there="$there" 'BEGIN { split(there, p, ", "); print p[1] / 3 ", " p[2] / 3 ", " p[3] / 3 }')
+carried_on() { # NAME SCALE: the same weld, and a later one that carries its map into another, so many times as large
+  a_run "$1" 0 0 100 50 "$in_thirds"
+  cat >"$work/results/$1/summary.json" <<EOJ
+{"cameras": [{"other_maps": []}, {"other_maps": []}], "loop_closing": {"corrections": [
+  {"kind": "loop", "camera": 1, "frame": 0, "matched_camera": 0, "matched_frame": 50, "T_matched_keyframe": [$in_thirds, 0, 0, 0, 1],
+   "note": "it moves by 0.8 (0.0 sigma) and scales by 0.6; map 3 becomes part of map 2"},
+  {"kind": "loop", "camera": 1, "frame": 9, "matched_camera": 1, "matched_frame": 9, "T_matched_keyframe": [0, 0, 0, 0, 0, 0, 1],
+   "note": "it moves by 0.8 (0.0 sigma) and scales by $2; map 2 becomes part of map 1"}]}}
+EOJ
+}
+carried_on told_in_another_unit 3.0
+table 0 '^\| told_in_another_unit .*\| 2 / 0 .*\| good \|'
+carried_on told_in_the_same_unit 1.0
+table 1 '^\| told_in_the_same_unit .*\| 2 / 1 .*\| FALSE \|'
+rm -r "$work/results/told_in_the_same_unit"
 a_run turned_weld 0 0 100 50 "$there" '0, 0, 0.26, 0.966'
 table 1 '^\| turned_weld .*\| 1 / 1 .*\| FALSE \|'
 finish
