@@ -278,7 +278,8 @@ int Start(dmslam::RunArguments arguments, dmslam::RunIdentity identity,
 
 int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
   dmslam::CheckRunArguments(arguments);
-  dmslam::CheckMap(arguments);  // what is in the folder stays as it is, where it does not fit
+  // What is in the folder stays as it is, where the map does not fit.
+  if (const std::optional<std::string> notice = dmslam::CheckMap(arguments)) Say(*notice);
   std::error_code error;
   fs::create_directories(arguments.output.folder, error);
   const dmslam::RunLock lock(arguments.output.folder);

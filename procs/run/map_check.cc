@@ -1,6 +1,7 @@
 #include "run/map_check.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,14 +32,30 @@ Settings SettingsOf(const RunArguments::Settings& settings) {
   return LoadSettings(settings.config, overrides);
 }
 
+/// Nothing of what a log has recorded of a map may be missing. Says where its run went on.
+std::optional<std::string> CheckWhole(const std::string& path, const std::optional<BusKey>& key) {
+  const LogIndex log(path, key);
+  if (log.Session().IsSavedMap()) return std::nullopt;
+  const RebuiltMap rebuilt = RebuildMap(log, log.Session());
+  if (rebuilt.missing > 0) {
+    throw InputError(path + ": is not whole: " + std::to_string(rebuilt.missing) +
+                     " map records are missing; what is there is saved with dmslam-map --log " + path +
+                     " --save FILE");
+  }
+  if (rebuilt.ended) return std::nullopt;
+  return path + ": the log ends before its run did; the map has the " +
+         std::to_string(rebuilt.map.keyframes().size()) + " keyframes of that time";
+}
+
 }  // namespace
 
-void CheckMap(const RunArguments& a) {
+std::optional<std::string> CheckMap(const RunArguments& a) {
   const std::string& path = a.map.begin;
-  if (path.empty()) return;
+  if (path.empty()) return std::nullopt;
   const SessionStart made = MadeWith(path);
   CheckFits(path, made, CameraThatPlays(a), SettingsOf(a.settings).Read<Pyramid>());
   if (a.build_folder.empty()) CheckVocabulary(path, made, LoadVocabulary("")->checksum());
+  return CheckWhole(path, BusKey::LoadIfWanted(a.bus.key));
 }
 
 }  // namespace dmslam

@@ -6,11 +6,15 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
+#include "dmslam/messaging/codec.h"
+#include "dmslam/messaging/event_log.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
+#include "dmslam/wire/codec.h"
 
 namespace dmslam {
 namespace {
@@ -43,6 +47,37 @@ class MapCheckTest : public testing::Test {
     keyframe.features = MakeFrameFeatures(FeatureSet(), map.camera(), map.pyramid());
     map.AddKeyframe(std::move(keyframe));
     SaveMap(arguments_.map.begin, map, made_);
+  }
+  /// A log of a run in which two keyframes were made; `second`: number of the second one's record.
+  void WriteLog(int64_t second) {
+    arguments_.map.begin = folder_ + "/run.lcmlog";
+    EventLogWriter log(arguments_.map.begin);
+    WriteRecord(made_, StreamId::kFrontend, 1, &log);
+    MapEditor map(TestCamera(), Pyramid());
+    for (const int64_t seq : {int64_t{1}, second}) {
+      Keyframe keyframe;
+      keyframe.id = KeyframeId::Make(1, static_cast<uint32_t>(seq));
+      keyframe.map_id = 1;
+      keyframe.features = MakeFrameFeatures(FeatureSet(), map.camera(), map.pyramid());
+      const KeyframeId id = keyframe.id;
+      map.AddKeyframe(std::move(keyframe));
+      WriteRecord(map.TakeDelta(MapEvent::kMapped, id, 1), StreamId::kMap, seq, &log);
+    }
+    log.Close();
+  }
+  template <typename Message>
+  static void WriteRecord(const Message& message, StreamId stream, int64_t seq, EventLogWriter* log) {
+    RecordHeader header{};
+    header.session = 1;
+    header.stream = static_cast<int32_t>(stream);
+    header.flags = RecordHeader::FLAG_FRESH;
+    header.epoch = 100;
+    header.writer = 5;
+    header.seq = seq;
+    std::string channel = wire::Info<Message>().channel;
+    Bytes bytes = wire::Encode(message);
+    Seal(header, channel, bytes);
+    log->Write(seq, channel, bytes);
   }
   /// Why the run is not begun; empty: it is.
   std::string Refusal() const {
@@ -92,6 +127,25 @@ TEST_F(MapCheckTest, AnotherVocabularyIsAMisfit) {
             std::string::npos);
   arguments_.build_folder = "/elsewhere";
   EXPECT_EQ(Refusal(), "") << "programs from elsewhere may have that one";
+}
+
+TEST_F(MapCheckTest, ALogThatLacksRecordsOfItsMapIsNotBegunIn) {
+  WriteLog(2);
+  EXPECT_EQ(Refusal(), "");
+  WriteLog(3);
+  EXPECT_NE(Refusal().find("run.lcmlog: is not whole: 1 map records are missing"), std::string::npos)
+      << Refusal();
+}
+
+TEST_F(MapCheckTest, ALogThatEndsBeforeItsRunDidIsBegunInAndSaidSo) {
+  WriteLog(2);
+  const std::optional<std::string> notice = CheckMap(arguments_);
+  ASSERT_TRUE(notice);
+  EXPECT_NE(notice->find("run.lcmlog: the log ends before its run did; the map has the 2 keyframes"),
+            std::string::npos)
+      << *notice;
+  arguments_.map.begin = folder_ + "/a.map";
+  EXPECT_FALSE(CheckMap(arguments_)) << "a saved map stands for itself";
 }
 
 TEST_F(MapCheckTest, WhatIsNoMapIsNamed) {

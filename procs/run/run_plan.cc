@@ -286,8 +286,9 @@ std::optional<std::string> ErrorIn(const std::string& line) {
 }  // namespace
 
 uint32_t ChooseSession(const RunArguments::MapFiles& map) {
-  if (map.begin.empty()) return 1 + RandomBelow(1u << 30);
-  return LogIndex(map.begin).Session().id + 1;
+  // Behind that of the map that is gone on with, so that its keyframes come first.
+  const uint32_t before = map.begin.empty() ? 0 : LogIndex(map.begin).Session().id;
+  return before + 1 + RandomBelow(map.begin.empty() ? 1u << 30 : 1u << 20);
 }
 
 std::string BusUrl(const RunArguments::Bus& bus, int port) {

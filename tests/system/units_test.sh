@@ -7,6 +7,7 @@ need_synthetic
 
 set_system "DMSLAM_LCM_URL=udpm://239.255.76.67:23421?ttl=0&recv_buf_size=4194304" "DMSLAM_OUT=$work/out" \
   "DMSLAM_SEQUENCE=$synthetic" "DMSLAM_PLAYER_OPTIONS=--camera $root/config/synthetic.yaml --lockstep"
+check "the channels of two NAMEs are apart: $DMSLAM_OPTIONS" test "$DMSLAM_OPTIONS" = "--prefix NAME/"
 for process in "${units[@]}"; do
   supervise "$process" &
   [[ $process != collector ]] || collector=$!

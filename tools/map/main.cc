@@ -205,7 +205,10 @@ void Print(const dmslam::LogIndex& log, const dmslam::RecordedSession& session,
   const std::string number = map_id ? "number " + std::to_string(*map_id) : "none";
   std::printf("map         %s, version %llu, %zu keyframes, %zu landmarks%s\n", number.c_str(),
               static_cast<unsigned long long>(rebuilt.map.version()), rebuilt.map.keyframes().size(),
-              rebuilt.map.num_landmarks(), rebuilt.ended ? ", complete" : "");
+              rebuilt.map.num_landmarks(),
+              rebuilt.ended          ? ", complete"
+              : session.IsSavedMap() ? ""
+                                     : ", of a run that had not ended");
   std::printf("records     %lld applied, %lld missing\n", static_cast<long long>(rebuilt.records),
               static_cast<long long>(rebuilt.missing));
   std::printf("trajectory  %zu frames\n", trajectories.final.size());

@@ -191,6 +191,8 @@ std::string Listing(const std::string& path, const Map& map, const SessionStart&
 int ListMaps(const std::string& path, const std::optional<BusKey>& key) {
   const RebuiltMap rebuilt = LoadMap(path, key);
   if (rebuilt.missing > 0) LogWarning("{}: {} map records are missing", path, rebuilt.missing);
+  if (!rebuilt.ended && !LogIndex(path, key).Session().IsSavedMap())
+    LogWarning("{}: the log ends before its run did; the map is that of this time", path);
   std::fputs(Listing(path, rebuilt.map, rebuilt.session).c_str(), stdout);
   return 0;
 }

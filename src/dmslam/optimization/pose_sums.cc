@@ -48,7 +48,7 @@ struct PoseTerms {
   return n;
 }
 
-/// For `n` observations, without robust loss. PoseSums of three as Eigen takes them: (a + b) + c, but for the
+/// For `n` observations, without robust loss. Sums of three as Eigen takes them: (a + b) + c, but for the
 /// third row of a product with R, a + (b + c).
 [[gnu::always_inline]] inline void MakeTerms(const PackedObservations& o, size_t n, const Pinhole& camera,
                                              const Eigen::Matrix3d& R, const Eigen::Vector3d& t,
