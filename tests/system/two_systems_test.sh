@@ -44,17 +44,43 @@ expect "one restart, of the collector that was killed" "$work/out" restarts "== 
 check "a run without disturbance" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --seed 3 --out "$work/alone" >/dev/null 2>&1
 check "its bytes are those of a run without disturbance" cmp "$work/out/trajectory.txt" "$work/alone/trajectory.txt"
 
-# A run that begins in a saved map has the session behind the map's: two of them on one port would be one.
+# Runs that begin in one saved map draw their sessions behind the map's: two of them on one port are two.
+session_of() { sed -nE 's/.*"session": *([0-9]+).*/\1/p' "$work/$1/run.json"; }
 check "a map is saved" run --sequence "$synthetic" --camera "$camera" --frames 60 --lockstep --save-map "$work/a.map" --out "$work/a" >"$work/a.log" 2>&1
-session=$(sed -nE 's/.*"session": *([0-9]+).*/\1/p' "$work/a/run.json")
-begin player --session $((session + 1)) --fresh-system --sequence "$synthetic" --camera "$camera" --speed 0.2 >"$work/other.log" 2>&1 &
+declare -A runs
+for name in first second; do
+  run --sequence "$synthetic" --camera "$camera" --lockstep --map "$work/a.map" --port 23481 --share-port --out "$work/in_$name" >"$work/in_$name.log" 2>&1 &
+  runs[$name]=$!
+done
+for name in first second; do wait "${runs[$name]}" || failed "the $name run in that map: $(<"$work/in_$name.log")"; done
+check "their sessions differ" test "$(session_of in_first)" -ne "$(session_of in_second)"
+for name in first second; do
+  check "that of the $name comes after the map's" test "$(session_of "in_$name")" -gt "$(session_of a)"
+  check "what the $name is told is its own" cmp "$work/in_first/trajectory.txt" "$work/in_$name/trajectory.txt"
+done
+
+# A run is not resumed while somebody else plays its session.
+set -m # a process group of its own, with the interrupt signal not ignored
+"$root/scripts/run.sh" --build-dir "$build" --sequence "$synthetic" --camera "$camera" --speed 0.2 --port 23481 --share-port \
+  --out "$work/b" >"$work/b.said" 2>&1 </dev/null &
+runner=$!
+set +m
+until [[ -s $work/b/checkpoint.lcmlog ]]; do
+  kill -0 "$runner" 2>/dev/null || break
+  sleep 0.05
+done
+kill -INT -- "-$runner"
+wait "$runner" || true
+session=$(session_of b)
+before=$(cksum "$work/b/summary.json" "$work/b/run.json")
+begin player --session "$session" --fresh-system --sequence "$synthetic" --camera "$camera" --speed 0.2 >"$work/other.log" 2>&1 &
 other=$!
 sleep 0.5
 status=0
-run --sequence "$synthetic" --camera "$camera" --lockstep --map "$work/a.map" --port 23481 --share-port --out "$work/b" >"$work/b.log" 2>&1 || status=$?
+run --resume "$work/b" >"$work/b.log" 2>&1 || status=$?
 ((status == 3)) || failed "dmslam-run ended with $status: $(<"$work/b.log")"
-check "it says who plays: $(<"$work/b.log")" grep -q "session $((session + 1)): player on .*(pid $other) writes this session already" "$work/b.log"
-check "it has no results" test ! -e "$work/b/summary.json"
+check "it says who plays: $(<"$work/b.log")" grep -q "session $session: player on .*(pid $other) writes this session already" "$work/b.log"
+check "its results stay as they are" test "$before" = "$(cksum "$work/b/summary.json" "$work/b/run.json")"
 check "nothing has happened to the player: $(<"$work/other.log")" kill "$other"
 no_orphans "the second run"
 finish
