@@ -104,13 +104,14 @@ struct PoseSums {
   double cost = 0;
 };
 
-/// Of an image's row, whose fifth element is zero: that adds nothing.
-[[gnu::always_inline]] inline void AddU(const Lanes& first, const Lanes& last, double weight, PoseSums* s) {
+/// Adds a row of the Jacobian: that of u, whose fifth element is zero and adds nothing, or that of v, whose
+/// fourth is.
+template <bool kOfU>
+[[gnu::always_inline]] inline void AddRow(const Lanes& first, const Lanes& last, double weight, PoseSums* s) {
   const Lanes weighted = first * weight, weighted_last = last * weight;
   const Lanes w0 = __builtin_shufflevector(weighted, weighted, 0, 0, 0, 0),
               w1 = __builtin_shufflevector(weighted, weighted, 1, 1, 1, 1),
               w2 = __builtin_shufflevector(weighted, weighted, 2, 2, 2, 2),
-              w3 = __builtin_shufflevector(weighted, weighted, 3, 3, 3, 3),
               w5 = __builtin_shufflevector(weighted_last, weighted_last, 1, 1, 1, 1);
   s->first[0] += w0 * first;
   s->last[0] += w0 * last;
@@ -118,26 +119,14 @@ struct PoseSums {
   s->last[1] += w1 * last;
   s->first[2] += w2 * first;
   s->last[2] += w2 * last;
-  s->first[3] += w3 * first;
-  s->last[3] += w3 * last;
-  s->last[5] += w5 * last;
-}
-
-/// The same where the fourth is.
-[[gnu::always_inline]] inline void AddV(const Lanes& first, const Lanes& last, double weight, PoseSums* s) {
-  const Lanes weighted = first * weight, weighted_last = last * weight;
-  const Lanes w0 = __builtin_shufflevector(weighted, weighted, 0, 0, 0, 0),
-              w1 = __builtin_shufflevector(weighted, weighted, 1, 1, 1, 1),
-              w2 = __builtin_shufflevector(weighted, weighted, 2, 2, 2, 2),
-              w4 = __builtin_shufflevector(weighted_last, weighted_last, 0, 0, 0, 0),
-              w5 = __builtin_shufflevector(weighted_last, weighted_last, 1, 1, 1, 1);
-  s->first[0] += w0 * first;
-  s->last[0] += w0 * last;
-  s->first[1] += w1 * first;
-  s->last[1] += w1 * last;
-  s->first[2] += w2 * first;
-  s->last[2] += w2 * last;
-  s->last[4] += w4 * last;
+  if constexpr (kOfU) {
+    const Lanes w3 = __builtin_shufflevector(weighted, weighted, 3, 3, 3, 3);
+    s->first[3] += w3 * first;
+    s->last[3] += w3 * last;
+  } else {
+    const Lanes w4 = __builtin_shufflevector(weighted_last, weighted_last, 0, 0, 0, 0);
+    s->last[4] += w4 * last;
+  }
   s->last[5] += w5 * last;
 }
 
@@ -179,29 +168,29 @@ template <typename... Column>
         s.cost += o.weight[k + i] * kCostBehind;
         continue;
       }
-      AddU(u_first[i], u_last[i], t.weight[k + i], &s);
-      AddV(v_first[i], v_last[i], t.weight[k + i], &s);
+      AddRow<true>(u_first[i], u_last[i], t.weight[k + i], &s);
+      AddRow<false>(v_first[i], v_last[i], t.weight[k + i], &s);
       s.cost += t.cost[k + i];
     }
   }
   *sums = s;
 }
 
-PoseEquations ToNormal(const PoseSums& sums) {
-  PoseEquations normal;
+PoseEquations ToEquations(const PoseSums& sums) {
+  PoseEquations equations;
   for (int i = 0; i < 6; ++i) {
     const size_t row = static_cast<size_t>(i);
     for (int j = i; j < 6; ++j)
-      normal.hessian(i, j) = normal.hessian(j, i) = j < 4 ? sums.first[row][j] : sums.last[row][j - 4];
-    normal.gradient[i] = sums.last[row][2];
+      equations.hessian(i, j) = equations.hessian(j, i) = j < 4 ? sums.first[row][j] : sums.last[row][j - 4];
+    equations.gradient[i] = sums.last[row][2];
   }
-  normal.cost = sums.cost;
-  return normal;
+  equations.cost = sums.cost;
+  return equations;
 }
 
-[[gnu::always_inline]] inline PoseEquations SumNormal(const Pinhole& camera, const Rigid3d& T,
-                                                      std::span<const PoseObservation> observations,
-                                                      std::span<const char> use, double huber_chi2) {
+[[gnu::always_inline]] inline PoseEquations SumEquations(const Pinhole& camera, const Rigid3d& T,
+                                                         std::span<const PoseObservation> observations,
+                                                         std::span<const char> use, double huber_chi2) {
   const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
   PackedObservations packed;
   PoseTerms terms;
@@ -212,14 +201,14 @@ PoseEquations ToNormal(const PoseSums& sums) {
     if (huber_chi2 < std::numeric_limits<double>::infinity()) MakeRobust(packed, n, huber_chi2, &terms);
     AddTerms(packed, terms, n, &sums);
   }
-  return ToNormal(sums);
+  return ToEquations(sums);
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) PoseEquations SumNormalAvx2(const Pinhole& camera, const Rigid3d& T,
-                                                            std::span<const PoseObservation> observations,
-                                                            std::span<const char> use, double huber_chi2) {
-  return SumNormal(camera, T, observations, use, huber_chi2);
+__attribute__((target("avx2"))) PoseEquations SumEquationsAvx2(const Pinhole& camera, const Rigid3d& T,
+                                                               std::span<const PoseObservation> observations,
+                                                               std::span<const char> use, double huber_chi2) {
+  return SumEquations(camera, T, observations, use, huber_chi2);
 }
 #endif
 
@@ -230,9 +219,9 @@ PoseEquations SumPoseEquations(const Pinhole& camera, const Rigid3d& T_cam_world
                                double huber_chi2, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
   if (path == VectorPath::kAvx2 && HasAvx2())
-    return SumNormalAvx2(camera, T_cam_world, observations, use, huber_chi2);
+    return SumEquationsAvx2(camera, T_cam_world, observations, use, huber_chi2);
 #endif
-  return SumNormal(camera, T_cam_world, observations, use, huber_chi2);
+  return SumEquations(camera, T_cam_world, observations, use, huber_chi2);
 }
 
 }  // namespace dmslam
