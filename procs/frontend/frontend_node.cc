@@ -75,11 +75,25 @@ bool FrontendNode::ReadyToWrite() {
     if (NobodyNeedsTheMap(map, *map_reader_)) Exit(0);
     return false;
   }
+  if (GivesWay()) return false;
   core().Resume();
   if (map.keyframes().empty()) return true;
   const Keyframe* newest = map.NewestKeyframeOf(options_.camera_id);
   if (newest != nullptr && newest->id.frame_index() > 0) frames_.GoOnBehind(newest->id.frame_index() - 1);
   LogInfo("frontend: has the map of {} keyframes and goes on in it", map.keyframes().size());
+  return true;
+}
+
+void FrontendNode::OnOtherCamera(const CameraInfo& info) { other_models_.Hear(info, camera_info_->camera); }
+
+/// True: a camera of another model was here first, and this process ends.
+bool FrontendNode::GivesWay() {
+  const std::optional<CameraId> first = other_models_.GivesWayTo(core().map(), options_.camera_id);
+  if (!first) return false;
+  Exit(kExitMisfit, "camera " + std::to_string(options_.camera_id) + " is another model than camera " +
+                        std::to_string(*first) +
+                        "; all cameras of a session need the same calibration (--camera), or to be told by "
+                        "it (dmslam-player --as-camera)");
   return true;
 }
 
@@ -234,7 +248,7 @@ bool FrontendNode::HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns
 
 bool FrontendNode::WorkOnce() {
   if (frames_.IsOver(context_.now_ns())) end_.OnEndHeard();
-  if (!work_->Idle()) return false;
+  if (!work_->Idle() || GivesWay()) return false;
   LetSnapshotBegin();
   if (core().IsRefining()) return Refine();
   if (!core().NeedsMapUnchanged()) {

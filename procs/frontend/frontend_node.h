@@ -21,6 +21,7 @@
 #include "frontend/last_words.h"
 #include "frontend/left_keyframes.h"
 #include "frontend/make_frontend.h"
+#include "frontend/other_models.h"
 #include "frontend/pose_report.h"
 #include "frontend/refused_images.h"
 #include "frontend/unaccepted_keyframes.h"
@@ -45,6 +46,7 @@ class FrontendNode : public StreamNode {
   bool WorkOnce() override;
   int64_t WorkDeadline() const override;
   void OnMessage(const std::string& channel, std::span<const uint8_t> bytes) override;
+  void OnOtherCamera(const CameraInfo& info) override;
   void PublishStatus() override;
   std::string WaitsFor() const override;
 
@@ -52,6 +54,7 @@ class FrontendNode : public StreamNode {
   SessionStart MakeSessionStart() const;
   void SaySessionAgain();
   void LeaveEndedMap();
+  bool GivesWay();
   void OnFrame(std::span<const uint8_t> bytes);
   FrameDone DoneWithNewest() const;
   void OnEndOfSequence(std::span<const uint8_t> bytes);
@@ -92,6 +95,7 @@ class FrontendNode : public StreamNode {
   CameraTurns turns_;
   std::optional<FrameTracking> tracking_;
   RefusedImages refused_;
+  OtherModels other_models_;
   bool hurries_ = false;  ///< catches up before it takes another image
   SequenceEnd end_;
   LastWords last_words_;

@@ -99,7 +99,10 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   if (!info) return;
   info->camera_id = camera;
   if (choice_ && session_ == 0) choice_->HearCamera(info->session, info->sequence, info->utime);
-  if (IsOfCamera() && camera != options_.camera_id) return OnOtherCamera(*info);
+  if (IsOfCamera() && camera != options_.camera_id) {
+    if (camera_info_ && info->session == session_) OnOtherCamera(*info);
+    return;
+  }
   if (!cameras_.Knows(camera)) {
     if (!MayBeOurs(info->session)) return;
     if (options_.of_a_log || cameras_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
@@ -148,18 +151,6 @@ void StreamNode::KnowCamera(const CameraInfo& info) {
   session_ = info.session;
   camera_info_ = info;
   OnCamera(info);
-}
-
-/// What all see is projected by one model: the camera that comes later, by its number, leaves.
-void StreamNode::OnOtherCamera(const CameraInfo& info) {
-  const bool ours = session_ == 0 || info.session == session_;
-  if (!ours || !camera_info_ || info.camera_id > options_.camera_id ||
-      info.camera.SeesAs(camera_info_->camera))
-    return;
-  Exit(kExitMisfit, "camera " + std::to_string(options_.camera_id) + " is another model than camera " +
-                        std::to_string(info.camera_id) +
-                        "; all cameras of a session need the same calibration (--camera), or to be told by "
-                        "it (dmslam-player --as-camera)");
 }
 
 /// A process that starts after the player has left still learns the camera, from those who write: one of them

@@ -74,6 +74,9 @@ class StreamNode : public Node {
   virtual void OnMessage(const std::string& channel, std::span<const uint8_t> bytes);
   /// A camera is known: of a frontend its own, of the others every one.
   virtual void OnCamera(const CameraInfo&) {}
+  /// What is said of another camera of the session, again and again; only a frontend that knows its own hears
+  /// it.
+  virtual void OnOtherCamera(const CameraInfo&) {}
   virtual void PublishStatus() {}
   /// Processes without which this one cannot go on now, with commas; empty: none. Told to people when it
   /// lasts.
@@ -201,7 +204,6 @@ class StreamNode : public Node {
   bool MayBeOurs(uint32_t session);
   bool MayChooseSession();
   void BelieveCamera(CameraInfo info);
-  void OnOtherCamera(const CameraInfo& info);
   bool IsOfCamera() const;
   void KeepCameraKnown();
   void RunElection();
