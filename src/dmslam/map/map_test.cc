@@ -114,6 +114,7 @@ TEST(Map, BestCovisibleAreThoseThatShareMost) {
       EXPECT_LE(shared, best.size() < 3 ? 1 : least);
     }
     std::vector<KeyframeId> ids;
+    ids.reserve(best.size());
     for (const Keyframe* other : best) ids.push_back(other->id);
     EXPECT_EQ(map.BestCovisible(id, 3, 2), ids);
   }
@@ -214,6 +215,7 @@ TEST_F(Viewing, IsTheSameForThreadsThatAskAtATime) {
     map_.SetPosition(landmark, {0.01 * round, 0, 4});
     std::array<ViewingRange, 4> ranges;
     std::vector<std::thread> threads;
+    threads.reserve(ranges.size());
     for (ViewingRange& range : ranges) threads.emplace_back([&] { range = map.Viewing(landmark); });
     for (std::thread& thread : threads) thread.join();
     for (const ViewingRange& range : ranges) {

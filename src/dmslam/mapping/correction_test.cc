@@ -7,7 +7,7 @@
 namespace dmslam {
 namespace {
 
-constexpr auto Id = WallScene::Id;
+KeyframeId Id(uint32_t frame) { return WallScene::Id(frame); }
 
 /// Keyframes 1, 2, 3 in a row, each hanging from the one before, and a landmark of each.
 class Correction : public testing::Test {

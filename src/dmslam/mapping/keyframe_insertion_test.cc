@@ -7,7 +7,7 @@
 namespace dmslam {
 namespace {
 
-constexpr auto Id = WallScene::Id;
+KeyframeId Id(uint32_t frame) { return WallScene::Id(frame); }
 
 /// Keyframes 1 and 2 see the wall; 2 is half a unit to the right of 1.
 class Insertion : public testing::Test {

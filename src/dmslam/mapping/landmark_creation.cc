@@ -197,7 +197,7 @@ std::optional<Eigen::Vector3d> Triangulate(const PairGeometry& pair, uint16_t fe
     ++diagnostics->refused_parallax;
     return std::nullopt;
   }
-  const std::optional<Eigen::Vector3d> point =
+  std::optional<Eigen::Vector3d> point =
       TriangulatePoint(pair.a.T_cam_world, pair.b.T_cam_world, ray_a, ray_b);
   const auto uv_a = point ? camera.Project(pair.a.T_cam_world * *point) : std::nullopt;
   const auto uv_b = point ? camera.Project(pair.b.T_cam_world * *point) : std::nullopt;

@@ -10,7 +10,7 @@
 namespace dmslam {
 namespace {
 
-constexpr auto Id = WallScene::Id;
+KeyframeId Id(uint32_t frame) { return WallScene::Id(frame); }
 
 /// Keyframes in a row, `step` apart and one second apart in time. All see the first `shared` points already,
 /// and have the rest of the wall free.

@@ -7,7 +7,7 @@
 namespace dmslam {
 namespace {
 
-constexpr auto Id = WallScene::Id;
+KeyframeId Id(uint32_t frame) { return WallScene::Id(frame); }
 
 class Fusion : public testing::Test {
  protected:

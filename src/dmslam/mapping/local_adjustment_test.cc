@@ -10,7 +10,7 @@
 namespace dmslam {
 namespace {
 
-constexpr auto Id = WallScene::Id;
+KeyframeId Id(uint32_t frame) { return WallScene::Id(frame); }
 
 /// Six keyframes side by side. Each sees a stripe of the wall, most of which the next one sees, too; the last
 /// two are not where the map has them.

@@ -43,11 +43,11 @@ void MapperCore::Publish(MapEvent event, std::optional<KeyframeId> about, std::o
   MapDelta delta = map_.TakeDelta(event, about, map_id);
   delta.correction_id = correction_id;
   delta.note = std::move(note);
-  Emit(std::move(delta));
+  Emit(delta);
 }
 
 /// What changes nothing is told where it is an answer.
-void MapperCore::Emit(MapDelta delta) {
+void MapperCore::Emit(const MapDelta& delta) {
   const bool answers = delta.event == MapEvent::kSettled || delta.event == MapEvent::kRefused ||
                        delta.event == MapEvent::kMapped || delta.event == MapEvent::kRequestDone ||
                        delta.event == MapEvent::kEnded || delta.event == MapEvent::kTurn ||
@@ -179,7 +179,7 @@ void MapperCore::OnAdjustRequest(const AdjustRequest& request) {
 void MapperCore::AnswerRequest(uint32_t request) {
   MapDelta delta = map_.TakeDelta(MapEvent::kRequestDone, {}, {});
   delta.request = request;
-  Emit(std::move(delta));
+  Emit(delta);
 }
 
 void MapperCore::Settle(KeyframeId id, std::optional<MapId> map_id) {

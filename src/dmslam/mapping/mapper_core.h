@@ -103,7 +103,7 @@ class MapperCore {
   void AdjustMaps();
   void Publish(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id,
                std::optional<uint64_t> correction_id = {}, std::string note = {});
-  void Emit(MapDelta delta);
+  void Emit(const MapDelta& delta);
   bool StartMap(const InitialMap& proposal);
   bool Interrupted();
   bool Stopped() const { return stop_ && stop_(); }

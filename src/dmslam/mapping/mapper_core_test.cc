@@ -159,7 +159,10 @@ class SecondVisit : public Corrections {
     for (uint16_t i = from; i < to; ++i) features.push_back(i);
     return features;
   }
-  static Eigen::Vector3d Point(uint16_t i) { return {0.3 * (i % 8) - 1.0, 0.3 * (i / 8) - 0.6, 4.0}; }
+  static Eigen::Vector3d Point(uint16_t i) {
+    const int column = i % 8, row = i / 8;
+    return {0.3 * column - 1.0, 0.3 * row - 0.6, 4.0};
+  }
   static Descriptor DescriptorOf(uint16_t i) {
     Random random(DeriveSeed(1, i, "descriptor"));
     return {{random.Next(), random.Next(), random.Next(), random.Next()}};
@@ -245,8 +248,9 @@ class KeyframeStep : public testing::Test {
     proposal.T_cam_reference.translation = Scale() * proposal.T_cam_reference.translation;
     proposal.T_cam_reference.translation.y() += off;
     const Keyframe& last = core_.map().keyframes().rbegin()->second;
-    for (uint16_t i = 0; i < last.landmarks.size(); ++i) {
-      if (last.landmarks[i].valid()) proposal.matches.push_back({i, last.landmarks[i]});
+    for (size_t i = 0; i < last.landmarks.size(); ++i) {
+      if (last.landmarks[i].valid())
+        proposal.matches.push_back({static_cast<uint16_t>(i), last.landmarks[i]});
     }
     return proposal;
   }

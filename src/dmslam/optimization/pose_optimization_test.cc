@@ -117,8 +117,8 @@ TEST(OptimizePose, WeightZeroHasNoInfluence) {
 TEST(OptimizePose, InformationPredictsTheScatter) {
   double sum = 0.0;
   const int runs = 200;
-  for (int k = 0; k < runs; ++k) {
-    const PoseData data = DataOf(static_cast<uint64_t>(100 + k), 1.0);
+  for (uint64_t k = 0; k < runs; ++k) {
+    const PoseData data = DataOf(100 + k, 1.0);
     PoseOptimizationOptions options;
     options.max_chi2 = 100.0;
     const auto report = OptimizePose(kCamera, data.T_cam_world, data.observations, options);
