@@ -522,7 +522,9 @@ void MapperNode::Save() {
                      ": not written, since this mapper took over and has not heard from the frontend "
                      "with which settings the map was made; 'dmslam-map --log LOG --save' writes it");
   }
-  SaveMap(path, core_->map(), *session_start_);
+  SessionRuns runs = saved_ ? saved_->runs() : SessionRuns();
+  runs.insert_or_assign(session_, *session_start_);
+  SaveMap(path, core_->map(), *session_start_, runs);
 }
 
 /// A step in work inserts and creates, and leaves out what takes long; an adjustment ends where it is.

@@ -10,7 +10,8 @@ namespace dmslam {
 SavedMap::SavedMap(std::string path, std::shared_ptr<FeatureStore> feature_store)
     : path_(std::move(path)),
       map_(LoadMap(path_, std::nullopt, std::move(feature_store))),
-      made_(map_->session) {}
+      made_(map_->session),
+      runs_(map_->runs) {}
 
 SavedMap::Beginning SavedMap::Begin(const Camera& camera, const Pyramid& pyramid, uint32_t session) {
   CheckFits(path_, made_, camera, pyramid);

@@ -27,11 +27,14 @@ class SavedMap {
   /// Why the vocabulary of that checksum is not the one with which it was made; empty: it is, or one of the
   /// two has none.
   std::string WhyMisfits(std::optional<uint64_t> vocabulary_checksum) const;
+  /// Of which it was made, as far as the file says.
+  const SessionRuns& runs() const { return runs_; }
 
  private:
   const std::string path_;
   std::optional<RebuiltMap> map_;  ///< none: handed out
   const SessionStart made_;        ///< how it was made
+  const SessionRuns runs_;
 };
 
 }  // namespace dmslam

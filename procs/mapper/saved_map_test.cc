@@ -21,6 +21,8 @@ class SavedMapTest : public testing::Test {
     made_.session = kSession;
     made_.camera = TestCamera();
     made_.vocabulary_checksum = 0xabc;
+    made_.seed = 5;
+    made_.configuration_hash = 0xdef;
     SaveMap(path_, editor_.map(), made_);
   }
   void TearDown() override { std::filesystem::remove(path_); }
@@ -71,6 +73,13 @@ TEST_F(SavedMapTest, GoesWithItsVocabularyEvenAfterItWasHandedOut) {
   EXPECT_EQ(saved.WhyMisfits(0xabc), "");
   EXPECT_EQ(saved.WhyMisfits(std::nullopt), "");
   EXPECT_NE(saved.WhyMisfits(0xdef).find(path_ + ": was made with another vocabulary"), std::string::npos);
+}
+
+TEST_F(SavedMapTest, TellsOfWhichRunsItIsMadeEvenAfterItWasHandedOut) {
+  SavedMap saved = Load();
+  saved.Begin(TestCamera(), Pyramid(), kSession + 1);
+  ASSERT_EQ(saved.runs().size(), 1u);
+  EXPECT_EQ(saved.runs().at(kSession).seed, 5u);
 }
 
 TEST_F(SavedMapTest, AFileThatIsNotThereIsNamed) {

@@ -32,6 +32,19 @@ check "to a few centimetres" holds "$(sed -nE '/"ate/,/}/s/^ *"rmse": *([0-9.]+)
 check "a run begins in the joined map" "${play[@]}" --frames 40 --map "$work/c.map" --localize --out "$work/in_c"
 expect "and finds itself" "$work/in_c" tracked_online_percent ">= 90"
 
+session_of() { sed -nE '1s/.*: 1 map, sessions ([0-9]+), .*/\1/p' <(map list "$1"); } # FILE: of a map of one
+for joined in ab c; do
+  check "the landmarks of $joined are proven" map landmark "$work/$joined.map" --all --json "$work/proofs.json" >"$work/said"
+  for first in a b; do
+    [[ $joined$first != abb ]] || continue
+    session=$(session_of "$work/$first.map")
+    check "$joined has kept the run of $first" grep -qE "^run +session $session, seed 3, configuration [0-9a-f]{16}, profile dm$" "$work/said"
+    check "and says which landmarks are of it" grep -q "\"state\":\"static\",\"session\":$session," "$work/proofs.json"
+  done
+done
+check "the second run is in its map" grep -qE "^run +session [0-9]+, seed 3, .*, map.saved=on$" \
+  <(map landmark "$work/ab.map" --all --json "$work/proofs.json")
+
 check "a map does not differ from itself" map diff "$work/a.map" "$work/a.map" >"$work/said"
 check "nothing is said then" test ! -s "$work/said"
 map diff "$work/a.map" "$work/c.map" >"$work/said"

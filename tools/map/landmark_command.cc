@@ -32,12 +32,13 @@ void Warn(const LandmarkProofs& proofs) {
     LogWarning("{}: {} map records are missing; what they said of landmarks is not told", proofs.path,
                proofs.read.missing);
   }
-  if (proofs.of_log && proofs.run_told && !proofs.settings_known) {
+  const ProvenRun* run = proofs.RunOf(proofs.session);
+  if (proofs.of_log && run != nullptr && !run->settings_known) {
     LogWarning(
         "{}: the run had other settings than profile {} has: give its own --config and --set, since the "
         "rules "
         "by which landmarks were removed are those of the settings given here",
-        proofs.path, proofs.run.profile);
+        proofs.path, run->start.profile);
   }
 }
 
@@ -75,7 +76,7 @@ int TellLandmark(const LandmarkArguments& arguments, const std::optional<BusKey>
     std::fputs(ProofText(proofs, history->second).c_str(), stdout);
   } else {
     for (const auto& [known, history] : all) wanted.push_back(&history);
-    std::printf("%s%zu landmarks, %zu in the map\n", RunText(proofs).c_str(), all.size(),
+    std::printf("%s%zu landmarks, %zu in the map\n", RunsText(proofs).c_str(), all.size(),
                 proofs.map().num_landmarks());
   }
   if (!arguments.json.empty()) WriteProofJson(arguments.json, proofs, wanted);

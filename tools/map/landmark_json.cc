@@ -101,7 +101,10 @@ Json FormerJson(const LandmarkHistory& history) {
 
 Json ToJson(const LandmarkProofs& proofs, const LandmarkHistory& history) {
   const LandmarkNow now = NowOf(proofs, history);
-  Json json = {{"id", NameOf(history.id)}, {"state", StateOfNow(proofs, history)}};
+  const std::optional<uint32_t> session = proofs.SessionOf(history);
+  Json json = {{"id", NameOf(history.id)},
+               {"state", StateOfNow(proofs, history)},
+               {"session", session ? Json(*session) : Json(nullptr)}};
   if (now.state) AddState(proofs, *now.state, &json);
   json["made"] = MadeJson(history);
   json["end"] = EndJson(history);
@@ -116,22 +119,33 @@ Json ToJson(const LandmarkProofs& proofs, const LandmarkHistory& history) {
   return json;
 }
 
-Json RunJson(const LandmarkProofs& proofs) {
-  const SessionStart& run = proofs.run;
-  Json json = {{"file", proofs.path},
-               {"of_log", proofs.of_log},
-               {"records", proofs.read.records},
-               {"missing", proofs.read.missing},
-               {"session", run.session}};
-  json["seed"] = proofs.run_told ? Json(run.seed) : Json(nullptr);
-  json["configuration_hash"] = proofs.run_told ? Json(Hex(run.configuration_hash)) : Json(nullptr);
-  json["settings_known"] = proofs.settings_known;
-  json["modes"] = proofs.modes;
-  json["profile"] = run.profile;
-  json["version"] = run.software;
-  json["vocabulary"] = run.vocabulary_checksum ? Json(Hex(*run.vocabulary_checksum)) : Json(nullptr);
-  json["sequence"] = run.sequence;
-  json["lockstep"] = run.mode == PlaybackMode::kLockstep;
+Json FileJson(const LandmarkProofs& proofs) {
+  return {{"file", proofs.path},
+          {"of_log", proofs.of_log},
+          {"records", proofs.read.records},
+          {"missing", proofs.read.missing}};
+}
+
+/// `run`: null where the file tells no more than its session.
+Json RunJson(uint32_t session, const ProvenRun* run) {
+  Json json = {{"session", session}, {"seed", nullptr}, {"configuration_hash", nullptr}};
+  if (run == nullptr) return json;
+  const SessionStart& start = run->start;
+  json["seed"] = start.seed;
+  json["configuration_hash"] = Hex(start.configuration_hash);
+  json["settings_known"] = run->settings_known;
+  json["modes"] = run->modes;
+  json["profile"] = start.profile;
+  json["version"] = start.software;
+  json["vocabulary"] = start.vocabulary_checksum ? Json(Hex(*start.vocabulary_checksum)) : Json(nullptr);
+  json["sequence"] = start.sequence;
+  json["lockstep"] = start.mode == PlaybackMode::kLockstep;
+  return json;
+}
+
+Json RunsJson(const LandmarkProofs& proofs) {
+  Json json = Json::array();
+  for (const uint32_t session : proofs.Sessions()) json.push_back(RunJson(session, proofs.RunOf(session)));
   return json;
 }
 
@@ -143,7 +157,9 @@ std::string Dump(const Json& json) { return json.dump(-1, ' ', false, Json::erro
 void WriteProofJson(const std::string& path, const LandmarkProofs& proofs,
                     const std::vector<const LandmarkHistory*>& histories) {
   OutputFile file(path);
-  file.Write("{\"run\": " + Dump(RunJson(proofs)) + ",\n\"landmarks\": [");
+  Json run = FileJson(proofs);
+  run.update(RunJson(proofs.session, proofs.RunOf(proofs.session)));
+  file.Write("{\"run\": " + Dump(run) + ",\n\"runs\": " + Dump(RunsJson(proofs)) + ",\n\"landmarks\": [");
   const char* before = "\n";
   for (const LandmarkHistory* history : histories) {
     file.Write(before + Dump(ToJson(proofs, *history)));

@@ -1,5 +1,6 @@
 #include "landmark_proof.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -7,6 +8,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/map/map_states.h"
+#include "dmslam/map/renumbering.h"
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/settings/settings.h"
 #include "dmslam/wire/codec.h"
@@ -56,6 +58,23 @@ std::optional<FrameEvidence> EvidenceOf(const LogIndex& log, const RecordedSessi
   return std::nullopt;
 }
 
+/// A landmark's age counts from a keyframe of the session in which it was made, or from one of an earlier
+/// session, where it has taken in a landmark of that one: what was numbered by one mapper was made in the
+/// last of these sessions.
+std::map<uint16_t, uint32_t> SessionsByOrdinal(const LandmarkHistories& histories) {
+  std::map<uint16_t, uint32_t> sessions;
+  for (const auto& [id, history] : histories.landmarks()) {
+    const Landmark* landmark = histories.map().FindLandmark(id);
+    const bool was_told = history.end && history.end->last;
+    if (landmark == nullptr && !was_told) continue;
+    const KeyframeId first =
+        landmark != nullptr ? landmark->first_keyframe : history.end->last->first_keyframe;
+    uint32_t& session = sessions[id.epoch_ordinal()];
+    session = std::max(session, first.session());
+  }
+  return sessions;
+}
+
 template <typename Number>
 bool ParseWhole(std::string_view text, Number* number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *number);
@@ -70,15 +89,13 @@ LandmarkProofs ReadProofs(const ProofSource& source, std::optional<LandmarkId> w
   if (!log.DescribeDamage().empty()) LogWarning("{}", log.DescribeDamage());
   const RecordedSession& session = log.Session(source.session);
   const SessionStart run = MadeWith(log, session);
-  const RunSettings settings = SettingsOf(run, source);
   LandmarkProofs proofs{source.path,
                         !session.IsSavedMap(),
-                        run,
-                        run.configuration_hash != 0,
-                        settings.known,
-                        settings.modes,
+                        run.session,
                         {},
-                        LandmarkHistories(run.camera, run.pyramid, settings.mapper)};
+                        {},
+                        {},
+                        LandmarkHistories(run.camera, run.pyramid, SettingsOf(run, source).mapper)};
   LandmarkHistories& histories = proofs.histories;
   if (watched) histories.Watch(*watched);
   ChangeReader reader;
@@ -91,7 +108,31 @@ LandmarkProofs ReadProofs(const ProofSource& source, std::optional<LandmarkId> w
   const int64_t until_us = source.at_s < 0 ? INT64_MAX : log.begin_us() + std::llround(source.at_s * 1e6);
   proofs.read = ForEachChange(log, session, until_us, reader);
   histories.Finish();
+  for (const auto& [id, start] : RunsOf(session, run, proofs.map())) {
+    const RunSettings settings = SettingsOf(start, source);
+    proofs.runs.emplace(id, ProvenRun{start, settings.known, settings.modes});
+  }
+  proofs.sessions_by_ordinal = SessionsByOrdinal(histories);
   return proofs;
+}
+
+const ProvenRun* LandmarkProofs::RunOf(uint32_t session_of_run) const {
+  const auto run = runs.find(session_of_run);
+  return run == runs.end() ? nullptr : &run->second;
+}
+
+std::set<uint32_t> LandmarkProofs::Sessions() const {
+  std::set<uint32_t> sessions = SessionsOf(map());
+  for (const auto& [id, run] : runs) sessions.insert(id);
+  return sessions;
+}
+
+std::optional<uint32_t> LandmarkProofs::SessionOf(const LandmarkHistory& history) const {
+  if (history.origin != LandmarkOrigin::kNotTold) return session;  // by a record of this log
+  const auto of_ordinal = sessions_by_ordinal.find(history.id.epoch_ordinal());
+  if (of_ordinal != sessions_by_ordinal.end()) return of_ordinal->second;
+  const std::set<uint32_t> all = Sessions();
+  return all.size() == 1 ? std::optional(*all.begin()) : std::nullopt;
 }
 
 LandmarkNow NowOf(const LandmarkProofs& proofs, const LandmarkHistory& history) {

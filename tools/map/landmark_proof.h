@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,19 +24,31 @@ struct ProofSource {
   std::vector<std::string> overrides;
 };
 
+/// A run of which landmarks come: with which seed, configuration ... it was played.
+struct ProvenRun {
+  SessionStart start;
+  /// Its settings are its profile's, with `modes`, and those that are given.
+  bool settings_known = false;
+  std::string modes;
+};
+
 /// What a file proves of its landmarks.
 struct LandmarkProofs {
   std::string path;
-  bool of_log = false;    ///< else a saved map: what is in it, and no history
-  SessionStart run;       ///< seed, configuration ... of the run that made it, or that saved it
-  bool run_told = false;  ///< false: the log lacks what the frontend said of the run
-  /// The mapper's rules were asked with the settings of the run, which has its profile's, and these.
-  bool settings_known = false;
-  std::string modes;
+  bool of_log = false;                               ///< else a saved map: what is in it, and no history
+  uint32_t session = 0;                              ///< of the log
+  std::map<uint32_t, ProvenRun> runs;                ///< by session, as far as the file tells them
+  std::map<uint16_t, uint32_t> sessions_by_ordinal;  ///< in which sessions landmarks were numbered so
   ChangesRead read;
   LandmarkHistories histories;
 
   const Map& map() const { return histories.map(); }
+  /// What is known of the run of that session; null: nothing.
+  const ProvenRun* RunOf(uint32_t session_of_run) const;
+  /// The sessions of the runs that the file tells, or whose keyframes are in it.
+  std::set<uint32_t> Sessions() const;
+  /// The session in which a landmark was made; none: the file does not say.
+  std::optional<uint32_t> SessionOf(const LandmarkHistory& history) const;
 };
 
 /// Reads the file; of `watched` all evidence is kept. Throws InputError.

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "dmslam/map/renumbering.h"
 #include "dmslam/map/testing/map_scene.h"
 #include "dmslam/util/check.h"
 #include "landmark_text.h"
@@ -78,6 +79,73 @@ TEST_F(OfASavedMap, TellsWhatItHoldsAndWhatOnlyALogTells) {
 TEST_F(OfASavedMap, TellsWhatBecameOfOneThatIsGone) {
   EXPECT_TRUE(Has(TextOf(1), "fused into 1:3, which is in the map")) << TextOf(1);
   EXPECT_TRUE(Has(TextOf(0), "not in the map; only the log of the run tells why")) << TextOf(0);
+}
+
+/// Of two runs, sessions 1 and 2: landmark 2:2 of the second has taken in 1:2 of the first.
+class OfAMapOfTwoRuns : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = std::filesystem::temp_directory_path() / ("landmark_runs_" + std::to_string(getpid()) + ".map");
+    MapScene scene;
+    scene.AddCloud(6, {0, 0, 4}, {0.5, 0.5, 0.2});
+    scene.MapAll(4);
+    map_.emplace(Beside(scene.map(), scene.map(), NamesBeside(scene.map(), scene.map(), true)));
+    map_->SetMapId(map_->At(LandmarkId::Make(2, 2)), MapScene::kMap);
+    map_->Fuse(map_->At(LandmarkId::Make(1, 2)), map_->At(LandmarkId::Make(2, 2)), {});
+    for (const uint32_t session : {1, 2}) {
+      SessionStart& run = runs_[session];
+      run.session = session;
+      run.seed = 40 + session;
+      run.configuration_hash = 0xabc0 + session;
+      run.profile = "dm";
+      run.sequence = "way " + std::to_string(session);
+      run.camera = map_->camera();
+      run.pyramid = map_->pyramid();
+    }
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+  std::string TextOf(LandmarkId id) const {
+    const LandmarkProofs proofs = ReadProofs({.path = path_, .config = "", .overrides = {}}, {}, {});
+    return ProofText(proofs, proofs.histories.landmarks().at(id));
+  }
+
+  std::string path_;
+  std::optional<MapEditor> map_;
+  SessionRuns runs_;
+};
+
+TEST_F(OfAMapOfTwoRuns, EachLandmarkIsOfItsOwnRun) {
+  SaveMap(path_, *map_, runs_.at(1), runs_);
+  const std::string first = TextOf(LandmarkId::Make(1, 4)), second = TextOf(LandmarkId::Make(2, 4));
+  EXPECT_TRUE(Has(first, "run         session 1, seed 41, configuration 000000000000abc1")) << first;
+  EXPECT_TRUE(Has(first, "sequence way 1")) << first;
+  EXPECT_FALSE(Has(first, "session 2")) << first;
+  EXPECT_TRUE(Has(second, "run         session 2, seed 42, configuration 000000000000abc2")) << second;
+  EXPECT_TRUE(Has(second, "sequence way 2")) << second;
+  EXPECT_FALSE(Has(second, "seed 41")) << second;
+  EXPECT_TRUE(Has(second, "follows frame 0 of session 2")) << second;
+}
+
+TEST_F(OfAMapOfTwoRuns, OneThatTookInOneOfTheOtherIsOfBoth) {
+  SaveMap(path_, *map_, runs_.at(1), runs_);
+  const std::string text = TextOf(LandmarkId::Make(2, 2)), gone = TextOf(LandmarkId::Make(1, 2));
+  EXPECT_TRUE(Has(text, "run         session 2, seed 42")) << "it is numbered by the second: " << text;
+  EXPECT_TRUE(Has(text, "frames saw it, too, of session 1, seed 41, configuration 000000000000abc1")) << text;
+  EXPECT_TRUE(Has(gone, "run         session 1, seed 41")) << gone;
+  EXPECT_TRUE(Has(gone, "fused into 2:2")) << gone;
+}
+
+TEST_F(OfAMapOfTwoRuns, OfARunThatIsNotToldNoneIsNamed) {
+  SaveMap(path_, *map_, runs_.at(2));
+  const std::string first = TextOf(LandmarkId::Make(1, 4)), second = TextOf(LandmarkId::Make(2, 4));
+  EXPECT_TRUE(
+      Has(first, "session 1; seed and configuration are not in this file, but in the log of that run"))
+      << first;
+  EXPECT_FALSE(Has(first, "seed 42")) << first;
+  EXPECT_TRUE(Has(second, "session 2, seed 42")) << second;
+  SaveMap(path_, *map_, runs_.at(2), {});
+  EXPECT_TRUE(Has(TextOf(LandmarkId::Make(2, 4)), "session 2; seed and configuration are not in this file"))
+      << "whose session the file has need not be the run of all that is in it";
 }
 
 }  // namespace

@@ -23,12 +23,13 @@ std::string Stamp(std::optional<int64_t> stamp_ns) {
 /// The words for one landmark of one file.
 class Words {
  public:
-  explicit Words(const LandmarkProofs& proofs) : proofs_(proofs) {}
+  explicit Words(const LandmarkProofs& proofs)
+      : proofs_(proofs), of_several_(!proofs.of_log && proofs.Sessions().size() > 1) {}
 
   std::string Frame(KeyframeId id) const {
     std::string text = "frame " + std::to_string(id.frame_index());
     if (id.camera() != 0) text += " of camera " + std::to_string(id.camera());
-    if (id.session() != proofs_.run.session) text += " of session " + std::to_string(id.session());
+    if (of_several_ || id.session() != proofs_.session) text += " of session " + std::to_string(id.session());
     return text;
   }
   /// "version 45 of the map, FUSED about frame 61".
@@ -52,6 +53,7 @@ class Words {
   std::string FusedInto(LandmarkId into) const;
 
   const LandmarkProofs& proofs_;
+  const bool of_several_;  ///< of their frames none is meant when no session is named
 };
 
 std::string Words::Made(const LandmarkHistory& history) const {
@@ -217,17 +219,50 @@ std::string PlaceText(const LandmarkProofs& proofs, const LandmarkState& state) 
                            Words(proofs).Frame(state.reference));
 }
 
-/// Other runs that had a part in it.
-std::string SessionsText(const LandmarkProofs& proofs, const LandmarkHistory& history,
-                         const LandmarkNow& now) {
-  std::set<uint32_t> sessions;
-  for (const std::vector<LandmarkSight>* sights : {&now.seen, &history.made_from}) {
-    for (const LandmarkSight& sight : *sights) sessions.insert(sight.keyframe.session());
+/// "session 5, seed 3, configuration 8078bb04eafdd3a4, profile dm".
+std::string RunName(const LandmarkProofs& proofs, uint32_t session) {
+  std::string text = Format("session %u", session);
+  const ProvenRun* run = proofs.RunOf(session);
+  if (run == nullptr) {
+    const bool its_own = proofs.of_log && session == proofs.session;
+    return text + (its_own
+                       ? "; seed and configuration are not in the log: the frontend's first record is missing"
+                       : "; seed and configuration are not in this file, but in the log of that run");
   }
-  sessions.erase(proofs.run.session);
-  if (sessions.empty()) return "";
-  return More("frames of session " + Listed(sessions) +
-              " saw it, too: seed and configuration are in its log");
+  text += Format(", seed %llu, configuration %s, profile ", static_cast<unsigned long long>(run->start.seed),
+                 Hex(run->start.configuration_hash).c_str()) +
+          run->start.profile;
+  if (!run->settings_known) text += " with settings of its own";
+  if (!run->modes.empty()) text += ", " + run->modes;
+  return text;
+}
+
+std::string RunText(const LandmarkProofs& proofs, uint32_t session) {
+  std::string text = Line("run", RunName(proofs, session));
+  const ProvenRun* run = proofs.RunOf(session);
+  if (run == nullptr) return text;
+  const SessionStart& start = run->start;
+  return text +
+         More(Format("version %s, vocabulary %s, sequence ", start.software.c_str(),
+                     start.vocabulary_checksum ? Hex(*start.vocabulary_checksum).c_str() : "none") +
+              start.sequence + (start.mode == PlaybackMode::kLockstep ? ", lock-step" : ", real time"));
+}
+
+/// The run of which it comes, and others that had a part in it.
+std::string RunsText(const LandmarkProofs& proofs, const LandmarkHistory& history, const LandmarkNow& now) {
+  const std::optional<uint32_t> made_in = proofs.SessionOf(history);
+  std::string text = made_in ? RunText(proofs, *made_in)
+                             : Line("run", "one of the sessions " + Listed(proofs.Sessions()) +
+                                               ": of one that is gone the file does not tell in which");
+  std::set<uint32_t> others;
+  if (now.state) others.insert(now.state->first_keyframe.session());
+  for (const std::vector<LandmarkSight>* sights : {&now.seen, &history.made_from}) {
+    for (const LandmarkSight& sight : *sights) others.insert(sight.keyframe.session());
+  }
+  for (const uint32_t other : others) {
+    if (other != made_in) text += More("frames saw it, too, of " + RunName(proofs, other));
+  }
+  return text;
 }
 
 std::string SightsText(const LandmarkProofs& proofs, const LandmarkHistory& history, const LandmarkNow& now) {
@@ -243,27 +278,9 @@ std::string SightsText(const LandmarkProofs& proofs, const LandmarkHistory& hist
 
 }  // namespace
 
-std::string RunText(const LandmarkProofs& proofs) {
-  const SessionStart& run = proofs.run;
-  if (!proofs.run_told)
-    return Line(
-        "run",
-        Format(
-            "session %u; seed and configuration are not in the log: the frontend's first record is missing",
-            run.session));
-  std::string profile = "profile " + run.profile;
-  if (!proofs.settings_known) profile += " with settings of its own";
-  if (!proofs.modes.empty()) profile += ", " + proofs.modes;
-  std::string text =
-      Line("run", Format("session %u, seed %llu, configuration %s, ", run.session,
-                         static_cast<unsigned long long>(run.seed), Hex(run.configuration_hash).c_str()) +
-                      profile);
-  text += More(Format("version %s, vocabulary %s, sequence ", run.software.c_str(),
-                      run.vocabulary_checksum ? Hex(*run.vocabulary_checksum).c_str() : "none") +
-               run.sequence + (run.mode == PlaybackMode::kLockstep ? ", lock-step" : ", real time"));
-  if (!proofs.of_log)
-    text +=
-        More("as the saved map says: of the run that saved it, or of the first of the maps that were joined");
+std::string RunsText(const LandmarkProofs& proofs) {
+  std::string text;
+  for (const uint32_t session : proofs.Sessions()) text += RunText(proofs, session);
   return text;
 }
 
@@ -272,7 +289,7 @@ std::string ProofText(const LandmarkProofs& proofs, const LandmarkHistory& histo
   const LandmarkNow now = NowOf(proofs, history);
   std::string text = Line(
       "landmark", NameOf(history.id) + Format(" (%llu)", static_cast<unsigned long long>(history.id.value)));
-  text += RunText(proofs) + SessionsText(proofs, history, now) + StateText(proofs, history, now);
+  text += RunsText(proofs, history, now) + StateText(proofs, history, now);
   if (history.end && proofs.of_log) text += More(words.Moment(history.end->when));
   if (now.state) text += More(CountsText(now.state->evidence)) + PlaceText(proofs, *now.state);
   text += Line("made", words.Made(history));

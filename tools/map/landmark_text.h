@@ -9,7 +9,7 @@ namespace dmslam {
 /// The proof of one landmark, for people: several lines.
 std::string ProofText(const LandmarkProofs& proofs, const LandmarkHistory& history);
 
-/// Of which run all that is proven, in one paragraph.
-std::string RunText(const LandmarkProofs& proofs);
+/// Of which runs all that is proven, a paragraph for each.
+std::string RunsText(const LandmarkProofs& proofs);
 
 }  // namespace dmslam

@@ -266,7 +266,7 @@ int Run(const Arguments& a) {
   if (!a.trajectory.empty()) dmslam::WriteTrajectory(a.trajectory, trajectories.final);
   if (!a.online.empty()) dmslam::WriteTrajectory(a.online, trajectories.online);
   if (!a.keyframes.empty()) dmslam::WriteTrajectory(a.keyframes, trajectories.keyframes);
-  if (!a.save.empty()) dmslam::SaveMap(a.save, rebuilt.map, rebuilt.session);
+  if (!a.save.empty()) dmslam::SaveMap(a.save, rebuilt.map, rebuilt.session, rebuilt.runs);
   Print(log, session, rebuilt, trajectories, map_id);
   if (!a.masks.empty()) Judge(a, rebuilt.map, map_id);
   return 0;

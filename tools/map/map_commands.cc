@@ -24,9 +24,24 @@ namespace {
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-/// Who begins in the map afterwards takes the next session.
-SessionStart StartOf(SessionStart start, const Map& map) {
-  start.session = std::max(start.session, NewestSession(map));
+/// Of those that had a part in the map: their keyframes are in it, or were the first to see its landmarks.
+SessionRuns RunsIn(const Map& map, const SessionRuns& runs) {
+  std::set<uint32_t> sessions = SessionsOf(map);
+  for (const LandmarkId id : map.LandmarkIdsSorted()) sessions.insert(map.At(id).first_keyframe.session());
+  SessionRuns there;
+  for (const uint32_t session : sessions) {
+    if (const auto run = runs.find(session); run != runs.end()) there.insert(*run);
+  }
+  return there;
+}
+
+/// How a file that holds `map` begins: as the run does of which all of it is, if there is only one. What is
+/// of several runs has the seed and settings of none. `start`: of the file of which it was taken.
+SessionStart StartOf(SessionStart start, const Map& map, const SessionRuns& runs) {
+  if (runs.size() == 1 && SessionsOf(map) == std::set{runs.begin()->first}) return runs.begin()->second;
+  start.session = NewestSession(map);
+  start.seed = start.configuration_hash = 0;
+  start.profile.clear();
   return start;
 }
 
@@ -68,14 +83,22 @@ class Progress {
   std::chrono::steady_clock::time_point said_ = std::chrono::steady_clock::now();
 };
 
-SessionStart StartOfJoined(const WholeMap& a, const WholeMap& b, const Map& joined) {
-  SessionStart start = StartOf(a.rebuilt.session, joined);
-  start.sequence += " + " + b.rebuilt.session.sequence;
-  return start;
+/// What the two files say of their runs.
+SessionRuns RunsOfBoth(const WholeMap& a, const WholeMap& b, const Renumbering& names_of_b) {
+  SessionRuns runs = a.rebuilt.runs;
+  for (const auto& [session, run] : b.rebuilt.runs) {
+    const auto renamed = names_of_b.sessions.find(session);
+    const uint32_t named = renamed == names_of_b.sessions.end() ? session : renamed->second;
+    runs.insert_or_assign(named, run).first->second.session = named;
+  }
+  return runs;
 }
 
-void Save(const std::string& path, const Map& map, const SessionStart& session) {
-  SaveMap(path, map, session);
+/// `start`: of the file of which the map was taken.
+void Save(const std::string& path, const Map& map, const SessionStart& start, const SessionRuns& known) {
+  const SessionRuns runs = RunsIn(map, known);
+  const SessionStart session = StartOf(start, map, runs);
+  SaveMap(path, map, session, runs);
   std::fputs(Listing(path, map, session).c_str(), stdout);
 }
 
@@ -218,7 +241,9 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
   for (const std::string& weld : report.welds) std::printf("joined: %s\n", weld.c_str());
   if (report.joined)
     std::printf("fused: %d observations and landmarks beside those of the welds\n", report.fused);
-  Save(arguments.save, merge.map(), StartOfJoined(a, b, merge.map()));
+  SessionStart start = a.rebuilt.session;
+  start.sequence += " + " + b.rebuilt.session.sequence;
+  Save(arguments.save, merge.map(), start, RunsOfBoth(a, b, names));
   return 0;
 }
 
@@ -247,7 +272,7 @@ int SplitMaps(const std::string& path, const std::string& prefix, const std::opt
     throw InputError(path + ": holds one map, number " + Listed(maps) + "; there is nothing to split");
   for (const MapId map_id : maps) {
     const Replica only = OnlyMap(whole.map(), map_id);
-    Save(prefix + std::to_string(map_id) + ".map", only, StartOf(whole.rebuilt.session, only));
+    Save(prefix + std::to_string(map_id) + ".map", only, whole.rebuilt.session, whole.rebuilt.runs);
   }
   return 0;
 }

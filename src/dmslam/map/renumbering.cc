@@ -113,7 +113,7 @@ Renumbering NamesBeside(const Map& a, const Map& b, bool sessions_too) {
   uint32_t session = sessions_a.empty() ? 0 : *sessions_a.rbegin();
   if (!sessions_b.empty()) session = std::max(session, *sessions_b.rbegin());
   for (const uint32_t of_b : sessions_b) {
-    if (sessions_a.contains(of_b)) names.sessions[of_b] = ++session;
+    if (sessions_a.contains(of_b) || !names.sessions.empty()) names.sessions[of_b] = ++session;
   }
   return names;
 }

@@ -24,8 +24,9 @@ std::set<uint16_t> OrdinalsOf(const Map& map);
 std::set<MapId> MapsOf(const Map& map);
 
 /// What `b` is to be called beside `a`: its ordinals and its maps come behind those of `a`. Its sessions stay
-/// as they are, unless `sessions_too`: then those that `a` has as well come behind the highest of both.
-/// Throws InputError where there are no ordinals left.
+/// as they are, unless `sessions_too`: then those that `a` has as well come behind the highest of both, and
+/// so do the later ones of `b`, since the order of sessions is that of time. Throws InputError where there
+/// are no ordinals left.
 Renumbering NamesBeside(const Map& a, const Map& b, bool sessions_too);
 
 /// The same delta with other names.

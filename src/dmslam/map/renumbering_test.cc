@@ -68,6 +68,21 @@ TEST(RenumberingTest, SessionsKeepTheirNumbersUnlessBothHaveThem) {
   EXPECT_TRUE(NamesBeside(a, moved, true).sessions.empty());
 }
 
+TEST(RenumberingTest, SessionsOfOtherNumbersKeepTheirOrder) {
+  const Replica a = RandomMap(1), b = RandomMap(2);
+  const Replica of_two = Beside(b, RandomMap(3), NamesBeside(b, RandomMap(3), true));
+  ASSERT_EQ(SessionsOf(of_two).size(), 2u) << "of which a has the first";
+  const Renumbering names = NamesBeside(a, of_two, true);
+  uint32_t last = 0;
+  for (const uint32_t session : SessionsOf(of_two)) {
+    const auto renamed = names.sessions.find(session);
+    const uint32_t named = renamed == names.sessions.end() ? session : renamed->second;
+    EXPECT_GT(named, last) << "later ones of b were later";
+    EXPECT_FALSE(SessionsOf(a).contains(named));
+    last = named;
+  }
+}
+
 TEST(RenumberingTest, OneOfTheMapsIsTakenOut) {
   const Replica a = RandomMap(1), b = RandomMap(2);
   const Renumbering names = NamesBeside(a, b, true);

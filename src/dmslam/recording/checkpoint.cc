@@ -83,7 +83,7 @@ void WriteCheckpoint(const std::string& path, const CutMap& map, const SessionSt
   const std::string fresh = NewPath(path);
   std::error_code error;
   try {
-    SaveMap(fresh, map, session);
+    SaveMap(fresh, map, session, {{session.session, session}});
   } catch (const InputError&) {
     fs::remove(fresh + ".part", error);
     fs::remove(fresh, error);

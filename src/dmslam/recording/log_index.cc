@@ -118,6 +118,7 @@ void LogIndex::Add(const LogEvent& event, Parts* parts) {
   message.order = num_messages_;
   message.offset = event.offset;
   message.channel = WithoutPrefix(event.channel);
+  if (message.channel == kLogRunChannel) return AddRun(event);
   if (AddOfPlayer(event, message)) return;
   if (IsRecordChannel(message.channel)) {
     AddRecord(std::move(message), event.bytes);
@@ -133,7 +134,8 @@ RecordedCamera& LogIndex::CameraOf(const Message& message) {
 
 /// Whether it is a message of a camera's player, and not a record.
 bool LogIndex::AddOfPlayer(const LogEvent& event, const RecordedMessage& message) {
-  const std::string channel = SplitCamera(message.channel).channel;
+  const std::string of_any_camera = SplitCamera(message.channel).channel;
+  const std::string_view channel = of_any_camera;
   if (channel == channels::kFrame) {
     AddFrame(event, message);
   } else if (channel == channels::kCameraInfo) {
@@ -156,6 +158,20 @@ void LogIndex::AddFrame(const LogEvent& event, RecordedMessage message) {
   RecordedCamera& camera = CameraOf(*frame);
   camera.frames.emplace(frame->frame_index, std::move(message));
   camera.stamps_ns.emplace(frame->frame_index, frame->stamp_ns);
+}
+
+void LogIndex::AddRun(const LogEvent& event) {
+  const std::optional<RecordHeader> header = ParseHeader(event.bytes);
+  const auto run = wire::Decode<SessionStart>(event.bytes);
+  const bool sound = header && run && header->session > 0 && header->session <= UINT32_MAX &&
+                     IsIntact(kLogRunChannel, event.bytes);
+  if (!sound) {
+    ++bad_messages_;
+    return;
+  }
+  RecordedSession& session = sessions_[static_cast<uint32_t>(header->session)];
+  session.id = static_cast<uint32_t>(header->session);
+  session.runs.emplace(run->session, *run);
 }
 
 void LogIndex::AddRecord(RecordedMessage message, std::span<const uint8_t> bytes) {

@@ -9,6 +9,7 @@
 #include "dmslam/messaging/event_log.h"
 #include "dmslam/messaging/types.h"
 #include "dmslam/recording/log_version.h"
+#include "dmslam/wire/frontend_messages.h"
 #include "dmslam/wire/player_messages.h"
 
 namespace dmslam {
@@ -57,7 +58,8 @@ struct RecordedSession {
   uint32_t id = 0;
   std::map<CameraId, RecordedCamera> cameras;  ///< whose players were recorded
   std::map<StreamId, RecordedStream> streams;
-  std::optional<LogContent> saved;  ///< of a saved map: what its first message says of it
+  std::optional<LogContent> saved;        ///< of a saved map: what its first message says of it
+  std::map<uint32_t, SessionStart> runs;  ///< of a saved map: what it says of the runs in it, by session
 
   const RecordedStream& Stream(StreamId id) const;
   /// Whether it was written by SaveMap, and by no run: also where its first message is lost.
@@ -98,6 +100,7 @@ class LogIndex {
   void Add(const LogEvent& event, Parts* parts);
   bool AddOfPlayer(const LogEvent& event, const RecordedMessage& message);
   void AddFrame(const LogEvent& event, RecordedMessage message);
+  void AddRun(const LogEvent& event);
   void AddRecord(RecordedMessage message, std::span<const uint8_t> bytes);
   void AddPart(const LogEvent& event, RecordedMessage message, Parts* parts);
   template <typename Message>

@@ -8,6 +8,10 @@
 
 namespace dmslam {
 
+/// On which a saved map tells with which seed and settings each of the runs was played that it is made of, as
+/// a session_t: where they are not those of its own session_t alone.
+inline constexpr char kLogRunChannel[] = "DMSLAM_LOG_RUN";
+
 /// The protocol of a message that another version has written, as far as that can be told: a beacon says it
 /// (its layout never changes), and former types are known.
 std::optional<int32_t> OtherProtocol(const LogEvent& event);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "dmslam/map/renumbering.h"
 #include "dmslam/map/snapshot.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/recording/log_version.h"
@@ -18,8 +19,8 @@ namespace dmslam {
 namespace {
 
 template <typename Message>
-void WriteRecord(EventLogWriter* log, int64_t utime_us, RecordHeader header, const Message& message) {
-  const char* channel = wire::Info<Message>().channel;
+void WriteRecord(EventLogWriter* log, int64_t utime_us, RecordHeader header, const Message& message,
+                 const char* channel = wire::Info<Message>().channel) {
   Bytes bytes = wire::Encode(message);
   Seal(header, channel, bytes);
   log->Write(utime_us, channel, bytes);
@@ -130,6 +131,13 @@ SessionStart MadeWith(const std::string& path) {
   return MadeWith(log, log.Session());
 }
 
+SessionRuns RunsOf(const RecordedSession& session, const SessionStart& made, const Map& map) {
+  if (!session.runs.empty()) return session.runs;
+  const bool told = made.configuration_hash != 0;  // else by nobody but a player
+  const bool its_own = !session.IsSavedMap() || SessionsOf(map) == std::set{made.session};
+  return told && its_own ? SessionRuns{{made.session, made}} : SessionRuns();
+}
+
 ChangesRead ForEachChange(const LogIndex& log, const RecordedSession& session, int64_t until_us,
                           const ChangeReader& reader) {
   const Replay replay = PlanReplay(session.Stream(StreamId::kMap), until_us);
@@ -177,20 +185,26 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
   rebuilt.records = read.records;
   rebuilt.missing = read.missing;
   rebuilt.skipped = rebuilt.map.skipped_references();
+  rebuilt.runs = RunsOf(session, start, rebuilt.map);
   return rebuilt;
 }
 
 CutMap Cut(const std::string& path, const Map& map) {
   if (map.keyframes().empty()) throw InputError(path + ": is not written: the map is empty");
   const Keyframe& newest = map.keyframes().rbegin()->second;
-  return {CutSnapshot(map, newest.id, kSnapshotPieceBytes), newest.stamp_ns};
+  return {CutSnapshot(map, newest.id, kSnapshotPieceBytes), SessionsOf(map), newest.stamp_ns};
 }
 
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session) {
-  SaveMap(path, Cut(path, map), session);
+  SaveMap(path, map, session, {{session.session, session}});
 }
 
-void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session) {
+void SaveMap(const std::string& path, const Map& map, const SessionStart& session, const SessionRuns& runs) {
+  SaveMap(path, Cut(path, map), session, runs);
+}
+
+void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session,
+             const SessionRuns& runs) {
   const int64_t utime_us = map.stamp_ns / 1000;
   const std::string partial = path + ".part";
   EventLogWriter log(partial);
@@ -199,6 +213,10 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
   start.protocol_version = kProtocolVersion;
   start.software = kVersion;
   WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), start);
+  if (map.sessions != std::set{session.session}) {  // else it is of that one run
+    for (const auto& [id, run] : runs)
+      WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kFrontend, 1), run, kLogRunChannel);
+  }
   int64_t seq = 0;
   for (const MapDelta& delta : map.pieces)
     WriteRecord(&log, utime_us, HeaderOf(session.session, StreamId::kMap, ++seq), delta);

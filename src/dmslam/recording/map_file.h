@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -12,10 +14,14 @@
 
 namespace dmslam {
 
+/// With which seed and settings sessions were played, by session: of those of which it is known.
+using SessionRuns = std::map<uint32_t, SessionStart>;
+
 /// A map with what it rests on.
 struct RebuiltMap {
   Replica map;
   SessionStart session;  ///< camera, pyramid, vocabulary ... of the run that made it
+  SessionRuns runs{};    ///< of which it is made, as far as the file says
   int64_t records = 0;   ///< that were applied
   int64_t missing = 0;   ///< records of the map that the log lacks: the map is as good as it can be
   uint64_t skipped = 0;  ///< what records said of keyframes and landmarks that are not there, because of that
@@ -30,6 +36,10 @@ std::optional<SessionStart> FindSessionStart(const LogIndex& log, const Recorded
 /// of the session, and for a saved map of which anything is missing, damaged, or of another version.
 SessionStart MadeWith(const LogIndex& log, const RecordedSession& session);
 SessionStart MadeWith(const std::string& path);
+
+/// What a file says of the runs of which the `map` in it is made. A log knows its own run; a saved map that
+/// of its one session, or those that it lists. `made`: see MadeWith.
+SessionRuns RunsOf(const RecordedSession& session, const SessionStart& made, const Map& map);
 
 /// Who goes through the recorded changes of a map. What is empty is not called.
 struct ChangeReader {
@@ -56,15 +66,20 @@ RebuiltMap RebuildMap(const LogIndex& log, const RecordedSession& session, int64
 /// A map as it will be written: taken from a map at one time, whoever writes it when and where.
 struct CutMap {
   std::vector<MapDelta> pieces;
-  int64_t stamp_ns = 0;  ///< of the newest keyframe
+  std::set<uint32_t> sessions;  ///< whose keyframes are in it
+  int64_t stamp_ns = 0;         ///< of the newest keyframe
 };
 /// Throws InputError for an empty map.
 CutMap Cut(const std::string& path, const Map& map);
 
 /// Writes a map as a log: a beacon, which says the version to every later one, its session, then the whole
-/// map as records. The same map gives the same bytes. Throws InputError when that cannot be written.
+/// map as records. The same map gives the same bytes. `runs`: what is known of the runs of which it is made;
+/// where they are not given, `session` is that of a run, and all that is known. Throws InputError when that
+/// cannot be written.
 void SaveMap(const std::string& path, const Map& map, const SessionStart& session);
-void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session);
+void SaveMap(const std::string& path, const Map& map, const SessionStart& session, const SessionRuns& runs);
+void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session,
+             const SessionRuns& runs);
 
 /// Reads what SaveMap has written, or rebuilds the map of any other log of a run. `key`: as for LogIndex.
 /// Throws InputError.

@@ -322,6 +322,36 @@ TEST_F(Recording, ASavedMapIsTheMap) {
   EXPECT_THROW(SaveMap(path_ + ".map", Map(TestCamera(), Pyramid()), start), InputError);
 }
 
+TEST_F(Recording, ASavedMapTellsTheRunsOfWhichItIsMade) {
+  TinyMapper mapper;
+  mapper.Step();
+  SessionStart own, former;
+  own.session = kSession;
+  former.session = 3;
+  own.camera = former.camera = TestCamera();
+  own.seed = 11, own.configuration_hash = 0xabc;
+  former.seed = 12, former.configuration_hash = 0xdef;
+  SaveMap(path_ + ".map", mapper.map(), own);
+  const RebuiltMap alone = LoadMap(path_ + ".map");
+  ASSERT_EQ(alone.runs.size(), 1u);
+  EXPECT_EQ(alone.runs.at(kSession).seed, 11u);
+
+  SessionStart later = own;
+  later.session = 9;
+  SaveMap(path_ + ".map", mapper.map(), later, {{3, former}, {kSession, own}});
+  const RebuiltMap both = LoadMap(path_ + ".map");
+  ASSERT_EQ(both.runs.size(), 2u);
+  EXPECT_EQ(both.runs.at(3).seed, 12u);
+  EXPECT_EQ(both.runs.at(3).configuration_hash, 0xdefu);
+  EXPECT_EQ(both.runs.at(kSession).seed, 11u);
+  EXPECT_EQ(both.session.session, 9u);
+  SaveMap(path_ + ".map2", both.map, both.session, both.runs);
+  EXPECT_EQ(ReadFileBytes(path_ + ".map"), ReadFileBytes(path_ + ".map2"));
+
+  SaveMap(path_ + ".map", mapper.map(), later, {});
+  EXPECT_TRUE(LoadMap(path_ + ".map").runs.empty()) << "nobody says that it is of session 9";
+}
+
 /// Why the map is not loaded; empty where it is.
 std::string WhyNotLoaded(const std::string& path) {
   try {

@@ -1,0 +1,99 @@
+#include "map_commands.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "dmslam/map/testing/map_scene.h"
+#include "landmark_text.h"
+
+namespace dmslam {
+namespace {
+
+using testing::MapScene;
+
+bool Has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// Maps of two runs, which do not show the same place. Both are of session 1.
+class MapCommandsTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directories(folder_);
+    Make("a.map", 41);
+    Make("b.map", 42);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  void Make(const std::string& name, uint64_t seed) const {
+    MapScene scene(seed);
+    scene.AddCloud(30, {0, 0, 4}, {0.5, 0.5, 0.2});
+    scene.MapAll(4);
+    SessionStart start;
+    start.session = MapScene::kSession;
+    start.seed = seed;
+    start.configuration_hash = 0xabc00 + seed;
+    start.profile = "dm";
+    start.sequence = "way of seed " + std::to_string(seed);
+    start.camera = scene.map().camera();
+    start.pyramid = scene.map().pyramid();
+    SaveMap(Path(name), scene.map(), start);
+  }
+  /// Both, one beside the other.
+  void Join(const std::string& name) const {
+    const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+    MergeArguments arguments;
+    arguments.a = Path("a.map");
+    arguments.b = Path("b.map");
+    arguments.save = Path(name);
+    arguments.vocabulary = std::string(source == nullptr ? "." : source) + "/data/vocabulary.dmv";
+    arguments.renumber = arguments.apart = true;
+    ASSERT_EQ(MergeMaps(arguments, {}), 0);
+  }
+  /// What the file proves of a landmark.
+  std::string ProofOf(const std::string& name, LandmarkId id) const {
+    const LandmarkProofs proofs = ReadProofs({.path = Path(name), .config = "", .overrides = {}}, {}, {});
+    return ProofText(proofs, proofs.histories.landmarks().at(id));
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("map_commands_" + std::to_string(getpid()));
+};
+
+TEST_F(MapCommandsTest, InAJoinedMapEachLandmarkIsOfItsOwnRun) {
+  Join("c.map");
+  const std::string of_a = ProofOf("c.map", LandmarkId::Make(1, 3)),
+                    of_b = ProofOf("c.map", LandmarkId::Make(2, 3));
+  EXPECT_TRUE(Has(of_a, "session 1, seed 41, configuration 00000000000abc29")) << of_a;
+  EXPECT_TRUE(Has(of_a, "sequence way of seed 41,")) << of_a;
+  EXPECT_TRUE(Has(of_b, "session 2, seed 42, configuration 00000000000abc2a")) << of_b;
+  EXPECT_TRUE(Has(of_b, "sequence way of seed 42,")) << of_b;
+}
+
+TEST_F(MapCommandsTest, AMapThatWasSplitOffIsOfItsOwnRunAlone) {
+  Join("c.map");
+  ASSERT_EQ(SplitMaps(Path("c.map"), Path("part"), {}), 0);
+  const std::string of_a = ProofOf("part1.map", LandmarkId::Make(1, 3)),
+                    of_b = ProofOf("part2.map", LandmarkId::Make(2, 3));
+  EXPECT_TRUE(Has(of_a, "session 1, seed 41")) << of_a;
+  EXPECT_TRUE(Has(of_b, "session 2, seed 42")) << of_b;
+  const RebuiltMap part = LoadMap(Path("part2.map"));
+  EXPECT_EQ(part.runs.size(), 1u);
+  EXPECT_EQ(part.session.seed, 42u);
+  EXPECT_EQ(part.session.sequence, "way of seed 42");
+}
+
+TEST_F(MapCommandsTest, AJoinedMapIsOfNoRunAsAWhole) {
+  Join("c.map");
+  const RebuiltMap joined = LoadMap(Path("c.map"));
+  EXPECT_EQ(joined.session.session, 2u) << "who begins in it takes a later one";
+  EXPECT_EQ(joined.session.seed, 0u);
+  EXPECT_EQ(joined.session.configuration_hash, 0u);
+  EXPECT_EQ(joined.session.sequence, "way of seed 41 + way of seed 42");
+  EXPECT_EQ(joined.runs.size(), 2u);
+}
+
+}  // namespace
+}  // namespace dmslam
