@@ -50,6 +50,14 @@ check "nothing is said then" test ! -s "$work/said"
 map diff "$work/a.map" "$work/c.map" >"$work/said"
 check "1: they differ" test $? = 1
 check "all of A is in both" grep -qE "^keyframes +0 only in A +[1-9][0-9]* only in B +[1-9]" "$work/said"
+map diff "$work/b.map" "$work/c.map" >"$work/said"
+check "so is all of B" grep -qE "^keyframes +0 only in A +[1-9][0-9]* only in B +[1-9]" "$work/said"
+check "whose landmarks are where they were, by their new ordinals" \
+  holds "$(sed -nE 's/^ +landmarks .* median ([0-9.]+), .*/\1/p' "$work/said") <= 0.05"
+map diff "$work/a.map" "$work/b.map" >"$work/said"
+check "1: two runs differ" test $? = 1
+check "they have nothing in common, though both number from 1" grep -q "^A and B have nothing in common" "$work/said"
+check "and nothing that has moved" test "$(grep -c moved "$work/said")" = 0
 map diff "$work/a.map" "$camera" 2>/dev/null
 check "2: that is no map" test $? = 2
 

@@ -58,19 +58,13 @@ std::optional<FrameEvidence> EvidenceOf(const LogIndex& log, const RecordedSessi
   return std::nullopt;
 }
 
-/// A landmark's age counts from a keyframe of the session in which it was made, or from one of an earlier
-/// session, where it has taken in a landmark of that one: what was numbered by one mapper was made in the
-/// last of these sessions.
+/// Also of those whose landmarks are all gone.
 std::map<uint16_t, uint32_t> SessionsByOrdinal(const LandmarkHistories& histories) {
-  std::map<uint16_t, uint32_t> sessions;
+  std::map<uint16_t, uint32_t> sessions = SessionsByOrdinal(histories.map());
   for (const auto& [id, history] : histories.landmarks()) {
-    const Landmark* landmark = histories.map().FindLandmark(id);
-    const bool was_told = history.end && history.end->last;
-    if (landmark == nullptr && !was_told) continue;
-    const KeyframeId first =
-        landmark != nullptr ? landmark->first_keyframe : history.end->last->first_keyframe;
+    if (!history.end || !history.end->last) continue;
     uint32_t& session = sessions[id.epoch_ordinal()];
-    session = std::max(session, first.session());
+    session = std::max(session, history.end->last->first_keyframe.session());
   }
   return sessions;
 }

@@ -158,12 +158,49 @@ std::string MadeApart(const SessionStart& a, const SessionStart& b) {
   return text;
 }
 
+/// The sessions of both of which it is known that they are other runs, a line each.
+std::string RunsApart(const SessionRuns& a, const SessionRuns& b, std::set<uint32_t>* other_runs) {
+  std::string text;
+  const auto named = [](const SessionStart& run) {
+    return Format("seed %llu, configuration %s, sequence ", static_cast<unsigned long long>(run.seed),
+                  Hex(run.configuration_hash).c_str()) +
+           run.sequence;
+  };
+  for (const auto& [session, run] : a) {
+    const auto other = b.find(session);
+    if (other == b.end() || named(run) == named(other->second)) continue;
+    other_runs->insert(session);
+    text += Format("session %u is another run in each: ", session) + named(run) + " in A; " +
+            named(other->second) + " in B\n";
+  }
+  return text;
+}
+
+/// Of frames of one number, taken at other times; in a session of which nothing is said yet.
+std::string TimesApart(const WholeMap& a, const WholeMap& b, const std::vector<KeyframeId>& other_times,
+                       const std::set<uint32_t>& told) {
+  for (const KeyframeId id : other_times) {
+    if (told.contains(id.session())) continue;
+    return Format("session %u is another run in each: its frame %u was taken at %.6f in A, at %.6f in B\n",
+                  id.session(), id.frame_index(), Seconds(a.map().At(id).stamp_ns),
+                  Seconds(b.map().At(id).stamp_ns));
+  }
+  return "";
+}
+
 void Print(const MapDifference& difference) {
+  if (difference.NothingInCommon())
+    std::printf(
+        "A and B have nothing in common: no keyframe and no landmark of one is of a run of the other\n");
   std::printf("%s\n", CountsOf("maps", difference.maps).c_str());
   std::printf("%s, %zu of them with other links\n", CountsOf("keyframes", difference.keyframes).c_str(),
               difference.changed_keyframes);
-  std::printf("%s, %zu of them with another history\n", CountsOf("landmarks", difference.landmarks).c_str(),
+  std::printf("%s, %zu of them with another history", CountsOf("landmarks", difference.landmarks).c_str(),
               difference.changed_landmarks);
+  if (difference.renumbered_landmarks > 0)
+    std::printf(", %zu by another ordinal", difference.renumbered_landmarks);
+  std::printf("\n");
+  if (difference.NothingInCommon()) return;
   PrintKeyframes("<", difference.keyframes.only_a);
   PrintKeyframes(">", difference.keyframes.only_b);
   for (const CommonMap& common : difference.common) PrintCommon(common);
@@ -249,18 +286,15 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
 
 int DiffMaps(const std::string& path_a, const std::string& path_b, const std::optional<BusKey>& key) {
   const WholeMap a = OpenWhole(path_a, key), b = OpenWhole(path_b, key);
-  const MapDifference difference = Compare(a.map(), b.map());
+  std::set<uint32_t> other_runs;
+  const std::string runs_apart = RunsApart(a.rebuilt.runs, b.rebuilt.runs, &other_runs);
+  const MapDifference difference = Compare(a.map(), b.map(), other_runs);
   const std::string made_apart = MadeApart(a.rebuilt.session, b.rebuilt.session);
-  if (difference.Equal() && made_apart.empty()) return 0;
+  if (difference.Equal() && made_apart.empty() && runs_apart.empty()) return 0;
   std::printf("A: %sB: %s", Listing(a.path, a.map(), a.rebuilt.session).c_str(),
               Listing(b.path, b.map(), b.rebuilt.session).c_str());
-  std::fputs(made_apart.c_str(), stdout);
-  if (!difference.other_times.empty()) {
-    const KeyframeId first = difference.other_times.front();
-    std::printf("session %u is another run in each: its frame %u was taken at %.6f in A, at %.6f in B\n",
-                first.session(), first.frame_index(), Seconds(a.map().At(first).stamp_ns),
-                Seconds(b.map().At(first).stamp_ns));
-  }
+  const std::string times_apart = TimesApart(a, b, difference.other_times, other_runs);
+  std::fputs((made_apart + runs_apart + times_apart).c_str(), stdout);
   Print(difference);
   return 1;
 }

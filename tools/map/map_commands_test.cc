@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <utility>
 
 #include "dmslam/map/testing/map_scene.h"
 #include "landmark_text.h"
@@ -83,6 +84,36 @@ TEST_F(MapCommandsTest, AMapThatWasSplitOffIsOfItsOwnRunAlone) {
   EXPECT_EQ(part.runs.size(), 1u);
   EXPECT_EQ(part.session.seed, 42u);
   EXPECT_EQ(part.session.sequence, "way of seed 42");
+}
+
+/// What `diff` says of two files, and its exit code.
+std::pair<int, std::string> Diff(const std::string& a, const std::string& b) {
+  ::testing::internal::CaptureStdout();
+  const int code = DiffMaps(a, b, {});
+  return {code, ::testing::internal::GetCapturedStdout()};
+}
+
+TEST_F(MapCommandsTest, OtherRunsOfOneSessionHaveNothingInCommon) {
+  const auto [code, said] = Diff(Path("a.map"), Path("b.map"));
+  EXPECT_EQ(code, 1);
+  EXPECT_TRUE(Has(said,
+                  "session 1 is another run in each: seed 41, configuration 00000000000abc29, sequence "
+                  "way of seed 41 in A; seed 42, "))
+      << said;
+  EXPECT_TRUE(Has(said, "A and B have nothing in common")) << said;
+  EXPECT_TRUE(Has(said, "30 only in A        30 only in B         0 in both")) << said;
+  EXPECT_FALSE(Has(said, "moved")) << said;
+  EXPECT_EQ(Diff(Path("a.map"), Path("a.map")), std::make_pair(0, std::string()));
+}
+
+TEST_F(MapCommandsTest, AMapIsFoundAgainInTheJoinedOne) {
+  Join("c.map");
+  const auto [code, said] = Diff(Path("a.map"), Path("c.map"));
+  EXPECT_EQ(code, 1);
+  EXPECT_TRUE(Has(said, " 0 only in A        30 only in B        30 in both, 0 of them with another history"))
+      << said;
+  EXPECT_TRUE(Has(said, "map 1 of A is in map 1 of B")) << said;
+  EXPECT_FALSE(Has(said, "nothing in common")) << said;
 }
 
 TEST_F(MapCommandsTest, AJoinedMapIsOfNoRunAsAWhole) {

@@ -10,19 +10,100 @@
 namespace dmslam {
 namespace {
 
-template <typename Id, typename Ids>
-NamesApart<Id> Apart(const Ids& a, const Ids& b) {
-  NamesApart<Id> names;
-  std::ranges::set_difference(a, b, std::back_inserter(names.only_a));
-  std::ranges::set_difference(b, a, std::back_inserter(names.only_b));
-  names.both = a.size() - names.only_a.size();
+/// A landmark by what it is called in its own run, wherever that has come to.
+struct NameInRun {
+  uint32_t session = 0;
+  size_t mapper = 0;  ///< of those of the session that made landmarks, one after another
+  uint64_t number = 0;
+  auto operator<=>(const NameInRun&) const = default;
+};
+
+std::map<NameInRun, LandmarkId> LandmarksByName(const Map& map) {
+  struct Maker {
+    uint32_t session = 0;
+    size_t mapper = 0;
+  };
+  std::map<uint32_t, size_t> mappers;  // by session
+  std::map<uint16_t, Maker> makers;
+  for (const auto& [ordinal, session] : SessionsByOrdinal(map))
+    makers[ordinal] = {session, mappers[session]++};
+  std::map<NameInRun, LandmarkId> landmarks;
+  for (const LandmarkId id : map.LandmarkIdsSorted()) {
+    const Maker& maker = makers.at(id.epoch_ordinal());
+    landmarks[{maker.session, maker.mapper, id.number()}] = id;
+  }
+  return landmarks;
+}
+
+/// Keyframes that are called the same, and were taken at other times.
+std::vector<KeyframeId> TakenAtOtherTimes(const Map& a, const Map& b) {
+  std::vector<KeyframeId> others;
+  for (const auto& [id, keyframe] : a.keyframes()) {
+    const Keyframe* other = b.FindKeyframe(id);
+    if (other != nullptr && other->stamp_ns != keyframe.stamp_ns) others.push_back(id);
+  }
+  return others;
+}
+
+/// Which things of two maps are the same.
+class Matches {
+ public:
+  Matches(const Map& a, const Map& b, const std::set<uint32_t>& other_runs);
+
+  const Map& a() const { return a_; }
+  const Map& b() const { return b_; }
+  /// The same in `b`; null: it is not there.
+  const Keyframe* Of(const Keyframe& of_a) const {
+    return other_runs_.contains(of_a.id.session()) ? nullptr : b_.FindKeyframe(of_a.id);
+  }
+  const Landmark* Of(const Landmark& of_a) const {
+    const auto match = landmarks_.find(of_a.id);
+    return match == landmarks_.end() ? nullptr : &b_.At(match->second);
+  }
+  NamesApart<KeyframeId> Keyframes() const;
+  NamesApart<LandmarkId> Landmarks() const;
+
+ private:
+  const Map& a_;
+  const Map& b_;
+  const std::set<uint32_t>& other_runs_;
+  std::map<LandmarkId, LandmarkId> landmarks_;  ///< of `a` and `b`
+};
+
+Matches::Matches(const Map& a, const Map& b, const std::set<uint32_t>& other_runs)
+    : a_(a), b_(b), other_runs_(other_runs) {
+  const std::map<NameInRun, LandmarkId> in_b = LandmarksByName(b);
+  for (const auto& [name, id] : LandmarksByName(a)) {
+    const auto match = in_b.find(name);
+    if (match != in_b.end() && !other_runs.contains(name.session)) landmarks_[id] = match->second;
+  }
+}
+
+NamesApart<KeyframeId> Matches::Keyframes() const {
+  NamesApart<KeyframeId> names;
+  for (const auto& [id, keyframe] : a_.keyframes()) {
+    if (Of(keyframe) != nullptr) {
+      ++names.both;
+    } else {
+      names.only_a.push_back(id);
+    }
+  }
+  for (const auto& [id, keyframe] : b_.keyframes()) {
+    if (other_runs_.contains(id.session()) || a_.FindKeyframe(id) == nullptr) names.only_b.push_back(id);
+  }
   return names;
 }
 
-std::vector<KeyframeId> KeyframeIds(const Map& map) {
-  std::vector<KeyframeId> ids;
-  for (const auto& [id, keyframe] : map.keyframes()) ids.push_back(id);
-  return ids;
+NamesApart<LandmarkId> Matches::Landmarks() const {
+  NamesApart<LandmarkId> names;
+  std::set<LandmarkId> matched;
+  for (const auto& [of_a, of_b] : landmarks_) matched.insert(of_b);
+  names.both = matched.size();
+  for (const LandmarkId id : a_.LandmarkIdsSorted()) {
+    if (!landmarks_.contains(id)) names.only_a.push_back(id);
+  }
+  std::ranges::set_difference(b_.LandmarkIdsSorted(), matched, std::back_inserter(names.only_b));
+  return names;
 }
 
 double Middle(std::vector<double>& values) {
@@ -72,19 +153,20 @@ double DepthAt(const Map& map, const Landmark& landmark) {
   return reference == nullptr ? 0.0 : (landmark.p_world - reference->T_cam_world.Center()).norm();
 }
 
-CommonMap CompareMap(const Map& a, const Map& b, MapId in_a, MapId in_b) {
+CommonMap CompareMap(const Matches& matches, MapId in_a, MapId in_b) {
+  const Map &a = matches.a(), &b = matches.b();
   CommonMap common;
   common.a = in_a;
   common.b = in_b;
   Places cameras, points;
   for (const Keyframe* keyframe : a.KeyframesOf(in_a)) {
-    const Keyframe* other = b.FindKeyframe(keyframe->id);
+    const Keyframe* other = matches.Of(*keyframe);
     if (other == nullptr || other->map_id != in_b) continue;
     cameras.Add(keyframe->T_cam_world.Center(), other->T_cam_world.Center(),
                 a.MedianDepth(*keyframe).value_or(0.0), b.MedianDepth(*other).value_or(0.0));
   }
   for (const Landmark* landmark : a.LandmarksOf(in_a)) {
-    const Landmark* other = b.FindLandmark(landmark->id);
+    const Landmark* other = matches.Of(*landmark);
     if (other != nullptr && other->map_id == in_b)
       points.Add(landmark->p_world, other->p_world, DepthAt(a, *landmark), DepthAt(b, *other));
   }
@@ -99,10 +181,10 @@ CommonMap CompareMap(const Map& a, const Map& b, MapId in_a, MapId in_b) {
 }
 
 /// Which map of `b` has most keyframes of map `in_a`; none: no map has any.
-std::optional<MapId> Counterpart(const Map& a, const Map& b, MapId in_a) {
+std::optional<MapId> Counterpart(const Matches& matches, MapId in_a) {
   std::map<MapId, size_t> votes;
-  for (const Keyframe* keyframe : a.KeyframesOf(in_a)) {
-    if (const Keyframe* other = b.FindKeyframe(keyframe->id)) ++votes[other->map_id];
+  for (const Keyframe* keyframe : matches.a().KeyframesOf(in_a)) {
+    if (const Keyframe* other = matches.Of(*keyframe)) ++votes[other->map_id];
   }
   const auto best = std::ranges::max_element(votes, {}, [](const auto& vote) { return vote.second; });
   return best == votes.end() ? std::nullopt : std::optional(best->first);
@@ -127,27 +209,38 @@ bool MapDifference::Equal() const {
   const bool in_place = std::ranges::all_of(
       common, [](const CommonMap& map) { return map.cameras.moved == 0 && map.points.moved == 0; });
   return same(maps) && same(keyframes) && same(landmarks) && other_times.empty() && changed_keyframes == 0 &&
-         changed_landmarks == 0 && in_place;
+         changed_landmarks == 0 && renumbered_landmarks == 0 && in_place;
 }
 
-MapDifference Compare(const Map& a, const Map& b) {
+MapDifference Compare(const Map& a, const Map& b, const std::set<uint32_t>& other_runs) {
   MapDifference difference;
-  difference.maps = Apart<MapId>(MapsOf(a), MapsOf(b));
-  difference.keyframes = Apart<KeyframeId>(KeyframeIds(a), KeyframeIds(b));
-  difference.landmarks = Apart<LandmarkId>(a.LandmarkIdsSorted(), b.LandmarkIdsSorted());
+  difference.other_times = TakenAtOtherTimes(a, b);
+  std::set<uint32_t> others = other_runs;
+  for (const KeyframeId id : difference.other_times) others.insert(id.session());
+  const Matches matches(a, b, others);
+  difference.keyframes = matches.Keyframes();
+  difference.landmarks = matches.Landmarks();
+  std::set<MapId> maps_b = MapsOf(b);
   for (const auto& [id, keyframe] : a.keyframes()) {
-    const Keyframe* other = b.FindKeyframe(id);
+    const Keyframe* other = matches.Of(keyframe);
     if (other == nullptr) continue;
-    if (other->stamp_ns != keyframe.stamp_ns) difference.other_times.push_back(id);
+    maps_b.erase(other->map_id);
     if (!SameKeyframe(keyframe, *other)) ++difference.changed_keyframes;
   }
   for (const LandmarkId id : a.LandmarkIdsSorted()) {
-    const Landmark* other = b.FindLandmark(id);
-    if (other != nullptr && !SameLandmark(a.At(id), *other)) ++difference.changed_landmarks;
+    const Landmark* other = matches.Of(a.At(id));
+    if (other == nullptr) continue;
+    if (!SameLandmark(a.At(id), *other)) ++difference.changed_landmarks;
+    if (other->id != id) ++difference.renumbered_landmarks;
   }
+  difference.maps.only_b.assign(maps_b.begin(), maps_b.end());
   for (const MapId in_a : MapsOf(a)) {
-    if (const std::optional<MapId> in_b = Counterpart(a, b, in_a))
-      difference.common.push_back(CompareMap(a, b, in_a, *in_b));
+    if (const std::optional<MapId> in_b = Counterpart(matches, in_a)) {
+      ++difference.maps.both;
+      difference.common.push_back(CompareMap(matches, in_a, *in_b));
+    } else {
+      difference.maps.only_a.push_back(in_a);
+    }
   }
   return difference;
 }

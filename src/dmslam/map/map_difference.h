@@ -1,13 +1,15 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "dmslam/map/map.h"
 
 namespace dmslam {
 
-/// Names that one of two maps has, and how many both have.
+/// What one of two maps has, by the names it has there, and how many both have.
 template <typename Id>
 struct NamesApart {
   std::vector<Id> only_a, only_b;  ///< sorted
@@ -31,21 +33,27 @@ struct CommonMap {
   Displacement cameras, points;  ///< beyond that
 };
 
-/// What `b` has that `a` has not, and the reverse. Things are the same where they are called the same:
-/// keyframes by session and frame, landmarks by their ids. What is known of the dead, and how far the streams
-/// are, is not compared.
+/// What `b` has that `a` has not, and the reverse. Things are the same where they are of the same run and
+/// have the same number in it: keyframes by session and frame, landmarks by session, which of its mappers
+/// made them, and number; maps where they have keyframes in common. Numbers alone say nothing: each run
+/// counts anew. What is known of the dead, and how far the streams are, is not compared.
 struct MapDifference {
   NamesApart<MapId> maps;
   NamesApart<KeyframeId> keyframes;
   NamesApart<LandmarkId> landmarks;
-  std::vector<KeyframeId> other_times;  ///< in both, but not taken at the same time: other runs, one number
+  std::vector<KeyframeId> other_times;  ///< called the same, but not taken at the same time: of other runs
   size_t changed_keyframes = 0;         ///< in both, with another parent, other loops or in another map
   size_t changed_landmarks = 0;         ///< in both, seen by others, or with another history
+  size_t renumbered_landmarks = 0;      ///< in both, by other ordinals: one map was joined with another
   std::vector<CommonMap> common;
 
   bool Equal() const;
+  /// No keyframe and no landmark is in both.
+  bool NothingInCommon() const { return keyframes.both == 0 && landmarks.both == 0; }
 };
 
-MapDifference Compare(const Map& a, const Map& b);
+/// `other_runs`: sessions of which it is known that they are other runs in `a` than in `b`. So are those
+/// whose frames were taken at other times.
+MapDifference Compare(const Map& a, const Map& b, const std::set<uint32_t>& other_runs = {});
 
 }  // namespace dmslam

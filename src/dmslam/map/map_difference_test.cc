@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dmslam/map/renumbering.h"
 #include "dmslam/map/testing/map_scene.h"
 
 namespace dmslam {
@@ -80,7 +81,58 @@ TEST(MapDifferenceTest, OtherRunsOfOneNumberAreToldApart) {
   for (MapScene* scene : {&early, &late}) scene->AddCloud(60, {0, 0, 4}, {1, 1, 0.5});
   early.MapAll(3);
   late.MapAll(3, 0.05, 0, 5'000'000'000);
-  EXPECT_EQ(Compare(early.map(), late.map()).other_times.size(), 3u);
+  const MapDifference difference = Compare(early.map(), late.map());
+  EXPECT_EQ(difference.other_times.size(), 3u);
+  EXPECT_TRUE(difference.NothingInCommon()) << "whatever their numbers";
+  EXPECT_EQ(difference.keyframes.only_a.size(), 3u);
+  EXPECT_EQ(difference.landmarks.only_b.size(), 60u);
+}
+
+/// The same map, as if it were of another session.
+Replica AsSession(const Map& map, uint32_t session) {
+  Renumbering names;
+  names.sessions[MapScene::kSession] = session;
+  return Beside(Replica(map.camera(), map.pyramid()), map, names);
+}
+
+void ExpectNothingInCommon(const MapDifference& difference) {
+  EXPECT_TRUE(difference.NothingInCommon());
+  EXPECT_FALSE(difference.Equal());
+  EXPECT_EQ(difference.maps.only_a, std::vector{MapScene::kMap});
+  EXPECT_EQ(difference.maps.only_b, std::vector{MapScene::kMap});
+  EXPECT_EQ(difference.maps.both, 0u);
+  EXPECT_EQ(difference.keyframes.only_a.size(), 6u);
+  EXPECT_EQ(difference.keyframes.only_b.size(), 6u);
+  EXPECT_EQ(difference.landmarks.only_a.size(), 60u);
+  EXPECT_EQ(difference.landmarks.only_b.size(), 60u);
+  EXPECT_EQ(difference.changed_landmarks, 0u);
+  EXPECT_TRUE(difference.common.empty());
+}
+
+TEST(MapDifferenceTest, NumbersThatCoincideAreNothingInCommon) {
+  const MapEditor map = SceneMap();
+  ExpectNothingInCommon(Compare(map, AsSession(map, 2)));
+  ExpectNothingInCommon(Compare(map, map, {MapScene::kSession}));
+}
+
+TEST(MapDifferenceTest, LandmarksAreFoundAgainWhereTheirMapWasJoinedWithAnother) {
+  const MapEditor a = SceneMap();
+  const Replica b = AsSession(a, 2);
+  const Replica joined = Beside(a, b, NamesBeside(a, b, false));
+  const MapDifference of_a = Compare(a, joined), of_b = Compare(b, joined);
+  EXPECT_EQ(of_a.landmarks.both, 60u);
+  EXPECT_EQ(of_a.renumbered_landmarks, 0u);
+  EXPECT_EQ(of_a.changed_landmarks, 0u);
+  EXPECT_TRUE(of_b.landmarks.only_a.empty());
+  EXPECT_EQ(of_b.landmarks.both, 60u);
+  EXPECT_EQ(of_b.landmarks.only_b.front(), MapScene::IdOf(0)) << "one of a, in spite of its number";
+  EXPECT_EQ(of_b.renumbered_landmarks, 60u);
+  EXPECT_EQ(of_b.maps.both, 1u);
+  EXPECT_EQ(of_b.maps.only_b, std::vector{MapScene::kMap});
+  ASSERT_EQ(of_b.common.size(), 1u);
+  EXPECT_EQ(of_b.common[0].b, 2u);
+  EXPECT_EQ(of_b.common[0].landmarks, 60u);
+  EXPECT_EQ(of_b.common[0].points.moved, 0u);
 }
 
 }  // namespace

@@ -91,6 +91,15 @@ std::set<uint16_t> OrdinalsOf(const Map& map) {
   return ordinals;
 }
 
+std::map<uint16_t, uint32_t> SessionsByOrdinal(const Map& map) {
+  std::map<uint16_t, uint32_t> sessions;
+  for (const LandmarkId id : map.LandmarkIdsSorted()) {
+    uint32_t& session = sessions[id.epoch_ordinal()];
+    session = std::max(session, map.At(id).first_keyframe.session());
+  }
+  return sessions;
+}
+
 std::set<MapId> MapsOf(const Map& map) {
   std::set<MapId> maps;
   for (const auto& [id, keyframe] : map.keyframes()) maps.insert(keyframe.map_id);

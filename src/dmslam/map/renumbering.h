@@ -20,6 +20,9 @@ struct Renumbering {
 std::set<uint32_t> SessionsOf(const Map& map);
 /// The ordinals of the epochs whose landmarks a map knows, living or dead.
 std::set<uint16_t> OrdinalsOf(const Map& map);
+/// The session in which each epoch's living landmarks were made. Their ages count from a keyframe of it, or
+/// of an earlier session where they have taken in a landmark of that one: it is the last of these sessions.
+std::map<uint16_t, uint32_t> SessionsByOrdinal(const Map& map);
 /// The numbers of the maps that have keyframes.
 std::set<MapId> MapsOf(const Map& map);
 
