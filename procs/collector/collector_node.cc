@@ -155,8 +155,7 @@ void CollectorNode::OnMessage(const std::string& channel, std::span<const uint8_
     if (const auto pose = Read<GroundTruthPose>(bytes); pose && !IsForeignFrame(pose->session))
       OnGroundTruth(*pose);
   } else if (channel == channels::kPlayerStatus) {
-    if (const auto status = Read<PlayerStatus>(bytes))
-      OnHealth(OfCamera(roles::kPlayer, status->camera_id), status->head);
+    if (const auto status = Read<PlayerStatus>(bytes)) OnPlayerStatus(*status);
   } else if (channel == channels::kFrontendStatus) {
     if (auto status = Read<FrontendStatus>(bytes)) OnFrontendStatus(std::move(*status));
   } else if (channel == channels::kMapperStatus) {
@@ -208,6 +207,11 @@ void CollectorNode::CountOwn() {
   const int64_t lost_before = run_.health[roles::kCollector].records_lost;
   OnHealth(roles::kCollector, MakeStatusHead("", readers));
   if (run_.health[roles::kCollector].records_lost != lost_before) processes_.NoteCounters();
+}
+
+void CollectorNode::OnPlayerStatus(const PlayerStatus& status) {
+  if (OnHealth(OfCamera(roles::kPlayer, status.camera_id), status.head))
+    sequences_.OnPublished(status.camera_id, status.frames_published);
 }
 
 void CollectorNode::OnFrontendStatus(FrontendStatus status) {

@@ -73,6 +73,7 @@ class CollectorNode : public StreamNode {
   bool IsOfThisRun(const std::string& process, const StatusHead& head);
   bool OnHealth(const std::string& process, const StatusHead& head);
   size_t NumKeyframes() const;
+  void OnPlayerStatus(const PlayerStatus& status);
   void OnFrontendStatus(FrontendStatus status);
   void CountOwn();
   void RepeatWhatIsLeft();

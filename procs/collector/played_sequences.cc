@@ -54,6 +54,12 @@ void PlayedSequences::OnEnd(const EndOfSequence& end) {
   note_(note.str());
 }
 
+void PlayedSequences::OnPublished(CameraId camera, int64_t frames) {
+  if (camera >= num_cameras_) return;
+  int64_t& published = published_[camera];
+  published = std::max(published, frames);
+}
+
 std::optional<int64_t> PlayedSequences::NumFrames() const {
   int64_t total = 0;
   for (const auto& [camera, announced] : announced_) total += announced.num_frames;
@@ -61,7 +67,7 @@ std::optional<int64_t> PlayedSequences::NumFrames() const {
 }
 
 /// Where the player's last word was not heard. A frame that never came to the frontend has no pose that could
-/// be counted, but a number.
+/// be counted, but a number; and where the frontend is gone, the player still says how many it has played.
 int64_t PlayedSequences::PublishedAsFarAsKnown(CameraId camera, const FramePoses& poses, bool is_over) const {
   const auto announced = announced_.find(camera);
   if (is_over && announced != announced_.end()) return announced->second.num_frames;
@@ -71,8 +77,10 @@ int64_t PlayedSequences::PublishedAsFarAsKnown(CameraId camera, const FramePoses
     if (!first) first = frame.index;
     last = frame.index;
   }
+  const auto said = published_.find(camera);
   const int64_t span = first ? int64_t{*last} - *first + 1 : 0;
-  return announced == announced_.end() ? span : std::min(span, announced->second.num_frames);
+  const int64_t played = std::max(span, said == published_.end() ? 0 : said->second);
+  return announced == announced_.end() ? played : std::min(played, announced->second.num_frames);
 }
 
 void PlayedSequences::Fill(const FramePoses& poses, bool is_over, RunRecord* run) const {

@@ -32,6 +32,8 @@ class PlayedSequences {
   /// announces nothing.
   void Announce(CameraId camera, std::optional<int64_t> num_frames, uint32_t first_frame);
   void OnEnd(const EndOfSequence& end);
+  /// How many frames a player has published so far, as its status says.
+  void OnPublished(CameraId camera, int64_t frames);
 
   bool AnyEnded() const { return !ended_.empty(); }
   bool AllEnded() const { return ended_.size() >= num_cameras_; }
@@ -52,8 +54,9 @@ class PlayedSequences {
   CameraId num_cameras_;
   std::map<CameraId, Announced> announced_, announced_early_;  ///< early: before there was a journal
   std::map<CameraId, EndOfSequence> ended_;
-  std::set<CameraId> noted_;  ///< of those that have ended, in the journal
-  Note note_;                 ///< empty before there is a journal
+  std::map<CameraId, int64_t> published_;  ///< the most that a player has said so far
+  std::set<CameraId> noted_;               ///< of those that have ended, in the journal
+  Note note_;                              ///< empty before there is a journal
 };
 
 }  // namespace dmslam

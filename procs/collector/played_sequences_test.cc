@@ -82,6 +82,19 @@ TEST_F(PlayedSequencesTest, WhereItWasNotHeardFramesAreCountedByTheirNumbers) {
   EXPECT_FALSE(Fill(sequences_, poses, true).end_heard);
 }
 
+TEST_F(PlayedSequencesTest, FramesThatWerePlayedToAFrontendThatIsGoneCount) {
+  Begin(sequences_);
+  sequences_.Announce(0, 100, 0);
+  for (const int64_t published : {40, 60, 2}) sequences_.OnPublished(0, published);  // it was started again
+  sequences_.OnPublished(5, 10);
+  const auto poses = PosesOf(0, {3, 4, 9});
+  EXPECT_EQ(Fill(sequences_, poses, false).cameras[0].frames.published, 60);
+  EXPECT_EQ(Fill(sequences_, PosesOf(0, {0, 79}), false).cameras[0].frames.published, 80);
+  EXPECT_EQ(Fill(sequences_, poses, true).cameras[0].frames.published, 100);
+  sequences_.OnEnd(EndOf(0, 70));
+  EXPECT_EQ(Fill(sequences_, poses, false).cameras[0].frames.published, 70) << "its last word counts";
+}
+
 TEST_F(PlayedSequencesTest, HowManyFramesAreToComeIsKnownOfThoseThatAnnounceThem) {
   Begin(sequences_);
   sequences_.Announce(0, std::nullopt, 0);

@@ -19,7 +19,6 @@ constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
     &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
 constexpr int64_t kSilentNs = 1'500'000'000;  // who lives says so once a second
 constexpr size_t kMostNewcomers = 16;
-constexpr const char* kFrontend = roles::kFrontend;  // of the first camera: its counters are noted
 
 }  // namespace
 
@@ -88,7 +87,7 @@ void ProcessLedger::NoteProcess(const std::string& process, const ProcessHealth&
   if (++known.count > 1) {
     ++run_->restarts;
     known.former = run_->health[process];
-    if (process == kFrontend) known.former_frontend = run_->cameras[0].frontend;
+    if (const FrontendStatus* frontend = FrontendOf(process)) known.former_frontend = *frontend;
     note += CountersOf(process);
   }
   note_(note);
@@ -108,10 +107,17 @@ std::string ProcessLedger::CountersOf(const std::string& process) const {
   std::ostringstream text;
   const ProcessHealth& health = run_->health.at(process);
   for (int64_t ProcessHealth::*counter : kHealthCounters) text << ' ' << health.*counter;
-  if (process == kFrontend)
-    for (int64_t FrontendStatus::*counter : kFrontendCounters)
-      text << ' ' << run_->cameras[0].frontend.*counter;
+  if (const FrontendStatus* frontend = FrontendOf(process))
+    for (int64_t FrontendStatus::*counter : kFrontendCounters) text << ' ' << frontend->*counter;
   return text.str();
+}
+
+/// What is known of the frontend that is called so; null: it is none.
+FrontendStatus* ProcessLedger::FrontendOf(const std::string& process) const {
+  for (CameraId camera = 0; camera < run_->cameras.size(); ++camera) {
+    if (process == OfCamera(roles::kFrontend, camera)) return &run_->cameras[camera].frontend;
+  }
+  return nullptr;
 }
 
 /// This process is another one than the collector before it, whatever its id.
@@ -149,7 +155,7 @@ void ProcessLedger::ReadProcess(const std::string& process, int32_t pid, std::is
   known.instances.Know(pid, now_ns, {});
   if (++known.count > 1) ++run_->restarts;
   for (int64_t ProcessHealth::*counter : kHealthCounters) text >> known.former.*counter;
-  if (process != kFrontend) return;
+  if (FrontendOf(process) == nullptr) return;
   for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> known.former_frontend.*counter;
 }
 
@@ -157,8 +163,9 @@ void ProcessLedger::ReadCounters(const std::string& process, int32_t pid, std::i
   ProcessHealth& health = run_->health[process];
   health.pid = pid;
   for (int64_t ProcessHealth::*counter : kHealthCounters) text >> health.*counter;
-  if (process != kFrontend) return;
-  for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> run_->cameras[0].frontend.*counter;
+  FrontendStatus* frontend = FrontendOf(process);
+  if (frontend == nullptr) return;
+  for (int64_t FrontendStatus::*counter : kFrontendCounters) text >> frontend->*counter;
 }
 
 }  // namespace dmslam

@@ -58,6 +58,7 @@ class ProcessLedger {
   void ReadProcess(const std::string& process, int32_t pid, std::istream& text, int64_t now_ns);
   void ReadCounters(const std::string& process, int32_t pid, std::istream& text);
   std::string CountersOf(const std::string& process) const;
+  FrontendStatus* FrontendOf(const std::string& process) const;
 
   RunRecord* run_;
   Note note_;                                                             ///< empty before there is a journal

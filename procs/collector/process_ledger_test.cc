@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <sstream>
+#include <utility>
 #include <vector>
 
 namespace dmslam {
@@ -33,7 +34,7 @@ class ProcessLedgerTest : public testing::Test {
   /// What a ledger knows that reads these notes.
   static RunRecord Read(const std::vector<std::string>& notes) {
     RunRecord run;
-    run.cameras.resize(1);
+    run.cameras.resize(2);
     ProcessLedger next(&run);
     for (const std::string& text : notes) {
       std::istringstream note(text);
@@ -101,6 +102,20 @@ TEST_F(ProcessLedgerTest, ItsNotesTellTheNextOne) {
   const RunRecord run = Read(notes_);
   EXPECT_EQ(run.restarts, 1);
   EXPECT_EQ(run.cameras[0].frontend.frames_processed, 42);
+}
+
+TEST_F(ProcessLedgerTest, OfEachCameraTheFrontendsBeforeAreAdded) {
+  run_.cameras.resize(2);
+  for (const auto& [pid, skipped] : {std::pair(7, 40), std::pair(8, 2)}) {
+    FrontendStatus status = Frontend(pid, 0.5, 10);
+    status.camera_id = 1;
+    status.frames_skipped = skipped;
+    ledger_.HearFrontend("frontend1", status, 0, pid * kSecond);
+  }
+  EXPECT_EQ(run_.cameras[1].frontend.frames_skipped, 42);
+  EXPECT_EQ(run_.cameras[0].frontend.frames_skipped, 0);
+  ledger_.NoteCounters();
+  EXPECT_EQ(Read(notes_).cameras[1].frontend.frames_skipped, 42) << "and whoever comes next knows it";
 }
 
 /// In containers each process has the same id.

@@ -145,6 +145,7 @@ Errors Evaluate(std::vector<StampedPose> ground_truth, const TrajectoryBuilder::
 struct CameraResults {
   const CameraRecord* run = nullptr;
   TrajectoryBuilder::Trajectories trajectories;
+  int64_t processed = 0;  ///< frames of which a frontend said where the camera was, or that it did not know
   Errors errors;
 };
 
@@ -152,7 +153,10 @@ struct CameraResults {
 std::vector<CameraResults> ResultsOfCameras(const RunRecord& run, const TrajectoryBuilder& builder) {
   std::vector<CameraResults> cameras;
   for (const CameraRecord& camera : run.cameras)
-    cameras.push_back({&camera, builder.Build(static_cast<CameraId>(cameras.size())), {}});
+    cameras.push_back({&camera, builder.Build(static_cast<CameraId>(cameras.size())), 0, {}});
+  for (const auto& [frame, pose] : builder.frame_poses()) {
+    if (frame.camera < cameras.size()) ++cameras[frame.camera].processed;
+  }
   return cameras;
 }
 
@@ -189,7 +193,7 @@ Json NumberOrNull(const std::optional<AteReport>& report) {
 }
 
 PlotFigure FigureOf(const RunRecord& run, const CameraResults& results) {
-  const auto& [camera, trajectories, errors] = results;
+  const auto& [camera, trajectories, processed, errors] = results;
   const std::string title = camera->sequence + ", " + run.mode + ", seed " + std::to_string(run.seed);
   if (errors.final) {
     char subtitle[120];
@@ -314,13 +318,21 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
   return json;
 }
 
+/// Lost is what was played, and was neither worked on nor skipped: it was dropped on its way, or there was no
+/// frontend, or one that died with it.
 Json CameraJson(CameraId number, const CameraResults& results) {
-  const auto& [camera, t, errors] = results;
+  const auto& [camera, t, processed, errors] = results;
+  const int64_t played = camera->frames.published, skipped = camera->frontend.frames_skipped;
   Json json;
   json["camera"] = number;
   json["sequence"] = camera->sequence;
-  json["frames"] = camera->frames.published;
-  json["frames_skipped"] = camera->frontend.frames_skipped;
+  json["frames"] = played;
+  json["frames_missing"] = camera->frames.missing;
+  json["frames_processed"] = processed;
+  json["frames_skipped"] = skipped;
+  json["frames_lost"] = std::max<int64_t>(0, played - processed - skipped);
+  json["frames_tracked_online"] = t.online.size();
+  json["frames_tracked"] = t.final.size();
   json["tracked_online_percent"] = Percent(t.online.size(), camera->frames.published);
   json["tracked_percent"] = Percent(t.final.size(), camera->frames.published);
   json["keyframes"] = t.keyframes.size();
@@ -471,6 +483,13 @@ std::string Table(const Json& summary) {
   row("frames published / skipped / lost", number("frames", "%.0f") + " / " +
                                                number("frames_skipped", "%.0f") + " / " +
                                                number("frames_lost", "%.0f"));
+  if (summary.contains("cameras")) {
+    for (const Json& camera : summary["cameras"]) {
+      row(("... of camera " + std::to_string(camera["camera"].get<int>())).c_str(),
+          camera["frames"].dump() + " / " + camera["frames_skipped"].dump() + " / " +
+              camera["frames_lost"].dump());
+    }
+  }
   row("tracked online / in the end [%]",
       number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
   if (summary.contains("cameras")) {

@@ -73,6 +73,30 @@ TEST_F(ResultsTest, MapsApartAreThoseOfAllCameras) {
   EXPECT_EQ(summary["cameras"][1]["other_maps"], Json::parse(R"([{"map": 2, "frames": 2}])"));
 }
 
+TEST_F(ResultsTest, OfEachCameraIsCountedWhatWasPlayedTrackedAndLost) {
+  run_.cameras.resize(3);
+  run_.restarts = 1;
+  for (uint32_t frame = 0; frame < 100; ++frame) Tell(0, frame, 1);
+  for (uint32_t frame = 10; frame < 20; ++frame) Tell(1, frame, 0);
+  for (uint32_t frame = 20; frame < 50; ++frame) Tell(1, frame, 1);  // then its frontend died
+  for (CameraRecord& camera : run_.cameras) camera.frames.published = 100;
+  run_.cameras[1].frontend.frames_skipped = 10;
+  const Json cameras = Summary()["cameras"];
+  const auto of_camera = [&cameras](size_t camera, const char* key) {
+    return cameras[camera].at(key).get<int>();
+  };
+  EXPECT_EQ(of_camera(0, "frames_lost"), 0);
+  EXPECT_EQ(of_camera(0, "frames_tracked_online"), 100);
+  EXPECT_EQ(of_camera(1, "frames"), 100);
+  EXPECT_EQ(of_camera(1, "frames_processed"), 40);
+  EXPECT_EQ(of_camera(1, "frames_skipped"), 10);
+  EXPECT_EQ(of_camera(1, "frames_lost"), 50);
+  EXPECT_EQ(of_camera(1, "frames_tracked_online"), 30);
+  EXPECT_EQ(of_camera(1, "frames_tracked"), 30);
+  EXPECT_EQ(of_camera(2, "frames_lost"), 100) << "its frontend was never there";
+  EXPECT_EQ(of_camera(2, "frames_tracked"), 0);
+}
+
 TEST_F(ResultsTest, OfOneCameraTheMapsApartHaveNoNumberOfACamera) {
   for (uint32_t frame = 10; frame < 20; ++frame) Tell(0, frame, 1);
   Tell(0, 20, 2);

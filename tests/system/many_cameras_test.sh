@@ -10,7 +10,7 @@ check "the second camera's pictures are rendered" "$build/bin/dmslam-synth" --qu
 sequences=(--sequence "$synthetic" --also "$second" --camera "$root/config/synthetic.yaml" --seed 3)
 
 camera_field() { # FOLDER CAMERA KEY
-  sed -n "/\"camera\": $2,/,\$p" "$1/summary.json" | sed -nE "s/^ *\"$3\": *([^,]*),?$/\1/p" | head -n 1
+  sed -n '/"cameras": \[/,$p' "$1/summary.json" | sed -n "/\"camera\": $2,/,\$p" | sed -nE "s/^ *\"$3\": *([^,]*),?$/\1/p" | head -n 1
 }
 expect_camera() { # DESCRIPTION FOLDER CAMERA KEY RELATION
   local value
@@ -93,6 +93,13 @@ check "both cameras are in one map in the end, after that" one_map "$work/killed
 expect "and lie right to one another" "$work/killed" ate_rmse_joint "<= 0.02"
 expect "no keyframe is missing, after that" "$work/killed" keyframes_missing "== 0"
 expect_camera "the other one is undisturbed" "$work/killed" 0 tracked_percent ">= 90"
+for camera in 0 1; do
+  expect_camera "all frames were played" "$work/killed" "$camera" frames "== 150"
+  counted=0
+  for key in frames_processed frames_skipped frames_lost; do counted+=+$(camera_field "$work/killed" "$camera" "$key"); done
+  expect_camera "each frame is accounted for" "$work/killed" "$camera" frames "== $counted"
+done
+expect_camera "those that came while there was no frontend are lost, which is told of its camera" "$work/killed" 1 frames_lost ">= 3"
 expect_camera "it has found itself again" "$work/killed" 1 tracked_online_percent ">= 30"
 
 # What does not fit is refused by name.
