@@ -176,22 +176,29 @@ std::string RunsApart(const SessionRuns& a, const SessionRuns& b, std::set<uint3
   return text;
 }
 
-/// Of frames of one number, taken at other times; in a session of which nothing is said yet.
-std::string TimesApart(const WholeMap& a, const WholeMap& b, const std::vector<KeyframeId>& other_times,
-                       const std::set<uint32_t>& told) {
-  for (const KeyframeId id : other_times) {
-    if (told.contains(id.session())) continue;
-    return Format("session %u is another run in each: its frame %u was taken at %.6f in A, at %.6f in B\n",
-                  id.session(), id.frame_index(), Seconds(a.map().At(id).stamp_ns),
-                  Seconds(b.map().At(id).stamp_ns));
+/// Sessions that are other runs by what is in the maps, a line each.
+std::string SeenApart(const MapDifference& difference) {
+  std::string text;
+  for (const auto& [session, why] : difference.other_runs) {
+    if (why == OtherRun::kNoKeyframe)
+      text += Format("session %u: neither has a keyframe of the other one's; its numbers are not compared\n",
+                     session);
+    if (why == OtherRun::kOtherLandmarks)
+      text += Format("session %u is another run in each: other frames see the landmarks of one number\n",
+                     session);
+    if (why != OtherRun::kOtherTimes) continue;
+    const auto first = std::ranges::find(difference.other_times, session,
+                                         [](const OtherTime& time) { return time.id.session(); });
+    text += Format("session %u is another run in each: its frame %u was taken at %.6f in A, at %.6f in B\n",
+                   session, first->id.frame_index(), Seconds(first->in_a_ns), Seconds(first->in_b_ns));
   }
-  return "";
+  return text;
 }
 
 void Print(const MapDifference& difference) {
   if (difference.NothingInCommon())
     std::printf(
-        "A and B have nothing in common: no keyframe and no landmark of one is of a run of the other\n");
+        "A and B have nothing in common: none of the keyframes and landmarks of one is in the other\n");
   std::printf("%s\n", CountsOf("maps", difference.maps).c_str());
   std::printf("%s, %zu of them with other links\n", CountsOf("keyframes", difference.keyframes).c_str(),
               difference.changed_keyframes);
@@ -290,11 +297,10 @@ int DiffMaps(const std::string& path_a, const std::string& path_b, const std::op
   const std::string runs_apart = RunsApart(a.rebuilt.runs, b.rebuilt.runs, &other_runs);
   const MapDifference difference = Compare(a.map(), b.map(), other_runs);
   const std::string made_apart = MadeApart(a.rebuilt.session, b.rebuilt.session);
-  if (difference.Equal() && made_apart.empty() && runs_apart.empty()) return 0;
+  if (difference.Equal() && made_apart.empty()) return 0;
   std::printf("A: %sB: %s", Listing(a.path, a.map(), a.rebuilt.session).c_str(),
               Listing(b.path, b.map(), b.rebuilt.session).c_str());
-  const std::string times_apart = TimesApart(a, b, difference.other_times, other_runs);
-  std::fputs((made_apart + runs_apart + times_apart).c_str(), stdout);
+  std::fputs((made_apart + runs_apart + SeenApart(difference)).c_str(), stdout);
   Print(difference);
   return 1;
 }

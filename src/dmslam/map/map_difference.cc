@@ -35,20 +35,67 @@ std::map<NameInRun, LandmarkId> LandmarksByName(const Map& map) {
   return landmarks;
 }
 
-/// Keyframes that are called the same, and were taken at other times.
-std::vector<KeyframeId> TakenAtOtherTimes(const Map& a, const Map& b) {
-  std::vector<KeyframeId> others;
-  for (const auto& [id, keyframe] : a.keyframes()) {
-    const Keyframe* other = b.FindKeyframe(id);
-    if (other != nullptr && other->stamp_ns != keyframe.stamp_ns) others.push_back(id);
+/// When each keyframe that a map knows was taken, living or culled [ns].
+std::map<KeyframeId, int64_t> StampsOf(const Map& map) {
+  std::map<KeyframeId, int64_t> stamps;
+  for (const auto& [id, keyframe] : map.keyframes()) stamps[id] = keyframe.stamp_ns;
+  for (const auto& [id, tombstone] : map.keyframe_tombstones()) stamps[id] = tombstone.stamp_ns;
+  return stamps;
+}
+
+/// By the keyframes of the sessions that both maps know: one run takes each frame once.
+void JudgeByKeyframes(const Map& a, const Map& b, MapDifference* difference) {
+  const std::map<KeyframeId, int64_t> in_a = StampsOf(a), in_b = StampsOf(b);
+  std::set<uint32_t> of_a, of_b, shared;
+  for (const auto& [id, stamp_ns] : in_b) of_b.insert(id.session());
+  for (const auto& [id, stamp_ns] : in_a) {
+    of_a.insert(id.session());
+    const auto other = in_b.find(id);
+    if (other == in_b.end()) continue;
+    shared.insert(id.session());
+    if (other->second == stamp_ns) continue;
+    difference->other_runs.emplace(id.session(), OtherRun::kOtherTimes);
+    difference->other_times.push_back({id, stamp_ns, other->second});
   }
-  return others;
+  for (const uint32_t session : of_a) {
+    if (of_b.contains(session) && !shared.contains(session))
+      difference->other_runs.emplace(session, OtherRun::kNoKeyframe);
+  }
+}
+
+/// Whether they may be one landmark at two times: it is seen as it was seen, or was made when it was made.
+bool MayBeOne(const Landmark& a, const Landmark& b) {
+  if (a.first_ns == b.first_ns) return true;
+  std::vector<Observation> common;
+  std::ranges::set_intersection(a.observations, b.observations, std::back_inserter(common));
+  return !common.empty();
+}
+
+/// By their landmarks: in one run most of them are what they were. `in_a`, `in_b`: all.
+void JudgeByLandmarks(const Map& a, const Map& b, const std::map<NameInRun, LandmarkId>& in_a,
+                      const std::map<NameInRun, LandmarkId>& in_b, MapDifference* difference) {
+  struct Votes {
+    size_t all = 0, may_be_one = 0;
+  };
+  std::map<uint32_t, Votes> votes;
+  for (const auto& [name, id] : in_a) {
+    const auto other = in_b.find(name);
+    if (other == in_b.end()) continue;
+    ++votes[name.session].all;
+    votes[name.session].may_be_one += MayBeOne(a.At(id), b.At(other->second)) ? 1 : 0;
+  }
+  for (const auto& [session, counted] : votes) {
+    if (2 * counted.may_be_one < counted.all)
+      difference->other_runs.emplace(session, OtherRun::kOtherLandmarks);
+  }
 }
 
 /// Which things of two maps are the same.
 class Matches {
  public:
-  Matches(const Map& a, const Map& b, const std::set<uint32_t>& other_runs);
+  /// `other_runs`: of which nothing is.
+  Matches(const Map& a, const Map& b, const std::map<NameInRun, LandmarkId>& landmarks_a,
+          const std::map<NameInRun, LandmarkId>& landmarks_b, const OtherRuns& other_runs);
 
   const Map& a() const { return a_; }
   const Map& b() const { return b_; }
@@ -66,16 +113,16 @@ class Matches {
  private:
   const Map& a_;
   const Map& b_;
-  const std::set<uint32_t>& other_runs_;
+  const OtherRuns& other_runs_;
   std::map<LandmarkId, LandmarkId> landmarks_;  ///< of `a` and `b`
 };
 
-Matches::Matches(const Map& a, const Map& b, const std::set<uint32_t>& other_runs)
+Matches::Matches(const Map& a, const Map& b, const std::map<NameInRun, LandmarkId>& landmarks_a,
+                 const std::map<NameInRun, LandmarkId>& landmarks_b, const OtherRuns& other_runs)
     : a_(a), b_(b), other_runs_(other_runs) {
-  const std::map<NameInRun, LandmarkId> in_b = LandmarksByName(b);
-  for (const auto& [name, id] : LandmarksByName(a)) {
-    const auto match = in_b.find(name);
-    if (match != in_b.end() && !other_runs.contains(name.session)) landmarks_[id] = match->second;
+  for (const auto& [name, id] : landmarks_a) {
+    const auto match = landmarks_b.find(name);
+    if (match != landmarks_b.end() && !other_runs.contains(name.session)) landmarks_[id] = match->second;
   }
 }
 
@@ -202,46 +249,53 @@ bool SameLandmark(const Landmark& a, const Landmark& b) {
          a.observations == b.observations;
 }
 
+/// What is in both, and how it has changed there.
+void CompareMatches(const Matches& matches, MapDifference* difference) {
+  const Map& a = matches.a();
+  std::set<MapId> maps_b = MapsOf(matches.b());
+  for (const auto& [id, keyframe] : a.keyframes()) {
+    const Keyframe* other = matches.Of(keyframe);
+    if (other == nullptr) continue;
+    maps_b.erase(other->map_id);
+    if (!SameKeyframe(keyframe, *other)) ++difference->changed_keyframes;
+  }
+  for (const LandmarkId id : a.LandmarkIdsSorted()) {
+    const Landmark* other = matches.Of(a.At(id));
+    if (other == nullptr) continue;
+    if (!SameLandmark(a.At(id), *other)) ++difference->changed_landmarks;
+    if (other->id != id) ++difference->renumbered_landmarks;
+  }
+  difference->maps.only_b.assign(maps_b.begin(), maps_b.end());
+  for (const MapId in_a : MapsOf(a)) {
+    if (const std::optional<MapId> in_b = Counterpart(matches, in_a)) {
+      ++difference->maps.both;
+      difference->common.push_back(CompareMap(matches, in_a, *in_b));
+    } else {
+      difference->maps.only_a.push_back(in_a);
+    }
+  }
+}
+
 }  // namespace
 
 bool MapDifference::Equal() const {
   const auto same = [](const auto& names) { return names.only_a.empty() && names.only_b.empty(); };
   const bool in_place = std::ranges::all_of(
       common, [](const CommonMap& map) { return map.cameras.moved == 0 && map.points.moved == 0; });
-  return same(maps) && same(keyframes) && same(landmarks) && other_times.empty() && changed_keyframes == 0 &&
+  return same(maps) && same(keyframes) && same(landmarks) && other_runs.empty() && changed_keyframes == 0 &&
          changed_landmarks == 0 && renumbered_landmarks == 0 && in_place;
 }
 
 MapDifference Compare(const Map& a, const Map& b, const std::set<uint32_t>& other_runs) {
   MapDifference difference;
-  difference.other_times = TakenAtOtherTimes(a, b);
-  std::set<uint32_t> others = other_runs;
-  for (const KeyframeId id : difference.other_times) others.insert(id.session());
-  const Matches matches(a, b, others);
+  for (const uint32_t session : other_runs) difference.other_runs.emplace(session, OtherRun::kTold);
+  JudgeByKeyframes(a, b, &difference);
+  const std::map<NameInRun, LandmarkId> in_a = LandmarksByName(a), in_b = LandmarksByName(b);
+  JudgeByLandmarks(a, b, in_a, in_b, &difference);
+  const Matches matches(a, b, in_a, in_b, difference.other_runs);
   difference.keyframes = matches.Keyframes();
   difference.landmarks = matches.Landmarks();
-  std::set<MapId> maps_b = MapsOf(b);
-  for (const auto& [id, keyframe] : a.keyframes()) {
-    const Keyframe* other = matches.Of(keyframe);
-    if (other == nullptr) continue;
-    maps_b.erase(other->map_id);
-    if (!SameKeyframe(keyframe, *other)) ++difference.changed_keyframes;
-  }
-  for (const LandmarkId id : a.LandmarkIdsSorted()) {
-    const Landmark* other = matches.Of(a.At(id));
-    if (other == nullptr) continue;
-    if (!SameLandmark(a.At(id), *other)) ++difference.changed_landmarks;
-    if (other->id != id) ++difference.renumbered_landmarks;
-  }
-  difference.maps.only_b.assign(maps_b.begin(), maps_b.end());
-  for (const MapId in_a : MapsOf(a)) {
-    if (const std::optional<MapId> in_b = Counterpart(matches, in_a)) {
-      ++difference.maps.both;
-      difference.common.push_back(CompareMap(matches, in_a, *in_b));
-    } else {
-      difference.maps.only_a.push_back(in_a);
-    }
-  }
+  CompareMatches(matches, &difference);
   return difference;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 #include <vector>
@@ -33,6 +34,21 @@ struct CommonMap {
   Displacement cameras, points;  ///< beyond that
 };
 
+/// Why a session that two maps name is not the same run in both, as far as can be seen.
+enum class OtherRun : uint8_t {
+  kTold,            ///< it was known before
+  kOtherTimes,      ///< a frame of one number was taken at other times
+  kNoKeyframe,      ///< neither knows a keyframe of the other one's, living or culled
+  kOtherLandmarks,  ///< most landmarks of one number were made, and are seen, by other frames
+};
+using OtherRuns = std::map<uint32_t, OtherRun>;  ///< by session
+
+/// A keyframe that is called the same in two maps, and was taken at two times [ns].
+struct OtherTime {
+  KeyframeId id;
+  int64_t in_a_ns = 0, in_b_ns = 0;
+};
+
 /// What `b` has that `a` has not, and the reverse. Things are the same where they are of the same run and
 /// have the same number in it: keyframes by session and frame, landmarks by session, which of its mappers
 /// made them, and number; maps where they have keyframes in common. Numbers alone say nothing: each run
@@ -41,10 +57,11 @@ struct MapDifference {
   NamesApart<MapId> maps;
   NamesApart<KeyframeId> keyframes;
   NamesApart<LandmarkId> landmarks;
-  std::vector<KeyframeId> other_times;  ///< called the same, but not taken at the same time: of other runs
-  size_t changed_keyframes = 0;         ///< in both, with another parent, other loops or in another map
-  size_t changed_landmarks = 0;         ///< in both, seen by others, or with another history
-  size_t renumbered_landmarks = 0;      ///< in both, by other ordinals: one map was joined with another
+  OtherRuns other_runs;  ///< of which nothing is compared
+  std::vector<OtherTime> other_times;
+  size_t changed_keyframes = 0;     ///< in both, with another parent, other loops or in another map
+  size_t changed_landmarks = 0;     ///< in both, seen by others, or with another history
+  size_t renumbered_landmarks = 0;  ///< in both, by other ordinals: one map was joined with another
   std::vector<CommonMap> common;
 
   bool Equal() const;
@@ -52,8 +69,7 @@ struct MapDifference {
   bool NothingInCommon() const { return keyframes.both == 0 && landmarks.both == 0; }
 };
 
-/// `other_runs`: sessions of which it is known that they are other runs in `a` than in `b`. So are those
-/// whose frames were taken at other times.
+/// `other_runs`: sessions of which it is known that they are other runs in `a` than in `b`.
 MapDifference Compare(const Map& a, const Map& b, const std::set<uint32_t>& other_runs = {});
 
 }  // namespace dmslam

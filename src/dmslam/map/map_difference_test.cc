@@ -115,6 +115,42 @@ TEST(MapDifferenceTest, NumbersThatCoincideAreNothingInCommon) {
   ExpectNothingInCommon(Compare(map, map, {MapScene::kSession}));
 }
 
+TEST(MapDifferenceTest, ASessionIsAnotherRunWhereItHasNoKeyframeOfTheOther) {
+  MapScene first, second;
+  for (MapScene* scene : {&first, &second}) scene->AddCloud(60, {0, 0, 4}, {1, 1, 0.5});
+  first.MapAll(6);
+  second.MapAll(6, 0.05, 50, 50 * MapScene::kStepNs);  // a later part of one sequence
+  const MapDifference difference = Compare(first.map(), second.map());
+  ExpectNothingInCommon(difference);
+  EXPECT_EQ(difference.other_runs.at(MapScene::kSession), OtherRun::kNoKeyframe);
+}
+
+TEST(MapDifferenceTest, ASessionIsAnotherRunWhereItsLandmarksAreOthers) {
+  const auto mapped = [](uint32_t second_of_landmarks, uint32_t by_keyframe) {
+    MapScene scene;
+    scene.AddCloud(60, {0, 0, 4}, {1, 1, 0.5}, second_of_landmarks * 1'000'000'000LL);
+    scene.MapAll(6);
+    for (uint32_t frame = 0; frame < 6; ++frame) {
+      const Keyframe& keyframe = scene.map().At(KeyframeId::Make(MapScene::kSession, frame));
+      for (uint16_t i = 0; frame != by_keyframe && i < 60; ++i) scene.map().ClearObservation(keyframe, i);
+    }
+    return scene.map();
+  };
+  const MapDifference difference = Compare(mapped(1, 2), mapped(2, 3));
+  ExpectNothingInCommon(difference);
+  EXPECT_EQ(difference.other_runs.at(MapScene::kSession), OtherRun::kOtherLandmarks);
+  EXPECT_EQ(Compare(mapped(1, 2), mapped(1, 3)).landmarks.both, 60u) << "made at one time";
+  EXPECT_EQ(Compare(mapped(1, 2), mapped(2, 2)).landmarks.both, 60u) << "seen by one keyframe";
+}
+
+TEST(MapDifferenceTest, ACulledKeyframeShowsThatTheRunIsTheSame) {
+  MapEditor early = SceneMap(), late = SceneMap();
+  for (uint32_t frame = 1; frame < 6; ++frame)
+    late.RemoveKeyframe(late.At(KeyframeId::Make(MapScene::kSession, frame)));
+  EXPECT_TRUE(Compare(early, late).other_runs.empty());
+  EXPECT_TRUE(Compare(late, early).other_runs.empty());
+}
+
 TEST(MapDifferenceTest, LandmarksAreFoundAgainWhereTheirMapWasJoinedWithAnother) {
   const MapEditor a = SceneMap();
   const Replica b = AsSession(a, 2);
