@@ -348,6 +348,15 @@ TEST_F(Recording, ASavedMapTellsTheRunsOfWhichItIsMade) {
   SaveMap(path_ + ".map2", both.map, both.session, both.runs);
   EXPECT_EQ(ReadFileBytes(path_ + ".map"), ReadFileBytes(path_ + ".map2"));
 
+  std::vector<uint8_t> bytes = ReadFileBytes(path_ + ".map2");
+  const std::string channel = kLogRunChannel;
+  const auto told = std::search(bytes.begin(), bytes.end(), channel.begin(), channel.end());
+  ASSERT_NE(told, bytes.end());
+  told[200] ^= 1U;
+  std::ofstream(path_ + ".map2", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  EXPECT_THROW(LoadMap(path_ + ".map2"), InputError) << "damaged";
+
   SaveMap(path_ + ".map", mapper.map(), later, {});
   EXPECT_TRUE(LoadMap(path_ + ".map").runs.empty()) << "nobody says that it is of session 9";
 }
