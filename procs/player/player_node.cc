@@ -1,9 +1,7 @@
 #include "player/player_node.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <sstream>
 #include <utility>
 
 #include "dmslam/console/log.h"
@@ -29,7 +27,7 @@ std::vector<size_t> OrderOfPlay(const PlayerOptions& options, size_t available, 
   std::vector<size_t> order;
   for (size_t i = options.start; i < available && order.size() < options.frames; ++i) {
     order.push_back(i);
-    for (const PlayerOptions::Jump& jump : options.jumps) {
+    for (const Jump& jump : options.jumps) {
       if (jump.from == i && jump.to > i) {
         *jumped += jump.to - i - 1;
         i = jump.to - 1;
@@ -50,37 +48,6 @@ double SpeedOf(const PlayerOptions& options) {
 }
 
 }  // namespace
-
-namespace {
-
-/// Two numbers with a comma between them and nothing else.
-std::optional<std::pair<double, double>> ParsePair(const std::string& text) {
-  std::istringstream stream(text);
-  double first = 0, second = 0;
-  char comma = 0;
-  const bool whole = stream >> first >> comma >> second && comma == ',' && (stream >> std::ws).eof();
-  if (!whole || first < 0 || first != std::floor(first)) return std::nullopt;
-  return std::pair(first, second);
-}
-
-}  // namespace
-
-PlayerOptions::BlackOut ParseBlackOut(const std::string& text) {
-  const auto pair = ParsePair(text);
-  if (!pair || pair->second <= 0) {
-    throw InputError("--black-out " + text +
-                     ": write FROM,SECONDS: a frame and a time above zero, as 300,1.5");
-  }
-  return {static_cast<size_t>(pair->first), pair->second};
-}
-
-PlayerOptions::Jump ParseJump(const std::string& text) {
-  const auto pair = ParsePair(text);
-  if (!pair || pair->second <= pair->first || pair->second != std::floor(pair->second)) {
-    throw InputError("--jump " + text + ": write FROM,TO: two frames, the second one later, as 300,360");
-  }
-  return {static_cast<size_t>(pair->first), static_cast<size_t>(pair->second)};
-}
 
 PlayerNode::PlayerNode(NodeContext context, PlayerOptions options, std::unique_ptr<FrameSource> source)
     : context_(std::move(context)),
@@ -188,12 +155,11 @@ bool PlayerNode::OthersAreReady(int64_t now_ns) {
 
 bool PlayerNode::IsBlack(size_t index) const {
   const double seconds = static_cast<double>(source_->StampNs(index)) * 1e-9;
-  return std::any_of(options_.black_outs.begin(), options_.black_outs.end(),
-                     [&](const PlayerOptions::BlackOut& b) {
-                       const size_t from = std::min(b.from, source_->size() - 1);
-                       const double begin = static_cast<double>(source_->StampNs(from)) * 1e-9;
-                       return index >= from && seconds < begin + b.seconds;
-                     });
+  return std::any_of(options_.black_outs.begin(), options_.black_outs.end(), [&](const BlackOut& b) {
+    const size_t from = std::min(b.from, source_->size() - 1);
+    const double begin = static_cast<double>(source_->StampNs(from)) * 1e-9;
+    return index >= from && seconds < begin + b.seconds;
+  });
 }
 
 bool PlayerNode::MakeFrame(size_t index) {

@@ -8,6 +8,7 @@
 
 #include "dmslam/camera/camera.h"
 #include "dmslam/dataset/frame_source.h"
+#include "dmslam/dataset/play_changes.h"
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/messaging/bus.h"
 #include "dmslam/runtime/node.h"
@@ -41,21 +42,9 @@ struct PlayerOptions {
   /// frame is repeated until it is done.
   std::vector<std::string> awaited;
   double lead_s = 0.5;  ///< between the first camera info and the first frame, so that others can get ready
-  struct BlackOut {
-    size_t from = 0;
-    double seconds = 0;
-  };
   std::vector<BlackOut> black_outs;
-  struct Jump {
-    size_t from = 0;
-    size_t to = 0;
-  };
   std::vector<Jump> jumps;
 };
-
-/// What --black-out ("FROM,SECONDS") and --jump ("FROM,TO") say. Throw InputError that names what is wrong.
-PlayerOptions::BlackOut ParseBlackOut(const std::string& text);
-PlayerOptions::Jump ParseJump(const std::string& text);
 
 /// Feeds frames to the bus, in real time or in lock-step.
 class PlayerNode : public Node {

@@ -19,6 +19,7 @@
 #include "run/resume.h"
 #include "run/run_plan.h"
 #include "run/session_taken.h"
+#include "run/source_check.h"
 
 namespace {
 
@@ -219,18 +220,26 @@ class Run {
   int64_t farewell_ns_ = INT64_MAX;  ///< until when the others may end, once there are results
 };
 
-dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
-  dmslam::RunPlace place;
-  place.programs = a.build_folder.empty() ? OwnFolder() : a.build_folder + "/bin";
-  place.out = a.output.folder;
-  place.terminal = isatty(STDERR_FILENO) != 0;
-  if (access((place.programs + "/dmslam-frontend").c_str(), X_OK) != 0)
-    throw dmslam::InputError(place.programs + " has no dmslam-frontend; build first, or check --build-dir");
-  if (a.output.WantsViewer() && access((place.programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
-    throw dmslam::InputError(place.programs +
+std::string ProgramsOf(const dmslam::RunArguments& a) {
+  return a.build_folder.empty() ? OwnFolder() : a.build_folder + "/bin";
+}
+
+void CheckPrograms(const dmslam::RunArguments& a) {
+  const std::string programs = ProgramsOf(a);
+  if (access((programs + "/dmslam-frontend").c_str(), X_OK) != 0)
+    throw dmslam::InputError(programs + " has no dmslam-frontend; build first, or check --build-dir");
+  if (a.output.WantsViewer() && access((programs + "/dmslam-viewer").c_str(), X_OK) != 0) {
+    throw dmslam::InputError(programs +
                              " has no dmslam-viewer; install what it needs with scripts/setup.sh viewer and "
                              "build again");
   }
+}
+
+dmslam::RunPlace PlaceOf(const dmslam::RunArguments& a) {
+  dmslam::RunPlace place;
+  place.programs = ProgramsOf(a);
+  place.out = a.output.folder;
+  place.terminal = isatty(STDERR_FILENO) != 0;
   std::error_code error;
   fs::create_directories(a.output.folder + "/log", error);
   if (error)
@@ -276,9 +285,16 @@ int Start(dmslam::RunArguments arguments, dmslam::RunIdentity identity,
   return run.Play();
 }
 
-int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
+/// What is in the folder stays as it is, where something is refused.
+void CheckAll(const dmslam::RunArguments& arguments) {
   dmslam::CheckRunArguments(arguments);
-  // What is in the folder stays as it is, where the map does not fit.
+  dmslam::CheckTools(arguments);
+  CheckPrograms(arguments);
+  dmslam::CheckSources(arguments);
+}
+
+int Begin(const dmslam::RunArguments& arguments, int argc, char** argv) {
+  CheckAll(arguments);
   if (const std::optional<std::string> notice = dmslam::CheckMap(arguments)) Say(*notice);
   std::error_code error;
   fs::create_directories(arguments.output.folder, error);
@@ -310,7 +326,7 @@ int Resume(const std::string& folder) {
     throw dmslam::InputError(out +
                              "/run.json: its arguments are not those of this dmslam-run; begin it anew");
   arguments.output.folder = out;
-  dmslam::CheckRunArguments(arguments);
+  CheckAll(arguments);
   ++identity.resumed;
   return Start(arguments, identity, point);
 }

@@ -103,9 +103,11 @@ void DeclareSource(CommandLine& line, RunArguments::Source& source) {
 void DeclareCamera(CommandLine& line, RunArguments::Camera& camera) {
   line.AddOption("--fps", camera.fps,
                  "rate of numbered images, of videos that state none, and asked of a camera; default: as the "
-                 "camera file says");
+                 "camera file says")
+      .InRange(0.01, 1000.0);
   line.AddOption("--encoding", camera.encoding,
-                 "how frames of videos and cameras travel: jpeg (default), png or raw, both without loss");
+                 "how frames of videos and cameras travel: jpeg (default), png or raw, both without loss")
+      .OneOf({"jpeg", "png", "raw"});
   line.AddOption("--camera", camera.file, "camera file (YAML); found by itself for TUM freiburg1/2/3");
 }
 
@@ -191,6 +193,8 @@ void CheckRunArguments(const RunArguments& a) {
   CheckSource(a.source, a.pace);
   CheckOtherCameras(a);
   if (a.output.folder.empty()) throw InputError("--out is missing (see --help)");
+  if (!a.source.start.empty()) CheckNumber("--start", a.source.start);
+  if (!a.source.frames.empty()) CheckNumber("--frames", a.source.frames);
   CheckNumber("--seed", a.settings.seed);
   CheckNumber("--pictures", a.output.pictures);
   CheckNumber("--receive-buffer", a.bus.receive_buffer);

@@ -168,7 +168,6 @@ ChildSpec MakePlayer(const RunArguments& a, const RunPlace& place, Words words) 
 
 /// A child that runs a program of somebody else's.
 ChildSpec MakeForeign(const std::string& name, const RunArguments& a, const RunPlace& place, Words command) {
-  NeedTool(command[0]);
   ChildSpec child = MakeChild(name, a, place, {});
   child.arguments = std::move(command);
   child.first.clear();
@@ -201,14 +200,14 @@ void PlanReplay(const RunArguments& a, const RunPlace& place, RunPlan* plan) {
   plan->replay_end->output = plan->replay_end->errors = place.LogOf(roles::kPlayer);
 }
 
-Words GroundTruth(const RunArguments::Source& source) {
+Words GroundTruthArguments(const RunArguments::Source& source) {
   const std::string file = source.sequence + "/groundtruth.txt";
   return !source.sequence.empty() && fs::is_regular_file(file) ? Words{"--ground-truth", file} : Words{};
 }
 
 /// Of every camera: a dash stands for none.
-Words GroundTruths(const RunArguments::Source& source) {
-  if (source.others.empty()) return GroundTruth(source);
+Words GroundTruthArgumentsOfAll(const RunArguments::Source& source) {
+  if (source.others.empty()) return GroundTruthArguments(source);
   Words words;
   std::vector<std::string> sequences = source.others;
   sequences.insert(sequences.begin(), source.sequence);
@@ -223,7 +222,7 @@ ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Word
   Words words = common;
   if (place.terminal) words.push_back("--quiet");
   Append(&words, {"--out", a.output.folder});
-  Append(&words, GroundTruths(a.source));
+  Append(&words, GroundTruthArgumentsOfAll(a.source));
   ChildSpec child = MakeChild(roles::kCollector, a, place, words);
   child.output = place.out + "/log/table.txt";
   child.errors_to_ours = place.terminal;
@@ -260,7 +259,7 @@ ChildSpec MakeLogger(const RunArguments& a, const RunPlace& place) {
 ChildSpec MakeViewer(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = common;
   AppendOption(&words, "--http", a.output.http);
-  Append(&words, GroundTruth(a.source));
+  Append(&words, GroundTruthArguments(a.source));
   return MakeCompanion(MakeChild(roles::kViewer, a, place, words));
 }
 
@@ -302,6 +301,11 @@ int FreePort() {
     if (!PortTaken(port)) break;
   }
   return port;
+}
+
+void CheckTools(const RunArguments& a) {
+  if (!a.source.replay.empty()) NeedTool("lcm-logplayer");
+  if (a.output.record) NeedTool("lcm-logger");
 }
 
 RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {

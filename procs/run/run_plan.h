@@ -30,6 +30,9 @@ struct RunPlace {
   std::string LogOf(const std::string& name) const { return out + "/log/" + name + ".log"; }
 };
 
+/// Throws InputError where a program of somebody else's that the run needs is not there.
+void CheckTools(const RunArguments& arguments);
+
 /// Reads what it must: the map's session, the log that is replayed. Throws InputError.
 RunPlan MakeRunPlan(const RunArguments& arguments, const RunPlace& place);
 

@@ -45,6 +45,36 @@ refused "no.such.key" run --sequence "$synthetic" --camera "$camera" --out "$wor
 refused "none.yaml" run --sequence "$synthetic" --camera "$camera" --out "$work/o" --config "$work/none.yaml"
 refused "between 1024 and 65535" run --sequence "$synthetic" --camera "$camera" --out "$work/o" --port 80
 
+# What an earlier run has left in the folder stays as it is, whatever is refused.
+mkdir -p "$work/done/log" "$work/second/rgb"
+for file in run.json summary.json trajectory.txt run.lcmlog log/player.log log/player1.log log/mapper.log log/table.txt; do
+  echo "of the earlier run" >"$work/done/$file"
+done
+cp -r "$work/done" "$work/before"
+sed -E 's/^( *f[xy][^:]*: *).*/\11200.0/' "$camera" >"$work/narrow.yaml"
+sed -E 's/^( *fx[^:]*: *).*/\1400.0/' "$camera" >"$work/other.yaml"
+cp "$synthetic/rgb.txt" "$work/second"
+cp "$synthetic"/rgb/* "$work/second/rgb"
+cp "$work/other.yaml" "$work/second/camera.yaml"
+again() { # PATTERN ARGUMENTS...: is refused, and changes nothing
+  refused "$1" run --sequence "$synthetic" --out "$work/done" "${@:2}"
+  check "$*: what was in the folder is as it was" diff -r "$work/before" "$work/done"
+}
+two=(--camera "$camera" --also "$work/second" --also-camera)
+again "second: its camera sees [0-9]+ % of what the one sees" "${two[@]}" "$work/narrow.yaml"
+again "no_fx.yaml: .*fx" "${two[@]}" "$work/no_fx.yaml"
+again "none.yaml: no such file; check --also-camera" "${two[@]}" "$work/none.yaml"
+again "rgb/[^ ]*: is 640x480 pixels, but the camera file says 320x480" "${two[@]}" "$work/small.yaml"
+again "also-camera is for recordings; /dev/video77" --camera "$camera" --also /dev/video77 --also-camera "$camera"
+again "rgb.txt|none" --camera "$camera" --also "$work/empty"
+cp "$camera" "$work/broken/camera.yaml"
+refused "second: its camera has fx 400, that of .*broken has fx [0-9.]+; name the files of both" run --sequence "$work/broken" \
+  --also "$work/second" --out "$work/done"
+again "is 640x480 pixels, but the camera file says 320x480" --camera "$work/small.yaml"
+again "no.such.key" --camera "$camera" --set no.such.key=1
+again "leaves no frame of 150" --camera "$camera" --start 150
+again "black-out 10: write FROM,SECONDS" --camera "$camera" --black-out 10
+
 # Somebody else's socket on the port.
 python3 -c '
 import socket, sys
