@@ -9,6 +9,7 @@
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/time.h"
+#include "player/asking_player.h"
 #include "player/live_node.h"
 #include "player/log_output.h"
 #include "player/open_sequence.h"
@@ -50,7 +51,7 @@ uint32_t ParseFrame(const std::string& option, const std::string& text) {
 void SetOptions(const Arguments& a, const dmslam::NodeOptions& node, dmslam::PlayerOptions* options) {
   *options = a.options;
   options->mode = a.lockstep ? dmslam::PlaybackMode::kLockstep : dmslam::PlaybackMode::kRealtime;
-  options->session = node.session == 0 ? 1 : node.session;
+  options->session = node.session == 0 ? 1 : node.session;  // a log's; AskingPlayer knows it of others
   options->camera_id = node.camera_id;
   options->take_over = node.take_over;
   options->local_frames = node.link == dmslam::Link::kLan && !a.remote_frontend;
@@ -73,6 +74,19 @@ std::unique_ptr<dmslam::FrameSource> Open(const Arguments& a, const dmslam::Node
   return dmslam::TellBy(dmslam::LoadCamera(a.as_camera_file), std::move(source), options);
 }
 
+/// Who was not told its session asks the bus for it. `Player`: PlayerNode or LiveNode.
+template <typename Player, typename Source>
+std::unique_ptr<dmslam::Node> MakePlayer(dmslam::NodeContext context, const dmslam::NodeOptions& node,
+                                         dmslam::PlayerOptions options, std::unique_ptr<Source> source) {
+  if (node.session != 0) return std::make_unique<Player>(std::move(context), options, std::move(source));
+  const auto held = std::make_shared<std::unique_ptr<Source>>(std::move(source));
+  const auto make = [context, options, held](uint32_t session) mutable {
+    options.session = session;
+    return std::make_unique<Player>(std::move(context), std::move(options), std::move(*held));
+  };
+  return std::make_unique<dmslam::AskingPlayer>(context, node.camera_id, node.NumCameras(), make);
+}
+
 std::unique_ptr<dmslam::Node> WatchCamera(const Arguments& a, dmslam::NodeContext context,
                                           const dmslam::NodeOptions& node) {
   dmslam::PlayerOptions options;
@@ -85,7 +99,7 @@ std::unique_ptr<dmslam::Node> WatchCamera(const Arguments& a, dmslam::NodeContex
   options.camera = dmslam::ChooseCamera(a.camera_file, options.sequence);
   if (a.fps > 0) options.camera.fps = a.fps;
   auto source = dmslam::OpenLive(options.sequence, options.camera);
-  return std::make_unique<dmslam::LiveNode>(std::move(context), options, std::move(source));
+  return MakePlayer<dmslam::LiveNode>(std::move(context), node, std::move(options), std::move(source));
 }
 
 /// Writes what the player would publish into a log, under the recording's own clock.
@@ -196,6 +210,7 @@ int main(int argc, char** argv) {
         dmslam::PlayerOptions options;
         auto source = Open(arguments, node, &options);
         if (!context.fresh_system) options.awaited = ToBeReady(node);
-        return std::make_unique<dmslam::PlayerNode>(std::move(context), options, std::move(source));
+        return MakePlayer<dmslam::PlayerNode>(std::move(context), node, std::move(options),
+                                              std::move(source));
       });
 }

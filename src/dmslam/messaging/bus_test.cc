@@ -110,6 +110,18 @@ TEST(LcmBus, CarriesMessagesAndKeepsPrefixesApart) {
   EXPECT_EQ(overheard, 0);
 }
 
+TEST(LcmBus, WhoSubscribesTwiceHearsAMessageOnce) {
+  EventLoop loop;
+  LcmBus here(Options(17706)), there(Options(17706));
+  std::string heard;
+  there.SetHandler([&](const std::string& channel, std::span<const uint8_t>) { heard += channel; });
+  for (const char* channel : {"X", "Y", "X"}) there.Subscribe(channel);
+  loop.Watch(there.fd(), [&] { there.Deliver(); });
+  for (const char* channel : {"X", "Y"}) here.Publish(Message(channel, {1}));
+  PumpUntil(&loop, [&] { return heard.ends_with("Y"); });
+  EXPECT_EQ(heard, "XY");
+}
+
 TEST(LcmBus, WhatAHandlerThrowsComesOutOfDeliver) {
   EventLoop loop;
   LcmBus bus(Options(17702));

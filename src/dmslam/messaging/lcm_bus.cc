@@ -6,6 +6,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <random>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -93,6 +94,7 @@ struct LcmBus::Impl {
   }
   lcm::LCM lcm;
   std::unique_ptr<lcm::LCM> tap;  // with ttl 0, where the bus itself leaves the host
+  std::set<std::string> subscribed;
 };
 
 LcmBus::LcmBus(Options options) : options_(std::move(options)) {
@@ -113,7 +115,9 @@ LcmBus::LcmBus(Options options) : options_(std::move(options)) {
 
 LcmBus::~LcmBus() = default;
 
+/// Twice to one channel LCM would deliver each message twice.
 void LcmBus::Subscribe(const std::string& channel) {
+  if (!impl_->subscribed.insert(channel).second) return;
   const std::string pattern = Literally(options_.prefix + channel);
   lcm::Subscription* subscription = impl_->lcm.subscribeFunction(pattern, &Impl::OnMessage, this);
   if (subscription == nullptr || impl_->lcm.getFileno() < 0) {

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "dmslam/runtime/camera_claims.h"
@@ -40,6 +42,9 @@ class KnownCameras {
     }
     return silent;
   }
+  /// Why nothing is heard of a camera that plays; empty: there is none such, or it was not noted.
+  const std::string& not_heard() const { return not_heard_; }
+  void NoteNotHeard(std::string why) { not_heard_ = std::move(why); }
 
  private:
   static constexpr int64_t kSilentNs = 1'500'000'000;
@@ -52,6 +57,7 @@ class KnownCameras {
   int64_t jitter_ns_;
   CameraClaims claims_;
   std::map<CameraId, Known> known_;
+  std::string not_heard_;
 };
 
 }  // namespace dmslam

@@ -53,7 +53,12 @@ ProcessMain::ProcessMain(const std::string& role, const std::string& description
   app_.AddOption("--link", link_, "host: records travel whole; lan: in parts of at most 1380 bytes")
       .OneOf({"host", "lan"})
       .ShowDefault();
-  app_.AddOption("--session", options_.session, "session id; 0: that of the bus, where there is one");
+  app_.AddOption(
+      "--session", options_.session,
+      role == roles::kPlayer
+          ? "session id; 0: that of the bus, where there is one; else the player of camera 0 draws "
+            "one at random"
+          : "session id; 0: that of the bus, where there is one");
   // Those who take part in a run wait for one another; tools and viewers wait for nobody.
   const std::vector<std::string> pipeline = {roles::kFrontend, roles::kMapper, roles::kLoopCloser,
                                              roles::kCollector};

@@ -60,7 +60,7 @@ StreamNode::StreamNode(NodeContext context, NodeOptions options, std::string rol
     Listen(SessionChoice::Channels(options_.NumCameras()), 0);
   }
   Listen({channels::kCameraInfo});
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
+  for (CameraId camera = 0; camera < kMaxCameras; ++camera) {
     if (camera != options_.camera_id) Listen({channels::kCameraInfo}, camera);
   }
 }
@@ -99,6 +99,7 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
   if (!info) return;
   info->camera_id = camera;
   if (choice_ && session_ == 0) choice_->HearCamera(info->session, info->sequence, info->utime);
+  if (camera >= options_.NumCameras() && camera != options_.camera_id) return OnSurplusCamera(*info);
   if (IsOfCamera() && camera != options_.camera_id) {
     if (camera_info_ && info->session == session_) OnOtherCamera(*info);
     return;
@@ -151,6 +152,20 @@ void StreamNode::KnowCamera(const CameraInfo& info) {
   session_ = info.session;
   camera_info_ = info;
   OnCamera(info);
+}
+
+/// More cameras play than this process was told of, so it hears nothing else of this one.
+void StreamNode::OnSurplusCamera(const CameraInfo& info) {
+  const bool counts = options_.HasPeer(roles::kFrontend) || role_ == roles::kViewer;
+  const bool ours = session_ != 0 && info.session == session_;
+  if (!counts || !ours || !cameras_.not_heard().empty() || !cameras_.SaidAgain(info, context_.now_ns()))
+    return;
+  const CameraId told = options_.NumCameras();
+  cameras_.NoteNotHeard(
+      "camera " + std::to_string(info.camera_id) + " plays in session " + std::to_string(session_) +
+      ", but this process was told of " + std::to_string(told) + (told == 1 ? " camera" : " cameras") +
+      " and hears nothing of it: give every process --cameras " + std::to_string(info.camera_id + 1));
+  LogWarning("{}: {}", role_, cameras_.not_heard());
 }
 
 /// A process that starts after the player has left still learns the camera, from those who write: one of them
@@ -553,7 +568,7 @@ StatusHead StreamNode::MakeStatusHead(const std::string& reason,
   StatusHead head;
   head.utime = context_.wall_us();
   head.session = session_;
-  head.reason = reason;
+  head.reason = reason.empty() ? cameras_.not_heard() : reason;
   ProcessHealth& health = head.health;
   health = MeasureProcess(context_.pid);
   health.uptime_s = static_cast<double>(context_.now_ns() - started_ns_) * 1e-9;

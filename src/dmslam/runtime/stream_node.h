@@ -204,6 +204,7 @@ class StreamNode : public Node {
   bool MayBeOurs(uint32_t session);
   bool MayChooseSession();
   void BelieveCamera(CameraInfo info);
+  void OnSurplusCamera(const CameraInfo& info);
   bool IsOfCamera() const;
   void KeepCameraKnown();
   void RunElection();

@@ -385,6 +385,7 @@ class Follower : public StreamNode {
   uint32_t session() const { return session_; }
   bool HearsAsForeign(uint32_t session) { return IsForeign(session); }
   int64_t foreign() const { return MakeStatusHead("", {}).health.dropped_foreign; }
+  std::string reason(const std::string& own = "") const { return MakeStatusHead(own, {}).reason; }
 
  private:
   void Begin(const CameraInfo&) override {
@@ -465,6 +466,43 @@ TEST_F(SessionTest, OneOfOtherSettingsInThePlaceOfTheTrueOneEndsNobody) {
   EXPECT_EQ(follower_->exit_code(), std::nullopt) << follower_->problem();
   EXPECT_EQ(follower_->taken(), 1);
   EXPECT_EQ(writer_->AcknowledgedBy("mapper"), 1);
+}
+
+/// Of a process that was told of two cameras.
+class TwoCamerasTest : public SessionTest {
+ protected:
+  TwoCamerasTest() {
+    NodeOptions node;
+    node.session = kSession;
+    node.peers = {"frontend", "frontend1"};
+    without_peers_ = std::move(follower_);  // the bus goes on to deliver to it
+    follower_ = std::make_unique<Follower>(ContextOnBus(&bus_.AddPort(), &now_ns_, "mapper"), node);
+    Pass(500);
+  }
+  void SayCamera(CameraId camera, uint32_t session, int times) {
+    CameraInfo info;
+    info.session = session;
+    info.camera = TestCamera();
+    for (; times > 0; --times) {
+      Say(ChannelOfCamera(channels::kCameraInfo, camera), wire::Encode(info));
+      Pass(100);
+    }
+  }
+  std::unique_ptr<Follower> without_peers_;
+};
+
+TEST_F(TwoCamerasTest, OneMoreIsNamedOnceItHasBeenSaidTwice) {
+  SayCamera(1, kSession, 3);
+  SayCamera(2, kSession + 1, 3);
+  SayCamera(2, kSession, 1);
+  EXPECT_EQ(follower_->reason(), "") << "said once it may be forged";
+  SayCamera(2, kSession, 1);
+  EXPECT_EQ(
+      follower_->reason(),
+      "camera 2 plays in session 4, but this process was told of 2 cameras and hears nothing of it: give "
+      "every process --cameras 3");
+  EXPECT_EQ(follower_->reason("waiting"), "waiting") << "what keeps it from its work comes first";
+  EXPECT_EQ(follower_->foreign(), 0);
 }
 
 /// Of a process that was not told its session.
