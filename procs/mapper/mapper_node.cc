@@ -11,6 +11,7 @@
 #include "dmslam/recording/checkpoint.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 
@@ -28,6 +29,19 @@ std::unique_ptr<Node> MakeMapper(NodeContext context, NodeOptions options, Mappe
   return std::make_unique<MapperNode>(std::move(context), std::move(options), std::move(files));
 }
 
+namespace {
+
+/// Said at the beginning, while the folder can still be made: the map is saved at the end.
+void WarnOfFolder(const std::string& save) {
+  try {
+    CheckFolderOf(save);
+  } catch (const InputError& error) {
+    LogWarning("mapper: --save-map: {}, before the run ends", error.what());
+  }
+}
+
+}  // namespace
+
 MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     : StreamNode(std::move(context), std::move(options), roles::kMapper),
       run_(options_.settings.Read<RunOptions>()),
@@ -43,6 +57,7 @@ MapperNode::MapperNode(NodeContext context, NodeOptions options, Files files)
     throw InputError("setting 'map.localize_only' needs a map: set map.saved=on and give --map FILE");
   }
   if (!files_.load.empty()) saved_.emplace(files_.load, feature_store_);
+  if (!files_.save.empty()) WarnOfFolder(files_.save);
   Listen({channels::kSessionAgain});
 }
 

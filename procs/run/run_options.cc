@@ -10,6 +10,7 @@
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/ids.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 namespace {
@@ -57,6 +58,18 @@ void CheckOtherCameras(const RunArguments& a) {
       WhyNotTheseCameras(a.camera.file, a.source.others.size(), a.source.other_cameras.size());
   if (!problem.empty()) throw InputError(problem);
   for (const std::string& file : a.source.other_cameras) CheckFile("--also-camera", file);
+}
+
+/// The folder of the results is made by the run itself.
+void CheckSaveMap(const std::string& path, const std::string& out) {
+  if (path.empty()) return;
+  const fs::path folder = fs::absolute(path).lexically_normal().parent_path();
+  if (folder == fs::absolute(out + "/").lexically_normal().parent_path()) return;
+  try {
+    CheckFolderOf(path);
+  } catch (const InputError& error) {
+    throw InputError(std::string("--save-map: ") + error.what());
+  }
 }
 
 void CheckKey(const RunArguments::Bus& bus, const RunArguments::Source& source) {
@@ -199,6 +212,7 @@ void CheckRunArguments(const RunArguments& a) {
   CheckNumber("--pictures", a.output.pictures);
   CheckNumber("--receive-buffer", a.bus.receive_buffer);
   CheckFile("--map", a.map.begin);
+  CheckSaveMap(a.map.save, a.output.folder);
   if (a.map.localize && a.map.begin.empty()) throw InputError("--localize needs a map: give it with --map");
   if (!a.settings.profile.empty() && a.settings.profile != "dm" && a.settings.profile != "baseline" &&
       a.settings.profile != "paper")

@@ -74,6 +74,20 @@ TEST_F(RunPlanTest, RefusesWhatDoesNotFit) {
   EXPECT_EQ(Refusal(), "") << "a camera may come later";
 }
 
+TEST_F(RunPlanTest, AFolderForTheMapThatIsNotThereIsRefusedBeforeTheRun) {
+  arguments_.map.save = folder_ + "/nowhere/a.map";
+  EXPECT_EQ(Refusal(), "--save-map: " + folder_ +
+                           "/nowhere: no such folder, so a.map cannot be written there; make it, or choose "
+                           "another folder");
+  arguments_.map.save = folder_ + "/a.map";
+  EXPECT_EQ(Refusal(), "");
+  arguments_.output.folder = folder_ + "/new";
+  for (const char* file : {"/new/a.map", "/./new/a.map"}) {
+    arguments_.map.save = folder_ + file;
+    EXPECT_EQ(Refusal(), "") << "the run makes the folder of its results";
+  }
+}
+
 TEST_F(RunPlanTest, HandsTheKeyToAllOnceItIsSafe) {
   unsetenv("DMSLAM_KEY_FILE");
   arguments_.bus.key = folder_ + "/key";

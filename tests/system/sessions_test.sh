@@ -21,7 +21,8 @@ check "the other one alone" "${play[@]}" --start 60 --save-map "$work/b.map" --o
 
 # Four seconds in all: nothing is proven to be no person. The place fills the image, which nobody does.
 check "two maps of one room are joined" map merge "$work/a.map" "$work/b.map" --save "$work/c.map" >"$work/said" 2>&1
-check "it says by what" grep -q "^joined: .*becomes part of map 1" "$work/said"
+check "it says by what, and of which file: $(<"$work/said")" \
+  grep -qE "^joined: frame [0-9]+ of $work/b.map and frame [0-9]+ of $work/a.map: .*becomes part of map 1" "$work/said"
 check "they are one map" listed "$work/c.map" "^$work/c.map: 1 map, sessions [0-9]+, [0-9]+, "
 check "the same again" map merge "$work/a.map" "$work/b.map" --save "$work/again.map" >/dev/null 2>&1
 check "gives the same bytes" cmp "$work/c.map" "$work/again.map"
@@ -153,4 +154,16 @@ unchanged "a map of another vocabulary"
 map diff "$work/a.map" "$work/words.map" >"$work/said"
 check "diff names the vocabularies" grep -qE "^vocabulary +[0-9a-f]{16} in A +[0-9a-f]{16} in B$" "$work/said"
 check "nothing was written" test ! -e "$work/none.map"
+# A folder that is not there is named, before the work.
+nowhere="$work/nowhere: no such folder, so [^ ]* cannot be written there; make it"
+refused "save-map: $nowhere" "${play[@]}" --save-map "$work/nowhere/c.map" --out "$work/a"
+unchanged "a folder for the map that is not there"
+refused "$nowhere" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --frames 20 \
+  --save-map "$work/nowhere/c.map" --out "$work/o"
+refused "$nowhere" map merge "$work/a.map" "$work/b.map" --save "$work/nowhere/c.map"
+refused "$nowhere" map split "$work/apart.map" --save-prefix "$work/nowhere/part"
+refused "$nowhere" map --map "$work/a.map" --save "$work/nowhere/c.map"
+timeout 2 "$build/bin/dmslam-mapper" --lcm-url "udpm://239.255.76.67:23495?ttl=0" --session 5 --save-map "$work/nowhere/c.map" \
+  >"$work/said" 2>&1
+check "a mapper says so at its beginning: $(<"$work/said")" grep -qE "mapper: --save-map: $nowhere.*before the run ends" "$work/said"
 finish

@@ -14,6 +14,7 @@
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 #include "in_process.h"
 #include "player/open_sequence.h"
 
@@ -213,6 +214,9 @@ int Run(const Arguments& a) {
   options.picture_every = a.pictures;
   options.picture_dir = a.out + "/pictures";
   std::filesystem::create_directories(a.pictures > 0 ? options.picture_dir : a.out);
+  for (const std::string& file : {a.map_files.save, a.record}) {
+    if (!file.empty()) dmslam::CheckFolderOf(file);
+  }
   BlockStopSignals();
   options.stop = [] { return StopSignal() != 0; };
   std::string problem;

@@ -20,6 +20,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
 #include "landmark_command.h"
@@ -235,6 +236,9 @@ void Judge(const Arguments& a, const dmslam::Map& map, std::optional<dmslam::Map
 int Run(const Arguments& a) {
   if (a.log.empty())
     throw dmslam::InputError("give --log FILE, or one of list, merge, diff, split and landmark (see --help)");
+  for (const std::string& file : {a.ply, a.trajectory, a.online, a.keyframes, a.save, a.json}) {
+    if (!file.empty()) dmslam::CheckFolderOf(file);
+  }
   const std::optional<dmslam::BusKey> key = dmslam::BusKey::LoadIfWanted(a.key);
   if (a.channels) return ListChannels(a.log, key);
   const dmslam::LogIndex log(a.log, key);
@@ -296,5 +300,8 @@ int main(int argc, char** argv) {
   } catch (const dmslam::InputError& error) {
     dmslam::LogError("{}", error.what());
     return is_diff ? 2 : dmslam::kExitInput;
+  } catch (const std::exception& error) {
+    dmslam::LogError("stopped by an internal error: {}", error.what());
+    return dmslam::kExitInternal;
   }
 }

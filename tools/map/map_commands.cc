@@ -17,6 +17,7 @@
 #include "dmslam/settings/settings.h"
 #include "dmslam/slam/map_merge.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 #include "text.h"
 
 namespace dmslam {
@@ -100,6 +101,13 @@ void Save(const std::string& path, const Map& map, const SessionStart& start, co
   const SessionStart session = StartOf(start, map, runs);
   SaveMap(path, map, session, runs);
   std::fputs(Listing(path, map, session).c_str(), stdout);
+}
+
+/// Frames of both files may have one number.
+void PrintWeld(const MapMergeReport::Weld& weld, const std::string& a, const std::string& b) {
+  const auto file = [&](const MapMergeReport::Weld::End& end) { return (end.of_b ? b : a).c_str(); };
+  std::printf("joined: frame %u of %s and frame %u of %s: %s\n", weld.keyframe.frame_index,
+              file(weld.keyframe), weld.place.frame_index, file(weld.place), weld.note.c_str());
 }
 
 // ---- The difference ----
@@ -222,6 +230,10 @@ WholeMap OpenWhole(const std::string& path, const std::optional<BusKey>& key) {
                      " map records are missing; what is there is taken with dmslam-map --log " + path +
                      " --save FILE");
   }
+  if (whole.rebuilt.skipped > 0) {
+    LogWarning("{}: {} references in it lead to keyframes or landmarks that it does not hold; left out", path,
+               whole.rebuilt.skipped);
+  }
   return whole;
 }
 
@@ -265,6 +277,7 @@ int ListMaps(const std::string& path, const std::optional<BusKey>& key) {
 }
 
 int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key) {
+  CheckFolderOf(arguments.save);
   const WholeMap a = OpenWhole(arguments.a, key), b = OpenWhole(arguments.b, key);
   CheckMayJoin(a, b, arguments.renumber);
   const std::shared_ptr<const Vocabulary> vocabulary = LoadVocabulary(arguments.vocabulary);
@@ -282,7 +295,7 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
   }
   for (const auto& [session, number] : names.sessions)
     std::printf("session %u of %s is called %u\n", session, b.path.c_str(), number);
-  for (const std::string& weld : report.welds) std::printf("joined: %s\n", weld.c_str());
+  for (const MapMergeReport::Weld& weld : report.welds) PrintWeld(weld, a.path, b.path);
   if (report.joined)
     std::printf("fused: %d observations and landmarks beside those of the welds\n", report.fused);
   SessionStart start = a.rebuilt.session;
@@ -306,6 +319,7 @@ int DiffMaps(const std::string& path_a, const std::string& path_b, const std::op
 }
 
 int SplitMaps(const std::string& path, const std::string& prefix, const std::optional<BusKey>& key) {
+  CheckFolderOf(prefix);
   const WholeMap whole = OpenWhole(path, key);
   const std::set<MapId> maps = MapsOf(whole.map());
   if (maps.size() == 1)

@@ -5,6 +5,7 @@
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 namespace {
@@ -188,7 +189,9 @@ std::string EventLogReader::DescribeGaps() const {
 
 EventLogWriter::EventLogWriter(std::string path)
     : path_(std::move(path)), file_(std::fopen(path_.c_str(), "wb")) {
-  if (!file_) throw InputError(path_ + ": cannot be written; check the path of the log");
+  if (file_) return;
+  CheckFolderOf(path_);
+  throw InputError(path_ + ": cannot be written; check that it is no folder and may be written to");
 }
 
 void EventLogWriter::Write(int64_t utime_us, const std::string& channel, std::span<const uint8_t> bytes) {

@@ -147,6 +147,7 @@ ChangesRead ForEachChange(const LogIndex& log, const RecordedSession& session, i
   }
   ChangesRead read{0, replay.missing};
   wire::RecordGroups<MapDelta> groups;
+  std::string first_fault;
   Term writer = replay.steps.front().term;
   for (const ReplayStep& step : replay.steps) {
     if (step.begins_anew) {
@@ -154,19 +155,22 @@ ChangesRead ForEachChange(const LogIndex& log, const RecordedSession& session, i
       groups.Clear();
     }
     if (std::exchange(writer, step.term) != step.term && reader.new_writer) reader.new_writer();
-    std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message));
+    std::string reason;
+    std::optional<MapDelta> delta = wire::Decode<MapDelta>(log.Read(*step.message), &reason);
     if (delta) {
       ++read.records;
       delta = groups.Add(std::move(*delta), step.term);
       if (!groups.fault().empty() || !groups.abandoned().empty()) ++read.missing;
     } else {
       ++read.missing;
+      if (first_fault.empty()) first_fault = reason;
     }
     if (delta) reader.change(*delta);
   }
   if (groups.open()) ++read.missing;
   if (session.IsSavedMap() && read.missing > 0)
-    RefuseDamaged(log, std::to_string(read.missing) + " records of the saved map cannot be decoded");
+    RefuseDamaged(log, std::to_string(read.missing) + " records of the saved map cannot be decoded" +
+                           (first_fault.empty() ? "" : " (" + first_fault + ")"));
   return read;
 }
 
@@ -205,6 +209,7 @@ void SaveMap(const std::string& path, const Map& map, const SessionStart& sessio
 
 void SaveMap(const std::string& path, const CutMap& map, const SessionStart& session,
              const SessionRuns& runs) {
+  CheckFolderOf(path);
   const int64_t utime_us = map.stamp_ns / 1000;
   const std::string partial = path + ".part";
   EventLogWriter log(partial);

@@ -486,6 +486,52 @@ TEST_F(Recording, ASavedMapOfAnotherVersionIsRefusedByNameEvenIfItsRecordsCanBeR
   EXPECT_EQ(WhyNotLoaded(to).find(refusal), 0u) << WhyNotLoaded(to);
 }
 
+TEST_F(Recording, ARecordOfASavedMapThatCannotBeIsNamedWithItsKeyframe) {
+  Saved(3);
+  const std::string from = path_ + ".map", to = path_ + ".map2";
+  CopyLog(from, to, [](LogEvent* event) {
+    auto delta = wire::Decode<MapDelta>(event->bytes);
+    if (!delta || delta->keyframes.empty()) return;
+    const RecordHeader header = *ParseHeader(event->bytes);
+    delta->keyframes.back().scale = 1.25;
+    event->bytes = wire::Encode(*delta);
+    const Bytes scale = {0x3f, 0xf4, 0, 0, 0, 0, 0, 0}, none = {0x7f, 0xf8, 0, 0, 0, 0, 0, 0};
+    const auto at = std::search(event->bytes.begin(), event->bytes.end(), scale.begin(), scale.end());
+    ASSERT_NE(at, event->bytes.end());
+    std::copy(none.begin(), none.end(), at);
+    Seal(header, event->channel, event->bytes);
+  });
+  const std::string why = WhyNotLoaded(to);
+  EXPECT_EQ(
+      why.find(to + ": is damaged: 1 records of the saved map cannot be decoded (map_record_t: scale of a "
+                    "keyframe out of range (frame "),
+      0u)
+      << why;
+  EXPECT_NE(why.find(" of session 7))"), std::string::npos) << why;
+}
+
+TEST_F(Recording, AFolderThatIsNotThereIsNamed) {
+  const std::string folder = path_ + "_nowhere";
+  const auto why = [](const std::function<void()>& write) -> std::string {
+    try {
+      write();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  TinyMapper mapper;
+  mapper.Step();
+  SessionStart start;
+  start.session = kSession;
+  start.camera = TestCamera();
+  EXPECT_EQ(why([&] { SaveMap(folder + "/a.map", mapper.map(), start); }),
+            folder + ": no such folder, so a.map cannot be written there; make it, or choose another folder");
+  EXPECT_EQ(
+      why([&] { EventLogWriter log(folder + "/run.lcmlog"); }),
+      folder + ": no such folder, so run.lcmlog cannot be written there; make it, or choose another folder");
+}
+
 TEST_F(Recording, ALogThatNamesNoCameraSaysTheCure) {
   TinyMapper mapper;
   EventLogWriter log(path_);

@@ -103,11 +103,16 @@ void MapMerge::Weld(std::shared_ptr<const Vocabulary> vocabulary, const Progress
     const std::string why_refused = WhyRefused(map_, answer);
     DMSLAM_CHECK(why_refused.empty(), why_refused.c_str());
     ApplyCorrection(map_, answer, options_.mapper);
-    if (answer.kind == LoopAnswer::Kind::kLoop) report_.welds.push_back(answer.note);
+    if (answer.kind == LoopAnswer::Kind::kLoop)
+      report_.welds.push_back({EndOf(answer.seen_from.value()), EndOf(answer.matched.value()), answer.note});
     MapDelta delta = map_.TakeDelta(MapEvent::kCorrected, id, map_.At(id).map_id);
     delta.correction_id = answer.correction_id;
     closer.ApplyMapDelta(delta);
   }
+}
+
+MapMergeReport::Weld::End MapMerge::EndOf(KeyframeId id) const {
+  return {id.frame_index(), std::ranges::binary_search(of_b_, id)};
 }
 
 /// A weld joins what is around it. Elsewhere keyframes of the two look at the same as well.

@@ -21,12 +21,21 @@ struct MapMergeOptions {
 };
 
 struct MapMergeReport {
-  bool joined = false;             ///< a map of `a` and one of `b` are one now
-  std::vector<std::string> welds;  ///< what each of them rests on
-  size_t keyframes_asked = 0;      ///< whether they show a place of another map
-  size_t places_tried = 0;         ///< that looked alike
-  size_t places_proposed = 0;      ///< of them, borne out by geometry, but not well enough or by no neighbour
-  int fused = 0;                   ///< landmarks and observations that became one, beside those of the welds
+  /// Two keyframes by which maps became one.
+  struct Weld {
+    struct End {
+      uint32_t frame_index = 0;
+      bool of_b = false;  ///< the keyframe is of `b`, not of `a`
+    };
+    End keyframe, place;  ///< which saw the other one's place
+    std::string note;     ///< what it rests on
+  };
+  bool joined = false;  ///< a map of `a` and one of `b` are one now
+  std::vector<Weld> welds;
+  size_t keyframes_asked = 0;  ///< whether they show a place of another map
+  size_t places_tried = 0;     ///< that looked alike
+  size_t places_proposed = 0;  ///< of them, borne out by geometry, but not well enough or by no neighbour
+  int fused = 0;               ///< landmarks and observations that became one, beside those of the welds
 };
 
 /// Two maps of one place become one. The steps are those by which a run welds two of its own maps: every
@@ -54,6 +63,7 @@ class MapMerge {
 
  private:
   void Weld(std::shared_ptr<const Vocabulary> vocabulary, const Progress& progress);
+  MapMergeReport::Weld::End EndOf(KeyframeId id) const;
   void FuseAll(MapId map_id, const Progress& progress);
   void PutBack();
 

@@ -55,7 +55,9 @@ TEST(MapMergeTest, TwoMapsOfOneRoomBecomeOne) {
   MapMerge merge = MergeOf(maps);
   const MapMergeReport report = merge.Run(testing::ShippedVocabulary());
   ASSERT_TRUE(report.joined);
-  EXPECT_EQ(report.welds.size(), 1u);
+  ASSERT_EQ(report.welds.size(), 1u);
+  EXPECT_TRUE(report.welds[0].keyframe.of_b) << "those of the second are asked first";
+  EXPECT_FALSE(report.welds[0].place.of_b);
   EXPECT_EQ(MapsOf(merge.map()).size(), 1u);
   EXPECT_EQ(merge.map().keyframes().size(), static_cast<size_t>(kKeyframes));
   EXPECT_LT(LargestError(merge.map()), 0.05) << "of a path with a radius of 2";

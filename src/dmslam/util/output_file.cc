@@ -25,6 +25,10 @@ bool Sync(const std::filesystem::path& path, int how) {
   return synced;
 }
 
+std::filesystem::path FolderOf(const std::filesystem::path& file) {
+  return file.parent_path().empty() ? "." : file.parent_path();
+}
+
 }  // namespace
 
 OutputFile::OutputFile(std::filesystem::path path)
@@ -64,9 +68,18 @@ bool RenameDurably(const std::filesystem::path& from, const std::filesystem::pat
   return Sync(from, O_RDONLY) && std::rename(from.c_str(), to.c_str()) == 0 && SyncFolderOf(to);
 }
 
-bool SyncFolderOf(const std::filesystem::path& path) {
-  const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
-  return Sync(folder, O_RDONLY | O_DIRECTORY);
+bool SyncFolderOf(const std::filesystem::path& path) { return Sync(FolderOf(path), O_RDONLY | O_DIRECTORY); }
+
+void CheckFolderOf(const std::filesystem::path& file) {
+  const std::filesystem::path folder = FolderOf(file);
+  const auto refuse = [&](const std::string& why, const std::string& cure) {
+    throw InputError(folder.string() + ": " + why + ", so " + file.filename().string() +
+                     " cannot be written there; " + cure + ", or choose another folder");
+  };
+  std::error_code ignored;
+  if (!std::filesystem::exists(folder, ignored)) refuse("no such folder", "make it");
+  if (!std::filesystem::is_directory(folder, ignored)) refuse("is no folder", "move it away");
+  if (access(folder.c_str(), W_OK) != 0) refuse("may not be written to", "change its rights");
 }
 
 }  // namespace dmslam

@@ -30,6 +30,10 @@ class OutputFile {
   std::FILE* file_ = nullptr;
 };
 
+/// Throws InputError that names the folder of a file where nothing can be written into it: it is not there,
+/// is none, or may not be written to.
+void CheckFolderOf(const std::filesystem::path& file);
+
 /// Writes a whole file: the former one stays until the new one is complete.
 void WriteFile(const std::filesystem::path& path, std::string_view text);
 

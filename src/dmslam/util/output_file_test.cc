@@ -76,5 +76,26 @@ TEST_F(OutputFileTest, AFullDiskLeavesTheFormerFile) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1) << "nothing else is left";
 }
 
+TEST_F(OutputFileTest, AFolderThatTakesNoFileIsNamed) {
+  const std::string folder = folder_.string();
+  const auto why = [](const std::string& file) -> std::string {
+    try {
+      CheckFolderOf(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(why(folder + "/a"), "");
+  EXPECT_EQ(why("a"), "") << "the folder of now";
+  EXPECT_EQ(why(folder + "/b/a"), folder +
+                                      "/b: no such folder, so a cannot be written there; make it, or choose "
+                                      "another folder");
+  std::ofstream(folder + "/b") << "a file";
+  EXPECT_EQ(why(folder + "/b/a"), folder +
+                                      "/b: is no folder, so a cannot be written there; move it away, or "
+                                      "choose another folder");
+}
+
 }  // namespace
 }  // namespace dmslam

@@ -23,10 +23,21 @@ inline constexpr uint32_t kMaxGroup = 1 << 16;
 class Checker {
  public:
   bool ok() const { return what_ == nullptr; }
-  const char* what() const { return what_; }
+  /// The complaint, and about which keyframe or landmark it is, where that is known.
+  std::string text() const { return std::string(what_) + (about_.empty() ? "" : " (" + about_ + ")"); }
 
   void Require(bool condition, const char* what) {
     if (!condition && what_ == nullptr) what_ = what;
+  }
+  /// What was required last is of this keyframe or landmark.
+  void Of(KeyframeId id) {
+    if (ok() || !about_.empty()) return;
+    about_ = "frame " + std::to_string(id.frame_index()) + " of session " + std::to_string(id.session());
+    if (id.camera() != 0) about_ += ", camera " + std::to_string(id.camera());
+  }
+  void Of(LandmarkId id) {
+    if (ok() || !about_.empty()) return;
+    about_ = "landmark " + std::to_string(id.epoch_ordinal()) + ":" + std::to_string(id.number());
   }
   void Finite(double value, const char* what) { Require(std::isfinite(value), what); }
   /// Finite and not beyond any map's size.
@@ -59,6 +70,7 @@ class Checker {
 
  private:
   const char* what_ = nullptr;
+  std::string about_;
 };
 
 /// Whether a text may travel: valid UTF-8 without control characters but line feeds, at most kMaxTextBytes.

@@ -245,7 +245,7 @@ std::vector<uint8_t> Encode(const Message& message) {
   Put put(check);
   if (check.ok()) Codec<Message>::Fields(put, message, wire);
   if (!check.ok())
-    throw InvariantError(std::string(Wire::getTypeName()) + " cannot be encoded: " + check.what());
+    throw InvariantError(std::string(Wire::getTypeName()) + " cannot be encoded: " + check.text());
   std::vector<uint8_t> bytes(static_cast<size_t>(wire.getEncodedSize()));
   const int size = static_cast<int>(bytes.size());
   DMSLAM_CHECK(wire.encode(bytes.data(), 0, size) == size, "a message must fill the size it announces");
@@ -290,7 +290,7 @@ std::optional<Message> Decode(std::span<const uint8_t> bytes, std::string* reaso
   std::optional<Message> message(std::in_place);
   Codec<Message>::Fields(get, *message, wire);
   if (check.ok()) Codec<Message>::Validate(*message, check);
-  if (!check.ok()) return refuse(check.what());
+  if (!check.ok()) return refuse(check.text());
   return message;
 }
 

@@ -301,6 +301,7 @@ void ValidateEvidence(const LandmarkEvidence& evidence, Checker& check) {
 }
 
 void ValidateKeyframes(const MapDelta& m, Checker& check) {
+  if (!check.ok()) return;
   for (const KeyframeState& keyframe : m.keyframes) {
     check.Id(keyframe.id, "impossible id of a keyframe");
     check.OptionalId(keyframe.parent, "impossible id of a parent");
@@ -313,11 +314,13 @@ void ValidateKeyframes(const MapDelta& m, Checker& check) {
     for (const KeyframeId id : keyframe.loop_edges) check.Id(id, "a loop edge to an impossible keyframe");
     check.Require(std::is_sorted(keyframe.loop_edges.begin(), keyframe.loop_edges.end()),
                   "loop edges are not ascending");
+    check.Of(keyframe.id);
   }
   for (const KeyframePose& pose : m.keyframe_poses) {
     check.Id(pose.id, "a pose of an impossible keyframe");
     check.Pose(pose.T_cam_world, "a changed pose that is none");
     check.Scale(pose.scale, "scale of a keyframe out of range");
+    check.Of(pose.id);
   }
   for (const KeyframeTombstone& dead : m.keyframe_tombstones) {
     check.Id(dead.id, "impossible id of a culled keyframe");
@@ -326,10 +329,12 @@ void ValidateKeyframes(const MapDelta& m, Checker& check) {
     check.Stamp(dead.stamp_ns);
     check.Pose(dead.T_kf_parent, "a culled keyframe without a place");
     check.Scale(dead.parent_scale, "scale of a culled keyframe's parent out of range");
+    check.Of(dead.id);
   }
 }
 
 void ValidateLandmarks(const MapDelta& m, Checker& check) {
+  if (!check.ok()) return;
   for (const ReferenceMove& move : m.reference_moves) {
     check.OptionalId(move.reference, "landmarks move with an impossible keyframe");
     check.UnitQuaternion(move.after_from_before.rotation, "landmarks move without a rotation");
@@ -344,23 +349,28 @@ void ValidateLandmarks(const MapDelta& m, Checker& check) {
     check.OptionalId(landmark.first_keyframe, "impossible first keyframe of a landmark");
     check.Stamp(landmark.first_ns);
     ValidateEvidence(landmark.evidence, check);
+    check.Of(landmark.id);
   }
   for (const LandmarkPosition& position : m.landmark_positions) {
     check.Id(position.id, "a position of an impossible landmark");
     check.Position(position.p_world, "position of a landmark is not finite");
+    check.Of(position.id);
   }
   for (const LandmarkEvidenceState& state : m.landmark_evidence) {
     check.Id(state.id, "evidence on an impossible landmark");
     ValidateEvidence(state.evidence, check);
+    check.Of(state.id);
   }
   for (const ObservationState& observation : m.observations) {
     check.Id(observation.keyframe, "an observation by an impossible keyframe");
     check.OptionalId(observation.landmark, "an observation of an impossible landmark");
+    check.Of(observation.keyframe);
   }
   for (const LandmarkTombstone& dead : m.landmark_tombstones) {
     check.Id(dead.id, "impossible id of a dead landmark");
     check.OptionalId(dead.replaced_by, "a landmark fused into an impossible one");
     check.Require(dead.replaced_by != dead.id, "a landmark fused into itself");
+    check.Of(dead.id);
   }
 }
 
@@ -406,6 +416,7 @@ void FrontendSeq(Copy&, Progress& progress, int64_t& wire) {
 
 /// Observations by keyframes that come with their features must name one of them.
 void ValidateObservedFeatures(const MapDelta& m, Checker& check) {
+  if (!check.ok()) return;
   std::unordered_map<KeyframeId, size_t> num_features;
   for (const KeyframeState& keyframe : m.keyframes) {
     if (keyframe.features != nullptr) num_features[keyframe.id] = keyframe.features->size();
@@ -415,6 +426,7 @@ void ValidateObservedFeatures(const MapDelta& m, Checker& check) {
     const auto found = num_features.find(observation.keyframe);
     check.Require(found == num_features.end() || observation.feature < found->second,
                   "an observation names a feature that is not there");
+    check.Of(observation.keyframe);
   }
 }
 
