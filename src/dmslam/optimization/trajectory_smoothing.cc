@@ -110,9 +110,10 @@ std::optional<double> Solve(NormalEquations* equations, StateSteps* steps) {
     if (factors[k].info() != Eigen::Success) return std::nullopt;
     for (int i = 0; i < kState; ++i) log_determinant += 2.0 * std::log(factors[k].matrixLLT()(i, i));
     if (k + 1 == count) break;
-    const StateMatrix gain = factors[k].solve(equations->above[k]);
-    equations->diagonal[k + 1].noalias() -= equations->above[k].transpose() * gain;
-    equations->gradient[k + 1].noalias() -= gain.transpose() * equations->gradient[k];
+    const StateMatrix half = factors[k].matrixL().solve(equations->above[k]);  // L^-1 above
+    equations->diagonal[k + 1].selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1.0);
+    const StateVector gradient = factors[k].matrixL().solve(equations->gradient[k]);
+    equations->gradient[k + 1].noalias() -= half.transpose() * gradient;
   }
   steps->resize(count);
   for (size_t k = count; k-- > 0;) {

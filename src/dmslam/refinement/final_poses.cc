@@ -28,7 +28,7 @@ constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and
 constexpr double kMaxMove = 0.3;      // of a landmark, as a share of its distance: more is a slip
 constexpr size_t kPortion = 64;       // frames or landmarks that are placed at once
 
-PoseObservation Observe(const Pyramid& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
+PoseObservation Observe(const PyramidTable& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
   return {p_world, sight.uv_px.cast<double>(), 1.0 / pyramid.SigmaSquared(sight.octave), 1.0};
 }
 
@@ -38,12 +38,12 @@ struct LandmarkEquations {
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
 
   void Add(const Map& map, const Rigid3d& T_cam_world, const Eigen::Vector3d& p_world,
-           const Eigen::Vector2d& uv_px, int octave) {
+           const Eigen::Vector2d& uv_px, uint8_t octave) {
     const Pinhole camera = map.camera().Ideal();
     const Eigen::Vector3d p_cam = T_cam_world * p_world;
     if (p_cam.z() <= 0.0) return;
     const Eigen::Vector2d error = camera.Project(p_cam) - uv_px;
-    const double inv_sigma_squared = 1.0 / map.pyramid().SigmaSquared(octave);
+    const double inv_sigma_squared = 1.0 / map.pyramid_table().SigmaSquared(octave);
     const double chi2 = error.squaredNorm() * inv_sigma_squared;
     const double weight =
         inv_sigma_squared * (chi2 > kChiSquared2Dof ? std::sqrt(kChiSquared2Dof / chi2) : 1.0);
@@ -89,7 +89,7 @@ std::vector<PoseObservation> ObserveAll(const Map& map, const std::vector<Sight>
   std::vector<PoseObservation> observations;
   observations.reserve(sights.size());
   for (const Sight& sight : sights) {
-    observations.push_back(Observe(map.pyramid(), sight, map.FindLandmark(sight.landmark)->p_world));
+    observations.push_back(Observe(map.pyramid_table(), sight, map.FindLandmark(sight.landmark)->p_world));
   }
   return observations;
 }
@@ -266,7 +266,7 @@ Matrix6d FinalPoses::SharedInformation(const Map& map, size_t frame) const {
     const Sight& sight = pose.sights[i];
     const Eigen::Vector3d p_cam = pose.measured * landmarks_.at(sight.landmark).p_world;
     if (p_cam.z() <= 0.0) continue;
-    const double variance = map.pyramid().SigmaSquared(sight.octave);
+    const double variance = map.pyramid_table().SigmaSquared(sight.octave);
     const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
     if (error.squaredNorm() > kChiSquared2Dof * variance) continue;  // the pose was told without it
     const Matrix26 J = PoseJacobian(camera, p_cam);
@@ -409,7 +409,7 @@ void FinalPoses::PlaceFrame(const Map& map, FinalPose* frame) const {
   a_few_steps.iterations = 2;
   std::vector<PoseObservation> observations;
   for (const Sight& sight : frame->sights) {
-    observations.push_back(Observe(map.pyramid(), sight, landmarks_.at(sight.landmark).p_world));
+    observations.push_back(Observe(map.pyramid_table(), sight, landmarks_.at(sight.landmark).p_world));
   }
   const PoseOptimizationReport report =
       OptimizePose(map.camera().Ideal(), frame->pose.T_cam_world, observations, a_few_steps);
