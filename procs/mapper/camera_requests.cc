@@ -29,7 +29,8 @@ std::vector<AdjustRequest> CameraRequests::TakeAdjust(const HasEnded& has_ended)
   for (CameraId camera = 0; camera < cameras_.size(); ++camera) {
     if (!IsDone(camera, has_ended)) return {};
     const std::optional<uint32_t>& request = cameras_[camera].adjust;
-    if (request) requests.push_back({*request, "the sequences have ended", std::nullopt, camera});
+    if (request && !has_ended(camera))
+      requests.push_back({*request, "the sequences have ended", std::nullopt, camera});
   }
   for (Camera& camera : cameras_) camera.adjust.reset();
   return requests;

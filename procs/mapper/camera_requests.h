@@ -36,7 +36,9 @@ class CameraRequests {
   /// The frame whose turn it is: known when every camera that goes on has named its own. It counts as given;
   /// `epoch_of`: in which epoch its camera's frontend writes.
   std::optional<Turn> TakeTurn(const HasEnded& has_ended, const std::function<int64_t(CameraId)>& epoch_of);
-  /// The requests to adjust the maps that are not answered, when all cameras are done; empty before.
+  /// The requests to adjust the maps that are not answered, when all cameras are done; empty before. Of a
+  /// camera that has ended since there is none: it had its answer, and had asked again while that was on its
+  /// way.
   std::vector<AdjustRequest> TakeAdjust(const HasEnded& has_ended);
 
  private:

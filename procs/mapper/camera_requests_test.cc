@@ -50,6 +50,15 @@ TEST_F(CameraRequestsTest, WhatWasAnsweredIsNotAnsweredAgainUnlessAnotherFronten
   EXPECT_EQ(Next(), 0U);
 }
 
+TEST_F(CameraRequestsTest, WhoHasEndedSinceHasHadItsAnswer) {
+  requests_.OnAdjust(0, 1);
+  requests_.OnAdjust(1, 1);
+  EXPECT_EQ(requests_.TakeAdjust(HasEnded()).size(), 2U);
+  requests_.OnAdjust(1, 2);  // sent while the answer was on its way
+  ended_ = {0, 1};
+  EXPECT_TRUE(requests_.TakeAdjust(HasEnded()).empty());
+}
+
 TEST_F(CameraRequestsTest, WhoIsDoneIsNotWaitedFor) {
   Ask(1, 5, 200);
   ended_ = {0};

@@ -339,7 +339,8 @@ bool MapperNode::WorkOnce() {
     return work_->Idle();
   }
   if (!records_.NoneIsDue()) return HandleFirstRecord();
-  return AnswerRequests() || GiveTurn() || EndIfDone();
+  if (AnswerRequests() || GiveTurn()) return work_->Idle();
+  return EndIfDone();
 }
 
 /// The records up to here are worked into the map: the next map record says so.
@@ -468,6 +469,7 @@ void MapperNode::AcceptWhatIsSafe() {
 // ---- Several cameras ----
 
 /// True: there may be more to do.
+/// True: a job for the core was made of it.
 bool MapperNode::GiveTurn() {
   if (!lockstep_ || frontends_.size() == 1 || end_.HasBegun()) return false;
   const auto turn =
@@ -476,9 +478,10 @@ bool MapperNode::GiveTurn() {
   Run([this, frame = KeyframeId::Make(session_, turn->frame_index, turn->camera)] {
     core_->GiveTurn(frame);
   });
-  return work_->Idle();
+  return true;
 }
 
+/// The same of requests to adjust the maps.
 bool MapperNode::AnswerRequests() {
   if (frontends_.size() == 1) return false;
   const std::vector<AdjustRequest> requests = requests_.TakeAdjust(HasEnded());
@@ -486,7 +489,7 @@ bool MapperNode::AnswerRequests() {
   Run([this, requests] {
     for (const AdjustRequest& request : requests) core_->OnAdjustRequest(request);
   });
-  return work_->Idle();
+  return true;
 }
 
 CameraRequests::HasEnded MapperNode::HasEnded() const {

@@ -44,6 +44,10 @@ void LiveNode::Receive(const std::string& channel, std::span<const uint8_t> byte
     ending_ = end_.OnSequenceDone(context_.now_ns()) || ending_;
     return;
   }
+  if (channel == channels::kCameraInfo) {
+    if (const auto said = wire::Decode<CameraInfo>(bytes)) office_.HearCamera(*said, MakeCameraInfo());
+    return;
+  }
   const auto done = wire::Decode<FrameDone>(bytes);
   if (done && done->session == options_.session) OnFrameDone(*done);
 }
@@ -54,6 +58,7 @@ void LiveNode::OnFrameDone(const FrameDone& done) {
   if (published_ == 0 || in_step_) return;
   if (done.frame_index <= frame_.frame_index) {
     in_step_ = done.frame_index == frame_.frame_index;
+    if (in_step_) office_.OnFrameTaken();
     return;
   }
   const auto newest = further_.OnAnswer({done.frame_index, done.stamp_ns}, context_.now_ns());
@@ -107,7 +112,7 @@ void LiveNode::TakeFrame() {
   ending_ = static_cast<size_t>(published_) >= options_.frames;
 }
 
-void LiveNode::PublishCameraInfo() {
+CameraInfo LiveNode::MakeCameraInfo() const {
   CameraInfo info;
   info.utime = context_.wall_us();
   info.session = options_.session;
@@ -116,7 +121,7 @@ void LiveNode::PublishCameraInfo() {
   const bool bounded = options_.frames > 0 && options_.frames != SIZE_MAX;
   if (bounded) info.num_frames = static_cast<int64_t>(options_.frames);
   info.mode = PlaybackMode::kRealtime;
-  PublishLoose(context_.bus, info, false, options_.camera_id);
+  return info;
 }
 
 void LiveNode::PublishStatus() {
@@ -156,7 +161,7 @@ void LiveNode::Advance() {
   if (exit_code_ || !office_.held()) return;
   if (now >= next_info_ns_) {
     next_info_ns_ = now + InfoAgainNs(infos_said_++);
-    PublishCameraInfo();
+    PublishLoose(context_.bus, MakeCameraInfo(), false, options_.camera_id);
   }
   SayWhetherAway();
   if (now >= next_status_ns_) {

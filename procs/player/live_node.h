@@ -36,7 +36,7 @@ class LiveNode : public Node {
   int64_t InSessionTime(int64_t stamp_ns);
   void SayWhetherAway();
   void TakeFrame();
-  void PublishCameraInfo();
+  CameraInfo MakeCameraInfo() const;
   void PublishStatus();
   void PublishEnd();
 

@@ -90,6 +90,8 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
     if (const auto done = wire::Decode<FrameDone>(bytes)) OnFrameDone(*done);
   } else if (channel == channels::kSequenceDone) {
     if (const auto done = wire::Decode<SequenceDone>(bytes)) OnSequenceDone(*done);
+  } else if (channel == channels::kCameraInfo) {
+    if (const auto said = wire::Decode<CameraInfo>(bytes)) office_.HearCamera(*said, MakeCameraInfo());
   }
 }
 
@@ -105,6 +107,7 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
   if (done.session != options_.session || !frame_bytes_ || done.frame_index < frame_.frame_index) return;
   if (done.frame_index == frame_.frame_index) {
     further_.Clear();
+    office_.OnFrameTaken();
     end_.OnFrameDone();
     awaiting_done_ = false;
   } else if (const auto newest = further_.OnAnswer({done.frame_index, done.stamp_ns}, context_.now_ns())) {
@@ -124,7 +127,7 @@ void PlayerNode::SkipBehind(uint32_t frame_index) {
   schedule_.MakeDue(playing_ ? context_.now_ns() : 0);
 }
 
-void PlayerNode::PublishCameraInfo() {
+CameraInfo PlayerNode::MakeCameraInfo() const {
   CameraInfo info;
   info.utime = context_.wall_us();
   info.session = options_.session;
@@ -134,7 +137,7 @@ void PlayerNode::PublishCameraInfo() {
   info.first_frame = source_->FrameIndex(schedule_.first());
   info.mode = options_.mode;
   info.speed = options_.speed;
-  PublishLoose(context_.bus, info, false, options_.camera_id);
+  return info;
 }
 
 /// Frames that nobody can track yet are not played: the first one waits, and is due when it need not any
@@ -252,7 +255,7 @@ void PlayerNode::Advance() {
   if (exit_code_ || !MayPlay()) return;
   if (now >= next_info_ns_) {
     next_info_ns_ = now + InfoAgainNs(infos_said_++);
-    PublishCameraInfo();
+    PublishLoose(context_.bus, MakeCameraInfo(), false, options_.camera_id);
   }
   if (now >= next_status_ns_) {
     next_status_ns_ = now + kStatusEveryNs;

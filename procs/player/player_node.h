@@ -72,7 +72,7 @@ class PlayerNode : public Node {
   void OnFrameDone(const FrameDone& done);
   void OnSequenceDone(const SequenceDone& done);
   void SkipBehind(uint32_t frame_index);
-  void PublishCameraInfo();
+  CameraInfo MakeCameraInfo() const;
   bool OthersAreReady(int64_t now_ns);
   void PublishFrame();
   bool MakeFrame(size_t index);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/testing/node_on_bus.h"
 
 namespace dmslam {
@@ -127,6 +128,53 @@ TEST_F(RealtimePlayerTest, WhoDoesNotComeIsNotWaitedForWithoutEnd) {
   EXPECT_TRUE(frames_.empty());
   Advance(1000);
   EXPECT_FALSE(frames_.empty());
+}
+
+/// What those say who have heard another player in this session.
+class PlayerOfAnotherCamera : public PlayerNodeTest {
+ protected:
+  void SayCamera(double fx_px, const std::string& sequence = "ten") {
+    CameraInfo info;
+    info.session = kSession;
+    info.camera = {.width_px = 64, .height_px = 48, .fx_px = fx_px, .fy_px = 60, .cx_px = 32, .cy_px = 24};
+    info.sequence = sequence;
+    Say(info);
+  }
+};
+
+TEST_F(PlayerOfAnotherCamera, EndsBeforeItsFirstFrame) {
+  SayCamera(70);
+  Advance(100);
+  SayCamera(70);
+  Advance(3000);
+  EXPECT_EQ(player_->exit_code(), kExitMisfit);
+  EXPECT_NE(player_->problem().find("its camera has fx 70, not fx 60"), std::string::npos)
+      << player_->problem();
+  EXPECT_TRUE(frames_.empty());
+}
+
+TEST_F(PlayerOfAnotherCamera, AnotherRecordingEndsItToo) {
+  SayCamera(60, "eleven");
+  Advance(100);
+  SayCamera(60, "eleven");
+  Advance(100);
+  EXPECT_EQ(player_->exit_code(), kExitMisfit);
+  EXPECT_NE(player_->problem().find("is that of eleven, and ten is another recording"), std::string::npos)
+      << player_->problem();
+}
+
+TEST_F(PlayerOfAnotherCamera, WhatIsForgedOnceOrAfterAFrameWasTakenEndsNothing) {
+  SayCamera(70);
+  SayCamera(60);
+  SayCamera(60);
+  Begin();
+  SayDone(0);
+  SayCamera(80);
+  Advance(100);
+  SayCamera(80);
+  Advance(100);
+  EXPECT_EQ(player_->exit_code(), std::nullopt);
+  EXPECT_EQ(frames_.size(), 2U);
 }
 
 TEST_F(PlayerNodeTest, OneForgedAnswerWhileItBeginsChangesNothing) {

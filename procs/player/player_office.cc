@@ -42,12 +42,26 @@ PlayerOffice::PlayerOffice(const NodeContext& context, const Part& part, bool ta
 std::vector<std::string> PlayerOffice::AnswersTo(CameraId camera_id) {
   return {ChannelOfCamera(channels::kFrameDone, camera_id),
           ChannelOfCamera(channels::kSequenceDone, camera_id), channels::kMapperStatus,
-          ChannelOfCamera(channels::kFrontendStatus, camera_id)};
+          ChannelOfCamera(channels::kFrontendStatus, camera_id),
+          ChannelOfCamera(channels::kCameraInfo, camera_id)};
 }
 
 PlayerOffice::~PlayerOffice() {
   endpoint_->Remove(&election_);
   if (writer_) endpoint_->Remove(writer_.get());
+}
+
+void PlayerOffice::HearCamera(const CameraInfo& said, const CameraInfo& ours) {
+  if (frame_taken_ || exit_code_ || said.session != part_.session || IsOfSame(said, ours)) return;
+  CameraInfo claim = said;
+  claim.camera_id = part_.camera_id;
+  if (!claims_.SaidAgain(claim, context_.now_ns())) return;
+  const auto difference = FirstDifference(ours.camera, said.camera);
+  exit_code_ = kExitMisfit;
+  problem_ = "session " + std::to_string(part_.session) + " is that of " + said.sequence + ", and " +
+             (difference ? "its camera has " + difference->b + ", not " + difference->a
+                         : ours.sequence + " is another recording") +
+             "; end its processes and start them anew, or give this one a session of its own (--session)";
 }
 
 void PlayerOffice::Advance() {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dmslam/messaging/endpoint.h"
+#include "dmslam/runtime/camera_claims.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/util/ids.h"
 #include "dmslam/wire/status.h"
@@ -31,6 +32,12 @@ class PlayerOffice {
   /// The channels on which a player of that camera is answered.
   static std::vector<std::string> AnswersTo(CameraId camera_id);
 
+  /// What is said of the camera that is played, and which it is by `ours`. Where others who have played in
+  /// this session mean another camera or another recording, and say so twice before a frame was taken, there
+  /// is nothing to play in it.
+  void HearCamera(const CameraInfo& said, const CameraInfo& ours);
+  /// A frame was taken: whatever is said of the camera now is said by nobody who knows better.
+  void OnFrameTaken() { frame_taken_ = true; }
   /// To be called before each turn.
   void Advance();
   /// The election is won, and no other player has asked to go on in this one's place.
@@ -55,6 +62,8 @@ class PlayerOffice {
   WriterElection election_;
   std::unique_ptr<StreamWriter> writer_;
   std::optional<int64_t> hands_over_until_ns_;  ///< then who asked for it must have gone on
+  CameraClaims claims_;                         ///< of others
+  bool frame_taken_ = false;
   std::optional<int> exit_code_;
   std::string problem_;
 };

@@ -42,6 +42,16 @@ ended player_again 3 player "${two[@]}" "${camera[@]}"
 check "a second player finds the session, and who plays it: $(<"$work/player_again.log")" \
   grep -q "session $session: player on .* writes this stream already" "$work/player_again.log"
 
+# A player that comes in the place of another one plays the same recording of the same camera, or nothing.
+player1=$(mine | grep -- "dmslam-player.*--camera-id 1" | cut -d: -f1)
+kill -TERM "$player1"
+while kill -0 "$player1" 2>/dev/null; do sleep 0.05; done
+sed -E 's/^( *fx[^:]*: *).*/\1400.0/' "$root/config/synthetic.yaml" >"$work/other.yaml"
+ended other_camera 2 player "${two[@]}" --camera-id 1 --sequence "$synthetic" --camera "$work/other.yaml" --speed 0.1
+says "session $session is that of synthetic, and its camera has fx 525.*, not fx 400" other_camera
+begin player1_again player "${two[@]}" --camera-id 1 "${camera[@]}" --speed 0.1
+says "takes session $session" player1_again
+
 # Another system on the same port.
 begin other player --session 1 "${camera[@]}" --speed 0.1
 sleep 3

@@ -11,6 +11,11 @@
 
 namespace dmslam {
 
+/// Whether two players mean the same: a camera of one model, and a recording of one name.
+inline bool IsOfSame(const CameraInfo& a, const CameraInfo& b) {
+  return a.camera.SeesAs(b.camera) && a.sequence == b.sequence;
+}
+
 /// Everything that a process does rests on the camera that it is told, and the telling may be forged. What is
 /// said is believed when it has been said twice, or when a frame follows it and nothing else was said
 /// meanwhile. Keeps a few claims of each camera: the one that was heard longest ago makes room.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -28,16 +29,22 @@ class KnownCameras {
   /// From now on the camera is known. `repeat`: whether it is one to be said again.
   void Believe(const CameraInfo& info, bool repeat, int64_t now_ns) {
     claims_.Forget(info.camera_id);
-    known_[info.camera_id] = {info, repeat, now_ns + kSilentNs + jitter_ns_};
+    known_[info.camera_id] = {info, repeat, now_ns + kSilentNs + jitter_ns_, 0};
   }
-  /// Somebody said what is known already.
-  void Heard(CameraId camera, int64_t now_ns) { known_.at(camera).due_ns = now_ns + kSilentNs + jitter_ns_; }
+  /// Somebody spoke of a camera that is known. Where it is another one that he means, or another recording,
+  /// what is known is said again soon: he may not have heard it.
+  void Heard(const CameraInfo& info, int64_t now_ns) {
+    Known& known = known_.at(info.camera_id);
+    known.due_ns = IsOfSame(info, known.info) ? now_ns + kSilentNs + jitter_ns_
+                                              : std::min(known.due_ns, known.said_ns + kContradictNs);
+  }
   /// The cameras of which nobody has said anything for a while. They are to be said now.
   std::vector<CameraInfo> TakeSilent(int64_t now_ns) {
     std::vector<CameraInfo> silent;
     for (auto& [id, known] : known_) {
       if (!known.repeat || now_ns < known.due_ns) continue;
       known.due_ns = now_ns + kSilentNs;
+      known.said_ns = now_ns;
       silent.push_back(known.info);
     }
     return silent;
@@ -48,10 +55,12 @@ class KnownCameras {
 
  private:
   static constexpr int64_t kSilentNs = 1'500'000'000;
+  static constexpr int64_t kContradictNs = 100'000'000;
   struct Known {
     CameraInfo info;
     bool repeat = false;
-    int64_t due_ns = 0;  ///< when it is repeated, unless somebody else says it before
+    int64_t due_ns = 0;   ///< when it is repeated, unless somebody else says it before
+    int64_t said_ns = 0;  ///< when that was done last
   };
 
   int64_t jitter_ns_;

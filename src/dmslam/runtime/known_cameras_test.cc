@@ -30,9 +30,23 @@ TEST(KnownCameras, OneThatHasFallenSilentIsSaidByOthersFromThenOn) {
 TEST(KnownCameras, WhoHearsItSaidByAnotherWaits) {
   KnownCameras cameras(0);
   cameras.Believe(RoomCamera(), true, 0);
-  cameras.Heard(0, 1'000 * kMs);
+  cameras.Heard(RoomCamera(), 1'000 * kMs);
   EXPECT_TRUE(cameras.TakeSilent(2'499 * kMs).empty());
   EXPECT_EQ(cameras.TakeSilent(2'500 * kMs).size(), 1u);
+}
+
+TEST(KnownCameras, WhoMeansAnotherOneIsContradictedTenTimesASecond) {
+  KnownCameras cameras(0);
+  cameras.Believe(RoomCamera(), true, 0);
+  CameraInfo other = RoomCamera();
+  other.camera.fx_px = 400;
+  CameraInfo elsewhere = RoomCamera();
+  elsewhere.sequence = "hall";
+  cameras.Heard(other, 1'000 * kMs);
+  ASSERT_EQ(cameras.TakeSilent(1'000 * kMs).size(), 1u);
+  cameras.Heard(elsewhere, 1'050 * kMs);
+  EXPECT_TRUE(cameras.TakeSilent(1'099 * kMs).empty());
+  EXPECT_EQ(cameras.TakeSilent(1'100 * kMs).size(), 1u);
 }
 
 TEST(KnownCameras, ThatOfARecordedSessionIsNotRepeated) {

@@ -108,7 +108,8 @@ void StreamNode::OnCameraInfo(CameraId camera, std::span<const uint8_t> bytes) {
     if (!MayBeOurs(info->session)) return;
     if (options_.of_a_log || cameras_.SaidAgain(*info, context_.now_ns())) BelieveCamera(*info);
   } else if (!IsForeignFrame(info->session)) {
-    cameras_.Heard(camera, context_.now_ns());
+    cameras_.Heard(*info, context_.now_ns());
+    KeepCameraKnown();
   }
 }
 
