@@ -343,13 +343,15 @@ Json CameraJson(CameraId number, const CameraResults& results) {
   return json;
 }
 
-/// Of several cameras: each, and all together.
+/// Of several cameras: each, and all together. What stands above them of the first one is the same there.
 Json CamerasJson(const std::vector<CameraResults>& results) {
   using Trajectories = TrajectoryBuilder::Trajectories;
   Json json;
   Json cameras = Json::array();
   for (size_t i = 0; i < results.size(); ++i)
     cameras.push_back(CameraJson(static_cast<CameraId>(i), results[i]));
+  for (const char* key : {"frames", "frames_processed", "frames_skipped", "frames_lost"})
+    json[key] = cameras.front()[key];
   json["cameras"] = cameras;
   json["other_maps"] = OtherMapsOfAllJson(results);
   json["ate_rmse_joint"] = NumberOrNull(EvaluateJointly(results, &Trajectories::final));

@@ -97,6 +97,30 @@ TEST_F(ResultsTest, OfEachCameraIsCountedWhatWasPlayedTrackedAndLost) {
   EXPECT_EQ(of_camera(2, "frames_tracked"), 0);
 }
 
+TEST_F(ResultsTest, OfSeveralCamerasTheFirstOnesCountsAreThoseOfAllOfItsFrontends) {
+  run_.cameras.resize(2);
+  run_.restarts = 1;  // of the other camera's frontend
+  for (uint32_t frame = 0; frame < 78; ++frame) Tell(0, frame, 1);
+  for (CameraRecord& camera : run_.cameras) camera.frames.published = 100;
+  run_.cameras[0].frontend.frames_processed = 74;  // when it said so last
+  run_.cameras[0].frontend.frames_skipped = 12;
+  const Json summary = Summary();
+  EXPECT_EQ(summary["frames_processed"], 78);
+  EXPECT_EQ(summary["frames_lost"], 10);
+  for (const char* key : {"frames", "frames_processed", "frames_skipped", "frames_lost"})
+    EXPECT_EQ(summary[key], summary["cameras"][0][key]) << key;
+}
+
+TEST_F(ResultsTest, OfOneCameraNobodyKnowsWhatNeverCameToAFrontendThatDied) {
+  for (uint32_t frame = 0; frame < 10; ++frame) Tell(0, frame, 1);
+  run_.cameras[0].frames.published = 10;
+  run_.cameras[0].frontend.frames_received = 9;
+  run_.end_heard = true;
+  EXPECT_EQ(Summary()["frames_lost"], 1);
+  run_.restarts = 1;
+  EXPECT_TRUE(Summary()["frames_lost"].is_null());
+}
+
 TEST_F(ResultsTest, OfOneCameraTheMapsApartHaveNoNumberOfACamera) {
   for (uint32_t frame = 10; frame < 20; ++frame) Tell(0, frame, 1);
   Tell(0, 20, 2);
