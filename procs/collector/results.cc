@@ -318,6 +318,12 @@ Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
   return json;
 }
 
+/// The map that holds most frames of all cameras; null where this one has nothing in it.
+Json MapOfCameraJson(const TrajectoryBuilder::Trajectories& t) {
+  const bool has_part = !t.final.empty() || !t.online.empty() || !t.keyframes.empty();
+  return t.map_id && has_part ? Json(*t.map_id) : Json();
+}
+
 /// Lost is what was played, and was neither worked on nor skipped: it was dropped on its way, or there was no
 /// frontend, or one that died with it.
 Json CameraJson(CameraId number, const CameraResults& results) {
@@ -336,7 +342,7 @@ Json CameraJson(CameraId number, const CameraResults& results) {
   json["tracked_online_percent"] = Percent(t.online.size(), camera->frames.published);
   json["tracked_percent"] = Percent(t.final.size(), camera->frames.published);
   json["keyframes"] = t.keyframes.size();
-  json["map"] = t.map_id ? Json(*t.map_id) : Json();
+  json["map"] = MapOfCameraJson(t);
   json["other_maps"] = OtherMapsJson(t);
   json["ate_rmse_final"] = NumberOrNull(errors.final);
   json["ate_rmse_online"] = NumberOrNull(errors.online);

@@ -121,6 +121,19 @@ TEST_F(ResultsTest, OfOneCameraNobodyKnowsWhatNeverCameToAFrontendThatDied) {
   EXPECT_TRUE(Summary()["frames_lost"].is_null());
 }
 
+TEST_F(ResultsTest, ACameraThatHasNothingInTheMapHasNone) {
+  run_.cameras.resize(4);
+  for (uint32_t frame = 10; frame < 20; ++frame) Tell(0, frame, 1);
+  Tell(1, 10, 1);
+  Tell(2, 10, 2);
+  Tell(3, 10, 0);
+  const Json cameras = Summary()["cameras"];
+  EXPECT_EQ(cameras[0]["map"], 1);
+  EXPECT_EQ(cameras[1]["map"], 1);
+  EXPECT_TRUE(cameras[2]["map"].is_null()) << "its frames are in another one: " << cameras[2];
+  EXPECT_TRUE(cameras[3]["map"].is_null()) << "it was never placed: " << cameras[3];
+}
+
 TEST_F(ResultsTest, OfOneCameraTheMapsApartHaveNoNumberOfACamera) {
   for (uint32_t frame = 10; frame < 20; ++frame) Tell(0, frame, 1);
   Tell(0, 20, 2);
