@@ -429,8 +429,8 @@ void StreamNode::WarnOnce(const std::string& matter, const std::string& text) {
 
 void StreamNode::WatchReaders() {
   constexpr char kDoubtful[] =
-      "dropped a message with a leap in its number, its time or its term: forged, or the echo of one that is "
-      "gone";
+      "put aside a message with a leap in its number, its time or its term: the first word of a process that "
+      "was started again (it counts when it is said again), the echo of one that is gone, or forged";
   if (writer_) {
     const WriterStatistics s = writer_->statistics();
     if (s.dropped_doubtful > 0) WarnOnce("doubtful", kDoubtful);

@@ -211,6 +211,28 @@ TEST_F(MapStreamTest, AnEarlierChangeThatItsWriterSaysAgainIsBelieved) {
   EXPECT_EQ(writer_->AcknowledgedBy("collector"), seq);
 }
 
+/// The first beacon of the next term is put aside until it is said again: with one message alone nobody can
+/// take a stream over. That is no attack yet, and the log does not call it one.
+TEST_F(MapStreamTest, AWriterThatIsStartedAgainIsToldAsOne) {
+  Publish(AddKeyframe(1));
+  Run();
+  MapSnapshots snapshots(&map_);
+  mapper_.Remove(writer_.get());
+  testing::internal::CaptureStdout();
+  writer_ = std::make_unique<StreamWriter>(WriterOfRole(kSession, StreamId::kMap, "mapper", "collector"),
+                                           Term{20, 9}, holder_->held(), &snapshots);
+  mapper_.AddWriter(writer_.get(), "MAPPER", {"COLLECTOR"});
+  Publish(AddKeyframe(2));
+  Run();
+  const std::string log = testing::internal::GetCapturedStdout();
+  EXPECT_EQ(holder_->map().keyframes().size(), 2U);
+  EXPECT_EQ(holder_->health().dropped_malformed, 1) << "as ever: its first word was not believed at once";
+  EXPECT_NE(log.find("was started again"), std::string::npos) << log;
+  EXPECT_EQ(log.find("dropped"), std::string::npos) << log;
+  mapper_.Remove(writer_.get());  // before what its snapshots are made of is gone
+  writer_.reset();
+}
+
 TEST_F(MapStreamTest, AGroupIsAppliedAsOneOrReplacedByASnapshot) {
   MapDelta first = AddKeyframe(1), second = AddKeyframe(2);
   first.group = {5, 0, 2};
