@@ -9,6 +9,7 @@
 #include "dmslam/messaging/bus_key.h"
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/http_address.h"
 #include "dmslam/util/ids.h"
 #include "dmslam/util/output_file.h"
 
@@ -217,6 +218,7 @@ void CheckRunArguments(const RunArguments& a) {
   if (!a.settings.profile.empty() && a.settings.profile != "dm" && a.settings.profile != "baseline" &&
       a.settings.profile != "paper")
     throw InputError("--profile " + a.settings.profile + ": write dm, baseline or paper");
+  if (!a.output.http.empty()) ParseHttpAddress(a.output.http);
   CheckKey(a.bus, a.source);
   CheckPort(a.bus);
 }

@@ -88,6 +88,18 @@ TEST_F(RunPlanTest, AFolderForTheMapThatIsNotThereIsRefusedBeforeTheRun) {
   }
 }
 
+TEST_F(RunPlanTest, AnAddressWhereNothingCanBeServedIsRefused) {
+  for (const char* address : {"127.0.0.1:99999", "notanaddress", ":8080", "127.0.0.1:", "127.0.0.1:-1"}) {
+    arguments_.output.http = address;
+    EXPECT_EQ(Refusal(), std::string("--http ") + address +
+                             ": write HOST:PORT, the port between 0 and 65535, as 127.0.0.1:8080");
+  }
+  for (const char* address : {"127.0.0.1:0", "[::1]:8080", "localhost:65535"}) {
+    arguments_.output.http = address;
+    EXPECT_EQ(Refusal(), "") << address;
+  }
+}
+
 TEST_F(RunPlanTest, HandsTheKeyToAllOnceItIsSafe) {
   unsetenv("DMSLAM_KEY_FILE");
   arguments_.bus.key = folder_ + "/key";

@@ -6,6 +6,7 @@
 #include "dmslam/messaging/event_loop.h"
 #include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/process_main.h"
+#include "dmslam/util/http_address.h"
 #include "viewer/log_playback.h"
 #include "viewer/viewer_node.h"
 #include "viewer/web_server.h"
@@ -47,6 +48,13 @@ int ShowLog(const std::string& log, const dmslam::NodeOptions& options, const dm
   return 0;
 }
 
+/// There and nowhere else.
+void ServeAt(const dmslam::HttpAddress& address, dmslam::WebServerOptions* web) {
+  web->host = address.host;
+  web->port = address.port;
+  web->or_any_port = false;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -75,7 +83,7 @@ int main(int argc, char** argv) {
   app.AddOption("--three", web.three_dir, "folder of three.js").ShowDefault();
   app.AddOption("--chart", web.chart_dir, "folder of Chart.js").ShowDefault();
   const auto complete = [&] {
-    if (!http.empty()) dmslam::ParseHttpAddress(http, &web);
+    if (!http.empty()) ServeAt(dmslam::ParseHttpAddress(http), &web);
     if (web.web_dir.empty()) web.web_dir = dmslam::FindDataFolder("procs/viewer/web");
   };
   process.SetOffline([&](const dmslam::NodeOptions& options) -> std::optional<int> {

@@ -111,20 +111,6 @@ std::string RandomToken() {
 
 }  // namespace
 
-void ParseHttpAddress(const std::string& text, WebServerOptions* options) {
-  options->or_any_port = false;
-  const size_t colon = text.rfind(':');
-  const InputError error("--http " + text + ": write HOST:PORT, as 127.0.0.1:8080");
-  if (colon == std::string::npos || colon == 0) throw error;
-  options->host = text.substr(0, colon);
-  if (options->host.front() == '[' && options->host.back() == ']')
-    options->host = options->host.substr(1, options->host.size() - 2);
-  const char* begin = text.data() + colon + 1;
-  const auto [end, code] = std::from_chars(begin, text.data() + text.size(), options->port);
-  if (code != std::errc() || end != text.data() + text.size() || options->port < 0 || options->port > 65535)
-    throw error;
-}
-
 struct WebServer::Impl {
   Impl(Exchange* the_exchange, PlaybackControl* the_control) : exchange(the_exchange), control(the_control) {}
   HttpResponse Handle(const HttpRequest& request) const;

@@ -21,9 +21,6 @@ struct WebServerOptions {
   std::string chart_dir;           ///< Chart.js, as Debian's libjs-chart.js lays it out
 };
 
-/// "HOST:PORT", also "[::1]:8080". Throws InputError.
-void ParseHttpAddress(const std::string& text, WebServerOptions* options);
-
 /// Serves the page, the map and the events over HTTP, in a thread of its own that touches nothing but the
 /// exchange. Where others than this host can come, who comes must bring a token.
 class WebServer {

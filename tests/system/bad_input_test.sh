@@ -72,6 +72,9 @@ refused "second: its camera has fx 400, that of .*broken has fx [0-9.]+; name th
   --also "$work/second" --out "$work/done"
 again "is 640x480 pixels, but the camera file says 320x480" --camera "$work/small.yaml"
 again "no.such.key" --camera "$camera" --set no.such.key=1
+for address in 127.0.0.1:99999 notanaddress; do
+  again "http $address: write HOST:PORT" --camera "$camera" --viewer --http "$address"
+done
 again "leaves no frame of 150" --camera "$camera" --start 150
 again "black-out 10: write FROM,SECONDS" --camera "$camera" --black-out 10
 
