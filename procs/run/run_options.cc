@@ -64,9 +64,11 @@ void CheckOtherCameras(const RunArguments& a) {
 /// The folder of the results is made by the run itself.
 void CheckSaveMap(const std::string& path, const std::string& out) {
   if (path.empty()) return;
-  const fs::path folder = fs::absolute(path).lexically_normal().parent_path();
-  if (folder == fs::absolute(out + "/").lexically_normal().parent_path()) return;
+  const fs::path file = fs::absolute(path).lexically_normal();
+  const fs::path results = fs::absolute(out + "/").lexically_normal().parent_path();
+  if (file == results) throw InputError("--save-map: " + path + ": is a folder; give the name of a file");
   try {
+    if (file.parent_path() == results) return CheckNoFolder(path);
     CheckFolderOf(path);
   } catch (const InputError& error) {
     throw InputError(std::string("--save-map: ") + error.what());

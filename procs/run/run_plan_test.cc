@@ -88,6 +88,18 @@ TEST_F(RunPlanTest, AFolderForTheMapThatIsNotThereIsRefusedBeforeTheRun) {
   }
 }
 
+TEST_F(RunPlanTest, AFolderInTheMapsPlaceIsRefusedBeforeTheRun) {
+  fs::create_directories(folder_ + "/adir");
+  for (const char* out : {"", "/new"}) {
+    arguments_.output.folder = folder_ + out;
+    for (const std::string& path :
+         {folder_ + "/adir", folder_ + "/adir/", folder_ + out, folder_ + out + "/"}) {
+      arguments_.map.save = path;
+      EXPECT_EQ(Refusal(), "--save-map: " + path + ": is a folder; give the name of a file");
+    }
+  }
+}
+
 TEST_F(RunPlanTest, AnAddressWhereNothingCanBeServedIsRefused) {
   for (const char* address : {"127.0.0.1:99999", "notanaddress", ":8080", "127.0.0.1:", "127.0.0.1:-1"}) {
     arguments_.output.http = address;

@@ -75,6 +75,12 @@ again "no.such.key" --camera "$camera" --set no.such.key=1
 for address in 127.0.0.1:99999 notanaddress; do
   again "http $address: write HOST:PORT" --camera "$camera" --viewer --http "$address"
 done
+mkdir "$work/adir"
+again "save-map: $work/adir: is a folder" --camera "$camera" --save-map "$work/adir"
+again "save-map: $work/done/log: is a folder" --camera "$camera" --save-map "$work/done/log"
+refused "$work/adir: is a folder" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --out "$work/o" \
+  --save-map "$work/adir"
+refused "$work/adir: is a folder" "$build/bin/dmslam-map" landmark "$work/none.map" --all --json "$work/adir"
 again "leaves no frame of 150" --camera "$camera" --start 150
 again "black-out 10: write FROM,SECONDS" --camera "$camera" --black-out 10
 

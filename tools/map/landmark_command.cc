@@ -6,6 +6,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 #include "landmark_json.h"
 #include "landmark_text.h"
 
@@ -65,6 +66,7 @@ void Warn(const LandmarkProofs& proofs) {
 
 int TellLandmark(const LandmarkArguments& arguments, const std::optional<BusKey>& key) {
   const std::optional<LandmarkId> id = IdOf(arguments);
+  if (!arguments.json.empty()) CheckFolderOf(arguments.json);
   const LandmarkProofs proofs = ReadProofs(arguments.source, id, key);
   Warn(proofs);
   const std::map<LandmarkId, LandmarkHistory>& all = proofs.histories.landmarks();

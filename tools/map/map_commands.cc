@@ -319,7 +319,7 @@ int DiffMaps(const std::string& path_a, const std::string& path_b, const std::op
 }
 
 int SplitMaps(const std::string& path, const std::string& prefix, const std::optional<BusKey>& key) {
-  CheckFolderOf(prefix);
+  CheckFolderOf(prefix + "1.map");
   const WholeMap whole = OpenWhole(path, key);
   const std::set<MapId> maps = MapsOf(whole.map());
   if (maps.size() == 1)

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dmslam/map/testing/map_scene.h"
+#include "dmslam/util/check.h"
 #include "landmark_text.h"
 
 namespace dmslam {
@@ -84,6 +85,29 @@ TEST_F(MapCommandsTest, AMapThatWasSplitOffIsOfItsOwnRunAlone) {
   EXPECT_EQ(part.runs.size(), 1u);
   EXPECT_EQ(part.session.seed, 42u);
   EXPECT_EQ(part.session.sequence, "way of seed 42");
+}
+
+/// What is said where it is refused.
+template <typename Command>
+std::string Refusal(const Command& command) {
+  try {
+    command();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(MapCommandsTest, AFolderInAFilesPlaceIsRefused) {
+  std::filesystem::create_directories(Path("adir"));
+  MergeArguments merge;
+  merge.save = Path("adir");
+  EXPECT_EQ(Refusal([&] { MergeMaps(merge, {}); }), Path("adir") + ": is a folder; give the name of a file");
+  Join("c.map");
+  for (const std::string& prefix : {Path("adir"), Path("adir/")}) {
+    ASSERT_EQ(SplitMaps(Path("c.map"), prefix, {}), 0);
+    EXPECT_TRUE(std::filesystem::is_regular_file(prefix + "2.map")) << "a prefix may be a folder's name";
+  }
 }
 
 /// What `diff` says of two files, and its exit code.

@@ -70,7 +70,14 @@ bool RenameDurably(const std::filesystem::path& from, const std::filesystem::pat
 
 bool SyncFolderOf(const std::filesystem::path& path) { return Sync(FolderOf(path), O_RDONLY | O_DIRECTORY); }
 
+void CheckNoFolder(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored) || (!file.empty() && file.filename().empty()))
+    throw InputError(file.string() + ": is a folder; give the name of a file");
+}
+
 void CheckFolderOf(const std::filesystem::path& file) {
+  CheckNoFolder(file);
   const std::filesystem::path folder = FolderOf(file);
   const auto refuse = [&](const std::string& why, const std::string& cure) {
     throw InputError(folder.string() + ": " + why + ", so " + file.filename().string() +

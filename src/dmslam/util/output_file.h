@@ -30,8 +30,11 @@ class OutputFile {
   std::FILE* file_ = nullptr;
 };
 
+/// Throws InputError where a file of this name cannot be written since it is the name of a folder.
+void CheckNoFolder(const std::filesystem::path& file);
+
 /// Throws InputError that names the folder of a file where nothing can be written into it: it is not there,
-/// is none, or may not be written to.
+/// is none, or may not be written to. One that names the file where it is a folder itself.
 void CheckFolderOf(const std::filesystem::path& file);
 
 /// Writes a whole file: the former one stays until the new one is complete.

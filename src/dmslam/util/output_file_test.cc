@@ -95,6 +95,9 @@ TEST_F(OutputFileTest, AFolderThatTakesNoFileIsNamed) {
   EXPECT_EQ(why(folder + "/b/a"), folder +
                                       "/b: is no folder, so a cannot be written there; move it away, or "
                                       "choose another folder");
+  fs::create_directories(folder + "/c");
+  for (const char* file : {"/c", "/c/"})
+    EXPECT_EQ(why(folder + file), folder + file + ": is a folder; give the name of a file");
 }
 
 }  // namespace
