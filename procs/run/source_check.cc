@@ -1,5 +1,6 @@
 #include "run/source_check.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -59,31 +60,48 @@ void CheckSize(FrameSource* source, size_t index, const Camera& camera) {
                     "; give the camera file that belongs to the sequence");
 }
 
-/// `name`: what to call the recording.
-void CheckFrames(const std::string& name, FrameSource* source, const Camera& camera, const RunArguments& a) {
-  const uint64_t start = NumberOr(a.source.start, 0);
-  if (start >= source->size() || NumberOr(a.source.frames, 1) == 0) {
+/// Which of `frames` frames are played. `name`: what to call the recording. Returns the first one.
+size_t CheckStart(const std::string& name, size_t frames, const RunArguments::Source& source) {
+  const uint64_t start = NumberOr(source.start, 0);
+  if (start >= frames || NumberOr(source.frames, 1) == 0) {
     throw InputError(name + ": --start " + std::to_string(start) + " leaves no frame of " +
-                     std::to_string(source->size()));
+                     std::to_string(frames));
   }
-  CheckSize(source, start, camera);
+  return start;
+}
+
+/// `name`: what to call the recording. Returns how many frames it has.
+size_t CheckFrames(const std::string& name, FrameSource* source, const Camera& camera,
+                   const RunArguments& a) {
+  CheckSize(source, CheckStart(name, source->size(), a.source), camera);
   source->GroundTruth();  // reads it
+  return source->size();
 }
 
-void CheckLive(const std::string& camera, const RunArguments& a) {
+/// Of a camera nobody knows how many frames there will be.
+size_t CheckLive(const std::string& camera, const RunArguments& a) {
   if (a.pace.lockstep) throw InputError(camera + ": a camera waits for nobody; leave --lockstep out");
+  return SIZE_MAX;
 }
 
-void CheckFirst(const RunArguments& a, const Camera& camera) {
-  if (!a.source.replay.empty()) {
-    PrefixOfCamera(a.source.replay);
-  } else if (!a.source.log.empty()) {
-    CheckFrames(a.source.log, OpenLog(a.source.log, a).get(), camera, a);
-  } else if (IsCamera(a.source.sequence)) {
-    CheckLive(a.source.sequence, a);
-  } else {
-    CheckFrames(a.source.sequence, OpenSequence(a.source.sequence, a.camera.file, a).get(), camera, a);
-  }
+/// lcm-logplayer plays whole logs; only of which frames are chosen or changed a copy is made.
+size_t CheckReplay(const std::string& log, const RunArguments& a) {
+  PrefixOfCamera(log);
+  const RunArguments::Source& source = a.source;
+  if (source.start.empty() && source.frames.empty() && source.black_outs.empty() && source.jumps.empty())
+    return SIZE_MAX;
+  const size_t frames = OpenLog(log, a)->size();
+  CheckStart(log, frames, source);
+  return frames;
+}
+
+/// Each of these returns how many frames there are.
+size_t CheckFirst(const RunArguments& a, const Camera& camera) {
+  const std::string& sequence = a.source.sequence;
+  if (!a.source.replay.empty()) return CheckReplay(a.source.replay, a);
+  if (!a.source.log.empty()) return CheckFrames(a.source.log, OpenLog(a.source.log, a).get(), camera, a);
+  if (IsCamera(sequence)) return CheckLive(sequence, a);
+  return CheckFrames(sequence, OpenSequence(sequence, a.camera.file, a).get(), camera, a);
 }
 
 /// A camera that is not told by the first one's model must be of it.
@@ -95,8 +113,8 @@ void CheckModel(const std::string& path, const Camera& camera, const RunArgument
                     "; name the files of both, with --camera and --also-camera (docs/many-cameras.md)");
 }
 
-void CheckOther(const std::string& path, const std::string& own_file, const RunArguments& a,
-                const Camera& first) {
+size_t CheckOther(const std::string& path, const std::string& own_file, const RunArguments& a,
+                  const Camera& first) {
   const bool told_by_first = !own_file.empty();
   const std::string& file = told_by_first ? own_file : a.camera.file;
   const Camera camera = CameraOf(file, path);
@@ -106,8 +124,20 @@ void CheckOther(const std::string& path, const std::string& own_file, const RunA
     return CheckLive(path, a);
   }
   auto source = OpenSequence(path, file, a);
-  CheckFrames(path, source.get(), camera, a);
+  const size_t frames = CheckFrames(path, source.get(), camera, a);
   if (told_by_first) SeenAs(std::move(source), camera, first, path);
+  return frames;
+}
+
+/// Only frames that there are can be changed. `frames`: of the longest recording.
+void CheckChanges(const RunArguments::Source& source, size_t frames) {
+  const auto check = [&](const std::string& option, size_t frame) {
+    if (frame < frames) return;
+    throw InputError(option + ": there is no frame " + std::to_string(frame) + ", the last of " +
+                     std::to_string(frames) + " frames is " + std::to_string(frames - 1));
+  };
+  for (const std::string& text : source.black_outs) check("--black-out " + text, ParseBlackOut(text).from);
+  for (const std::string& text : source.jumps) check("--jump " + text, ParseJump(text).to);
 }
 
 }  // namespace
@@ -134,10 +164,12 @@ void CheckSources(const RunArguments& a) {
   for (const std::string& text : a.source.black_outs) ParseBlackOut(text);
   for (const std::string& text : a.source.jumps) ParseJump(text);
   const Camera camera = CameraThatPlays(a);
-  CheckFirst(a, camera);
-  for (size_t i = 0; i < a.source.others.size(); ++i)
-    CheckOther(a.source.others[i], a.source.other_cameras.empty() ? "" : a.source.other_cameras[i], a,
-               camera);
+  size_t longest = CheckFirst(a, camera);
+  for (size_t i = 0; i < a.source.others.size(); ++i) {
+    const std::string own_file = a.source.other_cameras.empty() ? "" : a.source.other_cameras[i];
+    longest = std::max(longest, CheckOther(a.source.others[i], own_file, a, camera));
+  }
+  CheckChanges(a.source, longest);
 }
 
 }  // namespace dmslam

@@ -126,5 +126,18 @@ TEST_F(SourceCheckTest, SettingsAndChangesOfFramesAreRefusedByName) {
   ExpectRefused("--jump 10,5: write FROM,TO");
 }
 
+TEST_F(SourceCheckTest, ChangesOfFramesThatAreNotThereAreRefusedByName) {
+  arguments_.source.black_outs = {"1,0.5", "2,1"};
+  ExpectRefused("--black-out 2,1: there is no frame 2, the last of 2 frames is 1");
+  arguments_.source.black_outs = {"1,0.5"};
+  arguments_.source.jumps = {"0,1", "1,500"};
+  ExpectRefused("--jump 1,500: there is no frame 500, the last of 2 frames is 1");
+  arguments_.source.jumps = {"0,1"};
+  EXPECT_EQ(Refusal(), "");
+  WriteFileBytes(arguments_.source.others[0] + "/0003.png", EncodePng(GrayImage(640, 480)));
+  arguments_.source.black_outs = {"2,1"};
+  EXPECT_EQ(Refusal(), "") << "the other camera has that frame";
+}
+
 }  // namespace
 }  // namespace dmslam

@@ -82,6 +82,8 @@ refused "$work/adir: is a folder" "$build/bin/dmslam-inprocess" --sequence "$syn
   --save-map "$work/adir"
 refused "$work/adir: is a folder" "$build/bin/dmslam-map" landmark "$work/none.map" --all --json "$work/adir"
 again "leaves no frame of 150" --camera "$camera" --start 150
+again "--jump 5,500: there is no frame 500, the last of 150 frames is 149" --camera "$camera" --jump 5,500
+again "--black-out 500,1: there is no frame 500, the last of 150 frames is 149" --camera "$camera" --black-out 500,1
 again "black-out 10: write FROM,SECONDS" --camera "$camera" --black-out 10
 
 # Somebody else's socket on the port.
