@@ -170,6 +170,7 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
                 "that is of its model");
   app.AddFlag("--lockstep", a.lockstep, "wait for the frontend after each frame");
   app.AddOption("--speed", a.options.speed, "factor on the recorded rate; 0: as fast as possible")
+      .NonNegative()
       .ShowDefault();
   app.AddOption("--start", a.options.start, "first frame");
   app.AddOption("--frames", a.options.frames, "at most so many frames");

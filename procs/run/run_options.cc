@@ -1,6 +1,7 @@
 #include "run/run_options.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -75,6 +76,15 @@ void CheckSaveMap(const std::string& path, const std::string& out) {
   }
 }
 
+/// Below a thousandth it would be handed on as 0.
+void CheckSpeed(double speed) {
+  if (speed >= 0.001 && std::isfinite(speed)) return;
+  char text[32];
+  std::snprintf(text, sizeof(text), "%g", speed);
+  throw InputError(std::string("--speed ") + text +
+                   ": must be above zero, 0.001 or more; --lockstep plays as fast as it can");
+}
+
 void CheckKey(const RunArguments::Bus& bus, const RunArguments::Source& source) {
   const bool keyed = BusKey::LoadIfWanted(bus.key).has_value();
   if (keyed && !source.replay.empty()) {
@@ -136,7 +146,11 @@ void DeclareMap(CommandLine& line, RunArguments::MapFiles& map) {
 void DeclarePace(CommandLine& line, RunArguments::Pace& pace) {
   line.AddFlag("--lockstep", pace.lockstep,
                "wait for every frame: the same input and seed give the same bytes");
-  line.AddOption("--speed", pace.speed, "real time at so many times the recorded rate").ShowDefault();
+  line.AddOption("--speed", pace.speed,
+                 "in real time: play at so many times the recorded rate, from 0.001 on; 0.5 is half of it. "
+                 "Frames that come too fast for the frontend are skipped; --lockstep goes as fast as it can, "
+                 "and has no use for this")
+      .ShowDefault();
 }
 
 void DeclareSettings(CommandLine& line, RunArguments::Settings& settings) {
@@ -216,6 +230,7 @@ void CheckRunArguments(const RunArguments& a) {
   CheckNumber("--receive-buffer", a.bus.receive_buffer);
   CheckFile("--map", a.map.begin);
   CheckSaveMap(a.map.save, a.output.folder);
+  CheckSpeed(a.pace.speed);
   if (a.map.localize && a.map.begin.empty()) throw InputError("--localize needs a map: give it with --map");
   if (!a.settings.profile.empty() && a.settings.profile != "dm" && a.settings.profile != "baseline" &&
       a.settings.profile != "paper")

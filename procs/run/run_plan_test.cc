@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 
 #include "dmslam/util/check.h"
 #include "dmslam/util/ids.h"
@@ -109,6 +110,19 @@ TEST_F(RunPlanTest, AnAddressWhereNothingCanBeServedIsRefused) {
   for (const char* address : {"127.0.0.1:0", "[::1]:8080", "localhost:65535"}) {
     arguments_.output.http = address;
     EXPECT_EQ(Refusal(), "") << address;
+  }
+}
+
+TEST_F(RunPlanTest, ASpeedThatIsNoneIsRefused) {
+  for (const double speed : {0.0, -1.0, 1e-7, std::numeric_limits<double>::infinity()}) {
+    arguments_.pace.speed = speed;
+    EXPECT_NE(Refusal().find(": must be above zero, 0.001 or more"), std::string::npos) << speed;
+  }
+  arguments_.pace.speed = 0;
+  EXPECT_EQ(Refusal(), "--speed 0: must be above zero, 0.001 or more; --lockstep plays as fast as it can");
+  for (const double speed : {0.001, 0.5, 1000.0}) {
+    arguments_.pace.speed = speed;
+    EXPECT_EQ(Refusal(), "") << speed;
   }
 }
 

@@ -81,6 +81,7 @@ again "save-map: $work/done/log: is a folder" --camera "$camera" --save-map "$wo
 refused "$work/adir: is a folder" "$build/bin/dmslam-inprocess" --sequence "$synthetic" --camera "$camera" --out "$work/o" \
   --save-map "$work/adir"
 refused "$work/adir: is a folder" "$build/bin/dmslam-map" landmark "$work/none.map" --all --json "$work/adir"
+again "speed 0: must be above zero" --camera "$camera" --speed 0
 again "leaves no frame of 150" --camera "$camera" --start 150
 again "--jump 5,500: there is no frame 500, the last of 150 frames is 149" --camera "$camera" --jump 5,500
 again "--black-out 500,1: there is no frame 500, the last of 150 frames is 149" --camera "$camera" --black-out 500,1
