@@ -227,7 +227,14 @@ const RecordedSession& LogIndex::Session(uint32_t id) const {
   std::string ids;
   for (const auto& [session, content] : sessions_) ids += (ids.empty() ? "" : ", ") + std::to_string(session);
   if (id != 0) throw InputError(path() + ": holds no session " + std::to_string(id) + " but " + ids);
-  throw InputError(path() + ": holds several sessions (" + ids + "); choose one with --log-session");
+  const bool of_saved_maps = !sessions_.empty() && std::ranges::all_of(sessions_, [](const auto& session) {
+    return session.second.IsSavedMap();
+  });
+  if (!of_saved_maps)
+    throw InputError(path() + ": holds several sessions (" + ids + "); choose one with --log-session");
+  throw InputError(path() + ": is several saved maps in one file (of the sessions " + ids +
+                   "); give each by itself: dmslam-map --map " + path() +
+                   " --log-session SESSION --save FILE takes one out");
 }
 
 Bytes LogIndex::Read(const RecordedMessage& message) const {

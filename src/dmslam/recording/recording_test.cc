@@ -382,6 +382,32 @@ TEST_F(Recording, AMapBesideAnotherVocabularyIsNamed) {
             "(0000000000000def); give its own with --vocabulary");
 }
 
+TEST_F(Recording, SeveralSavedMapsInOneFileAreNamedAndEachCanBeTakenOut) {
+  TinyMapper mapper;
+  mapper.Step();
+  SessionStart start;
+  start.camera = TestCamera();
+  std::string both;
+  for (const uint32_t session : {5, 11}) {
+    start.session = session;
+    SaveMap(path_ + ".map", mapper.map(), start);
+    std::ifstream file(path_ + ".map", std::ios::binary);
+    both.append(std::istreambuf_iterator<char>(file), {});
+  }
+  const std::string path = path_ + ".map2";
+  std::ofstream(path, std::ios::binary) << both;
+  EXPECT_EQ(WhyNotLoaded(path), path +
+                                    ": is several saved maps in one file (of the sessions 5, 11); give each "
+                                    "by itself: dmslam-map --map " +
+                                    path + " --log-session SESSION --save FILE takes one out");
+  const LogIndex log(path);
+  for (const uint32_t session : {5, 11}) {
+    const RebuiltMap map = RebuildMap(log, log.Session(session));
+    EXPECT_EQ(map.session.session, session);
+    EXPECT_EQ(Content(map.map), Content(mapper.map()));
+  }
+}
+
 TEST_F(Recording, HalfASavedMapIsRefusedByName) {
   TinyMapper mapper;
   for (int i = 0; i < 60; ++i) mapper.Step();
