@@ -33,7 +33,9 @@ std::optional<std::string> CheckMap(const RunArguments& a) {
   if (path.empty()) return std::nullopt;
   const SessionStart made = MadeWith(path);
   CheckFits(path, made, CameraThatPlays(a), SettingsOf(a).Read<Pyramid>());
-  if (a.build_folder.empty()) CheckVocabulary(path, made, LoadVocabulary("")->checksum());
+  const std::string& vocabulary = a.settings.vocabulary;
+  if (a.build_folder.empty() || !vocabulary.empty())
+    CheckVocabulary(path, made, LoadVocabulary(vocabulary)->checksum());
   return CheckWhole(path, BusKey::LoadIfWanted(a.bus.key));
 }
 

@@ -12,7 +12,9 @@
 #include "dmslam/map/map_editor.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/event_log.h"
+#include "dmslam/place_recognition/places_test_util.h"
 #include "dmslam/recording/map_file.h"
+#include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 
@@ -127,6 +129,20 @@ TEST_F(MapCheckTest, AnotherVocabularyIsAMisfit) {
             std::string::npos);
   arguments_.build_folder = "/elsewhere";
   EXPECT_EQ(Refusal(), "") << "programs from elsewhere may have that one";
+}
+
+TEST_F(MapCheckTest, TheVocabularyOfTheMapMayBeGiven) {
+  arguments_.settings.vocabulary = folder_ + "/small.dmv";
+  places_test::SmallVocabulary().SaveBinary(arguments_.settings.vocabulary);
+  made_.vocabulary_checksum = LoadVocabulary(arguments_.settings.vocabulary)->checksum();
+  Save();
+  EXPECT_EQ(Refusal(), "");
+  arguments_.build_folder = "/elsewhere";
+  EXPECT_EQ(Refusal(), "");
+  made_.vocabulary_checksum = 0xabc;
+  Save();
+  EXPECT_NE(Refusal().find("give its own with --vocabulary"), std::string::npos)
+      << "one that is given is judged, whoever uses it";
 }
 
 TEST_F(MapCheckTest, ALogThatLacksRecordsOfItsMapIsNotBegunIn) {

@@ -162,6 +162,7 @@ void DeclareSettings(CommandLine& line, RunArguments::Settings& settings) {
       "dm (default), baseline (plain RANSAC start, no mutual exclusion, no motion belief) or paper (the "
       "DM-SLAM paper alone)");
   line.AddFlag("--no-loop", settings.no_loop, "do not close loops");
+  line.AddOption("--vocabulary", settings.vocabulary, "bag-of-words vocabulary; default: the one that ships");
 }
 
 void DeclareOutput(CommandLine& line, RunArguments::Output& output) {
@@ -228,6 +229,7 @@ void CheckRunArguments(const RunArguments& a) {
   CheckNumber("--seed", a.settings.seed);
   CheckNumber("--pictures", a.output.pictures);
   CheckNumber("--receive-buffer", a.bus.receive_buffer);
+  CheckFile("--vocabulary", a.settings.vocabulary);
   CheckFile("--map", a.map.begin);
   CheckSaveMap(a.map.save, a.output.folder);
   CheckSpeed(a.pace.speed);

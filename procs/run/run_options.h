@@ -34,6 +34,7 @@ struct RunArguments {
   };
   struct Settings {
     std::string seed = "1", config, profile;
+    std::string vocabulary;  ///< empty: the one that ships
     std::vector<std::string> sets;
     bool no_loop = false;
   };

@@ -140,6 +140,12 @@ RunArguments OfOther(RunArguments a, size_t i) {
   return a;
 }
 
+/// Of those who know places by their words.
+Words WithVocabulary(const RunArguments& a, Words words) {
+  AppendOption(&words, "--vocabulary", a.settings.vocabulary);
+  return words;
+}
+
 /// Player and frontend of each further camera.
 std::vector<ChildSpec> MakeOtherCameras(const RunArguments& a, const RunPlace& place, const Words& common) {
   if (place.resume && !a.source.others.empty())
@@ -147,7 +153,7 @@ std::vector<ChildSpec> MakeOtherCameras(const RunArguments& a, const RunPlace& p
   std::vector<ChildSpec> children;
   for (size_t i = 0; i < a.source.others.size(); ++i) {
     const CameraId camera = static_cast<CameraId>(i + 1);
-    children.push_back(MakeChild(roles::kFrontend, a, place, common, camera));
+    children.push_back(MakeChild(roles::kFrontend, a, place, WithVocabulary(a, common), camera));
     Words words = common;
     Append(&words, PlayerArguments(OfOther(a, i)));
     if (!a.source.other_cameras.empty()) Append(&words, {"--as-camera", a.camera.file});
@@ -230,7 +236,7 @@ ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Word
 }
 
 ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
-  Words words = common;
+  Words words = WithVocabulary(a, common);
   if (a.output.pictures != "0") {
     fs::create_directories(place.out + "/pictures");
     Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.output.pictures});
@@ -312,7 +318,8 @@ RunPlan MakeRunPlan(const RunArguments& a, const RunPlace& place) {
   const Words common = CommonArguments(a, place);
   RunPlan plan;
   plan.table = place.out + "/log/table.txt";
-  plan.pipeline = {MakeMapper(a, place, common), MakeChild(roles::kLoopCloser, a, place, common),
+  plan.pipeline = {MakeMapper(a, place, common),
+                   MakeChild(roles::kLoopCloser, a, place, WithVocabulary(a, common)),
                    MakeFrontend(a, place, common), MakeCollector(a, place, common)};
   if (a.source.replay.empty()) {
     plan.pipeline.push_back(MakePlayer(a, place, common));

@@ -170,6 +170,18 @@ TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
   EXPECT_EQ(Line("frontend").find("--lockstep"), std::string::npos);
 }
 
+TEST_F(RunPlanTest, AVocabularyIsHandedToThoseWhoKnowPlaces) {
+  arguments_.settings.vocabulary = folder_ + "/words.dmv";
+  EXPECT_EQ(Refusal(), folder_ + "/words.dmv: no such file; check --vocabulary");
+  std::ofstream(arguments_.settings.vocabulary) << "words";
+  EXPECT_EQ(Refusal(), "");
+  arguments_.source.others = {folder_ + "/second"};
+  for (const char* name : {"loopcloser", "frontend", "frontend1"})
+    EXPECT_NE(Line(name).find("--vocabulary " + folder_ + "/words.dmv "), std::string::npos) << name;
+  for (const char* name : {"mapper", "collector", "player", "player1"})
+    EXPECT_EQ(Line(name).find("--vocabulary"), std::string::npos) << name;
+}
+
 TEST_F(RunPlanTest, EachFurtherCameraHasAFrontendAndAPlayer) {
   EXPECT_EQ(Line("mapper").find("--cameras"), std::string::npos);
   arguments_.source.others = {folder_ + "/second", folder_ + "/third"};

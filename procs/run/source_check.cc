@@ -13,6 +13,7 @@
 #include "dmslam/dataset/seen_as.h"
 #include "dmslam/messaging/bus_key.h"
 #include "dmslam/recording/recorded_frames.h"
+#include "dmslam/runtime/load_vocabulary.h"
 #include "dmslam/runtime/process_main.h"
 #include "dmslam/util/check.h"
 #include "run/log_replay.h"
@@ -163,6 +164,7 @@ void CheckSources(const RunArguments& a) {
   SettingsOf(a);
   for (const std::string& text : a.source.black_outs) ParseBlackOut(text);
   for (const std::string& text : a.source.jumps) ParseJump(text);
+  if (!a.settings.vocabulary.empty()) LoadVocabulary(a.settings.vocabulary);
   const Camera camera = CameraThatPlays(a);
   size_t longest = CheckFirst(a, camera);
   for (size_t i = 0; i < a.source.others.size(); ++i) {

@@ -126,6 +126,11 @@ TEST_F(SourceCheckTest, SettingsAndChangesOfFramesAreRefusedByName) {
   ExpectRefused("--jump 10,5: write FROM,TO");
 }
 
+TEST_F(SourceCheckTest, AVocabularyThatIsNoneIsRefused) {
+  arguments_.settings.vocabulary = arguments_.camera.file;
+  ExpectRefused(arguments_.camera.file + ":");
+}
+
 TEST_F(SourceCheckTest, ChangesOfFramesThatAreNotThereAreRefusedByName) {
   arguments_.source.black_outs = {"1,0.5", "2,1"};
   ExpectRefused("--black-out 2,1: there is no frame 2, the last of 2 frames is 1");

@@ -151,6 +151,11 @@ check "a map of another vocabulary" test $? = 0
 check "2: a run in a map of another vocabulary" test $? = 2
 check "is refused by name, too: $(tail -n 1 "$work/said")" grep -q "words.map: was made with another vocabulary" "$work/said"
 unchanged "a map of another vocabulary"
+"${play[@]}" --map "$work/words.map" --vocabulary "$work/small.dmv" --frames 20 --out "$work/words" >"$work/said" 2>&1
+check "its own may be given" test $? != 2
+check "the run begins in it" grep -q "words.map: [0-9]* keyframes and [0-9]* landmarks loaded" "$work/words/log/mapper.log"
+refused "a.map and .*words.map: were made with different vocabularies .*can never be joined" map merge "$work/a.map" \
+  "$work/words.map" --renumber --save "$work/none.map"
 map diff "$work/a.map" "$work/words.map" >"$work/said"
 check "diff names the vocabularies" grep -qE "^vocabulary +[0-9a-f]{16} in A +[0-9a-f]{16} in B$" "$work/said"
 check "nothing was written" test ! -e "$work/none.map"

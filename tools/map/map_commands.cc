@@ -246,6 +246,13 @@ void CheckMayJoin(const WholeMap& a, const WholeMap& b, bool renumber) {
   const Pyramid &of_a = a.map().pyramid(), &of_b = b.map().pyramid();
   if (of_a.levels != of_b.levels || of_a.scale_factor != of_b.scale_factor)
     throw InputError(both + "were made with other features.levels or features.scale_factor");
+  const auto &words_a = a.rebuilt.session.vocabulary_checksum,
+             &words_b = b.rebuilt.session.vocabulary_checksum;
+  if (words_a && words_b && *words_a != *words_b) {
+    throw MisfitError(both + "were made with different vocabularies (checksums " + Hex(*words_a) + " and " +
+                      Hex(*words_b) +
+                      "), and can never be joined: make one of them anew, with the vocabulary of the other");
+  }
   const std::set<uint32_t> sessions_a = SessionsOf(a.map()), sessions_b = SessionsOf(b.map());
   std::vector<uint32_t> common;
   std::ranges::set_intersection(sessions_a, sessions_b, std::back_inserter(common));

@@ -29,7 +29,7 @@ class MapCommandsTest : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string Path(const std::string& name) const { return (folder_ / name).string(); }
-  void Make(const std::string& name, uint64_t seed) const {
+  void Make(const std::string& name, uint64_t seed, std::optional<uint64_t> vocabulary = {}) const {
     MapScene scene(seed);
     scene.AddCloud(30, {0, 0, 4}, {0.5, 0.5, 0.2});
     scene.MapAll(4);
@@ -41,6 +41,7 @@ class MapCommandsTest : public ::testing::Test {
     start.sequence = "way of seed " + std::to_string(seed);
     start.camera = scene.map().camera();
     start.pyramid = scene.map().pyramid();
+    start.vocabulary_checksum = vocabulary;
     SaveMap(Path(name), scene.map(), start);
   }
   /// Both, one beside the other.
@@ -108,6 +109,22 @@ TEST_F(MapCommandsTest, AFolderInAFilesPlaceIsRefused) {
     ASSERT_EQ(SplitMaps(Path("c.map"), prefix, {}), 0);
     EXPECT_TRUE(std::filesystem::is_regular_file(prefix + "2.map")) << "a prefix may be a folder's name";
   }
+}
+
+TEST_F(MapCommandsTest, MapsOfTwoVocabulariesCanNeverBeJoined) {
+  Make("a.map", 41, 0xabc);
+  Make("b.map", 42, 0xdef);
+  MergeArguments merge;
+  merge.a = Path("a.map");
+  merge.b = Path("b.map");
+  merge.save = Path("c.map");
+  merge.renumber = true;
+  EXPECT_THROW(MergeMaps(merge, {}), MisfitError);
+  EXPECT_EQ(Refusal([&] { MergeMaps(merge, {}); }),
+            merge.a + " and " + merge.b +
+                ": were made with different vocabularies (checksums 0000000000000abc and 0000000000000def), "
+                "and can never be joined: make one of them anew, with the vocabulary of the other");
+  EXPECT_FALSE(std::filesystem::exists(merge.save));
 }
 
 /// What `diff` says of two files, and its exit code.
