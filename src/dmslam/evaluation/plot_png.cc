@@ -1,11 +1,16 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "dmslam/evaluation/plot.h"
 #include "dmslam/evaluation/plot_canvas.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/output_file.h"
 
 namespace dmslam {
 namespace {
@@ -151,14 +156,17 @@ void PngCanvas::Text(PlotPoint at, const std::string& text, const TextStyle& sty
 void WritePng(const PlotFigure& figure, const std::string& path, double scale) {
   PngCanvas canvas(FigureSize(figure), scale);
   DrawFigure(figure, &canvas);
-  bool written = false;
+  std::vector<uint8_t> bytes;
+  bool encoded = false;
   try {
-    written = cv::imwrite(path, canvas.Finish());
+    encoded = cv::imencode(std::filesystem::path(path).extension().string(), canvas.Finish(), bytes);
   } catch (const cv::Exception&) {
-    written = false;
+    encoded = false;
   }
-  if (!written)
-    throw InputError(path + ": cannot be written; check that the folder exists and the name ends in .png");
+  if (!encoded) throw InputError(path + ": is no name of a picture; give one that ends in .png");
+  OutputFile file(path);
+  file.Write(std::as_bytes(std::span(bytes)));
+  file.Commit();
 }
 
 }  // namespace dmslam

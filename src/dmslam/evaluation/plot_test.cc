@@ -1,6 +1,7 @@
 #include "dmslam/evaluation/plot.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include "dmslam/evaluation/evaluation_test_util.h"
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/testing/small_disk.h"
 
 namespace dmslam {
 namespace {
@@ -122,6 +124,25 @@ TEST(Plot, UnwritableFileIsNamed) {
   EXPECT_THROW(WriteSvg(figure, "/nonexistent/a.svg"), InputError);
   EXPECT_THROW(WritePng(figure, "/nonexistent/a.png"), InputError);
   EXPECT_THROW(WritePng(figure, "a.nosuchformat"), InputError);
+}
+
+TEST(Plot, AFullDiskIsCalledThat) {
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("dmslam_plot_test_" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  const PlotFigure figure = OneCurve({0, 1}, {0, 1});
+  std::string why;
+  {
+    const SmallDisk disk(1000);
+    try {
+      WritePng(figure, (folder / "a.png").string());
+    } catch (const InputError& error) {
+      why = error.what();
+    }
+  }
+  EXPECT_NE(why.find("a.png: cannot be written (File too large)"), std::string::npos) << why;
+  EXPECT_TRUE(std::filesystem::is_empty(folder)) << "half a picture is left";
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Plot, ColoursRunFromBlueToRedAndAreClamped) {

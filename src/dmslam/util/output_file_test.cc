@@ -1,37 +1,19 @@
 #include "dmslam/util/output_file.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/testing/small_disk.h"
 
 namespace dmslam {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A disk that takes no file above so many bytes, as long as this lives.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &former_);
-    const rlimit small{bytes, former_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallDisk() { setrlimit(RLIMIT_FSIZE, &former_); }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
- private:
-  rlimit former_{};
-};
 
 class OutputFileTest : public testing::Test {
  protected:

@@ -2,36 +2,21 @@
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
+#include "dmslam/util/testing/small_disk.h"
+
 namespace dmslam {
 namespace {
 
 constexpr size_t kMegabyte = size_t{1} << 20;
-
-/// No file may become larger than this while it lives: as on a disk that is full.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &former_);
-    const rlimit small{bytes, former_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallDisk() { setrlimit(RLIMIT_FSIZE, &former_); }
-
- private:
-  rlimit former_{};
-};
 
 /// Of this process, in pages of files.
 size_t ResidentFilePages() {
