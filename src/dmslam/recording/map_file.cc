@@ -55,6 +55,15 @@ std::string Hex(uint64_t value) {
   return text.data();
 }
 
+/// Whatever ends this, no file of that name stays.
+struct Removal {
+  std::string path;
+  explicit Removal(std::string what) : path(std::move(what)) {}
+  ~Removal() { std::remove(path.c_str()); }
+  Removal(const Removal&) = delete;
+  Removal& operator=(const Removal&) = delete;
+};
+
 [[noreturn]] void RefuseVersion(const LogIndex& log, const std::string& its, const std::string& ours) {
   throw InputError(log.path() + ": was written with " + its + ", this program speaks " + ours +
                    ": load it with the program that wrote it, or make the map again with this one");
@@ -213,6 +222,7 @@ void SaveMap(const std::string& path, const CutMap& map, const SessionStart& ses
   const int64_t utime_us = map.stamp_ns / 1000;
   const std::string partial = path + ".part";
   EventLogWriter log(partial);
+  const Removal of_what_is_not_complete{partial};
   WriteLogVersion(&log, "", utime_us, {session.session, static_cast<int64_t>(map.pieces.size())});
   SessionStart start = session;  // of this program, whoever wrote the one it goes on from
   start.protocol_version = kProtocolVersion;

@@ -18,6 +18,7 @@
 #include "dmslam/recording/recorded_frames.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
+#include "dmslam/util/testing/small_disk.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
 
@@ -556,6 +557,28 @@ TEST_F(Recording, AFolderThatIsNotThereIsNamed) {
   EXPECT_EQ(
       why([&] { EventLogWriter log(folder + "/run.lcmlog"); }),
       folder + ": no such folder, so run.lcmlog cannot be written there; make it, or choose another folder");
+}
+
+TEST_F(Recording, AFullDiskLeavesTheFormerMapAndNoHalfOne) {
+  Saved(3);
+  const std::string path = path_ + ".map";
+  TinyMapper mapper;
+  for (int i = 0; i < 50; ++i) mapper.Step();
+  SessionStart start;
+  start.session = kSession;
+  start.camera = TestCamera();
+  std::string why;
+  {
+    const SmallDisk disk(10'000);
+    try {
+      SaveMap(path, mapper.map(), start);
+    } catch (const InputError& error) {
+      why = error.what();
+    }
+  }
+  EXPECT_NE(why.find("cannot be written; is the disk full?"), std::string::npos) << why;
+  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+  EXPECT_EQ(LoadMap(path).map.keyframes().size(), 3u) << "the former one is there";
 }
 
 TEST_F(Recording, ALogThatNamesNoCameraSaysTheCure) {
