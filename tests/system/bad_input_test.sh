@@ -87,6 +87,8 @@ again "--jump 5,500: there is no frame 500, the last of 150 frames is 149" --cam
 again "--black-out 500,1: there is no frame 500, the last of 150 frames is 149" --camera "$camera" --black-out 500,1
 again "black-out 10: write FROM,SECONDS" --camera "$camera" --black-out 10
 
+refused "$work/adir: is a folder" "$build/bin/dmslam-map" list "$work/adir"
+
 # Somebody else's socket on the port.
 python3 -c '
 import socket, sys

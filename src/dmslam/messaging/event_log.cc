@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <system_error>
 
 #include "dmslam/messaging/codec.h"
 #include "dmslam/util/check.h"
@@ -23,6 +25,9 @@ int64_t EventLogReader::Lengths::total() const { return static_cast<int64_t>(kHe
 
 EventLogReader::EventLogReader(std::string path)
     : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path_, ignored))
+    throw InputError(path_ + ": is a folder; give the log or the saved map itself");
   if (!file_ || std::fseek(file_.get(), 0, SEEK_END) != 0) {
     throw InputError(path_ + ": cannot be read; check the path of the log");
   }

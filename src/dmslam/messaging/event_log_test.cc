@@ -174,6 +174,16 @@ TEST_F(EventLog, WhatIsNoLogIsRefusedByName) {
   EXPECT_THROW(EventLogReader{path_ + ".none"}, InputError);
 }
 
+TEST_F(EventLog, AFolderIsCalledOne) {
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  try {
+    EventLogReader reader(folder);
+    FAIL() << "a folder was read";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.what(), folder + ": is a folder; give the log or the saved map itself");
+  }
+}
+
 TEST_F(EventLog, RandomDamageNeverStopsIt) {
   Random random(7);
   for (int round = 0; round < 300; ++round) {
