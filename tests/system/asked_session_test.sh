@@ -8,13 +8,6 @@ camera=(--camera "$root/config/synthetic.yaml" --sequence "$synthetic")
 begin() { # LOG PROCESS ARGUMENTS...
   "$build/bin/dmslam-$2" --lcm-url "$url" "${@:3}" >"$work/$1.log" 2>&1 </dev/null &
 }
-says() { # PATTERN LOG...
-  local log i
-  for log in "${@:2}"; do
-    for ((i = 0; i < 600; ++i)); do grep -qsE -- "$1" "$work/$log.log" && break; sleep 0.05; done
-    check "$log says '$1': $(<"$work/$log.log")" grep -qsE -- "$1" "$work/$log.log"
-  done
-}
 ended() { # LOG CODE COMMAND...
   local status=0
   timeout 30 "$build/bin/dmslam-$3" --lcm-url "$url" "${@:4}" >"$work/$1.log" 2>&1 </dev/null || status=$?

@@ -49,6 +49,14 @@ finish() {
 # run ARGUMENTS...: scripts/run.sh with the programs under test.
 run() { "$root/scripts/run.sh" --build-dir "$build" "$@"; }
 
+says() { # PATTERN NAME...: within half a minute each $work/NAME.log says it
+  local name i
+  for name in "${@:2}"; do
+    for ((i = 0; i < 600; ++i)); do grep -qsE -- "$1" "$work/$name.log" && break; sleep 0.05; done
+    check "$name says '$1': $(<"$work/$name.log")" grep -qsE -- "$1" "$work/$name.log"
+  done
+}
+
 no_orphans() { # within some seconds
   local i
   for ((i = 0; i < 200; ++i)); do

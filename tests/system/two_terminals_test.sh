@@ -8,13 +8,6 @@ begin() { exec "$build/bin/dmslam-$1" "${common[@]}" "${@:2}" >"$work/$1.log" 2>
 for process in mapper loopcloser frontend; do begin "$process" & done
 begin collector --out "$work/out" &
 begin player --sequence "$synthetic" --camera "$root/config/synthetic.yaml" --frames 60 --speed 0.5 &
-says() { # PATTERN PROCESS...
-  local process i
-  for process in "${@:2}"; do
-    for ((i = 0; i < 600; ++i)); do grep -qsE -- "$1" "$work/$process.log" && break; sleep 0.05; done
-    check "$process says '$1': $(<"$work/$process.log")" grep -qsE -- "$1" "$work/$process.log"
-  done
-}
 says "waiting for mapper" player
 says "waiting for frontend1" mapper collector
 check "it is said once" test "$(grep -c "waiting for mapper" "$work/player.log")" = 1
