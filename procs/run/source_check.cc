@@ -162,8 +162,6 @@ Settings SettingsOf(const RunArguments& a) {
 
 void CheckSources(const RunArguments& a) {
   SettingsOf(a);
-  for (const std::string& text : a.source.black_outs) ParseBlackOut(text);
-  for (const std::string& text : a.source.jumps) ParseJump(text);
   if (!a.settings.vocabulary.empty()) LoadVocabulary(a.settings.vocabulary);
   const Camera camera = CameraThatPlays(a);
   size_t longest = CheckFirst(a, camera);
