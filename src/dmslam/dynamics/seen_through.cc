@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <unordered_map>
 #include <vector>
 
 #include "dmslam/camera/image_scale.h"
@@ -46,15 +47,36 @@ struct Suspect {
   bool condemned = false;
 };
 
-using Suspects = std::map<LandmarkId, Suspect>;
+/// Those of some landmarks that are not proven, by id.
+class Suspects {
+ public:
+  Suspects(const Map& map, const std::vector<const Landmark*>& landmarks) {
+    for (const Landmark* landmark : landmarks) {
+      const std::vector<int64_t> stamps = ObservationStamps(map, *landmark);
+      if (stamps.empty() || OutlastsStanding(stamps, ProvenOptions())) continue;
+      suspects_.push_back({landmark, stamps.front(), stamps.back()});
+    }
+    std::ranges::sort(suspects_, {}, [](const Suspect& suspect) { return suspect.landmark->id; });
+    for (uint32_t i = 0; i < suspects_.size(); ++i) index_.emplace(suspects_[i].landmark->id, i);
+  }
+
+  /// Null: not one of them.
+  const Suspect* Find(LandmarkId id) const {
+    const auto found = index_.find(id);
+    return found == index_.end() ? nullptr : &suspects_[found->second];
+  }
+  size_t size() const { return suspects_.size(); }
+  auto begin() { return suspects_.begin(); }
+  auto end() { return suspects_.end(); }
+  auto begin() const { return suspects_.begin(); }
+  auto end() const { return suspects_.end(); }
+
+ private:
+  std::vector<Suspect> suspects_;
+  std::unordered_map<LandmarkId, uint32_t> index_;
+};
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
-
-void AddIfUnproven(const Map& map, const Landmark& landmark, Suspects* suspects) {
-  const std::vector<int64_t> stamps = ObservationStamps(map, landmark);
-  if (stamps.empty() || OutlastsStanding(stamps, ProvenOptions())) return;
-  (*suspects)[landmark.id] = {&landmark, stamps.front(), stamps.back()};
-}
 
 bool InImage(const Camera& camera, const Eigen::Vector2d& uv_px) {
   return uv_px.x() >= 0 && uv_px.y() >= 0 && uv_px.x() < camera.width_px && uv_px.y() < camera.height_px;
@@ -77,14 +99,14 @@ Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3
       *uv_px, SearchRadiusPx(map.camera(), kAroundRad), 0, kCoarsestOctave, [&](uint32_t feature) {
         const Landmark* other = map.LandmarkSeenBy(witness, feature);
         if (other == nullptr) return;
-        const auto suspect = suspects.find(other->id);
-        if (suspect != suspects.end() && suspect->second.condemned) return;
+        const Suspect* suspect = suspects.Find(other->id);
+        if (suspect != nullptr && suspect->condemned) return;
         const double ratio = (witness.T_cam_world * other->p_world).z() / p_cam.z();
         if (ratio > 1 + kDepthTolerance) {
           ++depths.behind;
         } else if (ratio > 1 - kDepthTolerance) {
           ++depths.same;
-          if (suspect == suspects.end() && std::abs(ratio - 1) < kSupportTolerance) ++depths.proven_same;
+          if (suspect == nullptr && std::abs(ratio - 1) < kSupportTolerance) ++depths.proven_same;
         }
       });
   return depths;
@@ -99,7 +121,7 @@ int Condemn(const std::vector<Suspect*>& found) {
 /// Asks every witness from another time, and condemns the suspects that are seen through. Returns how many.
 int CondemnSeenThrough(const Map& map, const std::vector<const Keyframe*>& witnesses, Suspects* suspects) {
   std::vector<Suspect*> found;
-  for (auto& [id, suspect] : *suspects) {
+  for (Suspect& suspect : *suspects) {
     if (suspect.condemned) continue;
     suspect.through = suspect.support = suspect.proven_support = 0;
     for (const Keyframe* witness : witnesses) {
@@ -130,8 +152,8 @@ double CondemnedAround(const Map& map, const Landmark& landmark, const Suspects&
       const double ratio = (keyframe.T_cam_world * other->p_world).z() / depth;
       if (std::abs(ratio - 1) > kDepthTolerance) return;
       ++all;
-      const auto suspect = suspects.find(other->id);
-      if (suspect != suspects.end() && suspect->second.condemned) ++condemned;
+      const Suspect* suspect = suspects.Find(other->id);
+      if (suspect != nullptr && suspect->condemned) ++condemned;
     };
     keyframe.features->grid.ForEachInRadius(keyframe.features->uv_px[o.feature], together_px, 0,
                                             kCoarsestOctave, visit);
@@ -143,7 +165,7 @@ double CondemnedAround(const Map& map, const Landmark& landmark, const Suspects&
 class CondemnedPlaces {
  public:
   CondemnedPlaces(const Map& map, const Suspects& suspects) : map_(map) {
-    for (const auto& [id, suspect] : suspects) {
+    for (const Suspect& suspect : suspects) {
       if (!suspect.condemned) continue;
       for (const Observation& o : suspect.landmark->observations) uv_px_[o.keyframe].push_back(PixelOf(o));
     }
@@ -174,7 +196,7 @@ int CondemnTogether(const Map& map, Suspects* suspects) {
   std::vector<Suspect*> found;
   const CondemnedPlaces condemned(map, *suspects);
   const double together_px = SearchRadiusPx(map.camera(), kTogetherRad);
-  for (auto& [id, suspect] : *suspects) {
+  for (Suspect& suspect : *suspects) {
     if (suspect.condemned) continue;
     const bool near = condemned.AnyNear(*suspect.landmark, together_px + 1e-6);
     const double share = near ? CondemnedAround(map, *suspect.landmark, *suspects) : 0.0;
@@ -187,7 +209,7 @@ int CondemnTogether(const Map& map, Suspects* suspects) {
 /// keyframes than see the landmark itself: whoever stood there was seen often, and what stands at his depth
 /// by chance seldom. Its neighbours share its fate.
 void CondemnUnsupported(const Map& map, Suspects* suspects) {
-  for (auto& [id, suspect] : *suspects) {
+  for (Suspect& suspect : *suspects) {
     const auto observers = static_cast<double>(suspect.landmark->observations.size());
     const bool supported = suspect.proven_support > kSupportPerObservation * observers;
     if (!supported) suspect.condemned = true;
@@ -197,7 +219,7 @@ void CondemnUnsupported(const Map& map, Suspects* suspects) {
 
 int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   int removed = 0;
-  for (const auto& [id, suspect] : suspects) {
+  for (const Suspect& suspect : suspects) {
     if (!suspect.condemned) continue;
     map.RemoveLandmark(*suspect.landmark);
     ++removed;
@@ -216,11 +238,12 @@ std::vector<const Keyframe*> WitnessesNear(const Map& map, const Keyframe& keyfr
 }  // namespace
 
 int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe) {
-  Suspects suspects;
+  std::vector<const Landmark*> landmarks;
   for (size_t feature = 0; feature < keyframe.landmarks.size(); ++feature) {
     const Landmark* landmark = map.LandmarkSeenBy(keyframe, feature);
-    if (landmark != nullptr) AddIfUnproven(map, *landmark, &suspects);
+    if (landmark != nullptr) landmarks.push_back(landmark);
   }
+  Suspects suspects(map, landmarks);
   const std::vector<const Keyframe*> witnesses = WitnessesNear(map, keyframe);
   if (CondemnSeenThrough(map, witnesses, &suspects) == 0) return 0;
   for (int round = 0; round < kRounds; ++round) {
@@ -231,16 +254,15 @@ int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe) {
 }
 
 int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before) {
-  Suspects suspects;
   const std::vector<const Landmark*> landmarks = map.LandmarksOf(map_id);
-  for (const Landmark* landmark : landmarks) AddIfUnproven(map, *landmark, &suspects);
+  Suspects suspects(map, landmarks);
   const std::vector<const Keyframe*> witnesses = map.KeyframesOf(map_id);
   const double before = static_cast<double>(removed_before);
   const double seen_through = before + CondemnSeenThrough(map, witnesses, &suspects);
   const bool any_proven = suspects.size() < landmarks.size();
   const bool somebody_stood =
       any_proven && seen_through > kStoodShare * (before + static_cast<double>(suspects.size()));
-  for (auto& [id, suspect] : suspects) {
+  for (Suspect& suspect : suspects) {
     if (somebody_stood && suspect.landmark->evidence.moved > 0) suspect.condemned = true;
   }
   for (int round = 0; round < kRounds; ++round) {

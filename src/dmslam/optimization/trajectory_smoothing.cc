@@ -1,12 +1,12 @@
 #include "dmslam/optimization/trajectory_smoothing.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "dmslam/geometry/symmetric_eigen.h"
+#include "dmslam/optimization/block_tridiagonal.h"
 #include "dmslam/util/parallel.h"
 
 namespace dmslam {
@@ -21,10 +21,9 @@ constexpr double kMinLogVariance = -37.0, kMaxLogVariance = 14.0;       // of a 
 constexpr double kMaxCarried = 0.9999;                                  // of a common error to the next frame
 constexpr double kFirstStep = 2.0, kLaterStep = 0.5, kLeastStep = 0.1;  // of a logarithm
 constexpr double kMinSpread = 1e-9;  // of an information's eigenvalue to the largest: less says nothing
-using MotionMatrix = Eigen::Matrix<double, kMotion, kMotion>;
-using MotionVector = Eigen::Matrix<double, kMotion, 1>;
-using StateMatrix = Eigen::Matrix<double, kState, kState>;
-using StateVector = Eigen::Matrix<double, kState, 1>;
+using StateMatrix = BlockTridiagonal::Block;
+using StateVector = BlockTridiagonal::Part;
+static_assert(kState == BlockTridiagonal::kBlock);
 
 /// Of one frame; times are in usual frame intervals.
 struct State {
@@ -89,42 +88,35 @@ struct Variances {
   double& operator[](int i) { return i == 0 ? pose : i == 1 ? rotation : translation; }
 };
 
-using StateSteps = std::vector<StateVector>;
+/// How well the motion holds, of the rotation and of the centre, in each direction.
+struct Precision {
+  double rotation = 0.0, translation = 0.0;
 
-/// The sum of squares around the present states: symmetric, block tridiagonal.
+  Eigen::Matrix<double, kPose, 3> Times(const Eigen::Matrix<double, kPose, 3>& error) const {
+    Eigen::Matrix<double, kPose, 3> weighed;
+    weighed << rotation * error.topRows<3>(), translation * error.bottomRows<3>();
+    return weighed;
+  }
+
+  /// Adds `times` of it to the block of (pose, rate, acceleration) i by j, its rotation turned.
+  void AddTo(int i, int j, double times, const Eigen::Matrix3d& turn, StateMatrix* to) const {
+    to->block<3, 3>(kPose * i, kPose * j) += times * rotation * turn;
+    to->block<3, 3>(kPose * i + 3, kPose * j + 3).diagonal().array() += times * translation;
+  }
+};
+
+/// turn^T on the left, turn on the right, or both, which cancel.
+Eigen::Matrix3d Turned(const Eigen::Matrix3d& turn, bool left, bool right) {
+  if (left == right) return Eigen::Matrix3d::Identity();
+  return left ? Eigen::Matrix3d(turn.transpose()) : turn;
+}
+
+/// The sum of squares around the present states. The right side is the negative gradient.
 struct NormalEquations {
-  std::vector<StateMatrix> diagonal, above;
-  StateSteps gradient;
+  BlockTridiagonal system;
   double cost = 0.0;              ///< sum of the squared errors
   double log_determinants = 0.0;  ///< of the information of all errors
 };
-
-/// Block Cholesky. The steps that solve the equations, and the logarithm of the matrix's determinant; none
-/// where it is not positive definite.
-std::optional<double> Solve(NormalEquations* equations, StateSteps* steps) {
-  const size_t count = equations->diagonal.size();
-  std::vector<Eigen::LLT<StateMatrix>> factors(count);
-  double log_determinant = 0.0;
-  for (size_t k = 0; k < count; ++k) {
-    factors[k].compute(equations->diagonal[k]);
-    if (factors[k].info() != Eigen::Success) return std::nullopt;
-    for (int i = 0; i < kState; ++i) log_determinant += 2.0 * std::log(factors[k].matrixLLT()(i, i));
-    if (k + 1 == count) break;
-    const StateMatrix half = factors[k].matrixL().solve(equations->above[k]);  // L^-1 above
-    equations->diagonal[k + 1].selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1.0);
-    const StateVector gradient = factors[k].matrixL().solve(equations->gradient[k]);
-    equations->gradient[k + 1].noalias() -= half.transpose() * gradient;
-  }
-  steps->resize(count);
-  for (size_t k = count; k-- > 0;) {
-    StateVector right = -equations->gradient[k];
-    if (k + 1 < count) right.noalias() -= equations->above[k] * (*steps)[k + 1];
-    (*steps)[k] = factors[k].solve(right);
-  }
-  if (!std::isfinite(log_determinant)) return std::nullopt;
-  const bool finite = std::all_of(steps->begin(), steps->end(), [](const auto& s) { return s.allFinite(); });
-  return finite ? std::optional(log_determinant) : std::nullopt;
-}
 
 class Smoother {
  public:
@@ -224,8 +216,8 @@ class Smoother {
       Eigen::Matrix<double, kPose, kState> J = Eigen::Matrix<double, kPose, kState>::Zero();
       J.leftCols<kPose>() = roots_[k];
       J.rightCols<kPose>().setIdentity();
-      equations->diagonal[k].noalias() += weight * J.transpose() * J;
-      equations->gradient[k].noalias() += weight * J.transpose() * error;
+      equations->system.diagonal[k].noalias() += weight * J.transpose() * J;
+      equations->system.right[k].noalias() -= weight * J.transpose() * error;
       equations->cost += weight * error.squaredNorm();
       equations->log_determinants -= kPose * variances.pose;
     }
@@ -240,57 +232,56 @@ class Smoother {
           first ? states_[k].common : states_[k].common - likeness.carried * states_[k - 1].common;
       equations->cost += error.dot(weight * error);
       equations->log_determinants += likeness.log_determinant;
-      equations->gradient[k].tail<kPose>() += weight * error;
-      equations->diagonal[k].bottomRightCorner<kPose, kPose>() += weight;
+      equations->system.right[k].tail<kPose>() -= weight * error;
+      equations->system.diagonal[k].bottomRightCorner<kPose, kPose>() += weight;
       if (first) continue;
       const Matrix6d carried = likeness.carried.transpose() * weight;
-      equations->gradient[k - 1].tail<kPose>() -= carried * error;
-      equations->diagonal[k - 1].bottomRightCorner<kPose, kPose>() += carried * likeness.carried;
-      equations->above[k - 1].bottomRightCorner<kPose, kPose>() -= carried;
+      equations->system.right[k - 1].tail<kPose>() += carried * error;
+      equations->system.diagonal[k - 1].bottomRightCorner<kPose, kPose>() += carried * likeness.carried;
+      equations->system.above[k - 1].bottomRightCorner<kPose, kPose>() -= carried;
     }
   }
 
-  /// White noise on the jerk between frames k and k + 1.
+  /// White noise on the jerk between frames k and k + 1. The error of (pose, rate, acceleration) is what b is
+  /// beyond where a goes on to: d error / d a = -T, but that the pose's rotation is turned into b's frame,
+  /// and d error / d b = 1. Its weight is that of the three by each other, times `precision` for each
+  /// direction.
   void AddMotion(size_t k, const Variances& variances, NormalEquations* equations) const {
     const double dt = Interval(k), dt2 = dt * dt, dt3 = dt2 * dt;
-    Eigen::Matrix3d covariance;
+    Eigen::Matrix3d covariance, T;
     covariance << dt2 * dt3 / 20.0, dt2 * dt2 / 8.0, dt3 / 6.0, dt2 * dt2 / 8.0, dt3 / 3.0, dt2 / 2.0,
         dt3 / 6.0, dt2 / 2.0, dt;
-    const Eigen::Matrix3d inverse = covariance.inverse();
+    T << 1.0, dt, 0.5 * dt2, 0.0, 1.0, dt, 0.0, 0.0, 1.0;
+    const Eigen::Matrix3d weight = covariance.inverse(), before = T.transpose() * weight, both = before * T;
     const State &a = states_[k], &b = states_[k + 1];
-    MotionVector error;
+    const Eigen::Matrix3d turn = (b.R_world_cam.conjugate() * a.R_world_cam).toRotationMatrix();
+    const Precision precision = {std::exp(-variances.rotation), std::exp(-variances.translation)};
+    Eigen::Matrix<double, kPose, 3> error;  // a column each
     error << Difference(a, b) - dt * a.rate - 0.5 * dt2 * a.acceleration,
         b.rate - a.rate - dt * a.acceleration, b.acceleration - a.acceleration;
-    // d error / d a = -(turn, dt, dt^2 / 2; 0, 1, dt; 0, 0, 1), d error / d b = 1
-    MotionMatrix J = MotionMatrix::Identity();
-    J.topLeftCorner<3, 3>() = (b.R_world_cam.conjugate() * a.R_world_cam).toRotationMatrix();
-    J.block<kPose, kPose>(0, kPose).diagonal().setConstant(dt);
-    J.block<kPose, kPose>(0, 2 * kPose).diagonal().setConstant(0.5 * dt2);
-    J.block<kPose, kPose>(kPose, 2 * kPose).diagonal().setConstant(dt);
-    const double rotation = std::exp(-variances.rotation), translation = std::exp(-variances.translation);
-    MotionMatrix W = MotionMatrix::Zero();
+    const Eigen::Matrix<double, kPose, 3> weighed = precision.Times(error);
+    Eigen::Matrix<double, kPose, 3> of_a = weighed * before.transpose();
+    of_a.topLeftCorner<3, 1>() = turn.transpose() * of_a.topLeftCorner<3, 1>();
+    const Eigen::Matrix<double, kPose, 3> of_b = weighed * weight;
+    BlockTridiagonal& system = equations->system;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
-        auto block = W.block<kPose, kPose>(kPose * i, kPose * j).diagonal();
-        block.head<3>().setConstant(rotation * inverse(i, j));
-        block.tail<3>().setConstant(translation * inverse(i, j));
+        precision.AddTo(i, j, both(i, j), Turned(turn, i == 0, j == 0), &system.diagonal[k]);
+        precision.AddTo(i, j, weight(i, j), Turned(turn, false, false), &system.diagonal[k + 1]);
+        precision.AddTo(i, j, -before(i, j), Turned(turn, i == 0, false), &system.above[k]);
       }
+      system.right[k].segment<kPose>(kPose * i) += of_a.col(i);
+      system.right[k + 1].segment<kPose>(kPose * i) -= of_b.col(i);
     }
-    const MotionMatrix JW = J.transpose() * W;
-    equations->diagonal[k].topLeftCorner<kMotion, kMotion>().noalias() += JW * J;
-    equations->diagonal[k + 1].topLeftCorner<kMotion, kMotion>() += W;
-    equations->above[k].topLeftCorner<kMotion, kMotion>() -= JW;
-    equations->gradient[k].head<kMotion>().noalias() -= JW * error;
-    equations->gradient[k + 1].head<kMotion>().noalias() += W * error;
-    equations->cost += error.dot(W * error);
+    equations->cost += error.cwiseProduct(of_b).sum();
     equations->log_determinants -= 9.0 * (variances.rotation + variances.translation);
   }
 
   NormalEquations Linearize(const Variances& variances) const {
     NormalEquations equations;
-    equations.diagonal.assign(states_.size(), kLeastInformation * StateMatrix::Identity());
-    equations.above.assign(states_.size() - 1, StateMatrix::Zero());
-    equations.gradient.assign(states_.size(), StateVector::Zero());
+    equations.system.diagonal.assign(states_.size(), kLeastInformation * StateMatrix::Identity());
+    equations.system.above.assign(states_.size() - 1, StateMatrix::Zero());
+    equations.system.right.assign(states_.size(), StateVector::Zero());
     AddPoses(variances, &equations);
     AddCommonErrors(&equations);
     for (size_t k = 0; k + 1 < states_.size(); ++k) {
@@ -302,12 +293,11 @@ class Smoother {
   /// -2 log of the likelihood of the poses, the states integrated out.
   double Unlikelihood(const Variances& variances) const {
     NormalEquations equations = Linearize(variances);
-    const StateSteps gradient = equations.gradient;
-    StateSteps steps;
-    const std::optional<double> log_determinant = Solve(&equations, &steps);
+    const std::vector<StateVector> downhill = equations.system.right;
+    const std::optional<double> log_determinant = Solve(&equations.system);
     if (!log_determinant) return std::numeric_limits<double>::infinity();
     double cost = equations.cost;  // at the minimum: less by what the steps gain
-    for (size_t k = 0; k < steps.size(); ++k) cost += gradient[k].dot(steps[k]);
+    for (size_t k = 0; k < downhill.size(); ++k) cost -= downhill[k].dot(equations.system.right[k]);
     return cost + *log_determinant - equations.log_determinants;
   }
 
@@ -344,9 +334,8 @@ class Smoother {
 
   void Update() {
     NormalEquations equations = Linearize(variances_);
-    StateSteps steps;
-    if (!Solve(&equations, &steps)) return;
-    for (size_t k = 0; k < states_.size(); ++k) states_[k].Step(steps[k]);
+    if (!Solve(&equations.system)) return;
+    for (size_t k = 0; k < states_.size(); ++k) states_[k].Step(equations.system.right[k]);
   }
 
   void Weigh() {

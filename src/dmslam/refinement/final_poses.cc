@@ -37,17 +37,15 @@ struct LandmarkEquations {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
 
-  void Add(const Map& map, const Rigid3d& T_cam_world, const Eigen::Vector3d& p_world,
-           const Eigen::Vector2d& uv_px, uint8_t octave) {
-    const Pinhole camera = map.camera().Ideal();
-    const Eigen::Vector3d p_cam = T_cam_world * p_world;
+  /// Seen at `uv_px` by a camera turned by R, before which it lies at `p_cam`.
+  void Add(const Pinhole& camera, const Eigen::Matrix3d& R, const Eigen::Vector3d& p_cam,
+           const Eigen::Vector2d& uv_px, double inv_sigma_squared) {
     if (p_cam.z() <= 0.0) return;
     const Eigen::Vector2d error = camera.Project(p_cam) - uv_px;
-    const double inv_sigma_squared = 1.0 / map.pyramid_table().SigmaSquared(octave);
     const double chi2 = error.squaredNorm() * inv_sigma_squared;
     const double weight =
         inv_sigma_squared * (chi2 > kChiSquared2Dof ? std::sqrt(kChiSquared2Dof / chi2) : 1.0);
-    const Matrix23 J = ProjectionJacobian(camera, p_cam) * T_cam_world.rotation.toRotationMatrix();
+    const Matrix23 J = ProjectionJacobian(camera, p_cam) * R;
     information += weight * J.transpose() * J;
     gradient += weight * J.transpose() * error;
   }
@@ -118,8 +116,10 @@ Eigen::Matrix3d InformationOf(const Map& map, const Landmark& landmark) {
   for (const auto& [keyframe_id, feature] : landmark.observations) {
     const Keyframe* keyframe = map.FindKeyframe(keyframe_id);
     if (keyframe == nullptr) continue;
-    equations.Add(map, keyframe->T_cam_world, landmark.p_world, keyframe->features->uv_px[feature],
-                  keyframe->features->set.keypoints[feature].octave);
+    const uint8_t octave = keyframe->features->set.keypoints[feature].octave;
+    equations.Add(map.camera().Ideal(), keyframe->T_cam_world.rotation.toRotationMatrix(),
+                  keyframe->T_cam_world * landmark.p_world, keyframe->features->uv_px[feature],
+                  1.0 / map.pyramid_table().SigmaSquared(octave));
   }
   return equations.information;
 }
@@ -175,9 +175,10 @@ PoseOptimizationReport MeasureCheckedPose(const Map& map, const Rigid3d& T_cam_w
 
 void FinalPoses::Add(const Map& map, FinalPose pose) {
   for (const Sight& sight : pose.sights) {
-    if (landmarks_.contains(sight.landmark)) continue;
+    const bool is_new = index_.try_emplace(sight.landmark, static_cast<uint32_t>(placed_.size())).second;
+    if (!is_new) continue;
     const Landmark& landmark = *map.FindLandmark(sight.landmark);
-    landmarks_[sight.landmark] = {landmark.p_world, landmark.p_world, InformationOf(map, landmark)};
+    placed_.push_back({landmark.p_world, landmark.p_world, InformationOf(map, landmark)});
   }
   poses_.push_back(std::move(pose));
   views_.clear();
@@ -201,7 +202,7 @@ void FinalPoses::BeginRound(const Map& map) {
   std::sort(poses_.begin(), poses_.end(), [](const FinalPose& a, const FinalPose& b) {
     return std::tie(a.pose.map_id, a.pose.stamp_ns) < std::tie(b.pose.map_id, b.pose.stamp_ns);
   });
-  if (views_.empty()) SortViews();
+  if (views_.empty()) ListSights(map);
   moves_ = {};
   GoTo(rounds_++ > 0 ? Step::kLandmarks : Step::kSmoothing);
 }
@@ -260,11 +261,12 @@ std::vector<FramePose> FinalPoses::Take() {
 Matrix6d FinalPoses::SharedInformation(const Map& map, size_t frame) const {
   const Pinhole camera = map.camera().Ideal();
   const FinalPose& pose = poses_[frame];
+  const Eigen::Matrix3d R = pose.measured.rotation.toRotationMatrix();
   Matrix6d shared = Matrix6d::Zero();
   for (size_t i = 0; i < pose.sights.size(); ++i) {
-    if (seen_before_[frame][i] == 0) continue;
+    if (!seen_[frame][i].seen_before) continue;
     const Sight& sight = pose.sights[i];
-    const Eigen::Vector3d p_cam = pose.measured * landmarks_.at(sight.landmark).p_world;
+    const Eigen::Vector3d p_cam = R * placed_[seen_[frame][i].landmark].p_world + pose.measured.translation;
     if (p_cam.z() <= 0.0) continue;
     const double variance = map.pyramid_table().SigmaSquared(sight.octave);
     const Eigen::Vector2d error = camera.Project(p_cam) - sight.uv_px.cast<double>();
@@ -296,8 +298,7 @@ std::vector<PoseEstimate> FinalPoses::Estimates(const Map& map, size_t begin, si
   ForEachInParallel(estimates.size(), threads_, [&](size_t k) {
     const FinalPose& frame = poses_[begin + k];
     const double time_s = 1e-9 * static_cast<double>(frame.pose.stamp_ns - poses_[begin].pose.stamp_ns);
-    estimates[k] = {time_s, frame.measured, frame.information, SharedInformation(map, begin + k),
-                    leaps[k] != 0};
+    estimates[k] = {time_s, frame.measured, frame.information, shared_[begin + k], leaps[k] != 0};
   });
   return estimates;
 }
@@ -330,7 +331,8 @@ void FinalPoses::Move(const Rigid3d& T_cam_world, FinalPose* pose) {
 
 bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const {
   return std::all_of(views.begin(), views.end(), [&](const View& view) {
-    return (poses_[view.frame].pose.T_cam_world * p_world).z() > 0.0;
+    const RotatedPose& camera = cameras_[view.frame];
+    return camera.R.row(2).dot(p_world) + camera.t.z() > 0.0;
   });
 }
 
@@ -339,13 +341,15 @@ bool FinalPoses::IsInFront(std::span<const View> views, const Eigen::Vector3d& p
 /// (Those frames that became keyframes speak twice.)
 Eigen::Vector3d FinalPoses::FromViews(const Map& map, std::span<const View> views,
                                       const Placed& landmark) const {
+  const Pinhole ideal = map.camera().Ideal();
   Eigen::Vector3d p_world = landmark.p_world;
   for (int step = 0; step < kLandmarkSteps; ++step) {
     LandmarkEquations equations{landmark.information, landmark.information * (p_world - landmark.p_map)};
     for (const View& view : views) {
-      const FinalPose& from = poses_[view.frame];
-      const Sight& sight = from.sights[view.sight];
-      equations.Add(map, from.pose.T_cam_world, p_world, sight.uv_px.cast<double>(), sight.octave);
+      const RotatedPose& camera = cameras_[view.frame];
+      const Sight& sight = poses_[view.frame].sights[view.sight];
+      equations.Add(ideal, camera.R, camera.R * p_world + camera.t, sight.uv_px.cast<double>(),
+                    1.0 / map.pyramid_table().SigmaSquared(sight.octave));
     }
     const Eigen::Vector3d move = -SolveSymmetric(equations.information, equations.gradient);
     if (!move.allFinite()) return p_world;
@@ -355,7 +359,7 @@ Eigen::Vector3d FinalPoses::FromViews(const Map& map, std::span<const View> view
 }
 
 void FinalPoses::PlaceLandmark(const Map& map, std::span<const View> views) {
-  Placed& landmark = landmarks_.at(views.front().landmark);
+  Placed& landmark = placed_[views.front().landmark];
   const Eigen::Vector3d wanted = FromViews(map, views, landmark);
   const Eigen::Vector3d beyond = landmark.p_world + kOverstep * (wanted - landmark.p_world);
   const double distance = (poses_[views.front().frame].pose.T_cam_world * landmark.p_map).norm();
@@ -366,30 +370,45 @@ void FinalPoses::PlaceLandmark(const Map& map, std::span<const View> views) {
   }
 }
 
+void FinalPoses::ListSights(const Map& map) {
+  seen_.assign(poses_.size(), {});
+  for (size_t k = 0; k < poses_.size(); ++k) {
+    for (const Sight& sight : poses_[k].sights) seen_[k].push_back({index_.at(sight.landmark), false});
+  }
+  SortViews();
+  NoteWhoSawBefore();
+  shared_.resize(poses_.size());
+  ForEachInParallel(poses_.size(), threads_, [&](size_t k) { shared_[k] = SharedInformation(map, k); });
+}
+
 void FinalPoses::SortViews() {
-  for (uint32_t frame = 0; frame < poses_.size(); ++frame) {
-    for (uint32_t sight = 0; sight < poses_[frame].sights.size(); ++sight) {
-      views_.push_back({poses_[frame].sights[sight].landmark, frame, sight});
+  for (uint32_t frame = 0; frame < seen_.size(); ++frame) {
+    for (uint32_t sight = 0; sight < seen_[frame].size(); ++sight) {
+      views_.push_back({seen_[frame][sight].landmark, frame, sight});
     }
   }
   std::sort(views_.begin(), views_.end(), [](const View& a, const View& b) {
     return std::tie(a.landmark, a.frame, a.sight) < std::tie(b.landmark, b.frame, b.sight);
   });
-  NoteWhoSawBefore();
 }
 
 void FinalPoses::NoteWhoSawBefore() {
-  seen_before_.assign(poses_.size(), {});
-  for (size_t k = 0; k < poses_.size(); ++k) seen_before_[k].assign(poses_[k].sights.size(), 0);
   for (size_t i = 1; i < views_.size(); ++i) {
     const View &before = views_[i - 1], &view = views_[i];
     const bool same = before.landmark == view.landmark && before.frame != view.frame &&
                       poses_[before.frame].pose.map_id == poses_[view.frame].pose.map_id;
-    seen_before_[view.frame][view.sight] = same && view.frame - before.frame <= kSharedFrames ? 1 : 0;
+    seen_[view.frame][view.sight].seen_before = same && view.frame - before.frame <= kSharedFrames;
   }
 }
 
 void FinalPoses::PlaceSomeLandmarks(const Map& map) {
+  if (next_ == 0) {
+    cameras_.clear();
+    for (const FinalPose& frame : poses_) {
+      const Rigid3d& T_cam_world = frame.pose.T_cam_world;
+      cameras_.push_back({T_cam_world.rotation.toRotationMatrix(), T_cam_world.translation});
+    }
+  }
   std::vector<std::span<const View>> landmarks;
   auto begin = views_.cbegin() + static_cast<ptrdiff_t>(next_);
   for (size_t n = 0; n < kPortion && begin != views_.cend(); ++n) {
@@ -402,14 +421,17 @@ void FinalPoses::PlaceSomeLandmarks(const Map& map) {
   next_ = static_cast<size_t>(begin - views_.cbegin());
 }
 
-void FinalPoses::PlaceFrame(const Map& map, FinalPose* frame) const {
+void FinalPoses::PlaceFrame(const Map& map, size_t index) {
+  FinalPose* const frame = &poses_[index];
   PoseOptimizationOptions a_few_steps;  // the landmarks move again before the next
   a_few_steps.rounds = 2;
   a_few_steps.robust_rounds = 1;
   a_few_steps.iterations = 2;
   std::vector<PoseObservation> observations;
-  for (const Sight& sight : frame->sights) {
-    observations.push_back(Observe(map.pyramid_table(), sight, landmarks_.at(sight.landmark).p_world));
+  observations.reserve(frame->sights.size());
+  for (size_t i = 0; i < frame->sights.size(); ++i) {
+    const Placed& landmark = placed_[seen_[index][i].landmark];
+    observations.push_back(Observe(map.pyramid_table(), frame->sights[i], landmark.p_world));
   }
   const PoseOptimizationReport report =
       OptimizePose(map.camera().Ideal(), frame->pose.T_cam_world, observations, a_few_steps);
@@ -420,7 +442,7 @@ void FinalPoses::PlaceFrame(const Map& map, FinalPose* frame) const {
 
 void FinalPoses::PlaceSomeFrames(const Map& map) {
   const size_t count = std::min(kPortion, poses_.size() - next_);
-  ForEachInParallel(count, threads_, [&](size_t i) { PlaceFrame(map, &poses_[next_ + i]); });
+  ForEachInParallel(count, threads_, [&](size_t i) { PlaceFrame(map, next_ + i); });
   next_ += count;
 }
 

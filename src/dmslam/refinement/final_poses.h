@@ -81,15 +81,25 @@ class FinalPoses {
   std::vector<FramePose> Take();
 
  private:
-  /// A sight of a landmark by one of the frames.
+  /// A landmark (of `placed_`) seen by one of the frames.
   struct View {
-    LandmarkId landmark;
-    uint32_t frame = 0, sight = 0;
+    uint32_t landmark = 0, frame = 0, sight = 0;
+  };
+  /// What is known of a frame's sight.
+  struct Seen {
+    uint32_t landmark = 0;     ///< of `placed_`
+    bool seen_before = false;  ///< by a frame shortly before
   };
   /// Where the map has it, how sure its keyframes are of that, and where it is now.
   struct Placed {
     Eigen::Vector3d p_map, p_world;
     Eigen::Matrix3d information;
+  };
+
+  /// A pose, world to camera, for those who apply it often.
+  struct RotatedPose {
+    Eigen::Matrix3d R;
+    Eigen::Vector3d t;
   };
 
   enum class Step { kBetweenRounds, kLandmarks, kFrames, kSmoothing };
@@ -111,26 +121,29 @@ class FinalPoses {
   void SmoothNextMap(const Map& map);
   bool IsInFront(std::span<const View> views, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d FromViews(const Map& map, std::span<const View> views, const Placed& landmark) const;
+  void ListSights(const Map& map);
   void SortViews();
   void NoteWhoSawBefore();
   void PlaceLandmark(const Map& map, std::span<const View> views);
   void PlaceSomeLandmarks(const Map& map);
-  void PlaceFrame(const Map& map, FinalPose* frame) const;
+  void PlaceFrame(const Map& map, size_t index);
   void PlaceSomeFrames(const Map& map);
 
   int threads_;
   MotionModelOptions motion_;
   std::vector<FinalPose> poses_;
-  std::vector<View> views_;  ///< all, by landmark; empty: to be listed
-  /// Of each frame's sights: whether a frame shortly before saw the same landmark; as old as the views.
-  std::vector<std::vector<uint8_t>> seen_before_;
+  std::vector<View> views_;              ///< all, by landmark; empty: to be listed
+  std::vector<std::vector<Seen>> seen_;  ///< of each frame's sights; as old as the views
+  std::vector<Matrix6d> shared_;         ///< of each frame; it hardly changes with the rounds
+  std::vector<RotatedPose> cameras_;     ///< where the frames are while landmarks are placed
   int rounds_ = 0;
   Moves moves_;  ///< in the last round
   bool map_has_moved_ = false;
   Step step_ = Step::kBetweenRounds;
   size_t next_ = 0;                     ///< in this step: the first view, frame or pose to be worked on
   std::map<MapId, MotionNoise> noise_;  ///< as found when the poses of a map were smoothed first
-  std::unordered_map<LandmarkId, Placed> landmarks_;
+  std::vector<Placed> placed_;          ///< the landmarks that the frames see
+  std::unordered_map<LandmarkId, uint32_t> index_;  ///< of `placed_`
 };
 
 }  // namespace dmslam

@@ -76,6 +76,7 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
                      [](const Kept& a, const Kept& b) { return a.pose.stamp_ns < b.pose.stamp_ns; });
   }
   CountFeatures();
+  FillViewingRanges(map);
 }
 
 std::vector<WaitingFrame> FrameRefiner::TakeFramesOf(MapId map_id) {
@@ -167,7 +168,6 @@ std::optional<FrameRefiner::Looked> FrameRefiner::Look(const Map& map, const Kep
 }
 
 void FrameRefiner::LookAhead(const Map& map, std::span<const Search> searches) {
-  FillViewingRanges(map);
   ahead_.resize(std::min(due_.size(), kAhead * searches.size()));
   ForEachInParallel(searches.size(), static_cast<int>(searches.size()), [&](size_t k) {
     for (size_t i = k; i < ahead_.size(); i += searches.size()) ahead_[i] = Look(map, due_[i], searches[k]);
