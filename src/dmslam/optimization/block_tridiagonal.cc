@@ -73,34 +73,48 @@ using Panel = std::array<Column, kBlock>;
   }
 }
 
-/// x(k) = L^-T (L^-1 right - below^T x(k + 1)), from the last row to the first.
-[[gnu::always_inline]] inline void Substitute(const Panel& panel, const Part& next, Part* x) {
-  Lanes known[2 * kVectors] = {};  // of this block's rows none at first
-  std::memcpy(known + kVectors, next.data(), sizeof(Part));
-  for (int j = kBlock - 1; j >= 0; --j) {
+/// Keeps of the factored columns what is needed to go back: L in the diagonal block, below^T in that above,
+/// and L^-1 right.
+[[gnu::always_inline]] inline void Keep(const Panel& panel, BlockTridiagonal* system, size_t k) {
+  for (int j = 0; j < kBlock; ++j) {
     const Column& column = panel[j];
-    Lanes sum = {};
-    for (int v = j / kLanes; v < kVectors; ++v) sum += column.here[v] * known[v];
-    for (int v = 0; v < kVectors; ++v) sum += column.below[v] * known[kVectors + v];
-    known[j / kLanes][j % kLanes] = (column.right - ((sum[0] + sum[1]) + (sum[2] + sum[3]))) / column.Here(j);
+    std::memcpy(system->diagonal[k].data() + kBlock * j, column.here, sizeof(column.here));
+    system->right[k][j] = column.right;
+    if (k == system->above.size()) continue;
+    for (int i = 0; i < kBlock; ++i) system->above[k](j, i) = column.below[i / kLanes][i % kLanes];
   }
-  std::memcpy(x->data(), known, sizeof(Part));
+}
+
+/// right = L^-T right, from the last row to the first.
+[[gnu::always_inline]] inline void Substitute(const Block& L, Part* right) {
+  for (int j = kBlock - 1; j >= 0; --j) {
+    double sum = (*right)[j];
+    for (int i = j + 1; i < kBlock; ++i) sum -= L(i, j) * (*right)[i];
+    (*right)[j] = sum / L(j, j);
+  }
+}
+
+/// right -= above x.
+[[gnu::always_inline]] inline void SubtractNext(const Block& above, const Part& x, Part* right) {
+  for (int i = 0; i < kBlock; ++i) {
+    for (int j = 0; j < kBlock; ++j) (*right)[j] -= above(j, i) * x[i];
+  }
 }
 
 [[gnu::always_inline]] inline std::optional<double> SolveHere(BlockTridiagonal* system) {
   const size_t count = system->diagonal.size();
-  std::vector<Panel> panels(count);
+  Panel panel{};
   double log_determinant = 0.0;
   for (size_t k = 0; k < count; ++k) {
-    Load(*system, k, &panels[k]);
-    if (!Factor(&panels[k])) return std::nullopt;
-    for (int j = 0; j < kBlock; ++j) log_determinant += 2.0 * std::log(panels[k][j].Here(j));
-    if (k + 1 < count) Eliminate(panels[k], &system->diagonal[k + 1], &system->right[k + 1]);
+    Load(*system, k, &panel);
+    if (!Factor(&panel)) return std::nullopt;
+    for (int j = 0; j < kBlock; ++j) log_determinant += 2.0 * std::log(panel[j].Here(j));
+    if (k + 1 < count) Eliminate(panel, &system->diagonal[k + 1], &system->right[k + 1]);
+    Keep(panel, system, k);
   }
-  Part next = Part::Zero();
   for (size_t k = count; k-- > 0;) {
-    Substitute(panels[k], next, &system->right[k]);
-    next = system->right[k];
+    if (k + 1 < count) SubtractNext(system->above[k], system->right[k + 1], &system->right[k]);
+    Substitute(system->diagonal[k], &system->right[k]);
   }
   const bool finite = std::isfinite(log_determinant) &&
                       std::ranges::all_of(system->right, [](const Part& x) { return x.allFinite(); });

@@ -277,33 +277,32 @@ class Smoother {
     equations->log_determinants -= 9.0 * (variances.rotation + variances.translation);
   }
 
-  NormalEquations Linearize(const Variances& variances) const {
-    NormalEquations equations;
-    equations.system.diagonal.assign(states_.size(), kLeastInformation * StateMatrix::Identity());
-    equations.system.above.assign(states_.size() - 1, StateMatrix::Zero());
-    equations.system.right.assign(states_.size(), StateVector::Zero());
-    AddPoses(variances, &equations);
-    AddCommonErrors(&equations);
+  void Linearize(const Variances& variances, NormalEquations* equations) const {
+    equations->cost = equations->log_determinants = 0.0;
+    equations->system.diagonal.assign(states_.size(), kLeastInformation * StateMatrix::Identity());
+    equations->system.above.assign(states_.size() - 1, StateMatrix::Zero());
+    equations->system.right.assign(states_.size(), StateVector::Zero());
+    AddPoses(variances, equations);
+    AddCommonErrors(equations);
     for (size_t k = 0; k + 1 < states_.size(); ++k) {
-      if (Joined(k)) AddMotion(k, variances, &equations);
+      if (Joined(k)) AddMotion(k, variances, equations);
     }
-    return equations;
   }
 
   /// -2 log of the likelihood of the poses, the states integrated out.
-  double Unlikelihood(const Variances& variances) const {
-    NormalEquations equations = Linearize(variances);
-    const std::vector<StateVector> downhill = equations.system.right;
-    const std::optional<double> log_determinant = Solve(&equations.system);
+  double Unlikelihood(const Variances& variances, NormalEquations* equations) const {
+    Linearize(variances, equations);
+    const std::vector<StateVector> downhill = equations->system.right;
+    const std::optional<double> log_determinant = Solve(&equations->system);
     if (!log_determinant) return std::numeric_limits<double>::infinity();
-    double cost = equations.cost;  // at the minimum: less by what the steps gain
-    for (size_t k = 0; k < downhill.size(); ++k) cost -= downhill[k].dot(equations.system.right[k]);
-    return cost + *log_determinant - equations.log_determinants;
+    double cost = equations->cost;  // at the minimum: less by what the steps gain
+    for (size_t k = 0; k < downhill.size(); ++k) cost -= downhill[k].dot(equations->system.right[k]);
+    return cost + *log_determinant - equations->log_determinants;
   }
 
   /// One logarithm after the other, by steps that become smaller.
   void FindVariances(double step) {
-    double best = Unlikelihood(variances_);
+    double best = Unlikelihood(variances_, &equations_[0]);
     for (; step > kLeastStep; step *= 0.5) {
       for (int i = 0; i < 3; ++i) FindVariance(i, step, &best);
     }
@@ -314,28 +313,29 @@ class Smoother {
   void FindVariance(int i, double step, double* best) {
     const std::array<double, 2> ways = {step, -step};
     std::array<double, 2> after{};
-    ForEachInParallel(2, options_.threads, [&](size_t way) { after[way] = UnlikelihoodAfter(i, ways[way]); });
+    ForEachInParallel(2, options_.threads,
+                      [&](size_t way) { after[way] = UnlikelihoodAfter(i, ways[way], &equations_[way]); });
     const size_t way = after[0] < *best ? 0 : 1;
-    for (double now = after[way]; now < *best; now = UnlikelihoodAfter(i, ways[way])) {
+    for (double now = after[way]; now < *best; now = UnlikelihoodAfter(i, ways[way], &equations_[way])) {
       *best = now;
       variances_[i] += ways[way];
     }
   }
 
-  double UnlikelihoodAfter(int i, double by) const {
+  double UnlikelihoodAfter(int i, double by, NormalEquations* equations) const {
     Variances tried = variances_;
     tried[i] += by;
     if (tried.pose < std::log(options_.min_variance) || tried.pose > std::log(options_.max_variance) ||
         tried[i] < kMinLogVariance || tried[i] > kMaxLogVariance) {
       return std::numeric_limits<double>::infinity();
     }
-    return Unlikelihood(tried);
+    return Unlikelihood(tried, equations);
   }
 
   void Update() {
-    NormalEquations equations = Linearize(variances_);
-    if (!Solve(&equations.system)) return;
-    for (size_t k = 0; k < states_.size(); ++k) states_[k].Step(equations.system.right[k]);
+    Linearize(variances_, &equations_[0]);
+    if (!Solve(&equations_[0].system)) return;
+    for (size_t k = 0; k < states_.size(); ++k) states_[k].Step(equations_[0].system.right[k]);
   }
 
   void Weigh() {
@@ -375,6 +375,7 @@ class Smoother {
   Matrix6d inverse_root_before_ = Matrix6d::Zero();
   std::vector<double> weights_;
   Variances variances_;
+  std::array<NormalEquations, 2> equations_;  ///< for what is tried at the same time; kept for their memory
 };
 
 }  // namespace
