@@ -40,6 +40,18 @@ Json Quantiles(const std::vector<double>& values) {
   return {{"p50", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"p99", Quantile(values, 0.99)}};
 }
 
+/// Of each quarter of the values, in the order in which they came: whether they grow as a run goes on.
+Json QuantilesOfQuarters(const std::deque<float>& values) {
+  Json quarters = Json::array();
+  auto begin = values.begin();
+  for (size_t quarter = 1; quarter <= 4; ++quarter) {
+    const auto end = values.begin() + static_cast<std::ptrdiff_t>(values.size() * quarter / 4);
+    quarters.push_back(Quantiles({begin, end}));
+    begin = end;
+  }
+  return quarters;
+}
+
 /// Of camera 1: "1:123".
 std::string FrameName(KeyframeId id) {
   const std::string frame = std::to_string(id.frame_index());
@@ -374,6 +386,7 @@ Json TimingJson(const RunRecord& run) {
   json["decode_ms"] = Quantiles(Doubles(durations.decode));
   json["extract_ms"] = Quantiles(Doubles(durations.extract));
   json["image_to_pose_ms"] = Quantiles(Doubles(durations.image_to_pose));
+  json["image_to_pose_ms_by_quarter"] = QuantilesOfQuarters(durations.image_to_pose);
   json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframes.to_landmarks_ms);
   json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframes.to_adjusted_ms);
   return json;

@@ -140,6 +140,20 @@ TEST_F(ResultsTest, OfOneCameraTheMapsApartHaveNoNumberOfACamera) {
   EXPECT_EQ(Summary()["other_maps"], Json::parse(R"([{"map": 2, "frames": 1}])"));
 }
 
+TEST_F(ResultsTest, TheTimesOfEachQuarterTellWhetherFramesTakeLongerAsTheRunGoesOn) {
+  for (int frame = 0; frame < 400; ++frame) {
+    FrameTrace trace;
+    trace.publish_us = 1000000 + 33000 * frame;
+    trace.published_us = trace.publish_us + 5000 + (frame < 300 ? 0 : 4000);
+    run_.durations.Add(trace);
+  }
+  const Json quarters = Summary()["image_to_pose_ms_by_quarter"];
+  ASSERT_EQ(quarters.size(), 4);
+  EXPECT_EQ(quarters[0]["p50"], 5.0);
+  EXPECT_EQ(quarters[2]["p99"], 5.0);
+  EXPECT_EQ(quarters[3]["p50"], 9.0);
+}
+
 TEST_F(ResultsTest, TheFirstMapIsTimedFromTheFirstFrameOfTheSequence) {
   for (uint32_t frame = 66; frame < 71; ++frame) Tell(0, frame, 0);
   for (uint32_t frame = 71; frame < 90; ++frame) Tell(0, frame, 1);

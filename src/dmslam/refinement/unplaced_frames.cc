@@ -4,6 +4,14 @@
 #include <iterator>
 
 namespace dmslam {
+namespace {
+
+// Frames are placed beside others, and of those the refiner keeps the newest two minutes
+// (FrameRefinerOptions). A camera that is lost now and then in a run of hours would fill the memory with
+// older ones.
+constexpr int64_t kMaxAgeNs = 120'000'000'000;
+
+}  // namespace
 
 void UnplacedFrames::Keep(WaitingFrame frame) {
   frames_.push_back(std::move(frame));
@@ -18,7 +26,10 @@ void UnplacedFrames::PutBack(std::vector<WaitingFrame> frames) {
 }
 
 void UnplacedFrames::Bound() {
-  while (frames_.size() > max_frames_) frames_.pop_front();
+  const auto is_forgotten = [this] {
+    return frames_.size() > max_frames_ || frames_.back().stamp_ns - frames_.front().stamp_ns > kMaxAgeNs;
+  };
+  while (!frames_.empty() && is_forgotten()) frames_.pop_front();
 }
 
 WaitingFrame UnplacedFrames::TakeNewest() {

@@ -24,7 +24,8 @@ struct WaitingFrame {
   }
 };
 
-/// Frames that had no pose when they came, in order. Beyond a number the oldest are forgotten.
+/// Frames that had no pose when they came, in order. Beyond a number, and two minutes, the oldest are
+/// forgotten.
 class UnplacedFrames {
  public:
   explicit UnplacedFrames(int max_frames) : max_frames_(static_cast<size_t>(max_frames)) {}

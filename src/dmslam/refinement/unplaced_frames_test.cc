@@ -29,6 +29,13 @@ TEST(UnplacedFramesTest, OfTooManyTheOldestAreForgotten) {
   EXPECT_EQ(TakeAll(frames), (std::vector<uint32_t>{5, 4, 3}));
 }
 
+TEST(UnplacedFramesTest, OfARunOfHoursThoseOfTheLastTwoMinutesStay) {
+  UnplacedFrames frames(100);
+  constexpr int64_t kSecond = 1'000'000'000;
+  for (uint32_t minute = 0; minute < 60; ++minute) frames.Keep({minute, 60 * kSecond * minute, {}});
+  EXPECT_EQ(TakeAll(frames), (std::vector<uint32_t>{59, 58, 57}));
+}
+
 TEST(UnplacedFramesTest, FramesThatArePutBackComeInTheirOrder) {
   UnplacedFrames frames(10);
   for (const uint32_t index : {2, 6}) frames.Keep(Frame(index));
