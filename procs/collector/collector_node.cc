@@ -237,8 +237,8 @@ void CollectorNode::TimeKeyframe(const MapDelta& delta) {
   const std::optional<int64_t> heard_ns = delta.about ? proposals_.HeardNs(*delta.about) : std::nullopt;
   if (!heard_ns) return;
   const double elapsed_ms = static_cast<double>(context_.now_ns() - *heard_ns) * 1e-6;
-  if (delta.event == MapEvent::kLandmarksCreated) run_.keyframes.to_landmarks_ms.push_back(elapsed_ms);
-  if (delta.event == MapEvent::kAdjusted) run_.keyframes.to_adjusted_ms.push_back(elapsed_ms);
+  if (delta.event == MapEvent::kLandmarksCreated) run_.keyframes.to_landmarks.Add(elapsed_ms);
+  if (delta.event == MapEvent::kAdjusted) run_.keyframes.to_adjusted.Add(elapsed_ms);
 }
 
 void CollectorNode::OnFramePose(const Record& record) {

@@ -28,27 +28,15 @@ double Percent(size_t part, int64_t whole) {
   return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-double Quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<size_t>(q * static_cast<double>(values.size())))];
+Json Quantiles(const DurationHistogram& durations) {
+  return {
+      {"p50", durations.Quantile(0.5)}, {"p95", durations.Quantile(0.95)}, {"p99", durations.Quantile(0.99)}};
 }
 
-std::vector<double> Doubles(const std::deque<float>& values) { return {values.begin(), values.end()}; }
-
-Json Quantiles(const std::vector<double>& values) {
-  return {{"p50", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"p99", Quantile(values, 0.99)}};
-}
-
-/// Of each quarter of the values, in the order in which they came: whether they grow as a run goes on.
-Json QuantilesOfQuarters(const std::deque<float>& values) {
+/// Of each quarter of the run: whether frames take longer as it goes on.
+Json QuantilesOfQuarters(const DurationHistory& durations) {
   Json quarters = Json::array();
-  auto begin = values.begin();
-  for (size_t quarter = 1; quarter <= 4; ++quarter) {
-    const auto end = values.begin() + static_cast<std::ptrdiff_t>(values.size() * quarter / 4);
-    quarters.push_back(Quantiles({begin, end}));
-    begin = end;
-  }
+  for (int i = 0; i < 4; ++i) quarters.push_back(Quantiles(durations.Between(0.25 * i, 0.25 * (i + 1))));
   return quarters;
 }
 
@@ -308,7 +296,9 @@ std::optional<int64_t> FirstStampNs(const RunRecord& run, const TrajectoryBuilde
   if (!first) return std::nullopt;
   const uint32_t played_first = run.first().frames.first_index.value_or(first->first);
   if (first->first <= played_first || ns_per_frame.empty()) return first->second;
-  return first->second - std::llround(Quantile(ns_per_frame, 0.5) * (first->first - played_first));
+  const auto middle = ns_per_frame.begin() + static_cast<std::ptrdiff_t>(ns_per_frame.size() / 2);
+  std::nth_element(ns_per_frame.begin(), middle, ns_per_frame.end());
+  return first->second - std::llround(*middle * (first->first - played_first));
 }
 
 Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,
@@ -380,15 +370,15 @@ Json CamerasJson(const std::vector<CameraResults>& results) {
 Json TimingJson(const RunRecord& run) {
   const FrameDurations& durations = run.durations;
   Json json;
-  json["frontend_ms_median"] = Quantile(Doubles(durations.step), 0.5);
-  json["frontend_ms_p95"] = Quantile(Doubles(durations.step), 0.95);
-  json["frontend_without_decoding_ms"] = Quantiles(Doubles(durations.apart));
-  json["decode_ms"] = Quantiles(Doubles(durations.decode));
-  json["extract_ms"] = Quantiles(Doubles(durations.extract));
-  json["image_to_pose_ms"] = Quantiles(Doubles(durations.image_to_pose));
+  json["frontend_ms_median"] = durations.step.Quantile(0.5);
+  json["frontend_ms_p95"] = durations.step.Quantile(0.95);
+  json["frontend_without_decoding_ms"] = Quantiles(durations.apart);
+  json["decode_ms"] = Quantiles(durations.decode);
+  json["extract_ms"] = Quantiles(durations.extract);
+  json["image_to_pose_ms"] = Quantiles(durations.image_to_pose.All());
   json["image_to_pose_ms_by_quarter"] = QuantilesOfQuarters(durations.image_to_pose);
-  json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframes.to_landmarks_ms);
-  json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframes.to_adjusted_ms);
+  json["keyframe_to_landmarks_ms"] = Quantiles(run.keyframes.to_landmarks);
+  json["keyframe_to_adjusted_ms"] = Quantiles(run.keyframes.to_adjusted);
   return json;
 }
 
@@ -538,8 +528,8 @@ std::string Table(const Json& summary) {
 }  // namespace
 
 void FrameDurations::Add(const FrameTrace& trace) {
-  const auto add = [](int64_t from_us, int64_t to_us, std::deque<float>* durations) {
-    if (to_us > 0) durations->push_back(static_cast<float>(to_us - from_us) * 1e-3F);
+  const auto add = [](int64_t from_us, int64_t to_us, auto* durations) {
+    if (to_us > 0) durations->Add(static_cast<double>(to_us - from_us) * 1e-3);
   };
   add(trace.begin_us, trace.tracked_us, &step);
   add(trace.decoded_us, trace.tracked_us, &apart);

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "collector/durations.h"
 #include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/wire/frontend_messages.h"
 #include "dmslam/wire/status.h"
@@ -22,12 +22,12 @@ struct CorrectionRecord {
   Rigid3d T_matched_keyframe;         ///< of a loop: as it was closed [map units]
 };
 
-/// What each frame took [ms]: five numbers a frame are kept, whatever the length of the run.
+/// What frames took.
 struct FrameDurations {
-  std::deque<float> step;   ///< of the frontend
-  std::deque<float> apart;  ///< ... without decoding
-  std::deque<float> decode, extract;
-  std::deque<float> image_to_pose;  ///< from when the player published it
+  DurationHistogram step;   ///< of the frontend
+  DurationHistogram apart;  ///< ... without decoding
+  DurationHistogram decode, extract;
+  DurationHistory image_to_pose;  ///< from when the player published it
 
   void Add(const FrameTrace& trace);
 };
@@ -50,8 +50,7 @@ struct KeyframeRecord {
   size_t missing = 0;             ///< proposed for a map that stands, and neither in it nor culled from it
   size_t lost_in_crash = 0;       ///< made after the last checkpoint before all died, and not made again
   size_t lost_with_frontend = 0;  ///< their frontend died while no mapper was there to take them
-  /// From when each was heard to when its landmarks and its adjustment were [ms].
-  std::vector<double> to_landmarks_ms, to_adjusted_ms;
+  DurationHistogram to_landmarks, to_adjusted;  ///< from when each was heard to when these were
 };
 
 struct MemorySample {

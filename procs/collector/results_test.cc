@@ -149,9 +149,9 @@ TEST_F(ResultsTest, TheTimesOfEachQuarterTellWhetherFramesTakeLongerAsTheRunGoes
   }
   const Json quarters = Summary()["image_to_pose_ms_by_quarter"];
   ASSERT_EQ(quarters.size(), 4);
-  EXPECT_EQ(quarters[0]["p50"], 5.0);
-  EXPECT_EQ(quarters[2]["p99"], 5.0);
-  EXPECT_EQ(quarters[3]["p50"], 9.0);
+  EXPECT_NEAR(quarters[0]["p50"].get<double>(), 5.0, 0.05);
+  EXPECT_NEAR(quarters[2]["p99"].get<double>(), 5.0, 0.05);
+  EXPECT_NEAR(quarters[3]["p50"].get<double>(), 9.0, 0.09);
 }
 
 TEST_F(ResultsTest, TheFirstMapIsTimedFromTheFirstFrameOfTheSequence) {
