@@ -1,7 +1,6 @@
 #include "dmslam/optimization/block_tridiagonal.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -27,11 +26,13 @@ struct Column {
 
 /// What eliminates one block: the columns of A from the diagonal down. Factored, they are those of the
 /// Cholesky factor L, and of L^-1 right.
-using Panel = std::array<Column, kBlock>;
+struct Panel {
+  Column column[kBlock];
+};
 
 [[gnu::always_inline]] inline void Load(const BlockTridiagonal& system, size_t k, Panel* panel) {
   for (int j = 0; j < kBlock; ++j) {
-    Column& column = (*panel)[j];
+    Column& column = panel->column[j];
     for (int i = j; i < kBlock; ++i) column.here[i / kLanes][i % kLanes] = system.diagonal[k](i, j);
     if (k < system.above.size()) {
       for (int i = 0; i < kBlock; ++i) column.below[i / kLanes][i % kLanes] = system.above[k](j, i);
@@ -43,7 +44,7 @@ using Panel = std::array<Column, kBlock>;
 /// Whether the diagonal block is positive definite. What lies above the diagonal is not looked at.
 [[gnu::always_inline]] inline bool Factor(Panel* panel) {
   for (int j = 0; j < kBlock; ++j) {
-    Column& from = (*panel)[j];
+    Column& from = panel->column[j];
     if (!(from.Here(j) > 0.0)) return false;
     const double root = std::sqrt(from.Here(j)), inverse = 1.0 / root;
     for (int v = j / kLanes; v < kVectors; ++v) from.here[v] *= inverse;
@@ -51,7 +52,7 @@ using Panel = std::array<Column, kBlock>;
     from.right *= inverse;
     from.here[j / kLanes][j % kLanes] = root;
     for (int c = j + 1; c < kBlock; ++c) {
-      Column& to = (*panel)[c];
+      Column& to = panel->column[c];
       const double times = from.Here(c);
       for (int v = c / kLanes; v < kVectors; ++v) to.here[v] -= times * from.here[v];
       for (int v = 0; v < kVectors; ++v) to.below[v] -= times * from.below[v];
@@ -63,7 +64,7 @@ using Panel = std::array<Column, kBlock>;
 
 /// Takes what is eliminated out of the next block.
 [[gnu::always_inline]] inline void Eliminate(const Panel& panel, Block* diagonal, Part* right) {
-  for (const Column& column : panel) {
+  for (const Column& column : panel.column) {
     double below[kBlock];
     std::memcpy(below, column.below, sizeof(below));
     for (int c = 0; c < kBlock; ++c) {
@@ -77,7 +78,7 @@ using Panel = std::array<Column, kBlock>;
 /// and L^-1 right.
 [[gnu::always_inline]] inline void Keep(const Panel& panel, BlockTridiagonal* system, size_t k) {
   for (int j = 0; j < kBlock; ++j) {
-    const Column& column = panel[j];
+    const Column& column = panel.column[j];
     std::memcpy(system->diagonal[k].data() + kBlock * j, column.here, sizeof(column.here));
     system->right[k][j] = column.right;
     if (k == system->above.size()) continue;
@@ -108,7 +109,7 @@ using Panel = std::array<Column, kBlock>;
   for (size_t k = 0; k < count; ++k) {
     Load(*system, k, &panel);
     if (!Factor(&panel)) return std::nullopt;
-    for (int j = 0; j < kBlock; ++j) log_determinant += 2.0 * std::log(panel[j].Here(j));
+    for (int j = 0; j < kBlock; ++j) log_determinant += 2.0 * std::log(panel.column[j].Here(j));
     if (k + 1 < count) Eliminate(panel, &system->diagonal[k + 1], &system->right[k + 1]);
     Keep(panel, system, k);
   }
