@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <unordered_set>
 #include <utility>
 
 #include "dmslam/map/map_states.h"
@@ -28,7 +29,9 @@ std::vector<const Keyframe*> NearestFirst(const Map& map, std::optional<Keyframe
 
 class Cutter {
  public:
-  Cutter(const Map& map, size_t max_bytes_hint) : map_(map), max_bytes_(max_bytes_hint), parts_(1) {}
+  Cutter(const Map& map, size_t max_bytes_hint) : map_(map), max_bytes_(max_bytes_hint), parts_(1) {
+    sent_.reserve(map.num_landmarks());
+  }
 
   /// The keyframe, the landmarks that it is the first to see, and what it sees with which feature.
   void Add(const Keyframe& keyframe) {
@@ -71,7 +74,7 @@ class Cutter {
   size_t max_bytes_;
   size_t bytes_ = 0;
   std::vector<MapDelta> parts_;
-  std::set<LandmarkId> sent_;
+  std::unordered_set<LandmarkId> sent_;
 };
 
 }  // namespace

@@ -382,6 +382,21 @@ TEST(Stream, ALateReaderGetsASnapshotAndGoesOnBehindIt) {
   }
 }
 
+/// As a large map: while it is cut, which takes half a minute, nobody is heard.
+TEST(Stream, WhoWaitsWhileASnapshotIsCutIsNotTakenForGone) {
+  StreamWriter::Options options = WriterOptions();
+  options.max_records = 4;
+  CountingSource source;
+  Pair pair(options, &source);
+  for (int i = 1; i <= 100; ++i) pair.writer.Publish("DMSLAM_TEST_X", MakeRecord(i), 0);
+  while (pair.writer.statistics().snapshots == 0 && pair.now_ns < 1000 * kMs) pair.Step(), pair.now_ns += kMs;
+  ASSERT_EQ(pair.writer.statistics().snapshots, 1);
+  pair.now_ns += 30'000 * kMs;
+  pair.Run(2000 * kMs);
+  EXPECT_EQ(pair.writer.statistics().snapshots, 1);
+  EXPECT_EQ(pair.TakeAll().size(), 34U);
+}
+
 TEST(Stream, ASnapshotKeepsToItsShareOfTheBus) {
   constexpr size_t kBytes = 30'000;
   StreamWriter::Options options = WriterOptions();

@@ -51,6 +51,7 @@ int64_t StreamWriter::Publish(const std::string& channel, Bytes message, int64_t
 }
 
 void StreamWriter::Advance(int64_t now_ns) {
+  ExcuseSilence(now_ns);
   ForgetSilentReaders(now_ns);
   ForgetAccepted();
   if (IsSilent()) return;
@@ -250,7 +251,7 @@ void StreamWriter::AdvanceSnapshot(int64_t now_ns) {
   if (source_ == nullptr) return;
   const bool wanted = std::any_of(readers_.begin(), readers_.end(),
                                   [](const auto& entry) { return entry.second.wants_snapshot; });
-  if (!snapshot_ && wanted && source_->Ready()) BeginSnapshot();
+  if (!snapshot_ && wanted && source_->Ready()) BeginSnapshot(now_ns);
   if (!snapshot_) return;
   for (auto& [id, reader] : readers_) {  // who comes before the first piece is forgotten may join
     if (!reader.wants_snapshot || snapshot_->window.first() != 1) continue;
@@ -272,10 +273,23 @@ void StreamWriter::AdvanceSnapshot(int64_t now_ns) {
   MakePieces();
 }
 
-void StreamWriter::BeginSnapshot() {
+/// Of a large map a snapshot is cut for seconds, in which nobody is heard: their silence is none.
+void StreamWriter::ExcuseSilence(int64_t now_ns) {
+  if (!snapshot_ || !snapshot_->cutting_since_ns) return;
+  const int64_t deaf_ns = now_ns - *std::exchange(snapshot_->cutting_since_ns, std::nullopt);
+  const auto excuse = [&](auto& entry) {
+    int64_t& last_heard_ns = entry.second.last_heard_ns;
+    last_heard_ns = std::max(last_heard_ns, std::min(now_ns, last_heard_ns + deaf_ns));
+  };
+  std::ranges::for_each(readers_, excuse);
+  std::ranges::for_each(snapshot_->takers, excuse);
+}
+
+void StreamWriter::BeginSnapshot(int64_t now_ns) {
   const int64_t number = ++snapshots_begun_;
   const int32_t key = StreamKey(options_.session, options_.stream, term_, number);
-  snapshot_.emplace(Snapshot{number, window_.last(), 0, SendWindow(WindowOptions(options_), key), {}});
+  snapshot_.emplace(
+      Snapshot{number, window_.last(), 0, SendWindow(WindowOptions(options_), key), {}, now_ns});
   source_->BeginSnapshot(snapshot_->cut);
   ++statistics_.snapshots;
   beacons_.due = true;

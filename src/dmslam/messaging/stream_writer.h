@@ -165,7 +165,8 @@ class StreamWriter : public StateMachine {
       int64_t received = 0;  // up to which piece
       int64_t last_heard_ns = 0;
     };
-    std::map<int64_t, Taker> takers;  // by reader
+    std::map<int64_t, Taker> takers;          // by reader
+    std::optional<int64_t> cutting_since_ns;  // none: it has been cut, and a step made since
   };
   struct Beacons {
     int64_t next_ns = INT64_MIN;
@@ -190,8 +191,9 @@ class StreamWriter : public StateMachine {
   void ForgetSilentReaders(int64_t now_ns);
   void ForgetAccepted();
   void AdvanceSnapshot(int64_t now_ns);
-  void BeginSnapshot();
+  void BeginSnapshot(int64_t now_ns);
   void EndSnapshot();
+  void ExcuseSilence(int64_t now_ns);
   void MakePieces();
   void SendPaced(int64_t now_ns);
   void Beacon(int64_t now_ns);

@@ -1,6 +1,8 @@
 #include "dmslam/runtime/map_snapshots.h"
 
+#include <iterator>
 #include <optional>
+#include <vector>
 
 #include "dmslam/map/snapshot.h"
 #include "dmslam/wire/codec.h"
@@ -15,8 +17,8 @@ bool MapSnapshots::Ready() {
 void MapSnapshots::BeginSnapshot(int64_t) {
   std::optional<KeyframeId> newest;
   if (!map_->keyframes().empty()) newest = map_->keyframes().rbegin()->first;
-  const std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kSnapshotPieceBytes);
-  parts_.assign(parts.begin(), parts.end());
+  std::vector<MapDelta> parts = CutSnapshot(*map_, newest, kSnapshotPieceBytes);
+  parts_.assign(std::make_move_iterator(parts.begin()), std::make_move_iterator(parts.end()));
 }
 
 SnapshotSource::Piece MapSnapshots::NextPiece() {
