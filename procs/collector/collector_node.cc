@@ -13,6 +13,7 @@
 #include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/runtime/process_info.h"
+#include "dmslam/runtime/service_notice.h"
 #include "dmslam/settings/run_options.h"
 #include "dmslam/util/check.h"
 
@@ -585,6 +586,7 @@ void CollectorNode::Gather(bool ended) {
 
 /// Why not all of them could be written; empty: they are there.
 std::string CollectorNode::WriteResultFiles(bool ended) {
+  ServiceNotice().Stopping();  // of a run of hours they take minutes
   Gather(ended);
   const WrittenResults results = WriteResults(collector_.out_dir, run_, *builder_, collector_.for_people);
   if (!results.problem.empty() && ended) return results.problem;

@@ -151,7 +151,7 @@ bool Supervisor::MayBegin(const Child& child) const {
 void Supervisor::Launch(Child* child) {
   child->due_ns = INT64_MAX;
   child->heard_ns.reset();
-  child->waits = child->hung = false;
+  child->waits = child->hung = child->at_last_work = false;
   const int output = OpenForChild(child->spec.output);
   const int errors = child->spec.errors_to_ours ? dup(STDERR_FILENO) : OpenForChild(child->spec.errors);
   const pid_t parent = getpid();
@@ -271,6 +271,7 @@ void Supervisor::OnNotice(pid_t sender, const std::string& text) {
                                   [&](const Child& c) { return c.pid > 0 && c.pid == sender; });
   if (child == children_.end()) return;
   child->heard_ns = now_ns();
+  if (ValueOf(text, "STOPPING") == "1") child->at_last_work = true;
   if (ValueOf(text, "READY") != "1") return;
   child->ready = true;
   ChildEvent event;
@@ -282,7 +283,7 @@ void Supervisor::OnNotice(pid_t sender, const std::string& text) {
 
 /// How long a child that is alive may say nothing; after that it hangs. No end: it is asked nothing.
 int64_t Supervisor::SilentUntil(const Child& child) const {
-  if (options_.watchdog_ns <= 0 || child.pid <= 0 || child.hung) return INT64_MAX;
+  if (options_.watchdog_ns <= 0 || child.pid <= 0 || child.hung || child.at_last_work) return INT64_MAX;
   if (child.heard_ns) return *child.heard_ns + options_.watchdog_ns;
   return child.spec.speaks ? child.began_ns + options_.first_word_ns : INT64_MAX;
 }
@@ -354,17 +355,24 @@ void Supervisor::StopAll() {
     if (child.pid > 0) kill(child.pid, child.spec.stop_signal);
     if (child.pid > 0) kill(child.pid, SIGCONT);  // who was stopped cannot end
   }
-  const int64_t deadline = now_ns() + options_.stop_ns;
-  bool killed = false;
+  const int64_t asked_ns = now_ns();
   while (size() > 0) {
-    const ChildEvent event = Wait(killed ? INT64_MAX : deadline);
-    const bool impatient = event.kind == ChildEvent::Kind::kSignal || now_ns() >= deadline;
-    if (!impatient || killed) continue;
-    killed = true;
-    for (const Child& child : children_) {
-      if (child.pid > 0) kill(child.pid, SIGKILL);
+    int64_t deadline_ns = INT64_MAX;
+    for (const Child& child : children_) deadline_ns = std::min(deadline_ns, KillsAfter(child) + asked_ns);
+    const bool impatient = Wait(deadline_ns).kind == ChildEvent::Kind::kSignal;
+    for (Child& child : children_) {
+      if (child.pid <= 0 || child.hung || (!impatient && now_ns() - asked_ns < KillsAfter(child))) continue;
+      child.hung = true;
+      kill(child.pid, SIGKILL);
     }
   }
+}
+
+/// How long after it was asked to end; no end where it has been killed.
+int64_t Supervisor::KillsAfter(const Child& child) const {
+  constexpr int64_t kNever = INT64_MAX / 2;
+  if (child.pid <= 0 || child.hung) return kNever;
+  return child.at_last_work ? options_.last_work_ns : options_.stop_ns;
 }
 
 bool Supervisor::Alive(const std::string& name) const { return PidOf(name) > 0; }

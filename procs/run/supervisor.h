@@ -69,8 +69,9 @@ class Supervisor {
     /// ... as does who is known to speak, and has said no word since its start: what it begins with, as a
     /// large map, may take long to load.
     int64_t first_word_ns = 300'000'000'000;
-    int64_t stop_ns = 10'000'000'000;  ///< who does not end when asked to is killed after so long
-    pid_t (*fork)() = ::fork;          ///< a test lets it fail
+    int64_t stop_ns = 10'000'000'000;        ///< who does not end when asked to is killed after so long...
+    int64_t last_work_ns = 600'000'000'000;  ///< ... or, where it has said that it is at its last work
+    pid_t (*fork)() = ::fork;                ///< a test lets it fail
   };
 
   explicit Supervisor(Options options);
@@ -87,6 +88,7 @@ class Supervisor {
   /// From now on nobody is started again.
   void StopRestarting();
   /// Asks all to end, kills those that do not, and returns when nobody is left. A signal kills at once.
+  /// Who says that it is at its last work (STOPPING=1) gets more time for it.
   void StopAll();
 
   bool Alive(const std::string& name) const;
@@ -109,6 +111,7 @@ class Supervisor {
     bool ready = false;  // its newest life has said so
     bool lived = false;  // long enough to be worth patience
     bool hung = false;
+    bool at_last_work = false;  // results are written, for example: not asked whether it is alive
   };
   bool MayBegin(const Child& child) const;
   void Launch(Child* child);
@@ -122,6 +125,7 @@ class Supervisor {
   void OnNotice(pid_t sender, const std::string& text);
   void KillHung();
   int64_t SilentUntil(const Child& child) const;
+  int64_t KillsAfter(const Child& child) const;
   void TakeSignals();
   void Poll(int64_t deadline_ns);
   int64_t NextDeadline() const;

@@ -240,6 +240,30 @@ TEST(SupervisorTest, StopsAllAndKillsWhoDoesNotListen) {
   EXPECT_LT(Supervisor::now_ns() - began, 5 * kSecondNs);
 }
 
+TEST(SupervisorTest, WhoIsAtItsLastWorkHasTimeForIt) {
+  Supervisor::Options options = Eager();
+  options.stop_ns = options.watchdog_ns = 300'000'000;
+  Supervisor supervisor(options);
+  const std::string done = ::testing::TempDir() + "last_work_" + std::to_string(getpid());
+  supervisor.Start(Python("collector",
+                          "import time\n"
+                          "def work(*_):\n"
+                          "  notify('STOPPING=1')\n"
+                          "  time.sleep(1.5)\n"
+                          "  open('" +
+                              done +
+                              "', 'w').close()\n"
+                              "  os._exit(0)\n"
+                              "signal.signal(signal.SIGTERM, work)\n"
+                              "notify('READY=1')\n"
+                              "while True:\n"
+                              "  notify('WATCHDOG=1')\n"
+                              "  time.sleep(0.02)\n"));
+  ASSERT_EQ(supervisor.Wait(Supervisor::now_ns() + 20 * kSecondNs).kind, Kind::kReady);
+  supervisor.StopAll();
+  EXPECT_TRUE(std::filesystem::remove(done)) << "it was killed";
+}
+
 TEST(SupervisorTest, ReportsWhoAsksItToStop) {
   Supervisor supervisor(Eager());
   supervisor.Start(Sleeper("child"));

@@ -28,6 +28,7 @@ void MapperCore::ContinueSaved(Map map, uint64_t successor) {
   MapEditor saved(std::move(map));
   saved.SetProgress({});
   Continue(std::move(saved), successor);
+  for (const auto& [id, keyframe] : map_.keyframes()) as_saved_.insert(keyframe.map_id);
 }
 
 void MapperCore::Continue(Map map, uint64_t successor) {
@@ -117,7 +118,10 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   adjusted_ = false;
   const bool maybe_unfinished = finished_ && finished_->insert(proposal.id.camera()).second;
   const Keyframe* there = map_.FindKeyframe(proposal.id);
-  if (maybe_unfinished && there != nullptr) return there;
+  if (maybe_unfinished && there != nullptr) {
+    as_saved_.erase(there->map_id);
+    return there;
+  }
   const InsertionReport report = InsertKeyframe(map_, proposal);
   Count(report.observations_dropped, &counters_.observations_dropped);
   if (report.keyframe == nullptr) {
@@ -126,6 +130,7 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   }
   order_.Add(proposal.id);
   ++counters_.keyframes_inserted;
+  as_saved_.erase(report.keyframe->map_id);
   Publish(MapEvent::kKeyframeInserted, proposal.id, report.keyframe->map_id);
   return report.keyframe;
 }
@@ -194,6 +199,7 @@ void MapperCore::AdjustMaps() {
   for (const auto& [id, keyframe] : map_.keyframes()) maps.insert(keyframe.map_id);
   for (const MapId map_id : maps) {
     if (Stopped()) return;
+    if (as_saved_.contains(map_id)) continue;
     Count(RemoveTooNear(map_, map_id, options_.min_depth), &counters_.landmarks_culled);
     AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, stop_);
     Publish(MapEvent::kMapAdjusted, {}, map_id);
@@ -233,6 +239,7 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   map_.SetProgress(progress);
   const KeyframeId about = answer.seen_from.value_or(answer.keyframe);
   const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(about);
+  if (anchor) as_saved_.erase(anchor->map_id);
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, about,
           anchor ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id, answer.note);

@@ -522,6 +522,25 @@ TEST_F(KeyframeStep, AFirstMapOfANumberThatIsTakenChangesNothing) {
   EXPECT_EQ(core_.map().num_landmarks(), landmarks);
 }
 
+TEST_F(KeyframeStep, TheEndLeavesASavedMapToWhichNothingHasComeAsItIs) {
+  ASSERT_TRUE(Start());
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  const KeyframeProposal third = Frame(3);
+  const AdjustRequest at_the_end{.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0};
+  for (const bool comes : {false, true}) {
+    std::vector<MapEvent> events;
+    MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1,
+                    [&](const MapDelta& delta) { events.push_back(delta.event); });
+    next.ContinueSaved(Map(core_.map()));
+    ASSERT_TRUE(!comes || next.OnKeyframe(third));
+    events.clear();
+    next.OnAdjustRequest(at_the_end);
+    const bool adjusts = std::ranges::find(events, MapEvent::kMapAdjusted) != events.end();
+    EXPECT_EQ(adjusts, comes);
+    EXPECT_EQ(events.back(), MapEvent::kRequestDone);
+  }
+}
+
 TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   ASSERT_TRUE(Start());
   ASSERT_TRUE(core_.OnKeyframe(Frame(2)));

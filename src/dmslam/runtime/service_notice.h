@@ -20,6 +20,8 @@ class ServiceNotice {
 
   /// `status`: one line that is shown with it; may be empty.
   void Ready(std::string_view status = "");
+  /// That what follows is the last work, which may take long: nobody listens for `Alive` any more.
+  void Stopping() { Send("STOPPING=1"); }
   /// Says so, four times within the time that was asked for. Cheap: to be called from every turn of a loop.
   /// `well`: asked when it is due; where it is false nothing is said.
   void Alive(int64_t now_ns, const std::function<bool()>& well);

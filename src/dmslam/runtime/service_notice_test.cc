@@ -56,6 +56,11 @@ TEST_F(ServiceNoticeTest, SaysThatItIsReadyAndFourTimesAPeriodThatItIsAlive) {
   EXPECT_EQ(Heard(), "WATCHDOG=1");
 }
 
+TEST_F(ServiceNoticeTest, SaysThatItIsAboutToEnd) {
+  ServiceNotice().Stopping();
+  EXPECT_EQ(Heard(), "STOPPING=1");
+}
+
 TEST_F(ServiceNoticeTest, WhoIsNotWellSaysNothingAndDoesNotSpin) {
   ServiceNotice notice;
   EXPECT_EQ(notice.longest_silence_ns(), 4'000'000'000);
