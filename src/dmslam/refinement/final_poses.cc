@@ -26,7 +26,7 @@ constexpr int kLandmarkSteps = 2;           // of Gauss and Newton
 constexpr double kOverstep = 1.7;
 constexpr size_t kSharedFrames = 10;  // since another saw a landmark: more, and their errors are their own
 constexpr double kMaxMove = 0.3;      // of a landmark, as a share of its distance: more is a slip
-constexpr size_t kPortion = 64;       // frames or landmarks that are placed at once
+constexpr size_t kFramesAtOnce = 256, kLandmarksAtOnce = 2048;  // some milliseconds' work for two threads
 
 PoseObservation Observe(const PyramidTable& pyramid, const Sight& sight, const Eigen::Vector3d& p_world) {
   return {p_world, sight.uv_px.cast<double>(), 1.0 / pyramid.SigmaSquared(sight.octave), 1.0};
@@ -411,7 +411,7 @@ void FinalPoses::PlaceSomeLandmarks(const Map& map) {
   }
   std::vector<std::span<const View>> landmarks;
   auto begin = views_.cbegin() + static_cast<ptrdiff_t>(next_);
-  for (size_t n = 0; n < kPortion && begin != views_.cend(); ++n) {
+  for (size_t n = 0; n < kLandmarksAtOnce && begin != views_.cend(); ++n) {
     const auto end =
         std::find_if(begin, views_.cend(), [begin](const View& v) { return v.landmark != begin->landmark; });
     if (end - begin >= kMinFrames) landmarks.emplace_back(begin, end);
@@ -441,7 +441,7 @@ void FinalPoses::PlaceFrame(const Map& map, size_t index) {
 }
 
 void FinalPoses::PlaceSomeFrames(const Map& map) {
-  const size_t count = std::min(kPortion, poses_.size() - next_);
+  const size_t count = std::min(kFramesAtOnce, poses_.size() - next_);
   ForEachInParallel(count, threads_, [&](size_t i) { PlaceFrame(map, next_ + i); });
   next_ += count;
 }
