@@ -7,7 +7,7 @@ namespace dmslam {
 namespace {
 
 constexpr double kLeastMs = 0.01, kStep = 1.01;
-constexpr size_t kMostBins = 2048;      // more than a day
+constexpr size_t kMostBins = 2048;      // up to two hours; what takes longer counts as that
 constexpr size_t kMostStretches = 160;  // half as many at least, in a run that is not short
 
 size_t BinOf(double ms) {

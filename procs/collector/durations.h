@@ -7,7 +7,7 @@
 namespace dmslam {
 
 /// How often which durations occurred, in memory that does not grow with their number. Each is known to 1 %;
-/// those of less than a hundredth of a millisecond count as 0.
+/// those of less than a hundredth of a millisecond count as 0, and those of more than two hours as that.
 class DurationHistogram {
  public:
   void Add(double ms);

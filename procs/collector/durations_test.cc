@@ -23,11 +23,11 @@ TEST(DurationHistogram, WhatTakesNoTimeTakesNone) {
   EXPECT_NEAR(histogram.Quantile(0.99), 7.0, 0.07);
 }
 
-TEST(DurationHistogram, DaysAndCenturiesAreCounted) {
+TEST(DurationHistogram, WhatTakesLongerThanTwoHoursCountsAsThat) {
   DurationHistogram histogram;
   for (const double ms : {3.6e6, 3e12}) histogram.Add(ms);
   EXPECT_NEAR(histogram.Quantile(0.0), 3.6e6, 3.6e4);
-  EXPECT_GT(histogram.Quantile(0.99), 5e6);
+  EXPECT_NEAR(histogram.Quantile(0.99), 6.9e6, 1e5);
 }
 
 TEST(DurationHistory, KnowsEachPartOfALongRun) {

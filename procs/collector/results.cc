@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "collector/map_ply.h"
+#include "dmslam/evaluation/statistics.h"
 #include "dmslam/evaluation/trajectory_plot.h"
 #include "dmslam/evaluation/uncertain_trajectory.h"
 #include "dmslam/util/build_version.h"
@@ -296,9 +297,7 @@ std::optional<int64_t> FirstStampNs(const RunRecord& run, const TrajectoryBuilde
   if (!first) return std::nullopt;
   const uint32_t played_first = run.first().frames.first_index.value_or(first->first);
   if (first->first <= played_first || ns_per_frame.empty()) return first->second;
-  const auto middle = ns_per_frame.begin() + static_cast<std::ptrdiff_t>(ns_per_frame.size() / 2);
-  std::nth_element(ns_per_frame.begin(), middle, ns_per_frame.end());
-  return first->second - std::llround(*middle * (first->first - played_first));
+  return first->second - std::llround(Median(ns_per_frame) * (first->first - played_first));
 }
 
 Json TrackingJson(const RunRecord& run, const TrajectoryBuilder& builder,

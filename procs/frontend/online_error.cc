@@ -3,8 +3,6 @@
 #include <iterator>
 #include <optional>
 
-#include "dmslam/evaluation/alignment.h"
-
 namespace dmslam {
 namespace {
 
@@ -21,17 +19,14 @@ void OnlineError::OnTruth(uint32_t frame_index, const Eigen::Vector3d& p_world) 
 double OnlineError::OnPose(uint32_t frame_index, const Eigen::Vector3d& p_map) {
   const auto truth = truth_.find(frame_index);
   if (truth == truth_.end()) return -1;
-  tracked_.push_back(p_map);
-  true_.push_back(truth->second);
+  const Eigen::Vector3d p_true = truth->second;
+  pairs_.Add(p_map, p_true);
   truth_.erase(truth_.begin(), std::next(truth));
-  if (tracked_.size() < kMinAligned) return -1;
-  const std::optional<Sim3d> true_from_map = AlignPoints(tracked_, true_, Alignment::kSim3);
-  return true_from_map ? (*true_from_map * tracked_.back() - true_.back()).norm() : -1;
+  if (pairs_.count() < kMinAligned) return -1;
+  const std::optional<Sim3d> true_from_map = pairs_.Align(Alignment::kSim3);
+  return true_from_map ? (*true_from_map * p_map - p_true).norm() : -1;
 }
 
-void OnlineError::Reset() {
-  tracked_.clear();
-  true_.clear();
-}
+void OnlineError::Reset() { pairs_ = {}; }
 
 }  // namespace dmslam

@@ -3,7 +3,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
-#include <vector>
+
+#include "dmslam/evaluation/alignment.h"
 
 namespace dmslam {
 
@@ -21,7 +22,7 @@ class OnlineError {
 
  private:
   std::map<uint32_t, Eigen::Vector3d> truth_;  ///< of frames that were not yet tracked
-  std::vector<Eigen::Vector3d> tracked_, true_;
+  PointPairs pairs_;                           ///< tracked, and where that truly was
 };
 
 }  // namespace dmslam

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -356,23 +357,23 @@ void Supervisor::StopAll() {
     if (child.pid > 0) kill(child.pid, SIGCONT);  // who was stopped cannot end
   }
   const int64_t asked_ns = now_ns();
+  const auto may_live_until = [&](const Child& child) {
+    return asked_ns + (child.at_last_work ? options_.last_work_ns : options_.stop_ns);
+  };
+  std::set<pid_t> killed;
+  const auto is_asked = [&](const Child& child) { return child.pid > 0 && !killed.contains(child.pid); };
   while (size() > 0) {
     int64_t deadline_ns = INT64_MAX;
-    for (const Child& child : children_) deadline_ns = std::min(deadline_ns, KillsAfter(child) + asked_ns);
+    for (const Child& child : children_) {
+      if (is_asked(child)) deadline_ns = std::min(deadline_ns, may_live_until(child));
+    }
     const bool impatient = Wait(deadline_ns).kind == ChildEvent::Kind::kSignal;
-    for (Child& child : children_) {
-      if (child.pid <= 0 || child.hung || (!impatient && now_ns() - asked_ns < KillsAfter(child))) continue;
-      child.hung = true;
+    for (const Child& child : children_) {
+      if (!is_asked(child) || (!impatient && now_ns() < may_live_until(child))) continue;
       kill(child.pid, SIGKILL);
+      killed.insert(child.pid);
     }
   }
-}
-
-/// How long after it was asked to end; no end where it has been killed.
-int64_t Supervisor::KillsAfter(const Child& child) const {
-  constexpr int64_t kNever = INT64_MAX / 2;
-  if (child.pid <= 0 || child.hung) return kNever;
-  return child.at_last_work ? options_.last_work_ns : options_.stop_ns;
 }
 
 bool Supervisor::Alive(const std::string& name) const { return PidOf(name) > 0; }

@@ -111,7 +111,7 @@ class Supervisor {
     bool ready = false;  // its newest life has said so
     bool lived = false;  // long enough to be worth patience
     bool hung = false;
-    bool at_last_work = false;  // results are written, for example: not asked whether it is alive
+    bool at_last_work = false;  // its newest life has said so: it writes results, and may be silent meanwhile
   };
   bool MayBegin(const Child& child) const;
   void Launch(Child* child);
@@ -125,7 +125,6 @@ class Supervisor {
   void OnNotice(pid_t sender, const std::string& text);
   void KillHung();
   int64_t SilentUntil(const Child& child) const;
-  int64_t KillsAfter(const Child& child) const;
   void TakeSignals();
   void Poll(int64_t deadline_ns);
   int64_t NextDeadline() const;

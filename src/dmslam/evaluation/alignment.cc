@@ -9,32 +9,6 @@ namespace {
 // A singular value this small against the largest counts as zero: the points lie on a line.
 constexpr double kRankTolerance = 1e-12;
 
-struct Moments {
-  Eigen::Vector3d source_mean = Eigen::Vector3d::Zero();
-  Eigen::Vector3d target_mean = Eigen::Vector3d::Zero();
-  double source_variance = 0;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // target times source
-};
-
-Moments ComputeMoments(std::span<const Eigen::Vector3d> source, std::span<const Eigen::Vector3d> target) {
-  Moments moments;
-  const double n = static_cast<double>(source.size());
-  for (size_t i = 0; i < source.size(); ++i) {
-    moments.source_mean += source[i];
-    moments.target_mean += target[i];
-  }
-  moments.source_mean /= n;
-  moments.target_mean /= n;
-  for (size_t i = 0; i < source.size(); ++i) {
-    const Eigen::Vector3d centred = source[i] - moments.source_mean;
-    moments.source_variance += centred.squaredNorm();
-    moments.covariance += (target[i] - moments.target_mean) * centred.transpose();
-  }
-  moments.source_variance /= n;
-  moments.covariance /= n;
-  return moments;
-}
-
 }  // namespace
 
 std::string_view AlignmentName(Alignment alignment) {
@@ -58,26 +32,41 @@ std::optional<Alignment> ParseAlignment(std::string_view name) {
   return std::nullopt;
 }
 
-std::optional<Sim3d> AlignPoints(std::span<const Eigen::Vector3d> source,
-                                 std::span<const Eigen::Vector3d> target, Alignment alignment) {
-  DMSLAM_CHECK(source.size() == target.size(), "points come in pairs");
+/// Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 1962.
+void PointPairs::Add(const Eigen::Vector3d& source, const Eigen::Vector3d& target) {
+  const double share = 1.0 / static_cast<double>(++count_);
+  const Eigen::Vector3d from_mean = source - source_mean_;
+  source_mean_ += share * from_mean;
+  target_mean_ += share * (target - target_mean_);
+  source_squares_ += from_mean.dot(source - source_mean_);
+  products_ += (target - target_mean_) * from_mean.transpose();
+}
+
+std::optional<Sim3d> PointPairs::Align(Alignment alignment) const {
   if (alignment == Alignment::kNone) return Sim3d();
-  if (source.size() < 3) return std::nullopt;
-  const Moments moments = ComputeMoments(source, target);
-  const Svd3 svd = SvdOf(moments.covariance);
+  if (count_ < 3) return std::nullopt;
+  const Svd3 svd = SvdOf(products_);
   const Eigen::Vector3d& singular = svd.values;
-  if (!(singular(1) > kRankTolerance * singular(0)) || !(moments.source_variance > 0)) return std::nullopt;
+  if (!(singular(1) > kRankTolerance * singular(0)) || !(source_squares_ > 0)) return std::nullopt;
 
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();
   if (svd.U.determinant() * svd.V.determinant() < 0) signs.z() = -1;
   const Eigen::Matrix3d rotation = svd.U * signs.asDiagonal() * svd.V.transpose();
-  const double scale = singular.dot(signs) / moments.source_variance;
+  const double scale = singular.dot(signs) / source_squares_;
   if (alignment == Alignment::kScale) {
     return Sim3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), scale);
   }
   const double kept_scale = alignment == Alignment::kSim3 ? scale : 1.0;
   return Sim3d(Eigen::Quaterniond(rotation).normalized(),
-               moments.target_mean - kept_scale * (rotation * moments.source_mean), kept_scale);
+               target_mean_ - kept_scale * (rotation * source_mean_), kept_scale);
+}
+
+std::optional<Sim3d> AlignPoints(std::span<const Eigen::Vector3d> source,
+                                 std::span<const Eigen::Vector3d> target, Alignment alignment) {
+  DMSLAM_CHECK(source.size() == target.size(), "points come in pairs");
+  PointPairs pairs;
+  for (size_t i = 0; i < source.size(); ++i) pairs.Add(source[i], target[i]);
+  return pairs.Align(alignment);
 }
 
 }  // namespace dmslam

@@ -45,6 +45,20 @@ TEST(Alignment, RecoversAnySimilarity) {
   }
 }
 
+TEST(Alignment, PointsThatComeOneByOneFarAwayAreAlignedAsWell) {
+  const Sim3d truth(ExpSo3({0.3, 1, -2}), {4e5, 5e6, 3e2}, 2.5);  // such as UTM coordinates
+  PointPairs pairs;
+  Random random(3);
+  for (int i = 0; i < 100'000; ++i) {
+    const Eigen::Vector3d point(random.Gaussian(), random.Gaussian(), random.Gaussian());
+    pairs.Add(point, truth * point);
+  }
+  const Sim3d found = pairs.Align(Alignment::kSim3).value();
+  EXPECT_NEAR(found.scale, truth.scale, 1e-7);
+  EXPECT_LT(AngleBetween(found.rotation, truth.rotation), 1e-7);
+  EXPECT_LT((found.translation - truth.translation).norm(), 1e-6);
+}
+
 TEST(Alignment, NoNearbyTransformFitsNoisyPointsBetter) {
   const auto source = RandomPoints(40, 7);
   auto target = Image(Sim3d(ExpSo3({0.3, 1, -2}), {1, 2, 3}, 1.7), source);

@@ -98,6 +98,7 @@ bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   const Keyframe* keyframe = FindOrInsert(proposal);
   if (keyframe == nullptr) return false;
   const MapId map_id = keyframe->map_id;
+  as_saved_.erase(map_id);
   CullYoung(map_id);
   CreateLandmarks(map_, *keyframe, proposal.moving, options_.creation, maker_, &counters_.creation);
   RemoveSeenThroughBy(*keyframe);
@@ -118,10 +119,7 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   adjusted_ = false;
   const bool maybe_unfinished = finished_ && finished_->insert(proposal.id.camera()).second;
   const Keyframe* there = map_.FindKeyframe(proposal.id);
-  if (maybe_unfinished && there != nullptr) {
-    as_saved_.erase(there->map_id);
-    return there;
-  }
+  if (maybe_unfinished && there != nullptr) return there;
   const InsertionReport report = InsertKeyframe(map_, proposal);
   Count(report.observations_dropped, &counters_.observations_dropped);
   if (report.keyframe == nullptr) {
@@ -130,7 +128,6 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   }
   order_.Add(proposal.id);
   ++counters_.keyframes_inserted;
-  as_saved_.erase(report.keyframe->map_id);
   Publish(MapEvent::kKeyframeInserted, proposal.id, report.keyframe->map_id);
   return report.keyframe;
 }

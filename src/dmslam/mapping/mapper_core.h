@@ -72,8 +72,8 @@ class MapperCore {
   bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
-  /// Adjusts every map as a whole, once, and answers the request. A saved map to which nothing has come stays
-  /// as it was saved.
+  /// Adjusts every map as a whole, once, and answers the request. A saved map that got
+  /// neither a keyframe nor a correction is not adjusted: it was when it was saved.
   void OnAdjustRequest(const AdjustRequest& request);
   /// Says that all maps are adjusted, as far as they are to be.
   void AnswerRequest(uint32_t request);
@@ -120,7 +120,7 @@ class MapperCore {
   Sink sink_;
   std::function<bool()> interrupt_, stop_;
   MapperCounters counters_;
-  std::set<MapId> as_saved_;                ///< maps that were saved, and to which nothing has come
+  std::set<MapId> as_saved_;                ///< saved maps that got neither a keyframe nor a correction
   std::map<MapId, uint64_t> seen_through_;  ///< landmarks of each map that were removed for it
 };
 
