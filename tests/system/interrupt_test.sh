@@ -42,8 +42,7 @@ ended_with 137 "the runner's own death"
 
 arguments+=(--no-restart)
 begin died
-pid=$(mine | grep 'bin/dmslam-mapper ' | grep -v setpriv | head -n 1 | cut -d: -f1)
-kill -KILL "$pid"
+kill -KILL "$(cat "$work/died/log/mapper.pid")"
 ended_with 137 "the mapper's death"
 check "says who died" grep -q "mapper was ended by signal 9" "$work/died.said"
 finish

@@ -21,11 +21,6 @@ const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
   return landmark != nullptr && landmark->map_id == map_id ? landmark : nullptr;
 }
 
-/// Computes those that are stale once, and not in each of the threads that look.
-void FillViewingRanges(const Map& map) {
-  for (const LandmarkId id : map.LandmarkIdsSorted()) map.Viewing(map.At(id));
-}
-
 /// Whether the keyframes before and after rule out that the camera was there. Behind people a few wrong
 /// sights may agree with a pose far aside.
 bool IsAside(const Map& map, KeyframeId reference, const FramePose& pose, const Rigid3d& T_cam_world) {
@@ -76,7 +71,6 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
                      [](const Kept& a, const Kept& b) { return a.pose.stamp_ns < b.pose.stamp_ns; });
   }
   CountFeatures();
-  FillViewingRanges(map);
 }
 
 std::vector<WaitingFrame> FrameRefiner::TakeFramesOf(MapId map_id) {
