@@ -36,6 +36,12 @@ for table in pairs windows system starts; do
   check "judge: $table as JSON" python3 -c 'import json, sys; json.load(open(sys.argv[1]))' "$work/$table.json"
 done
 
+check "judge: system says which windows are bad" python3 -c '
+import json, sys
+bad = json.load(open(sys.argv[1]))["system"]["bad_windows"]
+assert bad == {method: [] for method in bad} and "DLRSAC" in bad, bad
+' "$work/system.json"
+
 # Frames without a true pose are not judged.
 half=$work/half
 mkdir "$half"

@@ -373,6 +373,7 @@ struct SystemTally {
   Tally all, parallax, hard;
   int unjudged = 0;                   ///< windows that are in none of them, for want of true poses
   std::map<std::string, int> waited;  ///< frames, by reason
+  nlohmann::json bad_windows = nlohmann::json::array();
 };
 
 /// What the first frame of a window shows against one a little later.
@@ -395,20 +396,30 @@ WindowKind KindOfWindow(JudgedSequence& sequence, const SystemWindowOptions& opt
           score.moving_share() > options.hard_moving_share};
 }
 
-void AddWindow(JudgedSequence& sequence, const std::optional<FoundMap>& found, const WindowKind& kind,
-               SystemTally* tally) {
+/// Adds what was found in the window that begins with frame `first`.
+void AddWindow(JudgedSequence& sequence, size_t first, const std::optional<FoundMap>& found,
+               const WindowKind& kind, SystemTally* tally) {
   if (!kind.has_poses || (found && !sequence.TrueMotion(found->map.frame0.index, found->map.frame1.index))) {
     ++tally->unjudged;
     return;
+  }
+  std::optional<SelectionScore> score;
+  if (found) {
+    const FirstMap& map = found->map;
+    score = ScoreSelection(sequence.Judge(map.frame0.index, map.frame1.index, map.matches),
+                           MatchesWithPoint(map));
+    if (score->precision() < kBadPrecision) {
+      tally->bad_windows.push_back({{"frame", first},
+                                    {"first_keyframe", map.frame0.index},
+                                    {"second_keyframe", map.frame1.index},
+                                    {"precision", score->precision()}});
+    }
   }
   for (Tally* each :
        {&tally->all, kind.has_parallax ? &tally->parallax : nullptr, kind.is_hard ? &tally->hard : nullptr}) {
     if (!each) continue;
     ++each->asked;
-    if (!found) continue;
-    const FirstMap& map = found->map;
-    const auto truth = sequence.Judge(map.frame0.index, map.frame1.index, map.matches);
-    each->Add(ScoreSelection(truth, MatchesWithPoint(map)));
+    if (score) each->Add(*score);
   }
 }
 
@@ -439,6 +450,7 @@ nlohmann::json PrintSystem(const SystemWindowOptions& options,
   for (size_t s = 0; s < names.size(); ++s) {
     json["waited_for_frames"][names[s]] = tallies[s].waited;
     json["unjudged"][names[s]] = tallies[s].unjudged;
+    json["bad_windows"][names[s]] = tallies[s].bad_windows;
     TellUnjudged(tallies[s].unjudged, tallies[s].unjudged + tallies[s].all.asked,
                  ("windows of " + names[s]).c_str(), out);
   }
@@ -471,7 +483,7 @@ nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& 
         found = FirstMapOf(sequence, initializers[s].options, {first - std::min(before, first), first, end},
                            seed, &tallies[s].waited);
       }
-      AddWindow(sequence, found, kind, &tallies[s]);
+      AddWindow(sequence, first, found, kind, &tallies[s]);
     }
     sequence.ForgetBefore(first - std::min(first, before));
   }
