@@ -259,9 +259,9 @@ int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before) {
   const std::vector<const Keyframe*> witnesses = map.KeyframesOf(map_id);
   const double before = static_cast<double>(removed_before);
   const double seen_through = before + CondemnSeenThrough(map, witnesses, &suspects);
-  const bool any_proven = suspects.size() < landmarks.size();
+  const bool can_be_proven = suspects.size() < landmarks.size() && CanBeProven(map, map_id, ProvenOptions());
   const bool somebody_stood =
-      any_proven && seen_through > kStoodShare * (before + static_cast<double>(suspects.size()));
+      can_be_proven && seen_through > kStoodShare * (before + static_cast<double>(suspects.size()));
   for (Suspect& suspect : suspects) {
     if (somebody_stood && suspect.landmark->evidence.moved > 0) suspect.condemned = true;
   }

@@ -132,6 +132,22 @@ TEST_F(StandingPerson, AMapTooShortToProveAnythingIsNotEmptied) {
   EXPECT_EQ(RemoveUnproven(map_, 1, kManyBefore), 0);
 }
 
+// Within six seconds little is seen for longer than people stand: the rest is not theirs for that.
+TEST_F(StandingPerson, AMapThatIsHardlyOlderThanPeopleStandIsNotEmptied) {
+  const std::vector<KeyframeId> all = {AddKeyframe(0, 0), AddKeyframe(10, 0.4), AddKeyframe(60, 5.6),
+                                       AddKeyframe(70, 6)};
+  const auto proven = AddLandmarks(kWallDepth, all.back(), true);
+  const auto wall = AddLandmarks(kWallDepth, all.back(), false);
+  for (const KeyframeId id : all) See(id, wall, proven);
+  const auto young = AddLandmarks(kPersonDepth, all.back(), false);
+  See(all[2], young, proven);
+  See(all[3], young, proven);
+  constexpr uint64_t kManyBefore = 1000;
+  RemoveUnproven(map_, 1, kManyBefore);
+  EXPECT_EQ(CountLeft(map_, proven), 9);
+  EXPECT_GT(CountLeft(map_, young), 40);
+}
+
 TEST_F(StandingPerson, FurnitureIsProvenByTime) {
   const KeyframeId early = AddKeyframe(0, 0), early_too = AddKeyframe(10, 0.4);
   const KeyframeId late = AddKeyframe(300, 10), late_too = AddKeyframe(310, 10.4);
