@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "dmslam/camera/testing/test_camera.h"
+
 namespace dmslam {
 namespace {
 
@@ -12,7 +14,8 @@ SupportWidth Circle(int count, double radius_px) {
   SupportWidth width;
   for (int i = 0; i < count; ++i) {
     const double angle = 2 * M_PI * i / count;
-    width.Add(Eigen::Vector2d(320 + radius_px * std::cos(angle), 240 + radius_px * std::sin(angle)));
+    const Eigen::Vector2d uv_px(320 + radius_px * std::cos(angle), 240 + radius_px * std::sin(angle));
+    width.Add(uv_px, CellOf(TestCamera(), uv_px));
   }
   return width;
 }
@@ -28,6 +31,22 @@ TEST(RivalMotions, TheWiderOneWins) {
   EXPECT_TRUE(rivals.RivalWins(Circle(100, 60), Circle(60, 200), 70));
   EXPECT_FALSE(rivals.RivalWins(Circle(60, 200), Circle(100, 60), 110));
   EXPECT_FALSE(rivals.RivalWins(Circle(60, 200), Circle(61, 200), 70)) << "hardly wider: the first one stays";
+}
+
+TEST(SupportWidth, CellsCountOnceHoweverFineTheTexture) {
+  EXPECT_EQ(SupportWidth().CellScore(), 0);
+  EXPECT_NEAR(Circle(400, 100).CellScore(), Circle(40, 100).CellScore(), 1e-3);
+  EXPECT_NEAR(Circle(400, 100).Score(), 10 * Circle(40, 100).Score(), 1e-3);
+}
+
+/// Somebody in a patterned jacket holds two thirds of the points.
+TEST(RivalMotions, TheOneThatHoldsMoreOfTheImageWinsOverAFinerTexture) {
+  const RivalMotions rivals;
+  const SupportWidth person = Circle(230, 90), room = Circle(105, 190);
+  ASSERT_LT(room.Score(), 3 * person.Score()) << "by number it is not clearly wider";
+  EXPECT_TRUE(rivals.RivalWins(person, room, 116));
+  EXPECT_FALSE(rivals.RivalWins(room, person, 250));
+  EXPECT_FALSE(rivals.RivalWins(Circle(900, 90), room, 116)) << "by number the first one outweighs it";
 }
 
 TEST(RivalMotions, WhatContradictsAtRandomIsNoMotion) {

@@ -91,11 +91,12 @@ void PoseSolver::KeepWhatAgrees(const Pinhole& camera, const Rigid3d& T_cam_worl
 
 /// What contradicts the pose may have a motion of its own, and that may be the camera's: none where it holds
 /// less of the image.
-std::optional<Rigid3d> PoseSolver::FindWiderMotion(const Pinhole& camera, const Rigid3d& T_cam_world,
+std::optional<Rigid3d> PoseSolver::FindWiderMotion(const Camera& camera, const Rigid3d& T_cam_world,
                                                    const PoseOptimizationOptions& options,
                                                    const RivalMotions& rivals) {
+  const Pinhole pinhole = camera.Ideal();
   const auto explains = [&](const Rigid3d& T, const PoseObservation& o) {
-    return Chi2(camera, T, o) <= options.max_chi2;
+    return Chi2(pinhole, T, o) <= options.max_chi2;
   };
   contradicting_.clear();
   for (const PoseObservation& o : all_.observations) {
@@ -105,13 +106,13 @@ std::optional<Rigid3d> PoseSolver::FindWiderMotion(const Pinhole& camera, const 
   if (!rivals.IsWorthALook(contradicting)) return std::nullopt;
   PoseOptimizationOptions own = options;
   own.prior.reset();  // it speaks of the motion that is contradicted
-  OptimizePose(camera, T_cam_world, contradicting_, own, rival_);
+  OptimizePose(pinhole, T_cam_world, contradicting_, own, rival_);
   if (!rival_.usable) return std::nullopt;
   SupportWidth first, rival;
   for (const PoseObservation& o : all_.observations) {
     const bool by_first = explains(T_cam_world, o), by_rival = explains(rival_.T_cam_world, o);
-    if (by_first && !by_rival) first.Add(o.uv_px);
-    if (by_rival && !by_first) rival.Add(o.uv_px);
+    if (by_first == by_rival) continue;
+    (by_first ? first : rival).Add(o.uv_px, CellOf(camera, o.uv_px));
   }
   return rivals.RivalWins(first, rival, contradicting) ? std::optional(rival_.T_cam_world) : std::nullopt;
 }
@@ -161,7 +162,7 @@ PoseFit PoseSolver::Solve(const Map& map, const std::optional<PosePrior>& prior,
   OptimizePose(camera, frame->T_cam_world, current_.observations, options, optimized_);
   std::optional<Rigid3d> wider;
   if (judge->enabled() && !by_elders && optimized_.usable)
-    wider = FindWiderMotion(camera, optimized_.T_cam_world, options, judge->rivals());
+    wider = FindWiderMotion(map.camera(), optimized_.T_cam_world, options, judge->rivals());
   if (wider) GoOnFrom(camera, *wider, Options(std::nullopt));
   if (!optimized_.usable) return {0, optimized_.mean_chi2, rejected_, by_elders};
   frame->T_cam_world = optimized_.T_cam_world;
@@ -181,7 +182,7 @@ bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior
   }
   const PoseOptimizationOptions options = Options(prior);
   const Pinhole camera = map.camera().Ideal();
-  const auto wider = FindWiderMotion(camera, frame->T_cam_world, options, judge.rivals());
+  const auto wider = FindWiderMotion(map.camera(), frame->T_cam_world, options, judge.rivals());
   if (!wider) return false;
   GoOnFrom(camera, *wider, Options(std::nullopt));
   frame->ClearMatches();

@@ -75,7 +75,7 @@ class PoseSolver {
                        const PoseOptimizationOptions& options, Elders* elders);
   void KeepWhatAgrees(const Pinhole& camera, const Rigid3d& T_cam_world, double elder_age_s, int agreeing,
                       const Elders& elders);
-  std::optional<Rigid3d> FindWiderMotion(const Pinhole& camera, const Rigid3d& T_cam_world,
+  std::optional<Rigid3d> FindWiderMotion(const Camera& camera, const Rigid3d& T_cam_world,
                                          const PoseOptimizationOptions& options, const RivalMotions& rivals);
   void GoOnFrom(const Pinhole& camera, const Rigid3d& T_cam_world, const PoseOptimizationOptions& options);
   void SetClasses(TrackedFrame* frame);
