@@ -71,7 +71,7 @@ bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   }
   const bool is_new = !map_.HasKnown(proposal.first.id) && map_.KeyframesOf(proposal.map_id).empty();
   if (is_new && StartMap(proposal)) {
-    ++counters_.maps_started;
+    adjusted_ = false;
     Publish(MapEvent::kMapStarted, proposal.second.id, proposal.map_id);
     return true;
   }
@@ -237,6 +237,7 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   const KeyframeId about = answer.seen_from.value_or(answer.keyframe);
   const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(about);
   if (anchor) as_saved_.erase(anchor->map_id);
+  adjusted_ = false;  // a global adjustment too is composed with what has come since its base
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, about,
           anchor ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id, answer.note);

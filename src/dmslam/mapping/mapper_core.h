@@ -30,7 +30,6 @@ struct MapperCounters {
   uint64_t fusions = 0;
   uint64_t corrections_applied = 0;
   uint64_t corrections_refused = 0;
-  uint64_t maps_started = 0;
   uint64_t maps_refused = 0;
   uint64_t maps_dropped = 0;
   uint64_t adjustments_interrupted = 0;
@@ -72,8 +71,8 @@ class MapperCore {
   bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
-  /// Adjusts every map as a whole, once, and answers the request. A saved map that got
-  /// neither a keyframe nor a correction is not adjusted: it was when it was saved.
+  /// Adjusts every map as a whole, once for what has come until now, and answers the request. A saved map
+  /// that got neither a keyframe nor a correction is not adjusted: it was when it was saved.
   void OnAdjustRequest(const AdjustRequest& request);
   /// Says that all maps are adjusted, as far as they are to be.
   void AnswerRequest(uint32_t request);
@@ -113,7 +112,7 @@ class MapperCore {
   MapEditor map_;
   LandmarkMaker maker_;
   InsertionOrder order_;
-  bool adjusted_ = false;  ///< as a whole, since the last keyframe
+  bool adjusted_ = false;  ///< as a whole, since the last keyframe, first map or correction
   /// The map is continued: its mapper may have ended in the middle of the keyframe that comes first, of each
   /// camera; the cameras of which one has come. None: it is not.
   std::optional<std::set<CameraId>> finished_;

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -557,6 +559,61 @@ TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   EXPECT_EQ(said_.back().event, MapEvent::kEnded);
   EXPECT_TRUE(said_.back().progress.ended);
   EXPECT_EQ(said_.size(), before + 4);
+}
+
+/// What comes after an answered request to adjust all maps is adjusted by the next one, and by the end.
+class AfterARequest : public KeyframeStep {
+ protected:
+  void StartAndAdjust() {
+    ASSERT_TRUE(Start());
+    ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+    core_.OnAdjustRequest(Request());
+    ASSERT_FALSE(AdjustedBy([this] { core_.OnAdjustRequest(Request()); })) << "once is enough";
+  }
+  static AdjustRequest Request() {
+    return {.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0};
+  }
+  /// A first map of other frames, beside the one that there is.
+  InitialMap AnotherMap() const {
+    InitialMap proposal = FirstMap();
+    proposal.map_id = 2;
+    proposal.first = scene_.Propose(5, PlaceOf(0), 5, PlaceOf(0), 5);
+    proposal.second = scene_.Propose(6, PlaceOf(1), 5, PlaceOf(0), 6);
+    return proposal;
+  }
+  bool AdjustedBy(const std::function<void()>& ask) const {
+    const size_t before = said_.size();
+    ask();
+    const std::vector<MapEvent> events = EventsSince(before);
+    return std::ranges::find(events, MapEvent::kMapAdjusted) != events.end();
+  }
+};
+
+TEST_F(AfterARequest, AFirstMapIsAdjusted) {
+  StartAndAdjust();
+  ASSERT_TRUE(core_.OnInitialMap(AnotherMap()));
+  EXPECT_TRUE(AdjustedBy([this] { core_.OnAdjustRequest(Request()); }));
+  EXPECT_FALSE(AdjustedBy([this] { core_.End(); })) << "once is enough";
+}
+
+TEST_F(AfterARequest, WhatACorrectionMovedIsAdjusted) {
+  StartAndAdjust();
+  core_.OnLoopAnswer(OneUp(core_.map().version()));
+  EXPECT_TRUE(AdjustedBy([this] { core_.OnAdjustRequest(Request()); }));
+  LoopAnswer loop = OneUp(core_.map().version(), 8);
+  loop.kind = LoopAnswer::Kind::kLoop;
+  loop.seen_from = Id(2);
+  loop.matched = Id(1);
+  core_.OnLoopAnswer(loop);
+  ASSERT_EQ(core_.counters().corrections_applied, 2u);
+  EXPECT_TRUE(AdjustedBy([this] { core_.End(); }));
+}
+
+TEST_F(AfterARequest, OneThatIsRefusedChangesNothing) {
+  StartAndAdjust();
+  core_.OnLoopAnswer(OneUp(core_.map().version() + 1));
+  ASSERT_EQ(core_.counters().corrections_refused, 1u);
+  EXPECT_FALSE(AdjustedBy([this] { core_.End(); }));
 }
 
 }  // namespace
