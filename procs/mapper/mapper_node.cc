@@ -545,6 +545,11 @@ void MapperNode::Save() {
   SaveMap(path, core_->map(), *session_start_, runs);
 }
 
+void MapperNode::TellWhatWasNotDone() const {
+  const std::string text = core_ ? NotDoneText(core_->counters()) : "";
+  if (!text.empty()) LogInfo("mapper: {}", text);
+}
+
 /// A step in work inserts and creates, and leaves out what takes long; an adjustment ends where it is.
 void MapperNode::InterruptCore() {
   hurries_ = stops_ = true;
@@ -554,7 +559,10 @@ void MapperNode::InterruptCore() {
 MapperNode::~MapperNode() { hurries_ = stops_ = true; }
 
 void MapperNode::Stop() {
-  if (!stopping_) InterruptCore();
+  if (!stopping_) {
+    InterruptCore();
+    TellWhatWasNotDone();
+  }
   Save();
   StreamNode::Stop();
 }

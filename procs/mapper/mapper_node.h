@@ -57,6 +57,7 @@ class MapperNode : public StreamNode {
   void ListenToFrontends();
   bool PublishPart();
   void JoinFrontend(CameraId camera, const SessionStart& start);
+  void TellWhatWasNotDone() const;
   void Save();
   bool TakeCheckpoint();
   void BeginFetch();

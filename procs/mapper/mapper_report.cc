@@ -1,5 +1,7 @@
 #include "mapper/mapper_report.h"
 
+#include <utility>
+
 #include "dmslam/dynamics/motion_belief.h"
 
 namespace dmslam {
@@ -82,6 +84,20 @@ MapperStatus StatusOf(const MapperCore& core, const MapTally& tally) {
   status.corrections_applied = static_cast<int64_t>(counters.corrections_applied);
   status.corrections_refused = static_cast<int64_t>(counters.corrections_refused);
   return status;
+}
+
+std::string NotDoneText(const MapperCounters& counters) {
+  const std::pair<uint64_t, const char*> items[] = {
+      {counters.keyframes_refused, "keyframes refused, whose reference is unknown or of another map"},
+      {counters.maps_refused, "first maps refused"},
+      {counters.maps_dropped, "maps dropped, which their camera had given up"},
+      {counters.evidence_dropped, "words about landmarks that were gone"},
+      {counters.adjustments_interrupted, "adjustments cut short, since a keyframe waited"}};
+  std::string text;
+  for (const auto& [count, what] : items) {
+    if (count > 0) text += (text.empty() ? "" : "; ") + std::to_string(count) + ' ' + what;
+  }
+  return text;
 }
 
 }  // namespace dmslam

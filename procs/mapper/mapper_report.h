@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -51,5 +52,8 @@ class MapTally {
 
 /// What the core has to say of itself: sizes of the map, and what it did so far. `tally`: of its map.
 MapperStatus StatusOf(const MapperCore& core, const MapTally& tally);
+
+/// What the core did not do as it was asked to, in a sentence for the log; empty: nothing.
+std::string NotDoneText(const MapperCounters& counters);
 
 }  // namespace dmslam

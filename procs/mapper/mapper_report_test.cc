@@ -79,6 +79,23 @@ TEST_F(MapperReportTest, TellsWhatTheCoreDid) {
   EXPECT_EQ(status.corrections_refused, 1);
 }
 
+TEST_F(MapperReportTest, TellsAtTheEndWhatWasNotDone) {
+  ASSERT_TRUE(Start());
+  EXPECT_EQ(NotDoneText(core_.counters()), "");
+  KeyframeProposal lost = Next();
+  lost.reference = Id(77);
+  for (int times = 0; times < 2; ++times) EXPECT_FALSE(core_.OnKeyframe(lost));
+  Say(LandmarkId::Make(9, 9), 1, 0);
+  EXPECT_EQ(NotDoneText(core_.counters()),
+            "2 keyframes refused, whose reference is unknown or of another map; "
+            "1 words about landmarks that were gone");
+  MapReset reset;
+  reset.map_id = 1;
+  reset.fate = MapReset::Fate::kDrop;
+  core_.OnReset(reset);
+  EXPECT_NE(NotDoneText(core_.counters()).find("1 maps dropped"), std::string::npos);
+}
+
 TEST_F(MapperReportTest, CountsLandmarksWhileTheyAreBelievedToMove) {
   ASSERT_TRUE(Start());
   EXPECT_EQ(Status().moving_landmarks, 0);

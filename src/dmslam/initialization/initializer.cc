@@ -348,9 +348,6 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   window->promising = report.wait == WaitReason::kParallaxTooSmall ||
                       report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kOnTrial;
   report.num_matches = static_cast<int>(pairs.back()->matches.size());
-  report.num_static = agreement.num_static;
-  report.distribution_px = agreement.distribution_px;
-  report.agreement = agreement.agreement;
   return report;
 }
 
@@ -386,7 +383,6 @@ InitializerReport Initializer::Impl::TryContest(ReferenceWindow* window) {
   report.result = builder_.MakeMap(window->reference(), candidate, result.winner->support);
   report.parallax_rad = report.result->median_parallax_rad;
   report.num_matches = static_cast<int>(last.pair.matches.size());
-  report.num_static = candidate.NumPoints();
   return report;
 }
 

@@ -16,10 +16,7 @@ struct InitializerReport {
   std::string reason;              ///< the same in a sentence, with the numbers
   std::optional<FirstMap> result;  ///< set exactly when wait is kNone
   int num_matches = 0;             ///< between the reference and this frame
-  int num_static = 0;
-  double distribution_px = 0;
-  double agreement = 0;     ///< smallest Jaccard index between the pairs' static sets
-  double parallax_rad = 0;  ///< median, of the map or of one that had too little
+  double parallax_rad = 0;         ///< median, of the map or of one that had too little
 };
 
 /// Makes the first map out of a stream of frames. Several reference frames are kept side by side. Of each,

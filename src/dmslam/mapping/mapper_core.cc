@@ -65,10 +65,7 @@ bool MapperCore::Interrupted() {
 // ---- A first map ----
 
 bool MapperCore::OnInitialMap(const InitialMap& proposal) {
-  if (map_.HasKnown(proposal.second.id)) {
-    ++counters_.keyframes_repeated;
-    return false;
-  }
+  if (map_.HasKnown(proposal.second.id)) return false;
   const bool is_new = !map_.HasKnown(proposal.first.id) && map_.KeyframesOf(proposal.map_id).empty();
   if (is_new && StartMap(proposal)) {
     adjusted_ = false;
@@ -123,7 +120,7 @@ const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   const InsertionReport report = InsertKeyframe(map_, proposal);
   Count(report.observations_dropped, &counters_.observations_dropped);
   if (report.keyframe == nullptr) {
-    ++(report.repeated ? counters_.keyframes_repeated : counters_.keyframes_refused);
+    if (!report.repeated) ++counters_.keyframes_refused;
     return nullptr;
   }
   order_.Add(proposal.id);

@@ -19,20 +19,19 @@ namespace dmslam {
 /// What the mapper did, for its status.
 struct MapperCounters {
   uint64_t keyframes_inserted = 0;
-  uint64_t keyframes_repeated = 0;  ///< proposed again, and recognised
-  uint64_t keyframes_refused = 0;   ///< their reference is unknown
+  uint64_t keyframes_refused = 0;  ///< their reference is unknown
   uint64_t keyframes_culled = 0;
   uint64_t landmarks_culled = 0;
   uint64_t landmarks_moving_removed = 0;
   uint64_t landmarks_seen_through = 0;  ///< removed because other keyframes see what lies behind them
   uint64_t observations_dropped = 0;    ///< of landmarks that are gone
-  uint64_t evidence_dropped = 0;
+  uint64_t evidence_dropped = 0;        ///< of landmarks that are gone
   uint64_t fusions = 0;
   uint64_t corrections_applied = 0;
   uint64_t corrections_refused = 0;
   uint64_t maps_refused = 0;
   uint64_t maps_dropped = 0;
-  uint64_t adjustments_interrupted = 0;
+  uint64_t adjustments_interrupted = 0;  ///< since a keyframe waited
   CreationDiagnostics creation;
 };
 

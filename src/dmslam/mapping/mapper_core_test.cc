@@ -459,7 +459,8 @@ TEST_F(KeyframeStep, OneThatComesTwiceIsDoneOnce) {
   const size_t before = said_.size();
   EXPECT_FALSE(core_.OnKeyframe(proposal));
   EXPECT_EQ(said_.size(), before);
-  EXPECT_EQ(core_.counters().keyframes_repeated, 1u);
+  EXPECT_EQ(core_.counters().keyframes_inserted, 1u);
+  EXPECT_EQ(core_.counters().keyframes_refused, 0u);
 }
 
 TEST_F(KeyframeStep, AMapperThatContinuesDoesTheFirstOneAgain) {

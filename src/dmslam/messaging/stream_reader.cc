@@ -80,10 +80,7 @@ bool StreamReader::IsWanted(const head_t& head, int64_t now_ns) {
   const Term term{head.header.epoch, head.header.writer};
   const bool of_ours = options_.only_writer == 0 || term.writer == options_.only_writer;
   const bool is_over = term.epoch < held().epoch && term != term_ && !IsOnlyOneLeft(term, now_ns);
-  if (!of_ours || !term.valid() || is_over || term < term_) {
-    ++statistics_.dropped_stale;
-    return false;
-  }
+  if (!of_ours || !term.valid() || is_over || term < term_) return false;
   if (term != term_ && LeapsTooFar(term, now_ns)) {
     ++statistics_.dropped_doubtful;
     return false;
@@ -330,10 +327,7 @@ void StreamReader::ReceivePart(std::span<const uint8_t> bytes, int64_t now_ns) {
   const bool in_snapshot = snapshot_ && snapshot_->number != 0;
   if (in_snapshot && part->stream_key == KeyOf(snapshot_->number)) window = &snapshot_->window;
   if ((state_ == State::kFollowing || in_snapshot) && part->stream_key == KeyOf(0)) window = &window_;
-  if (window == nullptr) {
-    ++statistics_.dropped_stale;
-    return;
-  }
+  if (window == nullptr) return;
   if (LeapsAhead(*window, part->seq)) return;
   ReceiveWindow::PartResult result = window->AddPart(*part);
   if (result.result == ReceiveWindow::Result::kDuplicate) ++statistics_.duplicates;
@@ -360,10 +354,7 @@ void StreamReader::ReceiveRecord(const std::string& channel, std::span<const uin
     return;
   }
   ReceiveWindow* window = WindowOf(*header);
-  if (window == nullptr) {
-    ++statistics_.dropped_stale;
-    return;
-  }
+  if (window == nullptr) return;
   Add(window, channel, Bytes(bytes.begin(), bytes.end()), *header, now_ns);
 }
 
@@ -548,7 +539,6 @@ void StreamReader::SendAck(bool of_snapshot, int64_t now_ns) {
   ack.role = options_.role;
   ack.name = options_.name;
   outgoing_.push_back(SealedMessage(AckChannel(options_.reader), ack));
-  ++statistics_.acks;
 }
 
 std::vector<Outgoing> StreamReader::TakeOutgoing() { return std::exchange(outgoing_, {}); }

@@ -31,13 +31,11 @@ struct ReaderStatistics {
   int64_t snapshots = 0;        ///< received whole
   int64_t dropped_bad = 0;      ///< messages with wrong bytes
   int64_t dropped_foreign = 0;  ///< of other sessions
-  int64_t dropped_stale = 0;    ///< of other terms, or before any beacon was heard
   int64_t dropped_doubtful = 0;  ///< that say what cannot be, or what must be said again to be believed
   int64_t dropped_no_room = 0;   ///< beyond what is kept ahead; they come again
   double recovery_p50_ms =
       0;  ///< from a record's being named as missing to its being here, of the newest ones
   double recovery_p99_ms = 0;
-  int64_t acks = 0;       ///< sent
   int64_t backlog = 0;    ///< records known to exist and not yet taken
   size_t kept_bytes = 0;  ///< waiting to be taken, whole or in pieces
 };

@@ -147,9 +147,10 @@ void StreamWriter::ReceiveTakeOver(const std::string& channel, std::span<const u
   if (request->header.stream != static_cast<int32_t>(options_.stream)) return;
   if (request->header.session != options_.session) {
     ++statistics_.dropped_foreign;
-  } else if (Term{request->header.epoch, request->header.writer} != term_) {
-    ++statistics_.dropped_stale;
-  } else if (successors_.Asks(request->successor, request->utime, now_ns)) {
+    return;
+  }
+  const bool is_ours = Term{request->header.epoch, request->header.writer} == term_;
+  if (is_ours && successors_.Asks(request->successor, request->utime, now_ns)) {
     close_requested_by_ = request->name;
   }
 }
@@ -175,7 +176,6 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
         NameOfProtocol(kProtocolVersion) + "): run the same build everywhere";
     return;
   }
-  ++statistics_.acks;
   if ((ack->header.flags & RecordHeader::FLAG_SNAPSHOT) != 0) return ReceiveSnapshotAck(*ack, now_ns);
 
   Reader* reader = Meet(*ack, now_ns);
@@ -189,10 +189,7 @@ void StreamWriter::ReceiveAck(const std::string& channel, std::span<const uint8_
     superseded_by_ = "the writer that " + ack->name + " follows";
   reader->following = followed == term_;
   reader->wants_snapshot = ack->wants == ack_t::WANTS_SNAPSHOT && reader->following;
-  if (!reader->following) {
-    ++statistics_.dropped_stale;
-    return;
-  }
+  if (!reader->following) return;
   reader->accepted = std::clamp<int64_t>(ack->header.seq, 0, window_.last());
   reader->floor = std::max(reader->floor, reader->accepted);
   if (snapshot_ && !reader->wants_snapshot) snapshot_->takers.erase(ack->reader);
@@ -234,10 +231,8 @@ void StreamWriter::ReceiveSnapshotAck(const ack_t& ack, int64_t now_ns) {
   const auto reader = readers_.find(ack.reader);
   if (reader != readers_.end()) reader->second.last_heard_ns = now_ns;
   if (!snapshot_ || Term{ack.header.epoch, ack.header.writer} != term_ ||
-      ack.header.parent_epoch != snapshot_->number) {
-    ++statistics_.dropped_stale;
+      ack.header.parent_epoch != snapshot_->number)
     return;
-  }
   const auto taker = snapshot_->takers.find(ack.reader);
   if (taker == snapshot_->takers.end()) return;
   int64_t& received = taker->second.received;

@@ -38,17 +38,15 @@ class SnapshotSource {
 
 struct WriterStatistics {
   int64_t records = 0;
-  int64_t payload_bytes = 0;   ///< of the records published
-  int64_t sent_bytes = 0;      ///< of all messages sent for them, beacons included, local taps not
-  int64_t parts = 0;           ///< parts of first transmissions
-  int64_t parts_repaired = 0;  ///< parts sent again
-  int64_t repaired_bytes = 0;  ///< of them
-  int64_t overrun = 0;         ///< records forgotten that a known lossless reader still lacked
-  int64_t snapshots = 0;       ///< begun
-  int64_t acks = 0;
+  int64_t payload_bytes = 0;     ///< of the records published
+  int64_t sent_bytes = 0;        ///< of all messages sent for them, beacons included, local taps not
+  int64_t parts = 0;             ///< parts of first transmissions
+  int64_t parts_repaired = 0;    ///< parts sent again
+  int64_t repaired_bytes = 0;    ///< of them
+  int64_t overrun = 0;           ///< records forgotten that a known lossless reader still lacked
+  int64_t snapshots = 0;         ///< begun
   int64_t dropped_bad = 0;       ///< acknowledgements and beacons with wrong bytes
   int64_t dropped_foreign = 0;   ///< of other sessions
-  int64_t dropped_stale = 0;     ///< of other terms
   int64_t dropped_doubtful = 0;  ///< that say what cannot be, or what must be said again to be believed
   int64_t refused = 0;           ///< from readers of another protocol version or schema
   size_t kept_records = 0;

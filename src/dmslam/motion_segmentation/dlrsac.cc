@@ -349,7 +349,6 @@ std::optional<CoupledSet> Segmentation::ChooseSet() {
   for (size_t i = 0; i < kept_.size(); ++i) {
     if (!MayLead(kept_[i])) continue;
     CoupledSet set = MakeSet(i);
-    out_.cells[static_cast<size_t>(kept_[i].index)].coupled_distribution_px = set.distribution_px;
     const bool better = !best || set.distribution_px > best->distribution_px ||
                         (set.distribution_px == best->distribution_px && set.support > best->support);
     if (!better) continue;

@@ -58,7 +58,6 @@ struct CellReport {
   int num_static = 0;   ///< of the final answer
   bool chosen = false;  ///< belongs to the coupled set that was chosen
   Eigen::Vector2d centroid_px = Eigen::Vector2d::Zero();  ///< mean of its matches' uv0
-  double coupled_distribution_px = 0;  ///< square root of D over the coupled set that this cell leads
 };
 
 /// What a selector found. `refusal` other than kNone: no model, nothing is static.

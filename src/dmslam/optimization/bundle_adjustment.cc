@@ -136,7 +136,6 @@ class Adjustment {
     report->outliers.assign(problem().observations.size(), 0);
     for (size_t i = 0; i < report->outliers.size(); ++i) {
       report->outliers[i] = !(Chi2(problem().observations[i]) <= options_.max_chi2);
-      report->num_outliers += report->outliers[i];
     }
   }
 

@@ -54,7 +54,6 @@ struct BundleReport {
   double initial_cost = 0.0;  ///< Robust cost (half the sum), over all observations.
   double final_cost = 0.0;    ///< Robust cost after, over all observations.
   int iterations = 0;
-  int num_outliers = 0;
   std::vector<char> outliers;  ///< Parallel to the observations, at the final state.
   std::string message;         ///< Why it is not usable.
 };

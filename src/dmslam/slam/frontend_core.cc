@@ -291,7 +291,6 @@ FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
     const std::optional<int64_t> last_ns = tracker_.last_tracked_ns();
     const int64_t missing_ns = last_ns ? frame_.stamp_ns - *last_ns : INT64_MAX;
     phase_.OnMissing(missing_ns);
-    ++(phase_.state() == TrackingState::kLost ? counters_.lost : counters_.missing);
     if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsUndecided())
       output = GiveUpMap(MapReset::Fate::kKeep, "lost for too long");
   }
@@ -433,7 +432,6 @@ void FrontendCore::KeepBelieved(LateMap late_map, LatePlacement::Placed placed) 
   if (believed.empty() && grows) unplaced_.SetAside(WaitingFrame(frame_));
   for (LatePlacement::Placed& told : believed) {
     frame_ = std::move(told.frame);
-    ++counters_.localized_later;
     const FramePose pose = MakePose(TrackingState::kLocalizedLater, told.report, told.pose);
     if (grows) {
       unplaced_.ForgetSetAside(frame_.index);

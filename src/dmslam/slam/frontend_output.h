@@ -27,13 +27,10 @@ struct FrontendOutput {
 struct FrontendCounters {
   uint64_t frames = 0;
   uint64_t tracked = 0;
-  uint64_t missing = 0;  ///< not tracked, for no longer than a moment
-  uint64_t lost = 0;
   uint64_t relocalizations = 0;
   uint64_t resets = 0;
   uint64_t keyframes_proposed = 0;
   uint64_t keyframes_withheld = 0;  ///< wanted, but the mapper is behind
-  uint64_t localized_later = 0;
 };
 
 }  // namespace dmslam
