@@ -71,13 +71,6 @@ Json ToJson(const RpeOptions& options, const RpeReport& report) {
 
 }  // namespace
 
-std::vector<RpeOptions> DefaultRpe() {
-  std::vector<RpeOptions> all(3);
-  all[1].unit = RpeUnit::kSeconds;
-  all[2].unit = RpeUnit::kMetres;
-  return all;
-}
-
 Evaluation Evaluate(std::span<const StampedPose> ground_truth, std::span<const StampedPose> estimate,
                     const EvaluationOptions& options, const Coverage& coverage) {
   Evaluation evaluation;

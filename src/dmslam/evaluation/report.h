@@ -18,9 +18,6 @@ struct EvaluationOptions {
   std::vector<RpeOptions> rpe;
 };
 
-/// RPE per frame, per second and per metre.
-std::vector<RpeOptions> DefaultRpe();
-
 /// All that is said about one trajectory.
 struct Evaluation {
   EvaluationOptions options;

@@ -9,9 +9,12 @@
 namespace dmslam {
 namespace {
 
+/// RPE per frame, per second and per metre.
 EvaluationOptions DefaultOptions() {
   EvaluationOptions options;
-  options.rpe = DefaultRpe();
+  options.rpe.resize(3);
+  options.rpe[1].unit = RpeUnit::kSeconds;
+  options.rpe[2].unit = RpeUnit::kMetres;
   return options;
 }
 

@@ -13,16 +13,6 @@ inline GrayView ViewOf(const cv::Mat& image) {
   return {image.ptr<uint8_t>(), image.cols, image.rows, static_cast<ptrdiff_t>(image.step[0])};
 }
 
-/// A copy of the pixels of an 8-bit single-channel matrix.
-inline GrayPixels GrayPixelsOf(const cv::Mat& image) {
-  const GrayView view = ViewOf(image);
-  GrayPixels copy(view.width, view.height);
-  for (int y = 0; y < view.height; ++y) {
-    for (int x = 0; x < view.width; ++x) copy.at(x, y) = view.row(y)[x];
-  }
-  return copy;
-}
-
 /// A copy of a view as a matrix of type CV_8UC1.
 inline cv::Mat MatOf(const GrayView& view) {
   cv::Mat matrix(view.height, view.width, CV_8UC1);

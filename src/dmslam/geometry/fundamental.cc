@@ -2,7 +2,6 @@
 
 #include "dmslam/geometry/normalization.h"
 #include "dmslam/geometry/null_space.h"
-#include "dmslam/geometry/polynomial.h"
 #include "dmslam/geometry/symmetric_eigen.h"
 #include "dmslam/geometry/two_view.h"
 
@@ -94,31 +93,6 @@ std::optional<Eigen::Matrix3d> FundamentalEightPoint(std::span<const Eigen::Vect
   const auto f = LeastSquaresEpipolar(x1_px, x2_px, indices, weights, *n1, *n2);
   if (!f) return std::nullopt;
   return Denormalize(MakeRankTwo(FromRows(*f)), *n1, *n2);
-}
-
-int FundamentalSevenPoint(std::span<const Eigen::Vector2d> x1_px, std::span<const Eigen::Vector2d> x2_px,
-                          std::span<const int, 7> indices, std::array<Eigen::Matrix3d, 3>& models) {
-  const auto n1 = Normalization::Of(x1_px, indices), n2 = Normalization::Of(x2_px, indices);
-  if (!n1 || !n2) return 0;
-  Equations<7> rows;
-  for (size_t k = 0; k < 7; ++k) {
-    const auto i = static_cast<size_t>(indices[k]);
-    EpipolarRow((*n1)(x1_px[i]), (*n2)(x2_px[i]), rows[k]);
-  }
-  std::array<std::array<double, 9>, 2> basis;
-  if (!NullSpace<7>(rows, basis)) return 0;
-  const Eigen::Matrix3d a = FromRows(basis[0]).normalized(), b = FromRows(basis[1]).normalized();
-  // det(x a + b) as a cubic in x, from its values at four places.
-  const double at_zero = b.determinant(), lead = a.determinant();
-  const double at_one = (a + b).determinant(), at_minus_one = (b - a).determinant();
-  const double square = 0.5 * (at_one + at_minus_one) - at_zero;
-  const double linear = 0.5 * (at_one - at_minus_one) - lead;
-  std::array<double, 3> roots;
-  const int count = RealRootsCubic({lead, square, linear, at_zero}, roots);
-  for (int k = 0; k < count; ++k) {
-    models[static_cast<size_t>(k)] = Denormalize(roots[static_cast<size_t>(k)] * a + b, *n1, *n2);
-  }
-  return count;
 }
 
 }  // namespace dmslam

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <span>
 
 #include "dmslam/geometry/rigid3.h"
 
@@ -27,12 +26,5 @@ std::optional<Eigen::Vector3d> TriangulatePoint(const Rigid3d& T_cam1_world, con
 std::optional<Eigen::Vector3d> TriangulatePointInFirst(const Rigid3d& T_cam2_cam1,
                                                        const Eigen::Vector3d& ray1,
                                                        const Eigen::Vector3d& ray2);
-
-/// The point seen by n >= 2 cameras: least squares of the distances to the rays, then Gauss-Newton steps on
-/// the reprojection error in normalised coordinates. `rays[i]` belongs to `T_cam_world[i]`. None if the rays
-/// do not fix the point, or it lies behind one of the cameras.
-std::optional<Eigen::Vector3d> TriangulateMultiView(std::span<const Rigid3d> T_cam_world,
-                                                    std::span<const Eigen::Vector3d> rays,
-                                                    int refinements = 2);
 
 }  // namespace dmslam

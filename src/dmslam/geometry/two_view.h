@@ -30,10 +30,6 @@ std::optional<Eigen::Matrix3d> FundamentalEightPoint(std::span<const Eigen::Vect
                                                      std::span<const int> indices = {},
                                                      std::span<const double> weights = {});
 
-/// Seven matches; one or three solutions, written to `models`. Returns how many.
-int FundamentalSevenPoint(std::span<const Eigen::Vector2d> x1_px, std::span<const Eigen::Vector2d> x2_px,
-                          std::span<const int, 7> indices, std::array<Eigen::Matrix3d, 3>& models);
-
 // ---- Essential matrix ----
 
 /// Five rays in each view (z = 1 or any length); up to ten solutions, written to `models`; returns how many.
@@ -162,12 +158,6 @@ inline double TransferErrorSquared(const Eigen::Matrix3d& H, const Eigen::Vector
                                    const Eigen::Vector2d& x2) {
   const Eigen::Vector3d y = H * x1.homogeneous();
   return (y.hnormalized() - x2).squaredNorm();
-}
-
-/// Sum of both transfer errors [px^2].
-inline double SymmetricTransferErrorSquared(const Eigen::Matrix3d& H, const Eigen::Matrix3d& H_inverse,
-                                            const Eigen::Vector2d& x1, const Eigen::Vector2d& x2) {
-  return TransferErrorSquared(H, x1, x2) + TransferErrorSquared(H_inverse, x2, x1);
 }
 
 }  // namespace dmslam

@@ -128,18 +128,6 @@ TEST(Fundamental, DegenerateSamplesGiveNothing) {
   EXPECT_FALSE(FundamentalEightPoint(pair.x1_px, pair.x2_px, FirstIndices<7>()).has_value());
 }
 
-TEST(Fundamental, OneOfTheSevenPointSolutionsIsTrue) {
-  for (uint64_t seed = 1; seed <= 100; ++seed) {
-    const SyntheticViews pair = PairOf(seed);
-    std::array<Eigen::Matrix3d, 3> models;
-    const int count = FundamentalSevenPoint(pair.x1_px, pair.x2_px, FirstIndices<7>(), models);
-    double best = 1.0;
-    for (int k = 0; k < count; ++k)
-      best = std::min(best, ProjectiveDistance(models[static_cast<size_t>(k)], TrueF(pair)));
-    EXPECT_LT(best, 1e-6) << "seed " << seed;
-  }
-}
-
 TEST(Essential, OneOfTheFivePointSolutionsIsTrueAndAllAreEssential) {
   int failures = 0;
   for (uint64_t seed = 1; seed <= 300; ++seed) {
@@ -253,7 +241,9 @@ TEST(Homography, FourPointsAndLeastSquaresAreExactOnAPlane) {
     const Eigen::Matrix3d inverse = linear->inverse();
     const auto minimal = HomographyFourPoint(pair.x1_px, pair.x2_px, FirstIndices<4>(static_cast<int>(seed)));
     for (size_t i = 0; i < pair.x1_px.size(); ++i) {
-      EXPECT_LT(SymmetricTransferErrorSquared(*linear, inverse, pair.x1_px[i], pair.x2_px[i]), 1e-12);
+      EXPECT_LT(TransferErrorSquared(*linear, pair.x1_px[i], pair.x2_px[i]) +
+                    TransferErrorSquared(inverse, pair.x2_px[i], pair.x1_px[i]),
+                1e-12);
     }
     if (minimal) {
       EXPECT_LT(ProjectiveDistance(*minimal, *linear), 1e-4);
@@ -329,29 +319,6 @@ TEST(Triangulation, ExactWithoutNoiseAndNoneBehind) {
           TriangulatePoint(scene.T_cam_world[0], scene.T_cam_world[0], pair.rays1[i], pair.rays1[i]));
     }
   }
-}
-
-TEST(Triangulation, MultiViewReducesTheErrorOfTwoViews) {
-  const SyntheticScene scene =
-      MakeSyntheticScene({.seed = 3, .num_cameras = 8, .num_points = 60, .noise_px = 1.0, .step = 0.1});
-  double multi = 0.0, two = 0.0;
-  for (size_t p = 0; p < scene.points.size(); ++p) {
-    std::vector<Rigid3d> poses;
-    std::vector<Eigen::Vector3d> rays;
-    for (const auto& o : scene.observations) {
-      if (static_cast<size_t>(o.point) != p) continue;
-      poses.push_back(scene.T_cam_world[static_cast<size_t>(o.camera)]);
-      rays.push_back(scene.camera.Ray(o.uv_px));
-    }
-    if (rays.size() < 8) continue;
-    const auto all = TriangulateMultiView(poses, rays);
-    const auto pair = TriangulatePoint(poses[0], poses[1], rays[0], rays[1]);
-    if (!all || !pair) continue;
-    multi += (*all - scene.points[p]).squaredNorm();
-    two += (*pair - scene.points[p]).squaredNorm();
-  }
-  EXPECT_GT(two, 0.0);
-  EXPECT_LT(multi, 0.1 * two);
 }
 
 TEST(Triangulation, ParallaxIsTheAngleAtThePoint) {

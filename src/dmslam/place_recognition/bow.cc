@@ -37,12 +37,6 @@ double L1Score(const BowVector& a, const BowVector& b) {
   return score;
 }
 
-size_t CountCommonWords(const BowVector& a, const BowVector& b) {
-  size_t count = 0;
-  ForEachCommonWord(a, b, [&](float, float) { ++count; });
-  return count;
-}
-
 std::vector<BowMatch> MatchByNodes(const BowMatchSide& a, const BowMatchSide& b,
                                    const MatchOptions& options) {
   std::vector<FeatureMatch> found;

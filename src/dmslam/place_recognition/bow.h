@@ -42,9 +42,6 @@ struct BowImage {
 /// fast place recognition in image sequences", T-RO 2012, eq. 2). Symmetric to the bit.
 double L1Score(const BowVector& a, const BowVector& b);
 
-/// Number of words in common.
-size_t CountCommonWords(const BowVector& a, const BowVector& b);
-
 /// Feature `a` of the first image looks like feature `b` of the second.
 struct BowMatch {
   uint32_t a = 0;

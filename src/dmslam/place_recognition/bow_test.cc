@@ -51,13 +51,6 @@ TEST(L1Score, EqualsItsDefinition) {
   EXPECT_NEAR(L1Score(a, b), 1.0 - 0.5 * norm, 1e-6);
 }
 
-TEST(CountCommonWords, CountsEachOnce) {
-  const BowVector a = {{1, 0.5F}, {4, 0.25F}, {9, 0.25F}};
-  const BowVector b = {{0, 0.1F}, {4, 0.3F}, {9, 0.3F}, {10, 0.3F}};
-  EXPECT_EQ(CountCommonWords(a, b), 2U);
-  EXPECT_EQ(CountCommonWords(a, {}), 0U);
-}
-
 /// Two views of the same 150 corners: the second in another order, disturbed, turned by `turn`.
 class MatchByNodesTest : public testing::Test {
  protected:

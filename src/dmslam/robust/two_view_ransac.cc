@@ -1,7 +1,5 @@
 #include "dmslam/robust/two_view_ransac.h"
 
-#include <Eigen/LU>
-#include <algorithm>
 #include <vector>
 
 #include "dmslam/geometry/two_view.h"
@@ -25,27 +23,6 @@ struct Matches {
   double Sampson(const Eigen::Matrix3d& F, int index) const {
     const auto i = static_cast<size_t>(index);
     return SampsonErrorSquared(F, x1_px[i], x2_px[i]) * inverse_threshold[i];
-  }
-};
-
-struct FundamentalProblem {
-  using Model = Eigen::Matrix3d;
-  static constexpr int kSampleSize = 8;
-  static constexpr int kMaxModels = 1;
-  const Matches& matches;
-
-  int size() const { return matches.size(); }
-  int Fit(std::span<const int, 8> sample, std::array<Eigen::Matrix3d, 1>& models) const {
-    const auto F = FundamentalEightPointMinimal(matches.x1_px, matches.x2_px, sample);
-    if (F) models[0] = *F;
-    return F ? 1 : 0;
-  }
-  double NormalizedErrorSquared(const Eigen::Matrix3d& F, int i) const { return matches.Sampson(F, i); }
-  bool Refit(std::span<const int> indices, Eigen::Matrix3d& F) const {
-    const auto refitted =
-        FundamentalEightPoint(matches.x1_px, matches.x2_px, indices, matches.inverse_threshold);
-    if (refitted) F = *refitted;
-    return refitted.has_value();
   }
 };
 
@@ -80,44 +57,7 @@ struct EssentialProblem {
   }
 };
 
-struct Transfer {
-  Eigen::Matrix3d forward = Eigen::Matrix3d::Identity(), backward = Eigen::Matrix3d::Identity();
-};
-
-struct HomographyProblem {
-  using Model = Transfer;
-  static constexpr int kSampleSize = 4;
-  static constexpr int kMaxModels = 1;
-  const Matches& matches;
-
-  int size() const { return matches.size(); }
-  int Fit(std::span<const int, 4> sample, std::array<Transfer, 1>& models) const {
-    const auto H = HomographyFourPoint(matches.x1_px, matches.x2_px, sample);
-    if (H) models[0] = {*H, H->inverse()};
-    return H ? 1 : 0;
-  }
-  double NormalizedErrorSquared(const Transfer& H, int index) const {
-    const auto i = static_cast<size_t>(index);
-    const double there = TransferErrorSquared(H.forward, matches.x1_px[i], matches.x2_px[i]);
-    const double back = TransferErrorSquared(H.backward, matches.x2_px[i], matches.x1_px[i]);
-    return std::max(there, back) * matches.inverse_threshold[i];
-  }
-  bool Refit(std::span<const int> indices, Transfer& model) const {
-    const auto H = HomographyLinear(matches.x1_px, matches.x2_px, indices);
-    if (H) model = {*H, H->inverse()};
-    return H.has_value();
-  }
-};
-
 }  // namespace
-
-RansacReport<Eigen::Matrix3d> FundamentalFromMatches(std::span<const Eigen::Vector2d> x1_px,
-                                                     std::span<const Eigen::Vector2d> x2_px,
-                                                     std::span<const double> sigma_squared,
-                                                     const TwoViewRansacOptions& options) {
-  const Matches matches(x1_px, x2_px, sigma_squared, options.max_error_squared_px);
-  return Ransac(FundamentalProblem{matches}, options.ransac);
-}
 
 RansacReport<Eigen::Matrix3d> EssentialFromMatches(const Pinhole& camera,
                                                    std::span<const Eigen::Vector2d> x1_px,
@@ -130,22 +70,6 @@ RansacReport<Eigen::Matrix3d> EssentialFromMatches(const Pinhole& camera,
   for (const auto& x : x2_px) rays2.push_back(camera.Ray(x));
   auto report = Ransac(EssentialProblem{matches, camera, rays1, rays2}, options.ransac);
   report.model = EssentialFromFundamental(report.model, camera, camera);
-  return report;
-}
-
-RansacReport<Eigen::Matrix3d> HomographyFromMatches(std::span<const Eigen::Vector2d> x1_px,
-                                                    std::span<const Eigen::Vector2d> x2_px,
-                                                    std::span<const double> sigma_squared,
-                                                    const TwoViewRansacOptions& options) {
-  const Matches matches(x1_px, x2_px, sigma_squared, options.max_error_squared_px);
-  auto found = Ransac(HomographyProblem{matches}, options.ransac);
-  RansacReport<Eigen::Matrix3d> report;
-  report.success = found.success;
-  report.model = found.model.forward;
-  report.iterations = found.iterations;
-  report.num_inliers = found.num_inliers;
-  report.cost = found.cost;
-  report.inliers = std::move(found.inliers);
   return report;
 }
 

@@ -11,26 +11,16 @@ namespace dmslam {
 
 struct TwoViewRansacOptions {
   RansacOptions ransac;
-  double max_error_squared_px =
-      kChiSquared1Dof;  ///< Sampson (F, E) or each transfer error (H), times sigma squared where given.
+  double max_error_squared_px = kChiSquared1Dof;  ///< Sampson's, times sigma squared where given.
 };
 
-/// Robust two-view models over matches in undistorted pixels (x1[i] with x2[i]). `sigma_squared` is parallel
+/// Robust essential matrix over matches in undistorted pixels (x1[i] with x2[i]). `sigma_squared` is parallel
 /// to the matches (variance of the match relative to one pixel), or empty: all 1.
-RansacReport<Eigen::Matrix3d> FundamentalFromMatches(std::span<const Eigen::Vector2d> x1_px,
-                                                     std::span<const Eigen::Vector2d> x2_px,
-                                                     std::span<const double> sigma_squared,
-                                                     const TwoViewRansacOptions& options);
 /// The model is the essential matrix; the error is Sampson's in pixels.
 RansacReport<Eigen::Matrix3d> EssentialFromMatches(const Pinhole& camera,
                                                    std::span<const Eigen::Vector2d> x1_px,
                                                    std::span<const Eigen::Vector2d> x2_px,
                                                    std::span<const double> sigma_squared,
                                                    const TwoViewRansacOptions& options);
-/// The larger of the two transfer errors counts.
-RansacReport<Eigen::Matrix3d> HomographyFromMatches(std::span<const Eigen::Vector2d> x1_px,
-                                                    std::span<const Eigen::Vector2d> x2_px,
-                                                    std::span<const double> sigma_squared,
-                                                    const TwoViewRansacOptions& options);
 
 }  // namespace dmslam
