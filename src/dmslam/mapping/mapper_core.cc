@@ -1,11 +1,11 @@
 #include "dmslam/mapping/mapper_core.h"
 
-#include <algorithm>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "dmslam/dynamics/seen_through.h"
+#include "dmslam/map/shared_map.h"
 #include "dmslam/mapping/correction.h"
 #include "dmslam/mapping/culling.h"
 #include "dmslam/mapping/first_map.h"
@@ -156,16 +156,10 @@ void MapperCore::OnEvidence(const FrameEvidence& evidence) {
 }
 
 void MapperCore::OnReset(const MapReset& reset) {
-  if (reset.fate == MapReset::Fate::kKeep || IsShared(reset.map_id, reset.camera_id)) return;
+  if (reset.fate == MapReset::Fate::kKeep || IsShared(map_, reset.map_id, reset.camera_id)) return;
   ++counters_.maps_dropped;
   map_.DropMap(reset.map_id);
   Publish(MapEvent::kMapDropped, {}, reset.map_id, {}, reset.reason);
-}
-
-/// Whether another camera than `camera` has a part in it, as that one may not have heard yet.
-bool MapperCore::IsShared(MapId map_id, CameraId camera) const {
-  return std::ranges::any_of(map_.KeyframesOf(map_id),
-                             [&](const Keyframe* keyframe) { return keyframe->camera_id != camera; });
 }
 
 void MapperCore::GiveTurn(KeyframeId frame) { Publish(MapEvent::kTurn, frame, {}); }

@@ -95,7 +95,6 @@ class MapperCore {
 
  private:
   const Keyframe* FindOrInsert(const KeyframeProposal& proposal);
-  bool IsShared(MapId map_id, CameraId camera) const;
   void CullYoung(MapId map_id);
   void RemoveSeenThroughBy(const Keyframe& keyframe);
   void Adjust(const Keyframe& keyframe);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dmslam/map/shared_map.h"
 #include "dmslam/tracking/keyframe_policy.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/time.h"
@@ -87,12 +88,6 @@ void FrontendCore::Resume() {
   if (own != nullptr) gate_.ContinueAfter(own->stamp_ns);
 }
 
-/// Whether another camera has a part in it: then it is not this one's to drop.
-bool FrontendCore::IsSharedMap(MapId map_id) const {
-  return std::ranges::any_of(map_.KeyframesOf(map_id),
-                             [&](const Keyframe* keyframe) { return keyframe->id.camera() != camera_id_; });
-}
-
 void FrontendCore::ForgetMap() {
   late_.Forget();
   map_.Clear();
@@ -102,7 +97,7 @@ void FrontendCore::ForgetMap() {
 FrontendOutput FrontendCore::GiveUpMap(MapReset::Fate fate, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
-  if (map_id_ && IsSharedMap(*map_id_)) fate = MapReset::Fate::kKeep;
+  if (map_id_ && IsShared(map_, *map_id_, camera_id_)) fate = MapReset::Fate::kKeep;
   const bool drop = fate == MapReset::Fate::kDrop;
   if (map_id_) output.Add(MapReset{*map_id_, fate, reason, frame_.stamp_ns, camera_id_});
   if (drop && map_id_) own_maps_.Drop(*map_id_);

@@ -123,7 +123,6 @@ class FrontendCore {
   void FollowTurn();
   bool IsLostInTheLight(int64_t missing_ns);
   FrontendOutput GiveUpMap(MapReset::Fate fate, const std::string& reason);
-  bool IsSharedMap(MapId map_id) const;
   void FollowJoinedMap();
   bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
   void ReportLandmarks(const PlacedPose& pose, bool keyframe, EvidenceSchedule::Way way,

@@ -1,0 +1,37 @@
+#include "dmslam/map/shared_map.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "dmslam/camera/testing/test_camera.h"
+#include "dmslam/map/map_editor.h"
+
+namespace dmslam {
+namespace {
+
+void AddKeyframe(uint32_t frame, CameraId camera, MapId map_id, MapEditor* map) {
+  Keyframe keyframe;
+  keyframe.id = KeyframeId::Make(1, frame, camera);
+  keyframe.camera_id = camera;
+  keyframe.map_id = map_id;
+  keyframe.features = MakeFrameFeatures({}, map->camera(), map->pyramid());
+  map->AddKeyframe(std::move(keyframe));
+}
+
+TEST(SharedMap, IsOneInWhichAnotherCameraHasAKeyframe) {
+  MapEditor map(TestCamera(), Pyramid());
+  AddKeyframe(1, 0, 1, &map);
+  AddKeyframe(2, 0, 1, &map);
+  AddKeyframe(3, 2, 2, &map);
+  EXPECT_FALSE(IsShared(map, 1, 0)) << "the other camera is in another map";
+  EXPECT_TRUE(IsShared(map, 1, 2)) << "all of it is the first camera's";
+  AddKeyframe(4, 2, 1, &map);
+  EXPECT_TRUE(IsShared(map, 1, 0));
+  EXPECT_TRUE(IsShared(map, 1, 2));
+  EXPECT_FALSE(IsShared(map, 2, 2));
+  EXPECT_FALSE(IsShared(map, 9, 0)) << "nobody has a part in a map that is not there";
+}
+
+}  // namespace
+}  // namespace dmslam
