@@ -54,7 +54,7 @@ void MapTally::Note(KeyframeId id, std::optional<MapId> map_id) {
 }
 
 void MapTally::Note(LandmarkId id, const LandmarkEvidence& evidence) {
-  if (evidence.motion_belief > kBelievedToMove) {
+  if (IsBelievedToMove(evidence)) {
     moving_.insert(id);
   } else {
     moving_.erase(id);

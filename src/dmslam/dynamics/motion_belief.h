@@ -34,9 +34,13 @@ struct MotionBeliefOptions {
 /// Log odds of motion above which a landmark is believed to move.
 constexpr float kBelievedToMove = 0.0F;
 
+inline bool IsBelievedToMove(const LandmarkEvidence& evidence) {
+  return evidence.motion_belief > kBelievedToMove;
+}
+
 /// Whether a landmark is in the map and is not believed to move. Only such a landmark speaks for a place.
 inline bool IsStatic(const Landmark* landmark) {
-  return landmark != nullptr && landmark->evidence.motion_belief <= kBelievedToMove;
+  return landmark != nullptr && !IsBelievedToMove(landmark->evidence);
 }
 
 /// Removes those that are gone (null) or are believed to move.

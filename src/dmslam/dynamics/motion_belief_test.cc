@@ -47,6 +47,17 @@ TEST_F(MotionBeliefTest, WhatIsSeenElsewhereIsBelievedToMoveAndWhatIsFoundIsNot)
   EXPECT_FALSE(IsStatic(nullptr)) << "nor is what is gone";
 }
 
+TEST_F(MotionBeliefTest, WhatIsAsLikelyToMoveAsToStandIsBelievedToStand) {
+  LandmarkEvidence evidence;
+  EXPECT_FALSE(IsBelievedToMove(evidence)) << "nothing was said of it";
+  for (const float belief : {kBelievedToMove, kLowestBelief}) {
+    evidence.motion_belief = belief;
+    EXPECT_FALSE(IsBelievedToMove(evidence)) << belief;
+  }
+  evidence.motion_belief = kBelievedToMove + 0.01F;
+  EXPECT_TRUE(IsBelievedToMove(evidence));
+}
+
 TEST_F(MotionBeliefTest, WhatGoesOnMovingLeavesTheMap) {
   EXPECT_EQ(Say(0, 0, 2).removed, 0);
   ASSERT_NE(Find(0), nullptr);

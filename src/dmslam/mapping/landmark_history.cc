@@ -21,8 +21,6 @@ LandmarkOrigin OriginOf(MapEvent event) {
   }
 }
 
-bool Moves(const LandmarkEvidence& evidence) { return evidence.motion_belief > kBelievedToMove; }
-
 }  // namespace
 
 void LandmarkHistories::BeginAnew() {
@@ -154,9 +152,9 @@ void LandmarkHistories::NoteEvidence(LandmarkId id, const MapMoment& now) {
   if (landmark == nullptr) return;
   std::vector<EvidenceStep>& steps = HistoryOf(id, now).evidence;
   const bool all = watched_.contains(id);
-  const bool moved_before = !steps.empty() && Moves(steps.back().evidence);
+  const bool moved_before = !steps.empty() && IsBelievedToMove(steps.back().evidence);
   const bool is_news = all ? steps.empty() || steps.back().evidence != landmark->evidence
-                           : moved_before != Moves(landmark->evidence);
+                           : moved_before != IsBelievedToMove(landmark->evidence);
   if (is_news) steps.push_back({now, landmark->evidence});
 }
 
