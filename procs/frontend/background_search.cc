@@ -29,7 +29,7 @@ InitializerReport BackgroundSearch::AddFrame(const InitializerFrame& frame) {
     return std::exchange(last_, InitializerReport());
   }
   waiting_.push_back(frame);
-  while (SecondsBetween(waiting_.front(), frame) > kLongestWaitS) waiting_.pop_front();
+  while (SecondsFromTo(waiting_.front(), frame) > kLongestWaitS) waiting_.pop_front();
   changed_.notify_one();
   return last_;
 }

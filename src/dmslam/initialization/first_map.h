@@ -11,6 +11,7 @@
 #include "dmslam/features/frame_features.h"
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/motion_segmentation/match.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 
@@ -22,12 +23,12 @@ struct InitializerFrame {
 };
 
 /// Time from frame `from` to frame `to` [s]; negative where `to` comes first.
-inline double SecondsBetween(const InitializerFrame& from, const InitializerFrame& to) {
-  return static_cast<double>(to.stamp_ns - from.stamp_ns) * 1e-9;
+inline double SecondsFromTo(const InitializerFrame& from, const InitializerFrame& to) {
+  return SecondsFromTo(from.stamp_ns, to.stamp_ns);
 }
 
-inline double SecondsBetween(int64_t from_ns, const InitializerFrame& to) {
-  return static_cast<double>(to.stamp_ns - from_ns) * 1e-9;
+inline double SecondsFromTo(int64_t from_ns, const InitializerFrame& to) {
+  return SecondsFromTo(from_ns, to.stamp_ns);
 }
 
 /// Why there is no first map yet.

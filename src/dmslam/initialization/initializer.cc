@@ -222,7 +222,7 @@ InitializerReport Initializer::Impl::Consider(const InitializerFrame& frame) {
     stream_.last_looked_ns = frame.stamp_ns;
     return Wait(WaitReason::kTooFewFrames, "this is the first");
   }
-  if (SecondsBetween(stream_.last_looked_ns, frame) < options_.frame_step_s &&
+  if (SecondsFromTo(stream_.last_looked_ns, frame) < options_.frame_step_s &&
       !IsNearlyThere(stream_.last_wait)) {
     return stream_.last_wait;
   }
@@ -245,7 +245,7 @@ bool Initializer::Impl::IsNearlyThere(const InitializerReport& report) const {
 InitializerReport Initializer::Impl::TryWindows(const InitializerFrame& frame) {
   InitializerReport report = Wait(WaitReason::kTooFewFrames, "a new reference frame");
   bool may_contend =
-      !stream_.last_contest_ns || SecondsBetween(*stream_.last_contest_ns, frame) >= options_.contest.step_s;
+      !stream_.last_contest_ns || SecondsFromTo(*stream_.last_contest_ns, frame) >= options_.contest.step_s;
   std::vector<ReferenceView> views = MakeViews(frame);
   auto view = views.begin();
   std::deque<ReferenceWindow>& windows = stream_.windows.all();
@@ -270,7 +270,7 @@ ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
   const FrameFeatures& features0 = *window.reference().features;
   ReferenceView view;
   view.frame = frame;
-  view.since_reference_s = SecondsBetween(window.reference(), frame);
+  view.since_reference_s = SecondsFromTo(window.reference(), frame);
   const Eigen::Quaterniond R_k_0 = window.TurnAt(view.since_reference_s);
   view.pair.matches = MatchFrames(features0, *frame.features, camera_, options_.matching, &matcher,
                                   Turned(features0.uv_px, camera_, R_k_0));
@@ -402,7 +402,7 @@ bool Initializer::Impl::Leads(const InitializerFrame& now, const Contender& winn
   const bool same = led && static_cast<double>(common.size()) >= options_.contest.min_overlap * smaller;
   const int64_t since_ns = same ? window->lead->since_ns : now.stamp_ns;
   window->lead = ReferenceWindow::Lead{since_ns, std::move(features)};
-  return SecondsBetween(since_ns, now) >= options_.contest.lead_s;
+  return SecondsFromTo(since_ns, now) >= options_.contest.lead_s;
 }
 
 /// Sets of matches that may move together: the selector's, and what RANSAC finds in the rest, again and

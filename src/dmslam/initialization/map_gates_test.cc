@@ -42,7 +42,7 @@ class MapGatesTest : public ::testing::Test {
     Random random(DeriveSeed(3, frame, "view"));
     ReferenceView view;
     view.frame = Frame(frame);
-    view.since_reference_s = SecondsBetween(Frame(reference), view.frame);
+    view.since_reference_s = SecondsFromTo(Frame(reference), view.frame);
     for (size_t k = 0; k < shown; ++k) {
       const bool gone = k < late_ && frame < reference;  // they came just before the reference frame
       const Eigen::Vector3d place = points_[k] + Eigen::Vector3d(gone ? 0.4 : 0.0, 0, 0);

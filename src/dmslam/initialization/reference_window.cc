@@ -13,7 +13,7 @@ std::vector<const ReferenceView*> ReferenceWindow::PairsToAgree(int num_pairs, d
   }
   const auto asked = static_cast<size_t>(num_pairs);
   if (num_pairs < 1 || moved.size() < asked) return chosen;
-  const double span_s = SecondsBetween(moved.front()->frame, moved.back()->frame);
+  const double span_s = SecondsFromTo(moved.front()->frame, moved.back()->frame);
   if (span_s < min_step_s * static_cast<double>(asked - 1)) return chosen;
   if (asked == 1) return {moved.back()};
   for (size_t k = 0; k < asked; ++k) chosen.push_back(moved[k * (moved.size() - 1) / (asked - 1)]);

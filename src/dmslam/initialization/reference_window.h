@@ -21,7 +21,7 @@ class ReferenceWindow {
   ReferenceWindow& operator=(ReferenceWindow&&) = default;
 
   const InitializerFrame& reference() const { return reference_; }
-  double AgeAt(const InitializerFrame& frame) const { return SecondsBetween(reference_, frame); }
+  double AgeAt(const InitializerFrame& frame) const { return SecondsFromTo(reference_, frame); }
   /// Views stay where they are in memory while the window lives.
   const ReferenceView& AddView(ReferenceView view) { return views_.emplace_back(std::move(view)); }
   const std::deque<ReferenceView>& views() const { return views_; }

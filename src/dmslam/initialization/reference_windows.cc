@@ -8,7 +8,7 @@ namespace dmslam {
 
 void ReferenceWindows::KeepRecent(const InitializerFrame& frame) {
   recent_.push_back(frame);
-  while (SecondsBetween(recent_.front(), frame) > past_.seconds) recent_.pop_front();
+  while (SecondsFromTo(recent_.front(), frame) > past_.seconds) recent_.pop_front();
 }
 
 void ReferenceWindows::DropOld(const InitializerFrame& frame) {
@@ -40,7 +40,7 @@ void ReferenceWindows::BeginIfDue(const InitializerFrame& frame) {
 }
 
 bool ReferenceWindows::BriefOnesHelp(const InitializerFrame& frame) const {
-  return lost_soon_ns_ && SecondsBetween(*lost_soon_ns_, frame) <= options_.max_age_s;
+  return lost_soon_ns_ && SecondsFromTo(*lost_soon_ns_, frame) <= options_.max_age_s;
 }
 
 /// False where there is none. The oldest window that is neither promising nor leads a contest goes.
@@ -59,7 +59,7 @@ bool ReferenceWindows::MakeRoom() {
 void ReferenceWindows::Begin(const InitializerFrame& frame) {
   std::vector<InitializerFrame> before, past;
   for (const InitializerFrame& each : recent_) {
-    if (SecondsBetween(each, frame) <= past_.seconds && each.index != frame.index) before.push_back(each);
+    if (SecondsFromTo(each, frame) <= past_.seconds && each.index != frame.index) before.push_back(each);
   }
   const size_t asked = std::min(before.size(), static_cast<size_t>(std::max(0, past_.views)));
   for (size_t k = 0; k < asked; ++k) past.push_back(before[k * before.size() / asked]);

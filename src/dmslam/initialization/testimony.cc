@@ -43,7 +43,7 @@ void CompareClaims(const CandidateBuilder& builder, const ReferenceWindow& other
   if (!T_from_0) return;
   for (const ReferenceWindow::Claim& claim : other.claims) {
     if (claim.view == &candidate.last()) continue;  // the candidate itself
-    if (SecondsBetween(claim.view->frame, candidate.last().frame) > options.memory_s) continue;
+    if (SecondsFromTo(claim.view->frame, candidate.last().frame) > options.memory_s) continue;
     const auto T_to_0 = PoseAt(builder, window, candidate, claim.view->frame.index);
     if (T_to_0) tally->Compare(*T_to_0 * T_from_0->Inverse(), claim.T_view_0);
   }
@@ -59,7 +59,7 @@ void ComparePrediction(const CandidateBuilder& builder, const ReferenceWindow& o
   const bool claimed =
       claim.view == &found.last() && CandidateBuilder::SameMotion(claim.T_view_0, found.T_last_0());
   if (!claimed) return;
-  if (SecondsBetween(found.last().frame, candidate.last().frame) > options.memory_s) return;
+  if (SecondsFromTo(found.last().frame, candidate.last().frame) > options.memory_s) return;
   const uint32_t from = window.reference().index;
   const uint32_t to = std::min(candidate.last().frame.index, found.last().frame.index);
   if (from >= to) return;
@@ -86,7 +86,7 @@ std::vector<Rigid3d> MotionsToTry(const CandidateBuilder& builder, const std::de
   const InitializerFrame& last = window.views().back().frame;
   const auto add = [&](const ReferenceWindow& from) {
     for (const CandidateMap& found : from.hypotheses) {
-      if (&from != &window && SecondsBetween(found.last().frame, last) > options.share_s) continue;
+      if (&from != &window && SecondsFromTo(found.last().frame, last) > options.share_s) continue;
       const auto motion = MotionBetween(builder, from, found, window.reference().index, last.index);
       if (motion) motions.push_back(*motion);
     }

@@ -36,7 +36,7 @@ class TestimonyTest : public ::testing::Test {
     for (const uint32_t frame : frames) {
       ReferenceView view;
       view.frame = Frame(frame);
-      view.since_reference_s = SecondsBetween(window.reference(), view.frame);
+      view.since_reference_s = SecondsFromTo(window.reference(), view.frame);
       for (size_t k = 0; k < points_.size(); ++k) {
         Match match;
         match.index0 = match.index1 = static_cast<uint32_t>(k);

@@ -13,9 +13,6 @@ namespace {
 
 constexpr int kMostWitnesses = 15;  // keyframes around one that are asked whether they see what it sees
 
-/// Between two keyframes; time runs backwards where the map grows back.
-double SecondsBetween(int64_t a_ns, int64_t b_ns) { return std::abs(SecondsFromTo(a_ns, b_ns)); }
-
 }  // namespace
 
 LoopcloserCore::LoopcloserCore(const LoopcloserOptions& options, const Camera& camera, const Pyramid& pyramid,
@@ -119,7 +116,7 @@ std::vector<const Keyframe*> LoopcloserCore::NamePlacesInOtherMaps(const Keyfram
 /// Proposals that nothing has confirmed for long.
 void LoopcloserCore::ForgetUnconfirmed(int64_t now_ns) {
   std::erase_if(proposals_, [&](const Proposal& proposal) {
-    return SecondsBetween(now_ns, proposal.last_ns) > options_.confirmation.within_s;
+    return SecondsApart(now_ns, proposal.last_ns) > options_.confirmation.within_s;
   });
 }
 
@@ -138,7 +135,7 @@ std::optional<VerifiedLoop> LoopcloserCore::ConfirmProposed(const Keyframe& keyf
     proposal.claim = loop->Claim();
     proposal.last_ns = keyframe.stamp_ns;
     const bool enough = ++proposal.confirmations >= options_.confirmation.times &&
-                        SecondsBetween(keyframe.stamp_ns, proposal.first_ns) >= options_.confirmation.for_s;
+                        SecondsApart(keyframe.stamp_ns, proposal.first_ns) >= options_.confirmation.for_s;
     if (enough && (!best || loop->share > best->share)) best = std::move(loop);
   }
   return best;
@@ -153,7 +150,7 @@ bool LoopcloserCore::IsConfirmedAround(const VerifiedLoop& loop) const {
     std::string why;
     if (!verifier_.Confirm(map_, *other, loop.Claim(), &why)) continue;
     ++confirmations;
-    longest_s = std::max(longest_s, SecondsBetween(other->stamp_ns, loop.keyframe->stamp_ns));
+    longest_s = std::max(longest_s, SecondsApart(other->stamp_ns, loop.keyframe->stamp_ns));
   }
   return confirmations >= options_.confirmation.times && longest_s >= options_.confirmation.for_s;
 }

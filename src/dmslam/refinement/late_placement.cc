@@ -22,8 +22,6 @@ constexpr double kApartS = 0.3;         // ...apart, so that it is motion and no
 constexpr double kFasterThanAside = 2;  // ...which may be so many times as fast...
 constexpr double kSlack = 0.05;         // ...and this beside [depths of the scene]
 
-double SecondsBetween(int64_t a_ns, int64_t b_ns) { return std::abs(SecondsFromTo(a_ns, b_ns)); }
-
 /// The same moment of time that runs backwards.
 FrameTime Backwards(uint32_t index, int64_t stamp_ns) { return {~index, -stamp_ns}; }
 
@@ -45,7 +43,7 @@ bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& 
                               double depth, CameraId camera_id) {
   std::vector<const Keyframe*> aside;
   const auto add = [&](const Keyframe& keyframe) {
-    const bool apart = aside.empty() || SecondsBetween(keyframe.stamp_ns, aside.back()->stamp_ns) >= kApartS;
+    const bool apart = aside.empty() || SecondsApart(keyframe.stamp_ns, aside.back()->stamp_ns) >= kApartS;
     const bool ours = keyframe.id.camera() == camera_id && keyframe.map_id == map_id;
     if (ours && apart) aside.push_back(&keyframe);
   };
@@ -57,12 +55,12 @@ bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& 
     add(it->second);
   double speed = 0;
   for (size_t i = 1; i < aside.size(); ++i) {
-    const double seconds = SecondsBetween(aside[i]->stamp_ns, aside[i - 1]->stamp_ns);
+    const double seconds = SecondsApart(aside[i]->stamp_ns, aside[i - 1]->stamp_ns);
     const double distance = DistanceBetween(aside[i]->T_cam_world, aside[i - 1]->T_cam_world);
     if (seconds > 0) speed = std::max(speed, distance / seconds);
   }
   return std::ranges::all_of(aside, [&](const Keyframe* keyframe) {
-    const double seconds = SecondsBetween(frame.stamp_ns, keyframe->stamp_ns);
+    const double seconds = SecondsApart(frame.stamp_ns, keyframe->stamp_ns);
     return DistanceBetween(frame.T_cam_world, keyframe->T_cam_world) <=
            kFasterThanAside * speed * seconds + kSlack * depth;
   });

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -11,6 +12,9 @@ namespace dmslam {
 inline double SecondsFromTo(int64_t from_ns, int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
 }
+
+/// Between two moments, whichever comes first.
+inline double SecondsApart(int64_t a_ns, int64_t b_ns) { return std::abs(SecondsFromTo(a_ns, b_ns)); }
 
 /// In whole nanoseconds, towards zero.
 constexpr int64_t ToNs(double seconds) { return static_cast<int64_t>(seconds * 1e9); }
