@@ -21,6 +21,7 @@ struct FeatureStoreOptions {
     v.Number("map.features_mb", memory_mb, 0, 1e6, "MB",
              "of keyframes' features in the memory of each process that holds the map; those of further "
              "keyframes lie in a file of TMPDIR (or /var/tmp) that has no name");
+    v.ChangesNoResult();
   }
 };
 

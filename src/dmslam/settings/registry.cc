@@ -65,6 +65,8 @@ class Collector {
   void InBaseline(const char* value) { settings_.back().baseline = value; }
   /// The same in the profile `paper`.
   void InPaper(const char* value) { settings_.back().paper = value; }
+  /// What is computed is the same with any value of it.
+  void ChangesNoResult() { settings_.back().changes_results = false; }
   /// A field that takes a setting which another struct describes: the defaults must be the same.
   template <typename T>
   void Shared(const char* key, T& field) {

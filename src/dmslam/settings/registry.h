@@ -13,6 +13,7 @@ struct SettingInfo {
   std::string value;                    ///< the default
   std::optional<std::string> baseline;  ///< in the profile of this name, where that sets it
   std::optional<std::string> paper;     ///< likewise
+  bool changes_results = true;          ///< false: what is computed is the same with any value
   std::string unit;                     ///< empty: none
   std::string help;
   std::string allowed;  ///< "1 to 16", "on or off", "dlrsac, arsac or ransac"

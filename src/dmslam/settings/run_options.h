@@ -27,6 +27,7 @@ struct CheckpointOptions {
     v.Number("collector.checkpoint_s", every_s, 0, 3600, "s",
              "age at which a change of the map must be in OUT/checkpoint.lcmlog, from which a run whose "
              "processes all died goes on; 0: no checkpoints");
+    v.ChangesNoResult();
   }
 };
 

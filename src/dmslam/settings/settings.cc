@@ -146,8 +146,9 @@ std::string Settings::Value(std::string_view key) const {
 
 uint64_t Settings::Hash() const {
   uint64_t hash = 0;
-  for (const SettingInfo& setting : AllSettings())
-    hash = DeriveSeed(hash, 0, setting.key + "=" + Value(setting.key));
+  for (const SettingInfo& setting : AllSettings()) {
+    if (setting.changes_results) hash = DeriveSeed(hash, 0, setting.key + "=" + Value(setting.key));
+  }
   return hash;
 }
 

@@ -12,7 +12,7 @@
 
 namespace dmslam {
 
-/// Everything that can be set and that changes results: the same file and the same `--set`s go to every
+/// Everything that can be set: the same file and the same `--set`s go to every
 /// process. Here settings are text; each process reads the options that it needs out of them, and compiles
 /// nobody else's:
 ///
@@ -38,7 +38,7 @@ class Settings {
   template <typename Options>
   Options Read() const;
 
-  /// Over all values: two processes with the same hash agree.
+  /// Over all values that change results: two processes with the same hash compute the same.
   uint64_t Hash() const;
 
  private:
@@ -66,6 +66,7 @@ class SettingsReader {
   }
   void InBaseline(const char*) {}
   void InPaper(const char*) {}
+  void ChangesNoResult() {}
   template <typename T>
   void Shared(const char* key, T& field) {
     if (const std::optional<T> value = ParseSetting<T>(settings_.Value(key))) field = *value;

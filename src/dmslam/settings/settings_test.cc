@@ -132,6 +132,8 @@ TEST(SettingsTest, TheHashTellsWhatResultsTell) {
   EXPECT_NE(Load("seed: 2\n").Hash(), hash);
   EXPECT_NE(Load("profile: baseline\n").Hash(), hash);
   EXPECT_NE(Load("loop: {enabled: off}\n").Hash(), hash);
+  EXPECT_EQ(Load("collector: {checkpoint_s: 0}\nmap: {features_mb: 1}\n").Hash(), hash)
+      << "how much is kept where, and how often, is all the same to results";
 }
 
 TEST(SettingsTest, WhatIsWrongIsNamedWithFileLineAndCure) {

@@ -29,7 +29,7 @@ struct FrontendOptions {
   void Describe(Visitor& v) {
     v.Choice("initializer.method", initializer_method, {"dlrsac", "arsac", "ransac", "paper"},
              "which matches are static; of two frames alone: ransac, without gates, and paper, DLRSAC as "
-             "published");
+             "published (with these two, no initializer.* but method and feature_factor has an effect)");
     v.InBaseline("ransac");
     v.InPaper("paper");
     v.Number("initializer.feature_factor", initializer_feature_factor, 0.5, 5, "",
