@@ -468,7 +468,6 @@ void MapperNode::AcceptWhatIsSafe() {
 
 // ---- Several cameras ----
 
-/// True: there may be more to do.
 /// True: a job for the core was made of it.
 bool MapperNode::GiveTurn() {
   if (!lockstep_ || frontends_.size() == 1 || end_.HasBegun()) return false;
