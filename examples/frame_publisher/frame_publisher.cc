@@ -3,8 +3,7 @@
 // (docs/camera.md):
 //
 //   lcm-gen --cpp --cpp-hpath=types lcmtypes/dmslam_{camera_info,frame,end_of_sequence,sequence_done}_t.lcm
-//   c++ -std=c++17 -Itypes -o frame_publisher examples/frame_publisher/frame_publisher.cc -llcm -lyaml-cpp
-//   -lz
+//   c++ -Itypes examples/frame_publisher/frame_publisher.cc -o frame_publisher -llcm -lyaml-cpp -lz
 //   ./frame_publisher 'udpm://239.255.76.67:7670?ttl=0' camera.yaml images/*.png
 #include <yaml-cpp/yaml.h>
 #include <zlib.h>
@@ -20,10 +19,8 @@
 #include "dmslam/frame_t.hpp"
 #include "dmslam/sequence_done_t.hpp"
 
-static void OnDone(const lcm::ReceiveBuffer*, const std::string&, const dmslam::sequence_done_t*,
-                   bool* heard) {
-  *heard = true;
-}
+using Done = dmslam::sequence_done_t;
+static void OnDone(const lcm::ReceiveBuffer*, const std::string&, const Done*, bool* heard) { *heard = true; }
 
 // Every message carries the CRC-32 of its own bytes, taken while the field is zero.
 template <typename Message>

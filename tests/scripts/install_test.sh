@@ -63,7 +63,9 @@ expect 0 "" cmake -S "$root/examples/slam_folder" -B "$work/slam" -DCMAKE_PREFIX
   -DCMAKE_CXX_FLAGS="-Wall -Wextra -Werror" -DCMAKE_BUILD_TYPE=Release
 expect 0 "" cmake --build "$work/slam"
 check "it needs no LCM" test -z "$(ldd "$work/slam/slam_folder" | grep 'liblcm\.so')"
-check "it has at most 80 lines" test "$(wc -l <"$root/examples/slam_folder/main.cc")" -le 80
+for example in "$root"/examples/*/*.{cc,java} "$root"/examples/python/*.py; do
+  check "${example#"$root"/} has at most 80 lines" test "$(wc -l <"$example")" -le 80
+done
 expect 0 "of 150 frames tracked" "$work/slam/slam_folder" "$sequence" "$camera" \
   "$prefix/share/dmslam/data/vocabulary.dmv" "$work/folder.txt" seed=1
 expect 0 "" "$prefix/bin/dmslam-inprocess" --sequence "$sequence" --camera "$camera" --seed 1 --out "$work/whole"
