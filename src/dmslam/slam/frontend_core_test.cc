@@ -129,6 +129,12 @@ class Phases : public ::testing::Test {
     core_.emplace(setup);
   }
 
+  static std::shared_ptr<const Vocabulary> ShippedVocabulary() {
+    const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+    return std::make_shared<const Vocabulary>(
+        LoadOrbVocabulary((source != nullptr ? std::string(source) : ".") + "/data/vocabulary.dmv"));
+  }
+
   InitializerReport Search(const InitializerFrame& frame) {
     InitializerReport report;
     report.reason = "not yet";
@@ -224,6 +230,64 @@ TEST_F(Phases, ACameraThatTurnsWithoutAMapHasARotationAndNoPose) {
   }
   EXPECT_FALSE(core_->odometry().measured);
   EXPECT_LT(AngleBetween(core_->odometry().T_odom_cam.rotation, turned(14).conjugate()), 0.002);
+}
+
+TEST_F(Phases, WithoutAMapThereIsNothingToGoOnIn) {
+  core_->Resume();
+  EXPECT_EQ(core_->state(), TrackingState::kNotInitialized);
+}
+
+/// One that joins a system which has been running: maps are there, and the frontend made none of them.
+class Resuming : public Phases {
+ protected:
+  Resuming() : Phases(false, 0, ShippedVocabulary()) {}
+
+  /// An empty keyframe of map 7, newer than all others.
+  void AddKeyframe(CameraId camera) {
+    MapDelta delta;
+    KeyframeState& keyframe = delta.keyframes.emplace_back();
+    keyframe.id = KeyframeId::Make(1, 40, camera);
+    keyframe.camera_id = camera;
+    keyframe.map_id = 7;
+    keyframe.stamp_ns = 40 * kFrameNs;
+    keyframe.features = std::make_shared<const FeatureSet>();
+    core_->ApplyMapDelta(delta);
+  }
+  /// In which it looks for the camera.
+  std::optional<MapId> MapAfterResume() {
+    core_->Resume();
+    EXPECT_EQ(core_->state(), TrackingState::kLost);
+    return Find<FramePose>(Frame(50, true))->map_id;
+  }
+};
+
+TEST_F(Resuming, ItIsLostInTheMapAndFindsItselfInIt) {
+  scene_.MapAll(20);
+  core_->ApplyMapDelta(scene_.map().TakeDelta(MapEvent::kMapped, KeyframeId::Make(1, 19), 1));
+  core_->Resume();
+  EXPECT_EQ(core_->state(), TrackingState::kLost);
+  uint32_t frame = 20;
+  for (bool is_found = false; frame < 40 && !is_found; ++frame) {
+    const FrontendOutput output = Frame(frame);
+    EXPECT_EQ(Find<InitialMap>(output), nullptr) << "it begins no second map";
+    is_found = Find<FramePose>(output)->HasPose();
+    EXPECT_EQ(Find<FramePose>(output)->map_id, 1u);
+  }
+  EXPECT_LT(frame, 40u);
+  EXPECT_EQ(core_->state(), TrackingState::kTracking);
+}
+
+TEST_F(Resuming, OfSeveralMapsItTakesThatOfItsOwnNewestKeyframe) {
+  MapArrives();
+  AddKeyframe(1);
+  EXPECT_EQ(MapAfterResume(), 1u) << "the newest one is another camera's";
+  AddKeyframe(0);
+  EXPECT_EQ(MapAfterResume(), 7u);
+}
+
+TEST_F(Resuming, OneWithoutAKeyframeTakesTheNewestMap) {
+  AddKeyframe(1);
+  EXPECT_EQ(MapAfterResume(), 7u);
 }
 
 TEST_F(Phases, AProposalThatTheMapperRefusesIsGivenUp) {
@@ -516,11 +580,6 @@ class BesideAnother : public Phases {
  protected:
   BesideAnother() : Phases(false, 1, ShippedVocabulary()) {}
 
-  static std::shared_ptr<const Vocabulary> ShippedVocabulary() {
-    const char* source = std::getenv("DMSLAM_SOURCE_DIR");
-    return std::make_shared<const Vocabulary>(
-        LoadOrbVocabulary((source != nullptr ? std::string(source) : ".") + "/data/vocabulary.dmv"));
-  }
   /// Of keyframes within a second.
   void AnothersMapArrives() {
     scene_.MapAll(31, 0.01);
