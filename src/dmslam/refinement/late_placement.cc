@@ -113,6 +113,11 @@ bool LatePlacement::IsPlausible(const Map& map, const Keyframe* reference, const
   return AgreesWithKeyframesAside(map, reference->map_id, frame, session_, depth, camera_id_);
 }
 
+bool LatePlacement::IsBelieved(const Map& map, const TrackingReport& report, const PoseSearch& search,
+                               const TrackedFrame& frame) const {
+  return report.IsTracked() && IsPlausible(map, search.Reference(map), frame);
+}
+
 /// From a keyframe that is too far ahead for its motion to say anything: if the camera has hardly moved
 /// since.
 TrackingReport LatePlacement::FindBeside(const Map& map, PoseSearch* search, TrackedFrame* frame) const {
@@ -120,7 +125,7 @@ TrackingReport LatePlacement::FindBeside(const Map& map, PoseSearch* search, Tra
   const auto found = search->FromFrame(map, next, next.T_cam_world, std::nullopt, frame);
   if (found != PoseSearch::FromFrameResult::kFound) return {};
   TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
-  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->Reference(map), *frame);
+  if (!IsBelieved(map, report, *search, *frame)) report.TakePoseAway();
   return report;
 }
 
@@ -132,8 +137,8 @@ TrackingReport LatePlacement::TrackBackwards(const Map& map, PoseSearch* search,
   const uint64_t seed = DeriveSeed(seed_, frame->index, "late_keyframe");
   MotionFollower::Attempt attempt = follower_->Follow(map, time, false, seed, search, frame);
   TrackingReport& report = attempt.report;
-  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->Reference(map), *frame);
-  if (!report.ok && attempt.weak_pose) Coast(map, *attempt.weak_pose, report, *search, *frame);
+  if (!IsBelieved(map, report, *search, *frame)) report.TakePoseAway();
+  if (!report.IsTracked() && attempt.weak_pose) Coast(map, *attempt.weak_pose, report, *search, *frame);
   return report;
 }
 
@@ -150,14 +155,14 @@ LatePlacement::Found LatePlacement::Place(const Map& map, LateMap late_map, Pose
                                           const Relocalizer& relocalizer, TrackedFrame* frame) {
   FindNeighbour(map, late_map, *frame);
   Found found{TrackBackwards(map, search, frame)};
-  if (found.report.ok) return found;
+  if (found.report.IsTracked()) return found;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
   if (!relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   found = {search->InLocalMap(map, true, std::nullopt, frame), true};
   TrackingReport& report = found.report;
-  report.ok = report.ok && !report.doubtful && IsPlausible(map, search->Reference(map), *frame);
+  if (!IsBelieved(map, report, *search, *frame)) report.TakePoseAway();
   return found;
 }
 

@@ -40,7 +40,7 @@ class LatePlacement {
     TrackingReport report;
     bool jumped = false;  ///< recognised like a lost camera, and not followed from its neighbour
   };
-  /// Finds the frame's pose; the report is not ok where it is not believed. `search` and `relocalizer`: of
+  /// Finds the frame's pose; the report has none where it is not believed. `search` and `relocalizer`: of
   /// the frontend.
   Found Place(const Map& map, LateMap late_map, PoseSearch* search, const Relocalizer& relocalizer,
               TrackedFrame* frame);
@@ -74,6 +74,8 @@ class LatePlacement {
   void LeaveNeighbour();
   void FindNeighbour(const Map& map, LateMap late_map, const TrackedFrame& frame);
   bool IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const;
+  bool IsBelieved(const Map& map, const TrackingReport& report, const PoseSearch& search,
+                  const TrackedFrame& frame) const;
   bool LeadsTo(const Map& map, const std::optional<Before>& before) const;
   TrackingReport FindBeside(const Map& map, PoseSearch* search, TrackedFrame* frame) const;
   TrackingReport TrackBackwards(const Map& map, PoseSearch* search, TrackedFrame* frame);

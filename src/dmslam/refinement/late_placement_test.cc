@@ -106,9 +106,9 @@ class GrowingBack : public ::testing::Test {
                              const std::optional<LatePlacement::Before>& before = {}) {
     TrackedFrame frame = Frame(index, x, place);
     const TrackingReport report = Place(&frame);
-    EXPECT_TRUE(report.ok) << index << ": " << report.reason;
+    EXPECT_TRUE(report.HasPose()) << index << ": " << report.reason;
     std::vector<uint32_t> told;
-    if (!report.ok) return told;
+    if (!report.HasPose()) return told;
     for (const LatePlacement::Placed& placed : GoOnFrom(frame, report, before)) {
       told.push_back(placed.frame.index);
       const double own_x = placed.frame.index == index ? x : -0.02 * (kFirst - placed.frame.index);
@@ -140,7 +140,7 @@ TEST_F(GrowingBack, FramesArePlacedFromTheOneAfterThem) {
     const double x = -0.02 * (kFirst - index);
     TrackedFrame frame = Frame(index, x);
     const TrackingReport report = Place(&frame);
-    ASSERT_TRUE(report.ok) << index << ": " << report.reason;
+    ASSERT_TRUE(report.HasPose()) << index << ": " << report.reason;
     EXPECT_LT((frame.T_cam_world.Center() - Eigen::Vector3d(x, 0, 0)).norm(), 2e-3);
     GoOnFrom(frame, report);
   }
@@ -153,20 +153,20 @@ TEST_F(GrowingBack, AKeyframeFarAheadIsEnoughWhereTheCameraHardlyMoved) {
 TEST_F(GrowingBack, AFrameTooFarFromItsNeighbourIsNotBelieved) {
   TrackedFrame frame = Frame(kFirst - 1, -0.02);
   const TrackingReport report = Place(&frame);
-  ASSERT_TRUE(report.ok);
+  ASSERT_TRUE(report.HasPose());
   GoOnFrom(frame, report);
   TrackedFrame leap = Frame(kFirst - 2, -0.02);
   leap.stamp_ns = frame.stamp_ns - 1'000'000;  // the same place, but hardly any time between: as if it flew
   TrackedFrame near = Frame(kFirst - 2, -0.08);
   near.stamp_ns = leap.stamp_ns;
-  EXPECT_TRUE(Place(&leap).ok);
-  EXPECT_FALSE(Place(&near).ok) << "0.06 units in a thousandth of a second";
+  EXPECT_TRUE(Place(&leap).HasPose());
+  EXPECT_FALSE(Place(&near).HasPose()) << "0.06 units in a thousandth of a second";
 }
 
 TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
   TrackedFrame frame = Frame(kFirst - 1, -0.02);
   const TrackingReport report = Place(&frame);
-  ASSERT_TRUE(report.ok);
+  ASSERT_TRUE(report.HasPose());
   GoOnFrom(frame, report);
   const Rigid3d shift(Eigen::Quaterniond::Identity(), {-3.0, 0, 0});
   const KeyframeId id = KeyframeId::Make(MapScene::kSession, kFirst);
@@ -175,7 +175,7 @@ TEST_F(GrowingBack, TheNeighbourMovesWithTheMap) {
     scene_.map().SetPosition(scene_.map().At(MapScene::IdOf(i)), scene_.point(i) + Eigen::Vector3d(3, 0, 0));
   placement_.OnMapChanged(scene_.map());
   TrackedFrame next = Frame(kFirst - 2, -0.04);
-  ASSERT_TRUE(Place(&next).ok);
+  ASSERT_TRUE(Place(&next).HasPose());
   EXPECT_LT((next.T_cam_world.Center() - Eigen::Vector3d(2.96, 0, 0)).norm(), 3e-3);
 }
 
@@ -195,7 +195,7 @@ TEST_F(GrowingBack, WhatIsSeenInACornerIsToldBetweenWhatIsWellSeen) {
   EXPECT_EQ(Told(19, -0.02), std::vector<uint32_t>{19});
   EXPECT_EQ(Told(18, -0.04), std::vector<uint32_t>{18});
   TrackedFrame hidden = Frame(17, -0.06, Corner());
-  EXPECT_FALSE(Place(&hidden).ok);
+  EXPECT_FALSE(Place(&hidden).HasPose());
   EXPECT_EQ(Told(16, -0.08), (std::vector<uint32_t>{17, 16})) << "the motion led through it";
   EXPECT_EQ(Told(15, -0.10), std::vector<uint32_t>{15}) << "each is told once";
 }
@@ -225,7 +225,7 @@ TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
     LatePlacement placement(MapScene::kSession, 0, 0, {});
     TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(0));
     const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &frame);
-    ASSERT_TRUE(report.ok) << report.reason;
+    ASSERT_TRUE(report.HasPose()) << report.reason;
     const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
     const auto told =
         placement.GoOnFrom(scene.map(), LateMap::kGrows, search, {frame, report, pose, jumped}, std::nullopt);
@@ -249,18 +249,18 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
   for (const uint32_t index : {19u, 18u}) {
     TrackedFrame frame = see(index);
     const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &frame);
-    ASSERT_TRUE(report.ok) << index << ": " << report.reason;
+    ASSERT_TRUE(report.HasPose()) << index << ": " << report.reason;
     const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
     placement.GoOnFrom(scene.map(), LateMap::kGrows, search, {frame, report, pose, jumped}, std::nullopt);
   }
   for (const uint32_t index : {17u, 16u, 15u}) {
     TrackedFrame dark(index, index * kFrameNs,
                       MakeFrameFeatures({}, scene.map().camera(), scene.map().pyramid()));
-    EXPECT_FALSE(placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &dark).report.ok);
+    EXPECT_FALSE(placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &dark).report.HasPose());
   }
   TrackedFrame again = see(14);
   const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &again);
-  ASSERT_TRUE(report.ok) << report.reason;
+  ASSERT_TRUE(report.HasPose()) << report.reason;
   EXPECT_NEAR(again.T_cam_world.Center().x(), -0.6, 5e-3);
 }
 

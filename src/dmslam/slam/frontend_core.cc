@@ -279,7 +279,7 @@ FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
   FrontendOutput output;
   FollowTurn();
   unplaced_.Keep(WaitingFrame(frame_));
-  if (phase_.IsTrial() && report.contradicts) {
+  if (phase_.IsTrial() && report.outcome == TrackingReport::Outcome::kContradicted) {
     output = GiveUpMap(MapReset::Fate::kDrop,
                        std::string("the first map does not predict the next frames: ") + report.reason);
   } else {
@@ -387,7 +387,7 @@ std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced(LateMap l
   frame_ = unplaced_.TakeNewest().ToTracked(camera_, pyramid_);
   const LatePlacement::Found found =
       late_.Place(map_, late_map, &tracker_.search(), tracker_.relocalizer(), &frame_);
-  if (!found.report.ok) return std::nullopt;
+  if (!found.report.IsTracked()) return std::nullopt;
   const auto pose = PlacedPose::Of(tracker_.search().Reference(map_), frame_.T_cam_world);
   if (!pose) return std::nullopt;
   return LatePlacement::Placed{frame_, found.report, *pose, found.jumped};

@@ -19,9 +19,8 @@ MotionFollower::Attempt MotionFollower::Follow(const Map& map, const FrameTime& 
   attempt.by_rival |= attempt.report.by_rival;
   if (attempt.by_rival) motion_.Stop();
   if (!motion_.IsReachable(map, frame->T_cam_world, time)) {
-    attempt.report.ok = false;
+    attempt.report.outcome = TrackingReport::Outcome::kContradicted;
     attempt.report.reason = "the pose contradicts the camera's motion";
-    attempt.report.contradicts = true;
   } else if (attempt.report.num_static >= options_.min_coasting_inliers) {
     attempt.weak_pose = search->found(*frame);
   }
@@ -35,7 +34,7 @@ bool MotionFollower::FindFirstPose(const Map& map, const MotionModel::Prediction
   const Result last = search->FromFrame(map, last_, *prediction.T_cam_world, prediction.prior, frame);
   attempt->by_rival = last == Result::kFoundRival;
   if (last == Result::kFound || last == Result::kFoundRival) return true;
-  attempt->report.contradicts = last == Result::kContradicted;
+  if (last == Result::kContradicted) attempt->report.outcome = TrackingReport::Outcome::kContradicted;
   if (prediction.prior) {
     const int inliers = search->FromPrediction(map, *prediction.T_cam_world, prediction.prior, frame);
     if (inliers >= options_.min_local_inliers) return true;

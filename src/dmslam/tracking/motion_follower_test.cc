@@ -82,7 +82,7 @@ class MotionFollowerTest : public ::testing::Test {
   void TrackTwo() {
     for (const uint32_t index : {1U, 2U}) {
       TrackedFrame frame = Sharp(index, index * kStep);
-      ASSERT_TRUE(Follow(&frame).report.ok) << index;
+      ASSERT_TRUE(Follow(&frame).report.HasPose()) << index;
       OnTracked(frame);
     }
     ASSERT_TRUE(Prediction(3).prior);
@@ -115,7 +115,7 @@ TEST_F(MotionFollowerTest, GoesOnFromAKeyframeAndThenFromFrameToFrame) {
   for (uint32_t index = 1; index <= 6; ++index) {
     TrackedFrame frame = Blurred(index, index * kStep);
     const MotionFollower::Attempt attempt = Follow(&frame);
-    ASSERT_TRUE(attempt.report.ok) << attempt.report.reason;
+    ASSERT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
     EXPECT_LT(ErrorAt(frame.T_cam_world, index * kStep), 2e-3);
     EXPECT_FALSE(attempt.by_rival);
     EXPECT_TRUE(attempt.weak_pose);
@@ -134,7 +134,7 @@ TEST_F(MotionFollowerTest, WhoIsNowhereIsNotFollowed) {
   EXPECT_FALSE(follower_.motion().last_stamp_ns());
   TrackedFrame frame = Sharp(1, kStep);
   const MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_FALSE(attempt.report.ok);
+  EXPECT_FALSE(attempt.report.HasPose());
   EXPECT_STREQ(attempt.report.reason, kNotSeen);
   EXPECT_FALSE(attempt.weak_pose);
 }
@@ -143,10 +143,10 @@ TEST_F(MotionFollowerTest, WhoWasSeenLongAgoIsNotFollowed) {
   AddRoom();
   Begin();
   TrackedFrame frame = Sharp(14, kStep);
-  EXPECT_TRUE(Follow(&frame).report.ok);
+  EXPECT_TRUE(Follow(&frame).report.HasPose());
   frame = Sharp(16, kStep);
   const MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_FALSE(attempt.report.ok) << "half a second";
+  EXPECT_FALSE(attempt.report.HasPose()) << "half a second";
   EXPECT_STREQ(attempt.report.reason, kNotSeen);
 }
 
@@ -156,12 +156,12 @@ TEST_F(MotionFollowerTest, WhereTheLastFrameSawLittleAllThatLiesAroundIsLookedFo
   TrackTwo();
   LetLastHaveSeen([](size_t i) { return i < 5; });
   TrackedFrame frame = Blurred(3, 3 * kStep);
-  EXPECT_TRUE(Follow(&frame).report.ok);
+  EXPECT_TRUE(Follow(&frame).report.HasPose());
   EXPECT_LT(ErrorAt(frame.T_cam_world, 3 * kStep), 2e-3);
   follower_.Stop();
   EXPECT_FALSE(Prediction(3).prior);
   frame = Blurred(3, 3 * kStep);
-  EXPECT_FALSE(Follow(&frame).report.ok);
+  EXPECT_FALSE(Follow(&frame).report.HasPose());
 }
 
 TEST_F(MotionFollowerTest, AndWhereItIsNotByTheKeyframeThatItWasSeenFrom) {
@@ -169,7 +169,7 @@ TEST_F(MotionFollowerTest, AndWhereItIsNotByTheKeyframeThatItWasSeenFrom) {
   Begin();
   LetLastHaveSeen([](size_t i) { return i < 5; });
   TrackedFrame frame = Sharp(1, 0.15);
-  EXPECT_TRUE(Follow(&frame).report.ok);
+  EXPECT_TRUE(Follow(&frame).report.HasPose());
   EXPECT_LT(ErrorAt(frame.T_cam_world, 0.15), 2e-3);
 }
 
@@ -180,9 +180,9 @@ TEST_F(MotionFollowerTest, FewThatAreWhereTheyArePredictedLeadOnButAreNotTold) {
   LetLastHaveSeen([](size_t i) { return i < 5; });
   TrackedFrame frame = Blurred(3, 3 * kStep, [](size_t i) { return i < 14; });
   MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_FALSE(attempt.report.ok);
+  EXPECT_FALSE(attempt.report.HasPose());
   EXPECT_STREQ(attempt.report.reason, kNotSeen);
-  EXPECT_FALSE(attempt.report.contradicts);
+  EXPECT_NE(attempt.report.outcome, TrackingReport::Outcome::kContradicted);
   ASSERT_TRUE(attempt.weak_pose);
   EXPECT_LT(ErrorAt(attempt.weak_pose->T_cam_world, 3 * kStep), 5e-3);
   follower_.Coast(scene_.map(), *attempt.weak_pose, Time(3));
@@ -201,7 +201,7 @@ TEST_F(MotionFollowerTest, AWeakPoseIsNoMoreThanWhatTheMapAroundLeavesOfIt) {
   const auto shown = [](size_t i) { return i < 24; };
   TrackedFrame frame = Scattered(1, kStep, 9, shown, [](size_t i) { return i % 2 == 0; });
   MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_FALSE(attempt.report.ok);
+  EXPECT_FALSE(attempt.report.HasPose());
   EXPECT_STREQ(attempt.report.reason, "too few static features match the map");
   ASSERT_TRUE(attempt.weak_pose);
   EXPECT_LT(ErrorAt(attempt.weak_pose->T_cam_world, kStep), 1e-2);
@@ -220,8 +220,8 @@ TEST_F(MotionFollowerTest, WhatIsNearTheLastPlacesButNotInThemContradicts) {
   Begin();
   TrackedFrame frame = Scattered(1, kStep, 9, All, All);
   const MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_FALSE(attempt.report.ok);
-  EXPECT_TRUE(attempt.report.contradicts);
+  EXPECT_FALSE(attempt.report.HasPose());
+  EXPECT_EQ(attempt.report.outcome, TrackingReport::Outcome::kContradicted);
 }
 
 TEST_F(MotionFollowerTest, MoreIsAskedWhereItIsCareful) {
@@ -229,9 +229,9 @@ TEST_F(MotionFollowerTest, MoreIsAskedWhereItIsCareful) {
   Begin();
   const auto shown = [](size_t i) { return i < 25; };
   TrackedFrame frame = Sharp(1, kStep, shown);
-  EXPECT_TRUE(Follow(&frame).report.ok);
+  EXPECT_TRUE(Follow(&frame).report.HasPose());
   frame = Sharp(1, kStep, shown);
-  EXPECT_FALSE(Follow(&frame, true).report.ok);
+  EXPECT_FALSE(Follow(&frame, true).report.HasPose());
 }
 
 TEST_F(MotionFollowerTest, AJoltThatNoHandMakesIsNotFollowed) {
@@ -241,9 +241,9 @@ TEST_F(MotionFollowerTest, AJoltThatNoHandMakesIsNotFollowed) {
   TrackedFrame frame = Sharp(3, 3 * kStep + 0.22);
   const MotionFollower::Attempt attempt = Follow(&frame);
   ASSERT_GT(frame.T_cam_world.Center().x(), 3 * kStep + 0.165) << "it is found there";
-  EXPECT_FALSE(attempt.report.ok);
+  EXPECT_FALSE(attempt.report.HasPose());
   EXPECT_STREQ(attempt.report.reason, "the pose contradicts the camera's motion");
-  EXPECT_TRUE(attempt.report.contradicts);
+  EXPECT_EQ(attempt.report.outcome, TrackingReport::Outcome::kContradicted);
   EXPECT_FALSE(attempt.weak_pose);
 }
 
@@ -252,7 +252,7 @@ TEST_F(MotionFollowerTest, AJumpIsNoMotion) {
   Begin();
   TrackTwo();
   TrackedFrame frame = Sharp(3, 3 * kStep);
-  ASSERT_TRUE(Follow(&frame).report.ok);
+  ASSERT_TRUE(Follow(&frame).report.HasPose());
   OnTracked(frame, true);
   EXPECT_FALSE(Prediction(4).prior);
 }
@@ -266,14 +266,14 @@ TEST_F(MotionFollowerTest, WhereTheFramesBeforeFollowedSomebodyHisMotionIsForgot
   const double there = 3 * kStep + 0.1;
   TrackedFrame frame = Sharp(3, there, All, 0.1);
   MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_TRUE(attempt.report.ok) << attempt.report.reason;
+  EXPECT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
   EXPECT_TRUE(attempt.by_rival);
   EXPECT_LT(ErrorAt(frame.T_cam_world, there), 5e-4) << "what was expected of him has no say";
   EXPECT_FALSE(Prediction(4).prior);
 
   frame = Blurred(3, 2 * kStep + 0.1, All, 0.1);  // neither the motion nor the keyframe helps
   attempt = Follow(&frame);
-  EXPECT_TRUE(attempt.report.ok) << attempt.report.reason;
+  EXPECT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
   EXPECT_TRUE(attempt.by_rival);
 }
 
@@ -286,7 +286,7 @@ TEST_F(MotionFollowerTest, HoweverFarTheRoomIsFromWhereHisMotionLed) {
   const double there = 3 * kStep + 0.19;
   TrackedFrame frame = Sharp(3, there, All, 0.19);
   const MotionFollower::Attempt attempt = Follow(&frame);
-  EXPECT_TRUE(attempt.report.ok) << attempt.report.reason;
+  EXPECT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
   EXPECT_TRUE(attempt.by_rival);
   EXPECT_LT(ErrorAt(frame.T_cam_world, there), 2e-3);
   EXPECT_FALSE(Prediction(4).prior);

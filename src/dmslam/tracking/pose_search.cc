@@ -112,9 +112,8 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   TrackingReport report = CountClasses(camera_, *frame);
   CountExpected(map, expected, *frame, &report);
   report.by_rival = by_rival;
-  report.contradicts = static_cast<int>(fit.rejected.size()) > fit.inliers;
   Decide(fit, careful, &report);
-  if (report.ok && !report.doubtful) judge_.Believe(map, expected, *frame);
+  if (report.IsTracked()) judge_.Believe(map, expected, *frame);
   return report;
 }
 
@@ -141,16 +140,17 @@ void PoseSearch::CountExpected(const Map& map, std::span<const ExpectedLandmark>
 }
 
 void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report) const {
+  report->outcome = TrackingReport::Outcome::kTracked;
   report->num_static = fit.inliers;
+  report->num_elsewhere = static_cast<int>(fit.rejected.size());
   report->mean_chi2 = fit.mean_chi2;
   const int needed = careful ? options_.min_inliers_after_relocalization : options_.min_local_inliers;
   if (fit.inliers < needed) {
-    report->reason = "too few static features match the map";
+    report->TakePoseAway("too few static features match the map");
   } else if (report->cells < options_.min_cells) {
-    report->reason = "the static features lie in too small a part of the image";
-  } else {
-    report->ok = true;
-    if (options_.doubt) Doubt(fit, report);
+    report->TakePoseAway("the static features lie in too small a part of the image");
+  } else if (options_.doubt) {
+    Doubt(fit, report);
   }
 }
 
@@ -163,7 +163,7 @@ void PoseSearch::Doubt(const PoseFit& fit, TrackingReport* report) {
   } else {
     return;
   }
-  report->doubtful = true;
+  report->outcome = TrackingReport::Outcome::kDoubtful;
 }
 
 }  // namespace dmslam

@@ -49,7 +49,7 @@ class PoseSearch {
   bool FromKeyframe(const Map& map, KeyframeId keyframe, uint64_t seed, const Prior& prior,
                     TrackedFrame* frame);
   /// Refines the pose against the landmarks around: what its matches' keyframes and their neighbours see.
-  /// `careful`: the camera was lost just before, so more is asked. Where the report is ok, what the frame
+  /// `careful`: the camera was lost just before, so more is asked. Where it is tracked, what the frame
   /// says of landmarks is added to the judge's evidence.
   TrackingReport InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
 

@@ -368,10 +368,10 @@ TEST_F(PoseSearchTest, ByAFewMatchesAllThatLiesAroundIsFound) {
   TrackedFrame frame = Matched(See(), [](size_t i) { return i < 12; });
   EXPECT_EQ(search_->Reference(scene_.map()), nullptr);
   const TrackingReport report = InLocalMap(&frame);
-  EXPECT_TRUE(report.ok) << report.reason;
-  EXPECT_FALSE(report.doubtful);
+  EXPECT_TRUE(report.HasPose()) << report.reason;
+  EXPECT_FALSE(report.IsDoubtful());
   EXPECT_FALSE(report.by_rival);
-  EXPECT_FALSE(report.contradicts);
+  EXPECT_LE(report.num_elsewhere, report.num_static);
   EXPECT_GT(report.num_static, 130);
   EXPECT_EQ(report.num_static, CountMatches(frame));
   EXPECT_GE(report.num_expected, report.num_static);
@@ -425,10 +425,10 @@ TEST_F(PoseSearchTest, ACameraThatWasLostNeedsMoreThatMatches) {
     frame = Matched(std::move(frame), [](size_t) { return true; });
     const TrackingReport report = InLocalMap(&frame, careful);
     EXPECT_EQ(report.num_static, static_cast<int>(count)) << "all are in the picture";
-    if (!report.ok) {
+    if (!report.HasPose()) {
       EXPECT_STREQ(report.reason, "too few static features match the map");
     }
-    return report.ok;
+    return report.HasPose();
   };
   EXPECT_FALSE(tracked(19, false));
   EXPECT_TRUE(tracked(20, false));
@@ -443,7 +443,7 @@ TEST_F(PoseSearchTest, WhatLiesInASmallPartOfThePictureIsNotEnough) {
   TrackedFrame frame = Matched(See(near_the_middle), [](size_t) { return true; });
   const TrackingReport report = InLocalMap(&frame);
   ASSERT_GE(report.num_static, 20);
-  EXPECT_FALSE(report.ok);
+  EXPECT_FALSE(report.HasPose());
   EXPECT_STREQ(report.reason, "the static features lie in too small a part of the image");
   EXPECT_EQ(Believed(true).found, 0);
 }
@@ -460,19 +460,19 @@ TEST_F(PoseSearchTest, WhereWhatHasStoodForLongIsNotSeenAPoseIsDoubtedAndNotBeli
     return InLocalMap(&frame);
   };
   TrackingReport report = tracked(1);
-  EXPECT_TRUE(report.ok);
-  EXPECT_TRUE(report.doubtful);
+  EXPECT_TRUE(report.HasPose());
+  EXPECT_TRUE(report.IsDoubtful());
   EXPECT_STREQ(report.reason, "what has stood here for long is not seen");
   EXPECT_EQ(Believed(true).found, 0);
   report = tracked(4);
-  EXPECT_FALSE(report.doubtful) << report.num_old << " of " << report.num_old_expected << " are seen";
+  EXPECT_FALSE(report.IsDoubtful()) << report.num_old << " of " << report.num_old_expected << " are seen";
   EXPECT_GT(Believed(true).found, 50);
   TrackingOptions options;
   options.doubt = false;
   Begin(options);
-  EXPECT_FALSE(tracked(1).doubtful);
+  EXPECT_FALSE(tracked(1).IsDoubtful());
   Begin();
-  EXPECT_FALSE(tracked(0, 45).doubtful) << "hardly anything has stood here for long";
+  EXPECT_FALSE(tracked(0, 45).IsDoubtful()) << "hardly anything has stood here for long";
 }
 
 TEST_F(PoseSearchTest, WhatMayMatchByChanceIsDoubted) {
@@ -482,11 +482,11 @@ TEST_F(PoseSearchTest, WhatMayMatchByChanceIsDoubted) {
     TrackedFrame frame = SeeScattered(scattered_px, [count](size_t i) { return i < count; });
     frame = Matched(std::move(frame), [](size_t) { return true; });
     const TrackingReport report = InLocalMap(&frame);
-    EXPECT_TRUE(report.ok) << report.reason;
-    if (report.doubtful) {
+    EXPECT_TRUE(report.HasPose()) << report.reason;
+    if (report.IsDoubtful()) {
       EXPECT_STREQ(report.reason, "what matches the map may do so by chance");
     }
-    return report.doubtful;
+    return report.IsDoubtful();
   };
   EXPECT_TRUE(tracked(50, 1.7));
   EXPECT_FALSE(tracked(50, 0.5)) << "they are near their places";
@@ -500,9 +500,12 @@ TEST_F(PoseSearchTest, MoreThatContradictThanAgreeAreTold) {
   const Eigen::Vector3d gone(0.15, 0, 0);
   TrackedFrame frame = See([](size_t i) { return i < 50 || i >= 150; }, gone);
   frame = Matched(std::move(frame), [](size_t) { return true; });
-  const TrackingReport report = InLocalMap(&frame);
+  TrackingReport report = InLocalMap(&frame);
   EXPECT_EQ(report.num_static, 50);
-  EXPECT_TRUE(report.contradicts);
+  EXPECT_GT(report.num_elsewhere, report.num_static);
+  EXPECT_TRUE(report.HasPose());
+  report.TakePoseAway();
+  EXPECT_EQ(report.outcome, TrackingReport::Outcome::kContradicted);
 }
 
 TEST_F(PoseSearchTest, WhatIsSeenElsewhereHasMoved) {
@@ -511,7 +514,7 @@ TEST_F(PoseSearchTest, WhatIsSeenElsewhereHasMoved) {
   scene_.MapAll();
   TrackedFrame frame = Matched(See({}, {0.05, 0, 0}), [&](size_t i) { return IsOfRoom(i); });
   const TrackingReport report = InLocalMap(&frame);
-  ASSERT_TRUE(report.ok);
+  ASSERT_TRUE(report.HasPose());
   EXPECT_GT(report.num_moving, 25);
   EXPECT_GT(Believed(false).moved, 25);
 }
@@ -538,7 +541,7 @@ TEST_F(PoseSearchTest, TheRoomThatIsSeenElsewhereIsFollowed) {
   frame = Matched(std::move(frame), [&](size_t i) { return !IsOfRoom(i); });
   frame.T_cam_world = GoneAlong(gone);
   const TrackingReport report = search_->InLocalMap(scene_.map(), false, Certainly(GoneAlong(gone)), &frame);
-  EXPECT_TRUE(report.ok);
+  EXPECT_TRUE(report.HasPose());
   EXPECT_TRUE(report.by_rival);
   EXPECT_LT(Error(frame), 2e-3);
   EXPECT_EQ(CountMatches(frame, false), 0);

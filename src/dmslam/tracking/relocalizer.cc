@@ -115,7 +115,7 @@ std::optional<TrackingReport> Relocalizer::Refine(const Map& map, PoseSearch* se
   int found = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
     const TrackingReport report = search->InLocalMap(map, true, std::nullopt, frame);
-    if (report.ok && !report.doubtful) return report;
+    if (report.IsTracked()) return report;
     if (report.num_static <= found) return std::nullopt;
     found = report.num_static;
   }

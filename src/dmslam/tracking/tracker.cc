@@ -45,11 +45,6 @@ int64_t ConfirmNs(int proven) {
   return static_cast<int64_t>((1.0 - saved) * static_cast<double>(kConfirmNs));
 }
 
-void Refuse(const char* reason, TrackingReport* report) {
-  report->ok = false;
-  report->reason = reason;
-}
-
 }  // namespace
 
 Tracker::Tracker(const Setup& setup)
@@ -80,17 +75,17 @@ void Tracker::OnMapGivenUp() {
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
   Attempt attempt = FollowMotion(map, &frame);
-  if (IsDoubtfulForLong(attempt.report, frame.stamp_ns)) attempt.report.ok = false;
-  if (!attempt.report.ok && unbelieved_) GoBack();
-  if (attempt.report.ok) {
+  if (IsDoubtfulForLong(attempt.report, frame.stamp_ns)) attempt.report.TakePoseAway();
+  if (!attempt.report.HasPose() && unbelieved_) GoBack();
+  if (attempt.report.HasPose()) {
     FindBetterPlace(map, &frame, &attempt);
   } else {
     FindTurned(map, &frame, &attempt);
   }
-  if (!attempt.report.ok && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
+  if (!attempt.report.HasPose() && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
     Relocalize(map, request, &frame, &attempt);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
-  if (attempt.report.ok) result.pose = PlacedPose::Of(search_.Reference(map), frame.T_cam_world);
+  if (attempt.report.HasPose()) result.pose = PlacedPose::Of(search_.Reference(map), frame.T_cam_world);
   if (result.pose) {
     Follow(map, *result.pose, frame, attempt);
   } else if (attempt.weak_pose) {
@@ -98,14 +93,16 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   }
   if (unbelieved_) {
     result.pose.reset();
-    result.report.ok = false;
     if (unbelieved_->why == Unbelieved::Why::kFoundAnew) {
       search_.judge().DropEvidence();
       result.report.reason = "a place was recognised that is not confirmed yet";
     }
   }
-  if (result.pose)
+  if (result.pose) {
     result.certainty = certainty_.Estimate(map, frame, *result.pose, search_.basis(), !attempt.relocalized);
+  } else {
+    result.report.TakePoseAway();
+  }
   result.frame = std::move(frame);
   return result;
 }
@@ -115,7 +112,7 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
                      const Attempt& attempt) {
   if (attempt.relocalized) {
     unbelieved_ = Unbelieved{Unbelieved::Why::kFoundAnew, attempt.in_another_map, frame.stamp_ns, follower_};
-  } else if (attempt.report.doubtful && !unbelieved_) {
+  } else if (attempt.report.IsDoubtful() && !unbelieved_) {
     unbelieved_ =
         Unbelieved{Unbelieved::Why::kDoubtful, false, last_tracked_ns().value_or(frame.stamp_ns), follower_};
   }
@@ -130,7 +127,7 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
 /// them, proven landmarks are among it: the more of them, the sooner. In another map that is not, it must
 /// both be seen as a whole and predict.
 bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
-  if (report.doubtful) return false;
+  if (report.IsDoubtful()) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
   const int proven = CountProven(map, frame.landmarks, {});
   const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
@@ -147,7 +144,7 @@ bool Tracker::IsOldEnoughToProve(const Map& map) const {
 }
 
 bool Tracker::IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const {
-  return report.ok && report.doubtful && unbelieved_ && stamp_ns - unbelieved_->since_ns > kDoubtNs;
+  return report.IsDoubtful() && unbelieved_ && stamp_ns - unbelieved_->since_ns > kDoubtNs;
 }
 
 /// What was followed does not predict what is seen: the camera is where it was believed last, and lost.
@@ -185,7 +182,7 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
   TrackedFrame found(frame->index, frame->stamp_ns, frame->features);
   if (!search_.FromTurn(map, follower_.last(), *T_last, {.most_rad = reach_rad}, &found)) return;
   const TrackingReport report = search_.InLocalMap(map, true, std::nullopt, &found);
-  if (!report.ok || report.doubtful ||
+  if (!report.IsTracked() ||
       !follower_.motion().IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}))
     return;
   *frame = std::move(found);
@@ -206,7 +203,7 @@ void Tracker::FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* atte
   const PoseSearch::TurnRange beyond_search = {options_.local_radius_rad, kBesideRad};
   if (!second_search_.FromTurn(map, *frame, frame->T_cam_world, beyond_search, &found)) return;
   const TrackingReport beside = second_search_.InLocalMap(map, true, std::nullopt, &found);
-  if (!beside.ok || beside.doubtful || !ExplainsClearlyMore(beside, now)) return;
+  if (!beside.IsTracked() || !ExplainsClearlyMore(beside, now)) return;
   search_.judge().DropEvidence();  // what the pose that was wrong said of landmarks
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
@@ -242,9 +239,9 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
   if (request.credible && !credible(*frame, attempt->report))
-    Refuse("the place that was recognised is out of reach", &attempt->report);
-  if (attempt->report.doubtful) attempt->report.ok = false;
-  attempt->relocalized = attempt->report.ok;
+    attempt->report.TakePoseAway("the place that was recognised is out of reach");
+  if (attempt->report.IsDoubtful()) attempt->report.TakePoseAway();
+  attempt->relocalized = attempt->report.IsTracked();
   attempt->in_another_map = may_be_elsewhere && !is_here();
   if (attempt->relocalized) relocalized_ns_ = frame->stamp_ns;
 }

@@ -73,7 +73,7 @@ class Tracking : public ::testing::Test {
     for (int round = 0; round < 4; ++round) {
       EXPECT_EQ(search_.FromFrame(map_, *a, a->T_cam_world, {}, b), PoseSearch::FromFrameResult::kFound);
       const TrackingReport report = search_.InLocalMap(map_, false, {}, b);
-      EXPECT_TRUE(report.ok) << report.reason;
+      EXPECT_TRUE(report.HasPose()) << report.reason;
       EXPECT_GT(report.num_static, 250);
       EXPECT_GT(report.num_moving, 10);
       std::swap(a, b);
@@ -93,7 +93,7 @@ TEST_F(Tracking, SteadyStateDoesNotAllocate) {
   for (uint32_t i = 0; i < kLandmarks; ++i) first.landmarks[i] = LandmarkId::Make(1, i + 1);
   EXPECT_EQ(search_.FromFrame(map_, first, first.T_cam_world, {}, &second),
             PoseSearch::FromFrameResult::kFound);
-  EXPECT_TRUE(search_.InLocalMap(map_, false, {}, &second).ok);
+  EXPECT_TRUE(search_.InLocalMap(map_, false, {}, &second).HasPose());
   TrackedFrame third = Seen(3, 2.7, true);
   EXPECT_GT(TrackBoth(&second, &third), 0u);  // The counter works.
   EXPECT_EQ(TrackBoth(&second, &third), 0u);

@@ -6,6 +6,10 @@
 
 namespace dmslam {
 
+void TrackingReport::TakePoseAway() {
+  if (HasPose()) outcome = num_elsewhere > num_static ? Outcome::kContradicted : Outcome::kNotSeen;
+}
+
 TrackingReport CountClasses(const Camera& camera, const TrackedFrame& frame) {
   TrackingReport report;
   std::array<int, kNumCells> fixed{}, moving{};
