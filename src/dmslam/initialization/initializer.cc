@@ -341,12 +341,7 @@ InitializerReport Initializer::Impl::TryAgreed(ReferenceWindow* window) {
   } else {
     report = Wait(refused);
   }
-  if (report.wait == WaitReason::kNoReconstruction) {
-    window->found.reset();
-    window->doubtful = true;
-  }
-  window->promising = report.wait == WaitReason::kParallaxTooSmall ||
-                      report.wait == WaitReason::kNoReconstruction || report.wait == WaitReason::kOnTrial;
+  window->OnTried(report.wait);
   report.num_matches = static_cast<int>(pairs.back()->matches.size());
   return report;
 }
@@ -368,11 +363,11 @@ InitializerReport Initializer::Impl::TryContest(ReferenceWindow* window) {
   }
   ContestResult result = DecideContest(std::move(contenders), options_.contest, DiagonalPx(camera_));
   if (!result.winner) {
-    window->lead.reset();
+    window->OnContestUndecided();
     return Wait(result.refused);
   }
   CandidateMap& candidate = result.winner->candidate;
-  window->hypotheses = {candidate};
+  window->OnExplained(candidate);
   if (!Leads(last.frame, *result.winner, window)) {
     return Wait(WaitReason::kOnTrial, "the widest motion must win for some more frames");
   }
@@ -389,19 +384,13 @@ InitializerReport Initializer::Impl::TryContest(ReferenceWindow* window) {
 /// Whether the winner has won for long enough, with much the same features.
 bool Initializer::Impl::Leads(const InitializerFrame& now, const Contender& winner,
                               ReferenceWindow* window) const {
-  std::vector<uint32_t> features, common;
+  std::vector<uint32_t> features;
   const std::vector<Match>& matches = winner.candidate.last().pair.matches;
   for (size_t k = 0; k < matches.size(); ++k) {
     if (winner.support[k]) features.push_back(matches[k].index0);
   }
-  const bool led = window->lead.has_value();
-  const std::vector<uint32_t> before = led ? window->lead->features : std::vector<uint32_t>();
-  std::set_intersection(before.begin(), before.end(), features.begin(), features.end(),
-                        std::back_inserter(common));
-  const double smaller = static_cast<double>(std::min(before.size(), features.size()));
-  const bool same = led && static_cast<double>(common.size()) >= options_.contest.min_overlap * smaller;
-  const int64_t since_ns = same ? window->lead->since_ns : now.stamp_ns;
-  window->lead = ReferenceWindow::Lead{since_ns, std::move(features)};
+  const int64_t since_ns =
+      window->OnContestWon(now.stamp_ns, std::move(features), options_.contest.min_overlap);
   return SecondsFromTo(since_ns, now) >= options_.contest.lead_s;
 }
 
@@ -444,12 +433,11 @@ std::optional<CandidateMap> Initializer::Impl::Reconstruct(ReferenceWindow* wind
   const MotionRace race = motions_.Run(stream_.windows.all(), *window, is_static, refused);
   if (!race.best) return std::nullopt;
   const CandidateMap& best = *race.best;
-  window->hypotheses = {best};
-  if (race.runner_up) window->hypotheses.push_back(*race.runner_up);
+  window->OnExplained(best, race.runner_up);
   if (!best.HasRivalBelow(options_.testimony.min_rival_ratio) &&
       best.cost <= options_.motion.max_cost_alone &&
       builder_.DirectionSigma(best) <= options_.geometry.max_direction_sigma_rad) {
-    window->claims.push_back({&best.last(), best.T_last_0()});
+    window->OnClaimed({&best.last(), best.T_last_0()});
   }
   return motions_.WinnerOf(race, refused);
 }

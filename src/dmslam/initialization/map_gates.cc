@@ -81,14 +81,13 @@ bool MapGates::IsBelieved(const std::deque<ReferenceWindow>& windows, const Cand
 bool MapGates::IsSure(const CandidateMap& candidate, const ReferenceWindow& window) const {
   const bool clear = IsAlone(candidate, options_.motion) ||
                      builder_.DirectionSigma(candidate) <= options_.geometry.clear_direction_sigma_rad;
-  return !window.doubtful && clear && candidate.last().since_reference_s >= options_.sure_age_s;
+  return !window.IsDoubtful() && clear && candidate.last().since_reference_s >= options_.sure_age_s;
 }
 
 /// Whether the map found last says the same of the camera's motion. What holds for one view by chance seldom
 /// holds for the next.
 bool MapGates::FoundAgain(const CandidateMap& candidate, ReferenceWindow* window) const {
-  const auto before = window->found;
-  window->found = ReferenceWindow::Found{&candidate.last(), candidate.T_last_0()};
+  const auto before = window->OnFound({&candidate.last(), candidate.T_last_0()});
   if (!before) return false;
   CandidateMap longer = candidate;
   builder_.PlaceView(*before->view, &longer);

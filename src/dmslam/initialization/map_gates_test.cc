@@ -83,9 +83,10 @@ class MapGatesTest : public ::testing::Test {
     return map;
   }
   void Claim(const Rigid3d& motion, ReferenceWindow* window) const {
-    window->hypotheses = {RoomOf(*window)};
-    window->hypotheses.front().placed.front().T_k_0 = motion;
-    window->claims.push_back({&window->views().back(), motion});
+    CandidateMap room = RoomOf(*window);
+    room.placed.front().T_k_0 = motion;
+    window->OnExplained(room);
+    window->OnClaimed({&window->views().back(), motion});
   }
 
   bool Admit(ReferenceWindow* window, CandidateMap* candidate) {
@@ -236,7 +237,7 @@ TEST_F(MapGatesTest, ThePointsThatThePastLeavesMustBeEnough) {
 
 TEST_F(MapGatesTest, AMotionThatWasHardToTellFromOthersIsOnTrial) {
   ReferenceWindow& window = Watch(0, {4, 12, 20});
-  window.doubtful = true;
+  window.OnTried(WaitReason::kNoReconstruction);
   EXPECT_FALSE(AdmitRoom(&window));
   EXPECT_EQ(refused_.wait, WaitReason::kOnTrial);
 }
@@ -254,25 +255,24 @@ TEST_F(MapGatesTest, AMotionThatHasARivalMustKnowItsDirection) {
   room.rival_ratio = 2.0;
   EXPECT_TRUE(Admit(&window, &room)) << refused_.text;
   options_.geometry.clear_direction_sigma_rad = 1e-4;
-  window.found.reset();
-  room = RoomOf(window);
+  ReferenceWindow& second = Watch(0, {4, 12, 20});
+  room = RoomOf(second);
   room.rival_ratio = 2.0;
-  EXPECT_FALSE(Admit(&window, &room));
+  EXPECT_FALSE(Admit(&second, &room));
   EXPECT_EQ(refused_.wait, WaitReason::kOnTrial);
-  window.found.reset();
-  EXPECT_TRUE(AdmitRoom(&window)) << "it has no rival";
+  EXPECT_TRUE(AdmitRoom(&Watch(0, {4, 12, 20}))) << "it has no rival";
 }
 
 TEST_F(MapGatesTest, AnotherReferenceFrameMayConfirmWhatIsOnTrial) {
   Watch(0, {10, 22, 30});
   ReferenceWindow& window = Watch(10, {22, 30});
-  window.doubtful = true;
+  window.OnTried(WaitReason::kNoReconstruction);
   Claim(Motion(0, 30), &windows_.front());
   CandidateMap room = RoomOf(window);
   room.rival_ratio = 2.0;
   EXPECT_TRUE(Admit(&window, &room)) << refused_.text;
-  ASSERT_TRUE(window.found);
-  EXPECT_EQ(window.found->view, &window.views().back());
+  ASSERT_TRUE(window.found());
+  EXPECT_EQ(window.found()->view, &window.views().back());
 }
 
 TEST_F(MapGatesTest, AnotherReferenceFrameMayContradictTheClearestMotion) {
@@ -287,11 +287,11 @@ TEST_F(MapGatesTest, AnotherReferenceFrameMayContradictTheClearestMotion) {
 
 TEST_F(MapGatesTest, TheSameMotionFoundAgainAtTheNextViewIsBelieved) {
   ReferenceWindow& window = Watch(0, {4, 12, 20});
-  window.doubtful = true;
+  window.OnTried(WaitReason::kNoReconstruction);
   EXPECT_FALSE(AdmitRoom(&window));
-  ASSERT_TRUE(window.found);
-  EXPECT_EQ(window.found->view, &window.views().back());
-  EXPECT_TRUE(CandidateBuilder::SameMotion(window.found->T_view_0, Motion(0, 20)));
+  ASSERT_TRUE(window.found());
+  EXPECT_EQ(window.found()->view, &window.views().back());
+  EXPECT_TRUE(CandidateBuilder::SameMotion(window.found()->T_view_0, Motion(0, 20)));
   window.AddView(View(0, 22));
   CandidateMap room = RoomOf(window);
   EXPECT_TRUE(Admit(&window, &room)) << refused_.text;
@@ -300,8 +300,8 @@ TEST_F(MapGatesTest, TheSameMotionFoundAgainAtTheNextViewIsBelieved) {
 
 TEST_F(MapGatesTest, AnotherMotionThanTheLastIsNotFoundAgain) {
   ReferenceWindow& window = Watch(0, {4, 12, 20});
-  window.doubtful = true;
-  window.found = ReferenceWindow::Found{&window.views().back(), WrongMotion(0, 20)};
+  window.OnTried(WaitReason::kNoReconstruction);
+  window.OnFound({&window.views().back(), WrongMotion(0, 20)});
   window.AddView(View(0, 22));
   EXPECT_FALSE(AdmitRoom(&window));
   EXPECT_EQ(refused_.wait, WaitReason::kOnTrial);
@@ -309,7 +309,7 @@ TEST_F(MapGatesTest, AnotherMotionThanTheLastIsNotFoundAgain) {
 
 TEST_F(MapGatesTest, AMotionWithARivalThatIsFoundAgainStaysOnTrial) {
   ReferenceWindow& window = Watch(0, {4, 12, 20});
-  window.doubtful = true;
+  window.OnTried(WaitReason::kNoReconstruction);
   for (const bool again : {false, true}) {
     CandidateMap room = RoomOf(window);
     room.rival_ratio = 2.0;
@@ -322,9 +322,9 @@ TEST_F(MapGatesTest, AMotionWithARivalThatIsFoundAgainStaysOnTrial) {
 TEST_F(MapGatesTest, AViewThatShowsTooFewOfThePointsSaysNothingOfTheMotion) {
   ReferenceWindow& window = Watch(0, {4, 12});
   const ReferenceView& few = window.AddView(View(0, 20, 15));
-  window.doubtful = true;
+  window.OnTried(WaitReason::kNoReconstruction);
   window.AddView(View(0, 22));
-  window.found = ReferenceWindow::Found{&few, Motion(0, 22)};
+  window.OnFound({&few, Motion(0, 22)});
   EXPECT_FALSE(AdmitRoom(&window));
   EXPECT_EQ(refused_.wait, WaitReason::kOnTrial);
 }

@@ -1,6 +1,7 @@
 #include "dmslam/initialization/reference_window.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "dmslam/geometry/rigid3.h"
 
@@ -44,6 +45,34 @@ std::vector<const ReferenceView*> ReferenceWindow::ViewsBetween(const ReferenceV
   std::vector<const ReferenceView*> chosen;
   for (size_t k = 0; k < kept; ++k) chosen.push_back(all[k * all.size() / kept]);
   return chosen;
+}
+
+int64_t ReferenceWindow::OnContestWon(int64_t stamp_ns, std::vector<uint32_t> features, double min_overlap) {
+  int64_t since_ns = stamp_ns;
+  if (lead_) {
+    const std::vector<uint32_t>& before = lead_->features;
+    std::vector<uint32_t> common;
+    std::set_intersection(before.begin(), before.end(), features.begin(), features.end(),
+                          std::back_inserter(common));
+    const double smaller = static_cast<double>(std::min(before.size(), features.size()));
+    if (static_cast<double>(common.size()) >= min_overlap * smaller) since_ns = lead_->since_ns;
+  }
+  lead_ = Lead{since_ns, std::move(features)};
+  return since_ns;
+}
+
+void ReferenceWindow::OnExplained(const CandidateMap& best, const std::optional<CandidateMap>& runner_up) {
+  hypotheses_ = {best};
+  if (runner_up) hypotheses_.push_back(*runner_up);
+}
+
+void ReferenceWindow::OnTried(WaitReason wait) {
+  if (wait == WaitReason::kNoReconstruction) {
+    found_.reset();
+    doubtful_ = true;
+  }
+  promising_ = wait == WaitReason::kParallaxTooSmall || wait == WaitReason::kNoReconstruction ||
+               wait == WaitReason::kOnTrial;
 }
 
 }  // namespace dmslam

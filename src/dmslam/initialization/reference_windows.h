@@ -20,7 +20,7 @@ class ReferenceWindows {
   bool empty() const { return windows_.empty(); }
 
   /// `frame` becomes a reference frame; those kept just before it are its past.
-  void Begin(const InitializerFrame& frame);
+  void Begin(const InitializerFrame& frame, ReferenceWindow::Kind kind = ReferenceWindow::Kind::kLasting);
   /// The same where it is due. Between the reference frames that are kept there are brief ones, where
   /// reference frames last no longer.
   void BeginIfDue(const InitializerFrame& frame);

@@ -28,7 +28,7 @@ class ReferenceWindowsTest : public ::testing::Test {
     for (const ReferenceWindow& window : windows_.all()) references.push_back(window.reference().index);
     return references;
   }
-  long Brief() const { return std::ranges::count_if(windows_.all(), &ReferenceWindow::brief); }
+  long Brief() const { return std::ranges::count_if(windows_.all(), &ReferenceWindow::IsBrief); }
 
   ReferenceWindows windows_{{}, {}};
 };
@@ -41,11 +41,11 @@ TEST_F(ReferenceWindowsTest, OneIsTakenEveryTenthOfASecond) {
 TEST_F(ReferenceWindowsTest, OfTooManyTheOldestGoesThatPromisesNothing) {
   Ask(1.0, 1.8);
   ASSERT_EQ(windows_.all().size(), 8U);
-  windows_.all()[0].promising = true;
-  windows_.all()[1].lead.emplace();
+  windows_.all()[0].OnTried(WaitReason::kParallaxTooSmall);
+  windows_.all()[1].OnContestWon(0, {}, 0.5);
   Ask(1.8, 1.85);
   EXPECT_EQ(References(), (std::vector<uint32_t>{1000, 1100, 1300, 1400, 1500, 1600, 1700, 1800}));
-  for (ReferenceWindow& window : windows_.all()) window.promising = true;
+  for (ReferenceWindow& window : windows_.all()) window.OnTried(WaitReason::kParallaxTooSmall);
   Ask(1.9, 1.95);
   EXPECT_EQ(References().back(), 1800U) << "there is no room";
 }
@@ -53,7 +53,7 @@ TEST_F(ReferenceWindowsTest, OfTooManyTheOldestGoesThatPromisesNothing) {
 TEST_F(ReferenceWindowsTest, OldOnesAreGivenUpPromisingOnesLater) {
   windows_.Begin(At(1.0));
   windows_.Begin(At(1.1));
-  windows_.all()[0].promising = true;
+  windows_.all()[0].OnTried(WaitReason::kParallaxTooSmall);
   windows_.DropOld(At(3.05));
   EXPECT_EQ(References(), (std::vector<uint32_t>{1000, 1100}));
   windows_.DropOld(At(3.15));
@@ -100,6 +100,25 @@ TEST_F(ReferenceWindowsTest, FramesJustBeforeOneAreItsPast) {
     return ReferenceView{};
   });
   EXPECT_EQ(past, (std::vector<uint32_t>{2500, 2600, 2700, 2800, 2900})) << "spread evenly";
+}
+
+TEST(ReferenceWindowTest, AMotionGoesOnWithItsLeadWhereItsFeaturesAreMuchTheSame) {
+  ReferenceWindow window(At(1.0));
+  EXPECT_EQ(window.OnContestWon(10, {1, 2, 3, 4}, 0.5), 10);
+  EXPECT_EQ(window.OnContestWon(20, {3, 4, 5, 6}, 0.5), 10);
+  EXPECT_EQ(window.OnContestWon(30, {6, 7, 8}, 0.5), 30) << "another motion";
+  window.OnContestUndecided();
+  EXPECT_EQ(window.OnContestWon(40, {6, 7, 8}, 0.5), 40) << "there was a break";
+}
+
+TEST(ReferenceWindowTest, ViewsThatDetermineNoMotionMakeItDoubtfulForGood) {
+  ReferenceWindow window(At(1.0));
+  window.OnFound({nullptr, Rigid3d()});
+  window.OnTried(WaitReason::kNoReconstruction);
+  EXPECT_FALSE(window.found());
+  window.OnTried(WaitReason::kDisagreement);
+  EXPECT_TRUE(window.IsDoubtful());
+  EXPECT_FALSE(window.IsPromising());
 }
 
 }  // namespace

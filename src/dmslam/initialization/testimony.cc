@@ -41,7 +41,7 @@ void CompareClaims(const CandidateBuilder& builder, const ReferenceWindow& other
                    const TestimonyOptions& options, Tally* tally) {
   const auto T_from_0 = PoseAt(builder, window, candidate, other.reference().index);
   if (!T_from_0) return;
-  for (const ReferenceWindow::Claim& claim : other.claims) {
+  for (const ReferenceWindow::Motion& claim : other.claims()) {
     if (claim.view == &candidate.last()) continue;  // the candidate itself
     if (SecondsFromTo(claim.view->frame, candidate.last().frame) > options.memory_s) continue;
     const auto T_to_0 = PoseAt(builder, window, candidate, claim.view->frame.index);
@@ -53,9 +53,9 @@ void CompareClaims(const CandidateBuilder& builder, const ReferenceWindow& other
 void ComparePrediction(const CandidateBuilder& builder, const ReferenceWindow& older,
                        const ReferenceWindow& window, const CandidateMap& candidate,
                        const TestimonyOptions& options, Tally* tally) {
-  if (older.claims.empty() || older.hypotheses.empty()) return;
-  const CandidateMap& found = older.hypotheses.front();
-  const ReferenceWindow::Claim& claim = older.claims.back();
+  if (older.claims().empty() || older.hypotheses().empty()) return;
+  const CandidateMap& found = older.hypotheses().front();
+  const ReferenceWindow::Motion& claim = older.claims().back();
   const bool claimed =
       claim.view == &found.last() && CandidateBuilder::SameMotion(claim.T_view_0, found.T_last_0());
   if (!claimed) return;
@@ -85,7 +85,7 @@ std::vector<Rigid3d> MotionsToTry(const CandidateBuilder& builder, const std::de
   std::vector<Rigid3d> motions;
   const InitializerFrame& last = window.views().back().frame;
   const auto add = [&](const ReferenceWindow& from) {
-    for (const CandidateMap& found : from.hypotheses) {
+    for (const CandidateMap& found : from.hypotheses()) {
       if (&from != &window && SecondsFromTo(found.last().frame, last) > options.share_s) continue;
       const auto motion = MotionBetween(builder, from, found, window.reference().index, last.index);
       if (motion) motions.push_back(*motion);
@@ -111,7 +111,7 @@ Verdict Hear(const CandidateBuilder& builder, const std::deque<ReferenceWindow>&
     }
     if (tally.sum() == 0) continue;
     const bool is_own = other.reference().index == window.reference().index;
-    const double watched_s = other.claims.back().view->since_reference_s;
+    const double watched_s = other.claims().back().view->since_reference_s;
     if (tally.sum() < 0) {
       against_s += watched_s;
     } else if (!is_own) {

@@ -68,8 +68,8 @@ class TestimonyTest : public ::testing::Test {
     return map;
   }
   static void Claim(const CandidateMap& map, ReferenceWindow* window) {
-    window->hypotheses = {map};
-    window->claims.push_back({&map.last(), map.T_last_0()});
+    window->OnExplained(map);
+    window->OnClaimed({&map.last(), map.T_last_0()});
   }
   Verdict HearOf(const ReferenceWindow& window, const CandidateMap& map) const {
     return Hear(builder_, windows_, window, map, TestimonyOptions());
@@ -92,7 +92,9 @@ TEST_F(TestimonyTest, AnOlderAndAYoungerReferenceFrameConfirmTheSameMotion) {
   const ReferenceWindow& window = Watch(4, {8, 12});
   Claim(RoomOf(older), &older);
   EXPECT_EQ(HearOf(window, RoomOf(window)), Verdict::kConfirmed);
-  older.claims.clear();
+  windows_.clear();
+  Watch(0, {4, 8, 12});
+  Watch(4, {8, 12});
   ReferenceWindow& younger = Watch(8, {12});
   Claim(RoomOf(younger), &younger);
   EXPECT_EQ(HearOf(windows_[1], RoomOf(windows_[1])), Verdict::kConfirmed);
@@ -103,7 +105,9 @@ TEST_F(TestimonyTest, AnOtherMotionContradicts) {
   const ReferenceWindow& window = Watch(4, {8, 12});
   Claim(WrongMapOf(older), &older);
   EXPECT_EQ(HearOf(window, RoomOf(window)), Verdict::kContradicted);
-  older.claims.clear();
+  windows_.clear();
+  Watch(0, {4, 8, 12});
+  Watch(4, {8, 12});
   ReferenceWindow& younger = Watch(8, {12});
   Claim(WrongMapOf(younger), &younger);
   EXPECT_EQ(HearOf(windows_[1], RoomOf(windows_[1])), Verdict::kContradicted);
@@ -133,15 +137,14 @@ TEST_F(TestimonyTest, ACameraThatHardlyMovedHasNoDirectionToCompare) {
 // The motion that wins now is not believed where another one won at the views before.
 TEST_F(TestimonyTest, AWindowThatHasChangedItsMindIsNotBelieved) {
   ReferenceWindow& window = Watch(0, {4, 8, 12});
-  for (const ReferenceView& view : window.views())
-    window.claims.push_back({&view, Motion(0, view.frame.index)});
+  for (const ReferenceView& view : window.views()) window.OnClaimed({&view, Motion(0, view.frame.index)});
   EXPECT_EQ(HearOf(window, RoomOf(window)), Verdict::kUnheard) << "nobody confirms himself";
   EXPECT_EQ(HearOf(window, WrongMapOf(window)), Verdict::kContradicted);
 }
 
 TEST_F(TestimonyTest, WhatWasFoundLongAgoDoesNotCount) {
   ReferenceWindow& window = Watch(0, {4, 8, 50});
-  window.claims.push_back({&window.views()[1], WrongMotion(0, 8)});
+  window.OnClaimed({&window.views()[1], WrongMotion(0, 8)});
   EXPECT_EQ(HearOf(window, RoomOf(window)), Verdict::kUnheard);
 }
 
@@ -151,7 +154,7 @@ TEST_F(TestimonyTest, WhatOlderReferenceFramesFoundIsTriedAtTheYounger) {
   EXPECT_TRUE(MotionsToTry(builder_, windows_, window, TestimonyOptions()).empty());
   CandidateMap before = RoomOf(older);
   before.placed.front() = {&older.views()[1], Motion(0, 8), 1.0};
-  older.hypotheses = {before};
+  older.OnExplained(before);
   for (const ReferenceWindow* each : {&older, &window}) {
     const auto motions = MotionsToTry(builder_, windows_, *each, TestimonyOptions());
     ASSERT_EQ(motions.size(), 1U);
