@@ -157,8 +157,7 @@ FrontendOutput FrontendCore::ProcessFrame() {
 /// recognised goes on there.
 std::optional<FrontendOutput> FrontendCore::FindAgain() {
   if (map_.keyframes().empty() || own_maps_.HasDropped(map_)) return std::nullopt;
-  TrackingResult result =
-      tracker_.Track(map_, {.map_id = std::nullopt, .may_be_nowhere = true}, std::move(frame_));
+  TrackingResult result = tracker_.Track(map_, {.whereabouts = Tracker::PerhapsInNone{}}, std::move(frame_));
   frame_ = std::move(result.frame);
   if (!result.pose) return std::nullopt;
   ++counters_.relocalizations;
@@ -243,7 +242,9 @@ FrontendOutput FrontendCore::CatchUp() {
 // ---- Tracking ----
 
 FrontendOutput FrontendCore::Track() {
-  TrackingResult result = tracker_.Track(map_, {map_id_, !phase_.IsTrial()}, std::move(frame_));
+  Tracker::Request request{.whereabouts = Tracker::InAnyMap{}, .may_relocalize = !phase_.IsTrial()};
+  if (map_id_) request.whereabouts = Tracker::InMap{*map_id_};
+  TrackingResult result = tracker_.Track(map_, request, std::move(frame_));
   frame_ = std::move(result.frame);
   if (result.relocalized) ++counters_.relocalizations;
   if (!result.pose) return OnNotTracked(result.report);

@@ -256,7 +256,7 @@ TEST(RelocalizerTest, WhoIsLostInOneMapIsLookedForInAll) {
   tracker.BeginLost();
   TrackedFrame frame = wall.Frame(4.4);
   frame.stamp_ns = now_ns + 1'000'000'000;
-  const TrackingResult result = tracker.Track(replica, {MapId{7}, true}, std::move(frame));
+  const TrackingResult result = tracker.Track(replica, {Tracker::InMap{7}}, std::move(frame));
   ASSERT_TRUE(result.pose) << result.report.reason;
   EXPECT_TRUE(result.relocalized);
   EXPECT_LT((result.frame.T_cam_world.Center() - PoseAt(4.4).Center()).norm(), 0.02);

@@ -217,7 +217,8 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
   const FrameTime time{frame->index, frame->stamp_ns};
   const auto is_here = [&] {
     const Keyframe* reference = search_.Reference(map);
-    return reference != nullptr && reference->map_id == asked.map_id;
+    const InMap* was_in = std::get_if<InMap>(&asked.whereabouts);
+    return reference != nullptr && was_in != nullptr && reference->map_id == was_in->map_id;
   };
   // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too
   // young to have anything proven, what is seen as a whole. Nearby, some of it must be.
@@ -233,7 +234,7 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
             motion.IsReachableFromTracked(map, at.T_cam_world, time));
   };
   Relocalizer::Request request{.last_seen = last_reference(), .seed = seed};
-  const bool may_be_elsewhere = asked.map_id || asked.may_be_nowhere;
+  const bool may_be_elsewhere = !std::holds_alternative<InAnyMap>(asked.whereabouts);
   if (may_be_elsewhere) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;
   *frame = std::move(found);

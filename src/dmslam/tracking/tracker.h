@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <variant>
 
 #include "dmslam/map/replica.h"
 #include "dmslam/tracking/motion_follower.h"
@@ -36,13 +37,19 @@ class Tracker {
   /// Begins lost.
   void BeginLost() { follower_.BeginLost(); }
 
+  /// The camera was tracked in this map: lost, it is looked for in all maps, and in this one it must be
+  /// within reach.
+  struct InMap {
+    MapId map_id = 0;
+  };
+  /// The camera is in one of the maps, and was in none of them yet: it may be anywhere.
+  struct InAnyMap {};
+  /// The camera may be in none of the maps: in each of them a place must show what it must in another map.
+  struct PerhapsInNone {};
+  using Whereabouts = std::variant<InAnyMap, InMap, PerhapsInNone>;
   struct Request {
-    /// The map that is tracked in: a lost camera is looked for in all maps, and there it must be within
-    /// reach. None: it was nowhere yet.
-    std::optional<MapId> map_id;
-    bool may_relocalize = true;
-    /// The camera may be in none of the maps: in each of them a place must show what it must in another map.
-    bool may_be_nowhere = false;
+    Whereabouts whereabouts;
+    bool may_relocalize = true;  ///< a lost camera is looked for in the maps
   };
   /// The next frame of the stream. The map may have changed since the last one.
   TrackingResult Track(const Map& map, const Request& request, TrackedFrame frame);

@@ -409,7 +409,7 @@ class Recovering : public ::testing::Test {
       const bool hidden = blind || i % one_seen_of_ != 0;
       return hidden ? std::nullopt : std::optional(scene_.point(i));
     };
-    return tracker_->Track(replica_, {.map_id = lost_in_, .may_be_nowhere = may_be_nowhere_},
+    return tracker_->Track(replica_, {.whereabouts = whereabouts_},
                            scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(kStep * frame), place));
   }
   /// The first frame from `begin` on that has a pose.
@@ -420,10 +420,9 @@ class Recovering : public ::testing::Test {
     return 0;
   }
 
-  int64_t mapped_ns_ = 0;           ///< of the points
-  size_t one_seen_of_ = 1;          ///< points
-  std::optional<MapId> lost_in_{};  ///< none: nowhere
-  bool may_be_nowhere_ = false;     ///< in none of the maps
+  int64_t mapped_ns_ = 0;   ///< of the points
+  size_t one_seen_of_ = 1;  ///< points
+  Tracker::Whereabouts whereabouts_;
   MapScene scene_;
   Replica replica_{TestCamera(), Pyramid()};
   std::optional<Tracker> tracker_;
@@ -448,7 +447,7 @@ TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
 TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict) {
   Start(1.0);
   tracker_->BeginLost();
-  lost_in_ = MapScene::kMap + 1;
+  whereabouts_ = Tracker::InMap{MapScene::kMap + 1};
   const TrackingResult first = Track(kFound);
   EXPECT_TRUE(first.relocalized) << first.report.reason;
   EXPECT_FALSE(first.pose);
@@ -459,7 +458,7 @@ TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict
 TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
   Start(1.0);
   tracker_->BeginLost();
-  lost_in_ = MapScene::kMap + 1;
+  whereabouts_ = Tracker::InMap{MapScene::kMap + 1};
   one_seen_of_ = 4;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized);
 }
@@ -468,7 +467,7 @@ TEST_F(Recovering, OfAnotherMapTooYoungToProveAnythingAPartIsNoPlace) {
 TEST_F(Recovering, WhoMayBeInNoMapBelievesNoPartOfAYoungOne) {
   Start(1.0);
   tracker_->BeginLost();
-  may_be_nowhere_ = true;
+  whereabouts_ = Tracker::PerhapsInNone{};
   one_seen_of_ = 4;
   for (uint32_t frame = kFound; frame < kFound + 30; ++frame) EXPECT_FALSE(Track(frame).relocalized) << frame;
   one_seen_of_ = 1;
@@ -488,7 +487,7 @@ class FarAway : public Recovering {
   static constexpr uint32_t kSoon = kLost + 8;
 
   TrackingResult TrackFarAway() {
-    return tracker_->Track(replica_, {.map_id = MapScene::kMap},
+    return tracker_->Track(replica_, {.whereabouts = Tracker::InMap{MapScene::kMap}},
                            scene_.See(kSoon, kSoon * kFrameNs, MapScene::PoseAt(2.0)));
   }
 };
@@ -538,7 +537,7 @@ class LedAstray : public Recovering {
       const double aside = walks && frame > kLost ? 0.03 * (frame - kLost) : 0.0;
       return scene_.point(i) + Eigen::Vector3d(aside, 0, 0);
     };
-    return tracker_->Track(replica_, {.map_id = MapScene::kMap},
+    return tracker_->Track(replica_, {.whereabouts = Tracker::InMap{MapScene::kMap}},
                            scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(0), place));
   }
 };
@@ -578,7 +577,7 @@ TEST_F(Recovering, APoseThatFindsLittleGivesWayToOneBesideThatExplainsMuchMore) 
   constexpr double kStepAside = 0.006;
   mapped_ns_ = -10'000'000'000;
   Start(1.0, 1);
-  lost_in_ = MapScene::kMap;
+  whereabouts_ = Tracker::InMap{MapScene::kMap};
   const auto track = [&](uint32_t frame) {
     const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
       const bool walks = i % 8 == 0;
@@ -586,7 +585,7 @@ TEST_F(Recovering, APoseThatFindsLittleGivesWayToOneBesideThatExplainsMuchMore) 
       const double aside = walks ? kStepAside * std::min(frame, kShown) : 0.0;
       return scene_.point(i) + Eigen::Vector3d(aside, 0, 0);
     };
-    return tracker_->Track(replica_, {.map_id = lost_in_},
+    return tracker_->Track(replica_, {.whereabouts = whereabouts_},
                            scene_.See(frame, frame * kFrameNs, MapScene::PoseAt(0), place));
   };
   for (uint32_t frame = 1; frame + 1 < kShown; ++frame) track(frame);
