@@ -20,6 +20,7 @@
 #include "run/run_plan.h"
 #include "run/session_taken.h"
 #include "run/source_check.h"
+#include "run/supervisor.h"
 
 namespace {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "run/child.h"
 #include "run/resume.h"
 #include "run/run_options.h"
-#include "run/supervisor.h"
 
 namespace dmslam {
 

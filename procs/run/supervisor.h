@@ -1,52 +1,18 @@
 #pragma once
 
 #include <sys/types.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <cstdint>
 #include <deque>
 #include <list>
-#include <map>
 #include <optional>
 #include <string>
-#include <vector>
+
+#include "run/child.h"
+#include "run/supervisor_options.h"
 
 namespace dmslam {
-
-/// A process to be started, and started again.
-struct ChildSpec {
-  std::string name;                                ///< "mapper"
-  std::vector<std::string> arguments;              ///< the program's path first
-  std::vector<std::string> first;                  ///< only at its first start, behind the others
-  std::map<std::string, std::string> environment;  ///< beside our own
-  std::vector<std::string> after;                  ///< first started when these have said that they are ready
-  std::string output, errors;   ///< files that standard output and standard error are appended to
-  bool errors_to_ours = false;  ///< standard error is the supervisor's own
-  std::string pid_file;         ///< holds its process id; empty: none
-  bool restart = true;          ///< where that is worth it
-  int stop_signal = SIGTERM;
-  bool speaks = false;  ///< says that it is ready and then, again and again, that it is alive
-};
-
-/// What became of a child, or who spoke to the supervisor.
-struct ChildEvent {
-  enum class Kind : uint8_t {
-    kReady,      ///< said so (sd_notify); `text` is the status it gave with it
-    kEnded,      ///< and stays so
-    kRestarted,  ///< died, and is started again after `delay_ns`
-    kSignal,     ///< the supervisor itself was asked to stop; `code` is the signal
-    kTime,       ///< nothing happened until the deadline
-  };
-  Kind kind = Kind::kTime;
-  std::string name;
-  std::string text;
-  int code = 0;         ///< exit code, or 128 + signal
-  int restarts = 0;     ///< of this child so far
-  bool hung = false;    ///< it said nothing for too long, and was killed
-  bool yields = false;  ///< another process has taken its place: no failure
-  int64_t delay_ns = 0;
-};
 
 /// Starts processes and starts again those that die or hang. It cannot miss a death: whoever has ended is
 /// asked for until nobody is left, however many die at once. Its children end with it, whatever ends it.
@@ -54,25 +20,7 @@ struct ChildEvent {
 /// One for a program, made before any thread: it takes SIGCHLD, SIGINT, SIGTERM and SIGHUP for itself.
 class Supervisor {
  public:
-  struct Options {
-    int64_t short_life_ns = 3'000'000'000;  ///< who lives for less has made no progress
-    /// Nor has who is superseded within this time: it listens for others first, and waits for who asks for
-    /// its place.
-    int64_t short_office_ns = 60'000'000'000;
-    int most_short_lives = 8;              ///< in a row; then it is past help
-    int64_t first_delay_ns = 200'000'000;  ///< before the second start in a row; doubles with each
-    int64_t longest_delay_ns = 5'000'000'000;
-    int64_t patience_ns =
-        60'000'000'000;                   ///< bus or camera may be gone for so long; never at the first start
-    bool wait_for_what_may_come = false;  ///< ... for ever, and at the first start too
-    int64_t watchdog_ns = 0;              ///< who says nothing for so long hangs; 0: nobody is asked
-    /// ... as does who is known to speak, and has said no word since its start: what it begins with, as a
-    /// large map, may take long to load.
-    int64_t first_word_ns = 300'000'000'000;
-    int64_t stop_ns = 10'000'000'000;        ///< who does not end when asked to is killed after so long...
-    int64_t last_work_ns = 600'000'000'000;  ///< ... or, where it has said that it is at its last work
-    pid_t (*fork)() = ::fork;                ///< a test lets it fail
-  };
+  using Options = SupervisorOptions;
 
   explicit Supervisor(Options options);
   /// Kills whom it has.
