@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <list>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "viewer/event_hub.h"
+#include "viewer/http_connection.h"
 #include "viewer/http_request.h"
 
 namespace dmslam {
@@ -48,20 +48,8 @@ class HttpServer {
   void Begin();
 
  private:
-  using Clock = std::chrono::steady_clock;
-  struct Connection {
-    int fd = -1;
-    std::string in, out;
-    size_t sent = 0;  // of out
-    bool close_after = false;
-    std::shared_ptr<EventHub::Listener> listener;
-    Clock::time_point since;     // of the request that is being read; of the end of the one before
-    Clock::time_point progress;  // when it last took something
-    Clock::time_point spoke;     // an event or a comment was last put into `out`
-    Clock::time_point joined;    // began to listen
-    bool done = false;
-    bool writing() const { return sent < out.size(); }
-  };
+  using Clock = HttpConnection::Clock;
+  using Connection = HttpConnection;
   void Bind();
   void Run();
   void Accept();
