@@ -8,8 +8,8 @@
 #include "dmslam/dataset/live_source.h"
 #include "dmslam/runtime/node.h"
 #include "player/end_of_play.h"
-#include "player/player_node.h"
 #include "player/player_office.h"
+#include "player/player_options.h"
 
 namespace dmslam {
 

@@ -5,7 +5,7 @@
 
 #include "dmslam/camera/camera.h"
 #include "dmslam/dataset/frame_source.h"
-#include "player/player_node.h"
+#include "player/player_options.h"
 
 namespace dmslam {
 

@@ -15,8 +15,6 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kRepeatEveryNs = 300'000'000;
-
 std::string SequenceName(const std::string& path) {
   const std::filesystem::path p = std::filesystem::path(path).lexically_normal();
   return p.filename().empty() ? p.parent_path().filename().string() : p.filename().string();
@@ -98,18 +96,20 @@ void PlayerNode::Receive(const std::string& channel, std::span<const uint8_t> by
 void PlayerNode::OnSequenceDone(const SequenceDone& done) {
   if (done.session != options_.session || !end_.OnSequenceDone(context_.now_ns())) return;
   schedule_.GoTo(schedule_.size());
-  awaiting_done_ = false;
+  under_way_.awaiting_done = false;
 }
 
 /// What is said before a frame of ours was played is no answer to us. Once one is, the frontend says how far
 /// it is to each frame and each repeat.
 void PlayerNode::OnFrameDone(const FrameDone& done) {
-  if (done.session != options_.session || !frame_bytes_ || done.frame_index < frame_.frame_index) return;
-  if (done.frame_index == frame_.frame_index) {
+  if (done.session != options_.session || !under_way_.bytes ||
+      done.frame_index < under_way_.frame.frame_index)
+    return;
+  if (done.frame_index == under_way_.frame.frame_index) {
     further_.Clear();
     office_.OnFrameTaken();
     end_.OnFrameDone();
-    awaiting_done_ = false;
+    under_way_.awaiting_done = false;
   } else if (const auto newest = further_.OnAnswer({done.frame_index, done.stamp_ns}, context_.now_ns())) {
     SkipBehind(newest->index);
   }
@@ -119,11 +119,11 @@ void PlayerNode::OnFrameDone(const FrameDone& done) {
 /// never back. What was published last is done in any case, also where nothing comes after it.
 void PlayerNode::SkipBehind(uint32_t frame_index) {
   const size_t next = schedule_.PositionBehind(frame_index);
-  if (next < schedule_.position() || (next == schedule_.position() && !awaiting_done_)) return;
+  if (next < schedule_.position() || (next == schedule_.position() && !under_way_.awaiting_done)) return;
   if (playing_) LogInfo("player: the frontend has frame {} already; goes on behind it", frame_index);
   schedule_.GoTo(next);
   counts_.published = static_cast<int64_t>(next);
-  awaiting_done_ = false;
+  under_way_.awaiting_done = false;
   schedule_.MakeDue(playing_ ? context_.now_ns() : 0);
 }
 
@@ -166,28 +166,30 @@ bool PlayerNode::IsBlack(size_t index) const {
 }
 
 bool PlayerNode::MakeFrame(size_t index) {
-  frame_ = Frame();
-  frame_.camera_id = options_.camera_id;
-  frame_.session = options_.session;
-  frame_.frame_index = source_->FrameIndex(index);
-  frame_.stamp_ns = source_->StampNs(index);
-  frame_.capture_us = context_.wall_us();
+  Frame& frame = under_way_.frame;
+  frame = Frame();
+  frame.camera_id = options_.camera_id;
+  frame.session = options_.session;
+  frame.frame_index = source_->FrameIndex(index);
+  frame.stamp_ns = source_->StampNs(index);
+  frame.capture_us = context_.wall_us();
   try {
     if (IsBlack(index)) {
       ++counts_.black;
-      frame_.data = EncodePng(GrayImage(options_.camera.width_px, options_.camera.height_px));
-      frame_.encoding = FrameEncoding::kPng;
+      frame.data = EncodePng(GrayImage(options_.camera.width_px, options_.camera.height_px));
+      frame.encoding = FrameEncoding::kPng;
     } else {
       EncodedImage image = source_->Read(index);
       if (image.encoding == ImageEncoding::kFile) image.encoding = DetectEncoding(image.bytes);
-      EncodeFrame(image, source_->Name(index), options_.encoding, source_->AsPublished(), &frame_);
+      EncodeFrame(image, source_->Name(index), options_.encoding, source_->AsPublished(), &frame);
     }
   } catch (const InputError& error) {
     if (counts_.unreadable++ == 0) {
-      first_unreadable_ = error.what();
+      counts_.first_unreadable = error.what();
       LogWarning("{} (left out; further ones are only counted)", error.what());
     }
-    if (counts_.unreadable == schedule_.size()) problem_ = first_unreadable_ + "; no frame could be read";
+    if (counts_.unreadable == schedule_.size())
+      problem_ = counts_.first_unreadable + "; no frame could be read";
     return false;
   }
   return true;
@@ -199,14 +201,14 @@ void PlayerNode::PublishFrame() {
     if (!problem_.empty()) exit_code_ = kExitInput;
     return;
   }
-  frame_.publish_us = context_.wall_us();
-  frame_bytes_ = std::make_shared<const Bytes>(wire::Encode(frame_));
+  under_way_.frame.publish_us = context_.wall_us();
+  under_way_.bytes = std::make_shared<const Bytes>(wire::Encode(under_way_.frame));
   context_.bus->Publish(
-      {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
+      {ChannelOfCamera(channels::kFrame, options_.camera_id), under_way_.bytes, options_.local_frames});
   ++counts_.published;
   PublishGroundTruth(index);
-  awaiting_done_ = options_.mode == PlaybackMode::kLockstep;
-  next_repeat_ns_ = context_.now_ns() + kRepeatEveryNs;
+  under_way_.awaiting_done = options_.mode == PlaybackMode::kLockstep;
+  under_way_.RepeatLater(context_.now_ns());
 }
 
 void PlayerNode::PublishGroundTruth(size_t index) {
@@ -239,13 +241,14 @@ void PlayerNode::PublishStatus(PlayerStatus::State state) {
   status.head.utime = context_.wall_us();
   status.head.session = options_.session;
   status.head.health = office_.Health();
-  status.head.health.waiting_for = awaiting_done_ ? roles::kFrontend : readiness_.Missing(options_.camera_id);
-  status.state = awaiting_done_ || held_back_ ? PlayerStatus::State::kWaiting : state;
+  status.head.health.waiting_for =
+      under_way_.awaiting_done ? roles::kFrontend : readiness_.Missing(options_.camera_id);
+  status.state = under_way_.awaiting_done || held_back_ ? PlayerStatus::State::kWaiting : state;
   status.frames_published = counts_.published;
   status.frames_total = static_cast<int64_t>(schedule_.size());
   status.frames_missing = static_cast<int64_t>(source_->missing() + counts_.unreadable);
   status.repeats = counts_.repeats;
-  if (counts_.published > 0) status.frame_index = static_cast<int32_t>(frame_.frame_index);
+  if (counts_.published > 0) status.frame_index = static_cast<int32_t>(under_way_.frame.frame_index);
   status.late_ms = schedule_.late_ms();
   PublishLoose(context_.bus, status, false, options_.camera_id);
 }
@@ -261,14 +264,14 @@ void PlayerNode::Advance() {
     next_status_ns_ = now + kStatusEveryNs;
     PublishStatus(schedule_.IsOver() ? PlayerStatus::State::kDone : PlayerStatus::State::kPlaying);
   }
-  if (OthersAreReady(now) && !awaiting_done_ && schedule_.IsDue(now)) PublishFrame();
-  if (awaiting_done_ && now >= next_repeat_ns_) {
-    next_repeat_ns_ = now + kRepeatEveryNs;
+  if (OthersAreReady(now) && !under_way_.awaiting_done && schedule_.IsDue(now)) PublishFrame();
+  if (under_way_.IsRepeatDue(now)) {
+    under_way_.RepeatLater(now);
     ++counts_.repeats;
     context_.bus->Publish(
-        {ChannelOfCamera(channels::kFrame, options_.camera_id), frame_bytes_, options_.local_frames});
+        {ChannelOfCamera(channels::kFrame, options_.camera_id), under_way_.bytes, options_.local_frames});
   }
-  if (!schedule_.IsOver() || awaiting_done_) return;
+  if (!schedule_.IsOver() || under_way_.awaiting_done) return;
   if (end_.IsDue(now)) PublishEnd();
   if (const std::optional<int> code = end_.ExitCode(now, false)) exit_code_ = code;
   if (exit_code_ == kExitNoFrontend) problem_ = EndOfPlay::NobodyAnswered();
@@ -277,7 +280,7 @@ void PlayerNode::Advance() {
 int64_t PlayerNode::deadline_ns() const {
   if (!playing_ || !office_.held()) return std::min(endpoint_.deadline_ns(), office_.deadline_ns());
   int64_t deadline = std::min({next_info_ns_, next_status_ns_, endpoint_.deadline_ns()});
-  if (awaiting_done_) return std::min(deadline, next_repeat_ns_);
+  if (under_way_.awaiting_done) return std::min(deadline, under_way_.next_repeat_ns);
   if (held_back_) return deadline;  // statuses come, and infos go, twice a second
   if (!schedule_.IsOver()) return std::min(deadline, schedule_.due_ns());
   return std::min(deadline, end_.due_ns());

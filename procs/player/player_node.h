@@ -6,45 +6,21 @@
 #include <string>
 #include <vector>
 
-#include "dmslam/camera/camera.h"
 #include "dmslam/dataset/frame_source.h"
-#include "dmslam/dataset/play_changes.h"
 #include "dmslam/dataset/trajectory.h"
 #include "dmslam/messaging/bus.h"
 #include "dmslam/runtime/node.h"
 #include "dmslam/runtime/wait_notice.h"
 #include "dmslam/wire/codec.h"
 #include "player/end_of_play.h"
-#include "player/frame_encoding.h"
+#include "player/frame_under_way.h"
+#include "player/play_counts.h"
 #include "player/play_schedule.h"
 #include "player/player_office.h"
+#include "player/player_options.h"
 #include "player/readiness.h"
 
 namespace dmslam {
-
-/// What is played, and how.
-struct PlayerOptions {
-  std::string sequence;  ///< path of what is played; its last part names it
-  Camera camera;
-  uint32_t session = 1;
-  CameraId camera_id = 0;  ///< of several that work on one map
-  bool take_over = false;  ///< asks a present player of the session to leave
-  PlaybackMode mode = PlaybackMode::kRealtime;
-  double speed = 1.0;        ///< factor on the recorded rate; 0: as fast as possible
-  size_t start = 0;          ///< first frame
-  size_t frames = SIZE_MAX;  ///< at most so many
-  /// Frames up to the one of this index were played before this process began: they count, and are not played
-  /// again.
-  std::optional<uint32_t> behind;
-  EncodingOptions encoding;
-  bool local_frames = false;  ///< frames stay on this host: the frontend runs here, and the bus leaves it
-  /// Who is to be ready before the first frame: of frontend and mapper. Only in real time: in lock-step a
-  /// frame is repeated until it is done.
-  std::vector<std::string> awaited;
-  double lead_s = 0.5;  ///< between the first camera info and the first frame, so that others can get ready
-  std::vector<BlackOut> black_outs;
-  std::vector<Jump> jumps;
-};
 
 /// Feeds frames to the bus, in real time or in lock-step.
 class PlayerNode : public Node {
@@ -61,12 +37,6 @@ class PlayerNode : public Node {
   size_t total() const { return schedule_.size(); }
 
  private:
-  /// Of frames.
-  struct Counts {
-    int64_t published = 0, repeats = 0;
-    size_t jumped = 0, black = 0, unreadable = 0;
-  };
-
   bool MayPlay();
   void Receive(const std::string& channel, std::span<const uint8_t> bytes);
   void OnFrameDone(const FrameDone& done);
@@ -87,11 +57,9 @@ class PlayerNode : public Node {
   Endpoint endpoint_;
   PlayerOffice office_;
   std::vector<StampedPose> ground_truth_;
-  Counts counts_;
+  PlayCounts counts_;
   PlaySchedule schedule_;
-  Frame frame_;  ///< the newest one published
-  SharedBytes frame_bytes_;
-  bool awaiting_done_ = false;  ///< lock-step
+  FrameUnderWay under_way_;
   Readiness readiness_;
   WaitNotice wait_notice_{1'000'000'000};
   FurtherFrontend further_;
@@ -99,10 +67,10 @@ class PlayerNode : public Node {
   bool held_back_ = false;  ///< others are not ready yet
   bool playing_ = false;    ///< the office is held: nobody else plays this session
   int64_t playing_since_ns_ = 0;
-  int64_t next_info_ns_ = 0, next_repeat_ns_ = 0, next_status_ns_ = 0;
+  int64_t next_info_ns_ = 0, next_status_ns_ = 0;
   int64_t infos_said_ = 0;
   std::optional<int> exit_code_;
-  std::string problem_, first_unreadable_;
+  std::string problem_;
 };
 
 }  // namespace dmslam
