@@ -2,13 +2,12 @@
 
 namespace dmslam {
 
-std::optional<TurnRequest> CameraTurns::Ask(uint32_t frame_index, std::optional<int64_t> stamp_ns,
-                                            const Term& mapper) {
+std::optional<TurnRequest> CameraTurns::Ask(uint32_t frame_index, const TurnTime& time, const Term& mapper) {
   if (!camera_ || !mapper.valid() || (asked_ == frame_index && asked_of_ == mapper)) return std::nullopt;
   asked_ = frame_index;
   given_.reset();
   asked_of_ = mapper;
-  return TurnRequest{frame_index, stamp_ns, *camera_};
+  return TurnRequest{frame_index, time, *camera_};
 }
 
 void CameraTurns::OnTurn(KeyframeId frame) {

@@ -24,7 +24,7 @@ class CameraTurns {
   bool Has(uint32_t frame_index) const { return !camera_ || given_ == frame_index; }
   /// The request to be put to the mapper for that frame, which does not have its turn; counts as put then.
   /// None: it was put already, or no mapper is there. `mapper`: its term.
-  std::optional<TurnRequest> Ask(uint32_t frame_index, std::optional<int64_t> stamp_ns, const Term& mapper);
+  std::optional<TurnRequest> Ask(uint32_t frame_index, const TurnTime& time, const Term& mapper);
   /// The mapper has given the turn to this frame of some camera.
   void OnTurn(KeyframeId frame);
   /// Asked for one, and does not have it.

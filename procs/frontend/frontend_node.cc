@@ -240,9 +240,9 @@ bool FrontendNode::AwaitsFirstReaders() const {
   return InLockstep() && timing_.frames() == 0 && !AwaitedReaders().empty();
 }
 
-bool FrontendNode::HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns) {
+bool FrontendNode::HasTurn(uint32_t frame_index, const TurnTime& time) {
   if (turns_.Has(frame_index)) return true;
-  if (const auto request = turns_.Ask(frame_index, stamp_ns, map_reader_->term())) PublishRecord(*request);
+  if (const auto request = turns_.Ask(frame_index, time, map_reader_->term())) PublishRecord(*request);
   return false;
 }
 
@@ -289,7 +289,7 @@ bool FrontendNode::WorkAtEnd() {
   const Phase phase = end_.phase();
   if (phase == Phase::kPlaying || phase == Phase::kHandedOver) return false;
   if (phase >= Phase::kTelling) return TellLastPoses();
-  if (phase == Phase::kGrowingBack && !HasTurn(CameraTurns::kTheEnd, std::nullopt)) return false;
+  if (phase == Phase::kGrowingBack && !HasTurn(CameraTurns::kTheEnd, TurnTime::AtTheEnd())) return false;
   AskForAdjustedMaps();
   return !end_.Waits(core()) && WorkOn(phase);
 }
@@ -361,7 +361,7 @@ bool FrontendNode::CatchUp() {
 
 bool FrontendNode::MayTrackWaiting() {
   const Frame& next = frames_.waiting()->frame;
-  return !AwaitsFirstReaders() && HasTurn(next.frame_index, next.stamp_ns);
+  return !AwaitsFirstReaders() && HasTurn(next.frame_index, TurnTime::Of(next.stamp_ns));
 }
 
 bool FrontendNode::TrackWaiting() {

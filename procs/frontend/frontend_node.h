@@ -61,7 +61,7 @@ class FrontendNode : public StreamNode {
   bool ProposeWhatWasLeft();
   FrontendCore& core() const { return work_->core(); }
   bool InLockstep() const { return camera_info_ && camera_info_->mode == PlaybackMode::kLockstep; }
-  bool HasTurn(uint32_t frame_index, std::optional<int64_t> stamp_ns);
+  bool HasTurn(uint32_t frame_index, const TurnTime& time);
   void TakeMapRecords();
   void ApplyHeldRecords(size_t count, bool at_once);
   void OnApplied(size_t count);

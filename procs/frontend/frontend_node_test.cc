@@ -286,7 +286,7 @@ TEST_F(FrontendWithMapperTest, WithAnotherCameraInLockstepAFrameWaitsForItsTurn)
   Run(1500);
   Play(FrameAt(0));
   EXPECT_EQ(Last<TurnRequest>().frame_index, 0U);
-  EXPECT_EQ(Last<TurnRequest>().stamp_ns, 0);
+  EXPECT_EQ(Last<TurnRequest>().time.stamp_ns, 0);
   EXPECT_EQ(Count<FramePose>(), 0U);
   MapDelta delta;
   delta.event = MapEvent::kTurn;

@@ -11,12 +11,12 @@ void CameraRequests::OnTurn(CameraId camera, int64_t epoch, const TurnRequest& r
 
 std::optional<CameraRequests::Turn> CameraRequests::TakeTurn(
     const HasEnded& has_ended, const std::function<int64_t(CameraId)>& epoch_of) {
-  const auto when = [this](CameraId c) { return cameras_[c].turn->stamp_ns.value_or(INT64_MAX); };
+  const auto when = [this](CameraId c) -> const TurnTime& { return cameras_[c].turn->time; };
   std::optional<CameraId> next;
   for (CameraId camera = 0; camera < cameras_.size(); ++camera) {
     if (IsDone(camera, has_ended)) continue;
     if (!cameras_[camera].turn) return std::nullopt;
-    if (!next || when(camera) < when(*next)) next = camera;
+    if (!next || when(camera).ComesBefore(when(*next))) next = camera;
   }
   if (!next) return std::nullopt;
   const TurnRequest request = *std::exchange(cameras_[*next].turn, std::nullopt);

@@ -11,8 +11,8 @@ constexpr int64_t kEpoch = 10;
 
 class CameraRequestsTest : public testing::Test {
  protected:
-  void Ask(CameraId camera, uint32_t frame, std::optional<int64_t> stamp_ns, int64_t epoch = kEpoch) {
-    requests_.OnTurn(camera, epoch, {frame, stamp_ns, camera});
+  void Ask(CameraId camera, uint32_t frame, const TurnTime& time, int64_t epoch = kEpoch) {
+    requests_.OnTurn(camera, epoch, {frame, time, camera});
   }
   CameraRequests::HasEnded HasEnded() const {
     return [this](CameraId camera) { return ended_.contains(camera); };
@@ -29,24 +29,24 @@ class CameraRequestsTest : public testing::Test {
 
 TEST_F(CameraRequestsTest, FramesTakeTurnsByStampAndThenByCamera) {
   EXPECT_EQ(Next(), std::nullopt);
-  Ask(0, 5, 200);
+  Ask(0, 5, TurnTime::Of(200));
   EXPECT_EQ(Next(), std::nullopt) << "the other one may be earlier";
-  Ask(1, 3, 100);
+  Ask(1, 3, TurnTime::Of(100));
   EXPECT_EQ(Next(), 1U);
   EXPECT_EQ(Next(), std::nullopt) << "its next one is not known";
-  Ask(1, 4, 200);
+  Ask(1, 4, TurnTime::Of(200));
   EXPECT_EQ(Next(), 0U);
-  Ask(0, 6, std::nullopt);
+  Ask(0, 6, TurnTime::AtTheEnd());
   EXPECT_EQ(Next(), 1U) << "what is done at the end comes last";
 }
 
 TEST_F(CameraRequestsTest, WhatWasAnsweredIsNotAnsweredAgainUnlessAnotherFrontendAsks) {
-  Ask(0, 5, 100);
-  Ask(1, 5, 200);
+  Ask(0, 5, TurnTime::Of(100));
+  Ask(1, 5, TurnTime::Of(200));
   EXPECT_EQ(Next(), 0U);
-  Ask(0, 5, 100);
+  Ask(0, 5, TurnTime::Of(100));
   EXPECT_EQ(Next(), std::nullopt);
-  Ask(0, 5, 100, kEpoch + 1);
+  Ask(0, 5, TurnTime::Of(100), kEpoch + 1);
   EXPECT_EQ(Next(), 0U);
 }
 
@@ -60,7 +60,7 @@ TEST_F(CameraRequestsTest, WhoHasEndedSinceHasHadItsAnswer) {
 }
 
 TEST_F(CameraRequestsTest, WhoIsDoneIsNotWaitedFor) {
-  Ask(1, 5, 200);
+  Ask(1, 5, TurnTime::Of(200));
   ended_ = {0};
   EXPECT_EQ(Next(), 1U);
   requests_.OnAdjust(1, 1);

@@ -138,11 +138,24 @@ struct AdjustRequest {
   CameraId camera_id = 0;
 };
 
+/// When it is a camera's turn: with a frame, by its stamp, or at the end, when no frame of it follows.
+struct TurnTime {
+  std::optional<int64_t> stamp_ns;  ///< of the frame; none: at the end
+
+  static TurnTime Of(int64_t stamp_ns) { return {stamp_ns}; }
+  static TurnTime AtTheEnd() { return {std::nullopt}; }
+  bool IsAtTheEnd() const { return !stamp_ns; }
+  /// The end comes after all frames.
+  bool ComesBefore(const TurnTime& other) const {
+    return !IsAtTheEnd() && (other.IsAtTheEnd() || *stamp_ns < *other.stamp_ns);
+  }
+};
+
 /// Several cameras in lock-step: a frame has come, and waits until the mapper says that all that comes before
 /// it, by stamp and then by camera, is in the map (MapEvent::kTurn).
 struct TurnRequest {
   uint32_t frame_index = 0;
-  std::optional<int64_t> stamp_ns;  ///< none: no frame follows, and what is done at the end waits
+  TurnTime time;
   CameraId camera_id = 0;
 };
 

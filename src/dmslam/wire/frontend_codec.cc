@@ -299,15 +299,15 @@ struct Codec<TurnRequest> {
   static constexpr const char* kChannel = channels::kTurnRequest;
 
   static void Fields(auto& s, auto& m, auto& w) {
-    s.Utime(m.stamp_ns, w.utime);
-    s.OrMinusOne(m.stamp_ns, w.stamp_ns);
+    s.Utime(m.time.stamp_ns, w.utime);
+    s.OrMinusOne(m.time.stamp_ns, w.stamp_ns);  // -1: the end
     s(m.frame_index, w.frame_index);
     s(m.camera_id, w.camera_id);
   }
   static void Validate(const TurnRequest& m, Checker& check) {
     check.Require(m.frame_index < kMaxFrames, "number of the frame out of range");
     check.Require(m.camera_id < kMaxCameras, "number of the camera out of range");
-    check.Stamp(m.stamp_ns);
+    check.Stamp(m.time.stamp_ns);
   }
 };
 
