@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "collector/corrections.h"
+#include "collector/results.h"
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/messaging/protocol_messages.h"

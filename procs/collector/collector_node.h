@@ -12,7 +12,7 @@
 #include "collector/played_sequences.h"
 #include "collector/process_ledger.h"
 #include "collector/proposed_keyframes.h"
-#include "collector/results.h"
+#include "collector/run_record.h"
 #include "dmslam/runtime/other_readers.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "collector/results.h"
+#include "collector/correction_record.h"
 #include "dmslam/map/map.h"
 #include "dmslam/map/map_delta.h"
 

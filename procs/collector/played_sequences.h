@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "collector/results.h"
+#include "collector/run_record.h"
 #include "dmslam/slam/trajectory_builder.h"
 #include "dmslam/wire/player_messages.h"
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "collector/results.h"
+#include "collector/run_record.h"
 #include "dmslam/runtime/instance_watch.h"
 
 namespace dmslam {

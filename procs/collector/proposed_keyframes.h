@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "collector/results.h"
+#include "collector/keyframe_record.h"
 #include "dmslam/map/map_delta.h"
 #include "dmslam/messaging/types.h"
 #include "dmslam/util/ids.h"
