@@ -204,7 +204,7 @@ void ViewerCore::ChooseMap() {
 
 void ViewerCore::OnTruth(const SceneFrame& frame, const Rigid3d& T_world_cam) {
   if (!truth_file_.empty() && frame.camera == 0) return;
-  truth_[frame.camera].try_emplace(frame.index, Truth{T_world_cam.translation});
+  truth_[frame.camera].try_emplace(frame.index, TruePosition{T_world_cam.translation});
   dirty_ = true;
 }
 

@@ -12,17 +12,11 @@
 #include "dmslam/geometry/rigid3.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/map/replica.h"
+#include "viewer/ground_truth.h"
 #include "viewer/map_layout.h"
 #include "viewer/scene.h"
 
 namespace dmslam {
-
-/// How the ground truth lies on the map.
-struct TruthAlignment {
-  Sim3d map_from_truth;
-  double rmse_m = 0;  ///< of the camera's positions, after alignment
-  size_t pairs = 0;
-};
 
 /// Two maps became one.
 struct JoinedMaps {
@@ -109,11 +103,6 @@ class ViewerCore {
   std::optional<Eigen::Vector3d> TruthAt(const SceneFrame& frame) const;
   void SweepPoints(ViewerScene* scene);
 
-  struct Truth {
-    Eigen::Vector3d position;
-    bool drawn = false;
-  };
-
   Replica map_;
   std::optional<MapId> shown_map_;
   MapLayout layout_;
@@ -124,7 +113,7 @@ class ViewerCore {
   std::map<KeyframeId, std::vector<SceneFrame>>
       frames_of_;                                    ///< told from this keyframe, or from one it stands for
   std::map<SceneFrame, Eigen::Vector3d> positions_;  ///< of the frames in the shown map
-  std::map<CameraId, std::map<uint32_t, Truth>> truth_;
+  std::map<CameraId, std::map<uint32_t, TruePosition>> truth_;
   std::vector<StampedPose> truth_file_;
   size_t truth_file_next_ = 0;
   int64_t newest_ns_ = 0;

@@ -42,7 +42,7 @@ ViewerNode::ViewerNode(NodeContext context, NodeOptions options, ViewerOptions v
   }
 }
 
-ViewerNode::CameraState* ViewerNode::FindCamera(CameraId camera) {
+SeenCamera* ViewerNode::FindCamera(CameraId camera) {
   return camera < seen_cameras_.size() ? &seen_cameras_[camera] : nullptr;
 }
 
@@ -51,7 +51,7 @@ std::string ViewerNode::Who(CameraId camera) const {
 }
 
 void ViewerNode::OnCamera(const CameraInfo& info) {
-  if (CameraState* camera = FindCamera(info.camera_id)) camera->info = info;
+  if (SeenCamera* camera = FindCamera(info.camera_id)) camera->info = info;
 }
 
 void ViewerNode::Begin(const CameraInfo& info) {
@@ -127,7 +127,7 @@ void ViewerNode::OnLoose(const std::string& channel, std::span<const uint8_t> by
 }
 
 void ViewerNode::OnEnd(const EndOfSequence& end) {
-  CameraState* camera = FindCamera(end.camera_id);
+  SeenCamera* camera = FindCamera(end.camera_id);
   if (camera == nullptr || std::exchange(camera->ended, true)) return;
   board_.Expect(OfCamera(roles::kPlayer, end.camera_id));
   const std::string whose = seen_cameras_.size() == 1 ? "" : " of camera " + std::to_string(end.camera_id);
@@ -137,7 +137,7 @@ void ViewerNode::OnEnd(const EndOfSequence& end) {
 }
 
 /// In a word. Once no frame follows it counts no more how the last one was tracked.
-std::string ViewerNode::DoesOf(const CameraState& camera) const {
+std::string ViewerNode::DoesOf(const SeenCamera& camera) const {
   if (map_ended_) return "done";
   return camera.ended ? "ending" : StateWord(camera.frontend.state);
 }
@@ -159,7 +159,7 @@ void ViewerNode::OnStatusMessage(const std::string& channel, std::span<const uin
       Board(OfCamera(roles::kPlayer, status->camera_id), *status, StateWord(status->state));
   } else if (channel == channels::kFrontendStatus) {
     auto status = Read<FrontendStatus>(bytes);
-    CameraState* camera = status ? FindCamera(status->camera_id) : nullptr;
+    SeenCamera* camera = status ? FindCamera(status->camera_id) : nullptr;
     if (camera == nullptr) return;
     camera->frontend = std::move(*status);
     Board(OfCamera(roles::kFrontend, camera->frontend.camera_id), camera->frontend, DoesOf(*camera));
@@ -230,10 +230,10 @@ void ViewerNode::NoteMapEvent(const MapDelta& delta) {
 
 bool ViewerNode::TakeFrontendRecord() {
   return std::ranges::any_of(seen_cameras_,
-                             [this](CameraState& camera) { return TakeFrontendRecord(&camera); });
+                             [this](SeenCamera& camera) { return TakeFrontendRecord(&camera); });
 }
 
-bool ViewerNode::TakeFrontendRecord(CameraState* camera) {
+bool ViewerNode::TakeFrontendRecord(SeenCamera* camera) {
   const std::optional<Record> record = camera->reader->Take();
   if (!record) return false;
   const std::string channel = SplitCamera(record->channel).channel;
@@ -290,7 +290,7 @@ void ViewerNode::DrawIfDue() {
 }
 
 void ViewerNode::NotePose(const PoseView& view) {
-  CameraState* camera = FindCamera(view.camera_id);
+  SeenCamera* camera = FindCamera(view.camera_id);
   if (camera == nullptr) return;
   exchange_->Change([&](ViewerScene*, CameraSeries* series) { series->Add(view); });
   camera->map_id = view.map_id;
@@ -301,7 +301,7 @@ void ViewerNode::NotePose(const PoseView& view) {
 
 /// Once all that has come is in the map and drawn: a pose and the map that it is in change together.
 void ViewerNode::ShowPoses() {
-  for (CameraState& camera : seen_cameras_) {
+  for (SeenCamera& camera : seen_cameras_) {
     const std::optional<PoseView> view = std::exchange(camera.to_show, std::nullopt);
     if (view)
       exchange_->hub().Send(EventKind::kPose, PoseJson(*view, PlaceOf(*view), arrangement_), view->camera_id);
@@ -353,7 +353,7 @@ void ViewerNode::ReportIfDue() {
 
 void ViewerNode::PublishStatus() {
   std::vector<const StreamReader*> readers = {map_reader_.get(), loop_reader_.get()};
-  for (const CameraState& camera : seen_cameras_) readers.push_back(camera.reader.get());
+  for (const SeenCamera& camera : seen_cameras_) readers.push_back(camera.reader.get());
   const StatusHead head = MakeStatusHead(core_ ? "" : "waiting for a camera", readers);
   board_.OnStatus(roles::kViewer, head, core_ ? "watching" : "waiting", context_.now_ns(),
                   context_.wall_us());
@@ -370,8 +370,8 @@ std::string ViewerNode::StatusJson() const {
   view.mapper = &mapper_;
   view.loopcloser = &loopcloser_;
   view.board = &board_;
-  view.ended = map_ended_ || std::ranges::all_of(seen_cameras_, &CameraState::ended);
-  for (const CameraState& camera : seen_cameras_)
+  view.ended = map_ended_ || std::ranges::all_of(seen_cameras_, &SeenCamera::ended);
+  for (const SeenCamera& camera : seen_cameras_)
     view.cameras.push_back({camera.info ? &*camera.info : nullptr, camera.map_id, camera.ended});
   view.loops = loops_;
   view.browsers = exchange_->hub().num_listeners();

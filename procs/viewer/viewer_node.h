@@ -10,6 +10,7 @@
 #include "dmslam/runtime/stream_node.h"
 #include "viewer/exchange.h"
 #include "viewer/process_board.h"
+#include "viewer/seen_camera.h"
 #include "viewer/viewer_core.h"
 
 namespace dmslam {
@@ -39,17 +40,6 @@ class ViewerNode : public StreamNode {
   int64_t WorkDeadline() const override;
 
  private:
-  /// What is known of one camera.
-  struct CameraState {
-    std::optional<CameraInfo> info;
-    std::unique_ptr<StreamReader> reader;  ///< of its frontend's stream
-    FrontendStatus frontend;
-    std::optional<TrackingState> shown_state;
-    std::optional<PoseView> to_show;  ///< of its newest frame; none: it is shown
-    std::optional<MapId> map_id;      ///< of its newest frame
-    bool ended = false;
-  };
-
   void OnLoose(const std::string& channel, std::span<const uint8_t> bytes);
   bool PassOver(const std::string& channel, std::span<const uint8_t> bytes);
   void OnCollector(const std::string& channel, std::span<const uint8_t> bytes);
@@ -59,12 +49,12 @@ class ViewerNode : public StreamNode {
   void Board(const std::string& name, const Status& status, const std::string& state);
   bool TakeMapRecord();
   bool TakeFrontendRecord();
-  bool TakeFrontendRecord(CameraState* camera);
+  bool TakeFrontendRecord(SeenCamera* camera);
   void NoteState(const PoseView& view);
-  std::string DoesOf(const CameraState& camera) const;
+  std::string DoesOf(const SeenCamera& camera) const;
   void NoteWhatFrontendsDo();
   std::string Who(CameraId camera) const;
-  CameraState* FindCamera(CameraId camera);
+  SeenCamera* FindCamera(CameraId camera);
   bool TakeLoopRecord();
   void NoteMapEvent(const MapDelta& delta);
   void NotePose(const PoseView& view);
@@ -83,7 +73,7 @@ class ViewerNode : public StreamNode {
   std::unique_ptr<ViewerCore> core_;
   std::unique_ptr<StreamReader> map_reader_, loop_reader_;
   ProcessBoard board_;
-  std::vector<CameraState> seen_cameras_;  ///< by number
+  std::vector<SeenCamera> seen_cameras_;  ///< by number
   MapperStatus mapper_;
   LoopcloserStatus loopcloser_;
   std::optional<TruthAlignment> alignment_;
