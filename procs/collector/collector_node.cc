@@ -28,7 +28,6 @@ constexpr int64_t kSilentAfterEndNs = 3'000'000'000;
 constexpr int64_t kSilentFrontendNs = 1'000'000'000;  // it says ten times a second that it is there
 constexpr int64_t kRoomOnDiskNs = 30'000'000'000;     // after the end: no room comes any more
 constexpr int64_t kTryAgainNs = 1'000'000'000;
-constexpr int64_t kSettlingNs = 3'000'000'000;  // of two that began together one leaves within this time
 
 }  // namespace
 
@@ -41,8 +40,10 @@ CollectorNode::CollectorNode(NodeContext context, NodeOptions options, Collector
       collector_(std::move(collector)),
       sequences_(options_.NumCameras()),
       frames_(options_.NumCameras()),
-      others_(context_.random_id),
-      listens_until_ns_(context_.now_ns() + (context_.fresh_system ? 0 : OtherReaders::kListenNs)) {
+      place_({.own_id = context_.random_id,
+              .others_may_be = !context_.fresh_system,
+              .takes_over = options_.take_over},
+             context_.now_ns()) {
   Listen({channels::kMapperStatus, channels::kLoopcloserStatus, AckChannel(owners::kCollector)});
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     Listen({channels::kEndOfSequence, channels::kGroundTruthPose, channels::kFrameTrace,
@@ -74,7 +75,7 @@ void CollectorNode::KnowSession(const SessionStart& start) {
   info.camera = start.camera;
   info.sequence = start.sequence;
   info.mode = start.mode;
-  continues_ = !options_.take_over;  // else the one before it may still be there
+  place_.GoOn();
   KnowCamera(info);
 }
 
@@ -93,35 +94,27 @@ void CollectorNode::OnCamera(const CameraInfo& info) {
   run_.cameras[info.camera_id].sequence = info.sequence;
 }
 
-/// A collector writes no stream, so no election says whether there is another one. Who goes on with what one
-/// before it has written begins at once: what a frontend has kept for it is lost when the frontend dies.
 bool CollectorNode::MayBegin() {
   YieldToOther();
-  const bool alone = context_.fresh_system || !others_.Find(session_, context_.now_ns());
-  return !exit_code() && alone && (continues_ || context_.now_ns() >= listens_until_ns_);
+  return !exit_code() && place_.MayBegin(session_, context_.now_ns());
 }
 
 void CollectorNode::HearReader(std::span<const uint8_t> bytes) {
   const auto ack = DecodeAck(AckChannel(owners::kCollector), bytes);
-  if (!ack || context_.fresh_system) return;
-  others_.Hear({ack->reader, ack->name, ack->header.session, ack->utime}, context_.now_ns());
+  if (!ack) return;
+  place_.Hear({ack->reader, ack->name, ack->header.session, ack->utime}, context_.now_ns());
   YieldToOther();
 }
 
-/// Who comes later leaves, before it has written anything. Of two that began together, and could not hear
-/// each other before, it is the one with the larger id; or the one that believed to go on after the other.
 void CollectorNode::YieldToOther() {
-  const int64_t now_ns = context_.now_ns();
-  const auto other = others_.Find(session_, now_ns);
-  if (!other) return;
-  if (builder_ && now_ns - begun_ns_ > kSettlingNs) return;
-  if (builder_ && !continues_ && other->id > context_.random_id) return;
-  const std::string who = "session " + std::to_string(session_) + ": " + other->name;
-  if (builder_ || !options_.take_over)
+  const std::optional<CollectorPlace::Yield> yield = place_.TakeYield(session_, context_.now_ns());
+  if (!yield) return;
+  const std::string who = "session " + std::to_string(session_) + ": " + yield->other;
+  if (yield->how == CollectorPlace::Yield::How::kLeave)
     return Exit(kExitPresent, who +
                                   " writes results of this session already: stop it, or give another "
                                   "--session, --prefix or port");
-  if (!std::exchange(waits_for_other_, true)) LogInfo("{} writes its results; waits until it has ended", who);
+  LogInfo("{} writes its results; waits until it has ended", who);
 }
 
 void CollectorNode::Begin(const CameraInfo& info) {
@@ -131,7 +124,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
     ended_map_.safe_version = ended_map_.found->version();
     builder_->SetMap(*std::exchange(ended_map_.found, std::nullopt));
   }
-  begun_ns_ = context_.now_ns();
+  place_.OnBegun(context_.now_ns());
   run_.mode = info.mode == PlaybackMode::kLockstep ? "lockstep" : "realtime";
   run_.profile = options_.settings.profile();
   run_.seed = options_.settings.Read<RunOptions>().seed;
@@ -408,7 +401,7 @@ void CollectorNode::KeepCheckpoint() {
 }
 
 int64_t CollectorNode::WorkDeadline() const {
-  if (!builder_) return !continues_ && context_.now_ns() < listens_until_ns_ ? listens_until_ns_ : INT64_MAX;
+  if (!builder_) return place_.deadline_ns(context_.now_ns());
   return checkpointer_ && !IsWritten() ? checkpointer_->deadline_ns() : INT64_MAX;
 }
 
@@ -469,7 +462,7 @@ bool CollectorNode::WorkOnce() {
 
 /// For how long a writer was not heard, as far as this process can know.
 int64_t CollectorNode::SilentNs(const StreamReader& reader) const {
-  return std::min(reader.silent_ns(context_.now_ns()), context_.now_ns() - begun_ns_);
+  return std::min(reader.silent_ns(context_.now_ns()), place_.AtWorkNs(context_.now_ns()));
 }
 
 /// They have said so; or the map says that they have, and they are gone; or the player has said it, and none

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "collector/checkpointer.h"
+#include "collector/collector_place.h"
+#include "collector/ended_map.h"
 #include "collector/heard_frames.h"
 #include "collector/kept_records.h"
 #include "collector/make_collector.h"
@@ -13,7 +15,6 @@
 #include "collector/process_ledger.h"
 #include "collector/proposed_keyframes.h"
 #include "collector/run_record.h"
-#include "dmslam/runtime/other_readers.h"
 #include "dmslam/runtime/stream_node.h"
 #include "dmslam/slam/trajectory_builder.h"
 
@@ -39,12 +40,6 @@ class CollectorNode : public StreamNode {
   std::string WaitsFor() const override;
 
  private:
-  /// The map with which the run has ended.
-  struct EndedMap {
-    std::optional<Replica> found;          ///< on the disk, not yet taken over
-    std::optional<uint64_t> safe_version;  ///< need not be written again
-    std::optional<int64_t> here_ns;        ///< since when it is here
-  };
   /// How the run ends.
   struct Ends {
     bool of_frontends = false;
@@ -126,11 +121,7 @@ class CollectorNode : public StreamNode {
   Ends ends_;
   Results results_ = Results::kNone;
   Due due_;
-  OtherReaders others_;
-  int64_t listens_until_ns_ = 0;  ///< whether another collector is there
-  bool waits_for_other_ = false;
-  bool continues_ = false;  ///< with what a collector before it has written
-  int64_t begun_ns_ = 0;
+  CollectorPlace place_;
   bool map_is_fresh_ = false;  ///< a map that continues none is read from its beginning
 };
 
