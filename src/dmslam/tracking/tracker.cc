@@ -74,16 +74,7 @@ void Tracker::OnMapGivenUp() {
 }
 
 TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFrame frame) {
-  Attempt attempt = FollowMotion(map, &frame);
-  if (IsDoubtfulForLong(attempt.report, frame.stamp_ns)) attempt.report.TakePoseAway();
-  if (!attempt.report.HasPose() && unbelieved_) GoBack();
-  if (attempt.report.HasPose()) {
-    FindBetterPlace(map, &frame, &attempt);
-  } else {
-    FindTurned(map, &frame, &attempt);
-  }
-  if (!attempt.report.HasPose() && request.may_relocalize && MayRelocalize(attempt, frame.stamp_ns))
-    Relocalize(map, request, &frame, &attempt);
+  const Attempt attempt = FindPose(map, request, &frame);
   TrackingResult result{.report = attempt.report, .relocalized = attempt.relocalized};
   if (attempt.report.HasPose()) result.pose = PlacedPose::Of(search_.Reference(map), frame.T_cam_world);
   if (result.pose) {
@@ -91,13 +82,7 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   } else if (attempt.weak_pose) {
     follower_.Coast(map, *attempt.weak_pose, {frame.index, frame.stamp_ns});
   }
-  if (unbelieved_) {
-    result.pose.reset();
-    if (unbelieved_->why == Unbelieved::Why::kFoundAnew) {
-      search_.judge().DropEvidence();
-      result.report.reason = "a place was recognised that is not confirmed yet";
-    }
-  }
+  if (unbelieved_) Withhold(&result);
   if (result.pose) {
     result.certainty = certainty_.Estimate(map, frame, *result.pose, search_.basis(), !attempt.relocalized);
   } else {
@@ -105,6 +90,30 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
   }
   result.frame = std::move(frame);
   return result;
+}
+
+/// Where the motion leads or beside it, or else turned from where it was lost, or else in all places.
+Tracker::Attempt Tracker::FindPose(const Map& map, const Request& request, TrackedFrame* frame) {
+  Attempt attempt = FollowMotion(map, frame);
+  if (IsDoubtfulForLong(attempt.report, frame->stamp_ns)) attempt.report.TakePoseAway();
+  if (!attempt.report.HasPose() && unbelieved_) GoBack();
+  if (attempt.report.HasPose()) {
+    FindBetterPlace(map, frame, &attempt);
+  } else {
+    FindTurned(map, frame, &attempt);
+  }
+  if (!attempt.report.HasPose() && request.may_relocalize && MayRelocalize(attempt, frame->stamp_ns))
+    Relocalize(map, request, frame, &attempt);
+  return attempt;
+}
+
+/// A camera that is followed and not believed has no pose, and where it was found anew it says nothing of
+/// landmarks.
+void Tracker::Withhold(TrackingResult* result) {
+  result->pose.reset();
+  if (unbelieved_->why != Unbelieved::Why::kFoundAnew) return;
+  search_.judge().DropEvidence();
+  result->report.TakePoseAway("a place was recognised that is not confirmed yet");
 }
 
 /// Goes on from a frame whose pose was found.

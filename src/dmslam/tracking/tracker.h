@@ -83,6 +83,8 @@ class Tracker {
     bool in_another_map = false;  ///< than it was lost in
   };
 
+  Attempt FindPose(const Map& map, const Request& request, TrackedFrame* frame);
+  void Withhold(TrackingResult* result);
   Attempt FollowMotion(const Map& map, TrackedFrame* frame);
   void FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* attempt);
   void FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt);
