@@ -28,7 +28,7 @@ class CollectorPlace {
   void OnBegun(int64_t now_ns) { begun_ns_ = now_ns; }
   /// When it has listened for long enough to begin; INT64_MAX: it need not listen any more.
   int64_t deadline_ns(int64_t now_ns) const;
-  /// For how long it has been at work; 0: it has not begun.
+  /// For how long it has been at work: no time before it has begun.
   int64_t AtWorkNs(int64_t now_ns) const { return begun_ns_ ? now_ns - *begun_ns_ : 0; }
 
   /// What follows from the other one that is there.
@@ -38,7 +38,7 @@ class CollectorPlace {
   };
   /// None: nobody else is there, or the other one leaves. Who comes later leaves, before it has written
   /// anything. Of two that began together, and could not hear each other before, it is the one with the
-  /// larger id; or the one that believed to go on after the other. That it waits is told once.
+  /// larger id, or the one that took itself for the other's successor. That it waits is told once.
   std::optional<Yield> TakeYield(int64_t session, int64_t now_ns);
 
  private:

@@ -91,7 +91,7 @@ std::string NotDoneText(const MapperCounters& counters) {
       {counters.keyframes_refused, "keyframes refused, whose reference is unknown or of another map"},
       {counters.maps_refused, "first maps refused"},
       {counters.maps_dropped, "maps dropped, which their camera had given up"},
-      {counters.evidence_dropped, "words about landmarks that were gone"},
+      {counters.evidence_dropped, "pieces of evidence of landmarks that were gone"},
       {counters.adjustments_interrupted, "adjustments cut short, since a keyframe waited"}};
   std::string text;
   for (const auto& [count, what] : items) {

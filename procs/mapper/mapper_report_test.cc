@@ -88,7 +88,7 @@ TEST_F(MapperReportTest, TellsAtTheEndWhatWasNotDone) {
   Say(LandmarkId::Make(9, 9), 1, 0);
   EXPECT_EQ(NotDoneText(core_.counters()),
             "2 keyframes refused, whose reference is unknown or of another map; "
-            "1 words about landmarks that were gone");
+            "1 pieces of evidence of landmarks that were gone");
   MapReset reset;
   reset.map_id = 1;
   reset.fate = MapReset::Fate::kDrop;

@@ -27,10 +27,10 @@ class SupportWidth {
 };
 
 /// Two motions explain what a frame sees, each something that the other does not. People stand close together
-/// in the image and the room is all around them, so the wider one is the camera's: by far by number times D;
-/// or by far by cells times D and no less by number, as somebody whose clothes have a fine texture holds more
-/// points than the room, but no more of the image. For maps that are too young for age to tell them apart
-/// (elders.h).
+/// in the image and the room is all around them, so the wider one is the camera's. The rival is wider where
+/// its number times D is three times that of the first; or where its cells times D are, and its number times
+/// D is more: somebody whose clothes have a fine texture has more points than the room, but does not fill
+/// more cells. For maps that are too young for age to tell the two apart (elders.h).
 class RivalMotions {
  public:
   /// Whether `contradicting` matches are enough to look for a motion of their own.
