@@ -59,6 +59,7 @@ OrderedJson ToJson(const RunResult& run) {
       {"tracked_percent", ToJson(run.tracked_percent)},
       {"tracked_online_percent", ToJson(run.tracked_online_percent)},
       {"tracked_online_after_first_map_percent", ToJson(run.tracked_online_after_first_map_percent)},
+      {"ate_online_m", ToJson(run.ate_online_m)},
       {"first_map_s", ToJson(run.first_map_s)},
       {"frontend_ms_median", ToJson(run.frontend_ms_median)}};
   if (run.version) json["version"] = *run.version;
@@ -80,6 +81,7 @@ OrderedJson ToJson(const Cell& cell) {
       {"tracked_percent", ToJson(cell.TrackedPercent())},
       {"tracked_online_percent", ToJson(cell.TrackedOnlinePercent())},
       {"tracked_online_after_first_map_percent", ToJson(cell.TrackedOnlineAfterFirstMapPercent())},
+      {"ate_online_m", ToJson(cell.AteOnline())},
       {"first_map_s", ToJson(cell.FirstMapSeconds())}};
   for (const auto& [metric, name] : kMetrics) {
     json[name] = {{"rmse", ToJson(cell.Rmse(metric))},

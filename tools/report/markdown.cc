@@ -103,10 +103,10 @@ std::string RenderErrorTable(const Results& results, const Setting& setting, con
 
 std::string SpreadRow(const Cell& cell) {
   const std::string failed = Format("%zu of %zu", cell.Failed(), cell.Made());
-  return Format("| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", cell.sequence.c_str(),
+  return Format("| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", cell.sequence.c_str(),
                 cell.profile.c_str(), RunsText(cell).c_str(), cell.Failed() == 0 ? "0" : failed.c_str(),
-                WithEnds(cell.Rmse(Metric::kAte), 5).c_str(), WithEnds(cell.TrackedPercent(), 1).c_str(),
-                WithEnds(cell.TrackedOnlinePercent(), 1).c_str(),
+                WithEnds(cell.AteOnline(), 5).c_str(), WithEnds(cell.Rmse(Metric::kAte), 5).c_str(),
+                WithEnds(cell.TrackedPercent(), 1).c_str(), WithEnds(cell.TrackedOnlinePercent(), 1).c_str(),
                 WithEnds(cell.TrackedOnlineAfterFirstMapPercent(), 1).c_str(),
                 WithEnds(cell.FirstMapSeconds(), 2).c_str());
 }
@@ -114,8 +114,9 @@ std::string SpreadRow(const Cell& cell) {
 std::string SpreadTable(const Results& results, const Setting& setting) {
   std::string text =
       "### Over the seeds: median (least–most)\n\n| sequence | profile | runs with a trajectory | failed | "
-      "ATE RMSE [m] | tracked % | tracked as it came % | the same after the first map % | first map [s] |\n"
-      "|---|---|---:|---:|---:|---:|---:|---:|---:|\n";
+      "ATE RMSE as it came [m] | ATE RMSE in the end [m] | tracked % | tracked as it came % | the same after "
+      "the first map % | first map [s] |\n"
+      "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Cell& cell : results.cells) {
     if (cell.setting == setting.name) text += SpreadRow(cell);
   }

@@ -128,8 +128,9 @@ TEST_F(Reproduction, TablesAreEven) {
 
 TEST_F(Reproduction, RunsWithoutATrajectoryCountAndAreListed) {
   const Plan plan = MakePlan(options_);
-  WriteRun({"fr3_walking_xyz", "defaults", "dm", 1}, 0.01,
-           R"({"tracked_percent": 90, "tracked_online_after_first_map_percent": 88})");
+  WriteRun(
+      {"fr3_walking_xyz", "defaults", "dm", 1}, 0.01,
+      R"({"tracked_percent": 90, "ate_rmse_online": 0.02, "tracked_online_after_first_map_percent": 88})");
   WriteRun({"fr3_walking_xyz", "defaults", "dm", 2}, -1, R"({"tracked_percent": null})");
   const RunKey failed{"fr3_walking_xyz", "defaults", "dm", 3};
   fs::create_directories(root_ / "out" / failed.Folder());
@@ -139,6 +140,7 @@ TEST_F(Reproduction, RunsWithoutATrajectoryCountAndAreListed) {
   EXPECT_EQ(cell.Count(RunResult::State::kNoTrajectory), 1u);
   EXPECT_EQ(cell.Count(RunResult::State::kFailed), 1u);
   EXPECT_EQ(cell.TrackedPercent()->min, 0);
+  EXPECT_EQ(cell.AteOnline()->median, 0.02);
   EXPECT_EQ(cell.TrackedOnlineAfterFirstMapPercent()->max, 88);  // as the run says itself
   const std::string text = ReportMarkdown(results, std::nullopt, {});
   EXPECT_NE(text.find("it fell over"), std::string::npos);

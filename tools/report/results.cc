@@ -148,6 +148,7 @@ RunResult ReadRun(const RunKey& key, const fs::path& out, const fs::path& sequen
   run.machine = MachineIn(*summary);
   run.tracked_percent = NumberIn(*summary, "tracked_percent");
   run.tracked_online_percent = NumberIn(*summary, "tracked_online_percent");
+  run.ate_online_m = NumberIn(*summary, "ate_rmse_online");
   run.tracked_online_after_first_map_percent = NumberIn(*summary, "tracked_online_after_first_map_percent");
   run.first_map_s = NumberIn(*summary, "first_init_s");
   run.frontend_ms_median = NumberIn(*summary, "frontend_ms_median");
@@ -217,6 +218,9 @@ std::optional<Spread> Cell::TrackedPercent() const {
 }
 std::optional<Spread> Cell::TrackedOnlinePercent() const {
   return Collect(runs, [](const RunResult& run) { return run.tracked_online_percent; });
+}
+std::optional<Spread> Cell::AteOnline() const {
+  return Collect(runs, [](const RunResult& run) { return run.ate_online_m; });
 }
 std::optional<Spread> Cell::TrackedOnlineAfterFirstMapPercent() const {
   return Collect(runs, [](const RunResult& run) { return run.tracked_online_after_first_map_percent; });

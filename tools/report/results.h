@@ -21,6 +21,7 @@ struct RunResult {
   std::optional<Machine> machine;      // on which it was made
   std::optional<double> tracked_percent;
   std::optional<double> tracked_online_percent;
+  std::optional<double> ate_online_m;  // RMSE over the poses as they came, aligned by Sim3
   std::optional<double> first_map_s;
   std::optional<double> frontend_ms_median;
   // Frames tracked as they came, of those since the first pose.
@@ -75,6 +76,7 @@ struct Cell {
   std::optional<Spread> Std(Metric metric) const;
   std::optional<Spread> TrackedPercent() const;
   std::optional<Spread> TrackedOnlinePercent() const;
+  std::optional<Spread> AteOnline() const;
   std::optional<Spread> TrackedOnlineAfterFirstMapPercent() const;
   std::optional<Spread> FirstMapSeconds() const;
   /// The run whose ATE is the (lower) middle one; null where none has a trajectory.
