@@ -1,11 +1,32 @@
 #include "dmslam/tracking/pose_solver.h"
 
+#include <algorithm>
+#include <iterator>
+#include <span>
+
 namespace dmslam {
 
 namespace {
 
 double Chi2(const Pinhole& camera, const Rigid3d& T_cam_world, const PoseObservation& o) {
   return ReprojectionErrorSquared(camera, T_cam_world, o.p_world, o.uv_px) * o.inv_sigma_squared;
+}
+
+/// How a pose explains observations.
+struct Explained {
+  int agreeing = 0;
+  double cost = 0;  ///< sum of the squared errors, each of them bounded: the lower, the more is explained
+};
+
+Explained Explain(const Pinhole& camera, const Rigid3d& T_cam_world,
+                  std::span<const PoseObservation> observations, double max_chi2) {
+  Explained explained;
+  for (const PoseObservation& o : observations) {
+    const double chi2 = Chi2(camera, T_cam_world, o);
+    explained.agreeing += chi2 <= max_chi2 ? 1 : 0;
+    explained.cost += std::min(chi2, max_chi2);
+  }
+  return explained;
 }
 
 }  // namespace
@@ -49,6 +70,27 @@ void PoseSolver::Observe(const Map& map, const LandmarkVotes& votes, const Track
   }
 }
 
+/// Since all start as inliers, the eldest may agree on a compromise between the room and somebody who has
+/// just begun to move. Then those that agree with the pose of all matches are asked, too: their pose counts
+/// where they agree closely, and the eldest as a whole are explained better by it.
+std::optional<Rigid3d> PoseSolver::PoseOfEldest(const Pinhole& camera, const Rigid3d& T_cam_world,
+                                                const PoseOptimizationOptions& options) {
+  OptimizePose(camera, T_cam_world, eldest_, options, optimized_);
+  if (!optimized_.usable) return std::nullopt;
+  const Rigid3d T_eldest = optimized_.T_cam_world;
+  if (optimized_.mean_chi2 <= kOneMotionChi2) return T_eldest;
+  OptimizePose(camera, T_cam_world, current_.observations, options, optimized_);
+  if (!optimized_.usable) return T_eldest;
+  const Rigid3d T_all = optimized_.T_cam_world;
+  agreeing_.clear();
+  std::ranges::copy_if(eldest_, std::back_inserter(agreeing_),
+                       [&](const PoseObservation& o) { return Chi2(camera, T_all, o) <= options.max_chi2; });
+  OptimizePose(camera, T_all, agreeing_, options, optimized_);
+  if (!optimized_.usable || optimized_.mean_chi2 > kOneMotionChi2) return T_eldest;
+  const auto cost = [&](const Rigid3d& T) { return Explain(camera, T, eldest_, options.max_chi2).cost; };
+  return cost(optimized_.T_cam_world) < cost(T_eldest) ? optimized_.T_cam_world : T_eldest;
+}
+
 /// Takes out the younger matches that contradict the elders, and weighs the others down. False: there are
 /// none who are old enough to be trusted, or none who are younger, or the elders do not agree.
 bool PoseSolver::LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
@@ -60,9 +102,11 @@ bool PoseSolver::LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_wor
     if (current_.ages_s[i] >= *elder_age_s) eldest_.push_back(current_.observations[i]);
   }
   if (eldest_.size() == current_.observations.size()) return false;
-  OptimizePose(camera, T_cam_world, eldest_, options, optimized_);
-  if (!optimized_.usable || !elders->Decide(optimized_.num_inliers, eldest_.size())) return false;
-  KeepWhatAgrees(camera, optimized_.T_cam_world, *elder_age_s, optimized_.num_inliers, *elders);
+  const std::optional<Rigid3d> pose = PoseOfEldest(camera, T_cam_world, options);
+  if (!pose) return false;
+  const int agreeing = Explain(camera, *pose, eldest_, options.max_chi2).agreeing;
+  if (!elders->Decide(agreeing, eldest_.size())) return false;
+  KeepWhatAgrees(camera, *pose, *elder_age_s, agreeing, *elders);
   return elders->AreTrusted(*elder_age_s);
 }
 

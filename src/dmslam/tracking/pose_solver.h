@@ -22,6 +22,11 @@ struct PoseFit {
   bool by_rival = false;                    ///< a wider motion than that which most landmarks follow has
 };
 
+/// Mean squared error over the variance, of the matches that agree with a pose: where one motion explains
+/// them it is less. What agrees by chance, or with a pose between two motions, lies anywhere within the
+/// bound.
+inline constexpr double kOneMotionChi2 = 1.3;
+
 /// What the pose found last rests on; valid until the next call.
 struct PoseBasis {
   std::span<const LandmarkMatch> matches;
@@ -35,10 +40,11 @@ struct PoseBasis {
 enum class Elderhood : uint8_t { kCounts, kIgnored };
 
 /// Optimises a frame's pose over its matches: the elders first, then everyone who agrees with them, each with
-/// the weight that its age deserves. While no landmark is old enough to be trusted, what contradicts that
-/// pose is asked for a motion of its own, and the one that holds more of the image is the camera's. The same
-/// holds where all landmarks are that old: then age tells nobody apart, and width decides. Does not ask the
-/// heap for memory once its buffers have grown.
+/// the weight that its age deserves. Elders who agree badly are asked again, from where all together lead.
+/// While no landmark is old enough to be trusted, what contradicts that pose is asked for a motion of its
+/// own, and the one that holds more of the image is the camera's. The same holds where all landmarks are that
+/// old: then age tells nobody apart, and width decides. Does not ask the heap for memory once its buffers
+/// have grown.
 class PoseSolver {
  public:
   explicit PoseSolver(double max_chi2) : max_chi2_(max_chi2) {}
@@ -73,6 +79,8 @@ class PoseSolver {
   void Observe(const Map& map, const LandmarkVotes& votes, const TrackedFrame& frame);
   bool LetEldersDecide(const Pinhole& camera, const Rigid3d& T_cam_world,
                        const PoseOptimizationOptions& options, Elders* elders);
+  std::optional<Rigid3d> PoseOfEldest(const Pinhole& camera, const Rigid3d& T_cam_world,
+                                      const PoseOptimizationOptions& options);
   void KeepWhatAgrees(const Pinhole& camera, const Rigid3d& T_cam_world, double elder_age_s, int agreeing,
                       const Elders& elders);
   std::optional<Rigid3d> FindWiderMotion(const Camera& camera, const Rigid3d& T_cam_world,
@@ -85,7 +93,7 @@ class PoseSolver {
   // Workspace
   Matches all_;      ///< whatever the frame shows of landmarks
   Matches current_;  ///< those that have a say
-  std::vector<PoseObservation> eldest_, contradicting_;
+  std::vector<PoseObservation> eldest_, agreeing_, contradicting_;
   PoseOptimizationReport optimized_, rival_;
 };
 

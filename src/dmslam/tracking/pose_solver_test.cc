@@ -297,6 +297,28 @@ TEST_F(PoseSolverTest, EldersWhoDoNotAgreeDecideNothing) {
   EXPECT_LT(Error(frame.T_cam_world), 2e-3);
 }
 
+/// Of the elders more are limbs of somebody who has just begun to move than are room, and most agree with a
+/// pose between them, badly. All matches together know better.
+TEST_F(PoseSolverTest, EldersAreNotTakenAtACompromise) {
+  scene_.AddCloud(80, {-1.5, 0, 4}, {0.4, 1.5, 0.5}, Ago(2));
+  const size_t arm = scene_.size();
+  scene_.AddCloud(60, {-0.3, 0.3, 2}, {0.3, 0.2, 0.1}, Ago(2));
+  const size_t leg = scene_.size();
+  scene_.AddCloud(60, {-0.3, -0.3, 2}, {0.3, 0.2, 0.1}, Ago(2));
+  const size_t rest = scene_.size();
+  scene_.AddCloud(100, {1, 0, 4}, {0.8, 1.6, 1}, Ago(1));
+  scene_.MapAll();
+  TrackedFrame frame = Frame([&](size_t i) {
+    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+    if (i >= arm && i < leg) moved = {0.015, 0, 0.01};
+    if (i >= leg && i < rest) moved = {-0.01, 0.01, 0};
+    return std::optional<Eigen::Vector3d>(scene_.point(i) + moved);
+  });
+  const PoseFit fit = Solve(&frame);
+  EXPECT_LT(Error(frame.T_cam_world), 1e-3);
+  EXPECT_EQ(fit.inliers, 180);
+}
+
 TEST_F(PoseSolverTest, WhereAllAreOldNobodyIsAnElder) {
   AddRoom(120, 10);
   scene_.MapAll();
