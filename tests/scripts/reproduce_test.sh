@@ -146,7 +146,7 @@ check "it goes on where it was" test $(($(wc -l <"$CALLS") - before)) -eq 6
 # Runs that fail are reported, tried again the next time, and three in a row end it.
 expect 0 'dm/seed_1: exit status 7: it fell over' env FAIL=dm "${run[@]}" --out "$work/c" --seeds 1
 check "the report counts them" grep -q '4 of 12 failed or gave no trajectory' "$work/c/report.md"
-check "as nothing tracked" grep -qE '^\| fr1_xyz \| dm \| 0/1 \| 1 of 1 \| – \| 0\.0 \| 0\.0 \| 0\.0 ' "$work/c/report.md"
+check "as nothing tracked" grep -qE '^\| fr1_xyz \| dm \| 0/1 \| 1 of 1 \| – \| – \| 0\.0 \| 0\.0 \| 0\.0 ' "$work/c/report.md"
 check "progress.txt counts them" grep -q '^failed this time: 4' "$work/c/progress.txt"
 check "the report lists them" grep -q 'the run failed: exit status 7: it fell over' "$work/c/report.md"
 expect 0 'report.md' "${run[@]}" --out "$work/c" --seeds 1
