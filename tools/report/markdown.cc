@@ -179,7 +179,7 @@ const char* KindOf(const SequenceInfo& info) {
 
 std::string WhetherHere(const PlannedSequence& sequence) {
   if (sequence.present()) return "yes";
-  const std::string absent = "**absent**: " + std::string(sequence.info.source);
+  std::string absent = "**absent**: " + std::string(sequence.info.source);
   if (!sequence.has_runs) return absent;
   return absent + ". **Its runs are not shown**: give `scripts/reproduce.sh` its folder again";
 }
