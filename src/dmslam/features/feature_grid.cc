@@ -171,7 +171,7 @@ size_t FeatureGrid::CollectOf(const Circle& circle, const Run& run, uint32_t* fe
   const float radius_squared = circle.radius_px * circle.radius_px;
   const Wanted wanted = {circle.x_px, circle.y_px, radius_squared, circle.min_octave, circle.max_octave};
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return CollectAvx2(entries, wanted, features);
+  if (Takes(VectorPath::kAvx2, path)) return CollectAvx2(entries, wanted, features);
 #endif
   return Collect(entries, wanted, features);
 }

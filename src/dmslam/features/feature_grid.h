@@ -78,7 +78,7 @@ class FeatureGrid {
   /// where most features of the cells are wanted or refused without pattern, as it takes no branches.
   static constexpr size_t kSlack = 8;
   size_t CollectInRadius(const Eigen::Vector2d& center_px, double radius_px, int min_octave, int max_octave,
-                         uint32_t* features, VectorPath path = VectorPath::kAvx2) const;
+                         uint32_t* features, VectorPath path = VectorPath::kWidest) const;
 
   size_t size() const { return features_.empty() ? 0 : features_.size() - kSlack; }
   /// What its lists take in memory, with what their beginnings must be aligned to.
@@ -141,7 +141,7 @@ class FeatureGrid {
   /// Those of the run's entries that lie in the circle, into `features`, which has room for all of them and
   /// kSlack more.
   size_t CollectOf(const Circle& circle, const Run& run, uint32_t* features,
-                   VectorPath path = VectorPath::kAvx2) const;
+                   VectorPath path = VectorPath::kWidest) const;
   size_t CellIndex(int column, int row) const {
     return static_cast<size_t>(row) * static_cast<size_t>(columns_) + static_cast<size_t>(column);
   }

@@ -108,7 +108,7 @@ PoseNormal SumPoseNormal(const Pinhole& camera, const Rigid3d& T_cam_world,
                          std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
                          std::span<const int> indices, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2())
+  if (Takes(VectorPath::kAvx2, path))
     return SumAvx2(camera, T_cam_world, points_world, uv_px, inv_sigma_squared, indices);
 #endif
   return Sum(camera, T_cam_world, points_world, uv_px, inv_sigma_squared, indices);

@@ -22,6 +22,6 @@ struct PoseNormal {
 PoseNormal SumPoseNormal(const Pinhole& camera, const Rigid3d& T_cam_world,
                          std::span<const Eigen::Vector3d> points_world,
                          std::span<const Eigen::Vector2d> uv_px, std::span<const double> inv_sigma_squared,
-                         std::span<const int> indices, VectorPath path = VectorPath::kAvx2);
+                         std::span<const int> indices, VectorPath path = VectorPath::kWidest);
 
 }  // namespace dmslam

@@ -270,6 +270,23 @@ __attribute__((target("avx2"))) double SumCostAvx2(const PackedMatches& matches,
                                                    double enough) {
   return SumCost(matches, M, enough);
 }
+
+DMSLAM_AVX512 EssentialNormal SumNormalAvx512(const PackedMatches& matches, const TwoViewModel& model,
+                                              const Eigen::Matrix<double, 3, 2>& B, double bound_scale,
+                                              double enough) {
+  return SumNormal(matches, model, B, bound_scale, enough);
+}
+DMSLAM_AVX512 EssentialCost SumCostOfNormalAvx512(const PackedMatches& matches, const TwoViewModel& model,
+                                                  double bound_scale, double enough) {
+  return SumCostOfNormal(matches, model, bound_scale, enough);
+}
+DMSLAM_AVX512 RotationNormal SumRotationAvx512(const PackedMatches& matches, const UnitRays& rays1,
+                                               const Eigen::Matrix3d& R) {
+  return SumRotation(matches, rays1, R);
+}
+DMSLAM_AVX512 double SumCostAvx512(const PackedMatches& matches, const Eigen::Matrix3d& M, double enough) {
+  return SumCost(matches, M, enough);
+}
 #endif
 
 }  // namespace
@@ -307,8 +324,8 @@ EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewMo
                                    const Eigen::Matrix<double, 3, 2>& tangent, double bound_scale,
                                    double enough, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2())
-    return SumNormalAvx2(matches, model, tangent, bound_scale, enough);
+  if (Takes(VectorPath::kAvx512, path)) return SumNormalAvx512(matches, model, tangent, bound_scale, enough);
+  if (Takes(VectorPath::kAvx2, path)) return SumNormalAvx2(matches, model, tangent, bound_scale, enough);
 #endif
   return SumNormal(matches, model, tangent, bound_scale, enough);
 }
@@ -316,7 +333,8 @@ EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewMo
 EssentialCost SumEssentialCost(const PackedMatches& matches, const TwoViewModel& model, double bound_scale,
                                double enough, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return SumCostOfNormalAvx2(matches, model, bound_scale, enough);
+  if (Takes(VectorPath::kAvx512, path)) return SumCostOfNormalAvx512(matches, model, bound_scale, enough);
+  if (Takes(VectorPath::kAvx2, path)) return SumCostOfNormalAvx2(matches, model, bound_scale, enough);
 #endif
   return SumCostOfNormal(matches, model, bound_scale, enough);
 }
@@ -324,7 +342,8 @@ EssentialCost SumEssentialCost(const PackedMatches& matches, const TwoViewModel&
 RotationNormal SumRotationNormal(const PackedMatches& matches, const UnitRays& rays1,
                                  const Eigen::Matrix3d& R, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return SumRotationAvx2(matches, rays1, R);
+  if (Takes(VectorPath::kAvx512, path)) return SumRotationAvx512(matches, rays1, R);
+  if (Takes(VectorPath::kAvx2, path)) return SumRotationAvx2(matches, rays1, R);
 #endif
   return SumRotation(matches, rays1, R);
 }
@@ -332,7 +351,8 @@ RotationNormal SumRotationNormal(const PackedMatches& matches, const UnitRays& r
 double SumEpipolarCost(const PackedMatches& matches, const Eigen::Matrix3d& M, double enough,
                        [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return SumCostAvx2(matches, M, enough);
+  if (Takes(VectorPath::kAvx512, path)) return SumCostAvx512(matches, M, enough);
+  if (Takes(VectorPath::kAvx2, path)) return SumCostAvx2(matches, M, enough);
 #endif
   return SumCost(matches, M, enough);
 }

@@ -36,7 +36,7 @@ struct EssentialNormal {
 EssentialNormal SumEssentialNormal(const PackedMatches& matches, const TwoViewModel& model,
                                    const Eigen::Matrix<double, 3, 2>& tangent, double bound_scale,
                                    double enough = std::numeric_limits<double>::infinity(),
-                                   VectorPath path = VectorPath::kAvx2);
+                                   VectorPath path = VectorPath::kWidest);
 
 /// The cost and the count of SumEssentialNormal alone, the same to the last bit.
 struct EssentialCost {
@@ -45,7 +45,7 @@ struct EssentialCost {
 };
 EssentialCost SumEssentialCost(const PackedMatches& matches, const TwoViewModel& model, double bound_scale,
                                double enough = std::numeric_limits<double>::infinity(),
-                               VectorPath path = VectorPath::kAvx2);
+                               VectorPath path = VectorPath::kWidest);
 
 /// Rays of frame 1, made unit vectors, and the sum of both bounds; parallel to PackedMatches.
 struct UnitRays {
@@ -60,12 +60,12 @@ struct RotationNormal {
   Eigen::Vector3d gradient;
 };
 RotationNormal SumRotationNormal(const PackedMatches& matches, const UnitRays& rays1,
-                                 const Eigen::Matrix3d& R, VectorPath path = VectorPath::kAvx2);
+                                 const Eigen::Matrix3d& R, VectorPath path = VectorPath::kWidest);
 
 /// Sum of s / (1 + s), s the normalised Sampson distance, where it is below `enough`; else some number from
 /// `enough` up.
 double SumEpipolarCost(const PackedMatches& matches, const Eigen::Matrix3d& M,
                        double enough = std::numeric_limits<double>::infinity(),
-                       VectorPath path = VectorPath::kAvx2);
+                       VectorPath path = VectorPath::kWidest);
 
 }  // namespace dmslam

@@ -173,7 +173,7 @@ __attribute__((target("avx2"))) int FlagAvx2(const Eigen::Matrix3d& M, const Mat
 int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, int more_than,
                  [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return CountAvx2(M, arrays, range, more_than);
+  if (Takes(VectorPath::kAvx2, path)) return CountAvx2(M, arrays, range, more_than);
 #endif
   return Count(M, arrays, range, more_than);
 }
@@ -181,7 +181,7 @@ int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range rang
 int FlagInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, std::span<uint8_t> flags,
                 [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return FlagAvx2(M, arrays, range, flags.data());
+  if (Takes(VectorPath::kAvx2, path)) return FlagAvx2(M, arrays, range, flags.data());
 #endif
   return Flag(M, arrays, range, flags.data());
 }

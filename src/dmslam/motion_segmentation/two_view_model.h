@@ -52,10 +52,10 @@ double NormalizedSampson(const Eigen::Matrix3d& M, const MatchArrays& arrays, si
 
 /// How many of `range` are inliers, where these are more than `more_than`; else some number up to it.
 int CountInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, int more_than = -1,
-                 VectorPath path = VectorPath::kAvx2);
+                 VectorPath path = VectorPath::kWidest);
 /// Flags of all of `range` into flags[range.begin .. range.end).
 int FlagInliers(const Eigen::Matrix3d& M, const MatchArrays& arrays, Range range, std::span<uint8_t> flags,
-                VectorPath path = VectorPath::kAvx2);
+                VectorPath path = VectorPath::kWidest);
 /// The same for a rotation alone: transfer error of ray0 into image 1 against both points' variance.
 int CountRotationInliers(const Eigen::Matrix3d& R, const MatchArrays& arrays, Range range);
 

@@ -132,7 +132,7 @@ __attribute__((target("avx2"))) std::optional<double> SolveAvx2(BlockTridiagonal
 
 std::optional<double> Solve(BlockTridiagonal* system, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2()) return SolveAvx2(system);
+  if (Takes(VectorPath::kAvx2, path)) return SolveAvx2(system);
 #endif
   return SolveHere(system);
 }

@@ -22,6 +22,6 @@ struct BlockTridiagonal {
 
 /// Block Cholesky. Replaces `right` by x; the rest of `system` is used up. The logarithm of A's determinant;
 /// none where A is not positive definite, or x not finite. The same bits on every path.
-std::optional<double> Solve(BlockTridiagonal* system, VectorPath path = VectorPath::kAvx2);
+std::optional<double> Solve(BlockTridiagonal* system, VectorPath path = VectorPath::kWidest);
 
 }  // namespace dmslam

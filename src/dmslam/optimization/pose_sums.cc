@@ -210,6 +210,12 @@ __attribute__((target("avx2"))) PoseEquations SumEquationsAvx2(const Pinhole& ca
                                                                std::span<const char> use, double huber_chi2) {
   return SumEquations(camera, T, observations, use, huber_chi2);
 }
+
+DMSLAM_AVX512 PoseEquations SumEquationsAvx512(const Pinhole& camera, const Rigid3d& T,
+                                               std::span<const PoseObservation> observations,
+                                               std::span<const char> use, double huber_chi2) {
+  return SumEquations(camera, T, observations, use, huber_chi2);
+}
 #endif
 
 }  // namespace
@@ -218,7 +224,9 @@ PoseEquations SumPoseEquations(const Pinhole& camera, const Rigid3d& T_cam_world
                                std::span<const PoseObservation> observations, std::span<const char> use,
                                double huber_chi2, [[maybe_unused]] VectorPath path) {
 #if defined(__x86_64__)
-  if (path == VectorPath::kAvx2 && HasAvx2())
+  if (Takes(VectorPath::kAvx512, path))
+    return SumEquationsAvx512(camera, T_cam_world, observations, use, huber_chi2);
+  if (Takes(VectorPath::kAvx2, path))
     return SumEquationsAvx2(camera, T_cam_world, observations, use, huber_chi2);
 #endif
   return SumEquations(camera, T_cam_world, observations, use, huber_chi2);

@@ -28,6 +28,6 @@ struct PoseEquations {
 PoseEquations SumPoseEquations(const Pinhole& camera, const Rigid3d& T_cam_world,
                                std::span<const PoseObservation> observations, std::span<const char> use,
                                double huber_chi2 = std::numeric_limits<double>::infinity(),
-                               VectorPath path = VectorPath::kAvx2);
+                               VectorPath path = VectorPath::kWidest);
 
 }  // namespace dmslam
