@@ -115,7 +115,7 @@ SessionStart FrontendNode::MakeSessionStart() const {
   SessionStart start;
   start.session = session_;
   start.camera_id = options_.camera_id;
-  start.first_stamp_ns = 0;
+  if (frames_.waiting()) start.first_stamp_ns = frames_.waiting()->frame.stamp_ns;
   start.seed = run_.seed;
   start.configuration_hash = options_.settings.Hash();
   if (extras_.vocabulary) start.vocabulary_checksum = extras_.vocabulary->checksum();

@@ -438,9 +438,13 @@ std::vector<CameraId> Map::cameras() const {
 }
 
 void Map::SetProgressTo(const MapProgress& progress) {
-  if (progress == MapProgress()) progress_of_.clear();
   progress_ = progress;
   progress_of_[progress.camera] = progress;
+}
+
+void Map::ForgetProgress() {
+  progress_of_.clear();
+  SetProgressTo({});
 }
 
 }  // namespace dmslam

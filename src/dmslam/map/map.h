@@ -166,8 +166,10 @@ class Map {
   void SetVersion(uint64_t version) { version_ = version; }
   /// A change is complete.
   void TidyFeatures();
-  /// Of one camera; none at all (a default one): of all.
+  /// Of one camera, and of the loop closer.
   void SetProgressTo(const MapProgress& progress);
+  /// Of all cameras: nothing of any stream is in the map.
+  void ForgetProgress();
 
  private:
   /// Where a camera stands. Kept beside the keyframes, which lie all over the memory: thousands are compared

@@ -16,7 +16,7 @@
 namespace dmslam {
 
 /// What a map record says, and why it was written. Each has one meaning, and says which of the delta's
-/// `about`, `map_id`, `correction_id` and `request` there are.
+/// `about`, `map_id`, `correction_id` and `request` there are (NeededBy).
 enum class MapEvent : uint8_t {
   kKeyframeInserted = 1,  ///< keyframe `about`
   kLandmarksCreated = 2,  ///< by keyframe `about`
@@ -37,6 +37,40 @@ enum class MapEvent : uint8_t {
   kFirstMapRefused = 17,  ///< of `map_id`, with `about` as the `second` proposed; `note` says why
   kTurn = 18,             ///< the answer to a TurnRequest: all that comes before frame `about` is in the map
 };
+
+/// What a delta must name for its event; without it the record is refused.
+struct EventNeeds {
+  bool about = false, map_id = false, correction_id = false, request = false;
+};
+constexpr EventNeeds NeededBy(MapEvent event) {
+  switch (event) {
+    case MapEvent::kKeyframeInserted:
+    case MapEvent::kLandmarksCreated:
+    case MapEvent::kFused:
+    case MapEvent::kAdjusted:
+    case MapEvent::kMapped:
+    case MapEvent::kSettled:
+    case MapEvent::kTurn:
+      return {.about = true};
+    case MapEvent::kMapStarted:
+    case MapEvent::kFirstMapRefused:
+      return {.about = true, .map_id = true};
+    case MapEvent::kMapDropped:
+    case MapEvent::kMapAdjusted:
+      return {.map_id = true};
+    case MapEvent::kCorrected:
+    case MapEvent::kGloballyAdjusted:
+    case MapEvent::kRefused:
+      return {.correction_id = true};
+    case MapEvent::kRequestDone:
+      return {.request = true};
+    case MapEvent::kEvidence:
+    case MapEvent::kSnapshot:
+    case MapEvent::kEnded:
+      return {};
+  }
+  return {};
+}
 
 /// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.
 struct KeyframeState {

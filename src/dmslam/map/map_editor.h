@@ -53,6 +53,7 @@ class MapEditor : public Map {
   /// Forgets the keyframes and landmarks of a whole map.
   void DropMap(MapId map_id);
   void SetProgress(const MapProgress& progress) { SetProgressTo(progress); }
+  using Map::ForgetProgress;
 
   /// What changed since the last call, as absolute values, with the next version number. What else the header
   /// holds is the caller's.

@@ -21,6 +21,8 @@ void Replica::Apply(const MapDelta& delta) {
   ApplyObservations(delta);
   ApplyTombstones(delta);
   SetVersion(std::max(version(), delta.version));
+  // The writer has read nothing of any stream: it goes on in a saved map, whatever was told of others before.
+  if (delta.progress == MapProgress()) ForgetProgress();
   SetProgressTo(delta.progress);
   ForgetOldTombstones();
   TidyFeatures();

@@ -73,7 +73,7 @@ TEST(Snapshot, TellsHowFarEveryCameraIs) {
   for (const CameraId camera : {0u, 1u, 4u})
     EXPECT_EQ(replica.progress(camera), editor.map().progress(camera)) << camera;
   EXPECT_EQ(replica.progress(2).frontend, StreamPosition()) << "nothing is known of it";
-  editor.map().SetProgress({});
+  editor.map().ForgetProgress();
   EXPECT_EQ(editor.map().progress(1).frontend, StreamPosition()) << "the streams are others";
 }
 

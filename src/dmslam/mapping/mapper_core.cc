@@ -26,7 +26,7 @@ MapperCore::MapperCore(const MapperOptions& options, const Camera& camera, const
 
 void MapperCore::ContinueSaved(Map map, uint64_t successor) {
   MapEditor saved(std::move(map));
-  saved.SetProgress({});
+  saved.ForgetProgress();
   Continue(std::move(saved), successor);
   for (const auto& [id, keyframe] : map_.keyframes()) as_saved_.insert(keyframe.map_id);
 }

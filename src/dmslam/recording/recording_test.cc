@@ -227,7 +227,7 @@ TEST_F(Recording, ATermCountsUpToWhereTheNextOneTookItOver) {
   for (int i = 0; i < 4; ++i) other.Step();
   MapEditor expected(other.map());
   expected.SetPosition(expected.At(LandmarkId::Make(1, 1)), {9, 9, 9});
-  WriteRecord(log, 10, expected.TakeDelta(MapEvent::kAdjusted, {}, 1),
+  WriteRecord(log, 10, expected.TakeDelta(MapEvent::kAdjusted, KeyframeId::Make(1, 0), 1),
               Header(StreamId::kMap, 1, two, {100, 4}));
   log.Close();
   const LogIndex index(path_);

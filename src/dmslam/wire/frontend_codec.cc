@@ -31,7 +31,7 @@ struct Codec<SessionStart> {
     s(m.seed, w.seed);
     s(m.configuration_hash, w.configuration_hash);
     s(m.vocabulary_checksum, w.vocabulary_checksum);
-    s(m.first_stamp_ns, w.first_stamp_ns);
+    s.OrMinusOne(m.first_stamp_ns, w.first_stamp_ns);
     s(m.mode, w.mode);
     s(m.pyramid.levels, w.pyramid_levels);
     s(m.pyramid.scale_factor, w.pyramid_scale_factor);

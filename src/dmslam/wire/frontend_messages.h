@@ -17,7 +17,7 @@ namespace dmslam {
 /// The first record of the frontend's stream: on what the map that follows rests.
 struct SessionStart {
   uint32_t session = 0;
-  int64_t first_stamp_ns = 0;  ///< 0: not known
+  std::optional<int64_t> first_stamp_ns;  ///< of the frame that waited when this was told; none: none did
   uint64_t seed = 0;
   uint64_t configuration_hash = 0;              ///< of all settings that change results
   std::optional<uint64_t> vocabulary_checksum;  ///< none: there is no vocabulary

@@ -376,27 +376,11 @@ void ValidateLandmarks(const MapDelta& m, Checker& check) {
 
 /// What a record is about follows from its event alone: nobody has to guess.
 void ValidateEvent(const MapDelta& m, Checker& check) {
-  switch (m.event) {
-    case MapEvent::kSettled:
-    case MapEvent::kMapped:
-    case MapEvent::kMapStarted:
-    case MapEvent::kTurn:
-      check.Require(m.about.has_value(), "an event of a keyframe that names none");
-      break;
-    case MapEvent::kMapAdjusted:
-    case MapEvent::kMapDropped:
-    case MapEvent::kFirstMapRefused:
-      check.Require(m.map_id.has_value(), "an event of a map that names none");
-      break;
-    case MapEvent::kCorrected:
-    case MapEvent::kGloballyAdjusted:
-    case MapEvent::kRefused:
-      check.Require(m.correction_id.has_value(), "an answer to a correction that names none");
-      break;
-    default:
-      break;
-  }
-  check.Require(m.request.has_value() == (m.event == MapEvent::kRequestDone),
+  const EventNeeds needs = NeededBy(m.event);
+  check.Require(!needs.about || m.about, "an event of a keyframe that names none");
+  check.Require(!needs.map_id || m.map_id, "an event of a map that names none");
+  check.Require(!needs.correction_id || m.correction_id, "an answer to a correction that names none");
+  check.Require(m.request.has_value() == needs.request,
                 "an answer to a request that names none, or a request without its answer");
 }
 

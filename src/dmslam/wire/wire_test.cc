@@ -368,8 +368,26 @@ TEST(WireTest, EventsNameWhatTheyAreAbout) {
   EXPECT_EQ(Decode<MapDelta>(Encode(delta))->request, 1U);
   delta.request.reset();
   EXPECT_THROW(Encode(delta), InvariantError);
-  delta.event = MapEvent::kRefused;
-  EXPECT_THROW(Encode(delta), InvariantError);
+  for (int event = 1; event <= static_cast<int>(MapEvent::kTurn); ++event) {
+    SCOPED_TRACE(event);
+    const EventNeeds needs = NeededBy(static_cast<MapEvent>(event));
+    MapDelta whole;
+    whole.event = static_cast<MapEvent>(event);
+    if (needs.about) whole.about = KeyframeId::Make(1, 7);
+    if (needs.map_id) whole.map_id = 3;
+    if (needs.correction_id) whole.correction_id = 5;
+    if (needs.request) whole.request = 2;
+    EXPECT_TRUE(Decode<MapDelta>(Encode(whole)).has_value());
+    const auto refused_without = [&whole](auto field) {
+      MapDelta part = whole;
+      (part.*field).reset();
+      EXPECT_THROW(Encode(part), InvariantError);
+    };
+    if (needs.about) refused_without(&MapDelta::about);
+    if (needs.map_id) refused_without(&MapDelta::map_id);
+    if (needs.correction_id) refused_without(&MapDelta::correction_id);
+    if (needs.request) refused_without(&MapDelta::request);
+  }
   LoopAnswer answer;
   answer.keyframe = KeyframeId::Make(1, 7);
   EXPECT_TRUE(Decode<LoopAnswer>(Encode(answer)).has_value());
