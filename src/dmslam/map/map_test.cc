@@ -95,6 +95,43 @@ TEST(Map, KeyframesListTheLandmarksThatTheySee) {
   EXPECT_GT(seen, 20u);
 }
 
+TEST(Map, KeyframesNearStandNearAndLookTheSameWay) {
+  RandomEditor editor(13);
+  editor.Steps(2000);
+  MapEditor& map = editor.map();
+  double angle = 0;
+  for (const auto& [id, keyframe] : map.keyframes()) {  // most of them look the same way before
+    Rigid3d turned = keyframe.T_cam_world;
+    turned.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(angle += 0.3, Eigen::Vector3d::UnitY()));
+    map.SetPoseAndScale(keyframe, turned, keyframe.scale);
+  }
+  size_t near = 0, too_far = 0, turned_away = 0;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    std::set<KeyframeId> expected;
+    for (const auto& [other_id, other] : map.keyframes()) {
+      if (other_id == id || other.map_id != keyframe.map_id) continue;
+      const double apart = (other.T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
+      const double angle_rad = other.T_cam_world.rotation.angularDistance(keyframe.T_cam_world.rotation);
+      too_far += apart >= 1.0 ? 1 : 0;
+      turned_away += apart < 1.0 && angle_rad >= 0.7 ? 1 : 0;
+      if (apart < 1.0 && angle_rad < 0.7) expected.insert(other_id);
+    }
+    double farthest = 0;
+    std::set<KeyframeId> found;
+    for (const Keyframe* other : map.KeyframesNear(keyframe, 1.0, 0.7)) {
+      const double apart = (other->T_cam_world.Center() - keyframe.T_cam_world.Center()).norm();
+      EXPECT_GE(apart, farthest) << "the nearest first";
+      farthest = apart;
+      found.insert(other->id);
+    }
+    EXPECT_EQ(found, expected);
+    near += expected.size();
+  }
+  EXPECT_GT(near, 0u);
+  EXPECT_GT(too_far, 0u);
+  EXPECT_GT(turned_away, 0u);
+}
+
 TEST(Map, BestCovisibleAreThoseThatShareMost) {
   RandomEditor editor(5);
   editor.Steps(2000);

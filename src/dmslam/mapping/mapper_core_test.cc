@@ -562,6 +562,28 @@ TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   EXPECT_EQ(said_.size(), before + 4);
 }
 
+TEST_F(KeyframeStep, SaysOnceMoreWhatALoopCloserHasNotHeard) {
+  ASSERT_TRUE(Start());
+  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  const uint64_t version = core_.map().version();
+  core_.AskAgain(Id(2), 1);
+  EXPECT_EQ(said_.back().event, MapEvent::kMapped);
+  EXPECT_EQ(said_.back().about, Id(2));
+  EXPECT_EQ(said_.back().map_id, 1u);
+  EXPECT_TRUE(said_.back().Empty()) << "nothing of the map changes by that";
+  EXPECT_GT(said_.back().version, version);
+}
+
+TEST_F(KeyframeStep, AnswersARequestByItsNumberAndNothingElse) {
+  ASSERT_TRUE(Start());
+  core_.AnswerRequest(7);
+  EXPECT_EQ(said_.back().event, MapEvent::kRequestDone);
+  EXPECT_EQ(said_.back().request, 7u);
+  EXPECT_FALSE(said_.back().about.has_value());
+  EXPECT_FALSE(said_.back().map_id.has_value());
+  EXPECT_TRUE(said_.back().Empty());
+}
+
 /// What comes after an answered request to adjust all maps is adjusted by the next one, and by the end.
 class AfterARequest : public KeyframeStep {
  protected:
