@@ -3,7 +3,6 @@
 #include <algorithm>
 
 namespace dmslam {
-namespace {
 
 LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item, int64_t stamp_ns,
                          const MotionBeliefOptions& options) {
@@ -20,7 +19,9 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
   return state;
 }
 
-}  // namespace
+bool IsToBeRemoved(const LandmarkEvidence& evidence, const MotionBeliefOptions& options) {
+  return options.enabled && evidence.motion_belief > options.remove_above;
+}
 
 void KeepStatic(std::vector<const Landmark*>* landmarks) {
   std::erase_if(*landmarks, [](const Landmark* landmark) { return !IsStatic(landmark); });
@@ -54,7 +55,7 @@ EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
     const Landmark& landmark = map.At(*id);
     const LandmarkEvidence updated = Updated(landmark.evidence, item, evidence.stamp_ns, options);
     ++report.applied;
-    if (options.enabled && updated.motion_belief > options.remove_above) {
+    if (IsToBeRemoved(updated, options)) {
       map.RemoveLandmark(landmark);
       ++report.removed;
     } else {

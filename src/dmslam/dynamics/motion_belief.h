@@ -53,6 +53,13 @@ std::vector<uint8_t> StaticFeatures(const Map& map, const Keyframe& keyframe);
 /// moves, and when it last did, are those of the landmark that stays.
 LandmarkEvidence Merged(const LandmarkEvidence& stays, const LandmarkEvidence& goes);
 
+/// A landmark's evidence with what a record of frames, the newest of which has this stamp, says of it.
+LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item, int64_t stamp_ns,
+                         const MotionBeliefOptions& options);
+
+/// Whether a landmark of this evidence has been believed to move for so long that it leaves the map.
+bool IsToBeRemoved(const LandmarkEvidence& evidence, const MotionBeliefOptions& options);
+
 struct EvidenceReport {
   int applied = 0;
   int unknown = 0;  ///< landmarks that are gone

@@ -66,6 +66,16 @@ TEST_F(MotionBeliefTest, WhatGoesOnMovingLeavesTheMap) {
   EXPECT_EQ(scene_.map().num_landmarks(), kPoints - 1);
 }
 
+TEST_F(MotionBeliefTest, OnlyBeyondTheBoundALandmarkIsToBeRemoved) {
+  LandmarkEvidence evidence;
+  evidence.motion_belief = options_.remove_above;
+  EXPECT_FALSE(IsToBeRemoved(evidence, options_));
+  evidence.motion_belief += 0.5F;
+  EXPECT_TRUE(IsToBeRemoved(evidence, options_));
+  options_.enabled = false;
+  EXPECT_FALSE(IsToBeRemoved(evidence, options_)) << "switched off, belief removes nothing";
+}
+
 TEST_F(MotionBeliefTest, HoweverLongItStoodWhatBeginsToMoveLeavesSoon) {
   for (int i = 0; i < 50; ++i) Say(0, 30, 0);
   EXPECT_FLOAT_EQ(BeliefOf(0), kLowestBelief);

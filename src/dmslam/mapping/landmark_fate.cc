@@ -1,6 +1,5 @@
 #include "dmslam/mapping/landmark_fate.h"
 
-#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -48,25 +47,16 @@ LandmarkFate LandmarkFates::Of(const LandmarkTombstone& tombstone, const Map& ma
   }
 }
 
-/// By the mapper's own rule, applied to the landmark alone, which stays; as far as the mapper went.
+/// By the mapper's own rule, item by item until it removes the landmark.
 LandmarkEvidence LandmarkFates::With(const FrameEvidence& said, const Map& map,
                                      const Landmark& landmark) const {
-  MapEditor alone(map.camera(), map.pyramid());
-  Landmark copy;
-  copy.id = landmark.id;
-  copy.evidence = landmark.evidence;
-  alone.AddLandmark(std::move(copy));
-  MotionBeliefOptions belief = options_.belief;
-  belief.remove_above = std::numeric_limits<float>::max();
-  FrameEvidence of_it = said;
-  for (FrameEvidence::Item item : said.items) {
+  LandmarkEvidence evidence = landmark.evidence;
+  for (const FrameEvidence::Item& item : said.items) {
     if (map.Resolve(item.landmark) != landmark.id) continue;
-    if (alone.At(landmark.id).evidence.motion_belief > options_.belief.remove_above) break;
-    item.landmark = landmark.id;
-    of_it.items = {item};
-    ApplyEvidence(alone, of_it, belief);
+    evidence = Updated(evidence, item, said.stamp_ns, options_.belief);
+    if (IsToBeRemoved(evidence, options_.belief)) break;
   }
-  return alone.At(landmark.id).evidence;
+  return evidence;
 }
 
 /// First those on probation go, then landmarks are made, then those that are seen through go, old or new.
