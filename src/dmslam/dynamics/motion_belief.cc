@@ -9,8 +9,7 @@ LandmarkEvidence Updated(LandmarkEvidence state, const FrameEvidence::Item& item
   state.visible += item.visible;
   state.found += item.found;
   state.moved += item.moved;
-  if (item.moved > 0 && stamp_ns > 0)  // a stamp of zero travels as none
-    state.last_moved_ns = std::max(state.last_moved_ns.value_or(stamp_ns), stamp_ns);
+  if (item.moved > 0) state.last_moved_ns = std::max(state.last_moved_ns.value_or(stamp_ns), stamp_ns);
   if (options.enabled) {
     const float change = options.moved_step * static_cast<float>(item.moved) -
                          options.found_step * static_cast<float>(item.found);

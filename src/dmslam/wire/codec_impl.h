@@ -109,6 +109,12 @@ class Put {
     wire.resize(items.size());
     for (size_t i = 0; i < items.size(); ++i) (*this)(std::invoke(part, items[i]), wire[i]);
   }
+  /// The same for stamps whose absence is told as zero: a stamp of zero travels as an absent one.
+  template <typename Item, typename Memory, typename Part>
+  void StampColumn(const std::vector<Item, Memory>& items, std::vector<int64_t>& wire, Part part) {
+    wire.resize(items.size());
+    for (size_t i = 0; i < items.size(); ++i) wire[i] = std::invoke(part, items[i]).value_or(0);
+  }
   void Bytes(const std::vector<uint8_t>& bytes, std::vector<uint8_t>& wire) { wire = bytes; }
   template <typename Item, typename Memory, typename Part>
   void Descriptors(const std::vector<Item, Memory>& items, int32_t& num_bytes, std::vector<uint8_t>& wire,
@@ -188,6 +194,10 @@ class Get {
   void Column(std::vector<Item, Memory>& items, const std::vector<WireValue>& wire, Part part) {
     for (size_t i = 0; i < std::min(items.size(), wire.size()); ++i)
       (*this)(std::invoke(part, items[i]), wire[i]);
+  }
+  template <typename Item, typename Memory, typename Part>
+  void StampColumn(std::vector<Item, Memory>& items, const std::vector<int64_t>& wire, Part part) {
+    Column(items, wire, part);
   }
   void Bytes(std::vector<uint8_t>& bytes, const std::vector<uint8_t>& wire) { bytes = wire; }
   template <typename Item, typename Memory, typename Part>

@@ -233,7 +233,7 @@ void LandmarkColumns(auto& s, auto& m, auto& flat, auto& w) {
       m.landmarks, w.lm_moved, [](auto& item) -> auto& { return item.evidence.moved; });
   s.Column(
       m.landmarks, w.lm_motion_belief, [](auto& item) -> auto& { return item.evidence.motion_belief; });
-  s.Column(
+  s.StampColumn(
       m.landmarks, w.lm_last_moved_ns, [](auto& item) -> auto& { return item.evidence.last_moved_ns; });
   s.Descriptors(m.landmarks, w.num_landmark_descriptor_bytes, w.lm_descriptors, &State::descriptor);
 }
@@ -256,7 +256,7 @@ void LandmarkChangeColumns(auto& s, auto& m, auto& w) {
       evidence, w.evidence_moved, [](auto& item) -> auto& { return item.evidence.moved; });
   s.Column(
       evidence, w.evidence_motion_belief, [](auto& item) -> auto& { return item.evidence.motion_belief; });
-  s.Column(
+  s.StampColumn(
       evidence, w.evidence_last_moved_ns, [](auto& item) -> auto& { return item.evidence.last_moved_ns; });
 }
 

@@ -337,6 +337,20 @@ TEST(WireTest, AbsentStampsAndCapturesAtZeroAreTwoThings) {
   EXPECT_THROW(Encode(reset), InvariantError) << "a reset is of a map";
 }
 
+TEST(WireTest, AStampOfZeroAtWhichALandmarkMovedTravelsAsNone) {
+  MapDelta delta;
+  delta.landmark_evidence.resize(2);
+  for (uint32_t i = 0; i < 2; ++i) {
+    delta.landmark_evidence[i].id = LandmarkId::Make(1, 8 + i);
+    delta.landmark_evidence[i].evidence.last_moved_ns = i;
+  }
+  EXPECT_EQ(OnTheWire<map_record_t>(delta).evidence_last_moved_ns, (std::vector<int64_t>{0, 1}));
+  const std::optional<MapDelta> back = Decode<MapDelta>(Encode(delta));
+  ASSERT_TRUE(back.has_value());
+  EXPECT_FALSE(back->landmark_evidence[0].evidence.last_moved_ns.has_value());
+  EXPECT_EQ(back->landmark_evidence[1].evidence.last_moved_ns, 1);
+}
+
 TEST(WireTest, DepthsAndSigmasAreOfAllKeypointsOrNone) {
   KeyframeProposal keyframe = RandomMessage<KeyframeProposal>(5, 30);
   FeatureSet& features = keyframe.features;
