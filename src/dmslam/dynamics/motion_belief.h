@@ -17,7 +17,7 @@ struct MotionBeliefOptions {
   bool enabled = true;
   float found_step = 0.5F;    ///< taken from the log odds for each frame that found it in its place
   float moved_step = 1.0F;    ///< added for each frame that found it elsewhere
-  float remove_above = 2.5F;  ///< beyond this it leaves the map
+  float remove_above = 2.5F;  ///< beyond this it leaves the map; kHighestBelief: it never does
 
   template <typename Visitor>
   void Describe(Visitor& v) {
@@ -26,8 +26,8 @@ struct MotionBeliefOptions {
              "taken by a frame that finds a landmark in its place");
     v.Number("mapping.belief_moved_step", moved_step, 0, 10, "log odds",
              "added by a frame that finds it elsewhere");
-    v.Number("mapping.belief_remove_above", remove_above, 0, 100, "log odds",
-             "at which a landmark leaves the map");
+    v.Number("mapping.belief_remove_above", remove_above, 0, kHighestBelief, "log odds",
+             "above which a landmark leaves the map; the highest value: none leaves");
   }
 };
 
