@@ -17,7 +17,9 @@ struct VoteOptions {
 
   template <typename Visitor>
   void Describe(Visitor& v) {
-    v.Switch("tracking.motion_belief", motion_belief, "landmarks that are believed to move have no vote");
+    v.Switch("tracking.motion_belief", motion_belief,
+             "landmarks that are believed to move have no vote; switching it off also switches off elders, "
+             "rival motions, hidden places, trust by age and the belief that the mapper keeps");
     v.InBaseline("off");
     v.InPaper("off");
     v.Number("tracking.young_trust", young_trust, 0, 1, "", "weight of a landmark that was just made");
