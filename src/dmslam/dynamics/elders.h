@@ -6,6 +6,17 @@
 
 namespace dmslam {
 
+/// Mean squared error over the variance, of the matches that agree with a pose: where one motion explains
+/// them it is less. What agrees by chance, or with a pose between two motions, lies anywhere within the
+/// bound.
+inline constexpr double kOneMotionChi2 = 1.3;
+
+/// How well a pose explains the elders.
+struct ElderFit {
+  double mean_chi2 = 0;  ///< mean squared error over the variance, of those that agree with the pose
+  double cost = 0;       ///< sum over all elders of the same errors, each of them bounded
+};
+
 struct ElderOptions {
   bool elders = true;         ///< off: all matched landmarks decide at once
   int min_elders = 40;        ///< the oldest so many matched landmarks decide the pose first...
@@ -37,6 +48,14 @@ class Elders {
   std::optional<double> FromAge(std::span<const double> ages_s);
   /// Whether elders of this age are older than people stand.
   bool AreTrusted(double age_s) const { return age_s >= trusted_age_s_; }
+  /// Whether elders who agree on a pose with this mean squared error (over the variance) may be torn between
+  /// the room and somebody who has just begun to move: then they are asked again, from the pose of all.
+  static bool AreTorn(double mean_chi2) { return mean_chi2 > kOneMotionChi2; }
+  /// Whether the pose found when they are asked again counts: those that gave it agree closely, and it
+  /// explains the elders as a whole better than the first pose does.
+  static bool SecondPoseCounts(const ElderFit& first, const ElderFit& second) {
+    return second.mean_chi2 <= kOneMotionChi2 && second.cost < first.cost;
+  }
   /// Whether so many of the elders agree on a pose that it binds the others.
   bool Decide(int agreeing, size_t elders) const {
     return agreeing >= static_cast<int>(options_.agreement * static_cast<double>(elders));

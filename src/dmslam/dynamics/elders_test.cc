@@ -46,6 +46,20 @@ TEST(EldersTest, TheyDecideWhereMostOfThemAgree) {
   EXPECT_TRUE(elders.Decide(24, 40));
 }
 
+TEST(EldersTest, TheyAreTornWhereOneMotionDoesNotExplainThem) {
+  EXPECT_FALSE(Elders::AreTorn(kOneMotionChi2));
+  EXPECT_TRUE(Elders::AreTorn(kOneMotionChi2 + 0.01));
+}
+
+TEST(EldersTest, AskedAgainTheyMustAgreeCloselyAndAllOfThemBeExplainedBetter) {
+  const ElderFit first{2.0, 100.0};
+  EXPECT_TRUE(Elders::SecondPoseCounts(first, {1.0, 99.0}));
+  EXPECT_TRUE(Elders::SecondPoseCounts(first, {kOneMotionChi2, 99.0}));
+  EXPECT_FALSE(Elders::SecondPoseCounts(first, {1.0, 100.0})) << "no better than the first";
+  EXPECT_FALSE(Elders::SecondPoseCounts(first, {kOneMotionChi2 + 0.01, 50.0}))
+      << "between two motions as well";
+}
+
 TEST(EldersTest, TheYoungRefineWhatAgreesAndNeverOutweighThem) {
   const Elders elders({}, 4.0);
   EXPECT_TRUE(elders.Admit(7.8));

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dmslam/camera/image_scale.h"
+#include "dmslam/dynamics/elders.h"
 #include "dmslam/dynamics/landmark_votes.h"
 #include "dmslam/geometry/solve_symmetric.h"
 

@@ -71,14 +71,14 @@ void PoseSolver::Observe(const Map& map, const LandmarkVotes& votes, const Track
 }
 
 /// Since all start as inliers, the eldest may agree on a compromise between the room and somebody who has
-/// just begun to move. Then those that agree with the pose of all matches are asked, too: their pose counts
-/// where they agree closely, and the eldest as a whole are explained better by it.
+/// just begun to move. Then those that agree with the pose of all matches are asked, too.
 std::optional<Rigid3d> PoseSolver::PoseOfEldest(const Pinhole& camera, const Rigid3d& T_cam_world,
                                                 const PoseOptimizationOptions& options) {
   OptimizePose(camera, T_cam_world, eldest_, options, optimized_);
   if (!optimized_.usable) return std::nullopt;
   const Rigid3d T_eldest = optimized_.T_cam_world;
-  if (optimized_.mean_chi2 <= kOneMotionChi2) return T_eldest;
+  const double mean_chi2 = optimized_.mean_chi2;
+  if (!Elders::AreTorn(mean_chi2)) return T_eldest;
   OptimizePose(camera, T_cam_world, current_.observations, options, optimized_);
   if (!optimized_.usable) return T_eldest;
   const Rigid3d T_all = optimized_.T_cam_world;
@@ -86,9 +86,11 @@ std::optional<Rigid3d> PoseSolver::PoseOfEldest(const Pinhole& camera, const Rig
   std::ranges::copy_if(eldest_, std::back_inserter(agreeing_),
                        [&](const PoseObservation& o) { return Chi2(camera, T_all, o) <= options.max_chi2; });
   OptimizePose(camera, T_all, agreeing_, options, optimized_);
-  if (!optimized_.usable || optimized_.mean_chi2 > kOneMotionChi2) return T_eldest;
+  if (!optimized_.usable) return T_eldest;
+  const Rigid3d T_again = optimized_.T_cam_world;
   const auto cost = [&](const Rigid3d& T) { return Explain(camera, T, eldest_, options.max_chi2).cost; };
-  return cost(optimized_.T_cam_world) < cost(T_eldest) ? optimized_.T_cam_world : T_eldest;
+  const ElderFit first{mean_chi2, cost(T_eldest)}, again{optimized_.mean_chi2, cost(T_again)};
+  return Elders::SecondPoseCounts(first, again) ? T_again : T_eldest;
 }
 
 /// Takes out the younger matches that contradict the elders, and weighs the others down. False: there are

@@ -22,11 +22,6 @@ struct PoseFit {
   bool by_rival = false;                    ///< a wider motion than that which most landmarks follow has
 };
 
-/// Mean squared error over the variance, of the matches that agree with a pose: where one motion explains
-/// them it is less. What agrees by chance, or with a pose between two motions, lies anywhere within the
-/// bound.
-inline constexpr double kOneMotionChi2 = 1.3;
-
 /// What the pose found last rests on; valid until the next call.
 struct PoseBasis {
   std::span<const LandmarkMatch> matches;
