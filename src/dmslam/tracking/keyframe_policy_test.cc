@@ -11,6 +11,24 @@ namespace {
 
 using testing::MapScene;
 
+TEST(KeyframePolicyTest, AsksWhereTheMapShouldGrow) {
+  const KeyframeOptions options;
+  const int64_t long_ago = 2'000'000'000, just_now = 10'000'000;
+  EXPECT_FALSE(WantsKeyframe(options, {200, 200, long_ago})) << "the map suffices";
+  EXPECT_TRUE(WantsKeyframe(options, {170, 200, long_ago}));
+  EXPECT_FALSE(WantsKeyframe(options, {170, 200, just_now})) << "not yet";
+  EXPECT_TRUE(WantsKeyframe(options, {90, 200, just_now})) << "tracking becomes weak";
+  EXPECT_TRUE(WantsKeyframe(options, {55, 70, just_now})) << "... or hangs on few landmarks";
+  EXPECT_FALSE(WantsKeyframe(options, {15, 200, long_ago})) << "so few make no keyframe";
+}
+
+TEST(KeyframePolicyTest, TimeIsCountedInSecondsNotFrames) {
+  KeyframeOptions options;
+  options.min_interval_s = 0.1;
+  EXPECT_FALSE(WantsKeyframe(options, {170, 200, 99'999'999}));
+  EXPECT_TRUE(WantsKeyframe(options, {170, 200, 100'000'000}));
+}
+
 TEST(KeyframePolicyTest, AMapOfTwoKeyframesGrowsAlsoBesideALargerOne) {
   MapScene scene;
   scene.AddCloud(200, {0, 0, 4}, {1.0, 0.8, 0.5});

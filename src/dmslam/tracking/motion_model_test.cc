@@ -1,4 +1,4 @@
-// What a motion model promises beside what a tracker shows of it (tracker_test.cc).
+// Where the camera is expected, and where it may be.
 #include "dmslam/tracking/motion_model.h"
 
 #include <gtest/gtest.h>
@@ -26,9 +26,17 @@ class MotionModelTest : public ::testing::Test {
   static KeyframeId Kf(uint32_t k) { return KeyframeId::Make(MapScene::kSession, k); }
   static FrameTime Time(uint32_t frame, int64_t step_ns = kFrameNs) { return {frame, frame * step_ns}; }
   PlacedPose Placed(const Rigid3d& T_cam_world) { return PlacedPose::Of(map().At(Kf(0)), T_cam_world); }
-  void Track(double x, const FrameTime& time, double variance = 0) {
+  void Track(double x, const FrameTime& time, double variance = 0, bool jumped = false) {
     const Rigid3d T_cam_world = MapScene::PoseAt(x);
-    model_.OnTracked(map(), Placed(T_cam_world), {T_cam_world, variance * Matrix6d::Identity()}, time, false);
+    model_.OnTracked(map(), Placed(T_cam_world), {T_cam_world, variance * Matrix6d::Identity()}, time,
+                     jumped);
+  }
+  /// Tracks this frame of a camera that goes evenly.
+  void TrackTo(uint32_t frame, bool jumped = false) { Track(kStep * frame, Time(frame), 0, jumped); }
+  MotionModel::Prediction Predict(uint32_t frame) const { return model_.Predict(scene_.map(), Time(frame)); }
+  /// Distance of the predicted camera from (x, 0, 0).
+  double PredictionError(uint32_t frame, double x) const {
+    return (Predict(frame).T_cam_world.value().Center() - Eigen::Vector3d(x, 0, 0)).norm();
   }
   double PredictedX(const FrameTime& time) {
     return model_.Predict(map(), time).T_cam_world.value().Center().x();
@@ -37,6 +45,103 @@ class MotionModelTest : public ::testing::Test {
   MapScene scene_;
   MotionModel model_{{}};
 };
+
+TEST_F(MotionModelTest, NothingIsKnownBeforeTheFirstPose) {
+  EXPECT_FALSE(Predict(1).T_cam_world);
+  TrackTo(1);
+  const auto prediction = Predict(2);
+  ASSERT_TRUE(prediction.T_cam_world);
+  EXPECT_FALSE(prediction.prior) << "a pose alone is no motion";
+}
+
+TEST_F(MotionModelTest, GoesOnAsBefore) {
+  TrackTo(1);
+  TrackTo(2);
+  ASSERT_TRUE(Predict(3).prior);
+  EXPECT_LT(PredictionError(3, 3 * kStep), 1e-9);
+}
+
+TEST_F(MotionModelTest, AMotionOverAGapIsDividedByItsDuration) {
+  TrackTo(1);
+  TrackTo(3);  // a frame between was not tracked
+  EXPECT_LT(PredictionError(4, 4 * kStep), 1e-9);
+}
+
+TEST_F(MotionModelTest, APredictionOverAGapGoesAsFarAsTheCamera) {
+  TrackTo(1);
+  TrackTo(2);
+  EXPECT_LT(PredictionError(5, 5 * kStep), 1e-9);
+  EXPECT_LT(PredictionError(14, 7.5 * kStep), 1e-3) << "but not on and on";
+}
+
+TEST_F(MotionModelTest, AFrameTrackedTwiceHasNotMoved) {
+  TrackTo(1);
+  const Rigid3d corrected = MapScene::PoseAt(kStep * 1.1);
+  model_.OnTracked(map(), Placed(corrected), {corrected}, Time(1), false);
+  EXPECT_LT(PredictionError(2, kStep), kStep);
+}
+
+TEST_F(MotionModelTest, AJumpIsNoMotion) {
+  TrackTo(1);
+  TrackTo(2, true);
+  EXPECT_FALSE(Predict(3).prior);
+  EXPECT_LT(PredictionError(3, 2 * kStep), 1e-9);
+}
+
+TEST_F(MotionModelTest, ThePriorFadesWithTheGap) {
+  TrackTo(1);
+  TrackTo(2);
+  const double near = Predict(3).prior->information(0, 0), far = Predict(6).prior->information(0, 0);
+  EXPECT_GT(near / far, 10.0);
+  EXPECT_FALSE(Predict(8).prior) << "after a fifth of a second the motion says too little";
+  EXPECT_TRUE(Predict(10).recent);
+  EXPECT_FALSE(Predict(20).recent);
+}
+
+TEST_F(MotionModelTest, FollowsACorrectionOfTheMap) {
+  TrackTo(1);
+  TrackTo(2);
+  const Rigid3d shift(Eigen::Quaterniond::Identity(), {-1.0, 0, 0});
+  map().SetPose(map().At(Kf(0)), map().At(Kf(0)).T_cam_world * shift);
+  EXPECT_LT(PredictionError(3, 1.0 + 3 * kStep), 1e-9);
+}
+
+TEST_F(MotionModelTest, CoastsOnWeakPosesForAWhile) {
+  TrackTo(1);
+  TrackTo(2);
+  for (uint32_t frame = 3; frame <= 9; ++frame) {
+    model_.Coast(map(), {MapScene::PoseAt(kStep * frame)}, Time(frame));
+    EXPECT_TRUE(model_.IsCoasting());
+    ASSERT_TRUE(Predict(frame + 1).prior);
+    EXPECT_LT(PredictionError(frame + 1, kStep * (frame + 1)), 1e-9);
+  }
+  EXPECT_EQ(model_.last_stamp_ns(), Time(2).stamp_ns) << "a weak pose is not told";
+  TrackTo(10);
+  EXPECT_FALSE(model_.IsCoasting());
+}
+
+TEST_F(MotionModelTest, AJoltThatNoHandMakesIsOutOfReach) {
+  TrackTo(1);
+  TrackTo(2);
+  const auto reachable = [&](double x) { return model_.IsReachable(map(), MapScene::PoseAt(x), Time(3)); };
+  EXPECT_TRUE(reachable(3 * kStep));
+  EXPECT_TRUE(reachable(3 * kStep + 0.1)) << "2.5 % of the depth beside where the motion leads";
+  EXPECT_FALSE(reachable(3 * kStep + 0.3));
+  const Rigid3d turned(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())),
+                       MapScene::PoseAt(3 * kStep).translation);
+  EXPECT_FALSE(model_.IsReachable(map(), turned, Time(3)));
+}
+
+TEST_F(MotionModelTest, WhereItsMotionIsNotKnownACameraGoesNoFasterThanACarriedOne) {
+  TrackTo(1, true);
+  const auto reachable = [&](double x, uint32_t frame) {
+    return model_.IsReachable(map(), MapScene::PoseAt(x), Time(frame));
+  };
+  EXPECT_FALSE(reachable(1.0, 4)) << "a quarter of the depth in a tenth of a second";
+  EXPECT_TRUE(reachable(1.0, 31));
+  EXPECT_FALSE(reachable(20.0, 31));
+  EXPECT_TRUE(reachable(20.0, 300)) << "where it was ten seconds ago says nothing";
+}
 
 TEST_F(MotionModelTest, APlacedPoseGoesWithItsKeyframeAndItsScale) {
   map().SetPoseAndScale(map().At(Kf(2)), map().At(Kf(2)).T_cam_world, 3.0);  // before the pose is told
