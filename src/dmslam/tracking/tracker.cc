@@ -11,19 +11,33 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kCarefulNs = 1'000'000'000;  // so long more is asked of a camera that was found
-constexpr int64_t kConfirmNs = 500'000'000;    // so long, at most, a place must predict to be believed
-constexpr int64_t kCoastNs = 500'000'000;      // so long a weak pose leads on before places are looked for
-constexpr int64_t kNoPlacesNs = 200'000'000;   // and so long one waits without it
-constexpr int64_t kDoubtNs = 1'000'000'000;    // so long what may be no part of the room leads on
-constexpr double kTurnReachRad = 0.06;  // a lost camera is looked for where it was, turned by so much...
-constexpr double kTurnRadPerS = 0.3;    // ...and more with time...
-constexpr double kMostTurnRad = 0.3;    // ...up to this
-constexpr double kWholeShare = 0.3;     // of what the place should show, where it is seen as a whole
-constexpr double kThinShare = 0.25;     // a pose that finds less of what it should see is thin...
-constexpr double kBesideRad = 0.1;      // ...and compared with one beside it, turned by up to so much...
-constexpr double kClearlyMore = 1.3;    // ...which must find so many times as much
-constexpr int kSomeProven = 8;  // so many proven landmarks a place must show, in a map that can have them
+// For this time after a lost camera was found, a pose is searched for more widely and needs more inliers.
+constexpr int64_t kCarefulNs = 1'000'000'000;
+// A place that was recognised must predict what is seen for at most this time to be believed.
+constexpr int64_t kConfirmNs = 500'000'000;
+// While a weak pose still leads the search, places are looked for only after this time without a pose. A
+// camera that is found turned after a longer time counts as found anew.
+constexpr int64_t kCoastNs = 500'000'000;
+// Where no weak pose leads the search, places are looked for after this time without a pose.
+constexpr int64_t kNoPlacesNs = 200'000'000;
+// A pose that may rest on what is no part of the room is followed for at most this time.
+constexpr int64_t kDoubtNs = 1'000'000'000;
+// A lost camera is looked for where it was, turned by up to this angle when it has just been lost.
+constexpr double kTurnReachRad = 0.06;
+// That angle grows at this rate with the time since then [rad/s].
+constexpr double kTurnRadPerS = 0.3;
+// That angle grows no larger than this.
+constexpr double kMostTurnRad = 0.3;
+// A place is seen as a whole where this share of what it should show is found.
+constexpr double kWholeShare = 0.3;
+// A pose is thin where less than this share of what it should see is found.
+constexpr double kThinShare = 0.25;
+// A thin pose is compared with one beside it that is turned by up to this angle.
+constexpr double kBesideRad = 0.1;
+// The pose beside it takes its place only if it finds this many times as much.
+constexpr double kClearlyMore = 1.3;
+// In a map that is old enough to have proven landmarks, time confirms only a place that shows this many.
+constexpr int kSomeProven = 8;
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
