@@ -32,11 +32,11 @@ void MissingLandmarks::CallWitnesses(const Map& map, const TrackedFrame& frame,
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].valid()) continue;
     known_.Add(frame.landmarks[i]);
-    const double depth = (frame.T_cam_world * map.FindLandmark(frame.landmarks[i])->p_world).z();
+    const double depth = (frame.T_cam_world * map.At(frame.landmarks[i]).p_world).z();
     witnesses_.Add({frame.features->uv_px[i], depth, false});
   }
   for (const LandmarkId id : moved) {
-    const Eigen::Vector3d p_cam = frame.T_cam_world * map.FindLandmark(id)->p_world;
+    const Eigen::Vector3d p_cam = frame.T_cam_world * map.At(id).p_world;
     if (const auto uv = map.camera().Project(p_cam)) witnesses_.Add({*uv, p_cam.z(), true});
   }
   known_.Finish();

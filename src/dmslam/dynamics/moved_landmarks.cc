@@ -26,7 +26,7 @@ const std::vector<LandmarkId>& MovedLandmarks::Find(const Map& map,
 void MovedLandmarks::JudgeRejected(const Map& map, std::span<const RejectedMatch> rejected,
                                    TrackedFrame* frame) {
   for (const RejectedMatch& match : rejected) {
-    const Landmark& landmark = *map.FindLandmark(match.landmark);
+    const Landmark& landmark = map.At(match.landmark);
     const int distance =
         HammingDistance(landmark.descriptor, frame->features->set.descriptors[match.feature]);
     if (match.chi2 < kNearChi2 || distance > kNearDistance) continue;

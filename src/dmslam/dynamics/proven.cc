@@ -19,8 +19,7 @@ bool OutlastsStanding(const std::vector<int64_t>& stamps_ns, const ProvenOptions
 std::vector<int64_t> ObservationStamps(const Map& map, const Landmark& landmark) {
   std::vector<int64_t> stamps_ns;
   stamps_ns.reserve(landmark.observations.size());
-  for (const Observation& o : landmark.observations)
-    stamps_ns.push_back(map.FindKeyframe(o.keyframe)->stamp_ns);
+  for (const Observation& o : landmark.observations) stamps_ns.push_back(map.At(o.keyframe).stamp_ns);
   std::sort(stamps_ns.begin(), stamps_ns.end());
   return stamps_ns;
 }

@@ -87,7 +87,7 @@ std::vector<PoseObservation> ObserveAll(const Map& map, const std::vector<Sight>
   std::vector<PoseObservation> observations;
   observations.reserve(sights.size());
   for (const Sight& sight : sights) {
-    observations.push_back(Observe(map.pyramid_table(), sight, map.FindLandmark(sight.landmark)->p_world));
+    observations.push_back(Observe(map.pyramid_table(), sight, map.At(sight.landmark).p_world));
   }
   return observations;
 }
@@ -177,7 +177,7 @@ void FinalPoses::Add(const Map& map, FinalPose pose) {
   for (const Sight& sight : pose.sights) {
     const bool is_new = index_.try_emplace(sight.landmark, static_cast<uint32_t>(placed_.size())).second;
     if (!is_new) continue;
-    const Landmark& landmark = *map.FindLandmark(sight.landmark);
+    const Landmark& landmark = map.At(sight.landmark);
     placed_.push_back({landmark.p_world, landmark.p_world, InformationOf(map, landmark)});
   }
   poses_.push_back(std::move(pose));

@@ -191,7 +191,7 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   }
   if (!refined) return std::nullopt;
   refined->pose.state = TrackingState::kLocalizedLater;
-  refined->SetPose(*map.FindKeyframe(*keyframe_id), refined->measured);
+  refined->SetPose(map.At(*keyframe_id), refined->measured);
   return refined;
 }
 

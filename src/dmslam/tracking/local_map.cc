@@ -94,7 +94,7 @@ void LocalMap::RankByVotes(const Map& map, const TrackedFrame& frame) {
 /// The best neighbour of a local keyframe that is not local yet.
 std::optional<KeyframeId> LocalMap::NewNeighbour(const Map& map, KeyframeId of) {
   ranked_.clear();
-  for (const auto& [other, shared] : map.FindKeyframe(of)->covisible) {
+  for (const auto& [other, shared] : map.At(of).covisible) {
     if (shared >= 1) ranked_.emplace_back(-shared, other);
   }
   const auto asked = ranked_.begin() + std::min<ptrdiff_t>(kNeighboursAsked, std::ssize(ranked_));
@@ -119,7 +119,7 @@ void LocalMap::AddNeighbours(const Map& map) {
 
 void LocalMap::ListLandmarks(const Map& map) {
   seen_.clear();
-  for (const KeyframeId id : keyframes_) seen_.emplace_back(map.FindKeyframe(id)->seen);
+  for (const KeyframeId id : keyframes_) seen_.emplace_back(map.At(id).seen);
   Unite(seen_, &marks_, &landmarks_);
 }
 

@@ -127,7 +127,7 @@ std::optional<PoseCertainty> PoseCertaintyEstimator::Estimate(const Map& map, co
   result.rotation_rad = LargestSigma(result.covariance.bottomRightCorner<3, 3>());
   result.step = StepTo(map, now, result.depth);
   if (HasMapMoved(map)) jitter_.OnMapMoved();
-  jitter_.OnPose(frame.stamp_ns, map.FindKeyframe(pose.reference)->map_id, frame.T_cam_world, result.depth);
+  jitter_.OnPose(frame.stamp_ns, map.At(pose.reference).map_id, frame.T_cam_world, result.depth);
   result.covariance += ToPoseInReference(jitter_.Beyond(told, result.depth), pose.T_cam_reference);
   last_ = std::move(now);
   return result;

@@ -223,7 +223,7 @@ bool PoseSolver::FollowWiderMotion(const Map& map, const std::optional<PosePrior
   Observe(map, judge.votes(), *frame);
   LandmarkAges ages(map, frame->stamp_ns);
   for (size_t k = 0; k < elsewhere; ++k) {
-    const Landmark& landmark = *map.FindLandmark(judge.moved()[k]);
+    const Landmark& landmark = map.At(judge.moved()[k]);
     all_.Add(map, *frame, judge.moved_features()[k], landmark, ages.Of(landmark), 1.0);
   }
   const PoseOptimizationOptions options = Options(prior);

@@ -29,7 +29,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
     if (!last.landmarks[i].valid()) continue;
     const std::optional<LandmarkId> id = map.Resolve(last.landmarks[i]);
     if (!id) continue;
-    const Landmark& landmark = *map.FindLandmark(*id);
+    const Landmark& landmark = map.At(*id);
     if (!votes.HasVote(landmark)) continue;
     const std::optional<Eigen::Vector2d> uv = map.camera().Project(T_cam_world * landmark.p_world);
     if (!uv) continue;

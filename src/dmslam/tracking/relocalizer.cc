@@ -30,7 +30,7 @@ std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) 
   const std::vector<uint8_t> still = StaticFeatures(map, keyframe);
   std::vector<uint8_t> proven = still;
   for (size_t i = 0; i < proven.size(); ++i) {
-    if (proven[i] != 0) proven[i] = IsProven(map, *map.FindLandmark(keyframe.landmarks[i]), {}) ? 1 : 0;
+    if (proven[i] != 0) proven[i] = IsProven(map, map.At(keyframe.landmarks[i]), {}) ? 1 : 0;
   }
   return std::count(proven.begin(), proven.end(), 1) >= kManyProven ? proven : still;
 }
@@ -134,7 +134,7 @@ bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch*
       request.last_seen ? map.ResolveKeyframe(*request.last_seen) : std::nullopt;
   const std::vector<KeyframeId> candidates = Candidates(map, last, image);
   for (const KeyframeId id : candidates) {
-    if (TryKeyframe(map, *map.FindKeyframe(id), image, request.seed, frame) && fits()) return true;
+    if (TryKeyframe(map, map.At(id), image, request.seed, frame) && fits()) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
