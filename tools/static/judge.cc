@@ -320,10 +320,11 @@ nlohmann::json JudgeWindows(JudgedSequence& sequence, const WindowOptions& optio
           {"unjudged", unjudged}};
 }
 
-std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
-                                   const FrameSpan& span, uint64_t seed, std::map<std::string, int>* waited) {
-  options.past.first = static_cast<int>(span.first - span.past);
-  Initializer initializer(options, sequence.camera(), seed, MakeAdjustment(sequence.camera()));
+std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerChoice choice, const FrameSpan& span,
+                                   uint64_t seed, std::map<std::string, int>* waited) {
+  choice.options.past.first = static_cast<int>(span.first - span.past);
+  Initializer initializer(choice.options, sequence.camera(), seed, MakeAdjustment(sequence.camera()),
+                          choice.method);
   for (size_t frame = span.past; frame < std::min(span.end, sequence.size()); ++frame) {
     InitializerReport report = initializer.AddFrame(
         {static_cast<uint32_t>(frame), sequence.StampNs(frame), sequence.Features(frame)});
@@ -347,24 +348,23 @@ namespace {
 
 struct NamedInitializer {
   std::string name;
-  InitializerOptions options;
+  InitializerChoice choice;
 };
 
 /// The initialiser with each of the selectors.
 std::vector<NamedInitializer> AllInitializers(const SystemWindowOptions& options) {
   std::vector<NamedInitializer> initializers;
-  const auto add = [&](const std::string& name, const std::string& method, ModelKind kind) {
+  const auto add = [&](const std::string& name, SelectorMethod method, ModelKind kind) {
     if (name.find(options.only) == std::string::npos) return;
     InitializerOptions own = options.initializer;
-    own.method = method;
     own.selector.sampling.kind = kind;
-    initializers.push_back({name, own});
+    initializers.push_back({name, {own, method}});
   };
-  add("RANSAC, F", "ransac", ModelKind::kFundamental);
-  add("RANSAC, E", "ransac", ModelKind::kEssential);
-  add("ARSAC, F", "arsac", ModelKind::kFundamental);
-  add("ARSAC, E", "arsac", ModelKind::kEssential);
-  add("DLRSAC", "dlrsac", ModelKind::kEssential);
+  add("RANSAC, F", SelectorMethod::kRansac, ModelKind::kFundamental);
+  add("RANSAC, E", SelectorMethod::kRansac, ModelKind::kEssential);
+  add("ARSAC, F", SelectorMethod::kArsac, ModelKind::kFundamental);
+  add("ARSAC, E", SelectorMethod::kArsac, ModelKind::kEssential);
+  add("DLRSAC", SelectorMethod::kDlrsac, ModelKind::kEssential);
   return initializers;
 }
 
@@ -480,7 +480,7 @@ nlohmann::json JudgeSystem(JudgedSequence& sequence, const SystemWindowOptions& 
       const size_t end = first + static_cast<size_t>(options.frames);
       std::optional<FoundMap> found;
       if (kind.has_poses) {
-        found = FirstMapOf(sequence, initializers[s].options, {first - std::min(before, first), first, end},
+        found = FirstMapOf(sequence, initializers[s].choice, {first - std::min(before, first), first, end},
                            seed, &tallies[s].waited);
       }
       AddWindow(sequence, first, found, kind, &tallies[s]);
@@ -536,7 +536,7 @@ Start RunStart(JudgedSequence& sequence, const InitializerOptions& options, size
                std::map<std::string, int>* waited) {
   Start start;
   start.first = first;
-  const auto found = FirstMapOf(sequence, options, {first, first, sequence.size()}, seed, waited);
+  const auto found = FirstMapOf(sequence, {options}, {first, first, sequence.size()}, seed, waited);
   if (!found) return start;
   const FirstMap& map = found->map;
   start.found = true;

@@ -51,11 +51,15 @@ struct FoundMap {
   FirstMap map;
   size_t frame = 0;
 };
+/// An initialiser and what selects the static matches for it.
+struct InitializerChoice {
+  InitializerOptions options;
+  SelectorMethod method = SelectorMethod::kDlrsac;
+};
 /// The first map of a span of frames; none if there is none. Counts what the other frames waited for, if
 /// asked.
-std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerOptions options,
-                                   const FrameSpan& span, uint64_t seed,
-                                   std::map<std::string, int>* waited = nullptr);
+std::optional<FoundMap> FirstMapOf(JudgedSequence& sequence, InitializerChoice choice, const FrameSpan& span,
+                                   uint64_t seed, std::map<std::string, int>* waited = nullptr);
 /// Flags of map.matches: those with a point.
 std::vector<uint8_t> MatchesWithPoint(const FirstMap& map);
 

@@ -70,6 +70,14 @@ Camera ChooseCamera(const std::string& file, const std::string& sequence) {
   throw InputError("no camera is known for '" + sequence + "': give one with --camera FILE");
 }
 
+/// Of a first map; dlrsac-paper selects in single pairs only.
+SelectorMethod ToSelectorMethod(const std::string& name) {
+  if (name == "dlrsac") return SelectorMethod::kDlrsac;
+  if (name == "arsac") return SelectorMethod::kArsac;
+  if (name == "ransac") return SelectorMethod::kRansac;
+  throw InputError("unknown method '" + name + "': use dlrsac, arsac or ransac");
+}
+
 nlohmann::json Describe(const StaticSelection& selection, size_t num_matches) {
   nlohmann::json json;
   json["accepted"] = selection.IsUsable();
@@ -220,12 +228,11 @@ class Run {
   /// The points of the first map of an initialiser that is begun at `frame`.
   bool OnFirstMap(JudgedSequence& sequence, size_t frame) {
     InitializerOptions options;
-    options.method = settings_.method;
     options.selector.sampling.kind = settings_.model == "f" ? ModelKind::kFundamental : ModelKind::kEssential;
     options.matching = matching_;
     std::map<std::string, int> waited;
-    const auto found =
-        FirstMapOf(sequence, options, {frame, frame, sequence.size()}, settings_.seed, &waited);
+    const auto found = FirstMapOf(sequence, {options, ToSelectorMethod(settings_.method)},
+                                  {frame, frame, sequence.size()}, settings_.seed, &waited);
     if (!found) {
       std::cout << "from frame " << frame << ": no first map\n";
       report_["pairs"].push_back({{"first", frame}, {"accepted", false}, {"waited_for_frames", waited}});

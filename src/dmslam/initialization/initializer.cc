@@ -12,7 +12,6 @@
 #include "dmslam/initialization/reference_windows.h"
 #include "dmslam/motion_segmentation/turn.h"
 #include "dmslam/motion_segmentation/two_view_model.h"
-#include "dmslam/util/check.h"
 #include "dmslam/util/parallel.h"
 
 namespace dmslam {
@@ -95,17 +94,25 @@ RansacSelectorOptions RansacOptionsOf(const InitializerOptions& options) {
   return own;
 }
 
-std::unique_ptr<StaticSelector> MakeInitializerSelector(const InitializerOptions& options) {
-  if (options.method == "dlrsac") return std::make_unique<Dlrsac>(options.selector);
-  if (options.method == "ransac") return std::make_unique<RansacSelector>(RansacOptionsOf(options));
-  if (options.method != "arsac") {
-    throw InputError("unknown method '" + options.method + "': use dlrsac, arsac or ransac");
-  }
+ArsacOptions ArsacOptionsOf(const InitializerOptions& options) {
   ArsacOptions own;
   own.sampling = options.selector.sampling;
   own.input = options.selector.input;
   own.inlier = options.selector.inlier;
-  return std::make_unique<Arsac>(own);
+  return own;
+}
+
+std::unique_ptr<StaticSelector> MakeInitializerSelector(SelectorMethod method,
+                                                        const InitializerOptions& options) {
+  switch (method) {
+    case SelectorMethod::kDlrsac:
+      break;
+    case SelectorMethod::kArsac:
+      return std::make_unique<Arsac>(ArsacOptionsOf(options));
+    case SelectorMethod::kRansac:
+      return std::make_unique<RansacSelector>(RansacOptionsOf(options));
+  }
+  return std::make_unique<Dlrsac>(options.selector);
 }
 
 /// The other motions are wanted even where their matches lie close together.
@@ -147,14 +154,15 @@ InitializerReport Farther(InitializerReport a, InitializerReport b) {
 /// The work of one stream of frames.
 class Initializer::Impl {
  public:
-  Impl(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust)
+  Impl(const InitializerOptions& options, const Camera& camera, uint64_t seed, AdjustFunction adjust,
+       SelectorMethod method)
       : options_(options),
         camera_(camera),
         seed_(seed),
         builder_(options, camera, std::move(adjust)),
         motions_(options, camera, seed, builder_),
         gates_(options, builder_),
-        selector_(MakeInitializerSelector(options)),
+        selector_(MakeInitializerSelector(method, options)),
         rest_selector_(RestOptions(options)),
         stream_(options) {}
 
@@ -458,8 +466,8 @@ InitializerOptions ForImages(InitializerOptions options, const Camera& camera) {
 }  // namespace
 
 Initializer::Initializer(const InitializerOptions& options, const Camera& camera, uint64_t seed,
-                         AdjustFunction adjust)
-    : impl_(std::make_unique<Impl>(ForImages(options, camera), camera, seed, std::move(adjust))) {}
+                         AdjustFunction adjust, SelectorMethod method)
+    : impl_(std::make_unique<Impl>(ForImages(options, camera), camera, seed, std::move(adjust), method)) {}
 Initializer::~Initializer() = default;
 
 InitializerReport Initializer::AddFrame(const InitializerFrame& frame) { return impl_->AddFrame(frame); }

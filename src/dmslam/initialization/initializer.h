@@ -24,11 +24,11 @@ struct InitializerReport {
 /// they determine is made at once. Where they do not, every motion that the newest pair shows is carried
 /// through all views, and the one whose support is widest (paper Eq. 3, times its number) over all of them
 /// must win again and again for a while, and by far. A wrong start is worse than a late one. Same frames,
-/// options and seed: same answers.
+/// options, seed and selector: same answers.
 class Initializer {
  public:
   Initializer(const InitializerOptions& options, const Camera& camera, uint64_t seed,
-              AdjustFunction adjust = {});
+              AdjustFunction adjust = {}, SelectorMethod method = SelectorMethod::kDlrsac);
   ~Initializer();
 
   /// Frames come in order, each once. After a result the initialiser starts over with the next frame.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <string>
+#include <cstdint>
 
 #include "dmslam/initialization/pair_agreement.h"
 #include "dmslam/initialization/two_view_reconstruction.h"
@@ -13,6 +13,9 @@ namespace dmslam {
 /// Root of D (paper, Eq. 3) of a static set, by the image's diagonal: one that is more compact may be
 /// somebody's.
 inline constexpr double kMinDistributionShare = 0.175;
+
+/// What selects the matches of a pair of frames that are static.
+enum class SelectorMethod : uint8_t { kDlrsac, kArsac, kRansac };
 
 /// Several motions explain what several views show, and one of them shall be the camera's.
 struct ContestOptions {
@@ -105,7 +108,6 @@ struct InitializerOptions {
     agreement.dominance = DominanceOptions{};
   }
 
-  std::string method = "dlrsac";  ///< which matches are static, per pair of frames: dlrsac, arsac or ransac
   DlrsacOptions selector;      ///< of DLRSAC; its sampling, input and inlier options hold for the others, too
   AgreementOptions agreement;  ///< what several pairs must agree on
   ContestOptions contest;      ///< where they do not
@@ -132,6 +134,9 @@ struct InitializerOptions {
   /// A map of views that are nearer in time must be confirmed by another reference frame or found again, and
   /// may not be compact.
   double sure_age_s = 0.4;
+
+  /// The pyramid of the features, as it is set.
+  void SetPyramid(const Pyramid& pyramid) { selector.inlier.pyramid = reconstruction.pyramid = pyramid; }
 
   template <typename Visitor>
   void Describe(Visitor& v) {

@@ -34,8 +34,8 @@ InitializerReport Waiting(WaitReason wait, const char* reason) {
 
 ReconstructPair ReconstructByRansac(const Camera& camera, const Pyramid& pyramid) {
   HomographyOrFundamentalOptions options;
-  options.sigma_px = pyramid.Sigma(0);
-  options.reconstruction.pyramid = pyramid;
+  options.reconstruction.pyramid = pyramid.OfImages(camera.width_px, camera.height_px);
+  options.sigma_px = options.reconstruction.pyramid.Sigma(0);
   return [camera, options](std::span<const Match> matches, uint64_t seed) {
     return ReconstructBaseline(matches, camera, options, seed);
   };
@@ -46,7 +46,7 @@ ReconstructPair ReconstructByPaper(const Camera& camera, const Pyramid& pyramid)
   options.min_distribution_share = kMinDistributionShare;
   ReconstructionOptions gates;
   gates.min_parallax_rad = 0;  // the paper's is on the mean
-  gates.pyramid = pyramid;
+  gates.pyramid = pyramid.OfImages(camera.width_px, camera.height_px);
   return [camera, gates, selector = Dlrsac(options)](std::span<const Match> matches, uint64_t seed) {
     TwoViewReconstruction reconstruction =
         ReconstructFromStatic(matches, selector.Select(matches, camera, seed), camera, gates);

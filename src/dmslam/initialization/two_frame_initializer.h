@@ -20,11 +20,12 @@ struct TwoFrameOptions {
 using ReconstructPair = std::function<TwoViewReconstruction(std::span<const Match>, uint64_t)>;
 
 /// Homography or fundamental matrix by score, plain RANSAC (Mur-Artal, Montiel, Tardos, "ORB-SLAM", TRO 2015,
-/// Sec. IV). Knows nothing of motion in the scene.
+/// Sec. IV). Knows nothing of motion in the scene. `pyramid`: of the features, as it is set.
 ReconstructPair ReconstructByRansac(const Camera& camera, const Pyramid& pyramid = {});
 
 /// DLRSAC as the DM-SLAM paper has it (Lu et al., Appl. Sci. 2020, 10(12), 4252, Sec. 2.1) with the failure
 /// tests of its Sec. 2.3.1: too few matches or cells, the distribution or the mean parallax too small.
+/// `pyramid`: of the features, as it is set.
 ReconstructPair ReconstructByPaper(const Camera& camera, const Pyramid& pyramid = {});
 
 /// An initialiser of two frames: a reference frame is matched with every frame after it until a pair gives a

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
+#include <type_traits>
 #include <utility>
 
 #include "dmslam/features/orb_extractor.h"
@@ -55,10 +56,13 @@ class Collector {
   void Switch(const char* key, bool& field, const char* help) {
     Add(key, FormatSetting(field), help, Type::kSwitch).allowed = "on or off";
   }
-  void Choice(const char* key, std::string& field, std::initializer_list<const char*> choices,
-              const char* help) {
-    SettingInfo& info = Add(key, field, help, Type::kChoice);
-    info.choices.assign(choices.begin(), choices.end());
+  template <typename Enum>
+  void Choice(const char* key, Enum& field,
+              std::initializer_list<SettingChoice<std::type_identity_t<Enum>>> choices, const char* help) {
+    const auto chosen = std::ranges::find(choices, field, &SettingChoice<Enum>::value);
+    DMSLAM_CHECK(chosen != choices.end(), key);
+    SettingInfo& info = Add(key, chosen->word, help, Type::kChoice);
+    for (const SettingChoice<Enum>& choice : choices) info.choices.push_back(choice.word);
     info.allowed = JoinWithOr(info.choices);
   }
   /// Of the setting just described: its value in the profile `baseline`.

@@ -9,6 +9,13 @@
 
 namespace dmslam {
 
+/// A word that a setting may have for its value, and what it means.
+template <typename Enum>
+struct SettingChoice {
+  const char* word;
+  Enum value;
+};
+
 /// A setting's value as text: "on" or "off", the shortest text that is read as the same number, or a word.
 template <typename T>
 std::string FormatSetting(const T& value) {

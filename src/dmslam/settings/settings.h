@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "dmslam/settings/setting_value.h"
@@ -61,8 +62,13 @@ class SettingsReader {
     Shared(key, field);
   }
   void Switch(const char* key, bool& field, const char*) { Shared(key, field); }
-  void Choice(const char* key, std::string& field, std::initializer_list<const char*>, const char*) {
-    Shared(key, field);
+  template <typename Enum>
+  void Choice(const char* key, Enum& field,
+              std::initializer_list<SettingChoice<std::type_identity_t<Enum>>> choices, const char*) {
+    const std::string word = settings_.Value(key);
+    for (const SettingChoice<Enum>& choice : choices) {
+      if (choice.word == word) field = choice.value;
+    }
   }
   void InBaseline(const char*) {}
   void InPaper(const char*) {}

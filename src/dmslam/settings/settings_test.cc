@@ -67,7 +67,7 @@ TEST(SettingsTest, ReadsWhatRoomsDescribe) {
   EXPECT_EQ(settings.Read<MapperOptions>().belief.found_step, 0.1F);
   EXPECT_EQ(settings.Read<RunOptions>().seed, 7u);
   EXPECT_EQ(settings.Read<LoopcloserOptions>().min_share, 0.3);
-  EXPECT_EQ(settings.Read<FrontendOptions>().initializer_method, "arsac");
+  EXPECT_EQ(settings.Read<FrontendOptions>().initializer_method, FirstMapMethod::kArsac);
   EXPECT_EQ(settings.Read<InitializerOptions>().min_matches, InitializerOptions().min_matches);
 }
 
@@ -115,7 +115,7 @@ TEST(SettingsTest, TheProfileComesFirstWhereverItStands) {
     EXPECT_EQ(settings.Read<MapperOptions>().min_depth, 0.2) << text;
     EXPECT_FALSE(settings.Read<MapperOptions>().creation.mutual_exclusion) << text;
     EXPECT_FALSE(settings.Read<MapperOptions>().seen_through.enabled) << text;
-    EXPECT_EQ(settings.Read<FrontendOptions>().initializer_method, "ransac") << text;
+    EXPECT_EQ(settings.Read<FrontendOptions>().initializer_method, FirstMapMethod::kTwoFrameRansac) << text;
     EXPECT_EQ(settings.Read<FrontendOptions>().max_kept_frames, 300) << text;
     EXPECT_FALSE(settings.Read<FrontendOptions>().smooth_at_end) << text;
     EXPECT_FALSE(settings.Read<FrontendOptions>().keyframes_at_end) << text;

@@ -11,30 +11,37 @@ namespace {
 
 constexpr double kPaperGapS = 0.15;  // between the two frames; the paper: some frames
 
-FirstMapSearch Search(TwoFrameInitializer initializer) {
-  auto shared = std::make_shared<TwoFrameInitializer>(std::move(initializer));
-  return [shared](const InitializerFrame& frame) { return shared->AddFrame(frame); };
+template <typename AnyInitializer>
+FirstMapSearch SearchBy(std::shared_ptr<AnyInitializer> initializer) {
+  return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
 }
 
 }  // namespace
 
-FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
-                                  const Camera& camera, const Pyramid& levels, uint64_t seed) {
-  const Pyramid pyramid = levels.OfImages(camera.width_px, camera.height_px);
-  if (method == "ransac") {
-    return Search(TwoFrameInitializer({}, camera, ReconstructByRansac(camera, pyramid), seed));
+FirstMapSearch MakeFirstMapSearch(FirstMapMethod method, const InitializerOptions& options,
+                                  const Camera& camera, const Pyramid& pyramid, uint64_t seed) {
+  const auto by_selector = [&](SelectorMethod selector) {
+    InitializerOptions of_pyramid = options;
+    of_pyramid.SetPyramid(pyramid);
+    return SearchBy(
+        std::make_shared<Initializer>(of_pyramid, camera, seed, AdjustInitialMap(camera.Ideal()), selector));
+  };
+  const auto by_two_frames = [&](double min_gap_s, ReconstructPair reconstruct) {
+    TwoFrameOptions apart;
+    apart.min_gap_s = min_gap_s;
+    return SearchBy(std::make_shared<TwoFrameInitializer>(apart, camera, std::move(reconstruct), seed));
+  };
+  switch (method) {
+    case FirstMapMethod::kDlrsac:
+      break;
+    case FirstMapMethod::kArsac:
+      return by_selector(SelectorMethod::kArsac);
+    case FirstMapMethod::kTwoFrameRansac:
+      return by_two_frames(0, ReconstructByRansac(camera, pyramid));
+    case FirstMapMethod::kTwoFramePaper:
+      return by_two_frames(kPaperGapS, ReconstructByPaper(camera, pyramid));
   }
-  if (method == "paper") {
-    TwoFrameOptions some_frames_apart;
-    some_frames_apart.min_gap_s = kPaperGapS;
-    return Search(TwoFrameInitializer(some_frames_apart, camera, ReconstructByPaper(camera, pyramid), seed));
-  }
-  InitializerOptions chosen = options;
-  chosen.method = method;
-  chosen.selector.inlier.pyramid = pyramid;
-  chosen.reconstruction.pyramid = pyramid;
-  auto initializer = std::make_shared<Initializer>(chosen, camera, seed, AdjustInitialMap(camera.Ideal()));
-  return [initializer](const InitializerFrame& frame) { return initializer->AddFrame(frame); };
+  return by_selector(SelectorMethod::kDlrsac);
 }
 
 FirstMapPhase::Answer FirstMapPhase::AddFrame(const TrackedFrame& frame, uint32_t session, CameraId camera_id,

@@ -7,15 +7,16 @@
 #include "dmslam/initialization/initializer.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/map/tracked_frame.h"
+#include "dmslam/slam/first_map_method.h"
 
 namespace dmslam {
 
 /// Takes a frame of the stream in which a first map is looked for, and says what is known by now.
 using FirstMapSearch = std::function<InitializerReport(const InitializerFrame&)>;
 
-/// The search that `method` stands for: dlrsac, arsac, or of two frames alone: ransac, paper. These two know
-/// nothing of `options`. `pyramid` is the features'.
-FirstMapSearch MakeFirstMapSearch(const std::string& method, const InitializerOptions& options,
+/// The search by `method`. Those of two frames alone know nothing of `options`. `pyramid` is that of the
+/// features, as it is set.
+FirstMapSearch MakeFirstMapSearch(FirstMapMethod method, const InitializerOptions& options,
                                   const Camera& camera, const Pyramid& pyramid, uint64_t seed);
 
 /// Looks for a first map in the frames of a stream; begins anew when a map was given up.

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "dmslam/motion_segmentation/synthetic_pair.h"
@@ -45,7 +44,7 @@ class CoarseView {
     return {index, int64_t{index} * 33'333'333, MakeFrameFeatures(std::move(set), camera_, pyramid_)};
   }
 
-  bool HasFirstMap(const std::string& method, const Pyramid& pyramid) const {
+  bool HasFirstMap(FirstMapMethod method, const Pyramid& pyramid) const {
     const FirstMapSearch search = MakeFirstMapSearch(method, {}, camera_, pyramid, 1);
     for (uint32_t frame = 0; frame < 40; ++frame) {
       if (search(Frame(frame)).result) return true;
@@ -66,9 +65,10 @@ TEST(MakeFirstMapSearch, KnowsHowExactTheFeaturesOfEachLevelAre) {
   fine.scale_factor = 1.05;
   coarse.levels = 12;
   const CoarseView view(8, coarse);
-  EXPECT_TRUE(view.HasFirstMap("dlrsac", coarse));
-  EXPECT_FALSE(view.HasFirstMap("dlrsac", fine)) << "it would take them for as exact as those of level 0";
-  EXPECT_TRUE(view.HasFirstMap("ransac", coarse));
+  EXPECT_TRUE(view.HasFirstMap(FirstMapMethod::kDlrsac, coarse));
+  EXPECT_FALSE(view.HasFirstMap(FirstMapMethod::kDlrsac, fine))
+      << "it would take them for as exact as those of level 0";
+  EXPECT_TRUE(view.HasFirstMap(FirstMapMethod::kTwoFrameRansac, coarse));
 }
 
 }  // namespace

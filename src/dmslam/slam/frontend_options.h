@@ -1,16 +1,13 @@
 #pragma once
 
-#include <string>
-
 #include "dmslam/refinement/frame_refiner.h"
+#include "dmslam/slam/first_map_method.h"
 #include "dmslam/tracking/tracking_options.h"
 
 namespace dmslam {
 
 struct FrontendOptions {
-  /// dlrsac; arsac, behind the same gates; or of two frames alone: ransac, without gates (the baseline), and
-  /// paper, DLRSAC with the failure tests of its paper.
-  std::string initializer_method = "dlrsac";
+  FirstMapMethod initializer_method = FirstMapMethod::kDlrsac;
   double initializer_feature_factor =
       2.0;  ///< features of a frame while there is no map, times those of others
   TrackingOptions tracking;
@@ -27,7 +24,11 @@ struct FrontendOptions {
 
   template <typename Visitor>
   void Describe(Visitor& v) {
-    v.Choice("initializer.method", initializer_method, {"dlrsac", "arsac", "ransac", "paper"},
+    v.Choice("initializer.method", initializer_method,
+             {{"dlrsac", FirstMapMethod::kDlrsac},
+              {"arsac", FirstMapMethod::kArsac},
+              {"ransac", FirstMapMethod::kTwoFrameRansac},
+              {"paper", FirstMapMethod::kTwoFramePaper}},
              "which matches are static; of two frames alone: ransac, without gates, and paper, DLRSAC as "
              "published (with these two, no initializer.* but method and feature_factor has an effect)");
     v.InBaseline("ransac");
