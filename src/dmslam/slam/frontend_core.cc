@@ -94,12 +94,12 @@ void FrontendCore::ForgetMap() {
   tracker_.OnMapForgotten();
 }
 
-FrontendOutput FrontendCore::GiveUpMap(MapReset::Fate fate, const std::string& reason) {
+FrontendOutput FrontendCore::GiveUpMap(int64_t stamp_ns, MapReset::Fate fate, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
   if (map_id_ && IsShared(map_, *map_id_, camera_id_)) fate = MapReset::Fate::kKeep;
   const bool drop = fate == MapReset::Fate::kDrop;
-  if (map_id_) output.Add(MapReset{*map_id_, fate, reason, frame_.stamp_ns, camera_id_});
+  if (map_id_) output.Add(MapReset{*map_id_, fate, reason, stamp_ns, camera_id_});
   if (drop && map_id_) own_maps_.Drop(*map_id_);
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
   // The poses of a map that was wrong are void: the next one may place its frames.
@@ -142,7 +142,7 @@ FrontendOutput FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp
   if (IsBehind()) return AwaitTurn();
   FrontendOutput output;
   if (phase_.HasMap() && map_.keyframes().empty())
-    output = GiveUpMap(MapReset::Fate::kDrop, "the mapper began with an empty map");
+    output = GiveUpMap(stamp_ns, MapReset::Fate::kDrop, "the mapper began with an empty map");
   output.Append(ProcessFrame());
   return output;
 }
@@ -150,7 +150,7 @@ FrontendOutput FrontendCore::ProcessFeatures(uint32_t frame_index, int64_t stamp
 FrontendOutput FrontendCore::ProcessFrame() {
   if (phase_.IsSearching()) return Initialize();
   if (phase_.IsWaiting()) return AwaitMap();
-  return Track();
+  return Track(&frame_);
 }
 
 /// While a first map is looked for, every frame also asks the maps that there are where it is: who is
@@ -164,13 +164,13 @@ std::optional<FrontendOutput> FrontendCore::FindAgain() {
   map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
   first_map_.Restart();
   phase_.BeginLost();
-  return OnTracked(result);
+  return OnTracked(frame_, result);
 }
 
 FrontendOutput FrontendCore::Initialize() {
   if (std::optional<FrontendOutput> found = FindAgain()) return std::move(*found);
   FrontendOutput output;
-  FollowTurn();
+  FollowTurn(frame_);
   unplaced_.Keep(WaitingFrame(frame_));
   FirstMapPhase::Answer answer = first_map_.AddFrame(frame_, session_, camera_id_, *map_id_);
   if (answer.proposal) {
@@ -180,7 +180,7 @@ FrontendOutput FrontendCore::Initialize() {
     ++counters_.keyframes_proposed;
     output.Add(std::move(*answer.proposal));
   }
-  output.Add(NoPose(state(), std::move(answer.reason)));
+  output.Add(NoPose(frame_, state(), std::move(answer.reason)));
   return output;
 }
 
@@ -191,22 +191,20 @@ FrontendOutput FrontendCore::AwaitMap() {
     unplaced_.Keep(WaitingFrame(frame_));
     // A mapper that was started again may have settled it without a word.
     if (phase_.IsRefused() || !awaited()) output = GiveUpRefusedMap();
-    output.Add(NoPose(phase_.state(), "waiting for the mapper to answer the first map"));
+    output.Add(NoPose(frame_, phase_.state(), "waiting for the mapper to answer the first map"));
     return output;
   }
   BeginTrial(*second);
   if (catch_up_in_portions_) return AwaitTurn();
-  TrackedFrame present = std::move(frame_);
   while (IsBehind()) output.Append(CatchUp());
-  frame_ = std::move(present);
-  output.Append(phase_.IsSearching() ? Initialize() : Track());
+  output.Append(phase_.IsSearching() ? Initialize() : Track(&frame_));
   return output;
 }
 
 /// Where a map of that number is there, it is another one, which stays.
 FrontendOutput FrontendCore::GiveUpRefusedMap() {
   const bool is_taken = !map_.KeyframesOf(*map_id_).empty();
-  return GiveUpMap(is_taken ? MapReset::Fate::kKeep : MapReset::Fate::kDrop,
+  return GiveUpMap(frame_.stamp_ns, is_taken ? MapReset::Fate::kKeep : MapReset::Fate::kDrop,
                    "the mapper refused the first map");
 }
 
@@ -221,7 +219,8 @@ void FrontendCore::BeginTrial(const Keyframe& second) {
 FrontendOutput FrontendCore::AwaitTurn() {
   behind_.emplace_back(frame_);
   FrontendOutput output;
-  output.Add(NoPose(TrackingState::kWaitingForMap, "frames that waited for the first map come first"));
+  output.Add(
+      NoPose(frame_, TrackingState::kWaitingForMap, "frames that waited for the first map come first"));
   return output;
 }
 
@@ -231,96 +230,97 @@ double FrontendCore::seconds_behind() const {
 }
 
 FrontendOutput FrontendCore::CatchUp() {
-  frame_ = std::move(behind_.front()).ToTracked(camera_, pyramid_);
+  TrackedFrame frame = std::move(behind_.front()).ToTracked(camera_, pyramid_);
   behind_.pop_front();
-  odometry_.Predict({frame_.index, frame_.stamp_ns});
-  if (!map_.keyframes().empty()) return Track();
-  unplaced_.Keep(WaitingFrame(frame_));
-  return GiveUpMap(MapReset::Fate::kDrop, "the mapper began with an empty map");
+  odometry_.Predict({frame.index, frame.stamp_ns});
+  if (!map_.keyframes().empty()) return Track(&frame);
+  unplaced_.Keep(WaitingFrame(frame));
+  return GiveUpMap(frame.stamp_ns, MapReset::Fate::kDrop, "the mapper began with an empty map");
 }
 
 // ---- Tracking ----
 
-FrontendOutput FrontendCore::Track() {
+FrontendOutput FrontendCore::Track(TrackedFrame* frame) {
   Tracker::Request request{.whereabouts = Tracker::InAnyMap{}, .may_relocalize = !phase_.IsTrial()};
   if (map_id_) request.whereabouts = Tracker::InMap{*map_id_};
-  TrackingResult result = tracker_.Track(map_, request, std::move(frame_));
-  frame_ = std::move(result.frame);
+  TrackingResult result = tracker_.Track(map_, request, std::move(*frame));
+  *frame = std::move(result.frame);
   if (result.relocalized) ++counters_.relocalizations;
-  if (!result.pose) return OnNotTracked(result.report);
+  if (!result.pose) return OnNotTracked(*frame, result.report);
   map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
-  return OnTracked(result);
+  return OnTracked(*frame, result);
 }
 
-FrontendOutput FrontendCore::OnTracked(const TrackingResult& result) {
+FrontendOutput FrontendCore::OnTracked(const TrackedFrame& frame, const TrackingResult& result) {
   const TrackingReport& report = result.report;
   const PlacedPose& pose = *result.pose;
   ++counters_.tracked;
-  turns_.Begin(frame_);
+  turns_.Begin(frame);
   lit_since_ns_.reset();
-  phase_.OnTracked(frame_.stamp_ns);
-  odometry_.OnTracked(map_, {frame_.index, frame_.stamp_ns}, pose, frame_.T_cam_world, result.certainty,
+  phase_.OnTracked(frame.stamp_ns);
+  odometry_.OnTracked(map_, {frame.index, frame.stamp_ns}, pose, frame.T_cam_world, result.certainty,
                       !result.relocalized);
   FrontendOutput output;
-  ReportLandmarks(pose, WantsKeyframe(report, pose.reference), EvidenceSchedule::Way::kForward, &output);
-  FramePose told = MakePose(phase_.state(), report, pose);
-  last_poses_.Keep(frame_, told);
+  ReportLandmarks(frame, pose, WantsKeyframe(frame, report, pose.reference), EvidenceSchedule::Way::kForward,
+                  &output);
+  FramePose told = MakePose(frame, phase_.state(), report, pose);
+  last_poses_.Keep(frame, told);
   if (result.certainty) TellCertainty(*result.certainty, &told);
   output.Add(std::move(told));
   return output;
 }
 
 /// Where no position is known, the way the camera looks may be.
-void FrontendCore::FollowTurn() {
-  turns_.Follow(frame_);
+void FrontendCore::FollowTurn(const TrackedFrame& frame) {
+  turns_.Follow(frame);
   if (turns_.IsMeasured()) odometry_.OnTurned(turns_.begun_ns(), turns_.R_now_begun());
 }
 
-FrontendOutput FrontendCore::OnNotTracked(const TrackingReport& report) {
+FrontendOutput FrontendCore::OnNotTracked(const TrackedFrame& frame, const TrackingReport& report) {
   FrontendOutput output;
-  FollowTurn();
-  unplaced_.Keep(WaitingFrame(frame_));
+  FollowTurn(frame);
+  unplaced_.Keep(WaitingFrame(frame));
   if (phase_.IsTrial() && report.outcome == TrackingReport::Outcome::kContradicted) {
-    output = GiveUpMap(MapReset::Fate::kDrop,
+    output = GiveUpMap(frame.stamp_ns, MapReset::Fate::kDrop,
                        std::string("the first map does not predict the next frames: ") + report.reason);
   } else {
     const std::optional<int64_t> last_ns = tracker_.last_tracked_ns();
-    const int64_t missing_ns = last_ns ? frame_.stamp_ns - *last_ns : INT64_MAX;
+    const int64_t missing_ns = last_ns ? frame.stamp_ns - *last_ns : INT64_MAX;
     phase_.OnMissing(missing_ns);
-    if (IsLostInTheLight(missing_ns) && !localize_only_ && !tracker_.IsUndecided())
-      output = GiveUpMap(MapReset::Fate::kKeep, "lost for too long");
+    if (IsLostInTheLight(frame, missing_ns) && !localize_only_ && !tracker_.IsUndecided())
+      output = GiveUpMap(frame.stamp_ns, MapReset::Fate::kKeep, "lost for too long");
   }
-  output.Add(MakePose(phase_.IsSearching() ? phase_.state() : state(), report, std::nullopt));
+  output.Add(MakePose(frame, phase_.IsSearching() ? phase_.state() : state(), report, std::nullopt));
   return output;
 }
 
 /// For so long that another map is looked for. Darkness is no new place.
-bool FrontendCore::IsLostInTheLight(int64_t missing_ns) {
+bool FrontendCore::IsLostInTheLight(const TrackedFrame& frame, int64_t missing_ns) {
   const size_t wanted = static_cast<size_t>(features_.wanted());
-  if (static_cast<double>(frame_.features->size()) < kDarkShare * static_cast<double>(wanted)) {
+  if (static_cast<double>(frame.features->size()) < kDarkShare * static_cast<double>(wanted)) {
     lit_since_ns_.reset();
     return false;
   }
-  if (!lit_since_ns_) lit_since_ns_ = frame_.stamp_ns;
-  const int64_t lost_ns = std::min(missing_ns, frame_.stamp_ns - *lit_since_ns_);
+  if (!lit_since_ns_) lit_since_ns_ = frame.stamp_ns;
+  const int64_t lost_ns = std::min(missing_ns, frame.stamp_ns - *lit_since_ns_);
   return lost_ns > ToNs(options_.new_map_after_s);
 }
 
-FramePose FrontendCore::NoPose(TrackingState state, std::string reason) const {
-  FramePose told = MakePose(state, {}, std::nullopt);
+FramePose FrontendCore::NoPose(const TrackedFrame& frame, TrackingState state, std::string reason) const {
+  FramePose told = MakePose(frame, state, {}, std::nullopt);
   told.reason = std::move(reason);
   return told;
 }
 
-FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& report,
+FramePose FrontendCore::MakePose(const TrackedFrame& frame, TrackingState state, const TrackingReport& report,
                                  const std::optional<PlacedPose>& pose) const {
   FramePose told;
-  told.frame_index = frame_.index;
+  told.frame_index = frame.index;
   told.camera_id = camera_id_;
-  told.stamp_ns = frame_.stamp_ns;
+  told.stamp_ns = frame.stamp_ns;
   told.state = state;
   told.map_id = map_id_;
-  told.num_features = static_cast<uint16_t>(frame_.features->size());
+  told.num_features = static_cast<uint16_t>(frame.features->size());
   told.num_static = static_cast<uint16_t>(report.num_static);
   told.num_moving = static_cast<uint16_t>(report.num_moving);
   told.num_unknown = static_cast<uint16_t>(report.num_unknown);
@@ -330,16 +330,17 @@ FramePose FrontendCore::MakePose(TrackingState state, const TrackingReport& repo
   told.reference = pose->reference;
   told.T_cam_reference = pose->T_cam_reference;
   told.reference_scale = pose->scale;
-  told.T_cam_world = frame_.T_cam_world;
+  told.T_cam_world = frame.T_cam_world;
   return told;
 }
 
 // ---- Keyframes and evidence ----
 
-bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId reference_id) {
+bool FrontendCore::WantsKeyframe(const TrackedFrame& frame, const TrackingReport& report,
+                                 KeyframeId reference_id) {
   const Keyframe* reference = map_.FindKeyframe(reference_id);
   if (localize_only_ || reference == nullptr) return false;
-  const KeyframeInputs inputs{report.num_static, ExpectedOf(map_, *reference), gate_.SinceNs(frame_.stamp_ns),
+  const KeyframeInputs inputs{report.num_static, ExpectedOf(map_, *reference), gate_.SinceNs(frame.stamp_ns),
                               gate_.step_ns()};
   if (!dmslam::WantsKeyframe(options_.keyframe, inputs)) return false;
   if (!gate_.IsOpen()) ++counters_.keyframes_withheld;
@@ -347,32 +348,32 @@ bool FrontendCore::WantsKeyframe(const TrackingReport& report, KeyframeId refere
 }
 
 /// What frames said of landmarks, from time to time and before each keyframe; and the keyframe.
-void FrontendCore::ReportLandmarks(const PlacedPose& pose, bool keyframe, EvidenceSchedule::Way way,
-                                   FrontendOutput* output) {
-  if (evidence_.IsDueAt(frame_.stamp_ns, keyframe, way)) {
-    FrameEvidence evidence = tracker_.TakeEvidence(frame_.stamp_ns, map_id_);
+void FrontendCore::ReportLandmarks(const TrackedFrame& frame, const PlacedPose& pose, bool keyframe,
+                                   EvidenceSchedule::Way way, FrontendOutput* output) {
+  if (evidence_.IsDueAt(frame.stamp_ns, keyframe, way)) {
+    FrameEvidence evidence = tracker_.TakeEvidence(frame.stamp_ns, map_id_);
     evidence.camera_id = camera_id_;
     if (!evidence.items.empty() && !localize_only_) output->Add(std::move(evidence));
   }
-  if (keyframe) output->Add(ProposeKeyframe(pose));
+  if (keyframe) output->Add(ProposeKeyframe(frame, pose));
 }
 
-KeyframeProposal FrontendCore::ProposeKeyframe(const PlacedPose& pose) {
+KeyframeProposal FrontendCore::ProposeKeyframe(const TrackedFrame& frame, const PlacedPose& pose) {
   DMSLAM_CHECK(map_id_.has_value(), "a keyframe without a map");
   KeyframeProposal proposal;
-  proposal.id = ThisFrame();
+  proposal.id = KeyframeIdOf(frame);
   proposal.camera_id = camera_id_;
   proposal.map_id = *map_id_;
-  proposal.stamp_ns = frame_.stamp_ns;
+  proposal.stamp_ns = frame.stamp_ns;
   proposal.reference = pose.reference;
   proposal.T_cam_reference = pose.T_cam_reference;
   proposal.reference_scale = pose.scale;
-  proposal.features = frame_.features->set;
-  for (size_t i = 0; i < frame_.classes.size(); ++i) {
+  proposal.features = frame.features->set;
+  for (size_t i = 0; i < frame.classes.size(); ++i) {
     const uint16_t feature = static_cast<uint16_t>(i);
-    if (frame_.classes[i] == FeatureClass::kUsed && frame_.landmarks[i].valid()) {
-      proposal.matches.push_back({feature, frame_.landmarks[i]});
-    } else if (frame_.classes[i] == FeatureClass::kMoving) {
+    if (frame.classes[i] == FeatureClass::kUsed && frame.landmarks[i].valid()) {
+      proposal.matches.push_back({feature, frame.landmarks[i]});
+    } else if (frame.classes[i] == FeatureClass::kMoving) {
       proposal.moving.push_back(feature);
     }
   }
@@ -383,15 +384,14 @@ KeyframeProposal FrontendCore::ProposeKeyframe(const PlacedPose& pose) {
 
 // ---- After the end ----
 
-/// The newest of the frames without a pose becomes the present one; with its pose if it was placed.
-std::optional<LatePlacement::Placed> FrontendCore::PlaceNewestUnplaced(LateMap late_map) {
-  frame_ = unplaced_.TakeNewest().ToTracked(camera_, pyramid_);
+/// A frame without a pose, with its pose if it can be placed.
+std::optional<LatePlacement::Placed> FrontendCore::PlaceLate(LateMap late_map, TrackedFrame* frame) {
   const LatePlacement::Found found =
-      late_.Place(map_, late_map, &tracker_.search(), tracker_.relocalizer(), &frame_);
+      late_.Place(map_, late_map, &tracker_.search(), tracker_.relocalizer(), frame);
   if (!found.report.IsTracked()) return std::nullopt;
-  const auto pose = PlacedPose::Of(tracker_.search().Reference(map_), frame_.T_cam_world);
+  const auto pose = PlacedPose::Of(tracker_.search().Reference(map_), frame->T_cam_world);
   if (!pose) return std::nullopt;
-  return LatePlacement::Placed{frame_, found.report, *pose, found.jumped};
+  return LatePlacement::Placed{*frame, found.report, *pose, found.jumped};
 }
 
 std::optional<FrontendOutput> FrontendCore::GrowBack() {
@@ -401,46 +401,47 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
     late_.Forget();
     return std::nullopt;
   }
-  std::optional<LatePlacement::Placed> placed = PlaceNewestUnplaced(LateMap::kGrows);
+  TrackedFrame frame = TakeNewestUnplaced();
+  std::optional<LatePlacement::Placed> placed = PlaceLate(LateMap::kGrows, &frame);
   if (!placed) {
     tracker_.search().judge().DropEvidence();
-    unplaced_.SetAside(WaitingFrame(frame_));
+    unplaced_.SetAside(WaitingFrame(frame));
     return FrontendOutput();
   }
   const KeyframeId reference = placed->pose.reference;
   map_id_ = map_.FindKeyframe(reference)->map_id;
   // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
-  const bool known = map_.ResolveKeyframe(ThisFrame()).has_value();
-  const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(placed->report, reference);
+  const bool known = map_.ResolveKeyframe(KeyframeIdOf(frame)).has_value();
+  const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(frame, placed->report, reference);
   FrontendOutput output;
-  ReportLandmarks(placed->pose, wanted, EvidenceSchedule::Way::kBack, &output);
-  KeepBelieved(LateMap::kGrows, *std::move(placed));
+  ReportLandmarks(frame, placed->pose, wanted, EvidenceSchedule::Way::kBack, &output);
+  if (!KeepBelieved(LateMap::kGrows, *std::move(placed))) unplaced_.SetAside(WaitingFrame(frame));
   return output;
 }
 
-/// While the map grows, last poses come with those of the frames that were tracked, and a frame that is not
-/// believed yet is set aside.
-void FrontendCore::KeepBelieved(LateMap late_map, LatePlacement::Placed placed) {
+/// Whether any frame is believed now: this one, and those after it that were not yet. While the map grows,
+/// last poses come with those of the frames that were tracked.
+bool FrontendCore::KeepBelieved(LateMap late_map, LatePlacement::Placed placed) {
   const MapId map_id = map_.FindKeyframe(placed.pose.reference)->map_id;
-  const auto before = last_poses_.TrackedBefore(map_, map_id, frame_.index);
+  const auto before = last_poses_.TrackedBefore(map_, map_id, placed.frame.index);
   auto believed = late_.GoOnFrom(map_, late_map, tracker_.search(), std::move(placed), before);
   const bool grows = late_map == LateMap::kGrows;
-  if (believed.empty() && grows) unplaced_.SetAside(WaitingFrame(frame_));
-  for (LatePlacement::Placed& told : believed) {
-    frame_ = std::move(told.frame);
-    const FramePose pose = MakePose(TrackingState::kLocalizedLater, told.report, told.pose);
+  for (const LatePlacement::Placed& told : believed) {
+    const FramePose pose = MakePose(told.frame, TrackingState::kLocalizedLater, told.report, told.pose);
     if (grows) {
-      unplaced_.ForgetSetAside(frame_.index);
-      last_poses_.KeepPlaced(frame_, pose, told.confirmed);
+      unplaced_.ForgetSetAside(told.frame.index);
+      last_poses_.KeepPlaced(told.frame, pose, told.confirmed);
     } else {
-      last_poses_.AddPlaced(map_, frame_, pose, told.confirmed);
+      last_poses_.AddPlaced(map_, told.frame, pose, told.confirmed);
     }
   }
+  return !believed.empty();
 }
 
 bool FrontendCore::WorkAtEnd() {
   if (unplaced_.empty()) return last_poses_.Improve(map_);
-  if (auto placed = PlaceNewestUnplaced(LateMap::kStands)) KeepBelieved(LateMap::kStands, *std::move(placed));
+  TrackedFrame frame = TakeNewestUnplaced();
+  if (auto placed = PlaceLate(LateMap::kStands, &frame)) KeepBelieved(LateMap::kStands, *std::move(placed));
   return true;
 }
 

@@ -101,6 +101,7 @@ class FrontendCore {
   TrackingState state() const;
   /// Whether the next frame is one that a first map is looked for in, with more features than others.
   bool IsSearching() const { return phase_.IsSearching(); }
+  /// The newest, with what it sees of the map.
   const TrackedFrame& frame() const { return frame_; }
   /// As of the newest frame.
   const OdometryState& odometry() const { return odometry_.state(); }
@@ -117,23 +118,27 @@ class FrontendCore {
   FrontendOutput GiveUpRefusedMap();
   void BeginTrial(const Keyframe& second);
   FrontendOutput AwaitTurn();
-  FrontendOutput Track();
-  FrontendOutput OnTracked(const TrackingResult& result);
-  FrontendOutput OnNotTracked(const TrackingReport& report);
-  void FollowTurn();
-  bool IsLostInTheLight(int64_t missing_ns);
-  FrontendOutput GiveUpMap(MapReset::Fate fate, const std::string& reason);
+  // `frame`: the one that is worked on, the newest or one that waited.
+  FrontendOutput Track(TrackedFrame* frame);
+  FrontendOutput OnTracked(const TrackedFrame& frame, const TrackingResult& result);
+  FrontendOutput OnNotTracked(const TrackedFrame& frame, const TrackingReport& report);
+  void FollowTurn(const TrackedFrame& frame);
+  bool IsLostInTheLight(const TrackedFrame& frame, int64_t missing_ns);
+  FrontendOutput GiveUpMap(int64_t stamp_ns, MapReset::Fate fate, const std::string& reason);
   void FollowJoinedMap();
-  bool WantsKeyframe(const TrackingReport& report, KeyframeId reference);
-  void ReportLandmarks(const PlacedPose& pose, bool keyframe, EvidenceSchedule::Way way,
-                       FrontendOutput* output);
-  KeyframeId ThisFrame() const { return KeyframeId::Make(session_, frame_.index, camera_id_); }
-  KeyframeProposal ProposeKeyframe(const PlacedPose& pose);
-  FramePose NoPose(TrackingState state, std::string reason) const;
-  FramePose MakePose(TrackingState state, const TrackingReport& report,
+  bool WantsKeyframe(const TrackedFrame& frame, const TrackingReport& report, KeyframeId reference);
+  void ReportLandmarks(const TrackedFrame& frame, const PlacedPose& pose, bool keyframe,
+                       EvidenceSchedule::Way way, FrontendOutput* output);
+  KeyframeId KeyframeIdOf(const TrackedFrame& frame) const {
+    return KeyframeId::Make(session_, frame.index, camera_id_);
+  }
+  KeyframeProposal ProposeKeyframe(const TrackedFrame& frame, const PlacedPose& pose);
+  FramePose NoPose(const TrackedFrame& frame, TrackingState state, std::string reason) const;
+  FramePose MakePose(const TrackedFrame& frame, TrackingState state, const TrackingReport& report,
                      const std::optional<PlacedPose>& pose) const;
-  std::optional<LatePlacement::Placed> PlaceNewestUnplaced(LateMap late_map);
-  void KeepBelieved(LateMap late_map, LatePlacement::Placed placed);
+  TrackedFrame TakeNewestUnplaced() { return unplaced_.TakeNewest().ToTracked(camera_, pyramid_); }
+  std::optional<LatePlacement::Placed> PlaceLate(LateMap late_map, TrackedFrame* frame);
+  bool KeepBelieved(LateMap late_map, LatePlacement::Placed placed);
 
   // What is given
   FrontendOptions options_;
@@ -161,7 +166,7 @@ class FrontendCore {
   LastPoses last_poses_;
 
   // Frames
-  TrackedFrame frame_;
+  TrackedFrame frame_;  ///< the newest
   UnplacedFrames unplaced_;
   std::deque<WaitingFrame> behind_;  ///< since the first map's second keyframe, not tracked yet
   EvidenceSchedule evidence_;
