@@ -161,7 +161,7 @@ std::optional<FrontendOutput> FrontendCore::FindAgain() {
   frame_ = std::move(result.frame);
   if (!result.pose) return std::nullopt;
   ++counters_.relocalizations;
-  map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
+  map_id_ = map_.At(result.pose->reference).map_id;
   first_map_.Restart();
   phase_.BeginLost();
   return OnTracked(frame_, result);
@@ -247,7 +247,7 @@ FrontendOutput FrontendCore::Track(TrackedFrame* frame) {
   *frame = std::move(result.frame);
   if (result.relocalized) ++counters_.relocalizations;
   if (!result.pose) return OnNotTracked(*frame, result.report);
-  map_id_ = map_.FindKeyframe(result.pose->reference)->map_id;
+  map_id_ = map_.At(result.pose->reference).map_id;
   return OnTracked(*frame, result);
 }
 
@@ -409,7 +409,7 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
     return FrontendOutput();
   }
   const KeyframeId reference = placed->pose.reference;
-  map_id_ = map_.FindKeyframe(reference)->map_id;
+  map_id_ = map_.At(reference).map_id;
   // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
   const bool known = map_.ResolveKeyframe(KeyframeIdOf(frame)).has_value();
   const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(frame, placed->report, reference);
@@ -422,7 +422,7 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
 /// Whether any frame is believed now: this one, and those after it that were not yet. While the map grows,
 /// last poses come with those of the frames that were tracked.
 bool FrontendCore::KeepBelieved(LateMap late_map, LatePlacement::Placed placed) {
-  const MapId map_id = map_.FindKeyframe(placed.pose.reference)->map_id;
+  const MapId map_id = map_.At(placed.pose.reference).map_id;
   const auto before = last_poses_.TrackedBefore(map_, map_id, placed.frame.index);
   auto believed = late_.GoOnFrom(map_, late_map, tracker_.search(), std::move(placed), before);
   const bool grows = late_map == LateMap::kGrows;
