@@ -88,6 +88,7 @@ int Main(int argc, char** argv) {
   CLI::App app{"Time and quality of the ORB extractor beside cv::ORB on pairs of frames with true poses"};
   app.set_version_flag("--version", kVersion);
   OrbExtractorOptions options;
+  options.num_features = 1000;
   std::string sequence = "kitchen";
   int rounds = 10, pair_step = 50;
   bool portable = false;

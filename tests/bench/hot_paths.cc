@@ -18,9 +18,16 @@ namespace {
 
 using Path = std::function<void(int times)>;
 
+/// As many features as the figures that are kept were counted with.
+OrbExtractorOptions ExtractorOptions() {
+  OrbExtractorOptions options;
+  options.num_features = 1000;
+  return options;
+}
+
 void Extract(int times) {
   const GrayPixels image = testing::RandomRectangles(640, 480, 600, 1);
-  OrbExtractor extractor{OrbExtractorOptions()};
+  OrbExtractor extractor(ExtractorOptions());
   FeatureSet features;
   for (int i = 0; i < times; ++i) extractor.Extract(image.View(), &features);
 }
@@ -28,7 +35,7 @@ void Extract(int times) {
 /// A picture with itself turned a little.
 void Match(int times) {
   const GrayPixels image = testing::RandomRectangles(640, 480, 600, 1);
-  OrbExtractor extractor{OrbExtractorOptions()};
+  OrbExtractor extractor(ExtractorOptions());
   FeatureSet sets[2];
   extractor.Extract(image.View(), &sets[0]);
   extractor.Extract(testing::Turned(image, 0.02).View(), &sets[1]);

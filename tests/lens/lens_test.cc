@@ -33,7 +33,9 @@ struct TwoFrames {
 
 FeatureSet Extract(TumSequence& sequence, size_t index) {
   const GrayImage image = DecodeGray(sequence.Read(index), sequence.Name(index));
-  OrbExtractor extractor(OrbExtractorOptions{});
+  OrbExtractorOptions options;
+  options.num_features = 1000;
+  OrbExtractor extractor(options);
   FeatureSet set;
   extractor.Extract({image.data.data(), image.width, image.height, image.width}, &set);
   return set;

@@ -11,7 +11,10 @@ namespace {
 TEST(KitchenPairs, RepeatsAndMatchesAtLeastAsWellAsCvOrb) {
   const auto folder = SequenceFolder("kitchen");
   if (!folder) GTEST_SKIP() << "no kitchen sequence; set DMSLAM_DATA to the folder that holds it";
-  OrbExtractor extractor;
+  constexpr int kFeatures = 1000;
+  OrbExtractorOptions options;
+  options.num_features = kFeatures;
+  OrbExtractor extractor(options);
   Quality ours, theirs;
   for (int first = 50; first < 1000; first += 190) {
     for (const int gap : {5, 10}) {
@@ -22,7 +25,7 @@ TEST(KitchenPairs, RepeatsAndMatchesAtLeastAsWellAsCvOrb) {
       for (size_t i = 0; i < 2; ++i) extractor.Extract(ViewOf(frames[i].grey), &sets[i]);
       const Pyramid& pyramid = extractor.options().pyramid;
       AddPair(FromSet(sets[0], pyramid), FromSet(sets[1], pyramid), geometry, &ours);
-      AddPair(FromCvOrb(frames[0].grey, 1000), FromCvOrb(frames[1].grey, 1000), geometry, &theirs);
+      AddPair(FromCvOrb(frames[0].grey, kFeatures), FromCvOrb(frames[1].grey, kFeatures), geometry, &theirs);
     }
   }
   EXPECT_GE(ours.Repeatability(), theirs.Repeatability());

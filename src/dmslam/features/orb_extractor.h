@@ -11,7 +11,7 @@
 namespace dmslam {
 
 struct OrbExtractorOptions {
-  int num_features = 1000;  ///< most keypoints of an image; fewer where there are too few corners
+  int num_features = 2000;  ///< most keypoints of an image; fewer where there are too few corners
   Pyramid pyramid;          ///< levels 1..16, scale factor in [1.05, 2]
   int fast_threshold = 20;  ///< a corner's least difference to its circle [grey values], 1..254
   int min_fast_threshold =

@@ -20,7 +20,14 @@ namespace {
 using testing::RandomRectangles;
 using testing::Turned;
 
-FeatureSet Extract(const GrayPixels& image, const OrbExtractorOptions& options = {}) {
+/// What the tests expect is meant of so many features.
+OrbExtractorOptions ThousandFeatures() {
+  OrbExtractorOptions options;
+  options.num_features = 1000;
+  return options;
+}
+
+FeatureSet Extract(const GrayPixels& image, const OrbExtractorOptions& options = ThousandFeatures()) {
   FeatureSet features;
   OrbExtractor(options).Extract(image.View(), &features);
   return features;
@@ -54,7 +61,7 @@ TEST(OrbExtractor, OrientationPointsToTheBrightSide) {
   for (int y = 60; y < 120; ++y) {
     for (int x = 60; x < 120; ++x) image.at(x, y) = 220;  // bright towards +x +y: an eighth of a turn
   }
-  OrbExtractorOptions options;
+  OrbExtractorOptions options = ThousandFeatures();
   options.pyramid.levels = 1;
   const FeatureSet features = Extract(image, options);
   ASSERT_GE(features.size(), 1U);
@@ -82,7 +89,7 @@ TEST(OrbExtractor, FindsInASmallImageWhatTheImageTwiceAsLargeShows) {
   from.Resize(320, 240);
   for (int y = 0; y < 240; ++y) std::copy_n(small.View().row(y), 320, from.row(y));
   ImageResizer(320, 240, 640, 480).Resize(from, KernelsOn(SimdPath::kBest), &to);
-  OrbExtractor extractor;
+  OrbExtractor extractor(ThousandFeatures());
   FeatureSet found, enlarged;
   extractor.Extract(small.View(), &found);
   extractor.Extract(to.View(), &enlarged);
@@ -175,7 +182,7 @@ TEST(OrbExtractor, KeypointsSpreadOverTheImage) {
     for (int x = 320; x < 640; ++x) image.at(x, y) = static_cast<uint8_t>(96 + image.at(x, y) / 4);
   }
   const auto share_on_the_right = [&](double rank_decay) {
-    OrbExtractorOptions options;
+    OrbExtractorOptions options = ThousandFeatures();
     options.rank_decay = rank_decay;
     const FeatureSet features = Extract(image, options);
     int right = 0;
@@ -197,7 +204,7 @@ TEST(OrbExtractor, WeakCornersServeOnlyWhereThereAreNoStrongOnes) {
   square(50, 50, 200);
   square(74, 74, 112);    // contrast 12, in the cell of the strong square's corner
   square(170, 120, 112);  // contrast 12, alone
-  OrbExtractorOptions options;
+  OrbExtractorOptions options = ThousandFeatures();
   options.pyramid.levels = 1;
   options.cell_size_px = 96;
   const FeatureSet features = Extract(image, options);
@@ -215,7 +222,7 @@ TEST(OrbExtractor, WeakCornersServeOnlyWhereThereAreNoStrongOnes) {
 TEST(OrbExtractor, IsTheSameOnEveryPathAndEveryTime) {
   for (const auto& [width, height] : {std::pair(640, 480), std::pair(333, 251), std::pair(97, 61)}) {
     const GrayPixels image = RandomRectangles(width, height, width, 4);
-    OrbExtractorOptions options;
+    OrbExtractorOptions options = ThousandFeatures();
     options.simd_path = SimdPath::kPortable;
     const FeatureSet portable = Extract(image, options);
     ASSERT_GT(portable.size(), 20U);
@@ -236,7 +243,7 @@ TEST(OrbExtractor, IsTheSameOnEveryPathAndEveryTime) {
 TEST(OrbExtractor, DoesNotDependOnWhatItSawBefore) {
   const GrayPixels small = RandomRectangles(320, 240, 200, 5), other = RandomRectangles(500, 300, 300, 6),
                    large = RandomRectangles(640, 480, 600, 7);
-  OrbExtractor extractor;
+  OrbExtractor extractor(ThousandFeatures());
   FeatureSet features;
   for (const GrayPixels* image : {&other, &small, &large, &small}) {
     extractor.Extract(image->View(), &features);
@@ -255,7 +262,7 @@ TEST(OrbExtractor, ReadsNothingBesideTheView) {
   }
   const GrayView inside{larger.pixels.data() + 10 * 260 + 30, 200, 150, 260};
   FeatureSet features;
-  OrbExtractor().Extract(inside, &features);
+  OrbExtractor(ThousandFeatures()).Extract(inside, &features);
   EXPECT_EQ(features.descriptors, Extract(image).descriptors);
 }
 
@@ -263,7 +270,7 @@ TEST(OrbExtractor, AllocatesNothingOnceItKnowsTheSize) {
   for (const auto& [width, height] : {std::pair(640, 480), std::pair(320, 240)}) {
     const GrayPixels plain = RandomRectangles(width, height, 20, 9),
                      rich = RandomRectangles(width, height, 2000, 10);
-    OrbExtractor extractor;
+    OrbExtractor extractor(ThousandFeatures());
     FeatureSet features;
     extractor.Extract(plain.View(), &features);
     const size_t before = testing::NumAllocations();
@@ -278,7 +285,7 @@ TEST(OrbExtractor, AllocatesNothingOnceItKnowsTheSize) {
 
 TEST(OrbExtractor, SmallAndBlankImagesGiveNothing) {
   FeatureSet features;
-  OrbExtractor extractor;
+  OrbExtractor extractor(ThousandFeatures());
   for (const auto& [width, height] :
        {std::pair(0, 0), std::pair(1, 1), std::pair(32, 32), std::pair(500, 7)}) {
     const GrayPixels image(width, height, 7);
@@ -303,7 +310,7 @@ TEST(OrbExtractor, WideImagesUseEverySixteenth) {
 }
 
 TEST(OrbExtractor, ScaleFactorTwoAndOddSizes) {
-  OrbExtractorOptions options;
+  OrbExtractorOptions options = ThousandFeatures();
   options.pyramid = {6, 2.0};
   EXPECT_GT(Extract(RandomRectangles(641, 483, 500, 12), options).size(), 300U);
 }

@@ -120,12 +120,10 @@ SettingInfo ProfileInfo() {
 }
 
 std::vector<SettingInfo> CollectAll() {
-  OrbExtractorOptions extractor;
-  extractor.num_features = 2000;  // of the system; the extractor by itself asks for fewer
   Collector collector;
   Collect(collector, RunOptions());
   Collect(collector, FeatureStoreOptions());
-  Collect(collector, extractor);
+  Collect(collector, OrbExtractorOptions());
   Collect(collector, InitializerOptions());
   Collect(collector, FrontendOptions());
   Collect(collector, MapperOptions());

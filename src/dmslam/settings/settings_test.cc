@@ -71,10 +71,10 @@ TEST(SettingsTest, ReadsWhatRoomsDescribe) {
   EXPECT_EQ(settings.Read<InitializerOptions>().min_matches, InitializerOptions().min_matches);
 }
 
-TEST(SettingsTest, DefaultsAreThoseOfTheOptionsAndOfTheSystem) {
+TEST(SettingsTest, DefaultsAreThoseOfTheOptions) {
   const Settings settings;
   EXPECT_EQ(settings.profile(), "dm");
-  EXPECT_EQ(settings.Read<OrbExtractorOptions>().num_features, 2000);
+  EXPECT_EQ(settings.Read<OrbExtractorOptions>().num_features, OrbExtractorOptions().num_features);
   EXPECT_EQ(settings.Read<InitializerOptions>().agreement.min_agreement,
             InitializerOptions().agreement.min_agreement);
   EXPECT_EQ(settings.Read<MapperOptions>().min_depth, MapperOptions().min_depth);

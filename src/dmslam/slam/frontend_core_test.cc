@@ -32,6 +32,7 @@ class Phases : public ::testing::Test {
     strange_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
+    setup.extractor.num_features = 1000;  // of which a lit frame has a tenth
     setup.camera_id = camera_id;
     setup.vocabulary = std::move(vocabulary);
     setup.options.keyframes_at_end = true;

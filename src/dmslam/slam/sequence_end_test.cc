@@ -34,6 +34,7 @@ class SequenceEndTest : public ::testing::Test {
   static FrontendCore::Setup CoreSetup() {
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
+    setup.extractor.num_features = 1000;  // of which a lit frame has a tenth
     setup.seed = 1;
     setup.run_search = [](FirstMapSearch) {
       return [](const InitializerFrame&) { return InitializerReport(); };
