@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "dmslam/messaging/roles.h"
+#include "dmslam/runtime/node.h"
 
 namespace dmslam {
 namespace {
@@ -17,7 +18,7 @@ constexpr int64_t FrontendStatus::*kFrontendCounters[] = {
     &FrontendStatus::frames_received,    &FrontendStatus::frames_processed,
     &FrontendStatus::frames_skipped,     &FrontendStatus::keyframes_proposed,
     &FrontendStatus::keyframes_withheld, &FrontendStatus::relocalisations};
-constexpr int64_t kSilentNs = 1'500'000'000;  // who lives says so once a second
+constexpr int64_t kSilentNs = kStatusEveryNs * 3 / 2;  // who lives says so in every status
 constexpr size_t kMostNewcomers = 16;
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <algorithm>
 
 #include "dmslam/console/log.h"
+#include "dmslam/runtime/keyframe_limit.h"
 
 namespace dmslam {
 namespace {
 
-constexpr size_t kMostInFlight = 64;  // a frontend makes no more until some are taken
-constexpr int kMostOften = 30;        // a record is said again
+constexpr int kMostOften = 30;  // a record is said again
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void ProposedKeyframes::OnProposal(KeyframeId id, MapId map_id, const Version& s
 void ProposedKeyframes::KeepRecord(KeyframeId id, const SharedBytes& record) {
   if (!not_taken_.contains(id)) return;
   in_flight_[id] = {record, 0};
-  if (in_flight_.size() > kMostInFlight) in_flight_.erase(in_flight_.begin());
+  if (in_flight_.size() > kMostUnacceptedKeyframes) in_flight_.erase(in_flight_.begin());
 }
 
 void ProposedKeyframes::OnMapped(CameraId camera, const StreamPosition& mapped) {

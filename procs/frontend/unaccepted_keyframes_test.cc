@@ -19,10 +19,10 @@ TEST(UnacceptedKeyframesTest, TheMapperAcceptsThemInOrder) {
 
 TEST(UnacceptedKeyframesTest, AreTooManyUntilTheMapperCatchesUp) {
   UnacceptedKeyframes keyframes;
-  for (size_t seq = 1; seq < UnacceptedKeyframes::kMost; ++seq)
+  for (size_t seq = 1; seq < kMostUnacceptedKeyframes; ++seq)
     keyframes.OnPublished(static_cast<int64_t>(seq));
   EXPECT_FALSE(keyframes.AreTooMany());
-  keyframes.OnPublished(UnacceptedKeyframes::kMost);
+  keyframes.OnPublished(kMostUnacceptedKeyframes);
   EXPECT_TRUE(keyframes.AreTooMany());
   keyframes.OnAccepted(1);
   EXPECT_FALSE(keyframes.AreTooMany());

@@ -13,6 +13,9 @@ namespace dmslam {
 namespace {
 
 constexpr int kIterations = 20;
+/// Standard deviation of a keypoint [pixels of its level]: the first map's matches were selected with this
+/// one (Pyramid::Sigma), and with less the adjustment would clear some of those that were admitted.
+constexpr double kSelectedSigmaPx = 1.0;
 constexpr int kMinLandmarks = 40;
 constexpr int kMinSights = 20;  // of a view between: fewer do not fix its pose
 
@@ -77,7 +80,7 @@ bool BuildFirstMap(MapEditor& map, const InitialMap& proposal, LandmarkMaker& ma
   for (const Landmark* landmark : landmarks) {
     if (landmark != nullptr) map.UpdateDescriptor(*landmark);
   }
-  AdjustWholeMap(map, proposal.map_id, kIterations, 1.0, nullptr);
+  AdjustWholeMap(map, proposal.map_id, kIterations, kSelectedSigmaPx, nullptr);
   // Before it is scaled: one that nothing holds may be anywhere.
   for (const Keyframe* view : between) {
     if (view != nullptr && map.CountTracked(*view, 2) < kMinSights) RemoveWithLonelyLandmarks(map, *view);

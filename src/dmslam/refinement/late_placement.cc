@@ -15,7 +15,9 @@ namespace {
 constexpr int64_t kNearNs = 500'000'000;  // a placed frame so near in time bounds where a frame may be
 constexpr int kWellSeen = 50;             // static features...
 constexpr int kWellSeenCells = 8;         // ...and the cells of the image (kNumCells) that hold them
-constexpr double kMaxSpeed = 1.5;         // depths of the scene per second
+// Half more than a MotionModel allows a camera whose motion is not known (max_speed, max_turn_rad_per_s).
+// That adds a slack to both, and here there is none.
+constexpr double kMaxSpeed = 1.5;  // depths of the scene per second
 constexpr double kMaxTurnRadPerS = 3.0;
 constexpr size_t kKeyframesAside = 3;   // whose motion bounds that of the frames between them...
 constexpr double kApartS = 0.3;         // ...apart, so that it is motion and not noise...

@@ -54,7 +54,7 @@ class KnownCameras {
   void NoteNotHeard(std::string why) { not_heard_ = std::move(why); }
 
  private:
-  static constexpr int64_t kSilentNs = 1'500'000'000;
+  static constexpr int64_t kSilentNs = 1'500'000'000;  ///< a player says it at least twice a second
   static constexpr int64_t kContradictNs = 100'000'000;
   struct Known {
     CameraInfo info;
