@@ -249,7 +249,7 @@ bool Initializer::Impl::IsNearlyThere(const InitializerReport& report) const {
 }
 
 /// What the reference frames make of this one, the oldest first, until one has a map. At most one of them may
-/// try a contest with a frame: it is dear.
+/// try a contest with a frame: it is expensive.
 InitializerReport Initializer::Impl::TryWindows(const InitializerFrame& frame) {
   InitializerReport report = Wait(WaitReason::kTooFewFrames, "a new reference frame");
   bool may_contend =

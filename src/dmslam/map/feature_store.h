@@ -45,7 +45,7 @@ class FeatureStore {
 
   size_t bytes_in_memory() const { return *bytes_in_memory_; }
   size_t bytes_in_file() const { return *bytes_in_file_; }
-  /// What keeps features out of the file, once each time that it begins; empty: nothing new.
+  /// What keeps features out of the file. Reported once per occurrence; empty if nothing new.
   std::string TakeProblem();
 
  private:

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kNeighbours = 20, kNeighboursOfEach = 5;
 
-/// Whom a keyframe's landmarks are looked for in, each listed once.
+/// Keyframes in which to search for a keyframe's landmarks, each listed once.
 class Targets {
  public:
   explicit Targets(const Keyframe& keyframe) : listed_{keyframe.id} {}

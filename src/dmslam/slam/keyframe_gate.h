@@ -16,8 +16,7 @@ class KeyframeGate {
   bool IsOpen() const { return !withheld_ && !awaited_; }
   /// The keyframe whose settled record has not come.
   std::optional<KeyframeId> awaited() const { return awaited_ ? std::optional(awaited_->id) : std::nullopt; }
-  /// Between the keyframe before, whichever of them is the older, and `stamp_ns`; none: there was none
-  /// before.
+  /// Time between the previous keyframe and `stamp_ns`, in either order; none: there was no keyframe before.
   std::optional<int64_t> SinceNs(int64_t stamp_ns) const {
     return last_ns_ ? std::optional(std::abs(stamp_ns - *last_ns_)) : std::nullopt;
   }

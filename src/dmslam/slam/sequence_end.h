@@ -45,7 +45,7 @@ class SequenceEnd {
 
   void OnEndHeard();
   /// Another frontend asks for the stream. It will not have the features of the frames before: their poses
-  /// are refined in the map as it is, and told. To be called again changes nothing.
+  /// are refined in the map as it is, and told. Calling it again has no effect.
   void OnHandOver();
   bool HandsOver() const { return hands_over_; }
 
@@ -66,7 +66,7 @@ class SequenceEnd {
   };
   /// Does a portion of a phase's work, from kGrowingBack to kJoining. Knows the core alone.
   static Worked Work(Phase phase, FrontendCore* core);
-  /// Of Work() in this phase.
+  /// Takes the result of Work() for this phase.
   void OnWorked(bool is_done);
   /// The last poses are told.
   void OnTold();
