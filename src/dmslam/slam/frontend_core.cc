@@ -74,7 +74,7 @@ void FrontendCore::ApplyMapDelta(const MapDelta& delta) {
   late_.OnMapChanged(map_);
   tracker_.OnMapChanged(map_);
   FollowJoinedMap();
-  if (delta.event == MapEvent::kFirstMapRefused && delta.about) phase_.OnRefused(*delta.about);
+  if (delta.event == MapEvent::kFirstMapRefused) phase_.OnRefused(*delta.about);
   if (delta.progress.settled) gate_.OnSettled(*delta.progress.settled);
   // Now, as the next record may take landmarks away that are no part of the world but were good to see.
   if (delta.event == MapEvent::kMapAdjusted) last_poses_.Begin(map_, delta.map_id);
