@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/node.h"
 
