@@ -18,7 +18,7 @@ namespace {
 
 using Path = std::function<void(int times)>;
 
-/// As many features as the figures that are kept were counted with.
+/// The figures that are kept were counted with this many features.
 OrbExtractorOptions ExtractorOptions() {
   OrbExtractorOptions options;
   options.num_features = 1000;

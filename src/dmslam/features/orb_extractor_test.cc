@@ -20,7 +20,7 @@ namespace {
 using testing::RandomRectangles;
 using testing::Turned;
 
-/// What the tests expect is meant of so many features.
+/// The tests expect what this many features give.
 OrbExtractorOptions ThousandFeatures() {
   OrbExtractorOptions options;
   options.num_features = 1000;
