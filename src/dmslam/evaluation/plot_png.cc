@@ -30,22 +30,22 @@ class PngCanvas : public PlotCanvas {
   void Polyline(std::span<const PlotPoint> points, const PlotColor& color, double width_px,
                 bool dashed) override {
     const int thickness = std::max(1, static_cast<int>(std::lround(width_px * factor_)));
-    Blend(color, [&](cv::Mat* image) {
+    Blend(color, Around(points, thickness), [&] {
       for (const std::vector<cv::Point>& piece : dashed ? Dashes(points) : Pieces(points)) {
-        cv::polylines(*image, piece, false, Bgr(color), thickness, cv::LINE_AA, kFractionBits);
+        cv::polylines(target_, piece, false, Bgr(color), thickness, cv::LINE_AA, kFractionBits);
       }
     });
   }
   void Polygon(std::span<const PlotPoint> points, const PlotColor& fill) override {
     if (points.size() < 3) return;  // encloses nothing
     const std::vector<std::vector<cv::Point>> polygon = Pieces(points);
-    Blend(fill,
-          [&](cv::Mat* image) { cv::fillPoly(*image, polygon, Bgr(fill), cv::LINE_AA, kFractionBits); });
+    Blend(fill, Around(points, 0),
+          [&] { cv::fillPoly(target_, polygon, Bgr(fill), cv::LINE_AA, kFractionBits); });
   }
   void Disc(PlotPoint centre, double radius_px, const PlotColor& fill) override {
     const int radius = static_cast<int>(std::lround(radius_px * factor_ * (1 << kFractionBits)));
-    Blend(fill, [&](cv::Mat* image) {
-      cv::circle(*image, Fixed(centre), radius, Bgr(fill), cv::FILLED, cv::LINE_AA, kFractionBits);
+    Blend(fill, Around({&centre, 1}, Pixels(radius_px)), [&] {
+      cv::circle(target_, Fixed(centre), radius, Bgr(fill), cv::FILLED, cv::LINE_AA, kFractionBits);
     });
   }
   void Text(PlotPoint at, const std::string& text, const TextStyle& style) override;
@@ -85,12 +85,24 @@ class PngCanvas : public PlotCanvas {
   }
   std::vector<std::vector<cv::Point>> Dashes(std::span<const PlotPoint> points) const;
 
+  // What may be drawn on, up to `reach` pixels and a smoothed edge around the points.
+  cv::Rect Around(std::span<const PlotPoint> points, int reach) const {
+    constexpr int kEdge = 3;
+    cv::Rect box;
+    for (const PlotPoint& point : points) {
+      const cv::Point at = Fixed(point) / (1 << kFractionBits);
+      box |= cv::Rect(at.x - reach - kEdge, at.y - reach - kEdge, 2 * (reach + kEdge), 2 * (reach + kEdge));
+    }
+    return box & cv::Rect({0, 0}, target_.size());
+  }
+  // Draws into `box` of the target, and lets what was there show through.
   template <typename Draw>
-  void Blend(const PlotColor& color, const Draw& draw) {
-    if (color.alpha >= 1) return draw(&target_);
-    cv::Mat covered = target_.clone();
-    draw(&covered);
-    cv::addWeighted(covered, color.alpha, target_, 1 - color.alpha, 0, target_);
+  void Blend(const PlotColor& color, const cv::Rect& box, const Draw& draw) {
+    if (color.alpha >= 1) return draw();
+    if (box.empty()) return;
+    const cv::Mat before = target_(box).clone();
+    draw();
+    cv::addWeighted(target_(box), color.alpha, before, 1 - color.alpha, 0, target_(box));
   }
 
   double factor_;
