@@ -1,10 +1,13 @@
 #include "core_loop.h"
 
+#include <chrono>
+#include <optional>
 #include <utility>
 #include <variant>
 
 #include "dmslam/settings/frontend_setup.h"
 #include "dmslam/settings/run_options.h"
+#include "dmslam/slam/sequence_end.h"
 
 namespace dmslam::bench {
 
@@ -51,8 +54,6 @@ void CoreLoop::TellLoopCloser() {
 StepTimes CoreLoop::AfterFrame(const FrontendOutput& output, double frontend_ms) {
   StepTimes times;
   times.frontend = frontend_ms;
-  deltas_.clear();
-  told_ = 0;
   for (const FrontendEvent& event : output.events) {
     if (const auto* initial = std::get_if<InitialMap>(&event)) {
       mapper_.OnInitialMap(*initial);
@@ -71,10 +72,34 @@ StepTimes CoreLoop::AfterFrame(const FrontendOutput& output, double frontend_ms)
       mapper_.OnReset(*reset);
     }
   }
-  TellLoopCloser();
   const Stopwatch watch;
-  for (const MapDelta& delta : deltas_) frontend_.ApplyMapDelta(delta);
+  TellFrontend();
   times.replica_update = watch.ms();
+  return times;
+}
+
+void CoreLoop::TellFrontend() {
+  for (const MapDelta& delta : deltas_) frontend_.ApplyMapDelta(delta);
+  deltas_.clear();
+  told_ = 0;
+}
+
+EndTimes CoreLoop::End() {
+  using Clock = std::chrono::steady_clock;
+  const auto since = [](Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  };
+  EndTimes times;
+  const Clock::time_point start = Clock::now();
+  const auto adjust = [&](const AdjustRequest& request) {
+    const Clock::time_point asked = Clock::now();
+    mapper_.OnAdjustRequest(request);
+    times.adjustment = since(asked);
+    TellFrontend();
+  };
+  FinishSequence(&frontend_, std::nullopt,
+                 {[this](const FrontendOutput& output) { AfterFrame(output, 0); }, adjust});
+  times.all = since(start);
   return times;
 }
 

@@ -39,6 +39,12 @@ struct StepTimes {
   double replica_update = 0;  ///< frontend: the records that the keyframe caused
 };
 
+/// What the end of a run takes on the clock, since several cores share its work [s].
+struct EndTimes {
+  double adjustment = 0;  ///< mapper: of all maps
+  double all = 0;         ///< with the growth before it and the last poses after it
+};
+
 /// The cores of frontend, mapper and loop closer in lock-step, without processes, messages or a clock.
 class CoreLoop {
  public:
@@ -46,12 +52,15 @@ class CoreLoop {
 
   StepTimes StepImage(uint32_t index, int64_t stamp_ns, const GrayView& image);
   StepTimes StepFeatures(uint32_t index, int64_t stamp_ns, FeatureSet features);
+  /// No frame follows.
+  EndTimes End();
 
   const FrontendCore& frontend() const { return frontend_; }
   const Map& map() const { return mapper_.map(); }
 
  private:
   StepTimes AfterFrame(const FrontendOutput& output, double frontend_ms);
+  void TellFrontend();
   void OnDelta(const MapDelta& delta);
   void TellLoopCloser();
   void Settle(KeyframeId id, MapId map_id, StepTimes* times);

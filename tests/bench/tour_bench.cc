@@ -186,6 +186,8 @@ int Run(const Arguments& a) {
   std::printf("%llu frames, %llu tracked, %llu resets\n", static_cast<unsigned long long>(counters.frames),
               static_cast<unsigned long long>(counters.tracked),
               static_cast<unsigned long long>(counters.resets));
+  const EndTimes end = loop.End();
+  std::printf("end of the run: %.1f s, %.1f of them the adjustment of the map\n", end.all, end.adjustment);
   return Judge(stations, bytes);
 }
 

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "dmslam/camera/image_scale.h"
 #include "dmslam/dynamics/proven.h"
+#include "dmslam/geometry/point_grid.h"
 
 namespace dmslam {
 namespace {
@@ -47,23 +49,68 @@ struct Suspect {
   bool condemned = false;
 };
 
-/// Those of some landmarks that are not proven, by id.
+/// Who looks at suspects.
+struct WitnessView {
+  const Keyframe* keyframe = nullptr;
+  double reach = 0;  ///< of what is farther along its optical axis it says nothing: all that it sees is nearer
+};
+
+WitnessView WitnessOf(const Map& map, const Keyframe& keyframe) {
+  double farthest = 0;
+  for (size_t feature = 0; feature < keyframe.landmarks.size(); ++feature) {
+    const Landmark* landmark = map.LandmarkSeenBy(keyframe, feature);
+    if (landmark != nullptr)
+      farthest = std::max(farthest, (keyframe.T_cam_world * landmark->p_world).z());
+  }
+  return {&keyframe, farthest / (1 - kDepthTolerance)};
+}
+
+/// The box around all that a witness sees: its pyramid has five corners.
+Eigen::AlignedBox3d ViewOf(const Camera& camera, const WitnessView& witness) {
+  const Rigid3d T_world_cam = witness.keyframe->T_cam_world.Inverse();
+  Eigen::AlignedBox3d box(T_world_cam.translation);
+  for (const int x_px : {0, camera.width_px}) {
+    for (const int y_px : {0, camera.height_px})
+      box.extend(T_world_cam * (witness.reach * camera.Ray({x_px, y_px})));
+  }
+  return box;
+}
+
+/// The edge of the cubes that suspects are kept in: of a view's box, they take about a quarter.
+double EdgeOf(std::span<const WitnessView> witnesses) {
+  std::vector<double> reaches;
+  for (const WitnessView& witness : witnesses) reaches.push_back(witness.reach);
+  if (reaches.empty()) return 1.0;
+  const auto middle = reaches.begin() + static_cast<ptrdiff_t>(reaches.size() / 2);
+  std::nth_element(reaches.begin(), middle, reaches.end());
+  return *middle > 0 ? *middle / 4 : 1.0;
+}
+
+/// Those of some landmarks that are not proven, by id and by place.
 class Suspects {
  public:
-  Suspects(const Map& map, const std::vector<const Landmark*>& landmarks) {
+  Suspects(const Map& map, const std::vector<const Landmark*>& landmarks, double edge) : places_(edge) {
     for (const Landmark* landmark : landmarks) {
       const std::vector<int64_t> stamps = ObservationStamps(map, *landmark);
       if (stamps.empty() || OutlastsStanding(stamps, ProvenOptions())) continue;
       suspects_.push_back({landmark, stamps.front(), stamps.back()});
     }
     std::ranges::sort(suspects_, {}, [](const Suspect& suspect) { return suspect.landmark->id; });
-    for (uint32_t i = 0; i < suspects_.size(); ++i) index_.emplace(suspects_[i].landmark->id, i);
+    for (uint32_t i = 0; i < suspects_.size(); ++i) {
+      index_.emplace(suspects_[i].landmark->id, i);
+      places_.Add(suspects_[i].landmark->p_world, i);
+    }
   }
 
   /// Null: not one of them.
   const Suspect* Find(LandmarkId id) const {
     const auto found = index_.find(id);
     return found == index_.end() ? nullptr : &suspects_[found->second];
+  }
+  /// Calls `visit` for each suspect in the box, and for some around it.
+  template <typename Visit>
+  void ForEachIn(const Eigen::AlignedBox3d& box, const Visit& visit) {
+    places_.ForEachIn(box, [&](uint32_t i) { visit(suspects_[i]); });
   }
   size_t size() const { return suspects_.size(); }
   auto begin() { return suspects_.begin(); }
@@ -74,6 +121,7 @@ class Suspects {
  private:
   std::vector<Suspect> suspects_;
   std::unordered_map<LandmarkId, uint32_t> index_;
+  PointGrid places_;
 };
 
 double Seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
@@ -89,11 +137,13 @@ struct Depths {
 };
 
 /// Depths of the landmarks that `witness` sees around the pixel of `p_world`, relative to its own.
-Depths LookThrough(const Map& map, const Keyframe& witness, const Eigen::Vector3d& p_world,
+Depths LookThrough(const Map& map, const WitnessView& at, const Eigen::Vector3d& p_world,
                    const Suspects& suspects) {
   Depths depths;
+  const Keyframe& witness = *at.keyframe;
   const Eigen::Vector3d p_cam = witness.T_cam_world * p_world;
-  const auto uv_px = p_cam.z() > 0 ? map.camera().Project(p_cam) : std::nullopt;
+  if (p_cam.z() > at.reach) return depths;
+  const auto uv_px = map.camera().Project(p_cam);
   if (!uv_px || !InImage(map.camera(), *uv_px)) return depths;
   witness.features->grid.ForEachInRadius(
       *uv_px, SearchRadiusPx(map.camera(), kAroundRad), 0, kCoarsestOctave, [&](uint32_t feature) {
@@ -118,22 +168,26 @@ int Condemn(const std::vector<Suspect*>& found) {
   return static_cast<int>(found.size());
 }
 
+/// Whether the witness is from about when the suspect was seen.
+bool IsOfItsTime(const Keyframe& witness, const Suspect& suspect) {
+  return Seconds(suspect.first_ns - witness.stamp_ns) < kGuardS &&
+         Seconds(witness.stamp_ns - suspect.last_ns) < kGuardS;
+}
+
 /// Asks every witness from another time, and condemns the suspects that are seen through. Returns how many.
-int CondemnSeenThrough(const Map& map, const std::vector<const Keyframe*>& witnesses, Suspects* suspects) {
-  std::vector<Suspect*> found;
-  for (Suspect& suspect : *suspects) {
-    if (suspect.condemned) continue;
-    suspect.through = suspect.support = suspect.proven_support = 0;
-    for (const Keyframe* witness : witnesses) {
-      if (Seconds(suspect.first_ns - witness->stamp_ns) < kGuardS &&
-          Seconds(witness->stamp_ns - suspect.last_ns) < kGuardS) {
-        continue;
-      }
-      const Depths depths = LookThrough(map, *witness, suspect.landmark->p_world, *suspects);
+int CondemnSeenThrough(const Map& map, std::span<const WitnessView> witnesses, Suspects* suspects) {
+  for (Suspect& suspect : *suspects) suspect.through = suspect.support = suspect.proven_support = 0;
+  for (const WitnessView& witness : witnesses) {
+    suspects->ForEachIn(ViewOf(map.camera(), witness), [&](Suspect& suspect) {
+      if (suspect.condemned || IsOfItsTime(*witness.keyframe, suspect)) return;
+      const Depths depths = LookThrough(map, witness, suspect.landmark->p_world, *suspects);
       if (depths.behind > 0 && depths.same == 0) ++suspect.through;
       if (depths.same > 0) ++suspect.support;
       if (depths.proven_same > 0) ++suspect.proven_support;
-    }
+    });
+  }
+  std::vector<Suspect*> found;
+  for (Suspect& suspect : *suspects) {
     if (suspect.through > kThroughPerSupport * suspect.support) found.push_back(&suspect);
   }
   return Condemn(found);
@@ -227,11 +281,23 @@ int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   return removed;
 }
 
+/// Both tests by turns, as long as one of them finds more; `condemned`: so many were since witnesses were
+/// asked last.
+void CondemnInRounds(const Map& map, std::span<const WitnessView> witnesses, int condemned, Suspects* suspects) {
+  for (int round = 0; round < kRounds; ++round) {
+    condemned += CondemnTogether(map, suspects);
+    if (condemned == 0) return;
+    condemned = CondemnSeenThrough(map, witnesses, suspects);
+  }
+}
+
 /// Keyframes that look where this one looks, nearest first.
-std::vector<const Keyframe*> WitnessesNear(const Map& map, const Keyframe& keyframe) {
+std::vector<WitnessView> WitnessesNear(const Map& map, const Keyframe& keyframe) {
   const double depth = map.MedianDepth(keyframe).value_or(0.0);
-  std::vector<const Keyframe*> witnesses = map.KeyframesNear(keyframe, depth, kWitnessAngleRad);
-  if (witnesses.size() > kMaxWitnesses) witnesses.resize(kMaxWitnesses);
+  std::vector<WitnessView> witnesses;
+  for (const Keyframe* near : map.KeyframesNear(keyframe, depth, kWitnessAngleRad)) {
+    if (witnesses.size() < kMaxWitnesses) witnesses.push_back(WitnessOf(map, *near));
+  }
   return witnesses;
 }
 
@@ -243,32 +309,29 @@ int RemoveSeenThrough(MapEditor& map, const Keyframe& keyframe) {
     const Landmark* landmark = map.LandmarkSeenBy(keyframe, feature);
     if (landmark != nullptr) landmarks.push_back(landmark);
   }
-  Suspects suspects(map, landmarks);
-  const std::vector<const Keyframe*> witnesses = WitnessesNear(map, keyframe);
-  if (CondemnSeenThrough(map, witnesses, &suspects) == 0) return 0;
-  for (int round = 0; round < kRounds; ++round) {
-    const int together = CondemnTogether(map, &suspects);
-    if (together + CondemnSeenThrough(map, witnesses, &suspects) == 0) break;
-  }
+  const std::vector<WitnessView> witnesses = WitnessesNear(map, keyframe);
+  Suspects suspects(map, landmarks, EdgeOf(witnesses));
+  CondemnInRounds(map, witnesses, CondemnSeenThrough(map, witnesses, &suspects), &suspects);
   return RemoveCondemned(map, suspects);
 }
 
 int RemoveUnproven(MapEditor& map, MapId map_id, uint64_t removed_before) {
   const std::vector<const Landmark*> landmarks = map.LandmarksOf(map_id);
-  Suspects suspects(map, landmarks);
-  const std::vector<const Keyframe*> witnesses = map.KeyframesOf(map_id);
+  std::vector<WitnessView> witnesses;
+  for (const Keyframe* keyframe : map.KeyframesOf(map_id)) witnesses.push_back(WitnessOf(map, *keyframe));
+  Suspects suspects(map, landmarks, EdgeOf(witnesses));
+  const int seen_through = CondemnSeenThrough(map, witnesses, &suspects);
   const double before = static_cast<double>(removed_before);
-  const double seen_through = before + CondemnSeenThrough(map, witnesses, &suspects);
   const bool can_be_proven = suspects.size() < landmarks.size() && CanBeProven(map, map_id, ProvenOptions());
   const bool somebody_stood =
-      can_be_proven && seen_through > kStoodShare * (before + static_cast<double>(suspects.size()));
+      can_be_proven && before + seen_through > kStoodShare * (before + static_cast<double>(suspects.size()));
+  int condemned = seen_through;
   for (Suspect& suspect : suspects) {
-    if (somebody_stood && suspect.landmark->evidence.moved > 0) suspect.condemned = true;
+    if (!somebody_stood || suspect.condemned || suspect.landmark->evidence.moved <= 0) continue;
+    suspect.condemned = true;
+    ++condemned;
   }
-  for (int round = 0; round < kRounds; ++round) {
-    const int together = CondemnTogether(map, &suspects);
-    if (together + CondemnSeenThrough(map, witnesses, &suspects) == 0) break;
-  }
+  CondemnInRounds(map, witnesses, condemned, &suspects);
   if (somebody_stood) CondemnUnsupported(map, &suspects);
   return RemoveCondemned(map, suspects);
 }

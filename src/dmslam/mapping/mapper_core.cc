@@ -1,5 +1,7 @@
 #include "dmslam/mapping/mapper_core.h"
 
+#include <algorithm>
+#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -189,13 +191,29 @@ void MapperCore::AdjustMaps() {
     if (Stopped()) return;
     if (as_saved_.contains(map_id)) continue;
     Count(RemoveTooNear(map_, map_id, options_.min_depth), &counters_.landmarks_culled);
-    AdjustWholeMap(map_, map_id, options_.final_adjustment_iterations, options_.keypoint_sigma_px, stop_);
+    AdjustAtEnd(map_id);
     Publish(MapEvent::kMapAdjusted, {}, map_id);
     if (!options_.seen_through.enabled) continue;
     // With the next record: frames take their last poses from the map that still has those who stood.
     Count(RemoveUnproven(map_, map_id, seen_through_[map_id]), &counters_.landmarks_seen_through);
   }
   adjusted_ = true;
+}
+
+/// A large map's older keyframes hold the newest in place: local adjustments have settled them long ago, and
+/// the end of a run takes no longer the longer it was.
+void MapperCore::AdjustAtEnd(MapId map_id) {
+  const auto most = static_cast<size_t>(options_.final_adjustment_keyframes);
+  std::vector<const Keyframe*> keyframes = map_.KeyframesOf(map_id);
+  if (keyframes.size() > most) {
+    keyframes.clear();
+    for (const KeyframeId id : order_.Newest(map_, map_id, options_.final_adjustment_keyframes))
+      keyframes.push_back(&map_.At(id));
+    std::ranges::sort(keyframes, {}, &Keyframe::id);
+  }
+  BundleOptions bundle = GlobalBundleOptions(options_.final_adjustment_iterations);
+  bundle.interrupt = stop_;
+  AdjustKeyframes(map_, keyframes, std::numeric_limits<int>::max(), options_.keypoint_sigma_px, bundle);
 }
 
 void MapperCore::End(bool as_it_is) {

@@ -70,8 +70,9 @@ class MapperCore {
   bool OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
-  /// Adjusts every map as a whole, once for what has come until now, and answers the request. A saved map
-  /// that got neither a keyframe nor a correction is not adjusted: it was when it was saved.
+  /// Adjusts every map as a whole, of a large one the newest keyframes, once for what has come until now, and
+  /// answers the request. A saved map that got neither a keyframe nor a correction is not adjusted: it was
+  /// when it was saved.
   void OnAdjustRequest(const AdjustRequest& request);
   /// Says that all maps are adjusted, as far as they are to be.
   void AnswerRequest(uint32_t request);
@@ -99,6 +100,7 @@ class MapperCore {
   void RemoveSeenThroughBy(const Keyframe& keyframe);
   void Adjust(const Keyframe& keyframe);
   void AdjustMaps();
+  void AdjustAtEnd(MapId map_id);
   void Publish(MapEvent event, std::optional<KeyframeId> about, std::optional<MapId> map_id,
                std::optional<uint64_t> correction_id = {}, std::string note = {});
   void Emit(const MapDelta& delta);

@@ -584,6 +584,37 @@ TEST_F(KeyframeStep, AnswersARequestByItsNumberAndNothingElse) {
   EXPECT_TRUE(said_.back().Empty());
 }
 
+/// In which of the frames 1 to 5 the end has moved a keyframe.
+class TheEnd : public KeyframeStep {
+ protected:
+  std::vector<uint32_t> MovedWith(int final_adjustment_keyframes) {
+    MapperOptions options;
+    options.redundant_share = 2.0;
+    options.local_keyframes = 2;
+    options.final_adjustment_keyframes = final_adjustment_keyframes;
+    core_ = MapperCore(options, TestCamera(), Pyramid(), 1, [](const MapDelta&) {});
+    EXPECT_TRUE(core_.OnInitialMap(FirstMap()));
+    for (const uint32_t frame : {2u, 3u, 4u, 5u}) EXPECT_TRUE(core_.OnKeyframe(Frame(frame, 0.02)));
+    const Map before = core_.map();
+    core_.OnAdjustRequest({.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
+    std::vector<uint32_t> moved;
+    for (const uint32_t frame : {1u, 2u, 3u, 4u, 5u}) {
+      const Rigid3d& was = before.At(Id(frame)).T_cam_world;
+      const Rigid3d& is = core_.map().At(Id(frame)).T_cam_world;
+      if (was.translation != is.translation) moved.push_back(frame);
+    }
+    return moved;
+  }
+};
+
+TEST_F(TheEnd, AMapIsAdjustedAsAWhole) {
+  EXPECT_EQ(MovedWith(6), (std::vector<uint32_t>{1, 2, 3, 4, 5}));
+}
+
+TEST_F(TheEnd, OfALargeMapOnlyTheNewestKeyframesMove) {
+  EXPECT_EQ(MovedWith(2), (std::vector<uint32_t>{4, 5}));
+}
+
 /// What comes after an answered request to adjust all maps is adjusted by the next one, and by the end.
 class AfterARequest : public KeyframeStep {
  protected:

@@ -62,7 +62,9 @@ struct MapperOptions {
   double keypoint_sigma_px = kKeypointSigmaPx;
   int local_keyframes = 40;  ///< at most this many keyframes are adjusted at a time (most covisible first)
   int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
-  int final_adjustment_iterations = 30;  ///< of the whole map, when the sequence has ended
+  int final_adjustment_iterations = 30;  ///< when the sequence has ended
+  int final_adjustment_keyframes =
+      500;  ///< in a larger map, so many newest ones of each camera are adjusted then
   double min_depth = 0.1;  ///< a landmark goes before that where it is nearer to a keyframe than this share
                            ///< of what the keyframe sees in the median; 0: none does
   int min_covisibility = kMinCovisibility;
