@@ -545,7 +545,7 @@ void CollectorNode::ExitAtEnd() {
 /// A frontend's reset that no mapper carried out leaves its map as it was: the frontend died as it said so,
 /// and the next one went on in that map; or somebody forged it in the name of the dead.
 bool CollectorNode::WasCarriedOut(const MapReset& reset) const {
-  return proposals_.WasDropped(reset.map_id) || builder_->map().KeyframesOf(reset.map_id).empty();
+  return proposals_.WasDropped(reset.map_id) || !builder_->map().HasMap(reset.map_id);
 }
 
 /// All that the results are made of, once. `ended`: the sequence has come to its end. One that is interrupted

@@ -52,15 +52,15 @@ struct Suspect {
 /// Who looks at suspects.
 struct WitnessView {
   const Keyframe* keyframe = nullptr;
-  double reach = 0;  ///< of what is farther along its optical axis it says nothing: all that it sees is nearer
+  double reach =
+      0;  ///< of what is farther along its optical axis it says nothing: all that it sees is nearer
 };
 
 WitnessView WitnessOf(const Map& map, const Keyframe& keyframe) {
   double farthest = 0;
   for (size_t feature = 0; feature < keyframe.landmarks.size(); ++feature) {
     const Landmark* landmark = map.LandmarkSeenBy(keyframe, feature);
-    if (landmark != nullptr)
-      farthest = std::max(farthest, (keyframe.T_cam_world * landmark->p_world).z());
+    if (landmark != nullptr) farthest = std::max(farthest, (keyframe.T_cam_world * landmark->p_world).z());
   }
   return {&keyframe, farthest / (1 - kDepthTolerance)};
 }
@@ -281,9 +281,10 @@ int RemoveCondemned(MapEditor& map, const Suspects& suspects) {
   return removed;
 }
 
-/// Both tests by turns, as long as one of them finds more; `condemned`: so many were since witnesses were
-/// asked last.
-void CondemnInRounds(const Map& map, std::span<const WitnessView> witnesses, int condemned, Suspects* suspects) {
+/// Both tests by turns, as long as one of them finds more; `condemned`: so many are already.
+void CondemnInRounds(const Map& map, std::span<const WitnessView> witnesses, int condemned,
+                     Suspects* suspects) {
+  if (condemned == 0) return;
   for (int round = 0; round < kRounds; ++round) {
     condemned += CondemnTogether(map, suspects);
     if (condemned == 0) return;

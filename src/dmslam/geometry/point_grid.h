@@ -20,9 +20,7 @@ class PointGrid {
   template <typename Visit>
   void ForEachIn(const Eigen::AlignedBox3d& box, const Visit& visit) const {
     const Cube low = CubeOf(box.min()), high = CubeOf(box.max());
-    const auto visit_all = [&](const std::vector<uint32_t>& points) {
-      std::ranges::for_each(points, visit);
-    };
+    const auto visit_all = [&](const std::vector<uint32_t>& points) { std::ranges::for_each(points, visit); };
     const Eigen::Array3d count = (high - low + 1).cast<double>();
     if (count.prod() > static_cast<double>(cubes_.size())) {
       for (const auto& [key, points] : cubes_) visit_all(points);

@@ -71,10 +71,8 @@ LoopDetector::Found LoopDetector::Detect(const Map& map, const MapPlaces& places
 
 std::vector<const Keyframe*> LoopDetector::DetectInOtherMaps(const Map& map, const MapPlaces& places,
                                                              const Keyframe& keyframe) const {
-  const bool alone = std::ranges::all_of(
-      map.keyframes(), [&](const auto& item) { return item.second.map_id == keyframe.map_id; });
   const BowVector* words = places.Words(keyframe.id);
-  if (alone || words == nullptr) return {};
+  if (words == nullptr || !map.HasAnotherMap(keyframe.map_id)) return {};
   std::vector<const Keyframe*> found;
   const auto add = [&](const Keyframe* other, size_t most) {
     if (found.size() < most && std::ranges::find(found, other) == found.end()) found.push_back(other);

@@ -182,6 +182,7 @@ bool LoopcloserCore::MayJoin(const VerifiedLoop& loop) const {
 
 /// In turn, by their ids.
 std::vector<const Keyframe*> LoopcloserCore::NextToAsk(const Keyframe& newest) const {
+  if (!map_.HasAnotherMap(newest.map_id)) return {};
   std::vector<const Keyframe*> of_others;
   for (const auto& [id, keyframe] : map_.keyframes()) {
     if (keyframe.map_id != newest.map_id) of_others.push_back(&keyframe);

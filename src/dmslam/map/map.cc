@@ -157,6 +157,14 @@ std::vector<KeyframeId> Map::BestCovisible(KeyframeId id, int most, int min_shar
   return ids;
 }
 
+bool Map::HasMap(MapId map_id) const {
+  return std::ranges::any_of(standpoints_, [&](const Standpoint& at) { return at.map_id == map_id; });
+}
+
+bool Map::HasAnotherMap(MapId map_id) const {
+  return std::ranges::any_of(standpoints_, [&](const Standpoint& at) { return at.map_id != map_id; });
+}
+
 std::vector<const Keyframe*> Map::KeyframesOf(MapId map_id) const {
   std::vector<const Keyframe*> keyframes;
   for (const auto& [id, keyframe] : keyframes_) {

@@ -117,6 +117,10 @@ class Map {
   /// are turned from it by less than `angle_rad`, nearest first.
   std::vector<const Keyframe*> KeyframesNear(const Keyframe& keyframe, double distance,
                                              double angle_rad) const;
+  /// Whether one map has a keyframe: there is no map without one. Cheap, however many it has.
+  bool HasMap(MapId map_id) const;
+  /// Whether there is another map beside this one.
+  bool HasAnotherMap(MapId map_id) const;
   /// Keyframes of one map, by id.
   std::vector<const Keyframe*> KeyframesOf(MapId map_id) const;
   /// Landmarks of one map, by id.

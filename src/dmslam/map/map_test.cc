@@ -132,6 +132,25 @@ TEST(Map, KeyframesNearStandNearAndLookTheSameWay) {
   EXPECT_GT(turned_away, 0u);
 }
 
+TEST(Map, KnowsWhichMapsThereAre) {
+  RandomEditor editor(13);
+  editor.Steps(2000);
+  MapEditor& map = editor.map();
+  const MapId one = map.keyframes().begin()->second.map_id;
+  constexpr MapId kNew = 77;
+  EXPECT_TRUE(map.HasMap(one));
+  EXPECT_FALSE(map.HasMap(kNew));
+  for (const Keyframe* keyframe : map.KeyframesOf(one)) map.SetMapId(*keyframe, kNew);
+  EXPECT_FALSE(map.HasMap(one));
+  EXPECT_TRUE(map.HasMap(kNew));
+  for (const auto& [id, keyframe] : map.keyframes()) map.SetMapId(keyframe, kNew);
+  EXPECT_FALSE(map.HasAnotherMap(kNew));
+  map.SetMapId(map.keyframes().begin()->second, one);
+  EXPECT_TRUE(map.HasAnotherMap(kNew));
+  map.DropMap(one);
+  EXPECT_FALSE(map.HasAnotherMap(kNew));
+}
+
 TEST(Map, BestCovisibleAreThoseThatShareMost) {
   RandomEditor editor(5);
   editor.Steps(2000);

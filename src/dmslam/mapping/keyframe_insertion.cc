@@ -36,7 +36,7 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(*proposal.reference);
   if (!reference || !stands_for_it) return report;
   // A map that is gone has been joined with another since the frontend heard of it last.
-  if (reference->map_id != proposal.map_id && !map.KeyframesOf(proposal.map_id).empty()) return report;
+  if (reference->map_id != proposal.map_id && map.HasMap(proposal.map_id)) return report;
   Keyframe made =
       MakeKeyframe(map, proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
   made.map_id = reference->map_id;

@@ -68,7 +68,7 @@ bool MapperCore::Interrupted() {
 
 bool MapperCore::OnInitialMap(const InitialMap& proposal) {
   if (map_.HasKnown(proposal.second.id)) return false;
-  const bool is_new = !map_.HasKnown(proposal.first.id) && map_.KeyframesOf(proposal.map_id).empty();
+  const bool is_new = !map_.HasKnown(proposal.first.id) && !map_.HasMap(proposal.map_id);
   if (is_new && StartMap(proposal)) {
     adjusted_ = false;
     Publish(MapEvent::kMapStarted, proposal.second.id, proposal.map_id);

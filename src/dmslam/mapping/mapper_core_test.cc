@@ -607,9 +607,7 @@ class TheEnd : public KeyframeStep {
   }
 };
 
-TEST_F(TheEnd, AMapIsAdjustedAsAWhole) {
-  EXPECT_EQ(MovedWith(6), (std::vector<uint32_t>{1, 2, 3, 4, 5}));
-}
+TEST_F(TheEnd, AMapIsAdjustedAsAWhole) { EXPECT_EQ(MovedWith(6), (std::vector<uint32_t>{1, 2, 3, 4, 5})); }
 
 TEST_F(TheEnd, OfALargeMapOnlyTheNewestKeyframesMove) {
   EXPECT_EQ(MovedWith(2), (std::vector<uint32_t>{4, 5}));

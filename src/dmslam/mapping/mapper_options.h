@@ -64,7 +64,7 @@ struct MapperOptions {
   int local_fixed_keyframes = 20;        ///< at most this many hold the window in place
   int final_adjustment_iterations = 30;  ///< when the sequence has ended
   int final_adjustment_keyframes =
-      500;  ///< in a larger map, so many newest ones of each camera are adjusted then
+      500;                 ///< in a larger map, so many newest ones of each camera are adjusted then
   double min_depth = 0.1;  ///< a landmark goes before that where it is nearer to a keyframe than this share
                            ///< of what the keyframe sees in the median; 0: none does
   int min_covisibility = kMinCovisibility;

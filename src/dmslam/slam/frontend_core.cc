@@ -115,7 +115,7 @@ FrontendOutput FrontendCore::GiveUpMap(int64_t stamp_ns, MapReset::Fate fate, co
 
 /// The map that was tracked in may have become part of another.
 void FrontendCore::FollowJoinedMap() {
-  if (!phase_.HasMap() || !map_id_ || !map_.KeyframesOf(*map_id_).empty()) return;
+  if (!phase_.HasMap() || !map_id_ || map_.HasMap(*map_id_)) return;
   own_maps_.Take(*map_id_);
   const std::optional<KeyframeId> reference = tracker_.last_reference();
   const auto last = reference ? map_.ResolvePose(*reference) : std::nullopt;
@@ -203,7 +203,7 @@ FrontendOutput FrontendCore::AwaitMap() {
 
 /// Where a map of that number is there, it is another one, which stays.
 FrontendOutput FrontendCore::GiveUpRefusedMap() {
-  const bool is_taken = !map_.KeyframesOf(*map_id_).empty();
+  const bool is_taken = map_.HasMap(*map_id_);
   return GiveUpMap(frame_.stamp_ns, is_taken ? MapReset::Fate::kKeep : MapReset::Fate::kDrop,
                    "the mapper refused the first map");
 }

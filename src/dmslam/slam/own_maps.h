@@ -26,7 +26,7 @@ class OwnMaps {
 
   void Drop(MapId map_id) { dropped_ = map_id; }
   /// Whether the map that was dropped last is still there: the mapper has not heard of it yet.
-  bool HasDropped(const Map& map) const { return dropped_ && !map.KeyframesOf(*dropped_).empty(); }
+  bool HasDropped(const Map& map) const { return dropped_ && map.HasMap(*dropped_); }
 
  private:
   CameraId camera_;
