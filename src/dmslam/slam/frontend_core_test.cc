@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,20 +27,18 @@ class Phases : public ::testing::Test {
  protected:
   static constexpr size_t kPoints = 300;
 
-  explicit Phases(bool in_portions = false, CameraId camera_id = 0,
-                  std::shared_ptr<const Vocabulary> vocabulary = nullptr) {
+  /// `change`: what is different about the frontend.
+  explicit Phases(const std::function<void(FrontendCore::Setup&)>& change = {}) {
     scene_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     strange_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     FrontendCore::Setup setup;
     setup.camera = TestCamera();
     setup.extractor.num_features = 1000;  // of which a lit frame has a tenth
-    setup.camera_id = camera_id;
-    setup.vocabulary = std::move(vocabulary);
     setup.options.keyframes_at_end = true;
     setup.run_search = [this](const FirstMapSearch&) {
       return [this](const InitializerFrame& frame) { return Search(frame); };
     };
-    setup.catch_up_in_portions = in_portions;
+    if (change) change(setup);
     core_.emplace(setup);
   }
 
@@ -154,7 +153,7 @@ TEST_F(Phases, WithoutAMapThereIsNothingToGoOnIn) {
 /// One that joins a system which has been running: maps are there, and the frontend made none of them.
 class Resuming : public Phases {
  protected:
-  Resuming() : Phases(false, 0, ShippedVocabulary()) {}
+  Resuming() : Phases([](FrontendCore::Setup& setup) { setup.vocabulary = ShippedVocabulary(); }) {}
 
   /// An empty keyframe of map 7, newer than all others.
   void AddKeyframe(CameraId camera) {
@@ -202,6 +201,62 @@ TEST_F(Resuming, OfSeveralMapsItTakesThatOfItsOwnNewestKeyframe) {
 TEST_F(Resuming, OneWithoutAKeyframeTakesTheNewestMap) {
   AddKeyframe(1);
   EXPECT_EQ(MapAfterResume(), 7u);
+}
+
+/// One that begins in a map that was saved.
+class InSavedMap : public Phases {
+ protected:
+  explicit InSavedMap(bool localize_only = false)
+      : Phases([=](FrontendCore::Setup& setup) {
+          setup.vocabulary = ShippedVocabulary();
+          setup.in_saved_map = true;
+          setup.localize_only = localize_only;
+        }) {
+    scene_.MapAll(20);
+    core_->ApplyMapDelta(scene_.map().TakeDelta(MapEvent::kMapped, KeyframeId::Make(1, 19), 1));
+  }
+
+  /// Frames 20 to 119: all is seen, then half of it, then what nobody has seen.
+  struct Said {
+    int poses = 0, evidence = 0, keyframes = 0, first_maps = 0, resets = 0;
+  };
+  Said Play() {
+    Said said;
+    for (uint32_t frame = 20; frame < 120; ++frame) {
+      const FrontendOutput output = frame < 40   ? Frame(frame)
+                                    : frame < 60 ? HalfHidden(frame)
+                                                 : Strange(frame);
+      said.poses += Find<FramePose>(output)->HasPose() ? 1 : 0;
+      said.evidence += Find<FrameEvidence>(output) != nullptr ? 1 : 0;
+      said.keyframes += Find<KeyframeProposal>(output) != nullptr ? 1 : 0;
+      said.first_maps += Find<InitialMap>(output) != nullptr ? 1 : 0;
+      said.resets += Find<MapReset>(output) != nullptr ? 1 : 0;
+    }
+    return said;
+  }
+};
+
+TEST_F(InSavedMap, ItIsLostFromTheBeginning) { EXPECT_EQ(core_->state(), TrackingState::kLost); }
+
+TEST_F(InSavedMap, ItFindsItselfThereAndGoesOnWithIt) {
+  const Said said = Play();
+  EXPECT_GT(said.poses, 20);
+  EXPECT_GT(said.evidence, 0);
+  EXPECT_GT(said.keyframes, 0);
+  EXPECT_EQ(said.resets, 1) << "lost for long, it looks for another map";
+}
+
+class LocalizingOnly : public InSavedMap {
+ protected:
+  LocalizingOnly() : InSavedMap(true) {}
+};
+
+TEST_F(LocalizingOnly, ItFindsItselfThereAndAddsNothing) {
+  finds_map_ = true;
+  const Said said = Play();
+  EXPECT_GT(said.poses, 20);
+  EXPECT_EQ(said.evidence + said.keyframes + said.first_maps + said.resets, 0);
+  EXPECT_FALSE(core_->GrowBack()) << "nor when the sequence has ended";
 }
 
 TEST_F(Phases, AProposalThatTheMapperRefusesIsGivenUp) {
@@ -384,7 +439,7 @@ TEST_F(EvidenceRate, At60FramesASecond) { EXPECT_NEAR(Told(60), 6, 1); }
 
 class InPortions : public Phases {
  protected:
-  InPortions() : Phases(true) {}
+  InPortions() : Phases([](FrontendCore::Setup& setup) { setup.catch_up_in_portions = true; }) {}
 };
 
 TEST_F(InPortions, FramesThatWaitedForTheMapAreTrackedOneByOne) {
@@ -463,7 +518,7 @@ TEST_F(Phases, FramesBeforeTheMapArePlacedWhenTheSequenceHasEnded) {
 /// Camera 1 of several; what it finds in the map is camera 0's.
 class SecondCamera : public Phases {
  protected:
-  SecondCamera() : Phases(false, 1) {}
+  SecondCamera() : Phases([](FrontendCore::Setup& setup) { setup.camera_id = 1; }) {}
 };
 
 TEST_F(SecondCamera, NumbersItsMapsAndKeyframesApartFromOthers) {
@@ -492,7 +547,11 @@ TEST_F(SecondCamera, AFirstMapOfAnotherDoesNotAnswerItsOwn) {
 /// The same, and it would find itself in the map of another by what it looks like.
 class BesideAnother : public Phases {
  protected:
-  BesideAnother() : Phases(false, 1, ShippedVocabulary()) {}
+  BesideAnother()
+      : Phases([](FrontendCore::Setup& setup) {
+          setup.camera_id = 1;
+          setup.vocabulary = ShippedVocabulary();
+        }) {}
 
   /// Of keyframes within a second.
   void AnothersMapArrives() {
