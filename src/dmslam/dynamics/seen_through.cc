@@ -49,11 +49,10 @@ struct Suspect {
   bool condemned = false;
 };
 
-/// Who looks at suspects.
+/// Who looks at suspects, and how far. All that it sees is nearer, so of what lies beyond it says nothing.
 struct WitnessView {
   const Keyframe* keyframe = nullptr;
-  double reach =
-      0;  ///< of what is farther along its optical axis it says nothing: all that it sees is nearer
+  double reach = 0;  ///< along the optical axis
 };
 
 WitnessView WitnessOf(const Map& map, const Keyframe& keyframe) {
@@ -76,7 +75,7 @@ Eigen::AlignedBox3d ViewOf(const Camera& camera, const WitnessView& witness) {
   return box;
 }
 
-/// The edge of the cubes that suspects are kept in: of a view's box, they take about a quarter.
+/// The edge of the cubes that suspects are kept in: a quarter of how far witnesses see.
 double EdgeOf(std::span<const WitnessView> witnesses) {
   std::vector<double> reaches;
   for (const WitnessView& witness : witnesses) reaches.push_back(witness.reach);
