@@ -12,7 +12,7 @@
 namespace dmslam::bench {
 
 CoreLoop::CoreLoop(const Settings& settings, const Camera& camera,
-                   std::shared_ptr<const Vocabulary> vocabulary)
+                   const std::shared_ptr<const Vocabulary>& vocabulary)
     : frontend_(FrontendSetup(settings, camera, vocabulary)),
       mapper_(settings.Read<MapperOptions>(), camera, settings.Read<Pyramid>(), 1,
               [this](const MapDelta& delta) { OnDelta(delta); }),

@@ -48,7 +48,8 @@ struct EndTimes {
 /// The cores of frontend, mapper and loop closer in lock-step, without processes, messages or a clock.
 class CoreLoop {
  public:
-  CoreLoop(const Settings& settings, const Camera& camera, std::shared_ptr<const Vocabulary> vocabulary);
+  CoreLoop(const Settings& settings, const Camera& camera,
+           const std::shared_ptr<const Vocabulary>& vocabulary);
 
   StepTimes StepImage(uint32_t index, int64_t stamp_ns, const GrayView& image);
   StepTimes StepFeatures(uint32_t index, int64_t stamp_ns, FeatureSet features);
