@@ -319,8 +319,8 @@ bool FrontendNode::Refine() {
 
 /// All of them as a whole, so that the last poses are told in the best map.
 void FrontendNode::AskForAdjustedMaps() {
-  const auto request = end_.Ask(core().map(), context_.now_ns(),
-                                frames_.newest() ? DoneWithNewest().stamp_ns : 0, options_.camera_id);
+  const std::optional<int64_t> newest_ns = frames_.newest() ? frames_.newest()->stamp_ns : std::nullopt;
+  const auto request = end_.Ask(core().map(), context_.now_ns(), newest_ns, options_.camera_id);
   if (request) PublishRecord(*request);
 }
 

@@ -9,6 +9,7 @@
 #include "dmslam/tracking/motion_follower.h"
 #include "dmslam/tracking/pose_search.h"
 #include "dmslam/tracking/relocalizer.h"
+#include "dmslam/tracking/usual_speed.h"
 
 namespace dmslam {
 
@@ -20,6 +21,12 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
 /// about as fast as it does between them; `depth` of the scene [map units]. Keyframes of that camera count.
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
                               double depth, CameraId camera_id = 0);
+
+/// Whether the camera gets from the frame to the keyframes that follow it within half a second without going
+/// much faster than it did while it was tracked; `depth` of the scene [map units]. Keyframes of that camera
+/// count.
+bool IsLeftAtUsualSpeed(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
+                        double depth, const UsualSpeed& usual_speed, CameraId camera_id = 0);
 
 /// Whether so much is seen, and in so much of the image, that a frame that was placed when the sequence has
 /// ended is believed for itself, and may become a keyframe.
@@ -40,10 +47,14 @@ class LatePlacement {
     TrackingReport report;
     bool jumped = false;  ///< recognised like a lost camera, and not followed from its neighbour
   };
-  /// Finds the frame's pose; the report has none where it is not believed. `search` and `relocalizer`: of
-  /// the frontend.
-  Found Place(const Map& map, LateMap late_map, PoseSearch* search, const Relocalizer& relocalizer,
-              TrackedFrame* frame);
+  /// What the tracker has, to search with and of what it went by.
+  struct Tracked {
+    PoseSearch* search = nullptr;
+    const Relocalizer& relocalizer;
+    const UsualSpeed& usual_speed;
+  };
+  /// Finds the frame's pose; the report has none where it is not believed.
+  Found Place(const Map& map, LateMap late_map, const Tracked& tracked, TrackedFrame* frame);
   /// A frame with its pose.
   struct Placed {
     TrackedFrame frame;
@@ -72,6 +83,8 @@ class LatePlacement {
 
  private:
   void LeaveNeighbour();
+  Found Find(const Map& map, const Tracked& tracked, TrackedFrame* frame);
+  bool IsTooFast(const Map& map, const Tracked& tracked, const TrackedFrame& frame) const;
   void FindNeighbour(const Map& map, LateMap late_map, const TrackedFrame& frame);
   bool IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const;
   bool IsBelieved(const Map& map, const TrackingReport& report, const PoseSearch& search,

@@ -71,6 +71,33 @@ TEST(KeyframesAside, BoundWhatLiesBetweenThem) {
   EXPECT_FALSE(agrees(5, -2.0));
 }
 
+/// For three seconds 0.3 units per second, four units from the scene.
+UsualSpeed SlowCamera(const MapScene& scene, uint32_t first) {
+  UsualSpeed usual_speed;
+  const Keyframe* reference = scene.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, first));
+  for (int frame = 0; frame < 90; ++frame) {
+    const PlacedPose pose = PlacedPose::Of(*reference, MapScene::PoseAt(0.01 * frame));
+    usual_speed.OnPose(scene.map(), pose, frame * MapScene::kStepNs);
+  }
+  return usual_speed;
+}
+
+TEST(LeftAtUsualSpeed, WhoComesFromFarAwayDoesNot) {
+  MapScene scene;
+  scene.AddCloud(100, {0, 0, 4}, {1.6, 1.2, 0.5});
+  scene.MapAll(12, 0.01, 30, 30 * MapScene::kStepNs);
+  const UsualSpeed slow = SlowCamera(scene, 30);
+  const auto left = [&](uint32_t index, double x, const UsualSpeed& usual_speed) {
+    const TrackedFrame frame = scene.See(index, index * MapScene::kStepNs, MapScene::PoseAt(x));
+    return IsLeftAtUsualSpeed(scene.map(), MapScene::kMap, frame, MapScene::kSession, 4.0, usual_speed);
+  };
+  EXPECT_TRUE(left(29, -0.01, slow));
+  EXPECT_TRUE(left(29, -0.2, slow)) << "0.2 s later it may have gone there";
+  EXPECT_FALSE(left(29, -0.6, slow));
+  EXPECT_TRUE(left(29, -0.6, {})) << "who knows how fast it goes";
+  EXPECT_TRUE(left(5, -2.0, slow)) << "no keyframe follows within half a second";
+}
+
 /// Frames before the map's first keyframe, which is frame 20.
 class GrowingBack : public ::testing::Test {
  protected:
@@ -89,7 +116,7 @@ class GrowingBack : public ::testing::Test {
   }
   TrackingReport Place(TrackedFrame* frame) {
     const LatePlacement::Found found =
-        placement_.Place(scene_.map(), late_map_, &search_, relocalizer_, frame);
+        placement_.Place(scene_.map(), late_map_, {&search_, relocalizer_, {}}, frame);
     jumped_ = found.jumped;
     return found.report;
   }
@@ -224,7 +251,8 @@ TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
     PoseSearch search({}, TestCamera());
     LatePlacement placement(MapScene::kSession, 0, 0, {});
     TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(0));
-    const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &frame);
+    const auto [report, jumped] =
+        placement.Place(scene.map(), LateMap::kGrows, {&search, relocalizer, {}}, &frame);
     ASSERT_TRUE(report.HasPose()) << report.reason;
     const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
     const auto told =
@@ -232,6 +260,23 @@ TEST(LatePlacement, WhatIsProvenToBeNoPersonConfirmsAFrame) {
     ASSERT_EQ(told.size(), 1u);
     EXPECT_EQ(told.front().confirmed, keyframes == 280u);
   }
+}
+
+/// Keyframes that were placed late have gone off with somebody who walks: the next one is not placed there.
+TEST(GrowingBackFast, FasterThanTheCameraWasItIsNotFollowed) {
+  MapScene scene;
+  scene.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
+  scene.MapAll(12, 0.1, 20, 20 * MapScene::kStepNs);
+  Relocalizer relocalizer(nullptr);
+  PoseSearch search({}, TestCamera());
+  const auto is_placed = [&](const UsualSpeed& usual_speed) {
+    LatePlacement placement(MapScene::kSession, 0, 0, {});
+    TrackedFrame frame = scene.See(19, 19 * MapScene::kStepNs, MapScene::PoseAt(-0.1));
+    return placement.Place(scene.map(), LateMap::kGrows, {&search, relocalizer, usual_speed}, &frame)
+        .report.HasPose();
+  };
+  EXPECT_FALSE(is_placed(SlowCamera(scene, 20)));
+  EXPECT_TRUE(is_placed({})) << "who knows how fast it goes";
 }
 
 /// A camera that moves as fast before the map's first keyframe as after it.
@@ -248,7 +293,8 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
   };
   for (const uint32_t index : {19u, 18u}) {
     TrackedFrame frame = see(index);
-    const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &frame);
+    const auto [report, jumped] =
+        placement.Place(scene.map(), LateMap::kGrows, {&search, relocalizer, {}}, &frame);
     ASSERT_TRUE(report.HasPose()) << index << ": " << report.reason;
     const PlacedPose pose = *PlacedPose::Of(search.Reference(scene.map()), frame.T_cam_world);
     placement.GoOnFrom(scene.map(), LateMap::kGrows, search, {frame, report, pose, jumped}, std::nullopt);
@@ -256,10 +302,12 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
   for (const uint32_t index : {17u, 16u, 15u}) {
     TrackedFrame dark(index, index * kFrameNs,
                       MakeFrameFeatures({}, scene.map().camera(), scene.map().pyramid()));
-    EXPECT_FALSE(placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &dark).report.HasPose());
+    EXPECT_FALSE(
+        placement.Place(scene.map(), LateMap::kGrows, {&search, relocalizer, {}}, &dark).report.HasPose());
   }
   TrackedFrame again = see(14);
-  const auto [report, jumped] = placement.Place(scene.map(), LateMap::kGrows, &search, relocalizer, &again);
+  const auto [report, jumped] =
+      placement.Place(scene.map(), LateMap::kGrows, {&search, relocalizer, {}}, &again);
   ASSERT_TRUE(report.HasPose()) << report.reason;
   EXPECT_NEAR(again.T_cam_world.Center().x(), -0.6, 5e-3);
 }

@@ -386,8 +386,8 @@ KeyframeProposal FrontendCore::ProposeKeyframe(const TrackedFrame& frame, const 
 
 /// A frame without a pose, with its pose if it can be placed.
 std::optional<LatePlacement::Placed> FrontendCore::PlaceLate(LateMap late_map, TrackedFrame* frame) {
-  const LatePlacement::Found found =
-      late_.Place(map_, late_map, &tracker_.search(), tracker_.relocalizer(), frame);
+  const LatePlacement::Found found = late_.Place(
+      map_, late_map, {&tracker_.search(), tracker_.relocalizer(), tracker_.usual_speed()}, frame);
   if (!found.report.IsTracked()) return std::nullopt;
   const auto pose = PlacedPose::Of(tracker_.search().Reference(map_), frame->T_cam_world);
   if (!pose) return std::nullopt;

@@ -56,7 +56,7 @@ class TrajectoryBuilder {
   /// carried camera moves (SmoothTrajectory()), as well as each was known when it was told: the newest
   /// kMostJoined of each camera and map, as many as a frontend would remember. To be called when all is in.
   void JoinPosesOf(const std::set<FrameName>& frames);
-  static constexpr size_t kMostJoined = 3000;
+  static constexpr size_t kMostJoined = 3600;
 
   struct Trajectories {
     std::optional<MapId> map_id;      ///< the map that holds most frames; none: no frame is placed

@@ -70,10 +70,12 @@ Tracker::Tracker(const Setup& setup)
       follower_(setup.options) {}
 
 void Tracker::BeginAt(const Keyframe& keyframe) {
+  usual_speed_.Interrupt();
   follower_.BeginAt(keyframe, {keyframe.id.frame_index(), keyframe.stamp_ns});
 }
 
 void Tracker::OnMapForgotten() {
+  usual_speed_.Interrupt();
   relocalizer_.Clear();
   search_.Reset();
   second_search_.Reset();
@@ -81,6 +83,7 @@ void Tracker::OnMapForgotten() {
 }
 
 void Tracker::OnMapGivenUp() {
+  usual_speed_.Interrupt();
   search_.Reset();
   second_search_.Reset();
   follower_.Stop();
@@ -110,6 +113,11 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
 Tracker::Attempt Tracker::FindPose(const Map& map, const Request& request, TrackedFrame* frame) {
   Attempt attempt = FollowMotion(map, frame);
   if (IsDoubtfulForLong(attempt.report, frame->stamp_ns)) attempt.report.TakePoseAway();
+  if (IsCarriedAway(map, attempt.report, *frame)) {
+    search_.judge().DropEvidence();
+    attempt.report.TakePoseAway("the pose is farther away than the camera can have come");
+    attempt.weak_pose.reset();
+  }
   if (!attempt.report.HasPose() && unbelieved_) GoBack();
   if (attempt.report.HasPose()) {
     FindBetterPlace(map, frame, &attempt);
@@ -142,6 +150,8 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   follower_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns}, frame,
                       attempt.relocalized || attempt.by_rival);
   if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
+  if (attempt.relocalized) usual_speed_.Interrupt();
+  if (!unbelieved_) usual_speed_.OnPose(map, pose, frame.stamp_ns);
 }
 
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
@@ -168,6 +178,16 @@ bool Tracker::IsOldEnoughToProve(const Map& map) const {
 
 bool Tracker::IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const {
   return report.IsDoubtful() && unbelieved_ && stamp_ns - unbelieved_->since_ns > kDoubtNs;
+}
+
+/// Somebody who was mapped while he stood takes the camera along. A place that is seen as a whole or proven
+/// to be no person is no such: there the camera comes back.
+bool Tracker::IsCarriedAway(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
+  if (!options_.usual_speed || !report.HasPose()) return false;
+  if (unbelieved_ && unbelieved_->why == Unbelieved::Why::kFoundAnew) return false;
+  const std::optional<PlacedPose> pose = PlacedPose::Of(search_.Reference(map), frame.T_cam_world);
+  if (!pose || !usual_speed_.IsTooFar(map, *pose, frame.stamp_ns)) return false;
+  return !IsSeenAsAWhole(report) && CountProven(map, frame.landmarks, {}) < kManyProven;
 }
 
 /// What was followed does not predict what is seen: the camera is where it was believed last, and lost.
@@ -206,7 +226,8 @@ void Tracker::FindTurned(const Map& map, TrackedFrame* frame, Attempt* attempt) 
   if (!search_.FromTurn(map, follower_.last(), *T_last, {.most_rad = reach_rad}, &found)) return;
   const TrackingReport report = search_.InLocalMap(map, true, std::nullopt, &found);
   if (!report.IsTracked() ||
-      !follower_.motion().IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}))
+      !follower_.motion().IsReachable(map, found.T_cam_world, {frame->index, frame->stamp_ns}) ||
+      IsCarriedAway(map, report, found))
     return;
   *frame = std::move(found);
   attempt->report = report;

@@ -9,6 +9,7 @@
 #include "dmslam/tracking/motion_follower.h"
 #include "dmslam/tracking/pose_certainty.h"
 #include "dmslam/tracking/relocalizer.h"
+#include "dmslam/tracking/usual_speed.h"
 
 namespace dmslam {
 
@@ -73,6 +74,7 @@ class Tracker {
   FrameEvidence TakeEvidence(int64_t stamp_ns, std::optional<MapId> map_id) {
     return search_.judge().TakeEvidence(stamp_ns, map_id);
   }
+  const UsualSpeed& usual_speed() const { return usual_speed_; }
   /// For frames beside the stream, when it has ended.
   PoseSearch& search() { return search_; }
   const Relocalizer& relocalizer() const { return relocalizer_; }
@@ -95,6 +97,7 @@ class Tracker {
   bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
   bool IsOldEnoughToProve(const Map& map) const;
   bool IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const;
+  bool IsCarriedAway(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
   void GoBack();
 
   TrackingOptions options_;
@@ -104,6 +107,7 @@ class Tracker {
   Relocalizer relocalizer_;
   MotionFollower follower_;
   PoseCertaintyEstimator certainty_;
+  UsualSpeed usual_speed_;
   std::optional<int64_t> relocalized_ns_;  ///< when the camera was found last
   /// A camera that is followed and not believed.
   struct Unbelieved {

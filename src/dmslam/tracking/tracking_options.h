@@ -24,6 +24,8 @@ struct TrackingOptions {
   double chi2 = kChiSquared2Dof;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
   bool doubt = true;  ///< poses that may rest on what is no part of the room are followed, but not told
+  bool usual_speed =
+      true;           ///< poses that a camera would have reached faster than it usually goes are not told
   int min_cells = 6;  ///< inliers must lie in at least so many cells of an 8 x 6 grid
 
   template <typename Visitor>
@@ -37,6 +39,11 @@ struct TrackingOptions {
              "keyframes whose landmarks are searched for");
     v.Switch("tracking.doubt", doubt,
              "poses that may rest on what is no part of the room are followed for a second, but not told");
+    v.InBaseline("off");
+    v.InPaper("off");
+    v.Switch("tracking.usual_speed", usual_speed,
+             "a pose that the camera would have reached much faster than it usually goes is believed only "
+             "where the place is seen as a whole or proven to be no person");
     v.InBaseline("off");
     v.InPaper("off");
   }
