@@ -11,7 +11,7 @@ namespace {
 constexpr int64_t kOverNs = 200'000'000;  // a speed is that over this time...
 constexpr int64_t kSlackNs = 5'000'000;   // ...stamps being a little off
 constexpr double kKnownS = 1.5;           // of believed motion, before it says what is usual
-constexpr double kForgottenS = 120;       // of motion count in full; what was before, by half each time
+constexpr double kForgottenS = 30;        // of motion count in full; what was before, by half each time
 constexpr double kUsualShare = 0.8;       // of the time it goes no faster than usual
 constexpr double kHurryS = 0.5;           // no hurry takes longer...
 constexpr double kLonger = 0.5;           // ...and what goes on is so many times as fast
@@ -27,11 +27,11 @@ UsualSpeed::UsualSpeed() { recent_.reserve(kReserved); }
 
 void UsualSpeed::OnPose(const Map& map, const PlacedPose& pose, int64_t stamp_ns) {
   const std::optional<Step> step = StepTo(map, pose, stamp_ns);
-  if (step && IsTooFar(step->moved, step->seconds)) {
-    Interrupt();
-  } else if (step) {
-    const double since_s = SecondsFromTo(recent_.back().stamp_ns, stamp_ns);
+  if (step) {
+    const bool jumped = IsTooFar(step->moved, step->seconds);
+    const double since_s = jumped ? step->seconds : SecondsFromTo(recent_.back().stamp_ns, stamp_ns);
     Count(step->moved / step->seconds, std::min(kLongestStepS, since_s));
+    if (jumped) Interrupt();
   }
   const auto is_old = [&](const Recent& past) { return stamp_ns - past.stamp_ns >= kOverNs - kSlackNs; };
   const auto young = std::ranges::find_if_not(recent_, is_old);

@@ -17,7 +17,8 @@ class UsualSpeed {
  public:
   UsualSpeed();
 
-  /// A pose that is believed. A step that is too far is no motion: the camera was found again.
+  /// A pose that is believed. After a step that is too far for it, it is measured from there: it was found
+  /// again, or goes faster now.
   void OnPose(const Map& map, const PlacedPose& pose, int64_t stamp_ns);
   /// The next pose does not follow from those before.
   void Interrupt() { recent_.clear(); }

@@ -93,13 +93,19 @@ TEST_F(UsualSpeedTest, WhatWasLongAgoIsForgotten) {
   EXPECT_TRUE(IsTooFar(0.3 * 3.0 * 0.2, 0.2));
 }
 
-TEST_F(UsualSpeedTest, AJumpIsNoMotion) {
+TEST_F(UsualSpeedTest, AfterAJumpItIsMeasuredFromThere) {
   Go(0.3, 3.0);
-  for (int jumps = 0; jumps < 40; ++jumps) {
-    at_ += 5.0;
-    Go(0.3, 0.3);
-  }
-  EXPECT_TRUE(IsTooFar(0.3 * 3.0 * 0.2, 0.2));
+  at_ += 5.0;
+  Go(0.3, 0.1);
+  EXPECT_FALSE(IsTooFar(0.3 * 0.1, 0.1)) << "from before the jump it is";
+  Go(0.3, 0.3);
+  EXPECT_TRUE(IsTooFar(0.3 * 3.0 * 0.2, 0.2)) << "once is not usual";
+}
+
+TEST_F(UsualSpeedTest, WhoGoesFasterForAWhileMay) {
+  Go(0.3, 5.0);
+  Go(1.2, 5.0);
+  EXPECT_FALSE(IsTooFar(1.2 * 0.2, 0.2));
 }
 
 TEST_F(UsualSpeedTest, WhatDoesNotFollowIsNotTooFar) {
