@@ -1,6 +1,7 @@
-# One forged message of each kind, or five in a tenth of a second of those that speak of what is played, ask for a stream or name a
-# term that would leave none behind it, by who knows the protocol and has no key, in the middle of a run: it goes on to its end, nobody
-# dies of it, hangs or is deaf to what comes after it. DMSLAM_FORGED_TIMES="1 5" (scripts/nightly.sh) tries those once as well.
+# Somebody who knows the protocol and has no key forges messages in the middle of a run: one of each kind, or five in a tenth of a
+# second of those that speak of what is played, ask for a stream or name a term that would leave none behind it. The run goes on to
+# its end: nobody dies of it, hangs, or ignores what comes after. DMSLAM_FORGED_TIMES="1 5" (scripts/nightly.sh) also sends one of
+# those.
 source "$(dirname "$0")/lib.sh"
 port=23500
 source "$(dirname "$0")/forging.sh"

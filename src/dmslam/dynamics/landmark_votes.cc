@@ -30,6 +30,11 @@ bool LandmarkVotes::HasVote(const Landmark& landmark) const {
   return streak == streaks_.end() || streak->second < kStreakWithoutVote;
 }
 
+void LandmarkVotes::TakeBackSeenElsewhere(LandmarkId id) {
+  const auto streak = streaks_.find(id);
+  if (streak != streaks_.end() && --streak->second <= 0) streaks_.erase(streak);
+}
+
 double LandmarkVotes::Trust(double age_s) const {
   if (!options_.motion_belief) return 1.0;
   const double grown = std::clamp(age_s / options_.trusted_age_s, 0.0, 1.0);

@@ -62,6 +62,7 @@ class LandmarkVotes {
 
   void OnSeenElsewhere(LandmarkId id) { ++streaks_[id]; }
   void OnFound(LandmarkId id) { streaks_.erase(id); }
+  void TakeBackSeenElsewhere(LandmarkId id);
   void Reset() { streaks_.clear(); }
 
   const VoteOptions& options() const { return options_; }

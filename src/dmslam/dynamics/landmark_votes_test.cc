@@ -32,6 +32,23 @@ TEST(LandmarkVotesTest, AStreakElsewhereCostsTheVoteUntilItIsFound) {
   EXPECT_TRUE(votes.HasVote(landmark));
 }
 
+/// The pose by which it lay elsewhere was wrong.
+TEST(LandmarkVotesTest, ASightingThatIsTakenBackCostsNothing) {
+  Landmark landmark;
+  landmark.id = MapScene::IdOf(0);
+  LandmarkVotes votes({});
+  for (int sighting = 0; sighting < 5; ++sighting) {
+    votes.OnSeenElsewhere(landmark.id);
+    votes.TakeBackSeenElsewhere(landmark.id);
+  }
+  votes.TakeBackSeenElsewhere(landmark.id);
+  for (int sighting = 0; sighting < 3; ++sighting) {
+    EXPECT_TRUE(votes.HasVote(landmark)) << sighting;
+    votes.OnSeenElsewhere(landmark.id);
+  }
+  EXPECT_FALSE(votes.HasVote(landmark));
+}
+
 TEST(LandmarkVotesTest, TrustGrowsWithAge) {
   const LandmarkVotes votes({.young_trust = 0.3, .trusted_age_s = 4.0});
   EXPECT_DOUBLE_EQ(votes.Trust(0), 0.3);

@@ -63,6 +63,11 @@ void MotionJudge::Believe(const Map& map, std::span<const ExpectedLandmark> expe
   }
 }
 
+void MotionJudge::TakeBack() {
+  evidence_.Clear();
+  for (const LandmarkId id : moved_now_) votes_.TakeBackSeenElsewhere(id);
+}
+
 void MotionJudge::Reset() {
   votes_.Reset();
   evidence_.Clear();

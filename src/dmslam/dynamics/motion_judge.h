@@ -75,6 +75,8 @@ class MotionJudge {
     return evidence_.Take(stamp_ns, map_id);
   }
   void DropEvidence() { evidence_.Clear(); }
+  /// The frame judged last was believed wrongly: what it saw elsewhere was in its place.
+  void TakeBack();
   /// Forgets what belongs to a map that is gone.
   void Reset();
 

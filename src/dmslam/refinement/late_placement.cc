@@ -12,11 +12,9 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kNearNs = 500'000'000;    // a placed frame so near in time bounds where a frame may be
-constexpr int64_t kMomentNs = 200'000'000;  // motion over less time is noise
-constexpr double kLateHurry = 2.0;          // times its usual speed, of frames that rest on less
-constexpr int kWellSeen = 50;               // static features...
-constexpr int kWellSeenCells = 8;           // ...and the cells of the image (kNumCells) that hold them
+constexpr int64_t kNearNs = 500'000'000;  // a placed frame so near in time bounds where a frame may be
+constexpr int kWellSeen = 50;             // static features...
+constexpr int kWellSeenCells = 8;         // ...and the cells of the image (kNumCells) that hold them
 // Half more than a MotionModel allows a camera whose motion is not known (max_speed, max_turn_rad_per_s).
 // That adds a slack to both, and here there is none.
 constexpr double kMaxSpeed = 1.5;  // depths of the scene per second
@@ -76,10 +74,11 @@ bool IsLeftAtUsualSpeed(const Map& map, MapId map_id, const TrackedFrame& frame,
   for (; it != map.keyframes().end(); ++it) {
     const Keyframe& keyframe = it->second;
     const int64_t after_ns = keyframe.stamp_ns - frame.stamp_ns;
-    if (keyframe.id.camera() != camera_id || after_ns > kNearNs) return true;
-    if (keyframe.map_id != map_id || after_ns < kMomentNs) continue;
+    const bool ours = keyframe.id.camera() == camera_id && keyframe.id.session() == session;
+    if (!ours || after_ns > kNearNs) return true;
+    if (keyframe.map_id != map_id || after_ns < UsualSpeed::kShortestNs) continue;
     const double moved = DistanceBetween(frame.T_cam_world, keyframe.T_cam_world) / depth;
-    if (usual_speed.IsTooFar(moved, static_cast<double>(after_ns) * 1e-9, kLateHurry)) return false;
+    if (usual_speed.WasTooFar(moved, static_cast<double>(after_ns) * 1e-9)) return false;
   }
   return true;
 }
@@ -170,27 +169,19 @@ void LatePlacement::Coast(const Map& map, const FoundPose& weak_pose, const Trac
 }
 
 /// From its neighbour, or else like a lost camera.
-LatePlacement::Found LatePlacement::Find(const Map& map, const Tracked& tracked, TrackedFrame* frame) {
+LatePlacement::Found LatePlacement::Place(const Map& map, LateMap late_map, const Tracked& tracked,
+                                          TrackedFrame* frame) {
+  FindNeighbour(map, late_map, *frame);
   PoseSearch* search = tracked.search;
   Found found{TrackBackwards(map, search, frame)};
-  if (found.report.IsTracked()) return found;
+  if (found.report.IsTracked() && !IsTooFast(map, tracked, *frame)) return found;
   search->judge().DropEvidence();  // a pose that is not believed says nothing of landmarks
   frame->ClearMatches();
   const uint64_t seed = DeriveSeed(seed_, frame->index, "later");
   if (!tracked.relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   found = {search->InLocalMap(map, true, std::nullopt, frame), true};
   TrackingReport& report = found.report;
-  if (!IsBelieved(map, report, *search, *frame)) report.TakePoseAway();
-  return found;
-}
-
-LatePlacement::Found LatePlacement::Place(const Map& map, LateMap late_map, const Tracked& tracked,
-                                          TrackedFrame* frame) {
-  FindNeighbour(map, late_map, *frame);
-  Found found = Find(map, tracked, frame);
-  if (!found.report.IsTracked() || !IsTooFast(map, tracked, *frame)) return found;
-  tracked.search->judge().DropEvidence();
-  found.report.TakePoseAway("the pose is farther away than the camera can have come");
+  if (!IsBelieved(map, report, *search, *frame) || IsTooFast(map, tracked, *frame)) report.TakePoseAway();
   return found;
 }
 

@@ -22,9 +22,9 @@ bool IsPlausibleMotion(const Rigid3d& a, const Rigid3d& b, double seconds, doubl
 bool AgreesWithKeyframesAside(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
                               double depth, CameraId camera_id = 0);
 
-/// Whether the camera gets from the frame to the keyframes that follow it within half a second without going
-/// much faster than it did while it was tracked; `depth` of the scene [map units]. Keyframes of that camera
-/// count.
+/// Whether the camera gets from the frame to the keyframes that follow it within 0.2 to 0.5 s at no more than
+/// twice the fastest that was usual for it; `depth` of the scene [map units]. Only keyframes of that session,
+/// camera and map count. True where there are none.
 bool IsLeftAtUsualSpeed(const Map& map, MapId map_id, const TrackedFrame& frame, uint32_t session,
                         double depth, const UsualSpeed& usual_speed, CameraId camera_id = 0);
 
@@ -47,7 +47,7 @@ class LatePlacement {
     TrackingReport report;
     bool jumped = false;  ///< recognised like a lost camera, and not followed from its neighbour
   };
-  /// What the tracker has, to search with and of what it went by.
+  /// Of the tracker: its search, its relocaliser, and how fast the camera usually went.
   struct Tracked {
     PoseSearch* search = nullptr;
     const Relocalizer& relocalizer;
@@ -83,7 +83,6 @@ class LatePlacement {
 
  private:
   void LeaveNeighbour();
-  Found Find(const Map& map, const Tracked& tracked, TrackedFrame* frame);
   bool IsTooFast(const Map& map, const Tracked& tracked, const TrackedFrame& frame) const;
   void FindNeighbour(const Map& map, LateMap late_map, const TrackedFrame& frame);
   bool IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const;

@@ -75,7 +75,7 @@ void Tracker::BeginAt(const Keyframe& keyframe) {
 }
 
 void Tracker::OnMapForgotten() {
-  usual_speed_.Interrupt();
+  usual_speed_ = UsualSpeed();
   relocalizer_.Clear();
   search_.Reset();
   second_search_.Reset();
@@ -113,11 +113,7 @@ TrackingResult Tracker::Track(const Map& map, const Request& request, TrackedFra
 Tracker::Attempt Tracker::FindPose(const Map& map, const Request& request, TrackedFrame* frame) {
   Attempt attempt = FollowMotion(map, frame);
   if (IsDoubtfulForLong(attempt.report, frame->stamp_ns)) attempt.report.TakePoseAway();
-  if (IsCarriedAway(map, attempt.report, *frame)) {
-    search_.judge().DropEvidence();
-    attempt.report.TakePoseAway("the pose is farther away than the camera can have come");
-    attempt.weak_pose.reset();
-  }
+  if (IsCarriedAway(map, attempt.report, *frame)) Refuse(&attempt);
   if (!attempt.report.HasPose() && unbelieved_) GoBack();
   if (attempt.report.HasPose()) {
     FindBetterPlace(map, frame, &attempt);
@@ -150,8 +146,15 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   follower_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns}, frame,
                       attempt.relocalized || attempt.by_rival);
   if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
-  if (attempt.relocalized) usual_speed_.Interrupt();
-  if (!unbelieved_) usual_speed_.OnPose(map, pose, frame.stamp_ns);
+  if (!unbelieved_ && options_.usual_speed) usual_speed_.OnPose(map, pose, frame.stamp_ns);
+}
+
+/// A camera that was carried away. It says nothing against a first map that is on trial.
+void Tracker::Refuse(Attempt* attempt) {
+  search_.judge().TakeBack();
+  attempt->report.outcome = TrackingReport::Outcome::kNotSeen;
+  attempt->report.reason = "the pose is farther away than the camera can have come";
+  attempt->weak_pose.reset();
 }
 
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
@@ -180,8 +183,9 @@ bool Tracker::IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) 
   return report.IsDoubtful() && unbelieved_ && stamp_ns - unbelieved_->since_ns > kDoubtNs;
 }
 
-/// Somebody who was mapped while he stood takes the camera along. A place that is seen as a whole or proven
-/// to be no person is no such: there the camera comes back.
+/// Whether the camera seems to have gone faster than it can, as when it follows somebody who begins to walk.
+/// Not where the place is seen as a whole or is proven to be no person: there a lost camera comes back. Who
+/// walks may also be a rival's motion, so those are not spared.
 bool Tracker::IsCarriedAway(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
   if (!options_.usual_speed || !report.HasPose()) return false;
   if (unbelieved_ && unbelieved_->why == Unbelieved::Why::kFoundAnew) return false;

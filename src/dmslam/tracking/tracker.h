@@ -99,6 +99,7 @@ class Tracker {
   bool IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const;
   bool IsCarriedAway(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
   void GoBack();
+  void Refuse(Attempt* attempt);
 
   TrackingOptions options_;
   uint64_t seed_;

@@ -24,8 +24,9 @@ struct TrackingOptions {
   double chi2 = kChiSquared2Dof;
   MotionModelOptions motion;  ///< how well the next pose is known beforehand
   bool doubt = true;  ///< poses that may rest on what is no part of the room are followed, but not told
-  bool usual_speed =
-      true;           ///< poses that a camera would have reached faster than it usually goes are not told
+  /// Poses that are too far for the camera's usual speed count only where the place is seen as a whole or
+  /// proven to be no person; frames that are placed late do not count there either.
+  bool usual_speed = true;
   int min_cells = 6;  ///< inliers must lie in at least so many cells of an 8 x 6 grid
 
   template <typename Visitor>
@@ -42,8 +43,8 @@ struct TrackingOptions {
     v.InBaseline("off");
     v.InPaper("off");
     v.Switch("tracking.usual_speed", usual_speed,
-             "a pose that the camera would have reached much faster than it usually goes is believed only "
-             "where the place is seen as a whole or proven to be no person");
+             "a pose that is too far for the camera's usual speed counts only where the place is seen as a "
+             "whole or proven to be no person, and not at all in frames that are placed late");
     v.InBaseline("off");
     v.InPaper("off");
   }

@@ -8,18 +8,23 @@
 namespace dmslam {
 namespace {
 
-constexpr int64_t kOverNs = 200'000'000;  // a speed is that over this time...
-constexpr int64_t kSlackNs = 5'000'000;   // ...stamps being a little off
-constexpr double kKnownS = 1.5;           // of believed motion, before it says what is usual
-constexpr double kForgottenS = 30;        // of motion count in full; what was before, by half each time
-constexpr double kUsualShare = 0.8;       // of the time it goes no faster than usual
-constexpr double kHurryS = 0.5;           // no hurry takes longer...
-constexpr double kLonger = 0.5;           // ...and what goes on is so many times as fast
-constexpr double kAlways = 0.16;          // so much counts as usual for any camera [depths/s]
-constexpr double kSlowest = 0.001;        // the first bin's end [depths/s]
-constexpr double kPerBin = 1.1;           // from the end of a bin to the next
-constexpr double kLongestStepS = 1.0;     // a pose stands for no more time than this
+constexpr double kKnownS = 1.5;        // of believed motion, before it says what is usual
+constexpr double kForgottenS = 30;     // of motion count in full; what was before, by half each time
+constexpr double kUsualShare = 0.8;    // of the time it goes no faster than usual
+constexpr double kHurry = 2.5;         // times its usual speed...
+constexpr double kLateHurry = 2.0;     // ...and that, in frames that rest on less...
+constexpr double kHurryS = 0.5;        // ...for no longer...
+constexpr double kLonger = 0.5;        // ...after which it goes so many times as fast
+constexpr double kAlways = 0.16;       // so much counts as usual for any camera [depths/s]
+constexpr double kSlowest = 0.001;     // the first bin's end [depths/s]
+constexpr double kPerBin = 1.1;        // from the end of a bin to the next
+constexpr double kLongestStepS = 5.0;  // no step counts for more time than this
 constexpr size_t kReserved = 64;
+
+double SecondsOfHurry(double seconds) {
+  const double hurry_s = std::min(seconds, kHurryS);
+  return hurry_s + kLonger * (seconds - hurry_s);
+}
 
 }  // namespace
 
@@ -33,7 +38,7 @@ void UsualSpeed::OnPose(const Map& map, const PlacedPose& pose, int64_t stamp_ns
     Count(step->moved / step->seconds, std::min(kLongestStepS, since_s));
     if (jumped) Interrupt();
   }
-  const auto is_old = [&](const Recent& past) { return stamp_ns - past.stamp_ns >= kOverNs - kSlackNs; };
+  const auto is_old = [&](const Recent& past) { return stamp_ns - past.stamp_ns >= kShortestNs; };
   const auto young = std::ranges::find_if_not(recent_, is_old);
   if (young - recent_.begin() > 1) recent_.erase(recent_.begin(), young - 1);
   recent_.push_back({pose, stamp_ns});
@@ -41,7 +46,7 @@ void UsualSpeed::OnPose(const Map& map, const PlacedPose& pose, int64_t stamp_ns
 
 void UsualSpeed::Count(double speed, double seconds) {
   const double bin = std::log(std::max(speed, kSlowest) / kSlowest) / std::log(kPerBin);
-  seconds_[std::min(static_cast<size_t>(std::ceil(bin)), kBins - 1)] += seconds;
+  seconds_[static_cast<size_t>(std::min(std::ceil(bin), static_cast<double>(kBins - 1)))] += seconds;
   known_s_ += seconds;
   if (known_s_ >= kForgottenS) {
     for (double& counted : seconds_) counted /= 2;
@@ -58,18 +63,20 @@ void UsualSpeed::FindUsual() {
     end *= kPerBin;
   }
   usual_ = std::max(kAlways, end);
+  most_usual_ = std::max(most_usual_.value_or(0), *usual_);
 }
 
 std::optional<UsualSpeed::Step> UsualSpeed::StepTo(const Map& map, const PlacedPose& pose,
                                                    int64_t stamp_ns) const {
-  const auto old = std::find_if(recent_.rbegin(), recent_.rend(), [&](const Recent& past) {
-    return stamp_ns - past.stamp_ns >= kOverNs - kSlackNs;
-  });
+  const auto old = std::find_if(recent_.rbegin(), recent_.rend(),
+                                [&](const Recent& past) { return stamp_ns - past.stamp_ns >= kShortestNs; });
   if (old == recent_.rend()) return std::nullopt;
+  const std::optional<KeyframeId> before = map.ResolveKeyframe(old->pose.reference);
+  const std::optional<KeyframeId> now = map.ResolveKeyframe(pose.reference);
+  if (!before || !now || map.At(*before).map_id != map.At(*now).map_id) return std::nullopt;
   const std::optional<Rigid3d> from = old->pose.In(map), to = pose.In(map);
-  const std::optional<KeyframeId> reference = map.ResolveKeyframe(pose.reference);
-  const std::optional<double> depth = reference ? map.MedianDepth(map.At(*reference)) : std::nullopt;
-  if (!from || !to || !depth) return std::nullopt;
+  const std::optional<double> depth = map.MedianDepth(map.At(*now));
+  if (!from || !to || !depth || *depth <= 0) return std::nullopt;
   return Step{(from->Center() - to->Center()).norm() / *depth, SecondsFromTo(old->stamp_ns, stamp_ns)};
 }
 
@@ -78,10 +85,12 @@ bool UsualSpeed::IsTooFar(const Map& map, const PlacedPose& pose, int64_t stamp_
   return step && IsTooFar(step->moved, step->seconds);
 }
 
-bool UsualSpeed::IsTooFar(double moved, double seconds, double hurry) const {
-  if (!usual_) return false;
-  const double hurry_s = std::min(seconds, kHurryS);
-  return moved > hurry * *usual_ * (hurry_s + kLonger * (seconds - hurry_s));
+bool UsualSpeed::IsTooFar(double moved, double seconds) const {
+  return usual_ && moved > kHurry * *usual_ * SecondsOfHurry(seconds);
+}
+
+bool UsualSpeed::WasTooFar(double moved, double seconds) const {
+  return most_usual_ && moved > kLateHurry * *most_usual_ * SecondsOfHurry(seconds);
 }
 
 }  // namespace dmslam

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "dmslam/map/testing/map_scene.h"
 
 namespace dmslam {
@@ -81,15 +83,19 @@ TEST_F(UsualSpeedTest, AShortHurryIsNotUsual) {
 }
 
 TEST_F(UsualSpeedTest, TheRateOfTheFramesDoesNotMatter) {
-  Go(0.3, 3.0, 100'000'000);
-  EXPECT_FALSE(IsTooFar(0.3 * 1.8 * 0.2, 0.2));
-  EXPECT_TRUE(IsTooFar(0.3 * 3.0 * 0.2, 0.2));
+  for (const int64_t hz : {4, 10, 15, 60, 90}) {
+    usual_ = UsualSpeed();
+    Go(0.3, 3.0, 1'000'000'000 / hz);
+    const double step_s = std::max(0.2, 1.0 / static_cast<double>(hz));
+    EXPECT_FALSE(IsTooFar(0.3 * 1.8 * step_s, step_s)) << hz;
+    EXPECT_TRUE(IsTooFar(0.3 * 4.0 * step_s, step_s)) << hz;
+  }
 }
 
 /// Longer than the histogram counts in full.
 TEST_F(UsualSpeedTest, WhatWasLongAgoIsForgotten) {
   Go(1.0, 100.0);
-  Go(0.3, 2000.0);
+  Go(0.3, 40.0);
   EXPECT_TRUE(IsTooFar(0.3 * 3.0 * 0.2, 0.2));
 }
 
@@ -102,10 +108,37 @@ TEST_F(UsualSpeedTest, AfterAJumpItIsMeasuredFromThere) {
   EXPECT_TRUE(IsTooFar(0.3 * 3.0 * 0.2, 0.2)) << "once is not usual";
 }
 
-TEST_F(UsualSpeedTest, WhoGoesFasterForAWhileMay) {
+/// Most of the time it is not believed, as what is too far is not told.
+TEST_F(UsualSpeedTest, WhoIsFoundAgainFarAwayTimeAfterTimeGoesFasterNow) {
   Go(0.3, 5.0);
-  Go(1.2, 5.0);
-  EXPECT_FALSE(IsTooFar(1.2 * 0.2, 0.2));
+  for (int found = 0; found < 6; ++found) {
+    EXPECT_EQ(IsTooFar(1.2 * 0.2, 0.2), found < 2) << found;
+    now_ns_ += 1'000'000'000;
+    at_ += 1.2;
+    usual_.OnPose(scene_.map(), At(at_), now_ns_);
+    Go(1.2, 0.1);
+  }
+}
+
+TEST_F(UsualSpeedTest, WhatWasPlacedLateIsMeasuredByTheFastestThatWasUsual) {
+  Go(0.6, 30.0);
+  Go(0.0, 100.0);
+  EXPECT_FALSE(usual_.WasTooFar(0.6 * 0.3, 0.3));
+  EXPECT_TRUE(usual_.WasTooFar(0.6 * 2.5 * 0.3, 0.3));
+  EXPECT_TRUE(usual_.IsTooFar(0.6 * 0.3, 0.3));
+}
+
+TEST_F(UsualSpeedTest, FromAnotherMapNothingFollows) {
+  Go(0.3, 3.0);
+  const KeyframeId alone = KeyframeId::Make(MapScene::kSession, 500);
+  Keyframe keyframe = *scene_.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, 0));
+  keyframe.id = alone;
+  keyframe.map_id = MapScene::kMap + 1;
+  keyframe.parent = {};
+  keyframe.T_cam_world = MapScene::PoseAt(50.0);
+  scene_.map().AddKeyframe(std::move(keyframe));
+  const PlacedPose there{alone, Rigid3d(), 1.0};
+  EXPECT_FALSE(usual_.IsTooFar(scene_.map(), there, now_ns_ + 200'000'000));
 }
 
 TEST_F(UsualSpeedTest, WhatDoesNotFollowIsNotTooFar) {
