@@ -149,7 +149,7 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   if (!unbelieved_ && options_.usual_speed) usual_speed_.OnPose(map, pose, frame.stamp_ns);
 }
 
-/// A camera that was carried away. It says nothing against a first map that is on trial.
+/// The camera was carried away: the frame has no pose, and says nothing against a first map that is on trial.
 void Tracker::Refuse(Attempt* attempt) {
   search_.judge().TakeBack();
   attempt->report.outcome = TrackingReport::Outcome::kNotSeen;
