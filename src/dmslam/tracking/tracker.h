@@ -74,6 +74,7 @@ class Tracker {
   FrameEvidence TakeEvidence(int64_t stamp_ns, std::optional<MapId> map_id) {
     return search_.judge().TakeEvidence(stamp_ns, map_id);
   }
+  /// By the poses that were believed so far; not kept up where options.usual_speed is off.
   const UsualSpeed& usual_speed() const { return usual_speed_; }
   /// For frames beside the stream, when it has ended.
   PoseSearch& search() { return search_; }
