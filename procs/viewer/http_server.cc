@@ -115,6 +115,7 @@ void HttpServer::Run() {
     std::vector<pollfd> fds = {{stop_fd_, POLLIN, 0}, {listen_fd_, POLLIN, 0}, {hub_->fd(), POLLIN, 0}};
     for (const Connection& c : connections_)
       fds.push_back({c.fd, static_cast<int16_t>((HasRoom(c) ? POLLIN : 0) | (c.writing() ? POLLOUT : 0)), 0});
+    const Clock::time_point before = Clock::now();
     poll(fds.data(), fds.size(), kTickMs);
     if (fds[0].revents != 0) return;
     if (fds[2].revents != 0) hub_->ClearFd();
@@ -126,7 +127,7 @@ void HttpServer::Run() {
       if (!c.done && c.listener) SpeakEvents(&c);
       if (!c.done && c.writing()) WriteTo(&c);
       if (!c.done && !c.writing() && !c.listener) Answer(&c);
-      CheckTimes(&c);
+      CheckTimes(before, &c);
     }
     DropDone();
     if (fds[1].revents != 0) Accept();
@@ -284,12 +285,13 @@ void HttpServer::WriteTo(Connection* c) {
   c->since = Clock::now();
 }
 
-void HttpServer::CheckTimes(Connection* c) {
-  const Clock::time_point now = Clock::now();
+/// `before`: a time until which all that had come is read. What comes while the server is busy with others is
+/// not late.
+void HttpServer::CheckTimes(Clock::time_point before, Connection* c) {
   if (c->writing()) {
-    c->done = c->done || now - c->progress > options_.stall_time;
+    c->done = c->done || before - c->progress > options_.stall_time;
   } else if (!c->listener) {
-    c->done = c->done || now - c->since > (c->in.empty() ? options_.idle_time : options_.head_time);
+    c->done = c->done || before - c->since > (c->in.empty() ? options_.idle_time : options_.head_time);
   }
 }
 

@@ -63,7 +63,7 @@ class HttpServer {
   void BeginEvents(Connection* connection);
   void SpeakEvents(Connection* connection);
   void WriteTo(Connection* connection);
-  void CheckTimes(Connection* connection);
+  void CheckTimes(Clock::time_point before, Connection* connection);
   void DropDone();
 
   Options options_;

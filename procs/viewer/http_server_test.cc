@@ -6,7 +6,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <latch>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace dmslam {
@@ -83,7 +85,11 @@ class HttpServerTest : public testing::Test {
   }
   ~HttpServerTest() override { hub_.Close(); }
   void Begin() {
-    server_ = std::make_unique<HttpServer>(options_, &hub_, [](const HttpRequest& request) {
+    server_ = std::make_unique<HttpServer>(options_, &hub_, [this](const HttpRequest& request) {
+      if (request.path == "/long") {
+        at_work_.count_down();
+        enough_.wait();
+      }
       HttpResponse response;
       response.type = "text/plain";
       response.body = request.path == "/large" ? std::string(kLargeBytes, 'x') : "here is " + request.path;
@@ -101,6 +107,7 @@ class HttpServerTest : public testing::Test {
 
   HttpServer::Options options_;
   EventHub hub_;
+  std::latch at_work_{1}, enough_{1};  ///< the handler of /long has begun, and may end
   std::unique_ptr<HttpServer> server_;
 };
 
@@ -153,6 +160,21 @@ TEST_F(HttpServerTest, WhoSaysNothingIsDropped) {
   Client idle(server_->port());
   ASSERT_TRUE(idle.connected());
   EXPECT_TRUE(idle.Closed());
+}
+
+TEST_F(HttpServerTest, WhoAsksWhileTheServerIsBusyIsNotLate) {
+  Begin();
+  const Client first(server_->port()), second(server_->port());
+  for (const Client* client : {&first, &second}) {  // the server knows both, in this order
+    client->Say("GET /page HTTP/1.1\r\nHost: a\r\n\r\n");
+    client->Hear("here is /page");
+  }
+  first.Say("GET /long HTTP/1.1\r\nHost: a\r\n\r\n");
+  at_work_.wait();
+  second.Say("GET /page HTTP/1.1\r\nHost: a\r\n\r\n");
+  std::this_thread::sleep_for(options_.idle_time * 3 / 2);
+  enough_.count_down();
+  EXPECT_NE(second.Hear("here is /page").find("200 OK"), std::string::npos);
 }
 
 TEST_F(HttpServerTest, WhoDoesNotReadIsDroppedAndShutsNobodyOut) {
