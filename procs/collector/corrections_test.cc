@@ -44,8 +44,8 @@ TEST_F(CorrectionsTest, OneThatWasRefusedOrClosedNoLoopHasNoOtherEnd) {
   const auto before = LoopsOf(map_, WallScene::Id(3));
   EXPECT_FALSE(RecordOf(Correction(MapEvent::kCorrected), before, map_).matched);
   AddLoop(3, 0);
-  const CorrectionRecord record = RecordOf(Correction(MapEvent::kRefused), before, map_);
-  EXPECT_EQ(record.event, MapEvent::kRefused);
+  const CorrectionRecord record = RecordOf(Correction(MapEvent::kCorrectionRefused), before, map_);
+  EXPECT_EQ(record.event, MapEvent::kCorrectionRefused);
   EXPECT_FALSE(record.matched);
 }
 

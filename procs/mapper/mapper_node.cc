@@ -409,8 +409,9 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
   } else if (record.channel == channels::kKeyframe) {
     if (const auto proposal = Read<KeyframeProposal>(*record.bytes)) {
       return [this, version, proposal] {
-        const bool inserted = core_->OnKeyframe(*proposal);
-        AfterKeyframe(version, proposal->id, proposal->map_id, inserted);
+        const KeyframeOutcome outcome = core_->OnKeyframe(*proposal);
+        AfterKeyframe(version, proposal->id, proposal->map_id, outcome == KeyframeOutcome::kInserted,
+                      WhyRefused(outcome));
       };
     }
   } else if (record.channel == channels::kFrameEvidence) {
@@ -430,18 +431,18 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
 /// On the core. In lock-step, where the node is told at once, a keyframe settles when the loop closer has
 /// answered it.
 void MapperNode::AfterKeyframe(const Version& version, KeyframeId id, MapId map_id,
-                               bool checked_by_loopcloser) {
+                               bool checked_by_loopcloser, std::string why_refused) {
   const bool wait = lockstep_ && checked_by_loopcloser && options_.HasPeer(roles::kLoopCloser);
-  if (!wait) return Settle(id, map_id, version);
+  if (!wait) return Settle(id, map_id, version, std::move(why_refused));
   work_->Report([this, version, id, map_id] {
     settling_.Await({id, map_id, version}, loop_reader_->term());
   });
 }
 
 /// On the core.
-void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend) {
+void MapperNode::Settle(KeyframeId id, MapId map_id, const Version& of_frontend, std::string why_refused) {
   MarkFrontend(id.camera(), of_frontend);
-  core_->Settle(id, map_id);
+  core_->Settle(id, map_id, std::move(why_refused));
   work_->Report([this, id] { settling_.OnSettled(id); });
 }
 

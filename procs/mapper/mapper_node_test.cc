@@ -74,7 +74,7 @@ class LoopAnswersTest : public testing::Test {
     std::vector<MapDelta> refusals;
     while (std::optional<Record> record = map_->Take()) {
       std::optional<MapDelta> delta = wire::Decode<MapDelta>(*record->bytes);
-      if (delta && delta->event == MapEvent::kRefused) refusals.push_back(std::move(*delta));
+      if (delta && delta->event == MapEvent::kCorrectionRefused) refusals.push_back(std::move(*delta));
       map_->AcceptTaken();
     }
     return refusals;

@@ -62,7 +62,7 @@ TEST_F(MapperReportTest, TellsWhatTheCoreDid) {
   Say(Known(5), 0, 4);
   KeyframeProposal next = Next();
   for (uint16_t i = kKnown; i < kKnown + 10; ++i) next.moving.push_back(i);
-  ASSERT_TRUE(core_.OnKeyframe(next));
+  ASSERT_EQ(core_.OnKeyframe(next), KeyframeOutcome::kInserted);
   core_.RefuseCorrection(7, "a test");
   const MapperStatus status = Status();
   EXPECT_EQ(status.version, static_cast<int64_t>(core_.map().version()));
@@ -84,7 +84,7 @@ TEST_F(MapperReportTest, TellsAtTheEndWhatWasNotDone) {
   EXPECT_EQ(NotDoneText(core_.counters()), "");
   KeyframeProposal lost = Next();
   lost.reference = Id(77);
-  for (int times = 0; times < 2; ++times) EXPECT_FALSE(core_.OnKeyframe(lost));
+  for (int times = 0; times < 2; ++times) EXPECT_EQ(core_.OnKeyframe(lost), KeyframeOutcome::kRefused);
   Say(LandmarkId::Make(9, 9), 1, 0);
   EXPECT_EQ(NotDoneText(core_.counters()),
             "2 keyframes refused, whose reference is unknown or of another map; "

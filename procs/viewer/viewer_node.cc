@@ -215,7 +215,7 @@ void ViewerNode::NoteMapEvent(const MapDelta& delta) {
     case MapEvent::kMapAdjusted:
       Note(BoardEvent::Level::kInfo, "the whole map was adjusted");
       break;
-    case MapEvent::kRefused:
+    case MapEvent::kCorrectionRefused:
       Note(BoardEvent::Level::kBad, "a correction was refused: " + delta.note);
       break;
     case MapEvent::kEnded:

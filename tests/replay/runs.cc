@@ -97,7 +97,7 @@ class Cores {
     Settle(proposal.second.id, proposal.map_id, mapper_.OnInitialMap(proposal));
   }
   void Hear(const KeyframeProposal& proposal) {
-    Settle(proposal.id, proposal.map_id, mapper_.OnKeyframe(proposal));
+    Settle(proposal.id, proposal.map_id, mapper_.OnKeyframe(proposal) == KeyframeOutcome::kInserted);
   }
   void Hear(const MapReset& reset) {
     trajectory_.OnMapReset(reset);

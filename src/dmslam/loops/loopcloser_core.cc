@@ -35,7 +35,7 @@ void LoopcloserCore::ApplyMapDelta(const MapDelta& delta) {
 /// What the mapper made of the loop that was proposed.
 void LoopcloserCore::HearOfCorrection(const MapDelta& delta) {
   awaited_correction_.reset();
-  if (delta.event != MapEvent::kRefused) return;
+  if (delta.event != MapEvent::kCorrectionRefused) return;
   --counters_.loops;
   adjustment_due_ = false;
   keyframes_since_loop_ = options_.min_keyframes_between;

@@ -148,7 +148,7 @@ TEST(LoopcloserCoreTest, ItsStepsAreToldAndThatItWaitsForTheMapper) {
 TEST(LoopcloserCoreTest, ALoopThatWasRefusedIsFoundAgainAndNotAdjusted) {
   Room room({});
   LoopcloserCore core = MakeCore();
-  const Answers answers = Play(room, core, MapEvent::kRefused);
+  const Answers answers = Play(room, core, MapEvent::kCorrectionRefused);
   EXPECT_GE(answers.loops.size(), 2u);
   EXPECT_TRUE(answers.adjustments.empty());
   EXPECT_EQ(core.counters().loops, 0u);

@@ -18,24 +18,25 @@ namespace dmslam {
 /// What a map record says, and why it was written. Each has one meaning, and says which of the delta's
 /// `about`, `map_id`, `correction_id` and `request` there are (NeededBy).
 enum class MapEvent : uint8_t {
-  kKeyframeInserted = 1,  ///< keyframe `about`
-  kLandmarksCreated = 2,  ///< by keyframe `about`
-  kFused = 3,             ///< landmarks of keyframe `about` with those of its neighbours
-  kAdjusted = 4,          ///< local bundle adjustment around keyframe `about`
-  kMapped = 5,            ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
-  kEvidence = 6,          ///< what frames said of landmarks
-  kCorrected = 7,         ///< `correction_id`, a loop of keyframe `about`, was applied
-  kGloballyAdjusted = 8,  ///< `correction_id`, a global adjustment after a loop, was applied
-  kMapStarted = 9,        ///< `map_id`, of a first map; `about` is the `second` proposed
-  kMapDropped = 10,       ///< `map_id`, as the frontend said
-  kSettled = 11,          ///< the answer to a keyframe: all work that `about` caused is done
-  kSnapshot = 12,         ///< part of a snapshot
-  kRefused = 13,          ///< `correction_id` was not applied; `note` says why
-  kEnded = 14,            ///< the end of the session: nothing follows
-  kMapAdjusted = 15,      ///< `map_id` as a whole, after the last frame
-  kRequestDone = 16,      ///< the answer to an AdjustRequest, `request`: all maps are adjusted
-  kFirstMapRefused = 17,  ///< of `map_id`, with `about` as the `second` proposed; `note` says why
-  kTurn = 18,             ///< the answer to a TurnRequest: all that comes before frame `about` is in the map
+  kKeyframeInserted = 1,    ///< keyframe `about`
+  kLandmarksCreated = 2,    ///< by keyframe `about`
+  kFused = 3,               ///< landmarks of keyframe `about` with those of its neighbours
+  kAdjusted = 4,            ///< local bundle adjustment around keyframe `about`
+  kMapped = 5,              ///< local mapping of keyframe `about` is done (redundant keyframes are culled)
+  kEvidence = 6,            ///< what frames said of landmarks
+  kCorrected = 7,           ///< `correction_id`, a loop of keyframe `about`, was applied
+  kGloballyAdjusted = 8,    ///< `correction_id`, a global adjustment after a loop, was applied
+  kMapStarted = 9,          ///< `map_id`, of a first map; `about` is the `second` proposed
+  kMapDropped = 10,         ///< `map_id`, as the frontend said
+  kSettled = 11,            ///< the answer to a keyframe: all work that `about` caused is done; where it was
+                            ///< refused there was none, and `note` says why
+  kSnapshot = 12,           ///< part of a snapshot
+  kCorrectionRefused = 13,  ///< `correction_id` was not applied; `note` says why
+  kEnded = 14,              ///< the end of the session: nothing follows
+  kMapAdjusted = 15,        ///< `map_id` as a whole, after the last frame
+  kRequestDone = 16,        ///< the answer to an AdjustRequest, `request`: all maps are adjusted
+  kFirstMapRefused = 17,    ///< of `map_id`, with `about` as the `second` proposed; `note` says why
+  kTurn = 18,  ///< the answer to a TurnRequest: all that comes before frame `about` is in the map
 };
 
 /// What a delta must name for its event; without it the record is refused.
@@ -60,7 +61,7 @@ constexpr EventNeeds NeededBy(MapEvent event) {
       return {.map_id = true};
     case MapEvent::kCorrected:
     case MapEvent::kGloballyAdjusted:
-    case MapEvent::kRefused:
+    case MapEvent::kCorrectionRefused:
       return {.correction_id = true};
     case MapEvent::kRequestDone:
       return {.request = true};
@@ -70,6 +71,33 @@ constexpr EventNeeds NeededBy(MapEvent event) {
       return {};
   }
   return {};
+}
+
+/// Whether somebody waits for a record of this event, even where it changes nothing.
+constexpr bool IsAnswer(MapEvent event) {
+  switch (event) {
+    case MapEvent::kMapped:
+    case MapEvent::kSettled:
+    case MapEvent::kCorrectionRefused:
+    case MapEvent::kEnded:
+    case MapEvent::kRequestDone:
+    case MapEvent::kFirstMapRefused:
+    case MapEvent::kTurn:
+      return true;
+    case MapEvent::kKeyframeInserted:
+    case MapEvent::kLandmarksCreated:
+    case MapEvent::kFused:
+    case MapEvent::kAdjusted:
+    case MapEvent::kEvidence:
+    case MapEvent::kCorrected:
+    case MapEvent::kGloballyAdjusted:
+    case MapEvent::kMapStarted:
+    case MapEvent::kMapDropped:
+    case MapEvent::kSnapshot:
+    case MapEvent::kMapAdjusted:
+      return false;
+  }
+  return false;
 }
 
 /// A keyframe's own state: all of it. Features are there when the keyframe is new to the reader.

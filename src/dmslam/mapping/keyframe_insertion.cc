@@ -16,6 +16,10 @@ const Landmark* Usable(const Map& map, const Keyframe& keyframe, const KeyframeP
 
 }  // namespace
 
+std::string WhyRefused(KeyframeOutcome outcome) {
+  return outcome == KeyframeOutcome::kRefused ? "refused: its reference is unknown, or of another map" : "";
+}
+
 Keyframe MakeKeyframe(const Map& map, const KeyframeProposal& proposal, const Rigid3d& T_cam_world) {
   Keyframe keyframe;
   keyframe.id = proposal.id;
@@ -29,8 +33,10 @@ Keyframe MakeKeyframe(const Map& map, const KeyframeProposal& proposal, const Ri
 
 InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal) {
   InsertionReport report;
-  report.repeated = map.HasKnown(proposal.id);
-  if (report.repeated) return report;
+  if (map.HasKnown(proposal.id)) {
+    report.outcome = KeyframeOutcome::kRepeated;
+    return report;
+  }
   if (!proposal.reference) return report;
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*proposal.reference);
   const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(*proposal.reference);
@@ -53,6 +59,7 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   }
   const std::vector<const Keyframe*> nearest = map.BestCovisible(keyframe, 1, 1);
   map.SetParent(keyframe, nearest.empty() ? *stands_for_it : nearest.front()->id);
+  report.outcome = KeyframeOutcome::kInserted;
   report.keyframe = &keyframe;
   return report;
 }

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <string>
+
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/proposals.h"
 
@@ -8,9 +11,19 @@ namespace dmslam {
 /// A keyframe of what the frontend proposes, at a pose. It is in no map yet.
 Keyframe MakeKeyframe(const Map& map, const KeyframeProposal& proposal, const Rigid3d& T_cam_world);
 
+/// What a proposed keyframe came to.
+enum class KeyframeOutcome : uint8_t {
+  kInserted,  ///< it is in the map
+  kRepeated,  ///< it was proposed before: nothing is left to do
+  kRefused,   ///< its reference is unknown, or of another map
+};
+
+/// For the record that answers the keyframe; empty: it was not refused.
+std::string WhyRefused(KeyframeOutcome outcome);
+
 struct InsertionReport {
-  const Keyframe* keyframe = nullptr;  ///< in the map; null: it was not inserted
-  bool repeated = false;               ///< it was proposed before
+  KeyframeOutcome outcome = KeyframeOutcome::kRefused;
+  const Keyframe* keyframe = nullptr;  ///< in the map, exactly when it was inserted
   int observations_dropped = 0;        ///< of landmarks that are gone, or of another map
 };
 

@@ -81,17 +81,17 @@ TEST_F(Insertion, HangsFromItsReferenceWhereItSharesNothing) {
 
 TEST_F(Insertion, OneProposedTwiceIsRecognisedAlsoWhenItWasCulled) {
   EXPECT_NE(InsertKeyframe(map_, Seeing(10)).keyframe, nullptr);
-  EXPECT_TRUE(InsertKeyframe(map_, Seeing(10)).repeated);
+  EXPECT_EQ(InsertKeyframe(map_, Seeing(10)).outcome, KeyframeOutcome::kRepeated);
   map_.RemoveKeyframe(map_.At(Id(3)));
   const InsertionReport again = InsertKeyframe(map_, Seeing(10));
-  EXPECT_TRUE(again.repeated);
+  EXPECT_EQ(again.outcome, KeyframeOutcome::kRepeated);
   EXPECT_EQ(again.keyframe, nullptr);
 }
 
 TEST_F(Insertion, RefusesAReferenceThatIsUnknownOrOfAnotherMap) {
   const InsertionReport unknown = InsertKeyframe(map_, Seeing(10, 77));
   EXPECT_EQ(unknown.keyframe, nullptr);
-  EXPECT_FALSE(unknown.repeated);
+  EXPECT_EQ(unknown.outcome, KeyframeOutcome::kRefused);
   map_.SetMapId(map_.At(Id(2)), 2);
   EXPECT_EQ(InsertKeyframe(map_, Seeing(10)).keyframe, nullptr);
   EXPECT_EQ(map_.keyframes().size(), 2u);

@@ -63,7 +63,7 @@ class OfAMapper : public ::testing::Test {
 };
 
 TEST_F(OfAMapper, ToldWhichKeyframesMadeIt) {
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   const LandmarkHistory& first = Of(SeenBy(2, 5));
   EXPECT_EQ(first.origin, LandmarkOrigin::kFirstMap);
   EXPECT_EQ(first.made.about, WallScene::Id(1));
@@ -86,7 +86,7 @@ TEST_F(OfAMapper, ToldWhichKeyframesMadeIt) {
 }
 
 TEST_F(OfAMapper, WhatIsRarelyFoundWhileItIsYoungIsToldFromWhatIsSeenThrough) {
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   const LandmarkId lost = SeenBy(2, kKnown + 5);
   histories_.Watch(lost);
   const KeyframeProposal next = Frame(3);
@@ -94,7 +94,7 @@ TEST_F(OfAMapper, WhatIsRarelyFoundWhileItIsYoungIsToldFromWhatIsSeenThrough) {
   evidence.map_id = 1;
   evidence.items.push_back({lost, 20, 2, 0});
   core_.OnEvidence(evidence);
-  ASSERT_TRUE(core_.OnKeyframe(next));
+  ASSERT_EQ(core_.OnKeyframe(next), KeyframeOutcome::kInserted);
   const LandmarkHistory& history = Of(lost);
   ASSERT_TRUE(history.end);
   EXPECT_EQ(history.end->fate, LandmarkFate::kRarelyFound);

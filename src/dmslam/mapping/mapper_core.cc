@@ -49,13 +49,9 @@ void MapperCore::Publish(MapEvent event, std::optional<KeyframeId> about, std::o
   Emit(delta);
 }
 
-/// What changes nothing is told where it is an answer.
+/// What changes nothing is published only where it is an answer.
 void MapperCore::Emit(const MapDelta& delta) {
-  const bool answers = delta.event == MapEvent::kSettled || delta.event == MapEvent::kRefused ||
-                       delta.event == MapEvent::kMapped || delta.event == MapEvent::kRequestDone ||
-                       delta.event == MapEvent::kEnded || delta.event == MapEvent::kTurn ||
-                       delta.event == MapEvent::kFirstMapRefused;
-  if (answers || !delta.Empty()) sink_(delta);
+  if (IsAnswer(delta.event) || !delta.Empty()) sink_(delta);
 }
 
 bool MapperCore::Interrupted() {
@@ -93,9 +89,10 @@ bool MapperCore::StartMap(const InitialMap& proposal) {
 
 // ---- A keyframe ----
 
-bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
-  const Keyframe* keyframe = FindOrInsert(proposal);
-  if (keyframe == nullptr) return false;
+KeyframeOutcome MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
+  const InsertionReport insertion = FindOrInsert(proposal);
+  const Keyframe* keyframe = insertion.keyframe;
+  if (keyframe == nullptr) return insertion.outcome;
   const MapId map_id = keyframe->map_id;
   as_saved_.erase(map_id);
   CullYoung(map_id);
@@ -110,25 +107,23 @@ bool MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
     Count(CullRedundantKeyframes(map_, *keyframe, proposal.reference, options_), &counters_.keyframes_culled);
   }
   Publish(MapEvent::kMapped, proposal.id, map_id);
-  return true;
+  return KeyframeOutcome::kInserted;
 }
 
-/// The keyframe in the map. Null: what follows was done with it before, or it cannot be inserted.
-const Keyframe* MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
+/// The keyframe counts as inserted, too, where a mapper that has ended may have left it unfinished.
+InsertionReport MapperCore::FindOrInsert(const KeyframeProposal& proposal) {
   adjusted_ = false;
   const bool maybe_unfinished = finished_ && finished_->insert(proposal.id.camera()).second;
   const Keyframe* there = map_.FindKeyframe(proposal.id);
-  if (maybe_unfinished && there != nullptr) return there;
+  if (maybe_unfinished && there != nullptr) return {KeyframeOutcome::kInserted, there, 0};
   const InsertionReport report = InsertKeyframe(map_, proposal);
   Count(report.observations_dropped, &counters_.observations_dropped);
-  if (report.keyframe == nullptr) {
-    if (!report.repeated) ++counters_.keyframes_refused;
-    return nullptr;
-  }
+  if (report.outcome == KeyframeOutcome::kRefused) ++counters_.keyframes_refused;
+  if (report.keyframe == nullptr) return report;
   order_.Add(proposal.id);
   ++counters_.keyframes_inserted;
   Publish(MapEvent::kKeyframeInserted, proposal.id, report.keyframe->map_id);
-  return report.keyframe;
+  return report;
 }
 
 void MapperCore::CullYoung(MapId map_id) {
@@ -177,11 +172,11 @@ void MapperCore::AnswerRequest(uint32_t request) {
   Emit(delta);
 }
 
-void MapperCore::Settle(KeyframeId id, std::optional<MapId> map_id) {
+void MapperCore::Settle(KeyframeId id, std::optional<MapId> map_id, std::string why) {
   MapProgress progress = map_.progress(id.camera());
   progress.settled = id;
   map_.SetProgress(progress);
-  Publish(MapEvent::kSettled, id, map_id);
+  Publish(MapEvent::kSettled, id, map_id, {}, std::move(why));
 }
 
 void MapperCore::AdjustMaps() {
@@ -228,14 +223,14 @@ void MapperCore::End(bool as_it_is) {
 
 void MapperCore::RefuseCorrection(uint64_t correction_id, const std::string& why) {
   ++counters_.corrections_refused;
-  Publish(MapEvent::kRefused, {}, {}, correction_id, why);
+  Publish(MapEvent::kCorrectionRefused, {}, {}, correction_id, why);
 }
 
 void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   if (answer.kind == LoopAnswer::Kind::kNone) return;
   if (const std::string why = WhyRefused(map_, answer); !why.empty()) {
     ++counters_.corrections_refused;
-    Publish(MapEvent::kRefused, answer.keyframe, {}, answer.correction_id, why);
+    Publish(MapEvent::kCorrectionRefused, answer.keyframe, {}, answer.correction_id, why);
     return;
   }
   Count(ApplyCorrection(map_, answer, options_), &counters_.fusions);

@@ -10,6 +10,7 @@
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/proposals.h"
 #include "dmslam/mapping/insertion_order.h"
+#include "dmslam/mapping/keyframe_insertion.h"
 #include "dmslam/mapping/landmark_creation.h"
 #include "dmslam/mapping/landmark_maker.h"
 #include "dmslam/mapping/mapper_options.h"
@@ -65,9 +66,8 @@ class MapperCore {
 
   /// Builds a map of the proposal; false when it is known already or does not hold (a record says so).
   bool OnInitialMap(const InitialMap& proposal);
-  /// Inserts a keyframe and does the local mapping that follows; false when it is known already, or its
-  /// reference is not.
-  bool OnKeyframe(const KeyframeProposal& proposal);
+  /// Inserts a keyframe and does the local mapping that follows.
+  KeyframeOutcome OnKeyframe(const KeyframeProposal& proposal);
   void OnEvidence(const FrameEvidence& evidence);
   void OnReset(const MapReset& reset);
   /// Adjusts every map as a whole, of a large one the newest keyframes, once for what has come until now, and
@@ -85,8 +85,9 @@ class MapperCore {
   void RefuseCorrection(uint64_t correction_id, const std::string& why);
   /// Says that all that comes before a frame is in the map: its camera may work on it (lock-step of several).
   void GiveTurn(KeyframeId frame);
-  /// Says that all work that keyframe `id` caused is done.
-  void Settle(KeyframeId id, std::optional<MapId> map_id);
+  /// Says that all work that keyframe `id` caused is done, and of one that was refused why; `why` is empty
+  /// for all others.
+  void Settle(KeyframeId id, std::optional<MapId> map_id, std::string why = {});
   /// Says that the sequence has ended and that all it caused is done; first adjusts all maps, unless it
   /// is to leave them as they are.
   void End(bool as_it_is = false);
@@ -95,7 +96,7 @@ class MapperCore {
   const MapperCounters& counters() const { return counters_; }
 
  private:
-  const Keyframe* FindOrInsert(const KeyframeProposal& proposal);
+  InsertionReport FindOrInsert(const KeyframeProposal& proposal);
   void CullYoung(MapId map_id);
   void RemoveSeenThroughBy(const Keyframe& keyframe);
   void Adjust(const Keyframe& keyframe);

@@ -82,7 +82,7 @@ TEST_F(Corrections, OneFromBeforeAnotherIsRefused) {
   EXPECT_EQ(core_.counters().corrections_applied, 1u);
   EXPECT_EQ(core_.counters().corrections_refused, 1u);
   EXPECT_NEAR(HeightOf(2), 1.0, 1e-12);
-  EXPECT_EQ(said_.back().event, MapEvent::kRefused);
+  EXPECT_EQ(said_.back().event, MapEvent::kCorrectionRefused);
   EXPECT_EQ(said_.back().correction_id, 8u);
   EXPECT_NE(said_.back().note.find("before the correction"), std::string::npos) << said_.back().note;
   core_.OnLoopAnswer(OneUp(core_.map().version(), 9));
@@ -273,8 +273,8 @@ class KeyframeStep : public testing::Test {
 TEST_F(KeyframeStep, PublishesEveryStepInOrder) {
   ASSERT_TRUE(Start());
   EXPECT_EQ(EventsSince(0), std::vector<MapEvent>{MapEvent::kMapStarted});
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
-  ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
+  ASSERT_EQ(core_.OnKeyframe(Frame(3)), KeyframeOutcome::kInserted);
   const std::vector<MapEvent> expected = {MapEvent::kKeyframeInserted, MapEvent::kLandmarksCreated,
                                           MapEvent::kFused, MapEvent::kAdjusted, MapEvent::kMapped};
   std::vector<MapEvent> events = EventsSince(1);
@@ -289,7 +289,7 @@ TEST_F(KeyframeStep, PublishesEveryStepInOrder) {
 
 TEST_F(KeyframeStep, MapsTheWholeWall) {
   ASSERT_TRUE(Start());
-  for (const uint32_t frame : {2U, 3U}) ASSERT_TRUE(core_.OnKeyframe(Frame(frame)));
+  for (const uint32_t frame : {2U, 3U}) ASSERT_EQ(core_.OnKeyframe(Frame(frame)), KeyframeOutcome::kInserted);
   const Map& map = core_.map();
   EXPECT_EQ(map.keyframes().size(), 4u);
   EXPECT_GT(map.num_landmarks(), 120u) << "of 140; the first map had 60";
@@ -303,7 +303,7 @@ TEST_F(KeyframeStep, MapsTheWholeWall) {
 
 TEST_F(KeyframeStep, AdjustsWhatTheFrontendGotWrong) {
   ASSERT_TRUE(Start());
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2, 0.004)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2, 0.004)), KeyframeOutcome::kInserted);
   const Eigen::Vector3d center = core_.map().At(Id(2)).T_cam_world.Center() / Scale();
   EXPECT_LT((center - Eigen::Vector3d(PlaceOf(2), 0, 0)).norm(), 0.005) << "it was 0.016 off";
 }
@@ -312,13 +312,13 @@ TEST_F(KeyframeStep, MakesNothingOfWhatMoves) {
   ASSERT_TRUE(Start());
   KeyframeProposal proposal = Frame(2);
   for (uint16_t i = kKnown; i < scene_.size(); ++i) proposal.moving.push_back(i);
-  ASSERT_TRUE(core_.OnKeyframe(proposal));
+  ASSERT_EQ(core_.OnKeyframe(proposal), KeyframeOutcome::kInserted);
   EXPECT_LE(core_.map().num_landmarks(), size_t{kKnown});
 }
 
 TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
   ASSERT_TRUE(Start());
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   const KeyframeProposal next = Frame(3);
   FrameEvidence evidence;
   evidence.map_id = 1;
@@ -326,7 +326,7 @@ TEST_F(KeyframeStep, CullsYoungLandmarksThatAreNotFound) {
   ASSERT_TRUE(lost.valid());
   evidence.items.push_back({lost, 20, 2, 0});
   core_.OnEvidence(evidence);
-  ASSERT_TRUE(core_.OnKeyframe(next));
+  ASSERT_EQ(core_.OnKeyframe(next), KeyframeOutcome::kInserted);
   EXPECT_EQ(core_.map().FindLandmark(lost), nullptr);
   EXPECT_GE(core_.counters().landmarks_culled, 1u);
 }
@@ -369,7 +369,7 @@ TEST_F(FourthKeyframe, RemovesWhoStandsWhereTheWallWasSeen) {
     }
   }
   Continue();
-  ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(3)), KeyframeOutcome::kInserted);
   EXPECT_EQ(core_.counters().landmarks_seen_through, kFew);
   for (const LandmarkId id : person) EXPECT_EQ(core_.map().FindLandmark(id), nullptr);
 }
@@ -385,7 +385,7 @@ TEST_F(FourthKeyframe, JoinsLandmarksOfOnePoint) {
     }
   }
   Continue();
-  ASSERT_TRUE(core_.OnKeyframe(Frame(3)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(3)), KeyframeOutcome::kInserted);
   EXPECT_GE(core_.counters().fusions, kFew);
   for (const uint16_t i : WallScene::Range(kFirst, kFirst + kFew)) {
     EXPECT_EQ(core_.map().At(Id(3)).landmarks[i], LandmarkId::Make(1, 100U + i)) << i;
@@ -422,7 +422,7 @@ TEST_F(KeyframeStep, CullsKeyframesThatSayNothingNew) {
   ASSERT_TRUE(Start());
   for (uint32_t frame = 2; frame <= 7; ++frame) {
     KeyframeProposal proposal = Frame(frame);  // hardly farther than the one before: all see the same
-    ASSERT_TRUE(core_.OnKeyframe(proposal));
+    ASSERT_EQ(core_.OnKeyframe(proposal), KeyframeOutcome::kInserted);
   }
   EXPECT_GT(core_.counters().keyframes_culled, 0u);
   EXPECT_NE(core_.map().FindKeyframe(Id(0)), nullptr);
@@ -433,7 +433,7 @@ TEST_F(KeyframeStep, AnInterruptedStepStillInsertsAndCreates) {
   ASSERT_TRUE(Start());
   core_.SetInterrupt([] { return true; });
   const size_t before = said_.size();
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kKeyframeInserted,
                                                         MapEvent::kLandmarksCreated, MapEvent::kMapped}));
   EXPECT_EQ(core_.counters().adjustments_interrupted, 1u);
@@ -441,7 +441,7 @@ TEST_F(KeyframeStep, AnInterruptedStepStillInsertsAndCreates) {
 
 TEST_F(KeyframeStep, TheAdjustmentOfWholeMapsStopsWhenItIsAskedTo) {
   ASSERT_TRUE(Start());
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   int asked = 0;
   core_.SetInterrupt([] { return true; });  // a keyframe that waits does not cut it short
   core_.SetStop([&] { return ++asked > 1; });
@@ -455,32 +455,46 @@ TEST_F(KeyframeStep, TheAdjustmentOfWholeMapsStopsWhenItIsAskedTo) {
 TEST_F(KeyframeStep, OneThatComesTwiceIsDoneOnce) {
   ASSERT_TRUE(Start());
   const KeyframeProposal proposal = Frame(2);
-  ASSERT_TRUE(core_.OnKeyframe(proposal));
+  ASSERT_EQ(core_.OnKeyframe(proposal), KeyframeOutcome::kInserted);
   const size_t before = said_.size();
-  EXPECT_FALSE(core_.OnKeyframe(proposal));
+  EXPECT_EQ(core_.OnKeyframe(proposal), KeyframeOutcome::kRepeated);
   EXPECT_EQ(said_.size(), before);
   EXPECT_EQ(core_.counters().keyframes_inserted, 1u);
   EXPECT_EQ(core_.counters().keyframes_refused, 0u);
 }
 
+TEST_F(KeyframeStep, OneThatIsRefusedIsAnsweredWithTheReason) {
+  ASSERT_TRUE(Start());
+  KeyframeProposal proposal = Frame(2);
+  proposal.reference = Id(77);
+  const KeyframeOutcome outcome = core_.OnKeyframe(proposal);
+  EXPECT_EQ(outcome, KeyframeOutcome::kRefused);
+  core_.Settle(proposal.id, proposal.map_id, WhyRefused(outcome));
+  EXPECT_EQ(said_.back().event, MapEvent::kSettled);
+  EXPECT_NE(said_.back().note.find("its reference is unknown"), std::string::npos);
+  core_.Settle(Id(1), 1, WhyRefused(KeyframeOutcome::kInserted));
+  EXPECT_EQ(said_.back().note, "");
+}
+
 TEST_F(KeyframeStep, AMapperThatContinuesDoesTheFirstOneAgain) {
   ASSERT_TRUE(Start());
   const KeyframeProposal proposal = Frame(2);
-  ASSERT_TRUE(core_.OnKeyframe(proposal));
+  ASSERT_EQ(core_.OnKeyframe(proposal), KeyframeOutcome::kInserted);
   std::vector<MapDelta> said;
   MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1,
                   [&](const MapDelta& delta) { said.push_back(delta); });
   next.Continue(Map(core_.map()));
-  EXPECT_TRUE(next.OnKeyframe(proposal)) << "its mapper may have ended in the middle of it";
+  EXPECT_EQ(next.OnKeyframe(proposal), KeyframeOutcome::kInserted)
+      << "its mapper may have ended in the middle of it";
   EXPECT_EQ(said.back().event, MapEvent::kMapped);
-  EXPECT_FALSE(next.OnKeyframe(proposal)) << "and once is enough";
+  EXPECT_EQ(next.OnKeyframe(proposal), KeyframeOutcome::kRepeated) << "and once is enough";
 }
 
 TEST_F(KeyframeStep, AMapperThatContinuesNumbersItsLandmarksAnew) {
   ASSERT_TRUE(Start());
   MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1, [](const MapDelta&) {});
   next.Continue(Map(core_.map()));
-  ASSERT_TRUE(next.OnKeyframe(Frame(2)));
+  ASSERT_EQ(next.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   EXPECT_EQ(next.map().HighestOrdinal(), 2);
   for (const LandmarkId id : core_.map().LandmarkIdsSorted()) EXPECT_EQ(id.epoch_ordinal(), 1);
 }
@@ -527,7 +541,7 @@ TEST_F(KeyframeStep, AFirstMapOfANumberThatIsTakenChangesNothing) {
 
 TEST_F(KeyframeStep, TheEndLeavesASavedMapToWhichNothingHasComeAsItIs) {
   ASSERT_TRUE(Start());
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   const KeyframeProposal third = Frame(3);
   const AdjustRequest at_the_end{.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0};
   for (const bool comes : {false, true}) {
@@ -535,7 +549,7 @@ TEST_F(KeyframeStep, TheEndLeavesASavedMapToWhichNothingHasComeAsItIs) {
     MapperCore next(MapperOptions(), TestCamera(), Pyramid(), 1,
                     [&](const MapDelta& delta) { events.push_back(delta.event); });
     next.ContinueSaved(Map(core_.map()));
-    ASSERT_TRUE(!comes || next.OnKeyframe(third));
+    ASSERT_TRUE(!comes || next.OnKeyframe(third) == KeyframeOutcome::kInserted);
     events.clear();
     next.OnAdjustRequest(at_the_end);
     const bool adjusts = std::ranges::find(events, MapEvent::kMapAdjusted) != events.end();
@@ -546,7 +560,7 @@ TEST_F(KeyframeStep, TheEndLeavesASavedMapToWhichNothingHasComeAsItIs) {
 
 TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   ASSERT_TRUE(Start());
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   const size_t before = said_.size();
   core_.OnAdjustRequest({.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
   EXPECT_EQ(EventsSince(before), (std::vector<MapEvent>{MapEvent::kMapAdjusted, MapEvent::kRequestDone}));
@@ -564,7 +578,7 @@ TEST_F(KeyframeStep, TheEndAdjustsOnce) {
 
 TEST_F(KeyframeStep, SaysOnceMoreWhatALoopCloserHasNotHeard) {
   ASSERT_TRUE(Start());
-  ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+  ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
   const uint64_t version = core_.map().version();
   core_.AskAgain(Id(2), 1);
   EXPECT_EQ(said_.back().event, MapEvent::kMapped);
@@ -594,7 +608,8 @@ class TheEnd : public KeyframeStep {
     options.final_adjustment_keyframes = final_adjustment_keyframes;
     core_ = MapperCore(options, TestCamera(), Pyramid(), 1, [](const MapDelta&) {});
     EXPECT_TRUE(core_.OnInitialMap(FirstMap()));
-    for (const uint32_t frame : {2u, 3u, 4u, 5u}) EXPECT_TRUE(core_.OnKeyframe(Frame(frame, 0.02)));
+    for (const uint32_t frame : {2u, 3u, 4u, 5u})
+      EXPECT_EQ(core_.OnKeyframe(Frame(frame, 0.02)), KeyframeOutcome::kInserted);
     const Map before = core_.map();
     core_.OnAdjustRequest({.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
     std::vector<uint32_t> moved;
@@ -618,7 +633,7 @@ class AfterARequest : public KeyframeStep {
  protected:
   void StartAndAdjust() {
     ASSERT_TRUE(Start());
-    ASSERT_TRUE(core_.OnKeyframe(Frame(2)));
+    ASSERT_EQ(core_.OnKeyframe(Frame(2)), KeyframeOutcome::kInserted);
     core_.OnAdjustRequest(Request());
     ASSERT_FALSE(AdjustedBy([this] { core_.OnAdjustRequest(Request()); })) << "once is enough";
   }

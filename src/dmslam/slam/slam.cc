@@ -52,8 +52,8 @@ FramePose Slam::Handle(const FrontendOutput& output) {
       const bool is_new = mapper_.OnInitialMap(*initial);
       Settle(initial->second.id, initial->map_id, is_new);
     } else if (const auto* keyframe = std::get_if<KeyframeProposal>(&event)) {
-      const bool is_new = mapper_.OnKeyframe(*keyframe);
-      Settle(keyframe->id, keyframe->map_id, is_new);
+      const KeyframeOutcome outcome = mapper_.OnKeyframe(*keyframe);
+      Settle(keyframe->id, keyframe->map_id, outcome == KeyframeOutcome::kInserted, WhyRefused(outcome));
     } else if (const auto* evidence = std::get_if<FrameEvidence>(&event)) {
       mapper_.OnEvidence(*evidence);
     } else if (const auto* reset = std::get_if<MapReset>(&event)) {
@@ -66,10 +66,10 @@ FramePose Slam::Handle(const FrontendOutput& output) {
 }
 
 /// A keyframe is settled when the loop closer has answered it and the answer is in the map.
-void Slam::Settle(KeyframeId id, MapId map_id, bool is_new) {
+void Slam::Settle(KeyframeId id, MapId map_id, bool is_new, std::string why_refused) {
   TellLoopcloser();
   if (is_new) mapper_.OnLoopAnswer(loopcloser_.Check(id));
-  mapper_.Settle(id, map_id);
+  mapper_.Settle(id, map_id, std::move(why_refused));
 }
 
 void Slam::TellLoopcloser() {

@@ -38,7 +38,7 @@ class Slam {
 
  private:
   FramePose Handle(const FrontendOutput& output);
-  void Settle(KeyframeId id, MapId map_id, bool is_new);
+  void Settle(KeyframeId id, MapId map_id, bool is_new, std::string why_refused = {});
   void TellLoopcloser();
   void TellFrontend(bool all);
 
