@@ -223,7 +223,7 @@ void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
 void FrontendNode::OnApplied(size_t count) {
   for (; count > 0; --count) {
     const HeldRecords::Held held = held_.PopApplied();
-    if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer();
+    if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer(*held.delta.request);
     if (held.delta.event == MapEvent::kTurn) turns_.OnTurn(*held.delta.about);
   }
   map_reader_->Accept(held_.applied());

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <optional>
 
 #include "dmslam/evaluation/alignment.h"
 
@@ -14,9 +15,9 @@ class OnlineError {
  public:
   /// Where the camera truly was at a frame [m].
   void OnTruth(uint32_t frame_index, const Eigen::Vector3d& p_world);
-  /// Where it is believed to be [map units]; -1 where the truth is not known or too little was tracked to
+  /// Where it is believed to be [map units]. None where the truth is not known or too little was tracked to
   /// align it.
-  double OnPose(uint32_t frame_index, const Eigen::Vector3d& p_map);
+  std::optional<double> OnPose(uint32_t frame_index, const Eigen::Vector3d& p_map);
   /// Another map: its units and its origin have nothing to do with the last one's.
   void Reset();
 

@@ -97,7 +97,7 @@ TEST(PoseReportTest, TheViewIsOfTheCameraInTheWorld) {
   EXPECT_EQ(view.T_world_cam.translation.x(), 4);
   EXPECT_EQ(view.inliers, 40);
   EXPECT_DOUBLE_EQ(view.latency_ms, 25);
-  EXPECT_EQ(view.error_m, -1) << "nobody has said where it truly was";
+  EXPECT_FALSE(view.error_m) << "nobody has said where it truly was";
   report.OnEvent(FramePose());
   EXPECT_FALSE(report.ViewOf(TraceOf(5)).has_pose);
 }
@@ -113,10 +113,10 @@ TEST(PoseReportTest, TheErrorIsOfTheMapThatIsTrackedIn) {
     report.OnEvent(pose);
     return report.ViewOf(TraceOf(frame)).error_m;
   };
-  for (uint32_t frame = 0; frame < 9; ++frame) EXPECT_EQ(error_of(frame), -1);
-  EXPECT_NEAR(error_of(9), 0, 1e-9);
+  for (uint32_t frame = 0; frame < 9; ++frame) EXPECT_FALSE(error_of(frame));
+  EXPECT_NEAR(error_of(9).value(), 0, 1e-9);
   report.OnEvent(MapReset());
-  EXPECT_EQ(error_of(10), -1) << "too little was tracked in the new one";
+  EXPECT_FALSE(error_of(10)) << "too little was tracked in the new one";
 }
 
 }  // namespace

@@ -43,9 +43,9 @@ struct CandidateMap {
   int NumPoints() const;
 };
 
-/// An answer, or why there is none.
+/// Why there is no map.
 struct Refused {
-  WaitReason wait = WaitReason::kNone;
+  WaitReason wait = WaitReason::kNone;  ///< kNone: nothing was refused yet
   std::string text;
   double parallax_rad = 0;  ///< median, where it or the direction was not good enough
 };

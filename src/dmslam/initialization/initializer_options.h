@@ -10,10 +10,6 @@
 
 namespace dmslam {
 
-/// Root of D (paper, Eq. 3) of a static set, by the image's diagonal: one that is more compact may be
-/// somebody's.
-inline constexpr double kMinDistributionShare = 0.175;
-
 /// What selects the matches of a pair of frames that are static.
 enum class SelectorMethod : uint8_t { kDlrsac, kArsac, kRansac };
 
@@ -98,14 +94,11 @@ struct TestimonyOptions {
 
 /// Times are of the frames' stamps.
 struct InitializerOptions {
-  /// Fewer samples than the selector's own default, stricter agreement.
+  /// Fewer samples than the selector's own default.
   InitializerOptions() {
     selector.sampling.max_iterations = 600;
     // Agreement over pairs and the comparison of motions over all views decide what one pair leaves open.
     selector.max_rival_share = 0;
-    agreement.min_agreement = 0.87;
-    agreement.min_distribution_share = kMinDistributionShare;
-    agreement.dominance = DominanceOptions{};
   }
 
   DlrsacOptions selector;      ///< of DLRSAC; its sampling, input and inlier options hold for the others, too

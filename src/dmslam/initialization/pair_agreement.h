@@ -26,12 +26,17 @@ struct DominanceOptions {
   double min_distribution_share = 0.10;
 };
 
+/// Root of D (paper, Eq. 3) of a static set, by the image's diagonal: one that is more compact may be
+/// somebody's.
+inline constexpr double kMinDistributionShare = 0.175;
+
 struct AgreementOptions {
-  double min_agreement = 0.8;  ///< Jaccard index of two pairs' static sets, over features matched in both
-  int min_common = 30;         ///< features matched in both pairs, for the index to mean anything
-  double min_distribution_share = 0.15;       ///< root of D over the static matches, by the image's diagonal
-  std::optional<DominanceOptions> dominance;  ///< absent: whatever its share, a compact set is refused
-  int min_static = 100;                       ///< matches static in all pairs
+  double min_agreement = 0.87;  ///< Jaccard index of two pairs' static sets, over features matched in both
+  int min_common = 30;          ///< features matched in both pairs, for the index to mean anything
+  double min_distribution_share = kMinDistributionShare;
+  /// None: whatever its share, a compact set is refused.
+  std::optional<DominanceOptions> dominance = DominanceOptions{};
+  int min_static = 100;  ///< matches static in all pairs
 
   template <typename Visitor>
   void Describe(Visitor& v) {

@@ -100,7 +100,7 @@ Rigid3d Map::ResolvedPose::Compose(const Rigid3d& T_other_kf, double scale_then)
 
 std::optional<Map::ResolvedPose> Map::ResolvePose(KeyframeId id) const {
   if (const Keyframe* keyframe = FindKeyframe(id)) {
-    return ResolvedPose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id};
+    return ResolvedPose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id, keyframe};
   }
   std::vector<const KeyframeTombstone*> chain;
   while (chain.size() < 100000) {
@@ -109,7 +109,7 @@ std::optional<Map::ResolvedPose> Map::ResolvePose(KeyframeId id) const {
     chain.push_back(&it->second);
     id = it->second.parent;
     if (const Keyframe* keyframe = FindKeyframe(id)) {
-      ResolvedPose pose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id};
+      ResolvedPose pose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id, keyframe};
       for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
         pose.T_cam_world = pose.Compose((*link)->T_kf_parent, (*link)->parent_scale);
       }

@@ -39,15 +39,15 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   }
   if (!proposal.reference) return report;
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*proposal.reference);
-  const std::optional<KeyframeId> stands_for_it = map.ResolveKeyframe(*proposal.reference);
-  if (!reference || !stands_for_it) return report;
+  if (!reference) return report;
+  const KeyframeId stands_for_it = reference->keyframe->id;
   // A map that is gone has been joined with another since the frontend heard of it last.
   if (reference->map_id != proposal.map_id && map.HasMap(proposal.map_id)) return report;
   Keyframe made =
       MakeKeyframe(map, proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
   made.map_id = reference->map_id;
   made.scale = reference->scale;
-  made.parent = *stands_for_it;
+  made.parent = stands_for_it;
   const Keyframe& keyframe = map.AddKeyframe(std::move(made));
   for (const KeyframeProposal::Match& match : proposal.matches) {
     if (const Landmark* landmark = Usable(map, keyframe, match)) {
@@ -58,7 +58,7 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
     }
   }
   const std::vector<const Keyframe*> nearest = map.BestCovisible(keyframe, 1, 1);
-  map.SetParent(keyframe, nearest.empty() ? *stands_for_it : nearest.front()->id);
+  map.SetParent(keyframe, nearest.empty() ? stands_for_it : nearest.front()->id);
   report.outcome = KeyframeOutcome::kInserted;
   report.keyframe = &keyframe;
   return report;

@@ -23,15 +23,14 @@ const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
 
 /// Whether the keyframes before and after rule out that the camera was there. Behind people a few wrong
 /// sights may agree with a pose far aside.
-bool IsAside(const Map& map, KeyframeId reference, const FramePose& pose, const Rigid3d& T_cam_world) {
+bool IsAside(const Map& map, const Keyframe& reference, const FramePose& pose, const Rigid3d& T_cam_world) {
   TrackedFrame frame;
   frame.index = pose.frame_index;
   frame.stamp_ns = pose.stamp_ns;
   frame.T_cam_world = T_cam_world;
-  const Keyframe& keyframe = map.At(reference);
-  const double depth = map.MedianDepth(keyframe).value_or(1.0);
-  return !AgreesWithKeyframesAside(map, keyframe.map_id, frame, reference.session(), depth,
-                                   reference.camera());
+  const double depth = map.MedianDepth(reference).value_or(1.0);
+  return !AgreesWithKeyframesAside(map, reference.map_id, frame, reference.id.session(), depth,
+                                   reference.id.camera());
 }
 
 }  // namespace
@@ -174,13 +173,12 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   std::optional<Looked> looked = IsAhead() ? std::move(ahead_.front()) : Look(map, kept, search);
   if (IsAhead()) ahead_.pop_front();
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*kept.pose.reference);
-  const std::optional<KeyframeId> keyframe_id = map.ResolveKeyframe(*kept.pose.reference);
-  if (!looked || !reference || !keyframe_id) return std::nullopt;
+  if (!looked || !reference) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
   std::optional<FinalPose> refined = std::move(looked->refined);
   if (options_.for_smoothing) LookFromMotion(map, reference->map_id, kept, looked->known, search, &refined);
-  const bool is_moved_aside = refined && IsAside(map, *keyframe_id, kept.pose, refined->measured) &&
-                              !IsAside(map, *keyframe_id, kept.pose, told);
+  const bool is_moved_aside = refined && IsAside(map, *reference->keyframe, kept.pose, refined->measured) &&
+                              !IsAside(map, *reference->keyframe, kept.pose, told);
   if (is_moved_aside) refined.reset();
   before_ = std::exchange(last_, std::nullopt);
   if (refined) last_ = {reference->map_id, kept.pose.stamp_ns, refined->measured, refined->sights.size()};
@@ -191,7 +189,7 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   }
   if (!refined) return std::nullopt;
   refined->pose.state = TrackingState::kLocalizedLater;
-  refined->SetPose(map.At(*keyframe_id), refined->measured);
+  refined->SetPose(*reference->keyframe, refined->measured);
   return refined;
 }
 

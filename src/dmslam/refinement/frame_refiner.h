@@ -15,8 +15,11 @@
 
 namespace dmslam {
 
+/// Whose poses are improved at the end: so many frames of each camera, two minutes at 30 Hz.
+inline constexpr size_t kFramesRemembered = 3600;
+
 struct FrameRefinerOptions {
-  size_t max_frames = 3600;  ///< the oldest is forgotten beyond
+  size_t max_frames = kFramesRemembered;  ///< the oldest is forgotten beyond
   /// The features of the oldest are forgotten beyond (38 bytes each): these frames are only optimised with
   /// the landmarks that they saw.
   size_t max_features = 3'000'000;

@@ -27,7 +27,7 @@ class FirstMapPhase {
 
   struct Answer {
     std::optional<InitialMap> proposal;
-    std::string reason;  ///< why there is none, or that there is one
+    std::string reason;  ///< why there is none; for people
   };
   Answer AddFrame(const TrackedFrame& frame, uint32_t session, CameraId camera_id, MapId map_id);
   void Restart() { search_ = make_search_(); }

@@ -25,8 +25,9 @@
 
 namespace dmslam {
 
-/// Tracks the camera in a replica of the map and proposes keyframes. Knows no bus, no clock and no thread:
-/// images and map records in, records out. The same inputs give the same outputs.
+/// Tracks the camera in a replica of the map and proposes keyframes: images and map records in, records out.
+/// The same inputs give the same outputs. Knows no bus, and no clock decides anything (one measures how long
+/// extraction took); where work is shared among threads, their number changes no output.
 class FrontendCore {
  public:
   struct Setup {

@@ -109,7 +109,7 @@ void FinishSequence(FrontendCore* core, std::optional<int64_t> newest_stamp_ns,
   while (!end.Is(Phase::kTelling)) {
     if (const auto request = end.Ask(core->map(), 0, newest_stamp_ns, core->camera_id())) {
       listeners.adjust(*request);
-      end.OnAnswer();
+      end.OnAnswer(request->request);
     }
     DMSLAM_CHECK(!end.Waits(*core), "what is told is answered at once");
     const SequenceEnd::Worked worked = SequenceEnd::Work(end.phase(), core);

@@ -55,9 +55,9 @@ class SequenceEnd {
   /// is asked again.
   std::optional<AdjustRequest> Ask(const Map& map, int64_t now_ns, std::optional<int64_t> newest_stamp_ns,
                                    CameraId camera_id);
-  /// The mapper's answer. Only what was asked for counts; it may come while frames are worked on that came
-  /// after the question.
-  void OnAnswer() { answered_ = answered_ || asked_ns_; }
+  /// The mapper's answer to `request`. Only to the question put last does it count, since frames may come
+  /// after a question; it may come while these are worked on.
+  void OnAnswer(uint32_t request) { answered_ = answered_ || (asked_ns_ && request == requests_); }
 
   /// What a portion of work has come to.
   struct Worked {

@@ -92,7 +92,7 @@ TEST_F(SequenceEndTest, AMapperThatDoesNotAnswerIsAskedAgain) {
   MapArrives();
   SequenceEnd end(true);
   end.OnEndHeard();
-  end.OnAnswer();
+  end.OnAnswer(0);
   EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0)) << "the map may still grow";
   end.OnWorked(true);
   EXPECT_TRUE(end.Waits(core_)) << "nobody had asked";
@@ -104,7 +104,10 @@ TEST_F(SequenceEndTest, AMapperThatDoesNotAnswerIsAskedAgain) {
   EXPECT_TRUE(end.AppliesAllRecords());
   EXPECT_FALSE(end.Ask(core_.map(), 2 * kSecond, 7, 3));
   EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7, 3)->request, 2u);
-  end.OnAnswer();
+  end.OnAnswer(1);
+  end.OnAnswer(3);
+  EXPECT_TRUE(end.Waits(core_)) << "another question was answered, or another frontend's";
+  end.OnAnswer(2);
   EXPECT_FALSE(end.Waits(core_));
   EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7, 3));
 }

@@ -7,6 +7,7 @@
 namespace dmslam {
 namespace {
 
+// A camera that was not tracked for so long is lost; until then frames are missing.
 constexpr int64_t kLostAfterNs = 1'000'000'000 / 3;
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "dmslam/geometry/solve_symmetric.h"
 #include "dmslam/geometry/uncertain_pose.h"
+#include "dmslam/refinement/frame_refiner.h"
 
 namespace dmslam {
 namespace {
@@ -125,7 +126,7 @@ void TrajectoryBuilder::JoinPosesOf(const std::set<FrameName>& frames) {
   }
   for (const auto& [name, path] : paths) {
     std::optional<MotionNoise> noise;
-    size_t begin = path.size() - std::min(path.size(), kMostJoined);
+    size_t begin = path.size() - std::min(path.size(), kFramesRemembered);
     for (size_t end = begin; end < path.size(); begin = end) {
       const auto together = [&](const FramePose* pose) {
         return pose->stamp_ns - path[begin]->stamp_ns < kJoinedNs;

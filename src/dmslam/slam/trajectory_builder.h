@@ -54,9 +54,8 @@ class TrajectoryBuilder {
   /// Frames whose features went with their frontend: nobody looks for them again in the finished map, as is
   /// done for all others. Where they were not placed better in another way, their poses are joined with how a
   /// carried camera moves (SmoothTrajectory()), as well as each was known when it was told: the newest
-  /// kMostJoined of each camera and map, as many as a frontend would remember. To be called when all is in.
+  /// kFramesRemembered of each camera and map, as a frontend would. To be called when all is in.
   void JoinPosesOf(const std::set<FrameName>& frames);
-  static constexpr size_t kMostJoined = 3600;
 
   struct Trajectories {
     std::optional<MapId> map_id;      ///< the map that holds most frames; none: no frame is placed

@@ -95,7 +95,7 @@ void LocalMap::RankByVotes(const Map& map, const TrackedFrame& frame) {
 std::optional<KeyframeId> LocalMap::NewNeighbour(const Map& map, KeyframeId of) {
   ranked_.clear();
   for (const auto& [other, shared] : map.At(of).covisible) {
-    if (shared >= 1) ranked_.emplace_back(-shared, other);
+    ranked_.emplace_back(-shared, other);
   }
   const auto asked = ranked_.begin() + std::min<ptrdiff_t>(kNeighboursAsked, std::ssize(ranked_));
   std::partial_sort(ranked_.begin(), asked, ranked_.end());

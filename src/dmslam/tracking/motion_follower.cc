@@ -15,9 +15,9 @@ MotionFollower::Attempt MotionFollower::Follow(const Map& map, const FrameTime& 
   if (!prediction.T_cam_world || !prediction.recent) return attempt;
   if (!FindFirstPose(map, prediction, seed, search, frame, &attempt)) return attempt;
   attempt.report =
-      search->InLocalMap(map, careful, attempt.by_rival ? std::nullopt : prediction.prior, frame);
-  attempt.by_rival |= attempt.report.by_rival;
-  if (attempt.by_rival) motion_.Stop();
+      search->InLocalMap(map, careful, attempt.begins_anew ? std::nullopt : prediction.prior, frame);
+  attempt.begins_anew |= attempt.report.by_rival;
+  if (attempt.begins_anew) motion_.Stop();
   if (!motion_.IsReachable(map, frame->T_cam_world, time)) {
     attempt.report.outcome = TrackingReport::Outcome::kContradicted;
     attempt.report.reason = "the pose contradicts the camera's motion";
@@ -32,7 +32,7 @@ bool MotionFollower::FindFirstPose(const Map& map, const MotionModel::Prediction
                                    PoseSearch* search, TrackedFrame* frame, Attempt* attempt) const {
   using Result = PoseSearch::FromFrameResult;
   const Result last = search->FromFrame(map, last_, *prediction.T_cam_world, prediction.prior, frame);
-  attempt->by_rival = last == Result::kFoundRival;
+  attempt->begins_anew = last == Result::kFoundRival;
   if (last == Result::kFound || last == Result::kFoundRival) return true;
   if (last == Result::kContradicted) attempt->report.outcome = TrackingReport::Outcome::kContradicted;
   if (prediction.prior) {

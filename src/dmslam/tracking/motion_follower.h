@@ -26,7 +26,7 @@ class MotionFollower {
   struct Attempt {
     TrackingReport report;
     std::optional<FoundPose> weak_pose;  ///< that too few landmarks support, but enough to lead the search on
-    bool by_rival = false;               ///< what the frames before followed was not the room
+    bool begins_anew = false;  ///< the pose is no step on from the frame before, whose motion was wrong
   };
   /// Looks for the camera where its motion leads. `careful`: more is asked, as of a camera that was found
   /// anew. `seed`: of the search by the reference keyframe's features.

@@ -117,7 +117,7 @@ TEST_F(MotionFollowerTest, GoesOnFromAKeyframeAndThenFromFrameToFrame) {
     const MotionFollower::Attempt attempt = Follow(&frame);
     ASSERT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
     EXPECT_LT(ErrorAt(frame.T_cam_world, index * kStep), 2e-3);
-    EXPECT_FALSE(attempt.by_rival);
+    EXPECT_FALSE(attempt.begins_anew);
     EXPECT_TRUE(attempt.weak_pose);
     OnTracked(frame);
     EXPECT_EQ(follower_.last().index, index);
@@ -267,14 +267,14 @@ TEST_F(MotionFollowerTest, WhereTheFramesBeforeFollowedSomebodyHisMotionIsForgot
   TrackedFrame frame = Sharp(3, there, All, 0.1);
   MotionFollower::Attempt attempt = Follow(&frame);
   EXPECT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
-  EXPECT_TRUE(attempt.by_rival);
+  EXPECT_TRUE(attempt.begins_anew);
   EXPECT_LT(ErrorAt(frame.T_cam_world, there), 5e-4) << "what was expected of him has no say";
   EXPECT_FALSE(Prediction(4).prior);
 
   frame = Blurred(3, 2 * kStep + 0.1, All, 0.1);  // neither the motion nor the keyframe helps
   attempt = Follow(&frame);
   EXPECT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
-  EXPECT_TRUE(attempt.by_rival);
+  EXPECT_TRUE(attempt.begins_anew);
 }
 
 TEST_F(MotionFollowerTest, HoweverFarTheRoomIsFromWhereHisMotionLed) {
@@ -287,7 +287,7 @@ TEST_F(MotionFollowerTest, HoweverFarTheRoomIsFromWhereHisMotionLed) {
   TrackedFrame frame = Sharp(3, there, All, 0.19);
   const MotionFollower::Attempt attempt = Follow(&frame);
   EXPECT_TRUE(attempt.report.HasPose()) << attempt.report.reason;
-  EXPECT_TRUE(attempt.by_rival);
+  EXPECT_TRUE(attempt.begins_anew);
   EXPECT_LT(ErrorAt(frame.T_cam_world, there), 2e-3);
   EXPECT_FALSE(Prediction(4).prior);
 }

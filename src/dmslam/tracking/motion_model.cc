@@ -58,7 +58,11 @@ PlacedPose PlacedPose::Of(const Keyframe& reference, const Rigid3d& T_cam_world)
 std::optional<Rigid3d> PlacedPose::In(const Map& map) const {
   const std::optional<Map::ResolvedPose> keyframe = map.ResolvePose(reference);
   if (!keyframe) return std::nullopt;
-  return keyframe->Compose(T_cam_reference, scale);
+  return In(*keyframe);
+}
+
+Rigid3d PlacedPose::In(const Map::ResolvedPose& resolved) const {
+  return resolved.Compose(T_cam_reference, scale);
 }
 
 void MotionModel::Begin(const PlacedPose& pose, const FrameTime& time) {

@@ -22,6 +22,8 @@ struct PlacedPose {
   }
   /// T_cam_world in the map as it is now; none where nothing is known of the reference.
   std::optional<Rigid3d> In(const Map& map) const;
+  /// The same where it is known what stands for the reference.
+  Rigid3d In(const Map::ResolvedPose& resolved) const;
 };
 
 /// A pose that was found, and its covariance as its matches and what was known before leave it.

@@ -75,10 +75,9 @@ std::vector<PoseSight> PoseCertaintyEstimator::SightsOf(const Map& map, const Po
   std::vector<PoseSight> sights;
   sights.reserve(order_.size());
   for (const auto& [id, i] : order_) {
-    const Landmark* landmark = map.FindLandmark(id);
-    if (landmark == nullptr) continue;
+    const Landmark& landmark = *basis.matches[i].landmark;
     const PoseObservation& seen = basis.observations[i];
-    sights.push_back({id, landmark->p_world, RootOf(map, camera, *landmark), 1.0 / seen.inv_sigma_squared,
+    sights.push_back({id, landmark.p_world, RootOf(map, camera, landmark), 1.0 / seen.inv_sigma_squared,
                       seen.weight, static_cast<int>(CellOf(map.camera(), seen.uv_px))});
   }
   return sights;

@@ -144,7 +144,7 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
         Unbelieved{Unbelieved::Why::kDoubtful, false, last_tracked_ns().value_or(frame.stamp_ns), follower_};
   }
   follower_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns}, frame,
-                      attempt.relocalized || attempt.by_rival);
+                      attempt.relocalized || attempt.begins_anew);
   if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
   if (!unbelieved_ && options_.usual_speed) usual_speed_.OnPose(map, pose, frame.stamp_ns);
 }
@@ -255,7 +255,7 @@ void Tracker::FindBetterPlace(const Map& map, TrackedFrame* frame, Attempt* atte
   search_.judge().DropEvidence();  // what the pose that was wrong said of landmarks
   *frame = std::move(found);
   attempt->report = search_.InLocalMap(map, true, std::nullopt, frame);
-  attempt->by_rival = true;
+  attempt->begins_anew = true;
 }
 
 /// The frame stays as it was where no place in the map fits.

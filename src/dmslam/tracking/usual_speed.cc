@@ -71,13 +71,12 @@ std::optional<UsualSpeed::Step> UsualSpeed::StepTo(const Map& map, const PlacedP
   const auto old = std::find_if(recent_.rbegin(), recent_.rend(),
                                 [&](const Recent& past) { return stamp_ns - past.stamp_ns >= kShortestNs; });
   if (old == recent_.rend()) return std::nullopt;
-  const std::optional<KeyframeId> before = map.ResolveKeyframe(old->pose.reference);
-  const std::optional<KeyframeId> now = map.ResolveKeyframe(pose.reference);
-  if (!before || !now || map.At(*before).map_id != map.At(*now).map_id) return std::nullopt;
-  const std::optional<Rigid3d> from = old->pose.In(map), to = pose.In(map);
-  const std::optional<double> depth = map.MedianDepth(map.At(*now));
-  if (!from || !to || !depth || *depth <= 0) return std::nullopt;
-  return Step{(from->Center() - to->Center()).norm() / *depth, SecondsFromTo(old->stamp_ns, stamp_ns)};
+  const auto before = map.ResolvePose(old->pose.reference), now = map.ResolvePose(pose.reference);
+  if (!before || !now || before->map_id != now->map_id) return std::nullopt;
+  const std::optional<double> depth = map.MedianDepth(*now->keyframe);
+  if (!depth || *depth <= 0) return std::nullopt;
+  const Rigid3d from = old->pose.In(*before), to = pose.In(*now);
+  return Step{(from.Center() - to.Center()).norm() / *depth, SecondsFromTo(old->stamp_ns, stamp_ns)};
 }
 
 bool UsualSpeed::IsTooFar(const Map& map, const PlacedPose& pose, int64_t stamp_ns) const {

@@ -421,7 +421,7 @@ struct Codec<PoseView> {
     s(m.unknown, w.unknown);
     s(m.moving_share, w.moving_share);
     s(m.latency_ms, w.latency_ms);
-    s(m.error_m, w.error_m);
+    s.OrMinusOne(m.error_m, w.error_m);
   }
   static void Validate(const PoseView& m, Checker& check) {
     check.Session(m.session);
@@ -431,7 +431,7 @@ struct Codec<PoseView> {
     check.Require(m.inliers >= 0 && m.moving >= 0 && m.unknown >= 0, "negative number of features");
     check.Share(m.moving_share);
     check.Finite(m.latency_ms, "latency is not finite");
-    check.Finite(m.error_m, "error is not finite");
+    check.Finite(m.error_m.value_or(0), "error is not finite");
   }
 };
 

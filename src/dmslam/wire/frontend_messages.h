@@ -90,8 +90,8 @@ struct PoseView {
   int32_t unknown = 0;
   double moving_share = 0;
   double latency_ms = 0;  ///< from publication of the image to this pose
-  double error_m =
-      -1;  ///< distance to the ground truth after alignment of what was tracked so far; -1: not known
+  /// Distance to the ground truth after alignment of what was tracked so far; none: not known.
+  std::optional<double> error_m;
   CameraId camera_id = 0;
 };
 
