@@ -46,6 +46,7 @@ PairView PatchAmongOthers(uint32_t num_static, uint32_t num_others) {
 
 TEST(Agree, APatchIsEnoughWhereNothingElseMovesOtherwise) {
   AgreementOptions options;
+  options.dominance.reset();
   const auto refusal = [&](const PairView& pair) {
     const PairView* pairs[] = {&pair, &pair};
     return Agree(pairs, SyntheticCamera(), options).refusal;
