@@ -26,7 +26,10 @@ void KeyframeDatabaseOptions::Check() const {
   if (max_scored == 0) throw InputError("places: max_scored must be at least 1");
 }
 
-KeyframeDatabase::KeyframeDatabase(KeyframeDatabaseOptions options) : options_(options) { options_.Check(); }
+KeyframeDatabase::KeyframeDatabase(KeyframeDatabaseOptions options, size_t words)
+    : options_(options), postings_(words) {
+  options_.Check();
+}
 
 void KeyframeDatabase::Add(KeyframeId id, BowVector words) {
   DMSLAM_CHECK(id.valid(), "a keyframe needs an id");
@@ -66,7 +69,7 @@ void KeyframeDatabase::Clear() {
   entries_.clear();
   free_slots_.clear();
   slot_of_.clear();
-  postings_.clear();
+  for (std::vector<Slot>& list : postings_) list = {};
 }
 
 const BowVector* KeyframeDatabase::Find(KeyframeId id) const {

@@ -52,7 +52,9 @@ struct PlaceQuery {
 /// depend on the contents alone, not on the order in which keyframes came.
 class KeyframeDatabase {
  public:
-  explicit KeyframeDatabase(KeyframeDatabaseOptions options = {});
+  /// `words`: of the vocabulary, if it is known. Then the first keyframes do not wait for the table of them,
+  /// which is megabytes.
+  explicit KeyframeDatabase(KeyframeDatabaseOptions options = {}, size_t words = 0);
 
   /// Adds a keyframe. Replaces its words when it is there already.
   void Add(KeyframeId id, BowVector words);

@@ -118,7 +118,7 @@ TEST_F(KeyframeDatabaseTest, ResultsDependOnContentsNotOnHistory) {
   options.max_scored = 12;
   options.max_postings = 3000;
   KeyframeDatabase forward(options);
-  KeyframeDatabase shuffled(options);
+  KeyframeDatabase shuffled(options, vocabulary_.num_words());
   for (uint32_t i = 0; i < kPlaces; ++i) forward.Add(Id(i + 1), views[i]);
   for (uint32_t i = kPlaces; i-- > 0;) shuffled.Add(Id(i + 1), views[(i + 7) % kPlaces]);
   for (uint32_t i = 0; i < kPlaces; i += 3) shuffled.Remove(Id(i + 1));

@@ -23,7 +23,8 @@ std::vector<uint8_t> CountedFeatures(const Map& map, const Keyframe& keyframe) {
 }  // namespace
 
 MapPlaces::MapPlaces(std::shared_ptr<const Vocabulary> vocabulary, KeyframeDatabaseOptions options)
-    : vocabulary_(std::move(vocabulary)), database_(options) {}
+    : vocabulary_(std::move(vocabulary)),
+      database_(options, vocabulary_ == nullptr ? 0 : vocabulary_->num_words()) {}
 
 void MapPlaces::Update(const Replica& map) {
   if (!usable()) return;
