@@ -1,23 +1,10 @@
 // A keyframe is added between two frames: it must not have to make the table of all words.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstdlib>
-#include <new>
+#include <utility>
 
 #include "dmslam/place_recognition/keyframe_database.h"
-
-namespace {
-std::size_t largest = 0;  // allocation [bytes]
-}  // namespace
-
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  largest = std::max(largest, size);
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "dmslam/util/testing/allocations.h"
 
 namespace dmslam {
 namespace {
@@ -28,9 +15,9 @@ constexpr std::size_t kSmall = 4096;
 /// The largest allocation of adding a keyframe.
 std::size_t LargestOfAdding(KeyframeDatabase* database, uint32_t frame) {
   BowVector words = {{7, 0.5F}, {kWords - 1, 0.5F}};
-  largest = 0;
+  testing::allocations = {};
   database->Add(KeyframeId::Make(1, frame), std::move(words));
-  return largest;
+  return testing::allocations.largest;
 }
 
 TEST(KeyframeDatabaseAllocation, TheTableOfWordsIsThereBeforeTheFirstKeyframe) {

@@ -17,13 +17,13 @@ Slam::Slam(const Setup& setup)
       trajectory_(setup.frontend.camera, setup.frontend.pyramid) {}
 
 FramePose Slam::Process(uint32_t frame_index, int64_t stamp_ns, const GrayView& image) {
-  const FramePose pose = Handle(frontend_.ProcessImage(frame_index, stamp_ns, image));
+  FramePose pose = Handle(frontend_.ProcessImage(frame_index, stamp_ns, image));
   while (frontend_.IsBehind()) Handle(frontend_.CatchUp());
   return pose;
 }
 
 FramePose Slam::ProcessFeatures(uint32_t frame_index, int64_t stamp_ns, FeatureSet features) {
-  const FramePose pose = Handle(frontend_.ProcessFeatures(frame_index, stamp_ns, std::move(features)));
+  FramePose pose = Handle(frontend_.ProcessFeatures(frame_index, stamp_ns, std::move(features)));
   while (frontend_.IsBehind()) Handle(frontend_.CatchUp());
   return pose;
 }

@@ -124,7 +124,8 @@ void TrajectoryBuilder::JoinPosesOf(const std::set<FrameName>& frames) {
     if (told == poses_.end() || refined_.contains(frame) || told->second.covariance.empty()) continue;
     if (const auto map_id = MapOfFrame(told->second)) paths[{frame.camera, *map_id}].push_back(&told->second);
   }
-  for (const auto& [name, path] : paths) {
+  for (const auto& of_map : paths) {
+    const std::vector<const FramePose*>& path = of_map.second;
     std::optional<MotionNoise> noise;
     size_t begin = path.size() - std::min(path.size(), kFramesRemembered);
     for (size_t end = begin; end < path.size(); begin = end) {
