@@ -163,6 +163,7 @@ TEST_F(HttpServerTest, WhoSaysNothingIsDropped) {
 }
 
 TEST_F(HttpServerTest, WhoAsksWhileTheServerIsBusyIsNotLate) {
+  options_.idle_time = milliseconds(2000);  // nobody is idle for so long by chance
   Begin();
   const Client first(server_->port()), second(server_->port());
   for (const Client* client : {&first, &second}) {  // the server knows both, in this order

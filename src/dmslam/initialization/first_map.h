@@ -31,7 +31,7 @@ inline double SecondsFromTo(int64_t from_ns, const InitializerFrame& to) {
   return SecondsFromTo(from_ns, to.stamp_ns);
 }
 
-/// Why there is no first map yet, in the order of how far the search has come.
+/// Why there is no first map yet: the later in the list, the farther the search has come.
 enum class WaitReason : uint8_t {
   kNone = 0,              ///< there is one
   kTooFewFeatures,        ///< the frame has too few features

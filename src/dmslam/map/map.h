@@ -85,7 +85,8 @@ class Map {
     Rigid3d T_cam_world;
     double scale = 1.0;
     MapId map_id = 0;
-    const Keyframe* keyframe = nullptr;  ///< that stands for it now: itself, or the nearest ancestor left
+    /// What stands for it: itself, or the nearest ancestor that is left. Valid until the map changes.
+    const Keyframe* keyframe = nullptr;
     /// The pose of something told relative to this keyframe when its scale was `scale_then`.
     Rigid3d Compose(const Rigid3d& T_other_kf, double scale_then) const;
   };

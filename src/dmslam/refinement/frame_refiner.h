@@ -15,7 +15,8 @@
 
 namespace dmslam {
 
-/// Whose poses are improved at the end: so many frames of each camera, two minutes at 30 Hz.
+/// How many frames of a camera are remembered, so that their poses are improved at the end: two minutes at 30
+/// Hz.
 inline constexpr size_t kFramesRemembered = 3600;
 
 struct FrameRefinerOptions {

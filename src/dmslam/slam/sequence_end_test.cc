@@ -106,7 +106,7 @@ TEST_F(SequenceEndTest, AMapperThatDoesNotAnswerIsAskedAgain) {
   EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7, 3)->request, 2u);
   end.OnAnswer(1);
   end.OnAnswer(3);
-  EXPECT_TRUE(end.Waits(core_)) << "another question was answered, or another frontend's";
+  EXPECT_TRUE(end.Waits(core_)) << "another question was answered";
   end.OnAnswer(2);
   EXPECT_FALSE(end.Waits(core_));
   EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7, 3));
