@@ -1,28 +1,10 @@
 # Two cameras in one room, each with a player and a frontend of its own, work on one map: in lock-step with the same bytes
-# as in one process; in real time, one frontend killed and started again, the other undisturbed.
+# as in one process; what does not fit is refused. In real time: camera_dies_test.sh.
 source "$(dirname "$0")/lib.sh"
 need_synthetic
 multicast
+source "$(dirname "$0")/two_cameras.sh"
 
-second=$work/second
-check "the second camera's pictures are rendered" "$build/bin/dmslam-synth" --quiet --out "$second" --path halfsphere \
-  --frames 150 --moving-share 0.15 --seed 1
-sequences=(--sequence "$synthetic" --also "$second" --camera "$root/config/synthetic.yaml" --seed 3)
-
-camera_field() { # FOLDER CAMERA KEY
-  sed -n '/"cameras": \[/,$p' "$1/summary.json" | sed -n "/\"camera\": $2,/,\$p" | sed -nE "s/^ *\"$3\": *([^,]*),?$/\1/p" | head -n 1
-}
-expect_camera() { # DESCRIPTION FOLDER CAMERA KEY RELATION
-  local value
-  value=$(camera_field "$2" "$3" "$4")
-  if [[ ! $value =~ ^-?[0-9.e+-]+$ ]] || ! holds "$value $5"; then failed "$1: $4 of camera $3 is ${value:-absent}, wanted $5"; fi
-}
-one_map() { # FOLDER: both cameras are in it, and there is no other one
-  [[ $(camera_field "$1" 0 map) == $(camera_field "$1" 1 map) ]] && [[ $(camera_field "$1" 0 other_maps) == "[]" ]] &&
-    [[ $(camera_field "$1" 1 other_maps) == "[]" ]]
-}
-
-# Lock-step.
 check "the run ends with 0" run "${sequences[@]}" --lockstep --out "$work/first"
 no_orphans "the run"
 readonly RESULTS="trajectory.txt trajectory_1.txt trajectory_online.txt trajectory_online_1.txt keyframes.txt keyframes_1.txt map.ply"
@@ -74,33 +56,6 @@ check "two models, in one process: it ends with 0" "$build/bin/dmslam-inprocess"
 for file in trajectory.txt trajectory_1.txt map.ply; do
   check "$file of two models has the same bytes in one process" cmp "$work/models/$file" "$work/models_one/$file"
 done
-
-# Real time: a frontend dies. The other one goes on, and nobody else notices.
-run "${sequences[@]}" --speed 0.4 --out "$work/killed" >"$work/killed.txt" 2>&1 &
-pid=$!
-for ((i = 0; i < 200; ++i)); do
-  [[ ! -s $work/killed/log/frontend1.pid ]] || break
-  sleep 0.05
-done
-sleep 6
-check "it is killed" kill -KILL "$(cat "$work/killed/log/frontend1.pid")"
-wait "$pid"
-check "the run ends with 0 all the same" test $? -eq 0
-no_orphans "the run in real time"
-check "it was started again" grep -q "frontend1 was ended by signal 9; started again" "$work/killed.txt"
-expect "it was the only one" "$work/killed" restarts "== 1"
-check "both cameras are in one map in the end, after that" one_map "$work/killed"
-expect "and lie right to one another" "$work/killed" ate_rmse_joint "<= 0.02"
-expect "no keyframe is missing, after that" "$work/killed" keyframes_missing "== 0"
-expect_camera "the other one is undisturbed" "$work/killed" 0 tracked_percent ">= 90"
-for camera in 0 1; do
-  expect_camera "all frames were played" "$work/killed" "$camera" frames "== 150"
-  counted=0
-  for key in frames_processed frames_skipped frames_lost; do counted+=+$(camera_field "$work/killed" "$camera" "$key"); done
-  expect_camera "each frame is accounted for" "$work/killed" "$camera" frames "== $counted"
-done
-expect_camera "those that came while there was no frontend are lost, which is told of its camera" "$work/killed" 1 frames_lost ">= 3"
-expect_camera "it has found itself again" "$work/killed" 1 tracked_online_percent ">= 30"
 
 # What does not fit is refused by name.
 refused "camera-id 2: there are --cameras 2.*; give --cameras 3" "$build/bin/dmslam-frontend" --cameras 2 --camera-id 2

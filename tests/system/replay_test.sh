@@ -1,9 +1,9 @@
-# Recorded with the real lcm-logger, replayed with the real lcm-logplayer into new processes, at a fifth of the recorded rate.
+# Recorded with the real lcm-logger, replayed with the real lcm-logplayer into new processes, at half the recorded rate.
 source "$(dirname "$0")/lib.sh"
 need_data kitchen
 multicast
 
-check "the run ends with 0" run --sequence "$data/kitchen" --camera "$root/config/kitchen.yaml" --frames 200 --speed 0.2 \
+check "the run ends with 0" run --sequence "$data/kitchen" --camera "$root/config/kitchen.yaml" --frames 200 --speed 0.5 \
   --record --out "$work/first"
 check "the replay ends with 0" run --replay "$work/first/run.lcmlog" --out "$work/again"
 no_orphans "the replay"

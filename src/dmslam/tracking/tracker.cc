@@ -269,17 +269,14 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
     return reference != nullptr && was_in != nullptr && reference->map_id == was_in->map_id;
   };
   // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too
-  // young to have anything proven, what is seen as a whole. Nearby, some of it must be.
+  // young to have anything proven, what is seen as a whole. Nearby, some of it must be. Near is where the
+  // camera can have come from where it was tracked: where a weak pose has led since is a guess.
   const auto credible = [&](const TrackedFrame& at, const TrackingReport& report) {
     const int proven = CountProven(map, at.landmarks, {});
     if (proven >= kManyProven) return true;
-    const MotionModel& motion = follower_.motion();
-    if (!IsOldEnoughToProve(map))
-      return is_here() ? motion.IsReachable(map, at.T_cam_world, time) : IsSeenAsAWhole(report);
-    const bool is_no_person = proven >= kSomeProven || IsSeenAsAWhole(report);
-    return is_here() && is_no_person &&
-           (motion.IsReachable(map, at.T_cam_world, time) ||
-            motion.IsReachableFromTracked(map, at.T_cam_world, time));
+    const bool nearby = is_here() && follower_.motion().IsReachableFromTracked(map, at.T_cam_world, time);
+    if (IsOldEnoughToProve(map)) return nearby && (proven >= kSomeProven || IsSeenAsAWhole(report));
+    return is_here() ? nearby : IsSeenAsAWhole(report);
   };
   Relocalizer::Request request{.last_seen = last_reference(), .seed = seed};
   const bool may_be_elsewhere = !std::holds_alternative<InAnyMap>(asked.whereabouts);

@@ -410,11 +410,17 @@ TEST_F(LedAstray, IsFoundWhereSomeOfTheRoomIsProven) {
   EXPECT_LT(CountProven(replica_, result.frame.landmarks, {}), kManyProven);
 }
 
-/// In a map too young to have proven anything only the motion says what is possible.
-TEST_F(LedAstray, InAYoungMapItGoesOnFromThere) {
+/// In a map too young to have proven anything it must go on to predict what is seen.
+TEST_F(LedAstray, InAYoungMapItIsFoundWhereItCanHaveComeFromWhereItWasTracked) {
   Start(1.0, 1);
   for (uint32_t frame = 1; frame < kShown; ++frame) TrackAstray(frame);
-  EXPECT_FALSE(TrackAstray(kShown).relocalized);
+  const TrackingResult first = TrackAstray(kShown);
+  EXPECT_TRUE(first.relocalized) << first.report.reason;
+  EXPECT_FALSE(first.pose);
+  EXPECT_LT(ErrorAt(first.frame.T_cam_world, 0), 0.02);
+  uint32_t frame = kShown + 1;
+  while (frame < kShown + 60 && !TrackAstray(frame).pose) ++frame;
+  EXPECT_NEAR((frame - kShown) / 30.0, 0.5, 0.05);
 }
 
 TEST_F(Recovering, APlaceThatDoesNotPredictIsDropped) {
