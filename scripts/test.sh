@@ -9,4 +9,5 @@ esac
 "$top/scripts/setup.sh" test
 echo "building (some minutes the first time) ..." >&2
 "$top/scripts/build.sh" --tests release
-exec ctest --test-dir "$top/build/release" --output-on-failure -j "${DMSLAM_JOBS:-$(nproc)}" "$@"
+# One more at a time than there are cores: tests of processes spend part of their time waiting.
+exec ctest --test-dir "$top/build/release" --output-on-failure -j "${DMSLAM_JOBS:-$(($(nproc) + 1))}" "$@"
