@@ -17,7 +17,6 @@ constexpr double kSeenShare = 0.5;  // of what the last frame showed: less is hi
 // Somebody who fills the picture hides the room: of the landmarks that are older than people stand less than
 // this share is seen.
 constexpr double kLeastOldShare = 0.02;
-constexpr double kChanceShare = 0.1;  // of what is expected: more is not matched by chance
 
 void SetMatches(const std::vector<LandmarkMatch>& matches, const Rigid3d& T_cam_world, TrackedFrame* frame) {
   frame->ClearMatches();
@@ -157,7 +156,7 @@ void PoseSearch::Doubt(const PoseFit& fit, TrackingReport* report) {
   if (report->num_old_expected >= TrackingReport::kEnoughOld &&
       report->num_old < kLeastOldShare * report->num_old_expected) {
     report->reason = "what has stood here for long is not seen";
-  } else if (fit.mean_chi2 > kOneMotionChi2 && fit.inliers < kChanceShare * report->num_expected) {
+  } else if (fit.mean_chi2 > kOneMotionChi2 && report->MayMatchByChance()) {
     report->reason = "what matches the map may do so by chance";
   } else {
     return;

@@ -269,14 +269,17 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
     return reference != nullptr && was_in != nullptr && reference->map_id == was_in->map_id;
   };
   // Far away, and in another map, only what is proven to be no person is believed; or, where that map is too
-  // young to have anything proven, what is seen as a whole. Nearby, some of it must be. Near is where the
-  // camera can have come from where it was tracked: where a weak pose has led since is a guess.
+  // young to have anything proven, what is seen as a whole. Nearby, some of it must be; or, where the map is
+  // too young, the place must lie where the motion leads or show more than matches by chance. Nearby is where
+  // the camera can have come from where it was tracked: where a weak pose has led since is a guess.
   const auto credible = [&](const TrackedFrame& at, const TrackingReport& report) {
     const int proven = CountProven(map, at.landmarks, {});
     if (proven >= kManyProven) return true;
-    const bool nearby = is_here() && follower_.motion().IsReachableFromTracked(map, at.T_cam_world, time);
+    const MotionModel& motion = follower_.motion();
+    const bool nearby = is_here() && motion.IsReachableFromTracked(map, at.T_cam_world, time);
     if (IsOldEnoughToProve(map)) return nearby && (proven >= kSomeProven || IsSeenAsAWhole(report));
-    return is_here() ? nearby : IsSeenAsAWhole(report);
+    if (!is_here()) return IsSeenAsAWhole(report);
+    return nearby && (motion.IsReachable(map, at.T_cam_world, time) || !report.MayMatchByChance());
   };
   Relocalizer::Request request{.last_seen = last_reference(), .seed = seed};
   const bool may_be_elsewhere = !std::holds_alternative<InAnyMap>(asked.whereabouts);

@@ -10,6 +10,7 @@ namespace dmslam {
 /// What tracking one frame against the map came to.
 struct TrackingReport {
   static constexpr int kEnoughOld = 60;
+  static constexpr double kChanceShare = 0.1;  ///< of what is expected: so much may match by chance
 
   enum class Outcome : uint8_t {
     kNotSeen,       ///< no pose: too little of the map is seen
@@ -34,6 +35,7 @@ struct TrackingReport {
   bool HasPose() const { return outcome == Outcome::kTracked || outcome == Outcome::kDoubtful; }
   bool IsTracked() const { return outcome == Outcome::kTracked; }
   bool IsDoubtful() const { return outcome == Outcome::kDoubtful; }
+  bool MayMatchByChance() const { return num_static < kChanceShare * num_expected; }
   /// The pose, if there was one, is not to be used. What was seen then tells which outcome it is.
   void TakePoseAway();
   void TakePoseAway(const char* why) {
