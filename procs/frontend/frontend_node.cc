@@ -26,7 +26,7 @@ FrontendNode::FrontendNode(NodeContext context, const NodeOptions& options, Fron
     : StreamNode(std::move(context), options, OfCamera(roles::kFrontend, options.camera_id)),
       run_(options_.settings.Read<RunOptions>()),
       extras_(std::move(extras)),
-      end_(options_.HasPeer(roles::kMapper)) {
+      end_(options_.HasPeer(roles::kMapper), options.camera_id) {
   Listen({channels::kFrame, channels::kEndOfSequence, channels::kGroundTruthPose, channels::kKeyframe});
 }
 
@@ -223,7 +223,8 @@ void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
 void FrontendNode::OnApplied(size_t count) {
   for (; count > 0; --count) {
     const HeldRecords::Held held = held_.PopApplied();
-    if (held.delta.event == MapEvent::kRequestDone) end_.OnAnswer(*held.delta.request);
+    if (held.delta.event == MapEvent::kRequestDone)
+      end_.OnAnswer(held.delta.progress.camera, *held.delta.request);
     if (held.delta.event == MapEvent::kTurn) turns_.OnTurn(*held.delta.about);
   }
   map_reader_->Accept(held_.applied());
@@ -320,7 +321,7 @@ bool FrontendNode::Refine() {
 /// All of them as a whole, so that the last poses are told in the best map.
 void FrontendNode::AskForAdjustedMaps() {
   const std::optional<int64_t> newest_ns = frames_.newest() ? frames_.newest()->stamp_ns : std::nullopt;
-  const auto request = end_.Ask(core().map(), context_.now_ns(), newest_ns, options_.camera_id);
+  const auto request = end_.Ask(core().map(), context_.now_ns(), newest_ns);
   if (request) PublishRecord(*request);
 }
 

@@ -396,7 +396,7 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
     // The map stays as it is, but nobody is left waiting.
     if (record.channel != channels::kAdjustRequest) return {};
     if (const auto request = Read<AdjustRequest>(*record.bytes))
-      return [this, request] { core_->AnswerRequest(request->request); };
+      return [this, request] { core_->AnswerRequest(*request); };
     return {};
   }
   if (record.channel == channels::kInitialMap) {

@@ -199,7 +199,7 @@ struct MapDelta {
   std::optional<MapId> map_id;
   uint64_t version = 0;                   ///< the map's version after it; counts deltas
   std::optional<uint64_t> correction_id;  ///< the correction that was applied or refused
-  std::optional<uint32_t> request;        ///< the AdjustRequest that is answered
+  std::optional<uint32_t> request;        ///< the AdjustRequest of progress.camera that is answered
   std::optional<int64_t> stamp_ns;        ///< capture time of `about`, where that is known
   RecordGroup group;
   std::string note;

@@ -130,7 +130,7 @@ struct MapReset {
 };
 
 /// No frame follows: the frontend asks the mapper to adjust each of its maps as a whole. The mapper answers
-/// with MapEvent::kMapAdjusted for each and then MapEvent::kRequestDone.
+/// with MapEvent::kMapAdjusted for each and then MapEvent::kRequestDone, whose progress is this camera's.
 struct AdjustRequest {
   uint32_t request = 1;  ///< counts the requests of a frontend from 1: the answer names it
   std::string reason;

@@ -163,12 +163,14 @@ void MapperCore::GiveTurn(KeyframeId frame) { Publish(MapEvent::kTurn, frame, {}
 
 void MapperCore::OnAdjustRequest(const AdjustRequest& request) {
   if (!adjusted_) AdjustMaps();
-  AnswerRequest(request.request);
+  AnswerRequest(request);
 }
 
-void MapperCore::AnswerRequest(uint32_t request) {
+/// Each camera counts its own requests, so the answer's progress is that of the camera that asked.
+void MapperCore::AnswerRequest(const AdjustRequest& request) {
+  map_.SetProgress(map_.progress(request.camera_id));
   MapDelta delta = map_.TakeDelta(MapEvent::kRequestDone, {}, {});
-  delta.request = request;
+  delta.request = request.request;
   Emit(delta);
 }
 

@@ -75,7 +75,7 @@ class MapperCore {
   /// when it was saved.
   void OnAdjustRequest(const AdjustRequest& request);
   /// Says that all maps are adjusted, as far as they are to be.
-  void AnswerRequest(uint32_t request);
+  void AnswerRequest(const AdjustRequest& request);
   /// A loop or a global adjustment, composed with the poses of now: local mapping since its base changes
   /// nothing about it. Refused with a record where it no longer applies (WhyRefused).
   void OnLoopAnswer(const LoopAnswer& answer);

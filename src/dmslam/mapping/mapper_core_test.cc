@@ -569,11 +569,14 @@ TEST_F(KeyframeStep, TheEndAdjustsOnce) {
   EXPECT_FALSE(said_.back().about.has_value());
   core_.OnAdjustRequest({.request = 4, .reason = "nobody answered", .newest_stamp_ns = {}, .camera_id = 0});
   EXPECT_EQ(said_.back().request, 4U);
-  EXPECT_EQ(said_.size(), before + 3) << "they are adjusted already";
+  EXPECT_EQ(said_.back().progress.camera, 0U);
+  core_.AnswerRequest({.request = 4, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 1});
+  EXPECT_EQ(said_.back().progress.camera, 1U) << "each camera counts its own requests";
+  EXPECT_EQ(said_.size(), before + 4) << "they are adjusted already";
   core_.End();
   EXPECT_EQ(said_.back().event, MapEvent::kEnded);
   EXPECT_TRUE(said_.back().progress.ended);
-  EXPECT_EQ(said_.size(), before + 4);
+  EXPECT_EQ(said_.size(), before + 5);
 }
 
 TEST_F(KeyframeStep, SaysOnceMoreWhatALoopCloserHasNotHeard) {
@@ -590,7 +593,7 @@ TEST_F(KeyframeStep, SaysOnceMoreWhatALoopCloserHasNotHeard) {
 
 TEST_F(KeyframeStep, AnswersARequestByItsNumberAndNothingElse) {
   ASSERT_TRUE(Start());
-  core_.AnswerRequest(7);
+  core_.AnswerRequest({.request = 7, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
   EXPECT_EQ(said_.back().event, MapEvent::kRequestDone);
   EXPECT_EQ(said_.back().request, 7u);
   EXPECT_FALSE(said_.back().about.has_value());

@@ -49,7 +49,7 @@ void SequenceEnd::OnHandOver() {
 
 bool SequenceEnd::AwaitsAnswer(const Map& map) const {
   return Is(Phase::kAwaitingAdjustedMap) && has_mapper_ && !hands_over_ && !map.keyframes().empty() &&
-         !answered_;
+         !(question_ && question_->is_answered);
 }
 
 /// The map grows one keyframe at a time: the mapper has time for it.
@@ -59,10 +59,14 @@ bool SequenceEnd::Waits(const FrontendCore& core) const {
 }
 
 std::optional<AdjustRequest> SequenceEnd::Ask(const Map& map, int64_t now_ns,
-                                              std::optional<int64_t> newest_stamp_ns, CameraId camera_id) {
-  if (!AwaitsAnswer(map) || (asked_ns_ && now_ns - *asked_ns_ <= kAskAgainNs)) return std::nullopt;
-  asked_ns_ = now_ns;
-  return AdjustRequest{++requests_, "the sequence has ended", newest_stamp_ns, camera_id};
+                                              std::optional<int64_t> newest_stamp_ns) {
+  if (!AwaitsAnswer(map) || (question_ && now_ns - question_->asked_ns <= kAskAgainNs)) return std::nullopt;
+  question_ = {.request = question_ ? question_->request + 1 : 1, .asked_ns = now_ns};
+  return AdjustRequest{question_->request, "the sequence has ended", newest_stamp_ns, camera_id_};
+}
+
+void SequenceEnd::OnAnswer(CameraId camera, uint32_t request) {
+  if (question_ && camera == camera_id_ && request == question_->request) question_->is_answered = true;
 }
 
 SequenceEnd::Worked SequenceEnd::Work(Phase phase, FrontendCore* core) {
@@ -104,12 +108,12 @@ void SequenceEnd::OnTold() {
 
 void FinishSequence(FrontendCore* core, std::optional<int64_t> newest_stamp_ns,
                     const EndListeners& listeners) {
-  SequenceEnd end(true);
+  SequenceEnd end(true, core->camera_id());
   end.OnEndHeard();
   while (!end.Is(Phase::kTelling)) {
-    if (const auto request = end.Ask(core->map(), 0, newest_stamp_ns, core->camera_id())) {
+    if (const auto request = end.Ask(core->map(), 0, newest_stamp_ns)) {
       listeners.adjust(*request);
-      end.OnAnswer(request->request);
+      end.OnAnswer(request->camera_id, request->request);
     }
     DMSLAM_CHECK(!end.Waits(*core), "what is told is answered at once");
     const SequenceEnd::Worked worked = SequenceEnd::Work(end.phase(), core);

@@ -36,12 +36,12 @@ class SequenceEnd {
   };
 
   /// `has_mapper`: there is one that maps what is proposed and adjusts what it has.
-  explicit SequenceEnd(bool has_mapper) : has_mapper_(has_mapper) {}
+  SequenceEnd(bool has_mapper, CameraId camera_id) : has_mapper_(has_mapper), camera_id_(camera_id) {}
 
   Phase phase() const { return phase_; }
   bool Is(Phase phase) const { return phase_ == phase; }
   /// Nothing waits for settled records any more: map records are applied as they come.
-  bool AppliesAllRecords() const { return asked_ns_ || Is(Phase::kDone); }
+  bool AppliesAllRecords() const { return question_ || Is(Phase::kDone); }
 
   void OnEndHeard();
   /// Another frontend asks for the stream. It will not have the features of the frames before: their poses
@@ -53,11 +53,10 @@ class SequenceEnd {
   bool Waits(const FrontendCore& core) const;
   /// The question that is to be put to the mapper now; counts as put then. One that died before it answered
   /// is asked again.
-  std::optional<AdjustRequest> Ask(const Map& map, int64_t now_ns, std::optional<int64_t> newest_stamp_ns,
-                                   CameraId camera_id);
-  /// The mapper's answer to `request`. Only to the question put last does it count, since frames may come
-  /// after a question; it may come while these are worked on.
-  void OnAnswer(uint32_t request) { answered_ = answered_ || (asked_ns_ && request == requests_); }
+  std::optional<AdjustRequest> Ask(const Map& map, int64_t now_ns, std::optional<int64_t> newest_stamp_ns);
+  /// The mapper's answer to a camera's request. Only to the question that this camera put last does it count,
+  /// since frames may come after a question; it may come while these are worked on.
+  void OnAnswer(CameraId camera, uint32_t request);
 
   /// What a portion of work has come to.
   struct Worked {
@@ -74,14 +73,20 @@ class SequenceEnd {
   void OnMapEnded() { phase_ = Phase::kDone; }
 
  private:
+  /// To the mapper, to adjust the maps.
+  struct Question {
+    uint32_t request = 0;
+    int64_t asked_ns = 0;
+    bool is_answered = false;
+  };
+
   bool AwaitsAnswer(const Map& map) const;
 
   bool has_mapper_;
+  CameraId camera_id_;
   bool hands_over_ = false;
   Phase phase_ = Phase::kPlaying;
-  uint32_t requests_ = 0;            ///< to adjust the maps, so far
-  std::optional<int64_t> asked_ns_;  ///< when the mapper was asked last
-  bool answered_ = false;
+  std::optional<Question> question_;  ///< the one put last
 };
 
 /// Who listens to a frontend that is done with in one go.

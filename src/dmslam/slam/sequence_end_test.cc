@@ -18,6 +18,7 @@ using testing::MapScene;
 constexpr int64_t kSecond = 1'000'000'000;
 constexpr int64_t kFrameNs = 33'333'333;
 constexpr uint32_t kFrames = 20;
+constexpr CameraId kCamera = 3;
 
 /// A frontend that has seen a sequence without finding a first map, and may be given one.
 class SequenceEndTest : public ::testing::Test {
@@ -64,7 +65,7 @@ class SequenceEndTest : public ::testing::Test {
 };
 
 TEST_F(SequenceEndTest, GoesStepByStep) {
-  SequenceEnd end(true);
+  SequenceEnd end(true, kCamera);
   EXPECT_THROW(end.OnWorked(true), InvariantError) << "frames may come";
   EXPECT_THROW(SequenceEnd::Work(end.phase(), &core_), InvariantError);
   end.OnEndHeard();
@@ -73,7 +74,7 @@ TEST_F(SequenceEndTest, GoesStepByStep) {
   EXPECT_FALSE(end.AppliesAllRecords());
   WorkOn(&end);
   EXPECT_TRUE(end.Is(Phase::kAwaitingAdjustedMap));
-  EXPECT_FALSE(end.Ask(core_.map(), 0, std::nullopt, 0)) << "there is no map";
+  EXPECT_FALSE(end.Ask(core_.map(), 0, std::nullopt)) << "there is no map";
   EXPECT_FALSE(end.Waits(core_));
   WorkOn(&end);
   EXPECT_TRUE(end.Is(Phase::kRefining));
@@ -90,43 +91,44 @@ TEST_F(SequenceEndTest, GoesStepByStep) {
 
 TEST_F(SequenceEndTest, AMapperThatDoesNotAnswerIsAskedAgain) {
   MapArrives();
-  SequenceEnd end(true);
+  SequenceEnd end(true, kCamera);
   end.OnEndHeard();
-  end.OnAnswer(0);
-  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0)) << "the map may still grow";
+  end.OnAnswer(kCamera, 0);
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7)) << "the map may still grow";
   end.OnWorked(true);
   EXPECT_TRUE(end.Waits(core_)) << "nobody had asked";
-  const auto request = end.Ask(core_.map(), kSecond, 7, 3);
+  const auto request = end.Ask(core_.map(), kSecond, 7);
   ASSERT_TRUE(request);
   EXPECT_EQ(request->request, 1u);
   EXPECT_EQ(request->newest_stamp_ns, 7);
-  EXPECT_EQ(request->camera_id, 3u);
+  EXPECT_EQ(request->camera_id, kCamera);
   EXPECT_TRUE(end.AppliesAllRecords());
-  EXPECT_FALSE(end.Ask(core_.map(), 2 * kSecond, 7, 3));
-  EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7, 3)->request, 2u);
-  end.OnAnswer(1);
-  end.OnAnswer(3);
+  EXPECT_FALSE(end.Ask(core_.map(), 2 * kSecond, 7));
+  EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7)->request, 2u);
+  end.OnAnswer(kCamera, 1);
+  end.OnAnswer(kCamera, 3);
+  end.OnAnswer(kCamera + 1, 2);
   EXPECT_TRUE(end.Waits(core_)) << "another question was answered";
-  end.OnAnswer(2);
+  end.OnAnswer(kCamera, 2);
   EXPECT_FALSE(end.Waits(core_));
-  EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7, 3));
+  EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7));
 }
 
 TEST_F(SequenceEndTest, WithoutAMapperNothingGrowsAndNobodyIsAsked) {
   MapArrives();
-  SequenceEnd end(false);
+  SequenceEnd end(false, kCamera);
   end.OnEndHeard();
   EXPECT_TRUE(end.Is(Phase::kAwaitingAdjustedMap));
-  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0));
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7));
   EXPECT_FALSE(end.Waits(core_));
 }
 
 TEST_F(SequenceEndTest, WhoHandsOverTellsThePosesOfItsFramesInTheMapAsItIs) {
   MapArrives();
-  SequenceEnd end(true);
+  SequenceEnd end(true, kCamera);
   end.OnHandOver();
   EXPECT_TRUE(end.HandsOver());
-  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, 0)) << "the mapper has other things to do";
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7)) << "the mapper has other things to do";
   EXPECT_FALSE(end.Waits(core_));
   WorkOn(&end);
   WorkOn(&end);
@@ -138,7 +140,7 @@ TEST_F(SequenceEndTest, WhoHandsOverTellsThePosesOfItsFramesInTheMapAsItIs) {
 }
 
 TEST_F(SequenceEndTest, WhoIsAskedWhileItRefinesLeavesTheEndToTheNextOne) {
-  SequenceEnd end(true);
+  SequenceEnd end(true, kCamera);
   end.OnEndHeard();
   WorkOn(&end);
   WorkOn(&end);
@@ -152,7 +154,7 @@ TEST_F(SequenceEndTest, WhoIsAskedWhileItRefinesLeavesTheEndToTheNextOne) {
 }
 
 TEST_F(SequenceEndTest, WhoIsDoneHasNothingToHandOver) {
-  SequenceEnd end(true);
+  SequenceEnd end(true, kCamera);
   end.OnMapEnded();
   end.OnHandOver();
   EXPECT_FALSE(end.HandsOver());
