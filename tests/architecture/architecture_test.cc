@@ -27,11 +27,13 @@ const std::map<std::string, Names>& AllowedRooms() {
     a["camera"] = a["robust"] = {"util", "geometry"};
     a["features"] = {"util", "geometry", "camera", "robust"};
     a["motion_segmentation"] = a["map"] = {"util", "geometry", "camera", "robust", "features"};
+    a["triangulation"] = {"util", "geometry", "camera", "features", "map"};
     a["dynamics"] = {"util", "geometry", "camera", "features", "map"};
     a["optimization"] =
         a["place_recognition"] = {"util", "geometry", "camera", "robust", "features", "map", "dynamics"};
-    const Names heart = {"util", "geometry", "camera",       "robust",           "features",
-                         "map",  "dynamics", "optimization", "place_recognition"};
+    const Names heart = {
+        "util",         "geometry",          "camera",       "robust", "features", "map", "dynamics",
+        "optimization", "place_recognition", "triangulation"};
     const auto above = [](Names below, const Names& more) {
       below.insert(more.begin(), more.end());
       return below;

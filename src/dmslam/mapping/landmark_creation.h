@@ -6,17 +6,13 @@
 #include "dmslam/map/map_editor.h"
 #include "dmslam/mapping/landmark_maker.h"
 #include "dmslam/mapping/mapper_options.h"
+#include "dmslam/triangulation/keyframe_points.h"
 
 namespace dmslam {
 
 /// How many candidates each test of Algorithm 1 refused.
-struct CreationDiagnostics {
+struct CreationDiagnostics : TriangulationCounts {
   uint32_t refused_motion = 0;  ///< features of the keyframe that were free, and were seen to move
-  uint32_t matched = 0;
-  uint32_t refused_parallax = 0;
-  uint32_t refused_depth = 0;
-  uint32_t refused_reprojection = 0;
-  uint32_t refused_scale = 0;
   uint32_t refused_neighbourhood = 0;
   uint32_t refused_count = 0;
   uint32_t created = 0;
@@ -24,37 +20,16 @@ struct CreationDiagnostics {
   CreationDiagnostics& operator+=(const CreationDiagnostics& other);
 };
 
-/// A feature of a keyframe that is there already.
-struct NeighbourFeature {
-  const Keyframe* keyframe = nullptr;
-  uint16_t feature = 0;
-};
-
-/// A new point, seen by a feature of the new keyframe and by one of each of its neighbours named (one at
-/// least).
-struct NewLandmark {
-  uint16_t feature = 0;
-  std::vector<NeighbourFeature> seen_by;
-  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
-};
-
-/// Features of two keyframes that lie on each other's epipolar lines and look alike: pairs (feature of a, of
-/// b). Features are ordered by the plane through both cameras in which their rays lie, so that only those
-/// near the same plane are compared.
-std::vector<std::pair<uint16_t, uint16_t>> MatchAlongEpipolarPlanes(
-    const Keyframe& a, const std::vector<uint8_t>& use_a, const Keyframe& b,
-    const std::vector<uint8_t>& use_b, const Map& map, const LandmarkCreationOptions& options);
-
 /// DM-SLAM Algorithm 1: candidates for new landmarks of a keyframe from its best covisible keyframes.
 /// `moving` lists features of the keyframe that were seen to move (sorted); none is made of them. A feature
 /// is matched with every neighbour; its point comes from the pair with the widest parallax, and all pairs
 /// that agree with it become its observations. Points seen in most views come first. Those confirmed by
 /// enough views over enough time did not move: they are not counted among the candidates that exclude each
 /// other (options; the paper has none such).
-std::vector<NewLandmark> ProposeLandmarks(const Map& map, const Keyframe& keyframe,
-                                          const std::vector<uint16_t>& moving,
-                                          const LandmarkCreationOptions& options,
-                                          CreationDiagnostics* diagnostics);
+std::vector<KeyframePoint> ProposeLandmarks(const Map& map, const Keyframe& keyframe,
+                                            const std::vector<uint16_t>& moving,
+                                            const LandmarkCreationOptions& options,
+                                            CreationDiagnostics* diagnostics);
 
 /// Makes landmarks of these candidates. Where an earlier one of them has taken a candidate's feature in the
 /// neighbour it was made with, it makes none.

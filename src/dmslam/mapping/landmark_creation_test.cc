@@ -25,13 +25,13 @@ class Creation : public testing::Test {
     }
     for (uint16_t i = 0; i < shared; ++i) scene_.AddLandmark(map_, 1000U + i, i, frames);
   }
-  std::vector<NewLandmark> Propose(const std::vector<uint16_t>& moving = {}) {
+  std::vector<KeyframePoint> Propose(const std::vector<uint16_t>& moving = {}) {
     diagnostics_ = {};
     return ProposeLandmarks(map_, *newest_, moving, options_, &diagnostics_);
   }
-  static std::set<uint16_t> FeaturesOf(const std::vector<NewLandmark>& landmarks) {
+  static std::set<uint16_t> FeaturesOf(const std::vector<KeyframePoint>& landmarks) {
     std::set<uint16_t> features;
-    for (const NewLandmark& landmark : landmarks) features.insert(landmark.feature);
+    for (const KeyframePoint& landmark : landmarks) features.insert(landmark.feature);
     return features;
   }
 
@@ -44,9 +44,9 @@ class Creation : public testing::Test {
 
 TEST_F(Creation, FindsTheWallWhereItIs) {
   Build(WallScene(), 2, 20);
-  const std::vector<NewLandmark> made = Propose();
+  const std::vector<KeyframePoint> made = Propose();
   EXPECT_GT(made.size(), 110u) << "of 120 that are free";
-  for (const NewLandmark& landmark : made) {
+  for (const KeyframePoint& landmark : made) {
     EXPECT_GE(landmark.feature, 20) << "the others see something already";
     ASSERT_EQ(landmark.seen_by.size(), 1u);
     EXPECT_EQ(landmark.seen_by.front().keyframe, &map_.At(Id(1)));
@@ -59,7 +59,7 @@ TEST_F(Creation, FindsTheWallWhereItIs) {
 TEST_F(Creation, AllThatAgreeBecomeItsObservers) {
   Build(WallScene(), 3, 20);
   size_t both = 0;
-  for (const NewLandmark& landmark : Propose()) both += landmark.seen_by.size() == 2 ? 1 : 0;
+  for (const KeyframePoint& landmark : Propose()) both += landmark.seen_by.size() == 2 ? 1 : 0;
   EXPECT_GT(both, 100u);
 }
 
@@ -97,7 +97,7 @@ class LittleParallax : public Creation {
 
 TEST_F(LittleParallax, IsEnoughForTheNewestKeyframe) {
   EXPECT_GT(Propose().size(), 60u);
-  options_.min_parallax_rad = 0.02;
+  options_.triangulation.min_parallax_rad = 0.02;
   EXPECT_TRUE(Propose().empty());
   EXPECT_GT(diagnostics_.refused_parallax, 60u);
 }
@@ -125,12 +125,12 @@ class DenseWall : public Creation {
     Build(WallScene(30, 20, 0.1), 2, 60);
     options_.min_candidates = 10000;
   }
-  int LargestCrowd(const std::vector<NewLandmark>& made) const {
+  int LargestCrowd(const std::vector<KeyframePoint>& made) const {
     const double neighbourhood_px = options_.neighbourhood_rad * FocalPx(map_.camera());
     int largest = 0;
-    for (const NewLandmark& a : made) {
+    for (const KeyframePoint& a : made) {
       int near = 0;
-      for (const NewLandmark& b : made) {
+      for (const KeyframePoint& b : made) {
         const Eigen::Vector2d apart =
             newest_->features->uv_px[a.feature] - newest_->features->uv_px[b.feature];
         near += apart.cwiseAbs().maxCoeff() <= neighbourhood_px ? 1 : 0;
@@ -142,7 +142,7 @@ class DenseWall : public Creation {
 };
 
 TEST_F(DenseWall, CandidatesExcludeEachOtherInTheirNeighbourhood) {
-  const std::vector<NewLandmark> made = Propose();
+  const std::vector<KeyframePoint> made = Propose();
   EXPECT_GT(made.size(), 20u);
   EXPECT_EQ(LargestCrowd(made), 1);
   EXPECT_GT(diagnostics_.refused_neighbourhood, 300u);
@@ -151,7 +151,7 @@ TEST_F(DenseWall, CandidatesExcludeEachOtherInTheirNeighbourhood) {
 
 TEST_F(DenseWall, WithoutTheRuleTheyDoNot) {
   options_.mutual_exclusion = false;
-  const std::vector<NewLandmark> made = Propose();
+  const std::vector<KeyframePoint> made = Propose();
   EXPECT_GT(made.size(), 400u);
   EXPECT_GT(LargestCrowd(made), 10);
 }
@@ -190,7 +190,7 @@ TEST_F(Creation, EveryCandidateBecomesALandmark) {
     EXPECT_EQ(landmark->descriptor, scene_.descriptor(landmark->observations.front().feature));
     EXPECT_EQ(landmark->evidence.found, 1u);
   }
-  for (const NewLandmark& landmark : Propose())
+  for (const KeyframePoint& landmark : Propose())
     EXPECT_FALSE(newest_->landmarks[landmark.feature].valid()) << "nothing is made twice";
 }
 

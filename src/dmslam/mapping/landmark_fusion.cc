@@ -75,7 +75,7 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
                   landmark.descriptor, kNoneTaken);
   if (!hit || hit->distance > options.max_fuse_distance) return std::nullopt;
   const double error = NormalizedErrorSquared(*keyframe.features, hit->feature, view->uv_px, map.pyramid());
-  if (error > options.creation.reprojection_sigmas_squared) return std::nullopt;
+  if (error > options.creation.triangulation.reprojection_sigmas_squared) return std::nullopt;
   return static_cast<uint16_t>(hit->feature);
 }
 

@@ -3,7 +3,7 @@
 #include "dmslam/dynamics/motion_belief.h"
 #include "dmslam/dynamics/seen_through.h"
 #include "dmslam/map/conventions.h"
-#include "dmslam/util/chi_squared.h"
+#include "dmslam/triangulation/triangulation_options.h"
 
 namespace dmslam {
 
@@ -16,15 +16,7 @@ struct LandmarkCreationOptions {
   int min_candidates = 120;  ///< ...but never fewer than this
   int confirmed_views = 4;   ///< a point seen in as many views or more...
   double confirmed_span_s = 1.0;  ///< ...over so much time is not subject to Algorithm 1; 0 views: all are
-  int neighbours = 20;            ///< covisible keyframes that are matched with the new one
-  double min_baseline_over_depth = 0.01;
-  int max_descriptor_distance = 50;  ///< bits
-  double descriptor_ratio = 0.85;    ///< best over second best along the epipolar line
-  double epipolar_sigmas_squared = kRoundedChiSquared1Dof;
-  double min_parallax_rad = 0.0087;     ///< between the rays of a point, in the newest keyframe...
-  double min_past_parallax_rad = 0.02;  ///< ...and in one that is placed after those that follow it
-  double reprojection_sigmas_squared = kChiSquared2Dof;
-  double scale_ratio_slack = 1.5;  ///< times the pyramid's factor
+  TriangulationOptions triangulation;
 
   template <typename Visitor>
   void Describe(Visitor& v) {
@@ -42,7 +34,7 @@ struct LandmarkCreationOptions {
              "points seen in so many views for a second are free of the bound and the neighbourhood; 0: "
              "none");
     v.InPaper("0");
-    v.Number("mapping.min_parallax_rad", min_parallax_rad, 0.0005, 0.2, "rad",
+    v.Number("mapping.min_parallax_rad", triangulation.min_parallax_rad, 0.0005, 0.2, "rad",
              "between the rays by which the newest keyframe makes a landmark");
     v.InBaseline("0.02");
     v.InPaper("0.02");
