@@ -50,7 +50,7 @@ class LatePlacement {
   /// Of the tracker: its search, its relocaliser, and how fast the camera usually went.
   struct Tracked {
     PoseSearch* search = nullptr;
-    const Relocalizer& relocalizer;
+    Relocalizer& relocalizer;
     const UsualSpeed& usual_speed;
   };
   /// Finds the frame's pose; the report has none where it is not believed.

@@ -15,6 +15,7 @@ namespace {
 constexpr size_t kMaxCandidates = 8;
 constexpr size_t kMinMatches = 15;
 constexpr int kMinInliers = 12;
+constexpr int kMinUnmappedInliers = 20;  // there are more matches, so more agree by chance
 constexpr int kMaxIterations = 1000;
 constexpr int kNeighboursOfLast = 4;
 constexpr int kMaxRounds = 4;  // of the search in the local map
@@ -39,9 +40,15 @@ std::vector<uint8_t> SpeakingFeatures(const Map& map, const Keyframe& keyframe) 
 
 Relocalizer::Relocalizer(std::shared_ptr<const Vocabulary> vocabulary) : places_(std::move(vocabulary)) {}
 
-void Relocalizer::Clear() { places_.Clear(); }
+void Relocalizer::Clear() {
+  places_.Clear();
+  unmapped_.Clear();
+}
 
-void Relocalizer::Update(const Replica& map) { places_.Update(map); }
+void Relocalizer::Update(const Replica& map) {
+  places_.Update(map);
+  unmapped_.Clear();
+}
 
 std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<KeyframeId> last,
                                                 const BowImage& image) const {
@@ -69,7 +76,8 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
   std::vector<LandmarkMatch> seen;
   for (const BowMatch& match : matches)
     seen.push_back({static_cast<uint16_t>(match.b), map.LandmarkSeenBy(keyframe, match.a)});
-  return FindPose(map, seen, DeriveSeed(seed, keyframe.id.frame_index(), "relocalize"), frame);
+  const uint64_t own_seed = DeriveSeed(seed, keyframe.id.frame_index(), "relocalize");
+  return FindPose(map, seen, {kMinInliers, own_seed}, frame);
 }
 
 bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& places, uint64_t seed,
@@ -87,23 +95,33 @@ bool Relocalizer::TryTogether(const Map& map, const std::vector<KeyframeId>& pla
   std::erase_if(proven, [&](const Landmark* landmark) { return !IsProven(map, *landmark, {}); });
   if (std::ssize(proven) >= kEnoughProvenTogether) landmarks = std::move(proven);
   const std::vector<LandmarkMatch> seen = MatchLandmarks(landmarks, frame->features->set);
-  return FindPose(map, seen, DeriveSeed(seed, frame->index, "relocalize_together"), frame);
+  return FindPose(map, seen, {kMinInliers, DeriveSeed(seed, frame->index, "relocalize_together")}, frame);
 }
 
-/// The pose on which most of the matches agree, with those that do.
-bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, uint64_t seed,
+bool Relocalizer::TryUnmapped(const Map& map, const Keyframe& keyframe, uint64_t seed, TrackedFrame* frame) {
+  std::vector<const Landmark*> points = LandmarksSeenBy(map, {&keyframe});
+  KeepStatic(&points);
+  for (const Landmark& point : unmapped_.Of(map, keyframe)) points.push_back(&point);
+  const std::vector<LandmarkMatch> seen = MatchLandmarks(points, frame->features->set);
+  const uint64_t own_seed = DeriveSeed(seed, keyframe.id.frame_index(), "relocalize_unmapped");
+  return FindPose(map, seen, {kMinUnmappedInliers, own_seed}, frame);
+}
+
+/// The pose on which most of the matches agree, with those of them that show landmarks.
+bool Relocalizer::FindPose(const Map& map, const std::vector<LandmarkMatch>& matches, const Vote& vote,
                            TrackedFrame* frame) const {
   if (matches.size() < kMinMatches) return false;
   PoseRansacOptions options;
-  options.seed = seed;
-  options.min_inliers = kMinInliers;
+  options.seed = vote.seed;
+  options.min_inliers = vote.min_inliers;
   options.max_iterations = kMaxIterations;
   const auto report = PoseFromLandmarks(map, *frame->features, matches, options);
   if (!report.success) return false;
   frame->ClearMatches();
   frame->T_cam_world = report.model;
   for (size_t i = 0; i < matches.size(); ++i) {
-    if (report.inliers[i]) frame->landmarks[matches[i].feature] = matches[i].landmark->id;
+    const LandmarkId id = matches[i].landmark->id;
+    if (report.inliers[i] && id.valid()) frame->landmarks[matches[i].feature] = id;
   }
   return true;
 }
@@ -123,23 +141,29 @@ std::optional<TrackingReport> Relocalizer::Refine(const Map& map, PoseSearch* se
 }
 
 bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch* search,
-                             TrackedFrame* frame) const {
+                             TrackedFrame* frame) {
   if (!places_.usable()) return false;
-  const auto fits = [&] {
+  const auto fits = [&](bool may_be_chance) {
     const std::optional<TrackingReport> report = Refine(map, search, frame);
-    return report && (!request.credible || request.credible(*frame, *report));
+    return report && (may_be_chance || !report->MayMatchByChance()) &&
+           (!request.credible || request.credible(*frame, *report));
   };
   const BowImage image = places_.Transform(frame->features->set);
   const std::optional<KeyframeId> last =
       request.last_seen ? map.ResolveKeyframe(*request.last_seen) : std::nullopt;
   const std::vector<KeyframeId> candidates = Candidates(map, last, image);
   for (const KeyframeId id : candidates) {
-    if (TryKeyframe(map, map.At(id), image, request.seed, frame) && fits()) return true;
+    if (TryKeyframe(map, map.At(id), image, request.seed, frame) && fits(true)) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
-  if (last) places.push_back(*last);
-  return TryTogether(map, places, request.seed, frame) && fits();
+  if (last && std::ranges::find(places, *last) == places.end()) places.push_back(*last);
+  if (TryTogether(map, places, request.seed, frame) && fits(true)) return true;
+  if (!request.by_unmapped || places.empty()) return false;
+  // It takes long, so the places take turns from frame to frame. The pose rests on what is no landmark: what
+  // matches by chance must not confirm it.
+  const Keyframe& place = map.At(places[frame->index % places.size()]);
+  return TryUnmapped(map, place, request.seed, frame) && fits(false);
 }
 
 }  // namespace dmslam

@@ -25,6 +25,8 @@ constexpr int kPoints = 3000, kKeyframes = 30;
 constexpr double kStep = 0.35;  // between two keyframes [map units]
 constexpr size_t kPoorEvery = 8;
 constexpr int kPoorFlips = 32;
+constexpr int kChangedFlips = 80;
+constexpr size_t kUnchangedEvery = 12;
 constexpr double kMoverStep = 0.4;                  // how far the movers have gone when the camera is lost
 constexpr int64_t kInterval_ns = 1'000'000'000;     // between two keyframes
 constexpr uint32_t kStoodFrom = 11, kStoodTo = 14;  // keyframes that see movers who stood for a while
@@ -41,8 +43,11 @@ Rigid3d PoseAt(double x) { return Rigid3d(Eigen::Quaterniond::Identity(), Eigen:
 /// map believes so with `belief` (log odds).
 class Wall {
  public:
-  explicit Wall(double moving_share = 0.0, float belief = 0.0F, bool they_stood = false)
-      : map_(TestCamera(525, 319.5, 239.5), Pyramid()), they_stood_(they_stood) {
+  explicit Wall(double moving_share = 0.0, float belief = 0.0F, bool they_stood = false,
+                size_t landmark_every = 1)
+      : map_(TestCamera(525, 319.5, 239.5), Pyramid()),
+        they_stood_(they_stood),
+        landmark_every_(landmark_every) {
     Random random(5);
     for (int i = 0; i < kPoints; ++i) {
       points_.emplace_back(random.Uniform(-2.0, kStep * kKeyframes + 2.0), random.Uniform(-1.2, 1.2),
@@ -75,7 +80,7 @@ class Wall {
     map_.AddKeyframe(std::move(keyframe));
     const bool there = !they_stood_ || (k >= kStoodFrom && k <= kStoodTo);
     for (size_t feature = 0; feature < seen.size(); ++feature) {
-      if (moves_[seen[feature]] && !there) continue;
+      if ((moves_[seen[feature]] && !there) || seen[feature] % landmark_every_ != 0) continue;
       Landmark& landmark = landmarks_[seen[feature]];
       if (map_.FindLandmark(landmark.id) == nullptr) {
         landmark.reference = landmark.first_keyframe = id;
@@ -104,6 +109,24 @@ class Wall {
     }
     return TrackedFrame(1000, 1'000'000'000'000,
                         MakeFrameFeatures(std::move(few), map_.camera(), map_.pyramid()));
+  }
+  /// The features at `x`, of which most of those that show landmarks have changed too much to be recognised.
+  TrackedFrame Changed(double x, bool with_others = true) const {
+    std::vector<size_t> seen;
+    const FeatureSet all = See(PoseAt(x), 0.0, 1000, &seen)->set;
+    FeatureSet features;
+    Random random(13);
+    for (size_t i = 0; i < seen.size(); ++i) {
+      const bool is_landmark = seen[i] % landmark_every_ == 0;
+      if (!is_landmark && !with_others) continue;
+      features.keypoints.push_back(all.keypoints[i]);
+      features.descriptors.push_back(all.descriptors[i]);
+      if (!is_landmark || seen[i] % (kUnchangedEvery * landmark_every_) == 0) continue;
+      for (int flips = 0; flips < kChangedFlips; ++flips)
+        features.descriptors.back().words[random.Below(4)] ^= uint64_t{1} << random.Below(64);
+    }
+    return TrackedFrame(1000, 1'000'000'000'000,
+                        MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid()));
   }
   /// As many features as at `x`, that look like nothing in the map.
   TrackedFrame Elsewhere(double x) const {
@@ -137,7 +160,8 @@ class Wall {
   }
 
   MapEditor map_;
-  bool they_stood_;  ///< the movers, when they were mapped; else they were seen as long as the wall
+  bool they_stood_;        ///< the movers, when they were mapped; else they were seen as long as the wall
+  size_t landmark_every_;  ///< point is a landmark
   std::vector<Eigen::Vector3d> points_;
   std::vector<Descriptor> descriptors_;
   std::vector<bool> moves_;
@@ -158,7 +182,8 @@ class Lost {
   }
   bool Find(TrackedFrame* frame,
             std::function<bool(const TrackedFrame&, const TrackingReport&)> credible = {}) {
-    return relocalizer_.Relocalize(replica_, {{}, std::move(credible), 1}, &search_, frame);
+    return relocalizer_.Relocalize(
+        replica_, {.credible = std::move(credible), .seed = 1, .by_unmapped = true}, &search_, frame);
   }
   void Clear() { relocalizer_.Clear(); }
 
@@ -193,6 +218,18 @@ TEST(RelocalizerTest, WhatNoKeyframeShowsWellEnoughPlacesShowTogether) {
     ASSERT_TRUE(lost.Find(&frame)) << "at " << x;
     EXPECT_LT((frame.T_cam_world.Center() - PoseAt(x).Center()).norm(), 0.03) << "at " << x;
   }
+}
+
+TEST(RelocalizerTest, WhereFewLandmarksAreRecognisedOtherPointsFindThePlace) {
+  Wall wall(0.0, 0.0F, false, 8);
+  Lost lost(wall);
+  for (const double x : {1.9, 4.4, 7.3}) {
+    TrackedFrame frame = wall.Changed(x);
+    ASSERT_TRUE(lost.Find(&frame)) << "at " << x;
+    EXPECT_LT((frame.T_cam_world.Center() - PoseAt(x).Center()).norm(), 0.03) << "at " << x;
+  }
+  TrackedFrame landmarks_only = wall.Changed(4.4, false);
+  EXPECT_FALSE(lost.Find(&landmarks_only)) << "too few of them are recognised";
 }
 
 TEST(RelocalizerTest, LandmarksThatAreBelievedToMoveDoNotVote) {

@@ -281,7 +281,7 @@ void Tracker::Relocalize(const Map& map, const Request& asked, TrackedFrame* fra
     if (!is_here()) return IsSeenAsAWhole(report);
     return nearby && (motion.IsReachable(map, at.T_cam_world, time) || !report.MayMatchByChance());
   };
-  Relocalizer::Request request{.last_seen = last_reference(), .seed = seed};
+  Relocalizer::Request request{.last_seen = last_reference(), .seed = seed, .by_unmapped = true};
   const bool may_be_elsewhere = !std::holds_alternative<InAnyMap>(asked.whereabouts);
   if (may_be_elsewhere) request.credible = credible;
   if (!relocalizer_.Relocalize(map, request, &search_, &found)) return;

@@ -78,7 +78,7 @@ class Tracker {
   const UsualSpeed& usual_speed() const { return usual_speed_; }
   /// For frames beside the stream, when it has ended.
   PoseSearch& search() { return search_; }
-  const Relocalizer& relocalizer() const { return relocalizer_; }
+  Relocalizer& relocalizer() { return relocalizer_; }
 
  private:
   struct Attempt : MotionFollower::Attempt {
