@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
@@ -16,6 +17,7 @@
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/tracking/tracker.h"
+#include "dmslam/tracking/unmapped_points.h"
 #include "dmslam/util/random.h"
 
 namespace dmslam {
@@ -128,6 +130,11 @@ class Wall {
     return TrackedFrame(1000, 1'000'000'000'000,
                         MakeFrameFeatures(std::move(features), map_.camera(), map_.pyramid()));
   }
+  double DistanceTo(const Eigen::Vector3d& point) const {
+    double least = 1e9;
+    for (const Eigen::Vector3d& own : points_) least = std::min(least, (point - own).norm());
+    return least;
+  }
   /// As many features as at `x`, that look like nothing in the map.
   TrackedFrame Elsewhere(double x) const {
     FeatureSet features = Frame(x).features->set;
@@ -230,6 +237,22 @@ TEST(RelocalizerTest, WhereFewLandmarksAreRecognisedOtherPointsFindThePlace) {
   }
   TrackedFrame landmarks_only = wall.Changed(4.4, false);
   EXPECT_FALSE(lost.Find(&landmarks_only)) << "too few of them are recognised";
+}
+
+TEST(UnmappedPointsTest, LieOnTheWallAndAreKeptOfFewKeyframes) {
+  Wall wall(0.0, 0.0F, false, 8);
+  Replica replica(TestCamera(525, 319.5, 239.5), Pyramid());
+  for (int k = 0; k < kKeyframes; ++k) replica.Apply(wall.Next());
+  UnmappedPoints unmapped;
+  for (const auto& [id, keyframe] : replica.keyframes()) {
+    const std::vector<Landmark>& points = unmapped.Of(replica, keyframe);
+    EXPECT_GT(points.size(), 2 * keyframe.seen.size());
+    EXPECT_LT(wall.DistanceTo(points.front().p_world), 0.05);
+    EXPECT_FALSE(points.front().id.valid());
+    EXPECT_LE(unmapped.size(), 16U);
+  }
+  unmapped.Clear();
+  EXPECT_EQ(unmapped.size(), 0U);
 }
 
 TEST(RelocalizerTest, LandmarksThatAreBelievedToMoveDoNotVote) {

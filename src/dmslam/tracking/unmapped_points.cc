@@ -6,9 +6,16 @@
 
 namespace dmslam {
 
+namespace {
+
+constexpr size_t kMostKeyframes = 16;  // a camera may be lost for hours in a map of thousands
+
+}  // namespace
+
 const std::vector<Landmark>& UnmappedPoints::Of(const Map& map, const Keyframe& keyframe) {
-  const auto [at, is_new] = points_.try_emplace(keyframe.id);
-  if (!is_new) return at->second;
+  if (const auto at = points_.find(keyframe.id); at != points_.end()) return at->second;
+  if (points_.size() == kMostKeyframes) points_.clear();
+  std::vector<Landmark>& points = points_[keyframe.id];
   TriangulationCounts counts;
   for (const KeyframePoint& shown :
        TriangulateKeyframe(map, keyframe, FreeFeatures(keyframe), TriangulationOptions(), &counts)) {
@@ -16,9 +23,9 @@ const std::vector<Landmark>& UnmappedPoints::Of(const Map& map, const Keyframe& 
     point.map_id = keyframe.map_id;
     point.p_world = shown.p_world;
     point.descriptor = keyframe.features->set.descriptors[shown.feature];
-    at->second.push_back(std::move(point));
+    points.push_back(std::move(point));
   }
-  return at->second;
+  return points;
 }
 
 }  // namespace dmslam

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <vector>
 
@@ -13,10 +14,12 @@ namespace dmslam {
 /// where to look; whether the camera is there the landmarks decide.
 class UnmappedPoints {
  public:
-  /// Those of a keyframe of `map`, as landmarks without an id. Valid until Clear().
+  /// Those of a keyframe of `map`, as landmarks without an id. Valid until the next call. They are kept for
+  /// the next frames, which look like the same places.
   const std::vector<Landmark>& Of(const Map& map, const Keyframe& keyframe);
   /// Call where the map has changed.
   void Clear() { points_.clear(); }
+  size_t size() const { return points_.size(); }  ///< of how many keyframes they are kept
 
  private:
   std::map<KeyframeId, std::vector<Landmark>> points_;
