@@ -74,6 +74,7 @@ bool Relocalizer::TryKeyframe(const Map& map, const Keyframe& keyframe, const Bo
       MatchByNodes({&keyframe.features->set, places_.Nodes(keyframe.id), usable},
                    {&frame->features->set, &image.nodes, {}});
   std::vector<LandmarkMatch> seen;
+  seen.reserve(matches.size());
   for (const BowMatch& match : matches)
     seen.push_back({static_cast<uint16_t>(match.b), map.LandmarkSeenBy(keyframe, match.a)});
   const uint64_t own_seed = DeriveSeed(seed, keyframe.id.frame_index(), "relocalize");

@@ -57,7 +57,7 @@ class Wall {
       descriptors_.push_back({{random.Next(), random.Next(), random.Next(), random.Next()}});
       moves_.push_back(random.Uniform() < moving_share);
       Landmark landmark;
-      landmark.id = LandmarkId::Make(1, static_cast<uint64_t>(i + 1));
+      landmark.id = LandmarkId::Make(1, static_cast<uint64_t>(i) + 1);
       landmark.map_id = 1;
       landmark.p_world = points_.back();
       landmark.descriptor = descriptors_.back();
