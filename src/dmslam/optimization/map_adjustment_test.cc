@@ -87,6 +87,29 @@ TEST_F(WholeMap, WhoSeesALandmarkElsewhereSeesItNoMore) {
   EXPECT_EQ(map().At(MapScene::IdOf(7)).observations.size(), 3u);
 }
 
+/// Two keyframes see it along rays that part by a pixel, so no distance is too far for it.
+TEST(MapAdjustment, ALandmarkAtInfinityGoesNoFartherAndKeepsItsDirection) {
+  constexpr double kStep = 0.1, kDepth = 4.0;
+  MapScene scene;
+  scene.AddCloud(60, {0, 0, kDepth}, {0.9, 0.7, 0.6});
+  const size_t point = scene.AddPoint({0, 0, kDepth});
+  const double pixel = kDepth / scene.map().camera().Ideal().fx_px;
+  const auto mistaken = static_cast<uint16_t>(scene.AddPoint({3 * kStep + pixel, 0, kDepth}));
+  scene.MapAll(4, kStep);
+  MapEditor& map = scene.map();
+  const auto keyframe = [&](uint32_t k) -> const Keyframe& {
+    return map.At(KeyframeId::Make(MapScene::kSession, k));
+  };
+  for (const uint32_t k : {1U, 2U, 3U}) map.ClearObservation(keyframe(k), static_cast<uint16_t>(point));
+  map.RemoveLandmark(map.At(MapScene::IdOf(mistaken)));
+  map.SetObservation(keyframe(3), mistaken, map.At(MapScene::IdOf(point)));
+  map.SetPosition(map.At(MapScene::IdOf(point)), {0, 0, 1e13});
+  ASSERT_TRUE(AdjustWholeMap(map, MapScene::kMap, 30, 1.0, {}).bundle.usable);
+  const Eigen::Vector3d& p_world = map.At(MapScene::IdOf(point)).p_world;
+  EXPECT_LE(p_world.norm(), 1.0001e9);
+  EXPECT_GT(p_world.normalized().z(), 0.9999) << p_world.transpose();
+}
+
 TEST_F(WholeMap, StopsWhenItIsAskedTo) {
   int asked = 0;
   const MapAdjustmentReport report = Adjust(MapScene::kMap, [&] { return ++asked > 0; });
