@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kFuseRadiusRad = 0.0075;  // times the scale of the predicted octave
 constexpr int kMinLoopEdge = 20;           // pairs of fused landmarks that make an edge between two keyframes
+constexpr double kMostGrowth = 2;          // of what a keyframe sees, by one adjustment
 
 /// A keyframe and where the loop wants it: S_cam_world (corrected).
 struct Carried {
@@ -157,10 +158,11 @@ std::vector<LoopAnswer::KeyframeCorrection> SpreadOverGraph(const Map& map, cons
   return graph.Corrections();
 }
 
-/// How much larger the world around a keyframe became: ratio of its median depths.
+/// How much larger the world around a keyframe became: ratio of its median depths. Where half of what it sees
+/// is at infinity, a median jumps there or back; what is beyond the bounds the landmarks' offsets say.
 double Growth(std::optional<double> depth_before, std::optional<double> depth_after) {
   const bool usable = depth_before && depth_after && *depth_before > 0 && *depth_after > 0;
-  return usable ? *depth_after / *depth_before : 1.0;
+  return usable ? std::clamp(*depth_after / *depth_before, 1.0 / kMostGrowth, kMostGrowth) : 1.0;
 }
 
 std::string NoteOf(const VerifiedLoop& loop) {

@@ -198,5 +198,16 @@ TEST_F(Adjusting, WhatHangsOnAKeyframeShrinksWithItsWorld) {
   for (const auto& [id, left_world] : answer.landmark_offsets) EXPECT_LT(left_world.norm(), 0.02);
 }
 
+/// More than half of them say so and are dropped: the median depth falls from there to four.
+TEST_F(Adjusting, NoWorldShrinksFromInfinity) {
+  MapEditor& map = scene_.map();
+  for (size_t i = 0; i < kPoints; ++i) {
+    if (i % 5 < 3) map.SetPosition(map.At(MapScene::IdOf(i)), 1e8 * scene_.point(i));
+  }
+  const LoopAnswer answer = AdjustGlobally(map, map.At(Id(0)), {}, {});
+  ASSERT_EQ(answer.kind, LoopAnswer::Kind::kGlobalAdjustment);
+  for (const auto& [id, correction] : ByKeyframe(answer)) EXPECT_GT(correction.scale, 0.499) << id.value;
+}
+
 }  // namespace
 }  // namespace dmslam

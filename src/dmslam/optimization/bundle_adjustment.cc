@@ -16,6 +16,9 @@ namespace {
 
 constexpr int kMaxPosesDense = 60;  ///< Above, the reduced camera system is factorised as a sparse matrix.
 
+/// [units of the problem; a map's first keyframe sees at a depth of about 1]
+constexpr double kAtInfinity = 1e9;
+
 void CheckIndices(const BundleProblem& problem) {
   DMSLAM_CHECK(problem.pose_fixed.empty() || problem.pose_fixed.size() == problem.T_cam_world.size(),
                "one fixed flag per pose");
@@ -64,6 +67,7 @@ class Adjustment {
     if (!report.usable) return report;
     const std::vector<Rigid3d> poses_before = std::exchange(problem().T_cam_world, state_.poses);
     KeepScale(poses_before);
+    HoldAtInfinity();
     return report;
   }
 
@@ -158,6 +162,15 @@ class Adjustment {
       Rigid3d& T = problem().T_cam_world[i];
       const Eigen::Vector3d moved = center + scale * (T.Center() - center);
       T.translation = T.rotation * -moved;
+    }
+  }
+
+  /// Where the rays of a point are parallel, or part, each adjustment lets it go farther away, in the end
+  /// beyond what a record can hold. It is kept, since its direction says how the cameras are turned.
+  void HoldAtInfinity() {
+    for (Eigen::Vector3d& point : problem().points) {
+      const double distance = point.stableNorm();
+      if (distance > kAtInfinity) point *= kAtInfinity / distance;
     }
   }
 

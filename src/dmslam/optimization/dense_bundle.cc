@@ -184,6 +184,7 @@ class DenseBundle : public BundleSolver {
     for (size_t i = 0; i < inverses_.size(); ++i) AddPoint(i);
     const Eigen::VectorXd diagonal = normal_.diagonal();
     normal_.diagonal() += damping * diagonal;
+    HoldBlindPoses(diagonal);
     Eigen::VectorXd reduced = gradient_;
     for (size_t i = 0; i < inverses_.size(); ++i) Eliminate(i, damping, &reduced);
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factored(normal_);
@@ -199,6 +200,14 @@ class DenseBundle : public BundleSolver {
     }
     step.predicted_gain = 0.5 * (damping * damped - slope);
     return step;
+  }
+
+  /// A pose that sees nothing which counts stays: its equations are empty, and nothing could be solved with
+  /// them.
+  void HoldBlindPoses(const Eigen::VectorXd& diagonal) {
+    for (Eigen::Index row = 0; row < size_; ++row) {
+      if (diagonal[row] == 0.0) normal_(row, row) = 1.0;
+    }
   }
 
   /// Adds what the views see of the point to the normal equations of the poses; keeps what is the point's.

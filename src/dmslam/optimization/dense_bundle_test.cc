@@ -82,6 +82,19 @@ TEST(DenseBundle, InFewStepsItGetsAsFarAsCeres) {
   }
 }
 
+TEST(DenseBundle, APoseThatSeesNothingStaysAndTheOthersAreAdjusted) {
+  BundleProblem problem = Disturbed(4, 0.5);
+  BundleProblem with_blind = problem;
+  const Rigid3d blind(Eigen::Quaterniond::Identity(), {1, 2, 3});
+  with_blind.T_cam_world.push_back(blind);
+  const BundleStage stage{false, 15, 1e-6};
+  const std::vector<Rigid3d> expected = PosesAfter(MakeDenseBundle, stage, &problem);
+  std::vector<Rigid3d> poses = PosesAfter(MakeDenseBundle, stage, &with_blind);
+  EXPECT_EQ(poses.back().translation, blind.translation);
+  poses.pop_back();
+  EXPECT_LT(FarthestApart(poses, expected), 1e-9);
+}
+
 TEST(DenseBundle, WhatNobodySeesStaysAndWhatIsNotFiniteIsRefused) {
   BundleProblem problem = Disturbed(4, 0.5);
   problem.points.push_back({1, 2, 3});

@@ -9,9 +9,6 @@
 namespace dmslam {
 namespace {
 
-/// [map units; the first keyframe of a map sees at a depth of about 1]
-constexpr double kAtInfinity = 1e9;
-
 /// The bundle problem and whom its rows belong to.
 struct Window {
   BundleProblem problem;
@@ -65,19 +62,12 @@ void AddObservations(const Map& map, double sigma_px, Window& window) {
   }
 }
 
-/// Where the rays of a landmark are parallel, or part, each adjustment lets it go farther away, in the end
-/// beyond what a record can hold. It is kept, since its direction says how the camera is turned.
-Eigen::Vector3d NotBeyondInfinity(const Eigen::Vector3d& p_world) {
-  const double distance = p_world.norm();
-  return distance > kAtInfinity ? Eigen::Vector3d(p_world * (kAtInfinity / distance)) : p_world;
-}
-
 void WriteBack(MapEditor& map, const Window& window, const BundleReport& report) {
   for (size_t i = 0; i < window.keyframes.size(); ++i) {
     if (!window.problem.pose_fixed[i]) map.SetPose(*window.keyframes[i], window.problem.T_cam_world[i]);
   }
   for (size_t i = 0; i < window.landmarks.size(); ++i)
-    map.SetPosition(*window.landmarks[i], NotBeyondInfinity(window.problem.points[i]));
+    map.SetPosition(*window.landmarks[i], window.problem.points[i]);
   if (report.outliers.size() != window.features.size()) return;
   for (size_t i = 0; i < window.features.size(); ++i) {
     const auto pose = static_cast<size_t>(window.problem.observations[i].pose);

@@ -51,6 +51,10 @@ Matrix6d Symmetric(const Matrix6d& m) { return 0.5 * (m + m.transpose()); }
 
 }  // namespace
 
+bool IsCovariance(const Matrix6d& covariance) {
+  return covariance.allFinite() && covariance.diagonal().minCoeff() >= 0.0;
+}
+
 Eigen::Matrix3d LandmarkCovariance(const Pinhole& camera, const Eigen::Vector3d& p_world,
                                    std::span<const LandmarkRay> views) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();

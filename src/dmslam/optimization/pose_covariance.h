@@ -17,6 +17,9 @@ namespace dmslam {
 // everywhere (StepPose()); ToPoseInReference() tells them as a
 // message does.
 
+/// Whether it is finite and has no variance below zero. One that is a difference may be neither, by rounding.
+bool IsCovariance(const Matrix6d& covariance);
+
 /// A keyframe's sight of a landmark.
 struct LandmarkRay {
   Rigid3d T_cam_world;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <limits>
 
 #include "dmslam/geometry/synthetic_scene.h"
 #include "dmslam/optimization/pose_optimization.h"
@@ -142,6 +143,15 @@ double MeanNees(const Errors& errors, const Errors& believed) {
     sum += Nees(ErrorOf(report.T_cam_world, scene.T(0)), known.Sum());
   }
   return sum / kTrials;
+}
+
+TEST(IsCovariance, NotWithAVarianceBelowZeroNorWithAnInfiniteOne) {
+  Matrix6d covariance = 1e-4 * Matrix6d::Identity();
+  EXPECT_TRUE(IsCovariance(covariance));
+  covariance(4, 4) = -1e-12;
+  EXPECT_FALSE(IsCovariance(covariance));
+  covariance(4, 4) = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(IsCovariance(covariance));
 }
 
 TEST(PoseCovarianceTest, NoiseOfThePixels) {

@@ -125,9 +125,14 @@ std::optional<PoseCertainty> PoseCertaintyEstimator::Estimate(const Map& map, co
   result.position_share = LargestSigma(result.covariance.topLeftCorner<3, 3>()) / result.depth;
   result.rotation_rad = LargestSigma(result.covariance.bottomRightCorner<3, 3>());
   result.step = StepTo(map, now, result.depth);
+  if (result.step && !IsCovariance(result.step->covariance)) result.step.reset();
   if (HasMapMoved(map)) jitter_.OnMapMoved();
   jitter_.OnPose(frame.stamp_ns, map.At(pose.reference).map_id, frame.T_cam_world, result.depth);
   result.covariance += ToPoseInReference(jitter_.Beyond(told, result.depth), pose.T_cam_reference);
+  if (!IsCovariance(result.covariance)) {
+    last_.reset();
+    return std::nullopt;
+  }
   last_ = std::move(now);
   return result;
 }
