@@ -4,9 +4,10 @@
 
 namespace dmslam {
 
-bool IsShared(const Map& map, MapId map_id, CameraId camera) {
-  return std::ranges::any_of(map.KeyframesOf(map_id),
-                             [&](const Keyframe* keyframe) { return keyframe->id.camera() != camera; });
+bool MayDrop(const Map& map, MapId map_id, CameraId camera) {
+  return std::ranges::all_of(map.KeyframesOf(map_id), [&](const Keyframe* keyframe) {
+    return keyframe->id.camera() == camera && keyframe->loop_edges.empty();
+  });
 }
 
 }  // namespace dmslam

@@ -4,8 +4,9 @@
 
 namespace dmslam {
 
-/// Whether another camera than `camera` has a part in a map: a keyframe in it is that camera's. Then it is
-/// not this one's to drop, as the other one may not have heard yet that they have a map in common.
-bool IsShared(const Map& map, MapId map_id, CameraId camera);
+/// Whether a map is `camera`'s to drop, as a first map that does not predict: not if another camera has a
+/// keyframe in it, which may not have heard yet that they have a map in common; nor if it was joined with
+/// another map (a loop edge says so), whose poses would go with it.
+bool MayDrop(const Map& map, MapId map_id, CameraId camera);
 
 }  // namespace dmslam

@@ -153,7 +153,7 @@ void MapperCore::OnEvidence(const FrameEvidence& evidence) {
 }
 
 void MapperCore::OnReset(const MapReset& reset) {
-  if (reset.fate == MapReset::Fate::kKeep || IsShared(map_, reset.map_id, reset.camera_id)) return;
+  if (reset.fate == MapReset::Fate::kKeep || !MayDrop(map_, reset.map_id, reset.camera_id)) return;
   ++counters_.maps_dropped;
   map_.DropMap(reset.map_id);
   Publish(MapEvent::kMapDropped, {}, reset.map_id, {}, reset.reason);

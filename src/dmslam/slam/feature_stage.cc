@@ -1,13 +1,18 @@
 #include "dmslam/slam/feature_stage.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
 namespace dmslam {
 namespace {
 
+/// Two such images, and the points that they have in common, fit into one record (1 MiB).
+constexpr double kMostForFirstMap = 9000;
+
 OrbExtractorOptions WithMoreFeatures(OrbExtractorOptions options, double factor) {
-  options.num_features = static_cast<int>(std::lround(factor * options.num_features));
+  options.num_features =
+      static_cast<int>(std::lround(std::min(factor * options.num_features, kMostForFirstMap)));
   return options;
 }
 

@@ -9,10 +9,10 @@ namespace dmslam {
 namespace {
 
 /// Squares of random brightness: more corners than anybody asks for.
-GrayPixels Squares() {
+GrayPixels Squares(int width = 480, int height = 360) {
   constexpr int kSide = 12;
   Random random(3);
-  GrayPixels image(480, 360);
+  GrayPixels image(width, height);
   for (int y = 0; y < image.height; y += kSide) {
     for (int x = 0; x < image.width; x += kSide) {
       const auto grey = static_cast<uint8_t>(random.Below(256));
@@ -51,6 +51,12 @@ TEST(FeatureStage, MoreFeaturesAreTakenWhileAFirstMapIsLookedFor) {
   const FeatureSet later = stage.Extract(image.View(), false);
   EXPECT_EQ(later.size(), 101U);
   ExpectSameFeatures(later, ExtractedBy(Wanting(101), image));
+}
+
+TEST(FeatureStage, OfAFirstMapNoMoreThanTwoImagesOfARecordHold) {
+  const GrayPixels image = Squares(1920, 1080);
+  FeatureStage stage(Wanting(8000), 2.0);
+  EXPECT_EQ(stage.Extract(image.View(), true).size(), 9000U);
 }
 
 TEST(FeatureStage, TheOtherOptionsHoldForBoth) {

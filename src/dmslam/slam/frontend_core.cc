@@ -97,7 +97,7 @@ void FrontendCore::ForgetMap() {
 FrontendOutput FrontendCore::GiveUpMap(int64_t stamp_ns, MapReset::Fate fate, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
-  if (map_id_ && IsShared(map_, *map_id_, camera_id_)) fate = MapReset::Fate::kKeep;
+  if (map_id_ && !MayDrop(map_, *map_id_, camera_id_)) fate = MapReset::Fate::kKeep;
   const bool drop = fate == MapReset::Fate::kDrop;
   if (map_id_) output.Add(MapReset{*map_id_, fate, reason, stamp_ns, camera_id_});
   if (drop && map_id_) own_maps_.Drop(*map_id_);

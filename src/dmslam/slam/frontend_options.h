@@ -34,7 +34,7 @@ struct FrontendOptions {
     v.InBaseline("ransac");
     v.InPaper("paper");
     v.Number("initializer.feature_factor", initializer_feature_factor, 0.5, 5, "",
-             "features of a frame while there is no map, times features.count");
+             "features of a frame while there is no map, times features.count; at most 9000");
     tracking.Describe(v);
     v.Number("tracking.trial_s", trial_s, 0, 60, "s", "time for which a first map must predict the frames");
     v.InPaper("0");
