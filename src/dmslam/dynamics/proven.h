@@ -18,6 +18,8 @@ struct ProvenOptions {
 
 /// So many proven landmarks in view confirm a place.
 inline constexpr int kManyProven = 50;
+/// With fewer than that, in a map that is old enough to have some, nothing else confirms it.
+inline constexpr int kSomeProven = 8;
 
 /// Whether some of these sorted stamps lie outside any window as long as people stand.
 bool OutlastsStanding(const std::vector<int64_t>& stamps_ns, const ProvenOptions& options);

@@ -181,8 +181,18 @@ LatePlacement::Found LatePlacement::Place(const Map& map, LateMap late_map, cons
   if (!tracked.relocalizer.Relocalize(map, {.seed = seed}, search, frame)) return {};
   found = {search->InLocalMap(map, true, std::nullopt, frame), true};
   TrackingReport& report = found.report;
-  if (!IsBelieved(map, report, *search, *frame) || IsTooFast(map, tracked, *frame)) report.TakePoseAway();
+  if (!IsBelieved(map, report, *search, *frame) || !IsProvenPlace(map, *search, *frame) ||
+      IsTooFast(map, tracked, *frame))
+    report.TakePoseAway();
   return found;
+}
+
+/// Somebody who stood for a while is a place, too. What would be placed from there becomes keyframes, and
+/// these would prove him.
+bool LatePlacement::IsProvenPlace(const Map& map, const PoseSearch& search, const TrackedFrame& frame) {
+  const Keyframe* reference = search.Reference(map);
+  return reference != nullptr &&
+         (!CanBeProven(map, reference->map_id, {}) || CountProven(map, frame.landmarks, {}) >= kSomeProven);
 }
 
 /// Somebody who walked before the first map, and is in it, takes the camera along into the past.

@@ -83,6 +83,7 @@ class LatePlacement {
 
  private:
   void LeaveNeighbour();
+  static bool IsProvenPlace(const Map& map, const PoseSearch& search, const TrackedFrame& frame);
   bool IsTooFast(const Map& map, const Tracked& tracked, const TrackedFrame& frame) const;
   void FindNeighbour(const Map& map, LateMap late_map, const TrackedFrame& frame);
   bool IsPlausible(const Map& map, const Keyframe* reference, const TrackedFrame& frame) const;

@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "dmslam/map/replica.h"
 #include "dmslam/map/testing/map_scene.h"
 
 namespace dmslam {
@@ -310,6 +316,35 @@ TEST(GrowingBackFast, TheMotionLeadsOnOverFramesThatShowNothing) {
       placement.Place(scene.map(), LateMap::kGrows, {&search, relocalizer, {}}, &again);
   ASSERT_TRUE(report.HasPose()) << report.reason;
   EXPECT_NEAR(again.T_cam_world.Center().x(), -0.6, 5e-3);
+}
+
+/// Frame 330 shows what six keyframes saw eleven seconds after frame 0, and follows none of them.
+TrackingReport PlacedWhere(bool map_is_old) {
+  MapScene scene;
+  scene.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5});
+  scene.MapAll(6, 0.05, 300, 300 * MapScene::kStepNs);
+  if (map_is_old) {
+    Keyframe before;
+    before.id = KeyframeId::Make(MapScene::kSession, 0);
+    before.map_id = MapScene::kMap;
+    before.features = MakeFrameFeatures({}, scene.map().camera(), scene.map().pyramid());
+    scene.map().AddKeyframe(std::move(before));
+  }
+  Replica map(TestCamera(), Pyramid());
+  map.Apply(scene.map().TakeDelta(MapEvent::kMapped, {}, {}));
+  const char* source = std::getenv("DMSLAM_SOURCE_DIR");
+  Relocalizer relocalizer(std::make_shared<const Vocabulary>(
+      LoadOrbVocabulary(std::string(source == nullptr ? "." : source) + "/data/vocabulary.dmv")));
+  relocalizer.Update(map);
+  PoseSearch search({}, TestCamera());
+  LatePlacement placement(MapScene::kSession, 0, 0, {});
+  TrackedFrame frame = scene.See(330, 330 * MapScene::kStepNs, MapScene::PoseAt(0.3));
+  return placement.Place(map, LateMap::kGrows, {&search, relocalizer, {}}, &frame).report;
+}
+
+TEST(RecognisedLate, APlaceThatMayBeAPersonIsNotBelieved) {
+  EXPECT_TRUE(PlacedWhere(false).HasPose()) << "nothing can be proven yet";
+  EXPECT_FALSE(PlacedWhere(true).HasPose()) << "what was seen for 0.2 s may be a person";
 }
 
 }  // namespace

@@ -36,8 +36,6 @@ constexpr double kThinShare = 0.25;
 constexpr double kBesideRad = 0.1;
 // The pose beside it takes its place only if it finds this many times as much.
 constexpr double kClearlyMore = 1.3;
-// In a map that is old enough to have proven landmarks, time confirms only a place that shows this many.
-constexpr int kSomeProven = 8;
 
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
