@@ -76,6 +76,8 @@ TEST_F(DatasetTest, TumBadInputNamesFileAndLine) {
   EXPECT_NE(TumError("1 rgb/a.png\n2\n").find("rgb.txt:2: has 1 columns"), std::string::npos);
   EXPECT_NE(TumError("1 rgb/a.png x\n").find("rgb.txt:1: has 3 columns"), std::string::npos);
   EXPECT_NE(TumError("x rgb/a.png\n").find("rgb.txt:1: 'x' is not a stamp"), std::string::npos);
+  EXPECT_NE(TumError("-1.5 rgb/a.png\n").find("rgb.txt:1: stamp -1.500000 is below zero; add"),
+            std::string::npos);
   EXPECT_NE(TumError("2 rgb/a.png\n# c\n2 rgb/a.png\n").find("rgb.txt:3: stamp 2.000000 repeats"),
             std::string::npos);
   EXPECT_NE(TumError("2 rgb/a.png\n1 rgb/a.png\n").find("rgb.txt:2: stamp 1.000000 is earlier"),
@@ -142,6 +144,9 @@ TEST_F(DatasetTest, EurocFolderAndItsCamera) {
   EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("not a map"), std::string::npos);
   Write("mav0/cam0/data.csv", "5.5,a.png\n");
   EXPECT_NE(ErrorOf([&] { OpenFrameSource(root_.string()); }).find("data.csv:1: '5.5' is not a stamp"),
+            std::string::npos);
+  Write("mav0/cam0/data.csv", "-5,a.png\n");
+  EXPECT_NE(ErrorOf([&] { OpenFrameSource(root_.string()); }).find("data.csv:1: stamp -0.000000005 is below"),
             std::string::npos);
 }
 

@@ -67,6 +67,7 @@ StampedFile ParseEurocRow(std::span<const std::string_view> fields, const fs::pa
   if (error != std::errc() || end != fields[0].data() + fields[0].size()) {
     throw InputError(where + ": '" + std::string(fields[0]) + "' is not a stamp; write whole nanoseconds");
   }
+  RequireStampOfImage(stamp_ns, where);
   return {stamp_ns, (folder / "data" / fields[1]).string()};
 }
 

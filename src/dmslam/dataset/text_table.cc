@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/time.h"
 
 namespace dmslam {
 namespace {
@@ -24,6 +25,12 @@ void Split(std::string_view line, std::string_view separators, std::vector<std::
 
 std::string FileLine(const std::string& path, size_t line_number) {
   return path + ":" + std::to_string(line_number);
+}
+
+void RequireStampOfImage(int64_t stamp_ns, const std::string& where) {
+  if (stamp_ns >= 0) return;
+  throw InputError(where + ": stamp " + FormatStampNs(stamp_ns) +
+                   " is below zero; add the same time to the stamps of all images");
 }
 
 std::string ReadTextFile(const std::string& path) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -11,6 +12,9 @@ namespace dmslam {
 
 /// Where a value was read: "file:line", as editors understand it.
 std::string FileLine(const std::string& path, size_t line_number);
+
+/// Throws InputError for an image's stamp before 0: no message can hold it.
+void RequireStampOfImage(int64_t stamp_ns, const std::string& where);
 
 /// The whole of a file; throws InputError when it cannot be read.
 std::string ReadTextFile(const std::string& path);

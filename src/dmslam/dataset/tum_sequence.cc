@@ -23,6 +23,7 @@ StampedFile ParseEntry(std::span<const std::string_view> fields, const fs::path&
   if (!stamp_ns) {
     throw InputError(where + ": '" + std::string(fields[0]) + "' is not a stamp; write decimal seconds");
   }
+  RequireStampOfImage(*stamp_ns, where);
   return {*stamp_ns, (folder / fields[1]).string()};
 }
 

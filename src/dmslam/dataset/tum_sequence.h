@@ -16,7 +16,7 @@ struct StampedFile {
 
 /// Reads a list "stamp file" as the TUM RGB-D benchmark has it ('#' starts a comment line); paths are taken
 /// relative to the list's folder. Throws InputError with file and line for anything else than two columns,
-/// for a stamp that is no decimal number, and for stamps that repeat or go back.
+/// for a stamp that is no decimal number or below zero, and for stamps that repeat or go back.
 std::vector<StampedFile> ReadStampedFiles(const std::string& list_path);
 
 /// The entry whose stamp is nearest to `stamp_ns`, if it is at most `tolerance_ns` away.
