@@ -285,6 +285,10 @@ ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
   // Somebody who has most of the features may lead the turn; then the room is where it was, if anywhere.
   if (IsCompact(view.pair.matches, options_.agreement.min_distribution_share * DiagonalPx(camera_)))
     AddMatchesInPlace(features0, *frame.features, camera_, options_.matching, &matcher, &view.pair.matches);
+  // At the rim of a wide lens ideal pixels lie so far out that no selector takes them.
+  std::erase_if(view.pair.matches, [&](const Match& match) {
+    return !LiesWithinReach(match.uv0_px, camera_, {}) || !LiesWithinReach(match.uv1_px, camera_, {});
+  });
   view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);
   return view;

@@ -202,9 +202,8 @@ LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerif
   return answer;
 }
 
-LoopAnswer AdjustGlobally(const Map& map, const Keyframe& keyframe, const LoopCorrectionOptions& options,
-                          const std::function<bool()>& interrupt) {
-  const MapId map_id = keyframe.map_id;
+LoopAnswer AdjustGlobally(const Map& map, MapId map_id, uint64_t correction_id,
+                          const LoopCorrectionOptions& options, const std::function<bool()>& interrupt) {
   MapEditor adjusted(map);
   const MapAdjustmentReport report =
       AdjustWholeMap(adjusted, map_id, options.global_iterations, options.keypoint_sigma_px, interrupt);
@@ -221,12 +220,13 @@ LoopAnswer AdjustGlobally(const Map& map, const Keyframe& keyframe, const LoopCo
   }
   for (const Landmark* before : map.LandmarksOf(map_id)) {
     const Landmark* after = adjusted.FindLandmark(before->id);
-    const auto reference = corrected_from_base.find(before->reference);
+    const std::optional<KeyframeId> at = map.ResolveKeyframe(before->reference);
+    const auto reference = at ? corrected_from_base.find(*at) : corrected_from_base.end();
     if (after == nullptr || reference == corrected_from_base.end()) continue;
     answer.landmark_offsets.push_back({before->id, after->p_world - reference->second * before->p_world});
   }
   answer.kind = LoopAnswer::Kind::kGlobalAdjustment;
-  answer.correction_id = keyframe.id.value;
+  answer.correction_id = correction_id;
   char text[120];
   std::snprintf(text, sizeof(text), "%d keyframes, %d landmarks, cost %.6g to %.6g", report.keyframes,
                 report.landmarks, report.bundle.initial_cost, report.bundle.final_cost);

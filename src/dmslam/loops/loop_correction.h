@@ -17,9 +17,8 @@ namespace dmslam {
 LoopAnswer CorrectLoop(const Map& map, const VerifiedLoop& loop, const LoopVerifier& verifier,
                        const LoopcloserOptions& options, const std::function<bool()>& interrupt);
 
-/// Bundle adjustment of all that hangs together with `keyframe`, as a correction of `map`. Kind kNone when it
-/// failed.
-LoopAnswer AdjustGlobally(const Map& map, const Keyframe& keyframe, const LoopCorrectionOptions& options,
-                          const std::function<bool()>& interrupt);
+/// Bundle adjustment of a whole map, as a correction by that number. Kind kNone when it failed.
+LoopAnswer AdjustGlobally(const Map& map, MapId map_id, uint64_t correction_id,
+                          const LoopCorrectionOptions& options, const std::function<bool()>& interrupt);
 
 }  // namespace dmslam

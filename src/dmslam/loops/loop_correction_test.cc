@@ -174,7 +174,7 @@ class Adjusting : public ::testing::Test {
 
 TEST_F(Adjusting, KeyframesAndLandmarksGoWhereTheObservationsPutThem) {
   const Map& map = scene_.map();
-  const LoopAnswer answer = AdjustGlobally(map, map.At(Id(kMisplaced)), {}, {});
+  const LoopAnswer answer = AdjustGlobally(map, MapScene::kMap, 1, {}, {});
   ASSERT_EQ(answer.kind, LoopAnswer::Kind::kGlobalAdjustment);
   std::map<KeyframeId, Sim3d> corrections = ByKeyframe(answer);
   ASSERT_EQ(corrections.size(), kKeyframesOfCloud);
@@ -192,7 +192,7 @@ TEST_F(Adjusting, KeyframesAndLandmarksGoWhereTheObservationsPutThem) {
 TEST_F(Adjusting, WhatHangsOnAKeyframeShrinksWithItsWorld) {
   MapEditor& map = scene_.map();
   for (size_t i = 0; i < kPoints; ++i) map.SetPosition(map.At(MapScene::IdOf(i)), 1.1 * scene_.point(i));
-  const LoopAnswer answer = AdjustGlobally(map, map.At(Id(0)), {}, {});
+  const LoopAnswer answer = AdjustGlobally(map, MapScene::kMap, 1, {}, {});
   ASSERT_EQ(answer.kind, LoopAnswer::Kind::kGlobalAdjustment);
   for (const auto& [id, correction] : ByKeyframe(answer)) EXPECT_NEAR(correction.scale, 1 / 1.1, 0.005);
   for (const auto& [id, left_world] : answer.landmark_offsets) EXPECT_LT(left_world.norm(), 0.02);
@@ -204,7 +204,7 @@ TEST_F(Adjusting, NoWorldShrinksFromInfinity) {
   for (size_t i = 0; i < kPoints; ++i) {
     if (i % 5 < 3) map.SetPosition(map.At(MapScene::IdOf(i)), 1e8 * scene_.point(i));
   }
-  const LoopAnswer answer = AdjustGlobally(map, map.At(Id(0)), {}, {});
+  const LoopAnswer answer = AdjustGlobally(map, MapScene::kMap, 1, {}, {});
   ASSERT_EQ(answer.kind, LoopAnswer::Kind::kGlobalAdjustment);
   for (const auto& [id, correction] : ByKeyframe(answer)) EXPECT_GT(correction.scale, 0.499) << id.value;
 }

@@ -229,10 +229,14 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
   return answer;
 }
 
+/// The map in which the loop was closed. The keyframe that is asked about may be in another one.
 LoopAnswer LoopcloserCore::AdjustAfterLoop(const Keyframe& keyframe) {
   Begin(Step::kCorrect);
   adjustment_due_ = false;
-  LoopAnswer answer = AdjustGlobally(map_, keyframe, options_.correction, interrupt_);
+  const std::optional<Map::ResolvedPose> closed = map_.ResolvePose(*counters_.last_loop_keyframe);
+  if (!closed) return {};
+  LoopAnswer answer =
+      AdjustGlobally(map_, closed->map_id, keyframe.id.value, options_.correction, interrupt_);
   if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) ++counters_.global_adjustments;
   return answer;
 }

@@ -112,6 +112,7 @@ std::optional<Map::ResolvedPose> Map::ResolvePose(KeyframeId id) const {
       ResolvedPose pose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id, keyframe};
       for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
         pose.T_cam_world = pose.Compose((*link)->T_kf_parent, (*link)->parent_scale);
+        pose.scale /= (*link)->parent_scale;
       }
       return pose;
     }

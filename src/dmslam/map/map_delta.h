@@ -157,13 +157,14 @@ struct ObservationState {
   auto operator<=>(const ObservationState&) const = default;
 };
 
-/// A keyframe that is no more: where it stood, relative to the parent that takes its place.
+/// A keyframe that is no more: where it stood, relative to the parent that takes its place, in units of its
+/// own (its scale is 1 in them).
 struct KeyframeTombstone {
   KeyframeId id;
   KeyframeId parent;
   int64_t stamp_ns = 0;
   Rigid3d T_kf_parent;
-  double parent_scale = 1.0;  ///< the parent's scale when T_kf_parent was taken
+  double parent_scale = 1.0;  ///< the parent's scale in these units, when T_kf_parent was taken
 };
 
 struct LandmarkTombstone {

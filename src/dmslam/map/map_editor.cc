@@ -201,8 +201,9 @@ void MapEditor::RemoveKeyframe(const Keyframe& keyframe) {
       journal_.Note(other, KeyframeChange::kState);
     }
   }
-  Bury({id, parent->id, keyframe.stamp_ns, keyframe.T_cam_world * parent->T_cam_world.Inverse(),
-        parent->scale});
+  Rigid3d T_kf_parent = keyframe.T_cam_world * parent->T_cam_world.Inverse();
+  T_kf_parent.translation /= keyframe.scale;
+  Bury({id, parent->id, keyframe.stamp_ns, T_kf_parent, parent->scale / keyframe.scale});
   journal_.NoteTombstone(id);
   EraseKeyframe(id);
   journal_.Forget(id);

@@ -6,7 +6,8 @@
 namespace dmslam {
 namespace {
 
-constexpr size_t kRemembered = 1024;  // keyframes
+constexpr size_t kRemembered =
+    16384;  // keyframes, of which a third lives on; Newest() wants 500 of each camera
 
 }  // namespace
 

@@ -53,6 +53,12 @@ std::string_view ToString(CellState state) {
   return "unknown";
 }
 
+bool LiesWithinReach(const Eigen::Vector2d& uv_px, const Camera& camera, const InputOptions& options) {
+  const double outside = 0.5 + (camera.HasDistortion() ? options.outside_share * camera.width_px : 0.0);
+  return uv_px.x() >= -outside && uv_px.y() >= -outside && uv_px.x() <= camera.width_px - 1 + outside &&
+         uv_px.y() <= camera.height_px - 1 + outside;  // False for NaN.
+}
+
 std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const Camera& camera,
                                          const InputOptions& options) {
   const auto needed = static_cast<size_t>(std::max(8, options.min_matches));
@@ -60,11 +66,7 @@ std::optional<InputProblem> CheckMatches(std::span<const Match> matches, const C
     return InputProblem{Refusal::kTooFewMatches,
                         std::to_string(matches.size()) + " matches, " + std::to_string(needed) + " needed"};
   }
-  const double outside = 0.5 + (camera.HasDistortion() ? options.outside_share * camera.width_px : 0.0);
-  const auto inside = [&](const Eigen::Vector2d& uv) {
-    return uv.x() >= -outside && uv.y() >= -outside && uv.x() <= camera.width_px - 1 + outside &&
-           uv.y() <= camera.height_px - 1 + outside;  // False for NaN.
-  };
+  const auto inside = [&](const Eigen::Vector2d& uv_px) { return LiesWithinReach(uv_px, camera, options); };
   std::vector<double> displacement;
   displacement.reserve(matches.size());
   Eigen::AlignedBox2d extent;

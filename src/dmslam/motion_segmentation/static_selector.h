@@ -98,6 +98,9 @@ struct InputOptions {
   double outside_share = 0.5;
 };
 
+/// Whether an ideal pixel is finite and lies no farther outside the image than the options allow.
+bool LiesWithinReach(const Eigen::Vector2d& uv_px, const Camera& camera, const InputOptions& options);
+
 /// When a matched pair of points agrees with a model.
 struct InlierOptions {
   double chi2 = kRoundedChiSquared1Dof;  ///< bound on the squared Sampson distance in units of its variance

@@ -193,11 +193,11 @@ void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const FoundP
 
 void MotionModel::Coast(const Map& map, const FoundPose& found, const FrameTime& time) {
   if (!last_ || !IsWithin(Newest()->time, time, kKnownNs)) return;
-  const std::optional<PlacedPose> pose =
-      PlacedPose::Of(map.FindKeyframe(last_->pose.reference), found.T_cam_world);
-  if (!pose) return;
+  const std::optional<KeyframeId> reference = map.ResolveKeyframe(last_->pose.reference);
+  if (!reference) return;
+  const PlacedPose pose = PlacedPose::Of(map.At(*reference), found.T_cam_world);
   motion_ = MotionTo(map, found, time);
-  coasting_ = Pose{*pose, time};
+  coasting_ = Pose{pose, time};
   covariance_ = found.covariance;
 }
 

@@ -159,6 +159,23 @@ TEST_F(MotionModelTest, APlacedPoseOutlivesItsKeyframe) {
   EXPECT_LT((pose.In(map())->Center() - Eigen::Vector3d(0.3, 0, 0)).norm(), 1e-12);
 }
 
+/// Of a loop, a join or an adjustment each keyframe takes a scale of its own.
+TEST_F(MotionModelTest, APlacedPoseOutlivesAKeyframeOfAnotherScaleThanItsParents) {
+  map().SetPoseAndScale(map().At(Kf(1)), map().At(Kf(1)).T_cam_world, 0.8);
+  map().SetPoseAndScale(map().At(Kf(2)), map().At(Kf(2)).T_cam_world, 0.5);
+  const PlacedPose pose = PlacedPose::Of(map().At(Kf(2)), MapScene::PoseAt(0.3));
+  const auto scale_around = [&] { return map().ResolvePose(Kf(2))->scale; };
+  ASSERT_EQ(scale_around(), 0.5);
+  map().RemoveKeyframe(map().At(Kf(2)));
+  EXPECT_LT((pose.In(map())->Center() - Eigen::Vector3d(0.3, 0, 0)).norm(), 1e-12);
+  EXPECT_NEAR(scale_around(), 0.5, 1e-12);
+  // What became of the parent became of everything around it.
+  map().SetPoseAndScale(map().At(Kf(1)), map().At(Kf(1)).T_cam_world, 2.0);
+  EXPECT_NEAR(scale_around(), 1.0, 1e-12);
+  const double from_parent = 0.3 - map().At(Kf(1)).T_cam_world.Center().x();
+  EXPECT_NEAR(pose.In(map())->Center().x(), 0.3 + from_parent, 1e-12);
+}
+
 TEST_F(MotionModelTest, WhereNothingIsKnownOfTheReferenceThereIsNoPose) {
   EXPECT_FALSE(PlacedPose::Of(nullptr, Rigid3d()));
   PlacedPose pose = Placed(Rigid3d());

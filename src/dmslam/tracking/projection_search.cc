@@ -75,7 +75,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchKeyframe(const Map& map
         keyframe.landmarks[i].valid() ? map.FindLandmark(keyframe.landmarks[i]) : nullptr;
     if (landmark == nullptr || !votes.HasVote(*landmark)) continue;
     const std::optional<FeatureHit> hit =
-        FindFeature(features, middle_px, 2.0 * camera.width_px, 0, map.pyramid().levels,
+        FindFeature(features, middle_px, 2.0 * camera.width_px, 0, map.pyramid().NumLevels() - 1,
                     keyframe.features->set.descriptors[i], taken_, kMaxKeyframeSecond);
     if (!hit || hit->distance > kMaxKeyframeDistance) continue;
     if (hit->distance > kMaxKeyframeRatio * hit->second_distance) continue;

@@ -67,8 +67,13 @@ Tracker::Tracker(const Setup& setup)
       relocalizer_(setup.vocabulary),
       follower_(setup.options) {}
 
+/// What was believed or doubted of another map before says nothing of this one.
 void Tracker::BeginAt(const Keyframe& keyframe) {
   usual_speed_.Interrupt();
+  search_.Reset();
+  second_search_.Reset();
+  unbelieved_.reset();
+  relocalized_ns_.reset();
   follower_.BeginAt(keyframe, {keyframe.id.frame_index(), keyframe.stamp_ns});
 }
 

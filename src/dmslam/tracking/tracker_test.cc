@@ -170,6 +170,15 @@ TEST_F(Tracking, WhoHidesTheRoomIsNotTheRoom) {
   EXPECT_TRUE(Track(Frame(5, 0.0)).pose) << "it was followed meanwhile";
 }
 
+TEST_F(Tracking, WhatWasDoubtedIsNoConcernOfTheNextMap) {
+  for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
+  Track(Frame(4, 0.0, [](size_t i) { return !IsPerson(i); }));
+  ASSERT_TRUE(tracker_->IsUndecided());
+  tracker_->BeginAt(*scene_.map().FindKeyframe(KeyframeId::Make(MapScene::kSession, 0)));
+  EXPECT_FALSE(tracker_->IsUndecided());
+  EXPECT_TRUE(tracker_->TakeEvidence(0, 1).items.empty()) << "nor is what was seen of the landmarks there";
+}
+
 TEST_F(Tracking, WhoHidesTheRoomForLongIsFollowedNoFarther) {
   for (uint32_t frame = 1; frame < 4; ++frame) ASSERT_TRUE(Track(Frame(frame, 0.0)).pose);
   const std::optional<int64_t> believed_ns = tracker_->last_tracked_ns();
