@@ -65,10 +65,9 @@ void WriteGraph(const std::string& path, const Map& map) {
 
 /// Depth of the scene where a pose was told, by what its keyframe sees; 1 where nothing is left of that.
 double DepthAt(const Map& map, const FramePose& pose) {
-  const std::optional<KeyframeId> id = map.ResolveKeyframe(*pose.reference);
-  const Keyframe* keyframe = id ? map.FindKeyframe(*id) : nullptr;
-  if (keyframe == nullptr) return 1.0;
-  return map.MedianDepth(*keyframe).value_or(1.0) * pose.reference_scale / keyframe->scale;
+  const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*pose.reference);
+  if (!reference) return 1.0;
+  return map.MedianDepth(*reference->keyframe).value_or(1.0) * pose.reference_scale / reference->scale;
 }
 
 std::optional<Matrix6d> CovarianceOf(const std::vector<double>& upper) {

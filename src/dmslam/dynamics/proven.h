@@ -18,7 +18,7 @@ struct ProvenOptions {
 
 /// So many proven landmarks in view confirm a place.
 inline constexpr int kManyProven = 50;
-/// With fewer than that, in a map that is old enough to have some, nothing else confirms it.
+/// In a map that is old enough to have proven landmarks, time confirms only a place that shows this many.
 inline constexpr int kSomeProven = 8;
 
 /// Whether some of these sorted stamps lie outside any window as long as people stand.

@@ -38,9 +38,11 @@ std::vector<KeyframeId> InsertionOrder::Newest(const Map& map, MapId map_id, int
   std::vector<KeyframeId> newest;
   std::map<CameraId, int> taken;
   for (auto it = ids_.rbegin(); it != ids_.rend(); ++it) {
+    int& of_camera = taken[it->camera()];
+    if (of_camera == most) continue;
     const Keyframe* keyframe = map.FindKeyframe(*it);
-    if (keyframe == nullptr || keyframe->map_id != map_id || taken[it->camera()] == most) continue;
-    ++taken[it->camera()];
+    if (keyframe == nullptr || keyframe->map_id != map_id) continue;
+    ++of_camera;
     newest.push_back(*it);
   }
   return newest;

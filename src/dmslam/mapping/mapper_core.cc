@@ -240,11 +240,13 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   MapProgress progress = map_.progress();
   progress.corrected = map_.version() + 1;  // that of the record which says so
   map_.SetProgress(progress);
+  const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   const KeyframeId about = answer.seen_from.value_or(answer.keyframe);
-  const std::optional<Map::ResolvedPose> anchor = map_.ResolvePose(about);
+  // The keyframe that was asked about may be in another map than was adjusted.
+  const std::optional<Map::ResolvedPose> anchor =
+      map_.ResolvePose(loop ? about : answer.corrections.front().keyframe);
   if (anchor) as_saved_.erase(anchor->map_id);
   adjusted_ = false;  // a global adjustment too is composed with what has come since its base
-  const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, about,
           anchor ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id, answer.note);
 }

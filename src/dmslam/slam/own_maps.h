@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "dmslam/map/map.h"
+#include "dmslam/map/shared_map.h"
 
 namespace dmslam {
 
@@ -25,8 +26,11 @@ class OwnMaps {
   }
 
   void Drop(MapId map_id) { dropped_ = map_id; }
-  /// Whether the map that was dropped last is still there: the mapper has not heard of it yet.
-  bool HasDropped(const Map& map) const { return dropped_ && map.HasMap(*dropped_); }
+  /// Whether the map that was dropped last is still there: the mapper has not heard of it yet. Not where it
+  /// was joined with another meanwhile, and stays.
+  bool HasDropped(const Map& map) const {
+    return dropped_ && map.HasMap(*dropped_) && MayDrop(map, *dropped_, camera_);
+  }
 
  private:
   CameraId camera_;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <iterator>
+
 #include "dmslam/camera/testing/test_camera.h"
 #include "dmslam/map/map_editor.h"
 
@@ -45,6 +47,16 @@ TEST_F(OwnMapsTest, AMapThatWasDroppedIsThereUntilTheMapperHasHeardOfIt) {
   maps.Drop(1);
   EXPECT_TRUE(maps.HasDropped(map_));
   map_.DropMap(1);
+  EXPECT_FALSE(maps.HasDropped(map_));
+}
+
+TEST_F(OwnMapsTest, AMapThatWasJoinedBeforeTheMapperHeardOfItStays) {
+  OwnMaps maps(0);
+  for (const uint32_t frame : {1U, 2U}) AddKeyframe(1, frame);
+  maps.Drop(1);
+  ASSERT_TRUE(maps.HasDropped(map_));
+  const auto first = map_.keyframes().begin();
+  map_.AddLoopEdge(first->second, std::next(first)->second);
   EXPECT_FALSE(maps.HasDropped(map_));
 }
 

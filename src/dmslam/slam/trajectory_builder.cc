@@ -97,7 +97,8 @@ bool TrajectoryBuilder::Bridge(FramePose* pose) const {
   const FramePose& reference = frame->second;
   if (reference.map_id != pose->map_id) return false;  // its units are others
   Rigid3d T_cam_lost = pose->T_cam_reference;
-  T_cam_lost.translation /= pose->reference_scale;  // to the units in which the lost one was placed
+  // To the units in which the lost one was placed: a keyframe begins with its reference's scale.
+  T_cam_lost.translation *= reference.reference_scale / pose->reference_scale;
   pose->T_cam_reference = T_cam_lost * reference.T_cam_reference;
   pose->reference = reference.reference;
   pose->reference_scale = reference.reference_scale;

@@ -115,6 +115,24 @@ TEST_F(TrajectoryOfTwoMaps, FramesOfLostKeyframesAreToldOverTheFramesThatBecameT
   EXPECT_NEAR(built.final[2].T_world_cam.translation.x(), -9.5, 1e-12);
 }
 
+/// Frame 40 was told when keyframe 0 had half of its present scale, and the keyframe that it became began
+/// with that.
+TEST_F(TrajectoryOfTwoMaps, ALostKeyframeBeganWithTheScaleOfItsReference) {
+  for (const uint32_t frame : {40U, 41U}) {
+    FramePose pose = PoseIn(2, TrackingState::kTracking, 1.0);
+    pose.frame_index = frame;
+    pose.stamp_ns = frame;
+    pose.reference = KeyframeId::Make(1, frame == 40 ? 0 : 40);
+    pose.reference_scale = 0.5;
+    builder_.OnFramePose(pose);
+  }
+  builder_.BridgeLostKeyframes();
+  const TrajectoryBuilder::Trajectories built = builder_.Build();
+  ASSERT_EQ(built.final.size(), 2U);
+  const double step = built.final[1].T_world_cam.translation.x() - built.final[0].T_world_cam.translation.x();
+  EXPECT_NEAR(std::abs(step), 2.0, 1e-12) << "one unit of that time is two now";
+}
+
 TEST_F(TrajectoryOfTwoMaps, FramesToldOverOneAnotherStayWithoutAPlace) {
   for (const uint32_t frame : {10U, 11U}) {
     FramePose pose = PoseIn(2, TrackingState::kTracking, 1.0);
