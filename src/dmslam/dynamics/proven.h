@@ -18,7 +18,8 @@ struct ProvenOptions {
 
 /// So many proven landmarks in view confirm a place.
 inline constexpr int kManyProven = 50;
-/// In a map that is old enough to have proven landmarks, time confirms only a place that shows this many.
+/// In a map that is old enough to have proven landmarks, neither time nor the motion confirms a place that
+/// shows fewer.
 inline constexpr int kSomeProven = 8;
 
 /// Whether some of these sorted stamps lie outside any window as long as people stand.

@@ -286,8 +286,9 @@ ReferenceView Initializer::Impl::MakeView(const ReferenceWindow& window,
   if (IsCompact(view.pair.matches, options_.agreement.min_distribution_share * DiagonalPx(camera_)))
     AddMatchesInPlace(features0, *frame.features, camera_, options_.matching, &matcher, &view.pair.matches);
   // At the rim of a wide lens ideal pixels lie so far out that no selector takes them.
+  const InputOptions& input = options_.selector.input;
   std::erase_if(view.pair.matches, [&](const Match& match) {
-    return !LiesWithinReach(match.uv0_px, camera_, {}) || !LiesWithinReach(match.uv1_px, camera_, {});
+    return !LiesWithinReach(match.uv0_px, camera_, input) || !LiesWithinReach(match.uv1_px, camera_, input);
   });
   view.R_k_0 = FitTurn(view.pair.matches, camera_, R_k_0);
   view.moved = MedianDisplacement(view.pair.matches) >= options_.min_displacement_rad * FocalPx(camera_);

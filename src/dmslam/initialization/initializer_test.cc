@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <utility>
 
 #include "dmslam/initialization/initial_map.h"
@@ -173,6 +174,32 @@ TEST(Initializer, MapsTheRoomAndNotTheWalker) {
     ASSERT_TRUE(uv.has_value());
     EXPECT_LT((*uv - map->frame0.features->uv_px[point.feature0]).norm(), 4.0);
   }
+}
+
+/// Ideal pixels of what a wide lens shows at its rim.
+TEST(Initializer, WhatLiesFarOutsideTheIdealImageIsLeftOut) {
+  Camera camera = SyntheticCamera();
+  camera.k1 = 1e-9;
+  const SyntheticRoom room(600, 0, 7, camera);
+  Initializer initializer({}, camera, 1);
+  std::optional<FirstMap> map;
+  for (uint32_t index = 0; index < 60 && !map; ++index) {
+    InitializerFrame frame = room.Frame(index);
+    auto features = std::make_shared<FrameFeatures>(*frame.features);
+    Random random(11);  // the same in each frame
+    for (int k = 0; k < 40; ++k) {
+      features->set.keypoints.push_back({16, static_cast<uint16_t>(16 * 10 * k)});
+      features->set.descriptors.push_back({{random.Next(), random.Next(), random.Next(), random.Next()}});
+      features->uv_px.emplace_back(-1.2 * camera.width_px, 10.0 * k);
+    }
+    features->grid.Build(features->uv_px, features->set.keypoints, camera.width_px, camera.height_px);
+    frame.features = features;
+    InitializerReport report = initializer.AddFrame(frame);
+    EXPECT_EQ(report.reason.find("outside the image"), std::string::npos) << index << ": " << report.reason;
+    map = std::move(report.result);
+  }
+  ASSERT_TRUE(map);
+  EXPECT_GE(map->points.size(), 80U);
 }
 
 /// The turn by which features are looked for is then the walker's, and the room is not where it would bring
