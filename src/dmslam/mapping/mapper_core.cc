@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "dmslam/dynamics/seen_through.h"
-#include "dmslam/map/shared_map.h"
+#include "dmslam/map/may_drop.h"
 #include "dmslam/mapping/correction.h"
 #include "dmslam/mapping/culling.h"
 #include "dmslam/mapping/first_map.h"

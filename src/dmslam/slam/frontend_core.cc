@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "dmslam/map/shared_map.h"
+#include "dmslam/map/may_drop.h"
 #include "dmslam/tracking/keyframe_policy.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/time.h"

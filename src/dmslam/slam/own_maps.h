@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "dmslam/map/map.h"
-#include "dmslam/map/shared_map.h"
+#include "dmslam/map/may_drop.h"
 
 namespace dmslam {
 

@@ -1,4 +1,4 @@
-#include "dmslam/map/shared_map.h"
+#include "dmslam/map/may_drop.h"
 
 #include <gtest/gtest.h>
 
