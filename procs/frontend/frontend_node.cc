@@ -48,6 +48,9 @@ void FrontendNode::Begin(const CameraInfo& info) {
     };
   }
   setup.catch_up_in_portions = !lockstep;
+  remembered_.emplace(extras_.frame_memory, session_, options_.camera_id);
+  if (!extras_.frame_memory.empty())
+    setup.remember = [this](const RememberedFrame& frame) { remembered_->Add(frame); };
   work_ = std::make_unique<FrontendWork>(setup, MakeCoreThread(info.mode));
   left_.emplace(session_, options_.camera_id);
   map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
@@ -298,6 +301,7 @@ bool FrontendNode::WorkAtEnd() {
 /// True: the phase is done.
 bool FrontendNode::WorkOn(SequenceEnd::Phase phase) {
   work_->Run([this, phase] {
+    remembered_->TakeOver(&core());
     const auto worked = std::make_shared<const SequenceEnd::Worked>(SequenceEnd::Work(phase, &core()));
     work_->Report([this, phase, worked] { OnWorked(phase, *worked); });
   });
@@ -337,6 +341,7 @@ bool FrontendNode::TellLastPoses() {
   if (!last_words_.AreTold()) return false;
   end_.OnTold();
   if (end_.HandsOver()) return true;
+  remembered_->Remove();
   PublishSequenceDone();
   PublishStatus();
   writer_->Complete(context_.now_ns());

@@ -24,6 +24,7 @@
 #include "frontend/other_models.h"
 #include "frontend/pose_report.h"
 #include "frontend/refused_images.h"
+#include "frontend/remembered_frames.h"
 #include "frontend/unaccepted_keyframes.h"
 
 namespace dmslam {
@@ -105,7 +106,8 @@ class FrontendNode : public StreamNode {
   PoseReport pose_;
   FrameTiming timing_;
   std::shared_ptr<WorkSign> search_sign_ = std::make_shared<WorkSign>();  ///< of the search for a first map
-  std::unique_ptr<FrontendWork> work_;  ///< ends before everything that jobs touch
+  std::optional<RememberedFrames> remembered_;  ///< on the core, or while there is no job
+  std::unique_ptr<FrontendWork> work_;          ///< ends before everything that jobs touch
 };
 
 }  // namespace dmslam

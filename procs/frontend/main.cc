@@ -10,6 +10,9 @@ int main(int argc, char** argv) {
   process.app().AddOption("--vocabulary", vocabulary, "bag-of-words vocabulary; default: the one that ships");
   process.app().AddOption("--picture-dir", extras.picture_dir, "folder for pictures of the features");
   process.app().AddOption("--picture-every", extras.picture_every, "draw every Nth frame");
+  process.app().AddOption("--frame-memory", extras.frame_memory,
+                          "folder where frames wait for their last poses, so that a frontend that is started "
+                          "again has them (on a disk; some 200 MB a camera); default: they die with it");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, const dmslam::NodeOptions& options) {
     extras.vocabulary = dmslam::LoadVocabulary(vocabulary);
     return dmslam::MakeFrontend(std::move(context), options, extras);

@@ -15,6 +15,7 @@ struct FrontendExtras {
   std::shared_ptr<const Vocabulary> vocabulary;
   std::string picture_dir;  ///< empty: no pictures
   int picture_every = 0;    ///< every Nth frame
+  std::string frame_memory;  ///< folder of the frames that wait for their last poses; empty: they die with it
 };
 
 /// A `FrontendNode`, for those who only run one: its own header is much to compile.

@@ -277,7 +277,7 @@ class SimulatedSystem {
     const NodeOptions options = OptionsFor(*process);
     if (process->role == "mapper") return MakeMapper(context, options, {"", "", CheckpointPath(folder_)});
     if (process->role == "loopcloser") return MakeLoopcloser(context, options, workload_.vocabulary);
-    if (process->role == "frontend") return MakeFrontend(context, options, {workload_.vocabulary, "", 0});
+    if (process->role == "frontend") return MakeFrontend(context, options, {workload_.vocabulary, "", 0, ""});
     if (process->role == "collector") {
       CollectorOptions collector;
       collector.out_dir = folder_;

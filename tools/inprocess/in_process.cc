@@ -138,7 +138,7 @@ int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, 
   System system;
   AddMapSide(&options, &system);
   system.Add(MakeFrontend(system.ContextFor(roles::kFrontend), options.node,
-                          {options.vocabulary, options.picture_dir, options.picture_every}));
+                          {options.vocabulary, options.picture_dir, options.picture_every, ""}));
   system.Add(
       std::make_unique<PlayerNode>(system.ContextFor(roles::kPlayer), options.player, std::move(source)));
   for (AnotherCamera& other : others) {
@@ -147,7 +147,7 @@ int RunInProcess(InProcessOptions options, std::unique_ptr<FrameSource> source, 
     other.player.mode = PlaybackMode::kLockstep;
     other.player.session = options.player.session;
     system.Add(MakeFrontend(system.ContextFor(OfCamera(roles::kFrontend, node.camera_id)), node,
-                            {options.vocabulary, "", 0}));
+                            {options.vocabulary, "", 0, ""}));
     system.Add(std::make_unique<PlayerNode>(system.ContextFor(OfCamera(roles::kPlayer, node.camera_id)),
                                             other.player, std::move(other.source)));
   }

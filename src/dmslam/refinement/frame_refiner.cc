@@ -35,12 +35,29 @@ bool IsAside(const Map& map, const Keyframe& reference, const FramePose& pose, c
 
 }  // namespace
 
-void FrameRefiner::Keep(const TrackedFrame& frame, const FramePose& pose) {
+FrameRefiner::Kept FrameRefiner::ToKept(const TrackedFrame& frame, const FramePose& pose) {
   Kept kept{pose, SightsOf(frame), frame.features->set};
   kept.sights.shrink_to_fit();  // they stay for long
+  return kept;
+}
+
+void FrameRefiner::Keep(const TrackedFrame& frame, const FramePose& pose) {
+  Kept kept = ToKept(frame, pose);
   num_features_ += kept.features.keypoints.size();
   frames_.push_back(std::move(kept));
   Bound();
+}
+
+void FrameRefiner::KeepEarlier(const TrackedFrame& frame, const FramePose& pose) {
+  if (frames_.size() >= options_.max_frames) return;
+  Kept kept = ToKept(frame, pose);
+  const size_t features = kept.features.keypoints.size();
+  if (num_without_features_ > 0 || num_features_ + features > options_.max_features) {
+    kept.features = FeatureSet();
+    ++num_without_features_;
+  }
+  num_features_ += kept.features.keypoints.size();
+  frames_.push_front(std::move(kept));
 }
 
 void FrameRefiner::Bound() {

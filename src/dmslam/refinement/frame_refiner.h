@@ -42,6 +42,8 @@ class FrameRefiner {
 
   /// Keeps a tracked frame and the pose that was told of it.
   void Keep(const TrackedFrame& frame, const FramePose& pose);
+  /// The same of a frame before all that are kept, as far as there is room for it.
+  void KeepEarlier(const TrackedFrame& frame, const FramePose& pose);
 
   /// Gives back the frames that were tracked in map `map_id`, which was wrong, as far as their features are
   /// kept.
@@ -79,6 +81,7 @@ class FrameRefiner {
     std::vector<Sight> known;          ///< what it saw when it was tracked, and is in the map now
     std::optional<FinalPose> refined;  ///< none: it does not agree with the map
   };
+  static Kept ToKept(const TrackedFrame& frame, const FramePose& pose);
   void Bound();
   void CountFeatures();
   std::optional<Looked> Look(const Map& map, const Kept& kept, const Search& search) const;

@@ -41,6 +41,11 @@ void LastPoses::Keep(const TrackedFrame& frame, const FramePose& pose) {
   if (tracked_.size() > max_frames_) tracked_.pop_front();
 }
 
+void LastPoses::KeepEarlier(const TrackedFrame& frame, const FramePose& pose) {
+  refiner_.KeepEarlier(frame, pose);
+  if (tracked_.size() < max_frames_) tracked_.push_front(PlaceOf(pose));
+}
+
 void LastPoses::KeepPlaced(const TrackedFrame& frame, const FramePose& pose, bool vouches) {
   refiner_.Keep(frame, pose);
   if (vouches) placed_.push_back(PlaceOf(pose));

@@ -24,6 +24,8 @@ class LastPoses {
 
   /// Keeps a tracked frame and the pose that was told of it. It vouches for frames near it in time.
   void Keep(const TrackedFrame& frame, const FramePose& pose);
+  /// The same of a frame before all that are kept, as far as there is room for it.
+  void KeepEarlier(const TrackedFrame& frame, const FramePose& pose);
   /// Keeps a frame that was placed when the sequence has ended. `vouches`: as a tracked one does.
   void KeepPlaced(const TrackedFrame& frame, const FramePose& pose, bool vouches);
   /// Where the camera was in the frame just before `index`, if that was tracked in that map as it came.

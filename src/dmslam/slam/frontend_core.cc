@@ -48,6 +48,7 @@ FrontendCore::FrontendCore(const Setup& setup)
       camera_id_(setup.camera_id),
       localize_only_(setup.localize_only),
       catch_up_in_portions_(setup.catch_up_in_portions),
+      remember_(setup.remember),
       map_(setup.camera, setup.pyramid),
       own_maps_(setup.camera_id),
       features_(setup.extractor, setup.options.initializer_feature_factor),
@@ -86,6 +87,26 @@ void FrontendCore::Resume() {
   phase_.BeginLost();
   map_id_ = own != nullptr ? own->map_id : map_.keyframes().rbegin()->second.map_id;
   if (own != nullptr) gate_.ContinueAfter(own->stamp_ns);
+}
+
+/// One that became a keyframe has its pose by that; one whose map was given up waits for a pose again.
+void FrontendCore::TakeOver(RememberedFrame remembered) {
+  KeyframeProposal& seen = remembered.seen;
+  TrackedFrame frame(seen.id.frame_index(), seen.stamp_ns,
+                     MakeFrameFeatures(std::move(seen.features), camera_, pyramid_));
+  for (const KeyframeProposal::Match& match : seen.matches) {
+    frame.landmarks[match.feature] = match.landmark;
+    frame.classes[match.feature] = FeatureClass::kUsed;
+  }
+  const std::optional<FramePose>& pose = remembered.pose;
+  if (pose && pose->HasPose() && map_.ResolvePose(*pose->reference))
+    return last_poses_.KeepEarlier(frame, *pose);
+  if (!map_.ResolvePose(KeyframeIdOf(frame))) unplaced_.PutBack({WaitingFrame(frame)});
+}
+
+void FrontendCore::KeepUnplaced(const TrackedFrame& frame) {
+  unplaced_.Keep(WaitingFrame(frame));
+  if (remember_) remember_({SeenBy(frame), std::nullopt});
 }
 
 void FrontendCore::ForgetMap() {
@@ -171,7 +192,7 @@ FrontendOutput FrontendCore::Initialize() {
   if (std::optional<FrontendOutput> found = FindAgain()) return std::move(*found);
   FrontendOutput output;
   FollowTurn(frame_);
-  unplaced_.Keep(WaitingFrame(frame_));
+  KeepUnplaced(frame_);
   FirstMapPhase::Answer answer = first_map_.AddFrame(frame_, session_, camera_id_, *map_id_);
   if (answer.proposal) {
     const KeyframeProposal& second = answer.proposal->second;
@@ -188,7 +209,7 @@ FrontendOutput FrontendCore::AwaitMap() {
   FrontendOutput output;
   const Keyframe* second = map_.FindKeyframe(phase_.awaited_second().value());
   if (second == nullptr) {
-    unplaced_.Keep(WaitingFrame(frame_));
+    KeepUnplaced(frame_);
     // A mapper that was started again may have settled it without a word.
     if (phase_.IsRefused() || !awaited()) output = GiveUpRefusedMap();
     output.Add(NoPose(frame_, phase_.state(), "waiting for the mapper to answer the first map"));
@@ -218,6 +239,7 @@ void FrontendCore::BeginTrial(const Keyframe& second) {
 
 FrontendOutput FrontendCore::AwaitTurn() {
   behind_.emplace_back(frame_);
+  if (remember_) remember_({SeenBy(frame_), std::nullopt});
   FrontendOutput output;
   output.Add(
       NoPose(frame_, TrackingState::kWaitingForMap, "frames that waited for the first map come first"));
@@ -265,6 +287,7 @@ FrontendOutput FrontendCore::OnTracked(const TrackedFrame& frame, const Tracking
                   &output);
   FramePose told = MakePose(frame, phase_.state(), report, pose);
   last_poses_.Keep(frame, told);
+  if (remember_) remember_({SeenBy(frame), told});
   if (result.certainty) TellCertainty(*result.certainty, &told);
   output.Add(std::move(told));
   return output;
@@ -279,7 +302,7 @@ void FrontendCore::FollowTurn(const TrackedFrame& frame) {
 FrontendOutput FrontendCore::OnNotTracked(const TrackedFrame& frame, const TrackingReport& report) {
   FrontendOutput output;
   FollowTurn(frame);
-  unplaced_.Keep(WaitingFrame(frame));
+  KeepUnplaced(frame);
   if (phase_.IsTrial() && report.outcome == TrackingReport::Outcome::kContradicted) {
     output = GiveUpMap(frame.stamp_ns, MapReset::Fate::kDrop,
                        std::string("the first map does not predict the next frames: ") + report.reason);
@@ -360,26 +383,33 @@ void FrontendCore::ReportLandmarks(const TrackedFrame& frame, const PlacedPose& 
 
 KeyframeProposal FrontendCore::ProposeKeyframe(const TrackedFrame& frame, const PlacedPose& pose) {
   DMSLAM_CHECK(map_id_.has_value(), "a keyframe without a map");
-  KeyframeProposal proposal;
-  proposal.id = KeyframeIdOf(frame);
-  proposal.camera_id = camera_id_;
+  KeyframeProposal proposal = SeenBy(frame);
   proposal.map_id = *map_id_;
-  proposal.stamp_ns = frame.stamp_ns;
   proposal.reference = pose.reference;
   proposal.T_cam_reference = pose.T_cam_reference;
   proposal.reference_scale = pose.scale;
-  proposal.features = frame.features->set;
-  for (size_t i = 0; i < frame.classes.size(); ++i) {
-    const uint16_t feature = static_cast<uint16_t>(i);
-    if (frame.classes[i] == FeatureClass::kUsed && frame.landmarks[i].valid()) {
-      proposal.matches.push_back({feature, frame.landmarks[i]});
-    } else if (frame.classes[i] == FeatureClass::kMoving) {
-      proposal.moving.push_back(feature);
-    }
-  }
   gate_.OnProposed(proposal.id, proposal.stamp_ns);
   ++counters_.keyframes_proposed;
   return proposal;
+}
+
+/// As a keyframe without a pose.
+KeyframeProposal FrontendCore::SeenBy(const TrackedFrame& frame) const {
+  KeyframeProposal seen;
+  seen.id = KeyframeIdOf(frame);
+  seen.camera_id = camera_id_;
+  seen.map_id = map_id_.value_or(MapId{1});
+  seen.stamp_ns = frame.stamp_ns;
+  seen.features = frame.features->set;
+  for (size_t i = 0; i < frame.classes.size(); ++i) {
+    const uint16_t feature = static_cast<uint16_t>(i);
+    if (frame.classes[i] == FeatureClass::kUsed && frame.landmarks[i].valid()) {
+      seen.matches.push_back({feature, frame.landmarks[i]});
+    } else if (frame.classes[i] == FeatureClass::kMoving) {
+      seen.moving.push_back(feature);
+    }
+  }
+  return seen;
 }
 
 // ---- After the end ----

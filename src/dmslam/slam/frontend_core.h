@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "dmslam/map/remembered_frame.h"
 #include "dmslam/map/replica.h"
 #include "dmslam/refinement/last_poses.h"
 #include "dmslam/refinement/late_placement.h"
@@ -49,6 +50,9 @@ class FrontendCore {
     std::shared_ptr<const Vocabulary>
         vocabulary;  ///< for relocalisation; without one only the newest places are tried
     std::shared_ptr<FeatureStore> feature_store;  ///< of the map; null: all of it stays in memory
+    /// Hears of each frame whose last pose is still to be found, and again when more is known of it; may be
+    /// empty.
+    std::function<void(const RememberedFrame&)> remember;
   };
   explicit FrontendCore(const Setup& setup);
 
@@ -79,6 +83,9 @@ class FrontendCore {
 
   // ---- When it has ended, step by step ----
 
+  /// 0. A frame that a frontend before this one has left: its last pose is found as if it were an own one.
+  /// The newest of them first.
+  void TakeOver(RememberedFrame frame);
   /// 1. Before the mapper adjusts its maps: places one of the frames that had no pose when they came, the
   /// newest first, and proposes it as a keyframe where it shows more of the scene than the map has. So the
   /// map grows back to before its first keyframe. Not while a keyframe is awaited. None: nothing is left.
@@ -134,6 +141,8 @@ class FrontendCore {
     return KeyframeId::Make(session_, frame.index, camera_id_);
   }
   KeyframeProposal ProposeKeyframe(const TrackedFrame& frame, const PlacedPose& pose);
+  KeyframeProposal SeenBy(const TrackedFrame& frame) const;
+  void KeepUnplaced(const TrackedFrame& frame);
   FramePose NoPose(const TrackedFrame& frame, TrackingState state, std::string reason) const;
   FramePose MakePose(const TrackedFrame& frame, TrackingState state, const TrackingReport& report,
                      const std::optional<PlacedPose>& pose) const;
@@ -149,6 +158,7 @@ class FrontendCore {
   CameraId camera_id_;
   bool localize_only_;
   bool catch_up_in_portions_;
+  std::function<void(const RememberedFrame&)> remember_;
 
   // The map and where tracking stands
   Replica map_;

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <variant>
@@ -31,15 +33,14 @@ class Phases : public ::testing::Test {
   explicit Phases(const std::function<void(FrontendCore::Setup&)>& change = {}) {
     scene_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
     strange_.AddCloud(kPoints, {0, 0, 4}, {1.6, 1.2, 0.5});
-    FrontendCore::Setup setup;
-    setup.camera = TestCamera();
-    setup.extractor.num_features = 1000;  // of which a lit frame has a tenth
-    setup.options.keyframes_at_end = true;
-    setup.run_search = [this](const FirstMapSearch&) {
+    setup_.camera = TestCamera();
+    setup_.extractor.num_features = 1000;  // of which a lit frame has a tenth
+    setup_.options.keyframes_at_end = true;
+    setup_.run_search = [this](const FirstMapSearch&) {
       return [this](const InitializerFrame& frame) { return Search(frame); };
     };
-    if (change) change(setup);
-    core_.emplace(setup);
+    if (change) change(setup_);
+    core_.emplace(setup_);
   }
 
   static std::shared_ptr<const Vocabulary> ShippedVocabulary() {
@@ -114,6 +115,7 @@ class Phases : public ::testing::Test {
   MapScene scene_, strange_{77};
   bool finds_map_ = false;
   std::optional<InitializerFrame> first_;
+  FrontendCore::Setup setup_;
   std::optional<FrontendCore> core_;
 };
 
@@ -201,6 +203,71 @@ TEST_F(Resuming, OfSeveralMapsItTakesThatOfItsOwnNewestKeyframe) {
 TEST_F(Resuming, OneWithoutAKeyframeTakesTheNewestMap) {
   AddKeyframe(1);
   EXPECT_EQ(MapAfterResume(), 7u);
+}
+
+/// Frames 0 to 19 are a frontend's that then dies; another one has the map, and what was remembered.
+class Killed : public Phases {
+ protected:
+  Killed() {
+    setup_.remember = [this](const RememberedFrame& frame) {
+      remembered_.insert_or_assign(frame.seen.id.frame_index(), frame);
+    };
+    core_.emplace(setup_);
+    Propose();
+    finds_map_ = false;
+    scene_.MapAll(2);
+    map_ = scene_.map().TakeDelta(MapEvent::kMapStarted, KeyframeId::Make(1, 1), 1);
+    map_.progress.settled = KeyframeId::Make(1, 1);
+    core_->ApplyMapDelta(map_);
+    for (uint32_t frame = 2; frame < 20; ++frame) Frame(frame, frame == kBlind);
+    core_.emplace(setup_);
+    core_->ApplyMapDelta(map_);
+    core_->Resume();
+  }
+  void TakeOver() {
+    for (auto next = remembered_.rbegin(); next != remembered_.rend(); ++next) core_->TakeOver(next->second);
+  }
+  /// Frames that have a pose in the end.
+  std::set<uint32_t> Told() {
+    std::set<uint32_t> told;
+    const auto note = [&](const FrontendOutput& output) {
+      for (const FrontendEvent& event : output.events) {
+        const auto* pose = std::get_if<FramePose>(&event);
+        if (pose != nullptr && pose->HasPose()) told.insert(pose->frame_index);
+      }
+    };
+    while (const auto output = core_->GrowBack()) note(*output);
+    core_->RefineRest();
+    while (core_->IsRefining()) core_->RefineNext();
+    while (core_->WorkAtEnd()) {
+    }
+    note(core_->Finish());
+    return told;
+  }
+
+  static constexpr uint32_t kBlind = 10;
+  std::map<uint32_t, RememberedFrame> remembered_;
+  MapDelta map_;
+};
+
+TEST_F(Killed, ItsFramesAreForgottenWhereNobodyRemembersThem) { EXPECT_TRUE(Told().empty()); }
+
+TEST_F(Killed, ItsFramesGetTheirLastPoses) {
+  EXPECT_EQ(remembered_.size(), 20u);
+  EXPECT_FALSE(remembered_.at(kBlind).pose);
+  ASSERT_TRUE(remembered_.at(5).pose);
+  EXPECT_GT(remembered_.at(5).seen.matches.size(), 100u);
+  TakeOver();
+  const std::set<uint32_t> told = Told();
+  for (uint32_t frame = 2; frame < 20; ++frame) EXPECT_EQ(told.contains(frame), frame != kBlind) << frame;
+}
+
+TEST_F(Killed, WhatHasNoPoseInTheMapIsLookedForAgain) {
+  remembered_.at(7).pose->reference = KeyframeId::Make(1, 900);  // of a map that is no more
+  TakeOver();
+  int looked_for = 0;
+  while (core_->GrowBack()) ++looked_for;
+  EXPECT_EQ(looked_for, 2) << "that one and the blind one, but not the keyframes";
 }
 
 /// One that begins in a map that was saved.
