@@ -3,13 +3,18 @@
 #include <utility>
 
 #include "dmslam/console/log.h"
-#include "dmslam/refinement/frame_refiner.h"
 #include "dmslam/util/check.h"
 
 namespace dmslam {
+namespace {
+
+// Of each of two files: as many features as FrameRefiner keeps, of 43 bytes each.
+constexpr size_t kMostBytes = 128UL << 20;
+
+}  // namespace
 
 RememberedFrames::RememberedFrames(const std::string& folder, uint32_t session, CameraId camera) {
-  if (!folder.empty()) memory_.emplace(folder, session, camera, kFramesRemembered);
+  if (!folder.empty()) memory_.emplace(folder, session, camera, kMostBytes);
 }
 
 void RememberedFrames::Open(uint32_t first) {
@@ -45,9 +50,10 @@ void RememberedFrames::Remove() {
   memory_.reset();
 }
 
-void RememberedFrames::GiveUp(const std::string& why) {
-  LogWarning("frontend: {}; frames die with this process from now on", why);
+/// The room on the disk is for others, the log among them.
+void RememberedFrames::GiveUp(std::string why) {
   Remove();
+  LogWarning("frontend: {}; frames die with this process from now on", std::move(why));
 }
 
 }  // namespace dmslam

@@ -237,7 +237,8 @@ ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Word
 
 ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = WithVocabulary(a, common);
-  Append(&words, {"--frame-memory", place.out + "/frames"});
+  // In real time no frame is to wait for a disk.
+  if (a.pace.lockstep) Append(&words, {"--frame-memory", place.out + "/frames"});
   if (a.output.pictures != "0") {
     fs::create_directories(place.out + "/pictures");
     Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.output.pictures});

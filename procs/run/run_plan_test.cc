@@ -168,6 +168,9 @@ TEST_F(RunPlanTest, SaysTheSameToAllAndTheRestToWhomItConcerns) {
   EXPECT_NE(Line("mapper").find("--save-map map.log "), std::string::npos);
   EXPECT_NE(Line("collector").find("--ground-truth "), std::string::npos);
   EXPECT_EQ(Line("frontend").find("--lockstep"), std::string::npos);
+  EXPECT_NE(Line("frontend").find("--frame-memory "), std::string::npos);
+  arguments_.pace.lockstep = false;
+  EXPECT_EQ(Line("frontend").find("--frame-memory "), std::string::npos) << "no frame waits for a disk";
 }
 
 TEST_F(RunPlanTest, AVocabularyIsHandedToThoseWhoKnowPlaces) {

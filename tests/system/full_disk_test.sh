@@ -12,12 +12,18 @@ trap 'umount -l "$work/disk" 2>/dev/null; cleanup' EXIT
 mount -t tmpfs -o size=6m none "$work/disk" 2>/dev/null || { echo "SKIPPED: no tmpfs can be mounted"; exit $SKIPPED; }
 arguments=(--sequence "$synthetic" --camera "$root/config/synthetic.yaml" --lockstep --seed 1 --out "$work/disk/out")
 
+fill() { head -c 8000000 /dev/zero >>"$work/disk/filler" 2>/dev/null; }
 begin() { # a run, until its collector has seen some frames and the disk is full
   rm -rf "$work/disk/out" "$work/disk/filler"
   "$root/scripts/run.sh" --build-dir "$build" "${arguments[@]}" >"$work/said" 2>&1 </dev/null &
   runner=$!
   until grep -qs "frame [0-9]* of" "$work/disk/out/log/collector.log" || ! kill -0 "$runner" 2>/dev/null; do sleep 0.05; done
-  head -c 8000000 /dev/zero >"$work/disk/filler" 2>/dev/null
+  fill
+  # The frontend forgets its frames, and gives back what room they took.
+  until grep -qs "No space left.*frames die with this process" "$work/disk/out/log/frontend.log" || ! kill -0 "$runner" 2>/dev/null; do
+    sleep 0.05
+  done
+  fill
 }
 journal() { stat -c %s "$work/disk/out/collector.journal" 2>/dev/null || echo 0; }
 

@@ -72,7 +72,7 @@ Frames ReadFile(const std::string& path, uint32_t session, uint32_t end) {
 /// Of the frames in a file; none where there is none.
 struct FrameRange {
   std::optional<uint32_t> first, last;
-  size_t count = 0;
+  size_t bytes = 0;
 };
 FrameRange RangeIn(const std::string& path, uint32_t session) {
   FrameRange range;
@@ -81,18 +81,18 @@ FrameRange RangeIn(const std::string& path, uint32_t session) {
     if (!index) return;
     range.first = std::min(range.first.value_or(*index), *index);
     range.last = std::max(range.last.value_or(*index), *index);
-    ++range.count;
+    range.bytes += text.size();
   });
   return range;
 }
 
 }  // namespace
 
-FrameMemory::FrameMemory(std::string folder, uint32_t session, CameraId camera, size_t max_frames)
+FrameMemory::FrameMemory(std::string folder, uint32_t session, CameraId camera, size_t max_bytes)
     : folder_(std::move(folder)),
       session_(session),
       camera_(camera),
-      max_frames_(max_frames),
+      max_bytes_(max_bytes),
       paths_{PathOf(folder_, session, camera, "-a"), PathOf(folder_, session, camera, "-b")},
       journals_{Journal(paths_[0]), Journal(paths_[1])} {}
 
@@ -106,19 +106,20 @@ void FrameMemory::Open(uint32_t first) {
       there, [&](const FrameRange& range) { return range.first && *range.first < first; });
   if (!useful) RemoveFrames();
   current_ = useful && there[1].last > there[0].last ? 1 : 0;
-  written_ = useful ? there[current_].count : 0;
+  written_ = useful ? there[current_].bytes : 0;
   journals_[current_].Resume(session_, {});
 }
 
 void FrameMemory::Add(const RememberedFrame& frame) {
-  if (written_ >= max_frames_) {
+  if (written_ >= max_bytes_) {
     current_ = 1 - current_;
     journals_[current_].Remove();
     journals_[current_].Begin(session_);
     written_ = 0;
   }
-  journals_[current_].AppendNote(Encode(frame));
-  ++written_;
+  const std::string text = Encode(frame);
+  journals_[current_].AppendNote(text);
+  written_ += text.size();
 }
 
 void FrameMemory::ForEach(uint32_t end, const std::function<void(RememberedFrame)>& take) const {
@@ -127,7 +128,6 @@ void FrameMemory::ForEach(uint32_t end, const std::function<void(RememberedFrame
     for (auto next = frames.rbegin(); next != frames.rend(); ++next) {
       if (std::optional<RememberedFrame> frame = Decode(next->second)) take(*std::move(frame));
     }
-    if (frames.size() >= max_frames_) return;
     if (!frames.empty()) end = frames.begin()->first;  // what was told last counts
   }
 }

@@ -18,8 +18,8 @@ namespace dmslam {
 /// disk takes no more, problem() says so.
 class FrameMemory {
  public:
-  /// Remembers at least `max_frames`, and at most twice as many.
-  FrameMemory(std::string folder, uint32_t session, CameraId camera, size_t max_frames);
+  /// Remembers the newest `max_bytes` of frames at least, and at most twice as many.
+  FrameMemory(std::string folder, uint32_t session, CameraId camera, size_t max_bytes);
 
   /// Goes on behind what a frontend before this one has left, whose own frames begin with number `first`.
   /// Where that is no frame before `first`, it is of no use and removed. Throws InputError where the folder
@@ -41,11 +41,11 @@ class FrameMemory {
   std::string folder_;
   uint32_t session_;
   CameraId camera_;
-  size_t max_frames_;
+  size_t max_bytes_;
   std::array<std::string, 2> paths_;
   std::array<Journal, 2> journals_;  ///< one is written to; when it is full, the other one is emptied
   size_t current_ = 0;
-  size_t written_ = 0;  ///< frames in the current one
+  size_t written_ = 0;  ///< bytes of frames, to the current one
 };
 
 }  // namespace dmslam

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -16,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kSession = 7;
-constexpr size_t kMost = 100;
+constexpr size_t kMost = 1000000;
 
 class FrameMemoryTest : public testing::Test {
  protected:
@@ -49,9 +50,19 @@ class FrameMemoryTest : public testing::Test {
     return frames;
   }
   static std::vector<uint32_t> Numbers(const std::vector<RememberedFrame>& frames) {
-    std::vector<uint32_t> numbers;
-    for (const RememberedFrame& frame : frames) numbers.push_back(frame.seen.id.frame_index());
+    std::vector<uint32_t> numbers(frames.size());
+    std::ranges::transform(frames, numbers.begin(),
+                           [](const RememberedFrame& frame) { return frame.seen.id.frame_index(); });
     return numbers;
+  }
+  /// A file takes one frame beyond these.
+  size_t BytesOf(size_t num_frames) const {
+    FrameMemory memory(folder_, kSession, 0, kMost);
+    memory.Open(0);
+    memory.Add(Frame(0));
+    const size_t bytes = fs::file_size(fs::directory_iterator(folder_)->path());
+    memory.Remove();
+    return num_frames * bytes;
   }
   size_t NumFiles() const {
     return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
@@ -121,28 +132,30 @@ TEST_F(FrameMemoryTest, ANewRunOfThatSessionBeginsAnew) {
 
 TEST_F(FrameMemoryTest, TheOldestAreForgotten) {
   constexpr size_t kFew = 3;
+  const size_t most = BytesOf(kFew);
   for (uint32_t last = 3; last < 20; ++last) {
     fs::remove_all(folder_);
-    FrameMemory memory(folder_, kSession, 0, kFew);
+    FrameMemory memory(folder_, kSession, 0, most);
     memory.Open(0);
     for (uint32_t i = 0; i <= last; ++i) memory.Add(Frame(i));
-    const Numbered numbers = Numbers(Left(last + 1, kFew));
+    const Numbered numbers = Numbers(Left(last + 1, most));
     ASSERT_GE(numbers.size(), kFew) << last;
-    ASSERT_LE(numbers.size(), 2 * kFew) << last;
+    ASSERT_LE(numbers.size(), 2 * (kFew + 1)) << last;
     for (uint32_t i = 0; i < numbers.size(); ++i) ASSERT_EQ(numbers[i], last - i);
   }
 }
 
 TEST_F(FrameMemoryTest, AFrontendThatGoesOnInTheSecondFileForgetsAsMany) {
   constexpr size_t kFew = 3;
+  const size_t most = BytesOf(kFew);
   for (uint32_t i = 0; i < 20; ++i) {  // each frame has a frontend of its own
-    FrameMemory memory(folder_, kSession, 0, kFew);
+    FrameMemory memory(folder_, kSession, 0, most);
     memory.Open(i);
     memory.Add(Frame(i));
   }
-  const Numbered numbers = Numbers(Left(20, kFew));
+  const Numbered numbers = Numbers(Left(20, most));
   EXPECT_GE(numbers.size(), kFew);
-  EXPECT_LE(numbers.size(), 2 * kFew);
+  EXPECT_LE(numbers.size(), 2 * (kFew + 1));
   EXPECT_EQ(numbers.front(), 19u);
 }
 
