@@ -233,6 +233,19 @@ TEST_F(FrontendNodeTest, InRealTimeTheNewestOfThoseThatCameIsTracked) {
   EXPECT_EQ(status.frames_processed, 1);
 }
 
+TEST_F(FrontendNodeTest, InRealTimeFramesWaitForOneThatTakesLong) {
+  Start(PlaybackMode::kRealtime);
+  for (uint32_t index = 0; index < 3; ++index) {
+    Frame frame = FrameAt(index);
+    frame.stamp_ns = index * 33 * kMs;
+    Say(frame);
+  }
+  Run();
+  EXPECT_EQ(Count<FramePose>(), 3U);
+  EXPECT_EQ(Last<FramePose>().frame_index, 2U);
+  EXPECT_EQ(Status().frames_skipped, 0);
+}
+
 TEST_F(FrontendNodeTest, TheEndOfTheSequenceIsAnsweredWhenAllIsTold) {
   Start(PlaybackMode::kLockstep);
   for (uint32_t index = 0; index < 3; ++index) Play(FrameAt(index));

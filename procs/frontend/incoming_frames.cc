@@ -1,16 +1,26 @@
 #include "frontend/incoming_frames.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "dmslam/util/check.h"
 #include "frontend/camera_turns.h"
 
 namespace dmslam {
+namespace {
+
+constexpr int64_t kMaxWaitNs = 100'000'000;  // by their stamps
+
+}  // namespace
 
 std::optional<IncomingFrames::Verdict> IncomingFrames::WhyNotNew(const Frame& frame) const {
   if (frame.frame_index >= CameraTurns::kTheEnd) return Verdict::kOutOfRange;
   if (IsOld(frame)) return in_work() ? Verdict::kKnown : Verdict::kOld;
-  if (waiting_ && waiting_->frame.frame_index == frame.frame_index) return Verdict::kKnown;
+  const auto is_known = [&](const ReceivedFrame& waiting) {
+    return waiting.frame.frame_index == frame.frame_index ||
+           (mode_ == PlaybackMode::kRealtime && waiting.frame.stamp_ns >= frame.stamp_ns);
+  };
+  if (std::ranges::any_of(waiting_, is_known)) return Verdict::kKnown;
   return std::nullopt;
 }
 
@@ -30,21 +40,31 @@ IncomingFrames::Verdict IncomingFrames::Hear(ReceivedFrame received, int64_t now
   if (mode_ == PlaybackMode::kLockstep && in_work()) order_.OnPlayerWaits();
   if (!order_.Takes({frame.frame_index, frame.stamp_ns}, NewestHeard(), now_ns)) return Verdict::kFarAhead;
   ++received_;
-  if (waiting_) ++skipped_;
-  waiting_ = std::move(received);
+  MakeRoomFor(frame);
+  waiting_.push_back(std::move(received));
   return Verdict::kWaits;
+}
+
+/// Takes those away that would be too old when their turn comes.
+void IncomingFrames::MakeRoomFor(const Frame& frame) {
+  const auto is_old = [&](const ReceivedFrame& waiting) {
+    return mode_ == PlaybackMode::kLockstep || frame.stamp_ns - waiting.frame.stamp_ns >= kMaxWaitNs;
+  };
+  skipped_ += static_cast<int64_t>(std::erase_if(waiting_, is_old));
 }
 
 /// None: none was, or its stamp is not known.
 std::optional<PlayOrder::Place> IncomingFrames::NewestHeard() const {
-  if (waiting_) return PlayOrder::Place{waiting_->frame.frame_index, waiting_->frame.stamp_ns};
+  if (!waiting_.empty())
+    return PlayOrder::Place{waiting_.back().frame.frame_index, waiting_.back().frame.stamp_ns};
   if (!newest_ || !newest_->stamp_ns) return std::nullopt;
   return PlayOrder::Place{newest_->index, *newest_->stamp_ns};
 }
 
 ReceivedFrame IncomingFrames::Take() {
-  DMSLAM_CHECK(waiting_.has_value(), "a frame that is taken out has waited");
-  ReceivedFrame taken = *std::exchange(waiting_, std::nullopt);
+  DMSLAM_CHECK(!waiting_.empty(), "a frame that is taken out has waited");
+  ReceivedFrame taken = std::move(waiting_.front());
+  waiting_.pop_front();
   newest_ = {taken.frame.frame_index, taken.frame.stamp_ns, true};
   return taken;
 }
@@ -52,7 +72,8 @@ ReceivedFrame IncomingFrames::Take() {
 /// A player that was started again, too, begins from the front until it hears how far we are.
 void IncomingFrames::GoOnBehind(uint32_t frame_index) {
   newest_ = {frame_index, {}, false};
-  if (waiting_ && waiting_->frame.frame_index <= frame_index) waiting_.reset();
+  std::erase_if(waiting_,
+                [&](const ReceivedFrame& waiting) { return waiting.frame.frame_index <= frame_index; });
 }
 
 void IncomingFrames::Fill(FrontendStatus* status) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "dmslam/wire/player_messages.h"
@@ -15,8 +16,9 @@ struct ReceivedFrame {
   int64_t receive_us = 0;
 };
 
-/// Which of the frames that come are to be tracked. One waits at most, and a newer one takes its place; what
-/// was taken out is in work until it is settled.
+/// Which of the frames that come are to be tracked, in order. In real time those of a tenth of a second wait,
+/// as one frame may take longer than the next takes to come; in lock-step one does. What was taken out is in
+/// work until it is settled.
 class IncomingFrames {
  public:
   enum class Verdict {
@@ -45,8 +47,9 @@ class IncomingFrames {
   /// No frame follows, as far as is believed of what was heard.
   bool IsOver(int64_t now_ns) const { return order_.IsOver(now_ns); }
 
-  const std::optional<ReceivedFrame>& waiting() const { return waiting_; }
-  /// Takes out the one that waits (there must be one).
+  /// The oldest of those that wait; null: none does.
+  const ReceivedFrame* waiting() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
+  /// Takes it out (there must be one).
   ReceivedFrame Take();
   /// Everything follows that has to follow of the newest.
   void Settle() { newest_->in_work = false; }
@@ -55,17 +58,18 @@ class IncomingFrames {
   const std::optional<Newest>& newest() const { return newest_; }
   bool in_work() const { return newest_ && newest_->in_work; }
 
-  int64_t skipped() const { return skipped_; }  ///< a newer one was there already
+  int64_t skipped() const { return skipped_; }  ///< newer ones took their places
   void Fill(FrontendStatus* status) const;
 
  private:
   std::optional<Verdict> WhyNotNew(const Frame& frame) const;
   bool IsOld(const Frame& frame) const;
   std::optional<PlayOrder::Place> NewestHeard() const;
+  void MakeRoomFor(const Frame& frame);
 
   PlaybackMode mode_ = PlaybackMode::kRealtime;
   PlayOrder order_;
-  std::optional<ReceivedFrame> waiting_;
+  std::deque<ReceivedFrame> waiting_;
   std::optional<Newest> newest_;  ///< none: none was taken out
   int64_t received_ = 0;          ///< that waited, at least for a moment
   int64_t skipped_ = 0;

@@ -38,6 +38,23 @@ TEST(IncomingFramesTest, ANewerOneTakesThePlaceOfTheOneThatWaits) {
   EXPECT_EQ(StatusOf(frames).frame_index, 2);
 }
 
+TEST(IncomingFramesTest, InRealTimeThoseOfATenthOfASecondWaitInOrder) {
+  IncomingFrames frames;
+  for (uint32_t index = 0; index < 6; ++index) frames.Hear(At(index, index * 33 * kMs), 0);
+  EXPECT_EQ(frames.Hear(At(4, 4 * 33 * kMs), 0), Verdict::kKnown);
+  for (uint32_t index : {2U, 3U, 4U, 5U}) EXPECT_EQ(frames.Take().frame.frame_index, index);
+  EXPECT_EQ(StatusOf(frames).frames_skipped, 2);
+}
+
+TEST(IncomingFramesTest, InLockstepOneWaits) {
+  IncomingFrames frames;
+  frames.SetMode(PlaybackMode::kLockstep);
+  frames.Hear(At(0, 0), 0);
+  frames.Hear(At(1, kMs), 0);
+  EXPECT_EQ(frames.Take().frame.frame_index, 1U);
+  EXPECT_FALSE(frames.waiting());
+}
+
 TEST(IncomingFramesTest, ARepeatIsAnsweredWhenTheNewestIsSettled) {
   IncomingFrames frames;
   frames.SetMode(PlaybackMode::kLockstep);
