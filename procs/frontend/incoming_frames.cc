@@ -11,14 +11,18 @@ namespace {
 
 constexpr int64_t kMaxWaitNs = 100'000'000;  // by their stamps
 
+bool GoesBack(const Frame& from, const Frame& to) {
+  return to.frame_index <= from.frame_index || to.stamp_ns <= from.stamp_ns;
+}
+
 }  // namespace
 
 std::optional<IncomingFrames::Verdict> IncomingFrames::WhyNotNew(const Frame& frame) const {
   if (frame.frame_index >= CameraTurns::kTheEnd) return Verdict::kOutOfRange;
   if (IsOld(frame)) return in_work() ? Verdict::kKnown : Verdict::kOld;
   const auto is_known = [&](const ReceivedFrame& waiting) {
-    return waiting.frame.frame_index == frame.frame_index ||
-           (mode_ == PlaybackMode::kRealtime && waiting.frame.stamp_ns >= frame.stamp_ns);
+    if (waiting.frame.frame_index == frame.frame_index) return true;
+    return mode_ == PlaybackMode::kRealtime && newest_ && GoesBack(waiting.frame, frame);
   };
   if (std::ranges::any_of(waiting_, is_known)) return Verdict::kKnown;
   return std::nullopt;
@@ -45,10 +49,12 @@ IncomingFrames::Verdict IncomingFrames::Hear(ReceivedFrame received, int64_t now
   return Verdict::kWaits;
 }
 
-/// Takes those away that would be too old when their turn comes.
+/// Takes those away that would be too old when their turn comes. Before any was taken out nobody knows which
+/// is right of two that go back, and the later one stays.
 void IncomingFrames::MakeRoomFor(const Frame& frame) {
   const auto is_old = [&](const ReceivedFrame& waiting) {
-    return mode_ == PlaybackMode::kLockstep || frame.stamp_ns - waiting.frame.stamp_ns >= kMaxWaitNs;
+    return mode_ == PlaybackMode::kLockstep || frame.stamp_ns - waiting.frame.stamp_ns >= kMaxWaitNs ||
+           GoesBack(waiting.frame, frame);
   };
   skipped_ += static_cast<int64_t>(std::erase_if(waiting_, is_old));
 }

@@ -46,6 +46,19 @@ TEST(IncomingFramesTest, InRealTimeThoseOfATenthOfASecondWaitInOrder) {
   EXPECT_EQ(StatusOf(frames).frames_skipped, 2);
 }
 
+TEST(IncomingFramesTest, InRealTimeNoneThatWaitsGoesBack) {
+  IncomingFrames frames;
+  frames.Hear(At(9, 500 * kMs), 0);
+  frames.Hear(At(3, 33 * kMs), 0);  // nobody knows yet which of the two is right
+  EXPECT_EQ(frames.Take().frame.frame_index, 3U);
+  EXPECT_FALSE(frames.waiting());
+  frames.Hear(At(6, 66 * kMs), 0);
+  EXPECT_EQ(frames.Hear(At(5, 70 * kMs), 0), Verdict::kKnown);
+  EXPECT_EQ(frames.Hear(At(7, 60 * kMs), 0), Verdict::kKnown);
+  EXPECT_EQ(frames.Take().frame.frame_index, 6U);
+  EXPECT_FALSE(frames.waiting());
+}
+
 TEST(IncomingFramesTest, InLockstepOneWaits) {
   IncomingFrames frames;
   frames.SetMode(PlaybackMode::kLockstep);

@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
   process.app().AddOption("--picture-every", extras.picture_every, "draw every Nth frame");
   process.app().AddOption("--frame-memory", extras.frame_memory,
                           "folder where frames wait for their last poses, so that a frontend that is started "
-                          "again has them (on a disk; 130 to 260 MB a camera); default: they die with it");
+                          "again has them (on a disk; 130 to 270 MB a camera); default: they die with it");
   return process.Run(argc, argv, [&](dmslam::NodeContext context, const dmslam::NodeOptions& options) {
     extras.vocabulary = dmslam::LoadVocabulary(vocabulary);
     return dmslam::MakeFrontend(std::move(context), options, extras);

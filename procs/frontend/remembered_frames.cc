@@ -6,42 +6,40 @@
 #include "dmslam/util/check.h"
 
 namespace dmslam {
-namespace {
 
-// Of each of two files: as many features as FrameRefiner keeps, of 43 bytes each.
-constexpr size_t kMostBytes = 128UL << 20;
-
-}  // namespace
-
-RememberedFrames::RememberedFrames(const std::string& folder, uint32_t session, CameraId camera) {
-  if (!folder.empty()) memory_.emplace(folder, session, camera, kMostBytes);
+RememberedFrames::RememberedFrames(const std::string& folder, uint32_t session, CameraId camera,
+                                   size_t max_bytes) {
+  if (!folder.empty()) memory_.emplace(folder, session, camera, max_bytes);
 }
 
 void RememberedFrames::Open(uint32_t first) {
   first_ = first;
+  memory_->Open(first);
+}
+
+void RememberedFrames::Add(const RememberedFrame& frame) {
+  if (!memory_) return;
   try {
-    memory_->Open(first);
+    if (!first_) Open(frame.seen.id.frame_index());
+    memory_->Add(frame);
+    if (!memory_->problem().empty()) GiveUp(memory_->problem());
   } catch (const InputError& error) {
     GiveUp(error.what());
   }
 }
 
-void RememberedFrames::Add(const RememberedFrame& frame) {
-  if (memory_ && !first_) Open(frame.seen.id.frame_index());
-  if (!memory_) return;
-  memory_->Add(frame);
-  if (!memory_->problem().empty()) GiveUp(memory_->problem());
-}
-
 void RememberedFrames::TakeOver(FrontendCore* core) {
-  if (std::exchange(taken_over_, true)) return;
-  if (memory_ && !first_) Open(UINT32_MAX);
-  if (!memory_) return;
+  if (std::exchange(taken_over_, true) || !memory_) return;
   size_t count = 0;
-  memory_->ForEach(*first_, [&](RememberedFrame frame) {
-    core->TakeOver(std::move(frame));
-    ++count;
-  });
+  try {
+    if (!first_) Open(UINT32_MAX);
+    memory_->ForEach(*first_, [&](RememberedFrame frame) {
+      core->TakeOver(std::move(frame));
+      ++count;
+    });
+  } catch (const InputError& error) {
+    GiveUp(error.what());
+  }
   if (count > 0) LogInfo("frontend: finds the last poses of {} frames of the one before it, too", count);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,8 +15,12 @@ namespace dmslam {
 /// written that is logged once, and the frames die with the frontend. On the core.
 class RememberedFrames {
  public:
+  /// Of each of two files: as many features as FrameRefiner keeps, of 43 bytes each.
+  static constexpr size_t kMostBytes = 128UL << 20;
+
   /// `folder`: empty, no frame is remembered.
-  RememberedFrames(const std::string& folder, uint32_t session, CameraId camera);
+  RememberedFrames(const std::string& folder, uint32_t session, CameraId camera,
+                   size_t max_bytes = kMostBytes);
 
   /// What a frame saw, and again when more is known of it.
   void Add(const RememberedFrame& frame);

@@ -70,6 +70,14 @@ TEST_F(RememberedFramesTest, WhereTheyCannotBeKeptTheFrontendGoesOn) {
   EXPECT_EQ(Unplaced(&frames), 0);
 }
 
+TEST_F(RememberedFramesTest, WhereTheFolderGoesTheFrontendGoesOn) {
+  RememberedFrames frames(folder_, 1, 0, 1);  // a file for each
+  frames.Add(Frame(0));
+  fs::remove_all(folder_);
+  frames.Add(Frame(1));
+  EXPECT_EQ(Unplaced(&frames), 0);
+}
+
 TEST_F(RememberedFramesTest, NothingIsLeftWhenAllIsTold) {
   RememberedFrames frames(folder_, 1, 0);
   frames.Add(Frame(0));

@@ -10,6 +10,7 @@
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/messaging/roles.h"
+#include "dmslam/recording/frame_memory.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
@@ -56,7 +57,12 @@ class Run {
       for (const dmslam::ChildSpec& child : *children) Begin(child);
     }
     Watch();
-    if (signal_ == 0 && code_ == 0) StayOpen();
+    if (signal_ == 0 && code_ == 0) {
+      StayOpen();
+      std::error_code ignored;
+      fs::remove_all(dmslam::FrameMemoryPath(place_.out),
+                     ignored);  // of a frontend that was replaced elsewhere
+    }
     supervisor_.StopAll();
     PrintTable();
     if (signal_ == 0 && code_ == 0)

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "dmslam/recording/checkpoint.h"
+#include "dmslam/recording/frame_memory.h"
 #include "dmslam/recording/journal.h"
 #include "dmslam/recording/set_aside.h"
 #include "dmslam/util/build_version.h"
@@ -138,7 +139,9 @@ std::optional<std::string> KeepUnfinishedRun(const std::string& out) {
   if (!fs::exists(RunFile(out)) || (!fs::exists(newest) && !fs::exists(former))) return std::nullopt;
   const std::optional<int64_t> session = Journal::SessionOf(JournalPath(out));
   if (!session || *session != RunIdentity::Read(out).session) return std::nullopt;
-  return SetAside(out, *session, {kRunFile, NameOf(newest), NameOf(former), NameOf(JournalPath(out))});
+  return SetAside(
+      out, *session,
+      {kRunFile, NameOf(newest), NameOf(former), NameOf(JournalPath(out)), NameOf(FrameMemoryPath(out))});
 }
 
 ResumePoint FindResumePoint(const std::string& out, const RunIdentity& identity) {

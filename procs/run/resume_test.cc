@@ -12,6 +12,7 @@
 #include "dmslam/map/map_editor.h"
 #include "dmslam/messaging/codec.h"
 #include "dmslam/recording/checkpoint.h"
+#include "dmslam/recording/frame_memory.h"
 #include "dmslam/recording/journal.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
@@ -220,6 +221,7 @@ TEST_F(ResumeTest, WhatAnotherRunLeftIsKeptAndCanBeResumed) {
   EXPECT_EQ(KeepUnfinishedRun(out_), std::nullopt) << "without a map it cannot be resumed";
   WriteMap(3);
   WriteMap(4);
+  fs::create_directories(FrameMemoryPath(out_));
   for (const std::string name : {"/former-7", "/former-7-2"}) {
     ASSERT_EQ(KeepUnfinishedRun(out_), std::optional(out_ + name));
     for (const std::string& file : {CheckpointPath(out_), JournalPath(out_), out_ + "/run.json"})
@@ -227,6 +229,7 @@ TEST_F(ResumeTest, WhatAnotherRunLeftIsKeptAndCanBeResumed) {
     const ResumePoint point = FindResumePoint(out_ + name, RunIdentity::Read(out_ + name));
     EXPECT_EQ(point.last_frame, std::optional<uint32_t>(41));
     EXPECT_EQ(point.keyframes, 4U);
+    EXPECT_TRUE(fs::exists(FrameMemoryPath(out_ + "/former-7")) && !fs::exists(FrameMemoryPath(out_)));
     EXPECT_TRUE(fs::exists(FormerCheckpointPath(CheckpointPath(out_ + "/former-7"))));
     identity_.Write(out_);
     WriteJournal(41);

@@ -12,6 +12,7 @@
 #include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/roles.h"
 #include "dmslam/recording/checkpoint.h"
+#include "dmslam/recording/frame_memory.h"
 #include "dmslam/recording/log_index.h"
 #include "dmslam/util/check.h"
 #include "run/log_replay.h"
@@ -238,7 +239,7 @@ ChildSpec MakeCollector(const RunArguments& a, const RunPlace& place, const Word
 ChildSpec MakeFrontend(const RunArguments& a, const RunPlace& place, const Words& common) {
   Words words = WithVocabulary(a, common);
   // In real time no frame is to wait for a disk.
-  if (a.pace.lockstep) Append(&words, {"--frame-memory", place.out + "/frames"});
+  if (a.pace.lockstep) Append(&words, {"--frame-memory", FrameMemoryPath(place.out)});
   if (a.output.pictures != "0") {
     fs::create_directories(place.out + "/pictures");
     Append(&words, {"--picture-dir", place.out + "/pictures", "--picture-every", a.output.pictures});

@@ -22,7 +22,7 @@ constexpr size_t kIntBytes = 4;
 std::string EndOfName(CameraId camera) { return "-camera" + std::to_string(camera) + ".frames"; }
 
 std::string PathOf(const std::string& folder, uint32_t session, CameraId camera, const char* part) {
-  return folder + "/" + std::to_string(session) + part + EndOfName(camera);
+  return fs::path(folder) / (std::to_string(session) + part + EndOfName(camera));
 }
 
 std::string Encode(const RememberedFrame& frame) {
@@ -88,6 +88,8 @@ FrameRange RangeIn(const std::string& path, uint32_t session) {
 
 }  // namespace
 
+std::string FrameMemoryPath(const std::string& folder) { return folder + "/frames"; }
+
 FrameMemory::FrameMemory(std::string folder, uint32_t session, CameraId camera, size_t max_bytes)
     : folder_(std::move(folder)),
       session_(session),
@@ -123,12 +125,10 @@ void FrameMemory::Add(const RememberedFrame& frame) {
 }
 
 void FrameMemory::ForEach(uint32_t end, const std::function<void(RememberedFrame)>& take) const {
-  for (const std::string& path : {paths_[current_], paths_[1 - current_]}) {
-    const Frames frames = ReadFile(path, session_, end);
-    for (auto next = frames.rbegin(); next != frames.rend(); ++next) {
-      if (std::optional<RememberedFrame> frame = Decode(next->second)) take(*std::move(frame));
-    }
-    if (!frames.empty()) end = frames.begin()->first;  // what was told last counts
+  Frames frames = ReadFile(paths_[current_], session_, end);
+  frames.merge(ReadFile(paths_[1 - current_], session_, end));  // what was told last stays
+  for (auto next = frames.rbegin(); next != frames.rend(); ++next) {
+    if (std::optional<RememberedFrame> frame = Decode(next->second)) take(*std::move(frame));
   }
 }
 
@@ -146,8 +146,9 @@ void FrameMemory::Remove() {
 void FrameMemory::RemoveOtherSessions() const {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder_, ignored)) {
-    const bool is_ours = std::ranges::find(paths_, entry.path().string()) != paths_.end();
-    if (!is_ours && entry.path().filename().string().ends_with(EndOfName(camera_)))
+    const fs::path name = entry.path().filename();
+    const auto is_named_so = [&](const std::string& path) { return fs::path(path).filename() == name; };
+    if (name.string().ends_with(EndOfName(camera_)) && std::ranges::none_of(paths_, is_named_so))
       fs::remove(entry.path(), ignored);
   }
 }

@@ -11,6 +11,9 @@
 
 namespace dmslam {
 
+/// The folder of a run's frontends, in that of its results, while it goes on.
+std::string FrameMemoryPath(const std::string& folder);
+
 /// The newest frames of a camera, in files that outlive the frontend that saw them: one that is started again
 /// on this host finds their last poses as if it had never died.
 ///

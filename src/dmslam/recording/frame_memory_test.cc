@@ -184,6 +184,28 @@ TEST_F(FrameMemoryTest, OtherSessionsAreRemovedAndOtherCamerasStay) {
   EXPECT_EQ(NumFiles(), 1u) << "the other camera's stays";
 }
 
+TEST_F(FrameMemoryTest, TheFolderMayEndInASlash) {
+  {
+    FrameMemory memory(folder_ + "/", kSession, 0, kMost);
+    memory.Open(0);
+    memory.Add(Frame(0));
+  }
+  FrameMemory memory(folder_ + "/", kSession, 0, kMost);
+  memory.Open(1);
+  int frames = 0;
+  memory.ForEach(1, [&](const RememberedFrame&) { ++frames; });
+  EXPECT_EQ(frames, 1);
+}
+
+TEST_F(FrameMemoryTest, FramesThatAreToldAgainAfterTheSecondFileWasBegunHideNoOthers) {
+  const size_t most = BytesOf(3);
+  FrameMemory memory(folder_, kSession, 0, most);
+  memory.Open(0);
+  for (uint32_t i = 0; i < 6; ++i) memory.Add(Frame(i));
+  memory.Add(Frame(1, 5));
+  EXPECT_EQ(Numbers(Left(6, most)), (Numbered{5, 4, 3, 2, 1, 0}));
+}
+
 TEST_F(FrameMemoryTest, WhenNobodyNeedsItNothingIsLeft) {
   FrameMemory memory(folder_, kSession, 0, kMost);
   memory.Open(0);

@@ -44,7 +44,7 @@ class SequenceEnd {
   bool AppliesAllRecords() const { return question_ || Is(Phase::kDone); }
 
   void OnEndHeard();
-  /// Another frontend asks for the stream. It will not have the features of the frames before: their poses
+  /// Another frontend asks for the stream. It may not have the features of the frames before: their poses
   /// are refined in the map as it is, and told. Calling it again has no effect.
   void OnHandOver();
   bool HandsOver() const { return hands_over_; }

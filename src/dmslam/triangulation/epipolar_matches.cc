@@ -55,7 +55,7 @@ std::vector<PlaneEntry> PlaneEntries(const Keyframe& keyframe, const std::vector
     const Eigen::Vector3d ray = (R_world_cam * camera.Ray(keyframe.features->uv_px[i])).normalized();
     const double x = ray.dot(pencil.u), y = ray.dot(pencil.v);
     const double across = std::hypot(x, y);
-    if (across < 0.02) continue;  // nearly along the baseline: any plane would do
+    if (!(across >= 0.02)) continue;  // nearly along the baseline: any plane would do
     const uint8_t octave = keyframe.features->set.keypoints[i].octave;
     const double sigma_px = map.pyramid().Sigma(octave);
     const double along = ray.dot(pencil.axis);
