@@ -49,9 +49,10 @@ void RememberedFrames::Remove() {
 }
 
 /// The room on the disk is for others, the log among them.
-void RememberedFrames::GiveUp(std::string why) {
+void RememberedFrames::GiveUp(const std::string& why) {
+  const std::string reason = why;  // it may be a part of what goes
   Remove();
-  LogWarning("frontend: {}; frames die with this process from now on", std::move(why));
+  LogWarning("frontend: {}; frames die with this process from now on", reason);
 }
 
 }  // namespace dmslam

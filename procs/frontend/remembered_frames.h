@@ -31,7 +31,7 @@ class RememberedFrames {
 
  private:
   void Open(uint32_t first);
-  void GiveUp(std::string why);
+  void GiveUp(const std::string& why);
 
   std::optional<FrameMemory> memory_;
   std::optional<uint32_t> first_;  ///< frame of this process; none: nothing was added yet

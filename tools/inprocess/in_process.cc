@@ -22,7 +22,8 @@ constexpr int64_t kClockStartNs = 1'000'000'000;
 /// without which no reader follows them.
 class Recorder {
  public:
-  Recorder(MemoryBus::Port* bus, const std::string& path, std::function<int64_t()> now_us) : log_(path) {
+  Recorder(MemoryBus::Port* bus, const std::string& path, const std::function<int64_t()>& now_us)
+      : log_(path) {
     bus->SubscribeToAll();
     bus->SetHandler([this, now_us](const std::string& channel, std::span<const uint8_t> bytes) {
       log_.Write(now_us(), channel, bytes);
