@@ -50,9 +50,9 @@ void RememberedFrames::Remove() {
 
 /// The room on the disk is for others, the log among them.
 void RememberedFrames::GiveUp(const std::string& why) {
-  const std::string reason = why;  // it may be a part of what goes
-  Remove();
-  LogWarning("frontend: {}; frames die with this process from now on", reason);
+  memory_->Remove();
+  LogWarning("frontend: {}; frames die with this process from now on", why);
+  memory_.reset();
 }
 
 }  // namespace dmslam
