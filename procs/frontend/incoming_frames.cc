@@ -49,14 +49,17 @@ IncomingFrames::Verdict IncomingFrames::Hear(ReceivedFrame received, int64_t now
   return Verdict::kWaits;
 }
 
-/// Takes those away that would be too old when their turn comes. Before any was taken out nobody knows which
-/// is right of two that go back, and the later one stays.
+/// Where too many wait, all of them make room: whoever is too slow for long is late by one frame then, and
+/// not always by all that may wait. Before any was taken out nobody knows which is right of two that go back,
+/// and the later one stays.
 void IncomingFrames::MakeRoomFor(const Frame& frame) {
   const auto is_old = [&](const ReceivedFrame& waiting) {
     return mode_ == PlaybackMode::kLockstep || frame.stamp_ns - waiting.frame.stamp_ns >= kMaxWaitNs ||
            GoesBack(waiting.frame, frame);
   };
-  skipped_ += static_cast<int64_t>(std::erase_if(waiting_, is_old));
+  if (std::ranges::none_of(waiting_, is_old)) return;
+  skipped_ += std::ssize(waiting_);
+  waiting_.clear();
 }
 
 /// None: none was, or its stamp is not known.

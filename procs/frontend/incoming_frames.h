@@ -17,8 +17,8 @@ struct ReceivedFrame {
 };
 
 /// Which of the frames that come are to be tracked, in order. In real time those of a tenth of a second wait,
-/// as one frame may take longer than the next takes to come; in lock-step one does. What was taken out is in
-/// work until it is settled.
+/// as one frame may take longer than the next takes to come; where that is not enough all but the newest are
+/// skipped. In lock-step one waits. What was taken out is in work until it is settled.
 class IncomingFrames {
  public:
   enum class Verdict {
