@@ -13,8 +13,8 @@ class Vocabulary;
 /// What a frontend is given besides its settings.
 struct FrontendExtras {
   std::shared_ptr<const Vocabulary> vocabulary;
-  std::string picture_dir;  ///< empty: no pictures
-  int picture_every = 0;    ///< every Nth frame
+  std::string picture_dir;   ///< empty: no pictures
+  int picture_every = 0;     ///< every Nth frame
   std::string frame_memory;  ///< folder of the frames that wait for their last poses; empty: they die with it
 };
 
