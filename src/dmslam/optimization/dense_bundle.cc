@@ -6,27 +6,16 @@
 #include <numeric>
 #include <optional>
 
-#include "dmslam/optimization/reprojection.h"
+#include "dmslam/optimization/dense_equations.h"
 
 namespace dmslam {
 namespace {
 
-using Matrix63 = Eigen::Matrix<double, 6, 3>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kMostDamping = 1e3;
 constexpr double kLeastDamping = 1e-16;
 constexpr double kLeastGainRatio = 1e-3;
-
-/// A point seen in a view.
-struct Sight {
-  size_t observation;
-  int pose;
-  Eigen::Index row;  ///< of the poses' equations; negative: the pose is held
-  Eigen::Vector2d uv_px;
-  double inv_sigma;
-  bool counts;
-};
 
 /// What a step changes: six numbers (w, v) for each pose that is free, three for each point.
 struct Step {
@@ -41,27 +30,59 @@ struct Taken {
   double gain_ratio = 0;  ///< of what it gained and what it had promised
 };
 
+/// The points' sights in their order; the poses that are free get numbers in theirs.
+BundleSights SightsByPoint(const BundleState& state) {
+  const std::vector<BundleObservation>& observations = state.problem.observations;
+  std::vector<int> free_pose(state.poses.size(), -1);
+  int free_poses = 0;
+  for (size_t k = 0; k < free_pose.size(); ++k) {
+    if (!state.pose_held[k]) free_pose[k] = free_poses++;
+  }
+  BundleSights sights;
+  sights.first.assign(state.problem.points.size() + 1, 0);
+  for (const BundleObservation& o : observations) ++sights.first[At(o.point) + 1];
+  std::partial_sum(sights.first.begin(), sights.first.end(), sights.first.begin());
+  sights.all.resize(observations.size());
+  std::vector<size_t> next(sights.first.begin(), sights.first.end() - 1);
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const BundleObservation& o = observations[i];
+    const int pose = free_pose[At(o.pose)];
+    const bool adjusts = pose >= 0 || !state.PointHeld(o.point);
+    sights.all[next[At(o.point)]++] = {
+        i, At(o.pose), pose, o.uv_px, std::sqrt(o.inv_sigma_squared), state.active[i] && adjusts};
+  }
+  for (size_t i = 0; i < sights.num_points(); ++i) {
+    std::ranges::sort(sights.all.begin() + static_cast<ptrdiff_t>(sights.first[i]),
+                      sights.all.begin() + static_cast<ptrdiff_t>(sights.first[i + 1]), {},
+                      &BundleSight::free_pose);
+  }
+  return sights;
+}
+
 class DenseBundle : public BundleSolver {
  public:
   DenseBundle(const BundleOptions& options, BundleState* state)
-      : options_(options), state_(*state), camera_(state->problem.camera) {
-    SortByPoint();
-    rotations_.resize(state_.poses.size());
-    couplings_.resize(sights_.size());
-    inverses_.resize(state_.problem.points.size());
-    gradients_.resize(state_.problem.points.size());
-    diagonals_.resize(state_.problem.points.size());
+      : options_(options),
+        state_(*state),
+        camera_(state->problem.camera),
+        loss_{.huber_delta = options.huber_delta, .cauchy_width = options.cauchy_width},
+        sights_(SightsByPoint(*state)),
+        rotations_(state->poses.size()),
+        equations_(static_cast<size_t>(std::ranges::count(state->pose_held, 0)), sights_) {
+    place_of_.resize(sights_.all.size());
+    for (size_t k = 0; k < sights_.all.size(); ++k) place_of_[sights_.all[k].observation] = k;
   }
 
   int NumTerms() const override {
-    return static_cast<int>(std::ranges::count_if(sights_, [](const Sight& sight) { return sight.counts; }));
+    return static_cast<int>(
+        std::ranges::count_if(sights_.all, [](const BundleSight& sight) { return sight.counts; }));
   }
 
-  void Disable(size_t observation) override { sights_[place_of_[observation]].counts = false; }
+  void Disable(size_t observation) override { sights_.all[place_of_[observation]].counts = false; }
 
   BundleStageResult Solve(const BundleStage& stage) override {
     BundleStageResult result;
-    cauchy_ = stage.cauchy;
+    loss_.cauchy = stage.cauchy;
     double cost = Cost(state_.poses, state_.problem.points);
     result.sound = std::isfinite(cost);
     if (!result.sound) result.message = "the errors are not finite";
@@ -87,68 +108,9 @@ class DenseBundle : public BundleSolver {
   }
 
  private:
-  void SortByPoint() {
-    const std::vector<BundleObservation>& observations = state_.problem.observations;
-    std::vector<Eigen::Index> row_of(state_.poses.size(), -1);
-    for (size_t k = 0; k < row_of.size(); ++k) {
-      if (state_.pose_held[k]) continue;
-      row_of[k] = size_;
-      size_ += 6;
-    }
-    first_.assign(state_.problem.points.size() + 1, 0);
-    for (const BundleObservation& o : observations) ++first_[At(o.point) + 1];
-    std::partial_sum(first_.begin(), first_.end(), first_.begin());
-    sights_.resize(observations.size());
-    std::vector<size_t> next(first_.begin(), first_.end() - 1);
-    for (size_t i = 0; i < observations.size(); ++i) {
-      const BundleObservation& o = observations[i];
-      const bool adjusts = row_of[At(o.pose)] >= 0 || !state_.PointHeld(o.point);
-      sights_[next[At(o.point)]++] = {i,
-                                      o.pose,
-                                      row_of[At(o.pose)],
-                                      o.uv_px,
-                                      std::sqrt(o.inv_sigma_squared),
-                                      state_.active[i] && adjusts};
-    }
-    place_of_.resize(observations.size());
-    for (size_t i = 0; i + 1 < first_.size(); ++i) {
-      std::ranges::sort(sights_.begin() + static_cast<ptrdiff_t>(first_[i]),
-                        sights_.begin() + static_cast<ptrdiff_t>(first_[i + 1]), {}, &Sight::row);
-    }
-    for (size_t k = 0; k < sights_.size(); ++k) place_of_[sights_[k].observation] = k;
-  }
-
-  /// The loss of a squared error, and its slope.
-  double Loss(double squared, double* slope) const {
-    if (cauchy_) {
-      const double width_squared = options_.cauchy_width * options_.cauchy_width;
-      const double sum = 1.0 + squared / width_squared;
-      *slope = 1.0 / sum;
-      return width_squared * std::log(sum);
-    }
-    const double delta = options_.huber_delta;
-    *slope = 1.0;
-    if (squared <= delta * delta) return squared;
-    const double root = std::sqrt(squared);
-    *slope = delta / root;
-    return 2.0 * delta * root - delta * delta;
-  }
-
   double Cost(const std::vector<Rigid3d>& poses, const std::vector<Eigen::Vector3d>& points) {
     SetRotations(poses);
-    double cost = 0, slope = 0;
-    for (size_t i = 0; i < points.size(); ++i) {
-      for (size_t k = first_[i]; k < first_[i + 1]; ++k) {
-        const Sight& sight = sights_[k];
-        if (!sight.counts) continue;
-        const Eigen::Vector3d p = rotations_[At(sight.pose)] * points[i] + poses[At(sight.pose)].translation;
-        const double squared = p.z() > kMinBundleDepth ? (camera_.Project(p) - sight.uv_px).squaredNorm() *
-                                                             sight.inv_sigma * sight.inv_sigma
-                                                       : kErrorBehind * kErrorBehind;
-        cost += 0.5 * Loss(squared, &slope);
-      }
-    }
-    return cost;
+    return CostOf(camera_, loss_, sights_, {poses, rotations_, points, {}});
   }
 
   void SetRotations(const std::vector<Rigid3d>& poses) {
@@ -178,113 +140,84 @@ class DenseBundle : public BundleSolver {
 
   /// The step that minimises the quadratic model with that damping, a share of the diagonal.
   std::optional<Step> FindStep(double damping) {
-    normal_.setZero(size_, size_);
-    gradient_.setZero(size_);
     SetRotations(state_.poses);
-    for (size_t i = 0; i < inverses_.size(); ++i) AddPoint(i);
-    const Eigen::VectorXd diagonal = normal_.diagonal();
-    normal_.diagonal() += damping * diagonal;
-    HoldBlindPoses(diagonal);
-    Eigen::VectorXd reduced = gradient_;
-    for (size_t i = 0; i < inverses_.size(); ++i) Eliminate(i, damping, &reduced);
-    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factored(normal_);
-    if (factored.info() != Eigen::Success) return std::nullopt;
+    SetEquations(camera_, loss_, sights_,
+                 {state_.poses, rotations_, state_.problem.points, state_.problem.point_fixed}, &equations_);
+    const Eigen::VectorXd diagonal = DampPoses(damping);
+    EliminatePoints(sights_, damping, &equations_);
     Step step;
-    step.poses = -factored.solve(reduced);
-    double slope = gradient_.dot(step.poses);
+    if (!SolvePoses(&step.poses)) return std::nullopt;
+    double slope = ToVector(equations_.gradient).dot(step.poses);
     double damped = step.poses.cwiseAbs2().dot(diagonal);
-    for (size_t i = 0; i < inverses_.size(); ++i) {
+    for (size_t i = 0; i < sights_.num_points(); ++i) {
       const Eigen::Vector3d& moved = step.points.emplace_back(PointStep(i, step.poses));
-      slope += gradients_[i].dot(moved);
-      damped += moved.cwiseAbs2().dot(diagonals_[i]);
+      slope += equations_.point_gradients[i].dot(moved);
+      damped += moved.cwiseAbs2().dot(equations_.point_diagonals[i]);
     }
     step.predicted_gain = 0.5 * (damping * damped - slope);
     return step;
   }
 
-  /// A pose that sees nothing which counts stays: its equations are empty, and nothing could be solved with
-  /// them.
-  void HoldBlindPoses(const Eigen::VectorXd& diagonal) {
-    for (Eigen::Index row = 0; row < size_; ++row) {
-      if (diagonal[row] == 0.0) normal_(row, row) = 1.0;
-    }
-  }
-
-  /// Adds what the views see of the point to the normal equations of the poses; keeps what is the point's.
-  void AddPoint(size_t i) {
-    Eigen::Matrix3d own = Eigen::Matrix3d::Zero();
-    gradients_[i].setZero();
-    for (size_t k = first_[i]; k < first_[i + 1]; ++k) {
-      const Sight& sight = sights_[k];
-      couplings_[k].setZero();
-      const Eigen::Matrix3d& R = rotations_[At(sight.pose)];
-      const Eigen::Vector3d p = R * state_.problem.points[i] + state_.poses[At(sight.pose)].translation;
-      if (!sight.counts || !(p.z() > kMinBundleDepth)) continue;
-      const Eigen::Vector2d error = sight.inv_sigma * (camera_.Project(p) - sight.uv_px);
-      double weight = 1;
-      Loss(error.squaredNorm(), &weight);
-      const Matrix23 by_point = sight.inv_sigma * ProjectionJacobian(camera_, p) * R;
-      own.noalias() += weight * by_point.transpose() * by_point;
-      gradients_[i].noalias() += weight * by_point.transpose() * error;
-      if (sight.row < 0) continue;
-      const Matrix26 by_pose = sight.inv_sigma * PoseJacobian(camera_, p);
-      const Matrix26 weighted = weight * by_pose;
-      normal_.block<6, 6>(sight.row, sight.row).noalias() += weighted.transpose() * by_pose;
-      gradient_.segment<6>(sight.row).noalias() += weighted.transpose() * error;
-      couplings_[k].noalias() = weighted.transpose() * by_point;
-    }
-    if (state_.PointHeld(static_cast<int>(i))) {
-      own.setZero();
-      gradients_[i].setZero();
-    }
-    inverses_[i] = own;  // until it is damped and inverted
-    diagonals_[i] = own.diagonal();
-  }
-
-  /// Takes the point out of the poses' equations.
-  void Eliminate(size_t i, double damping, Eigen::VectorXd* reduced) {
-    inverses_[i].diagonal() += damping * diagonals_[i];
-    if (!(inverses_[i].determinant() > 0)) {
-      inverses_[i].setZero();  // held, or seen by nobody: it stays where it is
-      return;
-    }
-    inverses_[i] = inverses_[i].inverse().eval();
-    for (size_t k = first_[i]; k < first_[i + 1]; ++k) {
-      const Eigen::Index row = sights_[k].row;
-      if (row < 0 || !sights_[k].counts) continue;
-      const Matrix63 solved = couplings_[k] * inverses_[i];
-      reduced->segment<6>(row).noalias() -= solved * gradients_[i];
-      for (size_t l = first_[i]; l <= k; ++l) {  // the lower half
-        if (sights_[l].row < 0 || !sights_[l].counts) continue;
-        normal_.block<6, 6>(row, sights_[l].row).noalias() -= solved * couplings_[l].transpose();
+  /// The diagonal as it was. A pose that sees nothing which counts stays: its equations are empty, and
+  /// nothing could be solved with them.
+  Eigen::VectorXd DampPoses(double damping) {
+    Eigen::VectorXd diagonal(static_cast<Eigen::Index>(kPoseSize * equations_.num_poses()));
+    for (size_t k = 0; k < equations_.num_poses(); ++k) {
+      for (size_t i = 0; i < kPoseSize; ++i) {
+        double& own = equations_.Pose(k, k)[i].row[i];
+        diagonal[static_cast<Eigen::Index>(kPoseSize * k + i)] = own;
+        own = own == 0.0 ? 1.0 : own + damping * own;
       }
     }
+    return diagonal;
+  }
+
+  bool SolvePoses(Eigen::VectorXd* step) {
+    const auto size = static_cast<Eigen::Index>(kPoseSize * equations_.num_poses());
+    normal_.resize(size, size);
+    for (size_t k = 0; k < equations_.num_poses(); ++k) {
+      for (size_t l = 0; l <= k; ++l) {
+        const PoseBlock& block = equations_.Pose(k, l);
+        for (size_t c = 0; c < kPoseSize; ++c) {
+          const auto row = static_cast<Eigen::Index>(kPoseSize * k);
+          normal_.block<kPoseSize, 1>(row, static_cast<Eigen::Index>(kPoseSize * l + c)) = block[c].Numbers();
+        }
+      }
+    }
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factored(normal_);  // of the lower half
+    if (factored.info() != Eigen::Success) return false;
+    *step = -factored.solve(ToVector(equations_.reduced));
+    return true;
+  }
+
+  static Eigen::VectorXd ToVector(const std::vector<PoseColumn>& columns) {
+    Eigen::VectorXd all(static_cast<Eigen::Index>(kPoseSize * columns.size()));
+    for (size_t k = 0; k < columns.size(); ++k)
+      all.segment<kPoseSize>(static_cast<Eigen::Index>(kPoseSize * k)) = columns[k].Numbers();
+    return all;
   }
 
   Eigen::Vector3d PointStep(size_t i, const Eigen::VectorXd& poses) const {
-    Eigen::Vector3d sum = gradients_[i];
-    for (size_t k = first_[i]; k < first_[i + 1]; ++k) {
-      if (sights_[k].row < 0) continue;
-      sum.noalias() += couplings_[k].transpose() * poses.segment<6>(sights_[k].row);
+    Eigen::Vector3d sum = equations_.point_gradients[i];
+    for (size_t k = sights_.first[i]; k < sights_.first[i + 1]; ++k) {
+      const int pose = sights_.all[k].free_pose;
+      if (pose < 0) continue;
+      const auto moved = poses.segment<kPoseSize>(kPoseSize * pose);
+      for (int c = 0; c < 3; ++c)
+        sum[c] += equations_.couplings[k][static_cast<size_t>(c)].Numbers().dot(moved);
     }
-    return -inverses_[i] * sum;
+    return -equations_.points[i] * sum;
   }
 
   const BundleOptions& options_;
   BundleState& state_;
   Pinhole camera_;
-  bool cauchy_ = false;
-  Eigen::Index size_ = 0;         ///< of the poses' equations
-  std::vector<Sight> sights_;     ///< by point, then by pose; the held ones first
-  std::vector<size_t> first_;     ///< of each point
-  std::vector<size_t> place_of_;  ///< of each observation
+  BundleRobustLoss loss_;
+  BundleSights sights_;
+  std::vector<size_t> place_of_;  ///< of each observation, among the sights
   std::vector<Eigen::Matrix3d> rotations_;
-  Eigen::MatrixXd normal_;  ///< of the poses; the lower half
-  Eigen::VectorXd gradient_;
-  std::vector<Matrix63> couplings_;         ///< of each sight: pose with point
-  std::vector<Eigen::Matrix3d> inverses_;   ///< of each point's own equations
-  std::vector<Eigen::Vector3d> gradients_;  ///< of each point
-  std::vector<Eigen::Vector3d> diagonals_;
+  DenseEquations equations_;
+  Eigen::MatrixXd normal_;  ///< of the poses without the points; the lower half
 };
 
 }  // namespace
