@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "dmslam/features/types.h"
 
@@ -24,9 +25,10 @@ struct HammingKernels {
   HammingKeepNear keep_near;
 };
 
-/// Plain C++, the same everywhere.
-const HammingKernels& PortableHammingKernels();
-/// With the CPU's instruction for counting bits where it has one. Same results.
+/// Those that this machine can run, from plain C++, which runs everywhere, to the one with the widest
+/// instructions for counting bits. All have the same results.
+std::vector<const HammingKernels*> UsableHammingKernels();
+/// The last of them.
 const HammingKernels& BestHammingKernels();
 
 }  // namespace dmslam
