@@ -162,9 +162,9 @@ void Tracker::Refuse(Attempt* attempt) {
 
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
 /// over the image and as a whole, which a person is not, or if much of what is seen is proven to be no
-/// person; else when the place goes on to predict what is seen, and, in a map that is old enough to have
-/// them, proven landmarks are among it: the more of them, the sooner. In another map that is not, it must
-/// both be seen as a whole and predict.
+/// person; else when the place goes on to predict what is seen: in a map that is old enough to have proven
+/// landmarks, some of those, and the more of them, the sooner; in a younger one, more than matches by chance.
+/// In another map that is too young, it must both be seen as a whole and predict.
 bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
   if (report.IsDoubtful()) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
@@ -172,7 +172,7 @@ bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const Tra
   const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
   if (at_once || proven >= kManyProven) return true;
   const int64_t since_ns = frame.stamp_ns - unbelieved_->since_ns;
-  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs;
+  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs && !report.MayMatchByChance();
   return proven >= kSomeProven && since_ns >= ConfirmNs(proven);
 }
 

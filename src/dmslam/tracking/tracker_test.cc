@@ -309,6 +309,21 @@ TEST_F(Recovering, APlaceIsBelievedWhenItHasPredictedForHalfASecond) {
   EXPECT_NEAR((found - kFound) / 30.0, 0.5, 0.05);
 }
 
+/// As where somebody stands who is in the map: he keeps predicting himself, and the room is not there.
+TEST_F(Recovering, InAYoungMapAPlaceThatPredictsNoMoreThanChanceIsNotBelieved) {
+  Start(1.0);
+  one_seen_of_ = 4;
+  EXPECT_TRUE(Track(kFound).relocalized);
+  one_seen_of_ = 12;
+  for (uint32_t frame = kFound + 1; frame < kFound + 45; ++frame) {
+    const TrackingResult result = Track(frame);
+    EXPECT_FALSE(result.pose) << frame;
+    EXPECT_FALSE(result.relocalized) << frame << ": it is followed";
+  }
+  one_seen_of_ = 4;
+  EXPECT_TRUE(Track(kFound + 45).pose);
+}
+
 TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict) {
   Start(1.0);
   tracker_->BeginLost();
