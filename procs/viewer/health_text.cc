@@ -108,7 +108,8 @@ std::string Prometheus(const ProcessBoard& board, const FrontendStatus& f, const
   }
   page.One("frames_per_second", "gauge", "frames processed over the last second", f.fps);
   page.One("frames_processed_total", "counter", "frames worked on", static_cast<double>(f.frames_processed));
-  page.One("frames_skipped_total", "counter", "a newer one was there", static_cast<double>(f.frames_skipped));
+  page.One("frames_skipped_total", "counter", "left out in favour of the newest: too many waited",
+           static_cast<double>(f.frames_skipped));
   page.One("tracking", "gauge", "1 while the camera's pose is known",
            f.state == TrackingState::kTracking ? 1.0 : 0.0);
   page.One("inliers", "gauge", "static features in the newest frame", f.inliers);

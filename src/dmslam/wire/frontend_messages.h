@@ -45,7 +45,7 @@ struct SequenceDone {
   uint32_t session = 0;
   CameraId camera_id = 0;
   int64_t frames_processed = 0;
-  int64_t frames_skipped = 0;  ///< a newer one was there already
+  int64_t frames_skipped = 0;  ///< left out in favour of the newest: too many waited
 };
 
 /// Where the camera is for who controls its motion: in odom, which never jumps, and where odom lies in the

@@ -71,7 +71,7 @@ struct FrontendStatus {
   double fps = 0;  ///< frames processed over the last second
   int64_t frames_received = 0;
   int64_t frames_processed = 0;
-  int64_t frames_skipped = 0;          ///< a newer one was there already
+  int64_t frames_skipped = 0;          ///< left out in favour of the newest: too many waited
   std::optional<int32_t> frame_index;  ///< of the newest frame; none: none yet
   int32_t features = 0;                ///< in the newest frame
   int32_t inliers = 0;
