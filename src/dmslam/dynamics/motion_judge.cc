@@ -42,11 +42,11 @@ void MotionJudge::DropMatchesOfHiddenPlaces(const Map& map, std::span<const Expe
 void MotionJudge::Judge(const Map& map, std::span<const ExpectedLandmark> expected,
                         std::span<const RejectedMatch> rejected, TrackedFrame* frame) {
   moved_now_ = moved_.Find(map, expected, rejected, frame);
-  missing_.Judge(map, *frame, expected, moved_now_);
 }
 
 void MotionJudge::Believe(const Map& map, std::span<const ExpectedLandmark> expected,
                           const TrackedFrame& frame) {
+  missing_.Judge(map, frame, expected, moved_now_);
   const std::vector<LandmarkId>& hidden = missing_.hidden();
   for (const ExpectedLandmark& landmark : expected) {
     if (!std::binary_search(hidden.begin(), hidden.end(), landmark.id())) evidence_.OnVisible(landmark.id());

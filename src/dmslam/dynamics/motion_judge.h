@@ -61,13 +61,14 @@ class MotionJudge {
   /// Before the pose is optimised: takes the matches that are there by chance, where somebody hides the map.
   void DropMatchesOfHiddenPlaces(const Map& map, std::span<const ExpectedLandmark> expected,
                                  TrackedFrame* frame);
-  /// When it is: marks the features that see something that moves, and judges what is missing.
+  /// When it is: marks the features that see something that moves.
   void Judge(const Map& map, std::span<const ExpectedLandmark> expected,
              std::span<const RejectedMatch> rejected, TrackedFrame* frame);
   /// What it found elsewhere: landmarks and, in parallel, the features that show them.
   std::span<const LandmarkId> moved() const { return moved_now_; }
   std::span<const uint16_t> moved_features() const { return moved_.features(); }
-  /// Where the pose is believed: adds the judgement to the evidence and to the memory of what moves.
+  /// Where the pose is believed: judges what is missing, too, and adds all that to the evidence and to the
+  /// memory of what moves.
   void Believe(const Map& map, std::span<const ExpectedLandmark> expected, const TrackedFrame& frame);
 
   /// What was believed since the last call.

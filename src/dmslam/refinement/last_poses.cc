@@ -66,7 +66,7 @@ void LastPoses::RefineNext(const Map& map) {
   for (PoseSearch& search : searches_) {
     searches.emplace_back([&map, &search](TrackedFrame* frame) {
       search.Reset();  // what the frame before saw move may lie still in this one
-      return search.InLocalMap(map, false, std::nullopt, frame).HasPose();
+      return search.FitsLocalMap(map, frame);
     });
   }
   if (!refiner_.IsAhead()) refiner_.LookAhead(map, searches);

@@ -95,6 +95,17 @@ bool PoseSearch::FromTurn(const Map& map, const TrackedFrame& last, const Rigid3
 }
 
 TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame) {
+  const Fitted fitted = FitInLocalMap(map, careful, prior, frame);
+  if (fitted.report.IsTracked()) judge_.Believe(map, fitted.expected, *frame);
+  return fitted.report;
+}
+
+bool PoseSearch::FitsLocalMap(const Map& map, TrackedFrame* frame) {
+  return FitInLocalMap(map, false, std::nullopt, frame).report.HasPose();
+}
+
+PoseSearch::Fitted PoseSearch::FitInLocalMap(const Map& map, bool careful, const Prior& prior,
+                                             TrackedFrame* frame) {
   local_map_.Collect(map, *frame);
   const double wider = careful ? kWiderAfterRelocalization : 1.0;
   auto expected = MatchAround(map, wider, frame);
@@ -111,8 +122,7 @@ TrackingReport PoseSearch::InLocalMap(const Map& map, bool careful, const Prior&
   CountExpected(map, expected, *frame, &report);
   report.by_rival = by_rival;
   Decide(fit, careful, &report);
-  if (report.IsTracked()) judge_.Believe(map, expected, *frame);
-  return report;
+  return {report, expected};
 }
 
 std::span<const ExpectedLandmark> PoseSearch::MatchAround(const Map& map, double wider, TrackedFrame* frame) {

@@ -52,6 +52,9 @@ class PoseSearch {
   /// `careful`: the camera was lost just before, so more is asked. Where it is tracked, what the frame
   /// says of landmarks is added to the judge's evidence.
   TrackingReport InLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
+  /// The same of a camera that was not lost, where only the pose is asked for: nothing is learnt of
+  /// landmarks.
+  bool FitsLocalMap(const Map& map, TrackedFrame* frame);
 
   /// The keyframe that shares most landmarks with the frame searched for last; null: none was searched for,
   /// or it has left the map.
@@ -68,6 +71,12 @@ class PoseSearch {
   void Reset();
 
  private:
+  /// The pose and what is to be said of it, with what should be seen from there.
+  struct Fitted {
+    TrackingReport report;
+    std::span<const ExpectedLandmark> expected;
+  };
+  Fitted FitInLocalMap(const Map& map, bool careful, const Prior& prior, TrackedFrame* frame);
   std::span<const ExpectedLandmark> MatchAround(const Map& map, double wider, TrackedFrame* frame);
   void CountExpected(const Map& map, std::span<const ExpectedLandmark> expected, const TrackedFrame& frame,
                      TrackingReport* report) const;

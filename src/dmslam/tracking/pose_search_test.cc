@@ -381,6 +381,20 @@ TEST_F(PoseSearchTest, ByAFewMatchesAllThatLiesAroundIsFound) {
   ASSERT_NE(search_->Reference(scene_.map()), nullptr);
 }
 
+TEST_F(PoseSearchTest, WhereThePoseAloneIsAskedForNothingIsLearntOfLandmarks) {
+  AddRoom(150);
+  scene_.MapAll();
+  TrackedFrame learnt = Matched(See(), [](size_t i) { return i < 12; }), fitted = learnt;
+  EXPECT_TRUE(InLocalMap(&learnt).IsTracked());
+  EXPECT_FALSE(search_->judge().TakeEvidence(kNow, MapScene::kMap).items.empty());
+  EXPECT_TRUE(search_->FitsLocalMap(scene_.map(), &fitted));
+  EXPECT_TRUE(search_->judge().TakeEvidence(kNow, MapScene::kMap).items.empty());
+  EXPECT_EQ(fitted.landmarks, learnt.landmarks);
+  EXPECT_EQ(fitted.T_cam_world.translation, learnt.T_cam_world.translation);
+  TrackedFrame hidden = Matched(See([](size_t i) { return i < 5; }), [](size_t i) { return i < 5; });
+  EXPECT_FALSE(search_->FitsLocalMap(scene_.map(), &hidden));
+}
+
 TEST_F(PoseSearchTest, WhatWasFoundIsToldWithItsCovariance) {
   AddRoom(150);
   scene_.MapAll();
