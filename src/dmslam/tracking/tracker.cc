@@ -30,6 +30,9 @@ constexpr double kTurnRadPerS = 0.3;
 constexpr double kMostTurnRad = 0.3;
 // A place is seen as a whole where this share of what it should show is found.
 constexpr double kWholeShare = 0.3;
+// What lies in so many cells of the image is wider than somebody who stands there, where the room was lost
+// behind him.
+constexpr int kWiderThanSomebodyCells = kFillingCells / 2;
 // A pose is thin where less than this share of what it should see is found.
 constexpr double kThinShare = 0.25;
 // A thin pose is compared with one beside it that is turned by up to this angle.
@@ -40,6 +43,12 @@ constexpr double kClearlyMore = 1.3;
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
   return report.cells >= kFillingCells && report.num_static >= kWholeShare * report.num_expected;
+}
+
+/// Whether a place in a map that is too young to have much proven shows more than matches by chance, and more
+/// than somebody who stood there would: he is no landmark that is proven, and fills little of the image.
+bool IsMoreThanSomebody(const TrackingReport& report, int proven) {
+  return !report.MayMatchByChance() && (proven > 0 || report.cells >= kWiderThanSomebodyCells);
 }
 
 /// Whether one pose of a frame explains clearly more of it than another does: of all landmarks and of those
@@ -172,7 +181,7 @@ bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const Tra
   const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
   if (at_once || proven >= kManyProven) return true;
   const int64_t since_ns = frame.stamp_ns - unbelieved_->since_ns;
-  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs && !report.MayMatchByChance();
+  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs && IsMoreThanSomebody(report, proven);
   return proven >= kSomeProven && since_ns >= ConfirmNs(proven);
 }
 

@@ -270,7 +270,7 @@ class Recovering : public ::testing::Test {
   }
   TrackingResult Track(uint32_t frame, bool blind = false) {
     const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
-      const bool hidden = blind || i % one_seen_of_ != 0;
+      const bool hidden = blind || i % one_seen_of_ != 0 || std::abs(scene_.point(i).x()) > seen_aside_;
       return hidden ? std::nullopt : std::optional(scene_.point(i));
     };
     return tracker_->Track(replica_, {.whereabouts = whereabouts_},
@@ -284,8 +284,9 @@ class Recovering : public ::testing::Test {
     return 0;
   }
 
-  int64_t mapped_ns_ = 0;   ///< of the points
-  size_t one_seen_of_ = 1;  ///< points
+  int64_t mapped_ns_ = 0;    ///< of the points
+  size_t one_seen_of_ = 1;   ///< points
+  double seen_aside_ = 1e9;  ///< those no farther to the left or right
   bool usual_speed_ = true;
   Tracker::Whereabouts whereabouts_;
   MapScene scene_;
@@ -321,6 +322,19 @@ TEST_F(Recovering, InAYoungMapAPlaceThatPredictsNoMoreThanChanceIsNotBelieved) {
     EXPECT_FALSE(result.relocalized) << frame << ": it is followed";
   }
   one_seen_of_ = 4;
+  EXPECT_TRUE(Track(kFound + 45).pose);
+}
+
+TEST_F(Recovering, InAYoungMapAPlaceNoWiderThanSomebodyIsNotBelieved) {
+  Start(1.0);
+  seen_aside_ = 0.3;
+  EXPECT_TRUE(Track(kFound).relocalized);
+  for (uint32_t frame = kFound + 1; frame < kFound + 45; ++frame) {
+    const TrackingResult result = Track(frame);
+    EXPECT_FALSE(result.pose) << frame;
+    EXPECT_FALSE(result.report.MayMatchByChance()) << frame;
+  }
+  seen_aside_ = 1.5;
   EXPECT_TRUE(Track(kFound + 45).pose);
 }
 
