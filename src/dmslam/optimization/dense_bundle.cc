@@ -33,8 +33,8 @@ struct Taken {
 /// The points' sights in their order; the poses that are free get numbers in theirs.
 BundleSights SightsByPoint(const BundleState& state) {
   const std::vector<BundleObservation>& observations = state.problem.observations;
-  std::vector<int> free_pose(state.poses.size(), -1);
-  int free_poses = 0;
+  std::vector<std::optional<size_t>> free_pose(state.poses.size());
+  size_t free_poses = 0;
   for (size_t k = 0; k < free_pose.size(); ++k) {
     if (!state.pose_held[k]) free_pose[k] = free_poses++;
   }
@@ -46,8 +46,8 @@ BundleSights SightsByPoint(const BundleState& state) {
   std::vector<size_t> next(sights.first.begin(), sights.first.end() - 1);
   for (size_t i = 0; i < observations.size(); ++i) {
     const BundleObservation& o = observations[i];
-    const int pose = free_pose[At(o.pose)];
-    const bool adjusts = pose >= 0 || !state.PointHeld(o.point);
+    const std::optional<size_t> pose = free_pose[At(o.pose)];
+    const bool adjusts = pose.has_value() || !state.PointHeld(o.point);
     sights.all[next[At(o.point)]++] = {
         i, At(o.pose), pose, o.uv_px, std::sqrt(o.inv_sigma_squared), state.active[i] && adjusts};
   }
@@ -152,7 +152,7 @@ class DenseBundle : public BundleSolver {
     for (size_t i = 0; i < sights_.num_points(); ++i) {
       const Eigen::Vector3d& moved = step.points.emplace_back(PointStep(i, step.poses));
       slope += equations_.point_gradients[i].dot(moved);
-      damped += moved.cwiseAbs2().dot(equations_.point_diagonals[i]);
+      damped += moved.cwiseAbs2().dot(equations_.points[i].diagonal());
     }
     step.predicted_gain = 0.5 * (damping * damped - slope);
     return step;
@@ -200,13 +200,13 @@ class DenseBundle : public BundleSolver {
   Eigen::Vector3d PointStep(size_t i, const Eigen::VectorXd& poses) const {
     Eigen::Vector3d sum = equations_.point_gradients[i];
     for (size_t k = sights_.first[i]; k < sights_.first[i + 1]; ++k) {
-      const int pose = sights_.all[k].free_pose;
-      if (pose < 0) continue;
-      const auto moved = poses.segment<kPoseSize>(kPoseSize * pose);
+      const std::optional<size_t> pose = sights_.all[k].free_pose;
+      if (!pose) continue;
+      const auto moved = poses.segment<kPoseSize>(static_cast<Eigen::Index>(kPoseSize * *pose));
       for (int c = 0; c < 3; ++c)
         sum[c] += equations_.couplings[k][static_cast<size_t>(c)].Numbers().dot(moved);
     }
-    return -equations_.points[i] * sum;
+    return -equations_.point_inverses[i] * sum;
   }
 
   const BundleOptions& options_;

@@ -191,13 +191,11 @@ template <typename Vector>
       equations->couplings[k] = {};
       if (!sight.counts || !(terms.depth[n] > kMinBundleDepth)) continue;
       AddToPoint(terms, n, &own, &gradient);
-      if (sight.free_pose < 0) continue;
-      AddToPose<Vector>(terms, n, static_cast<size_t>(sight.free_pose), &equations->couplings[k], equations);
+      if (sight.free_pose) AddToPose<Vector>(terms, n, *sight.free_pose, &equations->couplings[k], equations);
     }
     const bool held = !place.point_held.empty() && place.point_held[i] != 0;
     equations->points[i] = held ? Eigen::Matrix3d(Eigen::Matrix3d::Zero()) : own;
     equations->point_gradients[i] = held ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : gradient;
-    equations->point_diagonals[i] = equations->points[i].diagonal();
   }
 }
 
@@ -226,13 +224,13 @@ template <typename Vector>
 template <typename Vector>
 [[gnu::always_inline]] inline void Eliminate(const BundleSights& sights, size_t i,
                                              DenseEquations* equations) {
-  const Eigen::Matrix3d& inverse = equations->points[i];
+  const Eigen::Matrix3d& inverse = equations->point_inverses[i];
   const Eigen::Vector3d& gradient = equations->point_gradients[i];
   SixNumbers<Vector> a, b, c, column;
   std::array<SixNumbers<Vector>, kPointSize> solved;
   for (size_t k = sights.first[i]; k < sights.first[i + 1]; ++k) {
-    if (sights.all[k].free_pose < 0 || !sights.all[k].counts) continue;
-    const auto pose = static_cast<size_t>(sights.all[k].free_pose);
+    if (!sights.all[k].free_pose || !sights.all[k].counts) continue;
+    const size_t pose = *sights.all[k].free_pose;
     const PointBlock& coupling = equations->couplings[k];
     a.Load(coupling[0]);
     b.Load(coupling[1]);
@@ -242,9 +240,9 @@ template <typename Vector>
     column.Set(solved[0], gradient.x(), solved[1], gradient.y(), solved[2], gradient.z());
     column.TakeFrom(&equations->reduced[pose]);
     for (size_t l = sights.first[i]; l <= k; ++l) {  // the lower half
-      if (sights.all[l].free_pose < 0 || !sights.all[l].counts) continue;
+      if (!sights.all[l].free_pose || !sights.all[l].counts) continue;
       const PointBlock& others = equations->couplings[l];
-      PoseBlock& block = equations->Pose(pose, static_cast<size_t>(sights.all[l].free_pose));
+      PoseBlock& block = equations->Pose(pose, *sights.all[l].free_pose);
       for (size_t row = 0; row < kPoseSize; ++row) {
         column.Set(solved[0], others[0].row[row], solved[1], others[1].row[row], solved[2],
                    others[2].row[row]);
@@ -256,10 +254,11 @@ template <typename Vector>
 
 /// Inverts the point's own equations. False: nothing is known of it.
 bool Invert(double damping, size_t i, DenseEquations* equations) {
-  Eigen::Matrix3d& own = equations->points[i];
-  own.diagonal() += damping * equations->point_diagonals[i];
+  Eigen::Matrix3d own = equations->points[i];
+  own.diagonal() += damping * equations->points[i].diagonal();
   const bool is_known = own.determinant() > 0;
-  own = is_known ? Eigen::Matrix3d(own.inverse()) : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
+  equations->point_inverses[i].setZero();
+  if (is_known) equations->point_inverses[i] = own.inverse();
   return is_known;
 }
 
@@ -307,8 +306,8 @@ DenseEquations::DenseEquations(size_t free_poses, const BundleSights& sights)
       reduced(free_poses),
       couplings(sights.all.size()),
       points(sights.num_points()),
-      point_gradients(sights.num_points()),
-      point_diagonals(sights.num_points()) {}
+      point_inverses(sights.num_points()),
+      point_gradients(sights.num_points()) {}
 
 double CostOf(const Pinhole& camera, const BundleRobustLoss& loss, const BundleSights& sights,
               const BundlePlace& place, [[maybe_unused]] VectorPath widest) {

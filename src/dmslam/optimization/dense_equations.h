@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace dmslam {
 struct BundleSight {
   size_t observation = 0;
   size_t pose = 0;
-  int free_pose = -1;  ///< its place among those that are adjusted; negative: the pose is held
+  std::optional<size_t> free_pose;  ///< its place among those that are adjusted; none: the pose is held
   Eigen::Vector2d uv_px;
   double inv_sigma = 0;
   bool counts = false;
@@ -76,13 +77,13 @@ using PointBlock = std::array<PoseColumn, 3>;
 /// The normal equations of a bundle: J^T W J x = -J^T W e, with x six numbers for each pose that is adjusted
 /// and three for each point. Its points are taken out of them by the Schur complement.
 struct DenseEquations {
-  std::vector<PoseBlock> poses;       ///< lower half, row by row: see Pose()
-  std::vector<PoseColumn> gradient;   ///< of each pose
-  std::vector<PoseColumn> reduced;    ///< the same without the points
-  std::vector<PointBlock> couplings;  ///< of each sight: pose with point
-  std::vector<Eigen::Matrix3d>
-      points;  ///< of each point's own equations; the inverse where that is taken out
-  std::vector<Eigen::Vector3d> point_gradients, point_diagonals;
+  std::vector<PoseBlock> poses;                 ///< lower half, row by row: see Pose()
+  std::vector<PoseColumn> gradient;             ///< of each pose
+  std::vector<PoseColumn> reduced;              ///< the same without the points
+  std::vector<PointBlock> couplings;            ///< of each sight: pose with point
+  std::vector<Eigen::Matrix3d> points;          ///< of each point's own equations
+  std::vector<Eigen::Matrix3d> point_inverses;  ///< of these, damped; zero: the point stays where it is
+  std::vector<Eigen::Vector3d> point_gradients;
 
   DenseEquations(size_t free_poses, const BundleSights& sights);
   size_t num_poses() const { return gradient.size(); }
@@ -99,7 +100,7 @@ void SetEquations(const Pinhole& camera, const BundleRobustLoss& loss, const Bun
                   VectorPath widest = VectorPath::kWidest);
 
 /// Takes the points out of the poses' equations, damped by this share of their diagonal. A point that is
-/// held, or that nobody sees, has an inverse of zero: it stays where it is.
+/// held, or that nobody sees, has an inverse of zero.
 void EliminatePoints(const BundleSights& sights, double damping, DenseEquations* equations,
                      VectorPath widest = VectorPath::kWidest);
 

@@ -39,8 +39,10 @@ struct Scene {
       for (const SyntheticObservation& o : truth.observations) {
         if (static_cast<size_t>(o.point) != i) continue;
         const size_t k = sights.all.size();
-        sights.all.push_back({k, static_cast<size_t>(o.camera), o.camera - 1, o.uv_px,
-                              0.5 + 0.1 * static_cast<double>(k % 7), k % 9 != 0});
+        const auto camera_number = static_cast<size_t>(o.camera);
+        const auto free_pose = camera_number > 0 ? std::optional(camera_number - 1) : std::nullopt;
+        sights.all.push_back(
+            {k, camera_number, free_pose, o.uv_px, 0.5 + 0.1 * static_cast<double>(k % 7), k % 9 != 0});
       }
       sights.first.push_back(sights.all.size());
     }
@@ -71,6 +73,7 @@ TEST(DenseEquations, AreTheSameHoweverWideTheVectors) {
       EXPECT_TRUE(SameBytes(equations.reduced, expected.reduced));
       EXPECT_TRUE(SameBytes(equations.couplings, expected.couplings));
       EXPECT_TRUE(SameBytes(equations.points, expected.points));
+      EXPECT_TRUE(SameBytes(equations.point_inverses, expected.point_inverses));
       EXPECT_TRUE(SameBytes(equations.point_gradients, expected.point_gradients));
       EXPECT_EQ(CostOf(scene.camera, loss, scene.sights, scene.Place(), path), cost);
     }
@@ -103,8 +106,9 @@ struct WholeSystem {
     const Eigen::Vector2d error = sight.inv_sigma * (scene.camera.Project(p) - sight.uv_px);
     cost += 0.5 * loss.Of(error.squaredNorm());
     Eigen::Matrix<double, 2, Eigen::Dynamic> J = Eigen::Matrix<double, 2, Eigen::Dynamic>::Zero(2, A.cols());
-    if (sight.free_pose >= 0)
-      J.middleCols<6>(6 * sight.free_pose) = sight.inv_sigma * PoseJacobian(scene.camera, p);
+    if (sight.free_pose)
+      J.middleCols<6>(static_cast<Eigen::Index>(6 * *sight.free_pose)) =
+          sight.inv_sigma * PoseJacobian(scene.camera, p);
     if (!scene.point_held[i]) {
       J.middleCols<3>(static_cast<Eigen::Index>(24 + 3 * i)) =
           sight.inv_sigma * ProjectionJacobian(scene.camera, p) * scene.rotations[sight.pose];

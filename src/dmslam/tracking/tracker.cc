@@ -30,8 +30,7 @@ constexpr double kTurnRadPerS = 0.3;
 constexpr double kMostTurnRad = 0.3;
 // A place is seen as a whole where this share of what it should show is found.
 constexpr double kWholeShare = 0.3;
-// What lies in so many cells of the image is wider than somebody who stands there, where the room was lost
-// behind him.
+// What lies in so many cells of the image is wider than somebody who stands in it.
 constexpr int kWiderThanSomebodyCells = kFillingCells / 2;
 // A pose is thin where less than this share of what it should see is found.
 constexpr double kThinShare = 0.25;
@@ -172,8 +171,9 @@ void Tracker::Refuse(Attempt* attempt) {
 /// Where it was doubtful, when it is so no more. Where it was found anew, at once if the place is seen all
 /// over the image and as a whole, which a person is not, or if much of what is seen is proven to be no
 /// person; else when the place goes on to predict what is seen: in a map that is old enough to have proven
-/// landmarks, some of those, and the more of them, the sooner; in a younger one, more than matches by chance.
-/// In another map that is too young, it must both be seen as a whole and predict.
+/// landmarks, some of those, and the more of them, the sooner; in a younger one, more than matches by chance
+/// and more than somebody who stands there shows. In another map that is too young, it must both be seen as a
+/// whole and predict.
 bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
   if (report.IsDoubtful()) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
