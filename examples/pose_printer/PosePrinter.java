@@ -18,7 +18,7 @@ import lcm.logging.Log;
 public class PosePrinter implements LCMSubscriber {
   private static final String[] STATES = {
     "no map yet", "waiting for a map", "trying a map", "tracking", "uncertain", "lost", "placed later",
-    "rotation only"
+    "rotation only", "too few landmarks"
   };
   private long session = 0;
 

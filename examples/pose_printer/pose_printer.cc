@@ -33,6 +33,8 @@ const char* StateName(int state) {
       return "placed later";
     case 7:
       return "rotation only";
+    case 8:
+      return "too few landmarks";
     default:
       return "unknown state";
   }

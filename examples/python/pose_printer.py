@@ -14,7 +14,7 @@ import lcm
 from dmslam import pose_t
 
 STATES = ["no map yet", "waiting for a map", "trying a map", "tracking", "uncertain", "lost",
-          "placed later", "rotation only"]
+          "placed later", "rotation only", "too few landmarks"]
 
 
 def on_pose(channel, data):

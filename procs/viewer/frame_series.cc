@@ -35,7 +35,7 @@ std::string FrameSeries::Json(int64_t since, int64_t most) const {
     const PoseView& view = views_[static_cast<size_t>(i - first_)];
     t.push_back(Round(static_cast<double>(view.stamp_ns - views_.front().stamp_ns) * 1e-9, 1e-3));
     frame.push_back(view.frame_index);
-    state.push_back(static_cast<int>(OnTheWire(view.state)));
+    state.push_back(static_cast<int>(view.state));
     inliers.push_back(view.inliers);
     moving.push_back(view.moving);
     share.push_back(Round(view.moving_share, 1e-4));

@@ -139,7 +139,6 @@ std::string StateWord(TrackingState state) {
     case TrackingState::kTracking:
       return "tracking";
     case TrackingState::kUncertain:
-    case TrackingState::kMissing:
       return "uncertain";
     case TrackingState::kLost:
       return "lost";
@@ -147,6 +146,8 @@ std::string StateWord(TrackingState state) {
       return "placed later";
     case TrackingState::kRotationOnly:
       return "rotation only";
+    case TrackingState::kMissing:
+      return "too few landmarks";
   }
   return "";
 }
@@ -235,7 +236,7 @@ std::string PoseJson(const PoseView& view, const std::optional<Rigid3d>& drawn, 
             {"camera", view.camera_id},
             {"arrangement", arrangement},
             {"t", static_cast<double>(view.stamp_ns) * 1e-9},
-            {"state", static_cast<int>(OnTheWire(view.state))},
+            {"state", static_cast<int>(view.state)},
             {"word", StateWord(view.state)},
             {"map", view.map_id ? Json(*view.map_id) : Json()},
             {"inliers", view.inliers},

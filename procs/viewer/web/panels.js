@@ -4,7 +4,7 @@ const byId = (id) => document.getElementById(id);
 const kWindowSeconds = 60;
 const kBuckets = 240;
 const kAxisRem = 3.6;  // width of the axes: the charts and the strip above them lie over one another
-const kStates = {0: 'none', 1: 'none', 2: 'warn', 3: 'good', 4: 'warn', 5: 'bad', 6: 'good'};
+const kStates = {0: 'none', 1: 'none', 2: 'warn', 3: 'good', 4: 'warn', 5: 'bad', 6: 'good', 8: 'warn'};
 const thousands = (n) => Number(n).toLocaleString('en').replace(/,/g, '\u202f');
 const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -238,7 +238,7 @@ export class SeriesPanel {
       chart.update('none');
     }
     this.drawStrip(begin, this.charts[0].chart.options.scales.x);
-    const tracked = state.filter((s) => s === 3 || s === 2).length;
+    const tracked = state.filter((s) => s >= 2 && s <= 4).length;
     text('value-tracked', (100 * tracked / state.length).toFixed(1) + ' %');
     text('count-tracked', (100 * tracked / state.length).toFixed(0) + ' %');
     const last = (key) => this.data[key][t.length - 1];

@@ -73,19 +73,36 @@ struct FrameEvidence {
   CameraId camera_id = 0;
 };
 
-/// How well is known where the camera is. The numbers are those of lcmtypes/dmslam_frame_pose_t.lcm, where
-/// one stands for kUncertain and kMissing.
+/// How well is known where the camera is. The numbers are those of lcmtypes/dmslam_frame_pose_t.lcm.
 enum class TrackingState : uint8_t {
   kNotInitialized = 0,  ///< a first map is looked for; no pose
   kWaitingForMap = 1,   ///< a first map was proposed and has not come back yet; no pose
-  kTrial = 2,           ///< a young map must still prove that it predicts
-  kTracking = 3,        ///< enough static landmarks fix position and rotation
-  kUncertain = 4,       ///< the landmarks fix the pose badly, as its covariance says
+  kTrial = 2,           ///< a young map must still prove that it predicts; pose
+  kTracking = 3,        ///< enough static landmarks fix position and rotation; pose
+  kUncertain = 4,       ///< the landmarks fix the pose badly, as its covariance says; pose
   kLost = 5,            ///< no pose for a while: it is looked for in the map
-  kLocalizedLater = 6,  ///< a frame placed in the map, or placed better, after the fact
+  kLocalizedLater = 6,  ///< a frame placed in the map, or placed better, after the fact; pose
   kRotationOnly = 7,    ///< how the camera turns is measured, where it is is not; no pose
   kMissing = 8,         ///< no pose since a moment ago: too few landmarks are found
 };
+
+/// Whether a frame in this state has a pose.
+constexpr bool HasPose(TrackingState state) {
+  switch (state) {
+    case TrackingState::kTrial:
+    case TrackingState::kTracking:
+    case TrackingState::kUncertain:
+    case TrackingState::kLocalizedLater:
+      return true;
+    case TrackingState::kNotInitialized:
+    case TrackingState::kWaitingForMap:
+    case TrackingState::kLost:
+    case TrackingState::kRotationOnly:
+    case TrackingState::kMissing:
+      return false;
+  }
+  return false;
+}
 
 /// How many numbers the covariance of a pose takes: position x, y, z [map units], then the rotation vector
 /// x, y, z [rad], both along the axes of the frame that the pose is told in; 6 x 6, symmetric: the upper
@@ -98,7 +115,7 @@ struct FramePose {
   int64_t stamp_ns = 0;
   TrackingState state = TrackingState::kNotInitialized;
   std::optional<MapId> map_id;
-  std::optional<KeyframeId> reference;  ///< none: no pose
+  std::optional<KeyframeId> reference;  ///< none: no pose, and `state` says why
   Rigid3d T_cam_reference;
   double reference_scale = 1.0;  ///< the reference's scale (Keyframe::scale) when the pose was told
   Rigid3d T_cam_world;           ///< in the map as the frontend knew it then

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <type_traits>
-
 #include "dmslam/wire/codec_impl.h"
 #include "dmslam/wire/frontend_messages.h"
 
@@ -19,7 +17,7 @@ struct EnumRange<Lens> {
 };
 template <>
 struct EnumRange<TrackingState> {
-  static constexpr auto kFirst = TrackingState::kNotInitialized, kLast = TrackingState::kRotationOnly;
+  static constexpr auto kFirst = TrackingState::kNotInitialized, kLast = TrackingState::kMissing;
   static constexpr const char* kName = "unknown tracking state";
 };
 template <>
@@ -27,16 +25,5 @@ struct EnumRange<MapReset::Fate> {
   static constexpr auto kFirst = MapReset::Fate::kKeep, kLast = MapReset::Fate::kDrop;
   static constexpr const char* kName = "unknown fate of a map";
 };
-
-/// On the wire a frame is uncertain with and without a pose. `has_pose`: as the wire says.
-void StateField(auto& s, auto& state, auto& wire, [[maybe_unused]] bool has_pose) {
-  if constexpr (std::remove_cvref_t<decltype(s)>::kToWire) {
-    const TrackingState told = OnTheWire(state);
-    s(told, wire);
-  } else {
-    s(state, wire);
-    if (state == TrackingState::kUncertain && !has_pose) state = TrackingState::kMissing;
-  }
-}
 
 }  // namespace dmslam::wire

@@ -190,7 +190,7 @@ struct Codec<FramePose> {
   static void Fields(auto& s, auto& m, auto& w) {
     s.Utime(m.stamp_ns, w.utime);
     s(m.frame_index, w.frame_index);
-    StateField(s, m.state, w.state, w.reference_id != 0);
+    s(m.state, w.state);
     s(m.stamp_ns, w.stamp_ns);
     s(m.map_id, w.map_id);
     s(m.reference, w.reference_id);
@@ -213,8 +213,8 @@ struct Codec<FramePose> {
   static void Validate(const FramePose& m, Checker& check) {
     check.Stamp(m.stamp_ns);
     check.OptionalId(m.reference, "impossible id of the reference keyframe");
-    check.Require(m.HasPose() ? m.state != TrackingState::kMissing : m.state != TrackingState::kUncertain,
-                  "a state that does not go with whether there is a pose");
+    // Not the reverse: logs from before STATE_MISSING have STATE_UNCERTAIN without a pose.
+    check.Require(!m.HasPose() || HasPose(m.state), "a pose in a state that has none");
     check.Pose(m.T_cam_reference, "no pose relative to the reference keyframe");
     check.Pose(m.T_cam_world, "no pose in the map");
     check.Scale(m.reference_scale, "scale of the reference out of range");
@@ -360,7 +360,7 @@ struct Codec<Odometry> {
     s(m.camera_id, w.camera_id);
     s(m.frame_index, w.frame_index);
     s(m.stamp_ns, w.stamp_ns);
-    StateField(s, m.state, w.state, w.measured != 0);
+    s(m.state, w.state);
     s(m.segment, w.segment);
     s(m.measured, w.measured);
     s(m.T_odom_cam, w.rotation_odom_cam, w.translation_odom_cam);
@@ -406,7 +406,7 @@ struct Codec<PoseView> {
     s(m.camera_id, w.camera_id);
     s(m.stamp_ns, w.stamp_ns);
     s(m.frame_index, w.frame_index);
-    StateField(s, m.state, w.state, w.has_pose != 0);
+    s(m.state, w.state);
     s(m.map_id, w.map_id);
     s(m.has_pose, w.has_pose);
     s(m.T_world_cam.translation.x(), w.x);

@@ -71,11 +71,6 @@ struct Odometry {
   CameraId camera_id = 0;
 };
 
-/// The state as its number in messages and pictures of them, where a frame without a pose may be uncertain.
-inline TrackingState OnTheWire(TrackingState state) {
-  return state == TrackingState::kMissing ? TrackingState::kUncertain : state;
-}
-
 /// A frame's pose laid out to be watched and plotted.
 struct PoseView {
   uint32_t session = 0;

@@ -127,7 +127,7 @@ struct Codec<FrontendStatus> {
   static void Fields(auto& copy, auto& m, auto& w) {
     FiniteOnly s(copy);
     HeadFields(s, m.head, w);
-    StateField(s, m.state, w.state, false);  // of the frontend, which has no pose where it tracks none
+    s(m.state, w.state);
     s(m.fps, w.fps);
     s(m.frames_received, w.frames_received);
     s(m.frames_processed, w.frames_processed);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "dmslam/end_of_sequence_t.hpp"
+#include "dmslam/frame_pose_t.hpp"
 #include "dmslam/frontend_status_t.hpp"
 #include "dmslam/map_record_t.hpp"
 #include "dmslam/util/check.h"
@@ -298,6 +299,22 @@ Wire OnTheWire(const auto& message) {
   Wire wire;
   EXPECT_EQ(wire.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
   return wire;
+}
+
+TEST(WireTest, AStateHasOneMeaning) {
+  FramePose pose;
+  pose.state = TrackingState::kMissing;
+  EXPECT_EQ(OnTheWire<frame_pose_t>(pose).state, frame_pose_t::STATE_MISSING);
+  EXPECT_EQ(Decode<FramePose>(Encode(pose))->state, TrackingState::kMissing);
+  FrontendStatus status;
+  status.state = TrackingState::kMissing;
+  EXPECT_EQ(OnTheWire<frontend_status_t>(status).state, frame_pose_t::STATE_MISSING);
+  pose.reference = KeyframeId::Make(1, 7);
+  EXPECT_THROW(Encode(pose), InvariantError) << "a pose, and none";
+  pose.state = TrackingState::kUncertain;
+  EXPECT_EQ(OnTheWire<frame_pose_t>(pose).state, frame_pose_t::STATE_UNCERTAIN);
+  pose.reference.reset();
+  EXPECT_TRUE(Decode<FramePose>(Encode(pose)).has_value()) << "as older logs have it";
 }
 
 TEST(WireTest, WhatIsAbsentTravelsAsZeroOrMinusOne) {

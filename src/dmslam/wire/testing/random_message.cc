@@ -56,11 +56,6 @@ void MakeSound(std::vector<double>& covariance, Random& random) {
   for (double& value : covariance) value = random.Uniform(0, 1);
 }
 
-/// A state that goes with whether there is a pose.
-void MakeSound(TrackingState& state, bool has_pose) {
-  if (state == TrackingState::kUncertain && !has_pose) state = TrackingState::kMissing;
-}
-
 void MakeSoundCamera(auto& m) { m.camera_id %= 256; }
 
 void MakeSound(RecordGroup& group, Random& random) {
@@ -169,8 +164,8 @@ void MakeSound(InitialMap& m, Random& random) {
 
 void MakeSound(FramePose& m, Random& random) {
   MakeSoundCamera(m);
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
-  MakeSound(m.state, m.HasPose());
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kMissing, random);
+  if (!HasPose(m.state)) m.reference.reset();
   m.reference_scale = random.Uniform(0.1, 10);
   m.moving_image_share = static_cast<float>(random.Uniform());
   MakeSound(m.covariance, random);
@@ -215,8 +210,7 @@ void MakeSound(SequenceDone& m, Random&) {
 void MakeSound(Odometry& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.session);
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
-  MakeSound(m.state, m.measured);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kMissing, random);
   m.segment &= 0x7fffffff;
   m.scale_map_odom = random.Uniform(0.1, 10);
   m.depth = random.Uniform(0.1, 10);
@@ -227,8 +221,7 @@ void MakeSound(Odometry& m, Random& random) {
 void MakeSound(PoseView& m, Random& random) {
   MakeSoundCamera(m);
   MakeSound(m.session);
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
-  MakeSound(m.state, m.has_pose);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kMissing, random);
   m.moving_share = random.Uniform();
 }
 
@@ -247,8 +240,7 @@ void MakeSound(FrameTrace& m, Random&) {
 
 void MakeSound(FrontendStatus& m, Random& random) {
   MakeSoundCamera(m);
-  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kRotationOnly, random);
-  MakeSound(m.state, false);
+  Draw(m.state, TrackingState::kNotInitialized, TrackingState::kMissing, random);
 }
 
 void MakeSound(MapDelta& m, Random& random) {
