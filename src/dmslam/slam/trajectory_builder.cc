@@ -28,6 +28,12 @@ PoseEstimate EstimateOf(const FramePose& told, const Map::ResolvedPose& referenc
 
 namespace {
 
+/// Its map was wrong from the beginning: the frame is one from before a first map.
+void TakeBack(FramePose* pose) {
+  pose->reference.reset();
+  pose->state = TrackingState::kNotInitialized;
+}
+
 /// World to camera in the units of a world that has grown by `growth`.
 Sim3d InGrownWorld(const Rigid3d& T_cam_world, double growth) {
   return Sim3d(T_cam_world.rotation, T_cam_world.translation / growth, 1.0 / growth);
@@ -83,7 +89,7 @@ void TrajectoryBuilder::OnFramePose(const FramePose& told) {
 void TrajectoryBuilder::OnMapReset(const MapReset& reset) {
   if (reset.fate == MapReset::Fate::kKeep) return;
   for (auto& [index, pose] : poses_) {
-    if (index.camera == reset.camera_id && pose.map_id == reset.map_id) pose.reference.reset();
+    if (index.camera == reset.camera_id && pose.map_id == reset.map_id) TakeBack(&pose);
   }
   std::erase_if(refined_, [&reset](const auto& entry) {
     return entry.first.camera == reset.camera_id && entry.second.map_id == reset.map_id;

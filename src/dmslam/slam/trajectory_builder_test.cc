@@ -51,7 +51,9 @@ TEST_F(TrajectoryOfTwoMaps, PosesOfADroppedMapDoNotComeBackWithAKeyframeOfTheSam
   EXPECT_TRUE(built.online.empty());
   EXPECT_FALSE(built.map_id.has_value()) << "no frame lies in any";
   EXPECT_TRUE(built.keyframes.empty());
-  EXPECT_EQ(builder_.frame_poses().size(), 1U) << "the frame is counted all the same";
+  ASSERT_EQ(builder_.frame_poses().size(), 1U) << "the frame is counted all the same";
+  const FramePose& left = builder_.frame_poses().begin()->second;
+  EXPECT_FALSE(left.HasPose() || HasPose(left.state)) << "its state says why it has no pose";
 }
 
 TEST_F(TrajectoryOfTwoMaps, FramesOfSeveralCamerasAreToldApart) {
