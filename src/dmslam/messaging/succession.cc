@@ -15,7 +15,6 @@ ReplicaSearch::Options SearchOptions(const ReplicaFetch::Options& options) {
   search.owner = options.owner;
   search.asker = options.id;
   for (const ReplicaFetch::Holder& holder : options.holders) search.roles.push_back(holder.role);
-  search.absent_ns = options.absent_ns;
   return search;
 }
 

@@ -34,7 +34,6 @@ class ReplicaFetch : public StateMachine {
     int64_t schema_hash = 0;
     std::vector<Holder> holders;  ///< who is waited for; none: nothing to fetch
     ReceiveWindow::Limits limits;
-    int64_t absent_ns = 5'000'000'000;   ///< a holder that does not answer for so long is absent
     int64_t stalled_ns = 6'000'000'000;  ///< a transfer that does not advance for so long is begun again
   };
   enum class State {
