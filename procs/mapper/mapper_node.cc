@@ -228,8 +228,8 @@ void MapperNode::SettleAgain() {
   for (const CameraId camera : core_->map().cameras()) {
     const std::optional<KeyframeId> id = core_->map().progress(camera).settled;
     if (!id) continue;
-    const std::optional<Map::ResolvedPose> settled = core_->map().ResolvePose(*id);
-    core_->Settle(*id, settled ? std::optional(settled->map_id) : std::nullopt);
+    const Keyframe* settled = core_->map().Resolve(*id);
+    core_->Settle(*id, settled != nullptr ? std::optional(settled->map_id) : std::nullopt);
   }
 }
 

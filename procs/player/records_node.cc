@@ -143,19 +143,17 @@ void RecordsNode::Enter(const RecordedMessage& message) {
 /// The landmark that most of the recorded one's features see in the map of now; none if they see none. Where
 /// both maps are the same it keeps its name, whatever became of it.
 std::optional<LandmarkId> RecordsNode::Translate(LandmarkId recorded) const {
-  const std::optional<LandmarkId> known = recorded_.Resolve(recorded);
-  const Landmark* landmark = known ? recorded_.FindLandmark(*known) : nullptr;
-  const std::optional<LandmarkId> namesake = live_.Resolve(recorded);
-  if (landmark == nullptr) return namesake ? std::nullopt : std::optional(recorded);
+  const Landmark* landmark = recorded_.Resolve(recorded);
+  const Landmark* namesake = live_.Resolve(recorded);
+  if (landmark == nullptr) return namesake != nullptr ? std::nullopt : std::optional(recorded);
   std::map<LandmarkId, int> votes;
   for (const Observation& observation : landmark->observations) {
     const Keyframe* keyframe = live_.FindKeyframe(observation.keyframe);
     if (keyframe == nullptr || observation.feature >= keyframe->landmarks.size()) continue;
     if (const LandmarkId now = keyframe->landmarks[observation.feature]; now.valid()) ++votes[now];
   }
-  const bool unseen =
-      landmark->observations.empty() && namesake && live_.FindLandmark(*namesake)->observations.empty();
-  if (unseen || (namesake && votes.contains(*namesake))) return recorded;
+  const bool unseen = landmark->observations.empty() && namesake != nullptr && namesake->observations.empty();
+  if (unseen || (namesake != nullptr && votes.contains(namesake->id))) return recorded;
   const auto most =
       std::max_element(votes.begin(), votes.end(), [](auto& a, auto& b) { return a.second < b.second; });
   return most == votes.end() ? std::nullopt : std::optional(most->first);

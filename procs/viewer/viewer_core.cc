@@ -97,11 +97,12 @@ void ViewerCore::MarkMoved(const std::vector<ReferenceMove>& moves) {
 void ViewerCore::HandFramesOn(const MapDelta& delta) {
   for (const KeyframeTombstone& tombstone : delta.keyframe_tombstones) {
     const auto it = frames_of_.find(tombstone.id);
-    const std::optional<KeyframeId> heir = map_.ResolveKeyframe(tombstone.id);
-    if (it == frames_of_.end() || !heir) continue;
+    const Keyframe* heir = map_.Resolve(tombstone.id);
+    if (it == frames_of_.end() || heir == nullptr) continue;
     const std::vector<SceneFrame> frames = std::move(it->second);
     frames_of_.erase(it);
-    frames_of_[*heir].insert(frames_of_[*heir].end(), frames.begin(), frames.end());
+    std::vector<SceneFrame>& inherited = frames_of_[heir->id];
+    inherited.insert(inherited.end(), frames.begin(), frames.end());
     dirty_frames_.insert(frames.begin(), frames.end());
   }
   const auto moved = [this](KeyframeId id) {
@@ -118,7 +119,8 @@ void ViewerCore::OnFramePose(const FramePose& pose) {
   NoteCamera(pose);
   if (!pose.HasPose()) return;
   frames_[FrameOf(pose)] = pose;
-  frames_of_[map_.ResolveKeyframe(*pose.reference).value_or(*pose.reference)].push_back(FrameOf(pose));
+  const Keyframe* reference = map_.Resolve(*pose.reference);
+  frames_of_[reference != nullptr ? reference->id : *pose.reference].push_back(FrameOf(pose));
   dirty_frames_.insert(FrameOf(pose));
   const bool is_shown = shown_map_ && pose.map_id == shown_map_;
   if (pose.state != TrackingState::kLocalizedLater && !is_shown) ChooseMap();
@@ -167,8 +169,8 @@ void ViewerCore::MarkMap(MapId map_id) {
 
 /// What it was told from may have become part of another map.
 std::optional<MapId> ViewerCore::MapOf(const FramePose& pose) const {
-  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
-  return reference ? std::optional(reference->map_id) : pose.map_id;
+  const Keyframe* reference = map_.Resolve(*pose.reference);
+  return reference != nullptr ? std::optional(reference->map_id) : pose.map_id;
 }
 
 /// By camera: the map of its newest frame that has a pose.
@@ -220,7 +222,7 @@ std::optional<CameraPlace> ViewerCore::WhereIs(CameraId camera) const {
   if (present == present_.end()) return std::nullopt;
   const FramePose& pose = frames_.at({camera, present->second});
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
-  const MapLayout::Place* place = reference ? layout_.Find(reference->map_id) : nullptr;
+  const MapLayout::Place* place = reference ? layout_.Find(reference->map_id()) : nullptr;
   if (place == nullptr) return std::nullopt;
   const Rigid3d T_world_cam = reference->Compose(pose.T_cam_reference, pose.reference_scale).Inverse();
   return CameraPlace{pose.stamp_ns, Rigid3d(T_world_cam.rotation, T_world_cam.translation + place->offset)};
@@ -319,14 +321,14 @@ void ViewerCore::DrawKeyframe(KeyframeId id, ViewerScene* scene) {
 void ViewerCore::DrawFrame(const SceneFrame& frame, ViewerScene* scene) {
   const FramePose& pose = frames_.at(frame);
   const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
-  const MapLayout::Place* place = reference ? layout_.Find(reference->map_id) : nullptr;
+  const MapLayout::Place* place = reference ? layout_.Find(reference->map_id()) : nullptr;
   positions_.erase(frame);
   if (place == nullptr) {
     scene->RemovePath(frame);
     return;
   }
   const Eigen::Vector3d position = reference->Compose(pose.T_cam_reference, pose.reference_scale).Center();
-  if (reference->map_id == shown_map_) positions_[frame] = position;
+  if (reference->map_id() == shown_map_) positions_[frame] = position;
   scene->SetPath(frame, {ToFloats(position + place->offset), pose.state == TrackingState::kLocalizedLater,
                          place->colour});
 }

@@ -46,19 +46,18 @@ EvidenceReport ApplyEvidence(MapEditor& map, const FrameEvidence& evidence,
                              const MotionBeliefOptions& options) {
   EvidenceReport report;
   for (const FrameEvidence::Item& item : evidence.items) {
-    const std::optional<LandmarkId> id = map.Resolve(item.landmark);
-    if (!id) {
+    const Landmark* landmark = map.Resolve(item.landmark);
+    if (landmark == nullptr) {
       ++report.unknown;
       continue;
     }
-    const Landmark& landmark = map.At(*id);
-    const LandmarkEvidence updated = Updated(landmark.evidence, item, evidence.stamp_ns, options);
+    const LandmarkEvidence updated = Updated(landmark->evidence, item, evidence.stamp_ns, options);
     ++report.applied;
     if (IsToBeRemoved(updated, options)) {
-      map.RemoveLandmark(landmark);
+      map.RemoveLandmark(*landmark);
       ++report.removed;
     } else {
-      map.SetEvidence(landmark, updated);
+      map.SetEvidence(*landmark, updated);
     }
   }
   return report;

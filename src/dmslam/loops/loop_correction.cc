@@ -220,8 +220,8 @@ LoopAnswer AdjustGlobally(const Map& map, MapId map_id, uint64_t correction_id,
   }
   for (const Landmark* before : map.LandmarksOf(map_id)) {
     const Landmark* after = adjusted.FindLandmark(before->id);
-    const std::optional<KeyframeId> at = map.ResolveKeyframe(before->reference);
-    const auto reference = at ? corrected_from_base.find(*at) : corrected_from_base.end();
+    const Keyframe* at = map.Resolve(before->reference);
+    const auto reference = at != nullptr ? corrected_from_base.find(at->id) : corrected_from_base.end();
     if (after == nullptr || reference == corrected_from_base.end()) continue;
     answer.landmark_offsets.push_back({before->id, after->p_world - reference->second * before->p_world});
   }

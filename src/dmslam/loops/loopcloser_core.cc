@@ -233,8 +233,8 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
 LoopAnswer LoopcloserCore::AdjustAfterLoop(const Keyframe& keyframe) {
   Begin(Step::kCorrect);
   adjustment_due_ = false;
-  const std::optional<Map::ResolvedPose> closed = map_.ResolvePose(*counters_.last_loop_keyframe);
-  if (!closed) return {};
+  const Keyframe* closed = map_.Resolve(*counters_.last_loop_keyframe);
+  if (closed == nullptr) return {};
   LoopAnswer answer =
       AdjustGlobally(map_, closed->map_id, keyframe.id.value, options_.correction, interrupt_);
   if (answer.kind == LoopAnswer::Kind::kGlobalAdjustment) ++counters_.global_adjustments;

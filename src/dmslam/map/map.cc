@@ -83,14 +83,14 @@ bool Map::HasKnown(KeyframeId id) const {
   return keyframes_.contains(id) || keyframe_tombstones_.contains(id);
 }
 
-std::optional<LandmarkId> Map::Resolve(LandmarkId id) const {
+const Landmark* Map::Resolve(LandmarkId id) const {
   for (int steps = 0; steps < 1000; ++steps) {
-    if (FindLandmark(id) != nullptr) return id;
+    if (const Landmark* landmark = FindLandmark(id)) return landmark;
     const auto it = landmark_tombstones_.find(id);
-    if (it == landmark_tombstones_.end() || !it->second) return std::nullopt;
+    if (it == landmark_tombstones_.end() || !it->second) return nullptr;
     id = *it->second;
   }
-  return std::nullopt;
+  return nullptr;
 }
 
 Rigid3d Map::ResolvedPose::Compose(const Rigid3d& T_other_kf, double scale_then) const {
@@ -100,7 +100,7 @@ Rigid3d Map::ResolvedPose::Compose(const Rigid3d& T_other_kf, double scale_then)
 
 std::optional<Map::ResolvedPose> Map::ResolvePose(KeyframeId id) const {
   if (const Keyframe* keyframe = FindKeyframe(id)) {
-    return ResolvedPose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id, keyframe};
+    return ResolvedPose{keyframe->T_cam_world, keyframe->scale, keyframe};
   }
   std::vector<const KeyframeTombstone*> chain;
   while (chain.size() < 100000) {
@@ -109,7 +109,7 @@ std::optional<Map::ResolvedPose> Map::ResolvePose(KeyframeId id) const {
     chain.push_back(&it->second);
     id = it->second.parent;
     if (const Keyframe* keyframe = FindKeyframe(id)) {
-      ResolvedPose pose{keyframe->T_cam_world, keyframe->scale, keyframe->map_id, keyframe};
+      ResolvedPose pose{keyframe->T_cam_world, keyframe->scale, keyframe};
       for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
         pose.T_cam_world = pose.Compose((*link)->T_kf_parent, (*link)->parent_scale);
         pose.scale /= (*link)->parent_scale;
@@ -120,14 +120,14 @@ std::optional<Map::ResolvedPose> Map::ResolvePose(KeyframeId id) const {
   return std::nullopt;
 }
 
-std::optional<KeyframeId> Map::ResolveKeyframe(KeyframeId id) const {
+const Keyframe* Map::Resolve(KeyframeId id) const {
   for (size_t steps = 0; steps <= keyframe_tombstones_.size(); ++steps) {
-    if (keyframes_.contains(id)) return id;
+    if (const Keyframe* keyframe = FindKeyframe(id)) return keyframe;
     const auto it = keyframe_tombstones_.find(id);
-    if (it == keyframe_tombstones_.end()) return std::nullopt;
+    if (it == keyframe_tombstones_.end()) return nullptr;
     id = it->second.parent;
   }
-  return std::nullopt;
+  return nullptr;
 }
 
 const std::vector<KeyframeId>& Map::Children(KeyframeId id) const {

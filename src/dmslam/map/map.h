@@ -78,21 +78,21 @@ class Map {
   /// What feature `feature` of a keyframe of this map sees; null: nothing.
   const Landmark* LandmarkSeenBy(const Keyframe& keyframe, size_t feature) const;
 
-  /// The landmark that stands for `id` now: itself, or what it was fused into; none when culled or unknown.
-  std::optional<LandmarkId> Resolve(LandmarkId id) const;
+  /// The landmark that stands for `id` now: itself, or what it was fused into; null when culled or unknown.
+  const Landmark* Resolve(LandmarkId id) const;
   /// Pose of a keyframe, through its tombstones when it was culled: T_kf_world. None when unknown.
   struct ResolvedPose {
     Rigid3d T_cam_world;
     double scale = 1.0;
-    MapId map_id = 0;
     /// What stands for it: itself, or the nearest ancestor that is left. Valid until the map changes.
     const Keyframe* keyframe = nullptr;
+    MapId map_id() const { return keyframe->map_id; }
     /// The pose of something told relative to this keyframe when its scale was `scale_then`.
     Rigid3d Compose(const Rigid3d& T_other_kf, double scale_then) const;
   };
   std::optional<ResolvedPose> ResolvePose(KeyframeId id) const;
-  /// The keyframe that stands for `id` now: itself, or the nearest ancestor that is left.
-  std::optional<KeyframeId> ResolveKeyframe(KeyframeId id) const;
+  /// The keyframe that stands for `id` now: itself, or the nearest ancestor that is left; null when unknown.
+  const Keyframe* Resolve(KeyframeId id) const;
   /// Whether a keyframe of this id is in the map, or was and has been culled.
   bool HasKnown(KeyframeId id) const;
   const std::map<KeyframeId, KeyframeTombstone>& keyframe_tombstones() const { return keyframe_tombstones_; }

@@ -110,7 +110,7 @@ TEST_F(Editor, FusedLandmarksShareObserversAndHaveTheEvidenceThatIsTold) {
   Take();
   map_.Fuse(map_.At(Lm(1)), map_.At(Lm(2)), {15, 12, 3, 0.5F, 0});
   EXPECT_EQ(map_.FindLandmark(Lm(1)), nullptr);
-  EXPECT_EQ(map_.Resolve(Lm(1)), Lm(2));
+  EXPECT_EQ(map_.Resolve(Lm(1)), &map_.At(Lm(2)));
   EXPECT_EQ(map_.At(Lm(2)).evidence.visible, 15u);
   EXPECT_EQ(map_.At(Lm(2)).evidence.found, 12u);
   EXPECT_EQ(map_.At(Lm(2)).evidence.moved, 3u);

@@ -209,7 +209,8 @@ TEST(Map, CulledKeyframesAndFusedLandmarksResolve) {
   const auto pose = map.ResolvePose(KeyframeId::Make(1, 3));
   ASSERT_TRUE(pose.has_value());
   EXPECT_NEAR((pose->T_cam_world.translation - Eigen::Vector3d(-6, 0, 0)).norm(), 0, 1e-12);
-  EXPECT_EQ(map.ResolveKeyframe(KeyframeId::Make(1, 3)), KeyframeId::Make(1, 1));
+  EXPECT_EQ(map.Resolve(KeyframeId::Make(1, 3)), &map.At(KeyframeId::Make(1, 1)));
+  EXPECT_EQ(pose->keyframe, map.Resolve(KeyframeId::Make(1, 3)));
   EXPECT_TRUE(map.HasKnown(KeyframeId::Make(1, 3)));
   EXPECT_FALSE(map.ResolvePose(KeyframeId::Make(1, 9)).has_value());
   EXPECT_FALSE(map.HasKnown(KeyframeId::Make(1, 9)));

@@ -165,7 +165,7 @@ Replica OnlyMap(const Map& map, MapId map_id) {
     return !rest.ResolvePose(tombstone.id).has_value();
   });
   std::erase_if(whole.landmark_tombstones, [&](const LandmarkTombstone& tombstone) {
-    return tombstone.replaced_by.has_value() && !rest.Resolve(tombstone.id).has_value();
+    return tombstone.replaced_by.has_value() && rest.Resolve(tombstone.id) == nullptr;
   });
   only.Apply(whole);
   return only;

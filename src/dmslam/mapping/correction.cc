@@ -78,10 +78,10 @@ struct LoopEnds {
 
 std::optional<LoopEnds> EndsOf(const Map& map, const LoopAnswer& answer) {
   if (!answer.seen_from || !answer.matched) return std::nullopt;
-  const std::optional<KeyframeId> here = map.ResolveKeyframe(*answer.seen_from);
-  const std::optional<KeyframeId> there = map.ResolveKeyframe(*answer.matched);
-  if (!here || !there || *here == *there) return std::nullopt;
-  return LoopEnds{map.At(*here), map.At(*there)};
+  const Keyframe* here = map.Resolve(*answer.seen_from);
+  const Keyframe* there = map.Resolve(*answer.matched);
+  if (here == nullptr || there == nullptr || here == there) return std::nullopt;
+  return LoopEnds{*here, *there};
 }
 
 /// Where a keyframe stands to the one that closed the loop.
@@ -116,10 +116,9 @@ LoopSide SideOf(const Map& map, const LoopEnds& ends, int min_covisibility) {
 
 void FuseAsTold(MapEditor& map, const LoopAnswer& answer) {
   for (const auto& fusion : answer.fusions) {
-    const std::optional<LandmarkId> from = map.Resolve(fusion.from), into = map.Resolve(fusion.into);
-    if (!from || !into) continue;
-    const Landmark &goes = map.At(*from), &stays = map.At(*into);
-    map.Fuse(goes, stays, Merged(stays.evidence, goes.evidence));
+    const Landmark *goes = map.Resolve(fusion.from), *stays = map.Resolve(fusion.into);
+    if (goes == nullptr || stays == nullptr) continue;
+    map.Fuse(*goes, *stays, Merged(stays->evidence, goes->evidence));
   }
 }
 
@@ -129,7 +128,9 @@ int TieToPlace(MapEditor& map, const LoopEnds& ends, const LoopSide& side, std::
                const MapperOptions& options) {
   int joined = 0;
   for (const BesideLoop& beside : side.keyframes) {
-    for (LandmarkId& landmark : place) landmark = map.Resolve(landmark).value_or(landmark);
+    for (LandmarkId& id : place) {
+      if (const Landmark* landmark = map.Resolve(id)) id = landmark->id;
+    }
     std::sort(place.begin(), place.end());
     place.erase(std::unique(place.begin(), place.end()), place.end());
     const Rigid3d T_cam_here(beside.T_cam_here.rotation,

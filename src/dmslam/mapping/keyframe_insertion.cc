@@ -8,10 +8,9 @@ namespace {
 
 /// Where the landmark of a match is now; null: it is gone, or is none of this map's.
 const Landmark* Usable(const Map& map, const Keyframe& keyframe, const KeyframeProposal::Match& match) {
-  const std::optional<LandmarkId> id = map.Resolve(match.landmark);
-  if (!id || match.feature >= keyframe.landmarks.size()) return nullptr;
-  const Landmark& landmark = map.At(*id);
-  return landmark.map_id == keyframe.map_id ? &landmark : nullptr;
+  const Landmark* landmark = map.Resolve(match.landmark);
+  if (landmark == nullptr || match.feature >= keyframe.landmarks.size()) return nullptr;
+  return landmark->map_id == keyframe.map_id ? landmark : nullptr;
 }
 
 }  // namespace
@@ -42,10 +41,10 @@ InsertionReport InsertKeyframe(MapEditor& map, const KeyframeProposal& proposal)
   if (!reference) return report;
   const KeyframeId stands_for_it = reference->keyframe->id;
   // A map that is gone has been joined with another since the frontend heard of it last.
-  if (reference->map_id != proposal.map_id && map.HasMap(proposal.map_id)) return report;
+  if (reference->map_id() != proposal.map_id && map.HasMap(proposal.map_id)) return report;
   Keyframe made =
       MakeKeyframe(map, proposal, reference->Compose(proposal.T_cam_reference, proposal.reference_scale));
-  made.map_id = reference->map_id;
+  made.map_id = reference->map_id();
   made.scale = reference->scale;
   made.parent = stands_for_it;
   const Keyframe& keyframe = map.AddKeyframe(std::move(made));

@@ -52,7 +52,7 @@ LandmarkEvidence LandmarkFates::With(const FrameEvidence& said, const Map& map,
                                      const Landmark& landmark) const {
   LandmarkEvidence evidence = landmark.evidence;
   for (const FrameEvidence::Item& item : said.items) {
-    if (map.Resolve(item.landmark) != landmark.id) continue;
+    if (map.Resolve(item.landmark) != &landmark) continue;
     evidence = Updated(evidence, item, said.stamp_ns, options_.belief);
     if (IsToBeRemoved(evidence, options_.belief)) break;
   }

@@ -243,12 +243,12 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
   const bool loop = answer.kind == LoopAnswer::Kind::kLoop;
   const KeyframeId about = answer.seen_from.value_or(answer.keyframe);
   // The keyframe that was asked about may be in another map than was adjusted.
-  const std::optional<Map::ResolvedPose> anchor =
-      map_.ResolvePose(loop ? about : answer.corrections.front().keyframe);
-  if (anchor) as_saved_.erase(anchor->map_id);
+  const Keyframe* anchor = map_.Resolve(loop ? about : answer.corrections.front().keyframe);
+  if (anchor != nullptr) as_saved_.erase(anchor->map_id);
   adjusted_ = false;  // a global adjustment too is composed with what has come since its base
   Publish(loop ? MapEvent::kCorrected : MapEvent::kGloballyAdjusted, about,
-          anchor ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id, answer.note);
+          anchor != nullptr ? std::optional(anchor->map_id) : std::nullopt, answer.correction_id,
+          answer.note);
 }
 
 }  // namespace dmslam

@@ -16,8 +16,7 @@ constexpr double kSeesMore = 1.3;  // from its motion, than from where it was to
 
 /// What became of a landmark of map `map_id`; null where it is gone.
 const Landmark* LandmarkNow(const Map& map, MapId map_id, LandmarkId id) {
-  const std::optional<LandmarkId> now = map.Resolve(id);
-  const Landmark* landmark = now ? map.FindLandmark(*now) : nullptr;
+  const Landmark* landmark = map.Resolve(id);
   return landmark != nullptr && landmark->map_id == map_id ? landmark : nullptr;
 }
 
@@ -79,7 +78,7 @@ void FrameRefiner::Begin(const Map& map, std::optional<MapId> map_id) {
   for (Kept& kept : std::exchange(frames_, {})) {
     const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*kept.pose.reference);
     if (!reference) continue;
-    (map_id && reference->map_id != *map_id ? others : due_).push_back(std::move(kept));
+    (map_id && reference->map_id() != *map_id ? others : due_).push_back(std::move(kept));
   }
   frames_ = std::move(others);
   if (options_.for_smoothing) {  // those that were placed later came after
@@ -171,7 +170,7 @@ std::optional<FrameRefiner::Looked> FrameRefiner::Look(const Map& map, const Kep
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(*kept.pose.reference);
   if (!reference) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
-  Looked looked{SightsNow(map, reference->map_id, kept), std::nullopt};
+  Looked looked{SightsNow(map, reference->map_id(), kept), std::nullopt};
   const auto found = SearchAgain(map, kept, told, looked.known, search);
   looked.refined = Measured(map, kept, told, found.value_or(looked.known));
   return looked;
@@ -193,12 +192,12 @@ std::optional<FinalPose> FrameRefiner::RefineNext(const Map& map, const Search& 
   if (!looked || !reference) return std::nullopt;
   const Rigid3d told = reference->Compose(kept.pose.T_cam_reference, kept.pose.reference_scale);
   std::optional<FinalPose> refined = std::move(looked->refined);
-  if (options_.for_smoothing) LookFromMotion(map, reference->map_id, kept, looked->known, search, &refined);
+  if (options_.for_smoothing) LookFromMotion(map, reference->map_id(), kept, looked->known, search, &refined);
   const bool is_moved_aside = refined && IsAside(map, *reference->keyframe, kept.pose, refined->measured) &&
                               !IsAside(map, *reference->keyframe, kept.pose, told);
   if (is_moved_aside) refined.reset();
   before_ = std::exchange(last_, std::nullopt);
-  if (refined) last_ = {reference->map_id, kept.pose.stamp_ns, refined->measured, refined->sights.size()};
+  if (refined) last_ = {reference->map_id(), kept.pose.stamp_ns, refined->measured, refined->sights.size()};
   if (!refined && kept.pose.state == TrackingState::kLocalizedLater) {
     refined.emplace();
     refined->pose = kept.pose;

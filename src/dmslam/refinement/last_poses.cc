@@ -56,8 +56,8 @@ std::optional<LatePlacement::Before> LastPoses::TrackedBefore(const Map& map, Ma
   const auto next = std::ranges::lower_bound(tracked_, index, {}, &Tracked::index);
   if (next == tracked_.begin()) return std::nullopt;
   const Tracked& before = *std::prev(next);
-  const auto reference = map.ResolvePose(before.pose.reference);
-  if (before.index + 1 != index || !reference || reference->map_id != map_id) return std::nullopt;
+  const Keyframe* reference = map.Resolve(before.pose.reference);
+  if (before.index + 1 != index || reference == nullptr || reference->map_id != map_id) return std::nullopt;
   return LatePlacement::Before{before.index, before.stamp_ns, *before.pose.In(map)};
 }
 
@@ -92,8 +92,8 @@ void LastPoses::AddPlaced(const Map& map, const TrackedFrame& frame, const Frame
 std::vector<FramePose> LastPoses::Take(const Map& map) {
   std::vector<TrackedAt> tracked;
   const auto add = [&](const Tracked& frame) {
-    if (const auto resolved = map.ResolvePose(frame.pose.reference))
-      tracked.push_back({frame.stamp_ns, resolved->map_id});
+    if (const Keyframe* reference = map.Resolve(frame.pose.reference))
+      tracked.push_back({frame.stamp_ns, reference->map_id});
   };
   std::ranges::for_each(tracked_, add);
   std::ranges::for_each(placed_, add);

@@ -139,8 +139,8 @@ void FrontendCore::FollowJoinedMap() {
   if (!phase_.HasMap() || !map_id_ || map_.HasMap(*map_id_)) return;
   own_maps_.Take(*map_id_);
   const std::optional<KeyframeId> reference = tracker_.last_reference();
-  const auto last = reference ? map_.ResolvePose(*reference) : std::nullopt;
-  if (last) map_id_ = last->map_id;
+  const Keyframe* last = reference ? map_.Resolve(*reference) : nullptr;
+  if (last != nullptr) map_id_ = last->map_id;
 }
 
 TrackingState FrontendCore::state() const {
@@ -441,7 +441,7 @@ std::optional<FrontendOutput> FrontendCore::GrowBack() {
   const KeyframeId reference = placed->pose.reference;
   map_id_ = map_.At(reference).map_id;
   // The way on does not depend on it: what is seen in a corner only would be mapped as wrong as it is placed.
-  const bool known = map_.ResolveKeyframe(KeyframeIdOf(frame)).has_value();
+  const bool known = map_.Resolve(KeyframeIdOf(frame)) != nullptr;
   const bool wanted = IsWellSeen(placed->report) && !known && WantsKeyframe(frame, placed->report, reference);
   FrontendOutput output;
   ReportLandmarks(frame, placed->pose, wanted, EvidenceSchedule::Way::kBack, &output);

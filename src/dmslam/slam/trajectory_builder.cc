@@ -166,8 +166,8 @@ void TrajectoryBuilder::Join(std::span<const FramePose* const> path, std::option
 
 std::optional<MapId> TrajectoryBuilder::MapOfFrame(const FramePose& pose) const {
   if (!pose.HasPose()) return std::nullopt;
-  const std::optional<Map::ResolvedPose> reference = map_.ResolvePose(*pose.reference);
-  return reference ? std::optional(reference->map_id) : std::nullopt;
+  const Keyframe* reference = map_.Resolve(*pose.reference);
+  return reference != nullptr ? std::optional(reference->map_id) : std::nullopt;
 }
 
 /// Of all cameras together; and how many frames of `camera` the others hold.

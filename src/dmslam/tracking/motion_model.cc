@@ -125,8 +125,8 @@ bool MotionModel::IsWithin(const FrameTime& newest, const FrameTime& time, int64
 /// Of the scene, as the keyframe seen last has it, or, where that was culled, the one that stands for it.
 /// None where there is no such keyframe, or it sees nothing.
 std::optional<double> MotionModel::Depth(const Map& map) const {
-  const std::optional<KeyframeId> seen = last_ ? map.ResolveKeyframe(last_->pose.reference) : std::nullopt;
-  return seen ? map.MedianDepth(map.At(*seen)) : std::nullopt;
+  const Keyframe* seen = last_ ? map.Resolve(last_->pose.reference) : nullptr;
+  return seen != nullptr ? map.MedianDepth(*seen) : std::nullopt;
 }
 
 MotionModel::Prediction MotionModel::Predict(const Map& map, const FrameTime& time) const {
@@ -193,9 +193,9 @@ void MotionModel::OnTracked(const Map& map, const PlacedPose& pose, const FoundP
 
 void MotionModel::Coast(const Map& map, const FoundPose& found, const FrameTime& time) {
   if (!last_ || !IsWithin(Newest()->time, time, kKnownNs)) return;
-  const std::optional<KeyframeId> reference = map.ResolveKeyframe(last_->pose.reference);
-  if (!reference) return;
-  const PlacedPose pose = PlacedPose::Of(map.At(*reference), found.T_cam_world);
+  const Keyframe* reference = map.Resolve(last_->pose.reference);
+  if (reference == nullptr) return;
+  const PlacedPose pose = PlacedPose::Of(*reference, found.T_cam_world);
   motion_ = MotionTo(map, found, time);
   coasting_ = Pose{pose, time};
   covariance_ = found.covariance;

@@ -30,7 +30,7 @@ bool Odometer::Continue(const Map& map, const FrameTime& time, const Rigid3d& T_
   if (!last_) return false;
   const std::optional<Rigid3d> T_last_world = last_->pose.In(map);
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(last_->pose.reference);
-  if (!T_last_world || !reference || reference->map_id != state_.map_id) return false;
+  if (!T_last_world || !reference || reference->map_id() != state_.map_id) return false;
   units_ *= reference->scale / last_->pose.scale;
   const double since_s = SecondsFromTo(last_->time.stamp_ns, time.stamp_ns);
   if (!follows || since_s > kCarryS || last_->segment != state_.segment) return false;
@@ -52,10 +52,10 @@ void Odometer::OnTracked(const Map& map, const FrameTime& time, const PlacedPose
                          const Rigid3d& T_cam_world, const std::optional<PoseCertainty>& certainty,
                          bool follows) {
   const std::optional<Map::ResolvedPose> reference = map.ResolvePose(pose.reference);
-  state_.map_id = reference ? std::optional(reference->map_id) : std::nullopt;
+  state_.map_id = reference ? std::optional(reference->map_id()) : std::nullopt;
   const std::optional<Map::ResolvedPose> before =
       last_ ? map.ResolvePose(last_->pose.reference) : std::nullopt;
-  if (!Continue(map, time, T_cam_world, follows)) BeginSegment(before && before->map_id == state_.map_id);
+  if (!Continue(map, time, T_cam_world, follows)) BeginSegment(before && before->map_id() == state_.map_id);
   const Rigid3d T_world_cam = T_cam_world.Inverse();
   state_.measured = true;
   state_.map_from_odom =

@@ -70,10 +70,10 @@ int PoseSearch::FromPrediction(const Map& map, const Rigid3d& T_predicted, const
 
 bool PoseSearch::FromKeyframe(const Map& map, KeyframeId keyframe_id, uint64_t seed, const Prior& prior,
                               TrackedFrame* frame) {
-  const std::optional<KeyframeId> found = map.ResolveKeyframe(keyframe_id);
-  if (!found) return false;
+  const Keyframe* found = map.Resolve(keyframe_id);
+  if (found == nullptr) return false;
   const std::vector<LandmarkMatch>& matches =
-      search_.MatchKeyframe(map, judge_.votes(), map.At(*found), *frame->features);
+      search_.MatchKeyframe(map, judge_.votes(), *found, *frame->features);
   if (matches.size() < kMinKeyframeMatches) return false;
   PoseRansacOptions ransac;
   ransac.seed = seed;

@@ -27,11 +27,9 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
   taken_.assign(features.size(), 0);
   for (size_t i = 0; i < last.landmarks.size(); ++i) {
     if (!last.landmarks[i].valid()) continue;
-    const std::optional<LandmarkId> id = map.Resolve(last.landmarks[i]);
-    if (!id) continue;
-    const Landmark& landmark = map.At(*id);
-    if (!votes.HasVote(landmark)) continue;
-    const std::optional<Eigen::Vector2d> uv = map.camera().Project(T_cam_world * landmark.p_world);
+    const Landmark* landmark = map.Resolve(last.landmarks[i]);
+    if (landmark == nullptr || !votes.HasVote(*landmark)) continue;
+    const std::optional<Eigen::Vector2d> uv = map.camera().Project(T_cam_world * landmark->p_world);
     if (!uv) continue;
     const Keypoint& seen = last.features->set.keypoints[i];
     const std::optional<FeatureHit> hit = FindFeature(
@@ -40,7 +38,7 @@ const std::vector<LandmarkMatch>& ProjectionSearch::MatchFrame(const Map& map, c
     if (!hit) continue;
     const size_t feature = static_cast<size_t>(hit->feature);
     taken_[feature] = 1;
-    matches_.push_back({static_cast<uint16_t>(feature), &landmark});
+    matches_.push_back({static_cast<uint16_t>(feature), landmark});
     turns_.push_back(
         static_cast<float>(static_cast<uint8_t>(features.set.keypoints[feature].angle - seen.angle)));
   }

@@ -50,7 +50,7 @@ void Relocalizer::Update(const Replica& map) {
   unmapped_.Clear();
 }
 
-std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<KeyframeId> last,
+std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, const Keyframe* last,
                                                 const BowImage& image) const {
   const auto none = [](const Keyframe&) { return false; };
   std::vector<KeyframeId> ids;
@@ -60,9 +60,10 @@ std::vector<KeyframeId> Relocalizer::Candidates(const Map& map, std::optional<Ke
   const auto add = [&](KeyframeId id) {
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
   };
-  if (last) {
-    add(*last);
-    for (const KeyframeId id : map.BestCovisible(*last, kNeighboursOfLast, kMinCovisibility)) add(id);
+  if (last != nullptr) {
+    add(last->id);
+    for (const Keyframe* beside : map.BestCovisible(*last, kNeighboursOfLast, kMinCovisibility))
+      add(beside->id);
   }
   return ids;
 }
@@ -150,15 +151,14 @@ bool Relocalizer::Relocalize(const Map& map, const Request& request, PoseSearch*
            (!request.credible || request.credible(*frame, *report));
   };
   const BowImage image = places_.Transform(frame->features->set);
-  const std::optional<KeyframeId> last =
-      request.last_seen ? map.ResolveKeyframe(*request.last_seen) : std::nullopt;
+  const Keyframe* last = request.last_seen ? map.Resolve(*request.last_seen) : nullptr;
   const std::vector<KeyframeId> candidates = Candidates(map, last, image);
   for (const KeyframeId id : candidates) {
     if (TryKeyframe(map, map.At(id), image, request.seed, frame) && fits(true)) return true;
   }
   std::vector<KeyframeId> places(
       candidates.begin(), candidates.begin() + std::min<ptrdiff_t>(kPlacesTogether, std::ssize(candidates)));
-  if (last && std::ranges::find(places, *last) == places.end()) places.push_back(*last);
+  if (last != nullptr && std::ranges::find(places, last->id) == places.end()) places.push_back(last->id);
   if (TryTogether(map, places, request.seed, frame) && fits(true)) return true;
   if (!request.by_unmapped || places.empty()) return false;
   // It takes long, so the places take turns from frame to frame. The pose rests on what is no landmark: what

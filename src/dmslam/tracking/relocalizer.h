@@ -40,8 +40,7 @@ class Relocalizer {
   bool Relocalize(const Map& map, const Request& request, PoseSearch* search, TrackedFrame* frame);
 
  private:
-  std::vector<KeyframeId> Candidates(const Map& map, std::optional<KeyframeId> last,
-                                     const BowImage& image) const;
+  std::vector<KeyframeId> Candidates(const Map& map, const Keyframe* last, const BowImage& image) const;
   bool TryKeyframe(const Map& map, const Keyframe& keyframe, const BowImage& image, uint64_t seed,
                    TrackedFrame* frame) const;
   /// All that these places and their neighbours show, by descriptor alone.

@@ -72,7 +72,7 @@ std::optional<UsualSpeed::Step> UsualSpeed::StepTo(const Map& map, const PlacedP
                                 [&](const Recent& past) { return stamp_ns - past.stamp_ns >= kShortestNs; });
   if (old == recent_.rend()) return std::nullopt;
   const auto before = map.ResolvePose(old->pose.reference), now = map.ResolvePose(pose.reference);
-  if (!before || !now || before->map_id != now->map_id) return std::nullopt;
+  if (!before || !now || before->map_id() != now->map_id()) return std::nullopt;
   const std::optional<double> depth = map.MedianDepth(*now->keyframe);
   if (!depth || *depth <= 0) return std::nullopt;
   const Rigid3d from = old->pose.In(*before), to = pose.In(*now);
