@@ -75,7 +75,7 @@ MapperStatus StatusOf(const MapperCore& core, const MapTally& tally) {
   status.landmarks_created = counters.creation.created;
   status.landmarks_culled = static_cast<int64_t>(
       counters.landmarks_culled + counters.landmarks_moving_removed + counters.landmarks_seen_through);
-  status.landmarks_fused = static_cast<int64_t>(counters.fusions);
+  status.landmarks_fused = counters.fused.landmarks;
   status.observations_dropped = static_cast<int64_t>(counters.observations_dropped);
   status.refused_neighbourhood = counters.creation.refused_neighbourhood + counters.creation.refused_count;
   status.refused_motion = counters.creation.refused_motion;

@@ -304,7 +304,9 @@ int MergeMaps(const MergeArguments& arguments, const std::optional<BusKey>& key)
     std::printf("session %u of %s is called %u\n", session, b.path.c_str(), number);
   for (const MapMergeReport::Weld& weld : report.welds) PrintWeld(weld, a.path, b.path);
   if (report.joined)
-    std::printf("fused: %d observations and landmarks beside those of the welds\n", report.fused);
+    std::printf("fused: %lld landmarks, %lld new observations, beside those of the welds\n",
+                static_cast<long long>(report.fused.landmarks),
+                static_cast<long long>(report.fused.observations));
   SessionStart start = a.rebuilt.session;
   start.sequence += " + " + b.rebuilt.session.sequence;
   Save(arguments.save, merge.map(), start, RunsOfBoth(a, b, names));

@@ -114,19 +114,22 @@ LoopSide SideOf(const Map& map, const LoopEnds& ends, int min_covisibility) {
   return measured;
 }
 
-void FuseAsTold(MapEditor& map, const LoopAnswer& answer) {
+FusionCounts FuseAsTold(MapEditor& map, const LoopAnswer& answer) {
+  FusionCounts fused;
   for (const auto& fusion : answer.fusions) {
     const Landmark *goes = map.Resolve(fusion.from), *stays = map.Resolve(fusion.into);
-    if (goes == nullptr || stays == nullptr) continue;
+    if (goes == nullptr || stays == nullptr || goes == stays) continue;
     map.Fuse(*goes, *stays, Merged(stays->evidence, goes->evidence));
+    ++fused.landmarks;
   }
+  return fused;
 }
 
 /// Every keyframe of this side is tied to all that it sees of the place: a few landmarks in a corner of its
 /// image would leave it free to turn about them.
-int TieToPlace(MapEditor& map, const LoopEnds& ends, const LoopSide& side, std::vector<LandmarkId> place,
-               const MapperOptions& options) {
-  int joined = 0;
+FusionCounts TieToPlace(MapEditor& map, const LoopEnds& ends, const LoopSide& side,
+                        std::vector<LandmarkId> place, const MapperOptions& options) {
+  FusionCounts fused;
   for (const BesideLoop& beside : side.keyframes) {
     for (LandmarkId& id : place) {
       if (const Landmark* landmark = map.Resolve(id)) id = landmark->id;
@@ -135,21 +138,22 @@ int TieToPlace(MapEditor& map, const LoopEnds& ends, const LoopSide& side, std::
     place.erase(std::unique(place.begin(), place.end()), place.end());
     const Rigid3d T_cam_here(beside.T_cam_here.rotation,
                              beside.T_cam_here.translation * (ends.here.scale / side.scale));
-    joined += FuseInto(map, *beside.keyframe, T_cam_here * ends.here.T_cam_world, place, options);
+    fused += FuseInto(map, *beside.keyframe, T_cam_here * ends.here.T_cam_world, place, options);
   }
-  return joined;
+  return fused;
 }
 
 /// What the two ends of a loop have in common becomes one.
-int Connect(MapEditor& map, const LoopAnswer& answer, const LoopEnds& ends, const LoopSide& side,
-            const MapperOptions& options) {
+FusionCounts Connect(MapEditor& map, const LoopAnswer& answer, const LoopEnds& ends, const LoopSide& side,
+                     const MapperOptions& options) {
   if (ends.here.map_id != ends.there.map_id) JoinMaps(map, ends.here, ends.there);
   map.AddLoopEdge(ends.here, ends.there);
   const std::vector<LandmarkId> place =
       LandmarksAround(map, ends.there.id, kPlaceNeighbours, options.min_covisibility);
-  FuseAsTold(map, answer);
-  const int tied = TieToPlace(map, ends, side, place, options);
-  return tied + FuseWithNeighbours(map, ends.here, options);
+  FusionCounts fused = FuseAsTold(map, answer);
+  fused += TieToPlace(map, ends, side, place, options);
+  fused += FuseWithNeighbours(map, ends.here, options);
+  return fused;
 }
 
 /// Turns the spanning tree of a keyframe around, so that it hangs from `parent`.
@@ -182,14 +186,14 @@ std::string WhyRefused(const Map& map, const LoopAnswer& answer) {
   return "";
 }
 
-int ApplyCorrection(MapEditor& map, const LoopAnswer& answer, const MapperOptions& options) {
+FusionCounts ApplyCorrection(MapEditor& map, const LoopAnswer& answer, const MapperOptions& options) {
   const bool is_loop = answer.kind == LoopAnswer::Kind::kLoop;
   const std::optional<LoopEnds> ends = is_loop ? EndsOf(map, answer) : std::nullopt;
   const LoopSide side = ends ? SideOf(map, *ends, options.min_covisibility) : LoopSide();
   const Corrections corrections(map, answer);
   MoveLandmarks(map, answer, corrections);
   MoveKeyframes(map, corrections);
-  return ends ? Connect(map, answer, *ends, side, options) : 0;
+  return ends ? Connect(map, answer, *ends, side, options) : FusionCounts();
 }
 
 void JoinMaps(MapEditor& map, const Keyframe& end, const Keyframe& place) {

@@ -4,6 +4,7 @@
 
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/proposals.h"
+#include "dmslam/mapping/landmark_fusion.h"
 #include "dmslam/mapping/mapper_options.h"
 
 namespace dmslam {
@@ -15,8 +16,8 @@ std::string WhyRefused(const Map& map, const LoopAnswer& answer);
 
 /// Composes the corrections with the poses of now. Keyframes without one of their own follow their nearest
 /// ancestor that has one, landmarks their reference keyframe. A loop then joins what its two ends have in
-/// common, and their maps where they are two. Returns how many observations and fusions were made.
-int ApplyCorrection(MapEditor& map, const LoopAnswer& answer, const MapperOptions& options);
+/// common, and their maps where they are two. Returns what was fused.
+FusionCounts ApplyCorrection(MapEditor& map, const LoopAnswer& answer, const MapperOptions& options);
 
 /// The map of keyframe `end` becomes part of that of keyframe `place`, and its spanning tree hangs from
 /// `place` at `end`.

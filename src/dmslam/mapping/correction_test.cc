@@ -131,7 +131,7 @@ class Joining : public Correction {
 };
 
 TEST_F(Joining, TwoMapsBecomeOne) {
-  EXPECT_GT(ApplyCorrection(map_, Loop(), options_), 30);
+  EXPECT_EQ(ApplyCorrection(map_, Loop(), options_).landmarks, 40);
   for (const auto& [id, keyframe] : map_.keyframes()) EXPECT_EQ(keyframe.map_id, 1u);
   EXPECT_TRUE(map_.LandmarksOf(2).empty());
   EXPECT_NEAR(HeightOf(12), 0, 1e-12);
@@ -164,7 +164,7 @@ TEST_F(Joining, AMapJoinsAlone) {
 TEST_F(Joining, ALoopWhoseEndsAreOneKeyframeNowMovesButJoinsNothing) {
   LoopAnswer answer = Loop();
   answer.matched = Id(12);
-  EXPECT_EQ(ApplyCorrection(map_, answer, options_), 0);
+  EXPECT_EQ(ApplyCorrection(map_, answer, options_), FusionCounts());
   EXPECT_NEAR(HeightOf(12), 0, 1e-12);
   EXPECT_EQ(map_.At(Id(12)).map_id, 2u);
 }

@@ -80,47 +80,48 @@ std::optional<uint16_t> FeatureAt(const Map& map, const Keyframe& keyframe, cons
 }
 
 /// Joins a landmark with what the feature sees already.
-void JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, const Landmark& landmark) {
+FusionCounts JoinAt(MapEditor& map, const Keyframe& keyframe, uint16_t feature, const Landmark& landmark) {
   const Landmark* other = map.LandmarkSeenBy(keyframe, feature);
   if (other == nullptr) {
     map.SetObservation(keyframe, feature, landmark);
     map.UpdateDescriptor(landmark);
-    return;
+    return {.landmarks = 0, .observations = 1};
   }
   const size_t mine = landmark.observations.size(), theirs = other->observations.size();
   const bool keep_other = theirs > mine || (theirs == mine && other->id < landmark.id);
   const Landmark &stays = keep_other ? *other : landmark, &goes = keep_other ? landmark : *other;
   map.Fuse(goes, stays, Merged(stays.evidence, goes.evidence));
+  return {.landmarks = 1, .observations = 0};
 }
 
 }  // namespace
 
-int FuseInto(MapEditor& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
-             const std::vector<LandmarkId>& landmarks, const MapperOptions& options) {
-  int joined = 0;
+FusionCounts FuseInto(MapEditor& map, const Keyframe& keyframe, const Rigid3d& T_cam_world,
+                      const std::vector<LandmarkId>& landmarks, const MapperOptions& options) {
+  FusionCounts fused;
   for (const LandmarkId id : landmarks) {
     const Landmark* landmark = map.FindLandmark(id);
     if (landmark == nullptr || landmark->SeenBy(keyframe.id) != nullptr) continue;
     if (options.belief.enabled && !IsStatic(landmark)) continue;
     const std::optional<uint16_t> feature = FeatureAt(map, keyframe, T_cam_world, *landmark, options);
     if (!feature) continue;
-    JoinAt(map, keyframe, *feature, *landmark);
-    ++joined;
+    fused += JoinAt(map, keyframe, *feature, *landmark);
   }
-  return joined;
+  return fused;
 }
 
-int FuseWithNeighbours(MapEditor& map, const Keyframe& keyframe, const MapperOptions& options) {
+FusionCounts FuseWithNeighbours(MapEditor& map, const Keyframe& keyframe, const MapperOptions& options) {
   Targets targets(keyframe);
   AddNeighboursOfNeighbours(map, keyframe, options.min_covisibility, &targets);
   AddKeyframesNearby(map, keyframe, options, &targets);
-  int joined = 0;
+  FusionCounts fused;
   std::vector<KeyframeId> ids;
   for (const Keyframe* target : targets.keyframes()) {
-    joined += FuseInto(map, *target, target->T_cam_world, LandmarksInOrderOfFeatures(keyframe), options);
+    fused += FuseInto(map, *target, target->T_cam_world, LandmarksInOrderOfFeatures(keyframe), options);
     ids.push_back(target->id);
   }
-  return joined + FuseInto(map, keyframe, keyframe.T_cam_world, LandmarksSeenBy(map, ids), options);
+  fused += FuseInto(map, keyframe, keyframe.T_cam_world, LandmarksSeenBy(map, ids), options);
+  return fused;
 }
 
 }  // namespace dmslam

@@ -15,7 +15,7 @@ class Fusion : public testing::Test {
     return scene_.AddLandmark(map_, number, at, frames);
   }
   LandmarkId Seen(uint32_t frame, uint16_t feature) const { return map_.At(Id(frame)).landmarks[feature]; }
-  int Fuse(uint32_t frame) { return FuseWithNeighbours(map_, map_.At(Id(frame)), options_); }
+  FusionCounts Fuse(uint32_t frame) { return FuseWithNeighbours(map_, map_.At(Id(frame)), options_); }
 
   WallScene scene_;
   MapEditor map_{TestCamera(), Pyramid()};
@@ -35,7 +35,7 @@ class TwoKeyframes : public Fusion {
 
 TEST_F(TwoKeyframes, AFeatureWithoutALandmarkBecomesAnObservation) {
   const LandmarkId mine = Add(1, 50, {2}), theirs = Add(2, 51, {1});
-  EXPECT_EQ(Fuse(2), 2);
+  EXPECT_EQ(Fuse(2), (FusionCounts{.landmarks = 0, .observations = 2}));
   EXPECT_EQ(Seen(1, 50), mine);
   EXPECT_EQ(Seen(2, 51), theirs);
   EXPECT_FALSE(Seen(3, 50).valid()) << "it lies outside that image";
@@ -44,7 +44,7 @@ TEST_F(TwoKeyframes, AFeatureWithoutALandmarkBecomesAnObservation) {
 TEST_F(TwoKeyframes, TwoAtOneFeatureBecomeTheOneWithMoreObservers) {
   const LandmarkId lonely = Add(1, 50, {1});
   const LandmarkId other = Add(2, 50, {2, 3});
-  EXPECT_EQ(Fuse(1), 1);
+  EXPECT_EQ(Fuse(1), (FusionCounts{.landmarks = 1, .observations = 0}));
   EXPECT_EQ(map_.FindLandmark(lonely), nullptr);
   EXPECT_EQ(map_.Resolve(lonely), &map_.At(other));
   EXPECT_EQ(Seen(1, 50), other);
@@ -79,16 +79,16 @@ TEST_F(TwoKeyframes, WhatLooksOtherwiseIsNotTheSame) {
   map_.AddKeyframe(changed);
   for (uint16_t i = 0; i < 20; ++i)
     map_.SetObservation(map_.At(Id(4)), i, map_.At(LandmarkId::Make(1, 100U + i)));
-  EXPECT_EQ(Fuse(1), 0);
+  EXPECT_EQ(Fuse(1), FusionCounts());
   EXPECT_EQ(map_.At(id).observations.size(), 1u);
 }
 
 TEST_F(TwoKeyframes, WhatIsBelievedToMoveSpeaksForNoPlace) {
   const LandmarkId id = Add(1, 50, {1});
   map_.SetEvidence(map_.At(id), {10, 2, 6, 1.0F, 0});
-  EXPECT_EQ(Fuse(1), 0);
+  EXPECT_EQ(Fuse(1), FusionCounts());
   options_.belief.enabled = false;
-  EXPECT_EQ(Fuse(1), 1);
+  EXPECT_EQ(Fuse(1).observations, 1);
 }
 
 TEST_F(TwoKeyframes, NeighboursOfNeighboursAreLookedAtToo) {
@@ -105,17 +105,17 @@ TEST_F(Fusion, KeyframesNearbyAreJoinedWithoutAnythingInCommon) {
   scene_.AddKeyframe(map_, 2, 0.1);
   for (uint16_t i = 0; i < 40; ++i) Add(100U + i, i, {1});
   options_.nearby_keyframes = 0;
-  EXPECT_EQ(Fuse(1), 0);
+  EXPECT_EQ(Fuse(1), FusionCounts());
   options_.nearby_keyframes = 1;
-  EXPECT_EQ(Fuse(1), 40);
+  EXPECT_EQ(Fuse(1).observations, 40);
   EXPECT_EQ(map_.At(Id(1)).covisible.at(Id(2)), 40);
 }
 
 TEST_F(TwoKeyframes, ProjectsFromThePoseThatIsTold) {
   const LandmarkId id = Add(1, 50, {1});
   map_.SetPose(map_.At(Id(2)), WallScene::At(0.6));  // not where it stood when it saw the wall
-  EXPECT_EQ(FuseInto(map_, map_.At(Id(2)), map_.At(Id(2)).T_cam_world, {id}, options_), 0);
-  EXPECT_EQ(FuseInto(map_, map_.At(Id(2)), WallScene::At(0.3), {id}, options_), 1);
+  EXPECT_EQ(FuseInto(map_, map_.At(Id(2)), map_.At(Id(2)).T_cam_world, {id}, options_), FusionCounts());
+  EXPECT_EQ(FuseInto(map_, map_.At(Id(2)), WallScene::At(0.3), {id}, options_).observations, 1);
   EXPECT_EQ(Seen(2, 50), id);
 }
 

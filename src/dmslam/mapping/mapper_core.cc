@@ -100,7 +100,7 @@ KeyframeOutcome MapperCore::OnKeyframe(const KeyframeProposal& proposal) {
   RemoveSeenThroughBy(*keyframe);
   Publish(MapEvent::kLandmarksCreated, proposal.id, map_id);
   if (!Interrupted()) {
-    Count(FuseWithNeighbours(map_, *keyframe, options_), &counters_.fusions);
+    counters_.fused += FuseWithNeighbours(map_, *keyframe, options_);
     Publish(MapEvent::kFused, proposal.id, map_id);
     Adjust(*keyframe);
     Publish(MapEvent::kAdjusted, proposal.id, map_id);
@@ -235,7 +235,7 @@ void MapperCore::OnLoopAnswer(const LoopAnswer& answer) {
     Publish(MapEvent::kCorrectionRefused, answer.keyframe, {}, answer.correction_id, why);
     return;
   }
-  Count(ApplyCorrection(map_, answer, options_), &counters_.fusions);
+  counters_.fused += ApplyCorrection(map_, answer, options_);
   ++counters_.corrections_applied;
   MapProgress progress = map_.progress();
   progress.corrected = map_.version() + 1;  // that of the record which says so

@@ -12,6 +12,7 @@
 #include "dmslam/mapping/insertion_order.h"
 #include "dmslam/mapping/keyframe_insertion.h"
 #include "dmslam/mapping/landmark_creation.h"
+#include "dmslam/mapping/landmark_fusion.h"
 #include "dmslam/mapping/landmark_maker.h"
 #include "dmslam/mapping/mapper_options.h"
 
@@ -27,7 +28,7 @@ struct MapperCounters {
   uint64_t landmarks_seen_through = 0;  ///< removed because other keyframes see what lies behind them
   uint64_t observations_dropped = 0;    ///< of landmarks that are gone
   uint64_t evidence_dropped = 0;        ///< of landmarks that are gone
-  uint64_t fusions = 0;
+  FusionCounts fused;
   uint64_t corrections_applied = 0;
   uint64_t corrections_refused = 0;
   uint64_t maps_refused = 0;

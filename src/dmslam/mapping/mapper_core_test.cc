@@ -386,7 +386,7 @@ TEST_F(FourthKeyframe, JoinsLandmarksOfOnePoint) {
   }
   Continue();
   ASSERT_EQ(core_.OnKeyframe(Frame(3)), KeyframeOutcome::kInserted);
-  EXPECT_GE(core_.counters().fusions, kFew);
+  EXPECT_EQ(core_.counters().fused.landmarks, kFew) << "observations are counted by themselves";
   for (const uint16_t i : WallScene::Range(kFirst, kFirst + kFew)) {
     EXPECT_EQ(core_.map().At(Id(3)).landmarks[i], LandmarkId::Make(1, 100U + i)) << i;
     EXPECT_EQ(core_.map().FindLandmark(LandmarkId::Make(1, 300U + i)), nullptr) << i;

@@ -9,6 +9,7 @@
 #include "dmslam/loops/loop_options.h"
 #include "dmslam/map/map_editor.h"
 #include "dmslam/map/renumbering.h"
+#include "dmslam/mapping/landmark_fusion.h"
 #include "dmslam/mapping/mapper_options.h"
 #include "dmslam/place_recognition/vocabulary.h"
 
@@ -35,7 +36,7 @@ struct MapMergeReport {
   size_t keyframes_asked = 0;  ///< whether they show a place of another map
   size_t places_tried = 0;     ///< that looked alike
   size_t places_proposed = 0;  ///< of them, borne out by geometry, but not well enough or by no neighbour
-  int fused = 0;               ///< landmarks and observations that became one, beside those of the welds
+  FusionCounts fused;          ///< beside what the welds fused
 };
 
 /// Two maps of one place become one. The steps are those by which a run welds two of its own maps: every

@@ -118,8 +118,8 @@ struct MapperStatus {
   int64_t keyframes_inserted = 0;
   int64_t keyframes_culled = 0;
   int64_t landmarks_created = 0;
-  int64_t landmarks_culled = 0;  ///< hardly found, seen to move, or seen through
-  int64_t landmarks_fused = 0;
+  int64_t landmarks_culled = 0;       ///< hardly found, seen to move, or seen through
+  int64_t landmarks_fused = 0;        ///< that became part of others
   int64_t observations_dropped = 0;   ///< of keyframes in flight, whose landmark was gone
   int64_t refused_neighbourhood = 0;  ///< candidates for landmarks refused by mutual exclusion
   int64_t refused_motion = 0;         ///< features of keyframes, seen to move: none is made of them
