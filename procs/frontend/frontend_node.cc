@@ -227,7 +227,8 @@ void FrontendNode::OnApplied(size_t count) {
   for (; count > 0; --count) {
     const HeldRecords::Held held = held_.PopApplied();
     if (held.delta.event == MapEvent::kRequestDone)
-      end_.OnAnswer(held.delta.progress.camera, *held.delta.request);
+    const MapProgress& progress = held.delta.progress;
+      end_.OnAnswer({progress.camera, progress.frontend.epoch, *held.delta.request});
     if (held.delta.event == MapEvent::kTurn) turns_.OnTurn(*held.delta.about);
   }
   map_reader_->Accept(held_.applied());
@@ -325,7 +326,7 @@ bool FrontendNode::Refine() {
 /// All of them as a whole, so that the last poses are told in the best map.
 void FrontendNode::AskForAdjustedMaps() {
   const std::optional<int64_t> newest_ns = frames_.newest() ? frames_.newest()->stamp_ns : std::nullopt;
-  const auto request = end_.Ask(core().map(), context_.now_ns(), newest_ns);
+  const auto request = end_.Ask(core().map(), context_.now_ns(), newest_ns, writer_->term().epoch);
   if (request) PublishRecord(*request);
 }
 

@@ -18,6 +18,11 @@ class CameraRequests {
  public:
   explicit CameraRequests(CameraId num_cameras) : cameras_(num_cameras) {}
 
+  /// A frontend of a camera begins its stream: what one before it asked for is void.
+  void OnBegin(CameraId camera) {
+    cameras_[camera].turn.reset();
+    cameras_[camera].adjust.reset();
+  }
   /// The next frame of a camera waits for its turn. `epoch`: of the frontend that says so. What was answered
   /// already is not answered again.
   void OnTurn(CameraId camera, int64_t epoch, const TurnRequest& request);

@@ -59,6 +59,21 @@ TEST_F(CameraRequestsTest, WhoHasEndedSinceHasHadItsAnswer) {
   EXPECT_TRUE(requests_.TakeAdjust(HasEnded()).empty());
 }
 
+TEST_F(CameraRequestsTest, WhatAFrontendBeforeAskedForIsVoid) {
+  requests_.OnAdjust(0, 1);
+  requests_.OnBegin(0);
+  requests_.OnAdjust(1, 1);
+  EXPECT_TRUE(requests_.TakeAdjust(HasEnded()).empty()) << "the new one still adds to the map";
+  requests_.OnAdjust(0, 1);
+  EXPECT_EQ(requests_.TakeAdjust(HasEnded()).size(), 2U);
+  Ask(0, 105, TurnTime::Of(500));
+  requests_.OnBegin(0);
+  Ask(1, 3, TurnTime::Of(600));
+  EXPECT_EQ(Next(), std::nullopt) << "the new one may go on before that frame";
+  Ask(0, 101, TurnTime::Of(400));
+  EXPECT_EQ(Next(), 0U);
+}
+
 TEST_F(CameraRequestsTest, WhoIsDoneIsNotWaitedFor) {
   Ask(1, 5, TurnTime::Of(200));
   ended_ = {0};

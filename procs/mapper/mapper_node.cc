@@ -346,6 +346,7 @@ bool MapperNode::WorkOnce() {
 /// The records up to here are worked into the map: the next map record says so.
 void MapperNode::MarkFrontend(CameraId camera, const Version& version) {
   MapProgress progress = core_->map().progress(camera);
+  requests_.OnBegin(camera);
   progress.frontend = {version.epoch, version.seq};
   core_->SetProgress(progress);
 }

@@ -200,7 +200,8 @@ struct MapDelta {
   std::optional<MapId> map_id;
   uint64_t version = 0;                   ///< the map's version after it; counts deltas
   std::optional<uint64_t> correction_id;  ///< the correction that was applied or refused
-  std::optional<uint32_t> request;        ///< the AdjustRequest of progress.camera that is answered
+  std::optional<uint32_t> request;        ///< the AdjustRequest of progress.camera that is answered, which
+                                          ///< was put in progress.frontend.epoch
   std::optional<int64_t> stamp_ns;        ///< capture time of `about`, where that is known
   RecordGroup group;
   std::string note;

@@ -149,7 +149,7 @@ struct MapReset {
 /// No frame follows: the frontend asks the mapper to adjust each of its maps as a whole. The mapper answers
 /// with MapEvent::kMapAdjusted for each and then MapEvent::kRequestDone, whose progress is this camera's.
 struct AdjustRequest {
-  uint32_t request = 1;  ///< counts the requests of a frontend from 1: the answer names it
+  uint32_t request = 1;  ///< counts the requests of a frontend from 1: the answer names it, and the epoch
   std::string reason;
   std::optional<int64_t> newest_stamp_ns;  ///< capture time of the newest frame, where there is one
   CameraId camera_id = 0;

@@ -42,13 +42,13 @@ void SequenceEnd::OnEndHeard() {
 
 /// Work on the last poses goes on where it is: only the next frontend says that the sequence is done.
 void SequenceEnd::OnHandOver() {
-  if (hands_over_ || Is(Phase::kDone)) return;
-  hands_over_ = true;
+  if (HandsOver() || Is(Phase::kDone)) return;
+  last_ = Phase::kHandedOver;
   phase_ = std::max(phase_, Phase::kAwaitingAdjustedMap);
 }
 
 bool SequenceEnd::AwaitsAnswer(const Map& map) const {
-  return Is(Phase::kAwaitingAdjustedMap) && has_mapper_ && !hands_over_ && !map.keyframes().empty() &&
+  return Is(Phase::kAwaitingAdjustedMap) && has_mapper_ && !HandsOver() && !map.keyframes().empty() &&
          !(question_ && question_->is_answered);
 }
 
@@ -59,14 +59,15 @@ bool SequenceEnd::Waits(const FrontendCore& core) const {
 }
 
 std::optional<AdjustRequest> SequenceEnd::Ask(const Map& map, int64_t now_ns,
-                                              std::optional<int64_t> newest_stamp_ns) {
+                                              std::optional<int64_t> newest_stamp_ns, int64_t epoch) {
   if (!AwaitsAnswer(map) || (question_ && now_ns - question_->asked_ns <= kAskAgainNs)) return std::nullopt;
-  question_ = {.request = question_ ? question_->request + 1 : 1, .asked_ns = now_ns};
+  question_ = {.epoch = epoch, .request = question_ ? question_->request + 1 : 1, .asked_ns = now_ns};
   return AdjustRequest{question_->request, "the sequence has ended", newest_stamp_ns, camera_id_};
 }
 
-void SequenceEnd::OnAnswer(CameraId camera, uint32_t request) {
-  if (question_ && camera == camera_id_ && request == question_->request) question_->is_answered = true;
+void SequenceEnd::OnAnswer(const Answer& answer) {
+  if (!question_ || answer.camera != camera_id_ || answer.epoch != question_->epoch) return;
+  if (answer.request == question_->request) question_->is_answered = true;
 }
 
 SequenceEnd::Worked SequenceEnd::Work(Phase phase, FrontendCore* core) {
@@ -103,7 +104,7 @@ void SequenceEnd::OnWorked(bool is_done) {
 
 void SequenceEnd::OnTold() {
   DMSLAM_CHECK(Is(Phase::kTelling), "the last poses are told when they are known");
-  phase_ = hands_over_ ? Phase::kHandedOver : Phase::kDone;
+  phase_ = last_;
 }
 
 void FinishSequence(FrontendCore* core, std::optional<int64_t> newest_stamp_ns,
@@ -111,9 +112,9 @@ void FinishSequence(FrontendCore* core, std::optional<int64_t> newest_stamp_ns,
   SequenceEnd end(true, core->camera_id());
   end.OnEndHeard();
   while (!end.Is(Phase::kTelling)) {
-    if (const auto request = end.Ask(core->map(), 0, newest_stamp_ns)) {
+    if (const auto request = end.Ask(core->map(), 0, newest_stamp_ns, 0)) {
       listeners.adjust(*request);
-      end.OnAnswer(request->camera_id, request->request);
+      end.OnAnswer({request->camera_id, 0, request->request});
     }
     DMSLAM_CHECK(!end.Waits(*core), "what is told is answered at once");
     const SequenceEnd::Worked worked = SequenceEnd::Work(end.phase(), core);

@@ -47,16 +47,23 @@ class SequenceEnd {
   /// Another frontend asks for the stream. It may not have the features of the frames before: their poses
   /// are refined in the map as it is, and told. Calling it again has no effect.
   void OnHandOver();
-  bool HandsOver() const { return hands_over_; }
+  bool HandsOver() const { return last_ == Phase::kHandedOver; }
 
   /// Whether the map must change before Work() can go on: a keyframe is awaited, or the mapper's answer.
   bool Waits(const FrontendCore& core) const;
   /// The question that is to be put to the mapper now; counts as put then. One that died before it answered
-  /// is asked again.
-  std::optional<AdjustRequest> Ask(const Map& map, int64_t now_ns, std::optional<int64_t> newest_stamp_ns);
-  /// The mapper's answer to a camera's request. Only to the question that this camera put last does it count,
-  /// since frames may come after a question; it may come while these are worked on.
-  void OnAnswer(CameraId camera, uint32_t request);
+  /// is asked again. `epoch`: in which this frontend writes.
+  std::optional<AdjustRequest> Ask(const Map& map, int64_t now_ns, std::optional<int64_t> newest_stamp_ns,
+                                   int64_t epoch);
+  /// Which request is answered. Each frontend of a camera counts its own from 1.
+  struct Answer {
+    CameraId camera = 0;
+    int64_t epoch = 0;  ///< of the frontend that asked
+    uint32_t request = 0;
+  };
+  /// The mapper's answer to a request. Only to the question that this frontend put last does it count, since
+  /// frames may come after a question; it may come while these are worked on.
+  void OnAnswer(const Answer& answer);
 
   /// What a portion of work has come to.
   struct Worked {
@@ -69,12 +76,14 @@ class SequenceEnd {
   void OnWorked(bool is_done);
   /// The last poses are told.
   void OnTold();
-  /// The map has ended with the frontend that this one has taken over from: there is nothing left to say.
-  void OnMapEnded() { phase_ = Phase::kDone; }
+  /// The map has ended with the frontend that this one has taken over from: there is nothing left to say, and
+  /// nothing to hand over.
+  void OnMapEnded() { phase_ = last_ = Phase::kDone; }
 
  private:
   /// To the mapper, to adjust the maps.
   struct Question {
+    int64_t epoch = 0;
     uint32_t request = 0;
     int64_t asked_ns = 0;
     bool is_answered = false;
@@ -84,8 +93,8 @@ class SequenceEnd {
 
   bool has_mapper_;
   CameraId camera_id_;
-  bool hands_over_ = false;
   Phase phase_ = Phase::kPlaying;
+  Phase last_ = Phase::kDone;         ///< in which it ends: that, or kHandedOver
   std::optional<Question> question_;  ///< the one put last
 };
 

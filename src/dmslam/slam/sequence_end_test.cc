@@ -19,6 +19,7 @@ constexpr int64_t kSecond = 1'000'000'000;
 constexpr int64_t kFrameNs = 33'333'333;
 constexpr uint32_t kFrames = 20;
 constexpr CameraId kCamera = 3;
+constexpr int64_t kEpoch = 1'000'000;
 
 /// A frontend that has seen a sequence without finding a first map, and may be given one.
 class SequenceEndTest : public ::testing::Test {
@@ -74,7 +75,7 @@ TEST_F(SequenceEndTest, GoesStepByStep) {
   EXPECT_FALSE(end.AppliesAllRecords());
   WorkOn(&end);
   EXPECT_TRUE(end.Is(Phase::kAwaitingAdjustedMap));
-  EXPECT_FALSE(end.Ask(core_.map(), 0, std::nullopt)) << "there is no map";
+  EXPECT_FALSE(end.Ask(core_.map(), 0, std::nullopt, kEpoch)) << "there is no map";
   EXPECT_FALSE(end.Waits(core_));
   WorkOn(&end);
   EXPECT_TRUE(end.Is(Phase::kRefining));
@@ -93,25 +94,37 @@ TEST_F(SequenceEndTest, AMapperThatDoesNotAnswerIsAskedAgain) {
   MapArrives();
   SequenceEnd end(true, kCamera);
   end.OnEndHeard();
-  end.OnAnswer(kCamera, 0);
-  EXPECT_FALSE(end.Ask(core_.map(), 0, 7)) << "the map may still grow";
+  end.OnAnswer({kCamera, kEpoch, 0});
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, kEpoch)) << "the map may still grow";
   end.OnWorked(true);
   EXPECT_TRUE(end.Waits(core_)) << "nobody had asked";
-  const auto request = end.Ask(core_.map(), kSecond, 7);
+  const auto request = end.Ask(core_.map(), kSecond, 7, kEpoch);
   ASSERT_TRUE(request);
   EXPECT_EQ(request->request, 1u);
   EXPECT_EQ(request->newest_stamp_ns, 7);
   EXPECT_EQ(request->camera_id, kCamera);
   EXPECT_TRUE(end.AppliesAllRecords());
-  EXPECT_FALSE(end.Ask(core_.map(), 2 * kSecond, 7));
-  EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7)->request, 2u);
-  end.OnAnswer(kCamera, 1);
-  end.OnAnswer(kCamera, 3);
-  end.OnAnswer(kCamera + 1, 2);
+  EXPECT_FALSE(end.Ask(core_.map(), 2 * kSecond, 7, kEpoch));
+  EXPECT_EQ(end.Ask(core_.map(), 12 * kSecond, 7, kEpoch)->request, 2u);
+  end.OnAnswer({kCamera, kEpoch, 1});
+  end.OnAnswer({kCamera, kEpoch, 3});
+  end.OnAnswer({kCamera + 1, kEpoch, 2});
   EXPECT_TRUE(end.Waits(core_)) << "another question was answered";
-  end.OnAnswer(kCamera, 2);
+  end.OnAnswer({kCamera, kEpoch, 2});
   EXPECT_FALSE(end.Waits(core_));
-  EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7));
+  EXPECT_FALSE(end.Ask(core_.map(), 30 * kSecond, 7, kEpoch));
+}
+
+TEST_F(SequenceEndTest, AnAnswerToTheFrontendBeforeIsNone) {
+  MapArrives();
+  SequenceEnd end(true, kCamera);
+  end.OnEndHeard();
+  end.OnWorked(true);
+  ASSERT_EQ(end.Ask(core_.map(), 0, 7, kEpoch)->request, 1u);
+  end.OnAnswer({kCamera, kEpoch - 1, 1});
+  EXPECT_TRUE(end.Waits(core_)) << "that one had counted from 1 as well";
+  end.OnAnswer({kCamera, kEpoch, 1});
+  EXPECT_FALSE(end.Waits(core_));
 }
 
 TEST_F(SequenceEndTest, WithoutAMapperNothingGrowsAndNobodyIsAsked) {
@@ -119,7 +132,7 @@ TEST_F(SequenceEndTest, WithoutAMapperNothingGrowsAndNobodyIsAsked) {
   SequenceEnd end(false, kCamera);
   end.OnEndHeard();
   EXPECT_TRUE(end.Is(Phase::kAwaitingAdjustedMap));
-  EXPECT_FALSE(end.Ask(core_.map(), 0, 7));
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, kEpoch));
   EXPECT_FALSE(end.Waits(core_));
 }
 
@@ -128,7 +141,7 @@ TEST_F(SequenceEndTest, WhoHandsOverTellsThePosesOfItsFramesInTheMapAsItIs) {
   SequenceEnd end(true, kCamera);
   end.OnHandOver();
   EXPECT_TRUE(end.HandsOver());
-  EXPECT_FALSE(end.Ask(core_.map(), 0, 7)) << "the mapper has other things to do";
+  EXPECT_FALSE(end.Ask(core_.map(), 0, 7, kEpoch)) << "the mapper has other things to do";
   EXPECT_FALSE(end.Waits(core_));
   WorkOn(&end);
   WorkOn(&end);
@@ -157,6 +170,16 @@ TEST_F(SequenceEndTest, WhoIsDoneHasNothingToHandOver) {
   SequenceEnd end(true, kCamera);
   end.OnMapEnded();
   end.OnHandOver();
+  EXPECT_FALSE(end.HandsOver());
+  EXPECT_TRUE(end.Is(Phase::kDone));
+}
+
+TEST_F(SequenceEndTest, AMapThatEndsMeanwhileLeavesNothingToHandOver) {
+  MapArrives();
+  SequenceEnd end(true, kCamera);
+  end.OnHandOver();
+  ASSERT_TRUE(end.HandsOver());
+  end.OnMapEnded();
   EXPECT_FALSE(end.HandsOver());
   EXPECT_TRUE(end.Is(Phase::kDone));
 }
