@@ -132,7 +132,7 @@ void CollectorNode::Begin(const CameraInfo& info) {
     run_.cameras[camera].ground_truth = collector_.ground_truth[camera];
   OpenJournal();
   BeginCheckpoints();
-  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap);
   ServeReplica(&builder_->map(), [this] { return MapHeld(*map_reader_); });
 }
 
@@ -365,11 +365,7 @@ void CollectorNode::OpenJournal() {
   processes_.Begin(note, MeasureProcess(context_.pid), context_.now_ns());
   if (context_.resumed) kept_->ForgetPositions();  // the frontend that wrote it is gone, too
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
-    frontend_readers_.push_back(MakeReader(
-        StreamId::kFrontend, owners::kFrontend,
-        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        kept_->PositionOf(camera), camera, is_first));
+    frontend_readers_.push_back(MakeReader(StreamId::kFrontend, kept_->PositionOf(camera), camera, is_first));
   }
 }
 

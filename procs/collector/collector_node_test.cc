@@ -80,7 +80,7 @@ class CollectorNodeTest : public testing::Test {
   std::unique_ptr<StreamWriter> MakeWriter(StreamId stream, const std::string& role) {
     auto writer = std::make_unique<StreamWriter>(WriterOfRole(kSession, stream, role, "collector"),
                                                  Term{10, 3}, Version{});
-    others_.AddWriter(writer.get(), OwnerOf(role), {"COLLECTOR"});
+    others_.AddWriter(writer.get(), OwnerName(role), {"COLLECTOR"});
     return writer;
   }
   template <typename Message>

@@ -9,6 +9,7 @@
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/settings/frontend_setup.h"
+#include "dmslam/wire/streams.h"
 #include "frontend/background_search.h"
 
 namespace dmslam {
@@ -53,11 +54,11 @@ void FrontendNode::Begin(const CameraInfo& info) {
     setup.remember = [this](const RememberedFrame& frame) { remembered_->Add(frame); };
   work_ = std::make_unique<FrontendWork>(setup, MakeCoreThread(info.mode));
   left_.emplace(session_, options_.camera_id);
-  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap);
   ServeReplica(
       &core().map(), [this] { return HandOverVersion(); },
       [this] { return work_->Idle() && held_.IsUpToDate(); });
-  WantWriter({StreamId::kFrontend, {roles::kMapper, roles::kCollector}, {}, nullptr});
+  WantWriter({StreamId::kFrontend, ReadersOf(StreamId::kFrontend, 1), {}, nullptr});
 }
 
 /// Into a running system a frontend comes with the map; where nobody has one it begins with a first.
@@ -226,8 +227,8 @@ void FrontendNode::ApplyHeldRecords(size_t count, bool at_once) {
 void FrontendNode::OnApplied(size_t count) {
   for (; count > 0; --count) {
     const HeldRecords::Held held = held_.PopApplied();
-    if (held.delta.event == MapEvent::kRequestDone)
     const MapProgress& progress = held.delta.progress;
+    if (held.delta.event == MapEvent::kRequestDone)
       end_.OnAnswer({progress.camera, progress.frontend.epoch, *held.delta.request});
     if (held.delta.event == MapEvent::kTurn) turns_.OnTurn(*held.delta.about);
   }

@@ -7,6 +7,7 @@
 #include "dmslam/messaging/roles.h"
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/settings/run_options.h"
+#include "dmslam/wire/streams.h"
 #include "loopcloser/make_loopcloser.h"
 
 namespace dmslam {
@@ -65,10 +66,10 @@ void LoopcloserNode::Begin(const CameraInfo& info) {
     });
   }
   core_->SetOnStep([this](LoopcloserCore::Step step) { OnStep(step); });
-  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
+  map_reader_ = MakeReader(StreamId::kMap);
   ServeReplica(
       &core_->map(), [this] { return MapHeld(*map_reader_); }, [this] { return work_->Idle(); });
-  WantWriter({StreamId::kLoopCloser, {roles::kMapper}, {}, nullptr});
+  WantWriter({StreamId::kLoopCloser, ReadersOf(StreamId::kLoopCloser, 1), {}, nullptr});
 }
 
 /// On the core.

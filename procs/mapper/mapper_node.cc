@@ -12,6 +12,7 @@
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/output_file.h"
+#include "dmslam/wire/streams.h"
 
 namespace dmslam {
 
@@ -93,24 +94,15 @@ void MapperNode::Begin(const CameraInfo& info) {
   if (!lockstep_) core_->SetInterrupt([this, goes_on] { return goes_on(hurries_); });
   core_->SetStop([this, goes_on] { return goes_on(stops_); });
   snapshots_ = std::make_unique<MapSnapshots>(&core_->map(), [this] { return work_->Idle(); });
-  std::vector<std::string> readers;
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
-    readers.push_back(OfCamera(roles::kFrontend, camera));
-  readers.insert(readers.end(), {roles::kLoopCloser, roles::kCollector});
-  WantWriter({StreamId::kMap, readers, {}, snapshots_.get()});
+  WantWriter({StreamId::kMap, ReadersOf(StreamId::kMap, options_.NumCameras()), {}, snapshots_.get()});
   ListenToFrontends();
 }
 
 /// From the beginning, not only when the map is here: a frontend that dies meanwhile has left behind what it
 /// had to say.
 void MapperNode::ListenToFrontends() {
-  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
-    frontends_.Add(MakeReader(
-        StreamId::kFrontend, owners::kFrontend,
-        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        std::nullopt, camera));
-  }
+  for (CameraId camera = 0; camera < options_.NumCameras(); ++camera)
+    frontends_.Add(MakeReader(StreamId::kFrontend, std::nullopt, camera));
 }
 
 // ---- Continuing what another mapper began ----
@@ -122,13 +114,8 @@ void MapperNode::BeginFetch() {
   fetch.name = context_.name;
   fetch.id = context_.random_id;
   fetch.schema_hash = SchemaHash();
-  std::vector<ReplicaFetch::Holder> holders;
-  for (CameraId camera = 0; camera < frontends_.size(); ++camera)
-    holders.push_back({OfCamera(roles::kFrontend, camera), OfCamera(owners::kFrontend, camera)});
-  holders.insert(holders.end(),
-                 {{roles::kLoopCloser, owners::kLoopCloser}, {roles::kCollector, owners::kCollector}});
-  for (const ReplicaFetch::Holder& holder : holders) {
-    if (options_.peers.empty() || options_.HasPeer(holder.role)) fetch.holders.push_back(holder);
+  for (const std::string& role : ReadersOf(StreamId::kMap, frontends_.size())) {
+    if (options_.peers.empty() || options_.HasPeer(role)) fetch.holders.push_back({role, OwnerName(role)});
   }
   left_ = std::make_unique<LeftMap>(
       LeftMap::Options{fetch, core_->map().camera(), core_->map().pyramid(), feature_store_}, &endpoint_,
@@ -210,8 +197,8 @@ void MapperNode::OnWriterOpen() {
     const StreamPosition mapped = core_->map().progress(camera).frontend;
     frontends_.BeginWith(camera, {mapped.epoch, mapped.seq});
   }
-  loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked},
-                            Version{progress.loopcloser.epoch, progress.loopcloser.seq});
+  loop_reader_ =
+      MakeReader(StreamId::kLoopCloser, Version{progress.loopcloser.epoch, progress.loopcloser.seq});
   // One that has ended could not say goodbye: whoever has died since may lack the map.
   if (progress.ended) end_.WaitUntil(context_.now_ns() + kBackAfterDeathNs);
   const auto begin = [this, ended = progress.ended] {
@@ -346,7 +333,6 @@ bool MapperNode::WorkOnce() {
 /// The records up to here are worked into the map: the next map record says so.
 void MapperNode::MarkFrontend(CameraId camera, const Version& version) {
   MapProgress progress = core_->map().progress(camera);
-  requests_.OnBegin(camera);
   progress.frontend = {version.epoch, version.seq};
   core_->SetProgress(progress);
 }
@@ -360,6 +346,7 @@ std::string MapperNode::WhyMisfits(const SessionStart& start) const {
 
 void MapperNode::JoinFrontend(CameraId camera, const SessionStart& start) {
   if (camera == 0) session_start_ = start;
+  requests_.OnBegin(camera);
   JoinSession(start);
 }
 

@@ -7,6 +7,7 @@
 #include "dmslam/messaging/roles.h"
 #include "dmslam/recording/map_file.h"
 #include "dmslam/util/check.h"
+#include "dmslam/wire/streams.h"
 #include "player/intervals.h"
 
 namespace dmslam {
@@ -46,8 +47,8 @@ void RecordsNode::PublishCameraInfo() {
 }
 
 void RecordsNode::Begin(const CameraInfo&) {
-  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
-  WantWriter({StreamId::kFrontend, {roles::kMapper, roles::kCollector}, {}, nullptr});
+  map_reader_ = MakeReader(StreamId::kMap);
+  WantWriter({StreamId::kFrontend, ReadersOf(StreamId::kFrontend, 1), {}, nullptr});
   PublishCameraInfo();
 }
 

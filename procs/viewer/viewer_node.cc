@@ -61,15 +61,10 @@ void ViewerNode::Begin(const CameraInfo& info) {
     scene->Clear();
     series->Clear();
   });
-  map_reader_ = MakeReader(StreamId::kMap, owners::kMapper, {channels::kMap});
-  for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera) {
-    seen_cameras_[camera].reader = MakeReader(
-        StreamId::kFrontend, owners::kFrontend,
-        {channels::kSession, channels::kInitialMap, channels::kKeyframe, channels::kFramePose,
-         channels::kFrameEvidence, channels::kMapReset, channels::kAdjustRequest, channels::kTurnRequest},
-        {}, camera);
-  }
-  loop_reader_ = MakeReader(StreamId::kLoopCloser, owners::kLoopCloser, {channels::kChecked});
+  map_reader_ = MakeReader(StreamId::kMap);
+  for (CameraId camera = 0; camera < seen_cameras_.size(); ++camera)
+    seen_cameras_[camera].reader = MakeReader(StreamId::kFrontend, {}, camera);
+  loop_reader_ = MakeReader(StreamId::kLoopCloser);
 }
 
 void ViewerNode::SetInHaste(bool in_haste) {

@@ -25,7 +25,7 @@ class LateComer : public StreamNode {
   void Begin(const CameraInfo& info) override {
     camera_s_ = Elapsed();
     map_ = std::make_unique<Replica>(info.camera, Pyramid());
-    reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap});
+    reader_ = MakeReader(StreamId::kMap);
   }
 
   bool WorkOnce() override {

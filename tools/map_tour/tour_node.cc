@@ -4,6 +4,7 @@
 
 #include "dmslam/console/log.h"
 #include "dmslam/messaging/roles.h"
+#include "dmslam/wire/streams.h"
 
 namespace dmslam {
 
@@ -16,8 +17,7 @@ void TourNode::Begin(const CameraInfo&) {
   tour_ = std::make_unique<TourMap>(tour_options_.tour, session_);
   tour_->KeepFeaturesIn(feature_store_);
   snapshots_ = std::make_unique<MapSnapshots>(&tour_->map());
-  WantWriter(
-      {StreamId::kMap, {roles::kFrontend, roles::kLoopCloser, roles::kCollector}, {}, snapshots_.get()});
+  WantWriter({StreamId::kMap, ReadersOf(StreamId::kMap, 1), {}, snapshots_.get()});
 }
 
 bool TourNode::WorkOnce() {

@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "dmslam/messaging/keyed_bus.h"
+#include "dmslam/messaging/roles.h"
 #include "dmslam/messaging/types.h"
 #include "dmslam/util/check.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/schema.h"
+#include "dmslam/wire/streams.h"
 
 namespace dmslam {
 namespace {
@@ -35,42 +37,61 @@ ChannelRow Row(const char* owner, const char* readers, const char* rate) {
   return {info.channel, info.type, owner, readers, rate};
 }
 
+std::string ForPeople(const std::string& role) { return role == roles::kLoopCloser ? "loop closer" : role; }
+
+std::string ForPeople(const std::vector<std::string>& roles) {
+  std::string text;
+  for (const std::string& role : roles) text += (text.empty() ? "" : ", ") + ForPeople(role);
+  return text;
+}
+
+/// Of a record. `others`: who hears it besides the readers of its stream.
+template <typename Message>
+ChannelRow RecordRow(StreamId stream, const char* rate, const std::string& others = "") {
+  const wire::MessageInfo info = wire::Info<Message>();
+  const StreamPlan& plan = PlanOf(stream);
+  const std::string readers = ForPeople(plan.readers) + "; " + ForPeople(plan.watchers);
+  return {info.channel, info.type, ForPeople(plan.writer), readers + others, rate};
+}
+
 std::vector<ChannelRow> PlayerRows() {
   return {
       Row<CameraInfo>("player; while it is silent, any writer of a stream repeats it", "everybody", "2 Hz"),
       Row<Frame>("player", "frontend, viewer", "camera's rate; repeated in lock-step"),
-      Row<EndOfSequence>("player", "frontend", "5 Hz, until heard"),
-      Row<GroundTruthPose>("player", "frontend (for `error_m` only), viewer", "camera's rate, where known"),
+      Row<EndOfSequence>("player", "frontend, collector, viewer", "5 Hz, until heard"),
+      Row<GroundTruthPose>("player", "frontend (for `error_m` only), collector, viewer",
+                           "camera's rate, where known"),
       Row<PlayerStatus>("player", "everybody", "1 Hz"),
   };
 }
 
 std::vector<ChannelRow> FrontendRows() {
+  constexpr auto kStream = StreamId::kFrontend;
   return {
-      Row<SessionStart>("frontend", "mapper, collector", "once"),
+      RecordRow<SessionStart>(kStream, "once"),
       {channels::kSessionAgain, wire::Info<SessionStart>().type, "frontend", "loop closer, mapper", "1 Hz"},
-      Row<InitialMap>("frontend", "mapper", "once per map"),
-      Row<KeyframeProposal>("frontend", "mapper", "per keyframe"),
-      Row<FramePose>("frontend", "mapper, collector", "per frame; once more where refined at the end"),
-      Row<FrameEvidence>("frontend", "mapper", "with keyframes, and between"),
-      Row<MapReset>("frontend", "mapper, collector", "rare"),
-      Row<AdjustRequest>("frontend", "mapper", "at the end"),
-      Row<TurnRequest>("frontend", "mapper", "per frame, of several cameras in lock-step"),
+      RecordRow<InitialMap>(kStream, "once per map"),
+      RecordRow<KeyframeProposal>(kStream, "per keyframe", "; a frontend that takes over"),
+      RecordRow<FramePose>(kStream, "per frame; once more where refined at the end"),
+      RecordRow<FrameEvidence>(kStream, "with keyframes, and between"),
+      RecordRow<MapReset>(kStream, "rare"),
+      RecordRow<AdjustRequest>(kStream, "at the end"),
+      RecordRow<TurnRequest>(kStream, "per frame, of several cameras in lock-step"),
       Row<FrameDone>("frontend", "player", "per frame"),
       Row<SequenceDone>("frontend", "player", "at the end, once for each end_of_sequence_t"),
       Row<Odometry>("frontend", "who controls the motion", "per frame"),
       Row<PoseView>("frontend", "eyes and plots, viewer", "per frame"),
       Row<FeatureView>("frontend", "viewer, pictures", "per frame"),
-      Row<FrameTrace>("frontend", "latency reports", "per frame"),
+      Row<FrameTrace>("frontend", "collector", "per frame"),
       Row<FrontendStatus>("frontend", "everybody", "1 Hz"),
   };
 }
 
 std::vector<ChannelRow> MapRows() {
   return {
-      Row<MapDelta>("mapper", "frontend, loop closer, viewer, collector", "several per keyframe"),
+      RecordRow<MapDelta>(StreamId::kMap, "several per keyframe"),
       Row<MapperStatus>("mapper", "everybody", "1 Hz"),
-      Row<LoopAnswer>("loop closer", "mapper", "per keyframe"),
+      RecordRow<LoopAnswer>(StreamId::kLoopCloser, "per keyframe"),
       Row<LoopcloserStatus>("loop closer", "everybody", "1 Hz"),
   };
 }
@@ -204,7 +225,8 @@ Made by `dmslam-message-docs` from `lcmtypes/*.lcm` and the table in `tools/mess
 - `utime` comes first: capture time in microseconds for what belongs to a frame, wall time for what is sent by the clock.
   Exact time travels as `stamp_ns`.
 - *Records* belong to a stream that loses nothing. Their second field is `header`; a writer's protocol fills it in (see
-  `src/dmslam/messaging/README.md`), and a program that only watches can ignore it.
+  `src/dmslam/messaging/README.md`), and a program that only watches can ignore it. A writer waits for the readers that stand
+  before the semicolon.
 - Poses are named by what they do: `cam_world` takes points of the world into the camera (x right, y down, z forward).
   Lengths are map units. Quaternions are unit, in the order x, y, z, w.
 - Keyframe ids are `session << 32 | camera_id << 28 | frame index`; landmark ids `ordinal of the mapper's epoch << 48 | number`. Ids and what else

@@ -26,10 +26,7 @@ TEST(MessageDocsTest, PageIsNotStale) {
 
 TEST(MessageDocsTest, EveryChannelIsTold) {
   const std::string page = MessageDocs();
-  const auto messages = []<typename... Type>(std::type_identity<std::tuple<Type...>>) {
-    return std::vector<wire::MessageInfo>{wire::Info<Type>()...};
-  }(std::type_identity<wire::Messages>());
-  for (const wire::MessageInfo& info : messages) {
+  for (const wire::MessageInfo& info : wire::AllInfos()) {
     EXPECT_NE(page.find("| `" + std::string(info.channel) + "`"), std::string::npos) << info.channel;
     const wire::StructType* type = wire::Schema::OfProject().Find(info.type);
     ASSERT_NE(type, nullptr);

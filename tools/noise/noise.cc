@@ -4,7 +4,7 @@
 
 #include "dmslam/messaging/keyed_bus.h"
 #include "dmslam/util/crc32c.h"
-#include "dmslam/wire/channels.h"
+#include "dmslam/wire/codec.h"
 
 namespace dmslam {
 namespace {
@@ -18,16 +18,8 @@ constexpr uint32_t kLargeSeldom = 50;
 }  // namespace
 
 std::vector<std::string> AllChannels() {
-  std::vector<std::string> all = {
-      channels::kCameraInfo,      channels::kFrame,          channels::kEndOfSequence,
-      channels::kGroundTruthPose, channels::kPlayerStatus,   channels::kSession,
-      channels::kInitialMap,      channels::kKeyframe,       channels::kFramePose,
-      channels::kFrameEvidence,   channels::kMapReset,       channels::kFrameDone,
-      channels::kAdjustRequest,   channels::kTurnRequest,    channels::kSequenceDone,
-      channels::kOdometry,        channels::kPoseView,       channels::kFeatureView,
-      channels::kFrameTrace,      channels::kFrontendStatus, channels::kMap,
-      channels::kMapperStatus,    channels::kChecked,        channels::kLoopcloserStatus,
-      channels::kSessionAgain};
+  std::vector<std::string> all = {channels::kSessionAgain};
+  for (const wire::MessageInfo& info : wire::AllInfos()) all.emplace_back(info.channel);
   for (const std::string process : {"FRONTEND", "MAPPER", "LOOPCLOSER", "COLLECTOR"}) {
     for (const auto& name : {HeadChannel(process), PartChannel(process), AckChannel(process),
                              TakeOverChannel(process), HandOverChannel(process), ReplicaChannel(process)}) {

@@ -24,6 +24,12 @@ std::string OfCamera(const std::string& role, CameraId camera) {
   return camera == 0 ? role : role + std::to_string(camera);
 }
 
+std::string OwnerName(const std::string& role) {
+  std::string owner = role;
+  std::ranges::transform(owner, owner.begin(), [](unsigned char c) { return std::toupper(c); });
+  return owner;
+}
+
 std::string ChannelOfCamera(const std::string& channel, CameraId camera) {
   const size_t at = camera == 0 ? std::string::npos : PlaceOfNumber(channel);
   return at == std::string::npos ? channel : std::string(channel).insert(at, std::to_string(camera));

@@ -14,6 +14,9 @@ namespace dmslam {
 /// "frontend" of camera 1: "frontend1". The same with the name of a stream's owner ("FRONTEND").
 std::string OfCamera(const std::string& role, CameraId camera);
 
+/// A role in the names of its channels: "FRONTEND1" of "frontend1".
+std::string OwnerName(const std::string& role);
+
 /// DMSLAM_FRONTEND_KEYFRAME of camera 1: DMSLAM_FRONTEND1_KEYFRAME. What belongs to no camera stays.
 std::string ChannelOfCamera(const std::string& channel, CameraId camera);
 

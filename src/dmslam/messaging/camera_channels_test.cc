@@ -25,6 +25,7 @@ TEST(CameraChannels, OthersHaveTheirNumberBehindTheProcess) {
   }
   EXPECT_EQ(ChannelOfCamera("DMSLAM_FRONTEND_KEYFRAME", 1), "DMSLAM_FRONTEND1_KEYFRAME");
   EXPECT_EQ(OfCamera("FRONTEND", 12), "FRONTEND12");
+  EXPECT_EQ(OwnerName("frontend12"), "FRONTEND12");
   EXPECT_NE(StreamOfCamera(StreamId::kFrontend, 1), StreamOfCamera(StreamId::kPlayer, 1));
   EXPECT_NE(StreamOfCamera(StreamId::kFrontend, 1), StreamOfCamera(StreamId::kFrontend, 2));
 }

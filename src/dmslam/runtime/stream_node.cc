@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <tuple>
 
 #include "dmslam/console/log.h"
@@ -12,16 +11,12 @@
 #include "dmslam/runtime/process_info.h"
 #include "dmslam/runtime/session_check.h"
 #include "dmslam/util/random.h"
+#include "dmslam/wire/streams.h"
 
 namespace dmslam {
 namespace {
 
 constexpr int64_t kMisfitNs = 2'000'000'000;
-
-std::string UpperCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
-  return text;
-}
 
 template <typename... Message>
 int64_t HashOf(const std::tuple<Message...>*) {
@@ -212,15 +207,14 @@ int64_t StreamNode::PublishBytes(const std::string& channel, Bytes bytes) {
   return writer_->Publish(ChannelOfCamera(channel, options_.camera_id), std::move(bytes), context_.now_ns());
 }
 
-std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std::string& owner,
-                                                     const std::vector<std::string>& record_channels,
-                                                     std::optional<Version> start, CameraId camera,
-                                                     bool wants_all) {
+std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, std::optional<Version> start,
+                                                     CameraId camera, bool wants_all) {
+  const StreamPlan& plan = PlanOf(stream);
   StreamReader::Options options;
   options.session = session_;
   options.stream = StreamOfCamera(stream, camera);
-  options.owner = OfCamera(owner, camera);
-  options.reader = UpperCase(role_);
+  options.owner = OwnerName(OfCamera(plan.writer, camera));
+  options.reader = OwnerName(role_);
   options.role = role_;
   options.name = context_.name;
   options.id = context_.random_id;
@@ -229,11 +223,11 @@ std::unique_ptr<StreamReader> StreamNode::MakeReader(StreamId stream, const std:
   options.start = start;
   options.wants_all = wants_all;
   auto reader = std::make_unique<StreamReader>(options);
-  std::vector<std::string> record_channels_of_camera;
-  record_channels_of_camera.reserve(record_channels.size());
-  for (const std::string& channel : record_channels)
-    record_channels_of_camera.push_back(ChannelOfCamera(channel, camera));
-  endpoint_.AddReader(reader.get(), options.owner, record_channels_of_camera);
+  std::vector<std::string> records_of_camera;
+  records_of_camera.reserve(plan.records.size());
+  for (const std::string& channel : plan.records)
+    records_of_camera.push_back(ChannelOfCamera(channel, camera));
+  endpoint_.AddReader(reader.get(), options.owner, records_of_camera);
   readers_.push_back({reader.get(), options.owner, {}, {}});
   return reader;
 }
@@ -263,7 +257,7 @@ void StreamNode::ServeReplica(const Map* map, std::function<Version()> held, std
   replica_.snapshots = std::make_unique<MapSnapshots>(map, std::move(may_read));
   ReplicaServer::Options options;
   options.holder.session = session_;
-  options.holder.holder = UpperCase(role_);
+  options.holder.holder = OwnerName(role_);
   options.holder.role = role_;
   options.holder.id = context_.random_id;
   options.name = context_.name;
@@ -286,7 +280,7 @@ void StreamNode::StartElection() {
   WriterElection::Options options;
   options.session = session_;
   options.stream = StreamOfCamera(plan_->stream, options_.camera_id);
-  options.owner = UpperCase(role_);
+  options.owner = OwnerName(role_);
   options.name = context_.name;
   options.writer = context_.random_id;
   options.schema_hash = SchemaHash();
@@ -313,8 +307,8 @@ void StreamNode::RunElection() {
 /// Of all whose acknowledgements are heard.
 std::vector<std::string> StreamNode::ReaderNames() const {
   std::vector<std::string> names;
-  for (const auto* roles : {&plan_->readers, &plan_->watchers}) {
-    for (const std::string& role : *roles) names.push_back(UpperCase(role));
+  for (const auto* roles : {&plan_->readers, &PlanOf(plan_->stream).watchers}) {
+    for (const std::string& role : *roles) names.push_back(OwnerName(role));
   }
   return names;
 }
@@ -323,7 +317,7 @@ StreamWriter::Options StreamNode::MakeWriterOptions() const {
   StreamWriter::Options options;
   options.session = session_;
   options.stream = StreamOfCamera(plan_->stream, options_.camera_id);
-  options.owner = UpperCase(role_);
+  options.owner = OwnerName(role_);
   options.name = context_.name;
   options.schema_hash = SchemaHash();
   options.clock_offset_us = ClockOffsetUs(context_);

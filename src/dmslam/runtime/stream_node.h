@@ -87,17 +87,14 @@ class StreamNode : public Node {
   /// By the names that channels have where there is one camera; of this process's camera, or of another.
   void Listen(const std::vector<std::string>& channels);
   void Listen(const std::vector<std::string>& channels, CameraId camera);
-  std::unique_ptr<StreamReader> MakeReader(StreamId stream, const std::string& owner,
-                                           const std::vector<std::string>& record_channels,
-                                           std::optional<Version> start = Version(), CameraId camera = 0,
-                                           bool wants_all = false);
+  /// Of one of the streams that wire/streams.h lists.
+  std::unique_ptr<StreamReader> MakeReader(StreamId stream, std::optional<Version> start = Version(),
+                                           CameraId camera = 0, bool wants_all = false);
   struct WriterPlan {
     StreamId stream = StreamId::kTest;
     std::vector<std::string> readers;  ///< roles of the lossless readers
     Version parent;
     SnapshotSource* snapshots = nullptr;
-    std::vector<std::string> watchers = {
-        roles::kViewer};  ///< roles whose wishes are heard, but who hold nothing back
   };
   /// Offers the replica of the map that this process holds to a mapper that starts. `held`: its version,
   /// empty while it is not whole. `map` must stay where it is.

@@ -33,7 +33,7 @@ class Holder : public StreamNode {
   int64_t malformed() const { return MakeStatusHead("", {}).health.dropped_malformed; }
 
  private:
-  void Begin(const CameraInfo&) override { reader_ = MakeReader(StreamId::kMap, "MAPPER", {channels::kMap}); }
+  void Begin(const CameraInfo&) override { reader_ = MakeReader(StreamId::kMap); }
   bool WorkOnce() override {
     const std::optional<Record> record = reader_->Take();
     if (!record) return false;
@@ -410,9 +410,7 @@ class Follower : public StreamNode {
   std::string reason(const std::string& own = "") const { return MakeStatusHead(own, {}).reason; }
 
  private:
-  void Begin(const CameraInfo&) override {
-    reader_ = MakeReader(StreamId::kFrontend, "FRONTEND", {channels::kSession});
-  }
+  void Begin(const CameraInfo&) override { reader_ = MakeReader(StreamId::kFrontend); }
   bool WorkOnce() override {
     const std::optional<Record> record = reader_->Take();
     if (!record || IsDoubtful(*record, reader_.get())) return false;

@@ -12,7 +12,7 @@ inline constexpr char kEndOfSequence[] = "DMSLAM_PLAYER_END_OF_SEQUENCE";
 inline constexpr char kGroundTruthPose[] = "DMSLAM_PLAYER_GROUND_TRUTH";
 inline constexpr char kPlayerStatus[] = "DMSLAM_PLAYER_STATUS";
 
-// Records of the frontend's stream.
+// Records of the frontend's stream (wire/streams.h lists what each stream carries).
 inline constexpr char kSession[] = "DMSLAM_FRONTEND_SESSION";
 inline constexpr char kInitialMap[] = "DMSLAM_FRONTEND_INITIAL_MAP";
 inline constexpr char kKeyframe[] = "DMSLAM_FRONTEND_KEYFRAME";

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "dmslam/map/map_delta.h"
@@ -34,6 +35,13 @@ struct MessageInfo {
 /// Of one of `Messages`.
 template <typename Message>
 MessageInfo Info();
+
+/// Of all `Messages`.
+inline std::vector<MessageInfo> AllInfos() {
+  return []<typename... Message>(std::type_identity<std::tuple<Message...>>) {
+    return std::vector<MessageInfo>{Info<Message>()...};
+  }(std::type_identity<Messages>());
+}
 
 /// Over the fingerprints of all `Messages`: two programs with the same one understand each other's messages.
 int64_t SchemaHash();

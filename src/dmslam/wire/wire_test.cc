@@ -8,12 +8,14 @@
 #include "dmslam/frame_pose_t.hpp"
 #include "dmslam/frontend_status_t.hpp"
 #include "dmslam/map_record_t.hpp"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/version.h"
 #include "dmslam/wire/check.h"
 #include "dmslam/wire/codec.h"
 #include "dmslam/wire/former_types.h"
 #include "dmslam/wire/schema.h"
+#include "dmslam/wire/streams.h"
 #include "dmslam/wire/testing/random_message.h"
 
 namespace dmslam::wire {
@@ -299,6 +301,28 @@ Wire OnTheWire(const auto& message) {
   Wire wire;
   EXPECT_EQ(wire.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
   return wire;
+}
+
+TEST(WireTest, EveryRecordIsOfOneStreamAndCarriesItsWritersName) {
+  std::multiset<std::string> listed, records;
+  for (const StreamId stream : {StreamId::kFrontend, StreamId::kMap, StreamId::kLoopCloser}) {
+    const StreamPlan& plan = PlanOf(stream);
+    for (const std::string& channel : plan.records) {
+      EXPECT_TRUE(channel.starts_with("DMSLAM_" + OwnerName(plan.writer) + "_")) << channel;
+      listed.insert(channel);
+    }
+  }
+  for (const MessageInfo& info : AllInfos()) {
+    if (info.is_record) records.insert(info.channel);
+  }
+  EXPECT_EQ(listed, records);
+}
+
+TEST(WireTest, ReadersAreOfEachCamera) {
+  EXPECT_EQ(ReadersOf(StreamId::kMap, 2),
+            (std::vector<std::string>{"frontend", "frontend1", "loopcloser", "collector"}));
+  EXPECT_EQ(ReadersOf(StreamId::kFrontend, 2), (std::vector<std::string>{"mapper", "collector"}));
+  EXPECT_THROW(PlanOf(StreamId::kTest), InvariantError);
 }
 
 TEST(WireTest, AStateHasOneMeaning) {

@@ -1,13 +1,12 @@
 #pragma once
 
-#include <algorithm>
-#include <cctype>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "dmslam/messaging/bus.h"
+#include "dmslam/messaging/camera_channels.h"
 #include "dmslam/messaging/stream_reader.h"
 #include "dmslam/messaging/stream_writer.h"
 #include "dmslam/runtime/node.h"
@@ -27,19 +26,13 @@ inline NodeContext ContextOnBus(Bus* bus, const int64_t* now_ns, std::string nam
   return context;
 }
 
-/// "MAPPER" for "mapper".
-inline std::string OwnerOf(std::string role) {
-  std::ranges::transform(role, role.begin(), [](unsigned char c) { return std::toupper(c); });
-  return role;
-}
-
 /// For the stream of a process that the test plays; `reader`: the role that reads it without loss.
 inline StreamWriter::Options WriterOfRole(uint32_t session, StreamId stream, const std::string& role,
                                           const std::string& reader) {
   StreamWriter::Options options;
   options.session = session;
   options.stream = stream;
-  options.owner = OwnerOf(role);
+  options.owner = OwnerName(role);
   options.name = role;
   options.schema_hash = SchemaHash();
   options.roles = {{reader, true}};
@@ -52,8 +45,8 @@ inline StreamReader::Options ReaderOfRole(uint32_t session, StreamId stream, con
   StreamReader::Options options;
   options.session = session;
   options.stream = stream;
-  options.owner = OwnerOf(writer);
-  options.reader = OwnerOf(role);
+  options.owner = OwnerName(writer);
+  options.reader = OwnerName(role);
   options.role = options.name = role;
   options.id = 3;
   options.schema_hash = SchemaHash();
