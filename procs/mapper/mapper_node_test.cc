@@ -178,6 +178,23 @@ class MapperStatusTest : public LoopAnswersTest {
   MapperStatus status_;
 };
 
+TEST_F(MapperStatusTest, AnAnsweredRequestIsNamedWithTheEpochOfWhoAsked) {
+  BeginFrontend();
+  Say(FirstMap());
+  Say(AdjustRequest{.request = 3, .reason = "the end", .newest_stamp_ns = {}, .camera_id = 0});
+  RunOn();
+  std::optional<MapDelta> answer;
+  while (const std::optional<Record> record = map_->Take()) {
+    auto delta = wire::Decode<MapDelta>(*record->bytes);
+    if (delta && delta->event == MapEvent::kRequestDone) answer = std::move(delta);
+    map_->AcceptTaken();
+  }
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->request, 3U);
+  EXPECT_EQ(answer->progress.camera, 0U);
+  EXPECT_EQ(answer->progress.frontend.epoch, frontend_->term().epoch);
+}
+
 TEST_F(MapperStatusTest, SaysForWhomItWaitsAndWhatIsInTheMap) {
   RunOn();
   EXPECT_EQ(status_.state, State::kWaiting);
