@@ -16,6 +16,9 @@ struct JoiningOptions {
   // that hangs in two places shows a quarter of it.
   int min_proven = kManyProven;
   double min_proven_share = 0.7;
+  // Where others say the same, half of what is proven around the place is enough: twice what such a picture
+  // shows.
+  double min_proven_share_among_others = 0.5;
   // Between two maps that are both too young to have anything proven: cells of the image in which a good part
   // of the place is seen, and those of them at the image's rim. Of all cells that should show several of its
   // landmarks, and of those at the rim, they must be this share. Somebody who stood in both maps is a figure

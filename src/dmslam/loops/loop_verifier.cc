@@ -377,17 +377,19 @@ bool LoopVerifier::FillsTheImage(const VerifiedLoop& loop) const {
          seen.at_rim.Hold(options_.joining.min_filled_rim_cells, options_.joining.min_filled_share);
 }
 
+bool LoopVerifier::IsMuchProven(const PlaceSupport& proven, double share, double min_share) const {
+  return proven.found >= options_.min_proven && proven.cells >= options_.min_proven_cells &&
+         share >= min_share;
+}
+
 /// Within one map only what is proven around the place says so. Between two either side may: one of them may
 /// be too young to have anything proven. Where both are, the place must fill the image. At the same time
 /// somebody who stands there is as good as a wall.
 bool LoopVerifier::IsNoPerson(const VerifiedLoop& loop, double min_share) const {
-  const auto says_so = [&](const PlaceSupport& proven, double share) {
-    return proven.found >= options_.min_proven && proven.cells >= options_.min_proven_cells &&
-           share >= min_share;
-  };
-  if (options_.min_proven == 0 || says_so(loop.proven, loop.proven_share)) return true;
-  return loop.joins && (loop.at_same_time || says_so(loop.counter, loop.counter_share.value_or(0.0)) ||
-                        FillsTheImage(loop));
+  if (options_.min_proven == 0 || IsMuchProven(loop.proven, loop.proven_share, min_share)) return true;
+  return loop.joins &&
+         (loop.at_same_time || IsMuchProven(loop.counter, loop.counter_share.value_or(0.0), min_share) ||
+          FillsTheImage(loop));
 }
 
 bool LoopVerifier::Holds(const VerifiedLoop& loop, double min_share) const {
@@ -407,7 +409,9 @@ bool LoopVerifier::HoldsBetweenMaps(const VerifiedLoop& loop) const {
 }
 
 bool LoopVerifier::HoldsAmongOthers(const VerifiedLoop& loop) const {
-  return HoldsBetweenMaps(loop) || (FillsTheImage(loop) && Holds(loop, options_.min_confirmed_share));
+  const bool is_room = FillsTheImage(loop) || IsMuchProven(loop.proven, loop.proven_share,
+                                                           options_.joining.min_proven_share_among_others);
+  return HoldsBetweenMaps(loop) || (is_room && Holds(loop, options_.min_confirmed_share));
 }
 
 std::optional<VerifiedLoop> LoopVerifier::Propose(const Map& map, const MapPlaces& places,

@@ -111,6 +111,7 @@ class LoopVerifier {
   void MeasureProven(const Map& map, const std::vector<const Landmark*>& around, const PlaceSupport& own,
                      VerifiedLoop* loop) const;
   std::vector<const Landmark*> ProvenOf(const Map& map, std::vector<const Landmark*> landmarks) const;
+  bool IsMuchProven(const PlaceSupport& proven, double share, double min_share) const;
   bool IsNoPerson(const VerifiedLoop& loop, double min_share) const;
   bool FillsTheImage(const VerifiedLoop& loop) const;
   bool Holds(const VerifiedLoop& loop, double min_share) const;

@@ -322,5 +322,28 @@ TEST(HoldsAmongOthersTest, TwoYoungMapsAreJoinedByAPlaceThatFillsTheImage) {
   EXPECT_FALSE(Verifier().HoldsAmongOthers(contradicted)) << "what outlasts people is not there";
 }
 
+TEST(HoldsAmongOthersTest, HalfOfWhatIsProvenAroundThePlaceIsEnough) {
+  VerifiedLoop loop = Joining(0.35);
+  loop.proven = Proven(20);
+  loop.proven_share = 0.5;
+  EXPECT_FALSE(Verifier().HoldsBetweenMaps(loop));
+  EXPECT_TRUE(Verifier().HoldsAmongOthers(loop));
+  VerifiedLoop picture = loop;
+  picture.proven_share = 0.4;
+  EXPECT_FALSE(Verifier().HoldsAmongOthers(picture)) << "what hangs in two places";
+  VerifiedLoop corner = loop;
+  corner.proven.cells = 5;
+  EXPECT_FALSE(Verifier().HoldsAmongOthers(corner));
+  VerifiedLoop hidden = loop;
+  hidden.share = 0.3;
+  EXPECT_FALSE(Verifier().HoldsAmongOthers(hidden)) << "too little of all that should be seen";
+  VerifiedLoop from_there = loop;
+  std::swap(from_there.proven, from_there.counter);
+  from_there.counter_share = 0.5;
+  from_there.proven_share = 0.0;
+  EXPECT_FALSE(Verifier().HoldsAmongOthers(from_there)) << "half of what the other side has proven is seen "
+                                                           "around somebody who stood in both maps, too";
+}
+
 }  // namespace
 }  // namespace dmslam
