@@ -7,6 +7,7 @@
 //
 // The bus may also be a log, played as fast as possible: "file://run.lcmlog?speed=0".
 
+#include <array>
 #include <cstdio>
 #include <lcm/lcm-cpp.hpp>
 #include <string>
@@ -15,29 +16,14 @@
 
 namespace {
 
+// By their numbers, as dmslam_frame_pose_t.lcm names them.
+const std::array kStates = {"no map yet",   "waiting for a map", "trying a map",
+                            "tracking",     "uncertain",         "lost",
+                            "placed later", "rotation only",     "too few landmarks"};
+
 const char* StateName(int state) {
-  switch (state) {
-    case 0:
-      return "no map yet";
-    case 1:
-      return "waiting for a map";
-    case 2:
-      return "trying a map";
-    case 3:
-      return "tracking";
-    case 4:
-      return "uncertain";
-    case 5:
-      return "lost";
-    case 6:
-      return "placed later";
-    case 7:
-      return "rotation only";
-    case 8:
-      return "too few landmarks";
-    default:
-      return "unknown state";
-  }
+  return state >= 0 && state < static_cast<int>(kStates.size()) ? kStates[static_cast<size_t>(state)]
+                                                                : "unknown state";
 }
 
 class PosePrinter {
