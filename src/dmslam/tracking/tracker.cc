@@ -32,6 +32,8 @@ constexpr double kMostTurnRad = 0.3;
 constexpr double kWholeShare = 0.3;
 // What lies in so many cells of the image is wider than somebody who stands in it.
 constexpr int kWiderThanSomebodyCells = kFillingCells / 2;
+// A place shows proven landmarks where this share of its frames does: now and then one is matched by chance.
+constexpr double kProvenFrames = 0.25;
 // A pose is thin where less than this share of what it should see is found.
 constexpr double kThinShare = 0.25;
 // A thin pose is compared with one beside it that is turned by up to this angle.
@@ -42,12 +44,6 @@ constexpr double kClearlyMore = 1.3;
 /// All over the image, which a person is not.
 bool IsSeenAsAWhole(const TrackingReport& report) {
   return report.cells >= kFillingCells && report.num_static >= kWholeShare * report.num_expected;
-}
-
-/// Whether a place in a map that is too young to have much proven shows more than matches by chance, and more
-/// than somebody who stood there would: he is no landmark that is proven, and fills little of the image.
-bool IsMoreThanSomebody(const TrackingReport& report, int proven) {
-  return !report.MayMatchByChance() && (proven > 0 || report.cells >= kWiderThanSomebodyCells);
 }
 
 /// Whether one pose of a frame explains clearly more of it than another does: of all landmarks and of those
@@ -174,15 +170,24 @@ void Tracker::Refuse(Attempt* attempt) {
 /// landmarks, some of those, and the more of them, the sooner; in a younger one, more than matches by chance
 /// and more than somebody who stands there shows. In another map that is too young, it must both be seen as a
 /// whole and predict.
-bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const {
+bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) {
+  const int proven = CountProven(map, frame.landmarks, {});
+  ++unbelieved_->frames;
+  unbelieved_->frames_with_proven += proven > 0 ? 1 : 0;
   if (report.IsDoubtful()) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
-  const int proven = CountProven(map, frame.landmarks, {});
   const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
   if (at_once || proven >= kManyProven) return true;
   const int64_t since_ns = frame.stamp_ns - unbelieved_->since_ns;
-  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs && IsMoreThanSomebody(report, proven);
+  if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs && IsMoreThanSomebody(report);
   return proven >= kSomeProven && since_ns >= ConfirmNs(proven);
+}
+
+/// Whether a place in a map that is too young to have much proven shows more than matches by chance, and more
+/// than somebody who stood there would: he is no landmark that is proven, and fills little of the image.
+bool Tracker::IsMoreThanSomebody(const TrackingReport& report) const {
+  const bool is_proven = unbelieved_->frames_with_proven >= kProvenFrames * unbelieved_->frames;
+  return !report.MayMatchByChance() && (is_proven || report.cells >= kWiderThanSomebodyCells);
 }
 
 /// The map that the frame was placed in.

@@ -95,7 +95,8 @@ class Tracker {
   void Relocalize(const Map& map, const Request& request, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
-  bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
+  bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame);
+  bool IsMoreThanSomebody(const TrackingReport& report) const;
   bool IsOldEnoughToProve(const Map& map) const;
   bool IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const;
   bool IsCarriedAway(const Map& map, const TrackingReport& report, const TrackedFrame& frame) const;
@@ -120,7 +121,8 @@ class Tracker {
     Why why = Why::kFoundAnew;
     bool in_another_map = false;  ///< than it was lost in
     int64_t since_ns = 0;
-    MotionFollower follower;  ///< as it was when the camera was believed last
+    MotionFollower follower;                 ///< as it was when the camera was believed last
+    int frames = 0, frames_with_proven = 0;  ///< since then: all, and those that show a proven landmark
   };
   std::optional<Unbelieved> unbelieved_;
 };

@@ -256,6 +256,12 @@ class Recovering : public ::testing::Test {
     scene_.AddCloud(400, {0, 0, 4}, {1.6, 1.2, 0.5}, mapped_ns_);
     const auto keyframes = static_cast<uint32_t>(map_s * 1e9 / MapScene::kStepNs) + 1;
     scene_.MapAll(keyframes, 0.2 / keyframes);
+    for (uint32_t k = 0; k + kSeenLately < keyframes; ++k) {
+      const Keyframe& keyframe = scene_.map().At(KeyframeId::Make(MapScene::kSession, k));
+      for (uint16_t i = 0; i < scene_.size(); ++i) {
+        if (i % one_old_of_ != 0) scene_.map().ClearObservation(keyframe, i);
+      }
+    }
     replica_.Apply(scene_.map().TakeDelta(MapEvent::kMapStarted, KeyframeId::Make(MapScene::kSession, 1), 1));
     const char* source = std::getenv("DMSLAM_SOURCE_DIR");
     Tracker::Setup setup;
@@ -270,7 +276,8 @@ class Recovering : public ::testing::Test {
   }
   TrackingResult Track(uint32_t frame, bool blind = false) {
     const auto place = [&](size_t i) -> std::optional<Eigen::Vector3d> {
-      const bool hidden = blind || i % one_seen_of_ != 0 || std::abs(scene_.point(i).x()) > seen_aside_;
+      const bool hidden = blind || i % one_seen_of_ != 0 || std::abs(scene_.point(i).x()) > seen_aside_ ||
+                          (hides_old_ && i % one_old_of_ == 0);
       return hidden ? std::nullopt : std::optional(scene_.point(i));
     };
     return tracker_->Track(replica_, {.whereabouts = whereabouts_},
@@ -284,8 +291,12 @@ class Recovering : public ::testing::Test {
     return 0;
   }
 
-  int64_t mapped_ns_ = 0;    ///< of the points
-  size_t one_seen_of_ = 1;   ///< points
+  static constexpr uint32_t kSeenLately = 30;  ///< keyframes
+
+  int64_t mapped_ns_ = 0;   ///< of the points
+  size_t one_seen_of_ = 1;  ///< points
+  size_t one_old_of_ = 1;   ///< points; the others have been seen for a second
+  bool hides_old_ = false;
   double seen_aside_ = 1e9;  ///< those no farther to the left or right
   bool usual_speed_ = true;
   Tracker::Whereabouts whereabouts_;
@@ -336,6 +347,27 @@ TEST_F(Recovering, InAYoungMapAPlaceNoWiderThanSomebodyIsNotBelieved) {
   }
   seen_aside_ = 1.5;
   EXPECT_TRUE(Track(kFound + 45).pose);
+}
+
+/// The wall behind somebody shows now and then only.
+TEST_F(Recovering, InAYoungMapANarrowPlaceThatShowsWhatIsProvenIsBelieved) {
+  one_old_of_ = 10;
+  Start(6.0);
+  seen_aside_ = 0.3;
+  for (uint32_t frame = kFound; frame < kFound + 7; ++frame) EXPECT_FALSE(Track(frame).pose) << frame;
+  hides_old_ = true;
+  const uint32_t found = FirstFound(kFound + 7);
+  EXPECT_NEAR((found - kFound) / 30.0, 0.5, 0.05);
+}
+
+TEST_F(Recovering, InAYoungMapOneProvenLandmarkInOneFrameProvesNothing) {
+  one_old_of_ = 10;
+  Start(6.0);
+  seen_aside_ = 0.3;
+  const TrackingResult first = Track(kFound);
+  EXPECT_GT(CountProven(replica_, first.frame.landmarks, {}), 0);
+  hides_old_ = true;
+  for (uint32_t frame = kFound + 1; frame < kFound + 45; ++frame) EXPECT_FALSE(Track(frame).pose) << frame;
 }
 
 TEST_F(Recovering, AnotherMapTooYoungToProveAnythingMustBeSeenAsAWholeAndPredict) {
