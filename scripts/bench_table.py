@@ -1,4 +1,4 @@
-"""Makes DIR/table.md of what scripts/bench.sh left in DIR. Ends with 1 where a required bar is missed."""
+"""Makes DIR/table.md of what scripts/bench.sh left in DIR: bench_table.py DIR. Ends with 1 where a required bar is missed."""
 
 import json
 import pathlib
@@ -61,6 +61,9 @@ def bars(benches):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     folder = pathlib.Path(sys.argv[1])
     benches = {path.stem: Bench(path) for path in sorted(folder.glob("*_bench.json"))}
     table = ["# Benchmarks", "", "CPU times [ms] of one thread, medians where there are quantiles, else means; cv::ORB with 1000 features on the same frames in the same run.", ""]

@@ -67,6 +67,9 @@ def chart(left, top, truth, runs):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     sequences, results, picture = (pathlib.Path(a) for a in sys.argv[1:4])
     names, parts = sys.argv[4:], []
     for row, name in enumerate(names):

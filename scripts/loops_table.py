@@ -95,6 +95,9 @@ def row(name, sequence, results):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     sequences, results = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
     print("| sequence | path [m] | tracked [%] | revisits found | loops / false | ATE --no-loop [m] | ATE [m] | asked [m] |")
     print("|---|---|---|---|---|---|---|---|")

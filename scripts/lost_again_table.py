@@ -50,6 +50,9 @@ def row(sequence, results):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     print("| run | lit frames online [%] | in the end [%] | ATE [m] | ATE online [m] | found after [s] | "
           "frames of maps apart | maps given up | relocalisations | loops and welds | dark frames with a pose |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")

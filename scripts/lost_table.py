@@ -46,6 +46,9 @@ def row(name, frames, truth, folder, plain_error, first, step):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     sequence, prefix, first, step = pathlib.Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
     frames = frame_stamps(sequence)
     truth = read(sequence / "groundtruth.txt")

@@ -1,9 +1,13 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README, docs/images, from a rendered sequence: scripts/pictures.sh [FRAME] (default 100).
+# Makes the pictures of the README, docs/images/{features,trajectory}.png, from a rendered sequence:
+# scripts/pictures.sh [FRAME]. FRAME: the frame whose features are shown (default: 100).
 set -euo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+case "${1:-}" in
+  -h | --help) sed -n '2,3s/^# //p' "$0"; exit 0 ;;
+esac
 frame=${1:-100}
-[[ $frame =~ ^[1-9][0-9]*$ ]] || { echo "pictures.sh: $frame is not the number of a frame" >&2; exit 2; }
+[[ $frame =~ ^[1-9][0-9]*$ ]] || { echo "pictures.sh: $frame is not the number of a frame (see --help)" >&2; exit 2; }
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 "$top/scripts/build.sh" release dmslam-synth dmslam-inprocess

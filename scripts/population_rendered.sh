@@ -1,6 +1,10 @@
 #!/usr/bin/env bash
-# Prints config/population_rendered.txt: what dmslam-synth is asked for, from consecutive seeds, none of them picked.
+# Prints config/population_rendered.txt: what dmslam-synth is asked for, from consecutive seeds, none of them picked:
+# scripts/population_rendered.sh >config/population_rendered.txt
 set -euo pipefail
+case "${1:-}" in
+  -h | --help) sed -n '2,3s/^# //p' "$0"; exit 0 ;;
+esac
 readonly FIRST_SEED=1 LAST_SEED=48 FRAMES=400
 
 state=0

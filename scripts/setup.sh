@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what a part of the project needs, from Debian's packages only: scripts/setup.sh core|test|tools|viewer|browser|package|shield...
+# Installs what parts of the project need, from Debian's packages only:
+# scripts/setup.sh core|test|tools|viewer|browser|package|shield...
 set -euo pipefail
 core=(build-essential cmake ninja-build ccache pkg-config
   liblcm-dev liblcm-bin libglib2.0-dev
@@ -13,7 +14,8 @@ browser=(chromium python3-websocket)
 package=(dpkg-dev file)
 shield=(nftables)
 usage() {
-  echo "Usage: scripts/setup.sh PART...   with PART one of: core test tools viewer browser (to test the viewer) package"
+  echo "Usage: scripts/setup.sh PART..."
+  echo "with PART one of: core test tools viewer browser (to test the viewer) package shield"
   echo "shield: loads a firewall rule that keeps crafted fragments from LCM, now and at every start (docs/security.md)"
 }
 [ $# -gt 0 ] || { usage >&2; exit 2; }

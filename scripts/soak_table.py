@@ -58,6 +58,9 @@ def quarter_rows(folder):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     folder = pathlib.Path(sys.argv[1])
     memory, grows = memory_rows(folder / "memory.csv")
     quarters, later = quarter_rows(folder)

@@ -1,8 +1,11 @@
 #!/bin/sh
 # Trains the vocabulary that ships with the project, data/vocabulary.dmv. Run it again whenever the descriptor changes.
-# usage: scripts/train_vocabulary.sh [path of dmslam-vocab]
+# Usage: scripts/train_vocabulary.sh [path of dmslam-vocab]
 # Images: $DMSLAM_DATA/vocabulary_images (default: ../shared/data beside the project).
 set -eu
+case "${1:-}" in
+  -h | --help) sed -n '2,4s/^# //p' "$0"; exit 0 ;;
+esac
 root=$(cd "$(dirname "$0")/.." && pwd)
 tool=${1:-$root/build/release/bin/dmslam-vocab}
 images=${DMSLAM_DATA:-$root/../shared/data}/vocabulary_images

@@ -112,6 +112,9 @@ def row(run):
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return
     sequences, results = map(pathlib.Path, sys.argv[1:3])
     print("| run | cameras in one map | with a pose in it [%] | frames of maps apart | loops and welds / false | joint ATE [m] | "
           "of each camera [m] | asked [m] | worst pose [m] | |")
