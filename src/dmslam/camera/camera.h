@@ -13,11 +13,10 @@ namespace dmslam {
 enum class Lens : uint8_t {
   /// Brown's distortion: k1, k2, k3 radial, p1, p2 tangential; OpenCV's order and meaning.
   kBrown = 0,
-  /// The image grows with the angle to the optical axis instead of its tangent: r = theta (1 + k1 theta^2 +
-  /// k2
-  /// theta^4 + k3 theta^6 + k4 theta^8). Kannala, Brandt, "A generic camera model and calibration method for
-  /// conventional, wide-angle, and fish-eye lenses", PAMI 2006, eq. 6 and OpenCV's `cv::fisheye`; often
-  /// called equidistant.
+  /// The image grows with the angle to the optical axis instead of its tangent:
+  /// r = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
+  /// Kannala, Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
+  /// fish-eye lenses", PAMI 2006, eq. 6 and OpenCV's `cv::fisheye`; often called equidistant.
   kFisheye = 1,
 };
 
