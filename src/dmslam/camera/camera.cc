@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "dmslam/util/check.h"
+#include "dmslam/util/yaml_error.h"
 
 namespace dmslam {
 namespace {
@@ -197,7 +198,7 @@ YAML::Node LoadYaml(const std::string& path) {
   } catch (const YAML::BadFile&) {
     throw InputError(path + ": cannot be read; check the path given with --camera");
   } catch (const YAML::Exception& error) {
-    throw InputError(path + ": is not valid YAML (" + error.what() + "); see docs/camera.md for an example");
+    throw InputError(NotYaml(path, error) + "; indent with spaces, not tabs (docs/camera.md has an example)");
   }
 }
 
@@ -303,8 +304,7 @@ std::optional<std::string> Camera::Problem() const {
   if (lens == Lens::kBrown && k4 != 0) return "a lens without fisheye has no k4";
   if (lens == Lens::kFisheye && Folds(*this)) {
     return "field 'distortion' bends the image back within it: these are not k1, k2, k3, k4 of a fisheye "
-           "lens "
-           "of this focal length";
+           "lens of this focal length";
   }
   if (!(fps > 0 && fps <= 1000)) return "field 'fps' is outside 0..1000";
   return std::nullopt;

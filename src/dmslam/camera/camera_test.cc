@@ -159,6 +159,8 @@ TEST(CameraFile, NamesTheFieldThatIsWrong) {
     EXPECT_NE(ErrorOf(lacking).find("field '" + field + "' is missing"), std::string::npos);
   }
   EXPECT_NE(ErrorOf("][").find("YAML"), std::string::npos);
+  EXPECT_NE(ErrorOf(good + "distortion:\t[0, 0\nfps: 30\n").find(".yaml:8: is not valid YAML (column "),
+            std::string::npos);
   EXPECT_THROW(LoadCamera("/nonexistent.yaml"), InputError);
 }
 

@@ -140,6 +140,10 @@ TEST_F(DatasetTest, EurocFolderAndItsCamera) {
   ASSERT_TRUE(fisheye);
   EXPECT_EQ(fisheye->lens, Lens::kFisheye);
   EXPECT_DOUBLE_EQ(fisheye->k4, 0.00020293673);
+  Write("mav0/cam0/sensor.yaml", "rate_hz: 20\nresolution:\t[752, 480\n");
+  EXPECT_NE(
+      ErrorOf([&] { FindCamera(root_.string(), ""); }).find("sensor.yaml:3: is not valid YAML (column "),
+      std::string::npos);
   Write("mav0/cam0/sensor.yaml", "5\n");
   EXPECT_NE(ErrorOf([&] { FindCamera(root_.string(), ""); }).find("not a map"), std::string::npos);
   Write("mav0/cam0/data.csv", "5.5,a.png\n");

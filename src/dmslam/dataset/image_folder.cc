@@ -10,6 +10,7 @@
 
 #include "dmslam/dataset/text_table.h"
 #include "dmslam/util/check.h"
+#include "dmslam/util/yaml_error.h"
 
 namespace dmslam {
 namespace {
@@ -163,8 +164,7 @@ Camera EurocSequence::ReadCamera(const std::string& sensor_yaml) {
   try {
     node = YAML::Load(ReadTextFile(sensor_yaml));
   } catch (const YAML::Exception& error) {
-    throw InputError(sensor_yaml + ": is not valid YAML (" + error.what() +
-                     "); give a camera file with --camera");
+    throw InputError(NotYaml(sensor_yaml, error) + "; give a camera file with --camera");
   }
   if (!node.IsMap())
     throw InputError(sensor_yaml + ": is not a map of fields; give a camera file with --camera");

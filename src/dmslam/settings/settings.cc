@@ -7,6 +7,7 @@
 #include "dmslam/settings/registry.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
+#include "dmslam/util/yaml_error.h"
 
 namespace dmslam {
 namespace {
@@ -94,7 +95,7 @@ std::vector<Given> ReadFile(const std::string& path) {
   } catch (const YAML::BadFile&) {
     throw InputError(path + ": cannot be read; check the path given with --config");
   } catch (const YAML::Exception& error) {
-    throw InputError(path + ": is not valid YAML (" + error.what() + ")");
+    throw InputError(NotYaml(path, error) + "; indent with spaces, not tabs, and write 'key: value' lines");
   }
   RefuseRepeated(all);
   return all;

@@ -197,6 +197,13 @@ TEST(SettingsTest, EveryBoundIsKeptAndNamed) {
   }
 }
 
+TEST(SettingsTest, NamesTheLineThatIsNoYaml) {
+  EXPECT_EQ(Refusal("tracking:\n\tmin_inliers: 25\n").find("FILE:2: is not valid YAML (column "), 0u)
+      << Refusal("tracking:\n\tmin_inliers: 25\n");
+  EXPECT_EQ(Refusal("seed: 7\nfeatures: {count: 1500\n").find("FILE:3: is not valid YAML (column 1: "), 0u)
+      << Refusal("seed: 7\nfeatures: {count: 1500\n");
+}
+
 TEST(SettingsTest, AWrongOverrideIsNamedAsItWasTyped) {
   EXPECT_EQ(Refusal("", {"tracking.min_inliers=3"}),
             "--set tracking.min_inliers=3: setting 'tracking.min_inliers': '3' is not allowed; write a whole "
