@@ -159,12 +159,12 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddOption("--log-session", a.log_session, "which of the log's sessions, where it holds several");
   app.AddOption("--channels", a.channels,
                 "of a log: camera, or records: the frontend's keyframes are entered as a writer of a new "
-                "session, without a "
-                "frontend and without images")
+                "session, without a frontend and without images")
       .OneOf({"camera", "records"});
   app.AddOption("--to-log", a.to_log, "write camera and frames into this log instead of publishing them");
   app.AddOption("--camera", a.camera_file,
-                "camera file (YAML); found by itself for TUM freiburg1/2/3 and logs");
+                "camera file (YAML); found by itself for rendered sequences, EuRoC and TUM freiburg1/2/3, "
+                "and in a --log");
   app.AddOption("--as-camera", a.as_camera_file,
                 "another camera file: frames are published as that camera would have taken them, for a map "
                 "that is of its model");

@@ -342,10 +342,10 @@ int Resume(const std::string& folder) {
 
 int main(int argc, char** argv) {
   dmslam::CommandLine line(
-      "Plays a sequence through player, frontend, mapper and loop closer, four processes on a private LCM "
-      "port, and writes into the --out folder: trajectory.txt (final, TUM format), trajectory_online.txt, "
-      "poses_online.csv, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A "
-      "process that dies or hangs is started again, and goes on where it was; where all died at once, "
+      "Plays a sequence through player, frontend, mapper and loop closer, four processes on a private LCM\n"
+      "port, and writes into the --out folder: trajectory.txt (final, TUM format), trajectory_online.txt,\n"
+      "poses_online.csv, keyframes.txt, map.ply, trajectory.png, summary.json, and the processes' logs. A\n"
+      "process that dies or hangs is started again, and goes on where it was; where all died at once,\n"
       "--resume does so.",
       "dmslam-run");
   dmslam::RunArguments arguments;

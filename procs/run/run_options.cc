@@ -134,7 +134,9 @@ void DeclareCamera(CommandLine& line, RunArguments::Camera& camera) {
   line.AddOption("--encoding", camera.encoding,
                  "how frames of videos and cameras travel: jpeg (default), png or raw, both without loss")
       .OneOf({"jpeg", "png", "raw"});
-  line.AddOption("--camera", camera.file, "camera file (YAML); found by itself for TUM freiburg1/2/3");
+  line.AddOption("--camera", camera.file,
+                 "camera file (YAML); found by itself for rendered sequences, EuRoC and TUM freiburg1/2/3, "
+                 "and in a --log");
 }
 
 void DeclareMap(CommandLine& line, RunArguments::MapFiles& map) {

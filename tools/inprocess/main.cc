@@ -54,11 +54,13 @@ void Declare(dmslam::CommandLine& app, Arguments& a) {
   app.AddOption("--log-session", a.log_session, "which of the log's sessions, where it holds several");
   app.AddOption("--record", a.record, "write all that is said into this log");
   app.AddOption("--out", a.out, "folder for the results").Required();
-  app.AddOption("--camera", a.camera, "camera file (YAML); found by itself for TUM freiburg1/2/3");
+  app.AddOption("--camera", a.camera,
+                "camera file (YAML); found by itself for rendered sequences, EuRoC and TUM freiburg1/2/3, "
+                "and in a --log");
   app.AddOption("--config", a.config, "settings (YAML)");
   app.AddOption("--set", a.overrides, "one setting: key=value; may be repeated");
   app.AddOption("--profile", a.profile, "dm, baseline or paper").OneOf({"dm", "baseline", "paper"});
-  app.AddOption("--seed", a.seed).ShowDefault();
+  app.AddOption("--seed", a.seed, "seed of everything random").ShowDefault();
   app.AddOption("--start", a.start, "first frame");
   app.AddOption("--frames", a.frames, "at most so many frames");
   app.AddOption("--black-out", a.black_outs,

@@ -79,7 +79,9 @@ std::optional<Camera> FindCamera(const std::string& sequence_dir, const std::str
 
 Camera KnownCamera(const std::string& sequence_dir, const std::string& config_dir) {
   if (const auto found = FindCamera(sequence_dir, config_dir)) return *found;
-  throw InputError(sequence_dir + ": which camera took this is not known; name its file with --camera");
+  throw InputError(sequence_dir +
+                   ": which camera took this is not known; name its file with --camera (config/ has some; "
+                   "see docs/camera.md)");
 }
 
 }  // namespace dmslam
