@@ -9,8 +9,8 @@
 #include "dmslam/console/command_line.h"
 #include "dmslam/evaluation/report.h"
 #include "dmslam/evaluation/trajectory_plot.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 #include "nees_main.h"
 
 namespace dmslam {
@@ -164,7 +164,7 @@ void Declare(dmslam::CommandLine* app, Arguments* arguments) {
   app->AddOption("--plot", arguments->plot,
                  "draw PREFIX.png and PREFIX.svg: top and side view, error over time");
   app->AddOption("--title", arguments->title, "title of the plot (default: the estimate's file name)");
-  app->SetVersion(kVersion);
+  app->SetVersion(BuildVersion());
 }
 
 }  // namespace

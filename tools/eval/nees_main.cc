@@ -10,8 +10,8 @@
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/evaluation/nees.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 
 namespace dmslam {
 namespace {
@@ -123,7 +123,7 @@ int NeesMain(int argc, char** argv) {
   app.AddOption("--slack", arguments.options.slack_m, "a truth may be wrong by so much [m]").ShowDefault();
   app.AddFlag("--details", arguments.details, "also each run");
   app.AddOption("--plot", arguments.plot, "draw PREFIX.png and PREFIX.svg of the first run");
-  app.SetVersion(kVersion);
+  app.SetVersion(BuildVersion());
   if (const auto code = app.Parse(argc, argv)) return *code;
   try {
     Evaluate(arguments);

@@ -13,9 +13,9 @@
 
 #include "dmslam/console/command_line.h"
 #include "dmslam/features/opencv_convert.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/random.h"
-#include "dmslam/util/version.h"
 #include "pattern_learner.h"
 
 namespace dmslam {
@@ -89,7 +89,7 @@ struct Arguments {
 };
 
 void Declare(CommandLine& app, Arguments& a) {
-  app.SetVersion(kVersion);
+  app.SetVersion(BuildVersion());
   app.AddOption("folder", a.folder, "folder of photographs").Required();
   app.AddOption("--images", a.num_images, "how many of them, evenly spread over the folder").Positive();
   app.AddOption("--candidates", a.options.num_candidates, "random tests to choose from").InRange(512, 100000);

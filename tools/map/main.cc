@@ -19,9 +19,9 @@
 #include "dmslam/recording/map_file.h"
 #include "dmslam/runtime/exit_codes.h"
 #include "dmslam/slam/trajectory_builder.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
 #include "dmslam/util/output_file.h"
-#include "dmslam/util/version.h"
 #include "dmslam/wire/codec.h"
 #include "landmark_command.h"
 #include "map_commands.h"
@@ -45,7 +45,7 @@ struct CommandArguments {
 };
 
 void Declare(dmslam::CommandLine& app, Arguments& a) {
-  app.SetVersion(dmslam::kVersion);
+  app.SetVersion(dmslam::BuildVersion());
   app.AddOption("--log,--map", a.log, "log of a run, or a saved map");
   app.AddOption("--log-session", a.session, "which of the log's sessions, where it holds several");
   app.AddOption(

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "dmslam/console/command_line.h"
-#include "dmslam/util/version.h"
+#include "dmslam/util/build_version.h"
 #include "evaluate.h"
 
 namespace {
@@ -61,7 +61,7 @@ void Run(const dmslam::PlacesOptions& options, const Outputs& outputs) {
 
 int main(int argc, char** argv) {
   dmslam::CommandLine app("Place recognition alone, scored against ground-truth poses", "dmslam-places-eval");
-  app.SetVersion(dmslam::kVersion);
+  app.SetVersion(dmslam::BuildVersion());
   dmslam::PlacesOptions options;
   Outputs outputs;
   AddOptions(app, options, outputs);

@@ -5,14 +5,14 @@
 #include <string>
 
 #include "dmslam/console/command_line.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 #include "settings_page.h"
 
 int main(int argc, char** argv) {
   dmslam::CommandLine app("Lists every setting with its default, as the page docs/configuration.md",
                           "dmslam-settings");
-  app.SetVersion(dmslam::kVersion);
+  app.SetVersion(dmslam::BuildVersion());
   std::string out;
   app.AddOption("--out", out, "file to write; without it the page goes to standard output");
   return app.Run(argc, argv, [&] {

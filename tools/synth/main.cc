@@ -10,8 +10,8 @@
 #include "dmslam/camera/camera.h"
 #include "dmslam/console/command_line.h"
 #include "dmslam/synthetic/sequence_writer.h"
+#include "dmslam/util/build_version.h"
 #include "dmslam/util/check.h"
-#include "dmslam/util/version.h"
 
 namespace {
 
@@ -152,7 +152,7 @@ int main(int argc, char** argv) {
       "Renders a synthetic sequence (textured room, hand-held camera, walking people, exact ground truth) "
       "into a folder in the format of the TUM RGB-D benchmark.",
       "dmslam-synth");
-  app.SetVersion(dmslam::kVersion);
+  app.SetVersion(dmslam::BuildVersion());
   Arguments args;
   AddOptions(app, args);
   return app.Run(argc, argv, [&] { Run(args); });

@@ -2,7 +2,7 @@
 
 #include "commands.h"
 #include "dmslam/console/command_line.h"
-#include "dmslam/util/version.h"
+#include "dmslam/util/build_version.h"
 
 namespace {
 
@@ -24,7 +24,7 @@ void AddTrain(dmslam::CommandLine& app, dmslam::TrainCommand& command) {
 
 int main(int argc, char** argv) {
   dmslam::CommandLine app("Trains, describes and converts bag-of-words vocabularies", "dmslam-vocab");
-  app.SetVersion(dmslam::kVersion);
+  app.SetVersion(dmslam::BuildVersion());
   app.RequireSubcommand();
   dmslam::TrainCommand train;
   AddTrain(app, train);

@@ -5,8 +5,7 @@
 
 namespace dmslam {
 
-/// The project's version, as `--version` prints it; the programs of a run name the commit too
-/// (build_version.h).
+/// The project's version. `--version` prints the commit behind it (build_version.h).
 inline constexpr const char* kVersion = "0.2.0";
 
 /// Version of what travels and of what is recorded: streams, message types, logs. Every beacon of a stream
