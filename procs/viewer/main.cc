@@ -26,7 +26,7 @@ class ServedViewer : public dmslam::Node {
   void Stop() override { node_.Stop(); }
   std::optional<int> exit_code() const override { return node_.exit_code(); }
   std::string problem() const override { return node_.problem(); }
-  std::string ready_text() const override { return "to be seen at " + server_.address(); }
+  std::string ready_text() const override { return "watch it live at " + server_.address(); }
 
  private:
   dmslam::Exchange exchange_;
@@ -42,7 +42,7 @@ int ShowLog(const std::string& log, const dmslam::NodeOptions& options, const dm
   dmslam::PlaybackControl control;
   dmslam::LogPlayback playback(log, options, viewer, &exchange);
   const dmslam::WebServer server(web, &exchange, &control);
-  dmslam::LogInfo("to be seen at {}", server.address());
+  dmslam::LogInfo("watch it at {}", server.address());
   loop.Watch(control.fd(), [&] { playback.Fulfil(control.Take(), dmslam::EventLoop::now_ns()); });
   while (loop.PumpOnce(playback.deadline_ns())) playback.Advance(dmslam::EventLoop::now_ns());
   return 0;

@@ -14,7 +14,7 @@ from browser import Browser  # noqa: E402
 def address_of(log, run):
     while run.poll() is None:
         said = open(log, encoding="utf-8").read()
-        found = re.search(r"to be seen at (http://\S+)", said)
+        found = re.search(r"watch it (?:live )?at (http://\S+)", said)
         if found:
             return found.group(1)
         time.sleep(0.1)
