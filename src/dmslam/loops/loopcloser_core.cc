@@ -23,22 +23,28 @@ LoopcloserCore::LoopcloserCore(const LoopcloserOptions& options, const Camera& c
       map_(camera, pyramid),
       places_(std::move(vocabulary)),
       detector_(options),
-      verifier_(options, seed),
-      keyframes_since_loop_(options.min_keyframes_between) {}
+      verifier_(options, seed) {}
 
 void LoopcloserCore::ApplyMapDelta(const MapDelta& delta) {
   map_.Apply(delta);
   places_.Update(map_);
-  if (awaited_correction_ && delta.correction_id == awaited_correction_) HearOfCorrection(delta);
+  const Proposed* proposed = std::get_if<Proposed>(&last_loop_);
+  if (proposed != nullptr && delta.correction_id == proposed->correction_id)
+    HearOfCorrection(Proposed(*proposed), delta);
 }
 
 /// What the mapper made of the loop that was proposed.
-void LoopcloserCore::HearOfCorrection(const MapDelta& delta) {
-  awaited_correction_.reset();
-  if (delta.event != MapEvent::kCorrectionRefused) return;
+void LoopcloserCore::HearOfCorrection(const Proposed& loop, const MapDelta& delta) {
+  if (delta.event != MapEvent::kCorrectionRefused) return OnLoopInMap(loop.keyframe);
   --counters_.loops;
-  adjustment_due_ = false;
-  keyframes_since_loop_ = options_.min_keyframes_between;
+  counters_.last_loop_keyframe = loop.loop_before;
+  keyframes_since_loop_.reset();
+  last_loop_ = Settled();
+}
+
+void LoopcloserCore::OnLoopInMap(KeyframeId keyframe) {
+  last_loop_ = Settled();
+  if (options_.correction.global_adjustment) last_loop_ = AdjustmentDue{keyframe};
 }
 
 void LoopcloserCore::Begin(Step step) const {
@@ -52,8 +58,8 @@ void LoopcloserCore::ForgetMap() {
   proposals_.clear();
   asked_again_.reset();
   sightings_.Clear();
-  awaited_correction_.reset();
-  // An adjustment that is due stays so: the loop that asked for it may be in the snapshot.
+  // Its loop may be in the snapshot, and what it has left to be adjusted.
+  if (const Proposed* proposed = std::get_if<Proposed>(&last_loop_)) OnLoopInMap(proposed->keyframe);
 }
 
 LoopAnswer LoopcloserCore::Check(KeyframeId id) {
@@ -75,13 +81,14 @@ LoopAnswer LoopcloserCore::Check(KeyframeId id) {
 LoopAnswer LoopcloserCore::FindCorrection(const Keyframe& keyframe) {
   if (!options_.enabled || !places_.usable()) return {};
   places_.Refresh(map_, keyframe.id);
-  ++keyframes_since_loop_;
-  if (awaited_correction_) return {};
-  if (adjustment_due_) return AdjustAfterLoop(keyframe);
+  if (keyframes_since_loop_) ++*keyframes_since_loop_;
+  if (AwaitsMapper()) return {};
+  if (const AdjustmentDue* due = std::get_if<AdjustmentDue>(&last_loop_))
+    return AdjustAfterLoop(due->keyframe, keyframe);
   std::vector<const Keyframe*> candidates = NamePlaces(keyframe);
   ForgetUnconfirmed(keyframe.stamp_ns);
   // The same place is seen for a while after a loop, and would be one again; another map is another matter.
-  if (keyframes_since_loop_ <= options_.min_keyframes_between)
+  if (keyframes_since_loop_ && *keyframes_since_loop_ <= options_.min_keyframes_between)
     std::erase_if(candidates, [&](const Keyframe* place) { return place->map_id == keyframe.map_id; });
   if (const std::optional<VerifiedLoop> loop = ConfirmProposed(keyframe)) return Close(*loop);
   if (const std::optional<VerifiedLoop> loop = ProposePlace(keyframe, candidates)) return Close(*loop);
@@ -219,21 +226,20 @@ LoopAnswer LoopcloserCore::Close(const VerifiedLoop& loop) {
   Begin(Step::kCorrect);
   LoopAnswer answer = CorrectLoop(map_, loop, verifier_, options_, interrupt_);
   if (answer.kind != LoopAnswer::Kind::kLoop) return {};
+  last_loop_ = Proposed{answer.correction_id.value(), loop.keyframe->id, counters_.last_loop_keyframe};
   ++counters_.loops;
   counters_.last_loop_keyframe = loop.keyframe->id;
   keyframes_since_loop_ = 0;
-  adjustment_due_ = options_.correction.global_adjustment;
-  awaited_correction_ = answer.correction_id;
   detector_.Reset();
   proposals_.clear();
   return answer;
 }
 
 /// The map in which the loop was closed. The keyframe that is asked about may be in another one.
-LoopAnswer LoopcloserCore::AdjustAfterLoop(const Keyframe& keyframe) {
+LoopAnswer LoopcloserCore::AdjustAfterLoop(KeyframeId loop, const Keyframe& keyframe) {
   Begin(Step::kCorrect);
-  adjustment_due_ = false;
-  const Keyframe* closed = map_.Resolve(*counters_.last_loop_keyframe);
+  last_loop_ = Settled();
+  const Keyframe* closed = map_.Resolve(loop);
   if (closed == nullptr) return {};
   LoopAnswer answer =
       AdjustGlobally(map_, closed->map_id, keyframe.id.value, options_.correction, interrupt_);

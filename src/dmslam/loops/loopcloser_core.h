@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "dmslam/loops/loop_detector.h"
@@ -57,7 +58,7 @@ class LoopcloserCore {
   const Map& map() const { return map_; }
   const LoopcloserCounters& counters() const { return counters_; }
   /// Whether a loop was proposed on which the mapper's word has not been heard.
-  bool AwaitsMapper() const { return awaited_correction_.has_value(); }
+  bool AwaitsMapper() const { return std::holds_alternative<Proposed>(last_loop_); }
   /// A place that words named consistently, or that an earlier keyframe proposed, and what geometry said of
   /// it.
   struct Verdict {
@@ -70,8 +71,21 @@ class LoopcloserCore {
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
 
  private:
+  /// A loop on which the mapper's word has not been heard.
+  struct Proposed {
+    uint64_t correction_id;
+    KeyframeId keyframe;
+    std::optional<KeyframeId> loop_before;  ///< the last one that is in the map
+  };
+  /// A loop is in the map, and the next keyframe's answer adjusts what it has left.
+  struct AdjustmentDue {
+    KeyframeId keyframe;  ///< that closed it
+  };
+  struct Settled {};
+
   void Begin(Step step) const;
-  void HearOfCorrection(const MapDelta& delta);
+  void HearOfCorrection(const Proposed& loop, const MapDelta& delta);
+  void OnLoopInMap(KeyframeId keyframe);
   LoopAnswer FindCorrection(const Keyframe& keyframe);
   std::vector<const Keyframe*> NamePlaces(const Keyframe& keyframe);
   std::vector<const Keyframe*> NamePlacesInOtherMaps(const Keyframe& keyframe) const;
@@ -90,7 +104,7 @@ class LoopcloserCore {
   bool MayJoin(const VerifiedLoop& loop) const;
   bool IsConfirmedAround(const VerifiedLoop& loop) const;
   LoopAnswer Close(const VerifiedLoop& loop);
-  LoopAnswer AdjustAfterLoop(const Keyframe& keyframe);
+  LoopAnswer AdjustAfterLoop(KeyframeId loop, const Keyframe& keyframe);
 
   LoopcloserOptions options_;
   Camera camera_;
@@ -107,12 +121,11 @@ class LoopcloserCore {
     int64_t first_ns = 0, last_ns = 0;
     int confirmations = 0;
   };
-  std::vector<Proposal> proposals_;        ///< oldest first
-  std::optional<KeyframeId> asked_again_;  ///< the last one
-  Sightings sightings_;                    ///< of one map in another
-  int keyframes_since_loop_;
-  bool adjustment_due_ = false;
-  std::optional<uint64_t> awaited_correction_;  ///< proposed; the mapper's word on it has not been heard
+  std::vector<Proposal> proposals_;          ///< oldest first
+  std::optional<KeyframeId> asked_again_;    ///< the last one
+  Sightings sightings_;                      ///< of one map in another
+  std::optional<int> keyframes_since_loop_;  ///< none: no loop was closed
+  std::variant<Settled, Proposed, AdjustmentDue> last_loop_;
   std::vector<Verdict> verdicts_;
   LoopcloserCounters counters_;
 };

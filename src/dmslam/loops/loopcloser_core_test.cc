@@ -152,6 +152,7 @@ TEST(LoopcloserCoreTest, ALoopThatWasRefusedIsFoundAgainAndNotAdjusted) {
   EXPECT_GE(answers.loops.size(), 2u);
   EXPECT_TRUE(answers.adjustments.empty());
   EXPECT_EQ(core.counters().loops, 0u);
+  EXPECT_EQ(core.counters().last_loop_keyframe, std::nullopt);
 }
 
 TEST(LoopcloserCoreTest, UntilTheMapperHasSpokenNothingMoreIsProposed) {
