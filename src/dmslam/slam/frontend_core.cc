@@ -115,23 +115,30 @@ void FrontendCore::ForgetMap() {
   tracker_.OnMapForgotten();
 }
 
-FrontendOutput FrontendCore::GiveUpMap(int64_t stamp_ns, MapReset::Fate fate, const std::string& reason) {
+FrontendOutput FrontendCore::GiveUpMap(int64_t stamp_ns, MapReset::Fate wanted, const std::string& reason) {
   FrontendOutput output;
   ++counters_.resets;
-  if (map_id_ && !MayDrop(map_, *map_id_, camera_id_)) fate = MapReset::Fate::kKeep;
-  const bool drop = fate == MapReset::Fate::kDrop;
-  if (map_id_) output.Add(MapReset{*map_id_, fate, reason, stamp_ns, camera_id_});
-  if (drop && map_id_) own_maps_.Drop(*map_id_);
   for (WaitingFrame& frame : std::exchange(behind_, {})) unplaced_.Keep(std::move(frame));
-  // The poses of a map that was wrong are void: the next one may place its frames.
-  if (drop && map_id_ && options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(*map_id_));
-  if (map_id_) own_maps_.Take(*map_id_);
+  if (map_id_) output.Add(LeaveMap(*map_id_, stamp_ns, wanted, reason));
   map_id_ = own_maps_.Next(map_);
   tracker_.OnMapGivenUp();
   first_map_.Restart();
   phase_.GiveUpMap();
   gate_.Open();
   return output;
+}
+
+/// A map that others have keyframes in stays, too. The poses of a map that was wrong are void: the next one
+/// may place its frames.
+MapReset FrontendCore::LeaveMap(MapId left, int64_t stamp_ns, MapReset::Fate wanted,
+                                const std::string& reason) {
+  const MapReset::Fate fate = MayDrop(map_, left, camera_id_) ? wanted : MapReset::Fate::kKeep;
+  if (fate == MapReset::Fate::kDrop) {
+    own_maps_.Drop(left);
+    if (options_.keyframes_at_end) unplaced_.PutBack(last_poses_.TakeFramesOf(left));
+  }
+  own_maps_.Take(left);
+  return {left, fate, reason, stamp_ns, camera_id_};
 }
 
 /// The map that was tracked in may have become part of another.

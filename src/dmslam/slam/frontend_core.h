@@ -132,7 +132,8 @@ class FrontendCore {
   FrontendOutput OnNotTracked(const TrackedFrame& frame, const TrackingReport& report);
   void FollowTurn(const TrackedFrame& frame);
   bool IsLostInTheLight(const TrackedFrame& frame, int64_t missing_ns);
-  FrontendOutput GiveUpMap(int64_t stamp_ns, MapReset::Fate fate, const std::string& reason);
+  FrontendOutput GiveUpMap(int64_t stamp_ns, MapReset::Fate wanted, const std::string& reason);
+  MapReset LeaveMap(MapId left, int64_t stamp_ns, MapReset::Fate wanted, const std::string& reason);
   void FollowJoinedMap();
   bool WantsKeyframe(const TrackedFrame& frame, const TrackingReport& report, KeyframeId reference);
   void ReportLandmarks(const TrackedFrame& frame, const PlacedPose& pose, bool keyframe,
