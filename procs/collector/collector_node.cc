@@ -335,25 +335,13 @@ void CollectorNode::OpenJournal() {
     LogInfo("what another run has left is kept in {}", *aside);
   kept_.emplace(JournalPath(collector_.out_dir));
   bool is_first = true;  // of this run's collectors: what was told before it came, nobody else has
-  const auto take = [&](std::span<const uint8_t> record) {
-    is_first = false;
-    CameraId camera = 0;
-    if (const auto pose = wire::Decode<FramePose>(record)) {
-      frames_.Hear(*pose);
-      camera = pose->camera_id;
-    } else if (const auto reset = wire::Decode<MapReset>(record)) {
-      CountReset(*reset);
-      camera = reset->camera_id;
-    } else if (auto start = wire::Decode<SessionStart>(record)) {
-      camera = start->camera_id;
-      if (camera == 0) session_start_ = std::move(start);
-    }
-    const std::optional<RecordHeader> header = ParseHeader(record);
-    kept_->SetPosition(camera, {header->epoch, header->seq});
-  };
   if (begins) {
     kept_->journal().Begin(session_);
   } else {
+    const auto take = [&](std::span<const uint8_t> record) {
+      is_first = false;
+      TakeJournaled(record);
+    };
     kept_->journal().Resume(session_, take, [&](const std::string& note) {
       is_first = false;
       ReadNote(note);
@@ -367,6 +355,23 @@ void CollectorNode::OpenJournal() {
   for (CameraId camera = 0; camera < options_.NumCameras(); ++camera) {
     frontend_readers_.push_back(MakeReader(StreamId::kFrontend, kept_->PositionOf(camera), camera, is_first));
   }
+}
+
+/// A record of the journal that a collector before this one kept.
+void CollectorNode::TakeJournaled(std::span<const uint8_t> record) {
+  CameraId camera = 0;
+  if (const auto pose = wire::Decode<FramePose>(record)) {
+    frames_.Hear(*pose);
+    camera = pose->camera_id;
+  } else if (const auto reset = wire::Decode<MapReset>(record)) {
+    CountReset(*reset);
+    camera = reset->camera_id;
+  } else if (auto start = wire::Decode<SessionStart>(record)) {
+    camera = start->camera_id;
+    if (camera == 0) session_start_ = std::move(start);
+  }
+  const std::optional<RecordHeader> header = ParseHeader(record);
+  kept_->SetPosition(camera, {header->epoch, header->seq});
 }
 
 void CollectorNode::BeginCheckpoints() {

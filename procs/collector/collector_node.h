@@ -90,6 +90,7 @@ class CollectorNode : public StreamNode {
   void RecallSession();
   void KnowSession(const SessionStart& start);
   void OpenJournal();
+  void TakeJournaled(std::span<const uint8_t> record);
   std::string OfTotal() const;
   void SayProgress();
   static constexpr int64_t kGoneNs = 2'000'000'000;  ///< whoever was not heard for so long is not there

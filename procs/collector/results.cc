@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -475,52 +476,85 @@ Json SummaryJson(const RunRecord& run, const TrajectoryBuilder& builder,
   return json;
 }
 
-std::string Table(const Json& summary) {
-  std::string table;
-  const auto row = [&](const char* name, const std::string& value) {
+/// The summary as lines of a name and a value each, as the terminal shows it.
+class SummaryTable {
+ public:
+  explicit SummaryTable(const Json& summary) : summary_(summary) {}
+
+  void AddRow(const std::string& name, const std::string& value) {
     char line[160];
-    std::snprintf(line, sizeof(line), "  %-34s %s\n", name, value.c_str());
-    table += line;
+    std::snprintf(line, sizeof(line), "  %-34s %s\n", name.c_str(), value.c_str());
+    text_ += line;
+  }
+  struct Number {
+    const char* key;
+    const char* format;
   };
-  const auto number = [&](const char* key, const char* format) {
-    if (!summary.contains(key) || summary[key].is_null()) return std::string("-");
+  /// What is missing is a dash.
+  void AddNumbers(const char* name, std::initializer_list<Number> numbers) {
+    std::string value;
+    for (const Number& number : numbers) {
+      if (!value.empty()) value += " / ";
+      value += Format(number);
+    }
+    AddRow(name, value);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string Format(const Number& number) const {
+    if (!summary_.contains(number.key) || summary_[number.key].is_null()) return "-";
     char text[40];
-    std::snprintf(text, sizeof(text), format, summary[key].get<double>());
-    return std::string(text);
-  };
-  row("sequence", summary["sequence"].get<std::string>());
-  row("frames published / skipped / lost", number("frames", "%.0f") + " / " +
-                                               number("frames_skipped", "%.0f") + " / " +
-                                               number("frames_lost", "%.0f"));
-  if (summary.contains("cameras")) {
-    for (const Json& camera : summary["cameras"]) {
-      row(("... of camera " + std::to_string(camera["camera"].get<int>())).c_str(),
-          camera["frames"].dump() + " / " + camera["frames_skipped"].dump() + " / " +
-              camera["frames_lost"].dump());
-    }
+    std::snprintf(text, sizeof(text), number.format, summary_[number.key].get<double>());
+    return text;
   }
-  row("tracked online / in the end [%]",
-      number("tracked_online_percent", "%.1f") + " / " + number("tracked_percent", "%.1f"));
-  if (summary.contains("cameras")) {
-    for (const Json& camera : summary["cameras"]) {
-      char text[80];
-      std::snprintf(text, sizeof(text), "%.1f / %.1f", camera["tracked_online_percent"].get<double>(),
-                    camera["tracked_percent"].get<double>());
-      row(("... of camera " + std::to_string(camera["camera"].get<int>())).c_str(), text);
-    }
-    row("joint ATE RMSE final / online [m]",
-        number("ate_rmse_joint", "%.4f") + " / " + number("ate_rmse_joint_online", "%.4f"));
+
+  const Json& summary_;
+  std::string text_;
+};
+
+std::string CameraRowName(const Json& camera) {
+  return "... of camera " + std::to_string(camera["camera"].get<int>());
+}
+
+void AddFrames(const Json& summary, SummaryTable* table) {
+  table->AddNumbers("frames published / skipped / lost",
+                    {{"frames", "%.0f"}, {"frames_skipped", "%.0f"}, {"frames_lost", "%.0f"}});
+  if (!summary.contains("cameras")) return;
+  for (const Json& camera : summary["cameras"]) {
+    table->AddRow(CameraRowName(camera), camera["frames"].dump() + " / " + camera["frames_skipped"].dump() +
+                                             " / " + camera["frames_lost"].dump());
   }
-  row("first map after [s]", number("first_init_s", "%.2f"));
-  row("ATE RMSE final / online [m]",
-      number("ate_rmse_final", "%.4f") + " / " + number("ate_rmse_online", "%.4f"));
-  row("keyframes / landmarks / loops",
-      number("keyframes", "%.0f") + " / " + number("landmarks", "%.0f") + " / " + number("loops", "%.0f"));
-  row("resets / relocalisations", number("resets", "%.0f") + " / " + number("relocalisations", "%.0f"));
-  row("frontend median / p95 [ms]",
-      number("frontend_ms_median", "%.1f") + " / " + number("frontend_ms_p95", "%.1f"));
-  row("records lost / repaired", number("records_lost", "%.0f") + " / " + number("records_repaired", "%.0f"));
-  return table;
+}
+
+void AddTracked(const Json& summary, SummaryTable* table) {
+  table->AddNumbers("tracked online / in the end [%]",
+                    {{"tracked_online_percent", "%.1f"}, {"tracked_percent", "%.1f"}});
+  if (!summary.contains("cameras")) return;
+  for (const Json& camera : summary["cameras"]) {
+    char text[80];
+    std::snprintf(text, sizeof(text), "%.1f / %.1f", camera["tracked_online_percent"].get<double>(),
+                  camera["tracked_percent"].get<double>());
+    table->AddRow(CameraRowName(camera), text);
+  }
+  table->AddNumbers("joint ATE RMSE final / online [m]",
+                    {{"ate_rmse_joint", "%.4f"}, {"ate_rmse_joint_online", "%.4f"}});
+}
+
+std::string Table(const Json& summary) {
+  SummaryTable table(summary);
+  table.AddRow("sequence", summary["sequence"].get<std::string>());
+  AddFrames(summary, &table);
+  AddTracked(summary, &table);
+  table.AddNumbers("first map after [s]", {{"first_init_s", "%.2f"}});
+  table.AddNumbers("ATE RMSE final / online [m]", {{"ate_rmse_final", "%.4f"}, {"ate_rmse_online", "%.4f"}});
+  table.AddNumbers("keyframes / landmarks / loops",
+                   {{"keyframes", "%.0f"}, {"landmarks", "%.0f"}, {"loops", "%.0f"}});
+  table.AddNumbers("resets / relocalisations", {{"resets", "%.0f"}, {"relocalisations", "%.0f"}});
+  table.AddNumbers("frontend median / p95 [ms]",
+                   {{"frontend_ms_median", "%.1f"}, {"frontend_ms_p95", "%.1f"}});
+  table.AddNumbers("records lost / repaired", {{"records_lost", "%.0f"}, {"records_repaired", "%.0f"}});
+  return table.text();
 }
 
 }  // namespace

@@ -374,35 +374,15 @@ bool MapperNode::HandleFirstRecord() {
 
 /// What a record of the frontend asks of the core; empty: nothing.
 MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
-  const Version version = record.version();
   if (record.channel == channels::kTurnRequest) {
     if (const auto request = Read<TurnRequest>(*record.bytes))
-      requests_.OnTurn(camera, version.epoch, *request);
+      requests_.OnTurn(camera, record.version().epoch, *request);
     return {};
   }
-  if (run_.localize_only) {
-    // The map stays as it is, but nobody is left waiting.
-    if (record.channel != channels::kAdjustRequest) return {};
-    if (const auto request = Read<AdjustRequest>(*record.bytes))
-      return [this, request] { core_->AnswerRequest(*request); };
-    return {};
-  }
-  if (record.channel == channels::kInitialMap) {
-    if (const auto proposal = Read<InitialMap>(*record.bytes)) {
-      return [this, version, proposal] {
-        const bool started = core_->OnInitialMap(*proposal);
-        AfterKeyframe(version, proposal->second.id, proposal->map_id, started);
-      };
-    }
-  } else if (record.channel == channels::kKeyframe) {
-    if (const auto proposal = Read<KeyframeProposal>(*record.bytes)) {
-      return [this, version, proposal] {
-        const KeyframeOutcome outcome = core_->OnKeyframe(*proposal);
-        AfterKeyframe(version, proposal->id, proposal->map_id, outcome == KeyframeOutcome::kInserted,
-                      WhyRefused(outcome));
-      };
-    }
-  } else if (record.channel == channels::kFrameEvidence) {
+  if (run_.localize_only) return LocalizeOnlyJobFor(record);
+  if (record.channel == channels::kInitialMap || record.channel == channels::kKeyframe)
+    return KeyframeJobFor(record);
+  if (record.channel == channels::kFrameEvidence) {
     if (const auto evidence = Read<FrameEvidence>(*record.bytes))
       return [this, evidence] { core_->OnEvidence(*evidence); };
   } else if (record.channel == channels::kMapReset) {
@@ -414,6 +394,33 @@ MapperNode::Job MapperNode::JobFor(CameraId camera, const Record& record) {
     }
   }
   return {};
+}
+
+/// The map stays as it is, but nobody is left waiting.
+MapperNode::Job MapperNode::LocalizeOnlyJobFor(const Record& record) {
+  if (record.channel != channels::kAdjustRequest) return {};
+  const auto request = Read<AdjustRequest>(*record.bytes);
+  if (!request) return {};
+  return [this, request] { core_->AnswerRequest(*request); };
+}
+
+MapperNode::Job MapperNode::KeyframeJobFor(const Record& record) {
+  const Version version = record.version();
+  if (record.channel == channels::kInitialMap) {
+    const auto proposal = Read<InitialMap>(*record.bytes);
+    if (!proposal) return {};
+    return [this, version, proposal] {
+      const bool started = core_->OnInitialMap(*proposal);
+      AfterKeyframe(version, proposal->second.id, proposal->map_id, started);
+    };
+  }
+  const auto proposal = Read<KeyframeProposal>(*record.bytes);
+  if (!proposal) return {};
+  return [this, version, proposal] {
+    const KeyframeOutcome outcome = core_->OnKeyframe(*proposal);
+    AfterKeyframe(version, proposal->id, proposal->map_id, outcome == KeyframeOutcome::kInserted,
+                  WhyRefused(outcome));
+  };
 }
 
 /// On the core. In lock-step, where the node is told at once, a keyframe settles when the loop closer has

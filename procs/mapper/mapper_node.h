@@ -76,6 +76,8 @@ class MapperNode : public StreamNode {
   using Job = std::function<void()>;
   void Run(Job job, std::function<void()> when_done = {});
   Job JobFor(CameraId camera, const Record& record);
+  Job LocalizeOnlyJobFor(const Record& record);
+  Job KeyframeJobFor(const Record& record);
   void AfterKeyframe(const Version& version, KeyframeId id, MapId map_id, bool checked_by_loopcloser,
                      std::string why_refused = {});
   void Settle(KeyframeId id, MapId map_id, const Version& of_frontend, std::string why_refused = {});

@@ -99,6 +99,51 @@ Json CamerasJson(const std::vector<CameraView>& views) {
   return cameras;
 }
 
+Json SequenceJson(const CameraInfo& info) {
+  const Camera& camera = info.camera;
+  return {{"sequence", info.sequence},
+          {"frames", info.num_frames.value_or(0)},
+          {"first_frame", info.first_frame},
+          {"lockstep", info.mode == PlaybackMode::kLockstep},
+          {"camera",
+           {{"width", camera.width_px},
+            {"height", camera.height_px},
+            {"fx", camera.fx_px},
+            {"fy", camera.fy_px},
+            {"cx", camera.cx_px},
+            {"cy", camera.cy_px}}}};
+}
+
+Json MapJson(const StatusView& view) {
+  return {{"id", view.map_id ? Json(*view.map_id) : Json()},
+          {"version", view.map_version},
+          {"keyframes", view.keyframes},
+          {"landmarks", view.landmarks},
+          {"moving", view.moving},
+          {"resets", view.resets},
+          {"loops", view.loops}};
+}
+
+Json FrontendJson(const FrontendStatus& status) {
+  return {{"fps", status.fps},
+          {"features", status.features},
+          {"skipped", status.frames_skipped},
+          {"processed", status.frames_processed},
+          {"p50", Round(status.latency_p50_ms, 2)},
+          {"p95", Round(status.latency_p95_ms, 2)},
+          {"extract", Round(status.extract_ms, 2)},
+          {"track", Round(status.track_ms, 2)},
+          {"relocalisations", status.relocalisations}};
+}
+
+Json MapperJson(const MapperStatus& status) {
+  return {{"landmarks_p50", Round(status.landmarks_p50_ms, 1)},
+          {"adjusted_p50", Round(status.adjusted_p50_ms, 1)},
+          {"adjustment", Round(status.adjustment_ms, 1)},
+          {"culled", status.landmarks_culled},
+          {"queue", status.keyframe_queue}};
+}
+
 }  // namespace
 
 std::string NameOf(MapId map_id) {
@@ -187,40 +232,12 @@ std::string ToJson(const StatusView& view) {
   json["now"] = view.wall_us / 1000;
   json["session"] = view.session;
   json["ended"] = view.ended;
-  if (view.camera != nullptr) {
-    const Camera& camera = view.camera->camera;
-    json["sequence"] = view.camera->sequence;
-    json["frames"] = view.camera->num_frames.value_or(0);
-    json["first_frame"] = view.camera->first_frame;
-    json["lockstep"] = view.camera->mode == PlaybackMode::kLockstep;
-    json["camera"] = {{"width", camera.width_px}, {"height", camera.height_px}, {"fx", camera.fx_px},
-                      {"fy", camera.fy_px},       {"cx", camera.cx_px},         {"cy", camera.cy_px}};
-  }
-  json["map"] = {{"id", view.map_id ? Json(*view.map_id) : Json()},
-                 {"version", view.map_version},
-                 {"keyframes", view.keyframes},
-                 {"landmarks", view.landmarks},
-                 {"moving", view.moving},
-                 {"resets", view.resets},
-                 {"loops", view.loops}};
+  if (view.camera != nullptr) json.update(SequenceJson(*view.camera));
+  json["map"] = MapJson(view);
   json["maps"] = MapsJson(view);
   json["cameras"] = CamerasJson(view.cameras);
-  const FrontendStatus& f = *view.frontend;
-  json["frontend"] = {{"fps", f.fps},
-                      {"features", f.features},
-                      {"skipped", f.frames_skipped},
-                      {"processed", f.frames_processed},
-                      {"p50", Round(f.latency_p50_ms, 2)},
-                      {"p95", Round(f.latency_p95_ms, 2)},
-                      {"extract", Round(f.extract_ms, 2)},
-                      {"track", Round(f.track_ms, 2)},
-                      {"relocalisations", f.relocalisations}};
-  const MapperStatus& m = *view.mapper;
-  json["mapper"] = {{"landmarks_p50", Round(m.landmarks_p50_ms, 1)},
-                    {"adjusted_p50", Round(m.adjusted_p50_ms, 1)},
-                    {"adjustment", Round(m.adjustment_ms, 1)},
-                    {"culled", m.landmarks_culled},
-                    {"queue", m.keyframe_queue}};
+  json["frontend"] = FrontendJson(*view.frontend);
+  json["mapper"] = MapperJson(*view.mapper);
   json["viewer"] = {{"browsers", view.browsers}, {"skipped", view.skipped}};
   json["truth"] = TruthJson(view.alignment);
   json["up"] = ToJson(view.up);

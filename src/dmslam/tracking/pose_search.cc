@@ -162,11 +162,14 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
   }
 }
 
+/// Who sees much of what he should is right, though all that has stood for long be hidden. Of less, somebody
+/// who hides the room may show as much, or chance.
 void PoseSearch::Doubt(const PoseFit& fit, TrackingReport* report) {
+  if (!report->MayMatchByChance()) return;
   if (report->num_old_expected >= TrackingReport::kEnoughOld &&
       report->num_old < kLeastOldShare * report->num_old_expected) {
     report->reason = "what has stood here for long is not seen";
-  } else if (fit.mean_chi2 > kOneMotionChi2 && report->MayMatchByChance()) {
+  } else if (fit.mean_chi2 > kOneMotionChi2) {
     report->reason = "what matches the map may do so by chance";
   } else {
     return;

@@ -152,7 +152,11 @@ void Tracker::Follow(const Map& map, const PlacedPose& pose, const TrackedFrame&
   }
   follower_.OnTracked(map, pose, search_.found(frame), {frame.index, frame.stamp_ns}, frame,
                       attempt.relocalized || attempt.begins_anew);
-  if (unbelieved_ && IsBelieved(map, attempt.report, frame)) unbelieved_.reset();
+  if (unbelieved_) {
+    const int proven = CountProven(map, frame.landmarks, {});
+    unbelieved_->CountFrame(proven);
+    if (IsBelieved(map, attempt.report, proven, frame.stamp_ns)) unbelieved_.reset();
+  }
   if (!unbelieved_ && options_.usual_speed) usual_speed_.OnPose(map, pose, frame.stamp_ns);
 }
 
@@ -170,15 +174,12 @@ void Tracker::Refuse(Attempt* attempt) {
 /// landmarks, some of those, and the more of them, the sooner; in a younger one, more than matches by chance
 /// and more than somebody who stands there shows. In another map that is too young, it must both be seen as a
 /// whole and predict.
-bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame) {
-  const int proven = CountProven(map, frame.landmarks, {});
-  ++unbelieved_->frames;
-  unbelieved_->frames_with_proven += proven > 0 ? 1 : 0;
+bool Tracker::IsBelieved(const Map& map, const TrackingReport& report, int proven, int64_t stamp_ns) const {
   if (report.IsDoubtful()) return false;
   if (unbelieved_->why == Unbelieved::Why::kDoubtful) return true;
   const bool at_once = IsSeenAsAWhole(report) && !unbelieved_->in_another_map;
   if (at_once || proven >= kManyProven) return true;
-  const int64_t since_ns = frame.stamp_ns - unbelieved_->since_ns;
+  const int64_t since_ns = stamp_ns - unbelieved_->since_ns;
   if (!IsOldEnoughToProve(map)) return since_ns >= kConfirmNs && IsMoreThanSomebody(report);
   return proven >= kSomeProven && since_ns >= ConfirmNs(proven);
 }

@@ -95,7 +95,7 @@ class Tracker {
   void Relocalize(const Map& map, const Request& request, TrackedFrame* frame, Attempt* attempt);
   bool IsCareful(int64_t stamp_ns) const;
   void Follow(const Map& map, const PlacedPose& pose, const TrackedFrame& frame, const Attempt& attempt);
-  bool IsBelieved(const Map& map, const TrackingReport& report, const TrackedFrame& frame);
+  bool IsBelieved(const Map& map, const TrackingReport& report, int proven, int64_t stamp_ns) const;
   bool IsMoreThanSomebody(const TrackingReport& report) const;
   bool IsOldEnoughToProve(const Map& map) const;
   bool IsDoubtfulForLong(const TrackingReport& report, int64_t stamp_ns) const;
@@ -123,6 +123,10 @@ class Tracker {
     int64_t since_ns = 0;
     MotionFollower follower;                 ///< as it was when the camera was believed last
     int frames = 0, frames_with_proven = 0;  ///< since then: all, and those that show a proven landmark
+    void CountFrame(int proven) {
+      ++frames;
+      if (proven > 0) ++frames_with_proven;
+    }
   };
   std::optional<Unbelieved> unbelieved_;
 };
