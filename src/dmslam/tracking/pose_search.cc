@@ -162,8 +162,8 @@ void PoseSearch::Decide(const PoseFit& fit, bool careful, TrackingReport* report
   }
 }
 
-/// A pose that shows much of what it should is right even where all that has stood for long is hidden. Where it
-/// shows little, that may be somebody who hides the room, or chance.
+/// A pose that shows much of what it should is right even where all that has stood for long is hidden. Where
+/// it shows little, that may be somebody who hides the room, or chance.
 void PoseSearch::Doubt(const PoseFit& fit, TrackingReport* report) {
   if (!report->MayMatchByChance()) return;
   if (report->num_old_expected >= TrackingReport::kEnoughOld &&
