@@ -463,7 +463,7 @@ TEST_F(PoseSearchTest, WhatLiesInASmallPartOfThePictureIsNotEnough) {
 }
 
 TEST_F(PoseSearchTest, WhereLittleAndNothingThatHasStoodForLongIsSeenAPoseIsDoubtedAndNotBelieved) {
-  constexpr size_t kYoung = 400;
+  constexpr size_t kYoung = 700;
   AddRoom(kYoung, 1);
   AddRoom(100, 10);
   scene_.MapAll();
@@ -475,21 +475,21 @@ TEST_F(PoseSearchTest, WhereLittleAndNothingThatHasStoodForLongIsSeenAPoseIsDoub
     frame = Matched(std::move(frame), [](size_t) { return true; });
     return InLocalMap(&frame);
   };
-  TrackingReport report = tracked(40, 1);
+  TrackingReport report = tracked(60, 1);
   EXPECT_TRUE(report.HasPose());
   EXPECT_TRUE(report.IsDoubtful());
   EXPECT_STREQ(report.reason, "what has stood here for long is not seen");
   EXPECT_EQ(Believed(true).found, 0);
-  report = tracked(40, 4);
+  report = tracked(60, 4);
   EXPECT_FALSE(report.IsDoubtful()) << report.num_old << " of " << report.num_old_expected << " are seen";
-  EXPECT_GT(Believed(true).found, 30);
-  EXPECT_FALSE(tracked(60, 0).IsDoubtful()) << "more is seen than somebody who hides the room shows";
+  EXPECT_GT(Believed(true).found, 50);
+  EXPECT_FALSE(tracked(90, 0).IsDoubtful()) << "more is seen than somebody who hides the room shows";
   TrackingOptions options;
   options.doubt = false;
   Begin(options);
-  EXPECT_FALSE(tracked(40, 1).IsDoubtful());
+  EXPECT_FALSE(tracked(60, 1).IsDoubtful());
   Begin();
-  EXPECT_FALSE(tracked(40, 0, 45).IsDoubtful()) << "hardly anything has stood here for long";
+  EXPECT_FALSE(tracked(60, 0, 45).IsDoubtful()) << "hardly anything has stood here for long";
 }
 
 TEST_F(PoseSearchTest, WhatMayMatchByChanceIsDoubted) {
